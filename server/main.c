@@ -15,6 +15,6 @@ static void keep_standard_streams(void) {
 
 int main(int argc, char **argv) {
     keep_standard_streams();
-    fourier_start();
+    fft_start();
     return command_main(argc, argv);
 }

@@ -8,6 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/base/spelling.h"
+
 enum { NAME_SIZE = OPTION_NAME, LINE_SIZE = 4096 };
 
 // Where the rows' values go to; one of these per options_read.
@@ -46,11 +48,12 @@ static Status refuse(const Reader *reader, const char *typed, const char *value,
     text_fit(fault.value, sizeof fault.value, value);
     if (row->unit != NULL)
         text_fit(fault.unit, sizeof fault.unit, row->unit);
-    const char *near = row->kind == FIELD_KIND_CHOICE ? texts_nearest(row->choices, value) : NULL;
+    const char *near =
+        row->kind == FIELD_KIND_CHOICE ? spelling_nearest(row->choices, value) : NULL;
     if (near != NULL)
         text_fit(fault.did_you_mean, sizeof fault.did_you_mean, near);
     snprintf(fault.detail, sizeof fault.detail, "must be %s, is %.100s", detail, value);
-    return problem_put(reader->problem, STATUS_USAGE, &fault);
+    return problem_add_fault(reader->problem, STATUS_USAGE, &fault);
 }
 
 static Status refuse_choice(const Reader *reader, const char *typed, const char *value,
@@ -97,11 +100,11 @@ static Status range_check(const Reader *reader, const char *typed, const Field *
     Problem *found = calloc(1, sizeof *found);
     if (found == NULL)
         return STATUS_NO_MEMORY;
-    const Status status = fields_check(rows, reader->item, "", found);
+    const Status status = fields_validate(rows, reader->item, "", found);
     for (size_t i = 0; status != STATUS_OK && i < found->count && i < PROBLEM_FAULTS; i++) {
         Fault fault = found->faults[i];
         text_fit(fault.pointer, sizeof fault.pointer, typed);
-        (void)problem_put(reader->problem, STATUS_USAGE, &fault);
+        (void)problem_add_fault(reader->problem, STATUS_USAGE, &fault);
     }
     free(found);
     return status == STATUS_OK ? STATUS_OK : STATUS_USAGE;
@@ -159,13 +162,13 @@ static Status unknown_put(const Reader *reader, const char *typed, const char *n
     Fault fault = {0};
     text_fit(fault.pointer, sizeof fault.pointer, typed);
     text_fit(fault.detail, sizeof fault.detail, is_flag ? "is no option" : "is no setting");
-    const char *near = fields_nearest(reader->fields, name);
+    const char *near = spelling_nearest_field(reader->fields, name);
     char spelt[NAME_SIZE];
     if (near != NULL) {
         name_spell(spelt, is_flag ? "--" : "", near, true);
         text_fit(fault.did_you_mean, sizeof fault.did_you_mean, is_flag ? spelt : near);
     }
-    return problem_put(reader->problem, STATUS_USAGE, &fault);
+    return problem_add_fault(reader->problem, STATUS_USAGE, &fault);
 }
 
 static char *trimmed(char *text) {

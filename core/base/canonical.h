@@ -1,6 +1,6 @@
-// The canonical form: the bytes that stand for a struct in a digest. Rows in table order, absent
-// members and notes left out, names written, numbers as little-endian IEEE doubles with -0 as 0.
-// Equal meaning, equal bytes. Not for people and never parsed. Used by whoever hashes a scene.
+// The canonical form of a struct: the bytes from which its digest is computed. Rows are in table
+// order with their names; absent members and notes are omitted; numbers are little-endian IEEE
+// doubles, -0 as 0. Equal meaning gives equal bytes. It is written only, never parsed.
 #ifndef CORE_BASE_CANONICAL_H
 #define CORE_BASE_CANONICAL_H
 
@@ -8,8 +8,8 @@
 
 #include "core/base/field.h"
 
-// Hands the canonical bytes to `take`, piece by piece.
+// Calls `append` for each piece of the canonical form of `item`, in order.
 void canonical_write(const Field *fields, const void *item,
-                     void (*take)(void *context, const void *bytes, size_t size), void *context);
+                     void (*append)(void *context, const void *bytes, size_t size), void *context);
 
 #endif

@@ -1,19 +1,18 @@
-// One block for all columns: one allocation, one free, and a matrix in Fortran order for whoever
-// wants one.
+// All columns share one block: one allocation, and a column-major matrix.
 #include "core/base/columns.h"
 
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-Status columns_make(Columns *columns, size_t count, size_t rows, size_t most_bytes,
-                    Problem *problem) {
+Status columns_allocate(Columns *columns, size_t count, size_t rows, size_t max_bytes,
+                        Problem *problem) {
     memset(columns, 0, sizeof *columns);
-    const size_t most = most_bytes != 0 ? most_bytes : SIZE_MAX / 2;
-    if (count != 0 && rows > most / sizeof(double) / count)
+    const size_t max = max_bytes != 0 ? max_bytes : SIZE_MAX / 2;
+    if (count != 0 && rows > max / sizeof(double) / count)
         return problem_set(problem, STATUS_LIMIT,
                            "%zu columns of %zu values are more than the limit of %zu bytes", count,
-                           rows, most);
+                           rows, max);
     const size_t cells = count * rows;
     columns->at = calloc(count != 0 ? count : 1, sizeof *columns->at);
     columns->block = malloc((cells != 0 ? cells : 1) * sizeof *columns->block);

@@ -1,5 +1,4 @@
-// Named columns of doubles of one length: time series, spectra, tables.
-// Not a matrix: each column has its own name and unit. Used by result/, the encoders and the store.
+// Named columns of doubles of equal length: time series, spectra, tables.
 #ifndef CORE_BASE_COLUMNS_H
 #define CORE_BASE_COLUMNS_H
 
@@ -10,10 +9,10 @@
 typedef struct Column {
     char name[48];
     char unit[24];
-    double *values; // `rows` of them, inside the Columns' block
+    double *values; // `rows` of them, inside the block of Columns
 } Column;
 
-// All zero is empty. The values of all columns lie in one block, column after column.
+// All zero is empty. The values of all columns are in one block, column after column.
 typedef struct Columns {
     Column *at;
     size_t count;
@@ -21,10 +20,10 @@ typedef struct Columns {
     double *block;
 } Columns;
 
-// Makes `count` columns of `rows` values (not initialised) without names. At most `most_bytes` (0:
-// no limit).
-Status columns_make(Columns *columns, size_t count, size_t rows, size_t most_bytes,
-                    Problem *problem);
+// Allocates `count` columns of `rows` uninitialised values, without names; freed by columns_clear.
+// STATUS_LIMIT if they need more than `max_bytes` (0: no limit).
+Status columns_allocate(Columns *columns, size_t count, size_t rows, size_t max_bytes,
+                        Problem *problem);
 void columns_name(Columns *columns, size_t index, const char *name, const char *unit);
 void columns_clear(Columns *columns);
 const Column *columns_find(const Columns *columns, const char *name); // NULL if absent

@@ -1,28 +1,28 @@
-// Every walk is one switch over the kind of a row. Members are reached by offset; lists go through
-// memcpy, because a typed twin's pointer may not be read as another pointer type.
+// Each operation is a switch over the kind of a row. Members are accessed by offset; lists are
+// copied with memcpy, because a typed list's pointer must not be read through another pointer type.
 #include "core/base/field.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-static void *member_of(const Field *field, const void *item) {
+static void *field_member(const Field *field, const void *item) {
     return (char *)item + field->offset;
 }
 
-static List list_of(const void *member) {
+static List field_list(const void *member) {
     List list;
     memcpy(&list, member, sizeof list);
     return list;
 }
 
-static void *element_of(const Field *field, List list, size_t index) {
+static void *field_element(const Field *field, List list, size_t index) {
     return (char *)list.at + index * field->size;
 }
 
-// Makes every member absent without looking at what it was.
-static void absent_all(const Field *fields, void *item) {
+// Makes every member absent without freeing it.
+static void fields_set_absent(const Field *fields, void *item) {
     for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
-        void *member = member_of(field, item);
+        void *member = field_member(field, item);
         switch (field->kind) {
         case FIELD_KIND_REAL:
             *(double *)member = (double)NAN;
@@ -54,12 +54,12 @@ static void absent_all(const Field *fields, void *item) {
         case FIELD_KIND_VARIANT:
             *(Variant **)member = NULL;
             break;
-        case FIELD_KIND_SHARED:
-            *(Shared **)member = NULL;
+        case FIELD_KIND_REFCOUNT:
+            *(Refcount **)member = NULL;
             break;
         case FIELD_KIND_ITEM:
         case FIELD_KIND_BASE:
-            absent_all(field->fields, member);
+            fields_set_absent(field->fields, member);
             break;
         case FIELD_KIND_END:
             break;
@@ -67,9 +67,9 @@ static void absent_all(const Field *fields, void *item) {
     }
 }
 
-static void free_all(const Field *fields, void *item) {
+static void fields_free(const Field *fields, void *item) {
     for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
-        void *member = member_of(field, item);
+        void *member = field_member(field, item);
         switch (field->kind) {
         case FIELD_KIND_TEXT:
             free(*(char **)member);
@@ -92,21 +92,21 @@ static void free_all(const Field *fields, void *item) {
             break;
         }
         case FIELD_KIND_LIST: {
-            const List list = list_of(member);
+            const List list = field_list(member);
             for (size_t i = 0; i < list.count; i++)
-                free_all(field->fields, element_of(field, list, i));
+                fields_free(field->fields, field_element(field, list, i));
             free(list.at);
             break;
         }
         case FIELD_KIND_VARIANT:
             variant_free(*(Variant **)member);
             break;
-        case FIELD_KIND_SHARED:
-            shared_drop(*(Shared **)member);
+        case FIELD_KIND_REFCOUNT:
+            refcount_unref(*(Refcount **)member);
             break;
         case FIELD_KIND_ITEM:
         case FIELD_KIND_BASE:
-            free_all(field->fields, member);
+            fields_free(field->fields, member);
             break;
         default:
             break;
@@ -117,11 +117,11 @@ static void free_all(const Field *fields, void *item) {
 void fields_clear(const Field *fields, void *item) {
     if (item == NULL)
         return;
-    free_all(fields, item);
-    absent_all(fields, item);
+    fields_free(fields, item);
+    fields_set_absent(fields, item);
 }
 
-static Status texts_copy(const char *const *source, size_t count, Texts *target) {
+static Status field_copy_texts(const char *const *source, size_t count, Texts *target) {
     if (count == 0)
         return STATUS_OK;
     target->at = calloc(count, sizeof *target->at);
@@ -136,7 +136,7 @@ static Status texts_copy(const char *const *source, size_t count, Texts *target)
     return STATUS_OK;
 }
 
-static Status reals_copy(const Reals *source, Reals *target) {
+static Status field_copy_reals(const Reals *source, Reals *target) {
     if (source->count == 0)
         return STATUS_OK;
     double *at = malloc(source->count * sizeof *at);
@@ -147,12 +147,12 @@ static Status reals_copy(const Reals *source, Reals *target) {
     return STATUS_OK;
 }
 
-// `item` is absent throughout.
-static Status default_all(const Field *fields, void *item) {
+// All members of `item` are absent.
+static Status fields_set_defaults(const Field *fields, void *item) {
     for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
         if (field->kind != FIELD_KIND_BASE && field->presence != PRESENCE_DEFAULT)
             continue;
-        void *member = member_of(field, item);
+        void *member = field_member(field, item);
         switch (field->kind) {
         case FIELD_KIND_REAL:
             *(double *)member = field->initial;
@@ -170,7 +170,7 @@ static Status default_all(const Field *fields, void *item) {
             size_t count = 0;
             while (field->initial_texts != NULL && field->initial_texts[count] != NULL)
                 count++;
-            TRY(texts_copy(field->initial_texts, count, member));
+            TRY(field_copy_texts(field->initial_texts, count, member));
             break;
         }
         case FIELD_KIND_VARIANT: {
@@ -182,7 +182,7 @@ static Status default_all(const Field *fields, void *item) {
         }
         case FIELD_KIND_ITEM:
         case FIELD_KIND_BASE:
-            TRY(default_all(field->fields, member));
+            TRY(fields_set_defaults(field->fields, member));
             break;
         default:
             break;
@@ -192,15 +192,15 @@ static Status default_all(const Field *fields, void *item) {
 }
 
 Status fields_default(const Field *fields, void *item) {
-    absent_all(fields, item);
-    return default_all(fields, item);
+    fields_set_absent(fields, item);
+    return fields_set_defaults(fields, item);
 }
 
-// `target` is absent throughout.
-static Status copy_all(const Field *fields, const void *source, void *target) {
+// All members of `target` are absent.
+static Status fields_copy_members(const Field *fields, const void *source, void *target) {
     for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
-        const void *from = member_of(field, source);
-        void *to = member_of(field, target);
+        const void *from = field_member(field, source);
+        void *to = field_member(field, target);
         switch (field->kind) {
         case FIELD_KIND_REAL:
             *(double *)to = *(const double *)from;
@@ -221,7 +221,7 @@ static Status copy_all(const Field *fields, const void *source, void *target) {
             break;
         }
         case FIELD_KIND_REALS:
-            TRY(reals_copy(from, to));
+            TRY(field_copy_reals(from, to));
             break;
         case FIELD_KIND_ROWS: {
             const Rows *rows = from;
@@ -229,28 +229,29 @@ static Status copy_all(const Field *fields, const void *source, void *target) {
             if (rows->count > 0 && (copy->at = calloc(rows->count, sizeof *copy->at)) == NULL)
                 return STATUS_NO_MEMORY;
             for (; copy->count < rows->count; copy->count++)
-                TRY(reals_copy(&rows->at[copy->count], &copy->at[copy->count]));
+                TRY(field_copy_reals(&rows->at[copy->count], &copy->at[copy->count]));
             break;
         }
         case FIELD_KIND_TEXTS: {
             const Texts *texts = from;
-            TRY(texts_copy((const char *const *)texts->at, texts->count, to));
+            TRY(field_copy_texts((const char *const *)texts->at, texts->count, to));
             break;
         }
         case FIELD_KIND_LIST: {
-            const List list = list_of(from);
+            const List list = field_list(from);
             if (list.count == 0)
                 break;
             const List copy = {calloc(list.count, field->size), list.count};
             if (copy.at == NULL)
                 return STATUS_NO_MEMORY;
-            // The list is whole before its elements are, so that a failure leaves it clearable.
+            // The list is stored before its elements are copied, so that it can be cleared after a
+            // failure.
             memcpy(to, &copy, sizeof copy);
             for (size_t i = 0; i < copy.count; i++)
-                absent_all(field->fields, element_of(field, copy, i));
+                fields_set_absent(field->fields, field_element(field, copy, i));
             for (size_t i = 0; i < copy.count; i++)
-                TRY(copy_all(field->fields, element_of(field, list, i),
-                             element_of(field, copy, i)));
+                TRY(fields_copy_members(field->fields, field_element(field, list, i),
+                                        field_element(field, copy, i)));
             break;
         }
         case FIELD_KIND_VARIANT: {
@@ -262,16 +263,16 @@ static Status copy_all(const Field *fields, const void *source, void *target) {
                 return STATUS_NO_MEMORY;
             *(Variant **)to = copy;
             copy->kind = variant->kind;
-            absent_all(copy->kind->fields, copy);
-            TRY(copy_all(copy->kind->fields, variant, copy));
+            fields_set_absent(copy->kind->fields, copy);
+            TRY(fields_copy_members(copy->kind->fields, variant, copy));
             break;
         }
-        case FIELD_KIND_SHARED:
-            *(Shared **)to = shared_hold(*(Shared *const *)from);
+        case FIELD_KIND_REFCOUNT:
+            *(Refcount **)to = refcount_ref(*(Refcount *const *)from);
             break;
         case FIELD_KIND_ITEM:
         case FIELD_KIND_BASE:
-            TRY(copy_all(field->fields, from, to));
+            TRY(fields_copy_members(field->fields, from, to));
             break;
         case FIELD_KIND_END:
             break;
@@ -281,17 +282,17 @@ static Status copy_all(const Field *fields, const void *source, void *target) {
 }
 
 Status fields_copy(const Field *fields, const void *source, void *target) {
-    absent_all(fields, target);
-    const Status status = copy_all(fields, source, target);
+    fields_set_absent(fields, target);
+    const Status status = fields_copy_members(fields, source, target);
     if (status != STATUS_OK)
         fields_clear(fields, target);
     return status;
 }
 
-static bool all_empty(const Field *fields, const void *item);
+static bool fields_are_empty(const Field *fields, const void *item);
 
-// Whether the member holds nothing, whatever its presence says of that.
-static bool is_empty(const Field *field, const void *member) {
+// Whether the member has no value, regardless of its presence.
+static bool field_is_empty(const Field *field, const void *member) {
     switch (field->kind) {
     case FIELD_KIND_REAL:
         return isnan(*(const double *)member);
@@ -308,14 +309,14 @@ static bool is_empty(const Field *field, const void *member) {
     case FIELD_KIND_TEXTS:
         return ((const Texts *)member)->count == 0;
     case FIELD_KIND_LIST:
-        return list_of(member).count == 0;
+        return field_list(member).count == 0;
     case FIELD_KIND_VARIANT:
         return *(Variant *const *)member == NULL;
-    case FIELD_KIND_SHARED:
-        return *(Shared *const *)member == NULL;
+    case FIELD_KIND_REFCOUNT:
+        return *(Refcount *const *)member == NULL;
     case FIELD_KIND_ITEM:
     case FIELD_KIND_BASE:
-        return all_empty(field->fields, member);
+        return fields_are_empty(field->fields, member);
     case FIELD_KIND_FLAG:
     case FIELD_KIND_END:
         break;
@@ -323,9 +324,9 @@ static bool is_empty(const Field *field, const void *member) {
     return true;
 }
 
-static bool all_empty(const Field *fields, const void *item) {
+static bool fields_are_empty(const Field *fields, const void *item) {
     for (const Field *field = fields; field->kind != FIELD_KIND_END; field++)
-        if ((field->flags & FIELD_HIDDEN) == 0 && !is_empty(field, member_of(field, item)))
+        if ((field->flags & FIELD_HIDDEN) == 0 && !field_is_empty(field, field_member(field, item)))
             return false;
     return true;
 }
@@ -335,7 +336,7 @@ bool field_is_absent(const Field *field, const void *item) {
         return true;
     switch (field->kind) {
     case FIELD_KIND_FLAG:
-        return (field->flags & FIELD_RARE) != 0 && !*(const bool *)member_of(field, item);
+        return (field->flags & FIELD_RARE) != 0 && !*(const bool *)field_member(field, item);
     case FIELD_KIND_BASE:
         return false;
     case FIELD_KIND_REALS:
@@ -343,13 +344,14 @@ bool field_is_absent(const Field *field, const void *item) {
     case FIELD_KIND_TEXTS:
     case FIELD_KIND_LIST:
     case FIELD_KIND_ITEM:
-        return field->presence != PRESENCE_DEFAULT && is_empty(field, member_of(field, item));
+        return field->presence != PRESENCE_DEFAULT &&
+               field_is_empty(field, field_member(field, item));
     default:
-        return is_empty(field, member_of(field, item));
+        return field_is_empty(field, field_member(field, item));
     }
 }
 
-bool reals_make(Reals *reals, size_t count) {
+bool reals_allocate(Reals *reals, size_t count) {
     reals->at = calloc(count + 1, sizeof *reals->at);
     reals->count = reals->at != NULL ? count : 0;
     return reals->at != NULL;
@@ -370,7 +372,7 @@ Variant *variant_new(const Kind *kind) {
 void variant_free(Variant *variant) {
     if (variant == NULL)
         return;
-    free_all(variant->kind->fields, variant);
+    fields_free(variant->kind->fields, variant);
     free(variant);
 }
 

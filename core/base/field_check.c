@@ -1,48 +1,49 @@
-// Judging rows: what is said of a value that its row does not allow. One sentence per fault: what
-// is wrong, what would be right, the unit.
+// Validation of a struct against its rows. Each fault has one message: what is wrong, what is
+// allowed, and the unit.
 #include <stdio.h>
 #include <string.h>
 
 #include "core/base/field.h"
+#include "core/base/json_pointer.h"
+#include "core/base/spelling.h"
 
 enum { POINTER_SIZE = sizeof((Fault){0}.pointer) };
 
-static bool range_holds(const Range *range, double value) {
-    return (range->is_open_below ? value > range->least : value >= range->least) &&
-           value <= range->most;
+static bool field_range_contains(const Range *range, double value) {
+    return (range->is_open_below ? value > range->min : value >= range->min) && value <= range->max;
 }
 
-static Status check_number(const Field *field, double value, const char *pointer,
-                           Problem *problem) {
+static Status field_check_number(const Field *field, double value, const char *pointer,
+                                 Problem *problem) {
     const Range *range = &field->range;
     if (!isfinite(value))
         return problem_add_real(problem, STATUS_INVALID, pointer, value, field->unit,
                                 "must be finite");
-    if (range_holds(range, value))
+    if (field_range_contains(range, value))
         return STATUS_OK;
-    char least[32], most[32], is[32];
-    text_real(least, range->least);
-    text_real(most, range->most);
+    char min[32], max[32], is[32];
+    text_real(min, range->min);
+    text_real(max, range->max);
     text_real(is, value);
     const char *space = field->unit != NULL ? " " : "";
     const char *unit = field->unit != NULL ? field->unit : "";
     const char *below = range->is_open_below ? "above" : "at least";
-    if (isinf(range->most))
+    if (isinf(range->max))
         return problem_add_real(problem, STATUS_INVALID, pointer, value, field->unit,
-                                "must be %s %s%s%s, is %s", below, least, space, unit, is);
+                                "must be %s %s%s%s, is %s", below, min, space, unit, is);
     return problem_add_real(problem, STATUS_INVALID, pointer, value, field->unit,
-                            "must be within [%s, %s]%s%s, is %s", least, most, space, unit, is);
+                            "must be within [%s, %s]%s%s, is %s", min, max, space, unit, is);
 }
 
-static Status check_length(size_t most, size_t has, const char *what, const char *pointer,
-                           Problem *problem) {
-    if (most == 0 || has <= most)
+static Status field_check_length(size_t max, size_t has, const char *what, const char *pointer,
+                                 Problem *problem) {
+    if (max == 0 || has <= max)
         return STATUS_OK;
-    return problem_add(problem, STATUS_INVALID, pointer, "must have at most %zu, has %zu %s", most,
+    return problem_add(problem, STATUS_INVALID, pointer, "must have at most %zu, has %zu %s", max,
                        has, what);
 }
 
-static Status check_missing(const Field *field, const char *pointer, Problem *problem) {
+static Status field_check_missing(const Field *field, const char *pointer, Problem *problem) {
     const bool is_many = field->kind == FIELD_KIND_REALS || field->kind == FIELD_KIND_ROWS ||
                          field->kind == FIELD_KIND_TEXTS || field->kind == FIELD_KIND_LIST;
     const char *unit = field->unit != NULL ? field->unit : "";
@@ -54,32 +55,10 @@ static Status check_missing(const Field *field, const char *pointer, Problem *pr
              field->doc != NULL ? field->doc : field->name, unit[0] != '\0' ? " [" : "", unit,
              unit[0] != '\0' ? "]" : "");
     text_fit(fault.detail, sizeof fault.detail, text);
-    return problem_put(problem, STATUS_INVALID, &fault);
+    return problem_add_fault(problem, STATUS_INVALID, &fault);
 }
 
-// `suffix` is what the suggestion ends with.
-static Status refuse(const char *const *texts, const char *text, const char *near,
-                     const char *suffix, const char *pointer, Problem *problem) {
-    Fault fault = {0};
-    char list[2 * sizeof fault.detail] = "must be one of ";
-    size_t length = strlen(list);
-    for (size_t i = 0; texts[i] != NULL && length < sizeof list; i++)
-        length += (size_t)snprintf(list + length, sizeof list - length, "%s%s", i > 0 ? ", " : "",
-                                   texts[i]);
-    text_fit(fault.detail, sizeof fault.detail, list);
-    text_fit(fault.pointer, sizeof fault.pointer, pointer);
-    text_quote(fault.value, sizeof fault.value, text);
-    if (near != NULL)
-        snprintf(fault.did_you_mean, sizeof fault.did_you_mean, "%s%s", near, suffix);
-    return problem_put(problem, STATUS_INVALID, &fault);
-}
-
-Status texts_refuse(const char *const *texts, const char *text, const char *pointer,
-                    Problem *problem) {
-    return refuse(texts, text, texts_nearest(texts, text), "", pointer, problem);
-}
-
-size_t name_number(const char *name, size_t *length) {
+size_t field_name_number(const char *name, size_t *length) {
     *length = strlen(name);
     const char *mark = strrchr(name, '_');
     if (mark == NULL || mark[1] < '1' || mark[1] > '9')
@@ -94,77 +73,66 @@ size_t name_number(const char *name, size_t *length) {
     return number;
 }
 
-static bool texts_have(const char *const *texts, const char *text) {
+static bool field_allows_text(const char *const *texts, const char *text, size_t length) {
     for (; *texts != NULL; texts++)
-        if (strcmp(*texts, text) == 0)
+        if (strncmp(*texts, text, length) == 0 && (*texts)[length] == '\0')
             return true;
     return false;
 }
 
-// A text that is none of the choices, or one of them with a number.
-static Status check_numbered(const char *const *texts, const char *text, const char *pointer,
-                             Problem *problem) {
-    char stem[64], suffix[64];
-    size_t length;
-    (void)name_number(text, &length);
-    if (length >= sizeof stem)
-        return texts_refuse(texts, text, pointer, problem);
-    memcpy(stem, text, length);
-    stem[length] = '\0';
-    text_fit(suffix, sizeof suffix, text + length);
-    return texts_have(texts, stem)
-               ? STATUS_OK
-               : refuse(texts, text, texts_nearest(texts, stem), suffix, pointer, problem);
-}
-
-static Status check_texts(const Field *field, const Texts *texts, const char *pointer,
-                          Problem *problem) {
-    Status status = check_length(field->most, texts->count, "texts", pointer, problem);
+static Status field_check_texts(const Field *field, const Texts *texts, const char *pointer,
+                                Problem *problem) {
+    Status status = field_check_length(field->max, texts->count, "texts", pointer, problem);
     if (status != STATUS_OK || field->choices == NULL)
         return status;
     for (size_t i = 0; i < texts->count; i++) {
-        if (texts_have(field->choices, texts->at[i]))
+        const char *text = texts->at[i];
+        size_t length = strlen(text);
+        if (field_allows_text(field->choices, text, length))
             continue;
+        if ((field->flags & FIELD_NUMBERED) != 0) {
+            (void)field_name_number(text, &length);
+            if (field_allows_text(field->choices, text, length))
+                continue;
+        }
         char place[POINTER_SIZE];
-        pointer_index(place, sizeof place, pointer, i);
-        const Status found = (field->flags & FIELD_NUMBERED) != 0
-                                 ? check_numbered(field->choices, texts->at[i], place, problem)
-                                 : texts_refuse(field->choices, texts->at[i], place, problem);
-        status = found != STATUS_OK ? found : status;
+        json_pointer_index(place, sizeof place, pointer, i);
+        status = spelling_reject_numbered(field->choices, text, length, place, problem);
     }
     return status;
 }
 
-static Status check_reals(const Field *field, const Reals *reals, const char *pointer,
-                          Problem *problem) {
-    Status status = check_length(field->most, reals->count, "numbers", pointer, problem);
+static Status field_check_reals(const Field *field, const Reals *reals, const char *pointer,
+                                Problem *problem) {
+    Status status = field_check_length(field->max, reals->count, "numbers", pointer, problem);
     if (status != STATUS_OK)
         return status;
     for (size_t i = 0; i < reals->count; i++) {
         const double value = reals->at[i];
-        if (isfinite(value) && range_holds(&field->range, value))
+        if (isfinite(value) && field_range_contains(&field->range, value))
             continue;
         char place[POINTER_SIZE];
-        pointer_index(place, sizeof place, pointer, i);
-        status = check_number(field, value, place, problem);
+        json_pointer_index(place, sizeof place, pointer, i);
+        status = field_check_number(field, value, place, problem);
     }
     return status;
 }
 
-static Status check_member(const Field *field, const void *item, const char *pointer,
-                           Problem *problem) {
+static Status field_check_member(const Field *field, const void *item, const char *pointer,
+                                 Problem *problem) {
     const void *member = (const char *)item + field->offset;
     Status status = STATUS_OK;
     char place[POINTER_SIZE];
     switch (field->kind) {
     case FIELD_KIND_REAL:
-        return check_number(field, *(const double *)member, pointer, problem);
+        return field_check_number(field, *(const double *)member, pointer, problem);
     case FIELD_KIND_COUNT:
-        return check_number(field, (double)*(const uint64_t *)member, pointer, problem);
+        return field_check_number(field, (double)*(const uint64_t *)member, pointer, problem);
     case FIELD_KIND_TEXT: {
         const char *text = *(char *const *)member;
-        return text == NULL ? STATUS_OK
-                            : check_length(field->most, strlen(text), "bytes", pointer, problem);
+        return text == NULL
+                   ? STATUS_OK
+                   : field_check_length(field->max, strlen(text), "bytes", pointer, problem);
     }
     case FIELD_KIND_CHOICE: {
         int choices = 0;
@@ -176,31 +144,31 @@ static Status check_member(const Field *field, const void *item, const char *poi
         return STATUS_OK;
     }
     case FIELD_KIND_REALS:
-        return check_reals(field, member, pointer, problem);
+        return field_check_reals(field, member, pointer, problem);
     case FIELD_KIND_ROWS: {
         const Rows *rows = member;
-        status = check_length(field->most, rows->count, "rows", pointer, problem);
+        status = field_check_length(field->max, rows->count, "rows", pointer, problem);
         if (status != STATUS_OK)
             return status;
         for (size_t i = 0; i < rows->count; i++) {
-            pointer_index(place, sizeof place, pointer, i);
-            if (check_reals(field, &rows->at[i], place, problem) != STATUS_OK)
+            json_pointer_index(place, sizeof place, pointer, i);
+            if (field_check_reals(field, &rows->at[i], place, problem) != STATUS_OK)
                 status = STATUS_INVALID;
         }
         return status;
     }
     case FIELD_KIND_TEXTS:
-        return check_texts(field, member, pointer, problem);
+        return field_check_texts(field, member, pointer, problem);
     case FIELD_KIND_LIST: {
         List list;
         memcpy(&list, member, sizeof list);
-        status = check_length(field->most, list.count, "elements", pointer, problem);
+        status = field_check_length(field->max, list.count, "elements", pointer, problem);
         if (status != STATUS_OK)
             return status;
         for (size_t i = 0; i < list.count; i++) {
-            pointer_index(place, sizeof place, pointer, i);
-            if (fields_check(field->fields, (const char *)list.at + i * field->size, place,
-                             problem) != STATUS_OK)
+            json_pointer_index(place, sizeof place, pointer, i);
+            if (fields_validate(field->fields, (const char *)list.at + i * field->size, place,
+                                problem) != STATUS_OK)
                 status = STATUS_INVALID;
         }
         return status;
@@ -208,22 +176,22 @@ static Status check_member(const Field *field, const void *item, const char *poi
     case FIELD_KIND_VARIANT: {
         const Variant *variant = *(Variant *const *)member;
         return variant == NULL ? STATUS_OK
-                               : fields_check(variant->kind->fields, variant, pointer, problem);
+                               : fields_validate(variant->kind->fields, variant, pointer, problem);
     }
     case FIELD_KIND_ITEM:
     case FIELD_KIND_BASE:
-        return fields_check(field->fields, member, pointer, problem);
+        return fields_validate(field->fields, member, pointer, problem);
     case FIELD_KIND_FLAG:
-    case FIELD_KIND_SHARED:
+    case FIELD_KIND_REFCOUNT:
     case FIELD_KIND_END:
         break;
     }
     return STATUS_OK;
 }
 
-// Whether an absent member is a fault. A default leaves nothing absent but what may be empty (texts
-// and lists) or was erased because it is not used (a choice).
-static bool must_be_there(const Field *field) {
+// Whether an absent member is a fault. Under PRESENCE_DEFAULT texts and lists may be empty and a
+// choice may be unused.
+static bool field_is_required(const Field *field) {
     if (field->presence == PRESENCE_REQUIRED)
         return true;
     return field->presence == PRESENCE_DEFAULT &&
@@ -231,39 +199,40 @@ static bool must_be_there(const Field *field) {
             field->kind == FIELD_KIND_VARIANT);
 }
 
-// Whether there is nothing to say of a member, not even where it stands: of most.
-static bool is_plainly_right(const Field *field, const void *item) {
+// Quick check without making a pointer: true for most members.
+static bool field_is_clearly_valid(const Field *field, const void *item) {
     const void *member = (const char *)item + field->offset;
     if (field_is_absent(field, item))
-        return !must_be_there(field);
+        return !field_is_required(field);
     switch (field->kind) {
     case FIELD_KIND_FLAG:
         return true;
     case FIELD_KIND_REAL:
         return isfinite(*(const double *)member) &&
-               range_holds(&field->range, *(const double *)member);
+               field_range_contains(&field->range, *(const double *)member);
     case FIELD_KIND_COUNT:
-        return range_holds(&field->range, (double)*(const uint64_t *)member);
+        return field_range_contains(&field->range, (double)*(const uint64_t *)member);
     default:
         return false;
     }
 }
 
-Status fields_check(const Field *fields, const void *item, const char *pointer, Problem *problem) {
+Status fields_validate(const Field *fields, const void *item, const char *pointer,
+                       Problem *problem) {
     Status status = STATUS_OK;
     for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
-        if (is_plainly_right(field, item))
+        if (field_is_clearly_valid(field, item))
             continue;
         char place[POINTER_SIZE];
         if (field->kind == FIELD_KIND_BASE)
             text_fit(place, sizeof place, pointer);
         else
-            pointer_join(place, sizeof place, pointer, field->name);
+            json_pointer_join(place, sizeof place, pointer, field->name);
         Status found = STATUS_OK;
         if (!field_is_absent(field, item))
-            found = check_member(field, item, place, problem);
-        else if (must_be_there(field))
-            found = check_missing(field, place, problem);
+            found = field_check_member(field, item, place, problem);
+        else if (field_is_required(field))
+            found = field_check_missing(field, place, problem);
         if (found != STATUS_OK)
             status = STATUS_INVALID;
     }

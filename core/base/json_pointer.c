@@ -1,27 +1,30 @@
-// A walk along the tokens: rows are found by name, elements by number, and the tag of a variant
-// stands beside the members of its kind.
+// The tokens of a pointer are resolved in turn: rows by name, elements by number. The tag of a
+// variant is a name among the members of its kind.
 #include "core/base/json_pointer.h"
 
+#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/base/spelling.h"
+
 enum { TOKEN = 64, NAMES = 64 };
 
-// What a pointer leads to.
-typedef struct Place {
+// The member that a pointer designates.
+typedef struct PointerTarget {
     const Field *field;
-    void *member;    // the row's member; of an array's element that double
-    bool is_element; // of REALS or ROWS
+    void *member;    // the row's member, or the double of an array
+    bool is_element; // element of REALS or ROWS
     bool is_tag;     // `member` is the Variant *
-    char **name;     // the shorthand's text of the item around it, or NULL
-    void *around;    // that item
+    char **name;     // shorthand text of the enclosing item, or NULL
+    void *around;    // the enclosing item
     const Field *item;
-} Place;
+} PointerTarget;
 
-// Takes the token behind the slash off the pointer. False where it is too long to be a name here.
-static bool take_token(const char **pointer, char token[TOKEN]) {
+// Reads the token after the slash and advances the pointer. False if it is longer than any name.
+static bool json_pointer_next_token(const char **pointer, char token[TOKEN]) {
     size_t length = 0;
     const char *at = *pointer + 1;
     for (; *at != '\0' && *at != '/'; at++) {
@@ -41,7 +44,7 @@ static bool take_token(const char **pointer, char token[TOKEN]) {
     return true;
 }
 
-static bool read_index(const char *token, size_t count, size_t *index) {
+static bool json_pointer_read_index(const char *token, size_t count, size_t *index) {
     if (token[0] < '0' || token[0] > '9' || (token[0] == '0' && token[1] != '\0') ||
         strlen(token) > 9)
         return false;
@@ -50,68 +53,69 @@ static bool read_index(const char *token, size_t count, size_t *index) {
     return *end == '\0' && *index < count;
 }
 
-static bool refuse(char why[POINTER_SENTENCE], const char *format, ...)
+static bool json_pointer_fail(char message[JSON_POINTER_MESSAGE_MAX], const char *format, ...)
     __attribute__((format(printf, 2, 3)));
 
-static bool refuse(char why[POINTER_SENTENCE], const char *format, ...) {
+static bool json_pointer_fail(char message[JSON_POINTER_MESSAGE_MAX], const char *format, ...) {
     va_list arguments;
     va_start(arguments, format);
-    vsnprintf(why, POINTER_SENTENCE, format, arguments);
+    vsnprintf(message, JSON_POINTER_MESSAGE_MAX, format, arguments);
     va_end(arguments);
     return false;
 }
 
-static bool refuse_name(const Field *fields, const char *token, const char *of,
-                        char why[POINTER_SENTENCE]) {
-    const char *near = fields_nearest(fields, token);
-    return refuse(why, "there is no \"%s\" in %s%s%s%s", token, of,
-                  near != NULL ? ": perhaps " : "", near != NULL ? near : "",
-                  near != NULL ? " is meant" : "");
+static bool json_pointer_fail_name(const Field *fields, const char *token, const char *of,
+                                   char message[JSON_POINTER_MESSAGE_MAX]) {
+    const char *near = spelling_nearest_field(fields, token);
+    return json_pointer_fail(message, "there is no \"%s\" in %s%s%s%s", token, of,
+                             near != NULL ? ": perhaps " : "", near != NULL ? near : "",
+                             near != NULL ? " is meant" : "");
 }
 
-static bool element(const Reals *reals, const char *token, const char *of, void **member,
-                    char why[POINTER_SENTENCE]) {
+static bool json_pointer_element(const Reals *reals, const char *token, const char *of,
+                                 void **member, char message[JSON_POINTER_MESSAGE_MAX]) {
     size_t index;
-    if (!read_index(token, reals->count, &index))
-        return refuse(why, "%s has elements 0 to %zu, \"%s\" is none of them", of,
-                      reals->count > 0 ? reals->count - 1 : 0, token);
+    if (!json_pointer_read_index(token, reals->count, &index))
+        return json_pointer_fail(message, "%s has elements 0 to %zu, \"%s\" is none of them", of,
+                                 reals->count > 0 ? reals->count - 1 : 0, token);
     *member = &reals->at[index];
     return true;
 }
 
-// Below a row that is no leaf; the place is what was reached so far.
-static bool go_into(Place *place, const Field *field, void *member, const char *pointer,
-                    char why[POINTER_SENTENCE]);
+// Resolves the tokens below a member that is an item, variant, list or array.
+static bool json_pointer_descend(PointerTarget *target, const Field *field, void *member,
+                                 const char *pointer, char message[JSON_POINTER_MESSAGE_MAX]);
 
-static bool go_on(Place *place, const Field *fields, void *item, const KindTable *kinds,
-                  Variant **variant, const char *pointer, const char *of,
-                  char why[POINTER_SENTENCE]) {
+static bool json_pointer_step(PointerTarget *target, const Field *fields, void *item,
+                              const KindTable *kinds, Variant **variant, const char *pointer,
+                              const char *of, char message[JSON_POINTER_MESSAGE_MAX]) {
     char token[TOKEN];
     if (*pointer != '/')
-        return refuse(why, "must begin with a slash, as in /dampers/0/clearance");
-    if (!take_token(&pointer, token))
-        return refuse(why, "a part of it is too long, or ~ stands without 0 or 1 behind it");
+        return json_pointer_fail(message, "must begin with a slash, as in /dampers/0/clearance");
+    if (!json_pointer_next_token(&pointer, token))
+        return json_pointer_fail(message,
+                                 "a part of it is too long, or ~ stands without 0 or 1 behind it");
     if (kinds != NULL && strcmp(token, kinds->tag) == 0) {
         if (*pointer != '\0')
-            return refuse(why, "%s is a name: nothing lies below it", token);
-        place->is_tag = true;
-        place->member = variant;
+            return json_pointer_fail(message, "%s is a name: nothing lies below it", token);
+        target->is_tag = true;
+        target->member = variant;
         return true;
     }
     size_t offset = 0;
     const Field *field = fields_find(fields, token, &offset);
     if (field == NULL)
-        return refuse_name(fields, token, of, why);
+        return json_pointer_fail_name(fields, token, of, message);
     void *member = (char *)item + offset + field->offset;
     if (*pointer != '\0')
-        return go_into(place, field, member, pointer, why);
-    place->field = field;
-    place->member = member;
+        return json_pointer_descend(target, field, member, pointer, message);
+    target->field = field;
+    target->member = member;
     return true;
 }
 
-static bool go_into(Place *place, const Field *field, void *member, const char *pointer,
-                    char why[POINTER_SENTENCE]) {
+static bool json_pointer_descend(PointerTarget *target, const Field *field, void *member,
+                                 const char *pointer, char message[JSON_POINTER_MESSAGE_MAX]) {
     char token[TOKEN];
     List list;
     size_t index;
@@ -121,111 +125,117 @@ static bool go_into(Place *place, const Field *field, void *member, const char *
         const Field *name =
             field->shorthand != NULL ? fields_find(field->fields, field->shorthand, &offset) : NULL;
         if (name != NULL) {
-            place->name = (char **)(void *)((char *)member + offset + name->offset);
-            place->around = member;
-            place->item = field;
+            target->name = (char **)(void *)((char *)member + offset + name->offset);
+            target->around = member;
+            target->item = field;
         }
-        return go_on(place, field->fields, member, NULL, NULL, pointer, field->name, why);
+        return json_pointer_step(target, field->fields, member, NULL, NULL, pointer, field->name,
+                                 message);
     }
     case FIELD_KIND_VARIANT: {
         Variant **variant = member;
         if (*variant == NULL)
-            return refuse(why, "the scene has no %s", field->name);
-        place->field = field;
-        return go_on(place, (*variant)->kind->fields, *variant, field->kinds, variant, pointer,
-                     (*variant)->kind->name, why);
+            return json_pointer_fail(message, "the scene has no %s", field->name);
+        target->field = field;
+        return json_pointer_step(target, (*variant)->kind->fields, *variant, field->kinds, variant,
+                                 pointer, (*variant)->kind->name, message);
     }
     case FIELD_KIND_LIST:
         memcpy(&list, member, sizeof list);
-        if (!take_token(&pointer, token) || !read_index(token, list.count, &index))
-            return refuse(why, "the scene has %zu %s: \"%s\" is none of them", list.count,
-                          field->name, token);
+        if (!json_pointer_next_token(&pointer, token) ||
+            !json_pointer_read_index(token, list.count, &index))
+            return json_pointer_fail(message, "the scene has %zu %s: \"%s\" is none of them",
+                                     list.count, field->name, token);
         if (*pointer == '\0')
-            return refuse(why, "one value cannot replace an element of %s: name a member of it",
-                          field->name);
-        return go_on(place, field->fields, (char *)list.at + index * field->size, NULL, NULL,
-                     pointer, field->name, why);
+            return json_pointer_fail(
+                message, "one value cannot replace an element of %s: name a member of it",
+                field->name);
+        return json_pointer_step(target, field->fields, (char *)list.at + index * field->size, NULL,
+                                 NULL, pointer, field->name, message);
     case FIELD_KIND_ROWS: {
         const Rows *rows = member;
-        if (!take_token(&pointer, token) || !read_index(token, rows->count, &index) ||
-            *pointer == '\0')
-            return refuse(why, "%s has %zu rows: name a row and a column, %s/0/0", field->name,
-                          rows->count, field->name);
+        if (!json_pointer_next_token(&pointer, token) ||
+            !json_pointer_read_index(token, rows->count, &index) || *pointer == '\0')
+            return json_pointer_fail(message, "%s has %zu rows: name a row and a column, %s/0/0",
+                                     field->name, rows->count, field->name);
         member = &rows->at[index];
     } // fall through
     case FIELD_KIND_REALS:
-        if (!take_token(&pointer, token) || *pointer != '\0')
-            return refuse(why, "nothing lies below an element of %s", field->name);
-        place->field = field;
-        place->is_element = true;
-        return element(member, token, field->name, &place->member, why);
+        if (!json_pointer_next_token(&pointer, token) || *pointer != '\0')
+            return json_pointer_fail(message, "nothing lies below an element of %s", field->name);
+        target->field = field;
+        target->is_element = true;
+        return json_pointer_element(member, token, field->name, &target->member, message);
     default:
-        return refuse(why, "nothing lies below %s", field->name);
+        return json_pointer_fail(message, "nothing lies below %s", field->name);
     }
 }
 
-// Whether one value can stand there.
-static bool takes_value(const Place *place) {
-    if (place->is_tag || place->is_element)
+// Whether one scalar can replace the member.
+static bool json_pointer_is_settable(const PointerTarget *target) {
+    if (target->is_tag || target->is_element)
         return true;
-    switch (place->field->kind) {
+    switch (target->field->kind) {
     case FIELD_KIND_REAL:
     case FIELD_KIND_COUNT:
     case FIELD_KIND_FLAG:
     case FIELD_KIND_TEXT:
     case FIELD_KIND_CHOICE:
-        return (place->field->flags & FIELD_NOTE) == 0;
+        return (target->field->flags & FIELD_NOTE) == 0;
     case FIELD_KIND_REALS:
-        return (place->field->flags & FIELD_LONE) != 0;
+        return (target->field->flags & FIELD_LONE) != 0;
     case FIELD_KIND_ITEM:
-        return place->field->shorthand != NULL;
+        return target->field->shorthand != NULL;
     default:
         return false;
     }
 }
 
-static bool find(const Field *fields, const void *item, const char *pointer, Place *place,
-                 char why[POINTER_SENTENCE]) {
-    *place = (Place){0};
-    if (!go_on(place, fields, (void *)item, NULL, NULL, pointer, "the scene", why))
+static bool json_pointer_resolve(const Field *fields, const void *item, const char *pointer,
+                                 PointerTarget *target, char message[JSON_POINTER_MESSAGE_MAX]) {
+    *target = (PointerTarget){0};
+    if (!json_pointer_step(target, fields, (void *)item, NULL, NULL, pointer, "the scene", message))
         return false;
-    if (takes_value(place))
+    if (json_pointer_is_settable(target))
         return true;
-    return refuse(why, "one value cannot replace %s: name a member of it", place->field->name);
+    return json_pointer_fail(message, "one value cannot replace %s: name a member of it",
+                             target->field->name);
 }
 
-const Field *pointer_find(const Field *fields, const void *item, const char *pointer, bool *is_tag,
-                          char why[POINTER_SENTENCE]) {
-    Place place;
-    const bool is_found = find(fields, item, pointer, &place, why);
-    *is_tag = is_found && place.is_tag;
-    return is_found ? place.field : NULL;
+const Field *json_pointer_find(const Field *fields, const void *item, const char *pointer,
+                               bool *is_tag, char message[JSON_POINTER_MESSAGE_MAX]) {
+    PointerTarget target;
+    const bool is_found = json_pointer_resolve(fields, item, pointer, &target, message);
+    *is_tag = is_found && target.is_tag;
+    return is_found ? target.field : NULL;
 }
 
-static const char *kind_name(const Scalar *value) {
+static const char *json_scalar_kind_name(const JsonScalar *value) {
     static const char *const names[] = {"a number", "a text", "true or false"};
     return names[value->kind];
 }
 
-static Status refuse_kind(const char *wanted, const Field *field, const Scalar *value,
-                          char why[POINTER_SENTENCE]) {
-    refuse(why, "must be %s%s%s%s, is %s", wanted, field->unit != NULL ? " [" : "",
-           field->unit != NULL ? field->unit : "", field->unit != NULL ? "]" : "",
-           kind_name(value));
+static Status json_pointer_fail_kind(const char *wanted, const Field *field,
+                                     const JsonScalar *value,
+                                     char message[JSON_POINTER_MESSAGE_MAX]) {
+    json_pointer_fail(message, "must be %s%s%s%s, is %s", wanted, field->unit != NULL ? " [" : "",
+                      field->unit != NULL ? field->unit : "", field->unit != NULL ? "]" : "",
+                      json_scalar_kind_name(value));
     return STATUS_INVALID;
 }
 
-// The names of choices or kinds, as far as they fit.
-static Status refuse_text(const char *const *names, const char *text, char why[POINTER_SENTENCE]) {
-    char list[POINTER_SENTENCE / 2] = "";
+// Lists the names of choices or kinds, as many as fit.
+static Status json_pointer_fail_choice(const char *const *names, const char *text,
+                                       char message[JSON_POINTER_MESSAGE_MAX]) {
+    char list[JSON_POINTER_MESSAGE_MAX / 2] = "";
     for (size_t i = 0, length = 0; names[i] != NULL && length < sizeof list; i++)
         length += (size_t)snprintf(list + length, sizeof list - length, "%s%s", i > 0 ? ", " : "",
                                    names[i]);
-    refuse(why, "must be one of %s, is \"%.40s\"", list, text);
+    json_pointer_fail(message, "must be one of %s, is \"%.40s\"", list, text);
     return STATUS_INVALID;
 }
 
-static Status set_text(char **target, const char *text) {
+static Status json_pointer_set_text(char **target, const char *text) {
     char *copy = strdup(text);
     if (copy == NULL)
         return STATUS_NO_MEMORY;
@@ -234,8 +244,8 @@ static Status set_text(char **target, const char *text) {
     return STATUS_OK;
 }
 
-// Members of the same name and kind stay as they are.
-static Status take_over(const Variant *source, Variant *target) {
+// Copies the members that have the same name and type in both kinds.
+static Status json_pointer_copy_common(const Variant *source, Variant *target) {
     for (const Field *field = target->kind->fields; field->kind != FIELD_KIND_END; field++) {
         const Field *at = field->kind == FIELD_KIND_BASE ? field->fields : field;
         const size_t base = field->kind == FIELD_KIND_BASE ? field->offset : 0;
@@ -257,21 +267,22 @@ static Status take_over(const Variant *source, Variant *target) {
     return STATUS_OK;
 }
 
-static Status set_kind(const KindTable *kinds, Variant **variant, const Scalar *value,
-                       const Field *field, char why[POINTER_SENTENCE]) {
-    if (value->kind != SCALAR_TEXT)
-        return refuse_kind("the name of a kind", field, value, why);
+static Status json_pointer_set_kind(const KindTable *kinds, Variant **variant,
+                                    const JsonScalar *value, const Field *field,
+                                    char message[JSON_POINTER_MESSAGE_MAX]) {
+    if (value->kind != JSON_SCALAR_TEXT)
+        return json_pointer_fail_kind("the name of a kind", field, value, message);
     const Kind *kind = kind_find(kinds, value->text);
     if (kind == NULL) {
         const char *names[NAMES + 1] = {NULL};
         for (size_t i = 0; i < NAMES && kinds->at(i) != NULL; i++)
             names[i] = kinds->at(i)->name;
-        return refuse_text(names, value->text, why);
+        return json_pointer_fail_choice(names, value->text, message);
     }
     if (kind == (*variant)->kind)
         return STATUS_OK;
     Variant *made = variant_new(kind);
-    if (made == NULL || take_over(*variant, made) != STATUS_OK) {
+    if (made == NULL || json_pointer_copy_common(*variant, made) != STATUS_OK) {
         variant_free(made);
         return STATUS_NO_MEMORY;
     }
@@ -280,56 +291,58 @@ static Status set_kind(const KindTable *kinds, Variant **variant, const Scalar *
     return STATUS_OK;
 }
 
-// The whole item is what its name says from now on.
-static Status set_name(const Field *field, void *item, char **name, const Scalar *value,
-                       char why[POINTER_SENTENCE]) {
-    if (value->kind != SCALAR_TEXT)
-        return refuse_kind("a name", field, value, why);
+// Replaces the whole item by its shorthand name.
+static Status json_pointer_set_name(const Field *field, void *item, char **name,
+                                    const JsonScalar *value,
+                                    char message[JSON_POINTER_MESSAGE_MAX]) {
+    if (value->kind != JSON_SCALAR_TEXT)
+        return json_pointer_fail_kind("a name", field, value, message);
     if (fields_default(field->fields, item) != STATUS_OK)
         return STATUS_NO_MEMORY;
-    return set_text(name, value->text);
+    return json_pointer_set_text(name, value->text);
 }
 
-static Status set_member(const Field *field, void *member, const Scalar *value,
-                         char why[POINTER_SENTENCE]) {
+static Status json_pointer_set_member(const Field *field, void *member, const JsonScalar *value,
+                                      char message[JSON_POINTER_MESSAGE_MAX]) {
     switch (field->kind) {
     case FIELD_KIND_REAL:
-        if (value->kind != SCALAR_NUMBER)
-            return refuse_kind("a number", field, value, why);
+        if (value->kind != JSON_SCALAR_NUMBER)
+            return json_pointer_fail_kind("a number", field, value, message);
         *(double *)member = value->number;
         return STATUS_OK;
     case FIELD_KIND_COUNT:
-        if (value->kind != SCALAR_NUMBER || value->whole == COUNT_ABSENT) {
+        if (value->kind != JSON_SCALAR_NUMBER || value->whole == COUNT_ABSENT) {
             char is[32];
-            if (value->kind != SCALAR_NUMBER)
-                return refuse_kind("a whole number", field, value, why);
-            refuse(why, "must be a whole number of at least 0, is %s",
-                   text_real(is, value->number));
+            if (value->kind != JSON_SCALAR_NUMBER)
+                return json_pointer_fail_kind("a whole number", field, value, message);
+            json_pointer_fail(message, "must be a whole number of at least 0, is %s",
+                              text_real(is, value->number));
             return STATUS_INVALID;
         }
         *(uint64_t *)member = value->whole;
         return STATUS_OK;
     case FIELD_KIND_FLAG:
-        if (value->kind != SCALAR_FLAG)
-            return refuse_kind("true or false", field, value, why);
+        if (value->kind != JSON_SCALAR_FLAG)
+            return json_pointer_fail_kind("true or false", field, value, message);
         *(bool *)member = value->flag;
         return STATUS_OK;
     case FIELD_KIND_TEXT:
-        return value->kind != SCALAR_TEXT ? refuse_kind("a text", field, value, why)
-                                          : set_text(member, value->text);
+        return value->kind != JSON_SCALAR_TEXT
+                   ? json_pointer_fail_kind("a text", field, value, message)
+                   : json_pointer_set_text(member, value->text);
     case FIELD_KIND_CHOICE:
-        if (value->kind != SCALAR_TEXT)
-            return refuse_kind("a name", field, value, why);
+        if (value->kind != JSON_SCALAR_TEXT)
+            return json_pointer_fail_kind("a name", field, value, message);
         for (int i = 0; field->choices[i] != NULL; i++)
             if (strcmp(field->choices[i], value->text) == 0) {
                 *(int *)member = i;
                 return STATUS_OK;
             }
-        return refuse_text(field->choices, value->text, why);
+        return json_pointer_fail_choice(field->choices, value->text, message);
     case FIELD_KIND_REALS: {
         Reals *reals = member;
-        if (value->kind != SCALAR_NUMBER)
-            return refuse_kind("a number", field, value, why);
+        if (value->kind != JSON_SCALAR_NUMBER)
+            return json_pointer_fail_kind("a number", field, value, message);
         double *at = malloc(sizeof *at);
         if (at == NULL)
             return STATUS_NO_MEMORY;
@@ -343,37 +356,134 @@ static Status set_member(const Field *field, void *member, const Scalar *value,
     }
 }
 
-Status pointer_set(const Field *fields, void *item, const char *pointer, const Scalar *value,
-                   char why[POINTER_SENTENCE]) {
-    Place place;
-    why[0] = '\0';
-    if (!find(fields, item, pointer, &place, why))
+Status json_pointer_set(const Field *fields, void *item, const char *pointer,
+                        const JsonScalar *value, char message[JSON_POINTER_MESSAGE_MAX]) {
+    PointerTarget target;
+    message[0] = '\0';
+    if (!json_pointer_resolve(fields, item, pointer, &target, message))
         return STATUS_INVALID;
-    if (place.is_tag)
-        return set_kind(place.field->kinds, place.member, value, place.field, why);
-    if (place.is_element) {
-        if (value->kind != SCALAR_NUMBER)
-            return refuse_kind("a number", place.field, value, why);
-        *(double *)place.member = value->number;
+    if (target.is_tag)
+        return json_pointer_set_kind(target.field->kinds, target.member, value, target.field,
+                                     message);
+    if (target.is_element) {
+        if (value->kind != JSON_SCALAR_NUMBER)
+            return json_pointer_fail_kind("a number", target.field, value, message);
+        *(double *)target.member = value->number;
         return STATUS_OK;
     }
-    if (place.field->kind == FIELD_KIND_ITEM) {
+    if (target.field->kind == FIELD_KIND_ITEM) {
         size_t offset = 0;
-        const Field *name = fields_find(place.field->fields, place.field->shorthand, &offset);
-        char **text = (char **)(void *)((char *)place.member + offset + name->offset);
-        if (value->kind == SCALAR_TEXT)
-            fields_clear(place.field->fields, place.member);
-        return set_name(place.field, place.member, text, value, why);
+        const Field *name = fields_find(target.field->fields, target.field->shorthand, &offset);
+        char **text = (char **)(void *)((char *)target.member + offset + name->offset);
+        if (value->kind == JSON_SCALAR_TEXT)
+            fields_clear(target.field->fields, target.member);
+        return json_pointer_set_name(target.field, target.member, text, value, message);
     }
-    if (place.name != NULL && place.member == (void *)place.name) {
-        if (value->kind == SCALAR_TEXT)
-            fields_clear(place.item->fields, place.around);
-        return set_name(place.item, place.around, place.name, value, why);
+    if (target.name != NULL && target.member == (void *)target.name) {
+        if (value->kind == JSON_SCALAR_TEXT)
+            fields_clear(target.item->fields, target.around);
+        return json_pointer_set_name(target.item, target.around, target.name, value, message);
     }
-    TRY(set_member(place.field, place.member, value, why));
-    if (place.name != NULL) {
-        free(*place.name);
-        *place.name = NULL;
+    TRY(json_pointer_set_member(target.field, target.member, value, message));
+    if (target.name != NULL) {
+        free(*target.name);
+        *target.name = NULL;
     }
     return STATUS_OK;
+}
+
+// Called for every member of every scene, hence plain loops instead of printf.
+void json_pointer_join(char *target, size_t size, const char *pointer, const char *name) {
+    // Longer than any pointer of a Fault; a name that is too long is truncated.
+    char whole[3 * sizeof((Fault){0}.pointer)];
+    const size_t buffer = sizeof whole - 3, own = strlen(pointer);
+    size_t length = own < buffer / 2 ? own : buffer / 2;
+    memcpy(whole, pointer, length);
+    whole[length++] = '/';
+    for (; *name != '\0' && length < buffer; name++) {
+        if (*name == '~' || *name == '/') {
+            whole[length++] = '~';
+            whole[length++] = *name == '~' ? '0' : '1';
+        } else {
+            whole[length++] = *name;
+        }
+    }
+    whole[length] = '\0';
+    text_fit(target, size, whole);
+}
+
+void json_pointer_index(char *target, size_t size, const char *pointer, size_t index) {
+    char digits[24], *name = digits + sizeof digits - 1;
+    *name = '\0';
+    do
+        *--name = (char)('0' + index % 10);
+    while ((index /= 10) > 0);
+    json_pointer_join(target, size, pointer, name);
+}
+
+JsonScalar json_scalar_number(double number) {
+    const bool is_whole = number >= 0 && number < 0x1p63 && floor(number) == number;
+    return (JsonScalar){.kind = JSON_SCALAR_NUMBER,
+                        .number = number,
+                        .whole = is_whole ? (uint64_t)number : COUNT_ABSENT};
+}
+
+static bool json_scalar_read_hex(const char *at, unsigned *code) {
+    char digits[5] = "";
+    memcpy(digits, at, strnlen(at, 4));
+    char *end;
+    *code = (unsigned)strtoul(digits, &end, 16);
+    return end == digits + 4;
+}
+
+// Decodes the escape after a backslash. Returns its length in bytes, 0 if it is invalid.
+static size_t json_scalar_read_escape(const char *json, char **to) {
+    static const char from[] = "\"\\/bfnrt", meant[] = "\"\\/\b\f\n\r\t";
+    const char *found = *json != '\0' ? strchr(from, *json) : NULL;
+    unsigned code;
+    if (found != NULL) {
+        *(*to)++ = meant[found - from];
+        return 1;
+    }
+    // The writer escapes only control characters this way.
+    if (*json != 'u' || !json_scalar_read_hex(json + 1, &code) || code == 0 || code >= 0x80)
+        return 0;
+    *(*to)++ = (char)code;
+    return 5;
+}
+
+static bool json_scalar_read_text(const char *json, char *buffer) {
+    for (json++; *json != '"'; json++) {
+        if (*json == '\0')
+            return false;
+        if (*json != '\\') {
+            *buffer++ = *json;
+            continue;
+        }
+        const size_t taken = json_scalar_read_escape(json + 1, &buffer);
+        if (taken == 0)
+            return false;
+        json += taken;
+    }
+    *buffer = '\0';
+    return json[1] == '\0';
+}
+
+bool json_scalar_read(const char *json, JsonScalar *value, char *buffer) {
+    char *end;
+    *value = (JsonScalar){.kind = JSON_SCALAR_FLAG, .flag = *json == 't'};
+    if (strcmp(json, "true") == 0 || strcmp(json, "false") == 0)
+        return true;
+    if (*json == '"') {
+        *value = (JsonScalar){.kind = JSON_SCALAR_TEXT, .text = buffer};
+        return json_scalar_read_text(json, buffer);
+    }
+    const double number = strtod(json, &end);
+    if (end == json || *end != '\0' || !isfinite(number))
+        return false;
+    *value = json_scalar_number(number);
+    // Above 2^53 a double cannot represent every integer.
+    if (value->whole != COUNT_ABSENT && strspn(json, "0123456789") == strlen(json))
+        value->whole = strtoull(json, NULL, 10);
+    return true;
 }

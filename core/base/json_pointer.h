@@ -1,24 +1,47 @@
-// A JSON Pointer into a struct by its Field rows: what stands there, and setting it to one value.
-// Not a reader of JSON (server/codec) and not a judge of ranges (field.h). Used by studies that run
-// a scene with some of its members changed.
+// JSON Pointers (RFC 6901): joining them, and finding and replacing the member of a struct that one
+// designates by its Field rows. Ranges are not checked here (fields_validate).
 #ifndef CORE_BASE_JSON_POINTER_H
 #define CORE_BASE_JSON_POINTER_H
 
 #include "core/base/field.h"
-#include "core/base/json_scalar.h"
 
-enum { POINTER_SENTENCE = 240 };
+// Writes "pointer/name" with ~ and / escaped; truncated to `size`.
+void json_pointer_join(char *target, size_t size, const char *pointer, const char *name);
+void json_pointer_index(char *target, size_t size, const char *pointer, size_t index);
 
-// The row of what `pointer` leads to; of an element of an array the array's. NULL, and why, where
-// there is nothing, or nothing that one value could replace. `*is_tag`: it is the name of a kind.
-const Field *pointer_find(const Field *fields, const void *item, const char *pointer, bool *is_tag,
-                          char why[POINTER_SENTENCE]);
+// One number, text or truth value. The text is borrowed.
+typedef enum JsonScalarKind {
+    JSON_SCALAR_NUMBER,
+    JSON_SCALAR_TEXT,
+    JSON_SCALAR_FLAG
+} JsonScalarKind;
+typedef struct JsonScalar {
+    JsonScalarKind kind;
+    double number;
+    uint64_t whole; // the number if it is an integer of at least 0, else COUNT_ABSENT
+    const char *text;
+    bool flag;
+} JsonScalar;
 
-// Puts `value` there. A kind's name makes it that kind: members that both kinds have stay, the
-// others get defaults. A text in place of an item with a shorthand replaces the whole item; a
-// change of one of its members takes that name away, for it would be untrue. STATUS_INVALID with a
-// sentence, STATUS_NO_MEMORY.
-Status pointer_set(const Field *fields, void *item, const char *pointer, const Scalar *value,
-                   char why[POINTER_SENTENCE]);
+JsonScalar json_scalar_number(double number);
+
+// Reads a scalar of JSON text as stored under FIELD_SCALARS. The characters of a text are written
+// to `buffer`, which must be as long as `json`. False if `json` is not a scalar.
+bool json_scalar_read(const char *json, JsonScalar *value, char *buffer);
+
+enum { JSON_POINTER_MESSAGE_MAX = 240 };
+
+// The row of the member at `pointer`; for an element of an array, the array's row. *is_tag is set
+// if the pointer designates the name of a kind. NULL and a message if nothing is there, or nothing
+// that one scalar can replace.
+const Field *json_pointer_find(const Field *fields, const void *item, const char *pointer,
+                               bool *is_tag, char message[JSON_POINTER_MESSAGE_MAX]);
+
+// Sets the member at `pointer` to `value`. Setting the name of a kind keeps members that both kinds
+// have and sets the others to defaults. A text for an item with a shorthand replaces the whole
+// item. Setting another member of such an item removes its name, which no longer describes the
+// item. STATUS_INVALID with a message, or STATUS_NO_MEMORY.
+Status json_pointer_set(const Field *fields, void *item, const char *pointer,
+                        const JsonScalar *value, char message[JSON_POINTER_MESSAGE_MAX]);
 
 #endif

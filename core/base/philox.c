@@ -2,9 +2,9 @@
 // 64-bit key that grows by a constant each round. Salmon, Moraes, Dror and Shaw, "Parallel random
 // numbers: as easy as 1, 2, 3", SC11.
 //
-// Normal numbers in rows, each from its own counter by the same operations in the same order: loops
-// without branches, which compilers turn into vectors, and without the C library's functions, which
-// differ from machine to machine.
+// Normal numbers are computed in rows, each from its own counter by the same operations in the same
+// order. The loops have no branches, so that compilers vectorise them, and no C library functions,
+// whose results differ between machines.
 #include "core/base/philox.h"
 
 #include <math.h>
@@ -14,32 +14,32 @@
 
 enum { ROW = 32 };
 
-INLINE double double_of(uint64_t bits) {
+INLINE double philox_double_of_bits(uint64_t bits) {
     double value;
     memcpy(&value, &bits, sizeof value);
     return value;
 }
 
-INLINE uint64_t bits_of(double value) {
+INLINE uint64_t philox_bits_of_double(double value) {
     uint64_t bits;
     memcpy(&bits, &value, sizeof bits);
     return bits;
 }
 
-// Of an integer below 2^51: in the last digits of 1.5 * 2^52.
-INLINE double double_from(uint64_t integer) {
-    return double_of(UINT64_C(0x4338000000000000) + integer) - 0x1.8p52;
+// Conversion of an integer below 2^51, through the last digits of 1.5 * 2^52.
+INLINE double philox_double_of_integer(uint64_t integer) {
+    return philox_double_of_bits(UINT64_C(0x4338000000000000) + integer) - 0x1.8p52;
 }
 
 // The upper 53 bits of two words, as an integer that a double holds exactly.
-INLINE double bits53(uint64_t high, uint64_t low) {
+INLINE double philox_bits53(uint64_t high, uint64_t low) {
     const uint64_t bits = (high << 32 | low) >> 11;
-    return 4 * double_from(bits >> 2) + double_from(bits & 3);
+    return 4 * philox_double_of_integer(bits >> 2) + philox_double_of_integer(bits & 3);
 }
 
-// Ten rounds, in words of 64 bits of which the lower 32 count.
-INLINE void make_words(uint64_t seed, uint64_t stream, uint64_t index, uint64_t *word0,
-                       uint64_t *word1, uint64_t *word2, uint64_t *word3) {
+// Ten rounds on words of 64 bits, of which the lower 32 are used.
+INLINE void philox_rounds(uint64_t seed, uint64_t stream, uint64_t index, uint64_t *word0,
+                          uint64_t *word1, uint64_t *word2, uint64_t *word3) {
     const uint64_t low = 0xffffffff;
     uint64_t c0 = index & low, c1 = index >> 32, c2 = stream & low, c3 = stream >> 32;
     uint64_t k0 = seed & low, k1 = seed >> 32;
@@ -59,35 +59,35 @@ INLINE void make_words(uint64_t seed, uint64_t stream, uint64_t index, uint64_t 
     *word3 = c3;
 }
 
-void noise_philox(const uint32_t counter[4], const uint32_t key[2], uint32_t out[4]) {
+void philox_words(const uint32_t counter[4], const uint32_t key[2], uint32_t out[4]) {
     uint64_t word[4];
-    make_words((uint64_t)key[1] << 32 | key[0], (uint64_t)counter[3] << 32 | counter[2],
-               (uint64_t)counter[1] << 32 | counter[0], &word[0], &word[1], &word[2], &word[3]);
+    philox_rounds((uint64_t)key[1] << 32 | key[0], (uint64_t)counter[3] << 32 | counter[2],
+                  (uint64_t)counter[1] << 32 | counter[0], &word[0], &word[1], &word[2], &word[3]);
     for (int i = 0; i < 4; i++)
         out[i] = (uint32_t)word[i];
 }
 
 // -2 log(u), 2^-53 <= u <= 1. u = 2^e z with z within sqrt(1/2) and sqrt(2), and log z = 2 atanh s,
 // s = (z - 1) / (z + 1).
-INLINE double minus_two_log(double u) {
-    const uint64_t half = UINT64_C(0x3fe6a09e667f3bcd), bits = bits_of(u);
+INLINE double philox_minus_two_log(double u) {
+    const uint64_t half = UINT64_C(0x3fe6a09e667f3bcd), bits = philox_bits_of_double(u);
     const uint64_t up = (bits - half + (UINT64_C(1024) << 52)) >> 52; // e + 1024
-    const double e = double_from(up) - 1024;
-    const double z = double_of(bits - ((up - 1024) << 52));
+    const double e = philox_double_of_integer(up) - 1024;
+    const double z = philox_double_of_bits(bits - ((up - 1024) << 52));
     const double f = z - 1, s = f / (z + 1), t = s * s;
     const double low = 1.0 / 3 + t * (1.0 / 5 + t * (1.0 / 7 + t * (1.0 / 9 + t * (1.0 / 11))));
     const double high =
         1.0 / 13 + t * (1.0 / 15 + t * (1.0 / 17 + t * (1.0 / 19 + t * (1.0 / 21 + t / 23))));
     const double t2 = t * t, t5 = t2 * t2 * t;
-    // log 2 in two parts, the first of which e times is exact.
+    // log 2 in two parts; e times the first is exact.
     const double rest = 2 * s * t * (low + t5 * high) + e * 1.90821492927058770002e-10;
     return -2 * (e * 6.93147180369123816490e-01 + (2 * s + rest));
 }
 
-// Cosine and sine of 2 pi u, 0 <= u < 1, from the nearest quarter turn on.
-INLINE void turn(double u, double *cosine, double *sine) {
+// Cosine and sine of 2 pi u, 0 <= u < 1, reduced to the nearest quarter turn.
+INLINE void philox_cos_sin(double u, double *cosine, double *sine) {
     const double quarters = (4 * u + 0x1.8p52) - 0x1.8p52;
-    const uint64_t quarter = bits_of(4 * u + 0x1.8p52);
+    const uint64_t quarter = philox_bits_of_double(4 * u + 0x1.8p52);
     const double x = (4 * u - quarters) * 1.57079632679489661923132169164, t = x * x;
     const double s =
         x + x * t *
@@ -106,27 +106,27 @@ INLINE void turn(double u, double *cosine, double *sine) {
                                                        t * (1.0 / 479001600 +
                                                             t * (-1.0 / 87178291200 +
                                                                  t * (1.0 / 20922789888000))))))));
-    // Odd quarters change the two, and two of four signs.
+    // Odd quarters swap the two; two of four quarters change each sign.
     const uint64_t odd = 0 - (quarter & 1);
-    const uint64_t one = (bits_of(s) & odd) | (bits_of(c) & ~odd);
-    const uint64_t other = (bits_of(c) & odd) | (bits_of(s) & ~odd);
-    *cosine = double_of(one ^ ((quarter + 1) >> 1 & 1) << 63);
-    *sine = double_of(other ^ (quarter >> 1 & 1) << 63);
+    const uint64_t one = (philox_bits_of_double(s) & odd) | (philox_bits_of_double(c) & ~odd);
+    const uint64_t other = (philox_bits_of_double(c) & odd) | (philox_bits_of_double(s) & ~odd);
+    *cosine = philox_double_of_bits(one ^ ((quarter + 1) >> 1 & 1) << 63);
+    *sine = philox_double_of_bits(other ^ (quarter >> 1 & 1) << 63);
 }
 
-INLINE void make_row(uint64_t seed, uint64_t stream, uint64_t index, double *out) {
+INLINE void philox_row(uint64_t seed, uint64_t stream, uint64_t index, double *out) {
     double u[ROW], v[ROW], cosine[ROW], sine[ROW];
     for (uint64_t i = 0; i < ROW; i++) {
         uint64_t word[4];
-        make_words(seed, stream, index + i, &word[0], &word[1], &word[2], &word[3]);
-        // One is added so that the logarithm's argument is in (0, 1], never 0.
-        u[i] = (bits53(word[1], word[0]) + 1) * 0x1p-53;
-        v[i] = bits53(word[3], word[2]) * 0x1p-53;
+        philox_rounds(seed, stream, index + i, &word[0], &word[1], &word[2], &word[3]);
+        // Adding 1 puts the argument of the logarithm in (0, 1].
+        u[i] = (philox_bits53(word[1], word[0]) + 1) * 0x1p-53;
+        v[i] = philox_bits53(word[3], word[2]) * 0x1p-53;
     }
     for (int i = 0; i < ROW; i++)
-        u[i] = minus_two_log(u[i]);
+        u[i] = philox_minus_two_log(u[i]);
     for (int i = 0; i < ROW; i++)
-        turn(v[i], &cosine[i], &sine[i]);
+        philox_cos_sin(v[i], &cosine[i], &sine[i]);
     for (int i = 0; i < ROW; i++) { // Box and Muller
         const double radius = sqrt(u[i]);
         out[2 * i] = radius * cosine[i];
@@ -134,39 +134,40 @@ INLINE void make_row(uint64_t seed, uint64_t stream, uint64_t index, double *out
     }
 }
 
-INLINE void make_all(uint64_t seed, uint64_t stream, uint64_t index, uint64_t count, double *out) {
+INLINE void philox_pairs(uint64_t seed, uint64_t stream, uint64_t index, uint64_t count,
+                         double *out) {
     double row[2 * ROW];
     for (; count >= ROW; count -= ROW, index += ROW, out += 2 * ROW)
-        make_row(seed, stream, index, out);
+        philox_row(seed, stream, index, out);
     if (count == 0)
         return;
-    make_row(seed, stream, index, row);
+    philox_row(seed, stream, index, row);
     memcpy(out, row, 2 * count * sizeof *out);
 }
 
 #ifdef __x86_64__
 static __attribute__((target("avx512f,avx512dq"))) void
-make_avx512(uint64_t seed, uint64_t stream, uint64_t index, uint64_t count, double *out) {
-    make_all(seed, stream, index, count, out);
+philox_pairs_avx512(uint64_t seed, uint64_t stream, uint64_t index, uint64_t count, double *out) {
+    philox_pairs(seed, stream, index, count, out);
 }
 
-static __attribute__((target("avx2"))) void make_avx2(uint64_t seed, uint64_t stream,
-                                                      uint64_t index, uint64_t count, double *out) {
-    make_all(seed, stream, index, count, out);
+static __attribute__((target("avx2"))) void
+philox_pairs_avx2(uint64_t seed, uint64_t stream, uint64_t index, uint64_t count, double *out) {
+    philox_pairs(seed, stream, index, count, out);
 }
 #endif
 
-void noise_normal_pairs(uint64_t seed, uint64_t stream, uint64_t index, uint64_t count,
-                        double *out) {
+void philox_normal_pairs(uint64_t seed, uint64_t stream, uint64_t index, uint64_t count,
+                         double *out) {
 #ifdef __x86_64__
     if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq")) {
-        make_avx512(seed, stream, index, count, out);
+        philox_pairs_avx512(seed, stream, index, count, out);
         return;
     }
     if (__builtin_cpu_supports("avx2")) {
-        make_avx2(seed, stream, index, count, out);
+        philox_pairs_avx2(seed, stream, index, count, out);
         return;
     }
 #endif
-    make_all(seed, stream, index, count, out);
+    philox_pairs(seed, stream, index, count, out);
 }

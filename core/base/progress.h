@@ -1,5 +1,5 @@
-// The core's only way to call outwards: progress goes out, "stop" comes in.
-// Used by everything that may take long. NULL means nobody watches.
+// The only callback of the core: reports progress and asks whether to stop. A NULL Progress is
+// allowed everywhere.
 #ifndef CORE_BASE_PROGRESS_H
 #define CORE_BASE_PROGRESS_H
 
@@ -8,7 +8,7 @@
 
 typedef struct Progress {
     void *context;
-    // Called every few 10,000 steps with the fraction done, 0 to 1. False asks the run to stop.
+    // Called every few 10,000 steps with the fraction done, 0 to 1. False requests a stop.
     bool (*advance)(void *context, double fraction);
 } Progress;
 
@@ -17,12 +17,12 @@ static inline bool progress_advance(const Progress *progress, double fraction) {
            progress->advance(progress->context, fraction);
 }
 
-// A part of a journey tells its own 0 to 1; whoever watches the whole sees the whole's, which never
-// goes back: two that go side by side may tell in turn.
+// Maps the progress of a part, 0 to 1, to a range of the whole. The whole never decreases, so two
+// parts that run side by side may report in turn.
 typedef struct ProgressRange {
     const Progress *whole;
     double from, share;
-    double furthest; // of the part, so far
+    double furthest; // largest fraction of the part so far
 } ProgressRange;
 
 static inline ProgressRange progress_range(const Progress *whole, double from, double share) {

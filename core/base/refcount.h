@@ -1,25 +1,26 @@
-// What several structs hold at once: made once, never changed, gone with the last hold.
-// Not a lock: whoever holds it may read it, from any thread. First member of such things
-// (excite/record.h), carried by rows of FIELD_SHARED.
+// Reference counting of immutable data that several structs share, from any thread. The first
+// member of such a struct; a row of FIELD_REFCOUNT carries a reference.
 #ifndef CORE_BASE_REFCOUNT_H
 #define CORE_BASE_REFCOUNT_H
 
 #include <stdatomic.h>
 #include <stddef.h>
 
-typedef struct Shared {
-    atomic_size_t holds; // 1 when it is made
-    void (*free)(struct Shared *shared);
-} Shared;
+typedef struct Refcount {
+    atomic_size_t count; // set to 1 by the creator
+    void (*free)(struct Refcount *shared);
+} Refcount;
 
-static inline Shared *shared_hold(Shared *shared) {
+// Adds a reference and returns `shared`. NULL is allowed.
+static inline Refcount *refcount_ref(Refcount *shared) {
     if (shared != NULL)
-        atomic_fetch_add(&shared->holds, 1);
+        atomic_fetch_add(&shared->count, 1);
     return shared;
 }
 
-static inline void shared_drop(Shared *shared) {
-    if (shared != NULL && atomic_fetch_sub(&shared->holds, 1) == 1)
+// Removes a reference; the last one frees `shared`. NULL is allowed.
+static inline void refcount_unref(Refcount *shared) {
+    if (shared != NULL && atomic_fetch_sub(&shared->count, 1) == 1)
         shared->free(shared);
 }
 

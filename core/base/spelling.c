@@ -1,21 +1,21 @@
-// "Did you mean": the least number of letters put in, taken out, changed or swapped with their
-// neighbour (optimal string alignment), whatever their case. And the pointers that say where a
-// fault is.
+// The distance of two names is the smallest number of letters inserted, deleted, changed or swapped
+// with their neighbour (optimal string alignment), ignoring case.
+#include "core/base/spelling.h"
+
+#include <stdio.h>
 #include <string.h>
 
-#include "core/base/field.h"
+enum { NAME_MAX = 48 }; // longer names get no suggestion
 
-enum { NAME_MAX = 48 }; // longer ones are no slips of the pen
-
-static int lower(char c) {
+static int spelling_lower(char c) {
     return c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : (unsigned char)c;
 }
 
-static size_t least(size_t a, size_t b) {
+static size_t spelling_min(size_t a, size_t b) {
     return a < b ? a : b;
 }
 
-static size_t distance(const char *a, size_t a_length, const char *b, size_t b_length) {
+static size_t spelling_distance(const char *a, size_t a_length, const char *b, size_t b_length) {
     size_t rows[3][NAME_MAX + 1];
     size_t *before = rows[0], *last = rows[1], *now = rows[2];
     for (size_t j = 0; j <= b_length; j++)
@@ -23,12 +23,12 @@ static size_t distance(const char *a, size_t a_length, const char *b, size_t b_l
     for (size_t i = 1; i <= a_length; i++) {
         now[0] = i;
         for (size_t j = 1; j <= b_length; j++) {
-            const bool is_same = lower(a[i - 1]) == lower(b[j - 1]);
+            const bool is_same = spelling_lower(a[i - 1]) == spelling_lower(b[j - 1]);
             size_t d = last[j - 1] + (is_same ? 0 : 1);
-            d = least(d, least(last[j], now[j - 1]) + 1);
-            if (i > 1 && j > 1 && lower(a[i - 1]) == lower(b[j - 2]) &&
-                lower(a[i - 2]) == lower(b[j - 1]))
-                d = least(d, before[j - 2] + 1);
+            d = spelling_min(d, spelling_min(last[j], now[j - 1]) + 1);
+            if (i > 1 && j > 1 && spelling_lower(a[i - 1]) == spelling_lower(b[j - 2]) &&
+                spelling_lower(a[i - 2]) == spelling_lower(b[j - 1]))
+                d = spelling_min(d, before[j - 2] + 1);
             now[j] = d;
         }
         size_t *spare = before;
@@ -39,78 +39,75 @@ static size_t distance(const char *a, size_t a_length, const char *b, size_t b_l
     return last[b_length];
 }
 
-typedef struct Nearest {
-    const char *meant; // what was written
+typedef struct SpellingSearch {
+    const char *text; // the misspelt name
     size_t length;
-    const char *name; // the nearest so far, NULL if none is near enough
+    const char *name; // the nearest so far; NULL: none is near enough
     size_t distance;
-} Nearest;
+} SpellingSearch;
 
-static bool nearest_start(Nearest *nearest, const char *meant) {
-    *nearest = (Nearest){meant, strlen(meant), NULL, SIZE_MAX};
-    return nearest->length > 0 && nearest->length <= NAME_MAX;
+static bool spelling_start(SpellingSearch *search, const char *text) {
+    *search = (SpellingSearch){text, strlen(text), NULL, SIZE_MAX};
+    return search->length > 0 && search->length <= NAME_MAX;
 }
 
-static void nearest_try(Nearest *nearest, const char *name) {
+static void spelling_try(SpellingSearch *search, const char *name) {
     const size_t length = strlen(name);
     if (length > NAME_MAX)
         return;
-    const size_t d = distance(nearest->meant, nearest->length, name, length);
-    const size_t longer = length > nearest->length ? length : nearest->length;
-    if (d <= longer / 3 && d < nearest->distance) {
-        nearest->name = name;
-        nearest->distance = d;
+    const size_t d = spelling_distance(search->text, search->length, name, length);
+    const size_t longer = length > search->length ? length : search->length;
+    if (d <= longer / 3 && d < search->distance) {
+        search->name = name;
+        search->distance = d;
     }
 }
 
-static void nearest_try_fields(Nearest *nearest, const Field *fields) {
+static void spelling_try_fields(SpellingSearch *search, const Field *fields) {
     for (const Field *field = fields; field->kind != FIELD_KIND_END; field++)
         if (field->kind == FIELD_KIND_BASE)
-            nearest_try_fields(nearest, field->fields);
+            spelling_try_fields(search, field->fields);
         else if ((field->flags & FIELD_HIDDEN) == 0)
-            nearest_try(nearest, field->name);
+            spelling_try(search, field->name);
 }
 
-const char *fields_nearest(const Field *fields, const char *name) {
-    Nearest nearest;
-    if (nearest_start(&nearest, name))
-        nearest_try_fields(&nearest, fields);
-    return nearest.name;
+const char *spelling_nearest_field(const Field *fields, const char *name) {
+    SpellingSearch search;
+    if (spelling_start(&search, name))
+        spelling_try_fields(&search, fields);
+    return search.name;
 }
 
-const char *texts_nearest(const char *const *texts, const char *name) {
-    Nearest nearest;
-    if (nearest_start(&nearest, name))
+const char *spelling_nearest(const char *const *texts, const char *name) {
+    SpellingSearch search;
+    if (spelling_start(&search, name))
         for (; *texts != NULL; texts++)
-            nearest_try(&nearest, *texts);
-    return nearest.name;
+            spelling_try(&search, *texts);
+    return search.name;
 }
 
-// Every member of every scene is judged at its pointer, so these are plain loops, not printf.
-void pointer_join(char *target, size_t size, const char *pointer, const char *name) {
-    // Room for a pointer as long as any, and a name too long is cut all the same.
-    char whole[3 * sizeof((Fault){0}.pointer)];
-    const size_t room = sizeof whole - 3, own = strlen(pointer);
-    size_t length = own < room / 2 ? own : room / 2;
-    memcpy(whole, pointer, length);
-    whole[length++] = '/';
-    for (; *name != '\0' && length < room; name++) {
-        if (*name == '~' || *name == '/') {
-            whole[length++] = '~';
-            whole[length++] = *name == '~' ? '0' : '1';
-        } else {
-            whole[length++] = *name;
-        }
+Status spelling_reject_numbered(const char *const *texts, const char *text, size_t length,
+                                const char *pointer, Problem *problem) {
+    Fault fault = {0};
+    char list[2 * sizeof fault.detail] = "must be one of ", stem[NAME_MAX + 1];
+    size_t used = strlen(list);
+    for (size_t i = 0; texts[i] != NULL && used < sizeof list; i++)
+        used +=
+            (size_t)snprintf(list + used, sizeof list - used, "%s%s", i > 0 ? ", " : "", texts[i]);
+    text_fit(fault.detail, sizeof fault.detail, list);
+    text_fit(fault.pointer, sizeof fault.pointer, pointer);
+    text_quote(fault.value, sizeof fault.value, text);
+    if (length < sizeof stem) {
+        memcpy(stem, text, length);
+        stem[length] = '\0';
+        const char *near = spelling_nearest(texts, stem);
+        if (near != NULL)
+            snprintf(fault.did_you_mean, sizeof fault.did_you_mean, "%s%s", near, text + length);
     }
-    whole[length] = '\0';
-    text_fit(target, size, whole);
+    return problem_add_fault(problem, STATUS_INVALID, &fault);
 }
 
-void pointer_index(char *target, size_t size, const char *pointer, size_t index) {
-    char digits[24], *name = digits + sizeof digits - 1;
-    *name = '\0';
-    do
-        *--name = (char)('0' + index % 10);
-    while ((index /= 10) > 0);
-    pointer_join(target, size, pointer, name);
+Status spelling_reject(const char *const *texts, const char *text, const char *pointer,
+                       Problem *problem) {
+    return spelling_reject_numbered(texts, text, strlen(text), pointer, problem);
 }

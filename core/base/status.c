@@ -1,5 +1,5 @@
-// Faults are kept in the order met, one per place. Past the hundredth they are only counted, before
-// any text is made of them: a document of a million faults costs no more than its reading.
+// Faults are kept in order, one per place. Beyond PROBLEM_FAULTS they are counted without
+// formatting their text, so that a document with a million faults costs no more than reading it.
 #include "core/base/status.h"
 
 #include <math.h>
@@ -30,11 +30,11 @@ const char *status_title(Status status) {
                                                  : status_titles[STATUS_INTERNAL];
 }
 
-// The largest length <= `most` at which `text` may be cut without splitting a UTF-8 character.
-static size_t edge_before(const char *text, size_t most) {
-    while (most > 0 && ((unsigned char)text[most] & 0xC0) == 0x80)
-        most--;
-    return most;
+// The largest length <= `max` at which `text` can be cut between two UTF-8 characters.
+static size_t text_boundary(const char *text, size_t max) {
+    while (max > 0 && ((unsigned char)text[max] & 0xC0) == 0x80)
+        max--;
+    return max;
 }
 
 void text_fit(char *target, size_t size, const char *text) {
@@ -46,7 +46,7 @@ void text_fit(char *target, size_t size, const char *text) {
         return;
     }
     const char *mark = size > 4 ? "..." : "";
-    const size_t kept = edge_before(text, size - 1 - strlen(mark));
+    const size_t kept = text_boundary(text, size - 1 - strlen(mark));
     memcpy(target, text, kept);
     memcpy(target + kept, mark, strlen(mark) + 1);
 }
@@ -70,7 +70,7 @@ void text_quote(char *target, size_t size, const char *text) {
             target[0] = '\0';
         return;
     }
-    // One character takes at most 6 bytes; the tail is "..." and the closing quote.
+    // A character needs at most 6 bytes; the end is "..." and the closing quote.
     const size_t end = size - 5;
     size_t length = 0;
     target[length++] = '"';
@@ -129,8 +129,8 @@ Status problem_set(Problem *problem, Status status, const char *format, ...) {
     return status;
 }
 
-// True where a fault would only be counted; it is then.
-static bool count_only(Problem *problem) {
+// Counts a fault beyond PROBLEM_FAULTS and returns true; false if there is space for it.
+static bool problem_count_only(Problem *problem) {
     if (problem == NULL)
         return true;
     if (problem->count < PROBLEM_FAULTS)
@@ -139,8 +139,8 @@ static bool count_only(Problem *problem) {
     return true;
 }
 
-Status problem_put(Problem *problem, Status status, const Fault *fault) {
-    if (count_only(problem))
+Status problem_add_fault(Problem *problem, Status status, const Fault *fault) {
+    if (problem_count_only(problem))
         return status;
     for (size_t i = 0; i < problem->count; i++)
         if (strcmp(problem->faults[i].pointer, fault->pointer) == 0)
@@ -159,19 +159,19 @@ static void fault_fill(Fault *fault, const char *pointer, const char *format, va
 }
 
 Status problem_add(Problem *problem, Status status, const char *pointer, const char *format, ...) {
-    if (count_only(problem))
+    if (problem_count_only(problem))
         return status;
     Fault fault;
     va_list arguments;
     va_start(arguments, format);
     fault_fill(&fault, pointer, format, arguments);
     va_end(arguments);
-    return problem_put(problem, status, &fault);
+    return problem_add_fault(problem, status, &fault);
 }
 
 Status problem_add_real(Problem *problem, Status status, const char *pointer, double value,
                         const char *unit, const char *format, ...) {
-    if (count_only(problem))
+    if (problem_count_only(problem))
         return status;
     Fault fault;
     va_list arguments;
@@ -179,10 +179,10 @@ Status problem_add_real(Problem *problem, Status status, const char *pointer, do
     fault_fill(&fault, pointer, format, arguments);
     va_end(arguments);
     char digits[32];
-    // JSON has no word for what is not finite.
+    // JSON has no representation of infinity and NaN.
     text_fit(fault.value, sizeof fault.value, isfinite(value) ? text_real(digits, value) : "");
     text_fit(fault.unit, sizeof fault.unit, unit != NULL ? unit : "");
-    return problem_put(problem, status, &fault);
+    return problem_add_fault(problem, status, &fault);
 }
 
 bool problem_concerns(const Problem *problem, const char *pointer) {
@@ -195,4 +195,16 @@ bool problem_concerns(const Problem *problem, const char *pointer) {
             return true;
     }
     return false;
+}
+
+bool text_format(char **target, const char *format, ...) {
+    char text[2 * TEXT_FORMAT_MAX], cut[TEXT_FORMAT_MAX];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    text_fit(cut, sizeof cut, text);
+    free(*target);
+    *target = strdup(cut);
+    return *target != NULL;
 }

@@ -1,13 +1,13 @@
-// What can go wrong, and where: one Status for a program to act on, one Problem for a person to
-// read. Not a log and not an exception: a Problem lives on the caller's stack and is returned,
-// never stored. Used by everything.
+// Errors: a Status for programs, a Problem with texts for users. A Problem is on the caller's stack
+// and is returned, not logged or stored. Also the few text functions that messages need.
 #ifndef CORE_BASE_STATUS_H
 #define CORE_BASE_STATUS_H
 
 #include <stdbool.h>
 #include <stddef.h>
 
-// One list yields the enum, the names and the titles. Order is free; OK is first because it is 0.
+// One list defines the enum, the slugs and the titles. OK is first because it is 0; the order of
+// the others is free.
 #define STATUS_LIST(X)                                                                             \
     X(OK, "ok", "Done")                                                                            \
     X(UNREADABLE, "unreadable", "The document cannot be read")                                     \
@@ -44,67 +44,72 @@ typedef enum Status {
         STATUS_COUNT
 } Status;
 
-const char *status_slug(Status status);  // stable, for machines: "invalid-scene"
-const char *status_title(Status status); // for people
+const char *status_slug(Status status);  // stable, for programs: "invalid-scene"
+const char *status_title(Status status); // for users
 
 enum { PROBLEM_FAULTS = 100 };
 
-// One fault at one place. Texts that do not fit are cut at a character's edge.
+// One fault at one place. Texts that do not fit are truncated at a UTF-8 character boundary.
 typedef struct Fault {
     char pointer[256];     // JSON Pointer, "" for the whole document
-    char detail[320];      // what is wrong and what would be right, with the unit
+    char detail[320];      // what is wrong and what is allowed, with the unit
     char value[128];       // the offending value as JSON text; "" if there is none
     char unit[24];         // "" if it has none
-    char did_you_mean[64]; // "" if nothing is near
-    size_t row;            // of a table, from 1, its header the first; 0: it is in none
-    char column[64];       // of that row
+    char did_you_mean[64]; // "" if there is no suggestion
+    size_t row;            // row of a table, from 1, which is its header; 0: not in a table
+    char column[64];       // column of that row
 } Fault;
 
 // All zero is "no problem". Only the first `count` faults (at most PROBLEM_FAULTS) are set.
 typedef struct Problem {
-    Status status;     // the first one's
-    char detail[512];  // the first one's sentence, after its place
-    size_t count;      // faults met, also those beyond PROBLEM_FAULTS
-    const char *whose; // has the faults, a static text; NULL: the scene
+    Status status;     // of the first fault
+    char detail[512];  // pointer and detail of the first fault
+    size_t count;      // all faults, also those beyond PROBLEM_FAULTS
+    const char *whose; // the document that has the faults, a static text; NULL: the scene
     Fault faults[PROBLEM_FAULTS];
 } Problem;
 
-// Makes `problem` empty without touching its 80 KB of faults. NULL is allowed here and below.
+// Empties `problem` without writing its 80 KB of faults. NULL is allowed here and below.
 void problem_clear(Problem *problem);
 
-// Says what went wrong as a whole; the first one stays. Returns `status`.
+// Sets the status and detail unless they are set already. Returns `status`.
 Status problem_set(Problem *problem, Status status, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 
-// Adds a fault at `pointer`; one fault per place, a second one there is dropped. Returns `status`.
+// Adds a fault at `pointer`, unless that place has one already. Returns `status`.
 Status problem_add(Problem *problem, Status status, const char *pointer, const char *format, ...)
     __attribute__((format(printf, 4, 5)));
 
-// The same with the number that is wrong and its unit (NULL: none).
+// The same with the invalid number and its unit (NULL: none).
 Status problem_add_real(Problem *problem, Status status, const char *pointer, double value,
                         const char *unit, const char *format, ...)
     __attribute__((format(printf, 6, 7)));
 
-// The same with value, unit and suggestion filled in by the caller.
-Status problem_put(Problem *problem, Status status, const Fault *fault);
+// The same with a Fault that the caller has filled in.
+Status problem_add_fault(Problem *problem, Status status, const Fault *fault);
 
-// Whether a fault lies at `pointer` or below it. Faults beyond PROBLEM_FAULTS are not seen.
+// Whether there is a fault at `pointer` or below, among the first PROBLEM_FAULTS.
 bool problem_concerns(const Problem *problem, const char *pointer);
 
-// Copies `text` into `target[size]`, cut at a UTF-8 character's edge and marked by "..." if it is
-// too long.
+// Copies `text` into `target[size]`. Text that is too long is truncated at a UTF-8 character
+// boundary and ends with "...".
 void text_fit(char *target, size_t size, const char *text);
-// Both may be NULL, which is a text of its own.
+// Whether two texts are equal; NULL equals NULL only.
 bool text_same(const char *a, const char *b);
 
-// Puts `item` behind the others of a list in `target[size]`, with ", " between, cut likewise.
+// Appends `item` to the list in `target[size]`, after ", "; truncated as by text_fit.
 void text_list(char *target, size_t size, const char *item);
 
-// `text` as a JSON string with its quotes, cut likewise inside them.
+// Writes `text` as a JSON string with quotes; truncated as by text_fit, inside the quotes.
 void text_quote(char *target, size_t size, const char *text);
 
-// The shortest of %.15g, %.16g, %.17g that reads back to the same double, for messages.
+// The shortest of %.15g, %.16g and %.17g that reads back as the same double.
 const char *text_real(char target[32], double value);
+
+// Frees *target and sets it to the formatted text, truncated to TEXT_FORMAT_MAX bytes; owned by the
+// caller. Without memory: false, and *target is NULL.
+enum { TEXT_FORMAT_MAX = 500 };
+bool text_format(char **target, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
 #define TRY(call)                                                                                  \
     do {                                                                                           \

@@ -1,18 +1,18 @@
-// Under a power law an isolated contact lasts (m_e v0^(1-n) / k)^(1/(n+1)) times what it does in
-// its own units, h: so k = m_e (h / T_c)^(n+1) v0^(1-n) makes it last T_c.
+// Under a power law the duration of an isolated contact is (m_e v0^(1-n) / k)^(1/(n+1)) h, where h
+// is the duration in its units. Hence k = m_e (h / T_c)^(n+1) v0^(1-n) gives the duration T_c.
 #include "core/contact/contact_parameters.h"
 
 #include <math.h>
 
 #include "core/contact/identification.h"
 
-// All but a power law's stiffness and speed.
-static void take(ContactStop *stop, double restitution, double contact_time) {
+// Sets all parameters except the stiffness and speed of a power law.
+static void contact_parameters_set(ContactStop *stop, double restitution, double contact_time) {
     ContactParameters *own = &stop->parameters;
     own->restitution = restitution;
     if (stop->law->form == CONTACT_LINEAR) {
-        const Identified found =
-            identify_measured(stop->mass, restitution, contact_time, (Separation)stop->separation);
+        const Identification found = identification_from_restitution(
+            stop->mass, restitution, contact_time, (Separation)stop->separation);
         own->stiffness = found.stiffness;
         own->damping = found.damping;
     } else if (stop->law->form == CONTACT_POWER) {
@@ -22,8 +22,8 @@ static void take(ContactStop *stop, double restitution, double contact_time) {
     }
 }
 
-ContactStop contact_prepare(const ContactLaw *law, int separation, double mass, double own_mass,
-                            const ContactNumbers *numbers) {
+ContactStop contact_stop_prepare(const ContactLaw *law, int separation, double mass,
+                                 double own_mass, const ContactNumbers *numbers) {
     ContactStop stop = {.law = law,
                         .separation = separation,
                         .mass = mass,
@@ -35,11 +35,11 @@ ContactStop contact_prepare(const ContactLaw *law, int separation, double mass, 
                                        .mass = own_mass}};
     const bool is_given = law->form == CONTACT_LINEAR && !isnan(numbers->stiffness);
     if (numbers->rows.count == 0 && !is_given)
-        take(&stop, numbers->restitution, numbers->contact_time);
+        contact_parameters_set(&stop, numbers->restitution, numbers->contact_time);
     return stop;
 }
 
-ContactRow contact_row(const ContactRows *rows, double approach_speed) {
+ContactRow contact_rows_interpolate(const ContactRows *rows, double approach_speed) {
     const ContactRow *at = rows->at;
     const size_t last = rows->count - 1;
     if (!(approach_speed > at[0].approach_speed))
@@ -59,13 +59,13 @@ ContactRow contact_row(const ContactRows *rows, double approach_speed) {
         at[below].contact_time + share * (at[above].contact_time - at[below].contact_time)};
 }
 
-ContactParameters contact_freeze(const ContactStop *stop, double approach_speed) {
+ContactParameters contact_parameters_at(const ContactStop *stop, double approach_speed) {
     double contact_time = stop->numbers.contact_time, duration = stop->duration;
     ContactParameters frozen = stop->parameters;
     if (stop->numbers.rows.count > 0) {
-        const ContactRow row = contact_row(&stop->numbers.rows, approach_speed);
+        const ContactRow row = contact_rows_interpolate(&stop->numbers.rows, approach_speed);
         ContactStop own = *stop;
-        take(&own, row.restitution, row.contact_time);
+        contact_parameters_set(&own, row.restitution, row.contact_time);
         frozen = own.parameters;
         duration = own.duration;
         contact_time = row.contact_time;

@@ -1,17 +1,6 @@
 // All contact laws, the default first.
 #include "core/contact/contact.h"
 
-const char *const separation_names[] = {[SEPARATION_ZERO_PENETRATION] = "zero_penetration",
-                                        [SEPARATION_ZERO_FORCE] = "zero_force",
-                                        NULL};
-
-// clang-format off
-const Field contact_fields[] = {
-    FIELD_CHOICE(Contact, separation, separation_names, SEPARATION_ZERO_PENETRATION, "when a contact ends"),
-    FIELD_END
-};
-// clang-format on
-
 const ContactLaw contact_auto = {
     .kind = {"auto", "spring_damper wherever a contact time or k, c is known, else impulse",
              contact_fields, sizeof(Contact)},
@@ -31,8 +20,8 @@ const ContactLaw *const contacts[] = {
     NULL,
 };
 
-static const Kind *contact_at(size_t index) {
+static const Kind *contacts_at(size_t index) {
     return index < COUNT(contacts) - 1 ? &contacts[index]->kind : NULL;
 }
 
-const KindTable contact_kinds = {"model", contact_at, false};
+const KindTable contact_kinds = {"model", contacts_at, false};

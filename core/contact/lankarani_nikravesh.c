@@ -1,5 +1,5 @@
-// Lankarani and Nikravesh 1990: N = k p^n (1 + D p'/v0) with D = (3/4) (1 - e^2), from the energy
-// that a nearly elastic impact loses.
+// Lankarani and Nikravesh 1990: N = k p^n (1 + D p'/v0) with D = (3/4) (1 - e^2), derived from the
+// energy loss of a nearly elastic impact.
 #include "core/contact/power_law.h"
 
 static double lankarani_nikravesh_factor(double e) {
@@ -12,8 +12,8 @@ const ContactLaw contact_lankarani_nikravesh = {
              contact_fields, sizeof(Contact)},
     .form = CONTACT_POWER,
     .factor = lankarani_nikravesh_factor,
-    .reached = power_reached,
-    .duration = power_duration,
-    .force = power_force,
-    .terms = power_terms,
+    .restitution = power_law_restitution,
+    .duration = power_law_duration,
+    .force = power_law_force,
+    .terms = power_law_terms,
 };

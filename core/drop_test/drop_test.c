@@ -11,6 +11,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "core/base/json_pointer.h"
 #include "core/base/rfc3339.h"
 #include "core/contact/identification.h"
 #include "core/drop_test/contact_detection.h"
@@ -72,7 +73,7 @@ static double drop_fall_speed(double height) {
 double drop_test_effective_mass(const DropTest *test) {
     if (test->base == MATERIAL_BASE_FREE)
         return !isnan(test->impactor_mass) && !isnan(test->base_mass)
-                   ? effective_mass(test->impactor_mass, test->base_mass)
+                   ? contact_effective_mass(test->impactor_mass, test->base_mass)
                    : (double)NAN;
     return test->base == MATERIAL_BASE_FIXED ? test->impactor_mass : (double)NAN;
 }
@@ -100,7 +101,7 @@ drop_fault(Problem *problem, const char *pointer, const char *name, double value
     va_start(arguments, format);
     vsnprintf(sentence, sizeof sentence, format, arguments);
     va_end(arguments);
-    pointer_join(place, sizeof place, pointer, name);
+    json_pointer_join(place, sizeof place, pointer, name);
     return unit != NULL
                ? problem_add_real(problem, STATUS_INVALID, place, value, unit, "%s", sentence)
                : problem_add(problem, STATUS_INVALID, place, "%s", sentence);
@@ -173,9 +174,9 @@ static Status drop_check(const DropTest *test, const Drop *drop, const char *poi
 static Status drop_test_check_drops(const DropTest *test, const char *pointer, Problem *problem) {
     Status status = STATUS_OK;
     char drops[POINTER_SIZE], place[POINTER_SIZE];
-    pointer_join(drops, sizeof drops, pointer, "drops");
+    json_pointer_join(drops, sizeof drops, pointer, "drops");
     for (size_t i = 0; i < test->drops.count; i++) {
-        pointer_index(place, sizeof place, drops, i);
+        json_pointer_index(place, sizeof place, drops, i);
         const Drop *drop = &test->drops.at[i];
         if (drop->excluded == NULL && !problem_concerns(problem, place) &&
             drop_check(test, drop, place, problem) != STATUS_OK)
@@ -194,11 +195,11 @@ size_t drop_test_sample_count(const DropTest *test) {
 static Status drop_test_check_traces(const DropTest *test, const char *pointer, Problem *problem) {
     Status status = STATUS_OK;
     char traces[POINTER_SIZE], trace[POINTER_SIZE], place[POINTER_SIZE];
-    pointer_join(traces, sizeof traces, pointer, "traces");
+    json_pointer_join(traces, sizeof traces, pointer, "traces");
     for (size_t i = 0; i < test->traces.count; i++) {
         const Trace *of = &test->traces.at[i];
-        pointer_index(trace, sizeof trace, traces, i);
-        pointer_join(place, sizeof place, trace, "force");
+        json_pointer_index(trace, sizeof trace, traces, i);
+        json_pointer_join(place, sizeof place, trace, "force");
         if (of->excluded == NULL && !problem_concerns(problem, trace) &&
             trace_validate(of->interval, &of->force, place, problem) != STATUS_OK)
             status = STATUS_INVALID;
@@ -222,26 +223,26 @@ static Status drop_test_check_base(const DropTest *test, const char *pointer, Pr
 }
 
 Status drop_test_validate(const DropTest *test, const char *pointer, Problem *problem) {
-    Status status = fields_check(drop_test_fields, test, pointer, problem);
+    Status status = fields_validate(drop_test_fields, test, pointer, problem);
     char place[POINTER_SIZE], traces[POINTER_SIZE];
-    pointer_join(place, sizeof place, pointer, "drops");
-    pointer_join(traces, sizeof traces, pointer, "traces");
+    json_pointer_join(place, sizeof place, pointer, "drops");
+    json_pointer_join(traces, sizeof traces, pointer, "traces");
     // A list that could not be read is empty too.
     if (test->drops.count == 0 && test->traces.count == 0 && !problem_concerns(problem, place) &&
         !problem_concerns(problem, traces)) {
         status = problem_add(problem, STATUS_INVALID, place,
                              "is required unless there are traces: at least one drop");
     }
-    pointer_join(place, sizeof place, pointer, "date");
+    json_pointer_join(place, sizeof place, pointer, "date");
     int64_t unix_ms;
     if (test->date != NULL && !problem_concerns(problem, place) &&
-        !date_read(test->date, &unix_ms)) {
+        !rfc3339_read(test->date, &unix_ms)) {
         Fault fault = {
             .detail =
                 "must be a date as 2026-11-21, or with a time of day as 2026-11-21T09:30:00Z"};
         text_fit(fault.pointer, sizeof fault.pointer, place);
         text_quote(fault.value, sizeof fault.value, test->date);
-        status = problem_put(problem, STATUS_INVALID, &fault);
+        status = problem_add_fault(problem, STATUS_INVALID, &fault);
     }
     if (drop_test_check_base(test, pointer, problem) != STATUS_OK)
         status = STATUS_INVALID;

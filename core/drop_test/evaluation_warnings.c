@@ -4,6 +4,7 @@
 #include <stdlib.h>
 
 #include "core/base/canonical.h"
+#include "core/base/json_pointer.h"
 #include "core/drop_test/gravity_correction.h"
 
 enum { OUTLIERS_MAX = 5, POINTER_SIZE = sizeof((Fault){0}.pointer) };
@@ -17,7 +18,7 @@ static void warning_pointer(const Measurement *of, const char *name, char pointe
     if (of->number != COUNT_ABSENT)
         snprintf(test, sizeof test, "/measurements/%llu", (unsigned long long)of->number);
     if (name != NULL)
-        pointer_join(pointer, POINTER_SIZE, test, name);
+        json_pointer_join(pointer, POINTER_SIZE, test, name);
     else
         snprintf(pointer, POINTER_SIZE, "%s", test);
 }

@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "core/base/text_format.h"
+#include "core/base/status.h"
 #include "core/drop_test/contact_detection.h"
 #include "core/drop_test/fit_confidence.h"
 
@@ -153,7 +153,7 @@ static Status trace_conclude(const FitConfidence *likely, bool is_form_sure, dou
     if (!is_form_sure) {
         if (is_wide)
             trace_withdraw(counted, contact);
-        return trace_status(sentence(
+        return trace_status(text_format(
             &contact->why,
             "the trace is hardly a pulse of the model under the separation rule %s: the rms "
             "residual of the best one is %.2g %% of the peak, and the noise is %.2g %% of it",
@@ -161,17 +161,17 @@ static Status trace_conclude(const FitConfidence *likely, bool is_form_sure, dou
     }
     if (is_wide) {
         trace_withdraw(counted, contact);
-        return trace_status(
-            sentence(&contact->why,
-                     "pulses from %.3g s to %.3g s fit the trace about equally well: less noise or "
-                     "more samples in contact would distinguish them",
-                     contact->least_contact_time, contact->most_contact_time));
+        return trace_status(text_format(
+            &contact->why,
+            "pulses from %.3g s to %.3g s fit the trace about equally well: less noise or "
+            "more samples in contact would distinguish them",
+            contact->least_contact_time, contact->most_contact_time));
     }
     if (likely->decay.mean + 2 * likely->decay.deviation > decay_max) {
         trace_withdraw(counted, contact);
-        return trace_status(sentence(&contact->why,
-                                     "the force has no distinct end: pulses with a restitution of "
-                                     "nearly 0 fit the trace as well"));
+        return trace_status(text_format(
+            &contact->why, "the force has no distinct end: pulses with a restitution of "
+                           "nearly 0 fit the trace as well"));
     }
     return STATUS_OK;
 }
@@ -180,7 +180,7 @@ static Status trace_conclude(const FitConfidence *likely, bool is_form_sure, dou
 static Status trace_draw(const PulseFit *fit, const PulseModel *model,
                          const ContactDetection *found, const DetectedContact *run, double origin,
                          Reals *pulse) {
-    if (!reals_make(pulse, TRACE_PULSE))
+    if (!reals_allocate(pulse, TRACE_PULSE))
         return STATUS_NO_MEMORY;
     for (size_t i = 0; i < TRACE_PULSE; i++) {
         const double share = (double)i / (TRACE_PULSE - 1), *part = fit->at.part;
@@ -197,7 +197,7 @@ static Status trace_fit_contact(FitWindow *window, const ContactDetection *found
                                 const DetectedContact *run, double origin, double interval,
                                 const PulseFit *fits, size_t count, TraceContact *contact) {
     if (count == 0)
-        return trace_status(sentence(&contact->why, "no pulse of the model fits"));
+        return trace_status(text_format(&contact->why, "no pulse of the model fits"));
     const PulseFit *fit = &fits[0];
     contact->seen.samples = (uint64_t)(fit->last - fit->first + 1);
     contact->seen.first = (origin + (double)fit->first) * interval;
@@ -214,16 +214,17 @@ static Status trace_fit_contact(FitWindow *window, const ContactDetection *found
     const double noise = found->noise / fabs(run->peak) / sqrt((double)window->per_block);
     contact->seen.misfit = noise > 0 ? contact->seen.misfit_share / noise : (double)NAN;
     if (contact->seen.samples < SAMPLES_MIN)
-        return trace_status(sentence(&contact->why,
-                                     "only %d samples are in contact, and pulses of very different "
-                                     "length fit so few: at least 5 are needed, 20 are better",
-                                     (int)contact->seen.samples));
+        return trace_status(
+            text_format(&contact->why,
+                        "only %d samples are in contact, and pulses of very different "
+                        "length fit so few: at least 5 are needed, 20 are better",
+                        (int)contact->seen.samples));
     if (contact->seen.misfit_share > misfit_max && contact->seen.misfit_share > 2 * noise)
-        return trace_status(sentence(&contact->why,
-                                     "the trace is no pulse of the model under the separation rule "
-                                     "%s: the rms residual of the best one is %.2g %% of the peak",
-                                     separation_names[window->separation],
-                                     100 * contact->seen.misfit_share));
+        return trace_status(
+            text_format(&contact->why,
+                        "the trace is no pulse of the model under the separation rule "
+                        "%s: the rms residual of the best one is %.2g %% of the peak",
+                        separation_names[window->separation], 100 * contact->seen.misfit_share));
     // Residuals rarely exceed this by chance, given the number of means and of samples of noise.
     const double freedom = fmax((double)means - 4, 1), known_from = fmax(found->noise_count - 1, 1);
     const double chance = 1 + 3.7 * sqrt(1 / freedom + 1 / known_from) / sqrt(2);
@@ -314,8 +315,8 @@ static Status trace_read_contact(double interval, const TraceOptions *options,
     trace_count_samples(found, run, options->separation, interval, contact);
     if (run->first == 0 || run->last == found->samples - 1) {
         contact->most_contact_time = (double)NAN;
-        return trace_status(sentence(&contact->why, "the trace %s during the contact",
-                                     run->first == 0 ? "begins" : "ends"));
+        return trace_status(text_format(&contact->why, "the trace %s during the contact",
+                                        run->first == 0 ? "begins" : "ends"));
     }
     const size_t from = trace_fill_window(found, number, options->separation, window);
     PulseFit fits[FITS_MAX];
@@ -326,11 +327,11 @@ static Status trace_read_contact(double interval, const TraceOptions *options,
                              : pulse_fit_run(window, fits);
     TRY(trace_fit_contact(window, found, run, (double)from, interval, fits, count, contact));
     if (!is_settled && !isnan(contact->contact_time))
-        return trace_status(sentence(&contact->why,
-                                     "gravity is only partly corrected: the masses and this force "
-                                     "do not lead to one approach speed; check them, or give it"));
+        return trace_status(text_format(
+            &contact->why, "gravity is only partly corrected: the masses and this force "
+                           "do not lead to one approach speed; check them, or give it"));
     if (options->gravity > 0 && !(window->pull_rate > 0) && !isnan(contact->contact_time))
-        return trace_status(sentence(
+        return trace_status(text_format(
             &contact->why,
             "gravity is not corrected: neither the approach speed nor the masses are known"));
     return STATUS_OK;
@@ -370,11 +371,11 @@ Status trace_analysis_run(double interval, const Reals *force, const TraceOption
         status = trace_read_contact(interval, options, &found, i, window, &list->at[i]);
     }
     if (status == STATUS_OK && found.count == 0)
-        status = trace_status(
-            sentence(&analysis->why, "no force exceeds the threshold of %.3g N", found.threshold));
+        status = trace_status(text_format(
+            &analysis->why, "no force exceeds the threshold of %.3g N", found.threshold));
     if (status == STATUS_OK && found.is_full)
-        status = trace_status(sentence(&analysis->why, "only the first %d contacts are evaluated",
-                                       TRACE_CONTACTS_MAX));
+        status = trace_status(text_format(
+            &analysis->why, "only the first %d contacts are evaluated", TRACE_CONTACTS_MAX));
     contact_detection_clear(&found);
     free(window);
     return status;

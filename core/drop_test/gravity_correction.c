@@ -45,7 +45,8 @@ static double gravity_pressure(const Swing *of, SwingState at) {
 
 GravityContact gravity_apply(const GravityLoad *load, double restitution, double contact_time) {
     const GravityContact endless = {0, (double)INFINITY};
-    const Identified isolated = identify_measured(1, restitution, 1, load->separation);
+    const Identification isolated =
+        identification_from_restitution(1, restitution, 1, load->separation);
     const double G = load->gravity * contact_time / load->speed, w = sqrt(isolated.stiffness);
     const Swing of = {w, isolated.damping_ratio, G / (w * w), load->separation};
     const SwingState start = {-of.equilibrium, 1};

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/base/text_format.h"
+#include "core/base/status.h"
 
 const char *const proposal_form_names[] = {"constant", "table", NULL};
 
@@ -86,7 +86,7 @@ static Status proposal_set_source(const Basis *basis, Material *material) {
         }
     }
     material->source = strdup(text);
-    if (material->source == NULL || !reals_make(&material->measurements, count))
+    if (material->source == NULL || !reals_allocate(&material->measurements, count))
         return STATUS_NO_MEMORY;
     for (size_t i = 0; i < count; i++)
         material->measurements.at[i] = (double)tests[i].number;
@@ -123,8 +123,9 @@ static Status proposal_set_constant(Evaluation *evaluation, Basis *basis,
     Warnings *warnings = &evaluation->warnings;
     const Statistic *e = &evaluation->restitution, *T = &evaluation->contact_time;
     if (e->count == 0)
-        return sentence(&proposal->why, "no reading that counts gives the restitution, which a "
-                                        "revision needs: add a measurement with heights or speeds")
+        return text_format(&proposal->why,
+                           "no reading that counts gives the restitution, which a "
+                           "revision needs: add a measurement with heights or speeds")
                    ? STATUS_OK
                    : STATUS_NO_MEMORY;
     for (size_t i = 0; i < evaluation->rows.count; i++)
@@ -239,10 +240,11 @@ static Status proposal_set_table(Evaluation *evaluation, Basis *basis, Bin *bins
     const size_t all = proposal_make_bins(evaluation, basis, bins);
     const size_t kept = proposal_keep_bins(basis, bins, all, &has_time);
     if (kept < 2 || kept > MATERIAL_ROWS)
-        return sentence(&proposal->why,
-                        "a table needs e%s at two approach speeds at least (%g times one another), "
-                        "%d at most; the readings have %zu",
-                        has_time ? " and T_c" : "", PROPOSAL_BIN, MATERIAL_ROWS, kept)
+        return text_format(
+                   &proposal->why,
+                   "a table needs e%s at two approach speeds at least (%g times one another), "
+                   "%d at most; the readings have %zu",
+                   has_time ? " and T_c" : "", PROPOSAL_BIN, MATERIAL_ROWS, kept)
                    ? STATUS_OK
                    : STATUS_NO_MEMORY;
     TRY(proposal_fill_table(basis, bins, kept, readings, &proposal->material.table));

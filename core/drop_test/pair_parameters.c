@@ -12,7 +12,6 @@
 #include <string.h>
 
 #include "core/contact/identification.h"
-#include "core/contact/identification_sensitivity.h"
 #include "core/math/student_t.h"
 
 // clang-format off
@@ -75,7 +74,7 @@ static PairRow pair_row(const Material *material, size_t index) {
 static PairFigure pair_figure(double value, double relative) {
     if (!isfinite(value))
         return (PairFigure){(double)NAN, (double)NAN, (double)NAN, (double)NAN};
-    const double factor = exp(student_quantile(0.95, 0) * relative);
+    const double factor = exp(student_t_quantile(0.95, 0) * relative);
     if (!isfinite(factor))
         return (PairFigure){value, (double)NAN, (double)NAN, (double)NAN};
     return (PairFigure){value, value * relative, value / factor, value * factor};
@@ -88,16 +87,18 @@ typedef struct PairCase {
     Separation separation;
 } PairCase;
 
-static Identified pair_identify(const PairCase *pair_case, double e, double T) {
+static Identification pair_identify(const PairCase *pair_case, double e, double T) {
     if (pair_case->identified_for != IDENTIFIED_FOR_RIG)
-        return identify_measured(pair_case->mass, e, T, pair_case->separation);
-    const Identified rig = identify_measured(pair_case->test_mass, e, T, pair_case->separation);
-    return identify_given(pair_case->mass, rig.stiffness, rig.damping, pair_case->separation);
+        return identification_from_restitution(pair_case->mass, e, T, pair_case->separation);
+    const Identification rig =
+        identification_from_restitution(pair_case->test_mass, e, T, pair_case->separation);
+    return identification_from_stiffness(pair_case->mass, rig.stiffness, rig.damping,
+                                         pair_case->separation);
 }
 
 static void pair_outputs(const PairCase *pair_case, double log_e, double log_T,
                          double values[OUTPUTS]) {
-    const Identified it = pair_identify(pair_case, exp(log_e), exp(log_T));
+    const Identification it = pair_identify(pair_case, exp(log_e), exp(log_T));
     values[0] = log(it.damping_ratio);
     values[1] = log(it.restitution);
     values[2] = log(it.contact_time);
@@ -136,7 +137,7 @@ static PairContact pair_contact(const PairCase *pair_case, const PairRow *known)
     const bool has_time = !isnan(known->T);
     const PairRow with = {known->speed, known->e, has_time ? known->T : 1, known->r_e,
                           has_time ? known->r_T : 0};
-    const Identified it = pair_identify(pair_case, with.e, with.T);
+    const Identification it = pair_identify(pair_case, with.e, with.T);
     double relative[OUTPUTS];
     pair_spread(pair_case, &with, relative);
     contact.restitution = pair_figure(it.restitution, relative[1]);
@@ -145,7 +146,7 @@ static PairContact pair_contact(const PairCase *pair_case, const PairRow *known)
     contact.damping_ratio = pair_figure(it.damping_ratio, relative[0]);
     if (!has_time)
         return contact;
-    const Propagation by = propagate(with.e, pair_case->separation);
+    const IdentificationSensitivity by = identification_sensitivity(with.e, pair_case->separation);
     contact.contact_time = pair_figure(it.contact_time, relative[2]);
     contact.stiffness = pair_figure(it.stiffness, hypot(by.stiffness_by_restitution * with.r_e,
                                                         by.stiffness_by_contact_time * with.r_T));
@@ -194,7 +195,7 @@ static Status pair_warn_of_mass(const Material *material, PairParameters *pair) 
                             "kg: e belongs to the test's pair",
                             mass, percent, side, test);
     const PairCase pair_case = {mass, test, IDENTIFIED_FOR_RIG, (Separation)rule};
-    const Identified it = pair_identify(&pair_case, known.e, known.T);
+    const Identification it = pair_identify(&pair_case, known.e, known.T);
     return warnings_add(&pair->warnings, "/effective_mass",
                         "this pair's effective mass of %.4g kg is %.3g %% %s the test's %.4g kg: "
                         "e and T_c belong to the test's pair; were k_b and c_b those of the test "
@@ -263,11 +264,12 @@ Status pair_parameters_run(const Material *material, double damper_mass, double 
         .damper_mass = damper_mass,
         .structure_mass = structure_mass,
         .identified_for = identified_for,
-        .effective_mass =
-            !isnan(structure_mass) ? effective_mass(damper_mass, structure_mass) : damper_mass,
+        .effective_mass = !isnan(structure_mass)
+                              ? contact_effective_mass(damper_mass, structure_mass)
+                              : damper_mass,
         .test_mass = material_test_mass(material),
     };
-    material_speeds(material, &pair->least_speed, &pair->most_speed);
+    material_speed_range(material, &pair->least_speed, &pair->most_speed);
     if (identified_for == IDENTIFIED_FOR_RIG && isnan(pair->test_mass))
         return problem_add(
             problem, STATUS_INVALID, "/identified_for",

@@ -16,7 +16,7 @@
 
 #include <stdlib.h>
 
-#include "core/base/text_format.h"
+#include "core/base/status.h"
 #include "core/math/student_t.h"
 
 static const char *const trend_verdict_names[] = {"constant", "not_constant", "undecided", NULL};
@@ -163,7 +163,7 @@ static bool statistic_is_too_close(const Reading *readings, size_t count, double
 
 static bool statistic_set_interval(const Reading *readings, size_t count, Statistic *statistic) {
     const double mean = statistic->mean;
-    double t = student_quantile(EVALUATION_CONFIDENCE, 0), weights = 0, squares = 0;
+    double t = student_t_quantile(EVALUATION_CONFIDENCE, 0), weights = 0, squares = 0;
     for (size_t i = 0; i < count; i++) {
         const double part = readings[i].weight * readings[i].uncertainty;
         squares += part * part;
@@ -173,34 +173,35 @@ static bool statistic_set_interval(const Reading *readings, size_t count, Statis
     bool is_made;
     if (count > 1 && statistic->deviation > rounding * fabs(mean) &&
         !(stated > 0 && statistic_is_too_close(readings, count, mean))) {
-        t = student_quantile(EVALUATION_CONFIDENCE, count - 1);
+        t = student_t_quantile(EVALUATION_CONFIDENCE, count - 1);
         statistic->standard_error =
             sqrt(statistic_squares(readings, count, mean) / (double)(count - 1) / weights);
         is_made =
             isnan(statistic->scatter)
-                ? sentence(&statistic->why,
-                           "mean +- %.4g standard errors, Student's t for %zu readings", t, count)
-                : sentence(&statistic->why,
-                           "mean weighted by the stated uncertainties and a scatter of %.3g "
-                           "beyond them, +- %.4g standard errors, Student's t for %zu "
-                           "readings",
-                           statistic->scatter, t, count);
+                ? text_format(&statistic->why,
+                              "mean +- %.4g standard errors, Student's t for %zu readings", t,
+                              count)
+                : text_format(&statistic->why,
+                              "mean weighted by the stated uncertainties and a scatter of %.3g "
+                              "beyond them, +- %.4g standard errors, Student's t for %zu "
+                              "readings",
+                              statistic->scatter, t, count);
     } else if (stated > 0) {
         statistic->standard_error = stated;
         is_made =
             count == 1
-                ? sentence(
+                ? text_format(
                       &statistic->why,
                       "one reading: the interval is that of its uncertainty; the spread is unknown")
-                : sentence(&statistic->why,
-                           "the %zu readings are closer together than their stated uncertainty "
-                           "allows: the interval is that of the uncertainty",
-                           count);
+                : text_format(&statistic->why,
+                              "the %zu readings are closer together than their stated uncertainty "
+                              "allows: the interval is that of the uncertainty",
+                              count);
     } else {
-        return sentence(&statistic->why,
-                        count == 1 ? "one reading without a stated uncertainty: no interval"
-                                   : "all readings are equal within the resolution of the "
-                                     "instrument, whose uncertainty is not stated: no interval");
+        return text_format(&statistic->why,
+                           count == 1 ? "one reading without a stated uncertainty: no interval"
+                                      : "all readings are equal within the resolution of the "
+                                        "instrument, whose uncertainty is not stated: no interval");
     }
     statistic->low = mean - t * statistic->standard_error;
     statistic->high = mean + t * statistic->standard_error;
@@ -255,22 +256,23 @@ static Line line_fit(const Reading *readings, size_t count) {
 static bool trend_describe(const char *name, const char *unit, double mean, Trend *trend) {
     const double percent = 100 / fabs(mean), missed = trend->missed_change * percent;
     if (trend->verdict == TREND_NOT_CONSTANT)
-        return sentence(
+        return text_format(
             &trend->detail,
             "%s %s by %.2g%s (%.3g %%) from %.3g to %.3g m/s (p = %.2g): it is not constant over "
             "speed, and a table over speed describes it better than a mean",
             name, trend->change < 0 ? "falls" : "rises", fabs(trend->change), unit,
             fabs(trend->change) * percent, trend->least_speed, trend->most_speed, trend->p);
-    return sentence(&trend->detail,
-                    "%s shows no trend from %.3g to %.3g m/s (slope %.2g +- %.2g%s per m/s, p = "
-                    "%.2g)%s a change of up to %.2g%s (%.3g %%) over these speeds would not have "
-                    "been seen",
-                    name, trend->least_speed, trend->most_speed, trend->slope,
-                    trend->standard_error, unit, trend->p,
-                    trend->verdict == TREND_CONSTANT
-                        ? " and may be taken as constant there;"
-                        : ", but the readings are too few or too scattered for a verdict:",
-                    trend->missed_change, unit, missed);
+    return text_format(
+        &trend->detail,
+        "%s shows no trend from %.3g to %.3g m/s (slope %.2g +- %.2g%s per m/s, p = "
+        "%.2g)%s a change of up to %.2g%s (%.3g %%) over these speeds would not have "
+        "been seen",
+        name, trend->least_speed, trend->most_speed, trend->slope, trend->standard_error, unit,
+        trend->p,
+        trend->verdict == TREND_CONSTANT
+            ? " and may be taken as constant there;"
+            : ", but the readings are too few or too scattered for a verdict:",
+        trend->missed_change, unit, missed);
 }
 
 static bool trend_set(const Line *line, const char *name, const char *unit, Statistic *statistic) {
@@ -281,19 +283,21 @@ static bool trend_set(const Line *line, const char *name, const char *unit, Stat
         trend->most_speed = line->most;
     }
     if (line->count < 3)
-        return sentence(&trend->detail,
-                        "whether %s is constant over speed is unknown: %zu reading%s with a speed, "
-                        "at least three are needed",
-                        name, line->count, line->count == 1 ? "" : "s");
+        return text_format(
+            &trend->detail,
+            "whether %s is constant over speed is unknown: %zu reading%s with a speed, "
+            "at least three are needed",
+            name, line->count, line->count == 1 ? "" : "s");
     const double span = line->most - line->least;
     if (!(span > span_min * line->speed))
-        return sentence(&trend->detail,
-                        "whether %s is constant over speed is unknown: all readings were made at "
-                        "about %.3g m/s",
-                        name, line->speed);
+        return text_format(
+            &trend->detail,
+            "whether %s is constant over speed is unknown: all readings were made at "
+            "about %.3g m/s",
+            name, line->speed);
     const double least = resolved * fabs(statistic->mean);
     const size_t freedom = line->count - 2;
-    const double t = student_quantile(EVALUATION_CONFIDENCE, freedom);
+    const double t = student_t_quantile(EVALUATION_CONFIDENCE, freedom);
     trend->mean_speed = line->speed;
     trend->mean_value = line->value;
     trend->slope = line->slope;
@@ -301,7 +305,7 @@ static bool trend_set(const Line *line, const char *name, const char *unit, Stat
     trend->low = line->slope - t * trend->standard_error;
     trend->high = line->slope + t * trend->standard_error;
     trend->t = line->slope / trend->standard_error;
-    trend->p = fmax(1 - student_share(fabs(trend->t), freedom), 0);
+    trend->p = fmax(1 - student_t_probability(fabs(trend->t), freedom), 0);
     trend->change = line->slope * span;
     trend->missed_change = fmax(fabs(trend->low), fabs(trend->high)) * span;
     trend->verdict = trend->p < significance ? TREND_NOT_CONSTANT
@@ -371,7 +375,7 @@ Status reading_statistics_run(Reading *readings, size_t count, const char *name,
     double *scratch = calloc(2 * count + 1, sizeof *scratch);
     bool is_made = scratch != NULL;
     if (is_made && count == 0) {
-        is_made = sentence(&statistic->why, "no reading that counts gives the %s", name);
+        is_made = text_format(&statistic->why, "no reading that counts gives the %s", name);
     } else if (is_made) {
         statistic->unweighted_mean = statistic_mean(readings, count, true);
         statistic_set_spread(readings, count, scratch, statistic);

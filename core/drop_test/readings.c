@@ -6,7 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/base/text_format.h"
+#include "core/base/json_pointer.h"
+#include "core/base/status.h"
 #include "core/drop_test/gravity_correction.h"
 #include "core/scene/material.h"
 
@@ -91,8 +92,8 @@ static Status reading_new(const Measurement *tests, size_t index, size_t place, 
 }
 
 static Status reading_add_note(EvaluationRow *row, const char *text, Problem *problem) {
-    return reading_status(sentence(&row->note, "%s%s%s", row->note != NULL ? row->note : "",
-                                   row->note != NULL ? "; " : "", text),
+    return reading_status(text_format(&row->note, "%s%s%s", row->note != NULL ? row->note : "",
+                                      row->note != NULL ? "; " : "", text),
                           problem);
 }
 
@@ -141,7 +142,7 @@ static Status reading_add_drop(const Measurement *tests, size_t index, size_t i,
     }
     row->restitution_counts = drop->excluded == NULL && !isnan(row->restitution);
     row->contact_time_counts = drop->excluded == NULL && !isnan(row->contact_time);
-    return reading_status(sentence(&row->from, "drop %zu", i + 1) &&
+    return reading_status(text_format(&row->from, "drop %zu", i + 1) &&
                               reading_copy(drop->excluded, &row->excluded) &&
                               reading_copy(drop->note, &row->note),
                           problem);
@@ -171,7 +172,7 @@ static Status reading_add_contact(const Measurement *tests, size_t index, size_t
         row->restitution_by = RESTITUTION_BY_PULSE;
     row->restitution_counts = trace->excluded == NULL && !isnan(row->restitution);
     row->contact_time_counts = trace->excluded == NULL && !isnan(row->contact_time);
-    return reading_status(sentence(&row->from, "trace %zu, contact %zu", i + 1, number + 1) &&
+    return reading_status(text_format(&row->from, "trace %zu, contact %zu", i + 1, number + 1) &&
                               reading_copy(trace->excluded, &row->excluded) &&
                               reading_copy(contact->why, &row->note),
                           problem);
@@ -183,9 +184,9 @@ static Status reading_add_empty(const Measurement *tests, size_t index, size_t i
     EvaluationRow *row = NULL;
     TRY(reading_new(tests, index, i, true, rows, &row, problem));
     return reading_status(
-        sentence(&row->from, "trace %zu", i + 1) &&
+        text_format(&row->from, "trace %zu", i + 1) &&
             reading_copy(tests[index].test->traces.at[i].excluded, &row->excluded) &&
-            sentence(&row->note, "%s", why != NULL ? why : "no contact is detected in it"),
+            text_format(&row->note, "%s", why != NULL ? why : "no contact is detected in it"),
         problem);
 }
 
@@ -205,7 +206,7 @@ static Status reading_add_trace(const Measurement *tests, size_t index, size_t i
     char place[sizeof((Fault){0}.pointer)], pointer[sizeof((Fault){0}.pointer)];
     const EvaluationRow at = {.measurement = tests[index].number, .is_of_trace = true, .place = i};
     reading_pointer(&at, place, sizeof place);
-    pointer_join(pointer, sizeof pointer, place, "force");
+    json_pointer_join(pointer, sizeof pointer, place, "force");
     TraceAnalysis analysis = {0};
     // An unreadable trace may be excluded for that reason.
     Status status = trace_analysis_run(trace->interval, &trace->force, &options, pointer, &analysis,

@@ -8,6 +8,8 @@
 // mean.
 #include "core/excitation/chirp.h"
 
+#include "core/base/json_pointer.h"
+
 #include <stdlib.h>
 
 #define PI 3.14159265358979323846264338328L
@@ -56,7 +58,7 @@ static Status chirp_complete(Excitation *excitation, const Span *span, const cha
         !isfinite(chirp_highest(chirp)) || !(chirp->sweep_time > 0) || !isfinite(chirp->sweep_time))
         return STATUS_OK; // the row adds the fault
     char place[sizeof((Fault){0}.pointer)], is[32], limit[32];
-    pointer_join(place, sizeof place, pointer, "end_frequency");
+    json_pointer_join(place, sizeof place, pointer, "end_frequency");
     if (chirp_highest(chirp) == 0)
         return problem_add_real(problem, STATUS_INVALID, place, chirp->end_frequency, "Hz",
                                 "must be above 0 Hz where the start frequency is 0 Hz");
@@ -64,7 +66,7 @@ static Status chirp_complete(Excitation *excitation, const Span *span, const cha
         chirp->rate = span->sample_rate *
                       fmax(ceil(KNOTS_A_CYCLE * chirp_highest(chirp) / span->sample_rate), 1);
     const size_t most = span->most != 0 && span->most < KNOTS_MAX ? span->most : KNOTS_MAX;
-    pointer_join(place, sizeof place, pointer, "rate");
+    json_pointer_join(place, sizeof place, pointer, "rate");
     if (chirp_highest(chirp) > chirp->rate / 2)
         return problem_add_real(problem, STATUS_INVALID, place, chirp->rate, "Hz",
                                 "must be at least twice the highest frequency, %s Hz, is %s",
@@ -128,7 +130,7 @@ static void chirp_doubt(const Excitation *excitation, const Span *span, const ch
     const ExcitationChirp *chirp = chirp_of(excitation);
     const double omega = 2 * (double)PI * chirp_highest(chirp), turn = omega / chirp->rate;
     char place[sizeof((Fault){0}.pointer)], is[32], limit[32];
-    pointer_join(place, sizeof place, pointer, "rate");
+    json_pointer_join(place, sizeof place, pointer, "rate");
     if (turn * turn / 12 > 1e-3)
         (void)problem_add(doubts, STATUS_INVALID, place,
                           "is %s Hz, too few for %s Hz: the lines between the knots miss the sweep "

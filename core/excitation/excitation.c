@@ -2,6 +2,8 @@
 // state.
 #include "core/excitation/excitation.h"
 
+#include "core/base/json_pointer.h"
+
 enum { STOREYS_MAX = 200 };
 
 // clang-format off
@@ -17,7 +19,7 @@ void excitation_doubt_frequency(double frequency, const Span *span, const char *
     if (!(frequency > span->sample_rate / 2))
         return;
     char place[sizeof((Fault){0}.pointer)], is[32], limit[32];
-    pointer_join(place, sizeof place, pointer, name);
+    json_pointer_join(place, sizeof place, pointer, name);
     (void)problem_add(
         doubts, STATUS_INVALID, place,
         "is %s Hz, above half the sample rate, %s Hz: the output's samples do not show "

@@ -17,10 +17,10 @@ typedef struct Excitation {
 
 // Properties of the run on which an excitation depends.
 typedef struct Span {
-    double duration;          // [s]
-    double sample_rate;       // [Hz]
-    size_t most;              // limit on the samples of the base, 0: none
-    FourierStock *transforms; // may be NULL
+    double duration;      // [s]
+    double sample_rate;   // [Hz]
+    size_t most;          // limit on the samples of the base, 0: none
+    FftCache *transforms; // may be NULL
 } Span;
 
 typedef struct ExcitationKind {

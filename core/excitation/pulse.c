@@ -2,6 +2,8 @@
 // length), and a triangle that reaches the amplitude at the middle.
 #include "core/excitation/pulse.h"
 
+#include "core/base/json_pointer.h"
+
 // clang-format off
 static const Field pulse_fields[] = {
     FIELD_BASE(ExcitationPulse, excitation, excitation_fields),
@@ -26,7 +28,7 @@ static Status pulse_complete(Excitation *excitation, const Span *span, const cha
         return STATUS_OK; // the row adds the fault
     const double least = fmax(1e-12 * pulse->start, 1e-12);
     char place[sizeof((Fault){0}.pointer)], is[32], limit[32];
-    pointer_join(place, sizeof place, pointer, "length");
+    json_pointer_join(place, sizeof place, pointer, "length");
     if (pulse->length < least)
         return problem_add_real(problem, STATUS_INVALID, place, pulse->length, "s",
                                 "must be at least %s s, what a clock can tell at that start, is %s",
@@ -42,12 +44,12 @@ static void pulse_doubt(const Excitation *excitation, const Span *span, const ch
                         Problem *doubts) {
     const ExcitationPulse *pulse = pulse_of(excitation);
     char place[sizeof((Fault){0}.pointer)], is[32], limit[32];
-    pointer_join(place, sizeof place, pointer, "start");
+    json_pointer_join(place, sizeof place, pointer, "start");
     if (pulse->start >= span->duration)
         (void)problem_add(doubts, STATUS_INVALID, place,
                           "is %s s: the run ends at %s s, before the pulse begins",
                           text_real(is, pulse->start), text_real(limit, span->duration));
-    pointer_join(place, sizeof place, pointer, "length");
+    json_pointer_join(place, sizeof place, pointer, "length");
     if (pulse->length * span->sample_rate < 2)
         (void)problem_add(doubts, STATUS_INVALID, place,
                           "is %s s, less than two samples of the output, %.3g s: the motion is "

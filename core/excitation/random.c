@@ -23,9 +23,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/base/json_pointer.h"
 #include "core/base/philox.h"
-#include "core/math/cosine_table.h"
-#include "core/math/sparse_spectrum_synthesis.h"
+#include "core/math/fft.h"
+#include "core/math/sparse_spectrum.h"
 
 #define PI 3.14159265358979323846264338328
 #define RATE_MIN 1e-9 // [Hz]
@@ -86,7 +87,7 @@ static bool random_check_rate(const ExcitationRandom *random, const Span *span, 
     if (!isfinite(span->duration) || random_sample_count(random, span) - 1 <= (double)most)
         return true;
     char place[256], rate[32], limit[32];
-    pointer_join(place, sizeof place, pointer, "rate");
+    json_pointer_join(place, sizeof place, pointer, "rate");
     problem_add_real(problem, STATUS_INVALID, place, random->rate, "Hz",
                      "must be at most %s Hz, which makes %zu samples of the base in this duration, "
                      "is %s",
@@ -100,8 +101,8 @@ static Status random_complete(Excitation *excitation, const Span *span, const ch
     ExcitationRandom *random = (ExcitationRandom *)(void *)excitation;
     Status status = STATUS_OK;
     char band[256], highest[256], limit[32], number[32];
-    pointer_join(band, sizeof band, pointer, "band");
-    pointer_index(highest, sizeof highest, band, 1);
+    json_pointer_join(band, sizeof band, pointer, "band");
+    json_pointer_index(highest, sizeof highest, band, 1);
     if (isnan(random->rate))
         random->rate = span->sample_rate;
     const bool has_rate = random_check_rate(random, span, pointer, problem);
@@ -136,44 +137,44 @@ static Status random_complete(Excitation *excitation, const Span *span, const ch
 
 // Writes the spectrum of y_m and transforms it.
 static void random_make_block(const ExcitationRandom *random, const RandomBlocks *blocks,
-                              uint64_t m, Synthesis *synthesis) {
-    double *bin = synthesis_bins(synthesis);
+                              uint64_t m, SparseSpectrum *synthesis) {
+    double *bin = sparse_spectrum_bins(synthesis);
     // Half, because the transform of a real sequence adds bin k and its mirror.
     const double scale = random->rms / sqrt((double)blocks->bins) / 2;
     memset(bin, 0, 2 * blocks->first_bin * sizeof *bin);
     double *inside = bin + 2 * blocks->first_bin;
-    noise_normal_pairs(random->seed, m, blocks->first_bin, blocks->bins, inside);
+    philox_normal_pairs(random->seed, m, blocks->first_bin, blocks->bins, inside);
     for (size_t k = 0; k < 2 * blocks->bins; k++)
         inside[k] *= scale;
-    synthesis_run(synthesis);
+    sparse_spectrum_run(synthesis);
 }
 
 // The faded first half of a block, added to `count` samples; then the second half, which starts the
 // next hop. Only the samples needed are computed.
-static void random_fade_in(const Synthesis *synthesis, const double *fade, size_t count,
+static void random_fade_in(const SparseSpectrum *synthesis, const double *fade, size_t count,
                            double *x) {
     double y[PART];
     for (size_t from = 0; from < count; from += PART) {
         const size_t many = count - from < PART ? count - from : PART;
-        synthesis_read(synthesis, from, PART, y);
+        sparse_spectrum_samples(synthesis, from, PART, y);
         for (size_t i = 0; i < many; i++)
             x[from + i] += fade[from + i] * y[i];
     }
 }
 
-static void random_fade_out(const Synthesis *synthesis, const double *fade, size_t hop,
+static void random_fade_out(const SparseSpectrum *synthesis, const double *fade, size_t hop,
                             size_t count, double *x) {
     double y[PART];
     for (size_t from = 0; from < count; from += PART) {
         const size_t many = count - from < PART ? count - from : PART;
-        synthesis_read(synthesis, hop + from, PART, y);
+        sparse_spectrum_samples(synthesis, hop + from, PART, y);
         for (size_t i = 0; i < many; i++)
             x[from + i] = fade[hop - 1 - from - i] * y[i];
     }
 }
 
 static Status random_make_samples(const ExcitationRandom *random, const RandomBlocks *blocks,
-                                  Synthesis *synthesis, const double *fade,
+                                  SparseSpectrum *synthesis, const double *fade,
                                   const Progress *progress, Base *base, Problem *problem) {
     const size_t hop = blocks->length / 2;
     const size_t hops = (base->count + hop - 1) / hop;
@@ -204,8 +205,8 @@ static Status random_make(const Excitation *excitation, const Span *span, const 
                            SAMPLES_MAX, wanted);
     const RandomBlocks blocks = random_blocks(random);
     const size_t hop = blocks.length / 2;
-    Synthesis *synthesis =
-        synthesis_new(blocks.length, blocks.first_bin + blocks.bins, span->transforms);
+    SparseSpectrum *synthesis =
+        sparse_spectrum_new(blocks.length, blocks.first_bin + blocks.bins, span->transforms);
     double *fade = malloc(hop * sizeof *fade);
     base->count = (size_t)wanted;
     base->values = malloc(base->count * sizeof *base->values);
@@ -217,11 +218,11 @@ static Status random_make(const Excitation *excitation, const Span *span, const 
         base->form = BASE_SAMPLED;
         base->interval = 1 / random->rate;
         const double step = PI / (double)blocks.length;
-        circle_cosines((0.5 - (double)hop) * step, step, hop, fade); // sines, a quarter turn on
+        fft_cosines((0.5 - (double)hop) * step, step, hop, fade); // sines, a quarter turn on
         status = random_make_samples(random, &blocks, synthesis, fade, progress, base, problem);
     }
     free(fade);
-    synthesis_free(synthesis, span->transforms);
+    sparse_spectrum_free(synthesis, span->transforms);
     if (status != STATUS_OK)
         base_clear(base);
     return status;

@@ -4,6 +4,8 @@
 
 #include "core/excitation/recorded_motion.h"
 
+#include "core/base/json_pointer.h"
+
 #define G 9.80665 // [m/s^2]
 
 // clang-format off
@@ -15,12 +17,12 @@ static const Field record_fields[] = {
     FIELD_REAL(ExcitationRecord, interval, "s", ABOVE(0), OPTIONAL, "time between samples; required with them"),
     FIELD_REAL(ExcitationRecord, scale, NULL, ANY, 1, "factor on the samples"),
     FIELD_TEXT(ExcitationRecord, source, 1000, PRESENCE_OPTIONAL, FIELD_NOTE, "where the samples come from; changes nothing"),
-    FIELD_SHARED(ExcitationRecord, named),
+    FIELD_REFCOUNT(ExcitationRecord, named),
     FIELD_END
 };
 // clang-format on
 
-static void named_record_free(Shared *shared) {
+static void named_record_free(Refcount *shared) {
     NamedRecord *named = (NamedRecord *)(void *)shared;
     free(named->samples.at);
     free(named);
@@ -30,7 +32,7 @@ NamedRecord *named_record_new(const char *name, const char *digest, double inter
                               Reals *samples) {
     NamedRecord *named = calloc(1, sizeof *named);
     if (named != NULL) {
-        atomic_init(&named->shared.holds, 1);
+        atomic_init(&named->shared.count, 1);
         named->shared.free = named_record_free;
         text_fit(named->name, sizeof named->name, name);
         text_fit(named->digest, sizeof named->digest, digest);
@@ -51,8 +53,8 @@ bool record_resolve(ExcitationRecord *record, NamedRecord *named) {
         return false;
     free(record->digest);
     record->digest = digest;
-    shared_hold(&named->shared);
-    shared_drop(record->named);
+    refcount_ref(&named->shared);
+    refcount_unref(record->named);
     record->named = &named->shared;
     return true;
 }
@@ -65,7 +67,7 @@ static const ExcitationRecord *record_of(const Excitation *excitation) {
 static Status record_refuse(const char *pointer, const char *name, const char *detail,
                             Problem *problem) {
     char place[sizeof((Fault){0}.pointer)];
-    pointer_join(place, sizeof place, pointer, name);
+    json_pointer_join(place, sizeof place, pointer, name);
     return problem_concerns(problem, place)
                ? STATUS_INVALID
                : problem_add(problem, STATUS_INVALID, place, "%s", detail);
@@ -85,7 +87,7 @@ static Status record_check_named(const ExcitationRecord *record, const char *poi
                           "must not stand beside the name of a record, which has its own", problem);
     if (named == NULL || strcmp(named->name, record->name) != 0) {
         char place[sizeof((Fault){0}.pointer)];
-        pointer_join(place, sizeof place, pointer, "digest");
+        json_pointer_join(place, sizeof place, pointer, "digest");
         return problem_concerns(problem, place)
                    ? STATUS_INVALID
                    : record_refuse(pointer, "name", "is not known here", problem);
@@ -128,7 +130,7 @@ static Status record_complete(Excitation *excitation, const Span *span, const ch
         if (isfinite(samples->at[i] * record->scale) || !isfinite(samples->at[i]))
             continue;
         char place[sizeof((Fault){0}.pointer)];
-        pointer_join(place, sizeof place, pointer, "scale");
+        json_pointer_join(place, sizeof place, pointer, "scale");
         return problem_add_real(problem, STATUS_INVALID, place, record->scale, NULL,
                                 "must leave every sample finite, sample %zu is not", i);
     }
@@ -209,7 +211,7 @@ static void record_doubt(const Excitation *excitation, const Span *span, const c
     const RecordLook look =
         record_look(record_samples(record), record_interval(record), record->scale);
     char place[sizeof((Fault){0}.pointer)];
-    pointer_join(place, sizeof place, pointer, record->named != NULL ? "name" : "samples");
+    json_pointer_join(place, sizeof place, pointer, record->named != NULL ? "name" : "samples");
     record_look_doubt(&look, record->named != NULL ? "stands for samples that " : "", place,
                       doubts);
 }

@@ -8,7 +8,7 @@ enum { RECORD_SAMPLES = 1 << 22, RECORD_NAME_SIZE = 65, RECORD_DIGEST_SIZE = 65 
 
 // A record that scenes refer to by name.
 typedef struct NamedRecord {
-    Shared shared;
+    Refcount shared;
     char name[RECORD_NAME_SIZE];     // [A-Za-z0-9][A-Za-z0-9._-]*
     char digest[RECORD_DIGEST_SIZE]; // of interval and samples, in hexadecimal digits
     double interval;                 // [s]
@@ -17,7 +17,7 @@ typedef struct NamedRecord {
 } NamedRecord;
 
 // Takes ownership of the samples, also when it fails. NULL without memory. Released by
-// shared_drop(&named->shared).
+// refcount_unref(&named->shared).
 NamedRecord *named_record_new(const char *name, const char *digest, double interval,
                               Reals *samples);
 
@@ -28,7 +28,7 @@ typedef struct ExcitationRecord {
     double interval;     // [s]
     double scale;        // [-]
     char *source;        // where the samples come from; may be NULL
-    Shared *named;       // the NamedRecord that the name was resolved to; NULL: not yet
+    Refcount *named;     // the NamedRecord that the name was resolved to; NULL: not yet
 } ExcitationRecord;
 
 static inline const NamedRecord *record_named(const ExcitationRecord *record) {

@@ -2,6 +2,8 @@
 // the latter a_g = -amplitude (2 pi f)^2 sin(2 pi f t).
 #include "core/excitation/sine.h"
 
+#include "core/base/json_pointer.h"
+
 static const char *const quantity_names[] = {
     [SINE_ACCELERATION] = "acceleration", [SINE_DISPLACEMENT] = "displacement", NULL};
 
@@ -38,12 +40,12 @@ static Status sine_complete(Excitation *excitation, const Span *span, const char
         return STATUS_OK; // the row adds the fault
     char place[sizeof((Fault){0}.pointer)];
     if (!isfinite(sine_omega(sine))) {
-        pointer_join(place, sizeof place, pointer, "frequency");
+        json_pointer_join(place, sizeof place, pointer, "frequency");
         return problem_add_real(problem, STATUS_INVALID, place, sine->frequency, "Hz",
                                 "is too high to compute with");
     }
     if (!isfinite(sine_amplitude(sine))) {
-        pointer_join(place, sizeof place, pointer, "amplitude");
+        json_pointer_join(place, sizeof place, pointer, "amplitude");
         return problem_add_real(problem, STATUS_INVALID, place, sine->amplitude, "m",
                                 "must give a finite acceleration, amplitude * (2 pi frequency)^2");
     }

@@ -1,41 +1,42 @@
-// Real Fourier transforms; FFTW lives here alone.
-// Not a spectrum: no windows, no scaling.
-// Used by result/spectrum.c, excite/random.c and the workspace.
+// Fourier transforms of real sequences by FFTW, unscaled, and tables of cosines.
 #ifndef CORE_MATH_FFT_H
 #define CORE_MATH_FFT_H
 
 #include <stddef.h>
 
-// Makes planning safe from several threads. Once per program, before the first transform.
-void fourier_start(void);
+// Makes FFTW's planner thread-safe. Called once per program, before the first transform.
+void fft_start(void);
 
-typedef struct Fourier Fourier;
+typedef struct Fft Fft;
 
-typedef enum FourierDirection {
-    FOURIER_FORWARD,  // real -> complex, exp(-i ...), unnormalised
-    FOURIER_BACKWARD, // complex -> real, exp(+i ...), unnormalised; destroys complex
-} FourierDirection;
+typedef enum FftDirection {
+    FFT_FORWARD,  // real -> complex, exp(-i ...), unnormalised
+    FFT_BACKWARD, // complex -> real, exp(+i ...), unnormalised; overwrites the complex buffer
+} FftDirection;
 
-// A plan for real sequences of `size` (1 ... 2^30) with its own aligned buffers: real[size],
-// complex as re, im pairs [size / 2 + 1]. One thread at a time. NULL without memory.
-Fourier *fourier_new(size_t size, FourierDirection direction);
-void fourier_free(Fourier *fourier);
-double *fourier_real(Fourier *fourier);
-double *fourier_complex(Fourier *fourier);
-void fourier_run(Fourier *fourier);
+// A plan for `size` (1 ... 2^30) real numbers with aligned buffers: real[size], and complex as
+// pairs re, im [size / 2 + 1]. For one thread at a time. Freed by fft_free; NULL without memory.
+Fft *fft_new(size_t size, FftDirection direction);
+void fft_free(Fft *fft);
+double *fft_real(Fft *fft);
+double *fft_complex(Fft *fft);
+void fft_run(Fft *fft);
 
-// Transforms kept for later: planning one costs as much as many runs of it. Of one thread at a
+// Plans kept for reuse, because planning costs as much as many transforms. For one thread at a
 // time. All zero is empty.
-enum { FOURIER_KEPT = 4 };
-typedef struct FourierStock {
-    Fourier *at[FOURIER_KEPT]; // the one put last is first
-} FourierStock;
+enum { FFT_CACHE_MAX = 4 };
+typedef struct FftCache {
+    Fft *at[FFT_CACHE_MAX]; // the last released one first
+} FftCache;
 
-// Out of the stock, or new; to be handed back by fourier_put. Without a stock: as fourier_new and
-// fourier_free.
-Fourier *fourier_take(FourierStock *stock, size_t size, FourierDirection direction);
-// Takes `fourier`; NULL is allowed. Large ones are not kept.
-void fourier_put(FourierStock *stock, Fourier *fourier);
-void fourier_stock_clear(FourierStock *stock);
+// A plan from the cache or a new one; returned with fft_release. Without a cache (NULL): fft_new.
+Fft *fft_acquire(FftCache *cache, size_t size, FftDirection direction);
+// Takes ownership of `fft` (may be NULL). Long transforms are freed, not kept.
+void fft_release(FftCache *cache, Fft *fft);
+void fft_cache_clear(FftCache *cache);
+
+// cosines[i] = cos(start + i step), i = 0 ... count - 1 [rad], to some 4e-16 for angles within a
+// few turns. Calls the C library twice per 64 values.
+void fft_cosines(double start, double step, size_t count, double *cosines);
 
 #endif

@@ -3,9 +3,10 @@
 #include <math.h>
 #include <string.h>
 
-enum { SIZE = EXPONENTIAL_SIZE * EXPONENTIAL_SIZE, TERMS = 18, NODES = 8 };
+enum { SIZE = MATRIX_EXPONENTIAL_MAX * MATRIX_EXPONENTIAL_MAX, TERMS = 18, NODES = 8 };
 
-static void multiply(const long double *a, const long double *b, size_t n, long double *out) {
+static void matrix_exponential_multiply(const long double *a, const long double *b, size_t n,
+                                        long double *out) {
     for (size_t i = 0; i < n; i++)
         for (size_t j = 0; j < n; j++) {
             long double sum = 0;
@@ -15,8 +16,8 @@ static void multiply(const long double *a, const long double *b, size_t n, long 
         }
 }
 
-// How often h must be halved until |A| h / 2^N <= 1/2, |A| being the largest row sum.
-static int halvings(const long double *A, size_t n, long double h) {
+// The smallest N with |A| h / 2^N <= 1/2, where |A| is the largest row sum.
+static int matrix_exponential_halvings(const long double *A, size_t n, long double h) {
     long double norm = 0;
     for (size_t i = 0; i < n; i++) {
         long double sum = 0;
@@ -31,12 +32,13 @@ static int halvings(const long double *A, size_t n, long double h) {
 }
 
 // exp(A h) - I by its Taylor series; |A| h <= 1/2.
-static void increment_small(const long double *A, size_t n, long double h, long double *out) {
+static void matrix_exponential_series(const long double *A, size_t n, long double h,
+                                      long double *out) {
     long double term[SIZE], next[SIZE];
     for (size_t i = 0; i < n * n; i++)
         out[i] = term[i] = A[i] * h;
     for (int k = 2; k < TERMS; k++) {
-        multiply(term, A, n, next);
+        matrix_exponential_multiply(term, A, n, next);
         for (size_t i = 0; i < n * n; i++) {
             term[i] = next[i] * h / (long double)k;
             out[i] += term[i];
@@ -45,30 +47,31 @@ static void increment_small(const long double *A, size_t n, long double h, long 
 }
 
 // (I + T)^2 - I = 2 T + T T.
-void exponential_double(size_t n, long double *increment) {
+void matrix_exponential_double(size_t n, long double *increment) {
     long double square[SIZE];
-    multiply(increment, increment, n, square);
+    matrix_exponential_multiply(increment, increment, n, square);
     for (size_t i = 0; i < n * n; i++)
         increment[i] = 2 * increment[i] + square[i];
 }
 
-void exponential_increment(const long double *A, size_t n, long double h, long double *increment) {
-    const int count = halvings(A, n, h);
-    increment_small(A, n, ldexpl(h, -count), increment);
+void matrix_exponential_increment(const long double *A, size_t n, long double h,
+                                  long double *increment) {
+    const int count = matrix_exponential_halvings(A, n, h);
+    matrix_exponential_series(A, n, ldexpl(h, -count), increment);
     for (int i = 0; i < count; i++)
-        exponential_double(n, increment);
+        matrix_exponential_double(n, increment);
 }
 
-void exponential(const long double *A, size_t n, long double h, long double *transition) {
-    exponential_increment(A, n, h, transition);
+void matrix_exponential(const long double *A, size_t n, long double h, long double *transition) {
+    matrix_exponential_increment(A, n, h, transition);
     for (size_t i = 0; i < n; i++)
         transition[i * n + i] += 1;
 }
 
-// Gauss-Legendre quadrature on [0, 1]: for products of two solutions over |A| h <= 1/2 its error is
+// Gauss-Legendre quadrature on [0, 1]; the error for products of two solutions over |A| h <= 1/2 is
 // below 1e-22.
 // clang-format off
-static const long double gauss[NODES][2] = {
+static const long double matrix_exponential_gauss[NODES][2] = {
     {0.0198550717512318841582L, 0.0506142681451881295763L},
     {0.1016667612931866302042L, 0.1111905172266872352722L},
     {0.2372337950418355070911L, 0.1568533229389436436690L},
@@ -81,8 +84,9 @@ static const long double gauss[NODES][2] = {
 // clang-format on
 
 // rows[k] = v' A^k h^k / k!, so that v' exp(A s h) = sum of rows[k] s^k.
-static void row_series(const long double *A, size_t n, long double h, const long double *v,
-                       long double rows[TERMS][EXPONENTIAL_SIZE]) {
+static void matrix_exponential_row_series(const long double *A, size_t n, long double h,
+                                          const long double *v,
+                                          long double rows[TERMS][MATRIX_EXPONENTIAL_MAX]) {
     memcpy(rows[0], v, n * sizeof *v);
     for (int k = 1; k < TERMS; k++)
         for (size_t j = 0; j < n; j++) {
@@ -93,74 +97,74 @@ static void row_series(const long double *A, size_t n, long double h, const long
         }
 }
 
-// The form of one pair over a time with |A| h <= 1/2.
-static void form_small(const long double *A, size_t n, long double h,
-                       const long double *const pair[2], long double *form) {
-    long double left[TERMS][EXPONENTIAL_SIZE], right[TERMS][EXPONENTIAL_SIZE];
-    row_series(A, n, h, pair[0], left);
-    row_series(A, n, h, pair[1], right);
+// The form of one pair by the Taylor series; |A| h <= 1/2.
+static void matrix_exponential_form_series(const long double *A, size_t n, long double h,
+                                           const long double *const pair[2], long double *form) {
+    long double left[TERMS][MATRIX_EXPONENTIAL_MAX], right[TERMS][MATRIX_EXPONENTIAL_MAX];
+    matrix_exponential_row_series(A, n, h, pair[0], left);
+    matrix_exponential_row_series(A, n, h, pair[1], right);
     memset(form, 0, n * n * sizeof *form);
     for (int q = 0; q < NODES; q++) {
-        long double a[EXPONENTIAL_SIZE] = {0}, b[EXPONENTIAL_SIZE] = {0};
+        long double a[MATRIX_EXPONENTIAL_MAX] = {0}, b[MATRIX_EXPONENTIAL_MAX] = {0};
         for (int k = TERMS; k-- > 0;)
             for (size_t j = 0; j < n; j++) {
-                a[j] = a[j] * gauss[q][0] + left[k][j];
-                b[j] = b[j] * gauss[q][0] + right[k][j];
+                a[j] = a[j] * matrix_exponential_gauss[q][0] + left[k][j];
+                b[j] = b[j] * matrix_exponential_gauss[q][0] + right[k][j];
             }
         for (size_t i = 0; i < n; i++)
             for (size_t j = 0; j < n; j++)
-                form[i * n + j] += gauss[q][1] * h * (a[i] * b[j] + a[j] * b[i]) / 2;
+                form[i * n + j] +=
+                    matrix_exponential_gauss[q][1] * h * (a[i] * b[j] + a[j] * b[i]) / 2;
     }
 }
 
-void exponential_forms(const long double *A, size_t n, long double h, size_t count,
-                       const long double *const pairs[][2], long double *forms) {
-    const int halved = halvings(A, n, h);
+void matrix_exponential_forms(const long double *A, size_t n, long double h, size_t count,
+                              const long double *const pairs[][2], long double *forms) {
+    const int halved = matrix_exponential_halvings(A, n, h);
     const long double small = ldexpl(h, -halved);
     for (size_t i = 0; i < count; i++)
-        form_small(A, n, small, pairs[i], forms + i * n * n);
+        matrix_exponential_form_series(A, n, small, pairs[i], forms + i * n * n);
     if (halved == 0)
         return;
     long double T[SIZE];
-    increment_small(A, n, small, T);
+    matrix_exponential_series(A, n, small, T);
     for (int pass = 0; pass < halved; pass++) {
         for (size_t i = 0; i < count; i++)
-            exponential_form_double(n, T, forms + i * n * n);
-        exponential_double(n, T);
+            matrix_exponential_form_double(n, T, forms + i * n * n);
+        matrix_exponential_double(n, T);
     }
 }
 
-// The integral over twice the time is this one's plus the same from where the first half ends:
-// F + (I + T)' F (I + T).
-void exponential_form_double(size_t n, const long double *increment, long double *form) {
-    long double E[SIZE], product[SIZE], second[SIZE];
+// The integral over twice the time is the sum of both halves: F + (I + T)' F (I + T).
+void matrix_exponential_form_double(size_t n, const long double *increment, long double *form) {
+    long double E[SIZE], matrix_exponential_product[SIZE], second[SIZE];
     memcpy(E, increment, n * n * sizeof *E);
     for (size_t i = 0; i < n; i++)
         E[i * n + i] += 1;
-    multiply(form, E, n, product);
+    matrix_exponential_multiply(form, E, n, matrix_exponential_product);
     for (size_t i = 0; i < n; i++)
         for (size_t j = 0; j < n; j++) {
             second[i * n + j] = 0;
             for (size_t k = 0; k < n; k++)
-                second[i * n + j] += E[k * n + i] * product[k * n + j];
+                second[i * n + j] += E[k * n + i] * matrix_exponential_product[k * n + j];
         }
     for (size_t i = 0; i < n * n; i++)
         form[i] += second[i];
 }
 
-// Multiplications, about, between looks at the progress.
-static const size_t WATCH_WORK = 1000000;
+// Approximate number of multiplications between progress calls.
+static const size_t PROGRESS_WORK = 1000000;
 
-// Who may stop it, and what has been done since the last look.
-typedef struct Patience {
+// Work since the last progress call.
+typedef struct ExponentialProgress {
     const Progress *progress;
     double fraction;
     size_t work;
-} Patience;
+} ExponentialProgress;
 
-// out = left right; zeros in `left` cost nothing.
-static bool product(const double *left, const double *right, size_t n, double *restrict out,
-                    Patience *patience) {
+// out = left right; zeros in `left` are skipped.
+static bool matrix_exponential_product(const double *left, const double *right, size_t n,
+                                       double *restrict out, ExponentialProgress *state) {
     for (size_t i = 0; i < n; i++) {
         double *restrict row = out + i * n;
         memset(row, 0, n * sizeof *row);
@@ -169,19 +173,19 @@ static bool product(const double *left, const double *right, size_t n, double *r
             for (size_t j = 0; j < n && factor != 0; j++)
                 row[j] += factor * of[j];
         }
-        if ((patience->work += n * n) < WATCH_WORK)
+        if ((state->work += n * n) < PROGRESS_WORK)
             continue;
-        patience->work = 0;
-        if (!progress_advance(patience->progress, patience->fraction))
+        state->work = 0;
+        if (!progress_advance(state->progress, state->fraction))
             return false;
     }
     return true;
 }
 
-bool exponential_doublings(const double *A, size_t n, double h, double *out, double *scratch,
-                           const Progress *progress, double fraction) {
-    enum { PAPER = 20, MOST = 1000 };
-    Patience patience = {progress, fraction, 0};
+bool matrix_exponential_doublings(const double *A, size_t n, double h, double *out, double *scratch,
+                                  const Progress *progress, double fraction) {
+    enum { DOUBLINGS_MIN = 20, DOUBLINGS_MAX = 1000 };
+    ExponentialProgress state = {progress, fraction, 0};
     double norm = 0, *small = scratch, *next = scratch + n * n;
     for (size_t i = 0; i < n; i++) {
         double sum = 0;
@@ -189,10 +193,11 @@ bool exponential_doublings(const double *A, size_t n, double h, double *out, dou
             sum += fabs(A[i * n + j]);
         norm = fmax(norm, sum);
     }
-    // Four terms leave (|A| h / 2^N)^5 / 120: 1e-13 of the first at most, for all doublings
-    // together.
-    int count = PAPER;
-    for (double rest = ldexp(norm * h, -PAPER); rest > 1e-3 && count < MOST; rest /= 2)
+    // The remainder of four terms is (|A| h / 2^N)^5 / 120, at most 1e-13 of the first term over
+    // all doublings.
+    int count = DOUBLINGS_MIN;
+    for (double rest = ldexp(norm * h, -DOUBLINGS_MIN); rest > 1e-3 && count < DOUBLINGS_MAX;
+         rest /= 2)
         count++;
     for (size_t i = 0; i < n * n; i++) {
         small[i] = ldexp(A[i] * h, -count);
@@ -200,13 +205,13 @@ bool exponential_doublings(const double *A, size_t n, double h, double *out, dou
     }
     // T = S (I + S/2 (I + S/3 (I + S/4)))
     for (int k = 3; k >= 1; k--) {
-        if (!product(small, out, n, next, &patience))
+        if (!matrix_exponential_product(small, out, n, next, &state))
             return false;
         for (size_t i = 0; i < n * n; i++)
             out[i] = (small[i] + next[i]) / k;
     }
     for (int i = 0; i < count; i++) {
-        if (!product(out, out, n, next, &patience))
+        if (!matrix_exponential_product(out, out, n, next, &state))
             return false;
         for (size_t j = 0; j < n * n; j++)
             out[j] = 2 * out[j] + next[j];

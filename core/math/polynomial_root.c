@@ -1,7 +1,7 @@
-// With B >= -g'' on all of [0, 1], g(s + d) >= g(s) + g'(s) d - B d^2 / 2: the positive zero of
-// that parabola is a step which cannot pass a root. Towards a simple root it shrinks like Newton's;
-// past a near miss it strides on. Where many such steps would be needed (almost a double root under
-// a coarse B) the interval is halved instead, which makes B local and always ends.
+// With B >= -g'' on [0, 1], g(s + d) >= g(s) + g'(s) d - B d^2 / 2. The positive zero of that
+// parabola is a step that cannot pass a root. It converges to a simple root like Newton's method
+// and moves past a near miss in one step. If many such steps are needed (nearly a double root under
+// a coarse B), the interval is halved, which makes B local and always terminates.
 #include "core/math/polynomial_root.h"
 
 #include <float.h>
@@ -9,16 +9,16 @@
 
 enum { ROOT_STEPS = 40, ROOT_HALVINGS = 52 };
 
-// g(s) is known to about this much: rounding of the coefficients and of Horner's scheme.
-static double noise(const double *c, size_t degree, double s) {
+// The rounding error of g(s), from the coefficients and Horner's scheme.
+static double polynomial_noise(const double *c, size_t degree, double s) {
     double sum = fabs(c[degree]);
     for (size_t i = degree; i-- > 0;)
         sum = sum * s + fabs(c[i]);
     return 2 * DBL_EPSILON * sum;
 }
 
-// Coefficients of g(from + width s) in place.
-static void shift(double *c, size_t degree, double from, double width) {
+// Replaces g(s) by g(from + width s).
+static void polynomial_shift(double *c, size_t degree, double from, double width) {
     for (size_t i = 0; i < degree; i++)
         for (size_t j = degree; j-- > i;)
             c[j] += from * c[j + 1];
@@ -27,33 +27,33 @@ static void shift(double *c, size_t degree, double from, double width) {
         c[i] *= scale;
 }
 
-// fmin is a call into the C library.
-static inline double below_zero(double value) {
+// Written out, because fmin is a call into the C library.
+static inline double polynomial_negative_part(double value) {
     return value < 0 ? value : 0;
 }
 
-static bool is_surely_positive(const double *c, size_t degree) {
-    double least = c[0];
+static bool polynomial_is_positive(const double *c, size_t degree) {
+    double min = c[0];
     for (size_t i = 1; i <= degree; i++)
-        least += below_zero(c[i]);
-    return least > 0;
+        min += polynomial_negative_part(c[i]);
+    return min > 0;
 }
 
-// The march; c[0] > 0. True if decided, then *found tells and *s is the root.
-static bool march(const double *c, size_t degree, double *s, bool *found) {
+// Steps from s = 0, where c[0] > 0. True if decided: *found, and the root *s.
+static bool polynomial_root_march(const double *c, size_t degree, double *s, bool *found) {
     double bound = 0;
     for (size_t i = 2; i <= degree; i++)
-        bound -= (double)(i * (i - 1)) * below_zero(c[i]);
+        bound -= (double)(i * (i - 1)) * polynomial_negative_part(c[i]);
     double at = 0;
     for (int step = 0; step < ROOT_STEPS; step++) {
-        const double value = root_value(c, degree, at);
-        const double slope = root_slope(c, degree, at);
-        if (isnan(value)) { // no number has no zero; halving would never end
+        const double value = polynomial_value(c, degree, at);
+        const double slope = polynomial_slope(c, degree, at);
+        if (isnan(value)) { // NAN: stop, because halving would not terminate
             *found = false;
             return true;
         }
-        if (value <= noise(c, degree, at)) {
-            // The last bit of the way needs no caution: what is left is rounding.
+        if (value <= polynomial_noise(c, degree, at)) {
+            // The rest is within rounding: one Newton step.
             const double last = slope < 0 ? -value / slope : 0;
             *s = fmin(fmax(at + last, 0), 1);
             *found = true;
@@ -79,27 +79,27 @@ static bool march(const double *c, size_t degree, double *s, bool *found) {
     return false;
 }
 
-// c[0] may have any sign here: a half may begin where the other ended.
-static bool search(const double *c, size_t degree, int halvings, double *s) {
+// c[0] may have any sign: the second half begins where the first ended.
+static bool polynomial_root_search(const double *c, size_t degree, int halvings, double *s) {
     if (c[0] <= 0) {
         *s = 0;
         return true;
     }
-    if (is_surely_positive(c, degree))
+    if (polynomial_is_positive(c, degree))
         return false;
     bool found;
-    if (march(c, degree, s, &found))
+    if (polynomial_root_march(c, degree, s, &found))
         return found;
     if (halvings == 0) {
         *s = 0;
         return true;
     }
-    double half[ROOT_DEGREE + 1];
+    double half[POLYNOMIAL_DEGREE_MAX + 1];
     for (int side = 0; side < 2; side++) {
         for (size_t i = 0; i <= degree; i++)
             half[i] = c[i];
-        shift(half, degree, 0.5 * side, 0.5);
-        if (search(half, degree, halvings - 1, s)) {
+        polynomial_shift(half, degree, 0.5 * side, 0.5);
+        if (polynomial_root_search(half, degree, halvings - 1, s)) {
             *s = 0.5 * (*s + side);
             return true;
         }
@@ -107,13 +107,13 @@ static bool search(const double *c, size_t degree, int halvings, double *s) {
     return false;
 }
 
-bool root_first_crossing(const double *c, size_t degree, double *s) {
-    // A root at the start is divided out: g(s) = s^n r(s), and r decides from there on.
+bool polynomial_root_first(const double *c, size_t degree, double *s) {
+    // A root at s = 0 is divided out: g(s) = s^n r(s), and r is searched.
     while (degree > 0 && c[0] == 0) {
         c++;
         degree--;
     }
     if (c[0] == 0)
         return false;
-    return search(c, degree, ROOT_HALVINGS, s);
+    return polynomial_root_search(c, degree, ROOT_HALVINGS, s);
 }

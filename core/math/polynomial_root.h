@@ -1,28 +1,26 @@
-// The first place where a polynomial stops being positive, found without ever stepping over one.
-// Not a general root finder: what happens behind the first crossing is nobody's business here.
-// Used by solve/ to locate events.
+// The first root at which a polynomial becomes negative. No earlier one is ever skipped.
 #ifndef CORE_MATH_POLYNOMIAL_ROOT_H
 #define CORE_MATH_POLYNOMIAL_ROOT_H
 
 #include <stdbool.h>
 #include <stddef.h>
 
-enum { ROOT_DEGREE = 31 };
+enum { POLYNOMIAL_DEGREE_MAX = 31 };
 
-// c[0] + c[1] s + ... + c[degree] s^degree on 0 <= s <= 1; a c[0] of exactly 0 is a root at the
-// start that does not count. True if the polynomial becomes negative somewhere: *s is then where it
-// first does (0 if at once), right to the rounding of the coefficients. Touching zero from above
-// within rounding counts as crossing.
-bool root_first_crossing(const double *c, size_t degree, double *s);
+// Searches c[0] + c[1] s + ... + c[degree] s^degree on 0 <= s <= 1. True if the polynomial becomes
+// negative: *s is the first such place (0 if at once), to the rounding of the coefficients. A root
+// at s = 0 from c[0] = 0 does not count. Touching zero from above within rounding counts as
+// crossing.
+bool polynomial_root_first(const double *c, size_t degree, double *s);
 
-// The polynomial's value, and its derivative's, at s.
-static inline double root_value(const double *c, size_t degree, double s) {
+// The value of the polynomial and of its derivative at s.
+static inline double polynomial_value(const double *c, size_t degree, double s) {
     double value = c[degree];
     for (size_t i = degree; i-- > 0;)
         value = value * s + c[i];
     return value;
 }
-static inline double root_slope(const double *c, size_t degree, double s) {
+static inline double polynomial_slope(const double *c, size_t degree, double s) {
     double slope = 0;
     for (size_t i = degree; i > 0; i--)
         slope = slope * s + (double)i * c[i];

@@ -1,17 +1,17 @@
-// With theta = atan(t / sqrt(n)) the share within [-t, t] is a finite sum (Abramowitz and Stegun
-// 26.7.3 and 26.7.4), all of whose terms are positive:
+// With theta = atan(t / sqrt(n)) the probability of [-t, t] is a finite sum of positive terms
+// (Abramowitz and Stegun 26.7.3 and 26.7.4):
 //
 //   n odd:  2/pi (theta + sin theta cos theta (1 + 2/3 cos^2 theta + 2/3 4/5 cos^4 theta ...)),
 //   n even: sin theta (1 + 1/2 cos^2 theta + 1/2 3/4 cos^4 theta ...),
 //
-// to the powers n - 3 and n - 2 of the cosine.
+// up to the powers n - 3 and n - 2 of the cosine.
 #include "core/math/student_t.h"
 
 #include <math.h>
 
 #define PI 3.14159265358979323846264338328
 
-double student_share(double t, size_t freedom) {
+double student_t_probability(double t, size_t freedom) {
     if (freedom == 0)
         return erf(t / sqrt(2));
     const double n = (double)freedom, square = n / (n + t * t);
@@ -25,17 +25,17 @@ double student_share(double t, size_t freedom) {
     return first == 1 ? 2 / PI * (theta + sine * cosine * sum) : sine * sum;
 }
 
-double student_quantile(double share, size_t freedom) {
-    double least = 0, most = 1;
-    while (student_share(most, freedom) < share && most < 1e9)
-        most *= 2;
+double student_t_quantile(double probability, size_t freedom) {
+    double low = 0, high = 1;
+    while (student_t_probability(high, freedom) < probability && high < 1e9)
+        high *= 2;
     for (;;) {
-        const double middle = least + (most - least) / 2;
-        if (!(least < middle && middle < most))
+        const double middle = low + (high - low) / 2;
+        if (!(low < middle && middle < high))
             return middle;
-        if (student_share(middle, freedom) < share)
-            least = middle;
+        if (student_t_probability(middle, freedom) < probability)
+            low = middle;
         else
-            most = middle;
+            high = middle;
     }
 }

@@ -63,7 +63,7 @@ static void modal_run_recurrence(ModalRun *run, double step, double omega) {
         system[P * SIZE + P] = -(long double)modes->damping[k * (n + 1)];
         system[P * SIZE + A] = -(long double)modes->participation[k];
         system[B * SIZE + A] = -(long double)omega * omega;
-        exponential_increment(system, SIZE, step, gain);
+        matrix_exponential_increment(system, SIZE, step, gain);
         for (size_t i = 0; i < 2 * SIZE; i++)
             run->recurrence[i * n + k] = (double)gain[i];
     }

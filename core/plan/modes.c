@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/math/symmetric_eigen.h"
+#include "core/math/symmetric_matrix.h"
 
 enum { ROUNDINGS = 8 };
 
@@ -58,7 +58,7 @@ static Status modes_fill(Modes *modes, size_t storeys, const double *mass, const
                          const double *damping, const double *influence, long double *work) {
     const size_t n = storeys;
     long double *values = work, *vectors = work + n;
-    TRY(linear_eigen(n, mass, stiffness, values, vectors));
+    TRY(symmetric_matrix_eigen(n, mass, stiffness, values, vectors));
     // omega and its square are to be doubles.
     if (!isfinite((double)values[n - 1]))
         return STATUS_INVALID;

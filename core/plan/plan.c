@@ -3,8 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/base/side.h"
-#include "core/result/metric.h"
+#include "core/result/response.h"
 
 // clang-format off
 const Field derived_fields[] = {
@@ -82,13 +81,13 @@ static void stops_report(const ContactStop *stop, double mass, Derived *derived)
         return;
     if (stop->law->form == CONTACT_POWER) {
         derived->factor = own->factor;
-        derived->reached_restitution = stop->law->reached(own->factor, own->exponent);
+        derived->reached_restitution = stop->law->restitution(own->factor, own->exponent);
         derived->reached_contact_time =
             stop->numbers.contact_time * pow(mass / stop->mass, 1 / (own->exponent + 1));
         return;
     }
-    const Identified found =
-        identify_given(mass, own->stiffness, own->damping, (Separation)stop->separation);
+    const Identification found = identification_from_stiffness(mass, own->stiffness, own->damping,
+                                                               (Separation)stop->separation);
     derived->damping_ratio = found.damping_ratio;
     if (isnan(stop->numbers.contact_time)) {
         derived->restitution = found.restitution;
@@ -120,8 +119,8 @@ static Status stops_make(const Scene *scene, Plan *plan, size_t index) {
         const Buffer *buffer = damper_buffer(damper, (Side)side);
         const ContactNumbers numbers = buffer_numbers(buffer);
         PlanStop *stop = &planned->stops[side];
-        stop->contact = contact_prepare(plan->law, scene_contact(scene)->separation,
-                                        damper_identified_mass(damper, mass), mass, &numbers);
+        stop->contact = contact_stop_prepare(plan->law, scene_contact(scene)->separation,
+                                             damper_identified_mass(damper, mass), mass, &numbers);
         TRY(stops_copy_rows(&stop->contact.numbers.rows));
         stop->restitution = stop->contact.parameters.restitution;
         stop->stiffness = stop->contact.parameters.stiffness;
@@ -153,7 +152,7 @@ bool stops_vary(const PlanDamper *damper) {
 
 ContactParameters stops_freeze(const PlanStop *stop, double approach_speed) {
     if (stop_varies(stop))
-        return contact_freeze(&stop->contact, approach_speed);
+        return contact_parameters_at(&stop->contact, approach_speed);
     return (ContactParameters){
         .restitution = stop->restitution, .stiffness = stop->stiffness, .damping = stop->damping};
 }
@@ -211,7 +210,7 @@ static Status plan_damper(const Scene *scene, Plan *plan, size_t index) {
     plan->dampers[index] = (PlanDamper){
         .storey = storey,
         .mass = damper->mass,
-        .effective_mass = effective_mass(moved, damper->mass),
+        .effective_mass = contact_effective_mass(moved, damper->mass),
         .clearance = damper->clearance,
         .offset = damper->offset,
         .position = damper->position,
@@ -309,8 +308,8 @@ static Status plan_values(const Scene *scene, Plan *plan) {
     const Excitation *excitation = scene_excitation(scene);
     TRY(fields_default(plan_report_fields, &plan->report));
     TRY(plan_allocate(plan, structure_storeys(structure), scene->dampers.count));
-    structure_fill(structure,
-                   &(const Matrices){plan->mass, plan->stiffness, plan->damping, plan->influence});
+    structure_assemble(structure, &(const StructureMatrices){plan->mass, plan->stiffness,
+                                                             plan->damping, plan->influence});
     plan_copy_start(&excitation->displacement, plan->displacement);
     plan_copy_start(&excitation->velocity, plan->velocity);
     plan->duration = scene->duration;

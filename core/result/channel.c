@@ -35,7 +35,7 @@ const char *const channel_requests[] = {
 
 const Channel *channel_find(const char *name, size_t *number) {
     size_t length;
-    *number = name_number(name, &length);
+    *number = field_name_number(name, &length);
     for (size_t i = 0; i < CHANNEL_COUNT; i++)
         if (strlen(channels[i].name) == length && memcmp(channels[i].name, name, length) == 0)
             return &channels[i];

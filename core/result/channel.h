@@ -1,5 +1,4 @@
-// The quantities a run can be asked for, by name and unit. The solver fills them, the table drives
-// everything else. Used by simulation/, solve/ and docs.
+// The output channels by name and unit.
 #ifndef CORE_RESULT_CHANNEL_H
 #define CORE_RESULT_CHANNEL_H
 
@@ -26,13 +25,13 @@ typedef struct Channel {
 } Channel;
 
 extern const Channel channels[CHANNEL_COUNT];
-// What may be asked for: CHANNEL_USUAL, which stands for what is sampled if nothing is said, then
-// all names. NULL-terminated.
+// The names that a request may contain: CHANNEL_USUAL, the default selection, then all channels.
+// NULL-terminated.
 extern const char *const channel_requests[];
 #define CHANNEL_USUAL "usual"
 
-// The channel of a name like "displacement" or "displacement_2", NULL if there is none; *number is
-// what it carries, from 1, or 0.
+// The channel of a name like "displacement" or "displacement_2", or NULL; *number is the number in
+// the name, from 1, or 0.
 const Channel *channel_find(const char *name, size_t *number);
 
 #endif

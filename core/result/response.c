@@ -4,10 +4,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/base/side.h"
-
+const char *const side_names[] = {[SIDE_LEFT] = "left", [SIDE_RIGHT] = "right", NULL};
 const char *const impact_kind_names[] = {
     [IMPACT_IMPACT] = "impact", [IMPACT_RESTING] = "resting", NULL};
+
+const char *const metric_names[] = {
+    "displacement", "mean_acceleration", "peak_force", "impacts", "psd", "rms_displacement", NULL,
+};
+const char *const metric_units[] = {"", "", "", "", " dB", "", NULL};
 
 // clang-format off
 const Field impact_fields[] = {

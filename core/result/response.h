@@ -1,6 +1,5 @@
-// What a solver hands back: sampled columns, the ledger of impacts, peaks and energies met on the
-// way. Statistics and spectra are made of it afterwards (statistics.h, spectrum.h). Filled by
-// solve/, read by everyone behind it.
+// The output of a solver: sampled columns, list of impacts, peaks and energies. Statistics and
+// spectra are computed from it.
 #ifndef CORE_RESULT_RESPONSE_H
 #define CORE_RESULT_RESPONSE_H
 
@@ -11,10 +10,14 @@
 #include "core/base/field.h"
 #include "core/result/channel.h"
 
+// The two stops of a damper, at u = offset -+ clearance / 2.
+typedef enum Side { SIDE_LEFT, SIDE_RIGHT } Side;
+extern const char *const side_names[]; // NULL-terminated
+
 typedef enum ImpactKind { IMPACT_IMPACT, IMPACT_RESTING } ImpactKind;
 
-// One event of the ledger. Magnitudes; what is not known (an open contact's end, a peak under
-// impulse) is NAN.
+// One impact or interval of persistent contact. Magnitudes; NAN if unknown: the end of an open
+// contact, the peak of an instantaneous impact.
 typedef struct Impact {
     int kind;                // ImpactKind
     double start, end;       // [s]
@@ -27,7 +30,7 @@ typedef struct Impact {
     double peak_force;       // largest |N| of the contact [N]
     double impulse;          // |integral of N| [N s]
     double energy_lost;      // work of the dissipative part [J]
-    bool is_resumed;         // N rose again inside the buffer: the contact before it goes on
+    bool is_resumed;         // continues the contact before: N rose again inside the buffer
 } Impact;
 
 typedef struct Impacts {
@@ -35,55 +38,69 @@ typedef struct Impacts {
     size_t count;
 } Impacts;
 
-// How fast impacts met one stop whose buffer was measured in a range of approach speeds. A rest has
-// no approach, and what is resumed keeps the parameters with which it began: neither counts.
-typedef struct Approaches {
+// Approach speeds at one stop, compared with the range in which its buffer was measured. Persistent
+// and resumed contacts are not counted.
+typedef struct ApproachSpeeds {
     bool is_ranged;
-    double from, to;              // that range; NAN: no such end [m/s]
-    uint64_t count, below, above; // impacts, and those of them outside
-    double least, most;           // speeds met [m/s]
-} Approaches;
+    double from, to;              // the measured range; NAN: no limit [m/s]
+    uint64_t count, below, above; // impacts, and impacts outside the range
+    double min, max;              // approach speeds of the impacts [m/s]
+} ApproachSpeeds;
 
 // Energies relative to the base [J]; `residual` is the largest |balance| over the largest energy.
 typedef struct Energy {
-    double initial;            // kinetic, of the springs and of the free masses at t = 0
-    double input;              // work of the base's motion
+    double initial;            // kinetic and strain at t = 0, free masses included
+    double input;              // work of the base motion
     double structural_damping; // lost in C
     double contact;            // lost in contacts
     double kinetic;            // at the end, structure and free masses
-    double strain;             // at the end, structure's springs and contact springs
+    double strain;             // at the end, springs of the structure and contacts
     double residual;           // [-]
 } Energy;
 
-// Peaks over samples and event instants, whether or not the channel was asked for; of several
-// storeys or dampers the largest.
+// Largest absolute values over samples and event instants, for any selection of channels; the
+// largest of all storeys or dampers.
 typedef struct Peaks {
     double displacement, velocity, acceleration, damper_displacement, contact_force;
 } Peaks;
 
 typedef struct Response {
-    double sample_rate; // [Hz]
-    size_t count;       // samples, i = 0 ... count - 1 at t = i / sample_rate
-    Columns series;   // the channels that were wanted, in the order wanted; rows == count (or none)
-    Impacts impacts;  // empty where is_unlisted
-    bool is_unlisted; // set beforehand: impacts are counted, not listed
+    double sample_rate;    // [Hz]
+    size_t count;          // samples, i = 0 ... count - 1 at t = i / sample_rate
+    Columns series;        // the requested channels in the requested order; rows == count or 0
+    Impacts impacts;       // empty if is_unlisted
+    bool is_unlisted;      // set by the caller: impacts are counted, not listed
     uint64_t impact_count; // of kind IMPACT_IMPACT
     uint64_t resting_count;
-    Approaches *approaches; // made beforehand, or NULL: of damper d at 2 d + side
+    ApproachSpeeds *approaches; // allocated by the caller, or NULL; damper d: [2 d + side]
     Energy energy;
     Peaks peaks;
-    double earlier; // largest displacement before statistics_from [m]
-    // Over samples from statistics_from on; of several storeys the largest.
+    double peak_before_window; // largest displacement before statistics_from [m]
+    // Over samples from statistics_from on; the largest of all storeys.
     double sum_squares_displacement, sum_squares_acceleration;
     size_t statistics_count;
-    bool has_trust;        // did the solver estimate what follows?
-    bool is_stepped;       // it is its steps' error then, not rounding's
-    double given_up;       // foretold error of displacement of the modes left out; in the estimate
-    double error_estimate; // largest error of displacement over the largest displacement, at most 1
-    double trust_horizon;  // that error passes RESPONSE_PARTING here [s]; NAN: not within the run
+    bool has_trust;          // whether the solver estimated the next four members
+    bool is_stepped;         // the error is that of its steps, not of rounding
+    double truncation_error; // of displacement by omitted modes; part of error_estimate
+    double error_estimate;   // largest error of displacement over the largest displacement, <= 1
+    double trust_horizon;    // where the error exceeds RESPONSE_DIVERGENCE [s]; NAN: nowhere
 } Response;
 
-#define RESPONSE_PARTING 1e-6
+#define RESPONSE_DIVERGENCE 1e-6
+
+// Measures of the accuracy of a result, with their units (" dB" or "").
+typedef enum Metric {
+    METRIC_DISPLACEMENT,
+    METRIC_MEAN_ACCELERATION,
+    METRIC_PEAK_FORCE,
+    METRIC_IMPACTS,
+    METRIC_PSD,
+    METRIC_RMS_DISPLACEMENT,
+    METRIC_COUNT
+} Metric;
+
+extern const char *const metric_names[]; // NULL-terminated
+extern const char *const metric_units[];
 
 extern const char *const impact_kind_names[];
 extern const Field impact_fields[];

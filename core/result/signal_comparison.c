@@ -7,18 +7,18 @@
 #include "core/math/fft.h"
 
 // clang-format off
-const Field likeness_fields[] = {
-    FIELD_REAL(Likeness, from, "s", ANY, OPTIONAL, "the common span begins here"),
-    FIELD_REAL(Likeness, to, "s", ANY, OPTIONAL, "and ends here"),
-    FIELD_COUNT(Likeness, samples, NULL, AT_MIN(0), 0, "compared in it, at the rate of the coarser one"),
-    FIELD_REAL(Likeness, rms, NULL, ANY, OPTIONAL, "of the reference within it"),
-    FIELD_REAL(Likeness, other_rms, NULL, ANY, OPTIONAL, "of the other"),
-    FIELD_REAL(Likeness, peak, NULL, ANY, OPTIONAL, "largest value of the reference within it"),
-    FIELD_REAL(Likeness, other_peak, NULL, ANY, OPTIONAL, "of the other"),
-    FIELD_REAL(Likeness, difference_rms, NULL, ANY, OPTIONAL, "of the difference"),
-    FIELD_REAL(Likeness, difference_peak, NULL, ANY, OPTIONAL, "largest difference"),
-    FIELD_REAL(Likeness, relative, NULL, ANY, OPTIONAL, "rms of the difference over the rms of the reference"),
-    FIELD_REAL(Likeness, correlation, NULL, ANY, OPTIONAL, "Pearson's coefficient of correlation"),
+const Field signal_comparison_fields[] = {
+    FIELD_REAL(SignalComparison, from, "s", ANY, OPTIONAL, "the common span begins here"),
+    FIELD_REAL(SignalComparison, to, "s", ANY, OPTIONAL, "and ends here"),
+    FIELD_COUNT(SignalComparison, samples, NULL, AT_MIN(0), 0, "compared in it, at the rate of the coarser one"),
+    FIELD_REAL(SignalComparison, rms, NULL, ANY, OPTIONAL, "of the reference within it"),
+    FIELD_REAL(SignalComparison, other_rms, NULL, ANY, OPTIONAL, "of the other"),
+    FIELD_REAL(SignalComparison, peak, NULL, ANY, OPTIONAL, "largest value of the reference within it"),
+    FIELD_REAL(SignalComparison, other_peak, NULL, ANY, OPTIONAL, "of the other"),
+    FIELD_REAL(SignalComparison, difference_rms, NULL, ANY, OPTIONAL, "of the difference"),
+    FIELD_REAL(SignalComparison, difference_peak, NULL, ANY, OPTIONAL, "largest difference"),
+    FIELD_REAL(SignalComparison, relative, NULL, ANY, OPTIONAL, "rms of the difference over the rms of the reference"),
+    FIELD_REAL(SignalComparison, correlation, NULL, ANY, OPTIONAL, "Pearson's coefficient of correlation"),
     FIELD_END
 };
 // clang-format on
@@ -74,11 +74,12 @@ static bool goes_on(const Progress *progress, size_t i) {
     return i % WATCH_SAMPLES != 0 || progress_advance(progress, 1);
 }
 
-Likeness likeness_measure(const Signal *reference, const Signal *other, double part,
-                          const Progress *progress) {
+SignalComparison signal_comparison_measure(const Signal *reference, const Signal *other,
+                                           double part, const Progress *progress) {
     const Grid grid = grid_of(reference, other);
     const double none = (double)NAN;
-    Likeness told = {none, none, grid.count, none, none, none, none, none, none, none, none, none};
+    SignalComparison told = {none, none, grid.count, none, none, none,
+                             none, none, none,       none, none, none};
     if (grid.count == 0)
         return told;
     double sx = 0, sy = 0, sxx = 0, syy = 0, sdd = 0, most_x = 0, most_y = 0, most_d = 0;
@@ -123,15 +124,15 @@ Likeness likeness_measure(const Signal *reference, const Signal *other, double p
     return told;
 }
 
-Status likeness_pair(const Signal *reference, const Signal *other, size_t least, Columns *pair,
-                     double *rate, Problem *problem) {
+Status signal_comparison_align(const Signal *reference, const Signal *other, size_t least,
+                               Columns *pair, double *rate, Problem *problem) {
     const Grid grid = grid_of(reference, other);
     *rate = grid.coarse->rate;
     if (grid.count < least)
         return problem_set(problem, STATUS_LIMIT,
                            "only %zu samples lie within both, at least %zu are needed", grid.count,
                            least);
-    TRY(columns_make(pair, 2, grid.count, 0, problem));
+    TRY(columns_allocate(pair, 2, grid.count, 0, problem));
     for (size_t i = 0; i < grid.count; i++) {
         pair->at[0].values[i] = value_at(reference, time_of(&grid, i));
         pair->at[1].values[i] = value_at(other, time_of(&grid, i));
@@ -213,7 +214,7 @@ static double best_lag(const Lags *lags, double centre, double most) {
 static double moved_correlation(const Signal *reference, const Signal *other, double shift) {
     Signal moved = *other;
     moved.start += shift;
-    return likeness_measure(reference, &moved, 1, NULL).correlation;
+    return signal_comparison_measure(reference, &moved, 1, NULL).correlation;
 }
 
 // The parabola leans where an end of one comes into the other's span: of its vertex and the whole
@@ -225,8 +226,8 @@ static double better_shift(const Signal *reference, const Signal *other, double 
                : vertex;
 }
 
-Status likeness_shift(const Signal *reference, const Signal *other, double most, double *shift,
-                      Problem *problem) {
+Status signal_comparison_shift(const Signal *reference, const Signal *other, double most,
+                               double *shift, Problem *problem) {
     const double rate = fmin(reference->rate, other->rate);
     const Signal *const both[2] = {reference, other};
     size_t counts[2], size = 1;
@@ -239,15 +240,15 @@ Status likeness_shift(const Signal *reference, const Signal *other, double most,
                       1;
     if (counts[0] < 2 || counts[1] < 2)
         return problem_set(problem, STATUS_LIMIT, "too few samples to find a shift");
-    if (counts[0] + counts[1] > LIKENESS_SHIFT_MAX)
+    if (counts[0] + counts[1] > SIGNAL_COMPARISON_SHIFT_MAX)
         return problem_set(problem, STATUS_LIMIT,
                            "%zu samples are too many to find a shift, at most %d: give the shift, "
                            "or fewer samples",
-                           counts[0] + counts[1], LIKENESS_SHIFT_MAX);
+                           counts[0] + counts[1], SIGNAL_COMPARISON_SHIFT_MAX);
     while (size < counts[0] + counts[1])
         size *= 2;
-    Fourier *forward = fourier_new(size, FOURIER_FORWARD);
-    Fourier *backward = fourier_new(size, FOURIER_BACKWARD);
+    Fft *forward = fft_new(size, FFT_FORWARD);
+    Fft *backward = fft_new(size, FFT_BACKWARD);
     double *energies[2] = {calloc(counts[0] + 1, sizeof(double)),
                            calloc(counts[1] + 1, sizeof(double))};
     double *first = calloc(size + 2, sizeof *first);
@@ -256,13 +257,13 @@ Status likeness_shift(const Signal *reference, const Signal *other, double most,
         first == NULL)
         status = problem_set(problem, STATUS_NO_MEMORY, "no memory to find a shift");
     for (int i = 0; i < 2 && status == STATUS_OK; i++) {
-        put_centred(both[i], rate, counts[i], fourier_real(forward), size);
-        sum_energy(fourier_real(forward), counts[i], energies[i]);
-        fourier_run(forward);
-        const double *made = fourier_complex(forward);
+        put_centred(both[i], rate, counts[i], fft_real(forward), size);
+        sum_energy(fft_real(forward), counts[i], energies[i]);
+        fft_run(forward);
+        const double *made = fft_complex(forward);
         for (size_t k = 0; k < size + 2 && i == 0; k++)
             first[k] = made[k];
-        double *product = fourier_complex(backward);
+        double *product = fft_complex(backward);
         for (size_t k = 0; k < size / 2 + 1 && i == 1; k++) { // a times the conjugate of b
             const double re = first[2 * k], im = first[2 * k + 1];
             product[2 * k] = re * made[2 * k] + im * made[2 * k + 1];
@@ -270,10 +271,10 @@ Status likeness_shift(const Signal *reference, const Signal *other, double most,
         }
     }
     if (status == STATUS_OK) {
-        fourier_run(backward);
-        const Lags lags = {
-            fourier_real(backward), size, energies[0], energies[1], (ptrdiff_t)counts[0],
-            (ptrdiff_t)counts[1]};
+        fft_run(backward);
+        const Lags lags = {fft_real(backward),   size,
+                           energies[0],          energies[1],
+                           (ptrdiff_t)counts[0], (ptrdiff_t)counts[1]};
         // Without a shift `other` begins so many samples behind the reference.
         const double centre = (other->start - reference->start) * rate;
         const double lag = best_lag(&lags, centre, most * rate);
@@ -286,8 +287,8 @@ Status likeness_shift(const Signal *reference, const Signal *other, double most,
             *shift = better_shift(reference, other, (nearbyint(lag) - centre) / rate,
                                   (lag - centre) / rate);
     }
-    fourier_free(forward);
-    fourier_free(backward);
+    fft_free(forward);
+    fft_free(backward);
     free(energies[0]);
     free(energies[1]);
     free(first);

@@ -11,21 +11,21 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/math/cosine_table.h"
+#include "core/math/fft.h"
 
 #define PI 3.14159265358979323846264338328
 
 enum { WATCH_SAMPLES = 1 << 16 }; // transformed between two looks at the progress
 
-const char *const spectrum_window_names[] = {"hann", "boxcar", "hamming", "blackman", NULL};
-const char *const spectrum_detrend_names[] = {"constant", "linear", "none", NULL};
+const char *const welch_window_names[] = {"hann", "boxcar", "hamming", "blackman", NULL};
+const char *const welch_detrend_names[] = {"constant", "linear", "none", NULL};
 
 // w[n] = a0 - a1 c + a2 (2 c^2 - 1), c = cos(2 pi n / L).
 static const double window_terms[][3] = {
-    [WINDOW_HANN] = {0.5, 0.5, 0},
-    [WINDOW_BOXCAR] = {1, 0, 0},
-    [WINDOW_HAMMING] = {0.54, 0.46, 0},
-    [WINDOW_BLACKMAN] = {0.42, 0.5, 0.08},
+    [WELCH_HANN] = {0.5, 0.5, 0},
+    [WELCH_BOXCAR] = {1, 0, 0},
+    [WELCH_HAMMING] = {0.54, 0.46, 0},
+    [WELCH_BLACKMAN] = {0.42, 0.5, 0.08},
 };
 
 // A sum with the roundings added up beside it (Neumaier 1974), for millions of terms.
@@ -46,7 +46,7 @@ static double sum_total(const Sum *sum) {
 
 static void make_window(int window, double *w, size_t length) {
     const double *a = window_terms[window];
-    circle_cosines(0, 2 * PI / (double)length, length, w);
+    fft_cosines(0, 2 * PI / (double)length, length, w);
     for (size_t n = 0; n < length; n++) {
         const double c = w[n];
         // A window of one sample is 1, whatever its name.
@@ -56,7 +56,7 @@ static void make_window(int window, double *w, size_t length) {
 
 // Takes the mean or the least squares line off x[length].
 static void remove_trend(int detrend, double *x, size_t length) {
-    if (detrend == DETREND_NONE)
+    if (detrend == WELCH_DETREND_NONE)
         return;
     Sum sum = {0};
     for (size_t n = 0; n < length; n++)
@@ -64,7 +64,7 @@ static void remove_trend(int detrend, double *x, size_t length) {
     const double mean = sum_total(&sum) / (double)length;
     for (size_t n = 0; n < length; n++)
         x[n] -= mean;
-    if (detrend == DETREND_CONSTANT || length == 1)
+    if (detrend == WELCH_DETREND_CONSTANT || length == 1)
         return;
     // Over the centred index t, whose squares sum to L (L^2 - 1) / 12, the line's slope stands
     // alone.
@@ -79,23 +79,23 @@ static void remove_trend(int detrend, double *x, size_t length) {
 
 // What the columns share.
 typedef struct Welch {
-    SpectrumSettings settings;
+    WelchSettings settings;
     size_t segments, bins;
     double scale; // 1 / (f_s sum w^2 S)
     double *window;
     Sum *power; // one per bin, summed over segments
-    Fourier *fourier;
+    Fft *fourier;
 } Welch;
 
 static void add_segment(Welch *welch, const double *x) {
     const size_t length = welch->settings.segment;
-    double *real = fourier_real(welch->fourier);
-    const double *bin = fourier_complex(welch->fourier);
+    double *real = fft_real(welch->fourier);
+    const double *bin = fft_complex(welch->fourier);
     memcpy(real, x, length * sizeof *real);
     remove_trend(welch->settings.detrend, real, length);
     for (size_t n = 0; n < length; n++)
         real[n] *= welch->window[n];
-    fourier_run(welch->fourier);
+    fft_run(welch->fourier);
     for (size_t k = 0; k < welch->bins; k++)
         sum_add(&welch->power[k], bin[2 * k] * bin[2 * k] + bin[2 * k + 1] * bin[2 * k + 1]);
 }
@@ -125,7 +125,7 @@ static Status run_columns(Welch *welch, const Columns *series, const Progress *p
     return STATUS_OK;
 }
 
-static Status check_settings(const Columns *series, const SpectrumSettings *settings,
+static Status check_settings(const Columns *series, const WelchSettings *settings,
                              Problem *problem) {
     if (settings->segment < 1 || settings->segment > series->rows)
         return problem_set(problem, STATUS_INVALID,
@@ -135,8 +135,8 @@ static Status check_settings(const Columns *series, const SpectrumSettings *sett
         return problem_set(problem, STATUS_INVALID,
                            "segments of %zu samples must overlap by less than that, not by %zu",
                            settings->segment, settings->overlap);
-    if (settings->window < WINDOW_HANN || settings->window > WINDOW_BLACKMAN ||
-        settings->detrend < DETREND_CONSTANT || settings->detrend > DETREND_NONE)
+    if (settings->window < WELCH_HANN || settings->window > WELCH_BLACKMAN ||
+        settings->detrend < WELCH_DETREND_CONSTANT || settings->detrend > WELCH_DETREND_NONE)
         return problem_set(problem, STATUS_INVALID, "no such window or detrending");
     return STATUS_OK;
 }
@@ -154,7 +154,7 @@ static Status make_spectrum(Welch *welch, const Columns *series, const char *con
         spectrum->frequency == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for spectra of %zu samples",
                            length);
-    TRY(columns_make(&spectrum->densities, series->count, welch->bins, 0, problem));
+    TRY(columns_allocate(&spectrum->densities, series->count, welch->bins, 0, problem));
 
     make_window(welch->settings.window, welch->window, length);
     Sum squares = {0};
@@ -170,18 +170,18 @@ static Status make_spectrum(Welch *welch, const Columns *series, const char *con
     return run_columns(welch, series, progress, &spectrum->densities, problem);
 }
 
-Status spectrum_welch(const Columns *series, const char *const *units, double sample_rate,
-                      const SpectrumSettings *settings, const Progress *progress,
-                      FourierStock *stock, Spectrum *spectrum, Problem *problem) {
+Status welch_spectrum(const Columns *series, const char *const *units, double sample_rate,
+                      const WelchSettings *settings, const Progress *progress, FftCache *stock,
+                      Spectrum *spectrum, Problem *problem) {
     *spectrum = (Spectrum){0};
     TRY(check_settings(series, settings, problem));
     Welch welch = {.settings = *settings,
-                   .fourier = fourier_take(stock, settings->segment, FOURIER_FORWARD)};
+                   .fourier = fft_acquire(stock, settings->segment, FFT_FORWARD)};
     const Status status =
         make_spectrum(&welch, series, units, sample_rate, progress, spectrum, problem);
     free(welch.window);
     free(welch.power);
-    fourier_put(stock, welch.fourier);
+    fft_release(stock, welch.fourier);
     if (status != STATUS_OK)
         spectrum_clear(spectrum);
     return status;

@@ -1,5 +1,4 @@
-// Welch power spectral densities, one-sided, per Hz, as scipy.signal.welch computes them.
-// Not a response spectrum. Used by simulation/.
+// Power spectral densities by Welch's method, one-sided, per Hz, equal to scipy.signal.welch.
 #ifndef CORE_RESULT_WELCH_H
 #define CORE_RESULT_WELCH_H
 
@@ -7,36 +6,34 @@
 #include "core/base/progress.h"
 #include "core/math/fft.h"
 
-typedef enum SpectrumWindow {
-    WINDOW_HANN,
-    WINDOW_BOXCAR,
-    WINDOW_HAMMING,
-    WINDOW_BLACKMAN
-} SpectrumWindow;
-typedef enum SpectrumDetrend { DETREND_CONSTANT, DETREND_LINEAR, DETREND_NONE } SpectrumDetrend;
-extern const char *const spectrum_window_names[];  // scipy's: "hann", "boxcar", ...
-extern const char *const spectrum_detrend_names[]; // "constant", "linear", "none" (scipy's False)
+typedef enum WelchWindow { WELCH_HANN, WELCH_BOXCAR, WELCH_HAMMING, WELCH_BLACKMAN } WelchWindow;
+typedef enum WelchDetrend {
+    WELCH_DETREND_CONSTANT,
+    WELCH_DETREND_LINEAR,
+    WELCH_DETREND_NONE
+} WelchDetrend;
+extern const char *const welch_window_names[];  // scipy's: "hann", "boxcar", ...
+extern const char *const welch_detrend_names[]; // "constant", "linear", "none" (scipy's False)
 
-typedef struct SpectrumSettings {
+typedef struct WelchSettings {
     size_t segment; // samples, 1 ... count
     size_t overlap; // samples, < segment
-    int window;     // SpectrumWindow, periodic ("fftbins") form
-    int detrend;    // SpectrumDetrend, per segment
-} SpectrumSettings;
+    int window;     // WelchWindow, periodic ("fftbins") form
+    int detrend;    // WelchDetrend, per segment
+} WelchSettings;
 
 typedef struct Spectrum {
-    SpectrumSettings settings;
-    size_t segments;   // averaged
-    double *frequency; // [Hz], densities.rows of them
-    Columns densities; // one column per input column, same names, unit squared per Hz
+    WelchSettings settings;
+    size_t segments;   // number averaged
+    double *frequency; // densities.rows values [Hz]
+    Columns densities; // one column per input column, with its name
 } Spectrum;
 
-// `series` holds the columns to transform, all of series->rows samples at `sample_rate` Hz.
-// `units[i]` is the density's unit of column i; `stock` may be NULL. Cleared by spectrum_clear;
-// empty on failure.
-Status spectrum_welch(const Columns *series, const char *const *units, double sample_rate,
-                      const SpectrumSettings *settings, const Progress *progress,
-                      FourierStock *stock, Spectrum *spectrum, Problem *problem);
+// The density of each column of `series`, sampled at `sample_rate` [Hz]; `units[i]` is its unit.
+// `cache` may be NULL. `spectrum` is cleared by spectrum_clear and empty on failure.
+Status welch_spectrum(const Columns *series, const char *const *units, double sample_rate,
+                      const WelchSettings *settings, const Progress *progress, FftCache *cache,
+                      Spectrum *spectrum, Problem *problem);
 void spectrum_clear(Spectrum *spectrum);
 
 #endif

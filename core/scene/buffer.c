@@ -1,6 +1,7 @@
 // A buffer is given in exactly one way: e with T_c, once or as a table, e alone, k_b with c_b, or e
 // with the k of a power law. Which of them do depends on the law.
 #include "core/scene/buffer.h"
+#include "core/base/json_pointer.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -48,14 +49,14 @@ bool buffer_is_measured(const Buffer *buffer) {
 }
 
 static bool has_numbers(const Buffer *buffer) {
-    return has(buffer->restitution) || buffer_has_contact(buffer) || buffer->table.count > 0;
+    return has(buffer->restitution) || buffer_has_contact_data(buffer) || buffer->table.count > 0;
 }
 
 bool buffer_is_given(const Buffer *buffer) {
     return buffer->material != NULL || has_numbers(buffer);
 }
 
-bool buffer_has_contact(const Buffer *buffer) {
+bool buffer_has_contact_data(const Buffer *buffer) {
     for (size_t i = 0; i < buffer->table.count; i++)
         if (has(buffer->table.at[i].contact_time))
             return true;
@@ -87,7 +88,7 @@ bool buffer_equals(const Buffer *a, const Buffer *b) {
            is_same_table(&a->table, &b->table);
 }
 
-void buffer_speeds(const Buffer *buffer, double *least, double *most) {
+void buffer_speed_range(const Buffer *buffer, double *least, double *most) {
     const ContactRows *rows = &buffer->table;
     *least = *most = (double)NAN;
     if (buffer->material != NULL) {
@@ -103,7 +104,7 @@ double buffer_test_mass(const Buffer *buffer) {
     const BufferTest *test = &buffer->test;
     if (buffer->material == NULL || isnan(test->impactor_mass) || isnan(test->base_mass))
         return (double)NAN;
-    return effective_mass(test->impactor_mass, test->base_mass);
+    return contact_effective_mass(test->impactor_mass, test->base_mass);
 }
 
 void buffer_move(Buffer *target, Buffer *source) {
@@ -122,7 +123,7 @@ ContactNumbers buffer_numbers(const Buffer *buffer) {
 static Status missing(const char *pointer, const char *name, const char *model,
                       const char *sentence, Problem *problem) {
     char place[sizeof((Fault){0}.pointer)];
-    pointer_join(place, sizeof place, pointer, name);
+    json_pointer_join(place, sizeof place, pointer, name);
     return problem_add(problem, STATUS_INVALID, place, sentence, model);
 }
 
@@ -169,15 +170,15 @@ static Status check_way(const Buffer *buffer, const ContactLaw *law, const char 
 static Status check_restitution(double restitution, const ContactLaw *law, const char *pointer,
                                 Problem *problem) {
     char place[sizeof((Fault){0}.pointer)], is[32], least[32];
-    pointer_join(place, sizeof place, pointer, "restitution");
+    json_pointer_join(place, sizeof place, pointer, "restitution");
     text_real(is, restitution);
     if (law->form == CONTACT_LINEAR && restitution == 0)
         return problem_add_real(problem, STATUS_INVALID, place, 0, NULL,
                                 "must be above 0 for the contact model spring_damper, is 0: its "
                                 "damping would be infinite (impulse allows 0)");
-    if (law->form != CONTACT_POWER || !(restitution < law->least_restitution))
+    if (law->form != CONTACT_POWER || !(restitution < law->restitution_min))
         return STATUS_OK;
-    if (law->least_restitution == 1)
+    if (law->restitution_min == 1)
         return problem_add_real(problem, STATUS_INVALID, place, restitution, NULL,
                                 "must be 1 or left out for the contact model %s, which gives all "
                                 "energy back, is %s",
@@ -185,7 +186,7 @@ static Status check_restitution(double restitution, const ContactLaw *law, const
     return problem_add_real(problem, STATUS_INVALID, place, restitution, NULL,
                             "must be at least %s for the contact model %s, is %s: its damping "
                             "grows beyond all bounds",
-                            text_real(least, law->least_restitution), law->kind.name, is);
+                            text_real(least, law->restitution_min), law->kind.name, is);
 }
 
 static Status check_table(const Buffer *buffer, const ContactLaw *law, const char *pointer,
@@ -193,7 +194,7 @@ static Status check_table(const Buffer *buffer, const ContactLaw *law, const cha
     const ContactRows *rows = &buffer->table;
     Status status = STATUS_OK;
     char table[sizeof((Fault){0}.pointer)];
-    pointer_join(table, sizeof table, pointer, "table");
+    json_pointer_join(table, sizeof table, pointer, "table");
     if (rows->count < 2)
         return problem_add(problem, STATUS_INVALID, table,
                            "must have at least two rows, has %zu: restitution and contact_time "
@@ -201,7 +202,7 @@ static Status check_table(const Buffer *buffer, const ContactLaw *law, const cha
                            rows->count);
     for (size_t i = 0; i < rows->count; i++) {
         char row[sizeof((Fault){0}.pointer)], place[sizeof((Fault){0}.pointer)];
-        pointer_index(row, sizeof row, table, i);
+        json_pointer_index(row, sizeof row, table, i);
         if (check_restitution(rows->at[i].restitution, law, row, problem) != STATUS_OK)
             status = STATUS_INVALID;
         if (law->form != CONTACT_IMPULSIVE && !has(rows->at[i].contact_time))
@@ -212,7 +213,7 @@ static Status check_table(const Buffer *buffer, const ContactLaw *law, const cha
         if (i == 0 || rows->at[i].approach_speed > rows->at[i - 1].approach_speed)
             continue;
         char is[32], than[32];
-        pointer_join(place, sizeof place, row, "approach_speed");
+        json_pointer_join(place, sizeof place, row, "approach_speed");
         status = problem_add_real(problem, STATUS_INVALID, place, rows->at[i].approach_speed, "m/s",
                                   "must be above the row before, %s m/s, is %s",
                                   text_real(than, rows->at[i - 1].approach_speed),
@@ -226,7 +227,7 @@ static Status check_power(const Buffer *buffer, const ContactLaw *law, const cha
     const char *model = law->kind.name;
     char place[sizeof((Fault){0}.pointer)];
     if (has(buffer->damping)) {
-        pointer_join(place, sizeof place, pointer, "damping");
+        json_pointer_join(place, sizeof place, pointer, "damping");
         return problem_add_real(problem, STATUS_INVALID, place, buffer->damping, "N s/m",
                                 "is not for the contact model %s, whose damping follows from "
                                 "restitution: choose spring_damper, or give that instead",
@@ -248,8 +249,8 @@ static Status check_power(const Buffer *buffer, const ContactLaw *law, const cha
     return check_restitution(buffer->restitution, law, pointer, problem);
 }
 
-Status buffer_check(const Buffer *buffer, const ContactLaw *law, const char *pointer,
-                    Problem *problem) {
+Status buffer_validate(const Buffer *buffer, const ContactLaw *law, const char *pointer,
+                       Problem *problem) {
     if (problem_concerns(problem, pointer))
         return STATUS_INVALID;
     TRY(check_way(buffer, law, pointer, problem));
@@ -282,7 +283,7 @@ void buffer_normalise(Buffer *buffer, const ContactLaw *law) {
     if (law->form != CONTACT_POWER)
         buffer->exponent = (double)NAN;
     else if (!has(buffer->exponent))
-        buffer->exponent = POWER_EXPONENT;
+        buffer->exponent = POWER_LAW_EXPONENT;
     if (law->form == CONTACT_POWER && law->factor == NULL && buffer->table.count == 0)
         buffer->restitution = 1;
 }

@@ -1,6 +1,5 @@
-// What stands at a stop: e and T_c as measured, once or over approach speed, or what is known of
-// its force. Not what it comes to for a pair of masses (contact/identify.h), nor a material of the
-// store. Used by damper.h and by whoever resolves materials.
+// The buffer at a stop: measured restitution e and contact time T_c, at one approach speed or
+// several, or the parameters of its contact force.
 #ifndef CORE_SCENE_BUFFER_H
 #define CORE_SCENE_BUFFER_H
 
@@ -9,18 +8,17 @@
 
 enum { BUFFER_ROWS = 1000 };
 
-// What is known of the test behind a material's numbers: what of them may be said in a scene. NAN:
-// not known.
+// The test in which the values of a resolved material were measured. NAN: unknown.
 typedef struct BufferTest {
-    double least_speed, most_speed; // approach speeds that were measured [m/s]
+    double least_speed, most_speed; // range of measured approach speeds [m/s]
     double impactor_mass;           // [kg]
     double base_mass;               // INFINITY: a fixed base [kg]
-    // Standard deviations over their values; of a table the root mean square of its rows'.
+    // Standard deviations relative to the values; for a table, the root mean square of its rows.
     double restitution_deviation, contact_time_deviation;
 } BufferTest;
 
-// What is not given is NAN. `material` alone is a name yet to be resolved; beside numbers
-// ("sponge@1") it says where they come from.
+// Values that are not given are NAN. `material` alone is a name to be resolved; with values
+// ("sponge@1") it is their source.
 typedef struct Buffer {
     char *material;
     double restitution;  // e [-]
@@ -28,41 +26,41 @@ typedef struct Buffer {
     double stiffness;    // k_b [N/m], under a power law [N/m^n]
     double damping;      // c_b [N s/m]
     double exponent;     // n of a power law
-    ContactRows table;   // e and T_c by strictly rising approach speed
-    BufferTest test;     // of a resolved material; in no document: the revision stands for it
+    ContactRows table;   // e and T_c by strictly ascending approach speed
+    BufferTest test;     // of a resolved material; not part of any document
 } Buffer;
 
 extern const Field buffer_fields[];
 
 bool buffer_is_given(const Buffer *buffer);
 
-// The numbers as contact/ takes them; the table is borrowed.
+// The values as contact parameters; the table is borrowed.
 ContactNumbers buffer_numbers(const Buffer *buffer);
 
-// Whether e and T_c are given, which hold for one pair of masses.
+// Whether e or T_c is given, which are valid for one pair of masses.
 bool buffer_is_measured(const Buffer *buffer);
 
-// Whether anything is said of how a contact goes on: a contact time, a stiffness or a damping.
-bool buffer_has_contact(const Buffer *buffer);
+// Whether a contact time, a stiffness or a damping is given.
+bool buffer_has_contact_data(const Buffer *buffer);
 
 bool buffer_equals(const Buffer *a, const Buffer *b);
 
-// The approach speeds for which its numbers were measured: those of its material, or its table's
-// ends; NAN: not known [m/s].
-void buffer_speeds(const Buffer *buffer, double *least, double *most);
+// The approach speeds at which the values were measured: those of the material, or the ends of the
+// table; NAN: unknown [m/s].
+void buffer_speed_range(const Buffer *buffer, double *least, double *most);
 
-// The effective mass of the pair that its material was tested with; NAN: not known [kg].
+// The effective mass of the pair in the test of the material; NAN: unknown [kg].
 double buffer_test_mass(const Buffer *buffer);
 
-// Moves `source` into `target` and leaves it absent.
+// Moves `source` to `target` and makes it absent.
 void buffer_move(Buffer *target, Buffer *source);
 
-// Judges a given buffer under a law that is none to be chosen, below `pointer`; silent where there
-// is a fault already.
-Status buffer_check(const Buffer *buffer, const ContactLaw *law, const char *pointer,
-                    Problem *problem);
+// Checks a given buffer under `law`, which must not be CONTACT_CHOSEN. Adds faults below `pointer`,
+// not where there is one already.
+Status buffer_validate(const Buffer *buffer, const ContactLaw *law, const char *pointer,
+                       Problem *problem);
 
-// Erases what the law does not use and fills the exponent where it uses one.
+// Removes the values that the law does not use, and sets the default exponent.
 void buffer_normalise(Buffer *buffer, const ContactLaw *law);
 
 #endif

@@ -1,6 +1,7 @@
 // A damper may have one buffer for both stops, one for each, or one for both and another for one of
 // them. What all of these mean is kept in one form, so that equal dampers are written equally.
 #include "core/scene/damper.h"
+#include "core/base/json_pointer.h"
 
 #include <stdlib.h>
 
@@ -50,8 +51,8 @@ const ContactLaw *dampers_contact_law(const Dampers *dampers, const Contact *con
     if (law->form != CONTACT_CHOSEN)
         return law;
     for (size_t i = 0; i < dampers->count; i++)
-        if (buffer_has_contact(damper_buffer(&dampers->at[i], SIDE_LEFT)) ||
-            buffer_has_contact(damper_buffer(&dampers->at[i], SIDE_RIGHT)))
+        if (buffer_has_contact_data(damper_buffer(&dampers->at[i], SIDE_LEFT)) ||
+            buffer_has_contact_data(damper_buffer(&dampers->at[i], SIDE_RIGHT)))
             return &contact_spring_damper;
     return &contact_impulse;
 }
@@ -61,13 +62,14 @@ static Status check_buffers(Damper *damper, const ContactLaw *law, const char *p
     char places[BUFFERS][sizeof((Fault){0}.pointer)];
     bool is_given[BUFFERS], is_told = false;
     for (size_t i = 0; i < BUFFERS; i++) {
-        pointer_join(places[i], sizeof places[i], pointer, buffer_names[i]);
+        json_pointer_join(places[i], sizeof places[i], pointer, buffer_names[i]);
         is_given[i] = buffer_is_given(buffer_at(damper, i));
         is_told = is_told || problem_concerns(problem, places[i]);
     }
     Status status = STATUS_OK;
     for (size_t i = 0; i < BUFFERS; i++)
-        if (is_given[i] && buffer_check(buffer_at(damper, i), law, places[i], problem) != STATUS_OK)
+        if (is_given[i] &&
+            buffer_validate(buffer_at(damper, i), law, places[i], problem) != STATUS_OK)
             status = STATUS_INVALID;
     // A buffer that could not be read may be the one that seems to be missing.
     if (is_told)
@@ -90,7 +92,7 @@ static Status check_position(const Damper *damper, const char *pointer, Problem 
     if (!(most >= 0) || !isfinite(damper->position) || fabs(damper->position) <= most)
         return STATUS_OK;
     char place[sizeof((Fault){0}.pointer)], limit[32], is[32];
-    pointer_join(place, sizeof place, pointer, "position");
+    json_pointer_join(place, sizeof place, pointer, "position");
     text_real(limit, most);
     text_real(is, damper->position);
     return problem_add_real(problem, STATUS_INVALID, place, damper->position, "m",
@@ -105,7 +107,7 @@ static Status check_clearance(const Damper *damper, const ContactLaw *law, const
     if (law->form != CONTACT_POWER || damper->clearance != 0)
         return STATUS_OK;
     char place[sizeof((Fault){0}.pointer)];
-    pointer_join(place, sizeof place, pointer, "clearance");
+    json_pointer_join(place, sizeof place, pointer, "clearance");
     return problem_add_real(problem, STATUS_INVALID, place, 0, "m",
                             "must be above 0 m for the contact model %s, is 0: its parameters are "
                             "those of an approach speed (spring_damper and impulse allow 0)",
@@ -118,7 +120,7 @@ static Status check_stops(const Damper *damper, const char *pointer, Problem *pr
     if (!isfinite(damper->offset) || !isfinite(damper->clearance) || isfinite(furthest))
         return STATUS_OK;
     char place[sizeof((Fault){0}.pointer)];
-    pointer_join(place, sizeof place, pointer, "offset");
+    json_pointer_join(place, sizeof place, pointer, "offset");
     return problem_add_real(problem, STATUS_INVALID, place, damper->offset, "m",
                             "puts a stop beyond all numbers");
 }
@@ -128,7 +130,7 @@ static Status check_storey(const Damper *damper, size_t storeys, const char *poi
     if (storeys == 0 || damper->storey <= storeys)
         return STATUS_OK;
     char place[sizeof((Fault){0}.pointer)];
-    pointer_join(place, sizeof place, pointer, "storey");
+    json_pointer_join(place, sizeof place, pointer, "storey");
     return problem_add_real(problem, STATUS_INVALID, place, (double)damper->storey, NULL,
                             "must be at most %zu, the number of storeys, is %llu", storeys,
                             (unsigned long long)damper->storey);
@@ -139,7 +141,7 @@ double damper_identified_mass(const Damper *damper, double own) {
         return own;
     return isnan(damper->rig.base_mass)
                ? damper->rig.impactor_mass
-               : effective_mass(damper->rig.impactor_mass, damper->rig.base_mass);
+               : contact_effective_mass(damper->rig.impactor_mass, damper->rig.base_mass);
 }
 
 // Restitution alone, and stiffness and damping, hold for any pair of masses.
@@ -194,7 +196,7 @@ static void fill_rig(Damper *damper, const ContactLaw *law) {
     damper->rig = rig_of(test);
 }
 
-void damper_ask_rig(const Damper *base, Damper *damper) {
+void damper_reset_rig(const Damper *base, Damper *damper) {
     const BufferTest *test;
     bool is_alike;
     if (base->identified_for != IDENTIFIED_FOR_RIG || !is_same_rig(&base->rig, &damper->rig) ||
@@ -239,7 +241,7 @@ static Status refuse_rig(const Damper *damper, const char *place, Problem *probl
 static Status check_rig(const Damper *damper, const ContactLaw *law, const char *pointer,
                         Problem *problem) {
     char place[sizeof((Fault){0}.pointer)];
-    pointer_join(place, sizeof place, pointer, "rig");
+    json_pointer_join(place, sizeof place, pointer, "rig");
     const bool is_given = is_rig_given(damper);
     if (!is_carried(damper, law) || problem_concerns(problem, place) ||
         is_given == (damper->identified_for == IDENTIFIED_FOR_RIG))

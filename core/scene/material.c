@@ -1,6 +1,7 @@
 // A material says e and T_c once, for every approach speed, or as a table; what it does not know it
 // does not say.
 #include "core/scene/material.h"
+#include "core/base/json_pointer.h"
 
 #include <math.h>
 #include <string.h>
@@ -61,7 +62,7 @@ static bool has(double value) {
     return !isnan(value);
 }
 
-bool material_slug_is_good(const char *slug) {
+bool material_slug_is_valid(const char *slug) {
     const size_t size = strlen(slug);
     return size > 0 && size <= MATERIAL_SLUG_MAX &&
            strspn(slug, "abcdefghijklmnopqrstuvwxyz0123456789_-") == size;
@@ -69,14 +70,14 @@ bool material_slug_is_good(const char *slug) {
 
 static Status fault(const char *pointer, const char *name, Problem *problem, const char *detail) {
     char place[sizeof((Fault){0}.pointer)];
-    pointer_join(place, sizeof place, pointer, name);
+    json_pointer_join(place, sizeof place, pointer, name);
     return problem_add(problem, STATUS_INVALID, place, "%s", detail);
 }
 
 // Whether the member `name` could not be read, which is told: what depends on it cannot be judged.
 static bool is_unread(const char *pointer, const char *name, const Problem *problem) {
     char place[sizeof((Fault){0}.pointer)];
-    pointer_join(place, sizeof place, pointer, name);
+    json_pointer_join(place, sizeof place, pointer, name);
     return problem_concerns(problem, place);
 }
 
@@ -92,7 +93,7 @@ static Status check_order(double least, double most, const char *unit, const cha
     char place[sizeof((Fault){0}.pointer)], is[32], than[32];
     if (!(most < least))
         return STATUS_OK;
-    pointer_join(place, sizeof place, pointer, name);
+    json_pointer_join(place, sizeof place, pointer, name);
     return problem_add_real(problem, STATUS_INVALID, place, most, unit,
                             "must be at least %s %s, the range's other end, is %s",
                             text_real(than, least), unit, text_real(is, most));
@@ -102,18 +103,18 @@ static Status check_table(const Material *material, const char *pointer, Problem
     const MaterialRows *rows = &material->table;
     char table[sizeof((Fault){0}.pointer)];
     Status status = STATUS_OK;
-    pointer_join(table, sizeof table, pointer, "table");
+    json_pointer_join(table, sizeof table, pointer, "table");
     if (rows->count == 1)
         status = problem_add(problem, STATUS_INVALID, table,
                              "must have at least two rows, has 1: restitution and contact_time "
                              "alone hold for every approach speed");
     char first[sizeof((Fault){0}.pointer)];
-    pointer_index(first, sizeof first, table, 0);
+    json_pointer_index(first, sizeof first, table, 0);
     const bool is_first_unread = is_unread(first, "contact_time", problem);
     for (size_t i = 0; i < rows->count; i++) {
         const MaterialRow *row = &rows->at[i];
         char at[sizeof((Fault){0}.pointer)], place[sizeof((Fault){0}.pointer)], is[32], than[32];
-        pointer_index(at, sizeof at, table, i);
+        json_pointer_index(at, sizeof at, table, i);
         if (has(row->contact_time) != has(rows->at[0].contact_time) && !is_first_unread)
             status = fault(at, "contact_time", problem,
                            "must be given in every row of the table or in none");
@@ -123,7 +124,7 @@ static Status check_table(const Material *material, const char *pointer, Problem
                            "needs a contact_time that it belongs to");
         if (i == 0 || !(row->approach_speed <= rows->at[i - 1].approach_speed))
             continue; // also where one is not known
-        pointer_join(place, sizeof place, at, "approach_speed");
+        json_pointer_join(place, sizeof place, at, "approach_speed");
         status = problem_add_real(problem, STATUS_INVALID, place, row->approach_speed, "m/s",
                                   "must be above the row before, %s m/s, is %s",
                                   text_real(than, rows->at[i - 1].approach_speed),
@@ -139,7 +140,7 @@ static Status check_ways(const Material *material, const char *pointer, Problem 
                              has(material->restitution_deviation) ||
                              has(material->contact_time_deviation);
     char table[sizeof((Fault){0}.pointer)];
-    pointer_join(table, sizeof table, pointer, "table");
+    json_pointer_join(table, sizeof table, pointer, "table");
     if (has_table && has_numbers)
         return problem_add(problem, STATUS_INVALID, table,
                            "stands in place of restitution, contact_time and their deviations: "
@@ -159,7 +160,7 @@ static Status check_ways(const Material *material, const char *pointer, Problem 
 
 static Status check_base(const Material *material, const char *pointer, Problem *problem) {
     char base[sizeof((Fault){0}.pointer)];
-    pointer_join(base, sizeof base, pointer, "base");
+    json_pointer_join(base, sizeof base, pointer, "base");
     if (problem_concerns(problem, base))
         return STATUS_OK;
     if (has(material->base_mass) && material->base != MATERIAL_BASE_FREE)
@@ -178,8 +179,8 @@ static Status check_measurements(const Material *material, const char *pointer, 
             is_again = is_again || material->measurements.at[k] == number;
         if (!is_again && number == floor(number))
             continue;
-        pointer_join(list, sizeof list, pointer, "measurements");
-        pointer_index(place, sizeof place, list, i);
+        json_pointer_join(list, sizeof list, pointer, "measurements");
+        json_pointer_index(place, sizeof place, list, i);
         status = problem_add_real(problem, STATUS_INVALID, place, number, NULL,
                                   is_again ? "stands there twice, %s"
                                            : "must be the number of a measurement, is %s",
@@ -196,17 +197,17 @@ static Status check_tags(const Material *material, const char *pointer, Problem 
         const size_t size = strlen(tag);
         if (size <= TAG_MAX && tag[strspn(tag, " \t\r\n")] != '\0')
             continue;
-        pointer_join(list, sizeof list, pointer, "tags");
-        pointer_index(place, sizeof place, list, i);
+        json_pointer_join(list, sizeof list, pointer, "tags");
+        json_pointer_index(place, sizeof place, list, i);
         status = problem_add(problem, STATUS_INVALID, place, "must have 1 to %d bytes, %s", TAG_MAX,
                              size > TAG_MAX ? "is longer" : "is empty");
     }
     return status;
 }
 
-Status material_check(const Material *material, const char *pointer, Problem *problem) {
+Status material_validate(const Material *material, const char *pointer, Problem *problem) {
     const Status faults[] = {
-        fields_check(material_fields, material, pointer, problem),
+        fields_validate(material_fields, material, pointer, problem),
         check_text(material->name, pointer, "name", problem),
         check_text(material->kind, pointer, "kind", problem),
         check_text(material->source, pointer, "source", problem),
@@ -225,7 +226,7 @@ Status material_check(const Material *material, const char *pointer, Problem *pr
     return STATUS_OK;
 }
 
-void material_speeds(const Material *material, double *least, double *most) {
+void material_speed_range(const Material *material, double *least, double *most) {
     const MaterialRows *rows = &material->table;
     *least = material->least_speed;
     *most = material->most_speed;
@@ -240,6 +241,6 @@ double material_test_mass(const Material *material) {
         return material->impactor_mass;
     if (material->base == MATERIAL_BASE_FREE && has(material->impactor_mass) &&
         has(material->base_mass))
-        return effective_mass(material->impactor_mass, material->base_mass);
+        return contact_effective_mass(material->impactor_mass, material->base_mass);
     return (double)NAN;
 }

@@ -7,7 +7,8 @@
 #include <float.h>
 #include <stdlib.h>
 
-#include "core/math/symmetric_eigen.h"
+#include "core/base/json_pointer.h"
+#include "core/math/symmetric_matrix.h"
 
 // How far an entry may be from its mirror, relative to the larger of both and to what the diagonal
 // allows; and how far M must be from singular.
@@ -15,17 +16,17 @@ static const double symmetry = 1e-12, distance = 1e-12;
 
 // clang-format off
 static const Field matrices_fields[] = {
-    FIELD_ROWS(StructureMatrices, mass, "kg", ANY, STRUCTURE_STOREYS, PRESENCE_REQUIRED, "mass matrix M, row after row: symmetric, positive definite"),
-    FIELD_ROWS(StructureMatrices, stiffness, "N/m", ANY, STRUCTURE_STOREYS, PRESENCE_REQUIRED, "stiffness matrix K: symmetric, positive semi-definite"),
-    FIELD_ROWS(StructureMatrices, damping, "N s/m", ANY, STRUCTURE_STOREYS, PRESENCE_OPTIONAL, "damping matrix C: its symmetric part positive semi-definite; 0 if no damping is given"),
-    FIELD_REALS(StructureMatrices, influence, NULL, ANY, STRUCTURE_STOREYS, PRESENCE_OPTIONAL, "how far each storey moves, per metre, with the base when nothing bends; all 1 if not given"),
-    FIELD_BASE(StructureMatrices, structure, structure_fields),
+    FIELD_ROWS(MatrixStructure, mass, "kg", ANY, STRUCTURE_STOREYS, PRESENCE_REQUIRED, "mass matrix M, row after row: symmetric, positive definite"),
+    FIELD_ROWS(MatrixStructure, stiffness, "N/m", ANY, STRUCTURE_STOREYS, PRESENCE_REQUIRED, "stiffness matrix K: symmetric, positive semi-definite"),
+    FIELD_ROWS(MatrixStructure, damping, "N s/m", ANY, STRUCTURE_STOREYS, PRESENCE_OPTIONAL, "damping matrix C: its symmetric part positive semi-definite; 0 if no damping is given"),
+    FIELD_REALS(MatrixStructure, influence, NULL, ANY, STRUCTURE_STOREYS, PRESENCE_OPTIONAL, "how far each storey moves, per metre, with the base when nothing bends; all 1 if not given"),
+    FIELD_BASE(MatrixStructure, structure, structure_fields),
     FIELD_END
 };
 // clang-format on
 
-static const StructureMatrices *matrix_of(const Structure *structure) {
-    return (const StructureMatrices *)(const void *)structure;
+static const MatrixStructure *matrix_of(const Structure *structure) {
+    return (const MatrixStructure *)(const void *)structure;
 }
 
 static size_t matrices_storeys(const Structure *structure) {
@@ -40,7 +41,7 @@ typedef struct Checked {
     const Rows *rows;
     const char *name, *unit;
     bool is_symmetric;
-    double margin; // of linear_find_indefinite
+    double margin; // of symmetric_matrix_find_indefinite
     const char *wanted;
 } Checked;
 
@@ -56,7 +57,7 @@ static Status check_square(const Checked *matrix, size_t storeys, const char *pl
         if (matrix->rows->at[i].count == storeys)
             continue;
         char row[sizeof((Fault){0}.pointer)];
-        pointer_index(row, sizeof row, place, i);
+        json_pointer_index(row, sizeof row, place, i);
         status = problem_add(problem, STATUS_INVALID, row,
                              "must have %zu number%s, one per row of the matrix, has %zu", storeys,
                              storeys == 1 ? "" : "s", matrix->rows->at[i].count);
@@ -74,8 +75,8 @@ static Status check_symmetry(const Checked *matrix, const char *place, Problem *
             if (fabs(is - mirror) <= symmetry * size)
                 continue;
             char row[sizeof((Fault){0}.pointer)], entry[sizeof((Fault){0}.pointer)], a[32], b[32];
-            pointer_index(row, sizeof row, place, i);
-            pointer_index(entry, sizeof entry, row, j);
+            json_pointer_index(row, sizeof row, place, i);
+            json_pointer_index(entry, sizeof entry, row, j);
             return problem_add_real(problem, STATUS_INVALID, entry, is, matrix->unit,
                                     "must equal its mirror %s/%zu/%zu, %s: the matrix must be "
                                     "symmetric, is %s",
@@ -96,14 +97,14 @@ static Status check_definite(const Checked *matrix, const char *place, Problem *
     if (flat == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a matrix");
     flatten(matrix->rows, flat);
-    const int block = linear_find_indefinite(n, flat, matrix->margin);
+    const int block = symmetric_matrix_find_indefinite(n, flat, matrix->margin);
     free(flat);
     if (block == 0)
         return STATUS_OK;
     if (block < 0)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a matrix");
     char row[sizeof((Fault){0}.pointer)];
-    pointer_index(row, sizeof row, place, (size_t)block - 1);
+    json_pointer_index(row, sizeof row, place, (size_t)block - 1);
     const double own = matrix->rows->at[block - 1].at[block - 1];
     return problem_add_real(problem, STATUS_INVALID, row, own, matrix->unit,
                             "must keep the matrix %s: with this row the leading %d by %d block is "
@@ -115,7 +116,7 @@ static Status check_definite(const Checked *matrix, const char *place, Problem *
 static Status check_matrix(const Checked *matrix, size_t storeys, const char *pointer,
                            Problem *problem) {
     char place[sizeof((Fault){0}.pointer)];
-    pointer_join(place, sizeof place, pointer, matrix->name);
+    json_pointer_join(place, sizeof place, pointer, matrix->name);
     if (problem_concerns(problem, place))
         return STATUS_OK; // told by the rows
     TRY(check_square(matrix, storeys, place, problem));
@@ -141,7 +142,7 @@ static Status fill_damping(Rows *damping, size_t storeys, Problem *problem) {
 }
 
 static Status matrices_complete(Structure *structure, const char *pointer, Problem *problem) {
-    StructureMatrices *matrix = (StructureMatrices *)(void *)structure;
+    MatrixStructure *matrix = (MatrixStructure *)(void *)structure;
     const size_t n = matrix->mass.count;
     const double rounding = 8 * DBL_EPSILON * (double)n;
     if (n == 0 || n > STRUCTURE_STOREYS)
@@ -163,12 +164,12 @@ static Status matrices_complete(Structure *structure, const char *pointer, Probl
         TRY(fill_influence(&matrix->influence, n, problem));
     if (matrix->damping.count == 0 && isnan(structure->damping_ratio))
         TRY(fill_damping(&matrix->damping, n, problem));
-    TRY(structure_check_count(&matrix->influence, n, pointer, "influence", problem));
+    TRY(structure_validate_count(&matrix->influence, n, pointer, "influence", problem));
     return status;
 }
 
-static void matrices_fill(const Structure *structure, const Matrices *matrices) {
-    const StructureMatrices *matrix = matrix_of(structure);
+static void matrices_fill(const Structure *structure, const StructureMatrices *matrices) {
+    const MatrixStructure *matrix = matrix_of(structure);
     const size_t n = matrix->mass.count;
     flatten(&matrix->mass, matrices->mass);
     flatten(&matrix->stiffness, matrices->stiffness);
@@ -193,19 +194,19 @@ static Status matrices_moved_mass(const Structure *structure, size_t storey, dou
     double *force = room + n * n, *moved = force + n;
     flatten(rows, room);
     force[storey] = 1;
-    const Status status = linear_solve(n, room, force, moved);
+    const Status status = symmetric_matrix_solve(n, room, force, moved);
     *mass = 1 / moved[storey];
     free(room);
     return status;
 }
 
-const StructureKind structure_matrices = {
+const StructureKind structure_matrix = {
     .kind = {"matrices", "any linear structure, by its matrices", matrices_fields,
-             sizeof(StructureMatrices)},
+             sizeof(MatrixStructure)},
     .damping_name = "damping",
     .storeys = matrices_storeys,
     .has_damping = matrices_has_damping,
     .complete = matrices_complete,
-    .fill = matrices_fill,
+    .assemble = matrices_fill,
     .moved_mass = matrices_moved_mass,
 };

@@ -1,6 +1,7 @@
 // Judging what rows cannot see. Each part is judged on its own, so that all faults are told at
 // once; a part that could not be read, or has a fault already, is passed over.
 #include "core/scene/scene.h"
+#include "core/base/json_pointer.h"
 
 #include <stdio.h>
 
@@ -57,8 +58,8 @@ static bool is_sound(const ContactLaw *law, int separation, double mass,
         return is_positive(mass * pow(1 / T_c, n + 1) * pow(1e3, 1 - n)) &&
                is_positive(mass * pow(1e3 / T_c, n + 1) * pow(CONTACT_SPEED_MIN, 1 - n));
     }
-    const Identified found = identify_measured(mass, numbers->restitution, numbers->contact_time,
-                                               (Separation)separation);
+    const Identification found = identification_from_restitution(
+        mass, numbers->restitution, numbers->contact_time, (Separation)separation);
     return is_positive(found.stiffness) && isfinite(found.damping);
 }
 
@@ -104,7 +105,7 @@ static Status check_contacts(const Scene *scene, Problem *problem) {
             structure_kind(structure)->moved_mass(structure, (size_t)damper->storey - 1, &moved);
         if (known == STATUS_NO_MEMORY)
             return problem_set(problem, known, "no memory for a scene");
-        const double mass = effective_mass(moved, damper->mass);
+        const double mass = contact_effective_mass(moved, damper->mass);
         TRY(check_contact(scene, law, i, SIDE_LEFT, mass, problem));
         if (damper_buffer(damper, SIDE_RIGHT) != damper_buffer(damper, SIDE_LEFT))
             TRY(check_contact(scene, law, i, SIDE_RIGHT, mass, problem));
@@ -118,7 +119,7 @@ static Status complete_dampers(Scene *scene, size_t storeys, Problem *problem) {
     // More than the rows allow were told by the rows.
     for (size_t i = 0; i < scene->dampers.count && i < SCENE_DAMPERS; i++) {
         char place[sizeof((Fault){0}.pointer)];
-        pointer_index(place, sizeof place, "/dampers", i);
+        json_pointer_index(place, sizeof place, "/dampers", i);
         if (damper_complete(&scene->dampers.at[i], law, storeys, place, problem) != STATUS_OK)
             status = STATUS_INVALID;
     }
@@ -146,9 +147,9 @@ static Status complete_start(Reals *start, const char *name, const char *unit, s
     if (start->count == 0 || (start->count == 1 && start->at[0] == 0))
         return structure_zeros(start, storeys, problem);
     if (start->count != 1 || storeys == 1)
-        return structure_check_count(start, storeys, "/excitation", name, problem);
+        return structure_validate_count(start, storeys, "/excitation", name, problem);
     char place[sizeof((Fault){0}.pointer)];
-    pointer_join(place, sizeof place, "/excitation", name);
+    json_pointer_join(place, sizeof place, "/excitation", name);
     return problem_add_real(problem, STATUS_INVALID, place, start->at[0], unit,
                             "must be a list of %zu numbers, one per storey, or 0", storeys);
 }

@@ -1,6 +1,5 @@
-// What the user describes: structure, dampers, contact, excitation, time. Plain values in SI units.
-// Not yet judged against each other (scene_complete) and not made ready (plan/).
-// Used by plan/ and simulation/.
+// The physical input: structure, dampers, contact law, excitation and duration. Plain values in SI
+// units.
 #ifndef CORE_SCENE_SCENE_H
 #define CORE_SCENE_SCENE_H
 
@@ -34,17 +33,17 @@ static inline const Excitation *scene_excitation(const Scene *scene) {
     return (const Excitation *)(const void *)scene->excitation;
 }
 
-// Samples per channel: i = 0 ... floor(duration * sample_rate (1 + 1e-12)). Saturates at SIZE_MAX.
+// The number of samples i = 0 ... floor(duration * sample_rate (1 + 1e-12)); at most SIZE_MAX.
 size_t scene_sample_count(const Scene *scene);
 
-// Storeys of the structure; 0 where a fault among `problem`'s leaves them unknown.
+// The number of storeys; 0 if unknown because of a fault in `problem`.
 size_t scene_storeys(const Scene *scene, const Problem *problem);
 
-// Judges and completes: adds every fault that the rows alone cannot see (materials still
-// unresolved, parts that exclude each other, positions beyond a stop, more than `most_samples`
-// samples; 0: no limit), fills defaults that depend on other members and erases what the chosen
-// model does not use, so that equal scenes have equal canonical forms. Call after fields_check and
-// after slugs are resolved; says nothing of what already has a fault.
-Status scene_complete(Scene *scene, size_t most_samples, Problem *problem);
+// Validates and completes a scene, after fields_validate and after materials are resolved. Adds
+// every fault that involves several members, not where there is one already: unresolved materials,
+// members that exclude each other, positions beyond a stop, more than `max_samples` samples (0: no
+// limit). Sets defaults that depend on other members and removes values that the chosen models do
+// not use, so that equal scenes have equal canonical forms.
+Status scene_complete(Scene *scene, size_t max_samples, Problem *problem);
 
 #endif

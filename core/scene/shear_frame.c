@@ -5,18 +5,20 @@
 // Such a K is positive semi-definite whatever its springs, if none is negative.
 #include "core/scene/structure.h"
 
+#include "core/base/json_pointer.h"
+
 // clang-format off
 static const Field frame_fields[] = {
-    FIELD_REALS(StructureFrame, masses, "kg", ABOVE(0), STRUCTURE_STOREYS, PRESENCE_REQUIRED, "of the storeys, from the ground up"),
-    FIELD_REALS(StructureFrame, stiffnesses, "N/m", AT_MIN(0), STRUCTURE_STOREYS, PRESENCE_REQUIRED, "of the springs below the storeys, from the ground up"),
-    FIELD_REALS(StructureFrame, dampings, "N s/m", AT_MIN(0), STRUCTURE_STOREYS, PRESENCE_OPTIONAL, "of the dampers beside those springs; 0 if no damping is given"),
-    FIELD_BASE(StructureFrame, structure, structure_fields),
+    FIELD_REALS(ShearFrame, masses, "kg", ABOVE(0), STRUCTURE_STOREYS, PRESENCE_REQUIRED, "of the storeys, from the ground up"),
+    FIELD_REALS(ShearFrame, stiffnesses, "N/m", AT_MIN(0), STRUCTURE_STOREYS, PRESENCE_REQUIRED, "of the springs below the storeys, from the ground up"),
+    FIELD_REALS(ShearFrame, dampings, "N s/m", AT_MIN(0), STRUCTURE_STOREYS, PRESENCE_OPTIONAL, "of the dampers beside those springs; 0 if no damping is given"),
+    FIELD_BASE(ShearFrame, structure, structure_fields),
     FIELD_END
 };
 // clang-format on
 
-static const StructureFrame *frame_of(const Structure *structure) {
-    return (const StructureFrame *)(const void *)structure;
+static const ShearFrame *frame_of(const Structure *structure) {
+    return (const ShearFrame *)(const void *)structure;
 }
 
 static size_t frame_storeys(const Structure *structure) {
@@ -35,8 +37,8 @@ static Status check_sums(const Reals *links, const char *unit, const char *point
             isfinite(links->at[i] + links->at[i - 1]))
             continue;
         char list[sizeof((Fault){0}.pointer)], place[sizeof((Fault){0}.pointer)];
-        pointer_join(list, sizeof list, pointer, name);
-        pointer_index(place, sizeof place, list, i);
+        json_pointer_join(list, sizeof list, pointer, name);
+        json_pointer_index(place, sizeof place, list, i);
         return problem_add_real(problem, STATUS_INVALID, place, links->at[i], unit,
                                 "and the one below must have a sum that numbers can hold");
     }
@@ -44,19 +46,19 @@ static Status check_sums(const Reals *links, const char *unit, const char *point
 }
 
 static Status frame_complete(Structure *structure, const char *pointer, Problem *problem) {
-    StructureFrame *frame = (StructureFrame *)(void *)structure;
+    ShearFrame *frame = (ShearFrame *)(void *)structure;
     const size_t storeys = frame->masses.count;
     char masses[sizeof((Fault){0}.pointer)];
-    pointer_join(masses, sizeof masses, pointer, "masses");
+    json_pointer_join(masses, sizeof masses, pointer, "masses");
     if (storeys == 0 || storeys > STRUCTURE_STOREYS || problem_concerns(problem, masses))
         return STATUS_OK; // told by the rows
     if (frame->dampings.count == 0 && isnan(structure->damping_ratio))
         TRY(structure_zeros(&frame->dampings, storeys, problem));
     const Status faults[] = {
-        structure_check_count(&frame->stiffnesses, storeys, pointer, "stiffnesses", problem),
+        structure_validate_count(&frame->stiffnesses, storeys, pointer, "stiffnesses", problem),
         frame->dampings.count == 0
             ? STATUS_OK
-            : structure_check_count(&frame->dampings, storeys, pointer, "dampings", problem),
+            : structure_validate_count(&frame->dampings, storeys, pointer, "dampings", problem),
         check_sums(&frame->stiffnesses, "N/m", pointer, "stiffnesses", problem),
         check_sums(&frame->dampings, "N s/m", pointer, "dampings", problem),
     };
@@ -75,8 +77,8 @@ static void fill_links(const Reals *links, size_t n, double *matrix) {
     }
 }
 
-static void frame_fill(const Structure *structure, const Matrices *matrices) {
-    const StructureFrame *frame = frame_of(structure);
+static void frame_fill(const Structure *structure, const StructureMatrices *matrices) {
+    const ShearFrame *frame = frame_of(structure);
     const size_t n = frame->masses.count;
     for (size_t i = 0; i < n; i++) {
         matrices->mass[i * n + i] = frame->masses.at[i];
@@ -91,13 +93,13 @@ static Status frame_moved_mass(const Structure *structure, size_t storey, double
     return STATUS_OK;
 }
 
-const StructureKind structure_frame = {
+const StructureKind structure_shear_frame = {
     .kind = {"frame", "a shear frame: storeys on top of each other, the first on the ground",
-             frame_fields, sizeof(StructureFrame)},
+             frame_fields, sizeof(ShearFrame)},
     .damping_name = "dampings",
     .storeys = frame_storeys,
     .has_damping = frame_has_damping,
     .complete = frame_complete,
-    .fill = frame_fill,
+    .assemble = frame_fill,
     .moved_mass = frame_moved_mass,
 };

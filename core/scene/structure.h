@@ -1,5 +1,5 @@
-// What ONE kind of structure is; structures.c lists all. Each comes to matrices of its storeys:
-// M x'' + C x' + K x = -M r a_g + N. Modes are plan/'s. Used by scene/, plan/ and simulation/.
+// One kind of structure; structures.c lists all kinds. Each provides the matrices of its storeys:
+// M x'' + C x' + K x = -M r a_g + N.
 #ifndef CORE_SCENE_STRUCTURE_H
 #define CORE_SCENE_STRUCTURE_H
 
@@ -10,79 +10,80 @@ enum { STRUCTURE_STOREYS = 200 };
 // First member of every kind of structure.
 typedef struct Structure {
     Variant variant;      // kind is a StructureKind's
-    double damping_ratio; // xi of every mode [-]; absent where C is given
+    double damping_ratio; // xi of every mode [-]; absent if C is given
 } Structure;
 
-// Where matrices are written: storeys x storeys, row after row, all zero before.
-typedef struct Matrices {
+// Storage for the matrices: storeys x storeys, row-major, zero on input.
+typedef struct StructureMatrices {
     double *mass, *stiffness, *damping; // M, K, C [kg], [N/m], [N s/m]
     double *influence;                  // r [-]
-} Matrices;
+} StructureMatrices;
 
 typedef struct StructureKind {
     Kind kind;
-    const char *damping_name; // of the row that damping_ratio excludes
+    const char *damping_name; // the member that excludes damping_ratio
     size_t (*storeys)(const Structure *structure);
-    bool (*has_damping)(const Structure *structure); // by that row
-    // Faults that rows cannot see, below `pointer`; then fills what was left to defaults.
+    bool (*has_damping)(const Structure *structure); // whether that member is given
+    // Adds the faults that involve several members, below `pointer`; then sets defaults.
     Status (*complete)(Structure *structure, const char *pointer, Problem *problem);
-    void (*fill)(const Structure *structure, const Matrices *matrices);
-    // What a force on a storey (from 0) moves at once, 1 / (M^-1)_jj [kg].
+    void (*assemble)(const Structure *structure, const StructureMatrices *matrices);
+    // The mass that a force on storey j (from 0) accelerates at once, 1 / (M^-1)_jj [kg].
     Status (*moved_mass)(const Structure *structure, size_t storey, double *mass);
 } StructureKind;
 
 extern const StructureKind *const structures[]; // NULL-terminated; "sdof" first
 extern const KindTable structure_kinds;
-extern const Field structure_fields[]; // the rows that every kind has
-extern const StructureKind structure_sdof, structure_frame, structure_matrices;
+extern const Field structure_fields[]; // the rows of every kind
+extern const StructureKind structure_sdof, structure_shear_frame, structure_matrix;
 
 static inline const StructureKind *structure_kind(const Structure *structure) {
     return (const StructureKind *)(const void *)structure->variant.kind;
 }
 
 // Kind "sdof".
-typedef struct StructureSdof {
+typedef struct SdofStructure {
     Structure structure;
     double mass;      // M [kg]
     double stiffness; // K [N/m]
-    double damping;   // C [N s/m]; absent where damping_ratio is given
-} StructureSdof;
+    double damping;   // C [N s/m]; absent if damping_ratio is given
+} SdofStructure;
 
-// Kind "frame": storey i on spring i and damper i, the first on the ground.
-typedef struct StructureFrame {
+// Kind "frame": spring i and damper i are below storey i, the first on the ground.
+typedef struct ShearFrame {
     Structure structure;
     Reals masses, stiffnesses, dampings;
-} StructureFrame;
+} ShearFrame;
 
 // Kind "matrices".
-typedef struct StructureMatrices {
+typedef struct MatrixStructure {
     Structure structure;
     Rows mass, stiffness, damping;
     Reals influence;
-} StructureMatrices;
+} MatrixStructure;
 
 size_t structure_storeys(const Structure *structure);
 
-// Faults that rows cannot see, below `pointer`; fills damping of 0 where none was given. Then the
-// structure has 1 to STRUCTURE_STOREYS storeys and its matrices are what they must be.
+// Adds the faults that involve several members, below `pointer`; sets the damping to 0 if none is
+// given. After STATUS_OK the structure has 1 to STRUCTURE_STOREYS storeys and valid matrices.
 Status structure_complete(Structure *structure, const char *pointer, Problem *problem);
 
-// The matrices of a completed structure. C is 0 where several storeys have a damping_ratio: it
-// takes their modes to know it.
-void structure_fill(const Structure *structure, const Matrices *matrices);
+// Writes the matrices of a completed structure. C is 0 if several storeys have a damping_ratio,
+// because it then depends on the modes.
+void structure_assemble(const Structure *structure, const StructureMatrices *matrices);
 
-// How fast a completed structure moves, for guesses and warnings [rad/s].
+// Estimated rates of a completed structure [rad/s].
 typedef struct StructureRates {
-    double slowest; // near its first natural frequency; 0 where a motion has none
-    double fastest; // about its last one, or its fastest decay if that is faster
+    double slowest; // near the first natural frequency; 0 if a motion has none
+    double fastest; // about the last one, or the fastest decay if that is faster
 } StructureRates;
 Status structure_rates(const Structure *structure, StructureRates *rates);
-// The same where only the `modes` slowest move.
+// The same for the `modes` slowest modes only.
 Status structure_rates_of(const Structure *structure, size_t modes, StructureRates *rates);
 
-// For the kinds: a list of `count` zeros; a fault unless the list has one number per storey.
+// For the kinds: sets a list to `count` zeros; adds a fault unless a list has one number per
+// storey.
 Status structure_zeros(Reals *reals, size_t count, Problem *problem);
-Status structure_check_count(const Reals *reals, size_t storeys, const char *pointer,
-                             const char *name, Problem *problem);
+Status structure_validate_count(const Reals *reals, size_t storeys, const char *pointer,
+                                const char *name, Problem *problem);
 
 #endif

@@ -11,7 +11,7 @@
 #include <string.h>
 
 #include "core/plan/modal_truncation.h"
-#include "core/result/metric.h"
+#include "core/result/response.h"
 #include "core/simulation/impulse_variant.h"
 #include "core/simulation/internal.h"
 #include "core/solve/exact_accuracy.h"
@@ -24,7 +24,7 @@ static const double ROUNDINGS = 1e-14; // error that a run without growth estima
 
 // Upper bounds of the metric's relative error over that of the displacement. A slightly late impact
 // falls into another sample interval. For the rms see target_rms_gain().
-static const double gains[METRICS] = {1, 200, 30, 10, 5000, 1};
+static const double gains[METRIC_COUNT] = {1, 200, 30, 10, 5000, 1};
 // The same for lines of a spectrum over the rms of the motion.
 static const double spectrum_gain = 10;
 
@@ -159,7 +159,7 @@ static void target_clear(AccuracyTarget *target) {
 // a motion that may have decayed since.
 static double target_decay(const Outcome *outcome) {
     const double largest = outcome->summary.peak_displacement;
-    return fmax(outcome->response.earlier, largest) / largest;
+    return fmax(outcome->response.peak_before_window, largest) / largest;
 }
 
 // The error of the rms is at most the largest difference over the rms. The difference is that large
@@ -168,7 +168,7 @@ static double target_decay(const Outcome *outcome) {
 static double target_rms_gain(const Outcome *outcome) {
     const Summary *summary = &outcome->summary;
     const double shape = summary->peak_displacement / summary->rms_displacement;
-    return outcome->response.earlier > 0 ? target_decay(outcome) * shape : 0.2 * shape;
+    return outcome->response.peak_before_window > 0 ? target_decay(outcome) * shape : 0.2 * shape;
 }
 
 // Error of the metric for a relative error of the displacement; `outcome` may be NULL.
@@ -297,7 +297,7 @@ static Candidate target_choose(const AccuracyTarget *target, double error) {
 static double target_estimate(const AccuracyTarget *target, const Candidate *candidate,
                               const Outcome *outcome) {
     // The run's estimate for modes left out is the prediction.
-    const double own = outcome->summary.error_estimate - outcome->response.given_up;
+    const double own = outcome->summary.error_estimate - outcome->response.truncation_error;
     // Where the trajectories have diverged, the distance of their statistics is unknown.
     const int metric = target->asked->metric;
     const bool is_path = metric == METRIC_DISPLACEMENT || metric == METRIC_MEAN_ACCELERATION;
@@ -406,11 +406,11 @@ typedef struct TargetSearch {
     const SimulationLimits *limits;
     const Progress *progress;
     Workspace *workspace;
-    double done;      // part of the progress
-    double steps;     // of all runs
-    Work work;        // of all runs
-    Outcome *outcome; // of the last run; NULL: it failed
-    double estimated; // error of the last run; 1: it failed
+    double done;       // part of the progress
+    double steps;      // of all runs
+    WorkCounters work; // of all runs
+    Outcome *outcome;  // of the last run; NULL: it failed
+    double estimated;  // error of the last run; 1: it failed
     PlanAttempts attempts;
 } TargetSearch;
 
@@ -451,7 +451,7 @@ static Status search_run(TargetSearch *search, const Candidate *candidate, Probl
     if (status == STATUS_OK) {
         search->estimated = target_estimate(&search->target, candidate, search->outcome);
         search->steps += search->outcome->steps;
-        work_add(&search->work, &search->outcome->work);
+        work_counters_add(&search->work, &search->outcome->work);
         if (search_add_attempt(search, candidate, search->estimated, search->outcome->steps) !=
             STATUS_OK)
             status = problem_set(fault, STATUS_NO_MEMORY, "no memory for a run");
@@ -486,7 +486,7 @@ static Status search_warn(const TargetSearch *search) {
         return STATUS_OK;
     if (!isnan(summary->trust_horizon))
         snprintf(until, sizeof until, "; to t = %.6g s the path is known to %g",
-                 summary->trust_horizon, RESPONSE_PARTING);
+                 summary->trust_horizon, RESPONSE_DIVERGENCE);
     if (isnan(search->estimated))
         return warnings_add(&search->outcome->warnings, "/accuracy/target",
                             "whether the error of %s is below %.3g is not known: rounding parts "

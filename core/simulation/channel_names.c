@@ -3,6 +3,9 @@
 // one canonical form.
 #include "core/simulation/channel_names.h"
 
+#include "core/base/json_pointer.h"
+#include "core/base/spelling.h"
+
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -139,7 +142,7 @@ static Status channel_names_check(const char *name, const ChannelCounts *counts,
     if (channel == NULL)
         return problem_concerns(problem, pointer)
                    ? STATUS_OK // reported with the fields
-                   : texts_refuse(channel_requests, name, pointer, problem);
+                   : spelling_reject(channel_requests, name, pointer, problem);
     const size_t most = channel_counts_of(counts, channel);
     if (most == 0)
         return problem_add(problem, STATUS_INVALID, pointer,
@@ -167,7 +170,7 @@ static Status channel_names_check(const char *name, const ChannelCounts *counts,
     text_quote(fault.value, sizeof fault.value, name);
     text_fit(fault.did_you_mean, sizeof fault.did_you_mean, meant);
     text_fit(fault.detail, sizeof fault.detail, detail);
-    return problem_put(problem, STATUS_INVALID, &fault);
+    return problem_add_fault(problem, STATUS_INVALID, &fault);
 }
 
 Status channel_names_complete(const Scene *scene, Texts *names, bool is_spectrum,
@@ -181,7 +184,7 @@ Status channel_names_complete(const Scene *scene, Texts *names, bool is_spectrum
     Status status = STATUS_OK;
     for (size_t i = 0; i < names->count; i++) {
         char place[sizeof((Fault){0}.pointer)];
-        pointer_index(place, sizeof place, pointer, expanded_names_index(&expanded, i));
+        json_pointer_index(place, sizeof place, pointer, expanded_names_index(&expanded, i));
         if (are_known && channel_names_check(names->at[i], &counts, place, problem) != STATUS_OK)
             status = STATUS_INVALID;
         size_t first = 0;

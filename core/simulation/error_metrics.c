@@ -31,9 +31,9 @@ const Field reference_summary_fields[] = {
 // clang-format on
 
 double error_metrics_by(const Errors *errors, int metric) {
-    const double all[METRICS] = {errors->displacement, errors->mean_acceleration,
-                                 errors->peak_force,   errors->impacts,
-                                 errors->psd,          errors->rms_displacement};
+    const double all[METRIC_COUNT] = {errors->displacement, errors->mean_acceleration,
+                                      errors->peak_force,   errors->impacts,
+                                      errors->psd,          errors->rms_displacement};
     return all[metric];
 }
 
@@ -48,10 +48,10 @@ static double errors_end(const Compared *reference) {
 }
 
 // Error of the reference within the samples compared. The estimate is for the whole run; at the
-// horizon the error is RESPONSE_PARTING.
+// horizon the error is RESPONSE_DIVERGENCE.
 static double errors_own(const Compared *reference) {
     const double estimate = reference->outcome->summary.error_estimate;
-    return isnan(reference->horizon) ? estimate : fmin(estimate, RESPONSE_PARTING);
+    return isnan(reference->horizon) ? estimate : fmin(estimate, RESPONSE_DIVERGENCE);
 }
 
 // Samples of the reference that can be compared.
@@ -134,8 +134,8 @@ static HorizonImpacts errors_impacts(const Impacts *impacts, double horizon) {
 
 static double errors_channel_distance(const Spectrum *reference, const double *wanted,
                                       const Spectrum *point, const double *density) {
-    const size_t end = distance_band_end(wanted, reference->densities.rows);
-    return distance_level(reference, wanted, point, density, 1, end);
+    const size_t end = spectrum_distance_band_end(wanted, reference->densities.rows);
+    return spectrum_distance_level(reference, wanted, point, density, 1, end);
 }
 
 // The channel with the largest distance.
@@ -165,7 +165,7 @@ ReferenceSummary error_metrics_reference(const Compared *reference) {
     const Spectrum *spectrum = &outcome->spectrum;
     for (size_t i = 0; i < spectrum->densities.count; i++) {
         const size_t end =
-            distance_band_end(spectrum->densities.at[i].values, spectrum->densities.rows);
+            spectrum_distance_band_end(spectrum->densities.at[i].values, spectrum->densities.rows);
         if (end < 2)
             continue;
         summary.psd_from = spectrum->frequency[1];

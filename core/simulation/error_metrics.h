@@ -3,7 +3,7 @@
 #ifndef CORE_SIMULATION_ERROR_METRICS_H
 #define CORE_SIMULATION_ERROR_METRICS_H
 
-#include "core/result/metric.h"
+#include "core/result/response.h"
 #include "core/simulation/simulation.h"
 
 // Differences from the reference; NAN is unknown.

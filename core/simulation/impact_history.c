@@ -60,7 +60,7 @@ static Point impact_run_end(const ImpactRun *run, double time, double speed, boo
         if (at[-1].damper == first->damper && at[-1].side == first->side)
             first = &at[-1];
     const PlanStop *stop = &plan->dampers[first->damper - 1].stops[first->side];
-    const ContactParameters own = contact_freeze(&stop->contact, first->approach_speed);
+    const ContactParameters own = contact_parameters_at(&stop->contact, first->approach_speed);
     Point point = {.time = time, .speed = speed};
     if (plan->form == CONTACT_LINEAR) {
         point.force = has_force ? own.damping * speed : 0;
@@ -142,7 +142,7 @@ static Status impact_run_fill(const ImpactRun *run, Columns *columns, Problem *p
     if (points == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the contact");
     const size_t count = impact_run_add_peak(run, points, impact_run_gather(run, points));
-    const Status status = columns_make(columns, COLUMNS, count, 0, problem);
+    const Status status = columns_allocate(columns, COLUMNS, count, 0, problem);
     for (size_t c = 0; c < COLUMNS && status == STATUS_OK; c++)
         columns_name(columns, c, names[c].name, names[c].unit);
     for (size_t i = 0; i < count && status == STATUS_OK; i++) {
@@ -359,7 +359,7 @@ static Status impact_run_fine(ImpactRun *run, const SimulationLimits *limits,
                               const Progress *progress, Workspace *workspace, Problem *problem) {
     const Plan *plan = run->inputs.plan;
     const size_t number = (size_t)run->impact->damper - 1;
-    TRY(columns_make(&run->fine, FINE_COLUMNS, plan->count, 0, problem));
+    TRY(columns_allocate(&run->fine, FINE_COLUMNS, plan->count, 0, problem));
     const Column *fine = run->fine.at;
     const RunColumn columns[FINE_COLUMNS] = {
         {CHANNEL_CONTACT_FORCE, number, fine[FINE_FORCE].values},

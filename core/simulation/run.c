@@ -107,9 +107,8 @@ static Status run_make_plan(const Simulation *simulation, Plan **plan, Problem *
 }
 
 // A base without motion becomes BASE_STILL, whatever its kind.
-static Status run_make_base(const Simulation *simulation, size_t samples_max,
-                            FourierStock *transforms, const Progress *progress, Base *base,
-                            Problem *problem) {
+static Status run_make_base(const Simulation *simulation, size_t samples_max, FftCache *transforms,
+                            const Progress *progress, Base *base, Problem *problem) {
     const Scene *scene = &simulation->scene;
     const Span span = {.duration = scene->duration,
                        .sample_rate = scene->sample_rate,
@@ -154,7 +153,7 @@ typedef struct RunContext {
     const Simulation *simulation;
     const SimulationLimits *limits;
     const Progress *progress;
-    FourierStock *transforms; // or NULL
+    FftCache *transforms; // or NULL
     Plan *plan;
     Base base;
     Columns hidden;      // channels that only a spectrum needs
@@ -189,7 +188,7 @@ static Status run_make_columns(RunContext *context, const Texts *names, Columns 
         count += run_find_column(context, names->at[i]) == NULL;
     if (count == 0)
         return STATUS_OK;
-    TRY(columns_make(columns, count, context->plan->count, 0, problem));
+    TRY(columns_allocate(columns, count, context->plan->count, 0, problem));
     for (size_t i = 0, made = 0; i < names->count; i++) {
         if (run_find_column(context, names->at[i]) != NULL)
             continue;
@@ -233,10 +232,10 @@ static Status run_spectrum(RunContext *context, Problem *problem) {
     }
     ProgressRange range = progress_range(context->progress, 0.9, 0.1);
     const Progress progress = progress_range_view(&range);
-    const SpectrumSettings settings = {(size_t)request->segment, (size_t)request->overlap,
-                                       request->window, request->detrend};
+    const WelchSettings settings = {(size_t)request->segment, (size_t)request->overlap,
+                                    request->window, request->detrend};
     Spectrum *spectrum = &context->outcome->spectrum;
-    TRY(spectrum_welch(columns, units, context->plan->sample_rate, &settings, &progress,
+    TRY(welch_spectrum(columns, units, context->plan->sample_rate, &settings, &progress,
                        context->transforms, spectrum, problem));
     context->outcome->work.spectrum_segments = spectrum->segments * spectrum->densities.count;
     return STATUS_OK;
@@ -244,11 +243,11 @@ static Status run_spectrum(RunContext *context, Problem *problem) {
 
 // The error of modes left out is predicted, because the run cannot measure it.
 static void run_add_given_up(const Plan *plan, Response *response) {
-    response->given_up = plan->given_up;
+    response->truncation_error = plan->given_up;
     if (!plan->is_truncated || !response->has_trust)
         return;
     response->error_estimate = fmin(response->error_estimate + plan->given_up, 1);
-    if (plan->given_up > RESPONSE_PARTING)
+    if (plan->given_up > RESPONSE_DIVERGENCE)
         response->trust_horizon = 0;
 }
 
@@ -280,14 +279,14 @@ static Status run_make_approaches(const Scene *scene, Response *response, Proble
     const size_t stops = 2 * scene->dampers.count;
     for (size_t i = 0; i < stops; i++) {
         double from, to;
-        buffer_speeds(damper_buffer(&scene->dampers.at[i / 2], (Side)(i % 2)), &from, &to);
+        buffer_speed_range(damper_buffer(&scene->dampers.at[i / 2], (Side)(i % 2)), &from, &to);
         if (isnan(from) && isnan(to))
             continue;
         if (response->approaches == NULL)
             response->approaches = calloc(stops, sizeof *response->approaches);
         if (response->approaches == NULL)
             return problem_set(problem, STATUS_NO_MEMORY, "no memory for the impacts");
-        response->approaches[i] = (Approaches){.is_ranged = true, .from = from, .to = to};
+        response->approaches[i] = (ApproachSpeeds){.is_ranged = true, .from = from, .to = to};
     }
     return STATUS_OK;
 }

@@ -8,8 +8,9 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "core/base/side.h"
+#include "core/base/json_pointer.h"
 #include "core/contact/contact.h"
+#include "core/result/response.h"
 #include "core/simulation/internal.h"
 
 typedef struct TypicalLimit {
@@ -55,7 +56,7 @@ static Status warnings_of_reals(const Field *field, const Reals *reals, const ch
         return warnings_of_real(field, reals->at[0], pointer, warnings);
     for (size_t i = 0; i < reals->count && warnings_find_limit(field->name) != NULL; i++) {
         char place[sizeof((Fault){0}.pointer)];
-        pointer_index(place, sizeof place, pointer, i);
+        json_pointer_index(place, sizeof place, pointer, i);
         TRY(warnings_of_real(field, reals->at[i], place, warnings));
     }
     return STATUS_OK;
@@ -72,7 +73,7 @@ static Status warnings_of_rows(const Field *fields, const void *item, const char
         }
         if ((field->flags & FIELD_HIDDEN) != 0)
             continue;
-        pointer_join(place, sizeof place, pointer, field->name);
+        json_pointer_join(place, sizeof place, pointer, field->name);
         if (field->kind == FIELD_KIND_REALS) {
             TRY(warnings_of_reals(field, member, place, warnings));
         } else if (field->kind == FIELD_KIND_REAL) {
@@ -88,7 +89,7 @@ static Status warnings_of_rows(const Field *fields, const void *item, const char
             memcpy(&list, member, sizeof list);
             for (size_t i = 0; i < list.count; i++) {
                 char element[sizeof((Fault){0}.pointer)];
-                pointer_index(element, sizeof element, place, i);
+                json_pointer_index(element, sizeof element, place, i);
                 TRY(warnings_of_rows(field->fields, (const char *)list.at + i * field->size,
                                      element, warnings));
             }
@@ -126,8 +127,8 @@ static Status warnings_of_masses(const Scene *scene, Warnings *warnings) {
         if (mass <= moved)
             continue;
         char damper[64], place[sizeof((Fault){0}.pointer)], is[32], than[32];
-        pointer_index(damper, sizeof damper, "/dampers", i);
-        pointer_join(place, sizeof place, damper, "mass");
+        json_pointer_index(damper, sizeof damper, "/dampers", i);
+        json_pointer_join(place, sizeof place, damper, "mass");
         TRY(warnings_add(warnings, place, "is %s kg, more than the %s's %s kg", text_real(is, mass),
                          structure_storeys(structure) > 1 ? "storey" : "structure",
                          text_real(than, moved)));
@@ -182,8 +183,8 @@ Status scene_warnings_of_input(const Simulation *simulation, Warnings *warnings)
 
 // The error is predicted, and dampers can enlarge it.
 static Status warnings_of_modes(Outcome *outcome) {
-    const double error = outcome->response.given_up;
-    if (!(error > RESPONSE_PARTING))
+    const double error = outcome->response.truncation_error;
+    if (!(error > RESPONSE_DIVERGENCE))
         return STATUS_OK;
     return warnings_add(&outcome->warnings, "/accuracy/modes",
                         "with the modes left out the displacement is wrong by up to %.2g of its "
@@ -192,13 +193,14 @@ static Status warnings_of_modes(Outcome *outcome) {
 }
 
 static Status warnings_of_horizon(Outcome *outcome) {
-    if (isnan(outcome->summary.trust_horizon) || outcome->response.given_up > RESPONSE_PARTING)
+    if (isnan(outcome->summary.trust_horizon) ||
+        outcome->response.truncation_error > RESPONSE_DIVERGENCE)
         return STATUS_OK;
     return warnings_add(&outcome->warnings, "/duration",
                         "the run goes on beyond t = %.6g s: there rounding has moved the "
                         "displacement by %g of its largest value, and from there on only "
                         "statistics hold",
-                        outcome->summary.trust_horizon, RESPONSE_PARTING);
+                        outcome->summary.trust_horizon, RESPONSE_DIVERGENCE);
 }
 
 // The error of the solver's steps, not of rounding.
@@ -208,8 +210,8 @@ static Status warnings_of_steps(Outcome *outcome) {
         return warnings_add(&outcome->warnings, "/accuracy",
                             "the error of these steps is not known: the run beside this one that "
                             "would tell it came to no end");
-    const double error = summary->error_estimate - outcome->response.given_up;
-    if (error <= RESPONSE_PARTING)
+    const double error = summary->error_estimate - outcome->response.truncation_error;
+    if (error <= RESPONSE_DIVERGENCE)
         return STATUS_OK;
     return warnings_add(&outcome->warnings, "/accuracy",
                         "with these steps the displacement is wrong by about %.2g of its largest "
@@ -245,13 +247,13 @@ static size_t buffer_stops_find(const Damper *damper, BufferStops stops[2]) {
 }
 
 // Sum over stops with the same range.
-static Approaches approaches_sum(const Approaches *met, int count) {
-    Approaches sum = met[0];
+static ApproachSpeeds approaches_sum(const ApproachSpeeds *met, int count) {
+    ApproachSpeeds sum = met[0];
     for (int i = 1; i < count; i++) {
         if (met[i].count == 0)
             continue;
-        sum.least = sum.count == 0 ? met[i].least : fmin(sum.least, met[i].least);
-        sum.most = sum.count == 0 ? met[i].most : fmax(sum.most, met[i].most);
+        sum.min = sum.count == 0 ? met[i].min : fmin(sum.min, met[i].min);
+        sum.max = sum.count == 0 ? met[i].max : fmax(sum.max, met[i].max);
         sum.count += met[i].count;
         sum.below += met[i].below;
         sum.above += met[i].above;
@@ -273,22 +275,22 @@ static void approaches_write_range(double from, double to, char *text, size_t si
 }
 
 // "slower", "faster" or both, and the extreme speeds.
-static void approaches_write_outside(const Approaches *met, char which[48], char reach[64]) {
+static void approaches_write_outside(const ApproachSpeeds *met, char which[48], char reach[64]) {
     if (met->above == 0) {
         snprintf(which, 48, "slower");
-        snprintf(reach, 64, "down to %.3g", met->least);
+        snprintf(reach, 64, "down to %.3g", met->min);
     } else if (met->below == 0) {
         snprintf(which, 48, "faster");
-        snprintf(reach, 64, "up to %.3g", met->most);
+        snprintf(reach, 64, "up to %.3g", met->max);
     } else {
         snprintf(which, 48, "slower and %llu faster", (unsigned long long)met->above);
-        snprintf(reach, 64, "at %.3g to %.3g", met->least, met->most);
+        snprintf(reach, 64, "at %.3g to %.3g", met->min, met->max);
     }
 }
 
-static Status warnings_of_stops(const BufferStops *stops, size_t damper, const Approaches *all,
+static Status warnings_of_stops(const BufferStops *stops, size_t damper, const ApproachSpeeds *all,
                                 Warnings *warnings) {
-    const Approaches met = approaches_sum(&all[stops->first], stops->count);
+    const ApproachSpeeds met = approaches_sum(&all[stops->first], stops->count);
     const bool is_named = stops->buffer->material != NULL;
     char pointer[64], range[96], which[48], reach[64];
     if (met.below + met.above == 0)
@@ -307,7 +309,8 @@ static Status warnings_of_stops(const BufferStops *stops, size_t damper, const A
                                        : "its numbers are used there without a measurement");
 }
 
-static Status warnings_of_speeds(const Scene *scene, const Approaches *met, Warnings *warnings) {
+static Status warnings_of_speeds(const Scene *scene, const ApproachSpeeds *met,
+                                 Warnings *warnings) {
     for (size_t i = 0; met != NULL && i < scene->dampers.count; i++) {
         BufferStops stops[2];
         const size_t count = buffer_stops_find(&scene->dampers.at[i], stops);

@@ -21,8 +21,8 @@ typedef struct SpectrumRequest {
     Texts channels;
     uint64_t segment; // COUNT_ABSENT: min(4096, count)
     uint64_t overlap; // COUNT_ABSENT: segment / 2
-    int window;       // SpectrumWindow
-    int detrend;      // SpectrumDetrend
+    int window;       // WelchWindow
+    int detrend;      // WelchDetrend
 } SpectrumRequest;
 
 typedef struct Output {
@@ -110,7 +110,7 @@ struct Outcome {
     Reduction reduction;
     Warnings warnings; // those that depend on the run
     double steps;      // solver steps, counted
-    Work work;         // counted by kind
+    WorkCounters work; // counted by kind
 };
 
 // Runs a completed simulation. Errors: STATUS_CANCELLED when `progress` asks to stop, STATUS_LIMIT

@@ -57,7 +57,7 @@ Status undamped_baseline_run(const Simulation *simulation, const SimulationLimit
             undamped_baseline_reduction(with->rms_acceleration, without->rms_acceleration),
         };
         outcome->steps += other->steps;
-        work_add(&outcome->work, &other->work);
+        work_counters_add(&outcome->work, &other->work);
     }
     outcome_unref(other);
     simulation_clear(&undamped);

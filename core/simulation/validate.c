@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/result/metric.h"
+#include "core/result/response.h"
 #include "core/simulation/channel_names.h"
 #include "core/simulation/internal.h"
 
@@ -20,8 +20,8 @@ static const Field psd_fields[] = {
     FIELD_TEXTS(SpectrumRequest, channels, channel_requests, usual, CHANNELS, PRESENCE_DEFAULT, FIELD_NUMBERED, "channels to transform; usual: mean_acceleration of the top storey"),
     FIELD_COUNT(SpectrumRequest, segment, "samples", AT_MIN(1), OPTIONAL, "length of a segment; default min(4096, count)"),
     FIELD_COUNT(SpectrumRequest, overlap, "samples", AT_MIN(0), OPTIONAL, "overlap of adjacent segments; default half a segment"),
-    FIELD_CHOICE(SpectrumRequest, window, spectrum_window_names, WINDOW_HANN, "window of each segment"),
-    FIELD_CHOICE(SpectrumRequest, detrend, spectrum_detrend_names, DETREND_CONSTANT, "trend removed from each segment"),
+    FIELD_CHOICE(SpectrumRequest, window, welch_window_names, WELCH_HANN, "window of each segment"),
+    FIELD_CHOICE(SpectrumRequest, detrend, welch_detrend_names, WELCH_DETREND_CONSTANT, "trend removed from each segment"),
     FIELD_END
 };
 
@@ -72,9 +72,9 @@ static Status validate_psd(SpectrumRequest *psd, size_t count, Warnings *warning
         return STATUS_OK;
     }
     if (psd->window == CHOICE_ABSENT)
-        psd->window = WINDOW_HANN;
+        psd->window = WELCH_HANN;
     if (psd->detrend == CHOICE_ABSENT)
-        psd->detrend = DETREND_CONSTANT;
+        psd->detrend = WELCH_DETREND_CONSTANT;
     TRY(validate_overlap(psd, problem));
     if (count == 0)
         return STATUS_OK;
@@ -204,7 +204,7 @@ static Status validate_values(const Simulation *simulation, const SimulationLimi
 Status simulation_validate(Simulation *simulation, const SimulationLimits *limits,
                            Warnings *warnings, Problem *problem) {
     const size_t most_samples = limits != NULL ? limits->samples : 0;
-    const Status rows = fields_check(simulation_fields, simulation, "", problem);
+    const Status rows = fields_validate(simulation_fields, simulation, "", problem);
     const Status scene = scene_complete(&simulation->scene, most_samples, problem);
     // The problem may contain earlier faults of the caller.
     const bool is_sound = rows == STATUS_OK && scene == STATUS_OK && !problem_concerns(problem, "");

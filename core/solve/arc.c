@@ -12,7 +12,7 @@
 size_t arc_degree(double rho) {
     size_t degree = 3;
     double term = 1;
-    while ((term > 4e-18 || degree < 5) && degree < ROOT_DEGREE)
+    while ((term > 4e-18 || degree < 5) && degree < POLYNOMIAL_DEGREE_MAX)
         term *= rho / (double)++degree;
     return degree;
 }
@@ -78,9 +78,10 @@ void arc_cut(Arc *arc, double s) {
 }
 
 State arc_at(const Arc *arc, double s) {
-    return (State){
-        root_value(arc->x, arc->degree, s), root_slope(arc->x, arc->degree, s) / arc->length,
-        root_value(arc->r, arc->degree, s), root_slope(arc->r, arc->degree, s) / arc->length};
+    return (State){polynomial_value(arc->x, arc->degree, s),
+                   polynomial_slope(arc->x, arc->degree, s) / arc->length,
+                   polynomial_value(arc->r, arc->degree, s),
+                   polynomial_slope(arc->r, arc->degree, s) / arc->length};
 }
 
 // Small terms first.
@@ -133,8 +134,9 @@ ArcIntegrals arc_integrals(const Arc *arc) {
     const Quadrature *rule = arc_quadrature(arc->rho);
     for (size_t i = 0; i < rule->count; i++) {
         const double s = rule->node[i], weight = rule->weight[i];
-        const double v = root_slope(arc->x, arc->degree, s), w = root_slope(arc->r, arc->degree, s);
-        const double a = root_value(arc->base, arc->degree, s);
+        const double v = polynomial_slope(arc->x, arc->degree, s),
+                     w = polynomial_slope(arc->r, arc->degree, s);
+        const double a = polynomial_value(arc->base, arc->degree, s);
         out.vv += weight * v * v;
         out.ww += weight * w * w;
         out.av += weight * a * v;
@@ -153,14 +155,14 @@ double arc_largest(const double *c, size_t degree, double least, double *s) {
         return least;
     // The magnitude is largest at an end or where its slope changes sign; an arc is too short for a
     // second such place.
-    double slope[ROOT_DEGREE + 1], at[3] = {0, 1, 1};
+    double slope[POLYNOMIAL_DEGREE_MAX + 1], at[3] = {0, 1, 1};
     const double sign = degree > 0 && c[1] < 0 ? -1 : 1;
     for (size_t k = 0; k < degree; k++)
         slope[k] = sign * (double)(k + 1) * c[k + 1];
     if (degree > 1)
-        (void)root_first_crossing(slope, degree - 1, &at[2]);
+        (void)polynomial_root_first(slope, degree - 1, &at[2]);
     for (size_t i = 0; i < 3; i++) {
-        const double value = fabs(root_value(c, degree, at[i]));
+        const double value = fabs(polynomial_value(c, degree, at[i]));
         if (value > least) {
             least = value;
             *s = at[i];

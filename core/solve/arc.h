@@ -44,10 +44,10 @@ typedef struct Arc {
     double length; // [s]
     double rho;    // length * rate, the base's included, at most 1
     size_t degree; // of x and r; push and force have one less
-    double x[ROOT_DEGREE + 1], r[ROOT_DEGREE + 1];
-    double push[ROOT_DEGREE + 1];  // s length^2
-    double force[ROOT_DEGREE + 1]; // n length^2; while resting, the constraint's
-    double base[ROOT_DEGREE + 1];  // a_g
+    double x[POLYNOMIAL_DEGREE_MAX + 1], r[POLYNOMIAL_DEGREE_MAX + 1];
+    double push[POLYNOMIAL_DEGREE_MAX + 1];  // s length^2
+    double force[POLYNOMIAL_DEGREE_MAX + 1]; // n length^2; while resting, the constraint's
+    double base[POLYNOMIAL_DEGREE_MAX + 1];  // a_g
 } Arc;
 
 // Integrals over an arc.

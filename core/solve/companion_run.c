@@ -58,7 +58,7 @@ static void compare(CompanionRun *neighbour, const ModalState *state, size_t bef
         look(neighbour, state, state->q, neighbour->engine.state.q);
     }
     const double error = part_of(neighbour) * neighbour->worst;
-    if (isnan(neighbour->horizon) && !(error <= RESPONSE_PARTING * neighbour->largest))
+    if (isnan(neighbour->horizon) && !(error <= RESPONSE_DIVERGENCE * neighbour->largest))
         neighbour->horizon = (double)before / state->plan->sample_rate;
     neighbour->is_finished = error > (neighbour->is_stepped ? 1 : PARTED) * neighbour->largest;
 }
@@ -130,7 +130,7 @@ void companion_run_tell(const CompanionRun *neighbour, const ModalState *state,
     response->is_stepped = neighbour->is_stepped;
     response->error_estimate = error < (neighbour->is_stepped ? 1 : PARTED) ? error : 1;
     // One that is told all the same was found before the displacement had grown.
-    response->trust_horizon = error <= RESPONSE_PARTING ? (double)NAN : neighbour->horizon;
+    response->trust_horizon = error <= RESPONSE_DIVERGENCE ? (double)NAN : neighbour->horizon;
 }
 
 void companion_run_clear(CompanionRun *neighbour) {

@@ -250,7 +250,7 @@ void contact_event_apply(ModalState *state, const ContactEvent *event) {
 bool contact_event_locate(double *gap, size_t degree, ContactEvent candidate, bool *is_found,
                           ContactEvent *first) {
     gap[0] = fmax(gap[0], 0);
-    if (!root_first_crossing(gap, degree, &candidate.s) || (*is_found && candidate.s >= first->s))
+    if (!polynomial_root_first(gap, degree, &candidate.s) || (*is_found && candidate.s >= first->s))
         return false;
     *is_found = true;
     *first = candidate;
@@ -269,7 +269,7 @@ bool contact_event_find_touch(const ModalState *state, size_t d, const double *r
                      room = modal_state_room(damper, (Side)side);
         if (reach < room)
             continue;
-        double gap[ROOT_DEGREE + 1];
+        double gap[POLYNOMIAL_DEGREE_MAX + 1];
         for (size_t k = 0; k <= degree; k++)
             gap[k] = -sign * r[k];
         gap[0] += room;
@@ -293,7 +293,7 @@ static void find_inside(const ModalState *state, const TaylorStep *arc, size_t d
                         ContactEvent *first) {
     const DamperState *damper = &state->damper[d];
     const double *r = taylor_step_r(arc, d), sign = modal_state_sign(damper->side);
-    double gap[ROOT_DEGREE + 1];
+    double gap[POLYNOMIAL_DEGREE_MAX + 1];
     spring_series(damper, arc, r, -sign, gap);
     if (damper->just_begun)
         gap[0] = 0;
@@ -314,7 +314,7 @@ static void find_end(const ModalState *state, const TaylorStep *arc, size_t d, b
         damper->phase == PHASE_RESTING || state->plan->separation == SEPARATION_ZERO_FORCE;
     const double *of = by_force ? taylor_step_force(arc, d) : taylor_step_r(arc, d);
     const size_t degree = by_force ? arc->degree - 1 : arc->degree;
-    double gap[ROOT_DEGREE + 1], size = 0;
+    double gap[POLYNOMIAL_DEGREE_MAX + 1], size = 0;
     for (size_t k = 0; k <= degree; k++) {
         gap[k] = sign * of[k];
         size += fabs(of[k]);

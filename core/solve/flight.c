@@ -21,7 +21,7 @@ void flight_ground(double omega, double length, double ground[2], double fall[2]
     system[SLOPE * GROUND + VALUE] = is_sine ? -(long double)omega : 0;
     system[SUM * GROUND + VALUE] = 1;
     system[FALL * GROUND + SUM] = 1;
-    exponential_increment(system, GROUND, length, gain);
+    matrix_exponential_increment(system, GROUND, length, gain);
     for (int column = 0; column < 2; column++) {
         ground[column] = (double)gain[SUM * GROUND + column];
         fall[column] = (double)gain[FALL * GROUND + column];
@@ -40,14 +40,14 @@ static void make_mode(Flight *flight, const ModalState *state, size_t i) {
     system[A * SIZE + B] = is_sine ? omega : 1;
     system[B * SIZE + A] = is_sine ? -(long double)omega : 0;
     long double gain[SIZE * SIZE], forms[2][SIZE * SIZE];
-    exponential_increment(system, SIZE, flight->length, gain);
+    matrix_exponential_increment(system, SIZE, flight->length, gain);
     for (int column = 0; column < 4; column++) {
         flight->gains.q[column][i] = (double)gain[Q * SIZE + column];
         flight->gains.p[column][i] = (double)gain[P * SIZE + column];
     }
     const long double speed[SIZE] = {[P] = 1}, base[SIZE] = {[A] = 1};
     const long double *const pairs[2][2] = {{speed, speed}, {base, speed}};
-    exponential_forms(system, SIZE, flight->length, 2, pairs, forms[0]);
+    matrix_exponential_forms(system, SIZE, flight->length, 2, pairs, forms[0]);
     // Off the diagonal both halves count.
     static const int places[7][2] = {{Q, Q}, {Q, P}, {P, P}, {Q, A}, {Q, B}, {P, A}, {P, B}};
     for (int k = 0; k < 7; k++)

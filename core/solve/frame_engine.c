@@ -312,7 +312,7 @@ static size_t fly(EventEngine *engine, size_t until) {
     state->sample += count;
     if (count == 0 || state->is_shadow)
         return count;
-    Work *done = &state->run->work;
+    WorkCounters *done = &state->run->work;
     *(state->base.base->form == BASE_STILL ? &done->unforced_samples : &done->flight_samples) +=
         count;
     done->mode_samples += count * state->mode_count;

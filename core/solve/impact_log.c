@@ -9,9 +9,9 @@ void impact_log_start(ImpactLog *ledger, Response *response, size_t most,
     ledger->largest_energy = ledger->energy.initial;
 }
 
-static void meet(Approaches *met, double speed) {
-    met->least = met->count == 0 ? speed : fmin(met->least, speed);
-    met->most = met->count == 0 ? speed : fmax(met->most, speed);
+static void meet(ApproachSpeeds *met, double speed) {
+    met->min = met->count == 0 ? speed : fmin(met->min, speed);
+    met->max = met->count == 0 ? speed : fmax(met->max, speed);
     met->count++;
     met->below += speed < met->from;
     met->above += speed > met->to;
@@ -112,7 +112,7 @@ void impact_log_balance(ImpactLog *ledger, const EnergyState *state) {
     ledger->largest_gain = impact_log_larger(ledger->largest_gain, balance);
 }
 
-void impact_log_count(const ImpactLog *ledger, Work *work) {
+void impact_log_count(const ImpactLog *ledger, WorkCounters *work) {
     const Response *response = ledger->response;
     work->contacts = response->impact_count - ledger->bounces;
     work->bounces = ledger->bounces;
@@ -122,7 +122,8 @@ void impact_log_count(const ImpactLog *ledger, Work *work) {
 
 void impact_log_forget_peaks(ImpactLog *ledger, const Instant *at) {
     Response *response = ledger->response;
-    response->earlier = impact_log_larger(response->earlier, response->peaks.displacement);
+    response->peak_before_window =
+        impact_log_larger(response->peak_before_window, response->peaks.displacement);
     response->peaks = (Peaks){.contact_force = fabs(at->force)};
 }
 

@@ -111,7 +111,7 @@ static inline void impact_log_acceleration(ImpactLog *ledger, double acceleratio
 }
 
 // What the ledger has counted, at the end.
-void impact_log_count(const ImpactLog *ledger, Work *work);
+void impact_log_count(const ImpactLog *ledger, WorkCounters *work);
 
 // STATUS_LIMIT or STATUS_NO_MEMORY once a row could not be kept, STATUS_UNSTABLE once more energy
 // came out of nothing than gain_max allows.

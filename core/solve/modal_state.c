@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/math/symmetric_eigen.h"
+#include "core/math/symmetric_matrix.h"
 
 double modal_state_time(const ModalState *state) {
     return (double)state->sample / state->plan->sample_rate + state->offset;

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/math/symmetric_eigen.h"
+#include "core/math/symmetric_matrix.h"
 
 static const double NEARLY = 1e-9;
 
@@ -71,7 +71,7 @@ static double find_growth(const double *even_part, size_t n) {
         largest = fmax(largest, own);
     }
     // D takes energy, or nearly: scaled to a unit diagonal, D + NEARLY I is positive definite.
-    return linear_find_indefinite(n, even_part, NEARLY) == 0 ? NEARLY * largest : -lowest;
+    return symmetric_matrix_find_indefinite(n, even_part, NEARLY) == 0 ? NEARLY * largest : -lowest;
 }
 
 // D, which need not be symmetric, its norm and how far it is from only taking energy.

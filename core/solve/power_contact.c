@@ -107,7 +107,7 @@ static double power_contact_depth(const ContactTerms *terms, double force) {
 // Energy in the buffer [J].
 static double power_contact_strain(const PowerContactDamper *at, double p) {
     const double n = at->terms.exponent;
-    return at->terms.stiffness * power_of(p, n) * p / (n + 1);
+    return at->terms.stiffness * power_law_pow(p, n) * p / (n + 1);
 }
 
 // Penetration up to which N changes the speed of an impact by at most the part `error`.
@@ -173,7 +173,7 @@ static bool power_contact_is_damped(const PowerContactDamper *at, const DamperSt
         return at->kink_passed > 0;
     const double p = power_contact_penetration(damper);
     const double elastic =
-        at->terms.is_elastic_below ? at->terms.stiffness * power_of(p, at->terms.exponent) : 0;
+        at->terms.is_elastic_below ? at->terms.stiffness * power_law_pow(p, at->terms.exponent) : 0;
     return at->acceleration - elastic / damper->effective_mass > 0;
 }
 
@@ -275,7 +275,7 @@ static double power_contact_scale(PowerContact *contact, double Y, double length
 // is.
 static bool power_contact_cut_release(PowerSeries *series) {
     double s;
-    const bool is_released = root_first_crossing(power_series_leader(series), series->degree, &s);
+    const bool is_released = polynomial_root_first(power_series_leader(series), series->degree, &s);
     if (is_released)
         power_series_cut(series, s);
     return is_released;
@@ -293,7 +293,7 @@ static bool power_contact_cut_time(PowerSeries *series, double length, bool *is_
     if (t <= length)
         return t >= length * (1 - 4 * DBL_EPSILON);
     left[0] = length;
-    *is_cut = root_first_crossing(left, series->degree, &s);
+    *is_cut = polynomial_root_first(left, series->degree, &s);
     if (*is_cut)
         power_series_cut(series, s);
     return true;
@@ -407,7 +407,7 @@ static void power_contact_state(PowerContact *contact, const Slice *slice, doubl
         if (state->dampers > 1)
             state->damper[d].r = row[series->at_r + d];
     }
-    const double Y = fmax(root_value(power_series_leader(series), series->degree, s), 0);
+    const double Y = fmax(polynomial_value(power_series_leader(series), series->degree, s), 0);
     double r = Y;
     for (int i = 1; i < series->root; i++)
         r *= Y;

@@ -129,9 +129,9 @@ static Status precise_make_table(TimeStepping *stepping, PreciseTable *table) {
     if (A != NULL && table->key != NULL) {
         memcpy(table->key, precise->key, precise->key_size * sizeof *table->key);
         precise_make_system(stepping, A);
-        status = exponential_doublings(A, precise->wide, precise->key[0], A + square,
-                                       A + 2 * square, state->run->progress,
-                                       modal_state_time(state) / state->plan->duration)
+        status = matrix_exponential_doublings(A, precise->wide, precise->key[0], A + square,
+                                              A + 2 * square, state->run->progress,
+                                              modal_state_time(state) / state->plan->duration)
                      ? precise_compress(precise, stepping->size, A + square, table)
                      : STATUS_CANCELLED;
     }

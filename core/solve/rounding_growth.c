@@ -229,7 +229,7 @@ INLINE void judge(Trust *trust, double time, const State *state, double largest)
     const double other = square[2] <= square[3] ? square[3] : square[2];
     const double most = one <= other ? other : one;
     trust->worst = most <= trust->worst ? trust->worst : most;
-    const double parting = RESPONSE_PARTING * trust->largest;
+    const double parting = RESPONSE_DIVERGENCE * trust->largest;
     if (isnan(trust->horizon) && !(trust->worst <= parting * parting))
         trust->horizon = trust->time;
     trust->is_spent = !(trust->worst < trust->largest * trust->largest) && trust->largest > 0;
@@ -372,8 +372,8 @@ void trust_tell(const Trust *trust, Response *response) {
     response->trust_horizon = trust->horizon;
     // Without any event a rounded frequency still turns the phase.
     const double drift = size > 0 ? ROUNDING * (1 + trust->phase * trust->lasting) : 0;
-    const double adrift = (RESPONSE_PARTING / ROUNDING - 1) / trust->phase;
-    if (drift > RESPONSE_PARTING && !(trust->horizon <= adrift))
+    const double adrift = (RESPONSE_DIVERGENCE / ROUNDING - 1) / trust->phase;
+    if (drift > RESPONSE_DIVERGENCE && !(trust->horizon <= adrift))
         response->trust_horizon = adrift;
     if (drift > error)
         error = drift;

@@ -7,7 +7,6 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "core/base/side.h"
 #include "core/result/response.h"
 #include "core/solve/arc.h"
 

@@ -212,7 +212,7 @@ static size_t single_mass_fly(SingleMass *single, size_t most) {
     single->pending += count;
     single->sample += count;
     single->run->steps += SAMPLE_STEPS * (double)count;
-    Work *work = &single->run->work;
+    WorkCounters *work = &single->run->work;
     *(single->run->base->form == BASE_STILL ? &work->unforced_samples : &work->flight_samples) +=
         count;
     single->last_velocity = s->v;
@@ -337,7 +337,7 @@ static bool piece_is_simple(const double *c, size_t n) {
     return slope_least > 0 || slope_most < 0 || bend_most < 0;
 }
 
-// The first root in (0, 1], as root_first_crossing: Newton from a guess, and a proof that what is
+// The first root in (0, 1], as polynomial_root_first: Newton from a guess, and a proof that what is
 // left after dividing the root out has none before it.
 static bool piece_first_root(const double *c, size_t degree, double *s) {
     const double *from = c;
@@ -355,9 +355,9 @@ static bool piece_first_root(const double *c, size_t degree, double *s) {
         return false;
     if (!(end < 0))
         return !(end > 0 && from[0] > 0 && piece_is_simple(from, n)) &&
-               root_first_crossing(c, degree, s);
+               polynomial_root_first(c, degree, s);
     if (!(from[0] > 0))
-        return root_first_crossing(c, degree, s);
+        return polynomial_root_first(c, degree, s);
     double slope_end = 0;
     for (size_t k = n; k > 0; k--)
         slope_end += (double)k * from[k];
@@ -383,10 +383,10 @@ static bool piece_first_root(const double *c, size_t degree, double *s) {
         step = -value / slope;
         at += step;
         if (!(at > 0 && at <= 1))
-            return root_first_crossing(c, degree, s);
+            return polynomial_root_first(c, degree, s);
     }
     if (!(fabs(step) <= 1e-9 * at))
-        return root_first_crossing(c, degree, s);
+        return polynomial_root_first(c, degree, s);
     // (s - at) q(s): -q must be positive up to there.
     double q = from[n], power = 1;
     double divided[PIECE_DEGREE + 1];
@@ -402,7 +402,7 @@ static bool piece_first_root(const double *c, size_t degree, double *s) {
         least += term < 0 ? term : 0;
     }
     if (!(least > 0))
-        return root_first_crossing(c, degree, s);
+        return polynomial_root_first(c, degree, s);
     *s = at;
     return true;
 }
@@ -790,9 +790,9 @@ static void contact_map_make(ContactMap *map, const Motion *m, double base_omega
         const double s = rule->node[q], weight = rule->weight[q] * interval;
         double v[FORM_SIZE], w[FORM_SIZE], a[FORM_SIZE];
         for (int i = 0; i < FORM_SIZE; i++) {
-            v[i] = root_value(columns[i].v, columns[i].degree, s) / interval;
-            w[i] = root_value(columns[i].w, columns[i].degree, s) / interval;
-            a[i] = root_value(columns[i].base, columns[i].base_degree, s);
+            v[i] = polynomial_value(columns[i].v, columns[i].degree, s) / interval;
+            w[i] = polynomial_value(columns[i].w, columns[i].degree, s) / interval;
+            a[i] = polynomial_value(columns[i].base, columns[i].base_degree, s);
         }
         for (int i = 0, n = 0; i < FORM_SIZE; i++)
             for (int j = i; j < FORM_SIZE; j++, n++) {

@@ -59,7 +59,7 @@ typedef struct Run {
     double steps_max;       // solver steps; 0: no limit
     bool is_clear;          // no mass comes to a stop: none has to be searched for
     double steps;           // out: work counted, in solver steps of SOLVER_STEP
-    Work work;              // out: what was done, kind by kind, but for what is not the solver's
+    WorkCounters work;      // out: what was done, kind by kind, but for what is not the solver's
 } Run;
 
 typedef struct Solver {

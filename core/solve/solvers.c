@@ -1,6 +1,6 @@
 #include "core/solve/solvers.h"
 
-#include "core/result/metric.h"
+#include "core/result/response.h"
 
 // clang-format off
 static const Field auto_fields[] = {

@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { ROW = ROOT_DEGREE + 1, NODES = 8, MODES = 4 };
+enum { ROW = POLYNOMIAL_DEGREE_MAX + 1, NODES = 8, MODES = 4 };
 
 // s^k and its derivative.
 static void powers(size_t degree, double s, double *power, double *slope) {
@@ -39,7 +39,8 @@ Status taylor_step_room(TaylorStep *arc, const ModalState *state, Problem *probl
         const Quadrature *rule = &arc_rules[kind];
         for (size_t node = 0; node < rule->count; node++) {
             double power[ROW];
-            powers(ROOT_DEGREE, rule->node[node], power, arc->slopes + (kind * NODES + node) * ROW);
+            powers(POLYNOMIAL_DEGREE_MAX, rule->node[node], power,
+                   arc->slopes + (kind * NODES + node) * ROW);
         }
     }
     return STATUS_OK;
@@ -177,7 +178,7 @@ void taylor_step_state(const TaylorStep *arc, ModalState *state, double s) {
         damper->r += r[0];
         damper->w /= arc->length;
     }
-    state->base_acceleration = root_value(arc->base, arc->base_degree, s);
+    state->base_acceleration = polynomial_value(arc->base, arc->base_degree, s);
 }
 
 // The derivatives of s^k at a rule's nodes, node after node; after an odd one's last come zeros.
@@ -224,8 +225,8 @@ StepWork taylor_step_work(const TaylorStep *arc, const ModalState *state) {
         for (size_t d = 0; d < state->dampers; d++)
             momentum[j] += state->damper[d].plan->mass *
                            slope_of(arc, taylor_step_r(arc, d), slopes + j * ROW);
-        work.input -=
-            rule->weight[j] * root_value(arc->base, arc->base_degree, rule->node[j]) * momentum[j];
+        work.input -= rule->weight[j] *
+                      polynomial_value(arc->base, arc->base_degree, rule->node[j]) * momentum[j];
     }
     return work;
 }

@@ -8,15 +8,15 @@
 
 // Coefficients in s = t / length, 0 <= s <= 1.
 typedef struct TaylorStep {
-    double length;                // [s]
-    double rho;                   // length * rate, the base's included, at most 1
-    size_t degree;                // of q and r; forces have one less
-    double base[ROOT_DEGREE + 1]; // a_g
-    size_t base_degree;           // no coefficient of a_g beyond it
-    double *q;                    // order after order, `padded` values each
-    double *r, *force;            // damper after damper, ROOT_DEGREE + 1 each; force is N
-    double *work;                 // modes x nodes of a quadrature
-    double *slopes;               // of s^k at the nodes of all rules
+    double length;                          // [s]
+    double rho;                             // length * rate, the base's included, at most 1
+    size_t degree;                          // of q and r; forces have one less
+    double base[POLYNOMIAL_DEGREE_MAX + 1]; // a_g
+    size_t base_degree;                     // no coefficient of a_g beyond it
+    double *q;                              // order after order, `padded` values each
+    double *r, *force; // damper after damper, POLYNOMIAL_DEGREE_MAX + 1 each; force is N
+    double *work;      // modes x nodes of a quadrature
+    double *slopes;    // of s^k at the nodes of all rules
     double *block;
 } TaylorStep;
 
@@ -46,10 +46,10 @@ void taylor_step_contact(const TaylorStep *arc, const ModalState *state, size_t 
                          double *impulse, double *lost);
 
 static inline const double *taylor_step_r(const TaylorStep *arc, size_t damper) {
-    return arc->r + damper * (ROOT_DEGREE + 1);
+    return arc->r + damper * (POLYNOMIAL_DEGREE_MAX + 1);
 }
 static inline const double *taylor_step_force(const TaylorStep *arc, size_t damper) {
-    return arc->force + damper * (ROOT_DEGREE + 1);
+    return arc->force + damper * (POLYNOMIAL_DEGREE_MAX + 1);
 }
 
 #endif

@@ -406,8 +406,8 @@ static double time_stepping_contact_time_at(const PlanDamper *damper, const Plan
     if (stop->contact.law != NULL && stop->contact.law->form == CONTACT_POWER)
         return stop->contact.duration *
                pow(mass * speed * speed / at.stiffness, 1 / (at.exponent + 1)) / speed;
-    const Identified found =
-        identify_given(mass, at.stiffness, at.damping, (Separation)stop->contact.separation);
+    const Identification found = identification_from_stiffness(
+        mass, at.stiffness, at.damping, (Separation)stop->contact.separation);
     // The damping sets the rate of an overdamped one.
     return isfinite(found.contact_time) ? found.contact_time : mass / at.damping;
 }
@@ -567,7 +567,7 @@ static void pair_compare(Pair *pair) {
                           fabs(modal_state_dot(state->modes->shapes + j * n, pair->difference, n)));
     pair->worst = fmax(pair->worst, difference);
     const double error = pair_factor(pair) * difference;
-    if (isnan(pair->horizon) && !(error <= RESPONSE_PARTING * pair->largest))
+    if (isnan(pair->horizon) && !(error <= RESPONSE_DIVERGENCE * pair->largest))
         pair->horizon = (double)(state->sample - pair->stride) / state->plan->sample_rate;
     pair->is_finished = error > pair->largest;
 }
@@ -693,12 +693,12 @@ static void pair_report(const Pair *pair, Response *response) {
     response->is_stepped = true;
     response->error_estimate = fmin(fmax(error, balance / 2), 1);
     response->trust_horizon = pair->horizon;
-    if (delay > RESPONSE_PARTING * size)
+    if (delay > RESPONSE_DIVERGENCE * size)
         response->trust_horizon = fmin(response->trust_horizon, pair->first_contact);
-    if (missed > RESPONSE_PARTING * size)
+    if (missed > RESPONSE_DIVERGENCE * size)
         response->trust_horizon = fmin(response->trust_horizon, pair->run.missed_since);
     // The horizon was found before the displacement had grown.
-    if (response->error_estimate <= RESPONSE_PARTING)
+    if (response->error_estimate <= RESPONSE_DIVERGENCE)
         response->trust_horizon = NAN;
 }
 

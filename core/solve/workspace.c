@@ -28,7 +28,7 @@ void workspace_tidy(Workspace *workspace) {
 }
 
 void workspace_clear(Workspace *workspace) {
-    fourier_stock_clear(&workspace->transforms);
+    fft_cache_clear(&workspace->transforms);
     single_mass_free(workspace->single);
     workspace->single = NULL;
     free(workspace->values);

@@ -7,7 +7,7 @@
 
 // All zero is empty.
 typedef struct Workspace {
-    FourierStock transforms;
+    FftCache transforms;
     struct SingleMass *single; // single_mass.h's, with the tables of the last system
     double *values;            // scratch
     size_t room;

@@ -121,9 +121,8 @@ static bool candidate_add_steps(TradeoffPoints *points, const Kind *solver,
 
 static bool candidate_add_tolerances(TradeoffPoints *points, const Kind *solver,
                                      const Range *range) {
-    for (double tolerance = fmin(tolerance_max, range->most);
-         tolerance >= fmax(range->least, tolerance_min) * (1 - 1e-9);
-         tolerance *= tolerance_factor) {
+    for (double tolerance = fmin(tolerance_max, range->max);
+         tolerance >= fmax(range->min, tolerance_min) * (1 - 1e-9); tolerance *= tolerance_factor) {
         TradeoffPoint *point =
             candidate_add(points, solver, "%s, tolerance %.3g", solver->name, tolerance);
         if (point == NULL)

@@ -70,8 +70,8 @@ const Field compare_entry_fields[] = {
     FIELD_ITEM(CompareEntry, summary, summary_fields, NULL, PRESENCE_DEFAULT, "as in any result"),
     FIELD_ITEM(CompareEntry, contacts, compare_contacts_fields, NULL, PRESENCE_DEFAULT, "summary of all impacts"),
     FIELD_ITEM(CompareEntry, differences, compare_differences_fields, NULL, PRESENCE_DEFAULT, "from the reference"),
-    FIELD_ITEM(CompareEntry, psd, distance_fields, NULL, PRESENCE_DEFAULT, "distance of its spectrum from the reference's"),
-    FIELD_ITEM(CompareEntry, displacement, likeness_fields, NULL, PRESENCE_DEFAULT, "comparison with the reference's, in metres"),
+    FIELD_ITEM(CompareEntry, psd, spectrum_distance_fields, NULL, PRESENCE_DEFAULT, "distance of its spectrum from the reference's"),
+    FIELD_ITEM(CompareEntry, displacement, signal_comparison_fields, NULL, PRESENCE_DEFAULT, "comparison with the reference's, in metres"),
     FIELD_ITEM(CompareEntry, divergence, compare_divergence_fields, NULL, PRESENCE_DEFAULT, "time at which it departs from the reference"),
     FIELD_REALS(CompareEntry, density, NULL, ANY, 0, PRESENCE_OPTIONAL, "its spectrum"),
     FIELD_ITEM(CompareEntry, trace, compare_trace_fields, NULL, PRESENCE_DEFAULT, "its displacement, smallest and largest of each bucket of samples"),
@@ -371,7 +371,7 @@ static Status comparison_fill_divergence(const CompareWork *work, const Outcome 
 static Status comparison_fill_trace(const Signal *signal, size_t bucket, CompareTrace *trace,
                                     Problem *problem) {
     const size_t count = (signal->count + bucket - 1) / bucket;
-    if (!reals_make(&trace->minimum, count) || !reals_make(&trace->maximum, count))
+    if (!reals_allocate(&trace->minimum, count) || !reals_allocate(&trace->maximum, count))
         return study_no_memory(problem);
     for (size_t i = 0; i < count; i++) {
         double min = INFINITY, max = -INFINITY;
@@ -387,7 +387,7 @@ static Status comparison_fill_trace(const Signal *signal, size_t bucket, Compare
 
 static Status comparison_copy_reals(const double *values, size_t count, Reals *target,
                                     Problem *problem) {
-    if (!reals_make(target, count))
+    if (!reals_allocate(target, count))
         return study_no_memory(problem);
     memcpy(target->at, values, count * sizeof *values);
     return STATUS_OK;
@@ -406,10 +406,10 @@ static Status comparison_measure(const CompareWork *work, const Outcome *outcome
     PlanReport plan; // of it the one list
     entry->contacts = comparison_contacts(outcome);
     entry->differences = comparison_differences(reference, outcome);
-    entry->psd = distance_measure(&reference->spectrum, reference->spectrum.densities.at[0].values,
-                                  spectrum, density, band->count == 2 ? band->at[0] : (double)NAN,
-                                  band->count == 2 ? band->at[1] : (double)NAN);
-    entry->displacement = likeness_measure(&from, &to, work->study->part, progress);
+    entry->psd = spectrum_distance_measure(
+        &reference->spectrum, reference->spectrum.densities.at[0].values, spectrum, density,
+        band->count == 2 ? band->at[0] : (double)NAN, band->count == 2 ? band->at[1] : (double)NAN);
+    entry->displacement = signal_comparison_measure(&from, &to, work->study->part, progress);
     if (!progress_advance(progress, 1))
         return problem_set(problem, STATUS_CANCELLED, "the study was stopped");
     TRY(comparison_fill_divergence(work, outcome, entry, problem));

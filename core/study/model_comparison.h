@@ -59,8 +59,8 @@ typedef struct CompareEntry {
     Summary summary;
     CompareContacts contacts;
     CompareDifferences differences;
-    Distance psd;
-    Likeness displacement;
+    SpectrumDistance psd;
+    SignalComparison displacement;
     CompareDivergence divergence;
     Reals density;
     CompareTrace trace;

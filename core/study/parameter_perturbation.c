@@ -138,7 +138,7 @@ static void perturbation_draw_factors(uint64_t seed, uint64_t run, size_t buffer
                                       double *contact_time) {
     for (uint64_t again = 0; again < DRAWS_MAX; again++) {
         double normal[2];
-        noise_normal_pair(seed, STREAM + buffer, DRAWS_MAX * run + again, normal);
+        philox_normal_pair(seed, STREAM + buffer, DRAWS_MAX * run + again, normal);
         *restitution = perturbation_factor(normal[0], deviation[0]);
         if (again == 0)
             *contact_time = perturbation_factor(normal[1], deviation[1]);

@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/contact/identification_sensitivity.h"
+#include "core/contact/identification.h"
 #include "core/study/uncertainty_bands.h"
 
 enum { RUNS_MAX = 2000, RUNS_DEFAULT = 200, DEVIATIONS_MAX = 1000 };
@@ -284,7 +284,8 @@ static Status sensitivity_scene(const void *of, size_t member, Simulation *scene
         return STATUS_OK;
     }
     const size_t buffers = perturbation_buffers(work->simulation);
-    if (!reals_make(&part->restitution, buffers) || !reals_make(&part->contact_time, buffers))
+    if (!reals_allocate(&part->restitution, buffers) ||
+        !reals_allocate(&part->contact_time, buffers))
         return study_no_memory(problem);
     perturbation_draw(&work->study->uncertainty, work->study->seed, work->simulation,
                       member - work->steps + 1, scene, part->restitution.at, part->contact_time.at);
@@ -367,7 +368,7 @@ static void sensitivity_fill_slope(const double quotients[SENSITIVITY_STEPS],
 static Status sensitivity_fill_row(const SensitivityWork *work, size_t index, Problem *problem) {
     SensitivityRow *row = &work->answer->response.at[work->rows[index]];
     row->slopes.at = calloc(STATISTICS_METRICS, sizeof *row->slopes.at);
-    if (row->slopes.at == NULL || !reals_make(&row->steps, SENSITIVITY_STEPS))
+    if (row->slopes.at == NULL || !reals_allocate(&row->steps, SENSITIVITY_STEPS))
         return study_no_memory(problem);
     for (size_t step = 0; step < SENSITIVITY_STEPS; step++)
         row->steps.at[step] = sensitivity_step(work, step);
@@ -436,7 +437,7 @@ static const char *sensitivity_refuse_stop(const ContactLaw *law, const Buffer *
 // masses do not change with the scene's masses.
 static void sensitivity_fill_stop(const SensitivityStudy *study, const Damper *damper,
                                   Separation separation, SensitivityStop *stop) {
-    const Propagation by = propagate(stop->restitution, separation);
+    const IdentificationSensitivity by = identification_sensitivity(stop->restitution, separation);
     const SensitivityBuffer buffer = damper_buffer(damper, (Side)stop->side) == &damper->buffer
                                          ? SENSITIVITY_BOTH
                                      : stop->side == SIDE_LEFT ? SENSITIVITY_LEFT

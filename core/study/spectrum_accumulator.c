@@ -100,15 +100,15 @@ static Status spectrum_accumulator_report_channel(const SpectrumAccumulator *sum
     const double *mean = sums->mean + channel * sums->rows;
     const double *squares = sums->squares + channel * sums->rows;
     const double n = (double)sums->count;
-    if (!reals_make(&spectrum->mean, sums->rows))
+    if (!reals_allocate(&spectrum->mean, sums->rows))
         return study_no_memory(problem);
     memcpy(spectrum->mean.at, mean, sums->rows * sizeof *mean);
     if (sums->count < 2)
         return STATUS_OK;
-    if (!reals_make(&spectrum->standard_deviation, sums->rows) ||
-        !reals_make(&spectrum->low, sums->rows) || !reals_make(&spectrum->high, sums->rows))
+    if (!reals_allocate(&spectrum->standard_deviation, sums->rows) ||
+        !reals_allocate(&spectrum->low, sums->rows) || !reals_allocate(&spectrum->high, sums->rows))
         return study_no_memory(problem);
-    const double t = student_quantile(STATISTICS_CONFIDENCE, sums->count - 1);
+    const double t = student_t_quantile(STATISTICS_CONFIDENCE, sums->count - 1);
     for (size_t k = 0; k < sums->rows; k++) {
         const double deviation = sqrt(squares[k] / (n - 1));
         const double factor = mean[k] > 0 ? exp(t * deviation / (mean[k] * sqrt(n))) : 1;

@@ -122,7 +122,7 @@ Status statistics_fill(const RunTable *table, int metric, RunStatistic *statisti
         statistic->standard_deviation = values.deviation;
         statistic->standard_error = values.deviation / sqrt((double)count);
         const double half =
-            student_quantile(STATISTICS_CONFIDENCE, count - 1) * statistic->standard_error;
+            student_t_quantile(STATISTICS_CONFIDENCE, count - 1) * statistic->standard_error;
         statistic->low = values.mean - half;
         statistic->high = values.mean + half;
     }

@@ -21,7 +21,7 @@
 
 // sqrt(quantile / d) of a chi-square, relative to d = 1.
 static double stopping_rule_narrowing(double d) {
-    const double z = student_quantile(2 * STOPPING_RULE_CONFIDENCE - 1, 0);
+    const double z = student_t_quantile(2 * STOPPING_RULE_CONFIDENCE - 1, 0);
     const double of_one = pow(1 - 2 / 9.0 + z * sqrt(2 / 9.0), 1.5);
     const double part = 2 / (9 * fmax(d, 1));
     return pow(1 - part + z * sqrt(part), 1.5) / of_one;
@@ -33,7 +33,7 @@ double stopping_rule_error(const RunSpread *spread, size_t count, size_t all) {
     if (count < 2)
         return INFINITY;
     const double n = (double)count;
-    const double t = student_quantile(STOPPING_RULE_CONFIDENCE, count - 1);
+    const double t = student_t_quantile(STOPPING_RULE_CONFIDENCE, count - 1);
     const double q = t * stopping_rule_narrowing(spread->freedom) +
                      fabs(spread->skewness) * (2 * t * t + 1) / (6 * sqrt(n));
     return q * spread->relative * sqrt(1 / n - 1 / (double)all);

@@ -55,7 +55,7 @@ Status study_request_complete(StudyRequest *request, const SimulationLimits *lim
     if (request->study == NULL || (status != STATUS_OK && status != STATUS_INVALID))
         return status;
     const Field rows[] = {study_request_fields[1], FIELD_END};
-    const Status own = fields_check(rows, request, "", problem);
+    const Status own = fields_validate(rows, request, "", problem);
     // The rest needs a valid scene.
     TRY(status);
     TRY(own);

@@ -3,6 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/base/json_pointer.h"
+#include "core/base/spelling.h"
 #include "core/solve/solvers.h"
 
 Status study_no_memory(Problem *problem) {
@@ -55,7 +57,7 @@ Status run_spectra_make(const Spectrum *like, Reals *frequency, RunSpectra *spec
                         Problem *problem) {
     const Columns *densities = &like->densities;
     spectra->at = calloc(densities->count, sizeof *spectra->at);
-    if (spectra->at == NULL || !reals_make(frequency, densities->rows))
+    if (spectra->at == NULL || !reals_allocate(frequency, densities->rows))
         return study_no_memory(problem);
     memcpy(frequency->at, like->frequency, densities->rows * sizeof *like->frequency);
     spectra->count = densities->count;
@@ -117,8 +119,8 @@ Status study_run_check_names(const Texts *given, const char *const *names, const
         if (names[at] != NULL)
             continue;
         char place[sizeof((Fault){0}.pointer)];
-        pointer_index(place, sizeof place, pointer, i);
-        status = texts_refuse(names, given->at[i], place, problem);
+        json_pointer_index(place, sizeof place, pointer, i);
+        status = spelling_reject(names, given->at[i], place, problem);
     }
     return status;
 }

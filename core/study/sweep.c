@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/base/json_pointer.h"
 #include "core/excitation/recorded_motion.h"
 
 // Points of a small scene that are validated with the request: about 20 ms.
@@ -57,7 +58,7 @@ static const Field sweep_axis_fields[] = {
 const Field pinned_record_fields[] = {
     FIELD_TEXT(PinnedRecord, name, RECORD_NAME_SIZE - 1, PRESENCE_REQUIRED, 0, "of an uploaded record"),
     FIELD_TEXT(PinnedRecord, digest, RECORD_DIGEST_SIZE - 1, PRESENCE_OPTIONAL, 0, "SHA-256 of its interval and samples"),
-    FIELD_SHARED(PinnedRecord, named),
+    FIELD_REFCOUNT(PinnedRecord, named),
     FIELD_END
 };
 
@@ -109,7 +110,7 @@ static Status sweep_check_metrics(const SweepStudy *study, Problem *problem) {
         for (size_t k = 0; k < i; k++)
             if (strcmp(study->metrics.at[i], study->metrics.at[k]) == 0) {
                 char place[sizeof((Fault){0}.pointer)];
-                pointer_index(place, sizeof place, "/study/metrics", i);
+                json_pointer_index(place, sizeof place, "/study/metrics", i);
                 return problem_add(problem, STATUS_INVALID, place, "is listed twice");
             }
     if (study->metrics.count == 0)

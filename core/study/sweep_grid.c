@@ -69,10 +69,10 @@ static Status sweep_axis_read(const SweepAxis *axis, SweepValues *values, Proble
     char *text = values->texts;
     for (size_t i = 0; i < values->count; i++) {
         if (sweep_axis_is_range(axis)) {
-            values->at[i] = scalar_number(sweep_axis_value(axis, i));
+            values->at[i] = json_scalar_number(sweep_axis_value(axis, i));
             continue;
         }
-        if (!scalar_read(axis->values.at[i], &values->at[i], text))
+        if (!json_scalar_read(axis->values.at[i], &values->at[i], text))
             return problem_set(problem, STATUS_INTERNAL, "a value of the sweep cannot be read");
         text += strlen(axis->values.at[i]) + 1;
     }
@@ -172,7 +172,7 @@ static void sweep_grid_clear_texts(Texts *texts) {
 
 // `*axis` is the one whose value cannot be set.
 static Status sweep_grid_apply(const SweepGrid *grid, size_t point, Simulation *target,
-                               size_t *axis, char why[POINTER_SENTENCE]) {
+                               size_t *axis, char why[JSON_POINTER_MESSAGE_MAX]) {
     TRY(fields_copy(simulation_fields, grid->simulation, target));
     for (size_t i = 0; i < grid->axis_count; i++) {
         const SweepValues *values = &grid->axes[i];
@@ -180,19 +180,19 @@ static Status sweep_grid_apply(const SweepGrid *grid, size_t point, Simulation *
             continue; // its pointer is faulty, which is reported already
         *axis = i;
         TRY(sweep_grid_split_buffer(values->pointer, target));
-        TRY(pointer_set(simulation_fields, target, values->pointer,
-                        &values->at[sweep_grid_index(grid, i, point)], why));
+        TRY(json_pointer_set(simulation_fields, target, values->pointer,
+                             &values->at[sweep_grid_index(grid, i, point)], why));
     }
     TRY(sweep_grid_fill_materials(&grid->study->materials, target));
     for (size_t i = 0; i < target->scene.dampers.count; i++)
-        damper_ask_rig(&grid->simulation->scene.dampers.at[i], &target->scene.dampers.at[i]);
+        damper_reset_rig(&grid->simulation->scene.dampers.at[i], &target->scene.dampers.at[i]);
     return sweep_grid_fill_record(&grid->study->records, target);
 }
 
 Status sweep_grid_scene(const SweepGrid *grid, size_t point, bool is_bare,
                         const SimulationLimits *limits, Simulation *target, Problem *problem) {
     size_t axis = 0;
-    char why[POINTER_SENTENCE] = "";
+    char why[JSON_POINTER_MESSAGE_MAX] = "";
     const Status status = sweep_grid_apply(grid, point, target, &axis, why);
     if (status == STATUS_INVALID)
         return problem_add(problem, status, grid->axes[axis].pointer, "%s", why);
@@ -310,25 +310,25 @@ static Status sweep_grid_find_fields(SweepGrid *grid, Problem *problem) {
     Status status = fields_copy(simulation_fields, grid->simulation, &scene);
     for (size_t i = 0; i < grid->axis_count && status != STATUS_NO_MEMORY; i++) {
         SweepValues *values = &grid->axes[i];
-        char why[POINTER_SENTENCE];
+        char why[JSON_POINTER_MESSAGE_MAX];
         if (sweep_grid_split_buffer(values->pointer, &scene) != STATUS_OK) {
             status = STATUS_NO_MEMORY;
             break;
         }
         values->field =
-            pointer_find(simulation_fields, &scene, values->pointer, &values->is_tag, why);
+            json_pointer_find(simulation_fields, &scene, values->pointer, &values->is_tag, why);
         if (values->field == NULL) {
             Fault fault = {0};
             snprintf(fault.pointer, sizeof fault.pointer, "/study/axes/%zu/pointer", i);
             text_fit(fault.detail, sizeof fault.detail, why);
             text_quote(fault.value, sizeof fault.value, values->pointer);
-            status = problem_put(problem, STATUS_INVALID, &fault);
+            status = problem_add_fault(problem, STATUS_INVALID, &fault);
             continue;
         }
         // Impossible values are reported point by point; a possible one is enough here.
         Status set = STATUS_INVALID;
         for (size_t k = 0; k < values->count && set == STATUS_INVALID; k++)
-            set = pointer_set(simulation_fields, &scene, values->pointer, &values->at[k], why);
+            set = json_pointer_set(simulation_fields, &scene, values->pointer, &values->at[k], why);
         if (set == STATUS_NO_MEMORY)
             status = set;
     }
@@ -394,7 +394,7 @@ static void sweep_grid_add_fault(const SweepGrid *grid, size_t point, const Faul
     char detail[sizeof own.detail + PLACE + 64];
     snprintf(detail, sizeof detail, "point %zu, %s: %s", point, fault->pointer, fault->detail);
     text_fit(own.detail, sizeof own.detail, detail);
-    problem_put(problem, STATUS_INVALID, &own);
+    problem_add_fault(problem, STATUS_INVALID, &own);
 }
 
 typedef struct Validation {

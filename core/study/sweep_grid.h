@@ -37,7 +37,7 @@ typedef struct Buffers {
 // A record that an axis names, in its version at submission.
 typedef struct PinnedRecord {
     char *name, *digest;
-    Shared *named; // a NamedRecord; NULL: not found yet
+    Refcount *named; // a NamedRecord; NULL: not found yet
 } PinnedRecord;
 
 typedef struct PinnedRecords {
@@ -59,7 +59,7 @@ typedef struct SweepStudy {
 typedef struct SweepValues {
     const char *pointer;
     size_t count, stride; // point p has value (p / stride) % count
-    Scalar *at;
+    JsonScalar *at;
     char *texts;        // of all its values
     const Field *field; // NULL: the pointer is faulty, the axis changes nothing
     bool is_tag;

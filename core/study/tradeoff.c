@@ -14,7 +14,7 @@ enum { SOLVERS_MAX = 32, REPEATS_MAX = 1000, BATCH_MAX = 10000 }; // runs of a t
 static const double batch_seconds = 5e-3;                         // of CPU, at least, of a timing
 static const double batch_steps = 1e5;                            // about as many solver steps
 
-static const double default_errors[METRICS] = {1e-3, 1e-2, 1e-2, 0, 0.1, 1e-3};
+static const double default_errors[METRIC_COUNT] = {1e-3, 1e-2, 1e-2, 0, 0.1, 1e-3};
 
 // clang-format off
 static const Field tradeoff_study_fields[] = {

@@ -34,9 +34,9 @@ static Status uncertainty_bands_report_channel(const UncertaintyBands *bands, si
                                                double *values, RunSpectrum *spectrum,
                                                Problem *problem) {
     const size_t rows = bands->rows, runs = bands->runs;
-    if (!reals_make(&spectrum->value, rows) || !reals_make(&spectrum->mean, rows) ||
-        !reals_make(&spectrum->q05, rows) || !reals_make(&spectrum->median, rows) ||
-        !reals_make(&spectrum->q95, rows))
+    if (!reals_allocate(&spectrum->value, rows) || !reals_allocate(&spectrum->mean, rows) ||
+        !reals_allocate(&spectrum->q05, rows) || !reals_allocate(&spectrum->median, rows) ||
+        !reals_allocate(&spectrum->q95, rows))
         return study_no_memory(problem);
     memcpy(spectrum->value.at, own, rows * sizeof *values);
     for (size_t k = 0; k < rows; k++) {

@@ -34,7 +34,7 @@ static Status refuse_channel(const MeasuredRequest *asked, const Response *respo
     snprintf(fault.detail, sizeof fault.detail,
              "must be a sampled channel in %s; the result has: %s",
              statistic_units[asked->measured.quantity], there[0] != '\0' ? there : "none");
-    return problem_put(problem, STATUS_INVALID, &fault);
+    return problem_add_fault(problem, STATUS_INVALID, &fault);
 }
 
 static Status choose_channel(const MeasuredRequest *asked, const Response *response,
@@ -55,13 +55,13 @@ static Status measure_spectra(const Signal *a, const Signal *b, Spectrum *spectr
     static const char *const units[2] = {"", ""};
     Columns pair = {0};
     double rate;
-    TRY(likeness_pair(a, b, MEASURED_MIN, &pair, &rate, problem));
+    TRY(signal_comparison_align(a, b, MEASURED_MIN, &pair, &rate, problem));
     columns_name(&pair, 0, "a", "");
     columns_name(&pair, 1, "measured", "");
     const size_t segment = pair.rows < SEGMENT ? pair.rows : SEGMENT;
-    const SpectrumSettings settings = {segment, segment / 2, WINDOW_HANN, DETREND_CONSTANT};
+    const WelchSettings settings = {segment, segment / 2, WELCH_HANN, WELCH_DETREND_CONSTANT};
     const Status status =
-        spectrum_welch(&pair, units, rate, &settings, NULL, NULL, spectrum, problem);
+        welch_spectrum(&pair, units, rate, &settings, NULL, NULL, spectrum, problem);
     columns_clear(&pair);
     return status;
 }
@@ -69,10 +69,10 @@ static Status measure_spectra(const Signal *a, const Signal *b, Spectrum *spectr
 static void write_answer(Bytes *bytes, const char *result, const Column *column,
                          const MeasuredRequest *asked, double shift, const Signal *a,
                          const Signal *b, const Spectrum *spectrum) {
-    const Likeness likeness = likeness_measure(a, b, COMPARE_PART, NULL);
-    const Distance distance =
-        distance_measure(spectrum, spectrum->densities.at[0].values, spectrum,
-                         spectrum->densities.at[1].values, (double)NAN, (double)NAN);
+    const SignalComparison likeness = signal_comparison_measure(a, b, COMPARE_PART, NULL);
+    const SpectrumDistance distance =
+        spectrum_distance_measure(spectrum, spectrum->densities.at[0].values, spectrum,
+                                  spectrum->densities.at[1].values, (double)NAN, (double)NAN);
     bytes_format(bytes,
                  "{\"a\": {\"id\": \"%s\", \"links\": {\"self\": \"%s/v1/results/%s\"}}, "
                  "\"channel\": ",
@@ -83,9 +83,9 @@ static void write_answer(Bytes *bytes, const char *result, const Column *column,
     bytes_format(bytes, ", \"align\": \"%s\", \"shift\": ", align_names[asked->align]);
     bytes_real(bytes, shift);
     bytes_text(bytes, ", \"motion\": ");
-    write_item(bytes, likeness_fields, &likeness, WRITE_REPORT);
+    write_item(bytes, signal_comparison_fields, &likeness, WRITE_REPORT);
     bytes_format(bytes, ", \"psd\": {\"segment\": %zu, ", spectrum->settings.segment);
-    write_members(bytes, distance_fields, &distance, WRITE_REPORT);
+    write_members(bytes, spectrum_distance_fields, &distance, WRITE_REPORT);
     bytes_text(bytes, "}, \"warnings\": [");
     if (b->rate > a->rate * (1 + 1e-9))
         compare_put_warning(bytes,
@@ -107,7 +107,7 @@ static Status compare(App *app, const char *result, const MeasuredRequest *asked
     double shift = asked->shift;
     const double longest = (double)a.count / a.rate + (double)b.count / b.rate + fabs(b.start);
     if (asked->align == ALIGN_AUTO)
-        TRY(likeness_shift(&a, &b, fmin(asked->most_shift, longest), &shift, problem));
+        TRY(signal_comparison_shift(&a, &b, fmin(asked->most_shift, longest), &shift, problem));
     b.start += shift;
     Spectrum spectrum = {0};
     Bytes bytes = {.most = app->reply_most};

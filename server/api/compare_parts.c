@@ -88,14 +88,14 @@ size_t compare_put_motions(Bytes *bytes, const Response *a, const Response *b,
         if (to == NULL || is_too_much)
             continue;
         const Signal x = signal_of(a, from), y = signal_of(b, to);
-        const Likeness likeness = likeness_measure(&x, &y, COMPARE_PART, NULL);
+        const SignalComparison likeness = signal_comparison_measure(&x, &y, COMPARE_PART, NULL);
         size_t number;
         if (channel == NULL && channel_find(from->name, &number) == &channels[0]) {
             channel = from->name;
             parting = likeness.parting;
         }
         bytes_text(bytes, separator);
-        put_named(bytes, from->name, from->unit, likeness_fields, &likeness);
+        put_named(bytes, from->name, from->unit, signal_comparison_fields, &likeness);
         separator = ", ";
         compared++;
         samples += (double)likeness.samples;
@@ -115,10 +115,10 @@ size_t compare_put_spectra(Bytes *bytes, const Spectrum *a, const Spectrum *b) {
         if (to == NULL || compared == CHANNELS)
             continue;
         compared++;
-        const Distance distance =
-            distance_measure(a, from->values, b, to->values, (double)NAN, (double)NAN);
+        const SpectrumDistance distance =
+            spectrum_distance_measure(a, from->values, b, to->values, (double)NAN, (double)NAN);
         bytes_text(bytes, separator);
-        put_named(bytes, from->name, from->unit, distance_fields, &distance);
+        put_named(bytes, from->name, from->unit, spectrum_distance_fields, &distance);
         separator = ", ";
     }
     bytes_text(bytes, "]");

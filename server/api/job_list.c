@@ -67,7 +67,7 @@ static Status read_time(const Request *request, const char *name, bool is_end, i
     TRY(query_text(request, name, &text, problem));
     if (text == NULL)
         return STATUS_OK;
-    if (!date_read(text, unix_ms))
+    if (!rfc3339_read(text, unix_ms))
         return problem_set(problem, STATUS_USAGE,
                            "the query parameter \"%s\" must be a day or a time as of RFC 3339, "
                            "2026-11-21T09:00:00Z, is \"%.40s\"",

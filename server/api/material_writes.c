@@ -28,7 +28,7 @@ static Status read_body(const Request *request, const char *whose, const Field *
     const Status status = read_json(request->body, request->body_size, fields, item, problem);
     if (!is_object(status, problem))
         return status;
-    const Status judged = fields_check(fields, item, "", problem);
+    const Status judged = fields_validate(fields, item, "", problem);
     return status != STATUS_OK ? status : judged;
 }
 
@@ -62,7 +62,7 @@ static Status judge(const MaterialBody *body, uint64_t measurements, Status stat
                     Problem *problem) {
     if (!is_object(status, problem))
         return status;
-    const Status all[] = {status, material_check(&body->material, "", problem),
+    const Status all[] = {status, material_validate(&body->material, "", problem),
                           check_measurements(&body->material, measurements, problem),
                           check_why(body->comment, "/comment", problem)};
     for (size_t i = 0; i < COUNT(all); i++)

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/base/spelling.h"
 #include "core/excitation/recorded_motion.h"
 #include "core/formats/ground_motion_text.h"
 #include "server/codec/read.h"
@@ -64,7 +65,7 @@ static Status read_choice(const Request *request, const char *name, const char *
             *choice = i;
             return STATUS_OK;
         }
-    return text == NULL ? STATUS_OK : texts_refuse(names, text, pointer, problem);
+    return text == NULL ? STATUS_OK : spelling_reject(names, text, pointer, problem);
 }
 
 // The table; `text` is the caller's.
@@ -134,7 +135,7 @@ Status measured_read(const Request *request, MeasuredRequest **made, Problem *pr
     if (asked == NULL || fields_default(request_fields, asked) != STATUS_OK)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the measurement");
     TRY(is_text ? read_text(request, asked, problem) : read_document(request, asked, problem));
-    TRY(fields_check(request_fields, asked, "", problem));
+    TRY(fields_validate(request_fields, asked, "", problem));
     if (asked->measured.samples.count < MEASURED_MIN)
         return problem_add(problem, STATUS_INVALID, "/measured/samples",
                            "must be at least %d samples, are %zu", MEASURED_MIN,

@@ -91,7 +91,7 @@ static Status read_body(const Request *request, MeasurementBody *body, Problem *
         read_json(request->body, request->body_size, measurement_body_fields, body, problem);
     if (status != STATUS_OK && status != STATUS_INVALID)
         return status;
-    const Status all[] = {status, fields_check(measurement_body_fields, body, "", problem),
+    const Status all[] = {status, fields_validate(measurement_body_fields, body, "", problem),
                           drop_test_validate(&body->test, "", problem)};
     for (size_t i = 0; i < COUNT(all); i++)
         TRY(all[i]);

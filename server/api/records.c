@@ -162,7 +162,7 @@ Status records_show(App *app, const Request *request, Reply *reply, Problem *pro
 static Status fill(const Request *request, const NamedRecord *named, Sheet *sheet,
                    Problem *problem) {
     const Reals *samples = &named->samples;
-    TRY(columns_make(&sheet->own, 1, samples->count, 0, problem));
+    TRY(columns_allocate(&sheet->own, 1, samples->count, 0, problem));
     columns_name(&sheet->own, 0, "acceleration", "m/s^2");
     memcpy(sheet->own.at[0].values, samples->at, samples->count * sizeof(double));
     sheet->table = (Table){.axis_name = "time", .axis_unit = "s", .axis_rate = 1 / named->interval};
@@ -180,7 +180,7 @@ Status records_samples(App *app, const Request *request, Reply *reply, Problem *
     TRY(store_record_named(app->store, request->parameters[0], &named, problem));
     snprintf(tag, sizeof tag, "%.64s-%.8s", named->digest, encoder->extension);
     const Status status = fill(request, named, &sheet, problem);
-    shared_drop(&named->shared);
+    refcount_unref(&named->shared);
     if (status == STATUS_OK && !reply_tagged(reply, request, tag))
         return tables_reply(app, reply, encoder, &sheet, problem);
     sheet_clear(&sheet);

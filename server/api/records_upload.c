@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/base/json_pointer.h"
+#include "core/base/spelling.h"
 #include "core/formats/ground_motion_text.h"
 #include "server/base/clock.h"
 #include "server/codec/read.h"
@@ -84,7 +86,7 @@ static Status read_queries(const Request *request, Asked *asked, Problem *proble
             asked->unit = i;
     return unit == NULL || asked->unit != CHOICE_ABSENT
                ? STATUS_OK
-               : texts_refuse(acceleration_unit_names, unit, "/unit", problem);
+               : spelling_reject(acceleration_unit_names, unit, "/unit", problem);
 }
 
 static Status warn_file(const GroundMotionText *import, bool is_told, Warnings *warnings) {
@@ -190,7 +192,7 @@ static Status check_name(const Asked *asked, Problem *problem) {
                    .detail = "must be 1 to 64 letters, digits, dots, underscores and dashes, the "
                              "first a letter or a digit"};
     text_quote(fault.value, sizeof fault.value, asked->name);
-    return problem_put(problem, STATUS_INVALID, &fault);
+    return problem_add_fault(problem, STATUS_INVALID, &fault);
 }
 
 // To m/s^2, and -0 to 0, so that what means the same has one digest.
@@ -199,7 +201,7 @@ static Status scale(Reals *samples, double size, Problem *problem) {
         char place[64];
         const double value = samples->at[i] * size + 0.0;
         if (!isfinite(value)) {
-            pointer_index(place, sizeof place, "/samples", i);
+            json_pointer_index(place, sizeof place, "/samples", i);
             return problem_add_real(problem, STATUS_INVALID, place, samples->at[i], NULL,
                                     "is too large to be an acceleration in m/s^2");
         }
@@ -266,7 +268,7 @@ static Status doubt(const RecordUpload *upload, Warnings *warnings) {
 static Status judge(Asked *asked, RecordUpload *upload, Problem *problem) {
     if (upload->samples.count > 0) // of a file: they are lent to the rows that judge them
         asked->samples = upload->samples;
-    const Status rows = fields_check(asked_fields, asked, "", problem);
+    const Status rows = fields_validate(asked_fields, asked, "", problem);
     const Status name = check_name(asked, problem);
     upload->samples = asked->samples;
     asked->samples = (Reals){NULL, 0};

@@ -112,7 +112,7 @@ void problem_told_put(const ProblemTold *told, Status status, Problem *problem) 
         text_put(fault.detail, sizeof fault.detail, faults[i].detail);
         text_put(fault.unit, sizeof fault.unit, faults[i].unit);
         text_put(fault.did_you_mean, sizeof fault.did_you_mean, faults[i].did_you_mean);
-        (void)problem_put(problem, status, &fault);
+        (void)problem_add_fault(problem, status, &fault);
     }
     if (problem != NULL && told->more < 1000000000)
         problem->count += problem->count > 0 ? told->more : 0;

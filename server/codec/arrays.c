@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/base/json_pointer.h"
 #include "server/base/bytes.h"
 
 enum { POINTER_SIZE = sizeof((Fault){0}.pointer) };
@@ -20,20 +21,20 @@ double read_number(const json_t *value) {
 
 bool read_allows(Reader *reader, const json_t *value, const Field *field, size_t has,
                  const char *what, const char *pointer) {
-    if (field->most == 0 || has <= field->most)
+    if (field->max == 0 || has <= field->max)
         return true;
     refuse_value(reader, pointer, value, NULL, NULL, "must have at most %zu %s, has %zu",
-                 field->most, what, has);
+                 field->max, what, has);
     return false;
 }
 
 // A number that the row allows, in place of one that could not be read, so that it is not judged a
 // second time.
 static double allowed_number(const Range *range) {
-    if (!isinf(range->least))
-        return range->is_open_below ? nextafter(range->least, (double)INFINITY) : range->least;
-    if (!isinf(range->most))
-        return range->most;
+    if (!isinf(range->min))
+        return range->is_open_below ? nextafter(range->min, (double)INFINITY) : range->min;
+    if (!isinf(range->max))
+        return range->max;
     return 0;
 }
 
@@ -74,7 +75,7 @@ void read_reals(Reader *reader, const json_t *value, const Field *field, Reals *
         if (!refuse_wants_detail(reader))
             continue;
         char place[POINTER_SIZE];
-        pointer_index(place, sizeof place, pointer, i);
+        json_pointer_index(place, sizeof place, pointer, i);
         refuse_type(reader, place, element, field, "a number");
     }
     free(target->at);
@@ -98,7 +99,7 @@ void read_rows(Reader *reader, const json_t *value, const Field *field, Rows *ta
     }
     for (size_t i = 0; i < count; i++) {
         char place[POINTER_SIZE];
-        pointer_index(place, sizeof place, pointer, i);
+        json_pointer_index(place, sizeof place, pointer, i);
         read_reals(reader, json_array_get(value, i), field, &at[i], place);
     }
     for (size_t i = 0; i < target->count; i++)
@@ -181,12 +182,12 @@ void read_texts(Reader *reader, const json_t *value, const Field *field, Texts *
         const char *key;
         json_t *element;
         json_object_foreach((json_t *)value, key, element) {
-            pointer_join(place, sizeof place, pointer, key);
+            json_pointer_join(place, sizeof place, pointer, key);
             add_text(reader, element, key, field, &texts, place);
         }
     } else {
         for (size_t i = 0; i < count; i++) {
-            pointer_index(place, sizeof place, pointer, i);
+            json_pointer_index(place, sizeof place, pointer, i);
             if ((field->flags & FIELD_SCALARS) != 0)
                 add_scalar(reader, json_array_get(value, i), &texts, place);
             else

@@ -96,24 +96,24 @@ static void print_object(Printer *printer, const Field *fields, const KindTable 
                          const Kind *kind);
 
 static void print_range(Printer *printer, const Range *range) {
-    if (!isinf(range->least))
-        real_member(printer, range->is_open_below ? "exclusiveMinimum" : "minimum", range->least);
-    if (!isinf(range->most))
-        real_member(printer, "maximum", range->most);
+    if (!isinf(range->min))
+        real_member(printer, range->is_open_below ? "exclusiveMinimum" : "minimum", range->min);
+    if (!isinf(range->max))
+        real_member(printer, "maximum", range->max);
 }
 
 static void print_length(Printer *printer, const Field *field) {
     if (field->presence == PRESENCE_REQUIRED)
         count_member(printer, "minItems", 1);
-    if (field->most > 0)
-        count_member(printer, "maxItems", field->most);
+    if (field->max > 0)
+        count_member(printer, "maxItems", field->max);
 }
 
 // A count is never negative, whatever its row says.
 static Range count_range(const Field *field) {
     Range range = field->range;
-    if (range.least < 0)
-        range = (Range){0, range.most, false};
+    if (range.min < 0)
+        range = (Range){0, range.max, false};
     return range;
 }
 
@@ -179,8 +179,8 @@ static void print_texts(Printer *printer, const Field *field) {
         open_member(printer, "additionalProperties", "{");
         text_member(printer, "type", "string");
         close_bracket(printer, "}");
-        if (field->most > 0)
-            count_member(printer, "maxProperties", field->most);
+        if (field->max > 0)
+            count_member(printer, "maxProperties", field->max);
         close_bracket(printer, "}");
         close_bracket(printer, "]");
     }
@@ -205,8 +205,8 @@ static void print_item(Printer *printer, const Field *field) {
         begin_line(printer);
         open_bracket(printer, "{");
         text_member(printer, "type", "string");
-        if (row->most > 0)
-            count_member(printer, "maxLength", row->most);
+        if (row->max > 0)
+            count_member(printer, "maxLength", row->max);
         text_member(printer, "description", row->doc);
         close_bracket(printer, "}");
     }
@@ -263,8 +263,8 @@ static void print_value(Printer *printer, const Field *field) {
         break;
     case FIELD_KIND_TEXT:
         text_member(printer, "type", "string");
-        if (field->most > 0)
-            count_member(printer, "maxLength", field->most);
+        if (field->max > 0)
+            count_member(printer, "maxLength", field->max);
         break;
     case FIELD_KIND_CHOICE:
         texts_member(printer, "enum", field->choices);
@@ -305,7 +305,7 @@ static void print_value(Printer *printer, const Field *field) {
         print_variant(printer, field);
         break;
     case FIELD_KIND_BASE:
-    case FIELD_KIND_SHARED:
+    case FIELD_KIND_REFCOUNT:
     case FIELD_KIND_END:
         break;
     }

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "core/base/field.h"
+#include "core/base/json_pointer.h"
 
 enum { POINTER = 256, NUMBERS = 16 };
 
@@ -121,11 +122,11 @@ static void walk_objects(Walk *walk, const char *pointer, const json_t *a, const
     json_t *value;
     char place[POINTER];
     json_object_foreach((json_t *)a, name, value) {
-        pointer_join(place, sizeof place, pointer, name);
+        json_pointer_join(place, sizeof place, pointer, name);
         walk_values(walk, place, value, json_object_get(b, name));
     }
     json_object_foreach((json_t *)b, name, value) {
-        pointer_join(place, sizeof place, pointer, name);
+        json_pointer_join(place, sizeof place, pointer, name);
         if (json_object_get(a, name) == NULL)
             walk_values(walk, place, NULL, value);
     }
@@ -146,7 +147,7 @@ static void walk_values(Walk *walk, const char *pointer, const json_t *a, const 
         walk_objects(walk, pointer, a, b);
     } else if (json_is_array(a) && !is_long_numbers(a) && !is_long_numbers(b)) {
         for (size_t i = 0; i < json_array_size(a) || i < json_array_size(b); i++) {
-            pointer_index(place, sizeof place, pointer, i);
+            json_pointer_index(place, sizeof place, pointer, i);
             walk_values(walk, place, json_array_get(a, i), json_array_get(b, i));
         }
     } else if (!is_equal(a, b)) {

@@ -36,7 +36,7 @@ static Status read_spectra(const json_t *root, Columns *columns, Problem *proble
                  rows = json_array_size(json_object_get(frequency, "values"));
     if (count == 0 || rows == 0)
         return refuse("spectra", problem);
-    TRY(columns_make(columns, 1 + count, rows, 0, problem));
+    TRY(columns_allocate(columns, 1 + count, rows, 0, problem));
     bool is_read = read_column(frequency, first, columns, 0);
     size_t i = 1;
     const char *name;

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/base/json_pointer.h"
 #include "server/base/bytes.h"
 #include "server/codec/scan.h"
 
@@ -87,7 +88,7 @@ static bool object_walk(const json_t *object, const char *place, const char *key
     json_object_foreach((json_t *)(uintptr_t)object, name, value) {
         if (strcmp(name, "links") == 0)
             continue;
-        pointer_join(inner, sizeof inner, place, name);
+        json_pointer_join(inner, sizeof inner, place, name);
         if (!walk(value, inner, name, pairs))
             return false;
     }
@@ -119,7 +120,7 @@ static bool walk(const json_t *value, const char *place, const char *key, Pairs 
         return pair_add(pairs, place + 1, text, NULL, "");
     }
     for (size_t i = 0; i < json_array_size(value); i++) {
-        pointer_index(inner, sizeof inner, place, i);
+        json_pointer_index(inner, sizeof inner, place, i);
         if (!element_walk(json_array_get(value, i), inner, pairs))
             return false;
     }

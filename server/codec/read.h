@@ -12,8 +12,8 @@ enum { READ_DEPTH = 32 };
 // `item`, which gets its defaults first (so it may be uninitialised; on failure it is still
 // clearable by fields_clear). STATUS_UNREADABLE: not JSON, duplicate keys, NaN, too deep, not
 // UTF-8, with line, column and where known a pointer. STATUS_INVALID: the faults, one at "" where
-// it is no object at all; what could be read has been read, so that fields_check and others can add
-// theirs to the same problem.
+// it is no object at all; what could be read has been read, so that fields_validate and others can
+// add theirs to the same problem.
 Status read_json(const char *text, size_t size, const Field *fields, void *item, Problem *problem);
 
 // The same of `count` bytes of the text from `first` on, which are a document by themselves and

@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "core/base/spelling.h"
 #include "server/base/shortest.h"
 
 static const char *type_name(const json_t *value) {
@@ -75,7 +76,7 @@ void refuse_value(Reader *reader, const char *pointer, const json_t *value, cons
     refuse_text(value, fault.value, sizeof fault.value);
     text_fit(fault.unit, sizeof fault.unit, unit != NULL ? unit : "");
     text_fit(fault.did_you_mean, sizeof fault.did_you_mean, meant != NULL ? meant : "");
-    problem_put(reader->problem, STATUS_INVALID, &fault);
+    problem_add_fault(reader->problem, STATUS_INVALID, &fault);
 }
 
 void refuse_type(Reader *reader, const char *pointer, const json_t *value, const Field *field,
@@ -107,7 +108,7 @@ void refuse_unnamed(Reader *reader, const char *pointer, const char *const *name
 const char *refuse_name(Reader *reader, const char *pointer, const json_t *value,
                         const char *const *names) {
     const char *name = json_string_value(value);
-    const char *meant = texts_nearest(names, name);
+    const char *meant = spelling_nearest(names, name);
     if (!refuse_wants_detail(reader))
         return meant;
     char list[NAMES_SIZE], shown[64];

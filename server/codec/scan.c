@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "core/base/field.h"
+#include "core/base/json_pointer.h"
 #include "server/codec/read.h"
 
 enum { KEY_SIZE = 512 }; // more of a key fits into no pointer
@@ -216,10 +217,10 @@ void scan_place(const char *text, size_t size, size_t position, ScanPlace *place
         memcpy(base, place->pointer, sizeof base);
         char name[KEY_SIZE];
         if (frame->is_array)
-            pointer_index(place->pointer, sizeof place->pointer, base, frame->index);
+            json_pointer_index(place->pointer, sizeof place->pointer, base, frame->index);
         else if (frame->has_key) {
             key_name(&scan, frame, name);
-            pointer_join(place->pointer, sizeof place->pointer, base, name);
+            json_pointer_join(place->pointer, sizeof place->pointer, base, name);
         }
     }
 }

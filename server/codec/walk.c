@@ -1,11 +1,13 @@
 // The walk goes by the document's keys, so that every unknown one is met; what is missing is
-// fields_check's to say. What cannot be read leaves its member as it was.
+// fields_validate's to say. What cannot be read leaves its member as it was.
 #include "server/codec/walk.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/base/json_pointer.h"
+#include "core/base/spelling.h"
 #include "server/base/shortest.h"
 #include "server/codec/arrays.h"
 
@@ -30,10 +32,10 @@ static void read_count(Reader *reader, const json_t *value, const Field *field, 
         return;
     }
     char least[32], most[32], is[SHORTEST_SIZE + 1];
-    text_real(least, field->range.least > 0 ? field->range.least : 0);
-    text_real(most, field->range.most < 0x1p63 ? field->range.most : 0x1p63);
+    text_real(least, field->range.min > 0 ? field->range.min : 0);
+    text_real(most, field->range.max < 0x1p63 ? field->range.max : 0x1p63);
     refuse_text(value, is, sizeof is);
-    if (isinf(field->range.most))
+    if (isinf(field->range.max))
         refuse_value(reader, pointer, value, field->unit, NULL,
                      "must be a whole number of at least %s, is %s", least, is);
     else
@@ -49,9 +51,9 @@ static void read_text(Reader *reader, const json_t *value, const Field *field, c
         return;
     }
     const size_t length = json_string_length(value);
-    if (field->most > 0 && length > field->most) {
+    if (field->max > 0 && length > field->max) {
         refuse_value(reader, pointer, value, NULL, NULL, "must have at most %zu bytes, has %zu",
-                     field->most, length);
+                     field->max, length);
         return;
     }
     char *text = strdup(json_is_null(value) ? "" : json_string_value(value));
@@ -100,7 +102,7 @@ static void read_list(Reader *reader, const json_t *value, const Field *field, v
             break;
         }
         char place[POINTER_SIZE];
-        pointer_index(place, sizeof place, pointer, i);
+        json_pointer_index(place, sizeof place, pointer, i);
         const json_t *object = json_array_get(value, i);
         if (json_is_object(object))
             walk_object(reader, object, field->fields, element, place);
@@ -154,7 +156,7 @@ static const Kind *read_kind(Reader *reader, const json_t *object, const KindTab
         return kind;
     *is_known = false;
     char place[POINTER_SIZE];
-    pointer_join(place, sizeof place, pointer, kinds->tag);
+    json_pointer_join(place, sizeof place, pointer, kinds->tag);
     const char *names[KINDS_SHOWN + 1] = {NULL};
     for (size_t i = 0; i < KINDS_SHOWN && kinds->at(i) != NULL; i++)
         names[i] = kinds->at(i)->name;
@@ -237,7 +239,7 @@ static void read_value(Reader *reader, const json_t *value, const Field *field, 
         read_variant(reader, value, field, member, pointer);
         break;
     case FIELD_KIND_BASE:
-    case FIELD_KIND_SHARED:
+    case FIELD_KIND_REFCOUNT:
     case FIELD_KIND_END:
         break;
     }
@@ -259,9 +261,9 @@ static void refuse_key(Reader *reader, const char *pointer, const json_t *value,
                      others);
         return;
     }
-    const char *meant = fields_nearest(fields, key);
+    const char *meant = spelling_nearest_field(fields, key);
     if (meant == NULL && kinds != NULL)
-        meant = texts_nearest((const char *const[]){kinds->tag, NULL}, key);
+        meant = spelling_nearest((const char *const[]){kinds->tag, NULL}, key);
     refuse_value(reader, pointer, value, NULL, meant, "unknown key");
 }
 
@@ -278,7 +280,7 @@ static void walk_members(Reader *reader, const json_t *object, const Field *fiel
         if (field == NULL && !refuse_wants_detail(reader))
             continue;
         char place[POINTER_SIZE];
-        pointer_join(place, sizeof place, pointer, key);
+        json_pointer_join(place, sizeof place, pointer, key);
         if (field == NULL)
             refuse_key(reader, place, value, key, fields, kinds,
                        kinds != NULL ? ((const Variant *)item)->kind : NULL);

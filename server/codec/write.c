@@ -103,7 +103,7 @@ static void put_value(Bytes *bytes, const Field *field, const void *member, Writ
         put_variant(bytes, field->kinds, *(Variant *const *)member, style);
         break;
     case FIELD_KIND_BASE:
-    case FIELD_KIND_SHARED:
+    case FIELD_KIND_REFCOUNT:
     case FIELD_KIND_END:
         break;
     }

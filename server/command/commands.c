@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/base/spelling.h"
 #include "core/simulation/simulation.h"
 #include "server/api/app.h"
 #include "server/command/any_study.h"
@@ -43,26 +44,10 @@ static const Command command_version = {
 };
 
 const Command *const commands[] = {
-    &command_serve,
-    &command_run,
-    &command_check,
-    &command_tradeoff,
-    &command_ensemble,
-    &command_study,
-    &command_sweep,
-    &command_import,
-    &command_materials,
-    &command_records,
-    &command_token,
-    &command_backup,
-    &command_submit,
-    &command_watch,
-    &command_get,
-    &command_cancel,
-    &command_compare,
-    &command_help,
-    &command_version,
-    NULL,
+    &command_serve,  &command_run,     &command_check,  &command_tradeoff,  &command_ensemble,
+    &command_study,  &command_sweep,   &command_import, &command_materials, &command_records,
+    &command_token,  &command_backup,  &command_submit, &command_watch,     &command_get,
+    &command_cancel, &command_compare, &command_help,   &command_version,   NULL,
 };
 
 static const char overview[] =
@@ -128,7 +113,7 @@ static int unknown_refuse(const char *name) {
     const char *names[COUNT(commands)];
     for (size_t i = 0; i < COUNT(commands); i++)
         names[i] = commands[i] == NULL ? NULL : commands[i]->name;
-    const char *near = texts_nearest(names, name);
+    const char *near = spelling_nearest(names, name);
     fprintf(stderr, "impactd: %s is no command", name);
     if (near != NULL)
         fprintf(stderr, " (did you mean %s?)", near);

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "core/base/spelling.h"
 #include "core/drop_test/material_proposal.h"
 #include "core/scene/damper.h"
 #include "server/command/materials_ask.h"
@@ -86,7 +87,7 @@ static const struct Action *action_find(const Options *options, Problem *problem
     char all[200] = "";
     for (size_t i = 0; i < COUNT(actions); i++)
         text_list(all, sizeof all, actions[i].name);
-    const char *near = texts_nearest(names, given);
+    const char *near = spelling_nearest(names, given);
     (void)problem_set(problem, STATUS_USAGE,
                       "the first operand must be one of %s, is \"%.60s\"%s%s%s", all, given,
                       near != NULL ? " (did you mean " : "", near != NULL ? near : "",

@@ -33,7 +33,7 @@ Status materials_name(const char *text, bool may_have_revision, Problem *problem
     const size_t length = strcspn(text, "@");
     snprintf(slug, sizeof slug, "%.*s", (int)(length < sizeof slug ? length : 0), text);
     const bool has_revision = text[length] == '@';
-    if (!material_slug_is_good(slug))
+    if (!material_slug_is_valid(slug))
         return problem_set(problem, STATUS_USAGE,
                            "a material is named by 1 to %d lower-case letters, digits, underscores "
                            "and dashes%s, is \"%.80s\"",

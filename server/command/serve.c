@@ -231,7 +231,7 @@ static Status serve(const ServeSettings *settings, const sigset_t *signals, Prob
     Listener *listener = NULL;
     Keeper *keeper = NULL;
     process_return_memory();
-    fourier_start();
+    fft_start();
     Status status = address_read(settings->listen, &door.address, problem);
     if (status == STATUS_OK) {
         const Status together = check(settings, problem);

@@ -41,7 +41,7 @@ void buckets_extremes(const double *values, size_t count, double *least, double 
 Status buckets_make(const Column *const *columns, size_t column_count, size_t first, size_t count,
                     size_t bucket, Columns *buckets, Problem *problem) {
     const size_t rows = (count + bucket - 1) / bucket;
-    TRY(columns_make(buckets, 2 * column_count, rows, 0, problem));
+    TRY(columns_allocate(buckets, 2 * column_count, rows, 0, problem));
     for (size_t c = 0; c < column_count; c++) {
         char name[sizeof columns[c]->name];
         const double *values = columns[c]->values + first;

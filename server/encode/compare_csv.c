@@ -16,8 +16,8 @@ void compare_csv(const Comparison *comparison, Bytes *bytes) {
     cells_header(bytes, summary_fields);
     cells_header_of(bytes, "contacts", compare_contacts_fields);
     cells_header_of(bytes, "difference", compare_differences_fields);
-    cells_header_of(bytes, "psd", distance_fields);
-    cells_header_of(bytes, "displacement", likeness_fields);
+    cells_header_of(bytes, "psd", spectrum_distance_fields);
+    cells_header_of(bytes, "displacement", signal_comparison_fields);
     bytes_text(bytes, ",divergence [s],why\n");
     for (size_t i = 0; i < comparison->entries.count; i++) {
         const CompareEntry *entry = &comparison->entries.at[i];
@@ -30,8 +30,8 @@ void compare_csv(const Comparison *comparison, Bytes *bytes) {
         cells_members(bytes, summary_fields, &entry->summary);
         cells_members(bytes, compare_contacts_fields, &entry->contacts);
         cells_members(bytes, compare_differences_fields, &entry->differences);
-        cells_members(bytes, distance_fields, &entry->psd);
-        cells_members(bytes, likeness_fields, &entry->displacement);
+        cells_members(bytes, spectrum_distance_fields, &entry->psd);
+        cells_members(bytes, signal_comparison_fields, &entry->displacement);
         bytes_text(bytes, ",");
         cells_real(bytes, entry->divergence.time);
         bytes_text(bytes, ",");

@@ -19,7 +19,7 @@ Status records_columns(const Field *fields, const void *items, size_t count, siz
     size_t wide = 0;
     for (const Field *field = fields; field->kind != FIELD_KIND_END; field++)
         wide += is_number(field);
-    TRY(columns_make(columns, wide, count, 0, problem));
+    TRY(columns_allocate(columns, wide, count, 0, problem));
     size_t c = 0;
     for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
         if (!is_number(field))

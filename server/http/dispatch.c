@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/base/field.h"
+#include "core/base/spelling.h"
 #include "server/base/link.h"
 #include "server/http/body.h"
 #include "server/http/header.h"
@@ -19,7 +20,7 @@ static Status check_queries(const Route *route, const Request *request, Problem 
             at++;
         if (allowed[at] != NULL)
             continue;
-        const char *nearest = texts_nearest(allowed, name);
+        const char *nearest = spelling_nearest(allowed, name);
         char list[160] = "";
         for (size_t k = 0; allowed[k] != NULL; k++)
             text_list(list, sizeof list, allowed[k]);

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "core/base/field.h"
+#include "core/base/spelling.h"
 
 bool route_match(const char *pattern, const char *path, RouteSpan spans[REQUEST_PARAMETERS],
                  size_t *count) {
@@ -91,7 +92,7 @@ bool route_nearest(const Route *table, const char *path, char target[ROUTE_SEGME
         if (strncmp(route->pattern, "/web/", 5) == 0)
             continue; // a page asks for its own files, and their names may be anything
         fill(route->pattern, path, filled, sizeof filled);
-        if (texts_nearest(candidates, path) == filled)
+        if (spelling_nearest(candidates, path) == filled)
             memcpy(target, filled, sizeof filled);
     }
     return target[0] != '\0';

@@ -166,12 +166,12 @@ static void nature_print(FILE *file, const Field *row) {
     unit_print(file, row);
     const bool has_range = row->kind == FIELD_KIND_REAL || row->kind == FIELD_KIND_COUNT ||
                            row->kind == FIELD_KIND_REALS || row->kind == FIELD_KIND_ROWS;
-    if (has_range && isfinite(row->range.least) && isfinite(row->range.most))
-        fprintf(file, ", %s to %s", text_real(least, row->range.least),
-                text_real(most, row->range.most));
-    else if (has_range && isfinite(row->range.least))
+    if (has_range && isfinite(row->range.min) && isfinite(row->range.max))
+        fprintf(file, ", %s to %s", text_real(least, row->range.min),
+                text_real(most, row->range.max));
+    else if (has_range && isfinite(row->range.min))
         fprintf(file, ", %s %s", row->range.is_open_below ? "above" : "at least",
-                text_real(least, row->range.least));
+                text_real(least, row->range.min));
     for (size_t i = 0; row->choices != NULL && row->choices[i] != NULL; i++) {
         fputs(i > 0 ? ", " : ": ", file);
         escaped(file, row->choices[i], false);

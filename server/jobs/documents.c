@@ -18,8 +18,8 @@ void document_summary(Bytes *bytes, const Outcome *outcome) {
     bytes_text(bytes, "}");
 }
 
-void document_work(Bytes *bytes, const Work *work) {
-    write_item(bytes, work_fields, work, WRITE_REPORT);
+void document_work(Bytes *bytes, const WorkCounters *work) {
+    write_item(bytes, work_counters_fields, work, WRITE_REPORT);
 }
 
 void document_warnings(Bytes *bytes, const Warnings *warnings) {
@@ -85,7 +85,7 @@ static bool put_values(Bytes *bytes, const char *unit, const double *values, siz
 }
 
 bool document_psd(Bytes *bytes, const Spectrum *spectrum, const Progress *watch) {
-    const SpectrumSettings *settings = &spectrum->settings;
+    const WelchSettings *settings = &spectrum->settings;
     const Columns *densities = &spectrum->densities;
     if (densities->count == 0) {
         bytes_text(bytes, "null");
@@ -93,9 +93,9 @@ bool document_psd(Bytes *bytes, const Spectrum *spectrum, const Progress *watch)
     }
     bytes_format(bytes,
                  "{\"method\": \"welch\", \"segment\": %zu, \"overlap\": %zu, \"window\": \"%s\", ",
-                 settings->segment, settings->overlap, spectrum_window_names[settings->window]);
+                 settings->segment, settings->overlap, welch_window_names[settings->window]);
     bytes_format(bytes, "\"detrend\": \"%s\", \"segments\": %zu, \"frequency\": ",
-                 spectrum_detrend_names[settings->detrend], spectrum->segments);
+                 welch_detrend_names[settings->detrend], spectrum->segments);
     if (!put_values(bytes, "Hz", spectrum->frequency, densities->rows, watch))
         return false;
     bytes_text(bytes, ", \"channels\": {");

@@ -10,7 +10,7 @@
 
 void document_plan(Bytes *bytes, const PlanReport *plan);
 void document_summary(Bytes *bytes, const Outcome *outcome); // with what was asked for besides
-void document_work(Bytes *bytes, const Work *work);
+void document_work(Bytes *bytes, const WorkCounters *work);
 void document_warnings(Bytes *bytes, const Warnings *warnings);
 // Two such arrays as one; NULL is an empty one.
 void document_join(Bytes *bytes, const char *first, const char *second);

@@ -99,7 +99,7 @@ static size_t as_count(Reader *reader, double value, size_t size) {
 }
 
 static void take_columns(Reader *reader, size_t count, size_t rows, Columns *columns) {
-    if (reader->is_bad || columns_make(columns, count, rows, reader->left, NULL) != STATUS_OK) {
+    if (reader->is_bad || columns_allocate(columns, count, rows, reader->left, NULL) != STATUS_OK) {
         reader->is_bad = true;
         return;
     }
@@ -155,10 +155,10 @@ static void take_response(Reader *reader, const double head[HEAD], Response *res
 
 static void take_spectrum(Reader *reader, const double head[HEAD], Spectrum *spectrum) {
     const size_t rows = as_count(reader, head[16], sizeof(double));
-    spectrum->settings = (SpectrumSettings){.segment = (size_t)head[17],
-                                            .overlap = (size_t)head[18],
-                                            .window = (int)head[19],
-                                            .detrend = (int)head[20]};
+    spectrum->settings = (WelchSettings){.segment = (size_t)head[17],
+                                         .overlap = (size_t)head[18],
+                                         .window = (int)head[19],
+                                         .detrend = (int)head[20]};
     spectrum->segments = (size_t)head[21];
     if (rows > 0 && (spectrum->frequency = malloc(rows * sizeof(double))) == NULL)
         reader->is_bad = true;

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "core/base/json_pointer.h"
+#include "core/base/spelling.h"
 #include "server/materials/catalogue.h"
 
 // The first of the faults alone tell what names there are.
@@ -47,7 +48,7 @@ static Status refuse_unknown(Store *store, const char *name, const char *slug, c
                 slugs[i] = known.at[i];
             text_list(list, sizeof list, known.at[i]);
         }
-        const char *nearest = slugs == NULL ? NULL : texts_nearest(slugs, slug);
+        const char *nearest = slugs == NULL ? NULL : spelling_nearest(slugs, slug);
         if (nearest != NULL)
             text_fit(fault.did_you_mean, sizeof fault.did_you_mean, nearest);
         free(slugs);
@@ -55,7 +56,7 @@ static Status refuse_unknown(Store *store, const char *name, const char *slug, c
     }
     snprintf(fault.detail, sizeof fault.detail, "no material is called \"%s\"%s%s", short_name,
              list[0] != '\0' ? "; there are " : "", list);
-    return problem_put(problem, STATUS_INVALID, &fault);
+    return problem_add_fault(problem, STATUS_INVALID, &fault);
 }
 
 // The slug is known, the revision is not.
@@ -69,7 +70,7 @@ static Status refuse_revision(const MaterialRevision *known, const char *what, c
     snprintf(fault.detail, sizeof fault.detail,
              "the material %.64s has no such revision; its %s is %s", known->slug, what,
              fault.did_you_mean);
-    return problem_put(problem, STATUS_INVALID, &fault);
+    return problem_add_fault(problem, STATUS_INVALID, &fault);
 }
 
 // All that there is of it is deprecated, so that its name alone stands for nothing.
@@ -84,7 +85,7 @@ static Status refuse_deprecated(const MaterialRevision *newest, const char *poin
              "every revision of the material %.64s is deprecated: name one, %s, to use it all the "
              "same",
              newest->slug, fault.did_you_mean);
-    return problem_put(problem, STATUS_INVALID, &fault);
+    return problem_add_fault(problem, STATUS_INVALID, &fault);
 }
 
 // What passes, or is no fault of the scene's.
@@ -126,7 +127,7 @@ static Status match(double *given, double known, const char *pointer, const char
         return STATUS_OK;
     }
     char place[sizeof((Fault){0}.pointer)], is[32], is_known[32];
-    pointer_join(place, sizeof place, pointer, member);
+    json_pointer_join(place, sizeof place, pointer, member);
     text_real(is, *given);
     if (isnan(known))
         text_fit(is_known, sizeof is_known, "none");
@@ -139,7 +140,7 @@ static Status match(double *given, double known, const char *pointer, const char
 static Status refuse_way(const char *pointer, const char *member, const char *detail,
                          const char *name, Problem *problem) {
     char place[sizeof((Fault){0}.pointer)];
-    pointer_join(place, sizeof place, pointer, member);
+    json_pointer_join(place, sizeof place, pointer, member);
     return problem_add(problem, STATUS_INVALID, place, detail, name);
 }
 
@@ -153,12 +154,12 @@ static Status match_table(ContactRows *given, const MaterialRows *known, const c
                           "is not that of %s, which has another number of rows: "
                           "leave one of them out",
                           name, problem);
-    pointer_join(table, sizeof table, pointer, "table");
+    json_pointer_join(table, sizeof table, pointer, "table");
     for (size_t i = 0; i < known->count; i++) {
         ContactRow *row = &given->at[i];
         const MaterialRow *wanted = &known->at[i];
         char place[sizeof((Fault){0}.pointer)];
-        pointer_index(place, sizeof place, table, i);
+        json_pointer_index(place, sizeof place, table, i);
         const Status faults[] = {
             match(&row->approach_speed, wanted->approach_speed, place, "approach_speed", "m/s",
                   name, problem),
@@ -231,7 +232,7 @@ static double mean_square(const MaterialRows *rows, bool is_contact_time) {
 
 static void fill_test(BufferTest *test, const Material *material) {
     const bool has_table = material->table.count > 0;
-    material_speeds(material, &test->least_speed, &test->most_speed);
+    material_speed_range(material, &test->least_speed, &test->most_speed);
     test->impactor_mass = material->impactor_mass;
     test->base_mass = material->base == MATERIAL_BASE_FIXED  ? (double)INFINITY
                       : material->base == MATERIAL_BASE_FREE ? material->base_mass

@@ -6,7 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/base/json_scalar.h"
+#include "core/base/json_pointer.h"
+#include "core/base/spelling.h"
 #include "core/study/sweep.h"
 #include "server/store/record_rows.h"
 
@@ -30,7 +31,7 @@ static Status refuse_unknown(Store *store, const char *name, const char *pointer
                  "\"%s\" is a record of a daemon, and there is none here: put the samples into the "
                  "scene (impactd import FILE), or send it to the daemon (impactd submit)",
                  short_name);
-        return problem_put(problem, STATUS_INVALID, &fault);
+        return problem_add_fault(problem, STATUS_INVALID, &fault);
     }
     const bool is_suggested = problem->count < SUGGESTED;
     if (is_suggested && store_records(store, NULL, "", LISTED, &known, NULL) == STATUS_OK) {
@@ -40,7 +41,7 @@ static Status refuse_unknown(Store *store, const char *name, const char *pointer
             if (names != NULL)
                 names[i] = known.at[i].name;
         }
-        const char *nearest = names == NULL ? NULL : texts_nearest(names, name);
+        const char *nearest = names == NULL ? NULL : spelling_nearest(names, name);
         if (nearest != NULL)
             text_fit(fault.did_you_mean, sizeof fault.did_you_mean, nearest);
         free(names);
@@ -51,7 +52,7 @@ static Status refuse_unknown(Store *store, const char *name, const char *pointer
                                : "; there are none: POST one to /v1/records",
              list);
     record_rows_clear(&known);
-    return problem_put(problem, STATUS_INVALID, &fault);
+    return problem_add_fault(problem, STATUS_INVALID, &fault);
 }
 
 // `pointer` is where the name stands, `place` where a digest would.
@@ -74,9 +75,9 @@ static Status find(Store *store, const char *name, const char *digest, const cha
              "is not that of the record \"%s\", which is %.16s...: the one that the scene was made "
              "with has been deleted; without a digest this one is taken",
              (*named)->name, (*named)->digest);
-    shared_drop(&(*named)->shared);
+    refcount_unref(&(*named)->shared);
     *named = NULL;
-    return problem_put(problem, STATUS_INVALID, &fault);
+    return problem_add_fault(problem, STATUS_INVALID, &fault);
 }
 
 static ExcitationRecord *record_of(const Simulation *simulation) {
@@ -95,7 +96,7 @@ Status prepare_record(Store *store, Simulation *simulation, Problem *problem) {
     TRY(find(store, record->name, record->digest, axis_pointer, "/excitation/digest", &named,
              problem));
     const bool is_resolved = record_resolve(record, named);
-    shared_drop(&named->shared);
+    refcount_unref(&named->shared);
     return is_resolved ? STATUS_OK
                        : problem_set(problem, STATUS_NO_MEMORY, "no memory for a scene");
 }
@@ -121,12 +122,12 @@ static Status pin(PinnedRecords *records, NamedRecord *named) {
         free(pinned->name);
         free(pinned->digest);
     }
-    shared_drop(&named->shared);
+    refcount_unref(&named->shared);
     return STATUS_NO_MEMORY;
 }
 
 // To what a sweep holds.
-static Status add_samples(const Shared *named, size_t *samples, const char *place,
+static Status add_samples(const Refcount *named, size_t *samples, const char *place,
                           Problem *problem) {
     *samples += ((const NamedRecord *)(const void *)named)->samples.count;
     if (*samples <= PINNED_SAMPLES)
@@ -140,13 +141,13 @@ static Status add_samples(const Shared *named, size_t *samples, const char *plac
 
 // What was found before stays; it only needs to be there still.
 static Status hold(Store *store, const char *name, const char *digest, const char *pointer,
-                   const char *place, Shared **named, Problem *problem) {
+                   const char *place, Refcount **named, Problem *problem) {
     NamedRecord *found;
     TRY(find(store, name, digest, pointer, place, &found, problem));
     if (*named == NULL)
         *named = &found->shared;
     else
-        shared_drop(&found->shared);
+        refcount_unref(&found->shared);
     return STATUS_OK;
 }
 
@@ -167,13 +168,13 @@ static Status resolve_pinned(Store *store, PinnedRecord *pinned, size_t index, P
 // One value of an axis. What is no text is for the axis to refuse.
 static Status resolve_value(Store *store, const char *value, PinnedRecords *records,
                             size_t *samples, const char *place, Problem *problem) {
-    Scalar scalar;
+    JsonScalar scalar;
     NamedRecord *named;
     char *room = malloc(strlen(value) + 1);
     if (room == NULL)
         return STATUS_NO_MEMORY;
     Status status = STATUS_OK;
-    if (scalar_read(value, &scalar, room) && scalar.kind == SCALAR_TEXT &&
+    if (json_scalar_read(value, &scalar, room) && scalar.kind == JSON_SCALAR_TEXT &&
         pinned_find(records, scalar.text) == NULL) {
         status = find(store, scalar.text, NULL, place, place, &named, problem);
         if (status == STATUS_OK)
@@ -231,11 +232,11 @@ void prepare_records_drop(StudyRequest *inquiry) {
     ExcitationRecord *record = record_of(&inquiry->simulation);
     SweepStudy *study = sweep_of(inquiry);
     if (record != NULL) {
-        shared_drop(record->named);
+        refcount_unref(record->named);
         record->named = NULL;
     }
     for (size_t i = 0; study != NULL && i < study->records.count; i++) {
-        shared_drop(study->records.at[i].named);
+        refcount_unref(study->records.at[i].named);
         study->records.at[i].named = NULL;
     }
 }

@@ -44,14 +44,14 @@ static bool takes_materials(const char *pointer) {
 static Status resolve_value(Store *store, char **value, Buffers *materials, const char *place,
                             Warnings *warnings, Problem *problem) {
     Buffer buffer;
-    Scalar scalar;
+    JsonScalar scalar;
     char *room = malloc(strlen(*value) + 1);
     if (room == NULL || fields_default(buffer_fields, &buffer) != STATUS_OK) {
         free(room);
         return STATUS_NO_MEMORY;
     }
     Status status = STATUS_OK;
-    if (scalar_read(*value, &scalar, room) && scalar.kind == SCALAR_TEXT) {
+    if (json_scalar_read(*value, &scalar, room) && scalar.kind == JSON_SCALAR_TEXT) {
         buffer.material = room;
         room = NULL;
         status = prepare_buffer(store, &buffer, place, warnings, problem);
@@ -137,9 +137,9 @@ Status prepare_sweep(Store *store, StudyRequest *inquiry, const SimulationLimits
             status = resolved != STATUS_OK ? resolved : status;
         }
         for (size_t i = 0; i < names->count && i < PROBLEM_FAULTS; i++)
-            problem_put(problem, STATUS_INVALID, &names->faults[i]);
+            problem_add_fault(problem, STATUS_INVALID, &names->faults[i]);
         for (size_t i = 0; i < rest->count && i < PROBLEM_FAULTS; i++)
-            problem_put(problem, rest->status, &rest->faults[i]);
+            problem_add_fault(problem, rest->status, &rest->faults[i]);
         if (status != STATUS_OK && problem->count == 0)
             problem_set(problem, status, "%s",
                         names->status != STATUS_OK ? names->detail : rest->detail);

@@ -22,9 +22,9 @@ void totals_run(Totals *totals, const Outcome *outcome, int64_t cpu_ns) {
     counter_add(&solver->runs, 1);
     counter_add(&solver->cpu_ns, cpu_ns > 0 ? (uint64_t)cpu_ns : 0);
     const char *work = (const char *)&outcome->work;
-    for (size_t k = 0; work_fields[k].kind == FIELD_KIND_COUNT && k < TOTALS_WORKS; k++)
+    for (size_t k = 0; work_counters_fields[k].kind == FIELD_KIND_COUNT && k < TOTALS_WORKS; k++)
         counter_add(&solver->work[k],
-                    *(const uint64_t *)(const void *)(work + work_fields[k].offset));
+                    *(const uint64_t *)(const void *)(work + work_counters_fields[k].offset));
 }
 
 void totals_study(Totals *totals, int64_t cpu_ns) {
@@ -76,11 +76,12 @@ static void write_solvers(const Totals *totals, Bytes *bytes) {
                  "What the engine did in these simulations, by solver and kind: steps, contacts, "
                  "bounces and others.");
     for (size_t i = 0; solvers[i] != NULL && i < TOTALS_SOLVERS; i++)
-        for (size_t k = 0; work_fields[k].kind == FIELD_KIND_COUNT && k < TOTALS_WORKS; k++) {
+        for (size_t k = 0; work_counters_fields[k].kind == FIELD_KIND_COUNT && k < TOTALS_WORKS;
+             k++) {
             if (counter_get(&totals->solvers[i].runs) == 0)
                 break;
             snprintf(labels, sizeof labels, "solver=\"%s\",kind=\"%s\"", solvers[i]->kind.name,
-                     work_fields[k].name);
+                     work_counters_fields[k].name);
             tally_count(bytes, work, labels, counter_get(&totals->solvers[i].work[k]));
         }
 }

@@ -12,7 +12,7 @@ enum { TOTALS_SOLVERS = 16, TOTALS_WORKS = 32, TOTALS_STATES = JOB_DISMISSED + 1
 
 typedef struct SolverTotals {
     Counter runs, cpu_ns;
-    Counter work[TOTALS_WORKS]; // by row of work_fields
+    Counter work[TOTALS_WORKS]; // by row of work_counters_fields
 } SolverTotals;
 
 typedef struct Totals {

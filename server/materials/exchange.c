@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/base/json_pointer.h"
 #include "core/base/rfc3339.h"
 #include "server/codec/material_bodies.h"
 #include "server/codec/write.h"
@@ -94,15 +95,15 @@ static bool grow(void **at, size_t *room, size_t count, size_t size) {
 static int64_t read_time(const char *text, const char *place, Problem *problem) {
     int64_t unix_ms = 0;
     char pointer[POINTER_SIZE];
-    if (text == NULL || (date_read(text, &unix_ms) && unix_ms > 0))
+    if (text == NULL || (rfc3339_read(text, &unix_ms) && unix_ms > 0))
         return unix_ms;
     Fault fault = {.row = 0};
-    pointer_join(pointer, sizeof pointer, place, "created");
+    json_pointer_join(pointer, sizeof pointer, place, "created");
     text_fit(fault.pointer, sizeof fault.pointer, pointer);
     text_quote(fault.value, sizeof fault.value, text);
     text_fit(fault.detail, sizeof fault.detail,
              "must be a date or a time after 1970, as 2026-11-21 or 2026-11-21T09:30:00.000Z");
-    (void)problem_put(problem, STATUS_INVALID, &fault);
+    (void)problem_add_fault(problem, STATUS_INVALID, &fault);
     return 0;
 }
 
@@ -129,11 +130,11 @@ static bool take_reviews(ImportRevision *revision, ExchangeReviews *reviews, Pro
     revision->reviews = calloc(reviews->count, sizeof *revision->reviews);
     if (revision->reviews == NULL)
         return false;
-    pointer_join(list, sizeof list, revision->mark.place, "reviews");
+    json_pointer_join(list, sizeof list, revision->mark.place, "reviews");
     for (size_t i = 0; i < reviews->count; i++) {
         ExchangeReview *review = &reviews->at[i];
         ImportReview *taken = &revision->reviews[revision->review_count++];
-        pointer_index(place, sizeof place, list, i);
+        json_pointer_index(place, sizeof place, list, i);
         taken->has_reviewer = review->reviewer != NULL;
         taken->has_created = review->created != NULL;
         taken->review.created_unix_ms = read_time(review->created, place, problem);
@@ -150,11 +151,11 @@ static bool take_reviews(ImportRevision *revision, ExchangeReviews *reviews, Pro
 static void mark_row(ImportMark *mark, const ExchangeRow *row, const char *place, const char *name,
                      size_t order, Problem *problem) {
     char number[POINTER_SIZE];
-    pointer_join(number, sizeof number, place, name);
+    json_pointer_join(number, sizeof number, place, name);
     if (row->number == 0)
         (void)problem_add_real(problem, STATUS_INVALID, number, 0, NULL,
                                "must be at least 1, is 0: numbers count from 1");
-    (void)fields_check(mark_fields, row, place, problem);
+    (void)fields_validate(mark_fields, row, place, problem);
     text_fit(mark->place, sizeof mark->place, place);
     mark->order = order;
     mark->is_adrift = problem_concerns(problem, number);
@@ -172,8 +173,8 @@ static Status take_revision(ImportRevision *revision, char *slug, ExchangeRow *r
     ImportMark *mark = &revision->mark;
     MaterialRevision *said = &revision->said;
     said->slug = slug;
-    (void)material_check(&row->material, mark->place, problem);
-    (void)fields_check(revision_mark_fields, row, mark->place, problem);
+    (void)material_validate(&row->material, mark->place, problem);
+    (void)fields_validate(revision_mark_fields, row, mark->place, problem);
     said->revision = number_of(row);
     said->reverts = row->reverts != COUNT_ABSENT ? row->reverts : 0;
     said->created_unix_ms = read_time(row->created, mark->place, problem);
@@ -193,7 +194,7 @@ static Status take_measurement(ImportMeasurement *measurement, char *slug, Excha
     MaterialMeasurement *made = &measurement->made;
     char test[POINTER_SIZE];
     made->slug = slug;
-    pointer_join(test, sizeof test, mark->place, "test");
+    json_pointer_join(test, sizeof test, mark->place, "test");
     if (!problem_concerns(problem, test))
         (void)drop_test_validate(&row->test, test, problem);
     made->measurement = number_of(row);
@@ -293,7 +294,7 @@ Status exchange_take(Exchange *exchange, const char *slug, ExchangeKind kind, Ex
 Status exchange_drift(Exchange *exchange, const char *slug, const char *place, Problem *problem) {
     if (is_full(exchange))
         return exchange_refuse_many(problem);
-    if (slug == NULL || !material_slug_is_good(slug))
+    if (slug == NULL || !material_slug_is_valid(slug))
         return STATUS_OK;
     ImportRevision *revision = add(exchange, EXCHANGE_REVISION);
     ImportMeasurement *measurement = add(exchange, EXCHANGE_MEASUREMENT);

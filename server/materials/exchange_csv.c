@@ -8,6 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/base/json_pointer.h"
+#include "core/base/spelling.h"
 #include "server/codec/csv_scan.h"
 #include "server/codec/read.h"
 #include "server/codec/scan.h"
@@ -32,7 +34,7 @@ typedef struct Table {
 static void place_of(char place[POINTER_SIZE], size_t row, const char *column) {
     char of_row[32];
     snprintf(of_row, sizeof of_row, "/%zu", row);
-    pointer_join(place, POINTER_SIZE, of_row, column);
+    json_pointer_join(place, POINTER_SIZE, of_row, column);
 }
 
 static void refuse(const Table *table, const char *column, const char *sentence) {
@@ -49,7 +51,7 @@ static void refuse_text(const Table *table, const char *column, const char *text
     text_fit(fault.detail, sizeof fault.detail, sentence);
     text_fit(fault.unit, sizeof fault.unit, unit != NULL ? unit : "");
     text_fit(fault.did_you_mean, sizeof fault.did_you_mean, meant != NULL ? meant : "");
-    (void)problem_put(table->problem, STATUS_INVALID, &fault);
+    (void)problem_add_fault(table->problem, STATUS_INVALID, &fault);
 }
 
 // Without the blanks around it, cut to fit.
@@ -95,7 +97,7 @@ static void read_column(Table *table, const CsvCell *cell) {
     if (cell->fault != NULL) {
         refuse(table, whole, cell->fault);
     } else if (whole[0] != '\0' && field == NULL) {
-        refuse_text(table, whole, whole, NULL, fields_nearest(exchange_row_fields, name),
+        refuse_text(table, whole, whole, NULL, spelling_nearest_field(exchange_row_fields, name),
                     "unknown column");
     } else if (field != NULL && is_known(table, field)) {
         refuse(table, name, "the column stands there twice");

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/base/json_pointer.h"
 #include "server/base/clock.h"
 #include "server/materials/exchange.h"
 #include "server/materials/exchange_same.h"
@@ -38,8 +39,9 @@ static void check_revisions(const MaterialImport *import, Problem *problem) {
             here->mark.is_adrift || before->mark.is_adrift)
             continue;
         char place[sizeof((Fault){0}.pointer)];
-        pointer_join(place, sizeof place, here->mark.place,
-                     strcmp(import->revision_name, "number") == 0 ? "slug" : import->revision_name);
+        json_pointer_join(place, sizeof place, here->mark.place,
+                          strcmp(import->revision_name, "number") == 0 ? "slug"
+                                                                       : import->revision_name);
         (void)problem_add(problem, STATUS_INVALID, place,
                           "\"%.64s\" has a revision in the file already, at %.64s: give each its "
                           "number if there are to be several",
@@ -78,7 +80,7 @@ static Status check_tests(const MaterialImport *import, Problem *problem) {
             strcmp(before->document, here->document) != 0)
             continue;
         char place[sizeof((Fault){0}.pointer)];
-        pointer_join(place, sizeof place, tests[i]->mark.place, "test");
+        json_pointer_join(place, sizeof place, tests[i]->mark.place, "test");
         (void)problem_add(problem, STATUS_INVALID, place,
                           "is in the file already, at %.64s: give each its number if it was done "
                           "twice",

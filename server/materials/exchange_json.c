@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "core/base/json_pointer.h"
 #include "server/base/bytes.h"
 #include "server/codec/read.h"
 #include "server/codec/scan.h"
@@ -56,7 +57,7 @@ static Status read_envelope(const char *text, size_t size, const ScanList *list,
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the materials");
     const Status status = read_json(outer.at, outer.count, envelope_fields, &envelope, problem);
     if (status == STATUS_OK || status == STATUS_INVALID) {
-        (void)fields_check(envelope_fields, &envelope, "", problem);
+        (void)fields_validate(envelope_fields, &envelope, "", problem);
         if (envelope.format != NULL && strcmp(envelope.format, exchange_format) != 0)
             (void)problem_add(problem, STATUS_INVALID, "/format", "must be \"%s\"",
                               exchange_format);
@@ -75,10 +76,10 @@ static Status read_envelope(const char *text, size_t size, const ScanList *list,
 static Status take_rows(Exchange *exchange, const One *one, ExchangeKind kind, ExchangeRows *rows,
                         const char *pointer, const char *name, size_t faults, Problem *problem) {
     char list[sizeof((Fault){0}.pointer)], place[sizeof list], slug[sizeof list];
-    pointer_join(slug, sizeof slug, pointer, "slug");
-    pointer_join(list, sizeof list, pointer, name);
+    json_pointer_join(slug, sizeof slug, pointer, "slug");
+    json_pointer_join(list, sizeof list, pointer, name);
     for (size_t i = 0; i < rows->count; i++) {
-        pointer_index(place, sizeof place, list, i);
+        json_pointer_index(place, sizeof place, list, i);
         // A fault of this row alone makes it a faulty one.
         const size_t before = problem_concerns(problem, place) ? faults : problem->count;
         TRY(exchange_take(exchange, one->slug, kind, &rows->at[i], place, slug, before, problem));
@@ -103,7 +104,7 @@ static Status read_one(Exchange *exchange, const char *text, size_t size, const 
     char pointer[sizeof((Fault){0}.pointer)];
     One one;
     const size_t faults = problem->count;
-    pointer_index(pointer, sizeof pointer, "/materials", index);
+    json_pointer_index(pointer, sizeof pointer, "/materials", index);
     Status status =
         read_json_part(text, size, list->first, list->count, pointer, one_fields, &one, problem);
     if (status == STATUS_OK || status == STATUS_INVALID)

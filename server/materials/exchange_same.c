@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "core/base/json_pointer.h"
 #include "server/codec/read.h"
 #include "server/codec/write.h"
 
@@ -36,7 +37,7 @@ static void tell(const Field *field, const Bytes *ours, const Bytes *there,
                  const MaterialRevision *revision, const char *place, Problem *problem) {
     Fault fault = {.row = 0};
     char is[sizeof fault.value];
-    pointer_join(fault.pointer, sizeof fault.pointer, place, field->name);
+    json_pointer_join(fault.pointer, sizeof fault.pointer, place, field->name);
     if (problem_concerns(problem, fault.pointer))
         return; // it could not be read, and is told
     show(fault.value, sizeof fault.value, ours, field);
@@ -56,7 +57,7 @@ static void tell(const Field *field, const Bytes *ours, const Bytes *there,
                                              : "nothing here",
         is);
     text_fit(fault.detail, sizeof fault.detail, detail);
-    (void)problem_put(problem, STATUS_INVALID, &fault);
+    (void)problem_add_fault(problem, STATUS_INVALID, &fault);
 }
 
 static bool compare(const Field *fields, bool takes_lists, const Material *a, const Material *b,

@@ -12,11 +12,11 @@ static Status refuse(const char *slug, const char *pointer, Problem *problem, co
     text_fit(fault.pointer, sizeof fault.pointer, pointer);
     text_fit(fault.detail, sizeof fault.detail, detail);
     text_quote(fault.value, sizeof fault.value, slug);
-    return problem_put(problem, STATUS_INVALID, &fault);
+    return problem_add_fault(problem, STATUS_INVALID, &fault);
 }
 
 Status slug_check(const char *slug, const char *pointer, Problem *problem) {
-    if (!material_slug_is_good(slug))
+    if (!material_slug_is_valid(slug))
         return refuse(slug, pointer, problem,
                       "must be 1 to 63 of a-z, 0-9, _ and -, as \"soft_rubber\"");
     for (size_t i = 0; i < COUNT(taken); i++)

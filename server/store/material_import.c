@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/base/json_pointer.h"
 #include "server/store/access.h"
 #include "server/store/material_import_walk.h"
 
@@ -67,11 +68,11 @@ static Status judge_reverts(const Walk *walk, Database *database, const ImportRe
 static void judge_measurements(const Walk *walk, const ImportRevision *ours, const Group *group) {
     const Reals *named = &ours->said.material.measurements;
     char list[POINTER_SIZE], place[POINTER_SIZE];
-    pointer_join(list, sizeof list, ours->mark.place, "measurements");
+    json_pointer_join(list, sizeof list, ours->mark.place, "measurements");
     for (size_t i = 0; i < named->count && !group->measurements_drift; i++) {
         if (named->at[i] <= (double)group->last_measurement)
             continue;
-        pointer_index(place, sizeof place, list, i);
+        json_pointer_index(place, sizeof place, list, i);
         (void)import_fault(walk, place, "",
                            "there is no measurement %.0f of \"%.64s\"; it has %llu", named->at[i],
                            group->slug, (unsigned long long)group->last_measurement);

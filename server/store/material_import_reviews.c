@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/base/json_pointer.h"
+
 enum { POINTER_SIZE = sizeof((Fault){0}.pointer) };
 
 typedef struct Reviews {
@@ -96,10 +98,10 @@ static Status match_reviews(Walk *walk, Database *database, const ImportRevision
     MaterialRevision dated = *said; // borrows
     if (ours->mark.is_faulty && !ours->mark.has_created)
         dated.created_unix_ms = 0;
-    pointer_join(list, sizeof list, ours->mark.place, "reviews");
+    json_pointer_join(list, sizeof list, ours->mark.place, "reviews");
     for (size_t i = 0; i < ours->review_count; i++) {
         const ImportReview *review = &ours->reviews[i];
-        pointer_index(place, sizeof place, list, i);
+        json_pointer_index(place, sizeof place, list, i);
         if (problem_concerns(walk->faults, place))
             continue; // it could not be read
         if (i < there->count) {

@@ -5,6 +5,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "core/base/json_pointer.h"
+
 enum { POINTER_SIZE = sizeof((Fault){0}.pointer) };
 
 // Clocks differ, and a date alone is its midnight wherever it was written.
@@ -21,7 +23,7 @@ Status import_fault(const Walk *walk, const char *place, const char *name, const
     vsnprintf(text, sizeof text, format, arguments);
     va_end(arguments);
     if (name[0] != '\0')
-        pointer_join(pointer, sizeof pointer, place, name);
+        json_pointer_join(pointer, sizeof pointer, place, name);
     else
         text_fit(pointer, sizeof pointer, place);
     return problem_add(walk->faults, STATUS_INVALID, pointer, "%s", text);
@@ -30,7 +32,7 @@ Status import_fault(const Walk *walk, const char *place, const char *name, const
 void import_deny(Walk *walk, const char *place, const char *name, const char *why) {
     if (walk->denied++ > 0)
         return;
-    pointer_join(walk->denied_place, sizeof walk->denied_place, place, name);
+    json_pointer_join(walk->denied_place, sizeof walk->denied_place, place, name);
     walk->denied_why = why;
 }
 

@@ -27,7 +27,7 @@ RecordMemory *record_memory_new(void) {
 }
 
 static void entry_free(Entry *entry) {
-    shared_drop(&entry->named->shared);
+    refcount_unref(&entry->named->shared);
     free(entry);
 }
 
@@ -57,7 +57,7 @@ static NamedRecord *find(RecordMemory *memory, uint64_t generation, const char *
         *at = entry->next;
         entry->next = memory->first;
         memory->first = entry;
-        shared_hold(&entry->named->shared);
+        refcount_ref(&entry->named->shared);
         return entry->named;
     }
     return NULL;
@@ -77,7 +77,7 @@ static void forget(RecordMemory *memory) {
     for (Entry **at = &memory->first; *at != NULL;) {
         Entry *entry = *at;
         // Nobody can come to hold it meanwhile but through the lock.
-        const bool is_ours = atomic_load(&entry->named->shared.holds) == 1;
+        const bool is_ours = atomic_load(&entry->named->shared.count) == 1;
         bytes += entry->named->samples.count * sizeof(double);
         if (!is_ours || bytes <= bytes_max) {
             at = &entry->next;
@@ -94,7 +94,7 @@ NamedRecord *record_memory_put(RecordMemory *memory, uint64_t generation, NamedR
     NamedRecord *known = find(memory, generation, named->name, named->digest);
     if (known == NULL && entry != NULL) {
         *entry = (Entry){memory->first, named, generation};
-        shared_hold(&named->shared);
+        refcount_ref(&named->shared);
         memory->first = entry;
         entry = NULL;
         forget(memory);
@@ -103,6 +103,6 @@ NamedRecord *record_memory_put(RecordMemory *memory, uint64_t generation, NamedR
     free(entry);
     if (known == NULL)
         return named;
-    shared_drop(&named->shared);
+    refcount_unref(&named->shared);
     return known;
 }

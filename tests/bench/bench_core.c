@@ -93,7 +93,7 @@ int main(int argc, char **argv) {
         return 2;
     }
     process_return_memory(); // as the daemon does
-    fourier_start();
+    fft_start();
     static Lane lanes[LANES];
     Store *store = NULL;
     Problem *problem = &lanes[0].problem;

@@ -330,7 +330,7 @@ int main(int argc, char **argv) {
     if (rows == NULL)
         return 1;
     process_return_memory(); // as the server does
-    fourier_start();
+    fft_start();
     draws.state = seed;
     for (size_t number = 0; count < wanted && number < SCENES_MAX; number++) {
         Simulation simulation;

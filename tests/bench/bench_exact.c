@@ -42,7 +42,7 @@ static double scene_us(bool is_random, bool has_channels, double duration) {
 }
 
 int main(void) {
-    fourier_start();
+    fft_start();
     printf("%-20s %8s %8s %8s %9s %8s %9s %9s %9s\n", "ns per sample", "memset", "memcpy", "run",
            "x memset", "base", "whole", "impacts", "plan us");
     for (size_t i = 0; i < bench_case_count; i++) {

@@ -69,7 +69,7 @@ static Plan *make_plan(const Case *from) {
 }
 
 int main(int argc, char **argv) {
-    fourier_start();
+    fft_start();
     printf("%-36s %10s %10s %10s %10s\n", "frame", "ns/sample", "impacts", "steps", "residual");
     for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
         if (argc > 1 && strstr(cases[c].name, argv[1]) == NULL)

@@ -327,7 +327,7 @@ int main(int argc, char **argv) {
     snprintf(folder + used, sizeof folder - used, "/bench_intake_XXXXXX");
     if (mkdtemp(folder) == NULL)
         stop(folder);
-    fourier_start();
+    fft_start();
     Store *store;
     char directory[4100], command[4200];
     snprintf(directory, sizeof directory, "%s/jobs", folder);

@@ -153,7 +153,7 @@ static bool contest(const BenchCase *bench, BenchScene *scene) {
 }
 
 int main(void) {
-    fourier_start();
+    fft_start();
     for (size_t i = 0; i < bench_case_count; i++) {
         BenchScene scene;
         const bool is_good =

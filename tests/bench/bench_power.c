@@ -132,7 +132,7 @@ static void bench_print(const Case *from, const char *solver, double tolerance, 
 }
 
 int main(int argc, char **argv) {
-    fourier_start();
+    fft_start();
     printf("  %-9s %8s %10s %10s %8s %10s %10s\n", "solver", "tol", "us/impact", "steps/imp",
            "ns/step", "error", "estimate");
     for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {

@@ -66,7 +66,7 @@ static Status measure(const Simulation *const simulations[2], bool are_kept, dou
 
 int main(void) {
     static const double durations[] = {10, 30, 60};
-    fourier_start();
+    fft_start();
     printf("%-12s %9s %21s %8s %21s %8s\n", "random base", "duration", "kept: summary, series",
            "ratio", "warm: summary, series", "ratio");
     for (size_t i = 0; i < 2 * COUNT(durations); i++) {

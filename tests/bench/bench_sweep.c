@@ -169,7 +169,7 @@ int main(int argc, char **argv) {
                                      .queue_most = 100,
                                      .cache_bytes = 1 << 24,
                                      .limits = {.samples = 1 << 25, .points = 1 << 24}};
-    fourier_start();
+    fft_start();
     if (store_open(folder, &store, &problem) != STATUS_OK ||
         intake_open(store, &settings, &intake, &problem) != STATUS_OK)
         return fail("opening", &problem);

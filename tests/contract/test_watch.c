@@ -111,6 +111,6 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(no_run_goes_long_without_looking_whether_it_is_to_stop),
     };
-    fourier_start();
+    fft_start();
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -18,9 +18,9 @@ static int index_of(const char *const *names, const char *name) {
 int main(int count, char **arguments) {
     if (count != 6)
         return 2;
-    const SpectrumSettings settings = {
-        .window = index_of(spectrum_window_names, arguments[1]),
-        .detrend = index_of(spectrum_detrend_names, arguments[2]),
+    const WelchSettings settings = {
+        .window = index_of(welch_window_names, arguments[1]),
+        .detrend = index_of(welch_detrend_names, arguments[2]),
         .segment = strtoul(arguments[3], NULL, 10),
         .overlap = strtoul(arguments[4], NULL, 10),
     };
@@ -33,8 +33,8 @@ int main(int count, char **arguments) {
 
     static Problem problem;
     Spectrum spectrum;
-    fourier_start();
-    const Status status = spectrum_welch(&series, &unit, strtod(arguments[5], NULL), &settings,
+    fft_start();
+    const Status status = welch_spectrum(&series, &unit, strtod(arguments[5], NULL), &settings,
                                          NULL, NULL, &spectrum, &problem);
     bool is_written = false;
     if (status == STATUS_OK)

@@ -64,6 +64,6 @@ Status drops_read(const char *text, DropTest *test, Problem *problem) {
 
 double drops_noise(uint64_t seed, uint64_t *next) {
     double pair[2];
-    noise_normal_pair(seed, 1, *next / 2, pair);
+    philox_normal_pair(seed, 1, *next / 2, pair);
     return pair[(*next)++ % 2];
 }

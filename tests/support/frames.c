@@ -67,8 +67,8 @@ void frames_damper(Plan *plan, size_t index, size_t storey, double mass, double 
     damper->effective_mass = 1 / (1 / mass + 1 / plan->mass[storey * plan->storeys + storey]);
     if (isnan(contact_time))
         plan->form = CONTACT_IMPULSIVE;
-    const Identified identified = identify_measured(damper->effective_mass, restitution,
-                                                    contact_time, SEPARATION_ZERO_PENETRATION);
+    const Identification identified = identification_from_restitution(
+        damper->effective_mass, restitution, contact_time, SEPARATION_ZERO_PENETRATION);
     for (int side = 0; side < 2; side++) {
         damper->stops[side].restitution = restitution;
         damper->stops[side].stiffness = identified.stiffness;

@@ -12,7 +12,7 @@ void scene_without_damper(Simulation *simulation) {
     assert_int_equal(fields_default(simulation_fields, simulation), STATUS_OK);
     Scene *scene = &simulation->scene;
     scene_choose(&scene->structure, &structure_kinds, "sdof");
-    StructureSdof *sdof = (StructureSdof *)(void *)scene->structure;
+    SdofStructure *sdof = (SdofStructure *)(void *)scene->structure;
     sdof->mass = 1.35;
     sdof->stiffness = 865;
     sdof->damping = 1.092;

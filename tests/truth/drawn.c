@@ -145,7 +145,7 @@ static const char *const wanted[REFERENCE_CHANNELS] = {
 void drawn_simulation(const ReferenceScene *scene, bool has_channels, Simulation *out) {
     Simulation simulation;
     paper_scene(&simulation, scene->restitution[0], scene->contact_time[0], scene->duration);
-    StructureSdof *structure = (StructureSdof *)(void *)simulation.scene.structure;
+    SdofStructure *structure = (SdofStructure *)(void *)simulation.scene.structure;
     structure->mass = scene->mass;
     structure->stiffness = scene->stiffness;
     structure->damping = scene->damping;

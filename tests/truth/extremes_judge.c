@@ -170,7 +170,7 @@ static double difference(const Opinion *a, const Opinion *b, double rate) {
 
 // What an opinion states for the time before its horizon.
 static double stated(const Opinion *opinion) {
-    return isinf(opinion->horizon) ? opinion->error : fmin(opinion->error, RESPONSE_PARTING);
+    return isinf(opinion->horizon) ? opinion->error : fmin(opinion->error, RESPONSE_DIVERGENCE);
 }
 
 static bool quad_serves(const Plan *plan, const Base *base) {

@@ -1,6 +1,6 @@
-// Reference for one storey and one free mass under a power law: flight and contact are integrated in
-// plain time by GSL. It shares with the product only the contact laws and their frozen parameters.
-// Its error is about 1e-12 a contact, and it is slow.
+// Reference for one storey and one free mass under a power law: flight and contact are integrated
+// in plain time by GSL. It shares with the product only the contact laws and their frozen
+// parameters. Its error is about 1e-12 a contact, and it is slow.
 #ifndef TESTS_TRUTH_POWER_REFERENCE_H
 #define TESTS_TRUTH_POWER_REFERENCE_H
 

@@ -10,7 +10,7 @@
 static const double AUDIBLE = 1e-9; // of the largest approach speed: impacts below are not compared
 static const double SILENT = 1e-13; // of the free mass's largest speed: neither are those
 
-const char *const reference_metric_names[METRIC_COUNT] = {
+const char *const reference_metric_names[MISS_COUNT] = {
     "displacement",        "start",           "velocity",
     "damper_displacement", "damper_velocity", "mean_acceleration",
     "contact_force",       "approach_speed",  "separation_speed",
@@ -96,13 +96,13 @@ static void compare_impacts(const ReferenceAnswer *answer, const ReferenceAnswer
             misses->is_same = false;
             return;
         }
-        miss(misses, METRIC_START, have->start * want->approach, want->start * want->approach,
+        miss(misses, MISS_START, have->start * want->approach, want->start * want->approach,
              scale->length);
-        miss(misses, METRIC_APPROACH, have->approach, want->approach, scale->speed);
-        miss(misses, METRIC_SEPARATION, have->separation, want->separation, scale->speed);
-        miss(misses, METRIC_PEAK, have->peak, want->peak, scale->peak);
-        miss(misses, METRIC_IMPULSE, have->impulse, want->impulse, scale->impulse);
-        miss(misses, METRIC_LOST, have->lost, want->lost, scale->lost);
+        miss(misses, MISS_APPROACH, have->approach, want->approach, scale->speed);
+        miss(misses, MISS_SEPARATION, have->separation, want->separation, scale->speed);
+        miss(misses, MISS_PEAK, have->peak, want->peak, scale->peak);
+        miss(misses, MISS_IMPULSE, have->impulse, want->impulse, scale->impulse);
+        miss(misses, MISS_LOST, have->lost, want->lost, scale->lost);
     }
 }
 
@@ -124,10 +124,10 @@ static void compare_rests(const ReferenceAnswer *answer, const ReferenceAnswer *
             misses->is_same = false;
             return;
         }
-        miss(misses, METRIC_REST_START, have->start, want->start, 1);
-        miss(misses, METRIC_REST_END, have->end, want->end, 1);
-        miss(misses, METRIC_REST_PEAK, have->peak, want->peak, scale->rest_peak);
-        miss(misses, METRIC_IMPULSE, have->impulse, want->impulse,
+        miss(misses, MISS_REST_START, have->start, want->start, 1);
+        miss(misses, MISS_REST_END, have->end, want->end, 1);
+        miss(misses, MISS_REST_PEAK, have->peak, want->peak, scale->rest_peak);
+        miss(misses, MISS_IMPULSE, have->impulse, want->impulse,
              fmax(want->impulse, scale->impulse));
     }
 }
@@ -140,12 +140,12 @@ void reference_compare(const ReferenceScene *scene, const ReferenceAnswer *answe
     const struct {
         ReferenceMetric metric;
         int channel;
-    } of[] = {{METRIC_DISPLACEMENT, REFERENCE_DISPLACEMENT},
-              {METRIC_VELOCITY, REFERENCE_VELOCITY},
-              {METRIC_DAMPER_DISPLACEMENT, REFERENCE_DAMPER_DISPLACEMENT},
-              {METRIC_DAMPER_VELOCITY, REFERENCE_DAMPER_VELOCITY},
-              {METRIC_MEAN_ACCELERATION, REFERENCE_MEAN_ACCELERATION},
-              {METRIC_FORCE, REFERENCE_FORCE}};
+    } of[] = {{MISS_DISPLACEMENT, REFERENCE_DISPLACEMENT},
+              {MISS_VELOCITY, REFERENCE_VELOCITY},
+              {MISS_DAMPER_DISPLACEMENT, REFERENCE_DAMPER_DISPLACEMENT},
+              {MISS_DAMPER_VELOCITY, REFERENCE_DAMPER_VELOCITY},
+              {MISS_MEAN_ACCELERATION, REFERENCE_MEAN_ACCELERATION},
+              {MISS_FORCE, REFERENCE_FORCE}};
     if (answer->count != truth->count) {
         snprintf(misses->why, sizeof misses->why, "%zu samples, not %zu", answer->count,
                  truth->count);

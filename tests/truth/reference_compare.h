@@ -6,27 +6,27 @@
 #include "tests/truth/reference.h"
 
 typedef enum ReferenceMetric {
-    METRIC_DISPLACEMENT,
-    METRIC_START, // times approach speed, over the clearance or the largest displacement
-    METRIC_VELOCITY,
-    METRIC_DAMPER_DISPLACEMENT,
-    METRIC_DAMPER_VELOCITY,
-    METRIC_MEAN_ACCELERATION,
-    METRIC_FORCE,
-    METRIC_APPROACH,
-    METRIC_SEPARATION,
-    METRIC_PEAK,
-    METRIC_IMPULSE,
-    METRIC_LOST,
-    METRIC_REST_START, // [s]
-    METRIC_REST_END,   // [s]
-    METRIC_REST_PEAK,
-    METRIC_COUNT
+    MISS_DISPLACEMENT,
+    MISS_START, // times approach speed, over the clearance or the largest displacement
+    MISS_VELOCITY,
+    MISS_DAMPER_DISPLACEMENT,
+    MISS_DAMPER_VELOCITY,
+    MISS_MEAN_ACCELERATION,
+    MISS_FORCE,
+    MISS_APPROACH,
+    MISS_SEPARATION,
+    MISS_PEAK,
+    MISS_IMPULSE,
+    MISS_LOST,
+    MISS_REST_START, // [s]
+    MISS_REST_END,   // [s]
+    MISS_REST_PEAK,
+    MISS_COUNT
 } ReferenceMetric;
-extern const char *const reference_metric_names[METRIC_COUNT];
+extern const char *const reference_metric_names[MISS_COUNT];
 
 typedef struct ReferenceMisses {
-    double of[METRIC_COUNT];
+    double of[MISS_COUNT];
     bool is_same; // the same impacts
     char why[200];
 } ReferenceMisses;

@@ -4,7 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "core/base/side.h"
+#include "core/result/response.h"
 
 typedef long double Real;
 

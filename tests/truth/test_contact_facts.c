@@ -44,7 +44,7 @@ static void assert_within(double value, double least, double most) {
 static void lonely_pair(Simulation *simulation, double restitution, double contact_time,
                         double duration) {
     paper_scene(simulation, restitution, contact_time, duration);
-    StructureSdof *structure = (StructureSdof *)(void *)simulation->scene.structure;
+    SdofStructure *structure = (SdofStructure *)(void *)simulation->scene.structure;
     structure->stiffness = structure->damping = 0;
     paper_free(simulation, 0);
     simulation->scene.dampers.at[0].clearance = 0x1p-6;
@@ -247,10 +247,10 @@ static void parameters_are_as_sensitive_as_published(void **state) {
     const double m = 0.1, e = 0.61, T = 0.025, small = 1e-6, loss = log(e);
     const double pi2 = 9.869604401089358;
     const Separation rule = SEPARATION_ZERO_PENETRATION;
-    const Identified low_e = identify_measured(m, e * (1 - small), T, rule),
-                     high_e = identify_measured(m, e * (1 + small), T, rule),
-                     low_T = identify_measured(m, e, T * (1 - small), rule),
-                     high_T = identify_measured(m, e, T * (1 + small), rule);
+    const Identification low_e = identification_from_restitution(m, e * (1 - small), T, rule),
+                         high_e = identification_from_restitution(m, e * (1 + small), T, rule),
+                         low_T = identification_from_restitution(m, e, T * (1 - small), rule),
+                         high_T = identification_from_restitution(m, e, T * (1 + small), rule);
     const double found[] = {
         log(high_e.stiffness / low_e.stiffness), log(high_T.stiffness / low_T.stiffness),
         log(high_e.damping / low_e.damping), log(high_T.damping / low_T.damping)};
@@ -292,7 +292,7 @@ static void point_samples_of_the_acceleration_tell_less_than_means(void **state)
 }
 
 int main(void) {
-    fourier_start();
+    fft_start();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_end_of_a_contact_is_tensile),
         cmocka_unit_test(the_force_jumps_at_touch_and_samples_show_what_follows),

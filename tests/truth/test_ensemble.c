@@ -196,7 +196,7 @@ static void judge(const Whole *whole, const double *errors, double spread, const
         lasting--;
     while (errors[lucky - 1] > target)
         lucky++;
-    const double z = student_quantile(STOPPING_RULE_CONFIDENCE, 0);
+    const double z = student_t_quantile(STOPPING_RULE_CONFIDENCE, 0);
     while (knowing < whole->runs &&
            z * spread * sqrt(1 / (double)knowing - 1 / (double)whole->runs) > target)
         knowing++;
@@ -324,7 +324,7 @@ int main(int argc, char **argv) {
         seed = strtoull(argv[2], NULL, 10);
     if (argc > 3)
         runs_of_each = strtoul(argv[3], NULL, 10);
-    fourier_start();
+    fft_start();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(targets_are_kept_with_few_runs_to_spare),
     };

@@ -208,7 +208,7 @@ int main(int count, char **arguments) {
     if (count > 4)
         rows = fopen(arguments[4], "w");
     setvbuf(stdout, NULL, _IOLBF, 0);
-    fourier_start();
+    fft_start();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(extremes_are_right_or_say_that_they_are_not),
     };

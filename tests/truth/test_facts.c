@@ -33,8 +33,8 @@ static Outcome *run(Simulation *simulation) {
     return outcome;
 }
 
-static StructureSdof *structure(Simulation *simulation) {
-    return (StructureSdof *)(void *)simulation->scene.structure;
+static SdofStructure *structure(Simulation *simulation) {
+    return (SdofStructure *)(void *)simulation->scene.structure;
 }
 
 static const Impact *impact(const Outcome *outcome, size_t index) {
@@ -374,7 +374,7 @@ static void energy_that_comes_and_goes_is_not_gained_from_nowhere(void **state) 
 }
 
 int main(void) {
-    fourier_start();
+    fft_start();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(table_one_follows_from_restitution_and_contact_time),
         cmocka_unit_test(the_first_impact_comes_at_the_same_instant_with_every_model),

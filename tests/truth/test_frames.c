@@ -181,14 +181,14 @@ static bool engine_run(const DrawnFrame *drawn, FrameTruth *answer, double *resi
     return status == STATUS_OK;
 }
 
-enum { X, V, A, Z, Y, FORCE, START, APPROACH, SEPARATION, PEAK, IMPULSE, LOST, METRICS };
-static const char *const metric_names[METRICS] = {
+enum { X, V, A, Z, Y, FORCE, START, APPROACH, SEPARATION, PEAK, IMPULSE, LOST, FRAME_METRICS };
+static const char *const frame_metric_names[FRAME_METRICS] = {
     "displacement",    "velocity", "acceleration", "damper_displacement",
     "damper_velocity", "force",    "start",        "approach",
     "separation",      "peak",     "impulse",      "energy_lost"};
 
 typedef struct Misses {
-    double of[METRICS];
+    double of[FRAME_METRICS];
     bool is_same;
     char why[160];
 } Misses;
@@ -235,7 +235,7 @@ static void compare(const FrameTruth *answer, const FrameTruth *truth, const Pla
     const double *const have[] = {answer->x, answer->v, answer->a,
                                   answer->z, answer->y, answer->force};
     const double *const want[] = {truth->x, truth->v, truth->a, truth->z, truth->y, truth->force};
-    double scales[METRICS] = {0};
+    double scales[FRAME_METRICS] = {0};
     for (int metric = X; metric <= FORCE; metric++) {
         const size_t rows = metric <= A ? plan->storeys : plan->damper_count;
         scales[metric] = doubles_largest(want[metric], rows * plan->count);
@@ -325,12 +325,12 @@ static Verdict judge(uint64_t number) {
         (void)engine_run(&drawn, &nudged, &other);
         compare(&nudged, &answer, plan, &drawn.base, &one);
         digit.is_same = digit.is_same && one.is_same;
-        for (int i = 0; i < METRICS; i++)
+        for (int i = 0; i < FRAME_METRICS; i++)
             digit.of[i] = fmax(digit.of[i], one.of[i]);
         frame_truth_clear(&nudged);
     }
     double most = 0, change = 0;
-    for (int i = 0; i < METRICS; i++) {
+    for (int i = 0; i < FRAME_METRICS; i++) {
         most = fmax(most, misses.of[i]);
         change = fmax(change, digit.of[i]);
     }
@@ -351,8 +351,8 @@ static Verdict judge(uint64_t number) {
                bases[drawn.base.form], answer.impact_count, truth.impact_count, most, change,
                residual, misses.why);
     }
-    for (int i = 0; i < METRICS && verdict == BAD; i++)
-        printf("    %-20s %.1e (digit %.1e)\n", metric_names[i], misses.of[i], digit.of[i]);
+    for (int i = 0; i < FRAME_METRICS && verdict == BAD; i++)
+        printf("    %-20s %.1e (digit %.1e)\n", frame_metric_names[i], misses.of[i], digit.of[i]);
     frame_truth_clear(&truth);
     frame_truth_clear(&answer);
     modal_state_clear(&drawn);

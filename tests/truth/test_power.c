@@ -84,7 +84,7 @@ static void power_draw(PowerScene *scene, uint64_t number) {
     Simulation *simulation = &scene->simulation;
     scene_with_damper(simulation, e, draws_scattered(&draws, 1e-5, 0.1));
     scene_choose(&simulation->scene.contact, &contact_kinds, law->kind.name);
-    StructureSdof *sdof = (StructureSdof *)(void *)simulation->scene.structure;
+    SdofStructure *sdof = (SdofStructure *)(void *)simulation->scene.structure;
     const double omega = draws_chance(&draws, 0.1) ? 0 : draws_scattered(&draws, 1, 300);
     sdof->stiffness = sdof->mass * omega * omega;
     sdof->damping = 2 * draws_scattered(&draws, 1e-3, 1) * omega * sdof->mass;
@@ -270,7 +270,7 @@ int main(int argc, char **argv) {
         cmocka_unit_test(full_accuracy_is_that_of_another_integrator),
         cmocka_unit_test(a_tolerance_s_estimate_holds),
     };
-    fourier_start();
+    fft_start();
     if (argc > 2) {
         scenes = (size_t)strtoul(argv[1], NULL, 10);
         seed = strtoull(argv[2], NULL, 10);

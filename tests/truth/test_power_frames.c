@@ -121,7 +121,7 @@ static void frames_agree_with_another_integrator(void **state) {
 
 int main(int argc, char **argv) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(frames_agree_with_another_integrator)};
-    fourier_start();
+    fft_start();
     if (argc > 2) {
         scenes = (size_t)strtoul(argv[1], NULL, 10);
         seed = strtoull(argv[2], NULL, 10);

@@ -69,14 +69,14 @@ static void judge(const ReferenceScene *scene, size_t number, Tally *tally) {
         for (int i = 1; i < DOUBLES; i++) {
             ReferenceMisses other;
             reference_compare(scene, &plain[i], &quad, &other);
-            for (int k = 0; k < METRIC_COUNT; k++)
+            for (int k = 0; k < MISS_COUNT; k++)
                 by_double.of[k] = fmax(by_double.of[k], other.of[k]);
             if (!other.is_same)
                 by_double = other;
         }
         reference_compare(scene, &solved, &quad, &by_solver);
-        if (!by_double.is_same || by_double.of[METRIC_DISPLACEMENT] > CHAOTIC ||
-            by_double.of[METRIC_START] > CHAOTIC) {
+        if (!by_double.is_same || by_double.of[MISS_DISPLACEMENT] > CHAOTIC ||
+            by_double.of[MISS_START] > CHAOTIC) {
             tally->chaotic++;
             if (is_verbose)
                 printf("scene %zu chaotic: %g %g, solver %g %g; %s | %s\n", number, by_double.of[0],
@@ -89,10 +89,10 @@ static void judge(const ReferenceScene *scene, size_t number, Tally *tally) {
                 tally->rests += quad.impacts[i].is_resting;
             if (!by_solver.is_same)
                 fault(tally, &is_told, scene, number, by_solver.why);
-            for (int i = 0; i < METRIC_COUNT && by_solver.is_same; i++) {
+            for (int i = 0; i < MISS_COUNT && by_solver.is_same; i++) {
                 const double limit =
-                    fmax(FACTOR * by_double.of[i], i <= METRIC_START ? FLOOR : 100 * FLOOR);
-                if (i <= METRIC_START)
+                    fmax(FACTOR * by_double.of[i], i <= MISS_START ? FLOOR : 100 * FLOOR);
+                if (i <= MISS_START)
                     tally->worst_ratio = fmax(tally->worst_ratio, by_solver.of[i] / limit);
                 if (!(by_solver.of[i] <= limit)) {
                     snprintf(text, sizeof text, "%s misses %g, a plain double %g",

@@ -14,7 +14,7 @@
 
 #include <cmocka.h>
 
-#include "core/result/metric.h"
+#include "core/result/response.h"
 #include "core/simulation/error_metrics.h"
 #include "server/codec/read.h"
 #include "tests/truth/drawn.h"

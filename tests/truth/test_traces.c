@@ -122,7 +122,7 @@ static void simulate(double restitution, double contact_time, int separation,
     Simulation simulation;
     scene_with_damper(&simulation, restitution, contact_time);
     Scene *scene = &simulation.scene;
-    StructureSdof *sdof = (StructureSdof *)(void *)scene->structure;
+    SdofStructure *sdof = (SdofStructure *)(void *)scene->structure;
     const double omega = 2 * 3.14159265358979 / (1e5 * contact_time);
     sdof->stiffness = sdof->mass * omega * omega;
     sdof->damping = 0;

@@ -157,7 +157,7 @@ int main(int argc, char **argv) {
         duration = strtod(argv[2], NULL);
     if (argc > 3)
         seed = strtoull(argv[3], NULL, 10);
-    fourier_start();
+    fft_start();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(trust_ends_where_runs_part_from_quad_precision),
     };

@@ -9,7 +9,7 @@
 #include "core/contact/identification.h"
 #include "core/drop_test/force_trace.h"
 
-static double force_of(const Identified *pair, double contact_time, double time) {
+static double force_of(const Identification *pair, double contact_time, double time) {
     if (time < 0 || time > contact_time)
         return 0;
     const double w = sqrt(pair->stiffness), Z = pair->damping_ratio;
@@ -20,7 +20,7 @@ static double force_of(const Identified *pair, double contact_time, double time)
     return pair->stiffness * y + pair->damping * speed;
 }
 
-static double peak_of(const Identified *pair, double contact_time) {
+static double peak_of(const Identification *pair, double contact_time) {
     double peak = 0;
     for (int i = 0; i <= 2000; i++)
         peak = fmax(peak, force_of(pair, contact_time, contact_time * i / 2000));
@@ -28,12 +28,14 @@ static double peak_of(const Identified *pair, double contact_time) {
 }
 
 double traces_force(double restitution, double contact_time, int separation, double time) {
-    const Identified pair = identify_measured(1, restitution, contact_time, (Separation)separation);
+    const Identification pair =
+        identification_from_restitution(1, restitution, contact_time, (Separation)separation);
     return force_of(&pair, contact_time, time);
 }
 
 double traces_peak(double restitution, double contact_time, int separation) {
-    const Identified pair = identify_measured(1, restitution, contact_time, (Separation)separation);
+    const Identification pair =
+        identification_from_restitution(1, restitution, contact_time, (Separation)separation);
     return peak_of(&pair, contact_time);
 }
 
@@ -41,7 +43,7 @@ static double uniform(uint64_t seed, uint64_t trial, uint32_t which) {
     const uint32_t counter[4] = {(uint32_t)trial, (uint32_t)(trial >> 32), which, 0x7ace};
     const uint32_t key[2] = {(uint32_t)seed, (uint32_t)(seed >> 32)};
     uint32_t out[4];
-    noise_philox(counter, key, out);
+    philox_words(counter, key, out);
     return (out[0] + 0.5) / 4294967296.0;
 }
 
@@ -53,12 +55,12 @@ double *traces_draw(const TraceCell *cell, uint64_t seed, uint64_t trial, size_t
     double *force = calloc(2 * pairs, sizeof *force);
     if (force == NULL)
         return NULL;
-    noise_normal_pairs(seed, trial, 0, pairs, force);
+    philox_normal_pairs(seed, trial, 0, pairs, force);
     // Just before the sample, so that an end on a sample is over there.
     const double phase = cell->is_on_grid ? -1e-9 : uniform(seed, trial, 1);
     const double start = (ceil(before) + phase) * interval;
-    const Identified pair =
-        identify_measured(1, cell->restitution, cell->contact_time, (Separation)cell->separation);
+    const Identification pair = identification_from_restitution(
+        1, cell->restitution, cell->contact_time, (Separation)cell->separation);
     const double peak = peak_of(&pair, cell->contact_time);
     const double scale = cell->scale != 0 ? cell->scale : 1;
     for (size_t i = 0; i < *count; i++) {

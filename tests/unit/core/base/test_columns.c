@@ -10,7 +10,7 @@
 static void columns_lie_one_behind_the_other(void **state) {
     (void)state;
     Columns columns;
-    assert_int_equal(columns_make(&columns, 3, 5, 0, NULL), STATUS_OK);
+    assert_int_equal(columns_allocate(&columns, 3, 5, 0, NULL), STATUS_OK);
     columns_name(&columns, 1, "velocity", "m/s");
     for (size_t i = 0; i < 15; i++)
         columns.block[i] = (double)i;
@@ -28,9 +28,9 @@ static void columns_lie_one_behind_the_other(void **state) {
 static void no_columns_or_no_rows_are_fine(void **state) {
     (void)state;
     Columns columns;
-    assert_int_equal(columns_make(&columns, 0, SIZE_MAX, 0, NULL), STATUS_OK);
+    assert_int_equal(columns_allocate(&columns, 0, SIZE_MAX, 0, NULL), STATUS_OK);
     columns_clear(&columns);
-    assert_int_equal(columns_make(&columns, 2, 0, 0, NULL), STATUS_OK);
+    assert_int_equal(columns_allocate(&columns, 2, 0, 0, NULL), STATUS_OK);
     columns_clear(&columns);
 }
 
@@ -39,12 +39,12 @@ static void too_many_bytes_are_a_limit_not_an_overflow(void **state) {
     Columns columns;
     Problem problem;
     problem_clear(&problem);
-    assert_int_equal(columns_make(&columns, 2, 8, 127, &problem), STATUS_LIMIT);
+    assert_int_equal(columns_allocate(&columns, 2, 8, 127, &problem), STATUS_LIMIT);
     assert_int_equal(problem.status, STATUS_LIMIT);
     assert_null(columns.block);
-    assert_int_equal(columns_make(&columns, 2, 8, 128, NULL), STATUS_OK);
+    assert_int_equal(columns_allocate(&columns, 2, 8, 128, NULL), STATUS_OK);
     columns_clear(&columns);
-    assert_int_equal(columns_make(&columns, 3, SIZE_MAX / 8, 0, NULL), STATUS_LIMIT);
+    assert_int_equal(columns_allocate(&columns, 3, SIZE_MAX / 8, 0, NULL), STATUS_LIMIT);
     assert_null(columns.at);
 }
 
@@ -54,7 +54,7 @@ static void long_names_are_cut(void **state) {
     char name[200];
     memset(name, 'n', sizeof name);
     name[sizeof name - 1] = '\0';
-    assert_int_equal(columns_make(&columns, 1, 1, 0, NULL), STATUS_OK);
+    assert_int_equal(columns_allocate(&columns, 1, 1, 0, NULL), STATUS_OK);
     columns_name(&columns, 0, name, NULL);
     assert_int_equal(strlen(columns.at[0].name), sizeof columns.at[0].name - 1);
     assert_string_equal(columns.at[0].unit, "");

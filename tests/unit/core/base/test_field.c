@@ -8,6 +8,8 @@
 
 #include "core/base/canonical.h"
 #include "core/base/field.h"
+#include "core/base/json_pointer.h"
+#include "core/base/spelling.h"
 
 typedef struct Part {
     char *material;
@@ -203,7 +205,7 @@ static void a_sound_struct_has_no_fault(void **state) {
     Whole whole;
     make_whole(&whole);
     problem_clear(&problem);
-    assert_int_equal(fields_check(whole_fields, &whole, "", &problem), STATUS_OK);
+    assert_int_equal(fields_validate(whole_fields, &whole, "", &problem), STATUS_OK);
     assert_int_equal(problem.count, 0);
     assert_int_equal(problem.status, STATUS_OK);
     fields_clear(whole_fields, &whole);
@@ -229,7 +231,7 @@ static void all_faults_are_told_at_once_each_at_its_place(void **state) {
     ((Square *)whole.spare)->sides.at[1] = -1;
     whole.common.offset = 1.5;
     problem_clear(&problem);
-    assert_int_equal(fields_check(whole_fields, &whole, "/in", &problem), STATUS_INVALID);
+    assert_int_equal(fields_validate(whole_fields, &whole, "/in", &problem), STATUS_INVALID);
     assert_int_equal(problem.status, STATUS_INVALID);
     assert_int_equal(problem.count, 13);
     assert_string_equal(detail_at("/in/mass"), "must be above 0 kg, is -1");
@@ -262,7 +264,7 @@ static void what_is_required_is_told_by_its_meaning_and_unit(void **state) {
     assert_int_equal(fields_default(whole_fields, &whole), STATUS_OK);
     whole.spare = variant_new(&shape_square);
     problem_clear(&problem);
-    assert_int_equal(fields_check(whole_fields, &whole, "", &problem), STATUS_INVALID);
+    assert_int_equal(fields_validate(whole_fields, &whole, "", &problem), STATUS_INVALID);
     // Neither of the absent optional items says that its stiffness is missing.
     assert_int_equal(problem.count, 2);
     assert_string_equal(detail_at("/mass"), "is required: mass of it [kg]");
@@ -281,7 +283,7 @@ static void a_default_made_absent_is_a_fault_where_a_number_is_needed(void **sta
     variant_free(whole.shape);
     whole.shape = NULL;
     problem_clear(&problem);
-    fields_check(whole_fields, &whole, "", &problem);
+    fields_validate(whole_fields, &whole, "", &problem);
     assert_int_equal(problem.count, 3);
     assert_string_equal(detail_at("/offset"), "is required: where it stands [m]");
     assert_string_equal(detail_at("/storey"), "is required: where");
@@ -302,7 +304,7 @@ static void too_long_lists_are_one_fault_each(void **state) {
     whole.parts.count = 3;
     fields_default(part_fields, &more[2]);
     problem_clear(&problem);
-    assert_int_equal(fields_check(whole_fields, &whole, "", &problem), STATUS_INVALID);
+    assert_int_equal(fields_validate(whole_fields, &whole, "", &problem), STATUS_INVALID);
     assert_int_equal(problem.count, 2);
     assert_string_equal(detail_at("/samples"), "must have at most 5, has 6 numbers");
     assert_string_equal(detail_at("/parts"), "must have at most 2, has 3 elements");
@@ -438,7 +440,7 @@ static void an_empty_list_is_not_the_same_as_a_default(void **state) {
     whole.channels.count = 0;
     assert_false(field_is_absent(field, &whole));
     problem_clear(&problem);
-    assert_int_equal(fields_check(whole_fields, &whole, "", &problem), STATUS_OK);
+    assert_int_equal(fields_validate(whole_fields, &whole, "", &problem), STATUS_OK);
     whole.samples.count = 0;
     assert_true(field_is_absent(fields_find(whole_fields, "samples", NULL), &whole));
     fields_clear(whole_fields, &whole);
@@ -458,36 +460,36 @@ static void rows_are_found_also_inside_a_base(void **state) {
 
 static void a_slip_of_the_pen_finds_the_name_that_was_meant(void **state) {
     (void)state;
-    assert_string_equal(fields_nearest(whole_fields, "mas"), "mass");
-    assert_string_equal(fields_nearest(whole_fields, "Storey"), "storey");
-    assert_string_equal(fields_nearest(whole_fields, "sotrey"), "storey");
-    assert_string_equal(fields_nearest(whole_fields, "ofset"), "offset");
-    assert_null(fields_nearest(whole_fields, "common_"));
-    assert_null(fields_nearest(whole_fields, "gravity"));
-    assert_null(fields_nearest(whole_fields, ""));
+    assert_string_equal(spelling_nearest_field(whole_fields, "mas"), "mass");
+    assert_string_equal(spelling_nearest_field(whole_fields, "Storey"), "storey");
+    assert_string_equal(spelling_nearest_field(whole_fields, "sotrey"), "storey");
+    assert_string_equal(spelling_nearest_field(whole_fields, "ofset"), "offset");
+    assert_null(spelling_nearest_field(whole_fields, "common_"));
+    assert_null(spelling_nearest_field(whole_fields, "gravity"));
+    assert_null(spelling_nearest_field(whole_fields, ""));
     char *monster = malloc(1000001);
     memset(monster, 'm', 1000000);
     monster[1000000] = '\0';
-    assert_null(fields_nearest(whole_fields, monster));
+    assert_null(spelling_nearest_field(whole_fields, monster));
     free(monster);
-    assert_string_equal(texts_nearest(rules, "zero-force"), "zero_force");
-    assert_null(texts_nearest(rules, "none"));
+    assert_string_equal(spelling_nearest(rules, "zero-force"), "zero_force");
+    assert_null(spelling_nearest(rules, "none"));
 }
 
 static void pointers_are_escaped_and_cut(void **state) {
     (void)state;
     char pointer[256];
-    pointer_join(pointer, sizeof pointer, "/a", "b/c~d");
+    json_pointer_join(pointer, sizeof pointer, "/a", "b/c~d");
     assert_string_equal(pointer, "/a/b~1c~0d");
-    pointer_index(pointer, sizeof pointer, "", 12);
+    json_pointer_index(pointer, sizeof pointer, "", 12);
     assert_string_equal(pointer, "/12");
     char name[1000];
     memset(name, '/', sizeof name);
     name[sizeof name - 1] = '\0';
-    pointer_join(pointer, sizeof pointer, "/a", name);
+    json_pointer_join(pointer, sizeof pointer, "/a", name);
     assert_int_equal(strlen(pointer), sizeof pointer - 1);
     char small[6];
-    pointer_join(small, sizeof small, "/a", "long");
+    json_pointer_join(small, sizeof small, "/a", "long");
     assert_int_equal(strlen(small), sizeof small - 1);
     assert_string_equal(small, "/a...");
 }

@@ -13,30 +13,31 @@
 #include "tests/support/fields.h"
 #include "tests/support/scenes.h"
 
-static char why[POINTER_SENTENCE];
+static char why[JSON_POINTER_MESSAGE_MAX];
 
 static Status set(Simulation *simulation, const char *pointer, const char *json) {
     char room[256];
-    Scalar value;
-    assert_true(scalar_read(json, &value, room));
-    return pointer_set(simulation_fields, simulation, pointer, &value, why);
+    JsonScalar value;
+    assert_true(json_scalar_read(json, &value, room));
+    return json_pointer_set(simulation_fields, simulation, pointer, &value, why);
 }
 
 static void scalars_are_read_as_they_were_written(void **state) {
     (void)state;
     char room[64];
-    Scalar value;
-    assert_true(scalar_read("0.015", &value, room));
-    assert_true(value.kind == SCALAR_NUMBER && value.number == 0.015);
+    JsonScalar value;
+    assert_true(json_scalar_read("0.015", &value, room));
+    assert_true(value.kind == JSON_SCALAR_NUMBER && value.number == 0.015);
     assert_true(value.whole == COUNT_ABSENT);
-    assert_true(scalar_read("9007199254740993", &value, room));
+    assert_true(json_scalar_read("9007199254740993", &value, room));
     assert_true(value.whole == 9007199254740993U);
-    assert_true(scalar_read("\"a \\\"b\\\" \\u0007\\n\"", &value, room));
+    assert_true(json_scalar_read("\"a \\\"b\\\" \\u0007\\n\"", &value, room));
     assert_string_equal(value.text, "a \"b\" \a\n");
-    assert_true(scalar_read("true", &value, room) && value.kind == SCALAR_FLAG && value.flag);
+    assert_true(json_scalar_read("true", &value, room) && value.kind == JSON_SCALAR_FLAG &&
+                value.flag);
     const char *const bad[] = {"", "x", "1x", "\"open", "\"\\q\"", "\"\\u12\"", "tru", "1e999"};
     for (size_t i = 0; i < COUNT(bad); i++)
-        assert_false(scalar_read(bad[i], &value, room));
+        assert_false(json_scalar_read(bad[i], &value, room));
 }
 
 static void numbers_texts_and_elements_are_set(void **state) {

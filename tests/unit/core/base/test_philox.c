@@ -30,7 +30,7 @@ static void the_generator_gives_the_published_integers(void **state) {
     (void)state;
     for (size_t i = 0; i < COUNT(known); i++) {
         uint32_t out[4];
-        noise_philox(known[i].counter, known[i].key, out);
+        philox_words(known[i].counter, known[i].key, out);
         assert_memory_equal(out, known[i].result, sizeof out);
     }
 }
@@ -39,13 +39,13 @@ static void a_pair_is_box_and_mullers_of_the_counters_words(void **state) {
     (void)state;
     const uint32_t counter[4] = {7, 1, 9, 2}, key[2] = {11, 3};
     uint32_t word[4];
-    noise_philox(counter, key, word);
+    philox_words(counter, key, word);
     const uint64_t a = (uint64_t)word[1] << 32 | word[0], b = (uint64_t)word[3] << 32 | word[2];
     const long double u = ldexpl((long double)(a >> 11) + 1, -53);
     const long double v = ldexpl((long double)(b >> 11), -53);
     const long double radius = sqrtl(-2 * logl(u)), angle = 2 * acosl(-1) * v;
     double pair[2];
-    noise_normal_pair(UINT64_C(3) << 32 | 11, UINT64_C(2) << 32 | 9, UINT64_C(1) << 32 | 7, pair);
+    philox_normal_pair(UINT64_C(3) << 32 | 11, UINT64_C(2) << 32 | 9, UINT64_C(1) << 32 | 7, pair);
     assert_true(fabsl(pair[0] - radius * cosl(angle)) < 1e-15L * radius);
     assert_true(fabsl(pair[1] - radius * sinl(angle)) < 1e-15L * radius);
 }
@@ -55,11 +55,11 @@ static void rows_are_as_good_as_the_c_library_in_long_double(void **state) {
     enum { PAIRS = 100000 };
     double *pairs = malloc(2 * PAIRS * sizeof *pairs);
     assert_non_null(pairs);
-    noise_normal_pairs(17, 4, 3, PAIRS, pairs);
+    philox_normal_pairs(17, 4, 3, PAIRS, pairs);
     for (uint32_t i = 0; i < PAIRS; i++) {
         const uint32_t counter[4] = {3 + i, 0, 4, 0}, key[2] = {17, 0};
         uint32_t word[4];
-        noise_philox(counter, key, word);
+        philox_words(counter, key, word);
         const uint64_t a = (uint64_t)word[1] << 32 | word[0];
         const uint64_t b = (uint64_t)word[3] << 32 | word[2];
         const long double u = ldexpl((long double)(a >> 11) + 1, -53);
@@ -79,11 +79,11 @@ static void a_row_has_the_bits_of_its_pairs(void **state) {
         // Across the 32nd bit of the index.
         const uint64_t first = UINT64_C(0xffffffff) - count / 2;
         row[2 * count] = 7;
-        noise_normal_pairs(1, 2, first, count, row);
+        philox_normal_pairs(1, 2, first, count, row);
         assert_true(row[2 * count] == 7);
         for (uint64_t i = 0; i < count; i++) {
             double pair[2];
-            noise_normal_pair(1, 2, first + i, pair);
+            philox_normal_pair(1, 2, first + i, pair);
             assert_memory_equal(pair, row + 2 * i, sizeof pair);
         }
     }
@@ -116,13 +116,13 @@ static void even_the_rarest_words_make_finite_numbers(void **state) {
     uint32_t c[4], back[4];
     double pair[2];
     unphilox(least, key, c);
-    noise_philox(c, key, back);
+    philox_words(c, key, back);
     assert_memory_equal(back, least, sizeof back);
-    noise_normal_pair(0, (uint64_t)c[3] << 32 | c[2], (uint64_t)c[1] << 32 | c[0], pair);
+    philox_normal_pair(0, (uint64_t)c[3] << 32 | c[2], (uint64_t)c[1] << 32 | c[0], pair);
     assert_true(fabs(pair[0] - sqrt(2 * 53 * log(2))) < 1e-14); // 8.57
     assert_true(pair[1] == 0);
     unphilox(most, key, c);
-    noise_normal_pair(0, (uint64_t)c[3] << 32 | c[2], (uint64_t)c[1] << 32 | c[0], pair);
+    philox_normal_pair(0, (uint64_t)c[3] << 32 | c[2], (uint64_t)c[1] << 32 | c[0], pair);
     assert_true(pair[0] == 0 && pair[1] == 0);
 }
 
@@ -132,7 +132,7 @@ static void the_normal_numbers_have_a_normal_distributions_moments(void **state)
     double sums[2][5] = {0}, product = 0, neighbours = 0, last = 0, largest = 0;
     for (uint64_t i = 0; i < PAIRS; i++) {
         double pair[2];
-        noise_normal_pair(5, 3, i, pair);
+        philox_normal_pair(5, 3, i, pair);
         for (int j = 0; j < 2; j++) {
             assert_true(isfinite(pair[j]));
             for (int power = 1; power < 5; power++)
@@ -163,7 +163,7 @@ static void seed_stream_and_index_each_matter_in_both_halves(void **state) {
                                {high, 0, 0}, {0, high, 0}, {0, 0, high}};
     double pair[7][2];
     for (size_t i = 0; i < 7; i++)
-        noise_normal_pair(at[i][0], at[i][1], at[i][2], pair[i]);
+        philox_normal_pair(at[i][0], at[i][1], at[i][2], pair[i]);
     for (size_t i = 0; i < 7; i++)
         for (size_t j = 0; j < i; j++)
             assert_true(pair[i][0] != pair[j][0] && pair[i][1] != pair[j][1]);

@@ -27,7 +27,7 @@ static void days_and_times_are_read_and_nonsense_is_not(void **state) {
     };
     for (size_t i = 0; i < COUNT(right); i++) {
         int64_t unix_ms = 7;
-        assert_true(date_read(right[i].text, &unix_ms));
+        assert_true(rfc3339_read(right[i].text, &unix_ms));
         assert_int_equal(unix_ms, right[i].unix_ms);
     }
     static const char *const wrong[] = {"",
@@ -47,7 +47,7 @@ static void days_and_times_are_read_and_nonsense_is_not(void **state) {
                                         "-2026-11-21"};
     for (size_t i = 0; i < COUNT(wrong); i++) {
         int64_t unix_ms;
-        assert_false(date_read(wrong[i], &unix_ms));
+        assert_false(rfc3339_read(wrong[i], &unix_ms));
     }
 }
 

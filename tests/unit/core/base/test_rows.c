@@ -9,6 +9,7 @@
 
 #include "core/base/canonical.h"
 #include "core/base/field.h"
+#include "core/base/json_pointer.h"
 #include "tests/support/fields.h"
 
 typedef struct Matrix {
@@ -38,7 +39,7 @@ static Matrix matrix_of(size_t count, const Reals *rows) {
 
 static Status check(const Matrix *matrix) {
     problem_clear(&problem);
-    return fields_check(fields, matrix, "", &problem);
+    return fields_validate(fields, matrix, "", &problem);
 }
 
 static void rows_are_copied_deeply_and_cleared(void **state) {
@@ -106,14 +107,14 @@ static void the_canonical_form_tells_rows_apart(void **state) {
 static void a_name_may_carry_a_number(void **state) {
     (void)state;
     size_t length;
-    assert_true(name_number("displacement_12", &length) == 12 && length == 12);
-    assert_true(name_number("contact_force", &length) == 0 && length == 13);
-    assert_true(name_number("x_0", &length) == 0 && length == 3);
-    assert_true(name_number("x_01", &length) == 0 && length == 4);
-    assert_true(name_number("x_1y", &length) == 0 && length == 4);
-    assert_true(name_number("x_", &length) == 0 && length == 2);
-    assert_true(name_number("x_99999999999999999999", &length) == 0);
-    assert_true(name_number("", &length) == 0 && length == 0);
+    assert_true(field_name_number("displacement_12", &length) == 12 && length == 12);
+    assert_true(field_name_number("contact_force", &length) == 0 && length == 13);
+    assert_true(field_name_number("x_0", &length) == 0 && length == 3);
+    assert_true(field_name_number("x_01", &length) == 0 && length == 4);
+    assert_true(field_name_number("x_1y", &length) == 0 && length == 4);
+    assert_true(field_name_number("x_", &length) == 0 && length == 2);
+    assert_true(field_name_number("x_99999999999999999999", &length) == 0);
+    assert_true(field_name_number("", &length) == 0 && length == 0);
 }
 
 static void numbered_names_are_judged_without_their_number(void **state) {
@@ -138,17 +139,17 @@ static void numbered_names_are_judged_without_their_number(void **state) {
 static void pointers_are_cut_at_their_room_and_escaped(void **state) {
     (void)state;
     char target[16], name[2000];
-    pointer_join(target, sizeof target, "/a", "b/c~d");
+    json_pointer_join(target, sizeof target, "/a", "b/c~d");
     assert_string_equal(target, "/a/b~1c~0d");
-    pointer_index(target, sizeof target, "/a", 0);
+    json_pointer_index(target, sizeof target, "/a", 0);
     assert_string_equal(target, "/a/0");
-    pointer_index(target, sizeof target, "", 1234567890);
+    json_pointer_index(target, sizeof target, "", 1234567890);
     assert_string_equal(target, "/1234567890");
     memset(name, '~', sizeof name - 1);
     name[sizeof name - 1] = '\0';
-    pointer_join(target, sizeof target, name, name);
+    json_pointer_join(target, sizeof target, name, name);
     assert_int_equal(strlen(target), sizeof target - 1);
-    pointer_join(target, sizeof target, "/x", name);
+    json_pointer_join(target, sizeof target, "/x", name);
     assert_string_equal(target, "/x/~0~0~0~0~...");
 }
 

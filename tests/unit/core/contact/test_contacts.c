@@ -32,7 +32,7 @@ static void a_power_law_has_what_it_takes(void **state) {
         if (contacts[i]->form != CONTACT_POWER)
             continue;
         count++;
-        assert_non_null(contacts[i]->reached);
+        assert_non_null(contacts[i]->restitution);
         assert_non_null(contacts[i]->duration);
         assert_non_null(contacts[i]->force);
     }

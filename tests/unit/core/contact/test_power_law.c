@@ -26,22 +26,23 @@ static void the_exact_factor_is_right_to_rounding(void **state) {
         {0.999, 0.0015015013512010866244}, {0.999999, 0.0000015000015000444835},
     };
     for (size_t i = 0; i < COUNT(known); i++)
-        assert_near(power_factor(known[i][0]), known[i][1], i == COUNT(known) - 1 ? 1e-14 : 1e-15);
-    assert_near(power_factor(1e-3), 1e3, 1e-15);
-    assert_true(power_factor(1) == 0);
+        assert_near(power_law_factor(known[i][0]), known[i][1],
+                    i == COUNT(known) - 1 ? 1e-14 : 1e-15);
+    assert_near(power_law_factor(1e-3), 1e3, 1e-15);
+    assert_true(power_law_factor(1) == 0);
 }
 
 static void the_reached_restitution_undoes_the_exact_factor(void **state) {
     (void)state;
     for (double e = 1e-3; e <= 1; e += 1e-3)
-        assert_near(power_reached(power_factor(e), 1.5), e, 1e-14);
+        assert_near(power_law_restitution(power_law_factor(e), 1.5), e, 1e-14);
     for (double off = 0.1; off > 1e-16; off /= 7)
-        assert_near(1 - power_reached(power_factor(1 - off), 1.5), 1 - (1 - off),
+        assert_near(1 - power_law_restitution(power_law_factor(1 - off), 1.5), 1 - (1 - off),
                     1e-7 + 3e-16 / off);
 }
 
 static double reached(const ContactLaw *law, double e) {
-    return law->reached(law->factor(e), POWER_EXPONENT);
+    return law->restitution(law->factor(e), POWER_LAW_EXPONENT);
 }
 
 static void textbook_factors_reach_what_they_reach(void **state) {
@@ -56,13 +57,13 @@ static void textbook_factors_reach_what_they_reach(void **state) {
 static void hertz_lasts_as_in_the_books(void **state) {
     (void)state;
     // In an isolated contact's own units the greatest penetration is 1.25^(2/5).
-    assert_near(power_duration(0, 1.5), 2.9432752 * pow(1.25, 0.4), 1e-7);
+    assert_near(power_law_duration(0, 1.5), 2.9432752 * pow(1.25, 0.4), 1e-7);
     // sqrt(pi) G(7/5) / G(9/10) is half of it.
-    assert_near(power_duration(0, 1.5),
+    assert_near(power_law_duration(0, 1.5),
                 2 * sqrt(acos(-1)) * tgamma(1.4) / tgamma(0.9) * pow(1.25, 0.4), 1e-13);
-    assert_near(power_duration(0, 1), acos(-1), 1e-14);
-    assert_near(power_duration(1e-9, 1.5), power_duration(0, 1.5), 1e-8);
-    assert_near(contact_jankowski.duration(0, 1.5), power_duration(0, 1.5), 1e-12);
+    assert_near(power_law_duration(0, 1), acos(-1), 1e-14);
+    assert_near(power_law_duration(1e-9, 1.5), power_law_duration(0, 1.5), 1e-8);
+    assert_near(contact_jankowski.duration(0, 1.5), power_law_duration(0, 1.5), 1e-12);
 }
 
 // Jankowski's law with n = 1 is a damped oscillator, then a free one.
@@ -71,7 +72,7 @@ static void a_linear_approach_has_closed_forms(void **state) {
     static const double factors[] = {0.1, 0.5, 0.9};
     for (size_t i = 0; i < COUNT(factors); i++) {
         const double z = factors[i], root = sqrt(1 - z * z);
-        assert_near(contact_jankowski.reached(z, 1), exp(-z / root * acos(z)), 1e-14);
+        assert_near(contact_jankowski.restitution(z, 1), exp(-z / root * acos(z)), 1e-14);
         assert_near(contact_jankowski.duration(z, 1), acos(z) / root + acos(0), 1e-13);
     }
 }

@@ -58,7 +58,7 @@ static void a_free_base_takes_part_of_the_rebound(void **state) {
            "\"drops\": [{\"approach_speed\": 2, \"rebound_height\": 0.01}]}");
     const double rise = sqrt(2 * 9.80665 * 0.01), base = (0.1 * 2 + 0.1 * rise) / 0.9;
     assert_near(drop_rebound_speed(&test, &test.drops.at[0]), rise + base, 1e-15);
-    assert_near(drop_test_effective_mass(&test), effective_mass(0.1, 0.9), 0);
+    assert_near(drop_test_effective_mass(&test), contact_effective_mass(0.1, 0.9), 0);
     test.base = 0;
     assert_near(drop_test_effective_mass(&test), 0.1, 0);
     test.base = CHOICE_ABSENT;

@@ -220,7 +220,7 @@ static void a_trace_s_contact_is_shown_as_it_was_detected(void **state) {
     test.traces.count = 1;
     Trace *trace = test.traces.at;
     *trace = (Trace){.interval = 1e-4};
-    assert_true(reals_make(&trace->force, 300));
+    assert_true(reals_allocate(&trace->force, 300));
     for (size_t i = 0; i < 300; i++) {
         const double s = ((double)i - 100.3) / 50;
         trace->force.at[i] = 5 + (s >= 0 && s <= 1 ? 8 * sin(3.14159265358979 * s) : 0);

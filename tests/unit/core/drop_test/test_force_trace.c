@@ -26,7 +26,7 @@ typedef struct Record {
 static void record_new(Record *record, double interval, size_t count, double noise) {
     assert_in_range(count, 1, MOST - 1);
     *record = (Record){.interval = interval, .force = {record->values, count}};
-    noise_normal_pairs(5, 7, 0, (count + 1) / 2, record->values);
+    philox_normal_pairs(5, 7, 0, (count + 1) / 2, record->values);
     for (size_t i = 0; i < count; i++)
         record->values[i] *= noise;
 }
@@ -35,7 +35,8 @@ static void record_new(Record *record, double interval, size_t count, double noi
 // until y, or the force, is back at 0. Returns how long that took.
 static double record_add(Record *record, double start, double e, double T_c, double m_e, double v0,
                          double g, int separation) {
-    const Identified pair = identify_measured(m_e, e, T_c, (Separation)separation);
+    const Identification pair =
+        identification_from_restitution(m_e, e, T_c, (Separation)separation);
     const double k = pair.stiffness / m_e, c = pair.damping / m_e, h = T_c / 20000;
     double y = 0, v = v0, time = 0;
     size_t next = (size_t)ceil(start / record->interval);

@@ -60,7 +60,7 @@ static void propose(const char *const *texts, size_t count, ProposalForm form) {
         material_proposal_run(&evaluation, tests, count, &before, form, &proposal, &problem),
         STATUS_OK);
     // What is proposed would be taken.
-    if (proposal.why == NULL && material_check(&proposal.material, "", &problem) != STATUS_OK)
+    if (proposal.why == NULL && material_validate(&proposal.material, "", &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
 }
 

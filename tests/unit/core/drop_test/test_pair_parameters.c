@@ -64,8 +64,8 @@ static void both_rules_are_told_for_the_pair(void **state) {
     derive(0.1107, 1.35, IDENTIFIED_FOR_SCENE, CHOICE_ABSENT);
     assert_int_equal(pair.contacts.count, 2);
     for (int rule = 0; rule < 2; rule++) {
-        const Identified it =
-            identify_measured(effective_mass(0.1107, 1.35), 0.61, 0.025, (Separation)rule);
+        const Identification it = identification_from_restitution(
+            contact_effective_mass(0.1107, 1.35), 0.61, 0.025, (Separation)rule);
         const PairContact *contact = &pair.contacts.at[rule];
         assert_int_equal(contact->separation, rule);
         assert_near(contact->stiffness.value, it.stiffness, 0);
@@ -94,11 +94,11 @@ static void uncertainties_are_those_of_drawn_readings(void **state) {
             for (int i = 0; i < DRAWN; i++) {
                 const double e = 0.61 + 0.02 * drops_noise(5, &next);
                 const double T = 0.025 + 0.001 * drops_noise(5, &next);
-                Identified it =
-                    identify_measured(for_rig ? 0.11 : pair.effective_mass, e, T, (Separation)rule);
+                Identification it = identification_from_restitution(
+                    for_rig ? 0.11 : pair.effective_mass, e, T, (Separation)rule);
                 if (for_rig)
-                    it = identify_given(pair.effective_mass, it.stiffness, it.damping,
-                                        (Separation)rule);
+                    it = identification_from_stiffness(pair.effective_mass, it.stiffness,
+                                                       it.damping, (Separation)rule);
                 const double values[] = {it.stiffness, it.damping, it.damping_ratio, it.restitution,
                                          it.contact_time};
                 for (int k = 0; k < 5; k++) {
@@ -122,9 +122,10 @@ static void uncertainties_are_those_of_drawn_readings(void **state) {
 static void a_rigs_stiffness_and_damping_are_carried_over(void **state) {
     (void)state;
     derive(0.5, (double)NAN, IDENTIFIED_FOR_RIG, SEPARATION_ZERO_PENETRATION);
-    const Identified rig = identify_measured(0.11, 0.61, 0.025, SEPARATION_ZERO_PENETRATION);
-    const Identified it =
-        identify_given(0.5, rig.stiffness, rig.damping, SEPARATION_ZERO_PENETRATION);
+    const Identification rig =
+        identification_from_restitution(0.11, 0.61, 0.025, SEPARATION_ZERO_PENETRATION);
+    const Identification it =
+        identification_from_stiffness(0.5, rig.stiffness, rig.damping, SEPARATION_ZERO_PENETRATION);
     assert_near(pair.contacts.at[0].stiffness.value, rig.stiffness, 0);
     assert_near(pair.contacts.at[0].restitution.value, it.restitution, 0);
     assert_near(pair.contacts.at[0].contact_time.value, it.contact_time, 0);
@@ -140,7 +141,8 @@ static void a_rigs_stiffness_and_damping_are_carried_over(void **state) {
     assert_int_equal(pair_parameters_run(&material, 0.5, (double)NAN, IDENTIFIED_FOR_RIG,
                                          CHOICE_ABSENT, &pair, &problem),
                      STATUS_INVALID);
-    assert_non_null(strstr(detail_at(&problem, "/identified_for"), "does not state the masses of the test"));
+    assert_non_null(
+        strstr(detail_at(&problem, "/identified_for"), "does not state the masses of the test"));
 }
 
 static void another_pair_is_warned_of(void **state) {
@@ -167,7 +169,7 @@ static void without_a_contact_time_only_the_ratio_is_known(void **state) {
     derive(0.11, (double)NAN, IDENTIFIED_FOR_SCENE, CHOICE_ABSENT);
     assert_true(isnan(pair.contacts.at[0].stiffness.value));
     assert_true(isnan(pair.contacts.at[0].damping.value));
-    const Identified it = identify_measured(0.11, 0.61, 1, SEPARATION_ZERO_FORCE);
+    const Identification it = identification_from_restitution(0.11, 0.61, 1, SEPARATION_ZERO_FORCE);
     assert_near(pair.contacts.at[1].damping_ratio.value, it.damping_ratio, 1e-15);
     assert_true(pair.contacts.at[1].damping_ratio.uncertainty > 0);
     assert_true(is_warned("/contacts", "no contact time"));
@@ -218,7 +220,8 @@ static void a_table_has_figures_for_each_row(void **state) {
     assert_int_equal(pair.contacts.count, 4);
     assert_near(pair.contacts.at[2].approach_speed, 0.9, 0);
     assert_near(pair.contacts.at[3].stiffness.value,
-                identify_measured(0.11, 0.5, 0.03, SEPARATION_ZERO_FORCE).stiffness, 1e-12);
+                identification_from_restitution(0.11, 0.5, 0.03, SEPARATION_ZERO_FORCE).stiffness,
+                1e-12);
     assert_true(isnan(pair.contacts.at[0].stiffness.uncertainty));
     assert_true(pair.contacts.at[2].stiffness.uncertainty > 0);
 }

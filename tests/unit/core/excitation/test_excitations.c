@@ -121,12 +121,12 @@ static void a_sine_between_the_samples_is_doubted(void **state) {
 static void a_sine_needs_its_frequency_and_amplitude(void **state) {
     (void)state;
     Excitation *excitation = excitation_new("sine");
-    assert_int_equal(fields_check(excitation->variant.kind->fields, excitation, "", &problem),
+    assert_int_equal(fields_validate(excitation->variant.kind->fields, excitation, "", &problem),
                      STATUS_INVALID);
     assert_int_equal(problem.count, 2);
     *real_of(excitation, "frequency") = 0;
     problem_clear(&problem);
-    fields_check(excitation->variant.kind->fields, excitation, "", &problem);
+    fields_validate(excitation->variant.kind->fields, excitation, "", &problem);
     assert_string_equal(detail_at(&problem, "/frequency"), "must be above 0 Hz, is 0");
     variant_free(&excitation->variant);
 }

@@ -19,7 +19,7 @@ static const char digest[] = "0123456789abcdef0123456789abcdef0123456789abcdef01
 
 static NamedRecord *named_make(const char *name) {
     Reals samples;
-    assert_true(reals_make(&samples, 3));
+    assert_true(reals_allocate(&samples, 3));
     samples.at[0] = 1;
     samples.at[1] = -2;
     samples.at[2] = 0.5;
@@ -47,7 +47,7 @@ static Status check(const ExcitationRecord *record) {
 }
 
 static size_t holds(const NamedRecord *named) {
-    return atomic_load(&named->shared.holds);
+    return atomic_load(&named->shared.count);
 }
 
 static void a_name_stands_for_samples_that_its_copies_share(void **state) {
@@ -64,7 +64,7 @@ static void a_name_stands_for_samples_that_its_copies_share(void **state) {
     record_free(record);
     fields_clear(excitation_record.kind.fields, &copy);
     assert_int_equal(holds(named), 1);
-    shared_drop(&named->shared);
+    refcount_unref(&named->shared);
 }
 
 static void the_base_moves_as_the_record_says(void **state) {
@@ -74,7 +74,7 @@ static void the_base_moves_as_the_record_says(void **state) {
     const Span span = {.duration = 1, .sample_rate = 100};
     Base base;
     assert_true(record_resolve(record, named));
-    shared_drop(&named->shared);
+    refcount_unref(&named->shared);
     record->scale = 2;
     assert_int_equal(excitation_record.make(&record->excitation, &span, NULL, &base, &problem),
                      STATUS_OK);
@@ -102,7 +102,7 @@ static void no_text_has_the_samples_and_no_text_gives_them(void **state) {
                                  "f\", \"scale\": 1}");
     // The canonical form is that of the name and the digest alone.
     canonical_write(excitation_record.kind.fields, record, gather, &resolved);
-    shared_drop(record->named);
+    refcount_unref(record->named);
     record->named = NULL;
     canonical_write(excitation_record.kind.fields, record, gather, &bare);
     assert_int_equal(resolved.count, bare.count);
@@ -122,7 +122,7 @@ static void no_text_has_the_samples_and_no_text_gives_them(void **state) {
     assert_null(fields_find(excitation_record.kind.fields, "named", NULL));
     record_free(record);
     assert_int_equal(holds(named), 1);
-    shared_drop(&named->shared);
+    refcount_unref(&named->shared);
 }
 
 static void what_stands_beside_a_name_is_a_fault(void **state) {
@@ -133,7 +133,7 @@ static void what_stands_beside_a_name_is_a_fault(void **state) {
     assert_int_equal(problem.count, 1);
     assert_string_equal(problem.faults[0].pointer, "/excitation/name");
     assert_true(record_resolve(record, named));
-    assert_true(reals_make(&record->samples, 1));
+    assert_true(reals_allocate(&record->samples, 1));
     record->interval = 0.02;
     assert_int_equal(check(record), STATUS_INVALID);
     assert_int_equal(problem.count, 2);
@@ -156,7 +156,7 @@ static void what_stands_beside_a_name_is_a_fault(void **state) {
     assert_int_equal(check(record), STATUS_INVALID);
     assert_true(problem_concerns(&problem, "/excitation/digest"));
     record_free(record);
-    shared_drop(&named->shared);
+    refcount_unref(&named->shared);
 }
 
 static void a_fault_that_was_told_is_told_once(void **state) {
@@ -185,7 +185,7 @@ static void a_doubt_of_a_named_record_stands_at_its_name(void **state) {
     assert_string_equal(problem.faults[0].pointer, "/excitation/name");
     assert_non_null(strstr(problem.faults[0].detail, "2e+03 m/s^2 (sample 1), more than 5 g"));
     record_free(record);
-    shared_drop(&named->shared);
+    refcount_unref(&named->shared);
 }
 
 int main(void) {

@@ -75,14 +75,14 @@ static void a_pulse_needs_its_amplitude_and_length(void **state) {
     assert_int_equal(fields_default(excitation_half_sine.kind.fields, &made), STATUS_OK);
     assert_true(made.start == 0);
     problem_clear(&problem);
-    assert_int_equal(fields_check(excitation_half_sine.kind.fields, &made, "", &problem),
+    assert_int_equal(fields_validate(excitation_half_sine.kind.fields, &made, "", &problem),
                      STATUS_INVALID);
     assert_int_equal(problem.count, 2);
     made.amplitude = 1;
     made.length = 0;
     made.start = -1;
     problem_clear(&problem);
-    assert_int_equal(fields_check(excitation_half_sine.kind.fields, &made, "", &problem),
+    assert_int_equal(fields_validate(excitation_half_sine.kind.fields, &made, "", &problem),
                      STATUS_INVALID);
     assert_string_equal(detail_at(&problem, "/length"), "must be above 0 s, is 0");
     assert_string_equal(detail_at(&problem, "/start"), "must be at least 0 s, is -1");

@@ -41,7 +41,7 @@ static long double slow_block(const ExcitationRandom *random, uint64_t m, size_t
     long double sum = 0;
     for (size_t k = blocks.first_bin; k < blocks.first_bin + blocks.bins; k++) {
         double normal[2];
-        noise_normal_pair(random->seed, m, k, normal);
+        philox_normal_pair(random->seed, m, k, normal);
         const long double turn = (long double)(k * i % blocks.length) / (long double)blocks.length;
         const long double angle = 2 * acosl(-1) * turn;
         sum += normal[0] * cosl(angle) - normal[1] * sinl(angle);
@@ -162,11 +162,11 @@ static void the_density_is_flat_within_the_band_and_nothing_outside(void **state
     Base base = base_of(&random, duration);
     Column column = {.name = "base", .values = base.values};
     const Columns series = {.at = &column, .count = 1, .rows = base.count};
-    const SpectrumSettings settings = {
-        .segment = 2048, .overlap = 1024, .window = WINDOW_BLACKMAN, .detrend = DETREND_NONE};
+    const WelchSettings settings = {
+        .segment = 2048, .overlap = 1024, .window = WELCH_BLACKMAN, .detrend = WELCH_DETREND_NONE};
     const char *unit = "(m/s^2)^2/Hz";
     Spectrum spectrum;
-    assert_int_equal(spectrum_welch(&series, &unit, 100, &settings, NULL, NULL, &spectrum, NULL),
+    assert_int_equal(welch_spectrum(&series, &unit, 100, &settings, NULL, NULL, &spectrum, NULL),
                      STATUS_OK);
     const double *density = spectrum.densities.at[0].values, asked = rms * rms / 10;
     double sums[10] = {0}, counts[10] = {0}, below = 0, above = 0;
@@ -396,6 +396,6 @@ int main(void) {
         cmocka_unit_test(the_watch_sees_every_block_and_can_stop),
         cmocka_unit_test(a_base_without_end_is_refused_when_made),
     };
-    fourier_start();
+    fft_start();
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

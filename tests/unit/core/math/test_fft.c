@@ -24,11 +24,11 @@ static void forward_is_the_sum_with_a_negative_exponent(void **state) {
     (void)state;
     for (size_t s = 0; s < COUNT(sizes); s++) {
         const size_t n = sizes[s];
-        Fourier *fourier = fourier_new(n, FOURIER_FORWARD);
+        Fft *fourier = fft_new(n, FFT_FORWARD);
         assert_non_null(fourier);
         for (size_t i = 0; i < n; i++)
-            fourier_real(fourier)[i] = number(i);
-        fourier_run(fourier);
+            fft_real(fourier)[i] = number(i);
+        fft_run(fourier);
         for (size_t k = 0; k <= n / 2; k++) {
             long double re = 0, im = 0;
             for (size_t i = 0; i < n; i++) {
@@ -36,10 +36,10 @@ static void forward_is_the_sum_with_a_negative_exponent(void **state) {
                 re += number(i) * cosl(angle);
                 im -= number(i) * sinl(angle);
             }
-            assert_true(fabsl(fourier_complex(fourier)[2 * k] - re) < 1e-13L);
-            assert_true(fabsl(fourier_complex(fourier)[2 * k + 1] - im) < 1e-13L);
+            assert_true(fabsl(fft_complex(fourier)[2 * k] - re) < 1e-13L);
+            assert_true(fabsl(fft_complex(fourier)[2 * k + 1] - im) < 1e-13L);
         }
-        fourier_free(fourier);
+        fft_free(fourier);
     }
 }
 
@@ -47,32 +47,32 @@ static void backward_undoes_forward_up_to_the_size(void **state) {
     (void)state;
     for (size_t s = 0; s < COUNT(sizes); s++) {
         const size_t n = sizes[s];
-        Fourier *there = fourier_new(n, FOURIER_FORWARD), *back = fourier_new(n, FOURIER_BACKWARD);
+        Fft *there = fft_new(n, FFT_FORWARD), *back = fft_new(n, FFT_BACKWARD);
         assert_true(there != NULL && back != NULL);
         for (size_t i = 0; i < n; i++)
-            fourier_real(there)[i] = number(i);
-        fourier_run(there);
-        memcpy(fourier_complex(back), fourier_complex(there), (n / 2 + 1) * 2 * sizeof(double));
-        fourier_run(back);
+            fft_real(there)[i] = number(i);
+        fft_run(there);
+        memcpy(fft_complex(back), fft_complex(there), (n / 2 + 1) * 2 * sizeof(double));
+        fft_run(back);
         for (size_t i = 0; i < n; i++)
-            assert_true(fabs(fourier_real(back)[i] / (double)n - number(i)) < 1e-15 * 8);
-        fourier_free(there);
-        fourier_free(back);
+            assert_true(fabs(fft_real(back)[i] / (double)n - number(i)) < 1e-15 * 8);
+        fft_free(there);
+        fft_free(back);
     }
 }
 
 // A hash of all the bits of one transform.
 static uint64_t transform_bits(size_t n) {
-    Fourier *fourier = fourier_new(n, FOURIER_FORWARD);
+    Fft *fourier = fft_new(n, FFT_FORWARD);
     assert_non_null(fourier);
     for (size_t i = 0; i < n; i++)
-        fourier_real(fourier)[i] = number(i);
-    fourier_run(fourier);
+        fft_real(fourier)[i] = number(i);
+    fft_run(fourier);
     uint64_t hash = UINT64_C(14695981039346656037);
-    const unsigned char *bytes = (const unsigned char *)fourier_complex(fourier);
+    const unsigned char *bytes = (const unsigned char *)fft_complex(fourier);
     for (size_t i = 0; i < (n / 2 + 1) * 2 * sizeof(double); i++)
         hash = (hash ^ bytes[i]) * UINT64_C(1099511628211);
-    fourier_free(fourier);
+    fft_free(fourier);
     return hash;
 }
 
@@ -84,7 +84,7 @@ static void a_transform_has_the_same_bits_whatever_was_planned_before(void **sta
         first[i] = transform_bits(mixed[i]);
     for (size_t i = COUNT(mixed); i-- > 0;) {
         void *hole = malloc(24 + 8 * i); // other addresses than before
-        fourier_free(fourier_new(mixed[i], FOURIER_BACKWARD));
+        fft_free(fft_new(mixed[i], FFT_BACKWARD));
         assert_int_equal(transform_bits(mixed[i]), first[i]);
         free(hole);
     }
@@ -110,36 +110,50 @@ static void several_threads_may_plan_at_once(void **state) {
 
 static void what_cannot_be_transformed_is_null(void **state) {
     (void)state;
-    assert_null(fourier_new(0, FOURIER_FORWARD));
-    assert_null(fourier_new(SIZE_MAX, FOURIER_FORWARD));
-    assert_null(fourier_new(((size_t)1 << 30) + 1, FOURIER_BACKWARD));
-    fourier_free(NULL);
+    assert_null(fft_new(0, FFT_FORWARD));
+    assert_null(fft_new(SIZE_MAX, FFT_FORWARD));
+    assert_null(fft_new(((size_t)1 << 30) + 1, FFT_BACKWARD));
+    fft_free(NULL);
 }
 
 static void a_stock_hands_out_what_was_put_into_it(void **state) {
     (void)state;
-    FourierStock stock = {0};
-    Fourier *first = fourier_take(&stock, 64, FOURIER_FORWARD);
+    FftCache stock = {0};
+    Fft *first = fft_acquire(&stock, 64, FFT_FORWARD);
     assert_non_null(first);
-    fourier_put(&stock, first);
-    Fourier *other = fourier_take(&stock, 64, FOURIER_BACKWARD);
+    fft_release(&stock, first);
+    Fft *other = fft_acquire(&stock, 64, FFT_BACKWARD);
     assert_non_null(other);
     assert_ptr_not_equal(other, first);
-    assert_ptr_equal(fourier_take(&stock, 64, FOURIER_FORWARD), first);
-    fourier_put(&stock, first);
-    fourier_put(&stock, other);
+    assert_ptr_equal(fft_acquire(&stock, 64, FFT_FORWARD), first);
+    fft_release(&stock, first);
+    fft_release(&stock, other);
     // More than it keeps: the oldest goes, the newest stay.
-    for (size_t i = 0; i < FOURIER_KEPT - 1; i++)
-        fourier_put(&stock, fourier_new(128 + i, FOURIER_FORWARD));
-    assert_ptr_equal(fourier_take(&stock, 64, FOURIER_BACKWARD), other);
-    fourier_put(NULL, other);
-    fourier_put(&stock, NULL);
-    fourier_stock_clear(&stock);
+    for (size_t i = 0; i < FFT_CACHE_MAX - 1; i++)
+        fft_release(&stock, fft_new(128 + i, FFT_FORWARD));
+    assert_ptr_equal(fft_acquire(&stock, 64, FFT_BACKWARD), other);
+    fft_release(NULL, other);
+    fft_release(&stock, NULL);
+    fft_cache_clear(&stock);
     assert_null(stock.at[0]);
+}
+
+static void cosines_at_equal_steps_are_the_library_s(void **state) {
+    (void)state;
+    const double pi = acos(-1);
+    static double cosines[5000];
+    static const size_t counts[] = {0, 1, 63, 64, 65, 4096, 5000};
+    for (size_t c = 0; c < COUNT(counts); c++) {
+        const double start = c % 2 == 0 ? 0 : -pi / 2, step = 2 * pi / ((double)counts[c] + 1);
+        fft_cosines(start, step, counts[c], cosines);
+        for (size_t i = 0; i < counts[c]; i++)
+            assert_true(fabs(cosines[i] - cos(start + (double)i * step)) < 1e-15);
+    }
 }
 
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(cosines_at_equal_steps_are_the_library_s),
         cmocka_unit_test(forward_is_the_sum_with_a_negative_exponent),
         cmocka_unit_test(backward_undoes_forward_up_to_the_size),
         cmocka_unit_test(a_transform_has_the_same_bits_whatever_was_planned_before),
@@ -147,6 +161,6 @@ int main(void) {
         cmocka_unit_test(what_cannot_be_transformed_is_null),
         cmocka_unit_test(a_stock_hands_out_what_was_put_into_it),
     };
-    fourier_start();
+    fft_start();
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -27,7 +27,7 @@ static void a_simple_root_is_found_to_rounding(void **state) {
         const double root = i / 1000.0, roots[3] = {root, 1.5 + root, 3};
         double c[4], s = -1;
         product(roots, 3, 1e-7, c);
-        assert_true(root_first_crossing(c, 3, &s));
+        assert_true(polynomial_root_first(c, 3, &s));
         assert_true(fabs(s - root) <= 8 * DBL_EPSILON);
     }
 }
@@ -38,7 +38,7 @@ static void the_first_of_two_close_roots_is_taken(void **state) {
         const double width = pow(10, -power), roots[2] = {0.4, 0.4 + width};
         double c[3], s = -1;
         product(roots, 2, 1, c);
-        assert_true(root_first_crossing(c, 2, &s));
+        assert_true(polynomial_root_first(c, 2, &s));
         assert_true(fabs(s - 0.4) <= 4 * DBL_EPSILON / width);
     }
 }
@@ -49,7 +49,7 @@ static void a_near_miss_is_not_a_crossing(void **state) {
         const double miss = pow(10, -power);
         const double c[3] = {0.16 + miss, -0.8, 1}; // (s - 0.4)^2 + miss
         double s;
-        assert_false(root_first_crossing(c, 2, &s));
+        assert_false(polynomial_root_first(c, 2, &s));
     }
 }
 
@@ -57,13 +57,13 @@ static void a_root_at_the_start_does_not_count(void **state) {
     (void)state;
     double s = -1;
     const double leaves[4] = {0, 1, -2, 0}, turns_at_once[3] = {0, 0, -1}, opens[4] = {0, 0, 0, 1};
-    assert_true(root_first_crossing(leaves, 3, &s));
+    assert_true(polynomial_root_first(leaves, 3, &s));
     assert_true(fabs(s - 0.5) <= DBL_EPSILON);
-    assert_true(root_first_crossing(turns_at_once, 2, &s));
+    assert_true(polynomial_root_first(turns_at_once, 2, &s));
     assert_true(s == 0);
-    assert_false(root_first_crossing(opens, 3, &s));
+    assert_false(polynomial_root_first(opens, 3, &s));
     const double nothing[2] = {0, 0};
-    assert_false(root_first_crossing(nothing, 1, &s));
+    assert_false(polynomial_root_first(nothing, 1, &s));
 }
 
 // Against a scan so fine that a root of these low degrees cannot hide from it.
@@ -73,7 +73,7 @@ static void coefficients_that_are_no_numbers_end_the_search(void **state) {
     double s;
     const double lost[][4] = {{1, NAN, 0, 0}, {1, -2, NAN, 1}, {NAN, -1, 0, 0}};
     for (size_t i = 0; i < sizeof lost / sizeof *lost; i++)
-        assert_false(root_first_crossing(lost[i], 3, &s));
+        assert_false(polynomial_root_first(lost[i], 3, &s));
 }
 
 static void random_polynomials_agree_with_a_scan(void **state) {
@@ -87,16 +87,16 @@ static void random_polynomials_agree_with_a_scan(void **state) {
             c[i] = ((double)rand() / RAND_MAX * 2 - 1) * pow(4, (int)(i % 4));
         c[0] = fabs(c[0]) + 1e-3;
         double s = 2, seen = 2;
-        const bool is_found = root_first_crossing(c, degree, &s);
+        const bool is_found = polynomial_root_first(c, degree, &s);
         for (int i = 0; i <= 2000 && seen > 1; i++)
-            if (root_value(c, degree, i / 2000.0) < -1e-12)
+            if (polynomial_value(c, degree, i / 2000.0) < -1e-12)
                 seen = i / 2000.0;
         if (seen <= 1)
             assert_true(is_found);
         if (is_found) {
             crossings++;
             assert_true(s <= seen + 1e-15);
-            assert_true(fabs(root_value(c, degree, s)) < 1e-12);
+            assert_true(fabs(polynomial_value(c, degree, s)) < 1e-12);
         }
     }
     assert_true(crossings > 1000);

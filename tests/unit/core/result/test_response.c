@@ -43,7 +43,7 @@ static void a_response_is_cleared_whole(void **state) {
     Response response;
     memset(&response, 0, sizeof response);
     response_clear(&response);
-    assert_int_equal(columns_make(&response.series, 2, 3, 0, NULL), STATUS_OK);
+    assert_int_equal(columns_allocate(&response.series, 2, 3, 0, NULL), STATUS_OK);
     response.impacts.at = calloc(4, sizeof(Impact));
     response.impacts.count = 4;
     response_clear(&response);

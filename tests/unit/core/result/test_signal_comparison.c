@@ -33,7 +33,7 @@ static void a_motion_is_like_itself(void **state) {
     (void)state;
     double *x = sampled(100, 501, 0);
     const Signal signal = {x, 501, 100, 0};
-    const Likeness own = likeness_measure(&signal, &signal, 0.01, NULL);
+    const SignalComparison own = signal_comparison_measure(&signal, &signal, 0.01, NULL);
     assert_true(own.samples == 501 && own.from == 0 && own.to == 5);
     assert_true(own.relative == 0 && own.difference_peak == 0 && isnan(own.parting));
     assert_near(own.correlation, 1, 1e-12);
@@ -44,12 +44,12 @@ static void the_coarser_ones_samples_are_compared_within_the_common_span(void **
     (void)state;
     double *x = sampled(100, 501, 0), *y = sampled(1000, 3001, 1.005);
     const Signal coarse = {x, 501, 100, 0}, fine = {y, 3001, 1000, 1.005};
-    const Likeness told = likeness_measure(&coarse, &fine, 0.01, NULL);
+    const SignalComparison told = signal_comparison_measure(&coarse, &fine, 0.01, NULL);
     assert_near(told.from, 1.01, 1e-12);
     assert_near(told.to, 4.0, 1e-12);
     assert_true(told.samples == 300);
     assert_true(told.relative < 1e-12 && told.difference_peak < 1e-12);
-    const Likeness other = likeness_measure(&fine, &coarse, 0.01, NULL);
+    const SignalComparison other = signal_comparison_measure(&fine, &coarse, 0.01, NULL);
     assert_true(other.samples == 300 && other.relative < 1e-12);
     free(x);
     free(y);
@@ -59,7 +59,7 @@ static void numbers_are_those_of_the_definitions(void **state) {
     (void)state;
     const double x[] = {1, -2, 3, 0}, y[] = {1, -2, 4, -1};
     const Signal a = {x, 4, 2, 0}, b = {y, 4, 2, 0};
-    const Likeness told = likeness_measure(&a, &b, 0.25, NULL);
+    const SignalComparison told = signal_comparison_measure(&a, &b, 0.25, NULL);
     assert_near(told.rms, sqrt(14.0 / 4), 1e-15);
     assert_near(told.other_rms, sqrt(22.0 / 4), 1e-15);
     assert_near(told.difference_rms, sqrt(0.5), 1e-15);
@@ -67,19 +67,19 @@ static void numbers_are_those_of_the_definitions(void **state) {
     assert_true(told.peak == 3 && told.other_peak == 4 && told.difference_peak == 1);
     assert_near(told.correlation, 16 / sqrt(13.0 * 21), 1e-14);
     assert_true(told.parting == 1); // 1 is more than a quarter of 3
-    assert_true(isnan(likeness_measure(&a, &b, 0.5, NULL).parting));
+    assert_true(isnan(signal_comparison_measure(&a, &b, 0.5, NULL).parting));
 }
 
 static void what_does_not_overlap_has_nothing_in_common(void **state) {
     (void)state;
     const double x[] = {1, 2};
     const Signal a = {x, 2, 1, 0}, b = {x, 2, 1, 5}, none = {NULL, 0, 1, 0};
-    assert_true(likeness_measure(&a, &b, 0.1, NULL).samples == 0);
-    assert_true(isnan(likeness_measure(&a, &b, 0.1, NULL).rms));
-    assert_true(likeness_measure(&a, &none, 0.1, NULL).samples == 0);
+    assert_true(signal_comparison_measure(&a, &b, 0.1, NULL).samples == 0);
+    assert_true(isnan(signal_comparison_measure(&a, &b, 0.1, NULL).rms));
+    assert_true(signal_comparison_measure(&a, &none, 0.1, NULL).samples == 0);
     Columns pair = {0};
     double rate;
-    assert_int_equal(likeness_pair(&a, &b, 1, &pair, &rate, NULL), STATUS_LIMIT);
+    assert_int_equal(signal_comparison_align(&a, &b, 1, &pair, &rate, NULL), STATUS_LIMIT);
 }
 
 static void a_shift_is_found_to_a_part_of_a_sample(void **state) {
@@ -92,7 +92,7 @@ static void a_shift_is_found_to_a_part_of_a_sample(void **state) {
         double *y = sampled(500, 2001, 1.5);
         const Signal b = {y, 2001, 500, 1.5 - shifts[i]};
         double shift;
-        assert_int_equal(likeness_shift(&a, &b, 3, &shift, NULL), STATUS_OK);
+        assert_int_equal(signal_comparison_shift(&a, &b, 3, &shift, NULL), STATUS_OK);
         assert_near(shift, shifts[i], 1e-3);
         free(y);
     }
@@ -107,7 +107,7 @@ static void a_copy_behind_silence_is_found_at_its_sample(void **state) {
     for (size_t i = 0; i < COUNT_X; i++) // begins with its largest value
         y[i + SILENCE] = x[i] = exp(-0.002 * (double)i) * cos(0.025 * (double)i);
     const Signal a = {x, COUNT_X, 1000, 0}, b = {y, COUNT_X + SILENCE, 1000, 0};
-    assert_int_equal(likeness_shift(&a, &b, 1, &shift, NULL), STATUS_OK);
+    assert_int_equal(signal_comparison_shift(&a, &b, 1, &shift, NULL), STATUS_OK);
     assert_near(shift, -0.037, 1e-12);
     free(x);
     free(y);
@@ -118,7 +118,7 @@ static void nothing_is_more_alike_than_alike(void **state) {
     for (size_t count = 2; count < 2000; count++) {
         double *x = sampled(100, count, 0);
         const Signal signal = {x, count, 100, 0};
-        assert_true(likeness_measure(&signal, &signal, 0.01, NULL).correlation <= 1);
+        assert_true(signal_comparison_measure(&signal, &signal, 0.01, NULL).correlation <= 1);
         free(x);
     }
 }
@@ -127,12 +127,12 @@ static void a_shift_stays_within_what_is_allowed(void **state) {
     (void)state;
     double *x = sampled(200, 2001, 0), *y = sampled(200, 1001, 1), shift;
     const Signal a = {x, 2001, 200, 0}, b = {y, 1001, 200, 0}; // 1 s would be right
-    assert_int_equal(likeness_shift(&a, &b, 0.3, &shift, NULL), STATUS_OK);
+    assert_int_equal(signal_comparison_shift(&a, &b, 0.3, &shift, NULL), STATUS_OK);
     assert_true(fabs(shift) <= 0.3 + 1.0 / 200);
     const Signal late = {y, 1001, 200, 100};
-    assert_int_equal(likeness_shift(&a, &late, 1, &shift, NULL), STATUS_LIMIT);
+    assert_int_equal(signal_comparison_shift(&a, &late, 1, &shift, NULL), STATUS_LIMIT);
     const Signal lone = {y, 1, 200, 0};
-    assert_int_equal(likeness_shift(&a, &lone, 1, &shift, NULL), STATUS_LIMIT);
+    assert_int_equal(signal_comparison_shift(&a, &lone, 1, &shift, NULL), STATUS_LIMIT);
     free(x);
     free(y);
 }
@@ -149,9 +149,9 @@ static void a_long_measurement_stops_soon_when_it_is_told_to(void **state) {
     const Signal signal = {.values = values, .count = MANY, .rate = 1000};
     int looks = 0;
     const Progress progress = {&looks, stop_at_third};
-    assert_true(isnan(likeness_measure(&signal, &signal, 0.5, &progress).rms));
+    assert_true(isnan(signal_comparison_measure(&signal, &signal, 0.5, &progress).rms));
     assert_int_equal(looks, 3);
-    assert_true(likeness_measure(&signal, &signal, 0.5, NULL).rms == 0);
+    assert_true(signal_comparison_measure(&signal, &signal, 0.5, NULL).rms == 0);
     test_free(values);
 }
 
@@ -167,6 +167,6 @@ int main(void) {
         cmocka_unit_test(a_shift_stays_within_what_is_allowed),
         cmocka_unit_test(a_long_measurement_stops_soon_when_it_is_told_to),
     };
-    fourier_start();
+    fft_start();
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -33,12 +33,12 @@ static void twice_the_density_is_three_decibels_off(void **state) {
     (void)state;
     fill();
     const Spectrum a = spectrum_of(frequency);
-    const Distance told = distance_measure(&a, wanted, &a, other, 10, 20);
+    const SpectrumDistance told = spectrum_distance_measure(&a, wanted, &a, other, 10, 20);
     assert_true(told.from == 10 && told.to == 20);
     assert_near(told.level, 10 * log10(2));
     assert_near(told.difference, 1);
     assert_near(told.power, 1);
-    const Distance back = distance_measure(&a, other, &a, wanted, 10, 20);
+    const SpectrumDistance back = spectrum_distance_measure(&a, other, &a, wanted, 10, 20);
     assert_near(back.power, -0.5);
     assert_near(back.level, told.level);
 }
@@ -50,20 +50,21 @@ static void without_a_band_it_is_where_the_power_is(void **state) {
         wanted[k] = 1e-9;
     wanted[0] = 1e9; // the mean does not count
     const Spectrum a = spectrum_of(frequency);
-    const Distance told = distance_measure(&a, wanted, &a, other, (double)NAN, (double)NAN);
+    const SpectrumDistance told =
+        spectrum_distance_measure(&a, wanted, &a, other, (double)NAN, (double)NAN);
     assert_true(told.from == 1 && told.to == 30);
-    assert_true(distance_band_end(wanted, ROWS) == 31);
+    assert_true(spectrum_distance_band_end(wanted, ROWS) == 31);
 }
 
 static void a_band_ends_where_the_other_has_no_bins(void **state) {
     (void)state;
     fill();
     const Spectrum a = spectrum_of(frequency), b = spectrum_of(half_frequency);
-    const Distance told = distance_measure(&a, wanted, &b, other, 40, 90);
+    const SpectrumDistance told = spectrum_distance_measure(&a, wanted, &b, other, 40, 90);
     assert_true(told.from == 40 && told.to == 50);
     assert_near(told.level, 10 * log10(2));
-    assert_true(isnan(distance_measure(&a, wanted, &b, other, 60, 90).level));
-    assert_true(isnan(distance_level(&a, wanted, &b, other, 1, ROWS)));
+    assert_true(isnan(spectrum_distance_measure(&a, wanted, &b, other, 60, 90).level));
+    assert_true(isnan(spectrum_distance_level(&a, wanted, &b, other, 1, ROWS)));
 }
 
 static void what_has_no_power_has_no_distance(void **state) {
@@ -72,11 +73,12 @@ static void what_has_no_power_has_no_distance(void **state) {
     for (size_t k = 0; k < ROWS; k++)
         wanted[k] = 0;
     const Spectrum a = spectrum_of(frequency);
-    assert_true(isnan(distance_measure(&a, wanted, &a, other, (double)NAN, (double)NAN).level));
-    const Distance told = distance_measure(&a, wanted, &a, other, 1, 5);
+    assert_true(
+        isnan(spectrum_distance_measure(&a, wanted, &a, other, (double)NAN, (double)NAN).level));
+    const SpectrumDistance told = spectrum_distance_measure(&a, wanted, &a, other, 1, 5);
     assert_true(isnan(told.level) && isnan(told.power) && told.to == 5);
     const Spectrum empty = {0};
-    assert_true(isnan(distance_measure(&empty, wanted, &a, other, 1, 5).from));
+    assert_true(isnan(spectrum_distance_measure(&empty, wanted, &a, other, 1, 5).from));
 }
 
 int main(void) {

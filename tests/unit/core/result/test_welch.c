@@ -20,21 +20,21 @@ static const char *const unit[] = {"m^2/Hz", "(m/s)^2/Hz"};
 // Two columns of noise, the second one's upon a steep line.
 static Columns columns_of(size_t rows) {
     Columns columns;
-    assert_int_equal(columns_make(&columns, 2, rows, 0, NULL), STATUS_OK);
+    assert_int_equal(columns_allocate(&columns, 2, rows, 0, NULL), STATUS_OK);
     columns_name(&columns, 0, "displacement", "m");
     columns_name(&columns, 1, "velocity", "m/s");
     for (size_t i = 0; i < rows; i++) {
         double pair[2];
-        noise_normal_pair(1, 1, i, pair);
+        philox_normal_pair(1, 1, i, pair);
         columns.at[0].values[i] = pair[0];
         columns.at[1].values[i] = pair[1] + 3 + 0.1 * (double)i;
     }
     return columns;
 }
 
-static Spectrum welch(const Columns *columns, SpectrumSettings settings, double rate) {
+static Spectrum welch(const Columns *columns, WelchSettings settings, double rate) {
     Spectrum spectrum;
-    assert_int_equal(spectrum_welch(columns, unit, rate, &settings, NULL, NULL, &spectrum, NULL),
+    assert_int_equal(welch_spectrum(columns, unit, rate, &settings, NULL, NULL, &spectrum, NULL),
                      STATUS_OK);
     return spectrum;
 }
@@ -44,11 +44,11 @@ static long double slow_window(int window, size_t n, size_t length) {
     if (length == 1)
         return 1;
     switch (window) {
-    case WINDOW_HANN:
+    case WELCH_HANN:
         return 0.5L - 0.5L * cosl(angle);
-    case WINDOW_HAMMING:
+    case WELCH_HAMMING:
         return 0.54L - 0.46L * cosl(angle);
-    case WINDOW_BLACKMAN:
+    case WELCH_BLACKMAN:
         return 0.42L - 0.5L * cosl(angle) + 0.08L * cosl(2 * angle);
     default:
         return 1;
@@ -65,11 +65,12 @@ static void slow_trend(int detrend, const double *x, size_t length, long double 
         y += x[i];
         ty += (long double)i * x[i];
     }
-    *slope = detrend == DETREND_LINEAR && length > 1 ? (n * ty - t * y) / (n * tt - t * t) : 0;
-    *level = detrend == DETREND_NONE ? 0 : (y - *slope * t) / n;
+    *slope =
+        detrend == WELCH_DETREND_LINEAR && length > 1 ? (n * ty - t * y) / (n * tt - t * t) : 0;
+    *level = detrend == WELCH_DETREND_NONE ? 0 : (y - *slope * t) / n;
 }
 
-static long double slow_density(const double *x, size_t rows, const SpectrumSettings *settings,
+static long double slow_density(const double *x, size_t rows, const WelchSettings *settings,
                                 double rate, size_t k) {
     const size_t length = settings->segment;
     long double squares = 0, power = 0, segments = 0;
@@ -102,10 +103,10 @@ static void densities_equal_a_slow_sum_for_every_window_and_trend(void **state) 
         {5, 1, 0},   {3, 3, 2},   {1, 1, 0},  {40, 39, 38},
     };
     for (size_t s = 0; s < COUNT(shapes); s++)
-        for (int window = WINDOW_HANN; window <= WINDOW_BLACKMAN; window++)
-            for (int detrend = DETREND_CONSTANT; detrend <= DETREND_NONE; detrend++) {
-                const SpectrumSettings settings = {shapes[s].segment, shapes[s].overlap, window,
-                                                   detrend};
+        for (int window = WELCH_HANN; window <= WELCH_BLACKMAN; window++)
+            for (int detrend = WELCH_DETREND_CONSTANT; detrend <= WELCH_DETREND_NONE; detrend++) {
+                const WelchSettings settings = {shapes[s].segment, shapes[s].overlap, window,
+                                                detrend};
                 Columns columns = columns_of(shapes[s].rows);
                 Spectrum spectrum = welch(&columns, settings, 8);
                 for (size_t c = 0; c < 2; c++) {
@@ -131,7 +132,7 @@ static void a_boxcar_density_integrates_to_the_mean_square(void **state) {
         const double rate = 977;
         Columns columns = columns_of(rows);
         Spectrum spectrum =
-            welch(&columns, (SpectrumSettings){rows, 0, WINDOW_BOXCAR, DETREND_NONE}, rate);
+            welch(&columns, (WelchSettings){rows, 0, WELCH_BOXCAR, WELCH_DETREND_NONE}, rate);
         assert_int_equal(spectrum.segments, 1);
         for (size_t c = 0; c < 2; c++) {
             long double square = 0, integral = 0;
@@ -151,7 +152,7 @@ static void a_boxcar_density_integrates_to_the_mean_square(void **state) {
 static void many_short_segments_lose_no_digits(void **state) {
     (void)state;
     Columns columns = columns_of(1000000);
-    Spectrum spectrum = welch(&columns, (SpectrumSettings){1, 0, WINDOW_HANN, DETREND_NONE}, 4);
+    Spectrum spectrum = welch(&columns, (WelchSettings){1, 0, WELCH_HANN, WELCH_DETREND_NONE}, 4);
     long double square = 0;
     for (size_t n = 0; n < columns.rows; n++)
         square += (long double)columns.at[0].values[n] * columns.at[0].values[n] /
@@ -166,7 +167,7 @@ static void frequencies_names_and_units_stand_beside_the_densities(void **state)
     (void)state;
     Columns columns = columns_of(1000);
     Spectrum spectrum =
-        welch(&columns, (SpectrumSettings){100, 50, WINDOW_HANN, DETREND_CONSTANT}, 250);
+        welch(&columns, (WelchSettings){100, 50, WELCH_HANN, WELCH_DETREND_CONSTANT}, 250);
     assert_int_equal(spectrum.densities.rows, 51);
     assert_int_equal(spectrum.segments, 19);
     assert_true(spectrum.frequency[0] == 0 && spectrum.frequency[1] == 2.5 &&
@@ -182,14 +183,14 @@ static void frequencies_names_and_units_stand_beside_the_densities(void **state)
 
 static void settings_that_make_no_sense_are_refused(void **state) {
     (void)state;
-    static const SpectrumSettings bad[] = {
+    static const WelchSettings bad[] = {
         {0, 0, 0, 0}, {11, 0, 0, 0}, {5, 5, 0, 0}, {5, SIZE_MAX, 0, 0},
         {5, 0, 4, 0}, {5, 0, -1, 0}, {5, 0, 0, 3}, {5, 0, 0, -1},
     };
     Columns columns = columns_of(10);
     for (size_t i = 0; i < COUNT(bad); i++) {
         Spectrum spectrum;
-        assert_int_equal(spectrum_welch(&columns, unit, 1, &bad[i], NULL, NULL, &spectrum, NULL),
+        assert_int_equal(welch_spectrum(&columns, unit, 1, &bad[i], NULL, NULL, &spectrum, NULL),
                          STATUS_INVALID);
         assert_null(spectrum.frequency);
         assert_int_equal(spectrum.densities.count, 0);
@@ -213,17 +214,17 @@ static void the_watch_sees_progress_and_can_stop(void **state) {
     (void)state;
     static Problem problem;
     Columns columns = columns_of(300000);
-    const SpectrumSettings settings = {4096, 2048, WINDOW_HANN, DETREND_CONSTANT};
+    const WelchSettings settings = {4096, 2048, WELCH_HANN, WELCH_DETREND_CONSTANT};
     Spectrum spectrum;
     Looks looks = {.most = 1000};
     const Progress progress = {&looks, look};
-    assert_int_equal(spectrum_welch(&columns, unit, 1, &settings, &progress, NULL, &spectrum, NULL),
+    assert_int_equal(welch_spectrum(&columns, unit, 1, &settings, &progress, NULL, &spectrum, NULL),
                      STATUS_OK);
     assert_true(looks.count > 10 && looks.last > 0.9);
     spectrum_clear(&spectrum);
     looks = (Looks){.most = 3};
     assert_int_equal(
-        spectrum_welch(&columns, unit, 1, &settings, &progress, NULL, &spectrum, &problem),
+        welch_spectrum(&columns, unit, 1, &settings, &progress, NULL, &spectrum, &problem),
         STATUS_CANCELLED);
     assert_int_equal(looks.count, 3);
     assert_null(spectrum.frequency);
@@ -239,6 +240,6 @@ int main(void) {
         cmocka_unit_test(settings_that_make_no_sense_are_refused),
         cmocka_unit_test(the_watch_sees_progress_and_can_stop),
     };
-    fourier_start();
+    fft_start();
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -23,7 +23,7 @@ static Material sponge(void) {
 static void expect(const Material *material, const char *pointer, const char *words) {
     static Problem problem;
     problem_clear(&problem);
-    const Status status = material_check(material, "", &problem);
+    const Status status = material_validate(material, "", &problem);
     if (pointer == NULL) {
         if (status != STATUS_OK)
             fail_msg("%s: %s", problem.faults[0].pointer, problem.faults[0].detail);
@@ -116,13 +116,13 @@ static void the_speeds_measured_are_stated_or_the_tables(void **state) {
     MaterialRow rows[] = {{0.1, 0.7, 0.02, nan, nan}, {0.5, 0.6, 0.018, nan, nan}};
     Material material = sponge();
     double least, most;
-    material_speeds(&material, &least, &most);
+    material_speed_range(&material, &least, &most);
     assert_true(isnan(least) && isnan(most));
     material.table = (MaterialRows){rows, 2};
-    material_speeds(&material, &least, &most);
+    material_speed_range(&material, &least, &most);
     assert_true(least == 0.1 && most == 0.5);
     material.most_speed = 0.7;
-    material_speeds(&material, &least, &most);
+    material_speed_range(&material, &least, &most);
     assert_true(least == 0.1 && most == 0.7);
 }
 
@@ -146,13 +146,13 @@ static void slugs_are_plain(void **state) {
     char longest[MATERIAL_SLUG_MAX + 2];
     memset(longest, 'a', sizeof longest);
     longest[MATERIAL_SLUG_MAX] = '\0';
-    assert_true(material_slug_is_good("soft_rubber-2"));
-    assert_true(material_slug_is_good(longest));
+    assert_true(material_slug_is_valid("soft_rubber-2"));
+    assert_true(material_slug_is_valid(longest));
     longest[MATERIAL_SLUG_MAX] = 'a';
     longest[MATERIAL_SLUG_MAX + 1] = '\0';
     const char *const bad[] = {"", "Sponge", "a b", "a@1", "a/b", "\xc3\xa4", longest};
     for (size_t i = 0; i < COUNT(bad); i++)
-        assert_false(material_slug_is_good(bad[i]));
+        assert_false(material_slug_is_valid(bad[i]));
 }
 
 int main(void) {

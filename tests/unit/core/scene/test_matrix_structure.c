@@ -19,7 +19,7 @@ static void what_is_not_given_is_no_damping_and_a_base_that_carries_all(void **s
     document_pass(&simulation, MATRICES(MASS ", " STIFFNESS));
     double all[14] = {0};
     const Structure *structure = scene_structure(&simulation.scene);
-    structure_fill(structure, &(const Matrices){all, all + 4, all + 8, all + 12});
+    structure_assemble(structure, &(const StructureMatrices){all, all + 4, all + 8, all + 12});
     const double wanted[14] = {2, .5, .5, 1, 5, -3, -3, 4, 0, 0, 0, 0, 1, 1};
     for (size_t i = 0; i < 14; i++)
         assert_true(all[i] == wanted[i]);

@@ -21,7 +21,7 @@ static void matrices_follow_the_storeys_from_the_ground_up(void **state) {
     double all[30] = {0};
     const Structure *structure = scene_structure(&simulation.scene);
     assert_int_equal(structure_storeys(structure), 3);
-    structure_fill(structure, &(const Matrices){all, all + 9, all + 18, all + 27});
+    structure_assemble(structure, &(const StructureMatrices){all, all + 9, all + 18, all + 27});
     const double wanted[30] = {1, 0,   0,  0, 2, 0, 0, 0, 3,  30, -20, 0, -20, 50, -30,
                                0, -30, 30, 1, 0, 0, 0, 2, -2, 0,  -2,  2, 1,   1,  1};
     for (size_t i = 0; i < 30; i++)
@@ -36,12 +36,12 @@ static void no_damping_is_a_list_of_zeros(void **state) {
     (void)state;
     Simulation simulation;
     document_pass(&simulation, FRAME(SPRINGS));
-    const StructureFrame *frame = (const StructureFrame *)(void *)simulation.scene.structure;
+    const ShearFrame *frame = (const ShearFrame *)(void *)simulation.scene.structure;
     assert_int_equal(frame->dampings.count, 3);
     assert_true(frame->dampings.at[0] == 0 && frame->dampings.at[2] == 0);
     simulation_clear(&simulation);
     document_pass(&simulation, FRAME(SPRINGS ", \"damping_ratio\": 0.05"));
-    frame = (const StructureFrame *)(void *)simulation.scene.structure;
+    frame = (const ShearFrame *)(void *)simulation.scene.structure;
     assert_int_equal(frame->dampings.count, 0);
     simulation_clear(&simulation);
 }

@@ -10,28 +10,29 @@
 
 static Problem problem;
 
-static StructureSdof sdof(double damping, double ratio) {
-    return (StructureSdof){.structure = {{&structure_sdof.kind}, ratio},
+static SdofStructure sdof(double damping, double ratio) {
+    return (SdofStructure){.structure = {{&structure_sdof.kind}, ratio},
                            .mass = 1.35,
                            .stiffness = 865,
                            .damping = damping};
 }
 
-static double structure_damping(const StructureSdof *structure) {
+static double structure_damping(const SdofStructure *structure) {
     double all[4] = {0};
-    structure_fill(&structure->structure, &(const Matrices){all, all + 1, all + 2, all + 3});
+    structure_assemble(&structure->structure,
+                       &(const StructureMatrices){all, all + 1, all + 2, all + 3});
     assert_true(all[0] == structure->mass && all[1] == structure->stiffness && all[3] == 1);
     return all[2];
 }
 
-static Status complete(StructureSdof *structure) {
+static Status complete(SdofStructure *structure) {
     problem_clear(&problem);
     return structure_complete(&structure->structure, "/structure", &problem);
 }
 
 static void no_damping_is_damping_of_zero(void **state) {
     (void)state;
-    StructureSdof structure = sdof((double)NAN, (double)NAN);
+    SdofStructure structure = sdof((double)NAN, (double)NAN);
     assert_int_equal(complete(&structure), STATUS_OK);
     assert_true(structure.damping == 0);
     assert_true(structure_damping(&structure) == 0);
@@ -39,7 +40,7 @@ static void no_damping_is_damping_of_zero(void **state) {
 
 static void damping_may_be_given_by_its_ratio(void **state) {
     (void)state;
-    StructureSdof structure = sdof((double)NAN, 0.016);
+    SdofStructure structure = sdof((double)NAN, 0.016);
     assert_int_equal(complete(&structure), STATUS_OK);
     assert_true(isnan(structure.damping));
     assert_true(fabs(structure_damping(&structure) - 0.032 * sqrt(865 * 1.35)) < 1e-15);
@@ -53,7 +54,7 @@ static void damping_may_be_given_by_its_ratio(void **state) {
 
 static void both_at_once_are_a_fault(void **state) {
     (void)state;
-    StructureSdof structure = sdof(1, 0.016);
+    SdofStructure structure = sdof(1, 0.016);
     assert_int_equal(complete(&structure), STATUS_INVALID);
     assert_string_equal(detail_at(&problem, "/structure/damping_ratio"),
                         "excludes damping: give one of the two");
@@ -62,11 +63,11 @@ static void both_at_once_are_a_fault(void **state) {
 
 static void the_rows_refuse_what_is_no_structure(void **state) {
     (void)state;
-    StructureSdof structure = sdof(-1, (double)NAN);
+    SdofStructure structure = sdof(-1, (double)NAN);
     structure.mass = 0;
     structure.stiffness = -865;
     problem_clear(&problem);
-    fields_check(structure_sdof.kind.fields, &structure, "/structure", &problem);
+    fields_validate(structure_sdof.kind.fields, &structure, "/structure", &problem);
     assert_int_equal(problem.count, 3);
     assert_string_equal(detail_at(&problem, "/structure/mass"), "must be above 0 kg, is 0");
     assert_string_equal(detail_at(&problem, "/structure/stiffness"),

@@ -9,7 +9,7 @@
 #include <cmocka.h>
 
 #include "core/base/canonical.h"
-#include "core/result/metric.h"
+#include "core/result/response.h"
 #include "core/simulation/simulation.h"
 #include "core/solve/solvers.h"
 #include "tests/support/document.h"

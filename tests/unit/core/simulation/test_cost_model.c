@@ -282,6 +282,6 @@ int main(void) {
         cmocka_unit_test(a_contact_among_many_masses_is_foretold_by_their_number),
         cmocka_unit_test(coupled_flight_is_foretold_by_the_pairs_of_modes),
     };
-    fourier_start();
+    fft_start();
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -17,8 +17,8 @@ static Outcome outcome_make(size_t count, double rate, size_t bins) {
     outcome.summary.error_estimate = 1e-14;
     outcome.summary.trust_horizon = (double)NAN;
     outcome.summary.rms_displacement = 1;
-    assert_int_equal(columns_make(&outcome.response.series, 2, count, 0, NULL), STATUS_OK);
-    assert_int_equal(columns_make(&outcome.spectrum.densities, 1, bins, 0, NULL), STATUS_OK);
+    assert_int_equal(columns_allocate(&outcome.response.series, 2, count, 0, NULL), STATUS_OK);
+    assert_int_equal(columns_allocate(&outcome.spectrum.densities, 1, bins, 0, NULL), STATUS_OK);
     outcome.spectrum.frequency = calloc(bins, sizeof(double));
     assert_non_null(outcome.spectrum.frequency);
     for (size_t i = 0; i < count; i++) {
@@ -78,7 +78,7 @@ static void samples_are_compared_within_the_horizon_only(void **state) {
     a.summary.trust_horizon = 0.3;
     a.summary.error_estimate = 1;
     b.response.series.at[0].values[20] -= 0.25;
-    assert_true(measure(&a, &b).displacement == RESPONSE_PARTING);
+    assert_true(measure(&a, &b).displacement == RESPONSE_DIVERGENCE);
     b.summary.rms_displacement = 1.5; // of the whole run, whatever the horizon
     assert_true(measure(&a, &b).rms_displacement == 0.5);
     outcome_free(&a);

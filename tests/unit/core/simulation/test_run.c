@@ -140,7 +140,7 @@ static void a_run_at_rest_can_be_stopped(void **state) {
 }
 
 int main(void) {
-    fourier_start();
+    fft_start();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_workspace_leaves_no_trace_in_a_run),
         cmocka_unit_test(a_run_looks_many_times_while_its_columns_are_made_ready),

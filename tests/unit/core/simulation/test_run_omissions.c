@@ -152,7 +152,7 @@ static void where_no_stop_is_reached_none_is_looked_for(void **state) {
         Outcome *outcome = outcome_of(scenes[i]);
         assert_left_out(outcome, "contacts");
         assert_true(left_out(&outcome->plan, "contacts")->value < 1);
-        const Work *work = &outcome->work;
+        const WorkCounters *work = &outcome->work;
         assert_int_equal(work->stop_searches, 0);
         assert_int_equal(work->contacts + work->bounces + work->rests, 0);
         assert_int_equal(work->neighbour_samples, 0);
@@ -179,7 +179,7 @@ static void solvers_that_step_look_for_no_stops_either(void **state) {
                                ", \"accuracy\": {%s}",
                      is_far ? "0.1" : "0.015", settings[i]);
             Outcome *outcome = outcome_of(members);
-            const Work *work = &outcome->work;
+            const WorkCounters *work = &outcome->work;
             assert_int_equal(work->stop_searches == 0, is_far);
             assert_int_equal(left_out(&outcome->plan, "contacts") != NULL, is_far);
             assert_int_equal(work->contacts > 0, !is_far);
@@ -269,7 +269,7 @@ static void where_nothing_moves_nothing_is_integrated(void **state) {
                  bases[i % COUNT(bases)], solvers[i / COUNT(bases)]);
         Outcome *outcome = outcome_of(members);
         assert_left_out(outcome, "motion");
-        const Work *work = &outcome->work;
+        const WorkCounters *work = &outcome->work;
         assert_int_equal(work->flight_samples + work->unforced_samples + work->arcs + work->steps +
                              work->stop_searches,
                          0);
@@ -407,7 +407,7 @@ static void a_plan_tells_beforehand_what_it_can(void **state) {
 }
 
 int main(void) {
-    fourier_start();
+    fft_start();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(where_no_stop_is_reached_none_is_looked_for),
         cmocka_unit_test(solvers_that_step_look_for_no_stops_either),

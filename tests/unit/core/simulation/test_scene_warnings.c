@@ -9,8 +9,8 @@
 
 #include <cmocka.h>
 
-#include "core/base/side.h"
 #include "core/math/fft.h"
+#include "core/result/response.h"
 #include "core/simulation/simulation.h"
 #include "tests/support/fields.h"
 #include "tests/support/scenes.h"
@@ -26,8 +26,8 @@ static Damper *damper_of(Simulation *simulation) {
     return &simulation->scene.dampers.at[0];
 }
 
-static StructureSdof *sdof_of(Simulation *simulation) {
-    return (StructureSdof *)(void *)simulation->scene.structure;
+static SdofStructure *sdof_of(Simulation *simulation) {
+    return (SdofStructure *)(void *)simulation->scene.structure;
 }
 
 static void implausible_values_get_a_warning_each(void **state) {
@@ -417,7 +417,7 @@ a_test_with_other_masses_is_told_where_its_numbers_are_taken_for_the_scene(void 
 }
 
 int main(void) {
-    fourier_start();
+    fft_start();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(implausible_values_get_a_warning_each),
         cmocka_unit_test(what_an_excitation_doubts_of_itself_becomes_a_warning),

@@ -45,7 +45,7 @@ static void assert_states_its_error(const char *text) {
     const double until = isnan(summary->trust_horizon) ? INFINITY : 0.7 * summary->trust_horizon;
     const double error = isnan(summary->trust_horizon)
                              ? summary->error_estimate
-                             : fmin(summary->error_estimate, RESPONSE_PARTING);
+                             : fmin(summary->error_estimate, RESPONSE_DIVERGENCE);
     double largest = 0, apart = 0;
     for (size_t i = 0; i < exact->response.count; i++) {
         largest = fmax(largest, fabs(b[i]));

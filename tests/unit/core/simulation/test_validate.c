@@ -25,8 +25,8 @@ static Damper *damper_of(Simulation *simulation) {
     return &simulation->scene.dampers.at[0];
 }
 
-static StructureSdof *sdof_of(Simulation *simulation) {
-    return (StructureSdof *)(void *)simulation->scene.structure;
+static SdofStructure *sdof_of(Simulation *simulation) {
+    return (SdofStructure *)(void *)simulation->scene.structure;
 }
 
 static void want(Texts *texts, size_t count, const char *const *names) {
@@ -68,8 +68,8 @@ static void the_papers_scene_is_sound_and_complete(void **state) {
     assert_int_equal(simulation.output.channels.count, 5);
     assert_int_equal(simulation.output.psd.segment, 4096);
     assert_int_equal(simulation.output.psd.overlap, 2048);
-    assert_int_equal(simulation.output.psd.window, WINDOW_HANN);
-    assert_int_equal(simulation.output.psd.detrend, DETREND_CONSTANT);
+    assert_int_equal(simulation.output.psd.window, WELCH_HANN);
+    assert_int_equal(simulation.output.psd.detrend, WELCH_DETREND_CONSTANT);
     assert_int_equal(damper_of(&simulation)->storey, 1);
     assert_ptr_equal(simulation.accuracy->kind, solvers[0]);
     simulation_clear(&simulation);
@@ -295,7 +295,7 @@ static void a_scene_that_would_take_too_long_is_refused_beforehand(void **state)
     scene_with_damper(&simulation, 0.61, 0.025);
     problem_clear(&told.problem);
     assert_int_equal(simulation_complete(&simulation, &few, NULL, &told.problem), STATUS_OK);
-    ((StructureSdof *)(void *)simulation.scene.structure)->damping = 1e12;
+    ((SdofStructure *)(void *)simulation.scene.structure)->damping = 1e12;
     assert_int_equal(simulation_complete(&simulation, &few, NULL, &told.problem), STATUS_INVALID);
     assert_true(problem_concerns(&told.problem, "/duration"));
     simulation_clear(&simulation);

@@ -42,7 +42,7 @@ static State by_exponential(const Motion *m, const State *start, const Slice *sl
     system[W * SIZE + W] = -(long double)m->contact_damping;
     system[A * SIZE + B] = slice->omega > 0 ? slice->omega : 1;
     system[B * SIZE + A] = -(long double)slice->omega;
-    exponential(system, SIZE, length, transition);
+    matrix_exponential(system, SIZE, length, transition);
     const double y[SIZE] = {start->x, start->v, start->r, start->w, slice->value, slice->slope};
     for (int i = 0; i < SIZE; i++) {
         end[i] = 0;
@@ -100,13 +100,15 @@ static void a_cut_arc_is_the_arc_up_to_there(void **state) {
     Arc arc;
     arc_make(&arc, &motion, &start, &slice, 1 / motion.rate);
     const State inside = arc_at(&arc, 0.37);
-    const double force = root_value(arc.force, arc.degree - 1, 0.37) / (arc.length * arc.length);
+    const double force =
+        polynomial_value(arc.force, arc.degree - 1, 0.37) / (arc.length * arc.length);
     arc_cut(&arc, 0.37);
     const State end = arc_end(&arc);
     assert_state(&end, &inside, motion.rate);
-    assert_close(root_value(arc.force, arc.degree - 1, 1) / (arc.length * arc.length), force, 1e4);
+    assert_close(polynomial_value(arc.force, arc.degree - 1, 1) / (arc.length * arc.length), force,
+                 1e4);
     assert_close(arc.length, 0.37 / motion.rate, 1);
-    assert_close(root_value(arc.base, arc.degree, 1), slice_at(&slice, arc.length), 1);
+    assert_close(polynomial_value(arc.base, arc.degree, 1), slice_at(&slice, arc.length), 1);
 }
 
 // Quadrature against exact integrals of the same motion, by the quadratic form.
@@ -138,7 +140,7 @@ static void integrals_are_exact(void **state) {
             const int pairs[4][2] = {{0, 0}, {1, 1}, {2, 0}, {2, 1}};
             const double values[4] = {integrals.vv, integrals.ww, integrals.av, integrals.aw};
             for (int p = 0; p < 4; p++) {
-                exponential_forms(
+                matrix_exponential_forms(
                     system, SIZE, length, 1,
                     (const long double *const[1][2]){{rows[pairs[p][0]], rows[pairs[p][1]]}}, form);
                 long double sum = 0;
@@ -164,7 +166,7 @@ static void the_peak_force_is_found_inside_an_arc(void **state) {
         arc_make(&arc, &motion, &at, &slice, 1 / motion.rate);
         peak = arc_peak_force(&arc, peak, &s);
         for (int j = 0; j <= 10000; j++)
-            scanned = fmax(scanned, fabs(root_value(arc.force, arc.degree - 1, j / 1e4)) /
+            scanned = fmax(scanned, fabs(polynomial_value(arc.force, arc.degree - 1, j / 1e4)) /
                                         (arc.length * arc.length));
         at = arc_end(&arc);
     }

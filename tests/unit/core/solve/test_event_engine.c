@@ -200,8 +200,8 @@ static Plan *shaken_frame(size_t dampers, bool is_impulse, double split) {
     for (size_t d = 0; d < dampers; d++) {
         frames_damper(plan, d, 2, 0.8 / split, 0.02, 0.6, is_impulse ? NAN : 0.02);
         // Of the whole mass, so that equal parts make one whole.
-        const Identified whole =
-            identify_measured(effective_mass(10, 0.8), 0.6, 0.02, SEPARATION_ZERO_PENETRATION);
+        const Identification whole = identification_from_restitution(
+            contact_effective_mass(10, 0.8), 0.6, 0.02, SEPARATION_ZERO_PENETRATION);
         for (int side = 0; side < 2; side++) {
             plan->dampers[d].stops[side].stiffness = whole.stiffness / split;
             plan->dampers[d].stops[side].damping = whole.damping / split;
@@ -496,7 +496,7 @@ static void a_short_pulse_costs_what_a_long_one_does(void **state) {
 }
 
 int main(void) {
-    fourier_start();
+    fft_start();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_papers_scenes_are_those_of_the_single_engine),
         cmocka_unit_test(free_vibration_without_dampers_is_the_closed_form),

@@ -31,7 +31,7 @@ typedef struct Pair {
 // From mid-clearance with speed towards the right stop, until shortly after the contact.
 static void pair_scene(Simulation *simulation, const Pair *pair) {
     scene_with_damper(simulation, pair->restitution, pair->contact_time);
-    StructureSdof *sdof = (StructureSdof *)(void *)simulation->scene.structure;
+    SdofStructure *sdof = (SdofStructure *)(void *)simulation->scene.structure;
     sdof->mass = 1.35;
     sdof->stiffness = sdof->damping = 0;
     Damper *damper = &simulation->scene.dampers.at[0];
@@ -133,7 +133,7 @@ static void power_laws_last_as_recorded_and_part_as_they_say(void **state) {
         for (size_t i = 0; i < COUNT(es); i++)
             for (size_t n = 0; n < COUNT(exponents); n++)
                 for (size_t k = 0; k < COUNT(ratios); k++) {
-                    if (es[i] < contacts[law]->least_restitution)
+                    if (es[i] < contacts[law]->restitution_min)
                         continue;
                     const Pair pair = {contacts[law]->kind.name,
                                        0,
@@ -146,7 +146,7 @@ static void power_laws_last_as_recorded_and_part_as_they_say(void **state) {
                                        NAN};
                     const double factor =
                         contacts[law]->factor != NULL ? contacts[law]->factor(es[i]) : 0;
-                    check(&pair, contacts[law]->reached(factor, exponents[n]), 1e-9);
+                    check(&pair, contacts[law]->restitution(factor, exponents[n]), 1e-9);
                 }
         print_message("%s: worst e %.1e, T_c %.1e\n", contacts[law]->kind.name, worst_restitution,
                       worst_time);
@@ -167,7 +167,7 @@ static void hunt_and_crossleys_exact_factor_gives_the_restitution_asked_for(void
 
 static void hertz_meets_its_closed_forms(void **state) {
     (void)state;
-    const double k = 1e6, v0 = 0.4, m_e = effective_mass(1.35, 0.0135);
+    const double k = 1e6, v0 = 0.4, m_e = contact_effective_mass(1.35, 0.0135);
     const Pair pair = {"hertz", 0, 0.01, NAN, NAN, k, NAN, v0, NAN};
     Derived derived;
     double residual;
@@ -182,7 +182,7 @@ static void hertz_meets_its_closed_forms(void **state) {
 
 static void losses_are_those_of_the_speeds(void **state) {
     (void)state;
-    const double m_e = effective_mass(1.35, 0.1 * 1.35);
+    const double m_e = contact_effective_mass(1.35, 0.1 * 1.35);
     for (size_t law = 0; contacts[law] != NULL; law++) {
         if (contacts[law]->form != CONTACT_POWER || contacts[law]->factor == NULL)
             continue;
@@ -219,7 +219,7 @@ static void impacts_keep_to_the_table_at_their_speed(void **state) {
         assert_true(response.impacts.count > 5);
         for (size_t k = 0; k < response.impacts.count; k++) {
             const Impact *impact = &response.impacts.at[k];
-            const ContactRow row = contact_row(&buffer->table, impact->approach_speed);
+            const ContactRow row = contact_rows_interpolate(&buffer->table, impact->approach_speed);
             if (isnan(impact->duration))
                 continue;
             assert_near(&pair, "restitution", impact->restitution, row.restitution, 1e-10);
@@ -239,7 +239,8 @@ static void a_rigs_contact_is_that_of_its_masses(void **state) {
         Derived derived;
         double residual;
         const Impact impact = meet(&pair, &derived, &residual);
-        const Identified there = identify_measured(0.3, 0.61, 0.025, (Separation)rule);
+        const Identification there =
+            identification_from_restitution(0.3, 0.61, 0.025, (Separation)rule);
         assert_true(derived.stiffness == there.stiffness && derived.damping == there.damping);
         assert_true(derived.identified_mass == 0.3 && derived.restitution == 0.61);
         // A lighter pair is damped more.

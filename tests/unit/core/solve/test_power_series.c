@@ -144,7 +144,7 @@ static void a_contact_takes_few_steps_and_ends_as_it_should(void **state) {
             double time;
             pair_make(&pair, contacts[l], n, factor, POWER_CONTACT_TOLERANCE);
             const int steps = pair_run(&pair, &time);
-            const double e = contacts[l]->reached(factor, n),
+            const double e = contacts[l]->restitution(factor, n),
                          T = contacts[l]->duration(factor, n) * unit_of(n);
             assert_true(fabs(-pair.frame.damper[0].w - e) < 3e-14);
             assert_true(fabs(time / T - 1) < 3e-14);
@@ -165,7 +165,7 @@ static void a_contact_keeps_its_tolerance(void **state) {
         for (size_t i = 0; i < COUNT(exponents) && contacts[l]->form == CONTACT_POWER; i++) {
             const double n = exponents[i];
             const double factor = contacts[l]->factor != NULL ? contacts[l]->factor(0.6) : 0;
-            const double e = contacts[l]->reached(factor, n),
+            const double e = contacts[l]->restitution(factor, n),
                          T = contacts[l]->duration(factor, n) * unit_of(n);
             int last = 10000;
             for (double tolerance = 1e-13; tolerance < 0.2; tolerance *= 100) {
@@ -217,10 +217,10 @@ static void the_order_is_integer_over_a_whole_contact(void **state) {
             for (int step = 0; step < 100 && !(s > 0); step++) {
                 double row[8];
                 (void)power_series_expand(series, &pair.frame, &still, Y, length, &scale);
-                if (root_first_crossing(power_series_leader(series), series->degree, &s))
+                if (polynomial_root_first(power_series_leader(series), series->degree, &s))
                     power_series_cut(series, s);
                 power_series_at(series, 1, row);
-                Y = root_value(power_series_leader(series), series->degree, 1);
+                Y = polynomial_value(power_series_leader(series), series->degree, 1);
                 time += row[series->at_t];
                 pair.frame.damper[0].w = row[0];
                 pair.frame.q[0] = row[series->at_q];

@@ -130,7 +130,7 @@ static void a_contact_of_any_length_follows_its_system(void **state) {
                                     0};
     for (size_t i = 0; i < COUNT(lengths); i++) {
         long double power[16];
-        exponential(system, 4, lengths[i], power);
+        matrix_exponential(system, 4, lengths[i], power);
         for (int column = 0; column < 4; column++) {
             Trust *trust = trust_make(865, 1.092, CONTACT_TIME);
             seed(trust, column == 0, column == 1, column == 2, column == 3);
@@ -287,6 +287,6 @@ int main(void) {
         cmocka_unit_test(without_a_damper_only_the_phase_drifts),
         cmocka_unit_test(what_does_not_move_has_no_error),
     };
-    fourier_start();
+    fft_start();
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

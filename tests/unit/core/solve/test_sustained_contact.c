@@ -51,8 +51,8 @@ static void vary_in_name(PlanDamper *damper, const ContactRow *row) {
         assert_non_null(numbers.rows.at);
         *numbers.rows.at = *row;
         damper->stops[side].contact =
-            contact_prepare(&contact_spring_damper, SEPARATION_ZERO_PENETRATION,
-                            damper->effective_mass, damper->effective_mass, &numbers);
+            contact_stop_prepare(&contact_spring_damper, SEPARATION_ZERO_PENETRATION,
+                                 damper->effective_mass, damper->effective_mass, &numbers);
         damper->stops[side].stiffness = NAN;
     }
 }

@@ -293,7 +293,7 @@ static void a_step_ten_times_finer_costs_about_ten_times_as_much(void **state) {
 }
 
 int main(void) {
-    fourier_start();
+    fft_start();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(steps_go_by_decades_from_the_sample_interval_into_the_contact),
         cmocka_unit_test(only_what_the_scene_has_can_be_given_up),

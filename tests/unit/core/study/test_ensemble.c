@@ -311,7 +311,7 @@ static void a_metric_without_a_target_is_left_out(void **state) {
 }
 
 int main(void) {
-    fourier_start();
+    fft_start();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(each_row_is_the_scene_with_its_seed),
         cmocka_unit_test(a_target_ends_it_and_looser_ones_end_it_sooner),

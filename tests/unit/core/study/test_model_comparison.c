@@ -256,6 +256,6 @@ int main(void) {
         cmocka_unit_test(it_stops_when_told_and_its_cost_is_that_of_its_runs),
         cmocka_unit_test(faults_are_told_at_their_places),
     };
-    fourier_start();
+    fft_start();
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

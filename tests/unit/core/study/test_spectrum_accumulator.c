@@ -26,7 +26,7 @@ static void assert_near(double is, double should) {
 // Two channels: the densities, and twice the mean of the four without any spread.
 static void spectrum_of(size_t run, Spectrum *spectrum) {
     *spectrum = (Spectrum){.frequency = frequency};
-    assert_int_equal(columns_make(&spectrum->densities, 2, ROWS, 0, &problem), STATUS_OK);
+    assert_int_equal(columns_allocate(&spectrum->densities, 2, ROWS, 0, &problem), STATUS_OK);
     columns_name(&spectrum->densities, 0, "displacement", "m^2/Hz");
     columns_name(&spectrum->densities, 1, "velocity", "(m/s)^2/Hz");
     for (size_t k = 0; k < ROWS; k++) {

@@ -83,10 +83,11 @@ static size_t judged(size_t storeys, size_t count, size_t scenes, int mode) {
     Scene *scene = &inquiry.simulation.scene;
     scene_start(&inquiry.simulation, 0, 0);
     variant_free(scene->structure);
-    scene->structure = variant_new(&structure_frame.kind);
+    scene->structure = variant_new(&structure_shear_frame.kind);
     assert_non_null(scene->structure);
-    StructureFrame *frame = (StructureFrame *)(void *)scene->structure;
-    assert_true(reals_make(&frame->masses, storeys) && reals_make(&frame->stiffnesses, storeys));
+    ShearFrame *frame = (ShearFrame *)(void *)scene->structure;
+    assert_true(reals_allocate(&frame->masses, storeys) &&
+                reals_allocate(&frame->stiffnesses, storeys));
     for (size_t i = 0; i < storeys; i++) {
         frame->masses.at[i] = 100;
         frame->stiffnesses.at[i] = 2e5;

@@ -247,7 +247,7 @@ static void what_cannot_be_answered_is_refused(void **state) {
 static void the_usual_error_is_the_metrics(void **state) {
     (void)state;
     static const double usual[] = {1e-3, 1e-2, 1e-2, 0, 0.1, 1e-3};
-    for (int metric = 0; metric < METRICS; metric++) {
+    for (int metric = 0; metric < METRIC_COUNT; metric++) {
         StudyRequest inquiry = study_request_make(0.025, 2, 3);
         study_of(&inquiry)->metric = metric;
         complete(&inquiry);
@@ -261,7 +261,7 @@ static void every_storey_of_a_frame_is_compared(void **state) {
     StudyRequest inquiry = study_request_make(0.025, 1, 1);
     Variant **structure = &inquiry.simulation.scene.structure;
     scene_choose(structure, &structure_kinds, "frame");
-    StructureFrame *frame = (StructureFrame *)(void *)*structure;
+    ShearFrame *frame = (ShearFrame *)(void *)*structure;
     for (size_t i = 0; i < 2; i++) {
         Reals *all[] = {&frame->masses, &frame->stiffnesses};
         const double values[] = {1.35, 865};
@@ -291,7 +291,7 @@ static void every_storey_of_a_frame_is_compared(void **state) {
 }
 
 int main(void) {
-    fourier_start();
+    fft_start();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_solver_is_tried_and_the_reference_with_less),
         cmocka_unit_test(a_point_that_fails_or_is_refused_stands_with_its_reason),

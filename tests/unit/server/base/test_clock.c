@@ -58,7 +58,7 @@ static void dates_are_read_back(void **state) {
         char text[32];
         int64_t back = 0;
         clock_rfc3339(at, text);
-        assert_true(date_read(text, &back));
+        assert_true(rfc3339_read(text, &back));
         assert_int_equal(back, at);
     }
 }

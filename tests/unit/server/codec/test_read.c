@@ -227,7 +227,7 @@ static void members_of_a_misspelt_kind_are_not_said_to_be_missing(void **state) 
     (void)state;
     assert_int_equal(read("{\"mass\": 1, \"shape\": {\"shape\": \"runnd\", \"radius\": 1}}"),
                      STATUS_INVALID);
-    assert_int_equal(fields_check(whole_fields, &whole, "", &problem), STATUS_OK);
+    assert_int_equal(fields_validate(whole_fields, &whole, "", &problem), STATUS_OK);
     assert_int_equal(problem.count, 1);
 }
 
@@ -250,7 +250,7 @@ static void all_faults_are_told_at_once(void **state) {
     assert_int_equal(read("{\"mass\": \"heavy\", \"slop\": 1, \"steps\": 0.5, \"storey\": 0,"
                           " \"channels\": [1, \"speed\"], \"shape\": {\"radius\": 3}}"),
                      STATUS_INVALID);
-    assert_int_equal(fields_check(whole_fields, &whole, "", &problem), STATUS_INVALID);
+    assert_int_equal(fields_validate(whole_fields, &whole, "", &problem), STATUS_INVALID);
     fault_at("/mass");
     fault_at("/slop");
     fault_at("/steps");

@@ -50,7 +50,7 @@ static Status survive(const char *text, size_t size) {
     assert_int_equal(problem.status, status);
     assert_int_equal(problem.count > 0, status != STATUS_OK);
     if (status != STATUS_UNREADABLE &&
-        fields_check(simulation_fields, &simulation, "", &problem) != STATUS_OK)
+        fields_validate(simulation_fields, &simulation, "", &problem) != STATUS_OK)
         status = STATUS_INVALID;
     fields_clear(simulation_fields, &simulation);
     if (status != STATUS_OK) {

@@ -138,7 +138,7 @@ static void problems_are_problem_documents(void **state) {
                        .did_you_mean = "structure",
                        .row = 3,
                        .column = "name"};
-    problem_put(&problem, STATUS_INVALID, &mass);
+    problem_add_fault(&problem, STATUS_INVALID, &mass);
     Bytes text = {0};
     write_problem(&text, &problem, 422, NULL);
     assert_string_equal(
@@ -147,7 +147,7 @@ static void problems_are_problem_documents(void **state) {
                  " \"errors\": [{\"pointer\": \"/structure/mass\", \"value\": -1,"
                  " \"detail\": \"must be above 0 kg, is -1\", \"unit\": \"kg\"}]}");
     bytes_clear(&text);
-    problem_put(&problem, STATUS_INVALID, &key);
+    problem_add_fault(&problem, STATUS_INVALID, &key);
     write_problem(&text, &problem, 422, "/v1/jobs");
     assert_string_equal(
         text.at, "{\"type\": \"/problems/invalid-scene\", \"title\": \"The scene has 2 faults\","

@@ -95,8 +95,8 @@ static void a_job_that_waits_keeps_its_record_but_not_in_memory(void **state) {
     Job *second = submit("\"kind\": \"record\", \"name\": \"a\"");
     assert_int_equal(store_record_named(store, "a", &named, &problem), STATUS_OK);
     // The memory's and ours.
-    assert_int_equal(atomic_load(&named->shared.holds), 2);
-    shared_drop(&named->shared);
+    assert_int_equal(atomic_load(&named->shared.count), 2);
+    refcount_unref(&named->shared);
     assert_int_equal(intake_record_delete(intake, "a", &problem), STATUS_CONFLICT);
     assert_non_null(strstr(problem.detail, "0 results and 1 unfinished job:"));
     dismiss(second);

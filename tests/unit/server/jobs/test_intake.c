@@ -974,7 +974,7 @@ static void waiting_scenes_have_a_limit_in_bytes(void **state) {
 }
 
 int main(void) {
-    fourier_start();
+    fft_start();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_job_finishes_and_is_found_again),
         cmocka_unit_test(a_known_scene_computes_nothing),

@@ -24,7 +24,7 @@ static Outcome *sample(void) {
     response->impacts.count = 2;
     response->impacts.at[1] =
         (Impact){.start = 0.1, .end = (double)NAN, .damper = 3, .side = 1, .is_resumed = true};
-    assert_int_equal(columns_make(&response->series, 2, 5, 0, NULL), STATUS_OK);
+    assert_int_equal(columns_allocate(&response->series, 2, 5, 0, NULL), STATUS_OK);
     columns_name(&response->series, 0, "displacement", "m");
     columns_name(&response->series, 1, "contact_force", "N");
     for (size_t i = 0; i < 10; i++)
@@ -34,7 +34,7 @@ static Outcome *sample(void) {
     spectrum->frequency = calloc(3, sizeof(double));
     assert_non_null(spectrum->frequency);
     spectrum->frequency[2] = 500;
-    assert_int_equal(columns_make(&spectrum->densities, 1, 3, 0, NULL), STATUS_OK);
+    assert_int_equal(columns_allocate(&spectrum->densities, 1, 3, 0, NULL), STATUS_OK);
     columns_name(&spectrum->densities, 0, "mean_acceleration", "(m/s^2)^2/Hz");
     for (size_t i = 0; i < 3; i++)
         spectrum->densities.block[i] = (double)i;

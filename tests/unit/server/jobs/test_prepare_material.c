@@ -46,7 +46,7 @@ static void say(const char *slug, const char *said) {
     MaterialRevision revision = {.slug = (char *)slug, .comment = (char *)"measured again"};
     assert_int_equal(read_json(said, strlen(said), material_fields, &revision.material, &problem),
                      STATUS_OK);
-    assert_int_equal(material_check(&revision.material, "", &problem), STATUS_OK);
+    assert_int_equal(material_validate(&revision.material, "", &problem), STATUS_OK);
     assert_int_equal(catalogue_write_lists(&revision, &problem), STATUS_OK);
     revision.created_unix_ms = 1;
     if (store_material_add(store, &revision, &problem) != STATUS_OK) {

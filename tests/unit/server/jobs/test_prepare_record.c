@@ -128,7 +128,7 @@ static void samples_are_let_go_of_and_had_again(void **state) {
                 &inquiry),
         STATUS_OK);
     const PinnedRecords *pinned = &((const SweepStudy *)(const void *)inquiry.study)->records;
-    const Shared *samples = record_in(&inquiry)->named;
+    const Refcount *samples = record_in(&inquiry)->named;
     prepare_records_drop(&inquiry);
     assert_true(record_in(&inquiry)->named == NULL && pinned->at[1].named == NULL);
     prepare_records_drop(&inquiry); // does nothing
@@ -156,7 +156,7 @@ static void a_sweep_holds_only_so_many_samples(void **state) {
         Reals samples;
         char name[8];
         snprintf(name, sizeof name, "large%zu", i);
-        assert_true(reals_make(&samples, RECORD_SAMPLES)); // never written
+        assert_true(reals_allocate(&samples, RECORD_SAMPLES)); // never written
         large[i] = record_memory_put(store_record_memory(store), store_generation(store),
                                      named_record_new(name, name, 1, &samples));
     }
@@ -171,7 +171,7 @@ static void a_sweep_holds_only_so_many_samples(void **state) {
     assert_non_null(strstr(problem.faults[0].detail, "16777216 samples"));
     study_request_clear(&inquiry);
     for (size_t i = 0; i < COUNT(large); i++)
-        shared_drop(&large[i]->shared);
+        refcount_unref(&large[i]->shared);
 }
 
 static void unknown_names_are_suggested_for_a_few_and_looked_up_for_a_hundred(void **state) {

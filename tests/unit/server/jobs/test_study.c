@@ -396,6 +396,6 @@ int main(void) {
         cmocka_unit_test(single_jobs_go_between_the_members_of_an_ensemble),
         cmocka_unit_test(studies_wait_where_much_is_held),
     };
-    fourier_start();
+    fft_start();
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -111,6 +111,6 @@ int main(void) {
         cmocka_unit_test(a_sweep_is_dismissed_at_any_moment_and_leaves_nothing),
         cmocka_unit_test(two_sweeps_and_their_doubles_share_the_workers),
     };
-    fourier_start();
+    fft_start();
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -79,8 +79,8 @@ static void a_record_comes_back_to_the_bit(void **state) {
     add_new(store, "other", 0.2);
     assert_int_equal(store_record_named(store, "elcentro", &again, &problem), STATUS_OK);
     assert_ptr_equal(named, again);
-    shared_drop(&named->shared);
-    shared_drop(&again->shared);
+    refcount_unref(&named->shared);
+    refcount_unref(&again->shared);
     assert_int_equal(store_record_named(store, "elcentr", &named, &problem), STATUS_NOT_FOUND);
     assert_null(named);
     store_end(store);
@@ -186,7 +186,7 @@ static void a_record_in_use_is_not_deleted(void **state) {
     add_new(store, "kobe", 0.7);
     assert_int_equal(store_record_named(store, "kobe", &named, &problem), STATUS_OK);
     assert_true(named->samples.at[0] == 0.7);
-    shared_drop(&named->shared);
+    refcount_unref(&named->shared);
     store_end(store);
 }
 
@@ -238,7 +238,7 @@ static void nothing_written_beside_the_daemon_changes_a_record(void **state) {
     assert_int_equal(store_open(folder, &store, &problem), STATUS_OK);
     assert_int_equal(store_record_named(store, "elcentro", &named, &problem), STATUS_OK);
     assert_true(named->interval == 0.02 && named->samples.at[0] == 0.1);
-    shared_drop(&named->shared);
+    refcount_unref(&named->shared);
     store_end(store);
 }
 
@@ -338,7 +338,7 @@ static void names_are_fit_for_paths_and_files(void **state) {
 
 static NamedRecord *large(const char *name) {
     Reals samples;
-    assert_true(reals_make(&samples, 3 << 20)); // 24 MiB, never touched
+    assert_true(reals_allocate(&samples, 3 << 20)); // 24 MiB, never touched
     return named_record_new(name, name, 1, &samples);
 }
 
@@ -349,26 +349,26 @@ static void the_memory_forgets_what_nobody_holds_beyond_its_budget(void **state)
     static const char *const others[] = {"a", "b", "c", "d"};
     for (size_t i = 0; i < COUNT(others); i++) {
         found = record_memory_put(memory, 1, large(others[i]));
-        shared_drop(&found->shared);
+        refcount_unref(&found->shared);
     }
     found = record_memory_find(memory, 1, "held", NULL);
     assert_ptr_equal(found, held);
-    shared_drop(&found->shared);
+    refcount_unref(&found->shared);
     assert_null(record_memory_find(memory, 1, "a", NULL));
     found = record_memory_find(memory, 1, "d", NULL);
     assert_non_null(found);
-    shared_drop(&found->shared);
+    refcount_unref(&found->shared);
     // Under another catalogue the digest tells whether it is the same.
     assert_null(record_memory_find(memory, 2, "held", NULL));
     assert_null(record_memory_find(memory, 2, "held", "other"));
     found = record_memory_find(memory, 2, "held", "held");
     assert_ptr_equal(found, held);
-    shared_drop(&found->shared);
+    refcount_unref(&found->shared);
     // Who was slower gets what is there.
     found = record_memory_put(memory, 2, large("held"));
     assert_ptr_equal(found, held);
-    shared_drop(&found->shared);
-    shared_drop(&held->shared);
+    refcount_unref(&found->shared);
+    refcount_unref(&held->shared);
     record_memory_free(memory);
     record_memory_free(NULL);
 }

@@ -1,5 +1,5 @@
 // Parts of long periods against the slow sum of their bins.
-#include "core/math/sparse_spectrum_synthesis.h"
+#include "core/math/sparse_spectrum.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -31,18 +31,18 @@ static double *bins_of(const Case *of, size_t empty) {
     assert_non_null(bins);
     for (size_t k = empty; k < of->bins; k++) {
         double normal[2];
-        noise_normal_pair(5, of->length, k, normal);
+        philox_normal_pair(5, of->length, k, normal);
         bins[2 * k] = normal[0] / (2 * sqrt((double)of->bins));
         bins[2 * k + 1] = normal[1] / (2 * sqrt((double)of->bins));
     }
     return bins;
 }
 
-static Synthesis *synthesis_of(const Case *of, const double *bins, FourierStock *stock) {
-    Synthesis *synthesis = synthesis_new(of->length, of->bins, stock);
+static SparseSpectrum *synthesis_of(const Case *of, const double *bins, FftCache *stock) {
+    SparseSpectrum *synthesis = sparse_spectrum_new(of->length, of->bins, stock);
     assert_non_null(synthesis);
-    memcpy(synthesis_bins(synthesis), bins, 2 * of->bins * sizeof *bins);
-    synthesis_run(synthesis);
+    memcpy(sparse_spectrum_bins(synthesis), bins, 2 * of->bins * sizeof *bins);
+    sparse_spectrum_run(synthesis);
     return synthesis;
 }
 
@@ -65,8 +65,8 @@ static void samples_are_the_sum_of_their_bins(void **state) {
         double *bins = bins_of(of, of->bins / 3 + (of->bins > 1));
         if (of->bins == 1)
             bins[0] = 0.4;
-        Synthesis *synthesis = synthesis_of(of, bins, NULL);
-        synthesis_read(synthesis, 0, of->length, values);
+        SparseSpectrum *synthesis = synthesis_of(of, bins, NULL);
+        sparse_spectrum_samples(synthesis, 0, of->length, values);
         const size_t looks = of->bins > 10000 ? 5 : 60;
         for (size_t i = 0; i < looks; i++) {
             // From both ends on, and all over.
@@ -77,7 +77,7 @@ static void samples_are_the_sum_of_their_bins(void **state) {
                 fail_msg("%zu of %zu, %zu bins: %.17g, not %.17g", at, of->length, of->bins,
                          values[at], wanted);
         }
-        synthesis_free(synthesis, NULL);
+        sparse_spectrum_free(synthesis, NULL);
         free(bins);
     }
     free(values);
@@ -88,15 +88,15 @@ static void a_part_has_the_bits_of_the_whole(void **state) {
     for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
         const Case *of = &cases[c];
         double *bins = bins_of(of, 0), *values = malloc(of->length * sizeof *values);
-        double part[SYNTHESIS_PART];
+        double part[SPARSE_SPECTRUM_BLOCK];
         assert_non_null(values);
-        Synthesis *synthesis = synthesis_of(of, bins, NULL);
-        synthesis_read(synthesis, 0, of->length, values);
-        for (size_t from = 0; from < of->length; from += 3 * SYNTHESIS_PART) {
-            synthesis_read(synthesis, from, SYNTHESIS_PART, part);
+        SparseSpectrum *synthesis = synthesis_of(of, bins, NULL);
+        sparse_spectrum_samples(synthesis, 0, of->length, values);
+        for (size_t from = 0; from < of->length; from += 3 * SPARSE_SPECTRUM_BLOCK) {
+            sparse_spectrum_samples(synthesis, from, SPARSE_SPECTRUM_BLOCK, part);
             assert_memory_equal(part, values + from, sizeof part);
         }
-        synthesis_free(synthesis, NULL);
+        sparse_spectrum_free(synthesis, NULL);
         free(values);
         free(bins);
     }
@@ -104,28 +104,29 @@ static void a_part_has_the_bits_of_the_whole(void **state) {
 
 static void a_stock_and_what_was_there_before_leave_no_trace(void **state) {
     (void)state;
-    FourierStock stock = {0};
-    double first[SYNTHESIS_PART], again[SYNTHESIS_PART];
+    FftCache stock = {0};
+    double first[SPARSE_SPECTRUM_BLOCK], again[SPARSE_SPECTRUM_BLOCK];
     const Case *of = &cases[3];
     double *bins = bins_of(of, 1);
     for (int i = 0; i < 3; i++) {
-        Synthesis *synthesis = synthesis_of(of, bins, &stock);
-        synthesis_read(synthesis, 2 * SYNTHESIS_PART, SYNTHESIS_PART, i == 0 ? first : again);
+        SparseSpectrum *synthesis = synthesis_of(of, bins, &stock);
+        sparse_spectrum_samples(synthesis, 2 * SPARSE_SPECTRUM_BLOCK, SPARSE_SPECTRUM_BLOCK,
+                                i == 0 ? first : again);
         if (i > 0)
             assert_memory_equal(first, again, sizeof first);
         // The bins are spoilt now; what is above them must not matter either.
-        double *spoilt = synthesis_bins(synthesis);
+        double *spoilt = sparse_spectrum_bins(synthesis);
         for (size_t k = 0; k < 2 * of->bins; k++)
             spoilt[k] = 1e300;
-        synthesis_free(synthesis, &stock);
+        sparse_spectrum_free(synthesis, &stock);
     }
     assert_non_null(stock.at[0]);
-    fourier_stock_clear(&stock);
+    fft_cache_clear(&stock);
     free(bins);
 }
 
 int main(void) {
-    fourier_start();
+    fft_start();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(samples_are_the_sum_of_their_bins),
         cmocka_unit_test(a_part_has_the_bits_of_the_whole),

@@ -8,40 +8,40 @@
 
 #include <cmocka.h>
 
-#include "core/math/symmetric_eigen.h"
+#include "core/math/symmetric_matrix.h"
 
 static void the_first_leading_block_that_is_not_definite_is_named(void **state) {
     (void)state;
     const double good[] = {2, -1, 0, -1, 2, -1, 0, -1, 2}, bad[] = {2, -1, 0, -1, 2, 3, 0, 3, 2},
                  worse[] = {-1, 0, 0, 1}, zero[] = {0, 0, 0, 1}, coupled_zero[] = {0, 1, 1, 1};
-    assert_int_equal(linear_find_indefinite(3, good, 0), 0);
-    assert_int_equal(linear_find_indefinite(3, bad, 0), 3);
-    assert_int_equal(linear_find_indefinite(2, worse, 0), 1);
-    assert_int_equal(linear_find_indefinite(2, zero, 0), 1);
-    assert_int_equal(linear_find_indefinite(2, zero, 1e-14), 0);
-    assert_int_equal(linear_find_indefinite(2, coupled_zero, 1e-14), 2);
+    assert_int_equal(symmetric_matrix_find_indefinite(3, good, 0), 0);
+    assert_int_equal(symmetric_matrix_find_indefinite(3, bad, 0), 3);
+    assert_int_equal(symmetric_matrix_find_indefinite(2, worse, 0), 1);
+    assert_int_equal(symmetric_matrix_find_indefinite(2, zero, 0), 1);
+    assert_int_equal(symmetric_matrix_find_indefinite(2, zero, 1e-14), 0);
+    assert_int_equal(symmetric_matrix_find_indefinite(2, coupled_zero, 1e-14), 2);
 }
 
 static void a_margin_passes_singular_matrices_or_keeps_away_from_them(void **state) {
     (void)state;
     const double singular[] = {1, -1, -1, 1}, nearly[] = {1, 1 - 1e-13, 1 - 1e-13, 1};
-    assert_int_equal(linear_find_indefinite(2, singular, 0), 2);
-    assert_int_equal(linear_find_indefinite(2, singular, 1e-14), 0);
-    assert_int_equal(linear_find_indefinite(2, nearly, 0), 0);
-    assert_int_equal(linear_find_indefinite(2, nearly, -1e-12), 2);
+    assert_int_equal(symmetric_matrix_find_indefinite(2, singular, 0), 2);
+    assert_int_equal(symmetric_matrix_find_indefinite(2, singular, 1e-14), 0);
+    assert_int_equal(symmetric_matrix_find_indefinite(2, nearly, 0), 0);
+    assert_int_equal(symmetric_matrix_find_indefinite(2, nearly, -1e-12), 2);
     // Units change nothing.
     const double wide[] = {1e300, 1e-10, 1e-10, 1e-300};
-    assert_int_equal(linear_find_indefinite(2, wide, 0), 0);
+    assert_int_equal(symmetric_matrix_find_indefinite(2, wide, 0), 0);
 }
 
 static void a_system_is_solved_whatever_its_units(void **state) {
     (void)state;
     const double A[] = {4e200, 1, 1, 1e-200}, b[] = {7e200, 4}; // as 4 1, 1 1 with 7, 4
     double x[2];
-    assert_int_equal(linear_solve(2, A, b, x), STATUS_OK);
+    assert_int_equal(symmetric_matrix_solve(2, A, b, x), STATUS_OK);
     assert_true(fabs(x[0] - 1) < 1e-15 && fabs(x[1] / 3e200 - 1) < 1e-15);
     const double B[] = {2, 1, 1, 2}, c[] = {3, 3};
-    assert_int_equal(linear_solve(2, B, c, x), STATUS_OK);
+    assert_int_equal(symmetric_matrix_solve(2, B, c, x), STATUS_OK);
     assert_true(fabs(x[0] - 1) < 1e-15 && fabs(x[1] - 1) < 1e-15);
 }
 
@@ -57,7 +57,7 @@ static void small_eigenvalues_are_as_right_as_large_ones(void **state) {
         if (i > 0)
             K[i * N + i - 1] = K[(i - 1) * N + i] = -3;
     }
-    assert_int_equal(linear_eigen(N, M, K, values, Y), STATUS_OK);
+    assert_int_equal(symmetric_matrix_eigen(N, M, K, values, Y), STATUS_OK);
     const long double pi = 3.14159265358979323846264338328L;
     for (size_t k = 0; k < N; k++) {
         const long double half = sinl((2 * k + 1) * pi / (2 * (2 * N + 1)));
@@ -81,7 +81,7 @@ static void equal_eigenvalues_have_orthogonal_vectors(void **state) {
     const double M[] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, .5, 0, 0, .5, 1},
                  K[] = {3, 0, 0, 0, 0, 3, 0, 0, 0, 0, 3, 1.5, 0, 0, 1.5, 3};
     long double values[4], Y[16];
-    assert_int_equal(linear_eigen(4, M, K, values, Y), STATUS_OK);
+    assert_int_equal(symmetric_matrix_eigen(4, M, K, values, Y), STATUS_OK);
     for (size_t i = 0; i < 4; i++) {
         assert_true(fabsl(values[i] - 3) < 1e-17L);
         for (size_t j = 0; j < 4; j++) {
@@ -98,8 +98,8 @@ static void an_indefinite_mass_has_no_eigenvalues(void **state) {
     (void)state;
     const double M[] = {1, 2, 2, 1}, negative[] = {-1, 0, 0, 1}, K[] = {1, 0, 0, 1};
     long double values[2], Y[4];
-    assert_int_equal(linear_eigen(2, M, K, values, Y), STATUS_INVALID);
-    assert_int_equal(linear_eigen(2, negative, K, values, Y), STATUS_INVALID);
+    assert_int_equal(symmetric_matrix_eigen(2, M, K, values, Y), STATUS_INVALID);
+    assert_int_equal(symmetric_matrix_eigen(2, negative, K, values, Y), STATUS_INVALID);
 }
 
 int main(void) {
