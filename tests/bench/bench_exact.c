@@ -1,12 +1,15 @@
-// ns of CPU per sample of the exact solver at the paper's scenes, 5 channels at 1 kHz, beside a
-// memset and a memcpy of the same bytes in the same run; and what a short scene costs as a whole.
-// Smallest of the repeats.
+// ns of CPU per sample of the exact solver for the paper's scenes, 5 channels at 1 kHz, beside a
+// memset and a memcpy of the same bytes in the same run; and the CPU time of short scenes as a
+// whole. Smallest of the repeats. Once for every vector width of this processor, or for the widths
+// that the arguments name: bench_exact [avx512] [avx2] [plain].
 #include <stdio.h>
+#include <string.h>
 
 #include "core/math/fft.h"
 #include "server/base/clock.h"
 #include "tests/bench/cases.h"
 #include "tests/support/paper.h"
+#include "tests/support/vectors.h"
 
 // CPU of simulation_run as a whole [us]; 0, and a line printed, if it fails.
 static double scene_us(bool is_random, bool has_channels, double duration) {
@@ -41,8 +44,8 @@ static double scene_us(bool is_random, bool has_channels, double duration) {
     return 0;
 }
 
-int main(void) {
-    fft_start();
+// ns per sample of every scene; false, and a line printed, if one fails.
+static bool print_samples(void) {
     printf("%-20s %8s %8s %8s %9s %8s %9s %9s %9s\n", "ns per sample", "memset", "memcpy", "run",
            "x memset", "base", "whole", "impacts", "plan us");
     for (size_t i = 0; i < bench_case_count; i++) {
@@ -50,7 +53,7 @@ int main(void) {
         BenchTimes times;
         if (!bench_open(&bench_cases[i], &scene) || !bench_run(&scene, &times)) {
             bench_close(&scene);
-            return 1;
+            return false;
         }
         const double set = bench_memset(&scene), copy = bench_memcpy(&scene);
         printf("%-20s %8.2f %8.2f %8.2f %9.2f %8.2f %9.2f %9zu %9.2f\n", bench_cases[i].name, set,
@@ -58,6 +61,10 @@ int main(void) {
                times.plan_us);
         bench_close(&scene);
     }
+    return true;
+}
+
+static bool print_scenes(void) {
     printf("\nsponge scenes as a whole   %12s %14s\n", "us per scene", "per second");
     const struct {
         const char *name;
@@ -70,8 +77,24 @@ int main(void) {
     for (size_t i = 0; i < COUNT(wholes); i++) {
         const double us = scene_us(wholes[i].is_random, wholes[i].has_channels, wholes[i].duration);
         if (us == 0)
-            return 1;
+            return false;
         printf("%-26s %12.1f %14.0f\n", wholes[i].name, us, 1e6 / us);
+    }
+    return true;
+}
+
+int main(int count, char **arguments) {
+    fft_start();
+    for (Vectors vectors = 0; vectors < VECTORS_COUNT; vectors++) {
+        bool is_named = count == 1;
+        for (int i = 1; i < count; i++)
+            is_named |= strcmp(arguments[i], vectors_names[vectors]) == 0;
+        if (!is_named || !vectors_set(vectors))
+            continue;
+        printf("vectors: %s\n", vectors_names[vectors]);
+        if (!print_samples() || !print_scenes())
+            return 1;
+        printf("\n");
     }
     return 0;
 }
