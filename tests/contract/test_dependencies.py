@@ -2,8 +2,9 @@
 """Files of core/ depend on each other without cycles and only downward; static functions have names of their own.
 
 A file depends on the files that it includes and on the files that define the symbols its object file uses. A header and
-the source of the same name are one file. Needs a finished build. The figures of server/ are printed, not enforced.
-`--update` rewrites the list of exceptions in this file from the present state of core/ and prints what changed."""
+the source of the same name are one file. core/README.md says which folders each folder may use. Needs a finished build.
+The figures of server/ are printed, not enforced. `--update` rewrites the list of exceptions in this file from the
+present state of core/ and prints what changed."""
 
 import collections
 import os
@@ -15,14 +16,7 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."
 import program  # noqa: E402
 from test_includes import FLOORS, sources, without_comments  # noqa: E402
 
-# The folders of core/ and the folders that each may use.
-CORE = {"base": "", "math": "base", "contact": "math base", "excitation": "math base", "result": "math base",
-        "scene": "contact excitation result math base",
-        "plan": "scene contact excitation result math base",
-        "solve": "plan scene contact excitation result math base",
-        "simulation": "solve plan scene contact excitation result math base",
-        "study": "simulation solve plan scene contact excitation result math base",
-        "drop_test": "scene contact math base", "formats": "base"}
+README = os.path.join(program.SOURCE, "core", "README.md")
 STATIC_NAME_MAX = 2  # files of core/ in which one name of a static function may be defined
 
 # Known exceptions. The list shrinks: an exception that is not needed any more fails the test, as a new violation does.
@@ -70,6 +64,16 @@ EXCEPTIONS = {
     ],
 }
 # exceptions: end
+
+
+def folders_of_readme():
+    """{folder of core/: folders that it may use}, as the table in core/README.md says."""
+    with open(README, encoding="utf-8") as file:
+        rows = re.findall(r"^\| (\w+) \| [^|]+ \|([\w, ]*)\|$", file.read(), re.M)
+    return {folder: re.findall(r"\w+", uses) for folder, uses in rows if folder != "folder"}
+
+
+CORE = folders_of_readme()
 
 
 def node(path):
@@ -148,7 +152,7 @@ def upward(edges):
     def folder(file):
         return file.split("/")[1]
     return {edge for edge in edges
-            if folder(edge[0]) != folder(edge[1]) and folder(edge[1]) not in CORE.get(folder(edge[0]), "").split()}
+            if folder(edge[0]) != folder(edge[1]) and folder(edge[1]) not in CORE.get(folder(edge[0]), [])}
 
 
 def static_names(texts):
@@ -226,6 +230,26 @@ def test_core_depends_downward():
     print(figures("core", found, circles))
     wrong = list(faults(found, EXCEPTIONS))
     assert not wrong, "\n" + "\n".join(wrong)
+
+
+def test_readme_names_what_exists():
+    """Every folder, file, function and type that core/README.md names exists, and it lists every folder."""
+    folders = {path.split("/")[1] for path, _ in sources() if path.startswith("core/")}
+    assert folders == CORE.keys(), folders ^ CORE.keys()
+    with open(README, encoding="utf-8") as file:
+        text = re.sub(r"\n```c\n.*?```\n", "\n", file.read(), flags=re.S)
+    words = set(re.findall(r"\w+", " ".join(text for path, text in sources() if path.startswith("core/"))))
+    for name in re.findall(r"`([^`\n]+)`", text):
+        if "NAME" in name or "hu_guo" in name:
+            continue
+        if "/" in name or name.endswith(".c"):
+            known = any(os.path.exists(os.path.join(program.SOURCE, top, name)) for top in (
+                "", "core", *(os.path.join("core", folder) for folder in folders)))
+        elif re.fullmatch(r"[\w.]*[A-Z_.][\w.]*", name):
+            known = words.issuperset(name.split("."))
+        else:
+            continue
+        assert known, f"`{name}` does not exist"
 
 
 def test_figures_of_server():
