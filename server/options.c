@@ -20,7 +20,7 @@ typedef struct Reader {
     Problem *problem;
 } Reader;
 
-// "queue_most" as it is typed: "queue-most" after "--", "QUEUE_MAX" after the prefix.
+// "queue_most" as it is typed: "queue-most" after "--", "QUEUE_MOST" after the prefix.
 static void name_spell(char target[NAME_SIZE], const char *prefix, const char *name, bool is_flag) {
     size_t at = 0;
     for (const char *c = prefix; *c != '\0' && at + 1 < NAME_SIZE; c++)

@@ -441,20 +441,38 @@ static bool single_mass_find_release(const SingleMass *single, const Piece *p, d
     return piece_first_root(depth, p->degree, s);
 }
 
-// The largest force on the piece up to s, where it rises at the start and falls at s (or the other
-// way round), and the acceleration there.
-static void single_mass_peak(SingleMass *single, const Piece *p, double s) {
+// The largest force on the piece up to s, and the acceleration there. `is_turning`: the force rises
+// at the start and falls at s, or the other way round.
+static void single_mass_peak(SingleMass *single, const Piece *p, double s, bool is_turning) {
     const Motion *m = &single->touching[single->side];
     const double T = p->length, mass = single_mass_effective(single) / (T * T);
     const double c = m->contact_damping * T, k2 = m->contact_omega2 * T * T;
-    double n[PIECE_DEGREE + 1];
-    for (size_t k = 0; k < p->degree; k++)
-        n[k] = c * p->w[k] + k2 * p->r[k];
-    // The zero of its slope: by Newton, or where that leaves the bracket by halves.
     const size_t degree = p->degree - 1;
-    double low = 0, high = s, at = s / 2, value = 0;
+    double n[PIECE_DEGREE + 1];
+    double bound = 0;
+    for (size_t k = 0; k <= degree; k++) {
+        n[k] = c * p->w[k] + k2 * p->r[k];
+        bound += fabs(n[k]);
+    }
+    if (!(mass * bound > impact_log_least_force(&single->impacts, &single->row)))
+        return;
+    double at = s / 2, value = 0;
+    if (!is_turning) { // it may turn twice
+        double slope[PIECE_DEGREE + 1] = {0}, power = 1;
+        const double sign = n[1] < 0 ? -1 : 1;
+        for (size_t k = 0; k < degree; k++, power *= s)
+            slope[k] = sign * (double)(k + 1) * n[k + 1] * power;
+        double where;
+        if (piece_is_simple(slope, degree - 1) ||
+            !polynomial_root_first(slope, degree - 1, &where))
+            return;
+        at = where * s;
+        value = polynomial_value(n, degree, at);
+    }
+    // The zero of the slope: by Newton, or where that leaves the bracket by halves.
+    double low = 0, high = s;
     const double sign = n[1] > 0 ? 1 : -1;
-    for (int i = 0; i < 2 * NEWTON_STEPS; i++) {
+    for (int i = 0; is_turning && i < 4 * NEWTON_STEPS; i++) {
         double slope = 0, bend = 0;
         value = n[degree];
         for (size_t k = degree; k-- > 0;) {
@@ -473,6 +491,8 @@ static void single_mass_peak(SingleMass *single, const Piece *p, double s) {
         }
         at = at + step > low && at + step < high ? at + step : (low + high) / 2;
     }
+    if (!(mass * fabs(value) > impact_log_least_force(&single->impacts, &single->row)))
+        return;
     impact_log_force(&single->impacts, &single->row, mass * fabs(value));
     State state;
     piece_at(p, at, &state);
@@ -486,16 +506,16 @@ static inline double single_mass_rise(const SingleMass *single, const Motion *m,
     return m->contact_damping * (single_mass_push(single, at) - n) + m->contact_omega2 * at->w;
 }
 
-// The same for a piece from the present state to `end`: a force that rises or falls all the way is
-// largest at its ends, which samples and events look at.
+// The same for a piece from the present state to `end`; a force that rises or falls all the way is
+// largest at its ends.
 static inline void single_mass_peak_between(SingleMass *single, const Piece *p, double s,
                                             const State *end) {
     const Motion *m = &single->touching[single->side];
     const double from = single_mass_rise(single, m, &single->state);
     const double to = single_mass_rise(single, m, end);
-    if (from > 0 ? to < 0 : to > 0)
-        single_mass_peak(single, p, s);
-    else
+    const bool is_turning = from > 0 ? to < 0 : to > 0;
+    single_mass_peak(single, p, s, is_turning);
+    if (!is_turning)
         impact_log_force(&single->impacts, &single->row,
                          single_mass_effective(single) *
                              fabs(m->contact_damping * end->w + m->contact_omega2 * end->r));
@@ -907,7 +927,7 @@ INLINE size_t single_mass_press(SingleMass *single, size_t most) {
         const State start = {y[0][k], y[1][k], y[2][k], y[3][k]};
         Piece piece;
         piece_make(&piece, m, &start, &slice, h);
-        single_mass_peak(single, &piece, 1);
+        single_mass_peak(single, &piece, 1, true);
     }
     // Samples 1 to count.
     const size_t first = single->sample + 1, bytes = count * sizeof(double);
@@ -1141,7 +1161,7 @@ INLINE bool single_mass_advance(SingleMass *single, size_t until) {
             pieces = 0;
             continue;
         }
-        if (!is_flight && is_quick && pieces == 0 &&
+        if (!is_flight && is_quick && single->state.r == 0 &&
             single->touching[single->side].rate * h > MAP_REACH) {
             const size_t sample = single->sample;
             const double offset = single->offset;

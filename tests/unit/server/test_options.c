@@ -47,7 +47,7 @@ static int start(void **state) {
 static int stop(void **state) {
     (void)state;
     fields_clear(fields, &settings);
-    unsetenv("TEST_QUEUE_MAX");
+    unsetenv("TEST_QUEUE_MOST");
     unsetenv("TEST_CONFIG");
     unsetenv("TEST_RATE");
     unsetenv("TEST_NAMES");
@@ -104,7 +104,7 @@ static void a_flag_beats_the_environment_that_the_file_that_the_default(void **s
     assert_int_equal(write(file, text, strlen(text)), (int)strlen(text));
     close(file);
     setenv("TEST_CONFIG", "/nowhere", 1);
-    setenv("TEST_QUEUE_MAX", "5", 1);
+    setenv("TEST_QUEUE_MOST", "5", 1);
     const Status status = READ("TEST_", "--config", path);
     unlink(path);
     assert_int_equal(status, STATUS_OK);
@@ -145,7 +145,7 @@ static void a_file_names_no_other_file(void **state) {
 
 static void the_environment_is_not_read_without_a_prefix(void **state) {
     (void)state;
-    setenv("TEST_QUEUE_MAX", "none", 1);
+    setenv("TEST_QUEUE_MOST", "none", 1);
     assert_int_equal(READ(NULL, "--rate", "2"), STATUS_OK);
     assert_int_equal(settings.queue_most, 50);
 }
