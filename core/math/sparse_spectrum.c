@@ -31,9 +31,9 @@ static const double SHARP = PI * TAPS * (1 - 1.0 / OVERSAMPLED);
 struct SparseSpectrum {
     Fft *fourier;
     size_t ratio, coarse, bins;
-    double *weights;                // 1 / K
-    double *kernel; // [TAPS][ratio]
-    double *samples;                // coarse + TAPS values, from index -TAPS / 2 on
+    double *weights; // 1 / K
+    double *kernel;  // [TAPS][ratio]
+    double *samples; // coarse + TAPS values, from index -TAPS / 2 on
     double *block;
 };
 

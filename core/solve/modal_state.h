@@ -30,10 +30,10 @@ typedef struct DamperState {
     Side side;            // of all phases but flight
     ContactOrigin origin; // what r is counted from
     int zero_gap_terms;   // terms of the gap, from the constant one on, that are exactly 0: it was
-                        // released from rest a moment ago
-    bool just_begun;           // the present phase has lasted for no time yet
-    double r, w;               // displacement and speed relative to the storey [m], [m/s]
-    double force;              // N on the structure as of the last modal_state_forces [N]
+                          // released from rest a moment ago
+    bool just_begun;      // the present phase has lasted for no time yet
+    double r, w;          // displacement and speed relative to the storey [m], [m/s]
+    double force;         // N on the structure as of the last modal_state_forces [N]
     ContactParameters contact; // frozen at the touch
     ImpactRow row;             // of the present contact or rest
 
@@ -97,8 +97,8 @@ typedef struct ModalState {
     DamperState *damper;
     double
         *delassus; // dampers x dampers: (M^-1) between their storeys, + 1/m on the diagonal [1/kg]
-    double *mobility; // dampers x storeys: (M^-1) between their storey and all [1/kg]; as
-                      // `delassus` of the modes kept
+    double *mobility;        // dampers x storeys: (M^-1) between their storey and all [1/kg]; as
+                             // `delassus` of the modes kept
     double *constraint_mass; // dampers x dampers: constraint forces are constraint_mass . (r''
                              // without them) [kg]
     size_t resting;          // how many are

@@ -28,7 +28,7 @@ enum {
 // Solver steps of a sample in a block.
 static const double SAMPLE_STEPS = 0.1;
 // The longest step, times the system's rate: of a piece, and of the transition over one interval.
-static const double PIECE_REACH = 1.7, MAP_REACH = 0.5;
+static const double PIECE_REACH = 1.0, MAP_REACH = 0.5;
 // Intervals shorter than this, times the structure's rate and a sine's, are short.
 static const double SHORT_REACH = 0.04;
 
@@ -463,8 +463,7 @@ static void single_mass_peak(SingleMass *single, const Piece *p, double s, bool 
         for (size_t k = 0; k < degree; k++, power *= s)
             slope[k] = sign * (double)(k + 1) * n[k + 1] * power;
         double where;
-        if (piece_is_simple(slope, degree - 1) ||
-            !polynomial_root_first(slope, degree - 1, &where))
+        if (piece_is_simple(slope, degree - 1) || !polynomial_root_first(slope, degree - 1, &where))
             return;
         at = where * s;
         value = polynomial_value(n, degree, at);

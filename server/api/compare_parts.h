@@ -3,8 +3,8 @@
 #ifndef SERVER_API_COMPARE_PARTS_H
 #define SERVER_API_COMPARE_PARTS_H
 
-#include "core/result/spectrum_distance.h"
 #include "core/result/signal_comparison.h"
+#include "core/result/spectrum_distance.h"
 #include "core/simulation/simulation.h"
 #include "server/base/bytes.h"
 

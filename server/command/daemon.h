@@ -30,7 +30,8 @@ void daemon_close(Daemon *daemon);
 double daemon_left(const Daemon *daemon); // [s], at least 0
 
 // http_ask, again after each 503 and 429 as Retry-After says. STATUS_OK for 200, 201, 202
-// and 204 alone; any other code is told in `problem`. The answer is cleared by http_answer_clear in any case.
+// and 204 alone; any other code is told in `problem`. The answer is cleared by http_answer_clear in
+// any case.
 Status daemon_ask(Daemon *daemon, const HttpAsk *ask, HttpAnswer *answer, Problem *problem);
 
 // An id as the API writes them; anything else is no path's part.

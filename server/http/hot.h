@@ -18,8 +18,8 @@ uint64_t hot_age(Hot *hot);
 // and `reply` becomes a borrower of it. One that is too large for the budget stays as it is.
 // `target` is as sent, `is_packed` says that the body is gzip, `route` whose it is.
 // Nothing is kept that was begun at another `age`: it may have been deleted since.
-void hot_put(Hot *hot, uint64_t age, const char *target, bool is_packed,
-             const struct Route *route, Reply *reply);
+void hot_put(Hot *hot, uint64_t age, const char *target, bool is_packed, const struct Route *route,
+             Reply *reply);
 
 // Fills `reply`, a borrower, and *route. False if it is not there.
 bool hot_find(Hot *hot, const char *target, bool is_packed, Reply *reply,

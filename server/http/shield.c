@@ -14,8 +14,9 @@ const ShieldHeader shield_tls = {"Strict-Transport-Security", "max-age=31536000"
 const char shield_policy[] =
     "default-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-const char shield_drawing_policy[] = "default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; "
-                                     "form-action 'none'; frame-ancestors 'none'";
+const char shield_drawing_policy[] =
+    "default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; "
+    "form-action 'none'; frame-ancestors 'none'";
 
 const char shield_page_policy[] =
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; "

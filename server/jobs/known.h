@@ -1,6 +1,6 @@
 // Whole answers to bodies that were answered before, by the body byte for byte: what a known scene
-// costs is a comparison, a copy and a late row. Not results and not scenes: of another writing of the
-// same scene nothing is known here. Locked. Used by intake.c.
+// costs is a comparison, a copy and a late row. Not results and not scenes: of another writing of
+// the same scene nothing is known here. Locked. Used by intake.c.
 #ifndef SERVER_JOBS_KNOWN_H
 #define SERVER_JOBS_KNOWN_H
 

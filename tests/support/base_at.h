@@ -1,5 +1,6 @@
 // What a base is at any instant, said as plainly as it can be: the measure of cursors, refined
-// bases and excitations. Not how a solver meets it (core/solve/base_motion_cursor.h). Used by tests.
+// bases and excitations. Not how a solver meets it (core/solve/base_motion_cursor.h). Used by
+// tests.
 #ifndef TESTS_SUPPORT_BASE_AT_H
 #define TESTS_SUPPORT_BASE_AT_H
 

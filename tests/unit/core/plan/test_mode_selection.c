@@ -9,8 +9,8 @@
 #include <cmocka.h>
 
 #include "core/base/canonical.h"
-#include "core/plan/mode_selection.h"
 #include "core/plan/modal_truncation.h"
+#include "core/plan/mode_selection.h"
 #include "core/solve/solver.h"
 #include "tests/support/document.h"
 

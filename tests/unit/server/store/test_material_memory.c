@@ -9,13 +9,11 @@
 
 #include <cmocka.h>
 
-static const MaterialRevision sponge = {.slug = "sponge",
-                                        .revision = 3,
-                                        .material = {.name = "Sponge",
-                                                     .source = "s",
-                                                     .restitution = 0.61,
-                                                     .contact_time = 0.025},
-                                        .status = "approved"};
+static const MaterialRevision sponge = {
+    .slug = "sponge",
+    .revision = 3,
+    .material = {.name = "Sponge", .source = "s", .restitution = 0.61, .contact_time = 0.025},
+    .status = "approved"};
 
 static bool has(MaterialMemory *memory, uint64_t generation, const char *slug, uint64_t revision) {
     MaterialRevision found = {0};
