@@ -14,7 +14,7 @@
 #include "core/result/response.h"
 #include "core/simulation/impulse_variant.h"
 #include "core/simulation/internal.h"
-#include "core/solve/exact_accuracy.h"
+#include "core/solve/exact.h"
 
 enum { ATTEMPTS = 3, NAME = 96 };
 

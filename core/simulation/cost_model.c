@@ -3,7 +3,7 @@
 #include <math.h>
 
 #include "core/simulation/internal.h"
-#include "core/solve/exact_accuracy.h"
+#include "core/solve/exact.h"
 #include "core/solve/step_work.h"
 
 static const double TURN = 6.28318530717958647693;

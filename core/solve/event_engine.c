@@ -1,49 +1,445 @@
-// A run of the general engine from its first sample to its end, with a neighbour beside it.
+// ExactFlight of all masses over a whole sample interval is one step where bounds on the gaps'
+// curvature prove that no stop can be reached (flight.h); a mass pressed to a stiff stop that it
+// surely does not leave has long steps too (sustained_contact.h); everything else goes by arcs
+// (taylor_step.h), whose polynomials locate events to rounding. Time is a sample's number and an
+// offset from it, so that short contacts keep their digits late in a run.
 #include "core/solve/event_engine.h"
 
-#include <stdlib.h>
+#include <float.h>
+#include <math.h>
 #include <string.h>
 
-#include "core/solve/companion_run.h"
-#include "core/solve/exact_accuracy.h"
-#include "core/solve/recorder.h"
+#include "core/solve/rounding_growth.h"
+#include "core/solve/step_work.h"
 
-static Status solve(EventEngine *engine, CompanionRun *neighbour) {
-    ModalState *state = &engine->state;
-    const Plan *plan = state->plan;
-    TRY(event_engine_settle(engine));
-    event_engine_take_sample(engine);
-    companion_run_start(neighbour, engine);
-    while (state->sample + 1 < plan->count) {
-        const size_t next = (state->sample / COMPANION_SAMPLES + 1) * COMPANION_SAMPLES;
-        const size_t until = next < plan->count - 1 ? next : plan->count - 1;
-        while (state->sample < until)
-            TRY(event_engine_step(engine, until));
-        if (!companion_run_step(neighbour, state))
-            TRY(event_engine_check(engine)); // it may have been told to stop
-    }
-    companion_run_tell(neighbour, state, state->impacts.response);
-    // The duration may end between samples.
-    TRY(event_engine_cross(engine, plan->duration - (double)state->sample / plan->sample_rate));
-    recorder_note(state);
-    TRY(event_engine_check(engine));
-    return recorder_ledger(state);
+enum { STILL_EVENTS = 1000, STORM_EVENTS = 100, IDLE_STEPS = 1000 };
+
+// An arc this short would lose its speeds' digits below the smallest doubles: it takes no time.
+static const double SHORTEST = 1e-250; // [s]
+
+static const double GAIN_CONTACTS = 1e3;
+
+static const double WATCH_STEPS = 3e4; // between looks at the progress
+static const double WORK_OF_STEP = 60; // multiplications
+
+Status event_engine_check(EventEngine *engine) {
+    const ModalState *state = &engine->state;
+    engine->work = 0;
+    const EnergyState energy = modal_state_energy(state);
+    double sum = energy.kinetic + energy.strain;
+    for (size_t i = 0; i < state->mode_count; i++)
+        sum += fabs(state->q[i]);
+    for (size_t d = 0; d < state->dampers; d++)
+        sum += fabs(state->damper[d].r);
+    if (!isfinite(sum))
+        return problem_set(state->problem, STATUS_UNSTABLE,
+                           "the motion left what double precision can hold at t = %.6g s",
+                           modal_state_time(state));
+    if (state->run->steps_max > 0 && state->run->steps > state->run->steps_max)
+        return problem_set(state->problem, STATUS_LIMIT, SOLVER_STOPPED "t = %.6g s of %.6g s",
+                           state->run->steps_max, state->run->steps_max * SOLVER_STEP,
+                           modal_state_time(state), state->plan->duration);
+    if (!progress_advance(state->run->progress, modal_state_time(state) / state->plan->duration))
+        return problem_set(state->problem, STATUS_CANCELLED, "cancelled at t = %.6g s",
+                           modal_state_time(state));
+    return STATUS_OK;
 }
 
-Status event_engine_run(Run *run, Response *response, Problem *problem) {
-    EventEngine engine;
-    CompanionRun *neighbour = calloc(1, sizeof *neighbour);
-    if (neighbour == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run");
-    memset(&engine, 0, sizeof engine);
-    Status status =
-        event_engine_make(&engine, run, exact_tolerance(run->accuracy), response, problem);
-    if (status == STATUS_OK)
-        status = solve(&engine, neighbour);
-    if (engine.record.block != NULL)
-        recorder_finish(&engine.record, &engine.state, response);
-    event_engine_clear(&engine);
-    companion_run_clear(neighbour);
-    free(neighbour);
-    return status;
+static double event_engine_each(const EventEngine *engine, StepWorkKind kind) {
+    const ModalState *state = &engine->state;
+    return step_work_steps(kind, state->mode_count, state->dampers, state->diagonal == NULL);
+}
+
+static Status event_engine_count_steps(EventEngine *engine, double steps) {
+    engine->state.run->steps += steps;
+    engine->work += steps;
+    return engine->work > WATCH_STEPS ? event_engine_check(engine) : STATUS_OK;
+}
+
+static void event_engine_take_work(EventEngine *engine, const StepWork *work) {
+    impact_log_work(&engine->state.impacts, work->input, work->damping);
+    engine->record.base_speed += work->ground;
+}
+
+// What a stretch of contact or rest adds to a damper's row; the state becomes that of a new peak.
+static void event_engine_take_contact(EventEngine *engine, size_t d) {
+    ModalState *state = &engine->state;
+    DamperState *damper = &state->damper[d];
+    const TaylorStep *arc = &engine->arc;
+    double s = -1, impulse, lost;
+    const double peak = arc_largest(taylor_step_force(arc, d), arc->degree - 1,
+                                    impact_log_least_force(&state->impacts, &damper->row), &s);
+    impact_log_force(&state->impacts, &damper->row, peak);
+    if (s > 0) {
+        taylor_step_state(arc, state, s);
+        modal_state_forces(state);
+        recorder_acceleration(state);
+    }
+    taylor_step_contact(arc, state, d, &impulse, &lost);
+    impact_log_stretch(&state->impacts, &damper->row, arc->length, impulse, lost);
+}
+
+// After an arc: has the gap of a mass released from rest opened beyond rounding yet? Where the arc
+// ends by closing it, the speed stays.
+static void event_engine_leave(DamperState *damper, bool is_hit) {
+    const double sign = modal_state_sign((Side)damper->origin);
+    if (sign * damper->r < 0)
+        damper->zero_gap_terms = 0;
+    else if (!is_hit || sign * damper->w < 0)
+        damper->r = damper->w = 0;
+}
+
+// Takes what lies on the arc and moves to its end, where `hit` (or none) has its event.
+static void event_engine_pass(EventEngine *engine, const ContactEvent *hit) {
+    ModalState *state = &engine->state;
+    const TaylorStep *arc = &engine->arc;
+    if (!state->is_shadow) {
+        const StepWork work = taylor_step_work(arc, state);
+        event_engine_take_work(engine, &work);
+    }
+    for (size_t d = 0; d < state->dampers && !state->is_shadow; d++)
+        if (state->damper[d].row.is_open)
+            event_engine_take_contact(engine, d);
+    taylor_step_state(arc, state, 1);
+    state->offset += arc->length;
+    state->events_at_instant = 0;
+    state->chatter_time += arc->length;
+    if (state->chatter_time > modal_state_clock(state)) {
+        state->chatter_events = 0;
+        state->chatter_time = 0;
+    }
+    for (size_t d = 0; d < state->dampers; d++) {
+        DamperState *damper = &state->damper[d];
+        damper->just_begun = false;
+        if (damper->zero_gap_terms > 0)
+            event_engine_leave(damper, hit != NULL && hit->damper == d);
+    }
+}
+
+// Of the one mass that there is.
+static State event_engine_single_state(const ModalState *state) {
+    const double shape = state->modes->shapes[0];
+    return (State){state->q[0] * shape, state->p[0] * shape, state->damper[0].r,
+                   state->damper[0].w};
+}
+
+static void event_engine_grow_to_event(RoundingGrowth *growth, const ModalState *state) {
+    const DamperState *damper = &state->damper[0];
+    const State at = event_engine_single_state(state);
+    const double time = modal_state_time(state),
+                 largest = state->impacts.response->peaks.displacement;
+    if (damper->phase == PHASE_FLIGHT)
+        rounding_growth_flight(growth, time, &at, largest);
+    else if (damper->phase == PHASE_CONTACT)
+        rounding_growth_contact(growth, damper->side, time, &at, largest);
+    else
+        rounding_growth_rest(growth, time, &at, largest);
+}
+
+static void event_engine_grow_over_event(RoundingGrowth *growth, const ModalState *state,
+                                         ContactPhase phase, const State *before) {
+    const DamperState *damper = &state->damper[0];
+    if (phase == PHASE_FLIGHT && state->plan->form == CONTACT_IMPULSIVE &&
+        damper->plan->clearance > 0)
+        rounding_growth_bounce(growth, damper->contact.restitution, before->w,
+                               state->diagonal[0] * before->v + state->omega2[0] * before->x);
+    if (damper->phase == PHASE_RESTING)
+        rounding_growth_stick(growth);
+}
+
+static Status event_engine_happen(EventEngine *engine, const ContactEvent *event) {
+    ModalState *state = &engine->state;
+    const size_t most = STILL_EVENTS * state->dampers;
+    state->events++;
+    state->chatter_events++;
+    if (++state->events_at_instant > most)
+        return problem_set(state->problem, STATUS_UNSTABLE,
+                           "more than %zu contact events at one instant, t = %.17g s", most,
+                           modal_state_time(state));
+    if (engine->growth != NULL) {
+        const ContactPhase phase = state->damper[0].phase;
+        const State before = event_engine_single_state(state);
+        event_engine_grow_to_event(engine->growth, state);
+        contact_event_apply(state, event);
+        event_engine_grow_over_event(engine->growth, state, phase, &before);
+    } else {
+        contact_event_apply(state, event);
+    }
+    return impact_log_status(&state->impacts, state->problem);
+}
+
+// The longest arc: a half-sine of the base is fast only while it lasts.
+static double event_engine_arc_max(const ModalState *state, const Slice *slice) {
+    return 1 / fmax(modal_state_rate(state), slice->omega);
+}
+
+// One step of contact under a power law, at most `length` long.
+static Status event_engine_press(EventEngine *engine, const Slice *slice, double length) {
+    ModalState *state = &engine->state;
+    PowerContactStep step;
+    power_contact_step(&engine->ode, slice, length, &step);
+    event_engine_take_work(engine, &step.work);
+    const double before = state->offset;
+    state->offset += step.length;
+    state->base_acceleration = slice_at(slice, step.length);
+    state->events_at_instant = 0;
+    // A step may be shorter than what the clock tells, or end where it began; not very many in
+    // turn.
+    engine->idle = state->offset > before ? 0 : engine->idle + 1;
+    state->events += engine->idle > 0 && engine->idle < IDLE_STEPS;
+    if (step.is_event)
+        TRY(event_engine_happen(engine, &step.event));
+    else
+        recorder_note(state);
+    state->run->work.steps++;
+    return event_engine_count_steps(engine, step.cost / WORK_OF_STEP);
+}
+
+// A long step of contact. False: it must go by arcs.
+static bool event_engine_hold(EventEngine *engine, const Slice *slice, double length) {
+    ModalState *state = &engine->state;
+    StepWork work;
+    if (slice->omega > 0 && state->base_omega == 0)
+        return false; // its steps know no such base
+    const double taken = sustained_contact_step(&engine->pressing, state, slice, length,
+                                                state->is_shadow ? NULL : &work);
+    if (taken == 0)
+        return false;
+    if (!state->is_shadow)
+        event_engine_take_work(engine, &work);
+    state->offset += taken;
+    state->base_acceleration = slice_at(slice, taken);
+    return true;
+}
+
+// Masses that touch and part at one instant again and again do so by rounding alone: between stops
+// without clearance, say, of a storey that hardly moves yet. They stay as they are for a while that
+// is longer each time, until the motion itself decides. (Impulses close such series themselves.)
+static bool event_engine_is_stalled(ModalState *state) {
+    if (state->chatter_events < STORM_EVENTS * state->dampers ||
+        state->plan->form == CONTACT_IMPULSIVE)
+        return false;
+    const double now = modal_state_time(state);
+    const bool goes_on = now - state->suppressed_at <= 4 * state->suppress_time;
+    state->suppress_time = fmax(goes_on ? 2 * state->suppress_time : 0, modal_state_clock(state));
+    state->suppressed_at = now;
+    return true;
+}
+
+// One arc, at most `length` long, up to its end or the first event.
+static Status event_engine_advance(EventEngine *engine, double length) {
+    ModalState *state = &engine->state;
+    TaylorStep *arc = &engine->arc;
+    Slice slice;
+    const double knot = base_cursor_slice(&state->base, state->sample, state->offset, &slice);
+    state->base_acceleration = slice.value;
+    if (power_contact_is_active(&engine->ode))
+        return event_engine_press(engine, &slice, fmin(length, knot));
+    if (event_engine_hold(engine, &slice, fmin(length, knot)))
+        return event_engine_count_steps(engine, event_engine_each(engine, STEP_WORK_HOLD));
+    const bool stays = event_engine_is_stalled(state);
+    const double most = fmin(fmin(length, knot), stays ? state->suppress_time : INFINITY);
+    taylor_step_make(arc, state, &slice, fmin(most, event_engine_arc_max(state, &slice)));
+    state->run->work.arcs++;
+    ContactEvent event;
+    const bool is_event = contact_event_find(state, arc, &event) &&
+                          !(stays && event.s * arc->length <= modal_state_clock(state));
+    if (is_event)
+        taylor_step_cut(arc, state, event.s * arc->length < SHORTEST ? 0 : event.s);
+    if (arc->length > 0)
+        event_engine_pass(engine, is_event ? &event : NULL);
+    if (is_event)
+        TRY(event_engine_happen(engine, &event));
+    return event_engine_count_steps(
+        engine, event_engine_each(engine, STEP_WORK_ARC) +
+                    (is_event ? event_engine_each(engine, STEP_WORK_EVENT) : 0));
+}
+
+Status event_engine_cross(EventEngine *engine, double length) {
+    ModalState *state = &engine->state;
+    // Less than this cannot be told from nothing: the clock's resolution at the interval's end.
+    const double clock = 2 * DBL_EPSILON * length;
+    while (length - state->offset > clock) {
+        const double before = state->offset;
+        const size_t events = state->events;
+        TRY(event_engine_advance(engine, length - state->offset));
+        if (state->offset == before && state->events == events)
+            return problem_set(state->problem, STATUS_UNSTABLE,
+                               "the contact is too stiff to be followed: at t = %.6g s a step of "
+                               "1/%.6g s is below the clock's resolution",
+                               modal_state_time(state), modal_state_rate(state));
+    }
+    return STATUS_OK;
+}
+
+// a_g over whole intervals from the present sample on; returns over how many it has no kinks.
+static size_t event_engine_find_slices(const ModalState *state, size_t count, Slice *slices) {
+    size_t found = 0;
+    for (; found < count; found++) {
+        if (found > 0 && state->base.base->form == BASE_SINE) {
+            const Slice *last = &slices[found - 1];
+            slices[found] = (Slice){
+                last->value * state->base_rotation[0] + last->slope * state->base_rotation[1],
+                last->slope * state->base_rotation[0] - last->value * state->base_rotation[1],
+                last->omega};
+        } else if (!base_cursor_interval(&state->base, state->sample + found, &slices[found]))
+            break;
+    }
+    return found;
+}
+
+// Whole intervals at once, up to sample `until`, and writes them down. Returns how many; 0: it must
+// go by arcs.
+static size_t event_engine_fly(EventEngine *engine, size_t until) {
+    ModalState *state = &engine->state;
+    Recorder *record = &engine->record;
+    Slice slices[FLIGHT_BUFFER_MAX];
+    StepWork work;
+    for (size_t d = 0; d < state->dampers; d++)
+        if (state->damper[d].phase != PHASE_FLIGHT || state->damper[d].zero_gap_terms > 0)
+            return 0;
+    size_t count = until - state->sample;
+    if (count > FLIGHT_BUFFER_MAX)
+        count = FLIGHT_BUFFER_MAX;
+    // Statistics begin with a stretch.
+    if (state->sample + 1 < record->statistics_start &&
+        state->sample + count >= record->statistics_start)
+        count = record->statistics_start - 1 - state->sample;
+    count = engine->flight.length == 0 ? 0 : event_engine_find_slices(state, count, slices);
+    state->run->work.stop_searches += count > 0 && state->has_stops;
+    if (count > 0)
+        count = flight_run(&engine->flight, &engine->trail, state, slices, count,
+                           state->is_shadow ? NULL : &work);
+    state->sample += count;
+    if (count == 0 || state->is_shadow)
+        return count;
+    WorkCounters *done = &state->run->work;
+    *(state->base.base->form == BASE_STILL ? &done->unforced_samples : &done->flight_samples) +=
+        count;
+    done->mode_samples += count * state->mode_count;
+    state->base_acceleration = base_cursor_at(&state->base, state->sample);
+    impact_log_work(&state->impacts, work.input, work.damping);
+    FlightBuffer *trail = &engine->trail;
+    flight_buffer_feel(trail, state, count);
+    if (state->sample + 1 - count == record->statistics_start)
+        recorder_forget(state);
+    recorder_take(record, state, count);
+    recorder_flight_peaks(record, state, count);
+    return count;
+}
+
+Status event_engine_settle(EventEngine *engine) {
+    ModalState *state = &engine->state;
+    for (bool is_event = true; is_event;) {
+        Slice slice;
+        ContactEvent event;
+        (void)base_cursor_slice(&state->base, 0, 0, &slice);
+        taylor_step_make(&engine->arc, state, &slice,
+                         fmin(state->interval, event_engine_arc_max(state, &slice)));
+        is_event = contact_event_find(state, &engine->arc, &event) && event.s == 0 &&
+                   state->damper[event.damper].phase == PHASE_FLIGHT;
+        if (is_event)
+            TRY(event_engine_happen(engine, &event));
+    }
+    return STATUS_OK;
+}
+
+static void event_engine_balance(ModalState *state) {
+    if (state->is_shadow || state->sample % 64 != 0)
+        return;
+    const EnergyState energy = modal_state_energy(state);
+    impact_log_balance(&state->impacts, &energy);
+}
+
+void event_engine_take_sample(EventEngine *engine) {
+    ModalState *state = &engine->state;
+    if (state->is_shadow)
+        return;
+    state->base_acceleration = base_cursor_at(&state->base, state->sample);
+    modal_state_forces(state);
+    if (state->sample == engine->record.statistics_start && state->sample > 0)
+        recorder_forget(state);
+    flight_buffer_take(&engine->trail, state, engine->record.base_speed);
+    recorder_take(&engine->record, state, 1);
+    recorder_peaks(state);
+}
+
+// Notes the samples just passed: so many flown over, or the present one.
+static void event_engine_track(EventEngine *engine, size_t flown) {
+    const ModalState *state = &engine->state;
+    const FlightBuffer *trail = &engine->trail;
+    for (size_t k = 1; k <= (flown > 0 ? flown : 1); k++) {
+        const size_t sample = flown > 0 ? state->sample - flown + k : state->sample;
+        memcpy(engine->track + (sample - 1) % FLIGHT_BUFFER_MAX * state->padded,
+               flown > 0 ? trail->q + k * trail->padded : state->q,
+               state->mode_count * sizeof *engine->track);
+    }
+}
+
+Status event_engine_finish_interval(EventEngine *engine) {
+    ModalState *state = &engine->state;
+    TRY(event_engine_cross(engine, state->interval));
+    state->run->work.mode_samples += state->mode_count;
+    state->sample++;
+    state->offset = 0;
+    event_engine_take_sample(engine);
+    return STATUS_OK;
+}
+
+Status event_engine_step(EventEngine *engine, size_t until) {
+    ModalState *state = &engine->state;
+    const size_t flown = event_engine_fly(engine, until);
+    if (flown > 0) {
+        TRY(event_engine_count_steps(engine,
+                                     (double)flown * event_engine_each(engine, STEP_WORK_FLIGHT)));
+    } else {
+        TRY(event_engine_finish_interval(engine));
+    }
+    if (engine->track != NULL)
+        event_engine_track(engine, flown);
+    event_engine_balance(state);
+    return STATUS_OK;
+}
+
+Status event_engine_make(EventEngine *engine, Run *run, double tolerance, Response *response,
+                         Problem *problem) {
+    ModalState *state = &engine->state;
+    TRY(modal_state_make(state, run, problem));
+    TRY(taylor_step_room(&engine->arc, state, problem));
+    TRY(flight_make(&engine->flight, state, problem));
+    TRY(sustained_contact_make(&engine->pressing, state, problem));
+    TRY(power_contact_make(&engine->ode, state, tolerance, problem));
+    TRY(flight_buffer_make(&engine->trail, state, problem));
+    TRY(recorder_start(&engine->record, &engine->trail, state, response, problem));
+    const EnergyState energy = modal_state_energy(state);
+    impact_log_start(&state->impacts, response, run->impacts_max, &energy);
+    // What contacts may be wrong by each, of many of them.
+    state->impacts.gain_max = fmax(
+        IMPACT_LOG_GAIN_EXACT, tolerance > POWER_CONTACT_TOLERANCE ? GAIN_CONTACTS * tolerance : 0);
+    return STATUS_OK;
+}
+
+Status event_engine_shadow(EventEngine *engine, const EventEngine *of, Run *run, double tolerance,
+                           Response *response) {
+    ModalState *state = &engine->state;
+    TRY(modal_state_make(state, run, NULL));
+    TRY(power_contact_make(&engine->ode, state, tolerance, NULL));
+    engine->arc = of->arc;
+    engine->flight = of->flight;
+    engine->pressing = of->pressing;
+    engine->trail = of->trail;
+    state->is_shadow = true;
+    const EnergyState energy = modal_state_energy(state);
+    impact_log_start(&state->impacts, response, run->impacts_max, &energy);
+    return STATUS_OK;
+}
+
+void event_engine_clear(EventEngine *engine) {
+    recorder_clear(&engine->record);
+    flight_buffer_clear(&engine->trail);
+    flight_clear(&engine->flight);
+    sustained_contact_clear(&engine->pressing);
+    power_contact_clear(&engine->ode);
+    taylor_step_clear(&engine->arc);
+    modal_state_clear(&engine->state);
 }

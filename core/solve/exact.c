@@ -1,15 +1,99 @@
 // The exact solver: between events the scene is a linear system, which is propagated exactly;
-// events are located to rounding. One storey with one mass goes by single_mass.h, everything else
-// by event_engine.h.
+// events are located to rounding. One storey with one mass goes by single_mass.h. Everything else
+// goes by the event engine, with a companion run beside it that shows how far the run can be
+// trusted.
+#include "core/solve/exact.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/solve/companion_run.h"
 #include "core/solve/event_engine.h"
-#include "core/solve/exact_accuracy.h"
+#include "core/solve/power_contact.h"
+#include "core/solve/recorder.h"
 #include "core/solve/refine.h"
 #include "core/solve/single_mass.h"
-#include "core/solve/solver.h"
+
+double exact_tolerance(const Accuracy *accuracy) {
+    const double asked =
+        accuracy == NULL ? (double)NAN : ((const AccuracyExact *)(const void *)accuracy)->tolerance;
+    return asked > POWER_CONTACT_TOLERANCE ? asked : POWER_CONTACT_TOLERANCE;
+}
+
+// Linear contacts and impulses have closed forms.
+void exact_forget_unused(Accuracy *accuracy, bool has_power_law) {
+    if (!has_power_law)
+        ((AccuracyExact *)(void *)accuracy)->tolerance = (double)NAN;
+}
+
+Status exact_decide(const Accuracy *accuracy, double base_interval, Plan *plan, Problem *problem) {
+    (void)base_interval;
+    (void)problem;
+    if (plan->form != CONTACT_POWER || plan->damper_count == 0)
+        return STATUS_OK;
+    const double tolerance = exact_tolerance(accuracy);
+    const bool is_asked = tolerance > POWER_CONTACT_TOLERANCE;
+    return decisions_add(&plan->report.decisions, "tolerance", is_asked ? "asked" : "rounding",
+                         tolerance, NULL,
+                         is_asked ? "relative error that a contact may end with; flight between "
+                                    "contacts is exact, and instants are found as well as these "
+                                    "contacts are known"
+                                  : "each contact as exact as rounding lets it be, for none asked "
+                                    "for less");
+}
+
+// clang-format off
+const Field accuracy_exact_fields[] = {
+    FIELD_BASE(AccuracyExact, accuracy, accuracy_fields),
+    FIELD_REAL(AccuracyExact, tolerance, NULL, WITHIN(1e-15, 1e-1), OPTIONAL, "relative error that a contact under a power law may end with; if absent none but rounding's; of no use to other laws, whose contacts have closed forms"),
+    FIELD_END
+};
+// clang-format on
+
+static Status exact_solve(EventEngine *engine, CompanionRun *neighbour) {
+    ModalState *state = &engine->state;
+    const Plan *plan = state->plan;
+    TRY(event_engine_settle(engine));
+    event_engine_take_sample(engine);
+    companion_run_start(neighbour, engine);
+    while (state->sample + 1 < plan->count) {
+        const size_t next = (state->sample / COMPANION_SAMPLES + 1) * COMPANION_SAMPLES;
+        const size_t until = next < plan->count - 1 ? next : plan->count - 1;
+        while (state->sample < until)
+            TRY(event_engine_step(engine, until));
+        if (!companion_run_step(neighbour, state))
+            TRY(event_engine_check(engine)); // it may have been told to stop
+    }
+    companion_run_tell(neighbour, state, state->impacts.response);
+    // The duration may end between samples.
+    TRY(event_engine_cross(engine, plan->duration - (double)state->sample / plan->sample_rate));
+    recorder_note(state);
+    TRY(event_engine_check(engine));
+    return recorder_ledger(state);
+}
+
+Status exact_run_engine(Run *run, Response *response, Problem *problem) {
+    EventEngine engine;
+    CompanionRun *neighbour = calloc(1, sizeof *neighbour);
+    if (neighbour == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run");
+    memset(&engine, 0, sizeof engine);
+    Status status =
+        event_engine_make(&engine, run, exact_tolerance(run->accuracy), response, problem);
+    if (status == STATUS_OK)
+        status = exact_solve(&engine, neighbour);
+    if (engine.record.block != NULL)
+        recorder_finish(&engine.record, &engine.state, response);
+    event_engine_clear(&engine);
+    companion_run_clear(neighbour);
+    free(neighbour);
+    return status;
+}
 
 static Status exact_run(Run *run, Response *response, Problem *problem) {
     if (!single_mass_serves(run->plan, run->is_clear))
-        return event_engine_run(run, response, problem);
+        return exact_run_engine(run, response, problem);
     // A base whose samples are further apart than the output's goes by strides once it has them.
     const size_t fine = refine_count(run->base, run->plan->sample_rate, run->plan->count);
     Workspace none = {0}, *workspace = run->workspace == NULL ? &none : run->workspace;

@@ -196,3 +196,266 @@ void modal_state_constrain(ModalState *state) {
     if (state->resting > 0)
         invert_hold(state);
 }
+
+static const double NEARLY = 1e-9;
+
+// (M^-1)_jk from the modes; 0 where it is no more than rounding, lest a hit on one storey stir a
+// mass that rests on another.
+static double mobility(const Modes *modes, size_t j, size_t k) {
+    const double *a = modes->shapes + j * modes->count, *b = modes->shapes + k * modes->count;
+    long double sum = 0, size = 0;
+    for (size_t i = 0; i < modes->count; i++) {
+        const long double term = (long double)a[i] * b[i];
+        sum += term;
+        size += fabsl(term);
+    }
+    return fabsl(sum) <= 4 * DBL_EPSILON * size ? 0 : (double)sum;
+}
+
+static void make_damper(ModalState *state, size_t d) {
+    const Plan *plan = state->plan;
+    const size_t n = state->mode_count, storeys = state->storey_count;
+    DamperState *damper = &state->damper[d];
+    const PlanDamper *planned = &plan->dampers[d];
+    *damper = (DamperState){
+        .plan = planned,
+        .shape = state->shapes + d * state->padded,
+        .base_coupling =
+            plan->influence[planned->storey] - 1 -
+            (state->residual_influence != NULL ? state->residual_influence[planned->storey] : 0),
+        .phase = PHASE_FLIGHT,
+        .origin = FROM_MIDDLE,
+        .r = planned->position,
+        .w = planned->velocity};
+    memcpy(state->shapes + d * state->padded, state->modes->shapes + planned->storey * n,
+           n * sizeof *state->shapes);
+    for (size_t j = 0; j < storeys; j++) {
+        state->mobility[d * storeys + j] = mobility(state->modes, planned->storey, j);
+        damper->max_mobility = fmax(damper->max_mobility, fabs(state->mobility[d * storeys + j]));
+    }
+    for (size_t e = 0; e < state->dampers; e++)
+        state->delassus[d * state->dampers + e] =
+            mobility(state->modes, planned->storey, plan->dampers[e].storey) +
+            (d == e ? 1 / planned->mass : 0);
+    damper->effective_mass = 1 / state->delassus[d * state->dampers + d];
+    double stiff = 0, size = 0;
+    for (size_t i = 0; i < n; i++) {
+        state->momentum_weights[i] += planned->mass * damper->shape[i];
+        stiff += damper->shape[i] * damper->shape[i] * state->omega2[i];
+        size += damper->shape[i] * damper->shape[i];
+    }
+    damper->elastic_bound = sqrt(stiff) + sqrt(size) * state->viscous;
+}
+
+// How fast energy may grow by what of D gives it, though D should only take: of D's symmetric part,
+// `even_part`.
+static double find_growth(const double *even_part, size_t n) {
+    double lowest = 0, largest = 0;
+    for (size_t i = 0; i < n; i++) {
+        const double own = even_part[i * n + i];
+        double others = 0;
+        for (size_t j = 0; j < n; j++)
+            others += j == i ? 0 : fabs(even_part[i * n + j]);
+        lowest = fmin(lowest, own - others); // Gershgorin
+        largest = fmax(largest, own);
+    }
+    // D takes energy, or nearly: scaled to a unit diagonal, D + NEARLY I is positive definite.
+    return symmetric_matrix_find_indefinite(n, even_part, NEARLY) == 0 ? NEARLY * largest : -lowest;
+}
+
+// D, which need not be symmetric, its norm and how far it is from only taking energy.
+static Status make_damping(ModalState *state) {
+    const size_t n = state->mode_count;
+    const double *damping = state->damping = state->modes->damping;
+    double *even_part = calloc(n * n, sizeof *even_part);
+    if (even_part == NULL)
+        return STATUS_NO_MEMORY;
+    double rows = 0, columns = 0, squares = 0;
+    for (size_t i = 0; i < n; i++) {
+        double row = 0, column = 0;
+        for (size_t j = 0; j < n; j++) {
+            const double here = damping[i * n + j], there = damping[j * n + i];
+            row += fabs(here);
+            column += fabs(there);
+            squares += here * here;
+            even_part[i * n + j] = (here + there) / 2;
+        }
+        rows = fmax(rows, row);
+        columns = fmax(columns, column);
+        state->diagonal[i] = damping[i * n + i];
+    }
+    state->viscous = fmin(sqrt(rows * columns), sqrt(squares));
+    state->growth = find_growth(even_part, n);
+    free(even_part);
+    if (state->modes->is_classical)
+        return STATUS_OK;
+    state->diagonal = NULL;
+    state->coupled = calloc(modal_state_even(n) * state->padded, sizeof *state->coupled);
+    if (state->coupled == NULL)
+        return STATUS_NO_MEMORY;
+    for (size_t i = 0; i < n; i++)
+        for (size_t j = 0; j < n; j++)
+            state->coupled[j * state->padded + i] = damping[i * n + j];
+    return STATUS_OK;
+}
+
+// q = shapes' M x: the modes are normal. `carried` is scratch.
+static void make_modal(const ModalState *state, const double *values, long double *carried,
+                       double *modal) {
+    const size_t n = state->mode_count, storeys = state->storey_count;
+    for (size_t j = 0; j < storeys; j++) {
+        carried[j] = 0;
+        for (size_t k = 0; k < storeys; k++)
+            carried[j] += (long double)state->plan->mass[j * storeys + k] * values[k];
+    }
+    for (size_t i = 0; i < n; i++) {
+        long double sum = 0;
+        for (size_t j = 0; j < storeys; j++)
+            sum += state->modes->shapes[j * n + i] * carried[j];
+        modal[i] = (double)sum;
+    }
+}
+
+static Status make_room(ModalState *state) {
+    const size_t n = state->padded, m = state->dampers;
+    double **const arrays[] = {&state->omega2,
+                               &state->diagonal,
+                               &state->momentum_weights,
+                               &state->participation,
+                               &state->q,
+                               &state->p,
+                               &state->elastic,
+                               &state->max_shape,
+                               &state->shapes,
+                               &state->shape_matrix,
+                               &state->storey_values,
+                               &state->mobility,
+                               &state->delassus,
+                               &state->constraint_mass,
+                               &state->scratch,
+                               &state->residual_influence};
+    const size_t tall = state->tall, all = modal_state_even(state->slot_count) * tall;
+    const size_t sizes[] = {
+        n, n, n, n, n, n, n, n, m * n, all, FLIGHT_ROWS * tall, m * tall, m * m, m * m, m * m, tall,
+    };
+    size_t total = simd_kernels_room(0);
+    for (size_t i = 0; i < COUNT(sizes); i++)
+        total += sizes[i];
+    state->block = calloc(total, sizeof *state->block);
+    state->damper = calloc(m > 0 ? m : 1, sizeof *state->damper);
+    if (state->block == NULL || state->damper == NULL)
+        return STATUS_NO_MEMORY;
+    double *at = simd_kernels_start(state->block);
+    for (size_t i = 0; i < COUNT(sizes); i++) {
+        *arrays[i] = at;
+        at += sizes[i];
+    }
+    return STATUS_OK;
+}
+
+// What the base does to storeys through modes that are left out; 0 where it is no more than
+// rounding.
+static void make_unmoved(ModalState *state) {
+    const size_t n = state->mode_count;
+    double most = 0;
+    for (size_t j = 0; j < state->storey_count; j++) {
+        const double own = state->plan->influence[j];
+        long double sum = own, size = fabs(own);
+        for (size_t i = 0; i < n; i++) {
+            const long double term =
+                (long double)state->modes->shapes[j * n + i] * state->modes->participation[i];
+            sum -= term;
+            size += fabsl(term);
+        }
+        state->residual_influence[j] = fabsl(sum) <= 8 * DBL_EPSILON * size ? 0 : (double)sum;
+        state->shape_matrix[n * state->tall + j] = -state->residual_influence[j];
+        most = fmax(most, fabs(state->residual_influence[j]));
+    }
+    state->max_shape[n] = most;
+}
+
+// Shapes and what is made of them.
+static void make_modes(ModalState *state) {
+    const size_t n = state->mode_count;
+    const Modes *modes = state->modes;
+    for (size_t i = 0; i < n; i++) {
+        state->omega2[i] = modes->omega[i] * modes->omega[i];
+        state->stiff = fmax(state->stiff, state->omega2[i]);
+        state->participation[i] = state->momentum_weights[i] = modes->participation[i];
+        for (size_t j = 0; j < state->storey_count; j++) {
+            const double shape = modes->shapes[j * n + i];
+            state->max_shape[i] = fmax(state->max_shape[i], fabs(shape));
+            state->shape_matrix[i * state->tall + j] = shape;
+        }
+    }
+    if (state->slot_count > n)
+        make_unmoved(state);
+    else
+        state->residual_influence = NULL;
+}
+
+static void modal_state_of(ModalState *state, Run *run, Problem *problem) {
+    const Plan *plan = run->plan;
+    memset(state, 0, sizeof *state);
+    state->run = run;
+    state->has_stops = run->plan->damper_count > 0 && !run->is_clear;
+    state->plan = plan;
+    state->problem = problem;
+    state->modes = plan->modes.count == 0 ? &state->own_modes : &plan->modes;
+    state->lanes = &simd_kernels_kinds[simd_kernels_widest()];
+    state->dampers = plan->damper_count;
+    state->interval = 1 / plan->sample_rate;
+    state->storey_count = plan->storeys;
+    state->tall = simd_kernels_padded(plan->storeys);
+    state->mode_count = plan->modes.count == 0 ? plan->storeys : plan->modes.count;
+    state->slot_count = state->mode_count + plan->is_truncated;
+    state->padded = simd_kernels_padded(state->slot_count);
+}
+
+Status modal_state_make(ModalState *state, Run *run, Problem *problem) {
+    const Plan *plan = run->plan;
+    const size_t n = plan->storeys;
+    modal_state_of(state, run, problem);
+    if (plan->modes.count == 0)
+        TRY(modes_make(&state->own_modes, n, plan->mass, plan->stiffness, plan->damping,
+                       plan->influence, problem));
+    if (make_room(state) != STATUS_OK || make_damping(state) != STATUS_OK)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys", n);
+    make_modes(state);
+    state->participation_norm = sqrt(modal_state_dot(
+        state->modes->participation, state->modes->participation, state->mode_count));
+    state->rate = fmax(fmax(sqrt(state->stiff), state->viscous), 1e-300);
+    // A pulse that is over sooner is flown through by arcs alone.
+    state->base_omega = run->base->omega * state->interval <= 4 || run->base->form == BASE_SINE
+                            ? run->base->omega
+                            : 0;
+    const long double turn = (long double)state->base_omega * state->interval;
+    state->base_rotation[0] = (double)cosl(turn);
+    state->base_rotation[1] = (double)sinl(turn);
+    bool is_sound = isfinite(state->rate) && isfinite(run->base->omega);
+    for (size_t d = 0; d < state->dampers; d++) {
+        make_damper(state, d);
+        const double m = state->damper[d].effective_mass;
+        is_sound = is_sound && m > 0 && isfinite(m);
+    }
+    if (!is_sound)
+        return problem_set(
+            problem, STATUS_UNSTABLE,
+            "the scene's masses and stiffnesses are too far apart for double precision");
+    long double *carried = malloc(n * sizeof *carried);
+    if (carried == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys", n);
+    make_modal(state, plan->displacement, carried, state->q);
+    make_modal(state, plan->velocity, carried, state->p);
+    free(carried);
+    base_cursor_make(&state->base, run->base, plan->sample_rate);
+    state->base_acceleration = base_cursor_at(&state->base, 0);
+    return STATUS_OK;
+}
+
+void modal_state_clear(ModalState *state) {
+    modes_clear(&state->own_modes);
+    free(state->damper);
+    free(state->coupled);
+    free(state->block);
+}

@@ -27,8 +27,8 @@ static const double SWING_STEP = 0.2, CONTACT_STEP = 0.1;
 static const double ROUNDING = DBL_EPSILON;
 
 // n steps of D and what is left.
-INLINE uint64_t divide(double length, double frequency, double step, double *rest) {
-    const double most = 4294967295; // TRUST_NEAR << TRUST_LEVELS, less 1
+INLINE uint64_t rounding_growth_divide(double length, double frequency, double step, double *rest) {
+    const double most = 4294967295; // GROWTH_NEAR << GROWTH_LEVELS, less 1
     const double count = length * frequency + 0.5;
     if (!(count < most)) {
         *rest = 0;
@@ -46,7 +46,7 @@ static void swing_multiply(double p[2][2], double q[2][2], double out[2][2]) {
 }
 
 // All powers up to n.
-static __attribute__((noinline)) void swing_make(TrustSwing *swing, uint64_t n) {
+static __attribute__((noinline)) void swing_make(GrowthStructure *swing, uint64_t n) {
     double(*const near)[2][2] = swing->near;
     if (swing->known == 0) {
         // A Taylor series of exp(A D): |A D| is below 0.2 in the units of the rate.
@@ -67,21 +67,21 @@ static __attribute__((noinline)) void swing_make(TrustSwing *swing, uint64_t n) 
         }
         swing->known = 2;
     }
-    const int wanted = n < TRUST_NEAR ? (int)n + 1 : TRUST_NEAR;
+    const int wanted = n < GROWTH_NEAR ? (int)n + 1 : GROWTH_NEAR;
     for (; swing->known < wanted; swing->known++)
         swing_multiply(near[swing->known - 1], near[1], near[swing->known]);
-    for (; n >> swing->levels >= TRUST_NEAR; swing->levels++) {
+    for (; n >> swing->levels >= GROWTH_NEAR; swing->levels++) {
         const bool is_first = swing->levels == 0;
-        double(*const last)[2] = is_first ? near[TRUST_NEAR / 2] : swing->power[swing->levels - 1];
+        double(*const last)[2] = is_first ? near[GROWTH_NEAR / 2] : swing->power[swing->levels - 1];
         swing_multiply(last, last, swing->power[swing->levels]);
     }
 }
 
 // The structure's errors; the free mass's are the caller's.
-INLINE void swing_go(TrustSwing *swing, Four *at_x, Four *at_v, double length) {
+INLINE void swing_go(GrowthStructure *swing, Four *at_x, Four *at_v, double length) {
     double h;
-    const uint64_t n = divide(length, swing->frequency, swing->step, &h);
-    if ((int)(n % TRUST_NEAR) >= swing->known || n >> swing->levels >= TRUST_NEAR)
+    const uint64_t n = rounding_growth_divide(length, swing->frequency, swing->step, &h);
+    if ((int)(n % GROWTH_NEAR) >= swing->known || n >> swing->levels >= GROWTH_NEAR)
         swing_make(swing, n);
     const double half = h * h / 2;
     Four x = *at_x, v = *at_v;
@@ -89,10 +89,10 @@ INLINE void swing_go(TrustSwing *swing, Four *at_x, Four *at_v, double length) {
     const Four b = -swing->omega2 * v - swing->damping * a;
     x += h * v + half * a;
     v += h * a + half * b;
-    double(*p)[2] = swing->near[n % TRUST_NEAR];
+    double(*p)[2] = swing->near[n % GROWTH_NEAR];
     *at_x = p[0][0] * x + p[0][1] * v;
     *at_v = p[1][0] * x + p[1][1] * v;
-    for (uint64_t level = 0, left = n / TRUST_NEAR; left > 0; level++, left >>= 1) {
+    for (uint64_t level = 0, left = n / GROWTH_NEAR; left > 0; level++, left >>= 1) {
         if ((left & 1) == 0)
             continue;
         p = swing->power[level];
@@ -125,11 +125,11 @@ static void contact_multiply(double p[4][4], double q[4][4], double out[4][4]) {
 }
 
 // All powers up to n.
-static __attribute__((noinline)) void contact_make(TrustContact *contact, uint64_t n) {
+static __attribute__((noinline)) void contact_make(GrowthContact *contact, uint64_t n) {
     double(*const near)[4][4] = contact->near;
     if (contact->known == 0) {
         // A Taylor series, each lane a column.
-        _Static_assert((int)TRUST_LANES == (int)SIZE, "a lane for each column");
+        _Static_assert((int)GROWTH_LANES == (int)SIZE, "a lane for each column");
         Errors term = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}, slope;
         memcpy(near[0], &term, sizeof near[0]);
         Errors sum = term;
@@ -142,13 +142,13 @@ static __attribute__((noinline)) void contact_make(TrustContact *contact, uint64
         memcpy(near[1], &sum, sizeof near[1]);
         contact->known = 2;
     }
-    const int wanted = n < TRUST_NEAR ? (int)n + 1 : TRUST_NEAR;
+    const int wanted = n < GROWTH_NEAR ? (int)n + 1 : GROWTH_NEAR;
     for (; contact->known < wanted; contact->known++)
         contact_multiply(near[contact->known - 1], near[1], near[contact->known]);
-    for (; n >> contact->levels >= TRUST_NEAR; contact->levels++) {
+    for (; n >> contact->levels >= GROWTH_NEAR; contact->levels++) {
         const bool is_first = contact->levels == 0;
         double(*const last)[4] =
-            (is_first ? near[TRUST_NEAR / 2] : contact->power[contact->levels - 1]);
+            (is_first ? near[GROWTH_NEAR / 2] : contact->power[contact->levels - 1]);
         contact_multiply(last, last, contact->power[contact->levels]);
     }
 }
@@ -161,10 +161,10 @@ INLINE void contact_map(double p[4][4], Errors *y) {
     y->w = (p[3][0] * from.x + p[3][1] * from.v) + (p[3][2] * from.r + p[3][3] * from.w);
 }
 
-INLINE void contact_go(TrustContact *contact, double (*at)[TRUST_LANES], double length) {
+INLINE void contact_go(GrowthContact *contact, double (*at)[GROWTH_LANES], double length) {
     double h;
-    const uint64_t n = divide(length, contact->frequency, contact->step, &h);
-    if ((int)(n % TRUST_NEAR) >= contact->known || n >> contact->levels >= TRUST_NEAR)
+    const uint64_t n = rounding_growth_divide(length, contact->frequency, contact->step, &h);
+    if ((int)(n % GROWTH_NEAR) >= contact->known || n >> contact->levels >= GROWTH_NEAR)
         contact_make(contact, n);
     const double half = h * h / 2, sixth = half * h * (1.0 / 3), last = half * half * (1.0 / 6);
     const Motion *m = &contact->motion;
@@ -177,8 +177,8 @@ INLINE void contact_go(TrustContact *contact, double (*at)[TRUST_LANES], double 
     y.v += (h * a.v + half * b.v) + (sixth * c.v + last * d.v);
     y.r += (h * a.r + half * b.r) + (sixth * c.r + last * d.r);
     y.w += (h * a.w + half * b.w) + (sixth * c.w + last * d.w);
-    contact_map(contact->near[n % TRUST_NEAR], &y);
-    for (uint64_t level = 0, left = n / TRUST_NEAR; left > 0; level++, left >>= 1)
+    contact_map(contact->near[n % GROWTH_NEAR], &y);
+    for (uint64_t level = 0, left = n / GROWTH_NEAR; left > 0; level++, left >>= 1)
         if ((left & 1) != 0)
             contact_map(contact->power[level], &y);
     PUT_FOUR(at[X], y.x);
@@ -188,61 +188,65 @@ INLINE void contact_go(TrustContact *contact, double (*at)[TRUST_LANES], double 
 }
 
 // Adds `size` to each lane, with signs of its own.
-INLINE void scatter(Trust *trust, int row, double size) {
-    static const double signs[16][TRUST_LANES] = {
+INLINE void rounding_growth_scatter(RoundingGrowth *growth, int row, double size) {
+    static const double signs[16][GROWTH_LANES] = {
         {-1, -1, -1, -1}, {-1, -1, -1, 1}, {-1, -1, 1, -1}, {-1, -1, 1, 1},
         {-1, 1, -1, -1},  {-1, 1, -1, 1},  {-1, 1, 1, -1},  {-1, 1, 1, 1},
         {1, -1, -1, -1},  {1, -1, -1, 1},  {1, -1, 1, -1},  {1, -1, 1, 1},
         {1, 1, -1, -1},   {1, 1, -1, 1},   {1, 1, 1, -1},   {1, 1, 1, 1}};
-    const double *sign = signs[trust->signs >> (60 - row * TRUST_LANES) & 15];
-    PUT_FOUR(trust->y[row], FOUR(trust->y[row]) + FOUR(sign) * size);
+    const double *sign = signs[growth->signs >> (60 - row * GROWTH_LANES) & 15];
+    PUT_FOUR(growth->y[row], FOUR(growth->y[row]) + FOUR(sign) * size);
 }
 
 // One rounding of what a stretch of this length held, `speed` being the relative one.
-INLINE void round_off(Trust *trust, double length, const State *state) {
-    const double reach = trust->reach;
+INLINE void rounding_growth_add_rounding(RoundingGrowth *growth, double length,
+                                         const State *state) {
+    const double reach = growth->reach;
     const double speed = fabs(state->w), own_speed = fabs(state->v);
     const double size = fabs(state->x) + reach * own_speed;
     // Systematic ones, of the structure's own numbers, grow for as long as it remembers.
-    const double lasting = length < trust->memory ? length : trust->memory;
-    const double own = ROUNDING * (size + lasting * trust->rate * size);
-    trust->signs = trust->signs * 6364136223846793005U + 1442695040888963407U;
-    scatter(trust, X, own);
-    scatter(trust, V, own * trust->rate);
-    scatter(trust, R, ROUNDING * speed * length);
-    scatter(trust, W,
-            ROUNDING * (speed + (trust->flying.omega2 * size + trust->flying.damping * own_speed) *
-                                    length));
+    const double lasting = length < growth->memory ? length : growth->memory;
+    const double own = ROUNDING * (size + lasting * growth->rate * size);
+    growth->signs = growth->signs * 6364136223846793005U + 1442695040888963407U;
+    rounding_growth_scatter(growth, X, own);
+    rounding_growth_scatter(growth, V, own * growth->rate);
+    rounding_growth_scatter(growth, R, ROUNDING * speed * length);
+    rounding_growth_scatter(
+        growth, W,
+        ROUNDING *
+            (speed + (growth->flying.omega2 * size + growth->flying.damping * own_speed) * length));
 }
 
 // The end of a stretch: what it adds, and how far the estimate is now.
-INLINE void judge(Trust *trust, double time, const State *state, double largest) {
-    const double length = time - trust->time;
-    round_off(trust, length, state);
+INLINE void rounding_growth_end_phase(RoundingGrowth *growth, double time, const State *state,
+                                      double largest) {
+    const double length = time - growth->time;
+    rounding_growth_add_rounding(growth, length, state);
     const double here = fabs(state->x), known = here > largest ? here : largest;
-    if (known > trust->largest)
-        trust->largest = known;
-    const Four x = FOUR(trust->y[X]), v = trust->reach * FOUR(trust->y[V]);
+    if (known > growth->largest)
+        growth->largest = known;
+    const Four x = FOUR(growth->y[X]), v = growth->reach * FOUR(growth->y[V]);
     const Four square = x * x + v * v;
     // What is not a number counts as the most.
     const double one = square[0] <= square[1] ? square[1] : square[0];
     const double other = square[2] <= square[3] ? square[3] : square[2];
     const double most = one <= other ? other : one;
-    trust->worst = most <= trust->worst ? trust->worst : most;
-    const double parting = RESPONSE_DIVERGENCE * trust->largest;
-    if (isnan(trust->horizon) && !(trust->worst <= parting * parting))
-        trust->horizon = trust->time;
-    trust->is_spent = !(trust->worst < trust->largest * trust->largest) && trust->largest > 0;
-    trust->time = time;
+    growth->worst = most <= growth->worst ? growth->worst : most;
+    const double parting = RESPONSE_DIVERGENCE * growth->largest;
+    if (isnan(growth->horizon) && !(growth->worst <= parting * parting))
+        growth->horizon = growth->time;
+    growth->is_spent = !(growth->worst < growth->largest * growth->largest) && growth->largest > 0;
+    growth->time = time;
 }
 
-void trust_start(Trust *trust, const Motion *flying, const Motion *touching, const Motion *resting,
-                 const State *state, double size, bool is_driven, double duration) {
+void rounding_growth_start(RoundingGrowth *growth, const Motion *flying, const Motion *touching,
+                           const Motion *resting, const State *state, double size, bool is_driven,
+                           double duration) {
     const double rate = fmax(fmax(sqrt(flying->omega2), flying->damping), 1 / duration);
-    TrustSwing *const swings[2] = {&trust->flying, &trust->resting};
+    GrowthStructure *const swings[2] = {&growth->flying, &growth->resting};
     // What an earlier run of the same system has made is still right.
     for (int i = 0; i < 2; i++) {
-        TrustSwing *swing = swings[i];
+        GrowthStructure *swing = swings[i];
         const double free = i == 0 ? 1 : 1 - resting->share; // M / (M + m) while the mass rests
         const double omega2 = free * flying->omega2, damping = free * flying->damping;
         if (swing->omega2 == omega2 && swing->damping == damping && swing->rate == rate)
@@ -255,125 +259,130 @@ void trust_start(Trust *trust, const Motion *flying, const Motion *touching, con
         swing->known = swing->levels = 0;
     }
     for (int side = 0; side < 2; side++) {
-        const Motion *now = &touching[side], *then = &trust->touching[side].motion;
+        const Motion *now = &touching[side], *then = &growth->touching[side].motion;
         const double most = fmax(now->rate, rate);
         if (then->omega2 == now->omega2 && then->damping == now->damping &&
             then->share == now->share && then->contact_omega2 == now->contact_omega2 &&
             then->contact_damping == now->contact_damping && then->rate == most)
             continue;
-        trust->touching[side].motion = *now;
-        trust->touching[side].motion.rate = most;
-        trust->touching[side].step = CONTACT_STEP / most;
-        trust->touching[side].frequency = most / CONTACT_STEP;
-        trust->touching[side].known = trust->touching[side].levels = 0;
+        growth->touching[side].motion = *now;
+        growth->touching[side].motion.rate = most;
+        growth->touching[side].step = CONTACT_STEP / most;
+        growth->touching[side].frequency = most / CONTACT_STEP;
+        growth->touching[side].known = growth->touching[side].levels = 0;
     }
-    trust->is_wide = wide_is_at_hand();
-    trust->is_spent = false;
-    trust->time = 0;
-    trust->share = flying->share;
-    trust->rate = rate;
-    trust->reach = 1 / rate;
-    trust->memory = flying->damping > 0 ? 2 / flying->damping : duration;
-    trust->phase = is_driven ? flying->rate : rate;
-    trust->lasting = is_driven ? duration : fmin(duration, trust->memory);
-    trust->largest = fabs(state->x);
-    trust->worst = 0;
-    trust->horizon = NAN;
-    trust->signs = 0x9e3779b97f4a7c15U;
-    memset(trust->y, 0, sizeof trust->y);
-    scatter(trust, R, ROUNDING * size);
-    round_off(trust, 0, state);
+    growth->is_wide = wide_is_at_hand();
+    growth->is_spent = false;
+    growth->time = 0;
+    growth->share = flying->share;
+    growth->rate = rate;
+    growth->reach = 1 / rate;
+    growth->memory = flying->damping > 0 ? 2 / flying->damping : duration;
+    growth->phase = is_driven ? flying->rate : rate;
+    growth->lasting = is_driven ? duration : fmin(duration, growth->memory);
+    growth->largest = fabs(state->x);
+    growth->worst = 0;
+    growth->horizon = NAN;
+    growth->signs = 0x9e3779b97f4a7c15U;
+    memset(growth->y, 0, sizeof growth->y);
+    rounding_growth_scatter(growth, R, ROUNDING * size);
+    rounding_growth_add_rounding(growth, 0, state);
 }
 
-INLINE void fly(Trust *trust, double time, const State *state, double largest) {
-    const double length = time - trust->time;
-    Four x = FOUR(trust->y[X]), v = FOUR(trust->y[V]);
+INLINE void rounding_growth_over_flight(RoundingGrowth *growth, double time, const State *state,
+                                        double largest) {
+    const double length = time - growth->time;
+    Four x = FOUR(growth->y[X]), v = FOUR(growth->y[V]);
     // The free mass goes straight on.
-    const Four speed = v + FOUR(trust->y[W]), z = x + FOUR(trust->y[R]) + length * speed;
-    swing_go(&trust->flying, &x, &v, length);
-    PUT_FOUR(trust->y[X], x);
-    PUT_FOUR(trust->y[V], v);
-    PUT_FOUR(trust->y[R], z - x);
-    PUT_FOUR(trust->y[W], speed - v);
-    judge(trust, time, state, largest);
+    const Four speed = v + FOUR(growth->y[W]), z = x + FOUR(growth->y[R]) + length * speed;
+    swing_go(&growth->flying, &x, &v, length);
+    PUT_FOUR(growth->y[X], x);
+    PUT_FOUR(growth->y[V], v);
+    PUT_FOUR(growth->y[R], z - x);
+    PUT_FOUR(growth->y[W], speed - v);
+    rounding_growth_end_phase(growth, time, state, largest);
 }
 
-INLINE void press(Trust *trust, Side side, double time, const State *state, double largest) {
-    contact_go(&trust->touching[side], trust->y, time - trust->time);
-    judge(trust, time, state, largest);
+INLINE void rounding_growth_over_contact(RoundingGrowth *growth, Side side, double time,
+                                         const State *state, double largest) {
+    contact_go(&growth->touching[side], growth->y, time - growth->time);
+    rounding_growth_end_phase(growth, time, state, largest);
 }
 
-WIDE static void fly_wide(Trust *trust, double time, const State *state, double largest) {
-    fly(trust, time, state, largest);
+WIDE static void rounding_growth_over_flight_wide(RoundingGrowth *growth, double time,
+                                                  const State *state, double largest) {
+    rounding_growth_over_flight(growth, time, state, largest);
 }
 
-WIDE static void press_wide(Trust *trust, Side side, double time, const State *state,
+WIDE static void rounding_growth_over_contact_wide(RoundingGrowth *growth, Side side, double time,
+                                                   const State *state, double largest) {
+    rounding_growth_over_contact(growth, side, time, state, largest);
+}
+
+void rounding_growth_flight(RoundingGrowth *growth, double time, const State *state,
                             double largest) {
-    press(trust, side, time, state, largest);
-}
-
-void trust_fly(Trust *trust, double time, const State *state, double largest) {
-    if (trust->is_spent)
+    if (growth->is_spent)
         return;
-    if (trust->is_wide)
-        fly_wide(trust, time, state, largest);
+    if (growth->is_wide)
+        rounding_growth_over_flight_wide(growth, time, state, largest);
     else
-        fly(trust, time, state, largest);
+        rounding_growth_over_flight(growth, time, state, largest);
 }
 
-void trust_press(Trust *trust, Side side, double time, const State *state, double largest) {
-    if (trust->is_spent)
+void rounding_growth_contact(RoundingGrowth *growth, Side side, double time, const State *state,
+                             double largest) {
+    if (growth->is_spent)
         return;
-    if (trust->is_wide)
-        press_wide(trust, side, time, state, largest);
+    if (growth->is_wide)
+        rounding_growth_over_contact_wide(growth, side, time, state, largest);
     else
-        press(trust, side, time, state, largest);
+        rounding_growth_over_contact(growth, side, time, state, largest);
 }
 
-void trust_rest(Trust *trust, double time, const State *state, double largest) {
-    if (trust->is_spent)
+void rounding_growth_rest(RoundingGrowth *growth, double time, const State *state, double largest) {
+    if (growth->is_spent)
         return;
-    Four x = FOUR(trust->y[X]), v = FOUR(trust->y[V]);
-    swing_go(&trust->resting, &x, &v, time - trust->time);
-    PUT_FOUR(trust->y[X], x);
-    PUT_FOUR(trust->y[V], v);
-    judge(trust, time, state, largest);
-    for (int i = 0; i < TRUST_LANES; i++)
-        trust->y[R][i] = trust->y[W][i] = 0;
+    Four x = FOUR(growth->y[X]), v = FOUR(growth->y[V]);
+    swing_go(&growth->resting, &x, &v, time - growth->time);
+    PUT_FOUR(growth->y[X], x);
+    PUT_FOUR(growth->y[V], v);
+    rounding_growth_end_phase(growth, time, state, largest);
+    for (int i = 0; i < GROWTH_LANES; i++)
+        growth->y[R][i] = growth->y[W][i] = 0;
 }
 
-void trust_bounce(Trust *trust, double restitution, double w, double push) {
-    if (trust->is_spent)
+void rounding_growth_bounce(RoundingGrowth *growth, double restitution, double w, double push) {
+    if (growth->is_spent)
         return;
-    const double gain = trust->share * (1 + restitution);
+    const double gain = growth->share * (1 + restitution);
     // s itself jumps, by what the structure's damper feels.
-    const double kick = trust->flying.damping * gain * w;
-    for (int i = 0; i < TRUST_LANES; i++) {
-        const double r = trust->y[R][i];
+    const double kick = growth->flying.damping * gain * w;
+    for (int i = 0; i < GROWTH_LANES; i++) {
+        const double r = growth->y[R][i];
         const double late = w != 0 ? -r / w : 0;
-        const double arriving = trust->y[W][i] + push * late;
-        trust->y[X][i] += gain * r;
-        trust->y[V][i] += gain * arriving + kick * late;
-        trust->y[R][i] = -restitution * r;
-        trust->y[W][i] = -restitution * arriving - (push + kick) * late;
+        const double arriving = growth->y[W][i] + push * late;
+        growth->y[X][i] += gain * r;
+        growth->y[V][i] += gain * arriving + kick * late;
+        growth->y[R][i] = -restitution * r;
+        growth->y[W][i] = -restitution * arriving - (push + kick) * late;
     }
 }
 
-void trust_stick(Trust *trust) {
-    for (int i = 0; i < TRUST_LANES; i++) {
-        trust->y[V][i] += trust->share * trust->y[W][i];
-        trust->y[R][i] = trust->y[W][i] = 0;
+void rounding_growth_stick(RoundingGrowth *growth) {
+    for (int i = 0; i < GROWTH_LANES; i++) {
+        growth->y[V][i] += growth->share * growth->y[W][i];
+        growth->y[R][i] = growth->y[W][i] = 0;
     }
 }
 
-void trust_tell(const Trust *trust, Response *response) {
-    const double size = fmax(trust->largest, response->peaks.displacement);
-    double error = size > 0 ? sqrt(trust->worst) / size : trust->worst == 0 ? 0 : 1;
-    response->trust_horizon = trust->horizon;
+void rounding_growth_report(const RoundingGrowth *growth, Response *response) {
+    const double size = fmax(growth->largest, response->peaks.displacement);
+    double error = size > 0 ? sqrt(growth->worst) / size : growth->worst == 0 ? 0 : 1;
+    response->trust_horizon = growth->horizon;
     // Without any event a rounded frequency still turns the phase.
-    const double drift = size > 0 ? ROUNDING * (1 + trust->phase * trust->lasting) : 0;
-    const double adrift = (RESPONSE_DIVERGENCE / ROUNDING - 1) / trust->phase;
-    if (drift > RESPONSE_DIVERGENCE && !(trust->horizon <= adrift))
+    const double drift = size > 0 ? ROUNDING * (1 + growth->phase * growth->lasting) : 0;
+    const double adrift = (RESPONSE_DIVERGENCE / ROUNDING - 1) / growth->phase;
+    if (drift > RESPONSE_DIVERGENCE && !(growth->horizon <= adrift))
         response->trust_horizon = adrift;
     if (drift > error)
         error = drift;

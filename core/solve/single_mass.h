@@ -7,15 +7,10 @@
 
 #include "core/solve/solver.h"
 
-typedef struct SingleMass SingleMass;
-
 // Whether the plan is one for single_mass_run; `is_clear`: no mass reaches a stop.
 bool single_mass_serves(const Plan *plan, bool is_clear);
 
 // As Solver.run. The workspace, if there is one, keeps the tables for the next run.
 Status single_mass_run(Run *run, Response *response, Problem *problem);
-
-// Frees what a workspace keeps; NULL is allowed.
-void single_mass_free(SingleMass *single);
 
 #endif

@@ -6,10 +6,9 @@
 
 #include "core/solve/base_motion_cursor.h"
 #include "core/solve/contact_modes.h"
-#include "core/solve/frame_engine.h"
+#include "core/solve/event_engine.h"
 #include "core/solve/lanes.h"
 #include "core/solve/rounding_growth.h"
-#include "core/solve/single_mass.h"
 #include "core/solve/taylor_flight.h"
 
 // All that the tables depend on.
@@ -29,6 +28,7 @@ typedef struct ContactMap {
     double vv[FORM_PAIRS], ww[FORM_PAIRS], av[FORM_PAIRS], aw[FORM_PAIRS];
 } ContactMap;
 
+typedef struct SingleMass SingleMass;
 struct SingleMass {
     Run *run;
     const Plan *plan;
@@ -67,7 +67,7 @@ struct SingleMass {
     ContactMap maps[2];
     bool has_modes[2];
     ContactModes modes[2]; // by Side
-    Trust growth;
+    RoundingGrowth growth;
 };
 
 static inline double single_mass_larger(double a, double b) {
@@ -156,8 +156,20 @@ static inline void single_mass_slice(SingleMass *single, Slice *slice) {
 #define SINGLE_MASS_STEPS 5 // solver steps of a piece or of a stretch of contact
 
 EnergyState single_mass_energy(const SingleMass *single);
+// What can be seen at the present instant.
+Instant single_mass_instant(const SingleMass *single);
+void single_mass_put(double *column, size_t sample, double value); // unless the column is NULL
+void single_mass_record(SingleMass *single);                       // the present sample
+// Adds to the energies: integrals of v^2, a_g v and a_g times the free mass's velocity.
+void single_mass_work(SingleMass *single, double vv, double av, double az);
+// Enters what waits in `stretch`, and takes the balance of energy.
+void single_mass_flush(SingleMass *single);
+void single_mass_note(SingleMass *single);       // peaks of the present instant
+void single_mass_note_force(SingleMass *single); // of the acceleration, after the force has jumped
+// Carries the rounding errors to the end of the present phase.
+void single_mass_end_phase(SingleMass *single);
 // The next sample is reached: records it.
 void single_mass_pass(SingleMass *single);
-void single_mass_release(SingleMass *single);
+void single_mass_release(SingleMass *single); // the present contact ends now
 
 #endif

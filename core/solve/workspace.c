@@ -3,8 +3,6 @@
 #include <stdint.h>
 #include <stdlib.h>
 
-#include "core/solve/single_mass.h"
-
 enum { KEPT_MAX = 1 << 18 }; // values
 
 double *workspace_values(Workspace *workspace, size_t count) {
@@ -29,7 +27,7 @@ void workspace_tidy(Workspace *workspace) {
 
 void workspace_clear(Workspace *workspace) {
     fft_cache_clear(&workspace->transforms);
-    single_mass_free(workspace->single);
+    free(workspace->single);
     workspace->single = NULL;
     free(workspace->values);
     workspace->values = NULL;

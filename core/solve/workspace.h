@@ -8,7 +8,7 @@
 // All zero is empty.
 typedef struct Workspace {
     FftCache transforms;
-    struct SingleMass *single; // single_mass.h's, with the tables of the last system
+    struct SingleMass *single; // one block, with the tables of the last system of one mass
     double *values;            // scratch
     size_t room;
 } Workspace;

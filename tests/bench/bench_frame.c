@@ -8,7 +8,7 @@
 #include <string.h>
 
 #include "core/math/fft.h"
-#include "core/solve/event_engine.h"
+#include "core/solve/exact.h"
 #include "server/base/clock.h"
 #include "tests/support/frames.h"
 #include "tests/support/paper.h"
@@ -108,7 +108,7 @@ int main(int argc, char **argv) {
             Response response = {0};
             run.steps = 0;
             const int64_t start = clock_thread_cpu_ns();
-            if (event_engine_run(&run, &response, &problem) != STATUS_OK)
+            if (exact_run_engine(&run, &response, &problem) != STATUS_OK)
                 return printf("%s\n", problem.detail), 1;
             least = fmin(least, (double)(clock_thread_cpu_ns() - start) / (double)plan->count);
             if (i + 1 == cases[c].repeats)

@@ -8,8 +8,7 @@
 #include <string.h>
 
 #include "core/math/fft.h"
-#include "core/solve/event_engine.h"
-#include "core/solve/exact_accuracy.h"
+#include "core/solve/exact.h"
 #include "core/solve/solvers.h"
 #include "core/solve/time_stepping.h"
 #include "server/base/clock.h"
@@ -96,7 +95,7 @@ static double bench_measure(const Case *from, const char *model, const char *sol
         run.steps = 0;
         const int64_t start = clock_thread_cpu_ns();
         const Status status = strcmp(solver, "exact") == 0
-                                  ? event_engine_run(&run, &result->response, &problem)
+                                  ? exact_run_engine(&run, &result->response, &problem)
                                   : solver_adaptive.run(&run, &result->response, &problem);
         if (status != STATUS_OK) {
             printf("%s\n", problem.detail);

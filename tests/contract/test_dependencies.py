@@ -24,15 +24,10 @@ STATIC_NAME_MAX = 2  # files of core/ in which one name of a static function may
 # exceptions: begin
 EXCEPTIONS = {
     "cycle": [
-        "core/solve/lanes_make > core/solve/lanes",
-        "core/solve/linear_contact > core/solve/single_mass",
-        "core/solve/single_mass_state > core/solve/single_mass",
-        "core/solve/workspace > core/solve/single_mass",
     ],
     "upward": [
     ],
     "static": [
-        "fly",
     ],
 }
 # exceptions: end

@@ -12,7 +12,7 @@
 
 #include <cmocka.h>
 
-#include "core/solve/event_engine.h"
+#include "core/solve/exact.h"
 #include "tests/support/doubles.h"
 #include "tests/support/frames.h"
 #include "tests/truth/drawn.h"
@@ -156,7 +156,7 @@ static bool engine_run(const DrawnFrame *drawn, FrameTruth *answer, double *resi
     answer->y = answer->z + m * plan->count;
     answer->force = answer->y + m * plan->count;
     Run run = {.plan = plan, .base = &drawn->base, .columns = columns, .column_count = 3 * (n + m)};
-    const Status status = event_engine_run(&run, &response, &problem);
+    const Status status = exact_run_engine(&run, &response, &problem);
     if (status != STATUS_OK)
         printf("  refused: %s\n", problem.detail);
     answer->impact_count = response.impacts.count;

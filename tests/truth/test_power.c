@@ -14,8 +14,7 @@
 #include <cmocka.h>
 
 #include "core/math/fft.h"
-#include "core/solve/event_engine.h"
-#include "core/solve/exact_accuracy.h"
+#include "core/solve/exact.h"
 #include "tests/support/scenes.h"
 #include "tests/truth/drawn.h"
 #include "tests/truth/power_reference.h"
@@ -131,7 +130,7 @@ static Answer power_run(const PowerScene *scene, double tolerance) {
                .column_count = 1,
                .steps_max = 1e9,
                .impacts_max = 100000};
-    answer.status = event_engine_run(&run, &answer.response, &problem);
+    answer.status = exact_run_engine(&run, &answer.response, &problem);
     answer.steps = run.steps;
     if (answer.status != STATUS_OK && is_verbose)
         printf("%s\n", problem.detail);

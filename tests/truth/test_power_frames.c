@@ -13,7 +13,7 @@
 #include <cmocka.h>
 
 #include "core/math/fft.h"
-#include "core/solve/exact_accuracy.h"
+#include "core/solve/exact.h"
 #include "core/solve/solvers.h"
 #include "core/solve/time_stepping.h"
 #include "tests/support/document.h"

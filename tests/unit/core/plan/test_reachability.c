@@ -11,7 +11,7 @@
 #include <cmocka.h>
 
 #include "core/plan/reachability.h"
-#include "core/solve/event_engine.h"
+#include "core/solve/exact.h"
 #include "tests/support/frames.h"
 
 enum { SCENES = 900, SAMPLES = 401 };
@@ -125,7 +125,7 @@ static void judge(uint64_t seed, BaseForm form, Told *told) {
     }
     Response response = {0};
     const Regime regime = regime_find(plan, &base);
-    if (event_engine_run(&run, &response, &problem) != STATUS_OK)
+    if (exact_run_engine(&run, &response, &problem) != STATUS_OK)
         fail_msg("seed %llu: %s", (unsigned long long)seed, problem.detail);
     if (is_shared)
         memcpy(structure + SAMPLES, structure, SAMPLES * sizeof *structure);

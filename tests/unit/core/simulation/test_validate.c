@@ -9,7 +9,7 @@
 
 #include "core/base/canonical.h"
 #include "core/simulation/simulation.h"
-#include "core/solve/exact_accuracy.h"
+#include "core/solve/exact.h"
 #include "core/solve/solvers.h"
 #include "tests/support/fields.h"
 #include "tests/support/scenes.h"

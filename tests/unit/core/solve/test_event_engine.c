@@ -11,7 +11,7 @@
 #include <cmocka.h>
 
 #include "core/math/fft.h"
-#include "core/solve/event_engine.h"
+#include "core/solve/exact.h"
 #include "core/solve/step_work.h"
 #include "tests/support/frames.h"
 #include "tests/support/paper.h"
@@ -98,7 +98,7 @@ static void the_papers_scenes_are_those_of_the_single_engine(void **state) {
         Plan *plan;
         Base base = {0};
         prepare(&simulation, &plan, &base);
-        Answer one = run(solver_exact.run, plan, &base), other = run(event_engine_run, plan, &base);
+        Answer one = run(solver_exact.run, plan, &base), other = run(exact_run_engine, plan, &base);
         // A scene may amplify a last digit: what that does to the single engine's answer is
         // allowed.
         plan->dampers[0].clearance *= 1 + 0x1p-52;
@@ -151,7 +151,7 @@ static void free_vibration_without_dampers_is_the_closed_form(void **state) {
         double shape[6];
         for (size_t j = 0; j < n; j++)
             plan->displacement[j] = shape[j] = 0.01 * sin(2 * angle * (double)(j + 1));
-        Answer answer = run(event_engine_run, plan, &still);
+        Answer answer = run(exact_run_engine, plan, &still);
         for (size_t i = 0; i < plan->count; i++) {
             const double t = (double)i / 100;
             const double swing = exp(-decay * t) * (cos(turn * t) + decay / turn * sin(turn * t));
@@ -178,10 +178,10 @@ static void whole_intervals_are_as_exact_as_arcs(void **state) {
         frames_uniform(plan, 3, 2000, 0.02);
         plan->damping[0] *= 7; // couples the modes
         plan->displacement[4] = 0.01;
-        Answer many = run(event_engine_run, plan, &bases[b]);
+        Answer many = run(exact_run_engine, plan, &bases[b]);
         plan->count = 100;
         plan->duration = 0.99;
-        Answer few = run(event_engine_run, plan, &bases[b]);
+        Answer few = run(exact_run_engine, plan, &bases[b]);
         for (size_t j = 0; j < 5; j++)
             for (int channel = 0; channel < 3; channel++)
                 assert_true(difference(of_storey(&many, channel, j), of_storey(&few, channel, j),
@@ -216,8 +216,8 @@ static void two_halves_of_a_damper_move_as_the_whole(void **state) {
     (void)state;
     for (int model = 0; model < 2; model++) {
         Plan *halves = shaken_frame(2, model == 1, 2), *whole = shaken_frame(1, model == 1, 1);
-        Answer two = run(event_engine_run, halves, &still),
-               one = run(event_engine_run, whole, &still);
+        Answer two = run(exact_run_engine, halves, &still),
+               one = run(exact_run_engine, whole, &still);
         assert_int_equal(two.response.impacts.count, 2 * one.response.impacts.count);
         assert_true(one.response.impacts.count > 20);
         for (size_t j = 0; j < 4; j++)
@@ -239,7 +239,7 @@ static void a_mirrored_scene_has_the_mirrored_answer(void **state) {
         plan->dampers[1].storey = mirror->dampers[1].storey = 0;
         for (size_t j = 0; j < 4; j++)
             mirror->displacement[j] = -plan->displacement[j];
-        Answer a = run(event_engine_run, plan, &still), b = run(event_engine_run, mirror, &still);
+        Answer a = run(exact_run_engine, plan, &still), b = run(exact_run_engine, mirror, &still);
         assert_true(a.response.impacts.count > 10);
         for (size_t i = 0; i < 3 * 6 * a.count; i++)
             assert_true(a.values[i] == -b.values[i]);
@@ -260,7 +260,7 @@ static void a_storey_on_an_unmoved_one_is_a_structure_by_itself(void **state) {
     frames_damper(plan, 0, 1, 0.1107, 0.015, 0.61, 0.025);
     frames_damper(alone, 0, 0, 0.1107, 0.015, 0.61, 0.025);
     plan->displacement[1] = alone->displacement[0] = 0.015;
-    Answer two = run(event_engine_run, plan, &still), one = run(event_engine_run, alone, &still);
+    Answer two = run(exact_run_engine, plan, &still), one = run(exact_run_engine, alone, &still);
     assert_int_equal(two.response.impacts.count, one.response.impacts.count);
     assert_true(difference(of_storey(&two, 0, 1), of_storey(&one, 0, 0), one.count) < 1e-9);
     answer_clear(&two);
@@ -281,7 +281,7 @@ static void momentum_is_kept_by_everything_that_collides(void **state) {
             plan->dampers[d].velocity = 0.7 - 0.5 * (double)d;
         }
         plan->velocity[1] = 0.4;
-        Answer answer = run(event_engine_run, plan, &still);
+        Answer answer = run(exact_run_engine, plan, &still);
         double want = 0;
         for (size_t i = 0; i < plan->count; i++) {
             double sum = 0;
@@ -303,7 +303,7 @@ static void momentum_is_kept_by_everything_that_collides(void **state) {
 static void peaks_and_sums_are_the_largest_storeys(void **state) {
     (void)state;
     Plan *plan = shaken_frame(1, false, 1);
-    Answer answer = run(event_engine_run, plan, &still);
+    Answer answer = run(exact_run_engine, plan, &still);
     double peak[2] = {0, 0}, sums[2] = {0, 0};
     for (size_t j = 0; j < 4; j++)
         for (int channel = 0; channel < 2; channel++) {
@@ -339,7 +339,7 @@ static void many_held_masses_change_stops_together(void **state) {
     const Base base = {.form = BASE_SINE, .amplitude = 10, .omega = 8 * acos(-1)};
     Run with = {.plan = plan, .base = &base};
     Response response = {0};
-    assert_int_equal(event_engine_run(&with, &response, NULL), STATUS_OK);
+    assert_int_equal(exact_run_engine(&with, &response, NULL), STATUS_OK);
     assert_true(response.energy.residual < 1e-11);
     response_clear(&response);
     plan_free(plan);
@@ -355,7 +355,7 @@ static Status status_of(const Plan *plan, Run with, Problem *problem) {
     with.plan = plan;
     with.base = &still;
     problem_clear(problem);
-    const Status status = event_engine_run(&with, &response, problem);
+    const Status status = exact_run_engine(&with, &response, problem);
     response_clear(&response);
     return status;
 }
@@ -388,7 +388,7 @@ static void the_work_of_the_neighbour_is_counted(void **state) {
     plan->displacement[2] = 0.01;
     Response response = {0};
     Run run = {.plan = plan, .base = &still};
-    assert_int_equal(event_engine_run(&run, &response, NULL), STATUS_OK);
+    assert_int_equal(exact_run_engine(&run, &response, NULL), STATUS_OK);
     const double flight =
         (double)plan->count *
         step_work_steps(STEP_WORK_FLIGHT, 3, 1, plan->modes.count > 0 && !plan->modes.is_classical);
@@ -428,7 +428,7 @@ static void masses_held_tight_wait_for_the_base_to_reach_them(void **state) {
         Problem problem;
         Run with = {.plan = plan, .base = &base, .steps_max = 1e6};
         problem_clear(&problem);
-        if (event_engine_run(&with, &response, &problem) != STATUS_OK)
+        if (exact_run_engine(&with, &response, &problem) != STATUS_OK)
             fail_msg("scene %d: %s", scene, problem.detail);
         assert_true(response.energy.residual < 1e-11);
         response_clear(&response);
@@ -474,7 +474,7 @@ static double knocked(const Plan *plan, double length, double *steps) {
                        .piece_count = 2};
     Response response = {0};
     Run with = {.plan = plan, .base = &base};
-    assert_int_equal(event_engine_run(&with, &response, NULL), STATUS_OK);
+    assert_int_equal(exact_run_engine(&with, &response, NULL), STATUS_OK);
     assert_true(response.impacts.count > 2 && response.energy.residual < 1e-12);
     *steps = with.steps;
     const double peak = response.peaks.displacement;

@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "core/solve/event_engine.h"
+#include "core/solve/exact.h"
 #include "core/solve/solvers.h"
 #include "tests/support/frames.h"
 
@@ -100,7 +100,7 @@ static void run_all(Status (*solve)(Run *run, Response *response, Problem *probl
 static void extreme_frames_end_with_an_answer_or_a_reason(void **state) {
     (void)state;
     size_t answered, refused;
-    run_all(event_engine_run, 20000, &answered, &refused);
+    run_all(exact_run_engine, 20000, &answered, &refused);
     assert_true(answered > RUNS / 5);
     assert_true(refused > RUNS / 70);
 }

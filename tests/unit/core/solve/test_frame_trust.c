@@ -9,7 +9,7 @@
 
 #include <cmocka.h>
 
-#include "core/solve/event_engine.h"
+#include "core/solve/exact.h"
 #include "tests/support/frames.h"
 
 enum { STOREYS = 3, NEIGHBOURS = 4, SAMPLES = 30001 };
@@ -42,7 +42,7 @@ static void solve(const Choice *choice, int ulps, double *values, Response *resp
     Run run = {.plan = plan, .base = &base, .columns = columns, .column_count = STOREYS};
     Problem problem;
     problem_clear(&problem);
-    if (event_engine_run(&run, response, &problem) != STATUS_OK)
+    if (exact_run_engine(&run, response, &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
     plan_free(plan);
 }
@@ -91,7 +91,7 @@ static void without_dampers_only_the_phase_drifts(void **state) {
     const Base still = {.form = BASE_STILL};
     Run run = {.plan = plan, .base = &still};
     Response response = {0};
-    assert_int_equal(event_engine_run(&run, &response, NULL), STATUS_OK);
+    assert_int_equal(exact_run_engine(&run, &response, NULL), STATUS_OK);
     assert_true(response.has_trust && isnan(response.trust_horizon));
     assert_true(response.error_estimate > 1e-15 && response.error_estimate < 1e-12);
     response_clear(&response);

@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "core/solve/event_engine.h"
+#include "core/solve/exact.h"
 #include "tests/support/frames.h"
 
 static const double STIFFNESS = 300, VISCOUS = 0.4, GYROSCOPIC = 9;
@@ -38,7 +38,7 @@ static Response run(const Plan *plan, double *x_1, double *x_2) {
     Response response = {0};
     Problem problem;
     problem_clear(&problem);
-    if (event_engine_run(&with, &response, &problem) != STATUS_OK)
+    if (exact_run_engine(&with, &response, &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
     return response;
 }

@@ -13,7 +13,7 @@
 
 #include "core/contact/identification.h"
 #include "core/contact/power_law.h"
-#include "core/solve/event_engine.h"
+#include "core/solve/exact.h"
 #include "tests/support/fields.h"
 #include "tests/support/scenes.h"
 
@@ -59,7 +59,7 @@ static Impact run(Simulation *simulation, Response *response, Plan **plan) {
         fail_msg("%s", problem.detail);
     assert_int_equal(plan_new(&simulation->scene, "exact", "exact", plan, &problem), STATUS_OK);
     Run with = {.plan = *plan, .base = &base};
-    if (event_engine_run(&with, response, &problem) != STATUS_OK)
+    if (exact_run_engine(&with, response, &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
     assert_true(response->impacts.count >= 1);
     return response->impacts.at[0];

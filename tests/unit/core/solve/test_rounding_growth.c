@@ -32,16 +32,16 @@ static Motion motion_of(double stiffness, double damping, double contact_time) {
     return motion;
 }
 
-static Trust *trust_make(double stiffness, double damping, double contact_time) {
+static RoundingGrowth *trust_make(double stiffness, double damping, double contact_time) {
     const Motion flying = motion_of(stiffness, damping, 0);
     const Motion touching = motion_of(stiffness, damping, contact_time);
     const Motion both[2] = {touching, touching};
     Motion resting = flying;
     resting.is_resting = true;
-    Trust *trust = malloc(sizeof *trust);
+    RoundingGrowth *trust = malloc(sizeof *trust);
     assert_non_null(trust);
-    memset(trust, 0xa5, sizeof *trust); // trust_start must write all that is read
-    trust_start(trust, &flying, both, &resting, &far, 0.015, false, 10);
+    memset(trust, 0xa5, sizeof *trust); // rounding_growth_start must write all that is read
+    rounding_growth_start(trust, &flying, both, &resting, &far, 0.015, false, 10);
     return trust;
 }
 
@@ -50,23 +50,24 @@ static void assert_near(double value, double wanted, double most) {
         fail_msg("%.17g is not within %g of %.17g", value, most, wanted);
 }
 
-static void seed(Trust *trust, double x, double v, double r, double w) {
+static void seed(RoundingGrowth *trust, double x, double v, double r, double w) {
     const double y[4] = {x, v, r, w};
     for (int row = 0; row < 4; row++)
-        for (int lane = 0; lane < TRUST_LANES; lane++)
+        for (int lane = 0; lane < GROWTH_LANES; lane++)
             trust->y[row][lane] = y[row];
 }
 
-static void assert_errors(const Trust *trust, double x, double v, double r, double w, double most) {
+static void assert_errors(const RoundingGrowth *trust, double x, double v, double r, double w,
+                          double most) {
     const double y[4] = {x, v, r, w};
     for (int row = 0; row < 4; row++)
-        for (int lane = 0; lane < TRUST_LANES; lane++)
+        for (int lane = 0; lane < GROWTH_LANES; lane++)
             assert_near(trust->y[row][lane], y[row], most);
 }
 
 // Two free bodies: the centre x + share r goes straight on, and what leaves a stop at -e w left it
 // `late` after the touch.
-static void assert_isolated(const Trust *trust, double after, double lasting) {
+static void assert_isolated(const RoundingGrowth *trust, double after, double lasting) {
     const double share = trust->share, e = RESTITUTION, x = 0.3, v = -0.7, r = 0.9, w = 0.4;
     const double before = 0.25, total = before + lasting + after;
     const double left_w = -e * w, left_r = -e * (r + w * (total - lasting));
@@ -76,11 +77,11 @@ static void assert_isolated(const Trust *trust, double after, double lasting) {
 
 static void an_impulse_changes_an_error_as_two_free_bodies_do(void **state) {
     (void)state;
-    Trust *trust = trust_make(0, 0, 0);
+    RoundingGrowth *trust = trust_make(0, 0, 0);
     seed(trust, 0.3, -0.7, 0.9, 0.4);
-    trust_fly(trust, 0.25, &far, 0);
-    trust_bounce(trust, RESTITUTION, 0.31, 0);
-    trust_fly(trust, 1, &far, 0);
+    rounding_growth_flight(trust, 0.25, &far, 0);
+    rounding_growth_bounce(trust, RESTITUTION, 0.31, 0);
+    rounding_growth_flight(trust, 1, &far, 0);
     assert_isolated(trust, 0.75, 0);
     free(trust);
 }
@@ -89,11 +90,12 @@ static void a_contact_changes_an_error_as_two_free_bodies_do(void **state) {
     (void)state;
     static const double times[] = {CONTACT_TIME, 0.025, 0.4};
     for (size_t i = 0; i < COUNT(times); i++) {
-        Trust *trust = trust_make(0, 0, times[i]);
+        RoundingGrowth *trust = trust_make(0, 0, times[i]);
         seed(trust, 0.3, -0.7, 0.9, 0.4);
-        trust_fly(trust, 0.25, &far, 0);
-        trust_press(trust, i % 2 == 0 ? SIDE_LEFT : SIDE_RIGHT, 0.25 + times[i], &far, 0);
-        trust_fly(trust, 1 + times[i], &far, 0);
+        rounding_growth_flight(trust, 0.25, &far, 0);
+        rounding_growth_contact(trust, i % 2 == 0 ? SIDE_LEFT : SIDE_RIGHT, 0.25 + times[i], &far,
+                                0);
+        rounding_growth_flight(trust, 1 + times[i], &far, 0);
         assert_isolated(trust, 0.75, times[i]);
         free(trust);
     }
@@ -102,11 +104,11 @@ static void a_contact_changes_an_error_as_two_free_bodies_do(void **state) {
 // A mass that is thrown at a stop which pushes with s: its energy error stays, but for e^2.
 static void a_late_bounce_meets_another_speed(void **state) {
     (void)state;
-    Trust *trust = trust_make(0, 0, 0);
+    RoundingGrowth *trust = trust_make(0, 0, 0);
     trust->share = 0;
     const double r = 1e-3, w = 0.3, push = 4;
     seed(trust, 0, 0, r, 0);
-    trust_bounce(trust, RESTITUTION, w, push);
+    rounding_growth_bounce(trust, RESTITUTION, w, push);
     // w dw - s dr is what the energy w^2 / 2 - s r is wrong by.
     const double before = -push * r,
                  after = -RESTITUTION * w * trust->y[3][0] - push * trust->y[2][0];
@@ -132,9 +134,9 @@ static void a_contact_of_any_length_follows_its_system(void **state) {
         long double power[16];
         matrix_exponential(system, 4, lengths[i], power);
         for (int column = 0; column < 4; column++) {
-            Trust *trust = trust_make(865, 1.092, CONTACT_TIME);
+            RoundingGrowth *trust = trust_make(865, 1.092, CONTACT_TIME);
             seed(trust, column == 0, column == 1, column == 2, column == 3);
-            trust_press(trust, SIDE_RIGHT, lengths[i], &far, 0);
+            rounding_growth_contact(trust, SIDE_RIGHT, lengths[i], &far, 0);
             for (int row = 0; row < 4; row++) {
                 // Rates carry the system's fastest rate.
                 const double unit = (row % 2 == 1 ? m.rate : 1) / (column % 2 == 1 ? m.rate : 1);
@@ -147,14 +149,14 @@ static void a_contact_of_any_length_follows_its_system(void **state) {
 
 static void a_rest_forgets_the_relative_error_and_keeps_the_momentum(void **state) {
     (void)state;
-    Trust *trust = trust_make(865, 1.092, 0);
+    RoundingGrowth *trust = trust_make(865, 1.092, 0);
     seed(trust, 0.3, -0.7, 0.9, 0.4);
-    trust_stick(trust);
+    rounding_growth_stick(trust);
     assert_errors(trust, 0.3, -0.7 + trust->share * 0.4, 0, 0, 1e-12);
     // Both swing together, slower.
     const double omega = sqrt(trust->resting.omega2);
     assert_near(omega * omega, 865 / (1.35 + 0.1107), 1e-9);
-    trust_rest(trust, 2 * PI / omega, &far, 0);
+    rounding_growth_rest(trust, 2 * PI / omega, &far, 0);
     assert_near(trust->y[2][0], 0, 0);
     assert_near(trust->y[3][0], 0, 0);
     free(trust);

@@ -10,7 +10,7 @@
 #include <cmocka.h>
 
 #include "core/contact/contact.h"
-#include "core/solve/event_engine.h"
+#include "core/solve/exact.h"
 #include "tests/support/frames.h"
 
 enum { STOREYS = 3, DAMPERS = 2, SAMPLES = 2001 };
@@ -80,7 +80,7 @@ static Solved solve(const Choice *choice, bool is_by_arcs) {
     Run run = {.plan = plan, .base = &base, .columns = columns, .column_count = 2};
     Problem problem;
     problem_clear(&problem);
-    if (event_engine_run(&run, &solved.response, &problem) != STATUS_OK)
+    if (exact_run_engine(&run, &solved.response, &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
     solved.steps = run.steps;
     plan_free(plan);

@@ -12,7 +12,7 @@
 #include "core/excitation/random.h"
 #include "core/math/fft.h"
 #include "core/simulation/error_metrics.h"
-#include "core/solve/exact_accuracy.h"
+#include "core/solve/exact.h"
 #include "core/solve/solver.h"
 #include "core/study/candidate_settings.h"
 #include "core/study/study_run.h"

@@ -1,7 +1,6 @@
-// What the exact solver may be asked for: its "accuracy" object. Not its engines (exact*.c,
-// frame*.c). Used by exact.c, frame.c, simulation/ and tests.
-#ifndef CORE_SOLVE_EXACT_ACCURACY_H
-#define CORE_SOLVE_EXACT_ACCURACY_H
+// Settings of the exact solver, the scene's "accuracy" object.
+#ifndef CORE_SOLVE_EXACT_H
+#define CORE_SOLVE_EXACT_H
 
 #include "core/solve/solver.h"
 
@@ -17,5 +16,8 @@ double exact_tolerance(const Accuracy *accuracy);
 // Solver.decide and .forget_unused of the exact solver.
 Status exact_decide(const Accuracy *accuracy, double base_interval, Plan *plan, Problem *problem);
 void exact_forget_unused(Accuracy *accuracy, bool has_power_law);
+
+// As Solver.run, by the event engine for every plan, also where single_mass.h serves.
+Status exact_run_engine(Run *run, Response *response, Problem *problem);
 
 #endif
