@@ -1,6 +1,6 @@
 // An arc: the motion over a stretch in which the contact state does not change and the base is
 // linear or a sine, as Taylor polynomials that are exact to rounding. Not a time step: it has no
-// error to trade. Used by the exact solver, wherever an event may lie.
+// error to trade.
 #ifndef CORE_SOLVE_ARC_H
 #define CORE_SOLVE_ARC_H
 

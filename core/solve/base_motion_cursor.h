@@ -1,5 +1,5 @@
 // The base as a stepping solver meets it: what a_g does from a given instant on, and for how long.
-// Not its making (excite/). Used by solve/.
+// Not its making (excite/).
 #ifndef CORE_SOLVE_BASE_MOTION_CURSOR_H
 #define CORE_SOLVE_BASE_MOTION_CURSOR_H
 

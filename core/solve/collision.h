@@ -1,5 +1,5 @@
-// Impulses between masses that stops keep apart: what collisions do to all speeds at once. Not when
-// they happen nor what follows (frame_events.c). Used by frame_events.c.
+// Impulses between masses that stops keep apart: what collisions do to all speeds at once. Not
+// when they happen nor what follows (contact_events.c).
 #ifndef CORE_SOLVE_COLLISION_H
 #define CORE_SOLVE_COLLISION_H
 

@@ -1,6 +1,6 @@
 // How far a run of the general engine can be trusted: the same run a few roundings away,
 // COMPANION_SAMPLES behind it until the two have parted. Not the single engine's way, which is
-// trust.h. Used by state.c.
+// rounding_growth.h.
 #ifndef CORE_SOLVE_COMPANION_RUN_H
 #define CORE_SOLVE_COMPANION_RUN_H
 

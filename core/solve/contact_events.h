@@ -1,5 +1,5 @@
-// Touching, bouncing, resting and zero_gap_terms in the general engine: what happens at an instant,
-// and finding that instant on an arc. Used by state.c.
+// Touching, bouncing, resting and leaving: how an event changes the state of the masses, and the
+// location of the first event on a Taylor step.
 #ifndef CORE_SOLVE_CONTACT_EVENTS_H
 #define CORE_SOLVE_CONTACT_EVENTS_H
 

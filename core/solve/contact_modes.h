@@ -1,6 +1,6 @@
 // One linear contact in closed form: two damped oscillations, a slow one of the whole and a fast
 // one of the buffer, about what a linear base or a sine makes of both. Not for contacts that are no
-// oscillation or hardly two: is_usable says so, and arcs do. Used by the exact solver.
+// oscillation or hardly two: is_usable says so, and arcs do.
 #ifndef CORE_SOLVE_CONTACT_MODES_H
 #define CORE_SOLVE_CONTACT_MODES_H
 

@@ -1,4 +1,4 @@
-// ExactFlight of all masses over a whole sample interval is one step where bounds on the gaps'
+// Flight of all masses over a whole sample interval is one step where bounds on the gaps'
 // curvature prove that no stop can be reached (flight.h); a mass pressed to a stiff stop that it
 // surely does not leave has long steps too (sustained_contact.h); everything else goes by arcs
 // (taylor_step.h), whose polynomials locate events to rounding. Time is a sample's number and an

@@ -1,6 +1,5 @@
-// The stepping of the general engine: from sample to sample, past all events between.
-// Not the whole run (state.c) and not the motion of one stretch (taylor_step.h, flight.h,
-// sustained_contact.h, power_contact.h). Used by state.c and companion_run.c.
+// The event engine: steps the modal state from sample to sample, past all events between. The
+// motions are those of taylor_step.h, flight.h, sustained_contact.h and power_contact.h.
 #ifndef CORE_SOLVE_EVENT_ENGINE_H
 #define CORE_SOLVE_EVENT_ENGINE_H
 
@@ -21,7 +20,7 @@ typedef struct EventEngine {
     PowerContact ode;
     FlightBuffer trail;
     Recorder record;
-    double work;                   // since the progress was asked
+    double work;                   // since Progress was asked
     size_t idle;                   // steps of contact in a row that took no time
     struct RoundingGrowth *growth; // of a single mass, told of each event; NULL: none
     double *track; // of the last FLIGHT_BUFFER_MAX samples, all modes: sample k at (k - 1) %
@@ -53,7 +52,7 @@ Status event_engine_finish_interval(EventEngine *engine);
 // From the present sample over `length` [s].
 Status event_engine_cross(EventEngine *engine, double length);
 
-// Whether the motion is finite, the limits are kept and the progress lets the run go on.
+// Whether the motion is finite, the limits are kept and Progress lets the run go on.
 Status event_engine_check(EventEngine *engine);
 
 #endif

@@ -1,6 +1,6 @@
-// Whole sample intervals of flight of all masses by one step each, made once per run: exact for a
-// still base, one linear over the interval, and a sine; with a bound on how far each gap can bend
-// meanwhile. Not for contacts and not for parts of an interval: those are arcs. Used by state.c.
+// Whole sample intervals of flight of all masses by one step each, made once per run: exact for
+// a still base, one linear over the interval, and a sine; with a bound on how far each gap can
+// bend meanwhile. Not for contacts and not for parts of an interval: those are arcs.
 #ifndef CORE_SOLVE_FLIGHT_H
 #define CORE_SOLVE_FLIGHT_H
 

@@ -1,6 +1,6 @@
-// The samples of one stretch of the general engine's motion, one after the other, before they are
-// written down. Not how they come about: flight.h fills whole stretches, frame_engine.c the
-// single samples behind contacts. Used by core/solve/state*.c.
+// The samples of one stretch of the general engine's motion, one after the other, before they
+// are written down. Not how they come about: flight.h fills whole stretches, event_engine.c the
+// single samples behind contacts.
 #ifndef CORE_SOLVE_FLIGHT_BUFFER_H
 #define CORE_SOLVE_FLIGHT_BUFFER_H
 

@@ -1,5 +1,5 @@
 // The ledgers kept while a run goes on: impacts, energies, peaks.
-// Not the samples: those are record.h's. Used by the solvers.
+// Not the samples: those are record.h's.
 #ifndef CORE_SOLVE_IMPACT_LOG_H
 #define CORE_SOLVE_IMPACT_LOG_H
 

@@ -1,6 +1,6 @@
 // Free flight from sample to sample, eight at once: all of them straight from the state before the
 // first, so that no sample waits for the one before. Not contacts and not parts of an interval:
-// where a stop may be reached it ends. Used by the exact solver.
+// where a stop may be reached it ends.
 #ifndef CORE_SOLVE_LANES_H
 #define CORE_SOLVE_LANES_H
 

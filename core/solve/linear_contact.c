@@ -211,6 +211,6 @@ size_t linear_contact_run(SingleMass *single, size_t most) {
     if (!(samples >= 1))
         return 0;
     most = samples < (double)most ? (size_t)samples : most;
-    return single->lanes.width == LANES_PLAIN ? press_all_plain(single, most)
-                                              : press_all_wide(single, most);
+    return single->lanes.width == LANES_PLAIN ? follow_plain(single, most)
+                                              : follow_wide(single, most);
 }

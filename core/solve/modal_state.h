@@ -1,6 +1,6 @@
 // What the general engine knows while it runs, and how it looks from outside: rooms, forces,
-// energies. Not the stepping (state.c), the events (frame_events.c) nor what is written down of it
-// (frame_record.c). Used by core/solve/state*.c.
+// energies. Not the stepping (event_engine.c), the events (contact_events.c) nor what is written
+// down of it (recorder.c).
 #ifndef CORE_SOLVE_MODAL_STATE_H
 #define CORE_SOLVE_MODAL_STATE_H
 

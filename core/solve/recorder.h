@@ -1,6 +1,5 @@
 // Writes the general engine's samples into the wanted columns, and takes peaks and sums over all
-// storeys and dampers. Not the ledger of impacts (ledger.h), but for its end. Used by
-// core/solve/state*.c and steps*.c.
+// storeys and dampers. Not the ledger of impacts (impact_log.h), but for its end.
 #ifndef CORE_SOLVE_RECORDER_H
 #define CORE_SOLVE_RECORDER_H
 

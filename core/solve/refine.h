@@ -1,6 +1,5 @@
 // A sampled base on the finer grid of the output, where that is a whole number of times as fine:
-// linear between its samples, as it was. Not a resampling: no other grids. Used by the exact
-// solver.
+// linear between its samples, as it was. Not a resampling: no other grids.
 #ifndef CORE_SOLVE_REFINE_H
 #define CORE_SOLVE_REFINE_H
 

@@ -1,5 +1,5 @@
 // A run in which nothing moves: the answer without any solver. Not a mass at rest at its stop: that
-// is the solvers'. Used by simulation/.
+// is the solvers'.
 #ifndef CORE_SOLVE_REST_H
 #define CORE_SOLVE_REST_H
 

@@ -1,6 +1,6 @@
 // How long a trajectory can be trusted: what rounding does to it, to first order, carried along the
 // events. Not an error control: nothing of the motion depends on it, and a per cent is enough here.
-// Used by the exact solver, which tells it of each stretch as it ends and of each instant's jump.
+//
 #ifndef CORE_SOLVE_ROUNDING_GROWTH_H
 #define CORE_SOLVE_ROUNDING_GROWTH_H
 

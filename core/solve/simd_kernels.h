@@ -1,5 +1,5 @@
-// The general engine's long loops over modes, eight at once, by whatever vectors the processor has.
-// Not their physics: flight.h, recorder.h. Used by core/solve/state*.c.
+// The general engine's long loops over modes, eight at once, by whatever vectors the processor
+// has. Not their physics: flight.h, recorder.h.
 #ifndef CORE_SOLVE_SIMD_KERNELS_H
 #define CORE_SOLVE_SIMD_KERNELS_H
 

@@ -18,7 +18,7 @@
 enum {
     PENDING_MAX = 1024,      // samples between two balances of energy
     PROGRESS_SAMPLES = 8192, // between two looks at the progress
-    LAY_SAMPLES = 1 << 16,   // prepared between two looks at the progress
+    CLEAR_SAMPLES = 1 << 16, // prepared between two looks at the progress
     BLOCK = 32,              // samples of contact at a time
     PIECE_DEGREE = 26,
     PIECES_MAX = 24, // in one interval; longer contacts are the event engine's
@@ -75,7 +75,7 @@ static inline size_t single_mass_smaller(size_t a, size_t b) {
 }
 
 // Whole intervals of flight; 0: a stop may be reached in the next one.
-static size_t single_mass_fly(SingleMass *single, size_t most) {
+static size_t single_mass_flight_block(SingleMass *single, size_t most) {
     Stretch *s = &single->stretch;
     const double *base;
     most = single_mass_smaller(most, single_mass_base_ahead(single, &base));
@@ -85,7 +85,7 @@ static size_t single_mass_fly(SingleMass *single, size_t most) {
         s->right = single_mass_gap(single, SIDE_RIGHT);
     }
     if (single->plan->damper_count > 0)
-        s->middle = single_mass_middle(single);
+        s->middle = single_mass_origin(single);
     const double z = single->state.v + single->state.w;
     s->x = single->state.x;
     s->v = single->state.v;
@@ -542,8 +542,8 @@ typedef enum FlightEnd { END_SAMPLE, END_STOP, END_UNCLEAR } FlightEnd;
 
 // A whole interval in which r turns: free if the stop that it went to is surely not reached, though
 // it may come near.
-INLINE bool single_mass_turns_free(const SingleMass *single, const TaylorFlight *flight, double end,
-                                   double slope, double vary) {
+INLINE bool single_mass_turns_before_stop(const SingleMass *single, const TaylorFlight *flight,
+                                          double end, double slope, double vary) {
     const double h = single->interval, w = single->state.w * h,
                  push = single_mass_push(single, &single->state);
     const Side side = w > 0 ? SIDE_RIGHT : SIDE_LEFT;
@@ -559,7 +559,7 @@ INLINE bool single_mass_turns_free(const SingleMass *single, const TaylorFlight 
 }
 
 // From a sample to the stop that is reached before the next, or to that one; *side is the stop.
-INLINE FlightEnd single_mass_reach(SingleMass *single, Side *side) {
+INLINE FlightEnd single_mass_fly_to_stop(SingleMass *single, Side *side) {
     enum { STEPS = 8 };
     single->run->work.stop_searches++;
     const double h = single->interval;
@@ -584,7 +584,7 @@ INLINE FlightEnd single_mass_reach(SingleMass *single, Side *side) {
         const double sag = bounds.most * h * h / 8;
         if (!(sign * slope > crooked && sign * w > crooked) &&
             !(least > sag && other - from > sag) &&
-            !single_mass_turns_free(single, &flight, end, slope, bounds.vary))
+            !single_mass_turns_before_stop(single, &flight, end, slope, bounds.vary))
             return END_UNCLEAR;
         single_mass_take_flight(single, &flight, 1);
         return END_SAMPLE;
@@ -618,7 +618,7 @@ INLINE FlightEnd single_mass_reach(SingleMass *single, Side *side) {
 }
 
 // In flight from a stop to the next sample.
-INLINE bool single_mass_depart(SingleMass *single) {
+INLINE bool single_mass_fly_from_stop(SingleMass *single) {
     const double length = single->interval - single->offset,
                  sign = single_mass_sign((Side)single->origin);
     const double w = -sign * single->state.w;
@@ -688,7 +688,7 @@ static void contact_map_make(ContactMap *map, const Motion *m, double base_omega
 }
 
 // Whole intervals that surely belong to the present contact; 0: its end may come in the next one.
-INLINE size_t single_mass_press(SingleMass *single, size_t most) {
+INLINE size_t single_mass_contact_block(SingleMass *single, size_t most) {
     const Motion *m = &single->touching[single->side];
     const double h = single->interval, sign = single_mass_sign(single->side);
     ContactMap *map = &single->maps[single->side];
@@ -792,7 +792,7 @@ INLINE size_t single_mass_press(SingleMass *single, size_t most) {
     }
     // Samples 1 to count.
     const size_t first = single->sample + 1, bytes = count * sizeof(double);
-    const double middle = single_mass_middle(single);
+    const double middle = single_mass_origin(single);
     double *const *columns = single->columns;
     if (columns[CHANNEL_DISPLACEMENT] != NULL)
         memcpy(columns[CHANNEL_DISPLACEMENT] + first, y[0] + 1, bytes);
@@ -997,8 +997,8 @@ INLINE bool single_mass_advance(SingleMass *single, size_t until) {
             if (single->sample < single->statistics_start)
                 most = single_mass_smaller(most, single->statistics_start - 1 - single->sample);
             const size_t passed = most == 0   ? 0
-                                  : is_flight ? single_mass_fly(single, most)
-                                              : single_mass_press(single, most);
+                                  : is_flight ? single_mass_flight_block(single, most)
+                                              : single_mass_contact_block(single, most);
             if (single->pending >= PENDING_MAX)
                 single_mass_flush(single);
             if (passed > 0)
@@ -1022,10 +1022,10 @@ INLINE bool single_mass_advance(SingleMass *single, size_t until) {
         if (is_flight && is_quick && (pieces == 0 || is_released)) {
             is_released = false;
             Side side;
-            const FlightEnd end = single->offset == 0 && single->has_stops
-                                      ? single_mass_reach(single, &side)
-                                  : single->offset > 0 && single_mass_depart(single) ? END_SAMPLE
-                                                                                     : END_UNCLEAR;
+            const FlightEnd end =
+                single->offset == 0 && single->has_stops ? single_mass_fly_to_stop(single, &side)
+                : single->offset > 0 && single_mass_fly_from_stop(single) ? END_SAMPLE
+                                                                          : END_UNCLEAR;
             if (end == END_SAMPLE)
                 single->offset = h;
             else if (end == END_STOP && !single_mass_touch(single, side))
@@ -1095,7 +1095,7 @@ WIDE static void single_mass_measure_wide(const double *values, size_t count, do
 
 // The columns' values that flight leaves alone, of samples `from` to `to`; contacts write over
 // them.
-static void single_mass_lay(const SingleMass *single, size_t from, size_t to) {
+static void single_mass_clear_rows(const SingleMass *single, size_t from, size_t to) {
     const Base *base = single->run->base;
     for (int i = 0; i < CHANNEL_COUNT; i++)
         if (single->columns[i] != NULL && single->stretch.columns[i] == NULL)
@@ -1108,12 +1108,13 @@ static void single_mass_lay(const SingleMass *single, size_t from, size_t to) {
 }
 
 // Part by part: all at once takes long where the run has many samples.
-static Status single_mass_lay_all(const SingleMass *single) {
+static Status single_mass_clear_columns(const SingleMass *single) {
     const size_t count = single->plan->count;
-    for (size_t from = 0; from < count; from += LAY_SAMPLES) {
+    for (size_t from = 0; from < count; from += CLEAR_SAMPLES) {
         if (from > 0 && !progress_advance(single->run->progress, 0))
             return problem_set(single->problem, STATUS_CANCELLED, "cancelled at t = 0 s");
-        single_mass_lay(single, from, count - from > LAY_SAMPLES ? from + LAY_SAMPLES : count);
+        single_mass_clear_rows(single, from,
+                               count - from > CLEAR_SAMPLES ? from + CLEAR_SAMPLES : count);
     }
     return STATUS_OK;
 }
@@ -1220,11 +1221,11 @@ static Status single_mass_start(SingleMass *single, Run *run, Response *response
             (is_damper && plan->damper_count == 0))
             stretch->columns[i] = NULL;
     }
-    return single->has_blocks ? single_mass_lay_all(single) : STATUS_OK;
+    return single->has_blocks ? single_mass_clear_columns(single) : STATUS_OK;
 }
 
 // A mass that starts on a stop may touch it at t = 0; the first sample shows the moment after.
-static Status single_mass_settle(SingleMass *single) {
+static Status single_mass_first_sample(SingleMass *single) {
     if (!single->has_stops || fabs(single->state.r) < single->damper->clearance / 2) {
         single_mass_record(single);
         return STATUS_OK;
@@ -1240,7 +1241,7 @@ static Status single_mass_settle(SingleMass *single) {
 
 static Status single_mass_solve(SingleMass *single) {
     const Plan *plan = single->plan;
-    TRY(single_mass_settle(single));
+    TRY(single_mass_first_sample(single));
     TRY(single_mass_loop(single));
     single_mass_flush(single);
     // The duration may end between samples.

@@ -19,13 +19,13 @@ void single_mass_put(double *column, size_t sample, double value) {
 // The present instant, for the peaks.
 Instant single_mass_instant(const SingleMass *single) {
     const State *at = &single->state;
-    const double n = single_mass_pull(single, at);
+    const double n = single_mass_contact_term(single, at);
     Instant instant = {.x = at->x,
                        .v = at->v,
                        .acceleration = single->flying.share * n - single_mass_push(single, at),
                        .force = single_mass_effective(single) * n};
     if (single->plan->damper_count > 0) {
-        instant.damper_x = at->x + (single_mass_middle(single) + at->r);
+        instant.damper_x = at->x + (single_mass_origin(single) + at->r);
         instant.damper_v = at->v + at->w;
         if (single->phase == PHASE_CONTACT)
             instant.penetration = single_mass_larger(single_mass_sign(single->side) * at->r, 0);
@@ -123,8 +123,9 @@ void single_mass_end_phase(SingleMass *single) {
 
 void single_mass_note_force(SingleMass *single) {
     const State *at = &single->state;
-    impact_log_acceleration(&single->impacts, single->flying.share * single_mass_pull(single, at) -
-                                                  single_mass_push(single, at));
+    impact_log_acceleration(&single->impacts,
+                            single->flying.share * single_mass_contact_term(single, at) -
+                                single_mass_push(single, at));
 }
 
 void single_mass_release(SingleMass *single) {

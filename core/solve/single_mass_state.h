@@ -90,7 +90,7 @@ static inline double single_mass_gap(const SingleMass *single, Side side) {
 }
 
 // Displacement of the mass relative to the storey at r = 0 [m].
-static inline double single_mass_middle(const SingleMass *single) {
+static inline double single_mass_origin(const SingleMass *single) {
     const double stop = single->damper->clearance / 2;
     return single->damper->offset +
            (single->origin == FROM_MIDDLE ? 0 : single_mass_sign((Side)single->origin) * stop);
@@ -107,7 +107,7 @@ static inline double single_mass_push(const SingleMass *single, const State *at)
 }
 
 // n [m/s^2]; 0 in flight.
-static inline double single_mass_pull(const SingleMass *single, const State *at) {
+static inline double single_mass_contact_term(const SingleMass *single, const State *at) {
     if (single->phase != PHASE_CONTACT)
         return 0;
     const Motion *m = &single->touching[single->side];

@@ -1,5 +1,5 @@
 // What ONE solver is; solvers.c lists all. A solver turns a plan and a base's motion into a
-// response. Used by simulation/ and tests/truth, which runs every solver on every case.
+// response.
 #ifndef CORE_SOLVE_SOLVER_H
 #define CORE_SOLVE_SOLVER_H
 

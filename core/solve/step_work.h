@@ -1,5 +1,5 @@
-// What the general engine's parts take, in solver steps, as measured on frames of 1 to 200 storeys.
-// Not a count. Used by frame_engine.c, which counts by it, and simulation/cost.c, which foretells.
+// What the general engine's parts take, in solver steps, as measured on frames of 1 to 200
+// storeys. Not a count.
 #ifndef CORE_SOLVE_STEP_WORK_H
 #define CORE_SOLVE_STEP_WORK_H
 

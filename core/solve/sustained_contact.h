@@ -1,6 +1,6 @@
-// Long steps of one damper's contact, a sample interval or some halves of it, where the contact is
-// so stiff that arcs would be many; with a proof that it lasts. Not for contacts whose parameters
-// depend on the impact, nor for several at once: those go by arcs. Used by state.c.
+// Long steps of one damper's contact, a sample interval or some halves of it, where the contact
+// is so stiff that arcs would be many; with a proof that it lasts. Not for contacts whose
+// parameters depend on the impact, nor for several at once: those go by arcs.
 #ifndef CORE_SOLVE_SUSTAINED_CONTACT_H
 #define CORE_SOLVE_SUSTAINED_CONTACT_H
 

@@ -1,6 +1,6 @@
 // Free flight over part of a sample interval under a base that is still, linear or a sine: a short
 // Taylor series. Not for intervals that are long for the structure or the sine: those are arcs.
-// Used by the exact solver on its way to a stop and away from one.
+//
 #ifndef CORE_SOLVE_TAYLOR_FLIGHT_H
 #define CORE_SOLVE_TAYLOR_FLIGHT_H
 

@@ -1,6 +1,6 @@
 // An arc of the general engine: all modes and dampers over a stretch in which no contact state
-// changes and the base is linear or a sine, as Taylor polynomials that are exact to rounding. Not
-// for whole intervals of flight: flight.h. Used by state.c and frame_events.c.
+// changes and the base is linear or a sine, as Taylor polynomials that are exact to rounding.
+// Not for whole intervals of flight: flight.h.
 #ifndef CORE_SOLVE_TAYLOR_STEP_H
 #define CORE_SOLVE_TAYLOR_STEP_H
 

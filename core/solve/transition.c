@@ -26,7 +26,7 @@ typedef struct DenseWork {
     Real *series; // of one column: TERMS x storeys
     Real *speeds; // node after node, column after column, of all modes
     Real *pulls;  // D times those of one column
-    size_t done;  // products since the progress was asked
+    size_t done;  // products since Progress was asked
 } DenseWork;
 
 // Coefficients in t / h of a_g for a unit of value or of slope.

@@ -1,6 +1,6 @@
 // Whole sample intervals by one dense transition for all modes: of flight where damping couples
-// them, or of one damper's contact; and the work along it as quadratic forms. Not the step itself
-// nor its proof. Used by frame_flight.c and sustained_contact.c.
+// them, or of one damper's contact; and the work along it as quadratic forms. Not the step
+// itself nor its proof.
 #ifndef CORE_SOLVE_TRANSITION_H
 #define CORE_SOLVE_TRANSITION_H
 

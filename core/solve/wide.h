@@ -1,6 +1,5 @@
-// Four numbers side by side, and functions compiled for processors that hold them in one register.
-// Not wider ones (lanes.h) and no fused operations: the bytes are the same everywhere. Used by
-// trust.c, hop.h, pulse.h, press.h and core/solve/exact_*.c.
+// Four numbers side by side, and functions compiled for processors that hold them in one
+// register. Not wider ones (lanes.h) and no fused operations: the bytes are the same everywhere.
 #ifndef CORE_SOLVE_WIDE_H
 #define CORE_SOLVE_WIDE_H
 
