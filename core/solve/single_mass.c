@@ -700,8 +700,15 @@ INLINE size_t single_mass_contact_block(SingleMass *single, size_t most) {
         most = BLOCK;
     const Base *form = single->run->base;
     const bool is_sine = form->form == BASE_SINE;
-    if (!map->is_made)
-        contact_map_make(map, m, is_sine ? form->omega : 0, h);
+    if (!map->is_made) {
+        const ContactMap *other = &single->maps[single->side == SIDE_LEFT ? SIDE_RIGHT : SIDE_LEFT];
+        const SingleMassKey *key = &single->key;
+        if (other->is_made && key->contact_omega2[0] == key->contact_omega2[1] &&
+            key->contact_damping[0] == key->contact_damping[1])
+            *map = *other;
+        else
+            contact_map_make(map, m, is_sine ? form->omega : 0, h);
+    }
     _Alignas(64) double y[FORM_SIZE][BLOCK + 8];
     if (!is_sine && base == NULL)
         for (size_t k = 0; k < BLOCK + 8; k++)
