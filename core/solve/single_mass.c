@@ -1294,25 +1294,24 @@ bool single_mass_serves(const Plan *plan, bool is_clear) {
     return plan_is_single(plan) || (is_clear && plan_is_single_in_flight(plan));
 }
 
-static SingleMass *single_mass_new(void) {
-    // Its vectors want their alignment.
-    const size_t room = (sizeof(SingleMass) + 63) / 64 * 64;
-    SingleMass *single = aligned_alloc(64, room);
-    if (single != NULL)
-        memset(single, 0, room);
-    return single;
+// Without a workspace: all on the stack.
+static __attribute__((noinline)) Status single_mass_run_alone(Run *run, Response *response,
+                                                              Problem *problem) {
+    SingleMass single;
+    memset(&single, 0, sizeof single);
+    return single_mass_run_with(&single, run, response, problem);
 }
 
 Status single_mass_run(Run *run, Response *response, Problem *problem) {
     Workspace *workspace = run->workspace;
-    SingleMass *single =
-        workspace != NULL && workspace->single != NULL ? workspace->single : single_mass_new();
-    if (single == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run");
-    const Status status = single_mass_run_with(single, run, response, problem);
-    if (workspace != NULL)
-        workspace->single = single;
-    else
-        free(single);
-    return status;
+    if (workspace == NULL)
+        return single_mass_run_alone(run, response, problem);
+    if (workspace->single == NULL) {
+        // Its vectors want their alignment.
+        const size_t room = (sizeof(SingleMass) + 63) / 64 * 64;
+        if ((workspace->single = aligned_alloc(64, room)) == NULL)
+            return single_mass_run_alone(run, response, problem);
+        memset(workspace->single, 0, room);
+    }
+    return single_mass_run_with(workspace->single, run, response, problem);
 }
