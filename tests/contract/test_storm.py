@@ -11,7 +11,6 @@ import cancel_storm  # noqa: E402
 import mixed  # noqa: E402
 import program  # noqa: E402
 
-SANITIZED = True
 THREADED = True
 REQUESTS = 50000
 CANCELS = 300

@@ -5,20 +5,23 @@
 const char *const vectors_names[VECTORS_COUNT] = {"avx512", "avx2", "plain"};
 
 #ifdef __x86_64__
-// struct __processor_model of libgcc and of compiler-rt.
-extern struct {
+// struct __processor_model of libgcc and of compiler-rt, under a name that clang does not know.
+extern struct VectorsCpu {
     unsigned vendor, type, subtype, features[1];
-} __cpu_model __attribute__((visibility("hidden")));
+} vectors_cpu __asm__("__cpu_model") __attribute__((visibility("hidden")));
 enum { FEATURE_AVX2 = 10, FEATURE_AVX512F = 15 };
 
+int __cpu_indicator_init(void);
+
+// No built-in function of the compiler: clang cannot have these and the struct in one file.
 bool vectors_set(Vectors vectors) {
-    __builtin_cpu_init();
+    (void)__cpu_indicator_init();
     if (vectors != VECTORS_AVX512)
-        __cpu_model.features[0] &= ~(1u << FEATURE_AVX512F);
+        vectors_cpu.features[0] &= ~(1u << FEATURE_AVX512F);
     if (vectors == VECTORS_PLAIN)
-        __cpu_model.features[0] &= ~(1u << FEATURE_AVX2);
-    const bool has_avx2 = __builtin_cpu_supports("avx2");
-    const bool has_avx512 = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq");
+        vectors_cpu.features[0] &= ~(1u << FEATURE_AVX2);
+    const bool has_avx2 = (vectors_cpu.features[0] >> FEATURE_AVX2 & 1) != 0;
+    const bool has_avx512 = (vectors_cpu.features[0] >> FEATURE_AVX512F & 1) != 0;
     return has_avx512 == (vectors == VECTORS_AVX512) && has_avx2 == (vectors != VECTORS_PLAIN);
 }
 #else
