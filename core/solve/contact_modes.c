@@ -127,11 +127,6 @@ static Complex power_of_e(Complex z) {
 }
 
 static void make_tables(ContactModes *modes, const Complex l[2], double interval) {
-    for (int i = 0; i < MODES_BLOCK; i++) {
-        const Complex turn = power_of_e(complex_of(0, (i + 1) * modes->base_omega * interval));
-        modes->cosine[i] = (double)creall(turn);
-        modes->sine[i] = (double)cimagl(turn);
-    }
     modes->unit = modes->time / MODES_TABLE_UNIT;
     modes->per_unit = MODES_TABLE_UNIT / modes->time;
     for (int mode = 0; mode < 2; mode++) {
@@ -142,15 +137,6 @@ static void make_tables(ContactModes *modes, const Complex l[2], double interval
         for (int i = 0; i <= MODES_TABLE; i++, power *= step) {
             modes->table[i][2 * mode] = (double)creall(power);
             modes->table[i][2 * mode + 1] = (double)cimagl(power);
-        }
-        const Complex jump = complex_of(modes->jump[2 * mode], modes->jump[2 * mode + 1]);
-        power = 1;
-        for (int i = 0; i < MODES_BLOCK; i++) {
-            modes->jumps[2 * mode][MODES_BLOCK + i] = (double)creall(power * jump);
-            modes->jumps[2 * mode + 1][MODES_BLOCK + i] = (double)cimagl(power * jump);
-            power *= whole;
-            modes->ride[2 * mode][i] = (double)creall(power);
-            modes->ride[2 * mode + 1][i] = (double)cimagl(power);
         }
         modes->peak[2 * mode] = (double)creall(peak);
         modes->peak[2 * mode + 1] = (double)cimagl(peak);

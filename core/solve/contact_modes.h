@@ -1,13 +1,13 @@
 // One linear contact in closed form: two damped oscillations, a slow one of the whole and a fast
-// one of the buffer, about what a linear base or a sine makes of both. Not for contacts that are no
-// oscillation or hardly two: is_usable says so, and arcs do.
+// one of the buffer, about what a linear base or a sine makes of both. is_usable is false for
+// contacts that are no two oscillations; those go by Taylor pieces.
 #ifndef CORE_SOLVE_CONTACT_MODES_H
 #define CORE_SOLVE_CONTACT_MODES_H
 
 #include "core/solve/arc.h"
 #include "core/solve/wide.h"
 
-enum { MODES_TABLE = 160, MODES_TABLE_UNIT = 64, MODES_BLOCK = 8 };
+enum { MODES_TABLE = 160, MODES_TABLE_UNIT = 64 };
 
 // What can be seen: the state, n = N / m_e and its derivatives, further derivatives of r.
 typedef enum ModesRow {
@@ -68,10 +68,6 @@ typedef struct ContactModes {
     double table[MODES_TABLE + 1][4];      // the oscillations over i / MODES_TABLE_UNIT of T_c
     double peak[4];                        // over peak_time
     double interval[4];                    // and over a sample interval
-    double ride[4][MODES_BLOCK];           // and over 1 to MODES_BLOCK of them
-    double jumps[4][2 * MODES_BLOCK];      // what jump comes to after as many: from the middle on
-    double cosine[MODES_BLOCK],
-        sine[MODES_BLOCK]; // of the sine's turn over 1 to MODES_BLOCK of them
 } ContactModes;
 
 // `base_omega` is a sine's (0: linear).
