@@ -18,19 +18,12 @@ import numpy
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
+from asking import endless  # noqa: E402
 from client import Fake, client, endless_body, endless_headers, fake, raw, say  # noqa: E402
 
 SANITIZED = True
 WAITS = True
 SPONGE = os.path.join(program.EXAMPLES, "paper_free_sponge.json")
-
-
-def endless():
-    """A scene that takes many seconds: millions of steps."""
-    scene = program.scene("paper_free_sponge")
-    scene.update(duration=2000, sample_rate=10, output={"channels": [], "psd": None},
-                 accuracy={"solver": "rk4", "step": 1e-5})
-    return json.dumps(scene)
 
 
 def test_submit_prints_the_job_and_waits_for_it():
@@ -121,7 +114,7 @@ def test_binary_data_is_kept_off_a_terminal():
 def test_waits_that_time_out_leave_the_job():
     """A job that outlives --wait is exit code 8 of submit, watch and get, and goes on; cancel stops it, once."""
     with program.daemon() as daemon:
-        code, out, errors = client(daemon.url, "submit", "-", "--wait", "0.5", text=endless())
+        code, out, errors = client(daemon.url, "submit", "-", "--wait", "0.5", text=json.dumps(endless()))
         job = out.strip()
         assert code == 8 and f"impactd cancel {job}" in errors, (code, out, errors)
         for command in ("watch", "get"):
@@ -143,12 +136,12 @@ def test_interrupts_end_the_watching_alone():
     with program.daemon() as daemon:
         for arguments in (("watch", None), ("submit", "-", "--wait", "100")):
             if arguments[0] == "watch":
-                job = client(daemon.url, "submit", "-", text=endless())[1].strip()
+                job = client(daemon.url, "submit", "-", text=json.dumps(endless()))[1].strip()
                 arguments = ("watch", job)
             with subprocess.Popen([program.impactd(), *arguments], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
                                   stderr=subprocess.PIPE, text=True,
                                   env={**kept, "IMPACTD_SERVER": daemon.url}) as process:
-                process.stdin.write(endless() if arguments[0] == "submit" else "")
+                process.stdin.write(json.dumps(endless()) if arguments[0] == "submit" else "")
                 process.stdin.close()
                 job = process.stdout.readline().split()[0]
                 if arguments[0] == "submit":  # its lines are on stderr
@@ -168,7 +161,7 @@ def test_watch_draws_a_bar_on_a_terminal():
     except OSError as error:
         raise program.Skipped(f"no terminal can be made here: {error}") from None
     with program.daemon() as daemon:
-        job = client(daemon.url, "submit", "-", text=endless())[1].strip()
+        job = client(daemon.url, "submit", "-", text=json.dumps(endless()))[1].strip()
         with subprocess.Popen([program.impactd(), "watch", job, "--server", daemon.url], stdout=subprocess.PIPE,
                               stderr=slave, text=True, env=kept) as process:
             os.close(slave)
@@ -204,7 +197,7 @@ def test_watch_shows_what_the_events_tell():
             assert code == 0 and out.splitlines()[1:3] == ["j-1 running 30 %", "j-1 running 60 %"], (out, errors)
             assert sum(path.endswith("/events") for _, path, _ in seen) == 1, seen
     with program.daemon() as daemon:
-        scene = json.loads(endless())
+        scene = endless()
         slow = client(daemon.url, "submit", "-", text=json.dumps(scene))[1].strip()
         code, out, errors = client(daemon.url, "watch", slow, "--wait", "3.2")
         assert code == 8 and slow in out, (code, out, errors)
@@ -238,7 +231,7 @@ def test_a_daemon_started_anew_is_found_again():
     """watch survives a restart of the daemon and sees the job's end."""
     with tempfile.TemporaryDirectory() as data, program.daemon(data=data) as daemon:
         port = daemon.port
-        job = client(daemon.url, "submit", "-", text=endless())[1].strip()
+        job = client(daemon.url, "submit", "-", text=json.dumps(endless()))[1].strip()
         kept = {name: value for name, value in os.environ.items() if not name.startswith("IMPACTD_")}
         with subprocess.Popen([program.impactd(), "watch", job, "--server", daemon.url], stdout=subprocess.PIPE,
                               text=True, env=kept) as process:

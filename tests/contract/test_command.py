@@ -16,16 +16,10 @@ import numpy
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
+from asking import endless  # noqa: E402
 
 SANITIZED = True
 SPONGE = os.path.join(program.EXAMPLES, "paper_free_sponge.json")
-
-
-def endless():
-    """A scene that takes many seconds: few samples, millions of impacts."""
-    scene = program.scene("paper_sine_aluminium")
-    scene.update(duration=2e6, sample_rate=10, output={"channels": [], "psd": None})
-    return json.dumps(scene)
 
 
 def test_help_leads_with_examples():
@@ -232,7 +226,7 @@ def test_interrupts_stop_at_once():
             earlier = sum(resource.getrusage(resource.RUSAGE_CHILDREN)[:2])
             with subprocess.Popen([program.impactd(), "run", "-", "-o", target], stdin=subprocess.PIPE,
                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-                process.stdin.write(endless())
+                process.stdin.write(json.dumps(endless()))
                 process.stdin.close()
                 end = time.monotonic() + 20
                 while len(os.listdir(folder)) < 2:
@@ -276,7 +270,7 @@ def on_a_terminal(text, bars=1000):
 
 def test_progress_bar_on_a_terminal():
     """A long run shows a bar that moves on a terminal; a short one, or one into a file, shows none."""
-    shown = on_a_terminal(endless(), 5)
+    shown = on_a_terminal(json.dumps(endless()), 5)
     percents = [int(part.split("%")[0].split("]")[1]) for part in shown.split("\r") if "%" in part]
     assert len(percents) >= 3 and percents == sorted(percents) and percents[-1] <= 100, shown
     with open(SPONGE, encoding="utf-8") as file:

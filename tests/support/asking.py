@@ -8,10 +8,11 @@ def sponge(**changes):
     return {**program.scene("paper_free_sponge"), **changes}
 
 
-def endless(duration=2e6):
-    """A scene that takes many seconds: few samples, millions of impacts."""
-    scene = program.scene("paper_sine_aluminium")
-    scene.update(duration=duration, sample_rate=10, output={"channels": [], "psd": None})
+def endless(number=0):
+    """A scene that takes many seconds, another one for each number: few samples, millions of steps."""
+    scene = program.scene("paper_free_sponge")
+    scene.update(duration=2500 + number / 10, sample_rate=10, output={"channels": [], "psd": None},
+                 accuracy={"solver": "rk4", "step": 1e-5})
     return scene
 
 
