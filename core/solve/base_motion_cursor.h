@@ -6,7 +6,7 @@
 #include <stdbool.h>
 
 #include "core/excitation/base_motion.h"
-#include "core/solve/arc.h"
+#include "core/solve/linear_motion.h"
 
 typedef struct BaseCursor {
     const Base *base;

@@ -67,8 +67,9 @@ static void event_engine_take_contact(EventEngine *engine, size_t d) {
     DamperState *damper = &state->damper[d];
     const TaylorStep *arc = &engine->arc;
     double s = -1, impulse, lost;
-    const double peak = arc_largest(taylor_step_force(arc, d), arc->degree - 1,
-                                    impact_log_least_force(&state->impacts, &damper->row), &s);
+    const double peak =
+        linear_motion_largest(taylor_step_force(arc, d), arc->degree - 1,
+                              impact_log_least_force(&state->impacts, &damper->row), &s);
     impact_log_force(&state->impacts, &damper->row, peak);
     if (s > 0) {
         taylor_step_state(arc, state, s);

@@ -419,7 +419,7 @@ static void power_contact_state(PowerContact *contact, const Slice *slice, doubl
 static void power_contact_losses(PowerContact *contact, size_t rule, double *loss) {
     const ModalState *state = contact->state;
     const PowerSeries *series = &contact->series;
-    const size_t n = state->mode_count, count = arc_rules[rule].count;
+    const size_t n = state->mode_count, count = linear_motion_rules[rule].count;
     memset(loss, 0, SERIES_NODES * sizeof *loss);
     for (size_t i = 0; i < n; i++) {
         double *p = contact->nodes + i * SERIES_NODES;
@@ -442,7 +442,8 @@ static void power_contact_losses(PowerContact *contact, size_t rule, double *los
 static void power_contact_integrate(PowerContact *contact, const Slice *slice, StepWork *work) {
     const ModalState *state = contact->state;
     const PowerSeries *series = &contact->series;
-    const size_t rule = contact->error > 1e-8 ? 0 : ARC_RULES - 1, count = arc_rules[rule].count;
+    const size_t rule = contact->error > 1e-8 ? 0 : LINEAR_MOTION_RULES - 1,
+                 count = linear_motion_rules[rule].count;
     const size_t n = state->mode_count, m = state->dampers, degree = series->degree;
     double weight[SERIES_NODES], Y[SERIES_NODES], ground[SERIES_NODES], loss[SERIES_NODES],
         momentum[SERIES_NODES] = {0};
@@ -460,7 +461,7 @@ static void power_contact_integrate(PowerContact *contact, const Slice *slice, S
             momentum[k] += state->damper[d].plan->mass * w[k];
     }
     for (size_t k = 0; k < count; k++) {
-        weight[k] = arc_rules[rule].weight[k] * series->length * series->root;
+        weight[k] = linear_motion_rules[rule].weight[k] * series->length * series->root;
         for (int i = 1; i < series->root; i++)
             weight[k] *= Y[k];
         ground[k] = series->is_sine ? ground[k] : slice_at(slice, ground[k]);
@@ -495,8 +496,9 @@ static void power_contact_peaks(PowerContact *contact, const Slice *slice) {
         double s = -1;
         if (!of->has_force)
             continue;
-        const double peak = arc_largest(of->force, series->degree - 1,
-                                        impact_log_least_force(&state->impacts, &damper->row), &s);
+        const double peak =
+            linear_motion_largest(of->force, series->degree - 1,
+                                  impact_log_least_force(&state->impacts, &damper->row), &s);
         impact_log_force(&state->impacts, &damper->row, peak);
         if (!(s > 0 && s < 1))
             continue;

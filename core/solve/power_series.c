@@ -77,11 +77,11 @@ Status power_series_make(PowerSeries *series, const ModalState *state, Problem *
     series->z = simd_kernels_start(series->block);
     series->rate = series->z + SERIES_ROW * series->stride;
     series->elastic = series->rate + SERIES_ROW * series->stride;
-    for (size_t i = 0; i < ARC_RULES; i++)
-        for (size_t node = 0; node < arc_rules[i].count; node++)
+    for (size_t i = 0; i < LINEAR_MOTION_RULES; i++)
+        for (size_t node = 0; node < linear_motion_rules[i].count; node++)
             for (size_t k = 0; k < SERIES_ROW; k++)
                 series->node_power[i][k * SERIES_NODES + node] =
-                    pow(arc_rules[i].node[node], (double)k);
+                    pow(linear_motion_rules[i].node[node], (double)k);
     return STATUS_OK;
 }
 

@@ -57,9 +57,10 @@ typedef struct PowerSeries {
     double *elastic;        // D p + W^2 q of one order
     SeriesContact *contact; // the leading contact first
     size_t contact_count;
-    int root;                                                // of the leading contact; 1: tau is t
-    SeriesFactor powers[SERIES_POWERS];                      // of Y
-    double node_power[ARC_RULES][SERIES_ROW * SERIES_NODES]; // powers of the nodes of arc_rules
+    int root;                           // of the leading contact; 1: tau is t
+    SeriesFactor powers[SERIES_POWERS]; // of Y
+    double node_power[LINEAR_MOTION_RULES]
+                     [SERIES_ROW * SERIES_NODES]; // powers of the nodes of linear_motion_rules
     double *block;
 } PowerSeries;
 
@@ -96,7 +97,7 @@ void power_series_column(const PowerSeries *series, size_t column, double *out);
 // Evaluates the whole row at s.
 void power_series_at(const PowerSeries *series, double s, double *row);
 // Evaluates the polynomial c, whose coefficients are `stride` values apart, at the nodes of
-// arc_rules[rule]; writes SERIES_NODES values.
+// linear_motion_rules[rule]; writes SERIES_NODES values.
 void power_series_nodes(const PowerSeries *series, size_t rule, const double *c, size_t stride,
                         size_t degree, double *out);
 

@@ -8,7 +8,7 @@
 #include <stdint.h>
 
 #include "core/result/response.h"
-#include "core/solve/arc.h"
+#include "core/solve/linear_motion.h"
 
 // So many roundings are followed at once, each with signs of its own; the first to part counts.
 enum { GROWTH_LANES = 4, GROWTH_NEAR = 64, GROWTH_LEVELS = 26 };

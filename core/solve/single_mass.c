@@ -1,8 +1,8 @@
 // Between events the storey and its free mass are a linear system in (x, v, r, w):
 //   x'' = -a_g - s + share n,   r'' = s - n,   s = D x' + W x,   n = c r' + k r
 // with c = k = 0 in flight. Flight over whole sample intervals goes by blocks (lanes.h), contact
-// over whole sample intervals by the transition over one of them, and an interval with an event by
-// pieces: Taylor polynomials about the piece's start, whose first root is the event.
+// over whole sample intervals by a table of the transitions over one to four of them, and an
+// interval with an event by pieces (motion_table.h), whose first root is the event.
 #include "core/solve/single_mass.h"
 
 #include <float.h>
@@ -11,7 +11,6 @@
 #include <string.h>
 
 #include "core/plan/plan.h"
-#include "core/solve/linear_contact.h"
 #include "core/solve/single_mass_state.h"
 #include "core/solve/wide.h"
 
@@ -19,28 +18,17 @@ enum {
     PENDING_MAX = 1024,      // samples between two balances of energy
     PROGRESS_SAMPLES = 8192, // between two looks at the progress
     CLEAR_SAMPLES = 1 << 16, // prepared between two looks at the progress
-    BLOCK = 32,              // samples of contact at a time
-    PIECE_DEGREE = 26,
-    PIECES_MAX = 24, // in one interval; longer contacts are the event engine's
-    NEWTON_STEPS = 8,
+    BLOCK = 32,              // samples of contact at a time, a multiple of 8
+    PIECES_MAX = 24,         // of one contact in an interval; longer ones are the event engine's
+    EVENTS_MAX = 4096,       // in an interval; with more the event engine goes on
 };
 
 // Solver steps of a sample in a block.
 static const double SAMPLE_STEPS = 0.1;
-// The longest step, times the system's rate: of a piece, and of the transition over one interval.
-static const double PIECE_REACH = 1.0, MAP_REACH = 0.5;
+// The longest piece, times the system's rate.
+static const double PIECE_REACH = 1.0;
 // Intervals shorter than this, times the structure's rate and a sine's, are short.
 static const double SHORT_REACH = 0.04;
-
-// A motion over part of an interval: coefficients in s = t / length.
-typedef struct Piece {
-    double length; // [s]
-    size_t degree;
-    double x[PIECE_DEGREE + 1], v[PIECE_DEGREE + 1]; // v is dx/ds
-    double r[PIECE_DEGREE + 1], w[PIECE_DEGREE + 1];
-    double base[PIECE_DEGREE + 1]; // a_g
-    size_t base_degree;
-} Piece;
 
 // The base from the present sample on: over how many intervals it goes on in one way, and its
 // samples, or NULL where it is still or a sine.
@@ -112,209 +100,38 @@ static size_t single_mass_flight_block(SingleMass *single, size_t most) {
 
 // --- pieces
 
-static const double piece_inverse[PIECE_DEGREE + 2] = {
-    0,        1.0 / 1,  1.0 / 2,  1.0 / 3,  1.0 / 4,  1.0 / 5,  1.0 / 6,
-    1.0 / 7,  1.0 / 8,  1.0 / 9,  1.0 / 10, 1.0 / 11, 1.0 / 12, 1.0 / 13,
-    1.0 / 14, 1.0 / 15, 1.0 / 16, 1.0 / 17, 1.0 / 18, 1.0 / 19, 1.0 / 20,
-    1.0 / 21, 1.0 / 22, 1.0 / 23, 1.0 / 24, 1.0 / 25, 1.0 / 26, 1.0 / 27};
-
-// The degree that leaves only rounding: 3! rho^(n - 3) / n! is below 4e-18, as a base's slope
-// enters x at t^3 only.
-INLINE size_t piece_degree(double rho) {
-    static const struct {
-        double rho;
-        size_t degree;
-    } table[] = {{7.8e-6, 6}, {1.9e-3, 8}, {2.1e-2, 10}, {8.5e-2, 12}, {0.214, 14},
-                 {0.413, 16}, {0.676, 18}, {0.994, 20},  {1.36, 22},   {1.76, 24}};
-    size_t i = 0;
-    while (i + 1 < COUNT(table) && rho > table[i].rho)
-        i++;
-    return table[i].degree;
+// The table of the present contact state for pieces under `slice`.
+static MotionTable *single_mass_table(SingleMass *single, const Slice *slice) {
+    const bool is_contact = single->phase == PHASE_CONTACT;
+    const Motion *m = is_contact ? &single->touching[single->side] : &single->flying;
+    MotionTable *table = &single->tables[is_contact ? single->contact_table[single->side] : 0];
+    const bool is_still = slice->value == 0 && slice->slope == 0;
+    if (!table->is_made || (!is_still && table->base_omega != slice->omega)) {
+        const double rate = single_mass_larger(m->rate, slice->omega), h = single->interval;
+        motion_table_make(table, m, slice->omega, rate * h > PIECE_REACH ? PIECE_REACH / rate : h);
+    }
+    return table;
 }
 
-INLINE void piece_make(Piece *p, const Motion *m, const State *y, const Slice *slice,
-                       double length) {
-    const double *inverse = piece_inverse, T = length, square = T * T;
-    const double D = m->damping * T, W = m->omega2 * square;
-    const double c = m->contact_damping * T, k2 = m->contact_omega2 * square, share = m->share;
-    p->length = length;
-    p->degree = piece_degree(length * single_mass_larger(m->rate, slice->omega));
-    const size_t degree = p->degree;
-    if (slice->omega > 0) {
-        const double turn = slice->omega * T;
-        const double cycle[4] = {slice->value, slice->slope, -slice->value, -slice->slope};
-        double scale = 1;
-        for (size_t k = 0; k <= degree; k++) {
-            p->base[k] = cycle[k % 4] * scale;
-            scale *= turn * inverse[k + 1];
-        }
-        p->base_degree = degree;
-    } else {
-        p->base[0] = slice->value;
-        p->base[1] = slice->slope * T;
-        p->base_degree = 1;
-    }
-    const double share_c = share * c, share_k = share * k2;
-    const size_t base_degree = p->base_degree;
-    double x = y->x, v = y->v * T, r = y->r, w = y->w * T;
-    for (size_t k = 0; k < degree; k++) {
-        p->x[k] = x;
-        p->v[k] = v;
-        p->r[k] = r;
-        p->w[k] = w;
-        const double s = D * v + W * x, n = c * w + k2 * r;
-        const double next_x = v * inverse[k + 1], next_r = w * inverse[k + 1];
-        const double own = (share_c * w - D * v) + (share_k * r - W * x);
-        v = (k > base_degree ? own : own - square * p->base[k]) * inverse[k + 1];
-        w = (s - n) * inverse[k + 1];
-        x = next_x;
-        r = next_r;
-    }
-    p->x[degree] = x;
-    p->r[degree] = r;
-    p->v[degree] = p->w[degree] = 0;
-}
-
-INLINE void piece_at(const Piece *p, double s, State *at) {
-    double x = p->x[p->degree], v = 0, r = p->r[p->degree], w = 0;
-    for (size_t k = p->degree; k-- > 0;) {
-        x = x * s + p->x[k];
-        v = v * s + p->v[k];
-        r = r * s + p->r[k];
-        w = w * s + p->w[k];
-    }
-    const double rate = 1 / p->length;
-    *at = (State){x, v * rate, r, w * rate};
-}
-
-// From the start to s.
-INLINE void piece_sums(const Piece *p, double rho, double s, PieceSums *out) {
-    const Quadrature *rule = arc_quadrature(rho * s);
-    double t[8], v[8] = {0}, w[8] = {0}, a[8] = {0};
-    for (size_t i = 0; i < 8; i++)
-        t[i] = rule->node[i] * s;
-    for (size_t k = p->degree; k-- > 0;)
-        for (size_t i = 0; i < 8; i++) {
-            v[i] = v[i] * t[i] + p->v[k];
-            w[i] = w[i] * t[i] + p->w[k];
-        }
-    double base = 0;
-    for (size_t k = p->base_degree + 1; k-- > 0;) {
-        base = base * s + p->base[k] * piece_inverse[k + 1];
-        for (size_t i = 0; i < 8; i++)
-            a[i] = a[i] * t[i] + p->base[k];
-    }
-    double vv = 0, ww = 0, av = 0, aw = 0;
-    for (size_t i = 0; i < rule->count; i++) {
-        const double weight = rule->weight[i];
-        vv += weight * v[i] * v[i];
-        ww += weight * w[i] * w[i];
-        av += weight * a[i] * v[i];
-        aw += weight * a[i] * w[i];
-    }
-    const double per_length = s / p->length;
-    *out = (PieceSums){vv * per_length, ww * per_length, av * s, aw * s, base * s * p->length};
-}
-
-// Whether a curve surely is monotone or concave, so that it is nowhere below both of its ends.
-static bool piece_is_simple(const double *c, size_t n) {
-    double slope_least = c[1], slope_most = c[1], bend_most = n > 1 ? 2 * c[2] : 0;
-    for (size_t k = 2; k <= n; k++) {
-        const double slope = (double)k * c[k], bend = (double)(k - 1) * slope;
-        slope_least += slope < 0 ? slope : 0;
-        slope_most += slope > 0 ? slope : 0;
-        bend_most += k > 2 && bend > 0 ? bend : 0;
-    }
-    return slope_least > 0 || slope_most < 0 || bend_most < 0;
-}
-
-// The first root in (0, 1], as polynomial_root_first: Newton from a guess, and a proof that what is
-// left after dividing the root out has none before it.
-static bool piece_first_root(const double *c, size_t degree, double *s) {
-    const double *from = c;
-    size_t n = degree;
-    if (from[0] == 0 && n > 1) {
-        from++;
-        n--;
-    }
-    double least = from[0], end = from[0];
-    for (size_t k = 1; k <= n; k++) {
-        end += from[k];
-        least += from[k] < 0 ? from[k] : 0;
-    }
-    if (least > 0)
-        return false;
-    if (!(end < 0))
-        return !(end > 0 && from[0] > 0 && piece_is_simple(from, n)) &&
-               polynomial_root_first(c, degree, s);
-    if (!(from[0] > 0))
-        return polynomial_root_first(c, degree, s);
-    double slope_end = 0;
-    for (size_t k = n; k > 0; k--)
-        slope_end += (double)k * from[k];
-    // On the cubic of s over the value with the same ends.
-    const double all = from[0] - end, part = from[0] / all, left = 1 - part;
-    double at = -1;
-    if (from[1] < 0 && slope_end < 0)
-        at = part + part * left * ((all / -from[1] - 1) * left - (all / -slope_end - 1) * part);
-    if (!(at > 0 && at <= 1)) { // on the parabola with the same start, slope and end
-        const double bend = end - from[0] - from[1];
-        const double root = sqrt(single_mass_larger(from[1] * from[1] - 4 * bend * from[0], 0));
-        at = from[1] < 0 ? 2 * from[0] / (root - from[1]) : (from[1] + root) / (-2 * bend);
-    }
-    if (!(at > 0 && at <= 1))
-        at = part;
-    double step = 1;
-    for (int i = 0; i < NEWTON_STEPS && fabs(step) > 1e-9 * at; i++) {
-        double value = from[n], slope = 0;
-        for (size_t k = n; k-- > 0;) {
-            slope = slope * at + value;
-            value = value * at + from[k];
-        }
-        step = -value / slope;
-        at += step;
-        if (!(at > 0 && at <= 1))
-            return polynomial_root_first(c, degree, s);
-    }
-    if (!(fabs(step) <= 1e-9 * at))
-        return polynomial_root_first(c, degree, s);
-    // (s - at) q(s): -q must be positive up to there.
-    double q = from[n], power = 1;
-    double divided[PIECE_DEGREE + 1];
-    divided[0] = q;
-    for (size_t k = n; k-- > 0;) {
-        divided[k] = q;
-        q = from[k] + at * q;
-    }
-    least = -divided[0];
-    for (size_t k = 1; k < n; k++) {
-        power *= at;
-        const double term = -divided[k] * power;
-        least += term < 0 ? term : 0;
-    }
-    if (!(least > 0))
-        return polynomial_root_first(c, degree, s);
-    *s = at;
-    return true;
-}
-
-// The stop that the mass reaches on the piece, and where.
-static bool single_mass_find_touch(const SingleMass *single, const Piece *p, double *s,
-                                   Side *side) {
+// The stop that the mass reaches on the piece up to `end`, and where.
+INLINE bool single_mass_find_touch(const SingleMass *single, const Piece *piece, double end,
+                                   double *s, Side *side) {
     single->run->work.stop_searches++;
+    const size_t terms = piece->table->terms;
     bool is_found = false;
-    double reach = 0, gap[PIECE_DEGREE + 1];
-    for (size_t k = 0; k <= p->degree; k++)
-        reach += fabs(p->r[k]);
+    double reach = 0, gap[PIECE_TERMS + 1];
+    for (size_t k = 0; k < terms; k++)
+        reach += fabs(piece->r[k]);
     for (int i = 0; i < 2; i++) {
         const double sign = single_mass_sign((Side)i), room = single_mass_gap(single, (Side)i);
         if (reach < room)
             continue;
-        for (size_t k = 0; k <= p->degree; k++)
-            gap[k] = -sign * p->r[k];
+        for (size_t k = 0; k < terms; k++)
+            gap[k] = -sign * piece->r[k];
+        gap[terms] = 0;
         gap[0] = single_mass_larger(gap[0] + room, 0);
         double at;
-        if (piece_first_root(gap, p->degree, &at) && (!is_found || at < *s)) {
+        if (piece_root(gap, terms, end, EVENT_TOLERANCE, &at) && (!is_found || at < *s)) {
             is_found = true;
             *s = at;
             *side = (Side)i;
@@ -323,92 +140,49 @@ static bool single_mass_find_touch(const SingleMass *single, const Piece *p, dou
     return is_found;
 }
 
-static bool single_mass_find_release(const SingleMass *single, const Piece *p, double *s) {
+INLINE bool single_mass_find_release(const SingleMass *single, const Piece *piece, double end,
+                                     double *s) {
     const double sign = single_mass_sign(single->side);
-    double depth[PIECE_DEGREE + 1];
-    for (size_t k = 0; k <= p->degree; k++)
-        depth[k] = sign * p->r[k];
+    const size_t terms = piece->table->terms;
+    double depth[PIECE_TERMS + 1];
+    for (size_t k = 0; k < terms; k++)
+        depth[k] = sign * piece->r[k];
+    depth[terms] = 0;
     depth[0] = single_mass_larger(depth[0], 0);
-    return piece_first_root(depth, p->degree, s);
+    return piece_root(depth, terms, end, EVENT_TOLERANCE, s);
 }
 
-// The largest force on the piece up to s, and the acceleration there. `is_turning`: the force rises
-// at the start and falls at s, or the other way round.
-static void single_mass_peak(SingleMass *single, const Piece *p, double s, bool is_turning) {
-    const Motion *m = &single->touching[single->side];
-    const double T = p->length, mass = single_mass_effective(single) / (T * T);
-    const double c = m->contact_damping * T, k2 = m->contact_omega2 * T * T;
-    const size_t degree = p->degree - 1;
-    double n[PIECE_DEGREE + 1];
-    double bound = 0;
-    for (size_t k = 0; k <= degree; k++) {
-        n[k] = c * p->w[k] + k2 * p->r[k];
-        bound += fabs(n[k]);
+// The largest force on the piece between its start and s, and the acceleration there.
+INLINE void single_mass_peak(SingleMass *single, const Piece *piece, double s) {
+    const MotionTable *table = piece->table;
+    const Motion *m = &table->motion;
+    const double mass = single_mass_effective(single),
+                 per_square = 1 / (table->length * table->length);
+    double slope[PIECE_TERMS + 1], bound = 0;
+    Four index = {0, 1, 2, 3}, sizes = {0}, size;
+    for (size_t k = 0; k < table->terms; k += 4) {
+        Four n;
+        piece_row(table->n, piece->start, k, &n);
+        PUT_FOUR(slope + k, n * index);
+        wide_size(&n, &size);
+        sizes += size;
+        index += 4;
     }
-    if (!(mass * bound > impact_log_least_force(&single->impacts, &single->row)))
+    slope[table->terms] = 0;
+    bound = (sizes[0] + sizes[1]) + (sizes[2] + sizes[3]);
+    if (!(mass * bound * per_square > impact_log_least_force(&single->impacts, &single->row)))
         return;
-    double at = s / 2, value = 0;
-    if (!is_turning) { // it may turn twice
-        double slope[PIECE_DEGREE + 1] = {0}, power = 1;
-        const double sign = n[1] < 0 ? -1 : 1;
-        for (size_t k = 0; k < degree; k++, power *= s)
-            slope[k] = sign * (double)(k + 1) * n[k + 1] * power;
-        double where;
-        if (piece_is_simple(slope, degree - 1) || !polynomial_root_first(slope, degree - 1, &where))
-            return;
-        at = where * s;
-        value = polynomial_value(n, degree, at);
-    }
-    // The zero of the slope: by Newton, or where that leaves the bracket by halves.
-    double low = 0, high = s;
-    const double sign = n[1] > 0 ? 1 : -1;
-    for (int i = 0; is_turning && i < 4 * NEWTON_STEPS; i++) {
-        double slope = 0, bend = 0;
-        value = n[degree];
-        for (size_t k = degree; k-- > 0;) {
-            bend = bend * at + slope;
-            slope = slope * at + value;
-            value = value * at + n[k];
-        }
-        if (sign * slope > 0)
-            low = at;
-        else
-            high = at;
-        const double step = -slope / (2 * bend);
-        if (fabs(step) < 1e-8 * s) {
-            value += step * (slope + step * bend);
-            break;
-        }
-        at = at + step > low && at + step < high ? at + step : (low + high) / 2;
-    }
-    if (!(mass * fabs(value) > impact_log_least_force(&single->impacts, &single->row)))
-        return;
-    impact_log_force(&single->impacts, &single->row, mass * fabs(value));
+    if (slope[1] < 0)
+        for (size_t k = 1; k < table->terms; k++)
+            slope[k] = -slope[k];
+    double at;
     State state;
-    piece_at(p, at, &state);
-    impact_log_acceleration(&single->impacts,
-                            m->share * value / (T * T) - single_mass_push(single, &state));
-}
-
-// n' [m/s^3].
-static inline double single_mass_rise(const SingleMass *single, const Motion *m, const State *at) {
-    const double n = m->contact_damping * at->w + m->contact_omega2 * at->r;
-    return m->contact_damping * (single_mass_push(single, at) - n) + m->contact_omega2 * at->w;
-}
-
-// The same for a piece from the present state to `end`; a force that rises or falls all the way is
-// largest at its ends.
-static inline void single_mass_peak_between(SingleMass *single, const Piece *p, double s,
-                                            const State *end) {
-    const Motion *m = &single->touching[single->side];
-    const double from = single_mass_rise(single, m, &single->state);
-    const double to = single_mass_rise(single, m, end);
-    const bool is_turning = from > 0 ? to < 0 : to > 0;
-    single_mass_peak(single, p, s, is_turning);
-    if (!is_turning)
-        impact_log_force(&single->impacts, &single->row,
-                         single_mass_effective(single) *
-                             fabs(m->contact_damping * end->w + m->contact_omega2 * end->r));
+    if (!piece_root(slope, table->terms, s, PEAK_TOLERANCE, &at) || !(at > 0))
+        return;
+    piece_at(piece, at, &state);
+    const double n = m->contact_damping * state.w + m->contact_omega2 * state.r;
+    impact_log_force(&single->impacts, &single->row, mass * fabs(n));
+    impact_log_acceleration(&single->impacts, m->share * n - single_mass_push(single, &state));
 }
 
 // --- events
@@ -458,42 +232,55 @@ static bool single_mass_touch(SingleMass *single, Side side) {
     return true;
 }
 
+// The base from the present instant on; returns for how long it goes on so, up to `h` after the
+// present sample at most [s].
+INLINE double single_mass_slice_until(SingleMass *single, double h, Slice *slice) {
+    const double left = h - single->offset;
+    if (single->has_blocks && single->is_short && single->run->base->form != BASE_PIECES) {
+        single_mass_slice(single, slice);
+        return left;
+    }
+    const double knot = base_cursor_slice(&single->base, single->sample, single->offset, slice);
+    return knot < left ? knot : left;
+}
+
 // One piece from the present instant, to its event or to `h` after the present sample at most.
 // False: the event engine has to go on.
 INLINE bool single_mass_step(SingleMass *single, double h) {
     const bool is_contact = single->phase == PHASE_CONTACT;
-    const Motion *m = is_contact ? &single->touching[single->side] : &single->flying;
+    if (is_contact && ++single->pieces > PIECES_MAX)
+        return false;
     Slice slice;
-    if (single->has_blocks && single->is_short && single->run->base->form != BASE_PIECES) {
-        single_mass_slice(single, &slice);
-    } else {
-        const double knot =
-            base_cursor_slice(&single->base, single->sample, single->offset, &slice);
-        h = single->offset + knot < h ? single->offset + knot : h;
-    }
-    double length = h - single->offset;
-    const double rate = single_mass_larger(m->rate, slice.omega);
-    length = length * rate > PIECE_REACH ? PIECE_REACH / rate : length;
+    const double left = single_mass_slice_until(single, h, &slice);
+    const MotionTable *table = single_mass_table(single, &slice);
+    const double length = table->length, last = left < length ? left / length : 1;
     Piece piece;
-    piece_make(&piece, m, &single->state, &slice, length);
+    piece_make(&piece, table, &single->state, &slice);
     single->run->work.arcs++;
     single->run->steps += SINGLE_MASS_STEPS;
-    double s = 1;
+    double s = last;
     Side side = single->side;
     const bool is_event =
-        is_contact ? single_mass_find_release(single, &piece, &s)
-                   : single->has_stops && single_mass_find_touch(single, &piece, &s, &side);
+        is_contact ? single_mass_find_release(single, &piece, last, &s)
+                   : single->has_stops && single_mass_find_touch(single, &piece, last, &s, &side);
     if (!is_event)
-        s = 1;
+        s = last;
     if (s > 0) {
         PieceSums sums;
         State end;
         const double z = single->state.v + single->state.w;
-        piece_sums(&piece, length * rate, s, &sums);
-        piece_at(&piece, s, &end);
+        piece_sums(&piece, s, &sums);
+        if (s == 1)
+            piece_end(table, piece.start, &end);
+        else
+            piece_at(&piece, s, &end);
         if (is_contact) {
+            const Motion *m = &table->motion;
             single_mass_work(single, sums.vv, sums.av, sums.av + sums.aw);
-            single_mass_peak_between(single, &piece, s, &end);
+            single_mass_peak(single, &piece, s);
+            impact_log_force(&single->impacts, &single->row,
+                             single_mass_effective(single) *
+                                 fabs(m->contact_damping * end.w + m->contact_omega2 * end.r));
             impact_log_stretch(&single->impacts, &single->row, s * length,
                                -single->damper->mass * ((end.v + end.w) - z + sums.a),
                                single->damper->stops[single->side].damping * sums.ww);
@@ -506,377 +293,337 @@ INLINE bool single_mass_step(SingleMass *single, double h) {
     }
     if (!is_event)
         return true;
+    single->pieces = 0;
+    if (++single->events > EVENTS_MAX)
+        return false;
     if (!is_contact)
         return single_mass_touch(single, side);
     single_mass_release(single);
     return true;
 }
 
-// --- flight over part of a short interval
+// --- contact over many lengths of its table
 
-INLINE void single_mass_take_flight(SingleMass *single, const TaylorFlight *flight, double s) {
-    PieceSums sums;
-    taylor_flight_integrals(flight, s, &sums);
-    single_mass_work(single, sums.vv, sums.av, sums.av + sums.aw);
-    single->base_speed += sums.a;
-    taylor_flight_at(flight, s, &single->state);
-    single->run->steps += SINGLE_MASS_STEPS;
-}
+// States and base at the present instant and after each length, then whatever; what follows them is
+// no larger than BLOCK_ROW.
+enum { BLOCK_ROW = BLOCK + 8 };
+typedef double BlockRows[START_SIZE][BLOCK_ROW];
 
-// What r'' can come to in flight over the rest of an interval.
-typedef struct PushBounds {
-    double most; // |r''| is not larger
-    double vary; // nor by how much it changes
-} PushBounds;
-
-INLINE void single_mass_bound_push(const SingleMass *single, double length, PushBounds *bounds) {
-    const Lanes *lanes = &single->lanes;
-    const double base = single->stretch.base_max, speed = fabs(single->state.v);
-    bounds->most = (lanes->damping + lanes->omega) *
-                   (speed + lanes->omega * fabs(single->state.x) + length * base);
-    const double drive = bounds->most + base; // |x''| is not larger
-    bounds->vary = length * (lanes->damping * drive + lanes->omega2 * (speed + length * drive));
-}
-
-typedef enum FlightEnd { END_SAMPLE, END_STOP, END_UNCLEAR } FlightEnd;
-
-// A whole interval in which r turns: free if the stop that it went to is surely not reached, though
-// it may come near.
-INLINE bool single_mass_turns_before_stop(const SingleMass *single, const TaylorFlight *flight,
-                                          double end, double slope, double vary) {
-    const double h = single->interval, w = single->state.w * h,
-                 push = single_mass_push(single, &single->state);
-    const Side side = w > 0 ? SIDE_RIGHT : SIDE_LEFT;
-    const double sign = single_mass_sign(side), room = single_mass_gap(single, side);
-    const double other = single->damper->clearance - room, s = w / (w - slope);
-    // The gap is a convex function of time, above each of its tangents.
-    if (!(sign * push < -vary) || !(s > 0 && s < 1) || !(other > sign * -single->state.r) ||
-        !(other > sign * -end))
+// Rows 4 and 5: `values` of a_g at whole lengths, or all from `slice`. False: the base is still.
+INLINE bool single_mass_block_base(const MotionTable *table, const double *values,
+                                   const Slice *slice, size_t count, BlockRows y) {
+    double *const a = y[4], *const b = y[5];
+    a[0] = slice->value;
+    b[0] = slice->slope;
+    if (values != NULL) {
+        const double per_length = 1 / table->length;
+        memcpy(a, values, (count + 1) * sizeof *values);
+        for (size_t k = 0; k < count; k++)
+            b[k] = (a[k + 1] - a[k]) * per_length;
+        b[count] = 0;
+    } else if (table->base_omega > 0) {
+        for (size_t k = 0; k < count; k++) {
+            a[k + 1] = table->turn[0] * a[k] + table->turn[1] * b[k];
+            b[k + 1] = table->turn[0] * b[k] - table->turn[1] * a[k];
+        }
+    } else if (slice->value != 0 || slice->slope != 0) {
+        for (size_t k = 1; k <= count; k++) {
+            a[k] = slice->value + slice->slope * ((double)k * table->length);
+            b[k] = slice->slope;
+        }
+    } else {
+        memset(a, 0, BLOCK_ROW * sizeof *a);
         return false;
-    double here, bend;
-    const double gap = room - sign * taylor_flight_gap(flight, s, &here, &bend);
-    return gap > fabs(here);
-}
-
-// From a sample to the stop that is reached before the next, or to that one; *side is the stop.
-INLINE FlightEnd single_mass_fly_to_stop(SingleMass *single, Side *side) {
-    enum { STEPS = 8 };
-    single->run->work.stop_searches++;
-    const double h = single->interval;
-    Slice slice;
-    TaylorFlight flight;
-    single_mass_slice(single, &slice);
-    taylor_flight_make(&flight, &single->short_flight, &single->state, &slice);
-    double slope, bend;
-    const double end = taylor_flight_gap(&flight, 1, &slope, &bend), w = single->state.w * h;
-    *side = end > single->state.r ? SIDE_RIGHT : SIDE_LEFT;
-    const double sign = single_mass_sign(*side), room = single_mass_gap(single, *side);
-    const double from = room - sign * single->state.r, to = room - sign * end;
-    PushBounds bounds;
-    single_mass_bound_push(single, h, &bounds);
-    // Between two instants w is as linear as r'' is constant.
-    const double crooked = bounds.vary * h * h;
-    if (!(from > 0))
-        return END_UNCLEAR;
-    if (to > 0) {
-        // Away from one stop all the way, or too far from both for the curve to reach one.
-        const double least = from < to ? from : to, other = single->damper->clearance;
-        const double sag = bounds.most * h * h / 8;
-        if (!(sign * slope > crooked && sign * w > crooked) &&
-            !(least > sag && other - from > sag) &&
-            !single_mass_turns_before_stop(single, &flight, end, slope, bounds.vary))
-            return END_UNCLEAR;
-        single_mass_take_flight(single, &flight, 1);
-        return END_SAMPLE;
     }
-    double s, step = 1;
-    const double gone = from - to, first = sign * w;
-    if (first > crooked) { // on the cubic of s over the gap with the slopes of both ends
-        const double share = from / gone, left = 1 - share;
-        s = share +
-            share * left * ((gone / first - 1) * left - (gone / (sign * slope) - 1) * share);
-    } else { // on the parabola
-        const double half = (gone - first) * from * 4 + first * first;
-        s = 2 * from / (first + sqrt(half > 0 ? half : 0));
-    }
-    for (int i = 0; i < STEPS && fabs(step) > 3e-6; i++) { // each step's error is about its cube
-        const double gap = room - sign * taylor_flight_gap(&flight, s, &slope, &bend);
-        step = gap * slope / (sign * slope * slope + gap * bend);
-        s += step;
-    }
-    if (!(fabs(step) <= 3e-6) || !(s > 0) || !(s <= 1) || !(sign * slope > 0))
-        return END_UNCLEAR;
-    // Met once and not before, as r went towards this stop all the way, or as a function of time
-    // that is all convex or all concave; and the other not at all.
-    const bool is_straight = first > crooked && sign * slope > crooked;
-    if (!is_straight && !(fabs(single_mass_push(single, &single->state)) > bounds.vary &&
-                          single->damper->clearance - from > fabs(w)))
-        return END_UNCLEAR;
-    single_mass_take_flight(single, &flight, s);
-    single->offset = s * h;
-    return END_STOP;
-}
-
-// In flight from a stop to the next sample.
-INLINE bool single_mass_fly_from_stop(SingleMass *single) {
-    const double length = single->interval - single->offset,
-                 sign = single_mass_sign((Side)single->origin);
-    const double w = -sign * single->state.w;
-    PushBounds bounds;
-    single_mass_bound_push(single, length, &bounds);
-    const double back =
-        sign * single_mass_push(single, &single->state) + bounds.vary; // r'' to the stop, at most
-    if (!(w > 0 && w > back * length / 2) ||
-        !((w + bounds.most * length) * length < single->damper->clearance) || length <= 0)
-        return false;
-    Slice slice;
-    TaylorFlight flight;
-    single_mass_slice(single, &slice);
-    taylor_flight_make(&flight, &single->short_flight, &single->state, &slice);
-    single_mass_take_flight(single, &flight, length * flight.table->per_unit);
+    for (size_t k = count + 1; k < count + BLOCK_TAPS; k++)
+        a[k] = b[k] = 0;
     return true;
 }
 
-// --- contact over whole intervals
-
-static void contact_map_make(ContactMap *map, const Motion *m, double base_omega, double interval) {
-    Piece columns[FORM_SIZE];
-    for (int i = 0; i < FORM_SIZE; i++) {
-        const State start = {i == 0, i == 1, i == 2, i == 3};
-        // a_g = a + (b - a) t / h, or a cos + b sin.
-        const Slice slice = base_omega > 0 ? (Slice){i == 4, i == 5, base_omega}
-                            : i == 4       ? (Slice){1, -1 / interval, 0}
-                            : i == 5       ? (Slice){0, 1 / interval, 0}
-                                           : (Slice){0, 0, 0};
-        piece_make(&columns[i], m, &start, &slice, interval);
-        const Piece *p = &columns[i];
-        double gain[4] = {0};
-        for (size_t k = p->degree; k > 0; k--) { // small terms first
-            gain[0] += p->x[k];
-            gain[1] += p->v[k];
-            gain[2] += p->r[k];
-            gain[3] += p->w[k];
+// Rows 0 to 3, four lengths at a time, up to the first state outside the stop; how many lengths.
+INLINE size_t single_mass_block_states(const MotionTable *table, const State *start, double sign,
+                                       bool has_base, bool is_sampled, size_t count, BlockRows y) {
+    double at[4] = {start->x, start->v, start->r, start->w};
+    for (int i = 0; i < 4; i++)
+        y[i][0] = at[i];
+    size_t k = 0;
+    while (k < count) {
+        const double *a = y[4] + k, *b = y[5] + k;
+        Four next[4];
+        for (int i = 0; i < 4; i++) {
+            const double(*const state)[BLOCK_SAMPLES] = table->from_state[i];
+            const double(*const base)[BLOCK_SAMPLES] = table->from_base[i];
+            Four gain = (FOUR(state[0]) * at[0] + FOUR(state[1]) * at[1]) +
+                        (FOUR(state[2]) * at[2] + FOUR(state[3]) * at[3]);
+            if (has_base && !is_sampled)
+                gain += FOUR(table->from_slice[i][0]) * a[0] + FOUR(table->from_slice[i][1]) * b[0];
+            else if (has_base)
+                gain += ((FOUR(base[0]) * a[0] + FOUR(base[1]) * a[1]) +
+                         (FOUR(base[2]) * a[2] + FOUR(base[3]) * a[3])) +
+                        FOUR(base[4]) * a[4];
+            next[i] = at[i] + gain;
+            PUT_FOUR(y[i] + k + 1, next[i]);
         }
-        map->gain[i][0] = gain[0];
-        map->gain[i][1] = gain[1] / interval;
-        map->gain[i][2] = gain[2];
-        map->gain[i][3] = gain[3] / interval;
+        k += BLOCK_SAMPLES;
+        for (int i = 0; i < 4; i++)
+            at[i] = next[i][3];
+        if (!(sign * at[2] > 0))
+            break;
     }
-    memset(map->vv, 0, sizeof map->vv);
-    memset(map->ww, 0, sizeof map->ww);
-    memset(map->av, 0, sizeof map->av);
-    memset(map->aw, 0, sizeof map->aw);
-    const Quadrature *rule = &arc_rules[ARC_RULES - 1];
-    for (size_t q = 0; q < rule->count; q++) {
-        const double s = rule->node[q], weight = rule->weight[q] * interval;
-        double v[FORM_SIZE], w[FORM_SIZE], a[FORM_SIZE];
-        for (int i = 0; i < FORM_SIZE; i++) {
-            v[i] = polynomial_value(columns[i].v, columns[i].degree, s) / interval;
-            w[i] = polynomial_value(columns[i].w, columns[i].degree, s) / interval;
-            a[i] = polynomial_value(columns[i].base, columns[i].base_degree, s);
-        }
-        for (int i = 0, n = 0; i < FORM_SIZE; i++)
-            for (int j = i; j < FORM_SIZE; j++, n++) {
-                const double both = i == j ? weight / 2 : weight;
-                map->vv[n] += both * (v[i] * v[j] + v[j] * v[i]);
-                map->ww[n] += both * (w[i] * w[j] + w[j] * w[i]);
-                map->av[n] += both * (a[i] * v[j] + a[j] * v[i]);
-                map->aw[n] += both * (a[i] * w[j] + a[j] * w[i]);
-            }
-    }
-    map->is_made = true;
+    count = k < count ? k : count;
+    for (int i = 0; i < 4; i++)
+        for (k = count + 1; k % 8 != 1; k++)
+            y[i][k] = 0;
+    return count;
 }
 
-// Whole intervals that surely belong to the present contact; 0: its end may come in the next one.
-INLINE size_t single_mass_contact_block(SingleMass *single, size_t most) {
-    const Motion *m = &single->touching[single->side];
-    const double h = single->interval, sign = single_mass_sign(single->side);
-    ContactMap *map = &single->maps[single->side];
-    if (m->rate * h > MAP_REACH)
+// n, q = r'' and their derivatives at the states of a block, and the absolute acceleration.
+typedef struct BlockForces {
+    _Alignas(32) double n[BLOCK_ROW + 1], rise[BLOCK_ROW], acceleration[BLOCK_ROW + 1];
+    _Alignas(32) double q[BLOCK_ROW], q_rise[BLOCK_ROW];
+} BlockForces;
+
+INLINE void single_mass_block_forces(const Motion *m, size_t count, BlockRows y, BlockForces *f) {
+    const double k2 = m->contact_omega2, c = m->contact_damping, D = m->damping, W = m->omega2;
+    for (size_t k = 0; k <= count; k += 4) {
+        const Four v = FOUR(y[1] + k), w = FOUR(y[3] + k);
+        const Four s = D * v + W * FOUR(y[0] + k), n = c * w + k2 * FOUR(y[2] + k);
+        const Four q = s - n, rise = c * q + k2 * w, acceleration = m->share * n - s;
+        PUT_FOUR(f->n + k, n);
+        PUT_FOUR(f->q + k, q);
+        PUT_FOUR(f->rise + k, rise);
+        PUT_FOUR(f->acceleration + k, acceleration);
+        PUT_FOUR(f->q_rise + k, D * (acceleration - FOUR(y[4] + k)) + W * v - rise);
+    }
+}
+
+// How many of the lengths surely belong to the contact. Over a length |r''| is at most that at its
+// ends and half a length times |r'''|, which in turn is at most that at its ends and half a length
+// times s'' + c |r'''| + k |r''|. s'' is bounded by the storey's own motion V and the contact's N,
+// each of which drives the other.
+INLINE size_t single_mass_block_inside(const SingleMass *single, const MotionTable *table,
+                                       size_t count, BlockRows y, const BlockForces *f) {
+    const Motion *m = &table->motion;
+    const double h = table->length, omega = sqrt(m->omega2), stiff = sqrt(m->contact_omega2);
+    const double sign = single_mass_sign(single->side), base = single->stretch.base_max;
+    const double base_slope = single->base_slope * (table->base_omega > 0 ? table->base_omega : 1);
+    const double own = m->damping + omega, contact = stiff + m->contact_damping;
+    const double both = own * h * h * m->share * contact, per_both = 1 / (1 - both);
+    const double k2 = m->contact_omega2;
+    const double rest = 1 - (m->contact_damping + k2 * h / 2) * h / 2, half_per_rest = h / 2 / rest;
+    double margin[BLOCK];
+    if (!(both < 0.5) || !(rest > 0.1))
         return 0;
-    const double *base;
-    most = single_mass_smaller(most, single_mass_base_ahead(single, &base));
-    if (most > BLOCK)
-        most = BLOCK;
-    const Base *form = single->run->base;
-    const bool is_sine = form->form == BASE_SINE;
-    if (!map->is_made) {
-        const ContactMap *other = &single->maps[single->side == SIDE_LEFT ? SIDE_RIGHT : SIDE_LEFT];
-        const SingleMassKey *key = &single->key;
-        if (other->is_made && key->contact_omega2[0] == key->contact_omega2[1] &&
-            key->contact_damping[0] == key->contact_damping[1])
-            *map = *other;
-        else
-            contact_map_make(map, m, is_sine ? form->omega : 0, h);
+    for (size_t k = 0; k < count; k += 4) {
+        Four x, v, r, w, w_next, q, q_next, rise, rise_next, largest, low, inside;
+        const Four here = sign * FOUR(y[2] + k), next = sign * FOUR(y[2] + k + 1);
+        const Four up = sign * FOUR(y[3] + k), none = {0};
+        wide_size(&FOUR(y[0] + k), &x);
+        wide_size(&FOUR(y[1] + k), &v);
+        wide_size(&FOUR(y[2] + k), &r);
+        wide_size(&FOUR(y[3] + k), &w);
+        wide_size(&FOUR(y[3] + k + 1), &w_next);
+        q = sign * FOUR(f->q + k);
+        q_next = sign * FOUR(f->q + k + 1);
+        wide_larger(&q, &q_next, &largest);
+        wide_size(&q, &q);
+        wide_size(&q_next, &q_next);
+        wide_larger(&q, &q_next, &q);
+        wide_size(&FOUR(f->q_rise + k), &rise);
+        wide_size(&FOUR(f->q_rise + k + 1), &rise_next);
+        wide_larger(&rise, &rise_next, &rise);
+        const Four N = w + stiff * r;
+        const Four V = (v + omega * x + h * (m->share * contact * N + base)) * per_both;
+        const Four n_max = contact * (N + own * h * V), x2 = base + own * V + m->share * n_max;
+        const Four x3 = base_slope + own * x2 + m->share * contact * (own * V + n_max);
+        const Four s2 = m->damping * x3 + m->omega2 * x2;
+        const Four more = (rise + h / 2 * (s2 + k2 * q)) * half_per_rest;
+        // Inside are the chord of r less the largest sag of a convex part, or r is monotone, or it
+        // leaves the stop.
+        const Four bend = (q + more) * h;
+        largest += more;
+        wide_larger(&largest, &none, &largest);
+        wide_smaller(&here, &next, &low);
+        const Four sag = low - largest * (h * h / 8), leaves = up - bend / 2 - 1e300 * r;
+        wide_larger(&w, &w_next, &inside);
+        inside -= bend;
+        wide_larger(&inside, &sag, &inside);
+        wide_larger(&inside, &leaves, &inside);
+        wide_smaller(&inside, &next, &inside);
+        PUT_FOUR(margin + k, inside);
     }
-    _Alignas(64) double y[FORM_SIZE][BLOCK + 8];
-    if (!is_sine && base == NULL)
-        for (size_t k = 0; k < BLOCK + 8; k++)
-            y[4][k] = y[5][k] = 0;
-    if (is_sine) {
-        Slice slice;
-        (void)base_cursor_interval(&single->base, single->sample, &slice);
-        y[4][0] = slice.value;
-        y[5][0] = slice.slope;
-        const LanesMap *turns = &single->lanes.sample;
-        for (size_t k = 0; k < most; k += LANES)
-            for (size_t j = 0; j < LANES; j++) {
-                y[4][k + j + 1] = turns->turn[0][j] * y[4][k] + turns->turn[1][j] * y[5][k];
-                y[5][k + j + 1] = turns->turn[0][j] * y[5][k] - turns->turn[1][j] * y[4][k];
-            }
-    } else if (base != NULL) {
-        memcpy(y[4], base, (most + 1) * sizeof *base);
-        memcpy(y[5], base + 1, most * sizeof *base);
-        y[5][most] = 0;
+    size_t inside = 0;
+    while (inside < count && margin[inside] > 0)
+        inside++;
+    return inside;
+}
+
+// Integrals over the lengths that begin at states 0 to `count` - 1; there are zeros after these.
+INLINE void single_mass_block_work(const MotionTable *table, int rows, size_t count, BlockRows y,
+                                   Four *sums) {
+    Four moment[FORM_PAIRS], form[FORMS] = {{0}};
+    const size_t pairs = rows == START_SIZE ? FORM_PAIRS : FORM_STATE_PAIRS;
+    for (size_t pair = 0; pair < pairs; pair++)
+        moment[pair] = (Four){0};
+    for (size_t k = 0; k < count; k += 4)
+        for (int i = 0, pair = 0; i < rows; i++)
+            for (int j = 0; j <= i; j++, pair++)
+                moment[pair] += FOUR(y[j] + k) * FOUR(y[i] + k);
+    for (size_t pair = 0; pair < pairs; pair += 4) {
+        Four all;
+        wide_sum(&moment[pair], &moment[pair + 1], &moment[pair + 2], &moment[pair + 3], &all);
+        for (int i = 0; i < FORMS; i++)
+            form[i] += FOUR(table->forms[i] + pair) * all;
     }
-    // |r''| over an interval: of the storey's own motion V and of the contact's N, each of which
-    // drives the other.
-    const double own = m->damping + sqrt(m->omega2), omega = sqrt(m->omega2);
-    const double stiff = sqrt(m->contact_omega2), contact = stiff + m->contact_damping;
-    const double both = own * h * h * m->share * contact, base_max = single->stretch.base_max;
-    if (!(both < 0.5))
-        return 0;
-    const double per_both = 1 / (1 - both);
-    Four at = {single->state.x, single->state.v, single->state.r, single->state.w};
-    double(*const g)[4] = map->gain;
-    const Four g0 = FOUR(g[0]), g1 = FOUR(g[1]), g2 = FOUR(g[2]), g3 = FOUR(g[3]);
-    const Four g4 = FOUR(g[4]), g5 = FOUR(g[5]);
-    size_t count = 0;
-    y[0][0] = at[0];
-    y[1][0] = at[1];
-    y[2][0] = at[2];
-    y[3][0] = at[3];
-    while (count < most) {
-        const double x = at[0], v = at[1], r = at[2], w = at[3];
-        const double a = y[4][count], b = y[5][count];
-        const Four next = at + (((g0 * x + g1 * v) + (g2 * r + g3 * w)) + (g4 * a + g5 * b));
-        const double N = fabs(w) + stiff * fabs(r), V = fabs(v) + omega * fabs(x);
-        const double V_most = (V + h * (m->share * contact * N + base_max)) * per_both;
-        const double bend = own * V_most + contact * (N + own * h * V_most);
-        const double from = sign * r, to = sign * next[2];
-        const double least = from < to ? from : to;
-        const bool is_inside =
-            least > bend * h * h / 8 || fabs(w) > bend * h || fabs(next[3]) > bend * h;
-        if (!(to > 0) || !is_inside)
-            break;
-        count++;
-        at = next;
-        y[0][count] = next[0];
-        y[1][count] = next[1];
-        y[2][count] = next[2];
-        y[3][count] = next[3];
-    }
-    if (count == 0)
-        return 0;
-    // Arrays up to `count` from here on; zeros behind.
-    const size_t padded = (count + 1 + 7) / 8 * 8;
-    double last[FORM_SIZE];
-    for (int i = 0; i < FORM_SIZE; i++) {
-        last[i] = y[i][count];
-        for (size_t k = count + 1; k < padded; k++)
-            y[i][k] = 0;
-    }
-    const double mass = single_mass_effective(single), k2 = m->contact_omega2;
-    const double c = m->contact_damping, D = m->damping, W = m->omega2, share = m->share;
-    _Alignas(64) double n[BLOCK + 8], rise[BLOCK + 8], acceleration[BLOCK + 8];
-    for (size_t k = 0; k < padded; k++) {
-        const double s = D * y[1][k] + W * y[0][k];
-        n[k] = c * y[3][k] + k2 * y[2][k];
-        rise[k] = c * (s - n[k]) + k2 * y[3][k];
-        acceleration[k] = share * n[k] - s;
-    }
-    // Peaks of the force between samples.
-    for (size_t k = 0; k < count; k++) {
-        if (!(sign * rise[k] > 0 && sign * rise[k + 1] < 0))
-            continue;
-        Slice slice = {y[4][k], (y[5][k] - y[4][k]) / h, 0};
-        if (is_sine)
-            slice = (Slice){y[4][k], y[5][k], form->omega};
-        const State start = {y[0][k], y[1][k], y[2][k], y[3][k]};
-        Piece piece;
-        piece_make(&piece, m, &start, &slice, h);
-        single_mass_peak(single, &piece, 1, true);
-    }
-    // Samples 1 to count.
+    wide_sum(&form[0], &form[1], &form[2], &form[3], sums);
+}
+
+// Samples 1 to `count` of a block, which are followed by zeros, into the columns, peaks and sums.
+INLINE void single_mass_block_record(SingleMass *single, size_t count, BlockRows y, const double *n,
+                                     const double *acceleration) {
+    const double sign = single_mass_sign(single->side), middle = single_mass_origin(single);
+    const double mass = single_mass_effective(single);
     const size_t first = single->sample + 1, bytes = count * sizeof(double);
-    const double middle = single_mass_origin(single);
+    double place[BLOCK + 8], peaks[5][8] = {0}, squares[2][8] = {0};
     double *const *columns = single->columns;
-    if (columns[CHANNEL_DISPLACEMENT] != NULL)
-        memcpy(columns[CHANNEL_DISPLACEMENT] + first, y[0] + 1, bytes);
-    if (columns[CHANNEL_VELOCITY] != NULL)
-        memcpy(columns[CHANNEL_VELOCITY] + first, y[1] + 1, bytes);
-    if (columns[CHANNEL_ACCELERATION] != NULL)
-        memcpy(columns[CHANNEL_ACCELERATION] + first, acceleration + 1, bytes);
-    for (size_t k = 1; k <= count && columns[CHANNEL_DAMPER_DISPLACEMENT] != NULL; k++)
-        columns[CHANNEL_DAMPER_DISPLACEMENT][single->sample + k] = y[0][k] + (middle + y[2][k]);
-    for (size_t k = 1; k <= count && columns[CHANNEL_DAMPER_VELOCITY] != NULL; k++)
-        columns[CHANNEL_DAMPER_VELOCITY][single->sample + k] = y[1][k] + y[3][k];
-    for (size_t k = 1; k <= count && columns[CHANNEL_PENETRATION] != NULL; k++)
-        columns[CHANNEL_PENETRATION][single->sample + k] = sign * y[2][k];
-    for (size_t k = 1; k <= count && columns[CHANNEL_CONTACT_FORCE] != NULL; k++)
-        columns[CHANNEL_CONTACT_FORCE][single->sample + k] = mass * n[k];
-    for (size_t k = 1; k <= count && columns[CHANNEL_BASE_ACCELERATION] != NULL; k++)
-        columns[CHANNEL_BASE_ACCELERATION][single->sample + k] =
-            base_cursor_at(&single->base, single->sample + k);
-    double gain = 0; // of the base's velocity
-    for (size_t k = 0; k < count; k++) {
-        double one = (y[4][k] + y[5][k]) * (h / 2);
-        if (is_sine) {
-            const LanesMap *turns = &single->lanes.sample;
-            one = -(turns->speed_s[0][0] * y[4][k] + turns->speed_s[1][0] * y[5][k]);
+    for (size_t from = 0; from < count; from += 8)
+        for (size_t k = from; k < from + 8; k++)
+            place[k] = y[0][k + 1] + (middle + y[2][k + 1]);
+    for (size_t k = count; k % 8 != 0; k++)
+        place[k] = 0;
+    for (size_t from = 1; from <= count; from += 8)
+        for (size_t j = 0; j < 8; j++) {
+            const size_t k = from + j;
+            const double sizes[5] = {fabs(y[0][k]), fabs(y[1][k]), fabs(acceleration[k]),
+                                     fabs(place[k - 1]), fabs(n[k])};
+            for (int i = 0; i < 5; i++)
+                peaks[i][j] = sizes[i] > peaks[i][j] ? sizes[i] : peaks[i][j];
+            squares[0][j] += y[0][k] * y[0][k];
+            squares[1][j] += acceleration[k] * acceleration[k];
         }
-        gain += one;
-        single_mass_put(columns[CHANNEL_MEAN_ACCELERATION], first + k,
-                        (y[1][k + 1] - y[1][k] + one) * single->plan->sample_rate);
-    }
-    double peak[5] = {0}, squares[2] = {0};
-    for (size_t k = 1; k <= count; k++) {
-        const double place = y[0][k] + (middle + y[2][k]);
-        peak[0] = single_mass_larger(peak[0], fabs(y[0][k]));
-        peak[1] = single_mass_larger(peak[1], fabs(y[1][k]));
-        peak[2] = single_mass_larger(peak[2], fabs(acceleration[k]));
-        peak[3] = single_mass_larger(peak[3], fabs(place));
-        peak[4] = single_mass_larger(peak[4], fabs(n[k]));
-        squares[0] += y[0][k] * y[0][k];
-        squares[1] += acceleration[k] * acceleration[k];
-    }
-    Peaks *peaks = &single->impacts.response->peaks;
-    peaks->displacement = single_mass_larger(peaks->displacement, peak[0]);
-    peaks->velocity = single_mass_larger(peaks->velocity, peak[1]);
-    peaks->acceleration = single_mass_larger(peaks->acceleration, peak[2]);
-    peaks->damper_displacement = single_mass_larger(peaks->damper_displacement, peak[3]);
-    impact_log_force(&single->impacts, &single->row, mass * peak[4]);
+    for (size_t half = 4; half > 0; half /= 2)
+        for (size_t j = 0; j < half; j++) {
+            for (int i = 0; i < 5; i++)
+                peaks[i][j] = single_mass_larger(peaks[i][j], peaks[i][j + half]);
+            for (int i = 0; i < 2; i++)
+                squares[i][j] += squares[i][j + half];
+        }
+    Peaks *all = &single->impacts.response->peaks;
+    all->displacement = single_mass_larger(all->displacement, peaks[0][0]);
+    all->velocity = single_mass_larger(all->velocity, peaks[1][0]);
+    all->acceleration = single_mass_larger(all->acceleration, peaks[2][0]);
+    all->damper_displacement = single_mass_larger(all->damper_displacement, peaks[3][0]);
+    impact_log_force(&single->impacts, &single->row, mass * peaks[4][0]);
     if (single->sample >= single->statistics_start) {
-        single->squares[0] += squares[0];
-        single->squares[1] += squares[1];
+        single->squares[0] += squares[0][0];
+        single->squares[1] += squares[1][0];
         single->statistics_count += count;
     }
-    // Work: over the intervals from samples 0 to count - 1.
-    for (int i = 0; i < FORM_SIZE; i++)
+    const double *const copied[] = {y[0] + 1, y[1] + 1, acceleration + 1, place};
+    static const int rows[] = {CHANNEL_DISPLACEMENT, CHANNEL_VELOCITY, CHANNEL_ACCELERATION,
+                               CHANNEL_DAMPER_DISPLACEMENT};
+    for (int i = 0; i < 4; i++)
+        if (columns[rows[i]] != NULL)
+            memcpy(columns[rows[i]] + first, copied[i], bytes);
+    for (size_t k = 0; k < count && columns[CHANNEL_DAMPER_VELOCITY] != NULL; k++)
+        columns[CHANNEL_DAMPER_VELOCITY][first + k] = y[1][k + 1] + y[3][k + 1];
+    for (size_t k = 0; k < count && columns[CHANNEL_PENETRATION] != NULL; k++)
+        columns[CHANNEL_PENETRATION][first + k] = sign * y[2][k + 1];
+    for (size_t k = 0; k < count && columns[CHANNEL_CONTACT_FORCE] != NULL; k++)
+        columns[CHANNEL_CONTACT_FORCE][first + k] = mass * n[k + 1];
+    for (size_t k = 0; k < count && columns[CHANNEL_BASE_ACCELERATION] != NULL; k++)
+        columns[CHANNEL_BASE_ACCELERATION][first + k] = base_cursor_at(&single->base, first + k);
+}
+
+// The lengths that surely belong to the present contact: `most` sample intervals at most, where
+// that is above 0, else up to the next sample. Returns how many; 0: its end may come in the first.
+INLINE size_t single_mass_contact_block(SingleMass *single, size_t most) {
+    const double sign = single_mass_sign(single->side), *values = NULL;
+    const bool is_sampled = most > 0;
+    Slice slice;
+    const double left = single_mass_slice_until(single, single->interval, &slice);
+    MotionTable *table = single_mass_table(single, &slice);
+    const Motion *m = &table->motion;
+    const double length = table->length;
+    if (is_sampled) {
+        most = single_mass_smaller(most, single_mass_base_ahead(single, &values));
+    } else {
+        const double fits = left / length, limit = PIECES_MAX - single->pieces;
+        most = (size_t)(fits < limit ? fits : limit);
+    }
+    most = single_mass_smaller(most, BLOCK);
+    if (most == 0)
+        return 0;
+    if (!table->has_block)
+        motion_table_make_block(table);
+    _Alignas(64) BlockRows y;
+    const bool has_base = single_mass_block_base(table, values, &slice, most, y);
+    size_t count =
+        single_mass_block_states(table, &single->state, sign, has_base, values != NULL, most, y);
+    BlockForces forces;
+    single_mass_block_forces(m, count, y, &forces);
+    count = single_mass_block_inside(single, table, count, y, &forces);
+    if (count == 0)
+        return 0;
+    const size_t padded = (count + 1 + 7) / 8 * 8;
+    const int rows = has_base ? START_SIZE : 4;
+    double last[4];
+    for (int i = 0; i < rows; i++)
+        for (size_t k = count + 1; k <= padded && k < BLOCK_ROW; k++)
+            y[i][k] = 0;
+    for (int i = 0; i < 4; i++)
+        last[i] = y[i][count];
+    double *const n = forces.n, *const rise = forces.rise,
+                  *const acceleration = forces.acceleration;
+    for (size_t k = count + 1; k <= padded; k++)
+        n[k] = acceleration[k] = 0;
+    for (size_t k = 0; k < count; k++) { // peaks of the force inside a length
+        if (!(sign * rise[k] > 0 && sign * rise[k + 1] < 0))
+            continue;
+        const State start = {y[0][k], y[1][k], y[2][k], y[3][k]};
+        const Slice then = {has_base ? y[4][k] : 0, has_base ? y[5][k] : 0, slice.omega};
+        Piece piece;
+        piece_make(&piece, table, &start, &then);
+        single_mass_peak(single, &piece, 1);
+    }
+    double gain = 0, speed[BLOCK]; // of the base's velocity
+    for (size_t k = 0; k < count; k++) {
+        speed[k] = has_base ? table->speed[0] * y[4][k] + table->speed[1] * y[5][k] : 0;
+        gain += speed[k];
+    }
+    if (is_sampled) {
+        single_mass_block_record(single, count, y, n, acceleration);
+        double *const column = single->columns[CHANNEL_MEAN_ACCELERATION];
+        for (size_t k = 0; k < count && column != NULL; k++)
+            column[single->sample + 1 + k] =
+                (y[1][k + 1] - y[1][k] + speed[k]) * single->plan->sample_rate;
+    } else {
+        const double force = fabs(n[count]);
+        impact_log_force(&single->impacts, &single->row, single_mass_effective(single) * force);
+        single->base_speed += gain;
+    }
+    for (int i = 0; i < rows; i++)
         y[i][count] = 0;
-    double vv = 0, ww = 0, av = 0, aw = 0;
-    for (int i = 0, p = 0; i < FORM_SIZE; i++)
-        for (int j = i; j < FORM_SIZE; j++, p++) {
-            double lanes[8] = {0};
-            for (size_t k = 0; k < padded; k += 8)
-                for (size_t l = 0; l < 8; l++)
-                    lanes[l] += y[i][k + l] * y[j][k + l];
-            const double sum = ((lanes[0] + lanes[4]) + (lanes[2] + lanes[6])) +
-                               ((lanes[1] + lanes[5]) + (lanes[3] + lanes[7]));
-            vv += map->vv[p] * sum;
-            ww += map->ww[p] * sum;
-            av += map->av[p] * sum;
-            aw += map->aw[p] * sum;
-        }
+    Four work;
+    if (has_base)
+        single_mass_block_work(table, START_SIZE, count, y, &work);
+    else
+        single_mass_block_work(table, 4, count, y, &work);
     const double z = single->state.v + single->state.w;
-    single_mass_work(single, vv, av, av + aw);
-    impact_log_stretch(&single->impacts, &single->row, (double)count * h,
+    single_mass_work(single, work[FORM_VV], work[FORM_AV], work[FORM_AV] + work[FORM_AW]);
+    impact_log_stretch(&single->impacts, &single->row, (double)count * length,
                        -single->damper->mass * ((last[1] + last[3]) - z + gain),
-                       single->damper->stops[single->side].damping * ww);
+                       single->damper->stops[single->side].damping * work[FORM_WW]);
     single->state = (State){last[0], last[1], last[2], last[3]};
-    single->last_velocity = last[1];
-    single->sample += count;
-    single->run->steps += SAMPLE_STEPS * (double)count;
+    if (is_sampled) {
+        single->last_velocity = last[1];
+        single->sample += count;
+        single->run->steps += SAMPLE_STEPS * (double)count;
+    } else {
+        single->offset += (double)count * length;
+        single->pieces += (int)count;
+        single->run->steps += SINGLE_MASS_STEPS;
+    }
     return count;
 }
 
@@ -988,61 +735,42 @@ static Status single_mass_by_engine(SingleMass *single) {
     return single_mass_check(single);
 }
 
-// Whole intervals by blocks, stiff contacts in closed form, and all else by pieces, up to sample
-// `until`; false: the event engine has to go on.
+// A block of short lengths is not tried where the mass leaves the stop within about one of them.
+INLINE bool single_mass_block_is_worthwhile(const SingleMass *single) {
+    const double sign = single_mass_sign(single->side);
+    const double r = sign * single->state.r, w = sign * single->state.w;
+    return r * single->touching[single->side].rate + w > 0;
+}
+
+// Whole intervals by blocks and all else by pieces, up to sample `until`; false: the event engine
+// has to go on.
 INLINE bool single_mass_advance(SingleMass *single, size_t until) {
     const double h = single->interval, clock = 2 * DBL_EPSILON * h;
-    int pieces = 0;
-    bool is_released = false; // just now
+    single->pieces = single->events = 0;
     while (single->sample < until) {
         const bool is_flight = single->phase == PHASE_FLIGHT;
-        const size_t ahead = single_mass_blocks_ahead(single);
-        const bool is_quick = ahead > 0 && single->is_short;
+        const size_t ahead = single->offset == 0 ? single_mass_blocks_ahead(single) : 0;
         size_t most = single_mass_smaller(until - single->sample, ahead);
-        if (single->offset == 0 && ahead > 0) {
-            // The sample where statistics begin is not for blocks: much begins anew there.
-            if (single->sample < single->statistics_start)
-                most = single_mass_smaller(most, single->statistics_start - 1 - single->sample);
-            const size_t passed = most == 0   ? 0
-                                  : is_flight ? single_mass_flight_block(single, most)
-                                              : single_mass_contact_block(single, most);
+        // The sample where statistics begin is not for blocks: much begins anew there.
+        if (single->sample < single->statistics_start)
+            most = single_mass_smaller(most, single->statistics_start - 1 - single->sample);
+        if (!is_flight && single->touching[single->side].rate * h > PIECE_REACH) {
+            if (single_mass_block_is_worthwhile(single))
+                (void)single_mass_contact_block(single, 0);
+        } else if (most > 0) {
+            const size_t passed = is_flight ? single_mass_flight_block(single, most)
+                                            : single_mass_contact_block(single, most);
             if (single->pending >= PENDING_MAX)
                 single_mass_flush(single);
-            if (passed > 0)
+            if (passed > 0 && (is_flight || passed == BLOCK || single->sample == until))
                 continue;
         }
         if (h - single->offset <= clock) {
             single_mass_pass(single);
-            pieces = 0;
-            continue;
-        }
-        if (!is_flight && is_quick && single->state.r == 0 &&
-            single->touching[single->side].rate * h > MAP_REACH) {
-            const size_t sample = single->sample;
-            const double offset = single->offset;
-            (void)linear_contact_run(single, single_mass_smaller(until - sample, ahead));
-            if (single->sample != sample || single->offset != offset) {
-                pieces = 0;
-                continue;
-            }
-        }
-        if (is_flight && is_quick && (pieces == 0 || is_released)) {
-            is_released = false;
-            Side side;
-            const FlightEnd end =
-                single->offset == 0 && single->has_stops ? single_mass_fly_to_stop(single, &side)
-                : single->offset > 0 && single_mass_fly_from_stop(single) ? END_SAMPLE
-                                                                          : END_UNCLEAR;
-            if (end == END_SAMPLE)
-                single->offset = h;
-            else if (end == END_STOP && !single_mass_touch(single, side))
-                return false;
-            if (end != END_UNCLEAR)
-                continue;
-        }
-        if (++pieces > PIECES_MAX || !single_mass_step(single, h))
+            single->pieces = single->events = 0;
+        } else if (!single_mass_step(single, h)) {
             return false;
-        is_released = !is_flight && single->phase == PHASE_FLIGHT;
+        }
     }
     return true;
 }
@@ -1162,10 +890,14 @@ static void single_mass_keep_tables(SingleMass *single) {
         return;
     single->key = key;
     single->has_tables = true;
-    single->maps[0].is_made = single->maps[1].is_made = false;
-    single->has_modes[0] = single->has_modes[1] = false;
+    for (size_t i = 0; i < COUNT(single->tables); i++)
+        single->tables[i].is_made = false;
+    single->contact_table[SIDE_LEFT] = 1;
+    single->contact_table[SIDE_RIGHT] = left->contact_omega2 == right->contact_omega2 &&
+                                                left->contact_damping == right->contact_damping
+                                            ? 1
+                                            : 2;
     lanes_make(&single->lanes, &single->flying, key.base_omega, key.interval, lanes_widest());
-    taylor_flight_table_make(&single->short_flight, &single->flying, key.base_omega, key.interval);
 }
 
 static Status single_mass_start(SingleMass *single, Run *run, Response *response,
@@ -1254,8 +986,8 @@ static Status single_mass_solve(SingleMass *single) {
     // The duration may end between samples.
     const double rest = plan->duration - (double)single->sample / plan->sample_rate;
     bool is_there = single->phase != PHASE_RESTING;
-    for (int i = 0; is_there && rest - single->offset > 2 * DBL_EPSILON * rest; i++)
-        is_there = i < PIECES_MAX && single_mass_step(single, rest);
+    while (is_there && rest - single->offset > 2 * DBL_EPSILON * rest)
+        is_there = single_mass_step(single, rest);
     if (!is_there) {
         TRY(single_mass_need_engine(single));
         single_mass_to_engine(single);

@@ -1,15 +1,14 @@
-// What single_mass.c and linear_contact.c know of a run while it goes on.
+// The state of a run of single_mass.c.
 #ifndef CORE_SOLVE_SINGLE_MASS_STATE_H
 #define CORE_SOLVE_SINGLE_MASS_STATE_H
 
 #include <math.h>
 
 #include "core/solve/base_motion_cursor.h"
-#include "core/solve/contact_modes.h"
 #include "core/solve/event_engine.h"
 #include "core/solve/lanes.h"
+#include "core/solve/motion_table.h"
 #include "core/solve/rounding_growth.h"
-#include "core/solve/taylor_flight.h"
 
 // All that the tables depend on.
 typedef struct SingleMassKey {
@@ -17,16 +16,6 @@ typedef struct SingleMassKey {
     double contact_omega2[2], contact_damping[2]; // by Side
     double interval, base_omega;
 } SingleMassKey;
-
-// Contact over one sample interval: gains of (x, v, r, w) from (x, v, r, w, a, b), with a_g = a at
-// its start and b at its end, or under a sine a and b its halves; and the integrals over it as
-// quadratic forms in these.
-enum { FORM_SIZE = 6, FORM_PAIRS = 21 };
-typedef struct ContactMap {
-    bool is_made;
-    double gain[FORM_SIZE][4];
-    double vv[FORM_PAIRS], ww[FORM_PAIRS], av[FORM_PAIRS], aw[FORM_PAIRS];
-} ContactMap;
 
 typedef struct SingleMass SingleMass;
 struct SingleMass {
@@ -58,15 +47,14 @@ struct SingleMass {
     double base_slope;   // of the base, no larger over the whole run: [m/s^3], of a sine [m/s^2]
     Slice sine;          // at sample sine_sample - 1
     size_t sine_sample;  // 0: none yet
+    int pieces, events;  // of the present contact, of the present interval
     EventEngine *engine; // made when it is first needed
     // Tables, kept for the next run of the same system.
     SingleMassKey key;
     bool has_tables;
     Lanes lanes;
-    TaylorFlightTable short_flight;
-    ContactMap maps[2];
-    bool has_modes[2];
-    ContactModes modes[2]; // by Side
+    size_t contact_table[2]; // by Side: which of the tables
+    MotionTable tables[3];   // of flight and of contacts
     RoundingGrowth growth;
 };
 

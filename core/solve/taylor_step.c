@@ -24,9 +24,9 @@ static void powers(size_t degree, double s, double *power, double *slope) {
 
 Status taylor_step_room(TaylorStep *arc, const ModalState *state, Problem *problem) {
     const size_t n = state->padded, m = state->dampers;
-    arc->block = calloc(
-        simd_kernels_room((ROW + 1 + NODES + 2) * n + (2 * ROW + 1) * m + ARC_RULES * NODES * ROW),
-        sizeof *arc->block);
+    arc->block = calloc(simd_kernels_room((ROW + 1 + NODES + 2) * n + (2 * ROW + 1) * m +
+                                          LINEAR_MOTION_RULES * NODES * ROW),
+                        sizeof *arc->block);
     if (arc->block == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu modes",
                            state->mode_count);
@@ -35,8 +35,8 @@ Status taylor_step_room(TaylorStep *arc, const ModalState *state, Problem *probl
     arc->r = arc->work + (NODES + 2) * n;
     arc->force = arc->r + ROW * m;
     arc->slopes = arc->force + ROW * m + m;
-    for (size_t kind = 0; kind < ARC_RULES; kind++) {
-        const Quadrature *rule = &arc_rules[kind];
+    for (size_t kind = 0; kind < LINEAR_MOTION_RULES; kind++) {
+        const Quadrature *rule = &linear_motion_rules[kind];
         for (size_t node = 0; node < rule->count; node++) {
             double power[ROW];
             powers(POLYNOMIAL_DEGREE_MAX, rule->node[node], power,
@@ -118,8 +118,8 @@ void taylor_step_make(TaylorStep *arc, const ModalState *state, const Slice *sli
     const size_t n = state->padded, m = state->dampers;
     arc->length = length;
     arc->rho = length * fmax(modal_state_rate(state), slice->omega);
-    arc->degree = arc_degree(arc->rho);
-    arc_base_series(arc->base, arc->degree, slice, length);
+    arc->degree = linear_motion_degree(arc->rho);
+    linear_motion_base_series(arc->base, arc->degree, slice, length);
     arc->base_degree = slice->omega > 0 ? arc->degree : 1;
     double *speed = arc->work, *elastic = arc->work + n, *push = arc->force + ROW * m;
     for (size_t i = 0; i < n; i++) {
@@ -183,7 +183,7 @@ void taylor_step_state(const TaylorStep *arc, ModalState *state, double s) {
 
 // The derivatives of s^k at a rule's nodes, node after node; after an odd one's last come zeros.
 static const double *node_slopes(const TaylorStep *arc, const Quadrature *rule) {
-    return arc->slopes + (size_t)(rule - arc_rules) * NODES * ROW;
+    return arc->slopes + (size_t)(rule - linear_motion_rules) * NODES * ROW;
 }
 
 // The derivative of a series at a node.
@@ -207,11 +207,11 @@ static void damping_power(const ModalState *state, const double *p, size_t count
 }
 
 StepWork taylor_step_work(const TaylorStep *arc, const ModalState *state) {
-    StepWork work = {0, 0, arc->length * arc_integral(arc->base, arc->base_degree)};
+    StepWork work = {0, 0, arc->length * linear_motion_integral(arc->base, arc->base_degree)};
     if (!(arc->length > 0))
         return work;
     const size_t n = state->padded;
-    const Quadrature *rule = arc_quadrature(arc->rho);
+    const Quadrature *rule = linear_motion_quadrature(arc->rho);
     const double *slopes = node_slopes(arc, rule);
     double *p = arc->work, power[NODES], momentum[NODES]; // times the arc's length
     state->lanes->series(n, arc->degree, arc->q, rule->count, slopes, ROW, p);
@@ -234,11 +234,11 @@ StepWork taylor_step_work(const TaylorStep *arc, const ModalState *state) {
 void taylor_step_contact(const TaylorStep *arc, const ModalState *state, size_t d, double *impulse,
                          double *lost) {
     const DamperState *damper = &state->damper[d];
-    *impulse = arc->length * arc_integral(taylor_step_force(arc, d), arc->degree - 1);
+    *impulse = arc->length * linear_motion_integral(taylor_step_force(arc, d), arc->degree - 1);
     *lost = 0;
     if (damper->phase != PHASE_CONTACT || damper->contact.damping == 0)
         return;
-    const Quadrature *rule = arc_quadrature(arc->rho);
+    const Quadrature *rule = linear_motion_quadrature(arc->rho);
     for (size_t j = 0; j < rule->count; j++) {
         const double w = slope_of(arc, taylor_step_r(arc, d), node_slopes(arc, rule) + j * ROW);
         *lost += rule->weight[j] * w * w;

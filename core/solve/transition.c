@@ -314,7 +314,7 @@ static Status make(Transition *dense, size_t levels, DenseWork *work, Problem *p
     size_t left = 0; // doublings
     for (; work->h * rate_of(state) > 0.5L; work->h /= 2)
         left++;
-    const Quadrature *rule = arc_quadrature(0.5);
+    const Quadrature *rule = linear_motion_quadrature(0.5);
     bool is_whole = make_small(work, rule) && make_forms(work, rule);
     for (; is_whole; left--) {
         if (left < levels) {

@@ -11,6 +11,25 @@ typedef double Four __attribute__((vector_size(32), aligned(8), may_alias)); // 
 #define FOUR(values) (*(const Four *)(values))
 #define PUT_FOUR(values, four) (*(Four *)(values) = (four))
 
+// Their sizes.
+INLINE void wide_size(const Four *a, Four *size) {
+    typedef long long Bits __attribute__((vector_size(32)));
+    const long long mask = 0x7fffffffffffffff;
+    *size = (Four)((Bits)*a & (Bits){mask, mask, mask, mask});
+}
+
+// The larger and the smaller ones of two, like a > b ? a : b and a < b ? a : b.
+INLINE void wide_larger(const Four *a, const Four *b, Four *larger) {
+    typedef long long Bits __attribute__((vector_size(32)));
+    const Bits is_larger = *a > *b;
+    *larger = (Four)((is_larger & (Bits)*a) | (~is_larger & (Bits)*b));
+}
+INLINE void wide_smaller(const Four *a, const Four *b, Four *smaller) {
+    typedef long long Bits __attribute__((vector_size(32)));
+    const Bits is_smaller = *a < *b;
+    *smaller = (Four)((is_smaller & (Bits)*a) | (~is_smaller & (Bits)*b));
+}
+
 // The sums of four of them, side by side.
 INLINE void wide_sum(const Four *a, const Four *b, const Four *c, const Four *d, Four *sum) {
     const Four first =
