@@ -57,6 +57,12 @@ INLINE bool is_inside(const Stretch *s, double r, double sag) {
     return r < s->right - sag && r > sag - s->left;
 }
 
+INLINE void ends_add(Stretch *s, double sign, double base) {
+    s->ends[0] += sign * (s->x * base);
+    s->ends[1] += sign * (s->v * base);
+    s->ends[2] += sign * (base * base);
+}
+
 #define WIDTH 2
 #define NAME(name) name##_plain
 #define TARGET
@@ -329,12 +335,24 @@ void lanes_make(Lanes *lanes, const Motion *flying, double base_omega, double in
     lanes->run = run_of(width);
 }
 
-void lanes_take_sums(Stretch *stretch, double sums[LANE_SUMS]) {
+// A is the B of the sample before, and x and v follow from those of that sample: the sums with A
+// are those over the samples before, which differ from the others by the ends alone.
+void lanes_take_sums(const Lanes *lanes, Stretch *stretch, double sums[LANE_SUMS]) {
     for (int i = 0; i < LANE_SUMS; i++) {
         const double *s = stretch->sums[i];
-        sums[i] = ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7]));
+        sums[i] = (s[0] + s[2]) + (s[1] + s[3]);
+    }
+    if (lanes->base_omega == 0) {
+        const LanesMap *m = &lanes->sample;
+        const double x = sums[XB] + stretch->ends[0], v = sums[VB] + stretch->ends[1];
+        sums[AA] = sums[BB] + stretch->ends[2];
+        sums[XA] = (x + (m->x_x[0] * x + m->x_v[0] * v)) +
+                   (lanes->x_a[0][0] * sums[AA] + lanes->x_a[1][0] * sums[AB]);
+        sums[VA] = (v + (m->v_x[0] * x + m->v_v[0] * v)) +
+                   (lanes->v_a[0][0] * sums[AA] + lanes->v_a[1][0] * sums[AB]);
     }
     memset(stretch->sums, 0, sizeof stretch->sums);
+    memset(stretch->ends, 0, sizeof stretch->ends);
 }
 
 double lanes_take_peak(Stretch *stretch, LanePeak which) {

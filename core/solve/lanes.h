@@ -11,7 +11,7 @@
 #include "core/result/response.h"
 #include "core/solve/base_motion_cursor.h"
 
-enum { LANES = 8 };
+enum { LANES = 8, SUM_LANES = 4 };
 
 // Sums over samples: with b the base at a sample and a at the one before, or under a sine its other
 // half: a_g is b cos + a sin from there on.
@@ -35,7 +35,8 @@ typedef struct Stretch {
     double base_max;                // |a_g| is not larger over the whole run [m/s^2]
     const BaseCursor *base;         // of a sine
     double *columns[CHANNEL_COUNT]; // those that flight fills, from sample 0; NULL: not wanted
-    _Alignas(64) double sums[LANE_SUMS][LANES], most[LANE_PEAKS][LANES];
+    _Alignas(64) double sums[LANE_SUMS][SUM_LANES], most[LANE_PEAKS][LANES];
+    double ends[3]; // x b, v b and b^2 before the first samples less those at the last ones
 } Stretch;
 
 // What the processor's vectors hold; the bytes are the same with all.
@@ -80,7 +81,7 @@ static inline size_t lanes_fly(const Lanes *lanes, Stretch *stretch, size_t samp
 }
 
 // The sums over all lanes, or the largest of one kind since it was last asked for; emptied.
-void lanes_take_sums(Stretch *stretch, double sums[LANE_SUMS]);
+void lanes_take_sums(const Lanes *lanes, Stretch *stretch, double sums[LANE_SUMS]);
 double lanes_take_peak(Stretch *stretch, LanePeak which);
 
 #endif

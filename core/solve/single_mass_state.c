@@ -80,7 +80,7 @@ void single_mass_flush(SingleMass *single) {
     double sums[LANE_SUMS], vv = 0, av = 0;
     Stretch *stretch = &single->stretch;
     Peaks *peaks = &single->impacts.response->peaks;
-    lanes_take_sums(stretch, sums);
+    lanes_take_sums(lanes, stretch, sums);
     const double speed = lanes_take_peak(stretch, OF_VELOCITY);
     peaks->velocity = single_mass_larger(peaks->velocity, speed);
     peaks->acceleration =
