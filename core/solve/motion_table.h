@@ -198,44 +198,49 @@ typedef struct PolynomialRange {
     double bend_min, bend_max;   // bounds of g''
 } PolynomialRange;
 
-INLINE void polynomial_range(const double *c, size_t terms, double s, PolynomialRange *range) {
+// `has_bounds`: all of it, else only the values at u = 1.
+INLINE void polynomial_range(const double *c, size_t terms, double s, bool has_bounds,
+                             PolynomialRange *range) {
     const double s2 = s * s, s4 = s2 * s2;
-    Four power = {1, s, s2, s2 * s}, index = {0, 1, 2, 3};
-    Four value = {0}, slope = {0}, bend = {0}, values = {0}, slopes = {0}, bends = {0}, size;
+    Four power = {1, s, s2, s2 * s}, index = {0, 1, 2, 3}, sum, size;
+    Four value = {0}, slope = {0}, bend = {0}, values = {0}, slopes = {0}, bends = {0};
+    const Four none = {0};
     double first[4] = {0};
     for (size_t k = 0; k < terms; k += 4) {
         const Four term = FOUR(c + k) * power;
         const Four once = term * index, twice = once * (index - 1);
-        if (k == 0)
-            PUT_FOUR(first, term);
         value += term;
         slope += once;
         bend += twice;
+        power *= s4;
+        index += 4;
+        if (!has_bounds)
+            continue;
+        if (k == 0)
+            PUT_FOUR(first, term);
         wide_size(&term, &size);
         values += size;
         wide_size(&once, &size);
         slopes += size;
         wide_size(&twice, &size);
         bends += size;
-        power *= s4;
-        index += 4;
     }
-    Four sum;
-    const Four none = {0};
     wide_sum(&value, &slope, &bend, &none, &sum);
-    wide_sum(&values, &slopes, &bends, &none, &size);
     range->value = sum[0];
     range->slope = sum[1];
     range->bend = sum[2];
+    if (!has_bounds)
+        return;
     // (a - |a|) / 2 is a where that is negative, else 0. The bounds keep the terms of u^0 whole,
     // and leave room for rounding.
-    const double room = 1e-14;
+    const double room = 1e-14, two = 2 * first[2];
+    wide_sum(&values, &slopes, &bends, &none, &size);
+    const double rest = sum[1] - first[1], rest_size = size[1] - fabs(first[1]);
+    const double bend_rest = sum[2] - two, bend_size = size[2] - fabs(two);
     range->value_min =
         first[0] + ((sum[0] - first[0]) - (size[0] - fabs(first[0]))) / 2 - room * size[0];
-    const double rest = sum[1] - first[1], rest_size = size[1] - fabs(first[1]);
     range->slope_min = first[1] + (rest - rest_size) / 2 - room * size[1];
     range->slope_max = first[1] + (rest + rest_size) / 2 + room * size[1];
-    const double two = 2 * first[2], bend_rest = sum[2] - two, bend_size = size[2] - fabs(two);
     range->bend_min = two + (bend_rest - bend_size) / 2 - room * size[2];
     range->bend_max = two + (bend_rest + bend_size) / 2 + room * size[2];
 }
@@ -271,7 +276,7 @@ INLINE bool piece_root(const double *c, size_t terms, double end, double toleran
     if (c[0] == 0) // a root at 0 does not count; what follows it is 0
         c++;
     PolynomialRange all;
-    polynomial_range(c, terms, end, &all);
+    polynomial_range(c, terms, end, true, &all);
     const double from = c[0];
     if (all.value_min > 0)
         return false;
@@ -282,7 +287,7 @@ INLINE bool piece_root(const double *c, size_t terms, double end, double toleran
         double at = end * polynomial_guess(from, c[1] * end, c[2] * end * end, &all);
         for (int i = 0; i < STEPS_MAX; i++) { // Halley's method: the error is cubed
             PolynomialRange here;
-            polynomial_range(c, terms, at, &here);
+            polynomial_range(c, terms, at, false, &here);
             const double step =
                 here.value * here.slope / (here.slope * here.slope - here.value * here.bend / 2);
             at -= at * step;

@@ -484,47 +484,44 @@ INLINE void single_mass_block_record(SingleMass *single, size_t count, BlockRows
     const double sign = single_mass_sign(single->side), middle = single_mass_origin(single);
     const double mass = single_mass_effective(single);
     const size_t first = single->sample + 1, bytes = count * sizeof(double);
-    double place[BLOCK + 8], peaks[5][8] = {0}, squares[2][8] = {0};
     double *const *columns = single->columns;
-    for (size_t from = 0; from < count; from += 8)
-        for (size_t k = from; k < from + 8; k++)
-            place[k] = y[0][k + 1] + (middle + y[2][k + 1]);
-    for (size_t k = count; k % 8 != 0; k++)
+    _Alignas(32) double place[BLOCK];
+    const double *const rows[] = {y[0] + 1, y[1] + 1, acceleration + 1, place, n + 1};
+    enum { ROWS = COUNT(rows) };
+    Four peaks[ROWS] = {{0}}, squares[2] = {{0}};
+    double peak[ROWS];
+    for (size_t k = 0; k < count; k += 4)
+        PUT_FOUR(place + k, FOUR(y[0] + k + 1) + (middle + FOUR(y[2] + k + 1)));
+    for (size_t k = count; k % 4 != 0; k++)
         place[k] = 0;
-    for (size_t from = 1; from <= count; from += 8)
-        for (size_t j = 0; j < 8; j++) {
-            const size_t k = from + j;
-            const double sizes[5] = {fabs(y[0][k]), fabs(y[1][k]), fabs(acceleration[k]),
-                                     fabs(place[k - 1]), fabs(n[k])};
-            for (int i = 0; i < 5; i++)
-                peaks[i][j] = sizes[i] > peaks[i][j] ? sizes[i] : peaks[i][j];
-            squares[0][j] += y[0][k] * y[0][k];
-            squares[1][j] += acceleration[k] * acceleration[k];
+    for (size_t k = 0; k < count; k += 4) {
+        for (int i = 0; i < ROWS; i++) {
+            Four size;
+            wide_size(&FOUR(rows[i] + k), &size);
+            wide_larger(&size, &peaks[i], &peaks[i]);
         }
-    for (size_t half = 4; half > 0; half /= 2)
-        for (size_t j = 0; j < half; j++) {
-            for (int i = 0; i < 5; i++)
-                peaks[i][j] = single_mass_larger(peaks[i][j], peaks[i][j + half]);
-            for (int i = 0; i < 2; i++)
-                squares[i][j] += squares[i][j + half];
-        }
+        squares[0] += FOUR(rows[0] + k) * FOUR(rows[0] + k);
+        squares[1] += FOUR(rows[2] + k) * FOUR(rows[2] + k);
+    }
+    for (int i = 0; i < ROWS; i++)
+        peak[i] = single_mass_larger(single_mass_larger(peaks[i][0], peaks[i][1]),
+                                     single_mass_larger(peaks[i][2], peaks[i][3]));
     Peaks *all = &single->impacts.response->peaks;
-    all->displacement = single_mass_larger(all->displacement, peaks[0][0]);
-    all->velocity = single_mass_larger(all->velocity, peaks[1][0]);
-    all->acceleration = single_mass_larger(all->acceleration, peaks[2][0]);
-    all->damper_displacement = single_mass_larger(all->damper_displacement, peaks[3][0]);
-    impact_log_force(&single->impacts, &single->row, mass * peaks[4][0]);
+    all->displacement = single_mass_larger(all->displacement, peak[0]);
+    all->velocity = single_mass_larger(all->velocity, peak[1]);
+    all->acceleration = single_mass_larger(all->acceleration, peak[2]);
+    all->damper_displacement = single_mass_larger(all->damper_displacement, peak[3]);
+    impact_log_force(&single->impacts, &single->row, mass * peak[4]);
     if (single->sample >= single->statistics_start) {
-        single->squares[0] += squares[0][0];
-        single->squares[1] += squares[1][0];
+        for (int i = 0; i < 2; i++)
+            single->squares[i] += (squares[i][0] + squares[i][2]) + (squares[i][1] + squares[i][3]);
         single->statistics_count += count;
     }
-    const double *const copied[] = {y[0] + 1, y[1] + 1, acceleration + 1, place};
-    static const int rows[] = {CHANNEL_DISPLACEMENT, CHANNEL_VELOCITY, CHANNEL_ACCELERATION,
-                               CHANNEL_DAMPER_DISPLACEMENT};
+    static const int channel[] = {CHANNEL_DISPLACEMENT, CHANNEL_VELOCITY, CHANNEL_ACCELERATION,
+                                  CHANNEL_DAMPER_DISPLACEMENT};
     for (int i = 0; i < 4; i++)
-        if (columns[rows[i]] != NULL)
-            memcpy(columns[rows[i]] + first, copied[i], bytes);
+        if (columns[channel[i]] != NULL)
+            memcpy(columns[channel[i]] + first, rows[i], bytes);
     for (size_t k = 0; k < count && columns[CHANNEL_DAMPER_VELOCITY] != NULL; k++)
         columns[CHANNEL_DAMPER_VELOCITY][first + k] = y[1][k + 1] + y[3][k + 1];
     for (size_t k = 0; k < count && columns[CHANNEL_PENETRATION] != NULL; k++)
