@@ -130,41 +130,33 @@ void sparse_spectrum_run(SparseSpectrum *spectrum) {
     memcpy(samples + TAPS / 2 - 1 + coarse, real, (TAPS / 2 + 1) * sizeof *samples);
 }
 
-// Eight phases at once; the result has the same bytes at every vector width.
-typedef double Vector __attribute__((vector_size(8 * LANES), aligned(8), may_alias));
-
-static inline __attribute__((always_inline)) void
-sparse_spectrum_interpolate(const SparseSpectrum *spectrum, size_t first, size_t count,
-                            double *values) {
-    const size_t ratio = spectrum->ratio;
-    for (size_t r = 0; r < ratio; r += LANES) {
-        Vector rows[TAPS]; // in registers if there are enough
-        for (size_t p = 0; p < TAPS; p++)
-            rows[p] = *(const Vector *)(spectrum->kernel + p * ratio + r);
-        for (size_t q = 0; q < count; q++) {
-            const double *near = spectrum->samples + first + q;
-            Vector even = rows[0] * near[0], odd = rows[1] * near[1];
-            for (size_t p = 2; p < TAPS; p += 2) {
-                even += rows[p] * near[p];
-                odd += rows[p + 1] * near[p + 1];
-            }
-            *(Vector *)(values + q * ratio + r) = even + odd;
-        }
+// A function for one width of vector, that is so many phases at once; each phase has the same bytes
+// in all of them. Vectors wider than the processor's would go through memory.
+#define INTERPOLATE(name, width, targets)                                                          \
+    typedef double name##_vector __attribute__((vector_size(8 * (width)), aligned(8), may_alias)); \
+    targets static void name(const SparseSpectrum *spectrum, size_t first, size_t count,           \
+                             double *values) {                                                     \
+        const size_t ratio = spectrum->ratio;                                                      \
+        for (size_t r = 0; r < ratio; r += (width)) {                                              \
+            name##_vector rows[TAPS];                                                              \
+            for (size_t p = 0; p < TAPS; p++)                                                      \
+                rows[p] = *(const name##_vector *)(spectrum->kernel + p * ratio + r);              \
+            for (size_t q = 0; q < count; q++) {                                                   \
+                const double *near = spectrum->samples + first + q;                                \
+                name##_vector even = rows[0] * near[0], odd = rows[1] * near[1];                   \
+                for (size_t p = 2; p < TAPS; p += 2) {                                             \
+                    even += rows[p] * near[p];                                                     \
+                    odd += rows[p + 1] * near[p + 1];                                              \
+                }                                                                                  \
+                *(name##_vector *)(values + q * ratio + r) = even + odd;                           \
+            }                                                                                      \
+        }                                                                                          \
     }
-}
 
+INTERPOLATE(sparse_spectrum_interpolate, 2, )
 #ifdef __x86_64__
-static __attribute__((target("avx512f"))) void
-sparse_spectrum_interpolate_avx512(const SparseSpectrum *spectrum, size_t first, size_t count,
-                                   double *values) {
-    sparse_spectrum_interpolate(spectrum, first, count, values);
-}
-
-static __attribute__((target("avx2"))) void
-sparse_spectrum_interpolate_avx2(const SparseSpectrum *spectrum, size_t first, size_t count,
-                                 double *values) {
-    sparse_spectrum_interpolate(spectrum, first, count, values);
-}
+INTERPOLATE(sparse_spectrum_interpolate_avx2, 4, __attribute__((target("avx2"))))
+INTERPOLATE(sparse_spectrum_interpolate_avx512, LANES, __attribute__((target("avx512f"))))
 #endif
 
 void sparse_spectrum_samples(const SparseSpectrum *spectrum, size_t from, size_t count,
