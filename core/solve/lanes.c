@@ -31,33 +31,34 @@ typedef struct Ends {
     _Alignas(64) double of[PARTS][LANES];
 } Ends;
 
-INLINE double larger(double a, double b) {
+INLINE double lanes_greater(double a, double b) {
     return a > b ? a : b;
 }
 
-INLINE double size(double a) {
+INLINE double lanes_size(double a) {
     return __builtin_fabs(a);
 }
 
 // |r''| over `count` samples is not larger [m/s^2]: |v| + Omega |x| grows by the base alone.
-INLINE double push_bound(const Lanes *t, double x, double v, size_t count, double base_max) {
-    const double reach = size(v) + t->omega * size(x) + (double)count * t->interval * base_max;
+INLINE double lanes_push_bound(const Lanes *t, double x, double v, size_t count, double base_max) {
+    const double reach =
+        lanes_size(v) + t->omega * lanes_size(x) + (double)count * t->interval * base_max;
     return (t->damping + t->omega) * reach;
 }
 
 // A sine's b and a from `sample` on.
-INLINE Slice start_sine(const Stretch *s, size_t sample, BaseKind kind) {
+INLINE Slice lanes_start_sine(const FlightBlock *s, size_t sample, BaseKind kind) {
     Slice slice = {0, 0, 0};
     if (kind == SINE)
         (void)base_cursor_interval(s->base, sample, &slice);
     return slice;
 }
 
-INLINE bool is_inside(const Stretch *s, double r, double sag) {
+INLINE bool lanes_is_inside(const FlightBlock *s, double r, double sag) {
     return r < s->right - sag && r > sag - s->left;
 }
 
-INLINE void ends_add(Stretch *s, double sign, double base) {
+INLINE void lanes_add_ends(FlightBlock *s, double sign, double base) {
     s->ends[0] += sign * (s->x * base);
     s->ends[1] += sign * (s->v * base);
     s->ends[2] += sign * (base * base);
@@ -90,15 +91,15 @@ LanesWidth lanes_widest(void) {
     return LANES_PLAIN;
 }
 
-static LanesRun *run_of(LanesWidth width) {
+static LanesRun *lanes_run_of(LanesWidth width) {
 #ifdef __x86_64__
     if (width == LANES_AVX512)
-        return run_avx512;
+        return lanes_run_avx512;
     if (width == LANES_AVX2)
-        return run_avx2;
+        return lanes_run_avx2;
 #endif
     (void)width;
-    return run_plain;
+    return lanes_run_plain;
 }
 
 // With S the structure's response to a unit impulse and I1, I2 its integrals, a base of a + s t
@@ -113,7 +114,7 @@ typedef struct Impulse {
 } Impulse;
 
 // Of y'' + damping y' + omega2 y = 0 at time t.
-static Impulse impulse_at(long double omega2, long double damping, long double t) {
+static Impulse lanes_impulse(long double omega2, long double damping, long double t) {
     Impulse out = {0, 0, 0};
     long double before = 0, term = t; // c_k t^k
     for (int k = 1; k < SERIES && fabsl(term) + fabsl(before * t) > 1e-23L * t; k++) {
@@ -129,9 +130,9 @@ static Impulse impulse_at(long double omega2, long double damping, long double t
 }
 
 // One-interval map less the identity.
-static void make_step(long double omega2, long double damping, long double h,
-                      long double step[2][2]) {
-    const Impulse one = impulse_at(omega2, damping, h);
+static void lanes_make_step(long double omega2, long double damping, long double h,
+                            long double step[2][2]) {
+    const Impulse one = lanes_impulse(omega2, damping, h);
     step[0][0] = -omega2 * one.I1;
     step[0][1] = one.S;
     step[1][0] = -omega2 * one.S;
@@ -140,8 +141,8 @@ static void make_step(long double omega2, long double damping, long double h,
 
 // What x and v have become from rest after time t under a_g = cos (column 0) or sin of omega t: a
 // Taylor series.
-static void force_by_sine(long double omega2, long double damping, long double omega, long double t,
-                          long double out[2][2]) {
+static void lanes_sine_force(long double omega2, long double damping, long double omega,
+                             long double t, long double out[2][2]) {
     for (int column = 0; column < 2; column++) {
         long double base[2] = {column == 0, column == 1 ? omega * t : 0}; // terms of a_g
         long double term[2] = {0, 0};                                     // of x
@@ -163,7 +164,7 @@ static void force_by_sine(long double omega2, long double damping, long double o
     }
 }
 
-static void turn_by_sine(long double angle, long double out[2]) {
+static void lanes_sine_turn(long double angle, long double out[2]) {
     long double term = 1;
     out[0] = out[1] = 0;
     for (int k = 0; k < SERIES; k++, term *= angle / k)
@@ -171,12 +172,12 @@ static void turn_by_sine(long double angle, long double out[2]) {
 }
 
 // From rest under a sine, after 1 to 8 samples and 1 to 8 blocks, and how far it has turned.
-static void follow_sine(long double omega2, long double damping, long double omega, long double h,
-                        double near[3][2][LANES], double far[3][2][LANES]) {
+static void lanes_follow_sine(long double omega2, long double damping, long double omega,
+                              long double h, double near[3][2][LANES], double far[3][2][LANES]) {
     long double step[2][2], force[2][2], one[2], at[2][2] = {{0}}, turn[2] = {1, 0};
-    make_step(omega2, damping, h, step);
-    force_by_sine(omega2, damping, omega, h, force);
-    turn_by_sine(omega * h, one);
+    lanes_make_step(omega2, damping, h, step);
+    lanes_sine_force(omega2, damping, omega, h, force);
+    lanes_sine_turn(omega * h, one);
     for (int j = 0; j < LANES * LANES; j++) {
         for (int column = 0; column < 2; column++) {
             // The sine as this interval's start sees it.
@@ -204,11 +205,12 @@ static void follow_sine(long double omega2, long double damping, long double ome
     }
 }
 
-static void make_sine(Lanes *lanes) {
+static void lanes_make_sine(Lanes *lanes) {
     double own[2][3][2][LANES], free_mass[2][3][2][LANES];
     LanesMap *const maps[2] = {&lanes->sample, &lanes->block};
-    follow_sine(lanes->omega2, lanes->damping, lanes->base_omega, lanes->interval, own[0], own[1]);
-    follow_sine(0, 0, lanes->base_omega, lanes->interval, free_mass[0], free_mass[1]);
+    lanes_follow_sine(lanes->omega2, lanes->damping, lanes->base_omega, lanes->interval, own[0],
+                      own[1]);
+    lanes_follow_sine(0, 0, lanes->base_omega, lanes->interval, free_mass[0], free_mass[1]);
     for (int i = 0; i < 2; i++) {
         memcpy(maps[i]->x_s, own[i][0], sizeof maps[i]->x_s);
         memcpy(maps[i]->v_s, own[i][1], sizeof maps[i]->v_s);
@@ -218,19 +220,19 @@ static void make_sine(Lanes *lanes) {
     }
 }
 
-static void times_more(long double step[2][2], long double vector[2]) {
+static void lanes_multiply(long double step[2][2], long double vector[2]) {
     const long double top = vector[0], low = vector[1];
     vector[0] += step[0][0] * top + step[0][1] * low;
     vector[1] += step[1][0] * top + step[1][1] * low;
 }
 
 // Powers, less the identity, of a step of `length` that is given so; `step` becomes the last.
-static void make_map(LanesMap *map, long double step[2][2], long double length) {
+static void lanes_make_map(LanesMap *map, long double step[2][2], long double length) {
     long double one[2][2] = {{step[0][0], step[0][1]}, {step[1][0], step[1][1]}};
     for (int j = 0; j < LANES; j++) {
         for (int c = 0; c < 2 && j > 0; c++) {
             long double column[2] = {step[0][c], step[1][c]};
-            times_more(one, column);
+            lanes_multiply(one, column);
             step[0][c] = column[0] + one[0][c];
             step[1][c] = column[1] + one[1][c];
         }
@@ -243,11 +245,11 @@ static void make_map(LanesMap *map, long double step[2][2], long double length) 
 }
 
 // What the base's samples give.
-static void make_base(Lanes *lanes) {
+static void lanes_make_base(Lanes *lanes) {
     const long double h = lanes->interval;
-    const Impulse one = impulse_at(lanes->omega2, lanes->damping, h);
+    const Impulse one = lanes_impulse(lanes->omega2, lanes->damping, h);
     long double step[2][2];
-    make_step(lanes->omega2, lanes->damping, h, step);
+    lanes_make_step(lanes->omega2, lanes->damping, h, step);
     // What the base's two ends give over one interval, carried on.
     long double first[2] = {one.I2 / h - one.I1, one.I1 / h - one.S};
     long double last[2] = {-one.I2 / h, -one.I1 / h};
@@ -267,29 +269,29 @@ static void make_base(Lanes *lanes) {
                                         : i == j + 1 ? -h * h / 6
                                                      : -h * h * (j + 1 - i));
         }
-        times_more(step, first);
-        times_more(step, last);
+        lanes_multiply(step, first);
+        lanes_multiply(step, last);
     }
 }
 
 // Integrals over an interval in terms of its end: time runs backwards, damping drives. Gauss-
 // Legendre with five points, right to rounding for intervals this short.
-static void make_forms(Lanes *lanes) {
+static void lanes_make_forms(Lanes *lanes) {
     static const double node[5] = {0.04691007703066800, 0.2307653449471585, 0.5, 0.7692346550528415,
                                    0.9530899229693320};
     static const double weight[5] = {0.1184634425280945, 0.2393143352496832, 0.2844444444444444,
                                      0.2393143352496832, 0.1184634425280945};
     const double W = lanes->omega2, D = lanes->damping, interval = lanes->interval;
     for (int i = 0; i < 5; i++) {
-        const Impulse back = impulse_at(W, -(long double)D, (long double)interval * node[i]);
+        const Impulse back = lanes_impulse(W, -(long double)D, (long double)interval * node[i]);
         const double S = (double)back.S, I1 = (double)back.I1;
         const double x = W * S, v = 1 + D * S - W * I1, h = weight[i] * interval;
         double a = I1 / interval, b = S - a, from = node[i], to = 1 - node[i];
         if (lanes->base_omega > 0) {
             long double force[2][2], turn[2];
-            force_by_sine(W, -(long double)D, lanes->base_omega, (long double)interval * node[i],
-                          force);
-            turn_by_sine((long double)lanes->base_omega * interval * node[i], turn);
+            lanes_sine_force(W, -(long double)D, lanes->base_omega, (long double)interval * node[i],
+                             force);
+            lanes_sine_turn((long double)lanes->base_omega * interval * node[i], turn);
             b = (double)-force[1][0];
             a = (double)force[1][1];
             to = (double)turn[0];
@@ -308,21 +310,21 @@ static void make_forms(Lanes *lanes) {
 
 static void lanes_make_tables(Lanes *lanes) {
     long double step[2][2];
-    make_step(lanes->omega2, lanes->damping, lanes->interval, step);
-    make_map(&lanes->sample, step, lanes->interval);
-    make_map(&lanes->block, step, (long double)LANES * lanes->interval);
+    lanes_make_step(lanes->omega2, lanes->damping, lanes->interval, step);
+    lanes_make_map(&lanes->sample, step, lanes->interval);
+    lanes_make_map(&lanes->block, step, (long double)LANES * lanes->interval);
     if (lanes->base_omega > 0)
-        make_sine(lanes);
+        lanes_make_sine(lanes);
     else
-        make_base(lanes);
-    make_forms(lanes);
+        lanes_make_base(lanes);
+    lanes_make_forms(lanes);
 }
 
 void lanes_make(Lanes *lanes, const Motion *flying, double base_omega, double interval,
                 LanesWidth width) {
     memset(lanes, 0, sizeof *lanes);
     const double omega = sqrt(flying->omega2);
-    if (!(LANES * interval * larger(larger(omega, flying->damping), base_omega) <= 1))
+    if (!(LANES * interval * lanes_greater(lanes_greater(omega, flying->damping), base_omega) <= 1))
         return;
     lanes->base_omega = base_omega;
     lanes->interval = interval;
@@ -332,12 +334,12 @@ void lanes_make(Lanes *lanes, const Motion *flying, double base_omega, double in
     lanes->omega = omega;
     lanes_make_tables(lanes);
     lanes->width = width;
-    lanes->run = run_of(width);
+    lanes->run = lanes_run_of(width);
 }
 
 // A is the B of the sample before, and x and v follow from those of that sample: the sums with A
 // are those over the samples before, which differ from the others by the ends alone.
-void lanes_take_sums(const Lanes *lanes, Stretch *stretch, double sums[LANE_SUMS]) {
+void lanes_take_sums(const Lanes *lanes, FlightBlock *stretch, double sums[LANE_SUMS]) {
     for (int i = 0; i < LANE_SUMS; i++) {
         const double *s = stretch->sums[i];
         sums[i] = (s[0] + s[2]) + (s[1] + s[3]);
@@ -355,10 +357,10 @@ void lanes_take_sums(const Lanes *lanes, Stretch *stretch, double sums[LANE_SUMS
     memset(stretch->ends, 0, sizeof stretch->ends);
 }
 
-double lanes_take_peak(Stretch *stretch, LanePeak which) {
+double lanes_take_peak(FlightBlock *stretch, LanePeak which) {
     double most = 0;
     for (int i = 0; i < LANES; i++)
-        most = larger(stretch->most[which][i], most);
+        most = lanes_greater(stretch->most[which][i], most);
     memset(stretch->most[which], 0, sizeof stretch->most[which]);
     return most;
 }

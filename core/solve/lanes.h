@@ -27,7 +27,7 @@ typedef enum LanePeak {
 } LanePeak;
 
 // What a stretch starts from and what it comes to.
-typedef struct Stretch {
+typedef struct FlightBlock {
     double x, v, r;                 // as in State
     double z;                       // velocity of the free mass relative to the base [m/s]
     double left, right;             // r stays within (-left, right); INFINITY without a damper
@@ -37,13 +37,13 @@ typedef struct Stretch {
     double *columns[CHANNEL_COUNT]; // those that flight fills, from sample 0; NULL: not wanted
     _Alignas(64) double sums[LANE_SUMS][SUM_LANES], most[LANE_PEAKS][LANES];
     double ends[3]; // x b, v b and b^2 before the first samples less those at the last ones
-} Stretch;
+} FlightBlock;
 
 // What the processor's vectors hold; the bytes are the same with all.
 typedef enum LanesWidth { LANES_PLAIN, LANES_AVX2, LANES_AVX512 } LanesWidth;
 
 typedef struct Lanes Lanes;
-typedef size_t LanesRun(const Lanes *lanes, Stretch *stretch, size_t sample, size_t count,
+typedef size_t LanesRun(const Lanes *lanes, FlightBlock *stretch, size_t sample, size_t count,
                         const double *base);
 
 // What x and v gain over i + 1 steps: from (x, v), and under a sine from its value and slope.
@@ -75,13 +75,13 @@ void lanes_make(Lanes *lanes, const Motion *flying, double base_omega, double in
 // Flies from `sample` over at most `count` intervals, as far as surely no stop is reached on the
 // way, and returns how many. `base` is a_g at `sample` and after (count + 1 of them), NULL if
 // still or a sine.
-static inline size_t lanes_fly(const Lanes *lanes, Stretch *stretch, size_t sample, size_t count,
-                               const double *base) {
+static inline size_t lanes_fly(const Lanes *lanes, FlightBlock *stretch, size_t sample,
+                               size_t count, const double *base) {
     return lanes->run(lanes, stretch, sample, count, base);
 }
 
 // The sums over all lanes, or the largest of one kind since it was last asked for; emptied.
-void lanes_take_sums(const Lanes *lanes, Stretch *stretch, double sums[LANE_SUMS]);
-double lanes_take_peak(Stretch *stretch, LanePeak which);
+void lanes_take_sums(const Lanes *lanes, FlightBlock *stretch, double sums[LANE_SUMS]);
+double lanes_take_peak(FlightBlock *stretch, LanePeak which);
 
 #endif

@@ -64,7 +64,7 @@ static inline size_t single_mass_smaller(size_t a, size_t b) {
 
 // Whole intervals of flight; 0: a stop may be reached in the next one.
 static size_t single_mass_flight_block(SingleMass *single, size_t most) {
-    Stretch *s = &single->stretch;
+    FlightBlock *s = &single->stretch;
     const double *base;
     most = single_mass_smaller(most, single_mass_base_ahead(single, &base));
     if (single->has_stops) {
@@ -935,7 +935,7 @@ static Status single_mass_start(SingleMass *single, Run *run, Response *response
     response->count = plan->count;
     single->has_blocks =
         single->lanes.run != NULL && (base->form != BASE_SAMPLED || single->base.ratio == 1);
-    Stretch *stretch = &single->stretch;
+    FlightBlock *stretch = &single->stretch;
     if (base->form == BASE_SAMPLED) {
         double step;
         if (single->lanes.width != LANES_PLAIN)

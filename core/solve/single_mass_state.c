@@ -78,7 +78,7 @@ void single_mass_flush(SingleMass *single) {
     const Plan *plan = single->plan;
     const Lanes *lanes = &single->lanes;
     double sums[LANE_SUMS], vv = 0, av = 0;
-    Stretch *stretch = &single->stretch;
+    FlightBlock *stretch = &single->stretch;
     Peaks *peaks = &single->impacts.response->peaks;
     lanes_take_sums(lanes, stretch, sums);
     const double speed = lanes_take_peak(stretch, OF_VELOCITY);

@@ -24,7 +24,7 @@ struct SingleMass {
     const PlanDamper *damper; // all zero where there is none
     Problem *problem;
     Motion flying, touching[2], resting;
-    Stretch stretch;
+    FlightBlock stretch;
     bool has_stops;     // that the mass may reach
     bool has_blocks;    // of flight
     size_t pending;     // samples whose sums wait in `stretch`

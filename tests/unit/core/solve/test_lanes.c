@@ -16,7 +16,7 @@ enum { COUNT_MAX = 203 };
 static const double INTERVAL = 1e-3;
 
 typedef struct Flown {
-    Stretch stretch;
+    FlightBlock stretch;
     double columns[CHANNEL_COUNT][COUNT_MAX + 1];
     size_t count;
 } Flown;
@@ -40,16 +40,16 @@ static void fly(const Lanes *lanes, const State *start, double room, const doubl
     static BaseCursor cursor;
     base_cursor_make(&cursor, &sine, 1 / INTERVAL);
     memset(flown, 0, sizeof *flown);
-    Stretch *s = &flown->stretch;
-    *s = (Stretch){.x = start->x,
-                   .v = start->v,
-                   .r = start->r,
-                   .z = start->v + start->w,
-                   .left = room,
-                   .right = room,
-                   .middle = 0.001,
-                   .base_max = base == NULL && lanes->base_omega == 0 ? 0 : 1.4,
-                   .base = &cursor};
+    FlightBlock *s = &flown->stretch;
+    *s = (FlightBlock){.x = start->x,
+                       .v = start->v,
+                       .r = start->r,
+                       .z = start->v + start->w,
+                       .left = room,
+                       .right = room,
+                       .middle = 0.001,
+                       .base_max = base == NULL && lanes->base_omega == 0 ? 0 : 1.4,
+                       .base = &cursor};
     for (int i = 0; i < CHANNEL_COUNT; i++)
         if (i <= CHANNEL_DAMPER_VELOCITY)
             s->columns[i] = flown->columns[i];
