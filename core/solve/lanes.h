@@ -10,6 +10,7 @@
 #include "core/result/channel.h"
 #include "core/result/response.h"
 #include "core/solve/base_motion_cursor.h"
+#include "core/solve/motion_table.h"
 
 enum { LANES = 8, SUM_LANES = 4 };
 
@@ -68,9 +69,8 @@ struct Lanes {
 };
 
 LanesWidth lanes_widest(void); // on this processor
-// `base_omega` is a sine's; 0: the base is still or linear.
-void lanes_make(Lanes *lanes, const Motion *flying, double base_omega, double interval,
-                LanesWidth width);
+// `one` is the table of flight over one sample interval; `is_sampled`: the base may be linear.
+void lanes_make(Lanes *lanes, const MotionTable *one, bool is_sampled, LanesWidth width);
 
 // Flies from `sample` over at most `count` intervals, as far as surely no stop is reached on the
 // way, and returns how many. `base` is a_g at `sample` and after (count + 1 of them), NULL if

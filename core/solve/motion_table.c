@@ -67,7 +67,7 @@ const unsigned char form_pairs[FORM_PAIRS][2] = {
     {0, 0}, {0, 1}, {1, 1}, {0, 2}, {1, 2}, {2, 2}, {0, 3}, {1, 3}, {2, 3}, {3, 3}, {0, 4}, {1, 4},
     {2, 4}, {3, 4}, {4, 4}, {0, 5}, {1, 5}, {2, 5}, {3, 5}, {4, 5}, {5, 5}, {5, 5}, {5, 5}, {5, 5}};
 
-static void motion_table_make_forms(MotionTable *table) {
+void motion_table_make_forms(MotionTable *table) {
     enum { PAIRS = START_SIZE * (START_SIZE + 1) / 2 };
     const Quadrature *rule = linear_motion_quadrature(table->rho);
     const size_t degree = table->terms - 1;

@@ -48,7 +48,8 @@ typedef struct MotionTable {
 
 // `length` times motion->rate and times base_omega is at most 1.
 void motion_table_make(MotionTable *table, const Motion *motion, double base_omega, double length);
-void motion_table_make_block(MotionTable *table); // from_state ... forms
+void motion_table_make_forms(MotionTable *table);
+void motion_table_make_block(MotionTable *table); // from_state to forms
 
 typedef struct Piece {
     const MotionTable *table;

@@ -875,14 +875,15 @@ static void single_mass_make_motions(SingleMass *single) {
 // Tables of another system are forgotten.
 static void single_mass_keep_tables(SingleMass *single) {
     const Motion *left = &single->touching[SIDE_LEFT], *right = &single->touching[SIDE_RIGHT];
-    const SingleMassKey key = {
-        .omega2 = single->flying.omega2,
-        .damping = single->flying.damping,
-        .share = single->flying.share,
-        .contact_omega2 = {left->contact_omega2, right->contact_omega2},
-        .contact_damping = {left->contact_damping, right->contact_damping},
-        .interval = single->interval,
-        .base_omega = single->run->base->form == BASE_SINE ? single->run->base->omega : 0};
+    const Base *base = single->run->base;
+    const SingleMassKey key = {.omega2 = single->flying.omega2,
+                               .damping = single->flying.damping,
+                               .share = single->flying.share,
+                               .contact_omega2 = {left->contact_omega2, right->contact_omega2},
+                               .contact_damping = {left->contact_damping, right->contact_damping},
+                               .interval = single->interval,
+                               .base_omega = base->form == BASE_SINE ? base->omega : 0,
+                               .is_sampled = base->form == BASE_SAMPLED};
     if (single->has_tables && memcmp(&key, &single->key, sizeof key) == 0)
         return;
     single->key = key;
@@ -894,7 +895,8 @@ static void single_mass_keep_tables(SingleMass *single) {
                                                 left->contact_damping == right->contact_damping
                                             ? 1
                                             : 2;
-    lanes_make(&single->lanes, &single->flying, key.base_omega, key.interval, lanes_widest());
+    const Slice form = {0, key.base_omega > 0, key.base_omega};
+    lanes_make(&single->lanes, single_mass_table(single, &form), key.is_sampled, lanes_widest());
 }
 
 static Status single_mass_start(SingleMass *single, Run *run, Response *response,

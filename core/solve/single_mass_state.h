@@ -15,6 +15,7 @@ typedef struct SingleMassKey {
     double omega2, damping, share;
     double contact_omega2[2], contact_damping[2]; // by Side
     double interval, base_omega;
+    uint64_t is_sampled; // without padding: keys are compared as bytes
 } SingleMassKey;
 
 typedef struct SingleMass SingleMass;

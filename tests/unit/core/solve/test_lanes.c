@@ -64,10 +64,10 @@ static void lanes_agree_with_pieces(void **state) {
         const bool is_still = kind < 4 && kind % 2 == 0, is_sine = kind >= 4;
         const Motion motion = structure(kind < 2 || kind == 4 ? 0.8 : 0);
         Lanes lanes;
-        lanes_make(&lanes, &motion, is_sine ? sine.omega : 0, INTERVAL, lanes_widest());
-        assert_non_null(lanes.run);
         static MotionTable table;
         motion_table_make(&table, &motion, is_sine ? sine.omega : 0, INTERVAL);
+        lanes_make(&lanes, &table, true, lanes_widest());
+        assert_non_null(lanes.run);
         const State start = {0.015, -0.1, 0.002, 0.03};
         static Flown flown;
         fly(&lanes, &start, 1, is_still || is_sine ? NULL : base, &flown);
@@ -121,7 +121,9 @@ static void no_width_of_vector_moves_a_bit(void **state) {
         static Flown flown[3];
         for (LanesWidth width = LANES_PLAIN; width <= lanes_widest(); width++) {
             Lanes lanes;
-            lanes_make(&lanes, &motion, kind < 4 ? 0 : sine.omega, INTERVAL, width);
+            static MotionTable table;
+            motion_table_make(&table, &motion, kind < 4 ? 0 : sine.omega, INTERVAL);
+            lanes_make(&lanes, &table, true, width);
             fly(&lanes, &start, kind < 2 || kind == 4 ? 1 : 0.012,
                 kind % 2 == 0 || kind > 3 ? NULL : base, &flown[width]);
             flown[width].stretch.base = NULL;
@@ -137,9 +139,9 @@ static void lanes_end_before_a_stop(void **state) {
     (void)state;
     const Motion motion = structure(0.8);
     Lanes lanes;
-    lanes_make(&lanes, &motion, 0, INTERVAL, lanes_widest());
     static MotionTable table;
     motion_table_make(&table, &motion, 0, INTERVAL);
+    lanes_make(&lanes, &table, true, lanes_widest());
     static Flown flown;
     for (int step = 1; step < 100; step++) {
         const double room = 0.0001 * step;
@@ -161,7 +163,9 @@ static void an_interval_too_long_for_the_structure_is_refused(void **state) {
     (void)state;
     const Motion motion = structure(0.8);
     Lanes lanes;
-    lanes_make(&lanes, &motion, 0, 0.02, lanes_widest());
+    static MotionTable table;
+    motion_table_make(&table, &motion, 0, 0.02);
+    lanes_make(&lanes, &table, true, lanes_widest());
     assert_null(lanes.run);
 }
 
