@@ -22,8 +22,7 @@ esac
 
 server/packages.sh server/packages.txt tests/packages.txt || exit 1
 
-# A small quarantine: a test judges the memory that a daemon keeps, which freed blocks held back would add to.
-export ASAN_OPTIONS=detect_leaks=1:quarantine_size_mb=16 UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1 TSAN_OPTIONS=halt_on_error=1
+export ASAN_OPTIONS=detect_leaks=1 UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1 TSAN_OPTIONS=halt_on_error=1
 # Debian's python3, which has the packages, whatever else is in PATH.
 python=/usr/bin/python3
 passed=0
