@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Everything that can be checked: builds with gcc and clang, with address, undefined-behaviour and thread sanitizers,
-# unit and contract tests in each (under the last what knows threads alone), truth tests and the tests of the
-# program in the release build. --quick: the release build only.
+# What a commit has to pass: builds with gcc, also with address, undefined-behaviour and thread sanitizers, unit and
+# contract tests in each (under the last what knows threads alone), truth tests and the tests of the program in the
+# release build. clang checks the sources. --quick: the release build only. tests/nightly.sh runs everything else.
 # On a bare Debian 12 it first installs what is missing (as root or with sudo). The last line counts.
 #
 # The release build comes first and is tested while the others are made, one by one, of what the tests leave of the
@@ -10,7 +10,7 @@ set -uo pipefail
 here=$(cd "$(dirname "$0")/.." && pwd)
 cd "$here" || exit 1
 
-presets=(release debug tsan clang)
+presets=(release debug tsan)
 case "${1-}" in
 '') ;;
 --quick) presets=(release) ;;
@@ -22,8 +22,7 @@ esac
 
 server/packages.sh server/packages.txt tests/packages.txt || exit 1
 
-# A small quarantine: a test judges the memory that a daemon keeps, which freed blocks held back would add to.
-export ASAN_OPTIONS=detect_leaks=1:quarantine_size_mb=16 UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1 TSAN_OPTIONS=halt_on_error=1
+export ASAN_OPTIONS=detect_leaks=1 UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1 TSAN_OPTIONS=halt_on_error=1
 # Debian's python3, which has the packages, whatever else is in PATH.
 python=/usr/bin/python3
 passed=0

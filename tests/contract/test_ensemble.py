@@ -18,7 +18,7 @@ import scipy.special
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
 
-SANITIZED = True
+SANITIZED = "nightly"
 SPONGE = os.path.join(program.EXAMPLES, "paper_random_sponge.json")
 SVG = "{http://www.w3.org/2000/svg}"
 STATISTICS = ["peak_displacement", "rms_displacement", "peak_acceleration", "rms_acceleration", "impacts",

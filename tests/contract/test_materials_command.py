@@ -14,7 +14,7 @@ import program  # noqa: E402
 from access import token, until  # noqa: E402
 from client import client, fake, say  # noqa: E402
 
-SANITIZED = True
+SANITIZED = "nightly"
 FOAM = {"slug": "foam", "name": "Foam, 12 mm", "kind": "foam", "restitution": 0.55, "contact_time": 0.02,
         "source": "drop test of 12 May", "tags": ["wet", "old"]}
 DROPS = {"impactor": "steel ball", "impactor_mass": 0.11, "base": "fixed", "gravity": 0, "temperature": 21,

@@ -11,13 +11,14 @@ import cancel_storm  # noqa: E402
 import mixed  # noqa: E402
 import program  # noqa: E402
 
+SANITIZED = True
 THREADED = True
-REQUESTS = 50000
+REQUESTS = 30000
 CANCELS = 300
 
 
 def test_memory_and_descriptors_stay_flat_under_requests_of_all_sorts():
-    """Of 50,000 requests none is answered wrongly, and memory and descriptors are flat after warming up."""
+    """Of 30,000 requests none is answered wrongly, and memory and descriptors are flat after warming up."""
     if program.sanitizer() == "thread":
         raise program.Skipped("asked where addresses are watched")
     # What is freed is held back by the address sanitizer; a little of it is enough to meet most uses after that.

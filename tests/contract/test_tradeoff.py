@@ -13,7 +13,7 @@ import xml.etree.ElementTree
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
 
-SANITIZED = True
+SANITIZED = "nightly"
 SPONGE = os.path.join(program.EXAMPLES, "paper_free_sponge.json")
 SVG = "{http://www.w3.org/2000/svg}"
 ERRORS = ["displacement", "mean_acceleration", "peak_force", "impacts", "psd", "rms_displacement"]

@@ -25,11 +25,7 @@
 #include "tests/truth/extremes.h"
 #include "tests/truth/extremes_judge.h"
 
-#ifdef __SANITIZE_ADDRESS__
-static size_t scenes = 100;
-#else
 static size_t scenes = 500;
-#endif
 static uint64_t seed = 1;
 static double most_seconds = 0.1;
 static FILE *rows;

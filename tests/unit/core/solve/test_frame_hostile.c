@@ -12,11 +12,7 @@
 #include "core/solve/solvers.h"
 #include "tests/support/frames.h"
 
-#ifdef __SANITIZE_ADDRESS__
-enum { RUNS = 200 };
-#else
-enum { RUNS = 500 };
-#endif
+enum { RUNS = IMPACTD_SANITIZED ? 200 : 500 };
 
 static uint64_t seed = 1;
 static double uniform(double a, double b) {

@@ -15,11 +15,7 @@
 #include "core/base/status.h"
 #include "server/base/shortest.h"
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-enum { PATTERNS = 300000 };
-#else
-enum { PATTERNS = 10000000 };
-#endif
+enum { PATTERNS = IMPACTD_SANITIZED ? 300000 : 10000000 };
 
 static const char *written(double value) {
     static char text[SHORTEST_SIZE + 1];

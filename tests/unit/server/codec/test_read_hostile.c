@@ -17,11 +17,7 @@
 #include "server/codec/read.h"
 #include "server/codec/write.h"
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-enum { MUTATIONS = 20000, SLOWDOWN = 20 };
-#else
-enum { MUTATIONS = 200000, SLOWDOWN = 1 };
-#endif
+enum { MUTATIONS = IMPACTD_SANITIZED ? 20000 : 200000, SLOWDOWN = IMPACTD_SANITIZED ? 20 : 1 };
 
 static const char scene[] =
     "{\"structure\": {\"kind\": \"sdof\", \"mass\": 1.35, \"stiffness\": 865, \"damping\": "

@@ -722,11 +722,7 @@ static void wait_until_idle(Room *room) {
 
 // [s], long enough that it still runs when there is no room any more; instrumented code takes many
 // times as long.
-#if defined __SANITIZE_THREAD__ || defined __SANITIZE_ADDRESS__
-enum { LONG = 4000 };
-#else
-enum { LONG = 20000 };
-#endif
+enum { LONG = IMPACTD_SANITIZED ? 4000 : 20000 };
 
 static void a_result_that_there_is_no_room_for_waits_for_it(void **state) {
     (void)state;

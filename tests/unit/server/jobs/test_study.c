@@ -16,11 +16,8 @@
 #include "server/jobs/order.h"
 #include "tests/support/room.h"
 
-#if defined __SANITIZE_THREAD__ || defined __SANITIZE_ADDRESS__
-enum { SLOWER = 20, FEWER = 8 }; // instrumented code takes many times the CPU
-#else
-enum { SLOWER = 1, FEWER = 1 };
-#endif
+// Instrumented code takes many times the CPU.
+enum { SLOWER = IMPACTD_SANITIZED ? 20 : 1, FEWER = IMPACTD_SANITIZED ? 8 : 1 };
 
 static Problem problem;
 

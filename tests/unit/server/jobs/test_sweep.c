@@ -61,7 +61,7 @@ static void a_sweep_interrupted_again_and_again_comes_to_its_end(void **state) {
     (void)state;
     Room room = room_make(3);
     char id[40], result[72];
-    enum { POINTS = 4000 };
+    enum { POINTS = IMPACTD_SANITIZED ? 1500 : 4000 };
     submit(&room, POINTS, 20, id);
     for (int i = 0; i < 6; i++) {
         room_nap(30000000L * (i + 1));

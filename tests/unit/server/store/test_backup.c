@@ -179,12 +179,7 @@ static Status replay(const char *bytes, size_t size) {
     return status;
 }
 
-// No thread takes part in it.
-#ifdef __SANITIZE_THREAD__
-enum { STRIDE = 301 };
-#else
-enum { STRIDE = 3 };
-#endif
+enum { STRIDE = IMPACTD_SANITIZED ? 101 : 3 };
 
 static void late_rows_end_where_their_bytes_are_no_rows(void **state) {
     (void)state;
