@@ -4,10 +4,8 @@
 
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 
 #include "core/excitation/random.h"
-#include "core/study/spectrum_accumulator.h"
 
 enum { RUNS_MAX = 10000 };
 
@@ -159,7 +157,7 @@ static Status ensemble_complete(void *request, const Simulation *simulation,
             : study_run_check_metric(simulation, statistics_metric_names[study->metric], problem);
     const Status densities =
         study_run_check_densities(simulation, study_run_densities(simulation), problem);
-    return seeds != STATUS_OK ? seeds : metric != STATUS_OK ? metric : densities;
+    return study_first_failure(study_first_failure(seeds, metric), densities);
 }
 
 // Of all runs: how many of them a target needs is unknown before the first are made.
@@ -177,7 +175,7 @@ static Status ensemble_cost(const void *request, const Simulation *simulation,
 typedef struct EnsembleWork {
     StudyWork work;
     const EnsembleStudy *study;
-    Ensemble *answer; // whose table has room for all runs
+    Ensemble *answer;
     bool has_force;
     SpectrumAccumulator sums;
     Spectrum like; // of the first run that ended
@@ -253,11 +251,9 @@ static Status ensemble_fold(void *of, size_t member, void *made, Problem *proble
     EnsembleWork *work = of;
     StudyPart *part = made;
     Ensemble *answer = work->answer;
+    const uint64_t seed = work->study->first_seed + member;
+    TRY(run_table_add(&answer->table, &part->run, seed, problem));
     RunRecord *run = &answer->table.at[member];
-    *run = part->run;
-    run->number = work->study->first_seed + member;
-    part->run.why = NULL;
-    answer->table.count = member + 1;
     answer->made++;
     if (run->why != NULL) {
         answer->failed++;
@@ -265,8 +261,8 @@ static Status ensemble_fold(void *of, size_t member, void *made, Problem *proble
         answer->steps += run->steps;
         if (!work->has_force)
             run->summary.peak_contact_force = (double)NAN;
-        const bool keeps_first = ensemble_has_target(work) && work->study->metric == STATISTICS_PSD;
-        TRY(spectrum_accumulator_add(&work->sums, &part->spectrum, keeps_first, problem));
+        const size_t kept = work->study->metric == STATISTICS_PSD ? SPECTRUM_ACCUMULATOR_FIRST : 0;
+        TRY(spectrum_accumulator_add(&work->sums, &part->spectrum, kept, problem));
         if (work->like.densities.count == 0) {
             work->like = part->spectrum;
             part->spectrum = (Spectrum){0};
@@ -330,6 +326,7 @@ static Status ensemble_begin(void *of, const StudyTools *tools, Problem *problem
     const EnsembleStudy *study = work->study = work->work.study;
     Ensemble *answer = work->answer = work->work.answer;
     (void)tools;
+    (void)problem;
     work->has_force = study_run_has_force(work->work.simulation);
     work->check = STOPPING_RULE_PILOT;
     work->work.members = (size_t)study->runs;
@@ -340,8 +337,7 @@ static Status ensemble_begin(void *of, const StudyTools *tools, Problem *problem
     answer->runs = study->runs;
     answer->first_seed = study->first_seed;
     answer->confidence = STATISTICS_CONFIDENCE;
-    answer->table.at = calloc((size_t)study->runs, sizeof *answer->table.at);
-    return answer->table.at != NULL ? STATUS_OK : study_no_memory(problem);
+    return STATUS_OK;
 }
 
 static const Kind ensemble_answer = {"ensemble", "results of many seeds", ensemble_answer_fields,

@@ -207,7 +207,7 @@ static void each_buffer_is_drawn_by_what_its_material_tells(void **state) {
     Sensitivity *answer = make(&inquiry);
     double most[2] = {0};
     for (size_t i = 0; i < answer->table.count; i++) {
-        const SensitivityDraw *draw = &answer->table.at[i];
+        const RunRecord *draw = &answer->table.at[i];
         assert_int_equal(draw->restitution.count, 2);
         assert_true(draw->contact_time.at[0] == 1 && draw->restitution.at[1] == 1); // they are sure
         most[0] = fmax(most[0], fabs(draw->restitution.at[0] - 1));
@@ -251,8 +251,8 @@ static void a_drawn_run_is_the_scene_with_its_numbers(void **state) {
     complete(&inquiry);
     Sensitivity *answer = make(&inquiry);
     assert_true(answer->made == 20 && answer->failed == 0 && answer->table.count == 20);
-    const SensitivityDraw *draw = &answer->table.at[11];
-    assert_true(draw->run == 12 && draw->restitution.count == 1 && draw->restitution.at[0] == 1);
+    const RunRecord *draw = &answer->table.at[11];
+    assert_true(draw->number == 12 && draw->restitution.count == 1 && draw->restitution.at[0] == 1);
     Simulation simulation;
     Outcome *outcome;
     paper_scene(&simulation, 0.61, 0.025 * draw->contact_time.at[0], 2);
