@@ -1,5 +1,8 @@
 // Every point is run once for its errors and then timed, in `repeats` rounds over all points, which
 // share a temporary slowdown of the machine. Short runs are timed many at once.
+//
+// Cost is the smallest CPU time: disturbances make a run longer, never shorter. Even so similar
+// times change places from one measurement to the next: among those the closest point is best.
 #include "core/study/tradeoff.h"
 
 #include <math.h>
@@ -13,6 +16,7 @@
 enum { SOLVERS_MAX = 32, REPEATS_MAX = 1000, BATCH_MAX = 10000 }; // runs of a timing
 static const double batch_seconds = 5e-3;                         // of CPU, at least, of a timing
 static const double batch_steps = 1e5;                            // about as many solver steps
+static const double similar = 1.25; // times as long is within the noise of a measurement
 
 static const double default_errors[METRIC_COUNT] = {1e-3, 1e-2, 1e-2, 0, 0.1, 1e-3};
 
@@ -82,7 +86,7 @@ static Status tradeoff_complete(void *request, const Simulation *simulation,
     const Status metric = study_run_check_metric(simulation, metric_names[study->metric], problem);
     const Status names = tradeoff_check_solvers(study, problem);
     const Status values = tradeoff_check_values(simulation, limits, problem);
-    return metric != STATUS_OK ? metric : names != STATUS_OK ? names : values;
+    return study_first_failure(study_first_failure(metric, names), values);
 }
 
 // Limits of one point.
@@ -264,8 +268,7 @@ static Status tradeoff_time_all(TradeoffRun *run, Problem *problem) {
     const size_t repeats = run->study->repeats;
     for (size_t round = 0; round < repeats; round++)
         for (size_t i = 0; i < points->count; i++) {
-            if (!progress_advance(run->tools->progress, run->done / run->all))
-                return problem_set(problem, STATUS_CANCELLED, "the study was stopped");
+            TRY(study_advance(run->tools->progress, run->done / run->all, problem));
             if (points->at[i].status == TRADEOFF_MEASURED)
                 TRY(tradeoff_time(run, i, round, problem));
         }
@@ -279,6 +282,93 @@ static Status tradeoff_time_all(TradeoffRun *run, Problem *problem) {
         point->cpu_median = (times[(repeats - 1) / 2] + times[repeats / 2]) / 2;
     }
     return STATUS_OK;
+}
+
+// A point's error; NAN if it was not measured.
+static double tradeoff_point_error(const TradeoffPoint *point, int metric) {
+    return point->status == TRADEOFF_MEASURED && !isnan(point->cpu_minimum)
+               ? error_metrics_by(&point->errors, metric)
+               : (double)NAN;
+}
+
+void tradeoff_mark_best(TradeoffPoints *points, int metric) {
+    for (size_t i = 0; i < points->count; i++) {
+        TradeoffPoint *point = &points->at[i];
+        const double cpu = point->cpu_minimum, error = tradeoff_point_error(point, metric);
+        point->is_best = !isnan(error);
+        for (size_t j = 0; j < points->count && point->is_best; j++) {
+            const double other = tradeoff_point_error(&points->at[j], metric);
+            const double time = points->at[j].cpu_minimum;
+            point->is_best = !(time <= cpu && other <= error && (time < cpu || other < error));
+        }
+    }
+}
+
+// The cheapest point that keeps the error, other than `without`; NULL: none.
+static const TradeoffPoint *tradeoff_cheapest(const TradeoffPoints *points, int metric,
+                                              double error, const TradeoffPoint *without) {
+    const TradeoffPoint *found = NULL;
+    for (size_t i = 0; i < points->count; i++) {
+        const TradeoffPoint *point = &points->at[i];
+        if (point != without && tradeoff_point_error(point, metric) <= error &&
+            (found == NULL || point->cpu_minimum < found->cpu_minimum))
+            found = point;
+    }
+    return found;
+}
+
+// The closest point that takes at most `cpu`, starting from `found` (NULL: none).
+static const TradeoffPoint *tradeoff_closest(const TradeoffPoints *points, int metric, double cpu,
+                                             const TradeoffPoint *found) {
+    for (size_t i = 0; i < points->count; i++) {
+        const TradeoffPoint *point = &points->at[i];
+        const double error = tradeoff_point_error(point, metric);
+        if (!isnan(error) && point->cpu_minimum <= cpu &&
+            (found == NULL || error < tradeoff_point_error(found, metric)))
+            found = point;
+    }
+    return found;
+}
+
+Status tradeoff_recommend(const TradeoffPoints *points, int metric, double error,
+                          TradeoffRecommendation *recommendation, Problem *problem) {
+    const char *name = metric_names[metric], *unit = metric_units[metric];
+    const TradeoffPoint *cheapest = tradeoff_cheapest(points, metric, error, NULL);
+    char text[512];
+    recommendation->point = COUNT_ABSENT;
+    if (cheapest == NULL) {
+        const TradeoffPoint *near = tradeoff_closest(points, metric, INFINITY, NULL);
+        if (near == NULL)
+            snprintf(text, sizeof text, "no point has an error of %s", name);
+        else
+            snprintf(text, sizeof text,
+                     "no point keeps %s within %.3g%s; the closest, %s, is at %.2g%s", name, error,
+                     unit, near->name, tradeoff_point_error(near, metric), unit);
+    } else {
+        const TradeoffPoint *best =
+            tradeoff_closest(points, metric, similar * cheapest->cpu_minimum, cheapest);
+        const TradeoffPoint *next = tradeoff_cheapest(points, metric, error, best);
+        const double reached = tradeoff_point_error(best, metric), cpu = best->cpu_minimum;
+        recommendation->point = (uint64_t)(best - points->at) + 1;
+        if (best != cheapest)
+            snprintf(text, sizeof text,
+                     "%s keeps %s within %.3g%s, %.2g%s in %.3g s, and takes hardly longer than "
+                     "the cheapest, %s, %.2g%s in %.3g s",
+                     best->name, name, error, unit, reached, unit, cpu, cheapest->name,
+                     tradeoff_point_error(cheapest, metric), unit, cheapest->cpu_minimum);
+        else if (next == NULL)
+            snprintf(text, sizeof text,
+                     "%s is the only point that keeps %s within %.3g%s: %.2g%s in %.3g s",
+                     best->name, name, error, unit, reached, unit, cpu);
+        else
+            snprintf(text, sizeof text,
+                     "%s is the cheapest that keeps %s within %.3g%s: %.2g%s in %.3g s; the next, "
+                     "%s, takes %.3g times as long",
+                     best->name, name, error, unit, reached, unit, cpu, next->name,
+                     next->cpu_minimum / cpu);
+    }
+    free(recommendation->why);
+    return study_copy_text(text, &recommendation->why, problem);
 }
 
 static Status tradeoff_run_all(TradeoffRun *run, Problem *problem) {
@@ -301,8 +391,9 @@ static Status tradeoff_run_all(TradeoffRun *run, Problem *problem) {
     outcome_unref(run->reference);
     run->reference = NULL;
     TRY(tradeoff_time_all(run, problem));
-    pareto_mark(points, study->metric);
-    return pareto_recommend(points, study->metric, study->error, &answer->recommendation, problem);
+    tradeoff_mark_best(points, study->metric);
+    return tradeoff_recommend(points, study->metric, study->error, &answer->recommendation,
+                              problem);
 }
 
 static Status tradeoff_study_run(const void *request, const Simulation *simulation,
