@@ -6,16 +6,14 @@
 
 #include "core/math/student_t.h"
 
-const char *const statistics_metric_names[] = {
-    "peak_displacement",
-    "rms_displacement",
-    "peak_acceleration",
-    "rms_acceleration",
-    "impacts",
-    "peak_contact_force",
-    "psd",
-    NULL,
-};
+const char *const statistics_metric_names[] = {"peak_displacement",
+                                               "rms_displacement",
+                                               "peak_acceleration",
+                                               "rms_acceleration",
+                                               "impacts",
+                                               "peak_contact_force",
+                                               "psd",
+                                               NULL};
 static const char *const statistics_units[] = {"m", "m", "m/s^2", "m/s^2", "1", "N"};
 
 double statistics_value(const Summary *summary, int metric) {
