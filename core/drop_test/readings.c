@@ -49,11 +49,17 @@ static Status reading_status(bool is_made, Problem *problem) {
                    : problem_set(problem, STATUS_NO_MEMORY, "no memory for the evaluation");
 }
 
+void measurement_pointer(uint64_t number, const char *rest, char *pointer, size_t size) {
+    if (number == COUNT_ABSENT)
+        snprintf(pointer, size, "%s", rest);
+    else
+        snprintf(pointer, size, "/measurements/%llu%s", (unsigned long long)number, rest);
+}
+
 void reading_pointer(const EvaluationRow *row, char *pointer, size_t size) {
-    char of[40] = "";
-    if (row->measurement != COUNT_ABSENT)
-        snprintf(of, sizeof of, "/measurements/%llu", (unsigned long long)row->measurement);
-    snprintf(pointer, size, "%s/%s/%zu", of, row->is_of_trace ? "traces" : "drops", row->place);
+    char rest[40];
+    snprintf(rest, sizeof rest, "/%s/%zu", row->is_of_trace ? "traces" : "drops", row->place);
+    measurement_pointer(row->measurement, rest, pointer, size);
 }
 
 bool reading_counts(const EvaluationRow *row) {

@@ -65,6 +65,10 @@ Status readings_add(const Measurement *tests, size_t index, int separation,
 Status readings_correct_gravity(const Measurement *tests, size_t count, int separation,
                                 const Progress *progress, EvaluationRows *rows, Problem *problem);
 
+// The JSON Pointer of a measurement, with `rest` behind it: "/measurements/3/gravity"; without a
+// number only the rest.
+void measurement_pointer(uint64_t number, const char *rest, char *pointer, size_t size);
+
 // The JSON Pointer of a row: "/drops/2", or "/measurements/3/traces/0".
 void reading_pointer(const EvaluationRow *row, char *pointer, size_t size);
 
