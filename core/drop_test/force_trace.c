@@ -8,7 +8,7 @@
 
 #include "core/base/status.h"
 #include "core/drop_test/contact_detection.h"
-#include "core/drop_test/fit_confidence.h"
+#include "core/drop_test/pulse_fit.h"
 
 enum { SAMPLES_MIN = 5, TRACE_MIN = 8 };
 
@@ -231,7 +231,7 @@ static Status trace_fit_contact(FitWindow *window, const ContactDetection *found
     const bool is_form_sure =
         !(contact->seen.misfit_share > 0.01 && contact->seen.misfit_share > noise * chance);
     FitConfidence likely;
-    TRY(fit_confidence_run(window, fits, count, is_form_sure, &likely));
+    TRY(pulse_fit_confidence(window, fits, count, is_form_sure, &likely));
     TRY(trace_draw(fit, &model, found, run, origin, &contact->seen.pulse));
     const TraceContact counted = *contact;
     contact->seen.start = (origin + fit->at.part[0]) * interval;
