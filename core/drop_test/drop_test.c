@@ -14,7 +14,6 @@
 #include "core/base/json_pointer.h"
 #include "core/base/rfc3339.h"
 #include "core/contact/identification.h"
-#include "core/drop_test/contact_detection.h"
 #include "core/drop_test/force_trace.h"
 #include "core/scene/material.h"
 
