@@ -7,7 +7,6 @@
 #include <string.h>
 
 #include "core/base/canonical.h"
-#include "core/base/json_pointer.h"
 #include "core/drop_test/gravity_correction.h"
 #include "core/scene/material.h"
 
@@ -116,26 +115,8 @@ bool reading_get(const EvaluationRow *row, bool is_time, Reading *reading) {
     return is_time ? row->contact_time_counts : row->restitution_counts;
 }
 
-// Appends an empty row.
-static Status reading_new(const Measurement *tests, size_t index, size_t place, bool is_of_trace,
-                          EvaluationRows *rows, EvaluationRow **row, Problem *problem) {
-    const size_t count = rows->count;
-    if (count == EVALUATION_ROWS_MAX)
-        return problem_set(problem, STATUS_LIMIT,
-                           "more than %d readings: evaluate fewer measurements at a time",
-                           EVALUATION_ROWS_MAX);
-    if (count == 0 || (count >= 16 && (count & (count - 1)) == 0)) {
-        EvaluationRow *at = realloc(rows->at, (count == 0 ? 16 : 2 * count) * sizeof *at);
-        TRY(reading_status(at != NULL, problem));
-        rows->at = at;
-    }
-    *row = &rows->at[rows->count++];
-    **row = (EvaluationRow){.is_of_trace = is_of_trace, .place = place, .test = index};
-    fields_clear(evaluation_row_fields, *row);
-    (*row)->measurement = tests[index].number;
-    if (is_of_trace)
-        (*row)->trace = place + 1;
-    return STATUS_OK;
+static bool reading_copy(const char *text, char **target) {
+    return text == NULL || (*target = strdup(text)) != NULL;
 }
 
 static Status reading_add_note(EvaluationRow *row, const char *text, Problem *problem) {
@@ -144,8 +125,47 @@ static Status reading_add_note(EvaluationRow *row, const char *text, Problem *pr
                           problem);
 }
 
-static bool reading_copy(const char *text, char **target) {
-    return text == NULL || (*target = strdup(text)) != NULL;
+// A list of rows under construction, of one test.
+typedef struct ReadingList {
+    const Measurement *of;
+    size_t test; // its index
+    int separation;
+    const Progress *progress;
+    EvaluationRows *rows;
+    Problem *problem;
+} ReadingList;
+
+// Appends a row without numbers: of a drop, of a trace, or of its contact `contact`, from 1.
+static Status reading_new(const ReadingList *list, size_t place, bool is_of_trace, size_t contact,
+                          const char *note, EvaluationRow **added) {
+    EvaluationRows *rows = list->rows;
+    const DropTest *test = list->of->test;
+    const char *excluded =
+        is_of_trace ? test->traces.at[place].excluded : test->drops.at[place].excluded;
+    if (rows->count == EVALUATION_ROWS_MAX)
+        return problem_set(list->problem, STATUS_LIMIT,
+                           "more than %d readings: evaluate fewer measurements at a time",
+                           EVALUATION_ROWS_MAX);
+    EvaluationRow *at = realloc(rows->at, (rows->count + 1) * sizeof *at);
+    TRY(reading_status(at != NULL, list->problem));
+    rows->at = at;
+    EvaluationRow *row = *added = &at[rows->count++];
+    *row = (EvaluationRow){.is_of_trace = is_of_trace, .place = place, .test = list->test};
+    fields_clear(evaluation_row_fields, row);
+    row->measurement = list->of->number;
+    if (is_of_trace)
+        row->trace = place + 1;
+    const bool is_made =
+        contact > 0 ? text_format(&row->from, "trace %zu, contact %zu", place + 1, contact)
+                    : text_format(&row->from, "%s %zu", is_of_trace ? "trace" : "drop", place + 1);
+    return reading_status(is_made && reading_copy(excluded, &row->excluded) &&
+                              reading_copy(note, &row->note),
+                          list->problem);
+}
+
+static void reading_set_counts(EvaluationRow *row) {
+    row->restitution_counts = row->excluded == NULL && !isnan(row->restitution);
+    row->contact_time_counts = row->excluded == NULL && !isnan(row->contact_time);
 }
 
 // The relative uncertainty of a speed that was read, or that follows from a height.
@@ -172,12 +192,11 @@ static void reading_set_restitution(const DropTest *test, const Drop *drop, Eval
         row->restitution_uncertainty = error;
 }
 
-static Status reading_add_drop(const Measurement *tests, size_t index, size_t i,
-                               EvaluationRows *rows, Problem *problem) {
-    const DropTest *test = tests[index].test;
-    const Drop *drop = &test->drops.at[i];
-    EvaluationRow *row = NULL;
-    TRY(reading_new(tests, index, i, false, rows, &row, problem));
+static Status reading_add_drop(const ReadingList *list, size_t place) {
+    const DropTest *test = list->of->test;
+    const Drop *drop = &test->drops.at[place];
+    EvaluationRow *row;
+    TRY(reading_new(list, place, false, 0, drop->note, &row));
     row->approach_speed = drop_approach_speed(drop);
     row->approach_speed_uncertainty =
         row->approach_speed * reading_speed_error(test, drop->approach_speed, drop->drop_height);
@@ -187,24 +206,20 @@ static Status reading_add_drop(const Measurement *tests, size_t index, size_t i,
         row->contact_time_uncertainty = test->time_uncertainty;
         row->contact_time_by = CONTACT_TIME_BY_DURATION;
     }
-    row->restitution_counts = drop->excluded == NULL && !isnan(row->restitution);
-    row->contact_time_counts = drop->excluded == NULL && !isnan(row->contact_time);
-    return reading_status(text_format(&row->from, "drop %zu", i + 1) &&
-                              reading_copy(drop->excluded, &row->excluded) &&
-                              reading_copy(drop->note, &row->note),
-                          problem);
+    reading_set_counts(row);
+    return STATUS_OK;
 }
 
-static Status reading_add_contact(const Measurement *tests, size_t index, size_t i, size_t number,
-                                  TraceContact *contact, EvaluationRows *rows, Problem *problem) {
-    const DropTest *test = tests[index].test;
-    const Trace *trace = &test->traces.at[i];
-    EvaluationRow *row = NULL;
-    TRY(reading_new(tests, index, i, true, rows, &row, problem));
+static Status reading_add_contact(const ReadingList *list, size_t place, size_t number,
+                                  TraceContact *contact) {
+    const DropTest *test = list->of->test;
+    const Reals *speeds = &test->traces.at[place].approach_speed;
+    EvaluationRow *row;
+    TRY(reading_new(list, place, true, number + 1, contact->why, &row));
     row->contact = contact->seen;
     contact->seen.pulse = (Reals){NULL, 0};
-    if (number < trace->approach_speed.count) {
-        row->approach_speed = trace->approach_speed.at[number];
+    if (number < speeds->count) {
+        row->approach_speed = speeds->at[number];
         row->approach_speed_uncertainty = test->speed_uncertainty;
     }
     row->contact_time = contact->contact_time;
@@ -217,65 +232,40 @@ static Status reading_add_contact(const Measurement *tests, size_t index, size_t
         row->contact_time_by = CONTACT_TIME_BY_PULSE;
     if (!isnan(row->restitution))
         row->restitution_by = RESTITUTION_BY_PULSE;
-    row->restitution_counts = trace->excluded == NULL && !isnan(row->restitution);
-    row->contact_time_counts = trace->excluded == NULL && !isnan(row->contact_time);
-    return reading_status(text_format(&row->from, "trace %zu, contact %zu", i + 1, number + 1) &&
-                              reading_copy(trace->excluded, &row->excluded) &&
-                              reading_copy(contact->why, &row->note),
-                          problem);
+    reading_set_counts(row);
+    return STATUS_OK;
 }
 
-// A trace without a contact is a row too.
-static Status reading_add_empty(const Measurement *tests, size_t index, size_t i, const char *why,
-                                EvaluationRows *rows, Problem *problem) {
-    EvaluationRow *row = NULL;
-    TRY(reading_new(tests, index, i, true, rows, &row, problem));
-    return reading_status(
-        text_format(&row->from, "trace %zu", i + 1) &&
-            reading_copy(tests[index].test->traces.at[i].excluded, &row->excluded) &&
-            text_format(&row->note, "%s", why != NULL ? why : "no contact is detected in it"),
-        problem);
-}
-
-static Status reading_add_trace(const Measurement *tests, size_t index, size_t i, int separation,
-                                const Progress *progress, EvaluationRows *rows, Problem *problem) {
-    const DropTest *test = tests[index].test;
-    const Trace *trace = &test->traces.at[i];
+static Status reading_add_trace(const ReadingList *list, size_t place) {
+    const DropTest *test = list->of->test;
+    const Trace *trace = &test->traces.at[place];
     const TraceOptions options = {
-        .separation = separation,
+        .separation = list->separation,
         .threshold = (double)NAN,
         .effective_mass = drop_test_effective_mass(test),
         .gravity = test->gravity > 0 ? test->gravity : 0,
         .approach_speeds = trace->approach_speed.at,
         .approach_speed_count = trace->approach_speed.count,
-        .progress = progress,
+        .progress = list->progress,
     };
-    char place[POINTER_SIZE], pointer[POINTER_SIZE];
-    const EvaluationRow at = {.measurement = tests[index].number, .is_of_trace = true, .place = i};
-    reading_pointer(&at, place);
-    json_pointer_join(pointer, sizeof pointer, place, "force");
+    char rest[48], pointer[POINTER_SIZE];
+    snprintf(rest, sizeof rest, "/traces/%zu/force", place);
+    measurement_pointer(list->of->number, rest, pointer);
     TraceAnalysis analysis = {0};
-    // An unreadable trace may be excluded for that reason.
+    EvaluationRow *row;
+    // An unreadable trace may be excluded for that reason. A trace without a contact is a row too.
     Status status = trace_analysis_run(trace->interval, &trace->force, &options, pointer, &analysis,
-                                       trace->excluded == NULL ? problem : NULL);
+                                       trace->excluded == NULL ? list->problem : NULL);
     if (status == STATUS_INVALID && trace->excluded != NULL)
-        status = reading_add_empty(tests, index, i, "it cannot be read", rows, problem);
+        status = reading_new(list, place, true, 0, "it cannot be read", &row);
     else if (status == STATUS_OK && analysis.contacts.count == 0)
-        status = reading_add_empty(tests, index, i, analysis.why, rows, problem);
+        status =
+            reading_new(list, place, true, 0,
+                        analysis.why != NULL ? analysis.why : "no contact is detected in it", &row);
     for (size_t k = 0; status == STATUS_OK && k < analysis.contacts.count; k++)
-        status = reading_add_contact(tests, index, i, k, &analysis.contacts.at[k], rows, problem);
+        status = reading_add_contact(list, place, k, &analysis.contacts.at[k]);
     trace_analysis_clear(&analysis);
     return status;
-}
-
-// Appends the rows of tests[index].
-static Status readings_add(const Measurement *tests, size_t index, int separation,
-                           const Progress *progress, EvaluationRows *rows, Problem *problem) {
-    for (size_t i = 0; i < tests[index].test->drops.count; i++)
-        TRY(reading_add_drop(tests, index, i, rows, problem));
-    for (size_t i = 0; i < tests[index].test->traces.count; i++)
-        TRY(reading_add_trace(tests, index, i, separation, progress, rows, problem));
-    return STATUS_OK;
 }
 
 // Of a drop with both e and T_c.
@@ -648,8 +638,13 @@ Status evaluation_run(const Measurement *tests, size_t count, Separation separat
                            "more than %d samples in traces, %zu: evaluate fewer measurements at a "
                            "time",
                            EVALUATION_SAMPLES_MAX, samples);
-    for (size_t i = 0; i < count; i++)
-        TRY(readings_add(tests, i, (int)separation, progress, rows, problem));
+    for (size_t i = 0; i < count; i++) {
+        const ReadingList list = {&tests[i], i, (int)separation, progress, rows, problem};
+        for (size_t k = 0; k < tests[i].test->drops.count; k++)
+            TRY(reading_add_drop(&list, k));
+        for (size_t k = 0; k < tests[i].test->traces.count; k++)
+            TRY(reading_add_trace(&list, k));
+    }
     TRY(readings_correct_gravity(tests, count, (int)separation, progress, rows, problem));
     evaluation_choose_restitutions(rows);
     for (size_t i = 0; i < rows->count; i++)
