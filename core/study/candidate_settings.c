@@ -216,6 +216,8 @@ Status candidate_settings_list(const Texts *names, const Simulation *simulation,
             candidate_add_solver(&list, solvers[i], finest);
     if (list.is_whole && candidate_is_requested(names, reference->name))
         candidate_add_reference(&list, reference);
+    for (size_t i = 0; i < points->count && list.is_whole; i++)
+        points->at[i].estimate = candidate_settings_cost(simulation, &points->at[i]);
     free(list.spare.contact_model);
     return list.is_whole ? STATUS_OK : study_no_memory(problem);
 }

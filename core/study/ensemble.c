@@ -189,8 +189,8 @@ Status ensemble_scene(const Simulation *simulation, uint64_t seed, Simulation *t
     return STATUS_OK;
 }
 
-static Status ensemble_member_scene(const void *of, size_t member, Simulation *scene, void *part,
-                                    Problem *problem) {
+static Status ensemble_member_scene(const void *of, size_t member, Simulation *scene,
+                                    StudyPart *part, Problem *problem) {
     const EnsembleWork *work = of;
     (void)part;
     return ensemble_scene(work->work.simulation, work->study->first_seed + member, scene, problem);
@@ -247,9 +247,8 @@ static void ensemble_extend(EnsembleWork *ensemble) {
         work->expected = work->wanted;
 }
 
-static Status ensemble_fold(void *of, size_t member, void *made, Problem *problem) {
+static Status ensemble_fold(void *of, size_t member, StudyPart *part, Problem *problem) {
     EnsembleWork *work = of;
-    StudyPart *part = made;
     Ensemble *answer = work->answer;
     const uint64_t seed = work->study->first_seed + member;
     TRY(run_table_add(&answer->table, &part->run, seed, problem));

@@ -401,10 +401,10 @@ static Status comparison_measure(const CompareWork *work, const Outcome *outcome
     return comparison_fill_trace(&to, (size_t)work->answer->trace_samples, &entry->trace, problem);
 }
 
-static Status comparison_scene(const void *of, size_t member, Simulation *scene, void *made,
+static Status comparison_scene(const void *of, size_t member, Simulation *scene, StudyPart *made,
                                Problem *problem) {
     const CompareWork *work = of;
-    ComparePart *part = made;
+    ComparePart *part = (ComparePart *)(void *)made;
     (void)fields_default(compare_entry_fields, &part->entry); // nothing to allocate
     return comparison_apply(work->study, work->work.simulation,
                             &work->answer->entries.at[member + 1], work->work.limits, scene,
@@ -412,19 +412,19 @@ static Status comparison_scene(const void *of, size_t member, Simulation *scene,
 }
 
 static Status comparison_keep(const void *of, const Outcome *outcome, const StudyTools *tools,
-                              void *made, Problem *problem) {
-    ComparePart *part = made;
+                              StudyPart *made, Problem *problem) {
+    ComparePart *part = (ComparePart *)(void *)made;
     return comparison_measure(of, outcome, tools->progress, &part->entry, problem);
 }
 
-static void comparison_clear(void *made) {
-    ComparePart *part = made;
+static void comparison_clear(StudyPart *made) {
+    ComparePart *part = (ComparePart *)(void *)made;
     fields_clear(compare_entry_fields, &part->entry);
 }
 
-static Status comparison_fold(void *of, size_t member, void *made, Problem *problem) {
+static Status comparison_fold(void *of, size_t member, StudyPart *made, Problem *problem) {
     const CompareWork *work = of;
-    ComparePart *part = made;
+    ComparePart *part = (ComparePart *)(void *)made;
     RunRecord *run = &part->part.run;
     CompareEntry *entry = &work->answer->entries.at[member + 1];
     const CompareEntry listed = *entry;

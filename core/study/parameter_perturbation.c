@@ -114,14 +114,6 @@ void perturbation_apply(const Simulation *simulation, int parameter, double fact
     }
 }
 
-size_t perturbation_buffers(const Simulation *simulation) {
-    size_t count = 0;
-    for (size_t i = 0; i < simulation->scene.dampers.count; i++)
-        for (size_t k = 0; k < BUFFERS; k++)
-            count += buffer_is_given(perturbation_buffer(&simulation->scene.dampers.at[i], k));
-    return count;
-}
-
 // Log-normal, of mean 1 and relative deviation s.
 static double perturbation_factor(double normal, double s) {
     const double variance = log1p(s * s);
@@ -144,9 +136,9 @@ static void perturbation_draw_factors(uint64_t seed, uint64_t run, size_t buffer
     factor[0] = 1 / max; // very rare: the restitution becomes 1
 }
 
-void perturbation_draw(const InputUncertainty *uncertainty, uint64_t seed,
-                       const Simulation *simulation, uint64_t run, Simulation *target,
-                       double *restitution, double *contact_time) {
+Status perturbation_draw(const InputUncertainty *uncertainty, uint64_t seed,
+                         const Simulation *simulation, uint64_t run, Simulation *target,
+                         Reals *restitution, Reals *contact_time, Problem *problem) {
     const Dampers *dampers = &simulation->scene.dampers;
     size_t drawn = 0;
     for (size_t i = 0; i < BUFFERS * dampers->count; i++) {
@@ -159,15 +151,16 @@ void perturbation_draw(const InputUncertainty *uncertainty, uint64_t seed,
         for (int parameter = 0; parameter < 2; parameter++)
             deviation[parameter] =
                 uncertainty_find(uncertainty, damper, (SensitivityBuffer)k, parameter);
-        perturbation_draw_factors(seed, run, drawn,
+        perturbation_draw_factors(seed, run, drawn++,
                                   perturbation_buffer_max(from, SENSITIVITY_RESTITUTION), deviation,
                                   factor);
         for (int parameter = 0; parameter < 2; parameter++)
             if (deviation[parameter] > 0)
                 perturbation_scale(from, parameter, factor[parameter], to);
-        restitution[drawn] = factor[0];
-        contact_time[drawn++] = factor[1];
+        TRY(study_add_real(factor[0], restitution, problem));
+        TRY(study_add_real(factor[1], contact_time, problem));
     }
+    return STATUS_OK;
 }
 
 // Below, a parameter is SENSITIVITY_RESTITUTION or SENSITIVITY_CONTACT_TIME.

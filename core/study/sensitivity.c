@@ -263,10 +263,9 @@ static double sensitivity_step_up(const SensitivityWork *work, int parameter, si
     return perturbation_max_step(work->simulation, parameter, sensitivity_step(work, step));
 }
 
-static Status sensitivity_scene(const void *of, size_t member, Simulation *scene, void *made,
+static Status sensitivity_scene(const void *of, size_t member, Simulation *scene, StudyPart *part,
                                 Problem *problem) {
     const SensitivityWork *work = of;
-    StudyPart *part = made;
     TRY(sensitivity_copy(work->simulation, scene, problem));
     if (member < work->steps) {
         const int parameter = work->answer->response.at[work->rows[member / ROW_STEPS]].parameter;
@@ -276,13 +275,9 @@ static Status sensitivity_scene(const void *of, size_t member, Simulation *scene
         perturbation_apply(work->simulation, parameter, factor, scene);
         return STATUS_OK;
     }
-    const size_t buffers = perturbation_buffers(work->simulation);
-    Reals *restitution = &part->run.restitution, *contact_time = &part->run.contact_time;
-    if (!reals_allocate(restitution, buffers) || !reals_allocate(contact_time, buffers))
-        return study_no_memory(problem);
-    perturbation_draw(&work->study->uncertainty, work->study->seed, work->simulation,
-                      member - work->steps + 1, scene, restitution->at, contact_time->at);
-    return STATUS_OK;
+    return perturbation_draw(&work->study->uncertainty, work->study->seed, work->simulation,
+                             member - work->steps + 1, scene, &part->run.restitution,
+                             &part->run.contact_time, problem);
 }
 
 static Status sensitivity_fold_draw(SensitivityWork *work, size_t index, StudyPart *part,
@@ -297,9 +292,8 @@ static Status sensitivity_fold_draw(SensitivityWork *work, size_t index, StudyPa
     return STATUS_OK;
 }
 
-static Status sensitivity_fold(void *of, size_t member, void *made, Problem *problem) {
+static Status sensitivity_fold(void *of, size_t member, StudyPart *part, Problem *problem) {
     SensitivityWork *work = of;
-    StudyPart *part = made;
     RunRecord *run = &part->run;
     if (run->why == NULL)
         work->answer->steps += run->steps;

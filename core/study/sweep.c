@@ -661,17 +661,16 @@ typedef struct SweepWork {
     Sweep *answer;
 } SweepWork;
 
-static Status sweep_scene(const void *of, size_t member, Simulation *scene, void *part,
+static Status sweep_scene(const void *of, size_t member, Simulation *scene, StudyPart *part,
                           Problem *problem) {
     const SweepWork *work = of;
     (void)part;
     return sweep_grid_scene(work->grid, member, true, work->work.limits, scene, problem);
 }
 
-static Status sweep_fold(void *of, size_t member, void *made, Problem *problem) {
+static Status sweep_fold(void *of, size_t member, StudyPart *part, Problem *problem) {
     SweepWork *work = of;
     const Texts *metrics = &work->grid->study->metrics;
-    const StudyPart *part = made;
     const RunRecord *run = &part->run;
     const SweepStatus status = sweep_status(run->status);
     SweepTable *table = &work->answer->table;

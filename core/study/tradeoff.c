@@ -112,7 +112,7 @@ static Status tradeoff_cost(const void *request, const Simulation *simulation,
         candidate_settings_list(&study->solvers, simulation, &answer.points, problem);
     *steps = 0;
     for (size_t i = 0; i < answer.points.count && status == STATUS_OK; i++) {
-        const double own = candidate_settings_cost(simulation, &answer.points.at[i]);
+        const double own = answer.points.at[i].estimate;
         if (own <= max)
             *steps += tradeoff_timed_steps(study, own);
     }
@@ -127,7 +127,6 @@ typedef struct TradeoffRun {
     SimulationLimits limits; // of a point
     Tradeoff *answer;
     Outcome *reference;
-    double *steps;    // estimated, of each point
     double *times;    // [s], `repeats` of each point
     double done, all; // estimated steps
     Problem *fault;   // of a point
@@ -139,16 +138,12 @@ static void tradeoff_trim(TradeoffRun *run) {
     size_t count = 0;
     for (size_t i = 0; i < points->count; i++) {
         TradeoffPoint *point = &points->at[i];
-        const bool is_finer = count > 0 && !isnan(point->step) &&
-                              run->steps[i] > run->limits.steps &&
-                              run->steps[count - 1] > run->limits.steps &&
-                              strcmp(point->solver, points->at[count - 1].solver) == 0;
-        if (is_finer) {
+        const TradeoffPoint *before = count > 0 ? &points->at[count - 1] : NULL;
+        if (before != NULL && !isnan(point->step) && point->estimate > run->limits.steps &&
+            before->estimate > run->limits.steps && strcmp(point->solver, before->solver) == 0)
             fields_clear(tradeoff_point_fields, point);
-            continue;
-        }
-        points->at[count] = *point;
-        run->steps[count++] = run->steps[i];
+        else
+            points->at[count++] = *point;
     }
     points->count = count;
 }
@@ -197,7 +192,7 @@ static Compared tradeoff_compared(const Outcome *outcome, const Simulation *simu
 static Status tradeoff_measure(TradeoffRun *run, size_t index, Problem *problem) {
     TradeoffPoint *point = &run->answer->points.at[index];
     Problem *fault = run->fault;
-    const double steps = run->steps[index];
+    const double steps = point->estimate;
     Simulation simulation = {0};
     Outcome *outcome = NULL;
     problem_clear(fault);
@@ -241,7 +236,7 @@ static Status tradeoff_time(TradeoffRun *run, size_t index, size_t round, Proble
     Simulation simulation = {0};
     // Its limits were checked before.
     Status status = candidate_settings_apply(run->simulation, point, NULL, &simulation, problem);
-    const double steps = run->steps[index];
+    const double steps = point->estimate;
     const double end = run->done + fmax(steps, batch_steps);
     size_t runs = 0;
     double took = 0;
@@ -375,14 +370,12 @@ static Status tradeoff_run_all(TradeoffRun *run, Problem *problem) {
     Tradeoff *answer = run->answer;
     const TradeoffStudy *study = run->study;
     TradeoffPoints *points = &answer->points;
-    if (run->steps == NULL || run->times == NULL || run->fault == NULL)
+    if (run->times == NULL || run->fault == NULL)
         return study_no_memory(problem);
-    for (size_t i = 0; i < points->count; i++)
-        run->steps[i] = candidate_settings_cost(run->simulation, &points->at[i]);
     tradeoff_trim(run);
     for (size_t i = 0; i < points->count; i++)
-        if (run->steps[i] <= run->limits.steps)
-            run->all += tradeoff_timed_steps(study, run->steps[i]);
+        if (points->at[i].estimate <= run->limits.steps)
+            run->all += tradeoff_timed_steps(study, points->at[i].estimate);
     TRY(tradeoff_run_reference(run, problem));
     const Compared reference = tradeoff_compared(run->reference, run->simulation, true);
     answer->reference.yardstick = error_metrics_reference(&reference);
@@ -411,13 +404,11 @@ static Status tradeoff_study_run(const void *request, const Simulation *simulati
                        .tools = tools,
                        .limits = tradeoff_limits(study, tools->limits),
                        .answer = answer,
-                       .steps = calloc(count + 1, sizeof(double)),
                        .times = calloc(count * study->repeats + 1, sizeof(double)),
                        .all = batch_steps,
                        .fault = calloc(1, sizeof(Problem))};
     const Status status = tradeoff_run_all(&run, problem);
     outcome_unref(run.reference);
-    free(run.steps);
     free(run.times);
     free(run.fault);
     return status;

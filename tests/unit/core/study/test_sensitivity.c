@@ -143,6 +143,19 @@ static void chaos_is_told_and_its_slopes_do_not_settle(void **state) {
     clear(&inquiry, answer);
 }
 
+static void draw(const SensitivityStudy *study, const StudyRequest *inquiry, uint64_t run,
+                 Simulation *member, double factors[2]) {
+    Reals drawn[2] = {{NULL, 0}, {NULL, 0}};
+    assert_int_equal(perturbation_draw(&study->uncertainty, study->seed, &inquiry->simulation, run,
+                                       member, &drawn[0], &drawn[1], NULL),
+                     STATUS_OK);
+    for (int i = 0; i < 2; i++) {
+        assert_int_equal(drawn[i].count, 1);
+        factors[i] = drawn[i].at[0];
+        free(drawn[i].at);
+    }
+}
+
 static void draws_have_the_stated_spread_and_stay_below_one(void **state) {
     (void)state;
     StudyRequest inquiry = study_request_make(0.9, 0.025, 1);
@@ -157,8 +170,7 @@ static void draws_have_the_stated_spread_and_stay_below_one(void **state) {
     enum { DRAWN = 20000 };
     for (uint64_t run = 1; run <= DRAWN; run++) {
         double factors[2];
-        perturbation_draw(&study->uncertainty, study->seed, &inquiry.simulation, run, &member,
-                          &factors[0], &factors[1]);
+        draw(study, &inquiry, run, &member, factors);
         const Buffer *buffer = &member.scene.dampers.at[0].buffer;
         assert_true(buffer->restitution == 0.9 * factors[0] && buffer->restitution <= 1);
         assert_true(buffer->contact_time == 0.025 * factors[1]);
@@ -174,8 +186,7 @@ static void draws_have_the_stated_spread_and_stay_below_one(void **state) {
     study->uncertainty.restitution_deviation = 0.5; // most of the upper half is beyond 1
     for (uint64_t run = 1; run <= 200; run++) {
         double factors[2];
-        perturbation_draw(&study->uncertainty, study->seed, &inquiry.simulation, run, &member,
-                          &factors[0], &factors[1]);
+        draw(study, &inquiry, run, &member, factors);
         assert_true(member.scene.dampers.at[0].buffer.restitution <= 1);
     }
     simulation_clear(&member);
