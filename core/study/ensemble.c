@@ -3,7 +3,6 @@
 #include "core/study/ensemble.h"
 
 #include <math.h>
-#include <stdio.h>
 
 #include "core/excitation/random.h"
 
@@ -280,23 +279,24 @@ static Status ensemble_fill_target(const EnsembleWork *work, Problem *problem) {
     const char *name = statistics_metric_names[work->study->metric];
     const unsigned long long made = (unsigned long long)work->answer->made,
                              all = (unsigned long long)work->study->runs;
-    char text[320];
     target->error = work->study->target;
     target->metric = work->study->metric;
     target->confidence = STOPPING_RULE_CONFIDENCE;
     target->is_kept = target->estimated_error <= target->error;
-    if (isnan(target->estimated_error))
-        snprintf(text, sizeof text, "no run of %llu came to an end that tells %s", all, name);
-    else if (made == all)
-        snprintf(text, sizeof text,
-                 "all %llu runs were made: no fewer were sure to keep the mean of %s within %g",
-                 all, name, target->error);
-    else
-        snprintf(text, sizeof text,
-                 "%llu of %llu runs keep the mean of %s within %g of that of all: within %.2g with "
-                 "%g %% confidence",
-                 made, all, name, target->error, target->estimated_error, 100 * target->confidence);
-    return study_copy_text(text, &target->why, problem);
+    return study_status(
+        isnan(target->estimated_error)
+            ? text_format(&target->why, "none of the %llu runs ended with a known %s", all, name)
+        : made == all
+            ? text_format(&target->why,
+                          "all %llu runs were made: with fewer, the mean of %s might not be "
+                          "within %g",
+                          all, name, target->error)
+            : text_format(&target->why,
+                          "%llu of %llu runs keep the mean of %s within %g of that of all: within "
+                          "%.2g with %g %% confidence",
+                          made, all, name, target->error, target->estimated_error,
+                          100 * target->confidence),
+        problem);
 }
 
 static Status ensemble_end(void *of, const StudyTools *tools, Problem *problem) {

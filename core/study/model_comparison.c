@@ -339,26 +339,26 @@ static Status comparison_fill_divergence(const CompareWork *work, const Outcome 
     const double percent = 100 * work->study->part, time = entry->displacement.parting;
     const double horizon =
         fmin(work->reference->summary.trust_horizon, outcome->summary.trust_horizon);
-    char text[240];
     divergence->time = time;
     divergence->horizon = horizon;
     divergence->is_trusted = !isnan(time) && !(time > horizon);
-    if (isnan(time))
-        snprintf(text, sizeof text,
-                 "the displacements never differ by more than %g %% of the largest within the run",
-                 percent);
-    else if (divergence->is_trusted)
-        snprintf(text, sizeof text,
-                 "the displacements differ by more than %g %% of the largest from %.6g s on, where "
-                 "both trajectories can be trusted: it is the contact's doing",
-                 percent, time);
-    else
-        snprintf(text, sizeof text,
-                 "the displacements differ by more than %g %% of the largest from %.6g s on, "
-                 "beyond the trust horizon of %.6g s: rounding alone may have parted them, compare "
-                 "statistics",
-                 percent, time, horizon);
-    return study_copy_text(text, &divergence->why, problem);
+    return study_status(
+        isnan(time) ? text_format(&divergence->why,
+                                  "the displacements never differ by more than %g %% of the "
+                                  "largest within the run",
+                                  percent)
+        : divergence->is_trusted
+            ? text_format(&divergence->why,
+                          "the displacements differ by more than %g %% of the largest from %.6g s "
+                          "on, where both trajectories can be trusted: the contact model is the "
+                          "cause",
+                          percent, time)
+            : text_format(&divergence->why,
+                          "the displacements differ by more than %g %% of the largest from %.6g s "
+                          "on, beyond the trust horizon of %.6g s: rounding alone may be the "
+                          "cause, compare statistics",
+                          percent, time, horizon),
+        problem);
 }
 
 static Status comparison_fill_trace(const Signal *signal, size_t bucket, CompareTrace *trace,

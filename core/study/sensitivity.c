@@ -7,7 +7,6 @@
 #include "core/study/sensitivity.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -479,7 +478,6 @@ static Status sensitivity_run_scene(SensitivityWork *work, const StudyTools *too
                                     Problem *problem) {
     Sensitivity *answer = work->answer;
     Simulation scene = {0};
-    char text[280];
     Status status = sensitivity_copy(work->simulation, &scene, problem);
     if (status == STATUS_OK)
         status = simulation_run(&scene, tools->limits, tools->progress, tools->workspace,
@@ -490,17 +488,18 @@ static Status sensitivity_run_scene(SensitivityWork *work, const StudyTools *too
     answer->summary = work->own->summary;
     answer->steps = work->own->steps;
     answer->is_chaotic = !isnan(horizon);
-    if (answer->is_chaotic)
-        snprintf(text, sizeof text,
-                 "rounding alone parts the trajectory after %.4g s: beyond that a small step of a "
-                 "parameter makes another trajectory, and slopes of its statistics need not "
-                 "settle; the spread tells which do",
-                 horizon);
-    else
-        snprintf(text, sizeof text,
-                 "the trajectory is the scene's own to the end: slopes that do not settle belong "
-                 "to what jumps, as numbers of impacts do, or to steps that are too large");
-    return study_copy_text(text, &answer->why, problem);
+    return study_status(
+        answer->is_chaotic
+            ? text_format(&answer->why,
+                          "rounding alone changes the trajectory after %.4g s: from there on a "
+                          "small step of a parameter gives another trajectory, and derivatives of "
+                          "its statistics may not exist; the spread shows which do",
+                          horizon)
+            : text_format(&answer->why,
+                          "the trajectory can be trusted to the end: derivatives on which the "
+                          "steps do not agree are those of numbers that jump, such as the number "
+                          "of impacts, or the steps are too large"),
+        problem);
 }
 
 static void sensitivity_free(void *of) {

@@ -82,6 +82,11 @@ static inline bool study_run_ends_study(Status status) {
 
 Status study_no_memory(Problem *problem);
 
+// STATUS_OK, or STATUS_NO_MEMORY if something could not be made.
+static inline Status study_status(bool is_made, Problem *problem) {
+    return is_made ? STATUS_OK : study_no_memory(problem);
+}
+
 // STATUS_CANCELLED if the progress, at `fraction`, requests a stop.
 Status study_advance(const Progress *progress, double fraction, Problem *problem);
 

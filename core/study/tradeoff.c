@@ -299,28 +299,21 @@ void tradeoff_mark_best(TradeoffPoints *points, int metric) {
     }
 }
 
-// The cheapest point that keeps the error, other than `without`; NULL: none.
-static const TradeoffPoint *tradeoff_cheapest(const TradeoffPoints *points, int metric,
-                                              double error, const TradeoffPoint *without) {
+// The cheapest point, or the closest, of those with at most this error and CPU time, without
+// `without`; NULL: none.
+static const TradeoffPoint *tradeoff_find(const TradeoffPoints *points, int metric, bool is_closest,
+                                          double max_error, double max_cpu,
+                                          const TradeoffPoint *without) {
     const TradeoffPoint *found = NULL;
+    double least = INFINITY;
     for (size_t i = 0; i < points->count; i++) {
         const TradeoffPoint *point = &points->at[i];
-        if (point != without && tradeoff_point_error(point, metric) <= error &&
-            (found == NULL || point->cpu_minimum < found->cpu_minimum))
-            found = point;
-    }
-    return found;
-}
-
-// The closest point that takes at most `cpu`, starting from `found` (NULL: none).
-static const TradeoffPoint *tradeoff_closest(const TradeoffPoints *points, int metric, double cpu,
-                                             const TradeoffPoint *found) {
-    for (size_t i = 0; i < points->count; i++) {
-        const TradeoffPoint *point = &points->at[i];
-        const double error = tradeoff_point_error(point, metric);
-        if (!isnan(error) && point->cpu_minimum <= cpu &&
-            (found == NULL || error < tradeoff_point_error(found, metric)))
-            found = point;
+        const double error = tradeoff_point_error(point, metric), cpu = point->cpu_minimum;
+        if (point == without || !(error <= max_error && cpu <= max_cpu) ||
+            (found != NULL && !((is_closest ? error : cpu) < least)))
+            continue;
+        found = point;
+        least = is_closest ? error : cpu;
     }
     return found;
 }
@@ -328,42 +321,43 @@ static const TradeoffPoint *tradeoff_closest(const TradeoffPoints *points, int m
 Status tradeoff_recommend(const TradeoffPoints *points, int metric, double error,
                           TradeoffRecommendation *recommendation, Problem *problem) {
     const char *name = metric_names[metric], *unit = metric_units[metric];
-    const TradeoffPoint *cheapest = tradeoff_cheapest(points, metric, error, NULL);
-    char text[512];
+    const TradeoffPoint *cheapest = tradeoff_find(points, metric, false, error, INFINITY, NULL);
+    const TradeoffPoint *best =
+        tradeoff_find(points, metric, true, INFINITY,
+                      cheapest != NULL ? similar * cheapest->cpu_minimum : (double)INFINITY, NULL);
+    char **why = &recommendation->why;
     recommendation->point = COUNT_ABSENT;
-    if (cheapest == NULL) {
-        const TradeoffPoint *near = tradeoff_closest(points, metric, INFINITY, NULL);
-        if (near == NULL)
-            snprintf(text, sizeof text, "no point has an error of %s", name);
-        else
-            snprintf(text, sizeof text,
-                     "no point keeps %s within %.3g%s; the closest, %s, is at %.2g%s", name, error,
-                     unit, near->name, tradeoff_point_error(near, metric), unit);
-    } else {
-        const TradeoffPoint *best =
-            tradeoff_closest(points, metric, similar * cheapest->cpu_minimum, cheapest);
-        const TradeoffPoint *next = tradeoff_cheapest(points, metric, error, best);
-        const double reached = tradeoff_point_error(best, metric), cpu = best->cpu_minimum;
-        recommendation->point = (uint64_t)(best - points->at) + 1;
-        if (best != cheapest)
-            snprintf(text, sizeof text,
-                     "%s keeps %s within %.3g%s, %.2g%s in %.3g s, and takes hardly longer than "
-                     "the cheapest, %s, %.2g%s in %.3g s",
-                     best->name, name, error, unit, reached, unit, cpu, cheapest->name,
-                     tradeoff_point_error(cheapest, metric), unit, cheapest->cpu_minimum);
-        else if (next == NULL)
-            snprintf(text, sizeof text,
-                     "%s is the only point that keeps %s within %.3g%s: %.2g%s in %.3g s",
-                     best->name, name, error, unit, reached, unit, cpu);
-        else
-            snprintf(text, sizeof text,
-                     "%s is the cheapest that keeps %s within %.3g%s: %.2g%s in %.3g s; the next, "
-                     "%s, takes %.3g times as long",
-                     best->name, name, error, unit, reached, unit, cpu, next->name,
-                     next->cpu_minimum / cpu);
-    }
-    free(recommendation->why);
-    return study_copy_text(text, &recommendation->why, problem);
+    if (best == NULL || cheapest == NULL)
+        return study_status(
+            best == NULL
+                ? text_format(why, "no point has an error of %s", name)
+                : text_format(why, "no point keeps %s within %.3g%s; the closest, %s, is at %.2g%s",
+                              name, error, unit, best->name, tradeoff_point_error(best, metric),
+                              unit),
+            problem);
+    if (!(tradeoff_point_error(best, metric) < tradeoff_point_error(cheapest, metric)))
+        best = cheapest;
+    const TradeoffPoint *next = tradeoff_find(points, metric, false, error, INFINITY, best);
+    const double reached = tradeoff_point_error(best, metric), cpu = best->cpu_minimum;
+    recommendation->point = (uint64_t)(best - points->at) + 1;
+    if (best != cheapest)
+        return study_status(
+            text_format(why,
+                        "%s keeps %s within %.3g%s, %.2g%s in %.3g s, and takes hardly longer than "
+                        "the cheapest, %s, %.2g%s in %.3g s",
+                        best->name, name, error, unit, reached, unit, cpu, cheapest->name,
+                        tradeoff_point_error(cheapest, metric), unit, cheapest->cpu_minimum),
+            problem);
+    return study_status(
+        next == NULL
+            ? text_format(why, "%s is the only point that keeps %s within %.3g%s: %.2g%s in %.3g s",
+                          best->name, name, error, unit, reached, unit, cpu)
+            : text_format(why,
+                          "%s is the cheapest that keeps %s within %.3g%s: %.2g%s in %.3g s; the "
+                          "next, %s, takes %.3g times as long",
+                          best->name, name, error, unit, reached, unit, cpu, next->name,
+                          next->cpu_minimum / cpu),
+        problem);
 }
 
 static Status tradeoff_run_all(TradeoffRun *run, Problem *problem) {
