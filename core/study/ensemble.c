@@ -339,13 +339,11 @@ static Status ensemble_begin(void *of, const StudyTools *tools, Problem *problem
     return STATUS_OK;
 }
 
-static const Kind ensemble_answer = {"ensemble", "results of many seeds", ensemble_answer_fields,
-                                     sizeof(Ensemble)};
-
 const StudyKind study_ensemble = {
     .kind = {"ensemble", "many seeds of a random base: means with their confidence, and spread",
              ensemble_study_fields, sizeof(EnsembleStudy)},
-    .answer = &ensemble_answer,
+    .answer = &(const Kind){"ensemble", "results of many seeds", ensemble_answer_fields,
+                            sizeof(Ensemble)},
     .shorten = "ask for fewer runs",
     .complete = ensemble_complete,
     .cost = ensemble_cost,

@@ -497,13 +497,11 @@ static Status comparison_begin(void *of, const StudyTools *tools, Problem *probl
     return STATUS_OK;
 }
 
-static const Kind comparison_answer = {"compare", "results of contact models and rules",
-                                       compare_answer_fields, sizeof(Comparison)};
-
 const StudyKind study_compare = {
     .kind = {"compare", "contact models and separation rules over one scene, side by side",
              compare_study_fields, sizeof(CompareStudy)},
-    .answer = &comparison_answer,
+    .answer = &(const Kind){"compare", "results of contact models and rules", compare_answer_fields,
+                            sizeof(Comparison)},
     .shorten = "ask for fewer models",
     .complete = comparison_complete,
     .cost = comparison_cost,

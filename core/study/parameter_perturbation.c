@@ -332,3 +332,19 @@ Status uncertainty_complete(InputUncertainty *uncertainty, const Simulation *sim
         uncertainty->contact_time_deviation = 0;
     return STATUS_OK;
 }
+
+Status uncertainty_check_common(const InputUncertainty *uncertainty, const Simulation *simulation,
+                                Problem *problem) {
+    Status status = STATUS_OK;
+    for (int parameter = 0; parameter < 2; parameter++) {
+        const double deviation = uncertainty_common(uncertainty, parameter);
+        const char *why = deviation > 0 ? perturbation_refuse(simulation, parameter) : NULL;
+        if (why != NULL)
+            status = problem_add_real(problem, STATUS_INVALID,
+                                      parameter == SENSITIVITY_RESTITUTION
+                                          ? "/study/restitution_deviation"
+                                          : "/study/contact_time_deviation",
+                                      deviation, NULL, "must be left out: %s", why);
+    }
+    return status;
+}

@@ -48,6 +48,10 @@ typedef struct InputUncertainty {
 Status uncertainty_complete(InputUncertainty *uncertainty, const Simulation *simulation,
                             Problem *problem);
 
+// Validates the deviations that are given for all buffers at once.
+Status uncertainty_check_common(const InputUncertainty *uncertainty, const Simulation *simulation,
+                                Problem *problem);
+
 // Whether any number has a deviation.
 bool uncertainty_exists(const InputUncertainty *uncertainty);
 

@@ -156,14 +156,6 @@ static const Field sensitivity_answer_fields[] = {
 };
 // clang-format on
 
-static Status sensitivity_check_deviation(const Simulation *simulation, double deviation,
-                                          int parameter, const char *pointer, Problem *problem) {
-    const char *why = deviation > 0 ? perturbation_refuse(simulation, parameter) : NULL;
-    return why == NULL ? STATUS_OK
-                       : problem_add_real(problem, STATUS_INVALID, pointer, deviation, NULL,
-                                          "must be left out: %s", why);
-}
-
 static Status sensitivity_check_runs(SensitivityStudy *study, const Simulation *simulation,
                                      Problem *problem) {
     const bool is_uncertain = uncertainty_exists(&study->uncertainty);
@@ -194,19 +186,14 @@ static Status sensitivity_complete(void *request, const Simulation *simulation,
         return problem_add(problem, STATUS_INVALID, "/study/kind",
                            "sensitivity needs a damper: the scene has none");
     TRY(uncertainty_complete(&study->uncertainty, simulation, problem));
-    const Status restitution = sensitivity_check_deviation(
-        simulation, study->uncertainty.restitution_deviation, SENSITIVITY_RESTITUTION,
-        "/study/restitution_deviation", problem);
-    const Status contact_time = sensitivity_check_deviation(
-        simulation, study->uncertainty.contact_time_deviation, SENSITIVITY_CONTACT_TIME,
-        "/study/contact_time_deviation", problem);
+    const Status deviations = uncertainty_check_common(&study->uncertainty, simulation, problem);
     const Status runs = sensitivity_check_runs(study, simulation, problem);
     // Defaults are written out, so that equal studies have one canonical form.
     const bool has_parameters = study->parameters.count > 0;
     for (int i = 0; i < SENSITIVITY_PARAMETERS && !has_parameters; i++)
         if (perturbation_refuse(simulation, i) == NULL)
             TRY(study_add_text(sensitivity_parameter_names[i], &study->parameters, problem));
-    return study_first_failure(study_first_failure(restitution, contact_time), runs);
+    return study_first_failure(deviations, runs);
 }
 
 // Members are steps, parameter by parameter, down and up by each of them, and then the drawn runs.
@@ -540,15 +527,13 @@ static Status sensitivity_begin(void *of, const StudyTools *tools, Problem *prob
     return STATUS_OK;
 }
 
-static const Kind sensitivity_answer = {"sensitivity", "effects of errors of a buffer's numbers",
-                                        sensitivity_answer_fields, sizeof(Sensitivity)};
-
 const StudyKind study_sensitivity = {
     .kind =
         {"sensitivity",
          "effects of errors of restitution, contact time and masses on k_b, c_b and the response",
          sensitivity_study_fields, sizeof(SensitivityStudy)},
-    .answer = &sensitivity_answer,
+    .answer = &(const Kind){"sensitivity", "effects of errors of a buffer's numbers",
+                            sensitivity_answer_fields, sizeof(Sensitivity)},
     .shorten = "ask for fewer runs or parameters",
     .complete = sensitivity_complete,
     .cost = sensitivity_cost,

@@ -704,13 +704,10 @@ static Status sweep_begin(void *of, const StudyTools *tools, Problem *problem) {
     return sweep_fill(work->grid, work->answer, problem);
 }
 
-static const Kind sweep_answer = {"sweep", "result of each point", sweep_answer_fields,
-                                  sizeof(Sweep)};
-
 const StudyKind study_sweep = {
     .kind = {"sweep", "the scene at many points: a grid or a list of values of its members",
              sweep_study_fields, sizeof(SweepStudy)},
-    .answer = &sweep_answer,
+    .answer = &(const Kind){"sweep", "result of each point", sweep_answer_fields, sizeof(Sweep)},
     .shorten = "ask for fewer points, or a cheaper scene",
     .max_runs = 1000,
     .complete = sweep_complete,

@@ -408,14 +408,12 @@ static Status tradeoff_study_run(const void *request, const Simulation *simulati
     return status;
 }
 
-static const Kind tradeoff_answer = {"tradeoff", "accuracy against CPU time, measured",
-                                     tradeoff_answer_fields, sizeof(Tradeoff)};
-
 const StudyKind study_tradeoff = {
     .kind = {"tradeoff",
              "error against CPU time over solvers, steps and other settings traded for speed",
              tradeoff_study_fields, sizeof(TradeoffStudy)},
-    .answer = &tradeoff_answer,
+    .answer = &(const Kind){"tradeoff", "accuracy against CPU time, measured",
+                            tradeoff_answer_fields, sizeof(Tradeoff)},
     .shorten = "ask for fewer solvers or repeats, or lower point_steps",
     .is_measured = true,
     .complete = tradeoff_complete,
