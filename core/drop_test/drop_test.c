@@ -170,10 +170,9 @@ static Status drop_check(const DropTest *test, const Drop *drop, const char *poi
     return status;
 }
 
-static Status drop_test_check_drops(const DropTest *test, const char *pointer, Problem *problem) {
+static Status drop_test_check_drops(const DropTest *test, const char *drops, Problem *problem) {
     Status status = STATUS_OK;
-    char drops[POINTER_SIZE], place[POINTER_SIZE];
-    json_pointer_join(drops, sizeof drops, pointer, "drops");
+    char place[POINTER_SIZE];
     for (size_t i = 0; i < test->drops.count; i++) {
         json_pointer_index(place, sizeof place, drops, i);
         const Drop *drop = &test->drops.at[i];
@@ -191,10 +190,9 @@ size_t drop_test_sample_count(const DropTest *test) {
     return samples;
 }
 
-static Status drop_test_check_traces(const DropTest *test, const char *pointer, Problem *problem) {
+static Status drop_test_check_traces(const DropTest *test, const char *traces, Problem *problem) {
     Status status = STATUS_OK;
-    char traces[POINTER_SIZE], trace[POINTER_SIZE], place[POINTER_SIZE];
-    json_pointer_join(traces, sizeof traces, pointer, "traces");
+    char trace[POINTER_SIZE], place[POINTER_SIZE];
     for (size_t i = 0; i < test->traces.count; i++) {
         const Trace *of = &test->traces.at[i];
         json_pointer_index(trace, sizeof trace, traces, i);
@@ -212,6 +210,18 @@ static Status drop_test_check_traces(const DropTest *test, const char *pointer, 
     return status;
 }
 
+static Status drop_test_check_date(const DropTest *test, const char *place, Problem *problem) {
+    int64_t unix_ms;
+    if (test->date == NULL || problem_concerns(problem, place) ||
+        rfc3339_read(test->date, &unix_ms))
+        return STATUS_OK;
+    Fault fault = {
+        .detail = "must be a date as 2026-11-21, or with a time of day as 2026-11-21T09:30:00Z"};
+    text_fit(fault.pointer, sizeof fault.pointer, place);
+    text_quote(fault.value, sizeof fault.value, test->date);
+    return problem_add_fault(problem, STATUS_INVALID, &fault);
+}
+
 static Status drop_test_check_base(const DropTest *test, const char *pointer, Problem *problem) {
     if (!isnan(test->base_mass) && test->base != MATERIAL_BASE_FREE)
         return drop_fault(problem, pointer, "base_mass", test->base_mass, "kg",
@@ -222,30 +232,21 @@ static Status drop_test_check_base(const DropTest *test, const char *pointer, Pr
 }
 
 Status drop_test_validate(const DropTest *test, const char *pointer, Problem *problem) {
-    Status status = fields_validate(drop_test_fields, test, pointer, problem);
-    char place[POINTER_SIZE], traces[POINTER_SIZE];
-    json_pointer_join(place, sizeof place, pointer, "drops");
+    bool is_valid = fields_validate(drop_test_fields, test, pointer, problem) == STATUS_OK;
+    char drops[POINTER_SIZE], traces[POINTER_SIZE], date[POINTER_SIZE];
+    json_pointer_join(drops, sizeof drops, pointer, "drops");
     json_pointer_join(traces, sizeof traces, pointer, "traces");
+    json_pointer_join(date, sizeof date, pointer, "date");
     // A list that could not be read is empty too.
-    if (test->drops.count == 0 && test->traces.count == 0 && !problem_concerns(problem, place) &&
+    if (test->drops.count == 0 && test->traces.count == 0 && !problem_concerns(problem, drops) &&
         !problem_concerns(problem, traces)) {
-        status = problem_add(problem, STATUS_INVALID, place,
-                             "is required unless there are traces: at least one drop");
+        is_valid = false;
+        (void)problem_add(problem, STATUS_INVALID, drops,
+                          "is required unless there are traces: at least one drop");
     }
-    json_pointer_join(place, sizeof place, pointer, "date");
-    int64_t unix_ms;
-    if (test->date != NULL && !problem_concerns(problem, place) &&
-        !rfc3339_read(test->date, &unix_ms)) {
-        Fault fault = {
-            .detail =
-                "must be a date as 2026-11-21, or with a time of day as 2026-11-21T09:30:00Z"};
-        text_fit(fault.pointer, sizeof fault.pointer, place);
-        text_quote(fault.value, sizeof fault.value, test->date);
-        status = problem_add_fault(problem, STATUS_INVALID, &fault);
-    }
-    if (drop_test_check_base(test, pointer, problem) != STATUS_OK)
-        status = STATUS_INVALID;
-    if (drop_test_check_traces(test, pointer, problem) != STATUS_OK)
-        status = STATUS_INVALID;
-    return drop_test_check_drops(test, pointer, problem) != STATUS_OK ? STATUS_INVALID : status;
+    is_valid = drop_test_check_date(test, date, problem) == STATUS_OK && is_valid;
+    is_valid = drop_test_check_base(test, pointer, problem) == STATUS_OK && is_valid;
+    is_valid = drop_test_check_traces(test, traces, problem) == STATUS_OK && is_valid;
+    is_valid = drop_test_check_drops(test, drops, problem) == STATUS_OK && is_valid;
+    return is_valid ? STATUS_OK : STATUS_INVALID;
 }

@@ -62,11 +62,6 @@ typedef struct ContactDetection {
     bool is_full; // more than TRACE_CONTACTS_MAX were found; the others are left out
 } ContactDetection;
 
-static int detection_compare(const void *a, const void *b) {
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 // The distance from a repeated value to its neighbours among sorted values, if those are frequent
 // too: the step of a converter that is coarser than the noise; else 0.
 static double detection_step(const double *values, size_t count, size_t at) {
@@ -87,7 +82,7 @@ static double detection_step(const double *values, size_t count, size_t at) {
 
 // The middle of the shortest interval that holds 30 % of the values. Sorts them.
 static double detection_densest(double *values, size_t count, double *width) {
-    qsort(values, count, sizeof *values, detection_compare);
+    reals_sort(values, count);
     const size_t held = count * 3 / 10 < 2 ? (count < 2 ? count : 2) : count * 3 / 10;
     size_t best = 0;
     for (size_t i = 1; i + held <= count; i++)
@@ -114,11 +109,11 @@ static void detection_line(const double *force, size_t count, double *scratch, d
         for (size_t j = 0; j < i; j++)
             slopes[n++] = (value[i] - value[j]) / (place[i] - place[j]);
     }
-    qsort(slopes, n, sizeof *slopes, detection_compare);
+    reals_sort(slopes, n);
     c[1] = (slopes[n / 2 - 1] + slopes[n / 2]) / 2;
     for (size_t i = 0; i < PARTS; i++)
         value[i] -= c[1] * place[i];
-    qsort(value, PARTS, sizeof *value, detection_compare);
+    reals_sort(value, PARTS);
     c[0] = (value[PARTS / 2 - 1] + value[PARTS / 2]) / 2;
 }
 

@@ -91,14 +91,9 @@ static double statistic_cut(size_t count) {
     return cuts[i - 1].cut + share * (cuts[i].cut - cuts[i - 1].cut);
 }
 
-static int statistic_compare(const void *a, const void *b) {
-    const double left = *(const double *)a, right = *(const double *)b;
-    return left < right ? -1 : left > right ? 1 : 0;
-}
-
 // Sorts the values.
 static double statistic_median(double *values, size_t count) {
-    qsort(values, count, sizeof *values, statistic_compare);
+    reals_sort(values, count);
     return count % 2 == 1 ? values[count / 2] : values[count / 2 - 1] / 2 + values[count / 2] / 2;
 }
 

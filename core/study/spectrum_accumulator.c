@@ -175,7 +175,7 @@ static Status spectrum_accumulator_report_channel_quantiles(const SpectrumAccumu
             values[i] = sums->kept[(i * sums->channels + channel) * rows + k];
             sum += values[i] / (double)runs;
         }
-        statistics_sort(values, runs);
+        reals_sort(values, runs);
         spectrum->mean.at[k] = sum;
         spectrum->q05.at[k] = statistics_quantile(values, runs, 0.05);
         spectrum->median.at[k] = statistics_quantile(values, runs, 0.5);

@@ -11,7 +11,6 @@
 #include <string.h>
 
 #include "core/solve/solvers.h"
-#include "core/study/statistics.h"
 
 enum { SOLVERS_MAX = 32, REPEATS_MAX = 1000, BATCH_MAX = 10000 }; // runs of a timing
 static const double batch_seconds = 5e-3;                         // of CPU, at least, of a timing
@@ -272,7 +271,7 @@ static Status tradeoff_time_all(TradeoffRun *run, Problem *problem) {
         double *times = &run->times[i * repeats];
         if (point->status != TRADEOFF_MEASURED)
             continue;
-        statistics_sort(times, repeats);
+        reals_sort(times, repeats);
         point->cpu_minimum = times[0];
         point->cpu_median = (times[(repeats - 1) / 2] + times[repeats / 2]) / 2;
     }
