@@ -24,42 +24,42 @@ static const double height_tolerance = 0.2;
 
 // clang-format off
 static const Field drop_fields[] = {
-    FIELD_REAL(Drop, drop_height, "m", ABOVE(0), OPTIONAL, "from which the impactor fell, above the buffer at rest"),
-    FIELD_REAL(Drop, rebound_height, "m", AT_MIN(0), OPTIONAL, "to which it rose again"),
-    FIELD_REAL(Drop, approach_speed, "m/s", ABOVE(0), OPTIONAL, "relative to the base, just before contact"),
-    FIELD_REAL(Drop, rebound_speed, "m/s", AT_MIN(0), OPTIONAL, "relative to the base, just after contact"),
-    FIELD_REAL(Drop, contact_time, "s", ABOVE(0), OPTIONAL, "how long the contact lasted"),
-    FIELD_TEXT(Drop, excluded, TEXT_MAX, PRESENCE_OPTIONAL, 0, "why it does not count; it is kept and shown"),
-    FIELD_TEXT(Drop, note, TEXT_MAX, PRESENCE_OPTIONAL, 0, "of this drop"),
+    FIELD_REAL(Drop, drop_height, "m", ABOVE(0), OPTIONAL, "height from which the impactor fell, above the buffer at rest"),
+    FIELD_REAL(Drop, rebound_height, "m", AT_MIN(0), OPTIONAL, "height to which it rebounded"),
+    FIELD_REAL(Drop, approach_speed, "m/s", ABOVE(0), OPTIONAL, "speed relative to the base, just before contact"),
+    FIELD_REAL(Drop, rebound_speed, "m/s", AT_MIN(0), OPTIONAL, "speed relative to the base, just after contact"),
+    FIELD_REAL(Drop, contact_time, "s", ABOVE(0), OPTIONAL, "duration of the contact"),
+    FIELD_TEXT(Drop, excluded, TEXT_MAX, PRESENCE_OPTIONAL, 0, "reason why it does not count; it is kept and shown"),
+    FIELD_TEXT(Drop, note, TEXT_MAX, PRESENCE_OPTIONAL, 0, "remarks on this drop"),
     FIELD_END
 };
 
 static const Field trace_fields[] = {
-    FIELD_REAL(Trace, interval, "s", WITHIN(1e-9, 1), REQUIRED, "from one sample to the next"),
-    FIELD_REALS(Trace, force, "N", ANY, TRACE_SAMPLES_MAX, PRESENCE_REQUIRED, "the transducer's samples; either sign, any baseline"),
-    FIELD_LONE_REALS(Trace, approach_speed, "m/s", ABOVE(0), TRACE_CONTACTS_MAX, PRESENCE_OPTIONAL, "of its contacts in order, as far as known"),
-    FIELD_TEXT(Trace, excluded, TEXT_MAX, PRESENCE_OPTIONAL, 0, "why it does not count; it is kept and shown"),
-    FIELD_TEXT(Trace, note, TEXT_MAX, PRESENCE_OPTIONAL, 0, "of this trace"),
+    FIELD_REAL(Trace, interval, "s", WITHIN(1e-9, 1), REQUIRED, "time from one sample to the next"),
+    FIELD_REALS(Trace, force, "N", ANY, TRACE_SAMPLES_MAX, PRESENCE_REQUIRED, "samples of the transducer; either sign, any baseline"),
+    FIELD_LONE_REALS(Trace, approach_speed, "m/s", ABOVE(0), TRACE_CONTACTS_MAX, PRESENCE_OPTIONAL, "speeds of its contacts in order, as far as known"),
+    FIELD_TEXT(Trace, excluded, TEXT_MAX, PRESENCE_OPTIONAL, 0, "reason why it does not count; it is kept and shown"),
+    FIELD_TEXT(Trace, note, TEXT_MAX, PRESENCE_OPTIONAL, 0, "remarks on this trace"),
     FIELD_END
 };
 
 const Field drop_test_fields[] = {
-    FIELD_TEXT(DropTest, impactor, TEXT_MAX, PRESENCE_OPTIONAL, 0, "what fell: \"steel ball, 30 mm\""),
+    FIELD_TEXT(DropTest, impactor, TEXT_MAX, PRESENCE_OPTIONAL, 0, "body that fell, such as \"steel ball, 30 mm\""),
     FIELD_REAL(DropTest, impactor_mass, "kg", ABOVE(0), OPTIONAL, "its mass"),
-    FIELD_CHOICE(DropTest, base, material_base_names, OPTIONAL, "what the buffer lay on"),
-    FIELD_REAL(DropTest, base_mass, "kg", ABOVE(0), OPTIONAL, "of a free base"),
-    FIELD_TEXT(DropTest, geometry, TEXT_MAX, PRESENCE_OPTIONAL, 0, "of the buffer and the set-up"),
-    FIELD_REAL(DropTest, gravity, "m/s^2", WITHIN(0, 1000), OPTIONAL, "that presses the impactor into the buffer during contact, to be corrected in e and T_c; 0: none; if absent it is not corrected; heights count by 9.80665 in any case"),
+    FIELD_CHOICE(DropTest, base, material_base_names, OPTIONAL, "support of the buffer"),
+    FIELD_REAL(DropTest, base_mass, "kg", ABOVE(0), OPTIONAL, "mass of a free base"),
+    FIELD_TEXT(DropTest, geometry, TEXT_MAX, PRESENCE_OPTIONAL, 0, "geometry of the buffer and of the set-up"),
+    FIELD_REAL(DropTest, gravity, "m/s^2", WITHIN(0, 1000), OPTIONAL, "gravity that presses the impactor into the buffer during contact, corrected in e and T_c; 0: none; if absent it is not corrected; heights are converted to speeds with 9.80665 in any case"),
     FIELD_REAL(DropTest, temperature, "degC", WITHIN(-273.15, 5000), OPTIONAL, "of the buffer"),
-    FIELD_TEXT(DropTest, instrument, TEXT_MAX, PRESENCE_OPTIONAL, 0, "with which it was read"),
-    FIELD_TEXT(DropTest, date, 40, PRESENCE_OPTIONAL, 0, "of the test: 2026-11-21, or with a time of day 2026-11-21T09:30:00Z"),
-    FIELD_TEXT(DropTest, person, TEXT_MAX, PRESENCE_OPTIONAL, 0, "or laboratory that did the test"),
+    FIELD_TEXT(DropTest, instrument, TEXT_MAX, PRESENCE_OPTIONAL, 0, "instrument of the readings"),
+    FIELD_TEXT(DropTest, date, 40, PRESENCE_OPTIONAL, 0, "date of the test: 2026-11-21, or with a time of day 2026-11-21T09:30:00Z"),
+    FIELD_TEXT(DropTest, person, TEXT_MAX, PRESENCE_OPTIONAL, 0, "person or laboratory that made the test"),
     FIELD_TEXT(DropTest, source, TEXT_MAX, PRESENCE_OPTIONAL, 0, "DOI, report or notebook"),
     FIELD_TEXT(DropTest, notes, NOTE_MAX, PRESENCE_OPTIONAL, 0, "further remarks"),
     FIELD_REAL(DropTest, height_uncertainty, "m", AT_MIN(0), OPTIONAL, "standard uncertainty of one height"),
     FIELD_REAL(DropTest, speed_uncertainty, "m/s", AT_MIN(0), OPTIONAL, "standard uncertainty of one speed"),
     FIELD_REAL(DropTest, time_uncertainty, "s", AT_MIN(0), OPTIONAL, "standard uncertainty of one contact time"),
-    FIELD_LIST(DropTest, drops, drop_fields, DROPS_MAX, PRESENCE_OPTIONAL, "impacts as they were read"),
+    FIELD_LIST(DropTest, drops, drop_fields, DROPS_MAX, PRESENCE_OPTIONAL, "readings of single impacts"),
     FIELD_LIST(DropTest, traces, trace_fields, TRACES_MAX, PRESENCE_OPTIONAL, "records of a force transducer; at most 1,048,576 samples in all"),
     FIELD_END
 };

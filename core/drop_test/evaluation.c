@@ -21,12 +21,12 @@ static const char *const contact_time_by_names[] = {"duration", "pulse", NULL};
 // clang-format off
 static const Field evaluation_row_fields[] = {
     FIELD_COUNT(EvaluationRow, measurement, NULL, AT_MIN(1), OPTIONAL, "number of the measurement"),
-    FIELD_TEXT(EvaluationRow, from, 0, PRESENCE_OPTIONAL, 0, "which drop, or which contact of which trace, from 1"),
-    FIELD_COUNT(EvaluationRow, trace, NULL, AT_MIN(1), OPTIONAL, "which trace of its measurement, from 1; null: a drop"),
-    FIELD_REAL(EvaluationRow, approach_speed, "m/s", ANY, OPTIONAL, "as read, else sqrt(2 g h)"),
+    FIELD_TEXT(EvaluationRow, from, 0, PRESENCE_OPTIONAL, 0, "the drop, or the trace and its contact, from 1"),
+    FIELD_COUNT(EvaluationRow, trace, NULL, AT_MIN(1), OPTIONAL, "trace of its measurement, from 1; null: a drop"),
+    FIELD_REAL(EvaluationRow, approach_speed, "m/s", ANY, OPTIONAL, "as given, else sqrt(2 g h)"),
     FIELD_REAL(EvaluationRow, approach_speed_uncertainty, "m/s", ANY, OPTIONAL, "its standard uncertainty"),
     FIELD_REAL(EvaluationRow, restitution, NULL, ANY, OPTIONAL, "e"),
-    FIELD_REAL(EvaluationRow, restitution_uncertainty, NULL, ANY, OPTIONAL, "its standard uncertainty, from the instrument's or the fit's"),
+    FIELD_REAL(EvaluationRow, restitution_uncertainty, NULL, ANY, OPTIONAL, "its standard uncertainty, from that of the instrument or of the fit"),
     FIELD_CHOICE(EvaluationRow, restitution_by, restitution_by_names, OPTIONAL, "its source"),
     FIELD_REAL(EvaluationRow, contact_time, "s", ANY, OPTIONAL, "T_c of the isolated pair"),
     FIELD_REAL(EvaluationRow, contact_time_uncertainty, "s", ANY, OPTIONAL, "its standard uncertainty"),
@@ -38,25 +38,25 @@ static const Field evaluation_row_fields[] = {
     FIELD_FLAG(EvaluationRow, restitution_counts, 0, "e is in the mean"),
     FIELD_FLAG(EvaluationRow, contact_time_counts, 0, "T_c is in the mean"),
     FIELD_REAL(EvaluationRow, restitution_score, NULL, ANY, OPTIONAL, "robust deviations of e from the median, or from the line where a trend is shown"),
-    FIELD_FLAG(EvaluationRow, restitution_is_outlier, 0, "so far away that only one good sample in twenty has such a reading; it counts"),
+    FIELD_FLAG(EvaluationRow, restitution_is_outlier, 0, "an outlier: only one good sample in twenty contains such a reading; it counts"),
     FIELD_REAL(EvaluationRow, contact_time_score, NULL, ANY, OPTIONAL, "the same of T_c"),
     FIELD_FLAG(EvaluationRow, contact_time_is_outlier, 0, "the same of T_c"),
-    FIELD_TEXT(EvaluationRow, excluded, 0, PRESENCE_OPTIONAL, 0, "why neither counts, as stated with the test"),
+    FIELD_TEXT(EvaluationRow, excluded, 0, PRESENCE_OPTIONAL, 0, "reason why neither counts, as stated with the test"),
     FIELD_TEXT(EvaluationRow, note, 0, PRESENCE_OPTIONAL, 0, "further remarks"),
     FIELD_ITEM(EvaluationRow, contact, trace_detection_fields, NULL, PRESENCE_OPTIONAL, "the contact as detected in its trace; null: none was detected, or a drop"),
     FIELD_END
 };
 
 static const Field ranges_fields[] = {
-    FIELD_REAL(Ranges, least_speed, "m/s", ANY, OPTIONAL, "the slowest approach that counts"),
+    FIELD_REAL(Ranges, least_speed, "m/s", ANY, OPTIONAL, "slowest approach that counts"),
     FIELD_REAL(Ranges, most_speed, "m/s", ANY, OPTIONAL, "the fastest"),
-    FIELD_REAL(Ranges, least_temperature, "degC", ANY, OPTIONAL, "the coldest test of which a reading counts"),
+    FIELD_REAL(Ranges, least_temperature, "degC", ANY, OPTIONAL, "coldest test with a reading that counts"),
     FIELD_REAL(Ranges, most_temperature, "degC", ANY, OPTIONAL, "the warmest"),
     FIELD_END
 };
 
 const Field evaluation_fields[] = {
-    FIELD_CHOICE(Evaluation, separation, separation_names, OPTIONAL, "the rule by which traces were read and gravity was taken out"),
+    FIELD_CHOICE(Evaluation, separation, separation_names, OPTIONAL, "separation rule of the evaluation of traces and of the correction of gravity"),
     FIELD_REAL(Evaluation, confidence, NULL, ANY, OPTIONAL, "of the intervals"),
     FIELD_BASE(Evaluation, ranges, ranges_fields),
     FIELD_ITEM(Evaluation, restitution, reading_statistic_fields, NULL, PRESENCE_DEFAULT, "e [-]"),

@@ -23,17 +23,17 @@ static const double width_max = 0.5, decay_max = 4.2, misfit_max = 0.15;
 // clang-format off
 const Field trace_detection_fields[] = {
     FIELD_REAL(TraceDetection, baseline, "N", ANY, OPTIONAL, "of the trace"),
-    FIELD_REAL(TraceDetection, noise, "N", ANY, OPTIONAL, "of the trace outside contacts, its standard deviation"),
+    FIELD_REAL(TraceDetection, noise, "N", ANY, OPTIONAL, "standard deviation of the trace outside contacts"),
     FIELD_REAL(TraceDetection, threshold, "N", ANY, OPTIONAL, "distance from the baseline that marks a contact"),
-    FIELD_REAL(TraceDetection, first, "s", ANY, OPTIONAL, "the first sample in contact, or beyond the threshold where nothing is fitted; times count from the trace's first sample"),
-    FIELD_REAL(TraceDetection, last, "s", ANY, OPTIONAL, "the last such sample"),
-    FIELD_COUNT(TraceDetection, samples, NULL, AT_MIN(0), OPTIONAL, "how many samples these are"),
+    FIELD_REAL(TraceDetection, first, "s", ANY, OPTIONAL, "first sample in contact, or beyond the threshold if no pulse is fitted; times count from the first sample of the trace"),
+    FIELD_REAL(TraceDetection, last, "s", ANY, OPTIONAL, "last such sample"),
+    FIELD_COUNT(TraceDetection, samples, NULL, AT_MIN(0), OPTIONAL, "number of samples from first to last"),
     FIELD_REAL(TraceDetection, peak, "N", ANY, OPTIONAL, "largest force from the baseline, with its sign"),
     FIELD_REAL(TraceDetection, crossing_time, "s", ANY, OPTIONAL, "between the crossings of the threshold on the pressing side"),
     FIELD_REAL(TraceDetection, crossing_uncertainty, "s", ANY, OPTIONAL, "its standard uncertainty, of half a sample interval at either end"),
-    FIELD_REAL(TraceDetection, crossing_shortfall, NULL, ANY, OPTIONAL, "part of T_c by which crossing_time is too short, by the fitted pulse"),
+    FIELD_REAL(TraceDetection, crossing_shortfall, NULL, ANY, OPTIONAL, "part of T_c by which crossing_time is too short, according to the fitted pulse"),
     FIELD_REAL(TraceDetection, impulse, "N s", ANY, OPTIONAL, "of the best pulse: m_e v0 (1 + e) without gravity"),
-    FIELD_REAL(TraceDetection, start, "s", ANY, OPTIONAL, "start of the contact, by the fit; null: too few samples, no pulse fits, or the trace begins or ends during the contact"),
+    FIELD_REAL(TraceDetection, start, "s", ANY, OPTIONAL, "start of the contact according to the fit; null: too few samples, no pulse fits, or the trace begins or ends during the contact"),
     FIELD_REAL(TraceDetection, end, "s", ANY, OPTIONAL, "end of the contact"),
     FIELD_REALS(TraceDetection, pulse, "N", ANY, 0, PRESENCE_OPTIONAL, "the fitted pulse on its baseline, at equal intervals from start to end; empty where those are unknown"),
     FIELD_REAL(TraceDetection, misfit, NULL, ANY, OPTIONAL, "rms of the residuals during contact, over the noise"),
@@ -444,7 +444,7 @@ static Status trace_conclude(const FitConfidence *likely, bool is_form_sure, dou
             trace_withdraw(counted, contact);
         return trace_status(text_format(
             &contact->why,
-            "the trace is hardly a pulse of the model under the separation rule %s: the rms "
+            "the trace differs from every pulse of the model under the rule %s: the rms "
             "residual of the best one is %.2g %% of the peak, and the noise is %.2g %% of it",
             separation_names[separation], 100 * contact->seen.misfit_share, 100 * noise));
     }

@@ -37,7 +37,7 @@ static const Field contact_rows[] = {
 const Field pair_parameters_fields[] = {
     FIELD_REAL(PairParameters, damper_mass, "kg", ANY, OPTIONAL, "the free mass"),
     FIELD_REAL(PairParameters, structure_mass, "kg", ANY, OPTIONAL, "of the structure that it strikes; null: fixed"),
-    FIELD_CHOICE(PairParameters, identified_for, identified_for_names, OPTIONAL, "whose e and T_c the material's are"),
+    FIELD_CHOICE(PairParameters, identified_for, identified_for_names, OPTIONAL, "pair to which e and T_c of the material belong"),
     FIELD_REAL(PairParameters, effective_mass, "kg", ANY, OPTIONAL, "of this pair"),
     FIELD_REAL(PairParameters, test_mass, "kg", ANY, OPTIONAL, "effective mass of the test's pair"),
     FIELD_REAL(PairParameters, least_speed, "m/s", ANY, OPTIONAL, "slowest approach that was measured"),
@@ -275,6 +275,7 @@ Status pair_parameters_run(const Material *material, double damper_mass, double 
         status = pair_warn_of_material(material, separation, pair);
     if (status == STATUS_OK)
         status = pair_warn_of_overdamping(pair);
-    return status == STATUS_OK ? STATUS_OK
-                               : problem_set(problem, STATUS_NO_MEMORY, "no memory for it");
+    return status == STATUS_OK
+               ? STATUS_OK
+               : problem_set(problem, STATUS_NO_MEMORY, "no memory for the parameters");
 }

@@ -38,7 +38,7 @@ static const Field ensemble_statistic_fields[] = {
 };
 
 static const Field ensemble_statistics_fields[] = {
-    FIELD_ITEM(EnsembleStatistics, peak_displacement, ensemble_statistic_fields, NULL, PRESENCE_DEFAULT, "of this number of the summary"),
+    FIELD_ITEM(EnsembleStatistics, peak_displacement, ensemble_statistic_fields, NULL, PRESENCE_DEFAULT, "statistics of this metric of the summary"),
     FIELD_ITEM(EnsembleStatistics, rms_displacement, ensemble_statistic_fields, NULL, PRESENCE_DEFAULT, "likewise"),
     FIELD_ITEM(EnsembleStatistics, peak_acceleration, ensemble_statistic_fields, NULL, PRESENCE_DEFAULT, "likewise"),
     FIELD_ITEM(EnsembleStatistics, rms_acceleration, ensemble_statistic_fields, NULL, PRESENCE_DEFAULT, "likewise"),
@@ -91,7 +91,7 @@ static const Field ensemble_target_fields[] = {
     FIELD_COUNT(EnsembleTarget, predicted_runs, NULL, AT_MIN(0), OPTIONAL, "predicted number of runs that keep the target, the pilot included"),
     FIELD_REAL(EnsembleTarget, estimated_error, NULL, ANY, OPTIONAL, "of the mean of the runs made; 0 if all were made"),
     FIELD_FLAG(EnsembleTarget, is_kept, false, "the estimated error is within the wanted error"),
-    FIELD_TEXT(EnsembleTarget, why, 0, PRESENCE_OPTIONAL, 0, "explanation"),
+    FIELD_TEXT(EnsembleTarget, why, 0, PRESENCE_OPTIONAL, 0, "explanation in words"),
     FIELD_END
 };
 

@@ -48,7 +48,7 @@ static const Field compare_divergence_fields[] = {
     FIELD_REAL(CompareDivergence, time, "s", ANY, OPTIONAL, "first time at which the displacements differ by the stated part of the largest; unknown: not within the run"),
     FIELD_REAL(CompareDivergence, horizon, "s", ANY, OPTIONAL, "the earlier trust horizon of the two; unknown: neither has one within the run"),
     FIELD_FLAG(CompareDivergence, is_trusted, false, "the time is within the horizon: the contact causes the difference, not rounding"),
-    FIELD_TEXT(CompareDivergence, why, 0, PRESENCE_OPTIONAL, 0, "explanation"),
+    FIELD_TEXT(CompareDivergence, why, 0, PRESENCE_OPTIONAL, 0, "explanation in words"),
     FIELD_END
 };
 

@@ -76,7 +76,7 @@ const char *perturbation_refuse(const Simulation *simulation, int parameter) {
     if (isnan(max))
         return "no buffer of the scene has it, or the contact model does not use it";
     if (!(max > 0))
-        return "it is 0: a relative change is none";
+        return "it is 0, which has no relative change";
     // A law without loss has the restitution 1 and no other.
     if (parameter == SENSITIVITY_RESTITUTION && law->form == CONTACT_POWER && law->factor == NULL)
         return "the contact model gives all energy back";

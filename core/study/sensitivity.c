@@ -39,7 +39,7 @@ static const Field sensitivity_study_fields[] = {
     FIELD_REAL(SensitivityStudy, step, NULL, WITHIN(1e-6, 0.2), 0.01, "relative step of the central differences; half and a quarter of it are tried too"),
     FIELD_BASE(SensitivityStudy, uncertainty, sensitivity_input_fields),
     FIELD_COUNT(SensitivityStudy, runs, NULL, WITHIN(0, RUNS_MAX), OPTIONAL, "runs with restitution and contact time drawn at random; 200 if absent, none without a deviation"),
-    FIELD_COUNT(SensitivityStudy, seed, NULL, WITHIN(0, 0x1p53 - 1), 1, "of the draws"),
+    FIELD_COUNT(SensitivityStudy, seed, NULL, WITHIN(0, 0x1p53 - 1), 1, "seed of the draws"),
     FIELD_END
 };
 
@@ -64,7 +64,7 @@ static const Field sensitivity_stop_fields[] = {
 };
 
 static const Field sensitivity_slope_fields[] = {
-    FIELD_CHOICE(SensitivitySlope, metric, statistics_metric_names, OPTIONAL, "number of the summary"),
+    FIELD_CHOICE(SensitivitySlope, metric, statistics_metric_names, OPTIONAL, "metric of the summary"),
     FIELD_REAL(SensitivitySlope, value, NULL, ANY, OPTIONAL, "of the scene itself"),
     FIELD_REAL(SensitivitySlope, derivative, NULL, ANY, OPTIONAL, "relative change over that of the parameter, by the central difference of the middle step"),
     FIELD_REAL(SensitivitySlope, spread, NULL, ANY, OPTIONAL, "largest less smallest difference of all steps"),
@@ -81,7 +81,7 @@ static const Field sensitivity_row_fields[] = {
 };
 
 static const Field sensitivity_statistic_fields[] = {
-    FIELD_CHOICE(RunStatistic, metric, statistics_metric_names, OPTIONAL, "number of the summary"),
+    FIELD_CHOICE(RunStatistic, metric, statistics_metric_names, OPTIONAL, "metric of the summary"),
     FIELD_TEXT(RunStatistic, unit, 0, PRESENCE_OPTIONAL, 0, "of the numbers below"),
     FIELD_COUNT(RunStatistic, count, NULL, AT_MIN(0), 0, "runs in which it is known"),
     FIELD_REAL(RunStatistic, value, NULL, ANY, OPTIONAL, "of the scene itself"),
@@ -110,7 +110,7 @@ static const Field sensitivity_spectrum_fields[] = {
     FIELD_TEXT(RunSpectrum, unit, 0, PRESENCE_OPTIONAL, 0, "of the densities"),
     FIELD_REALS(RunSpectrum, value, NULL, ANY, 0, PRESENCE_OPTIONAL, "of the scene itself"),
     FIELD_REALS(RunSpectrum, mean, NULL, ANY, 0, PRESENCE_OPTIONAL, "mean of the runs' densities at each frequency"),
-    FIELD_REALS(RunSpectrum, q05, NULL, ANY, 0, PRESENCE_OPTIONAL, "5 % of the runs are below, at each frequency for itself"),
+    FIELD_REALS(RunSpectrum, q05, NULL, ANY, 0, PRESENCE_OPTIONAL, "5 % of the runs are below, at each frequency separately"),
     FIELD_REALS(RunSpectrum, median, NULL, ANY, 0, PRESENCE_OPTIONAL, "half of the runs are below"),
     FIELD_REALS(RunSpectrum, q95, NULL, ANY, 0, PRESENCE_OPTIONAL, "95 % of the runs are below"),
     FIELD_END
@@ -143,7 +143,7 @@ static const Field sensitivity_answer_fields[] = {
     FIELD_COUNT(Sensitivity, runs, NULL, AT_MIN(0), 0, "requested runs with restitution and contact time drawn at random"),
     FIELD_COUNT(Sensitivity, made, NULL, AT_MIN(0), 0, "drawn runs made"),
     FIELD_COUNT(Sensitivity, failed, NULL, AT_MIN(0), 0, "drawn runs that failed; all numbers below are of the others"),
-    FIELD_COUNT(Sensitivity, seed, NULL, AT_MIN(0), OPTIONAL, "of the draws"),
+    FIELD_COUNT(Sensitivity, seed, NULL, AT_MIN(0), OPTIONAL, "seed of the draws"),
     FIELD_BASE(Sensitivity, uncertainty, sensitivity_uncertainty_fields),
     FIELD_TEXT(Sensitivity, distribution, 0, PRESENCE_OPTIONAL, 0, "distribution of the draws"),
     FIELD_REAL(Sensitivity, confidence, NULL, ANY, OPTIONAL, "of the intervals of means"),
@@ -244,7 +244,7 @@ static double sensitivity_step(const SensitivityWork *work, size_t step) {
     return ldexp(work->study->step, -(int)step);
 }
 
-// Up it may be less.
+// The step up is smaller where a restitution would exceed 1.
 static double sensitivity_step_up(const SensitivityWork *work, int parameter, size_t step) {
     return perturbation_max_step(work->simulation, parameter, sensitivity_step(work, step));
 }
@@ -507,11 +507,12 @@ static Status sensitivity_begin(void *of, const StudyTools *tools, Problem *prob
     answer->confidence = STATISTICS_CONFIDENCE;
     TRY(study_copy_text(
         study->uncertainty.spread.count == 0
-            ? "log-normal factors of mean 1 and the stated relative deviation, each buffer's "
-              "restitution and contact time for themselves; a restitution beyond 1 is drawn again"
-            : "log-normal factors of mean 1 and the relative deviations of spread, each buffer's "
-              "restitution and contact time for themselves, all rows of a table by one factor; a "
-              "restitution beyond 1 is drawn again",
+            ? "log-normal factors of mean 1 and the stated relative deviation, independent for the "
+              "restitution and the contact time of each buffer; a restitution beyond 1 is drawn "
+              "again"
+            : "log-normal factors of mean 1 and the relative deviations of spread, independent for "
+              "the restitution and the contact time of each buffer, one factor for all rows of a "
+              "table; a restitution beyond 1 is drawn again",
         &answer->distribution, problem));
     if (fields_copy(sensitivity_uncertainty_fields, &study->uncertainty, &answer->uncertainty) !=
         STATUS_OK)

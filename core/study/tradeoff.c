@@ -198,8 +198,8 @@ static Status tradeoff_measure(TradeoffRun *run, size_t index, Problem *problem)
     Status status;
     if (steps > run->limits.steps)
         status = problem_set(fault, STATUS_LIMIT,
-                             "would take about %.2g solver steps, more than the %.2g that a point "
-                             "may",
+                             "would take about %.2g solver steps, more than the %.2g that one "
+                             "point may take",
                              steps, run->limits.steps);
     else
         status = candidate_settings_apply(run->simulation, point, &run->limits, &simulation, fault);
