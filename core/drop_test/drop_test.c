@@ -13,7 +13,6 @@
 
 #include "core/base/json_pointer.h"
 #include "core/base/rfc3339.h"
-#include "core/contact/identification.h"
 #include "core/drop_test/force_trace.h"
 #include "core/scene/material.h"
 
@@ -70,11 +69,8 @@ static double drop_fall_speed(double height) {
 }
 
 double drop_test_effective_mass(const DropTest *test) {
-    if (test->base == MATERIAL_BASE_FREE)
-        return !isnan(test->impactor_mass) && !isnan(test->base_mass)
-                   ? contact_effective_mass(test->impactor_mass, test->base_mass)
-                   : (double)NAN;
-    return test->base == MATERIAL_BASE_FIXED ? test->impactor_mass : (double)NAN;
+    return material_test_mass(&(Material){
+        .impactor_mass = test->impactor_mass, .base = test->base, .base_mass = test->base_mass});
 }
 
 double drop_approach_speed(const Drop *drop) {

@@ -51,6 +51,7 @@ typedef struct DetectedContact {
 
 typedef struct ContactDetection {
     double *force;   // without baseline, one for each sample [N]
+    double largest;  // magnitude of these [N]
     double baseline; // in the middle of the trace [N]
     double bend[2];  // the baseline adds these times u and u^2, u from -1 to 1 over the trace [N]
     size_t samples;
@@ -128,10 +129,17 @@ static double detection_baseline(const ContactDetection *detection, double sampl
     return detection->baseline + u * (detection->bend[0] + u * detection->bend[1]);
 }
 
+// A sample without the baseline c[0] + c[1] u + c[2] u^2.
+static double detection_residual(const Reals *force, size_t i, const double *c) {
+    const double u = detection_place((double)i, force->count);
+    return force->at[i] - (c[0] + u * (c[1] + u * c[2]));
+}
+
 static void detection_subtract(ContactDetection *detection, const Reals *force, const double *c) {
+    detection->largest = 0;
     for (size_t i = 0; i < force->count; i++) {
-        const double u = detection_place((double)i, force->count);
-        detection->force[i] = force->at[i] - (c[0] + u * (c[1] + u * c[2]));
+        detection->force[i] = detection_residual(force, i, c);
+        detection->largest = fmax(detection->largest, fabs(detection->force[i]));
     }
     detection->baseline = c[0];
     detection->bend[0] = c[1];
@@ -147,7 +155,7 @@ static double detection_fit(const Reals *force, const bool *is_inside, size_t te
         if (is_inside[i])
             continue;
         const double u = detection_place((double)i, force->count), power[TERMS] = {1, u, u * u};
-        const double left = force->at[i] - (c[0] + u * (c[1] + u * c[2]));
+        const double left = detection_residual(force, i, c);
         for (size_t j = 0; j < terms; j++) {
             for (size_t k = 0; k < terms; k++)
                 a[j][k] += power[j] * power[k];
@@ -167,8 +175,7 @@ static double detection_fit(const Reals *force, const bool *is_inside, size_t te
             c[j] += a[j][TERMS] / a[j][j];
     double sum = 0;
     for (size_t i = 0; i < force->count; i++) {
-        const double u = detection_place((double)i, force->count);
-        const double left = force->at[i] - (c[0] + u * (c[1] + u * c[2]));
+        const double left = detection_residual(force, i, c);
         sum += is_inside[i] ? 0 : left * left;
     }
     return sum;
@@ -222,13 +229,10 @@ static size_t detection_mark(const ContactDetection *detection, size_t count, do
 
 static Status detection_find_baseline(const Reals *force, ContactDetection *detection) {
     const size_t n = force->count;
-    double *scratch = malloc(n * sizeof *scratch);
-    bool *is_inside = malloc(n * sizeof *is_inside);
-    if (scratch == NULL || is_inside == NULL) {
-        free(scratch);
-        free(is_inside);
+    double *scratch = malloc(n * (sizeof *scratch + sizeof(bool)));
+    if (scratch == NULL)
         return STATUS_NO_MEMORY;
-    }
+    bool *is_inside = (bool *)(void *)(scratch + n);
     double level[TERMS] = {0}, width, line[TERMS] = {0}, line_width;
     memcpy(scratch, force->at, n * sizeof *scratch);
     level[0] = detection_densest(scratch, n, &width);
@@ -243,12 +247,10 @@ static Status detection_find_baseline(const Reals *force, ContactDetection *dete
     double *c = is_line ? line : level;
     detection_subtract(detection, force, c);
     // 30 % of a normal distribution are within 0.385 standard deviations of its mean.
-    double noise = (is_line ? line_width : width) / 0.77, largest = 0;
-    for (size_t i = 0; i < n; i++)
-        largest = fmax(largest, fabs(detection->force[i]));
+    double noise = (is_line ? line_width : width) / 0.77;
+    const double min = 1e-6 * detection->largest;
     for (int round = 0; round < 6; round++) {
-        const size_t outside =
-            detection_mark(detection, n, fmax(4 * noise, 1e-6 * largest), is_inside);
+        const size_t outside = detection_mark(detection, n, fmax(4 * noise, min), is_inside);
         if (outside < 2)
             break;
         noise = sqrt(detection_fit_baseline(force, is_inside, outside, c));
@@ -257,7 +259,6 @@ static Status detection_find_baseline(const Reals *force, ContactDetection *dete
     }
     detection->noise = noise;
     free(scratch);
-    free(is_inside);
     return STATUS_OK;
 }
 
@@ -318,11 +319,8 @@ static Status detection_run(const Reals *force, double threshold, ContactDetecti
     if (detection->force == NULL)
         return STATUS_NO_MEMORY;
     TRY(detection_find_baseline(force, detection));
-    double largest = 0;
-    for (size_t i = 0; i < force->count; i++)
-        largest = fmax(largest, fabs(detection->force[i]));
     detection->threshold =
-        isnan(threshold) ? fmax(6 * detection->noise, 0.002 * largest) : threshold;
+        isnan(threshold) ? fmax(6 * detection->noise, 0.002 * detection->largest) : threshold;
     detection_find_runs(force->count, detection);
     return STATUS_OK;
 }

@@ -97,16 +97,14 @@ static double statistic_median(double *values, size_t count) {
     return count % 2 == 1 ? values[count / 2] : values[count / 2 - 1] / 2 + values[count / 2] / 2;
 }
 
-static double statistic_mean(const Reading *readings, size_t count, bool with_outliers) {
+static double statistic_mean(const Reading *readings, size_t count) {
     double sum = 0, rest = 0, n = 0;
+    for (size_t i = 0; i < count; i++) {
+        sum += readings[i].weight * readings[i].value;
+        n += readings[i].weight;
+    }
     for (size_t i = 0; i < count; i++)
-        if (with_outliers || !readings[i].is_outlier) {
-            sum += readings[i].weight * readings[i].value;
-            n += readings[i].weight;
-        }
-    for (size_t i = 0; i < count; i++)
-        if (with_outliers || !readings[i].is_outlier)
-            rest += readings[i].weight * (readings[i].value - sum / n);
+        rest += readings[i].weight * (readings[i].value - sum / n);
     return sum / n + rest / n;
 }
 
@@ -122,7 +120,7 @@ static double statistic_weigh(Reading *readings, size_t count, double scatter) {
     for (size_t i = 0; i < count; i++)
         readings[i].weight =
             1 / (readings[i].uncertainty * readings[i].uncertainty + scatter * scatter);
-    return statistic_squares(readings, count, statistic_mean(readings, count, true));
+    return statistic_squares(readings, count, statistic_mean(readings, count));
 }
 
 // Sets weights and scatter where all readings state their uncertainty.
@@ -203,51 +201,6 @@ static bool statistic_set_interval(const Reading *readings, size_t count, Statis
     return is_made;
 }
 
-// The line through those readings that have a speed.
-typedef struct Line {
-    size_t count;
-    double speed, value; // means
-    double squares;      // of speeds about their mean
-    double slope, left;  // left: sum of squares of the residuals
-    double least, most;  // speeds
-} Line;
-
-static Line line_fit(const Reading *readings, size_t count) {
-    Line line = {.least = (double)INFINITY, .most = -(double)INFINITY};
-    double weights = 0, products = 0;
-    for (size_t i = 0; i < count; i++) {
-        if (isnan(readings[i].speed))
-            continue;
-        line.count++;
-        weights += readings[i].weight;
-        line.speed += readings[i].weight * readings[i].speed;
-        line.value += readings[i].weight * readings[i].value;
-        line.least = fmin(line.least, readings[i].speed);
-        line.most = fmax(line.most, readings[i].speed);
-    }
-    line.speed /= weights;
-    line.value /= weights;
-    for (size_t i = 0; i < count; i++) {
-        if (isnan(readings[i].speed))
-            continue;
-        const double off = readings[i].speed - line.speed;
-        line.squares += readings[i].weight * off * off;
-        products += readings[i].weight * off * (readings[i].value - line.value);
-    }
-    line.slope = line.squares > 0 ? products / line.squares : 0;
-    for (size_t i = 0; i < count; i++) {
-        if (isnan(readings[i].speed))
-            continue;
-        const double off =
-            readings[i].value - line.value - line.slope * (readings[i].speed - line.speed);
-        line.left += readings[i].weight * off * off;
-    }
-    // In units of an average weight.
-    line.left *= (double)line.count / weights;
-    line.squares *= (double)line.count / weights;
-    return line;
-}
-
 static bool trend_describe(const char *name, const char *unit, double mean, Trend *trend) {
     const double percent = 100 / fabs(mean), missed = trend->missed_change * percent;
     if (trend->verdict == TREND_NOT_CONSTANT)
@@ -261,7 +214,7 @@ static bool trend_describe(const char *name, const char *unit, double mean, Tren
         &trend->detail,
         "%s shows no trend from %.3g to %.3g m/s (slope %.2g +- %.2g%s per m/s, p = "
         "%.2g)%s a change of up to %.2g%s (%.3g %%) over these speeds would not have "
-        "been seen",
+        "been detected",
         name, trend->least_speed, trend->most_speed, trend->slope, trend->standard_error, unit,
         trend->p,
         trend->verdict == TREND_CONSTANT
@@ -270,54 +223,88 @@ static bool trend_describe(const char *name, const char *unit, double mean, Tren
         trend->missed_change, unit, missed);
 }
 
-static bool trend_set(const Line *line, const char *name, const char *unit, Statistic *statistic) {
-    Trend *trend = &statistic->trend;
-    trend->count = line->count;
-    if (line->count > 0) {
-        trend->least_speed = line->least;
-        trend->most_speed = line->most;
+// The slope of the line through mean_speed and mean_value, and its standard error, at least
+// `least` relative to the range of speeds.
+static void trend_fit(const Reading *readings, size_t count, double weights, double least,
+                      Trend *trend) {
+    double products = 0, squares = 0, left = 0; // of speeds, of residuals
+    for (size_t i = 0; i < count; i++) {
+        if (isnan(readings[i].speed))
+            continue;
+        const double off = readings[i].speed - trend->mean_speed;
+        squares += readings[i].weight * off * off;
+        products += readings[i].weight * off * (readings[i].value - trend->mean_value);
     }
-    if (line->count < 3)
+    trend->slope = squares > 0 ? products / squares : 0;
+    for (size_t i = 0; i < count; i++) {
+        if (isnan(readings[i].speed))
+            continue;
+        const double off = readings[i].value - trend->mean_value -
+                           trend->slope * (readings[i].speed - trend->mean_speed);
+        left += readings[i].weight * off * off;
+    }
+    // In units of an average weight.
+    left *= (double)trend->count / weights;
+    squares *= (double)trend->count / weights;
+    trend->standard_error = sqrt(fmax(left / (double)(trend->count - 2), least * least) / squares);
+}
+
+static bool trend_set(const Reading *readings, size_t count, const char *name, const char *unit,
+                      Statistic *statistic) {
+    Trend *trend = &statistic->trend;
+    double weights = 0, speed = 0, value = 0;
+    trend->count = 0;
+    for (size_t i = 0; i < count; i++) {
+        if (isnan(readings[i].speed))
+            continue;
+        trend->count++;
+        weights += readings[i].weight;
+        speed += readings[i].weight * readings[i].speed;
+        value += readings[i].weight * readings[i].value;
+        trend->least_speed = fmin(trend->least_speed, readings[i].speed);
+        trend->most_speed = fmax(trend->most_speed, readings[i].speed);
+    }
+    const size_t with_speed = (size_t)trend->count;
+    if (with_speed < 3)
         return text_format(
             &trend->detail,
             "whether %s is constant over speed is unknown: %zu reading%s with a speed, "
             "at least three are needed",
-            name, line->count, line->count == 1 ? "" : "s");
-    const double span = line->most - line->least;
-    if (!(span > span_min * line->speed))
+            name, with_speed, with_speed == 1 ? "" : "s");
+    const double span = trend->most_speed - trend->least_speed, mean = fabs(statistic->mean);
+    speed /= weights;
+    if (!(span > span_min * speed))
         return text_format(
             &trend->detail,
             "whether %s is constant over speed is unknown: all readings were made at "
             "about %.3g m/s",
-            name, line->speed);
-    const double least = resolved * fabs(statistic->mean);
-    const size_t freedom = line->count - 2;
-    const double t = student_t_quantile(EVALUATION_CONFIDENCE, freedom);
-    trend->mean_speed = line->speed;
-    trend->mean_value = line->value;
-    trend->slope = line->slope;
-    trend->standard_error = sqrt(fmax(line->left / (double)freedom, least * least) / line->squares);
-    trend->low = line->slope - t * trend->standard_error;
-    trend->high = line->slope + t * trend->standard_error;
-    trend->t = line->slope / trend->standard_error;
+            name, speed);
+    trend->mean_speed = speed;
+    trend->mean_value = value / weights;
+    trend_fit(readings, count, weights, resolved * mean, trend);
+    const size_t freedom = with_speed - 2;
+    const double half = student_t_quantile(EVALUATION_CONFIDENCE, freedom) * trend->standard_error;
+    trend->low = trend->slope - half;
+    trend->high = trend->slope + half;
+    trend->t = trend->slope / trend->standard_error;
     trend->p = fmax(1 - student_t_probability(fabs(trend->t), freedom), 0);
-    trend->change = line->slope * span;
+    trend->change = trend->slope * span;
     trend->missed_change = fmax(fabs(trend->low), fabs(trend->high)) * span;
-    trend->verdict = trend->p < significance ? TREND_NOT_CONSTANT
-                     : trend->missed_change <= TREND_CHANGE_MAX * fabs(statistic->mean)
-                         ? TREND_CONSTANT
-                         : TREND_UNDECIDED;
+    trend->verdict = trend->p < significance                           ? TREND_NOT_CONSTANT
+                     : trend->missed_change <= TREND_CHANGE_MAX * mean ? TREND_CONSTANT
+                                                                       : TREND_UNDECIDED;
     return trend_describe(name, unit, statistic->mean, trend);
 }
 
 // `scratch` has room for two numbers a reading.
-static void statistic_set_outliers(Reading *readings, size_t count, const Line *line,
-                                   double *scratch, Statistic *statistic) {
+static void statistic_set_outliers(Reading *readings, size_t count, double *scratch,
+                                   Statistic *statistic) {
+    const Trend *trend = &statistic->trend;
     double *values = scratch, *sorted = values + count, mean = 0;
     for (size_t i = 0; i < count; i++) {
         values[i] = readings[i].value;
-        if (statistic->trend.verdict == TREND_NOT_CONSTANT && !isnan(readings[i].speed))
-            values[i] -= line->slope * (readings[i].speed - line->speed);
+        if (trend->verdict == TREND_NOT_CONSTANT && !isnan(readings[i].speed))
+            values[i] -= trend->slope * (readings[i].speed - trend->mean_speed);
         sorted[i] = values[i];
     }
     const double middle = statistic_median(sorted, count);
@@ -333,10 +320,13 @@ static void statistic_set_outliers(Reading *readings, size_t count, const Line *
         const double scale = fmax(fmax(spread, own), resolved * fabs(middle));
         readings[i].score = scale > 0 ? (values[i] - middle) / scale : 0;
         readings[i].is_outlier = fabs(readings[i].score) > statistic_cut(count);
-        statistic->outliers += readings[i].is_outlier ? 1 : 0;
+        if (readings[i].is_outlier) {
+            readings[i].weight = 0;
+            statistic->outliers++;
+        }
     }
     if (statistic->outliers > 0 && statistic->outliers < count)
-        statistic->mean_without_outliers = statistic_mean(readings, count, false);
+        statistic->mean_without_outliers = statistic_mean(readings, count);
 }
 
 static void statistic_set_spread(const Reading *readings, size_t count, double *scratch,
@@ -372,20 +362,19 @@ Status reading_statistics_run(Reading *readings, size_t count, const char *name,
     if (is_made && count == 0) {
         is_made = text_format(&statistic->why, "no reading that counts gives the %s", name);
     } else if (is_made) {
-        statistic->unweighted_mean = statistic_mean(readings, count, true);
+        statistic->unweighted_mean = statistic_mean(readings, count);
         statistic_set_spread(readings, count, scratch, statistic);
         statistic_set_weights(readings, count, statistic);
-        statistic->mean = statistic_mean(readings, count, true);
+        statistic->mean = statistic_mean(readings, count);
         is_made = statistic_set_interval(readings, count, statistic);
     }
     statistic->spread = fmax(isnan(statistic->scatter) ? statistic->deviation : statistic->scatter,
                              statistic->standard_error);
     if (!(statistic->spread > rounding * fabs(statistic->mean)))
         statistic->spread = (double)NAN;
-    const Line line = line_fit(readings, count);
-    is_made = is_made && trend_set(&line, name, unit, statistic);
+    is_made = is_made && trend_set(readings, count, name, unit, statistic);
     if (is_made && count > 2)
-        statistic_set_outliers(readings, count, &line, scratch, statistic);
+        statistic_set_outliers(readings, count, scratch, statistic);
     free(scratch);
     return is_made ? STATUS_OK
                    : problem_set(problem, STATUS_NO_MEMORY, "no memory for the evaluation");

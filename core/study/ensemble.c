@@ -310,7 +310,7 @@ static Status ensemble_end(void *of, const StudyTools *tools, Problem *problem) 
                             problem));
     statistics_trust(&answer->table, &answer->trust);
     TRY(study_failures_fill(&answer->table, &answer->failures, problem));
-    return spectrum_accumulator_report(&work->sums, &work->like, &answer->frequency,
+    return spectrum_accumulator_report(&work->sums, &work->like, false, NULL, &answer->frequency,
                                        &answer->spectra, problem);
 }
 

@@ -370,8 +370,8 @@ static Status sensitivity_end(void *of, const StudyTools *tools, Problem *proble
         return STATUS_OK;
     TRY(sensitivity_fill_statistics(work, problem));
     TRY(study_failures_fill(&answer->table, &answer->failures, problem));
-    return spectrum_accumulator_report_quantiles(&work->sums, &work->own->spectrum, tools->progress,
-                                                 &answer->frequency, &answer->spectra, problem);
+    return spectrum_accumulator_report(&work->sums, &work->own->spectrum, true, tools->progress,
+                                       &answer->frequency, &answer->spectra, problem);
 }
 
 // Why a stop has no closed forms; NULL: it has.

@@ -147,26 +147,11 @@ static Status spectrum_accumulator_report_channel(const SpectrumAccumulator *sum
     return STATUS_OK;
 }
 
-Status spectrum_accumulator_report(const SpectrumAccumulator *sums, const Spectrum *like,
-                                   Reals *frequency, RunSpectra *spectra, Problem *problem) {
-    if (sums->count == 0)
-        return STATUS_OK;
-    TRY(spectrum_accumulator_make_report(like, frequency, spectra, problem));
-    for (size_t c = 0; c < sums->channels; c++)
-        TRY(spectrum_accumulator_report_channel(sums, c, &spectra->at[c], problem));
-    return STATUS_OK;
-}
-
 // `values` has room for all runs.
-static Status spectrum_accumulator_report_channel_quantiles(const SpectrumAccumulator *sums,
-                                                            size_t channel,
-                                                            const Progress *progress,
-                                                            double *values, RunSpectrum *spectrum,
-                                                            Problem *problem) {
+static Status spectrum_accumulator_report_quantiles(const SpectrumAccumulator *sums, size_t channel,
+                                                    const Progress *progress, double *values,
+                                                    RunSpectrum *spectrum, Problem *problem) {
     const size_t rows = sums->rows, runs = sums->count;
-    if (!reals_allocate(&spectrum->mean, rows) || !reals_allocate(&spectrum->q05, rows) ||
-        !reals_allocate(&spectrum->median, rows) || !reals_allocate(&spectrum->q95, rows))
-        return study_no_memory(problem);
     for (size_t k = 0; k < rows; k++) {
         double sum = 0;
         if (k % FREQUENCIES_PER_CHECK == 0)
@@ -176,29 +161,31 @@ static Status spectrum_accumulator_report_channel_quantiles(const SpectrumAccumu
             sum += values[i] / (double)runs;
         }
         reals_sort(values, runs);
-        spectrum->mean.at[k] = sum;
-        spectrum->q05.at[k] = statistics_quantile(values, runs, 0.05);
-        spectrum->median.at[k] = statistics_quantile(values, runs, 0.5);
-        spectrum->q95.at[k] = statistics_quantile(values, runs, 0.95);
+        TRY(study_add_real(sum, &spectrum->mean, problem));
+        TRY(study_add_real(statistics_quantile(values, runs, 0.05), &spectrum->q05, problem));
+        TRY(study_add_real(statistics_quantile(values, runs, 0.5), &spectrum->median, problem));
+        TRY(study_add_real(statistics_quantile(values, runs, 0.95), &spectrum->q95, problem));
     }
     return STATUS_OK;
 }
 
-Status spectrum_accumulator_report_quantiles(const SpectrumAccumulator *sums, const Spectrum *own,
-                                             const Progress *progress, Reals *frequency,
-                                             RunSpectra *spectra, Problem *problem) {
+Status spectrum_accumulator_report(const SpectrumAccumulator *sums, const Spectrum *like,
+                                   bool has_quantiles, const Progress *progress, Reals *frequency,
+                                   RunSpectra *spectra, Problem *problem) {
     if (sums->count == 0)
         return STATUS_OK;
     double *values = calloc(sums->count, sizeof *values);
     Status status = values == NULL
                         ? study_no_memory(problem)
-                        : spectrum_accumulator_make_report(own, frequency, spectra, problem);
+                        : spectrum_accumulator_make_report(like, frequency, spectra, problem);
     for (size_t c = 0; c < sums->channels && status == STATUS_OK; c++) {
-        status = study_copy_reals(own->densities.at[c].values, sums->rows, &spectra->at[c].value,
-                                  problem);
-        if (status == STATUS_OK)
-            status = spectrum_accumulator_report_channel_quantiles(sums, c, progress, values,
-                                                                   &spectra->at[c], problem);
+        RunSpectrum *spectrum = &spectra->at[c];
+        status = has_quantiles ? study_copy_reals(like->densities.at[c].values, sums->rows,
+                                                  &spectrum->value, problem)
+                               : spectrum_accumulator_report_channel(sums, c, spectrum, problem);
+        if (has_quantiles && status == STATUS_OK)
+            status =
+                spectrum_accumulator_report_quantiles(sums, c, progress, values, spectrum, problem);
     }
     free(values);
     return status;

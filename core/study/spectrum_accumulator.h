@@ -42,15 +42,11 @@ Status spectrum_accumulator_add(SpectrumAccumulator *sums, const Spectrum *spect
 RunSpread spectrum_accumulator_spread(const SpectrumAccumulator *sums, size_t all);
 
 // Fills frequencies and spectra: mean, deviation and confidence interval of the mean. `like` is the
-// spectrum of any of the runs.
+// spectrum of any of the runs. With quantiles, which need all runs kept: mean and quantiles, and
+// `like` as the value; `progress` may then stop the sorting.
 Status spectrum_accumulator_report(const SpectrumAccumulator *sums, const Spectrum *like,
-                                   Reals *frequency, RunSpectra *spectra, Problem *problem);
-
-// Fills frequencies and spectra: mean and quantiles of the runs, all of which are kept, and the
-// values of `own`. `progress` may stop the sorting.
-Status spectrum_accumulator_report_quantiles(const SpectrumAccumulator *sums, const Spectrum *own,
-                                             const Progress *progress, Reals *frequency,
-                                             RunSpectra *spectra, Problem *problem);
+                                   bool has_quantiles, const Progress *progress, Reals *frequency,
+                                   RunSpectra *spectra, Problem *problem);
 
 void spectrum_accumulator_clear(SpectrumAccumulator *sums);
 

@@ -29,18 +29,20 @@ Status study_copy_reals(const double *values, size_t count, Reals *target, Probl
     return STATUS_OK;
 }
 
+// There is room for as many elements as the next power of two.
 void *study_list_add(void *list, size_t size, Problem *problem) {
     List grown;
     memcpy(&grown, list, sizeof grown);
-    char *at = realloc(grown.at, (grown.count + 1) * size);
-    if (at == NULL) {
+    const size_t count = grown.count;
+    if ((count & (count - 1)) == 0)
+        grown.at = realloc(grown.at, (count == 0 ? 1 : 2 * count) * size);
+    if (grown.at == NULL) {
         (void)study_no_memory(problem);
         return NULL;
     }
-    char *added = at + size * grown.count++;
-    grown.at = at;
+    grown.count++;
     memcpy(list, &grown, sizeof grown);
-    return memset(added, 0, size);
+    return memset((char *)grown.at + size * count, 0, size);
 }
 
 Status study_add_text(const char *text, Texts *texts, Problem *problem) {

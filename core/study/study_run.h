@@ -99,10 +99,11 @@ static inline Status study_first_failure(Status first, Status second) {
 Status study_copy_text(const char *text, char **target, Problem *problem);
 Status study_copy_reals(const double *values, size_t count, Reals *target, Problem *problem);
 
-// Appends an element of `size` zeros to a typed list (base/field.h). NULL without memory.
+// Appends an element of `size` zeros to a typed list (base/field.h) that only this function has
+// filled. NULL without memory.
 void *study_list_add(void *list, size_t size, Problem *problem);
 
-// Append a copy of a text, and a number. STATUS_NO_MEMORY.
+// The same with a copy of a text, and with a number. STATUS_NO_MEMORY.
 Status study_add_text(const char *text, Texts *texts, Problem *problem);
 Status study_add_real(double value, Reals *reals, Problem *problem);
 void study_clear_texts(Texts *texts);
