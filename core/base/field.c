@@ -357,6 +357,16 @@ bool reals_allocate(Reals *reals, size_t count) {
     return reals->at != NULL;
 }
 
+static int reals_compare(const void *a, const void *b) {
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+void reals_sort(double *values, size_t count) {
+    if (count > 0)
+        qsort(values, count, sizeof *values, reals_compare);
+}
+
 Variant *variant_new(const Kind *kind) {
     Variant *variant = calloc(1, kind->size);
     if (variant == NULL)

@@ -244,6 +244,9 @@ bool field_is_absent(const Field *field, const void *item);
 // Allocates `count` zeros, owned by `reals`. Without memory: false, and `reals` is empty.
 bool reals_allocate(Reals *reals, size_t count);
 
+// Sorts numbers in ascending order.
+void reals_sort(double *values, size_t count);
+
 // Creates a value of `kind` with its defaults; freed by variant_free. NULL without memory.
 Variant *variant_new(const Kind *kind);
 void variant_free(Variant *variant);

@@ -13,8 +13,6 @@
 
 #include "core/base/json_pointer.h"
 #include "core/base/rfc3339.h"
-#include "core/contact/identification.h"
-#include "core/drop_test/contact_detection.h"
 #include "core/drop_test/force_trace.h"
 #include "core/scene/material.h"
 
@@ -25,42 +23,42 @@ static const double height_tolerance = 0.2;
 
 // clang-format off
 static const Field drop_fields[] = {
-    FIELD_REAL(Drop, drop_height, "m", ABOVE(0), OPTIONAL, "from which the impactor fell, above the buffer at rest"),
-    FIELD_REAL(Drop, rebound_height, "m", AT_MIN(0), OPTIONAL, "to which it rose again"),
-    FIELD_REAL(Drop, approach_speed, "m/s", ABOVE(0), OPTIONAL, "relative to the base, just before contact"),
-    FIELD_REAL(Drop, rebound_speed, "m/s", AT_MIN(0), OPTIONAL, "relative to the base, just after contact"),
-    FIELD_REAL(Drop, contact_time, "s", ABOVE(0), OPTIONAL, "how long the contact lasted"),
-    FIELD_TEXT(Drop, excluded, TEXT_MAX, PRESENCE_OPTIONAL, 0, "why it does not count; it is kept and shown"),
-    FIELD_TEXT(Drop, note, TEXT_MAX, PRESENCE_OPTIONAL, 0, "of this drop"),
+    FIELD_REAL(Drop, drop_height, "m", ABOVE(0), OPTIONAL, "height from which the impactor fell, above the buffer at rest"),
+    FIELD_REAL(Drop, rebound_height, "m", AT_MIN(0), OPTIONAL, "height to which it rebounded"),
+    FIELD_REAL(Drop, approach_speed, "m/s", ABOVE(0), OPTIONAL, "speed relative to the base, just before contact"),
+    FIELD_REAL(Drop, rebound_speed, "m/s", AT_MIN(0), OPTIONAL, "speed relative to the base, just after contact"),
+    FIELD_REAL(Drop, contact_time, "s", ABOVE(0), OPTIONAL, "duration of the contact"),
+    FIELD_TEXT(Drop, excluded, TEXT_MAX, PRESENCE_OPTIONAL, 0, "reason why it does not count; it is kept and shown"),
+    FIELD_TEXT(Drop, note, TEXT_MAX, PRESENCE_OPTIONAL, 0, "remarks on this drop"),
     FIELD_END
 };
 
 static const Field trace_fields[] = {
-    FIELD_REAL(Trace, interval, "s", WITHIN(1e-9, 1), REQUIRED, "from one sample to the next"),
-    FIELD_REALS(Trace, force, "N", ANY, TRACE_SAMPLES_MAX, PRESENCE_REQUIRED, "the transducer's samples; either sign, any baseline"),
-    FIELD_LONE_REALS(Trace, approach_speed, "m/s", ABOVE(0), TRACE_CONTACTS_MAX, PRESENCE_OPTIONAL, "of its contacts in order, as far as known"),
-    FIELD_TEXT(Trace, excluded, TEXT_MAX, PRESENCE_OPTIONAL, 0, "why it does not count; it is kept and shown"),
-    FIELD_TEXT(Trace, note, TEXT_MAX, PRESENCE_OPTIONAL, 0, "of this trace"),
+    FIELD_REAL(Trace, interval, "s", WITHIN(1e-9, 1), REQUIRED, "time from one sample to the next"),
+    FIELD_REALS(Trace, force, "N", ANY, TRACE_SAMPLES_MAX, PRESENCE_REQUIRED, "samples of the transducer; either sign, any baseline"),
+    FIELD_LONE_REALS(Trace, approach_speed, "m/s", ABOVE(0), TRACE_CONTACTS_MAX, PRESENCE_OPTIONAL, "speeds of its contacts in order, as far as known"),
+    FIELD_TEXT(Trace, excluded, TEXT_MAX, PRESENCE_OPTIONAL, 0, "reason why it does not count; it is kept and shown"),
+    FIELD_TEXT(Trace, note, TEXT_MAX, PRESENCE_OPTIONAL, 0, "remarks on this trace"),
     FIELD_END
 };
 
 const Field drop_test_fields[] = {
-    FIELD_TEXT(DropTest, impactor, TEXT_MAX, PRESENCE_OPTIONAL, 0, "what fell: \"steel ball, 30 mm\""),
+    FIELD_TEXT(DropTest, impactor, TEXT_MAX, PRESENCE_OPTIONAL, 0, "body that fell, such as \"steel ball, 30 mm\""),
     FIELD_REAL(DropTest, impactor_mass, "kg", ABOVE(0), OPTIONAL, "its mass"),
-    FIELD_CHOICE(DropTest, base, material_base_names, OPTIONAL, "what the buffer lay on"),
-    FIELD_REAL(DropTest, base_mass, "kg", ABOVE(0), OPTIONAL, "of a free base"),
-    FIELD_TEXT(DropTest, geometry, TEXT_MAX, PRESENCE_OPTIONAL, 0, "of the buffer and the set-up"),
-    FIELD_REAL(DropTest, gravity, "m/s^2", WITHIN(0, 1000), OPTIONAL, "that presses the impactor into the buffer during contact, to be corrected in e and T_c; 0: none; if absent it is not corrected; heights count by 9.80665 in any case"),
+    FIELD_CHOICE(DropTest, base, material_base_names, OPTIONAL, "support of the buffer"),
+    FIELD_REAL(DropTest, base_mass, "kg", ABOVE(0), OPTIONAL, "mass of a free base"),
+    FIELD_TEXT(DropTest, geometry, TEXT_MAX, PRESENCE_OPTIONAL, 0, "geometry of the buffer and of the set-up"),
+    FIELD_REAL(DropTest, gravity, "m/s^2", WITHIN(0, 1000), OPTIONAL, "gravity that presses the impactor into the buffer during contact, corrected in e and T_c; 0: none; if absent it is not corrected; heights are converted to speeds with 9.80665 in any case"),
     FIELD_REAL(DropTest, temperature, "degC", WITHIN(-273.15, 5000), OPTIONAL, "of the buffer"),
-    FIELD_TEXT(DropTest, instrument, TEXT_MAX, PRESENCE_OPTIONAL, 0, "with which it was read"),
-    FIELD_TEXT(DropTest, date, 40, PRESENCE_OPTIONAL, 0, "of the test: 2026-11-21, or with a time of day 2026-11-21T09:30:00Z"),
-    FIELD_TEXT(DropTest, person, TEXT_MAX, PRESENCE_OPTIONAL, 0, "or laboratory that did the test"),
+    FIELD_TEXT(DropTest, instrument, TEXT_MAX, PRESENCE_OPTIONAL, 0, "instrument of the readings"),
+    FIELD_TEXT(DropTest, date, 40, PRESENCE_OPTIONAL, 0, "date of the test: 2026-11-21, or with a time of day 2026-11-21T09:30:00Z"),
+    FIELD_TEXT(DropTest, person, TEXT_MAX, PRESENCE_OPTIONAL, 0, "person or laboratory that made the test"),
     FIELD_TEXT(DropTest, source, TEXT_MAX, PRESENCE_OPTIONAL, 0, "DOI, report or notebook"),
     FIELD_TEXT(DropTest, notes, NOTE_MAX, PRESENCE_OPTIONAL, 0, "further remarks"),
     FIELD_REAL(DropTest, height_uncertainty, "m", AT_MIN(0), OPTIONAL, "standard uncertainty of one height"),
     FIELD_REAL(DropTest, speed_uncertainty, "m/s", AT_MIN(0), OPTIONAL, "standard uncertainty of one speed"),
     FIELD_REAL(DropTest, time_uncertainty, "s", AT_MIN(0), OPTIONAL, "standard uncertainty of one contact time"),
-    FIELD_LIST(DropTest, drops, drop_fields, DROPS_MAX, PRESENCE_OPTIONAL, "impacts as they were read"),
+    FIELD_LIST(DropTest, drops, drop_fields, DROPS_MAX, PRESENCE_OPTIONAL, "readings of single impacts"),
     FIELD_LIST(DropTest, traces, trace_fields, TRACES_MAX, PRESENCE_OPTIONAL, "records of a force transducer; at most 1,048,576 samples in all"),
     FIELD_END
 };
@@ -71,11 +69,8 @@ static double drop_fall_speed(double height) {
 }
 
 double drop_test_effective_mass(const DropTest *test) {
-    if (test->base == MATERIAL_BASE_FREE)
-        return !isnan(test->impactor_mass) && !isnan(test->base_mass)
-                   ? contact_effective_mass(test->impactor_mass, test->base_mass)
-                   : (double)NAN;
-    return test->base == MATERIAL_BASE_FIXED ? test->impactor_mass : (double)NAN;
+    return material_test_mass(&(Material){
+        .impactor_mass = test->impactor_mass, .base = test->base, .base_mass = test->base_mass});
 }
 
 double drop_approach_speed(const Drop *drop) {
@@ -171,10 +166,9 @@ static Status drop_check(const DropTest *test, const Drop *drop, const char *poi
     return status;
 }
 
-static Status drop_test_check_drops(const DropTest *test, const char *pointer, Problem *problem) {
+static Status drop_test_check_drops(const DropTest *test, const char *drops, Problem *problem) {
     Status status = STATUS_OK;
-    char drops[POINTER_SIZE], place[POINTER_SIZE];
-    json_pointer_join(drops, sizeof drops, pointer, "drops");
+    char place[POINTER_SIZE];
     for (size_t i = 0; i < test->drops.count; i++) {
         json_pointer_index(place, sizeof place, drops, i);
         const Drop *drop = &test->drops.at[i];
@@ -192,10 +186,9 @@ size_t drop_test_sample_count(const DropTest *test) {
     return samples;
 }
 
-static Status drop_test_check_traces(const DropTest *test, const char *pointer, Problem *problem) {
+static Status drop_test_check_traces(const DropTest *test, const char *traces, Problem *problem) {
     Status status = STATUS_OK;
-    char traces[POINTER_SIZE], trace[POINTER_SIZE], place[POINTER_SIZE];
-    json_pointer_join(traces, sizeof traces, pointer, "traces");
+    char trace[POINTER_SIZE], place[POINTER_SIZE];
     for (size_t i = 0; i < test->traces.count; i++) {
         const Trace *of = &test->traces.at[i];
         json_pointer_index(trace, sizeof trace, traces, i);
@@ -213,6 +206,18 @@ static Status drop_test_check_traces(const DropTest *test, const char *pointer, 
     return status;
 }
 
+static Status drop_test_check_date(const DropTest *test, const char *place, Problem *problem) {
+    int64_t unix_ms;
+    if (test->date == NULL || problem_concerns(problem, place) ||
+        rfc3339_read(test->date, &unix_ms))
+        return STATUS_OK;
+    Fault fault = {
+        .detail = "must be a date as 2026-11-21, or with a time of day as 2026-11-21T09:30:00Z"};
+    text_fit(fault.pointer, sizeof fault.pointer, place);
+    text_quote(fault.value, sizeof fault.value, test->date);
+    return problem_add_fault(problem, STATUS_INVALID, &fault);
+}
+
 static Status drop_test_check_base(const DropTest *test, const char *pointer, Problem *problem) {
     if (!isnan(test->base_mass) && test->base != MATERIAL_BASE_FREE)
         return drop_fault(problem, pointer, "base_mass", test->base_mass, "kg",
@@ -223,30 +228,21 @@ static Status drop_test_check_base(const DropTest *test, const char *pointer, Pr
 }
 
 Status drop_test_validate(const DropTest *test, const char *pointer, Problem *problem) {
-    Status status = fields_validate(drop_test_fields, test, pointer, problem);
-    char place[POINTER_SIZE], traces[POINTER_SIZE];
-    json_pointer_join(place, sizeof place, pointer, "drops");
+    bool is_valid = fields_validate(drop_test_fields, test, pointer, problem) == STATUS_OK;
+    char drops[POINTER_SIZE], traces[POINTER_SIZE], date[POINTER_SIZE];
+    json_pointer_join(drops, sizeof drops, pointer, "drops");
     json_pointer_join(traces, sizeof traces, pointer, "traces");
+    json_pointer_join(date, sizeof date, pointer, "date");
     // A list that could not be read is empty too.
-    if (test->drops.count == 0 && test->traces.count == 0 && !problem_concerns(problem, place) &&
+    if (test->drops.count == 0 && test->traces.count == 0 && !problem_concerns(problem, drops) &&
         !problem_concerns(problem, traces)) {
-        status = problem_add(problem, STATUS_INVALID, place,
-                             "is required unless there are traces: at least one drop");
+        is_valid = false;
+        (void)problem_add(problem, STATUS_INVALID, drops,
+                          "is required unless there are traces: at least one drop");
     }
-    json_pointer_join(place, sizeof place, pointer, "date");
-    int64_t unix_ms;
-    if (test->date != NULL && !problem_concerns(problem, place) &&
-        !rfc3339_read(test->date, &unix_ms)) {
-        Fault fault = {
-            .detail =
-                "must be a date as 2026-11-21, or with a time of day as 2026-11-21T09:30:00Z"};
-        text_fit(fault.pointer, sizeof fault.pointer, place);
-        text_quote(fault.value, sizeof fault.value, test->date);
-        status = problem_add_fault(problem, STATUS_INVALID, &fault);
-    }
-    if (drop_test_check_base(test, pointer, problem) != STATUS_OK)
-        status = STATUS_INVALID;
-    if (drop_test_check_traces(test, pointer, problem) != STATUS_OK)
-        status = STATUS_INVALID;
-    return drop_test_check_drops(test, pointer, problem) != STATUS_OK ? STATUS_INVALID : status;
+    is_valid = drop_test_check_date(test, date, problem) == STATUS_OK && is_valid;
+    is_valid = drop_test_check_base(test, pointer, problem) == STATUS_OK && is_valid;
+    is_valid = drop_test_check_traces(test, traces, problem) == STATUS_OK && is_valid;
+    is_valid = drop_test_check_drops(test, drops, problem) == STATUS_OK && is_valid;
+    return is_valid ? STATUS_OK : STATUS_INVALID;
 }

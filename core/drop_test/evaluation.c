@@ -1,20 +1,62 @@
+// Uncertainties by the rule of small errors: with e = sqrt(h_r / h_d) and v = sqrt(2 g h) a
+// relative error of a height counts half.
 #include "core/drop_test/evaluation.h"
 
+#include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
-#include "core/drop_test/evaluation_warnings.h"
+#include "core/base/canonical.h"
+#include "core/drop_test/gravity_correction.h"
+#include "core/scene/material.h"
+
+enum { OUTLIERS_MAX = 5, POINTER_SIZE = sizeof((Fault){0}.pointer) };
+
+static const double effect_min = 0.01;     // of gravity
+static const double pair_tolerance = 0.02; // of effective masses that are considered equal
+
+static const char *const restitution_by_names[] = {"heights", "speeds", "pulse", NULL};
+static const char *const contact_time_by_names[] = {"duration", "pulse", NULL};
 
 // clang-format off
+static const Field evaluation_row_fields[] = {
+    FIELD_COUNT(EvaluationRow, measurement, NULL, AT_MIN(1), OPTIONAL, "number of the measurement"),
+    FIELD_TEXT(EvaluationRow, from, 0, PRESENCE_OPTIONAL, 0, "the drop, or the trace and its contact, from 1"),
+    FIELD_COUNT(EvaluationRow, trace, NULL, AT_MIN(1), OPTIONAL, "trace of its measurement, from 1; null: a drop"),
+    FIELD_REAL(EvaluationRow, approach_speed, "m/s", ANY, OPTIONAL, "as given, else sqrt(2 g h)"),
+    FIELD_REAL(EvaluationRow, approach_speed_uncertainty, "m/s", ANY, OPTIONAL, "its standard uncertainty"),
+    FIELD_REAL(EvaluationRow, restitution, NULL, ANY, OPTIONAL, "e"),
+    FIELD_REAL(EvaluationRow, restitution_uncertainty, NULL, ANY, OPTIONAL, "its standard uncertainty, from that of the instrument or of the fit"),
+    FIELD_CHOICE(EvaluationRow, restitution_by, restitution_by_names, OPTIONAL, "its source"),
+    FIELD_REAL(EvaluationRow, contact_time, "s", ANY, OPTIONAL, "T_c of the isolated pair"),
+    FIELD_REAL(EvaluationRow, contact_time_uncertainty, "s", ANY, OPTIONAL, "its standard uncertainty"),
+    FIELD_CHOICE(EvaluationRow, contact_time_by, contact_time_by_names, OPTIONAL, "its source"),
+    FIELD_REAL(EvaluationRow, least_contact_time, "s", ANY, OPTIONAL, "of a trace: lower end of the 95 % interval of T_c, also where there is no value"),
+    FIELD_REAL(EvaluationRow, most_contact_time, "s", ANY, OPTIONAL, "likewise"),
+    FIELD_REAL(EvaluationRow, read_restitution, NULL, ANY, OPTIONAL, "e before the correction of gravity; null: none was made"),
+    FIELD_REAL(EvaluationRow, read_contact_time, "s", ANY, OPTIONAL, "T_c before the correction of gravity; null: none was made"),
+    FIELD_FLAG(EvaluationRow, restitution_counts, 0, "e is in the mean"),
+    FIELD_FLAG(EvaluationRow, contact_time_counts, 0, "T_c is in the mean"),
+    FIELD_REAL(EvaluationRow, restitution_score, NULL, ANY, OPTIONAL, "robust deviations of e from the median, or from the line where a trend is shown"),
+    FIELD_FLAG(EvaluationRow, restitution_is_outlier, 0, "an outlier: only one good sample in twenty contains such a reading; it counts"),
+    FIELD_REAL(EvaluationRow, contact_time_score, NULL, ANY, OPTIONAL, "the same of T_c"),
+    FIELD_FLAG(EvaluationRow, contact_time_is_outlier, 0, "the same of T_c"),
+    FIELD_TEXT(EvaluationRow, excluded, 0, PRESENCE_OPTIONAL, 0, "reason why neither counts, as stated with the test"),
+    FIELD_TEXT(EvaluationRow, note, 0, PRESENCE_OPTIONAL, 0, "further remarks"),
+    FIELD_ITEM(EvaluationRow, contact, trace_detection_fields, NULL, PRESENCE_OPTIONAL, "the contact as detected in its trace; null: none was detected, or a drop"),
+    FIELD_END
+};
+
 static const Field ranges_fields[] = {
-    FIELD_REAL(Ranges, least_speed, "m/s", ANY, OPTIONAL, "the slowest approach that counts"),
+    FIELD_REAL(Ranges, least_speed, "m/s", ANY, OPTIONAL, "slowest approach that counts"),
     FIELD_REAL(Ranges, most_speed, "m/s", ANY, OPTIONAL, "the fastest"),
-    FIELD_REAL(Ranges, least_temperature, "degC", ANY, OPTIONAL, "the coldest test of which a reading counts"),
+    FIELD_REAL(Ranges, least_temperature, "degC", ANY, OPTIONAL, "coldest test with a reading that counts"),
     FIELD_REAL(Ranges, most_temperature, "degC", ANY, OPTIONAL, "the warmest"),
     FIELD_END
 };
 
 const Field evaluation_fields[] = {
-    FIELD_CHOICE(Evaluation, separation, separation_names, OPTIONAL, "the rule by which traces were read and gravity was taken out"),
+    FIELD_CHOICE(Evaluation, separation, separation_names, OPTIONAL, "separation rule of the evaluation of traces and of the correction of gravity"),
     FIELD_REAL(Evaluation, confidence, NULL, ANY, OPTIONAL, "of the intervals"),
     FIELD_BASE(Evaluation, ranges, ranges_fields),
     FIELD_ITEM(Evaluation, restitution, reading_statistic_fields, NULL, PRESENCE_DEFAULT, "e [-]"),
@@ -37,6 +79,282 @@ void ranges_extend(Ranges *ranges, const EvaluationRow *row, const Measurement *
     ranges->most_speed = fmax(ranges->most_speed, row->approach_speed);
     ranges->least_temperature = fmin(ranges->least_temperature, temperature);
     ranges->most_temperature = fmax(ranges->most_temperature, temperature);
+}
+
+static Status reading_status(bool is_made, Problem *problem) {
+    return is_made ? STATUS_OK
+                   : problem_set(problem, STATUS_NO_MEMORY, "no memory for the evaluation");
+}
+
+// The JSON Pointer of a measurement, with `rest` behind it: "/measurements/3/gravity"; without a
+// number only the rest.
+static void measurement_pointer(uint64_t number, const char *rest, char pointer[POINTER_SIZE]) {
+    if (number == COUNT_ABSENT)
+        snprintf(pointer, POINTER_SIZE, "%s", rest);
+    else
+        snprintf(pointer, POINTER_SIZE, "/measurements/%llu%s", (unsigned long long)number, rest);
+}
+
+// The JSON Pointer of a row: "/drops/2", or "/measurements/3/traces/0".
+static void reading_pointer(const EvaluationRow *row, char pointer[POINTER_SIZE]) {
+    char rest[40];
+    snprintf(rest, sizeof rest, "/%s/%zu", row->is_of_trace ? "traces" : "drops", row->place);
+    measurement_pointer(row->measurement, rest, pointer);
+}
+
+bool reading_counts(const EvaluationRow *row) {
+    return row->restitution_counts || row->contact_time_counts;
+}
+
+bool reading_get(const EvaluationRow *row, bool is_time, Reading *reading) {
+    *reading = (Reading){
+        .value = is_time ? row->contact_time : row->restitution,
+        .uncertainty = is_time ? row->contact_time_uncertainty : row->restitution_uncertainty,
+        .speed = row->approach_speed,
+    };
+    return is_time ? row->contact_time_counts : row->restitution_counts;
+}
+
+static bool reading_copy(const char *text, char **target) {
+    return text == NULL || (*target = strdup(text)) != NULL;
+}
+
+static Status reading_add_note(EvaluationRow *row, const char *text, Problem *problem) {
+    return reading_status(text_format(&row->note, "%s%s%s", row->note != NULL ? row->note : "",
+                                      row->note != NULL ? "; " : "", text),
+                          problem);
+}
+
+// A list of rows under construction, of one test.
+typedef struct ReadingList {
+    const Measurement *of;
+    size_t test; // its index
+    int separation;
+    const Progress *progress;
+    EvaluationRows *rows;
+    Problem *problem;
+} ReadingList;
+
+// Appends a row without numbers: of a drop, of a trace, or of its contact `contact`, from 1.
+static Status reading_new(const ReadingList *list, size_t place, bool is_of_trace, size_t contact,
+                          const char *note, EvaluationRow **added) {
+    EvaluationRows *rows = list->rows;
+    const DropTest *test = list->of->test;
+    const char *excluded =
+        is_of_trace ? test->traces.at[place].excluded : test->drops.at[place].excluded;
+    if (rows->count == EVALUATION_ROWS_MAX)
+        return problem_set(list->problem, STATUS_LIMIT,
+                           "more than %d readings: evaluate fewer measurements at a time",
+                           EVALUATION_ROWS_MAX);
+    if ((rows->count & (rows->count - 1)) == 0) {
+        EvaluationRow *at = realloc(rows->at, (2 * rows->count + 1) * sizeof *at);
+        TRY(reading_status(at != NULL, list->problem));
+        rows->at = at;
+    }
+    EvaluationRow *row = *added = &rows->at[rows->count++];
+    *row = (EvaluationRow){.is_of_trace = is_of_trace, .place = place, .test = list->test};
+    fields_clear(evaluation_row_fields, row);
+    row->measurement = list->of->number;
+    if (is_of_trace)
+        row->trace = place + 1;
+    const bool is_made =
+        contact > 0 ? text_format(&row->from, "trace %zu, contact %zu", place + 1, contact)
+                    : text_format(&row->from, "%s %zu", is_of_trace ? "trace" : "drop", place + 1);
+    return reading_status(is_made && reading_copy(excluded, &row->excluded) &&
+                              reading_copy(note, &row->note),
+                          list->problem);
+}
+
+static void reading_set_counts(EvaluationRow *row) {
+    row->restitution_counts = row->excluded == NULL && !isnan(row->restitution);
+    row->contact_time_counts = row->excluded == NULL && !isnan(row->contact_time);
+}
+
+// The relative uncertainty of a speed that was read, or that follows from a height.
+static double reading_speed_error(const DropTest *test, double speed, double height) {
+    return !isnan(speed) ? test->speed_uncertainty / speed
+                         : test->height_uncertainty / (2 * height);
+}
+
+static void reading_set_restitution(const DropTest *test, const Drop *drop, EvaluationRow *row) {
+    const double before = row->approach_speed, after = drop_rebound_speed(test, drop);
+    if (isnan(before) || isnan(after))
+        return;
+    const bool is_by_height = isnan(drop->rebound_speed);
+    row->restitution = fmin(after / before, 1);
+    row->restitution_by = is_by_height ? RESTITUTION_BY_HEIGHTS : RESTITUTION_BY_SPEEDS;
+    // The impactor's part of the separation speed, which on a fixed base is the whole.
+    double share = row->restitution;
+    if (is_by_height && test->base == MATERIAL_BASE_FREE)
+        share -= test->impactor_mass / test->base_mass;
+    const double error =
+        fabs(share) * hypot(reading_speed_error(test, drop->approach_speed, drop->drop_height),
+                            reading_speed_error(test, drop->rebound_speed, drop->rebound_height));
+    if (isfinite(error))
+        row->restitution_uncertainty = error;
+}
+
+static Status reading_add_drop(const ReadingList *list, size_t place) {
+    const DropTest *test = list->of->test;
+    const Drop *drop = &test->drops.at[place];
+    EvaluationRow *row;
+    TRY(reading_new(list, place, false, 0, drop->note, &row));
+    row->approach_speed = drop_approach_speed(drop);
+    row->approach_speed_uncertainty =
+        row->approach_speed * reading_speed_error(test, drop->approach_speed, drop->drop_height);
+    reading_set_restitution(test, drop, row);
+    if (!isnan(drop->contact_time)) {
+        row->contact_time = drop->contact_time;
+        row->contact_time_uncertainty = test->time_uncertainty;
+        row->contact_time_by = CONTACT_TIME_BY_DURATION;
+    }
+    reading_set_counts(row);
+    return STATUS_OK;
+}
+
+static Status reading_add_contact(const ReadingList *list, size_t place, size_t number,
+                                  TraceContact *contact) {
+    const DropTest *test = list->of->test;
+    const Reals *speeds = &test->traces.at[place].approach_speed;
+    EvaluationRow *row;
+    TRY(reading_new(list, place, true, number + 1, contact->why, &row));
+    row->contact = contact->seen;
+    contact->seen.pulse = (Reals){NULL, 0};
+    if (number < speeds->count) {
+        row->approach_speed = speeds->at[number];
+        row->approach_speed_uncertainty = test->speed_uncertainty;
+    }
+    row->contact_time = contact->contact_time;
+    row->contact_time_uncertainty = contact->contact_time_uncertainty;
+    row->least_contact_time = contact->least_contact_time;
+    row->most_contact_time = contact->most_contact_time;
+    row->restitution = contact->restitution;
+    row->restitution_uncertainty = contact->restitution_uncertainty;
+    if (!isnan(row->contact_time))
+        row->contact_time_by = CONTACT_TIME_BY_PULSE;
+    if (!isnan(row->restitution))
+        row->restitution_by = RESTITUTION_BY_PULSE;
+    reading_set_counts(row);
+    return STATUS_OK;
+}
+
+static Status reading_add_trace(const ReadingList *list, size_t place) {
+    const DropTest *test = list->of->test;
+    const Trace *trace = &test->traces.at[place];
+    const TraceOptions options = {
+        .separation = list->separation,
+        .threshold = (double)NAN,
+        .effective_mass = drop_test_effective_mass(test),
+        .gravity = test->gravity > 0 ? test->gravity : 0,
+        .approach_speeds = trace->approach_speed.at,
+        .approach_speed_count = trace->approach_speed.count,
+        .progress = list->progress,
+    };
+    char rest[48], pointer[POINTER_SIZE];
+    snprintf(rest, sizeof rest, "/traces/%zu/force", place);
+    measurement_pointer(list->of->number, rest, pointer);
+    TraceAnalysis analysis = {0};
+    EvaluationRow *row;
+    // An unreadable trace may be excluded for that reason. A trace without a contact is a row too.
+    Status status = trace_analysis_run(trace->interval, &trace->force, &options, pointer, &analysis,
+                                       trace->excluded == NULL ? list->problem : NULL);
+    if (status == STATUS_INVALID && trace->excluded != NULL)
+        status = reading_new(list, place, true, 0, "it cannot be read", &row);
+    else if (status == STATUS_OK && analysis.contacts.count == 0)
+        status =
+            reading_new(list, place, true, 0,
+                        analysis.why != NULL ? analysis.why : "no contact is detected in it", &row);
+    for (size_t k = 0; status == STATUS_OK && k < analysis.contacts.count; k++)
+        status = reading_add_contact(list, place, k, &analysis.contacts.at[k]);
+    trace_analysis_clear(&analysis);
+    return status;
+}
+
+// Of a drop with both e and T_c.
+static Status reading_correct_both(const GravityLoad *load, EvaluationRow *row, Problem *problem) {
+    const GravityCorrected read = {row->restitution, row->contact_time,
+                                   row->restitution_uncertainty / row->restitution,
+                                   row->contact_time_uncertainty / row->contact_time};
+    GravityCorrected isolated;
+    if (!(row->restitution > 0) || !gravity_correct(load, &read, &isolated)) {
+        row->restitution_counts = row->contact_time_counts = false;
+        return reading_add_note(
+            row, "does not count: no contact has this e and T_c under that gravity", problem);
+    }
+    row->read_restitution = row->restitution;
+    row->read_contact_time = row->contact_time;
+    row->restitution = isolated.restitution;
+    row->contact_time = isolated.contact_time;
+    row->restitution_uncertainty = isolated.restitution * isolated.restitution_uncertainty;
+    row->contact_time_uncertainty = isolated.contact_time * isolated.contact_time_uncertainty;
+    return STATUS_OK;
+}
+
+// Of a drop with one of e and T_c; `other` is the mean of the other one, NAN: unknown.
+static Status reading_correct_one(const GravityLoad *load, double other, EvaluationRow *row,
+                                  Problem *problem) {
+    const bool is_time = isnan(row->restitution), is_known = !isnan(other) && !isnan(load->speed);
+    double *value = is_time ? &row->contact_time : &row->restitution;
+    double *read = is_time ? &row->read_contact_time : &row->read_restitution;
+    double isolated;
+    if (!is_known || !gravity_correct_one(load, is_time, *value, other, &isolated))
+        return reading_add_note(
+            row,
+            is_known  ? "gravity is not corrected: no contact has this value under it"
+            : is_time ? "gravity is not corrected: this needs a speed and a restitution"
+                      : "gravity is not corrected: this needs a contact time",
+            problem);
+    // Errors grow with the correction.
+    *(is_time ? &row->contact_time_uncertainty : &row->restitution_uncertainty) *=
+        isolated / *value;
+    *read = *value;
+    *value = isolated;
+    return STATUS_OK;
+}
+
+// The mean T_c or e of a test's readings without gravity; NAN: there are none.
+static double reading_mean(const EvaluationRows *rows, size_t test, bool is_time) {
+    double sum = 0, count = 0;
+    for (size_t i = 0; i < rows->count; i++) {
+        const EvaluationRow *row = &rows->at[i];
+        Reading reading;
+        if (row->test == test && (row->is_of_trace || !isnan(row->read_contact_time)) &&
+            reading_get(row, is_time, &reading)) {
+            sum += reading.value;
+            count++;
+        }
+    }
+    return sum / count;
+}
+
+// Corrects all drops whose test states gravity; the fit of a trace has corrected its contacts. A
+// drop with only one of e and T_c borrows the mean of the other from its test's readings without
+// gravity.
+static Status readings_correct_gravity(const Measurement *tests, size_t count, int separation,
+                                       const Progress *progress, EvaluationRows *rows,
+                                       Problem *problem) {
+    for (int pass = 0; pass < 2; pass++)
+        for (size_t test = 0; test < count; test++) {
+            // First drops with both, from which the others borrow.
+            const double e = pass > 0 ? reading_mean(rows, test, false) : 0;
+            const double T = pass > 0 ? reading_mean(rows, test, true) : 0;
+            for (size_t i = 0; i < rows->count; i++) {
+                EvaluationRow *row = &rows->at[i];
+                const int known = !isnan(row->restitution) + !isnan(row->contact_time);
+                if (row->test != test || row->is_of_trace || !(tests[test].test->gravity > 0) ||
+                    known != 2 - pass)
+                    continue;
+                if (!progress_advance(progress, 1))
+                    return STATUS_CANCELLED;
+                const GravityLoad load = {tests[test].test->gravity, row->approach_speed,
+                                          (Separation)separation,
+                                          row->restitution_by == RESTITUTION_BY_HEIGHTS};
+                TRY(pass == 0 ? reading_correct_both(&load, row, problem)
+                              : reading_correct_one(&load, isnan(row->restitution) ? e : T, row,
+                                                    problem));
+            }
+        }
+    return STATUS_OK;
 }
 
 size_t evaluation_sample_count(const Measurement *tests, size_t count) {
@@ -85,6 +403,231 @@ static Status evaluation_set_statistic(bool is_time, Reading *readings, Evaluati
     return STATUS_OK;
 }
 
+// The slowest row of a test that counts.
+static const EvaluationRow *evaluation_slowest(const EvaluationRows *rows, size_t test) {
+    const EvaluationRow *found = NULL;
+    for (size_t i = 0; i < rows->count; i++) {
+        const EvaluationRow *row = &rows->at[i];
+        if (row->test == test && reading_counts(row) && !isnan(row->approach_speed) &&
+            (found == NULL || row->approach_speed < found->approach_speed))
+            found = row;
+    }
+    return found;
+}
+
+static Status evaluation_warn_of_gravity(const Measurement *of, size_t test,
+                                         Evaluation *evaluation) {
+    const EvaluationRow *row =
+        isnan(of->test->gravity) ? evaluation_slowest(&evaluation->rows, test) : NULL;
+    if (row == NULL)
+        return STATUS_OK;
+    Warnings *warnings = &evaluation->warnings;
+    char place[POINTER_SIZE];
+    measurement_pointer(of->number, "/gravity", place);
+    const double e = row->restitution_counts ? row->restitution : evaluation->restitution.mean;
+    const double T = row->contact_time_counts ? row->contact_time : evaluation->contact_time.mean;
+    if (isnan(T))
+        return warnings_add(warnings, place,
+                            "gravity during contact is not corrected, and its effect is unknown "
+                            "without a contact time; \"gravity\": 0 states that there is none");
+    if (!(e > 0))
+        return STATUS_OK;
+    const GravityLoad load = {STANDARD_GRAVITY, row->approach_speed,
+                              (Separation)evaluation->separation,
+                              row->restitution_by == RESTITUTION_BY_HEIGHTS};
+    const GravityContact with = gravity_apply(&load, e, T);
+    static const char advice[] = "set \"gravity\": 9.80665 to correct it, 0 where there is none";
+    if (!(with.restitution > 0))
+        return warnings_add(warnings, place,
+                            "gravity during contact is not corrected: in a vertical drop at the "
+                            "slowest %.3g m/s a contact with this e and T_c would not end; %s",
+                            row->approach_speed, advice);
+    const double longer = with.contact_time / T - 1, lower = 1 - with.restitution / e;
+    if (!(fmax(longer, lower) > effect_min))
+        return STATUS_OK;
+    return warnings_add(
+        warnings, place,
+        "gravity during contact is not corrected: in a vertical drop at the slowest %.3g m/s it "
+        "lengthens a contact with this e and T_c by %.2g %% and lowers e by %.2g %%; %s",
+        row->approach_speed, 100 * longer, 100 * lower, advice);
+}
+
+// Heights give speeds by standard gravity, which need not be the gravity during contact.
+static Status evaluation_warn_of_heights(const Measurement *of, size_t test,
+                                         Evaluation *evaluation) {
+    const double gravity = of->test->gravity;
+    if (!(gravity > 0) || !(fabs(gravity / STANDARD_GRAVITY - 1) > effect_min))
+        return STATUS_OK;
+    bool is_by_height = false;
+    for (size_t i = 0; i < evaluation->rows.count; i++) {
+        const EvaluationRow *row = &evaluation->rows.at[i];
+        if (row->test != test || row->is_of_trace || !reading_counts(row))
+            continue;
+        const Drop *drop = &of->test->drops.at[row->place];
+        is_by_height = is_by_height || (!isnan(drop->approach_speed)
+                                            ? row->restitution_by == (int)RESTITUTION_BY_HEIGHTS
+                                            : !isnan(drop->drop_height));
+    }
+    char place[POINTER_SIZE];
+    measurement_pointer(of->number, "/gravity", place);
+    return !is_by_height
+               ? STATUS_OK
+               : warnings_add(&evaluation->warnings, place,
+                              "gravity during contact is %.4g m/s^2, but speeds follow from "
+                              "heights by %.6g m/s^2: where the impactor fell by another gravity, "
+                              "give approach_speed and rebound_speed",
+                              gravity, STANDARD_GRAVITY);
+}
+
+static Status evaluation_warn_of_pairs(const Measurement *tests, size_t count, Warnings *warnings) {
+    for (size_t i = 1; i < count; i++) {
+        char place[POINTER_SIZE];
+        measurement_pointer(tests[i].number, "", place);
+        const double first = drop_test_effective_mass(tests[0].test);
+        const double other = drop_test_effective_mass(tests[i].test);
+        if (fabs(other - first) > pair_tolerance * first)
+            TRY(warnings_add(warnings, place,
+                             "was made with another pair of masses: effective mass %.4g kg, that "
+                             "of the first is %.4g kg; e and T_c belong to a pair",
+                             other, first));
+    }
+    return STATUS_OK;
+}
+
+// FNV-1a; two of a hundred different tests practically never have the same 64 bits.
+static void evaluation_digest(void *context, const void *bytes, size_t size) {
+    uint64_t *sum = context;
+    const unsigned char *at = bytes;
+    for (size_t i = 0; i < size; i++)
+        *sum = (*sum ^ at[i]) * 1099511628211u;
+}
+
+// Tests that count and equal an earlier one in every member.
+static Status evaluation_warn_of_copies(const Measurement *tests, size_t count,
+                                        Evaluation *evaluation) {
+    const EvaluationRows *rows = &evaluation->rows;
+    uint64_t *sums = calloc(count + 1, sizeof *sums); // 0: does not count
+    Status status = sums != NULL ? STATUS_OK : STATUS_NO_MEMORY;
+    for (size_t i = 0; i < rows->count && status == STATUS_OK; i++)
+        if (reading_counts(&rows->at[i]))
+            sums[rows->at[i].test] = 14695981039346656037u;
+    for (size_t i = 0; i < count && status == STATUS_OK; i++) {
+        if (sums[i] == 0)
+            continue;
+        canonical_write(drop_test_fields, tests[i].test, evaluation_digest, &sums[i]);
+        size_t k = 0;
+        while (sums[k] != sums[i])
+            k++;
+        if (k == i)
+            continue;
+        char place[POINTER_SIZE], other[40] = "a test before it";
+        measurement_pointer(tests[i].number, "", place);
+        if (tests[k].number != COUNT_ABSENT)
+            snprintf(other, sizeof other, "measurement %llu", (unsigned long long)tests[k].number);
+        status = warnings_add(&evaluation->warnings, place,
+                              "is %s once more, equal in every member, and both count: if it was "
+                              "sent twice the standard errors are too small; leave one out",
+                              other);
+    }
+    free(sums);
+    return status;
+}
+
+// The shape of a pulse gives e too, but only as far as the buffer follows the model.
+static Status evaluation_warn_of_pulses(Evaluation *evaluation) {
+    bool is_by_pulse = false, is_left_out = false;
+    for (size_t i = 0; i < evaluation->rows.count; i++) {
+        const EvaluationRow *row = &evaluation->rows.at[i];
+        const bool is_pulse = row->restitution_by == RESTITUTION_BY_PULSE;
+        is_left_out =
+            is_left_out || (is_pulse && row->excluded == NULL && !row->restitution_counts);
+        is_by_pulse = is_by_pulse || (is_pulse && row->restitution_counts);
+    }
+    if (is_left_out)
+        return warnings_add(&evaluation->warnings, "",
+                            "the restitution from the shape of pulses is shown but does not "
+                            "count: heights or speeds are known");
+    if (is_by_pulse)
+        return warnings_add(&evaluation->warnings, "",
+                            "restitution follows from the shape of force pulses alone, which is "
+                            "right only for a buffer that follows the model; heights or speeds are "
+                            "more reliable");
+    return STATUS_OK;
+}
+
+static Status evaluation_warn_of_interval(Evaluation *evaluation) {
+    for (size_t i = 0; i < evaluation->rows.count && evaluation->contact_time.count == 0; i++) {
+        const EvaluationRow *row = &evaluation->rows.at[i];
+        char place[POINTER_SIZE];
+        reading_pointer(row, place);
+        if (row->excluded == NULL && !isnan(row->least_contact_time) &&
+            !isnan(row->most_contact_time))
+            return warnings_add(&evaluation->warnings, place,
+                                "no trace gives a value of the contact time; by %s it is between "
+                                "%.3g and %.3g s (%s)",
+                                row->from, row->least_contact_time, row->most_contact_time,
+                                row->note != NULL ? row->note : "no reason is known");
+    }
+    return STATUS_OK;
+}
+
+// Contacts of traces that count although their figures are doubtful.
+static Status evaluation_warn_of_doubt(Evaluation *evaluation) {
+    const EvaluationRow *first = NULL;
+    size_t count = 0;
+    for (size_t i = 0; i < evaluation->rows.count; i++) {
+        const EvaluationRow *row = &evaluation->rows.at[i];
+        if (!row->is_of_trace || !row->contact_time_counts || row->note == NULL)
+            continue;
+        first = first != NULL ? first : row;
+        count++;
+    }
+    if (first == NULL)
+        return STATUS_OK;
+    char place[POINTER_SIZE];
+    reading_pointer(first, place);
+    return warnings_add(&evaluation->warnings, place,
+                        "%zu contact%s of traces count%s though doubtful; %s: %s", count,
+                        count == 1 ? "" : "s", count == 1 ? "s" : "", first->from, first->note);
+}
+
+static Status evaluation_warn_of_outliers(Evaluation *evaluation) {
+    int warned[2] = {0, 0};
+    for (size_t i = 0; i < 2 * evaluation->rows.count; i++) {
+        const bool is_time = i % 2 == 1;
+        const EvaluationRow *row = &evaluation->rows.at[i / 2];
+        const Statistic *of = is_time ? &evaluation->contact_time : &evaluation->restitution;
+        if (!(is_time ? row->contact_time_is_outlier : row->restitution_is_outlier) ||
+            warned[is_time]++ >= OUTLIERS_MAX)
+            continue;
+        char place[POINTER_SIZE];
+        reading_pointer(row, place);
+        TRY(warnings_add(
+            &evaluation->warnings, place,
+            "%s %.4g of %s is %.1f robust deviations from the median; it counts: the mean is %.4g "
+            "with all readings and %.4g without outliers (%llu); a reading that is known to be "
+            "wrong needs \"excluded\" with the reason",
+            is_time ? "contact time" : "restitution",
+            is_time ? row->contact_time : row->restitution, row->from,
+            fabs(is_time ? row->contact_time_score : row->restitution_score), of->mean,
+            of->mean_without_outliers, (unsigned long long)of->outliers));
+    }
+    return STATUS_OK;
+}
+
+static Status evaluation_warn(const Measurement *tests, size_t count, Evaluation *evaluation) {
+    for (size_t i = 0; i < count; i++) {
+        TRY(evaluation_warn_of_gravity(&tests[i], i, evaluation));
+        TRY(evaluation_warn_of_heights(&tests[i], i, evaluation));
+    }
+    TRY(evaluation_warn_of_pairs(tests, count, &evaluation->warnings));
+    TRY(evaluation_warn_of_copies(tests, count, evaluation));
+    TRY(evaluation_warn_of_pulses(evaluation));
+    TRY(evaluation_warn_of_interval(evaluation));
+    TRY(evaluation_warn_of_doubt(evaluation));
+    return evaluation_warn_of_outliers(evaluation);
+}
+
 Status evaluation_run(const Measurement *tests, size_t count, Separation separation,
                       const Progress *progress, Evaluation *evaluation, Problem *problem) {
     *evaluation = (Evaluation){.separation = (int)separation,
@@ -97,8 +640,13 @@ Status evaluation_run(const Measurement *tests, size_t count, Separation separat
                            "more than %d samples in traces, %zu: evaluate fewer measurements at a "
                            "time",
                            EVALUATION_SAMPLES_MAX, samples);
-    for (size_t i = 0; i < count; i++)
-        TRY(readings_add(tests, i, (int)separation, progress, rows, problem));
+    for (size_t i = 0; i < count; i++) {
+        const ReadingList list = {&tests[i], i, (int)separation, progress, rows, problem};
+        for (size_t k = 0; k < tests[i].test->drops.count; k++)
+            TRY(reading_add_drop(&list, k));
+        for (size_t k = 0; k < tests[i].test->traces.count; k++)
+            TRY(reading_add_trace(&list, k));
+    }
     TRY(readings_correct_gravity(tests, count, (int)separation, progress, rows, problem));
     evaluation_choose_restitutions(rows);
     for (size_t i = 0; i < rows->count; i++)
@@ -109,10 +657,8 @@ Status evaluation_run(const Measurement *tests, size_t count, Separation separat
     for (int is_time = 0; is_time < 2 && status == STATUS_OK; is_time++)
         status = evaluation_set_statistic(is_time == 1, readings, evaluation, problem);
     free(readings);
-    const EvaluationResult result = {(int)separation, rows, &evaluation->restitution,
-                                     &evaluation->contact_time};
     if (status == STATUS_OK)
-        status = evaluation_warnings_add(tests, count, &result, &evaluation->warnings);
+        status = evaluation_warn(tests, count, evaluation);
     return status == STATUS_OK
                ? STATUS_OK
                : problem_set(problem, STATUS_NO_MEMORY, "no memory for the evaluation");

@@ -3,11 +3,57 @@
 #ifndef CORE_DROP_TEST_EVALUATION_H
 #define CORE_DROP_TEST_EVALUATION_H
 
+#include "core/base/progress.h"
 #include "core/base/report.h"
 #include "core/contact/contact.h"
-#include "core/drop_test/readings.h"
+#include "core/drop_test/drop_test.h"
+#include "core/drop_test/force_trace.h"
+#include "core/drop_test/reading_statistics.h"
 
-enum { EVALUATION_SAMPLES_MAX = 4 * TRACE_SAMPLES_MAX };
+enum { EVALUATION_ROWS_MAX = 20000, EVALUATION_SAMPLES_MAX = 4 * TRACE_SAMPLES_MAX };
+
+// A test and its number within the material; COUNT_ABSENT: not numbered yet. Borrowed.
+typedef struct Measurement {
+    uint64_t number;
+    const DropTest *test;
+} Measurement;
+
+// The source of a row's e and T_c.
+typedef enum RestitutionBy {
+    RESTITUTION_BY_HEIGHTS,
+    RESTITUTION_BY_SPEEDS,
+    RESTITUTION_BY_PULSE
+} RestitutionBy;
+typedef enum ContactTimeBy { CONTACT_TIME_BY_DURATION, CONTACT_TIME_BY_PULSE } ContactTimeBy;
+
+// One drop, or one contact of a trace. Uncertainties are standard uncertainties; unknown values are
+// NAN, CHOICE_ABSENT or NULL.
+typedef struct EvaluationRow {
+    uint64_t measurement;                              // its number; COUNT_ABSENT
+    char *from;                                        // "drop 3"; "trace 1, contact 2"
+    uint64_t trace;                                    // from 1; COUNT_ABSENT: a drop
+    double approach_speed, approach_speed_uncertainty; // [m/s]
+    double restitution, restitution_uncertainty;       // [-]
+    int restitution_by;                                // RestitutionBy
+    double contact_time, contact_time_uncertainty;     // [s]
+    int contact_time_by;                               // ContactTimeBy
+    double least_contact_time, most_contact_time;      // of a trace, 95 % [s]
+    double read_restitution, read_contact_time; // before the correction of gravity; NAN: none made
+    bool restitution_counts, contact_time_counts;
+    double restitution_score, contact_time_score; // robust deviations from the median
+    bool restitution_is_outlier, contact_time_is_outlier;
+    char *excluded;         // why neither counts
+    char *note;             // further remarks
+    TraceDetection contact; // as detected in the trace
+    // Not written to JSON:
+    bool is_of_trace; // `place` is an index of /traces, not of /drops
+    size_t place;
+    size_t test; // index of the Measurement
+} EvaluationRow;
+typedef struct EvaluationRows {
+    EvaluationRow *at;
+    size_t count;
+} EvaluationRows;
 
 // Conditions of the rows that count; NAN: unknown.
 typedef struct Ranges {
@@ -36,6 +82,12 @@ size_t evaluation_sample_count(const Measurement *tests, size_t count);
 Status evaluation_run(const Measurement *tests, size_t count, Separation separation,
                       const Progress *progress, Evaluation *evaluation, Problem *problem);
 void evaluation_clear(Evaluation *evaluation);
+
+// Whether e or T_c of a row counts.
+bool reading_counts(const EvaluationRow *row);
+
+// T_c or e of a row; false: it does not count.
+bool reading_get(const EvaluationRow *row, bool is_time, Reading *reading);
 
 // All NAN, and extended by a row.
 extern const Ranges ranges_unknown;

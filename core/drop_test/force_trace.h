@@ -7,7 +7,7 @@
 #include "core/base/progress.h"
 #include "core/contact/contact.h"
 
-enum { TRACE_PULSE = 33 };
+enum { TRACE_PULSE = 33, TRACE_CONTACTS_MAX = 200 };
 
 // How a trace is evaluated.
 typedef struct TraceOptions {

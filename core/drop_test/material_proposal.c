@@ -30,32 +30,36 @@ static Status proposal_describe(const Material *before, Material *material) {
     return fields_copy(material_fields, &described, material);
 }
 
-// The rows that a revision is based on; by rising speed for a table.
-typedef struct Basis {
-    const EvaluationRow **rows;
-    size_t count;
-    Measurement *tests; // of the rows, in order
+// A proposal in progress. The lists have room for all rows of the evaluation, or all tests.
+typedef struct Proposal {
+    Evaluation *evaluation;
+    const Measurement *tests;
     size_t test_count;
-} Basis;
+    const EvaluationRow **rows; // that the revision is based on; of a table by rising speed
+    size_t row_count;
+    const Measurement **sources; // the tests of these rows, in order
+    size_t source_count;
+    Reading *readings; // scratch
+    MaterialProposal *result;
+} Proposal;
 
 static bool proposal_is_same(double a, double b) {
     return a == b || (isnan(a) && isnan(b));
 }
 
 // Impactor and base, if all tests have the same.
-static Status proposal_set_pair(const Basis *basis, Material *material, Warnings *warnings) {
-    const DropTest *first = basis->tests[0].test;
-    bool is_one = true;
-    for (size_t i = 1; i < basis->test_count; i++) {
-        const DropTest *test = basis->tests[i].test;
-        is_one = is_one && text_same(test->impactor, first->impactor) &&
-                 proposal_is_same(test->impactor_mass, first->impactor_mass) &&
-                 test->base == first->base && proposal_is_same(test->base_mass, first->base_mass);
+static Status proposal_set_pair(const Proposal *proposal) {
+    Material *material = &proposal->result->material;
+    const DropTest *first = proposal->sources[0]->test;
+    for (size_t i = 1; i < proposal->source_count; i++) {
+        const DropTest *test = proposal->sources[i]->test;
+        if (!text_same(test->impactor, first->impactor) || test->base != first->base ||
+            !proposal_is_same(test->impactor_mass, first->impactor_mass) ||
+            !proposal_is_same(test->base_mass, first->base_mass))
+            return warnings_add(&proposal->evaluation->warnings, "/revision/impactor_mass",
+                                "impactor and base are left out: the measurements were made with "
+                                "different ones");
     }
-    if (!is_one)
-        return warnings_add(warnings, "/revision/impactor_mass",
-                            "impactor and base are left out: the measurements were made with "
-                            "different ones");
     material->impactor_mass = first->impactor_mass;
     material->base = first->base;
     material->base_mass = first->base_mass;
@@ -65,22 +69,23 @@ static Status proposal_set_pair(const Basis *basis, Material *material, Warnings
 }
 
 // The different sources of the tests, else their numbers.
-static Status proposal_set_source(const Basis *basis, Material *material) {
+static Status proposal_set_source(const Proposal *proposal) {
+    Material *material = &proposal->result->material;
+    const Measurement *const *sources = proposal->sources;
+    const size_t count = proposal->source_count;
     char text[SOURCE_MAX + 1] = "", number[32];
-    const Measurement *tests = basis->tests;
-    const size_t count = basis->test_count;
     for (size_t i = 0; i < count; i++) {
         size_t first = 0;
-        while (!text_same(tests[first].test->source, tests[i].test->source))
+        while (!text_same(sources[first]->test->source, sources[i]->test->source))
             first++;
-        if (tests[i].test->source != NULL && first == i)
-            text_list(text, sizeof text, tests[i].test->source);
+        if (sources[i]->test->source != NULL && first == i)
+            text_list(text, sizeof text, sources[i]->test->source);
     }
     if (text[0] == '\0') {
         snprintf(text, sizeof text, "measurements of this material:");
-        for (size_t i = 0; i < count && tests[i].number != COUNT_ABSENT; i++) {
+        for (size_t i = 0; i < count && sources[i]->number != COUNT_ABSENT; i++) {
             snprintf(number, sizeof number, "%s%llu", i > 0 ? ", " : " ",
-                     (unsigned long long)tests[i].number);
+                     (unsigned long long)sources[i]->number);
             if (strlen(text) + strlen(number) < sizeof text)
                 memcpy(text + strlen(text), number, strlen(number) + 1);
         }
@@ -89,48 +94,53 @@ static Status proposal_set_source(const Basis *basis, Material *material) {
     if (material->source == NULL || !reals_allocate(&material->measurements, count))
         return STATUS_NO_MEMORY;
     for (size_t i = 0; i < count; i++)
-        material->measurements.at[i] = (double)tests[i].number;
+        material->measurements.at[i] = (double)sources[i]->number;
     return STATUS_OK;
 }
 
-// Ranges, separation rule, pair and source. `tests` of the basis has room for all.
-static Status proposal_set_basis(Evaluation *evaluation, const Measurement *tests, size_t count,
-                                 Basis *basis, Material *material) {
+// Ranges, separation rule, pair and source.
+static Status proposal_set_basis(Proposal *proposal) {
+    Material *material = &proposal->result->material;
     Ranges ranges = ranges_unknown;
-    for (size_t i = 0; i < basis->count; i++) {
-        const EvaluationRow *row = basis->rows[i];
-        ranges_extend(&ranges, row, tests);
+    for (size_t i = 0; i < proposal->row_count; i++) {
+        const EvaluationRow *row = proposal->rows[i];
+        ranges_extend(&ranges, row, proposal->tests);
         if (row->contact_time_counts && row->contact_time_by == (int)CONTACT_TIME_BY_PULSE)
-            material->separation = evaluation->separation;
+            material->separation = proposal->evaluation->separation;
     }
-    for (size_t test = 0; test < count; test++)
-        for (size_t i = 0; i < basis->count; i++)
-            if (basis->rows[i]->test == test) {
-                basis->tests[basis->test_count++] = tests[test];
-                break;
-            }
+    for (size_t test = 0; test < proposal->test_count; test++) {
+        size_t i = 0;
+        while (i < proposal->row_count && proposal->rows[i]->test != test)
+            i++;
+        if (i < proposal->row_count)
+            proposal->sources[proposal->source_count++] = &proposal->tests[test];
+    }
     material->least_speed = ranges.least_speed;
     material->most_speed = ranges.most_speed;
     material->least_temperature = ranges.least_temperature;
     material->most_temperature = ranges.most_temperature;
-    TRY(proposal_set_pair(basis, material, &evaluation->warnings));
-    return proposal_set_source(basis, material);
+    TRY(proposal_set_pair(proposal));
+    return proposal_set_source(proposal);
 }
 
-static Status proposal_set_constant(Evaluation *evaluation, Basis *basis,
-                                    MaterialProposal *proposal) {
-    Material *material = &proposal->material;
-    Warnings *warnings = &evaluation->warnings;
-    const Statistic *e = &evaluation->restitution, *T = &evaluation->contact_time;
+static Status proposal_refuse(bool is_made) {
+    return is_made ? STATUS_OK : STATUS_NO_MEMORY;
+}
+
+static Status proposal_set_constant(Proposal *proposal) {
+    Material *material = &proposal->result->material;
+    const EvaluationRows *rows = &proposal->evaluation->rows;
+    Warnings *warnings = &proposal->evaluation->warnings;
+    const Statistic *e = &proposal->evaluation->restitution,
+                    *T = &proposal->evaluation->contact_time;
     if (e->count == 0)
-        return text_format(&proposal->why,
-                           "no reading that counts gives the restitution, which a "
-                           "revision needs: add a measurement with heights or speeds")
-                   ? STATUS_OK
-                   : STATUS_NO_MEMORY;
-    for (size_t i = 0; i < evaluation->rows.count; i++)
-        if (reading_counts(&evaluation->rows.at[i]))
-            basis->rows[basis->count++] = &evaluation->rows.at[i];
+        return proposal_refuse(text_format(&proposal->result->why,
+                                           "no reading that counts gives the restitution, which a "
+                                           "revision needs: add a measurement with heights or "
+                                           "speeds"));
+    for (size_t i = 0; i < rows->count; i++)
+        if (reading_counts(&rows->at[i]))
+            proposal->rows[proposal->row_count++] = &rows->at[i];
     material->restitution = e->mean;
     material->restitution_deviation = e->spread;
     material->contact_time = T->mean;
@@ -145,143 +155,125 @@ static Status proposal_set_constant(Evaluation *evaluation, Basis *basis,
                                        "impulsive contact only");
 }
 
-// The rows of the basis that make one row of the table.
-typedef struct Bin {
-    size_t first, count;
-    bool has_restitution, has_time;
-} Bin;
-
 static int proposal_compare(const void *a, const void *b) {
     const double left = (*(const EvaluationRow *const *)a)->approach_speed;
     const double right = (*(const EvaluationRow *const *)b)->approach_speed;
-    return left < right ? -1 : left > right ? 1 : 0;
+    return (left > right) - (left < right);
 }
 
-// Collects the rows that count and have a speed, in bins. `bins` has room for all rows.
-static size_t proposal_make_bins(const Evaluation *evaluation, Basis *basis, Bin *bins) {
-    size_t count = 0;
-    for (size_t i = 0; i < evaluation->rows.count; i++) {
-        const EvaluationRow *row = &evaluation->rows.at[i];
-        if (reading_counts(row) && !isnan(row->approach_speed))
-            basis->rows[basis->count++] = row;
-    }
-    if (basis->count > 0)
-        qsort(basis->rows, basis->count, sizeof(const EvaluationRow *), proposal_compare);
-    for (size_t i = 0; i < basis->count; i++) {
-        const EvaluationRow *row = basis->rows[i];
-        if (count == 0 ||
-            row->approach_speed > PROPOSAL_BIN * basis->rows[bins[count - 1].first]->approach_speed)
-            bins[count++] = (Bin){.first = i};
-        Bin *bin = &bins[count - 1];
-        bin->count++;
-        bin->has_restitution = bin->has_restitution || row->restitution_counts;
-        bin->has_time = bin->has_time || row->contact_time_counts;
-    }
-    return count;
+// Collects the rows that count and have a speed, in the order of their speeds.
+static void proposal_sort_rows(Proposal *proposal) {
+    const EvaluationRows *rows = &proposal->evaluation->rows;
+    for (size_t i = 0; i < rows->count; i++)
+        if (reading_counts(&rows->at[i]) && !isnan(rows->at[i].approach_speed))
+            proposal->rows[proposal->row_count++] = &rows->at[i];
+    if (proposal->row_count > 0)
+        qsort(proposal->rows, proposal->row_count, sizeof *proposal->rows, proposal_compare);
 }
 
-// Every row of a table needs e, and T_c if any has it: drops the other bins with their rows.
-static size_t proposal_keep_bins(Basis *basis, Bin *bins, size_t count, bool *has_time) {
-    size_t kept = 0, rows = 0;
-    *has_time = false;
-    for (size_t i = 0; i < count; i++)
-        *has_time = *has_time || bins[i].has_time;
-    for (size_t i = 0; i < count; i++) {
-        if (!bins[i].has_restitution || (*has_time && !bins[i].has_time))
-            continue;
-        bins[kept] = bins[i];
-        bins[kept].first = rows;
-        for (size_t k = 0; k < bins[i].count; k++)
-            basis->rows[rows++] = basis->rows[bins[i].first + k];
-        kept++;
-    }
-    basis->count = rows;
-    return kept;
+// Number of rows from `first` on whose speeds make one row of the table.
+static size_t proposal_bin(const Proposal *proposal, size_t first) {
+    size_t end = first;
+    while (end < proposal->row_count && !(proposal->rows[end]->approach_speed >
+                                          PROPOSAL_BIN * proposal->rows[first]->approach_speed))
+        end++;
+    return end - first;
 }
 
-// Mean and deviation of T_c or e in a bin, by the same rule as over all readings.
-static Status proposal_fold(const Basis *basis, const Bin *bin, bool is_time, Reading *readings,
+// Mean and deviation of T_c or e of rows, by the same rule as over all readings.
+static Status proposal_mean(const Proposal *proposal, size_t first, size_t count, bool is_time,
                             double *mean, double *deviation) {
-    size_t count = 0;
-    for (size_t i = 0; i < bin->count; i++)
-        count += reading_get(basis->rows[bin->first + i], is_time, &readings[count]);
+    size_t found = 0;
+    for (size_t i = first; i < first + count; i++)
+        found += reading_get(proposal->rows[i], is_time, &proposal->readings[found]);
     Statistic statistic;
-    const Status status = reading_statistics_run(readings, count, "reading", "", &statistic, NULL);
+    const Status status =
+        reading_statistics_run(proposal->readings, found, "reading", "", &statistic, NULL);
     *mean = statistic.mean;
     *deviation = statistic.spread;
     fields_clear(reading_statistic_fields, &statistic);
     return status;
 }
 
-static Status proposal_fill_table(const Basis *basis, const Bin *bins, size_t count,
-                                  Reading *readings, MaterialRows *table) {
-    table->at = calloc(count, sizeof *table->at);
+// A row of the table for each bin. Every row needs e, and T_c if any has it: the other bins are
+// left out with their readings. `*all` is the number of bins.
+static Status proposal_fill_table(Proposal *proposal, bool has_time, size_t *all) {
+    MaterialRows *table = &proposal->result->material.table;
+    size_t kept = 0;
+    *all = 0;
+    table->at = calloc(proposal->row_count + 1, sizeof *table->at);
     if (table->at == NULL)
         return STATUS_NO_MEMORY;
-    table->count = count;
-    for (size_t i = 0; i < count; i++) {
-        MaterialRow *row = &table->at[i];
-        double sum = 0;
-        for (size_t k = 0; k < bins[i].count; k++)
-            sum += basis->rows[bins[i].first + k]->approach_speed;
-        row->approach_speed = sum / (double)bins[i].count;
-        TRY(proposal_fold(basis, &bins[i], false, readings, &row->restitution,
-                          &row->restitution_deviation));
-        TRY(proposal_fold(basis, &bins[i], true, readings, &row->contact_time,
-                          &row->contact_time_deviation));
+    for (size_t first = 0, count; first < proposal->row_count; first += count, ++*all) {
+        MaterialRow row = {0};
+        count = proposal_bin(proposal, first);
+        for (size_t i = first; i < first + count; i++)
+            row.approach_speed += proposal->rows[i]->approach_speed;
+        row.approach_speed /= (double)count;
+        TRY(proposal_mean(proposal, first, count, false, &row.restitution,
+                          &row.restitution_deviation));
+        TRY(proposal_mean(proposal, first, count, true, &row.contact_time,
+                          &row.contact_time_deviation));
+        if (isnan(row.restitution) || (has_time && isnan(row.contact_time)))
+            continue;
+        memmove(&proposal->rows[kept], &proposal->rows[first], count * sizeof *proposal->rows);
+        kept += count;
+        table->at[table->count++] = row;
     }
+    proposal->row_count = kept;
     return STATUS_OK;
 }
 
-// `bins` and `readings` have room for all rows and one more.
-static Status proposal_set_table(Evaluation *evaluation, Basis *basis, Bin *bins, Reading *readings,
-                                 MaterialProposal *proposal) {
-    bool has_time;
-    const size_t all = proposal_make_bins(evaluation, basis, bins);
-    const size_t kept = proposal_keep_bins(basis, bins, all, &has_time);
-    if (kept < 2 || kept > MATERIAL_ROWS)
-        return text_format(
-                   &proposal->why,
-                   "a table needs e%s at two approach speeds at least (%g times one another), "
-                   "%d at most; the readings have %zu",
-                   has_time ? " and T_c" : "", PROPOSAL_BIN, MATERIAL_ROWS, kept)
-                   ? STATUS_OK
-                   : STATUS_NO_MEMORY;
-    TRY(proposal_fill_table(basis, bins, kept, readings, &proposal->material.table));
-    if (kept < all)
-        TRY(warnings_add(&evaluation->warnings, "/revision/table",
-                         "%zu of %zu speeds are left out: e%s is not known there", all - kept, all,
+static Status proposal_set_table(Proposal *proposal) {
+    Warnings *warnings = &proposal->evaluation->warnings;
+    const size_t *kept = &proposal->result->material.table.count;
+    bool has_time = false;
+    size_t all;
+    proposal_sort_rows(proposal);
+    for (size_t i = 0; i < proposal->row_count; i++)
+        has_time = has_time || proposal->rows[i]->contact_time_counts;
+    TRY(proposal_fill_table(proposal, has_time, &all));
+    if (*kept < 2 || *kept > MATERIAL_ROWS)
+        return proposal_refuse(text_format(
+            &proposal->result->why,
+            "a table needs e%s at two approach speeds at least (%g times one another), %d at most; "
+            "the readings have %zu",
+            has_time ? " and T_c" : "", PROPOSAL_BIN, MATERIAL_ROWS, *kept));
+    if (*kept < all)
+        TRY(warnings_add(warnings, "/revision/table",
+                         "%zu of %zu speeds are left out: e%s is not known there", all - *kept, all,
                          has_time ? " or T_c" : ""));
     return has_time ? STATUS_OK
-                    : warnings_add(&evaluation->warnings, "/revision/table",
+                    : warnings_add(warnings, "/revision/table",
                                    "no contact time is known at any speed: the material can be "
                                    "used with impulsive contact only");
 }
 
 Status material_proposal_run(Evaluation *evaluation, const Measurement *tests, size_t count,
-                             const Material *before, ProposalForm form, MaterialProposal *proposal,
+                             const Material *before, ProposalForm form, MaterialProposal *result,
                              Problem *problem) {
-    *proposal = (MaterialProposal){.why = NULL};
+    *result = (MaterialProposal){.why = NULL};
     const size_t room = evaluation->rows.count + 1;
-    Basis basis = {.rows = calloc(room, sizeof(const EvaluationRow *)),
-                   .tests = calloc(count + 1, sizeof(Measurement))};
-    Bin *bins = calloc(room, sizeof *bins);
-    Reading *readings = calloc(room, sizeof *readings);
-    Status status = basis.rows != NULL && basis.tests != NULL && bins != NULL && readings != NULL
-                        ? proposal_describe(before, &proposal->material)
+    Proposal proposal = {.evaluation = evaluation,
+                         .tests = tests,
+                         .test_count = count,
+                         .rows = calloc(room, sizeof *proposal.rows),
+                         .sources = calloc(count + 1, sizeof *proposal.sources),
+                         .readings = calloc(room, sizeof *proposal.readings),
+                         .result = result};
+    Status status = proposal.rows != NULL && proposal.sources != NULL && proposal.readings != NULL
+                        ? proposal_describe(before, &result->material)
                         : STATUS_NO_MEMORY;
     if (status == STATUS_OK)
-        status = form == PROPOSAL_TABLE
-                     ? proposal_set_table(evaluation, &basis, bins, readings, proposal)
-                     : proposal_set_constant(evaluation, &basis, proposal);
-    if (status == STATUS_OK && proposal->why == NULL)
-        status = proposal_set_basis(evaluation, tests, count, &basis, &proposal->material);
-    free(basis.rows);
-    free(basis.tests);
-    free(bins);
-    free(readings);
-    if (status != STATUS_OK || proposal->why != NULL)
-        fields_clear(material_fields, &proposal->material);
+        status = form == PROPOSAL_TABLE ? proposal_set_table(&proposal)
+                                        : proposal_set_constant(&proposal);
+    if (status == STATUS_OK && result->why == NULL)
+        status = proposal_set_basis(&proposal);
+    free(proposal.rows);
+    free(proposal.sources);
+    free(proposal.readings);
+    if (status != STATUS_OK || result->why != NULL)
+        fields_clear(material_fields, &result->material);
     return status == STATUS_OK
                ? STATUS_OK
                : problem_set(problem, STATUS_NO_MEMORY, "no memory for the proposal");

@@ -8,8 +8,8 @@
 // itself.
 #include "core/drop_test/pair_parameters.h"
 
+#include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "core/contact/identification.h"
 #include "core/math/student_t.h"
@@ -37,7 +37,7 @@ static const Field contact_rows[] = {
 const Field pair_parameters_fields[] = {
     FIELD_REAL(PairParameters, damper_mass, "kg", ANY, OPTIONAL, "the free mass"),
     FIELD_REAL(PairParameters, structure_mass, "kg", ANY, OPTIONAL, "of the structure that it strikes; null: fixed"),
-    FIELD_CHOICE(PairParameters, identified_for, identified_for_names, OPTIONAL, "whose e and T_c the material's are"),
+    FIELD_CHOICE(PairParameters, identified_for, identified_for_names, OPTIONAL, "pair to which e and T_c of the material belong"),
     FIELD_REAL(PairParameters, effective_mass, "kg", ANY, OPTIONAL, "of this pair"),
     FIELD_REAL(PairParameters, test_mass, "kg", ANY, OPTIONAL, "effective mass of the test's pair"),
     FIELD_REAL(PairParameters, least_speed, "m/s", ANY, OPTIONAL, "slowest approach that was measured"),
@@ -123,14 +123,11 @@ static void pair_spread(const PairCase *pair_case, const PairRow *known, double 
 }
 
 static PairContact pair_contact(const PairCase *pair_case, const PairRow *known) {
-    const PairFigure none = pair_figure((double)NAN, 0);
-    PairContact contact = {.separation = (int)pair_case->separation,
-                           .approach_speed = known->speed,
-                           .restitution = pair_figure(known->e, known->r_e),
-                           .contact_time = none,
-                           .stiffness = none,
-                           .damping = none,
-                           .damping_ratio = none};
+    PairContact contact = {.separation = 0};
+    fields_clear(contact_rows, &contact);
+    contact.separation = (int)pair_case->separation;
+    contact.approach_speed = known->speed;
+    contact.restitution = pair_figure(known->e, known->r_e);
     if (!(known->e > 0))
         return contact;
     // Z does not depend on the contact time.
@@ -173,36 +170,32 @@ static Status pair_fill(const Material *material, int separation, PairParameters
 
 static Status pair_warn_of_mass(const Material *material, PairParameters *pair) {
     const double mass = pair->effective_mass, test = pair->test_mass;
-    const bool is_rig = pair->identified_for == IDENTIFIED_FOR_RIG;
     if (isnan(test))
         return warnings_add(&pair->warnings, "/test_mass",
                             "the masses of the test are unknown: e and T_c belong to its pair, and "
                             "how far this pair differs is unknown");
     if (!(fabs(mass - test) > mass_tolerance * test))
         return STATUS_OK;
-    const double percent = 100 * fabs(mass / test - 1);
-    const char *side = mass > test ? "above" : "below";
-    if (is_rig)
-        return warnings_add(&pair->warnings, "/effective_mass",
-                            "this pair's effective mass of %.4g kg is %.3g %% %s the test's %.4g "
-                            "kg: k_b and c_b are those of the test, e and T_c follow from them",
-                            mass, percent, side, test);
+    char differs[128];
+    snprintf(differs, sizeof differs,
+             "this pair's effective mass of %.4g kg is %.3g %% %s the test's %.4g kg", mass,
+             100 * fabs(mass / test - 1), mass > test ? "above" : "below", test);
     const PairRow known = pair_row(material, 0);
-    const int rule = pair->contacts.at[0].separation;
-    if (isnan(known.T) || !(known.e > 0))
+    if (pair->identified_for == IDENTIFIED_FOR_RIG)
         return warnings_add(&pair->warnings, "/effective_mass",
-                            "this pair's effective mass of %.4g kg is %.3g %% %s the test's %.4g "
-                            "kg: e belongs to the test's pair",
-                            mass, percent, side, test);
-    const PairCase pair_case = {mass, test, IDENTIFIED_FOR_RIG, (Separation)rule};
+                            "%s: k_b and c_b are those of the test, e and T_c follow from them",
+                            differs);
+    if (isnan(known.T) || !(known.e > 0))
+        return warnings_add(&pair->warnings, "/effective_mass", "%s: e belongs to the test's pair",
+                            differs);
+    const PairCase pair_case = {mass, test, IDENTIFIED_FOR_RIG,
+                                (Separation)pair->contacts.at[0].separation};
     const Identification it = pair_identify(&pair_case, known.e, known.T);
     return warnings_add(&pair->warnings, "/effective_mass",
-                        "this pair's effective mass of %.4g kg is %.3g %% %s the test's %.4g kg: "
-                        "e and T_c belong to the test's pair; were k_b and c_b those of the test "
-                        "(identified_for=rig), e would be %.3g in place of %.3g and T_c %.3g s in "
-                        "place of %.3g s",
-                        mass, percent, side, test, it.restitution, known.e, it.contact_time,
-                        known.T);
+                        "%s: e and T_c belong to the test's pair; were k_b and c_b those of the "
+                        "test (identified_for=rig), e would be %.3g in place of %.3g and T_c %.3g "
+                        "s in place of %.3g s",
+                        differs, it.restitution, known.e, it.contact_time, known.T);
 }
 
 static Status pair_warn_of_material(const Material *material, int separation,
@@ -282,6 +275,7 @@ Status pair_parameters_run(const Material *material, double damper_mass, double 
         status = pair_warn_of_material(material, separation, pair);
     if (status == STATUS_OK)
         status = pair_warn_of_overdamping(pair);
-    return status == STATUS_OK ? STATUS_OK
-                               : problem_set(problem, STATUS_NO_MEMORY, "no memory for it");
+    return status == STATUS_OK
+               ? STATUS_OK
+               : problem_set(problem, STATUS_NO_MEMORY, "no memory for the parameters");
 }

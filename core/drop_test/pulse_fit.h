@@ -1,5 +1,5 @@
 // Least-squares fit of the model's pulse to one window of a force trace: start, end, decay,
-// amplitude and baseline.
+// amplitude and baseline, and the uncertainty of the fit.
 #ifndef CORE_DROP_TEST_PULSE_FIT_H
 #define CORE_DROP_TEST_PULSE_FIT_H
 
@@ -36,12 +36,6 @@ typedef struct FitResidual {
     double model_square; // of the model about its mean, at unit amplitude
 } FitResidual;
 
-// Bounds of start, end and L. The same samples are in contact all over a box of one gap.
-typedef struct FitBox {
-    double least[FIT_PARTS], most[FIT_PARTS];
-    long first, last; // first sample in contact at least, last one at most
-} FitBox;
-
 typedef struct PulseFit {
     FitPoint at;
     long first, last; // samples in contact
@@ -50,15 +44,9 @@ typedef struct PulseFit {
     double curvature[FIT_PARTS][FIT_PARTS]; // Gauss-Newton
 } PulseFit;
 
-// `start` in (first - gaps, first], `end` in [last, last + gaps).
-FitBox fit_box_make(long first, long last, long gaps);
-
 // The pulse at a point and its T_c [sample intervals]; false: no such contact exists.
 bool pulse_fit_model(const FitWindow *window, const FitPoint *point, PulseModel *model,
                      double *contact_time);
-
-// The minimum within a box, from `fit->at`.
-void pulse_fit_in_box(const FitWindow *window, const FitBox *box, PulseFit *fit);
 
 // Local minima from pulses of six decays, the best first. Returns their number.
 size_t pulse_fit_run(const FitWindow *window, PulseFit fits[FITS_MAX]);
@@ -66,9 +54,18 @@ size_t pulse_fit_run(const FitWindow *window, PulseFit fits[FITS_MAX]);
 // Improves a fit that was made with another pull_rate.
 void pulse_fit_continue(const FitWindow *window, PulseFit *fit);
 
-// Logarithm of the likelihood of a sum of squares under noise of unknown variance, up to a
-// constant; and that variance.
-double pulse_fit_log_likelihood(const FitWindow *window, double sum);
-double pulse_fit_variance(const FitWindow *window, double sum);
+// Distribution of T_c and L over all gaps between samples in which the contact may start and end.
+typedef struct Posterior {
+    double mean, deviation;
+} Posterior;
+typedef struct FitConfidence {
+    Posterior contact_time, decay; // [sample intervals], [-]
+    double least, most;            // 95 % interval of contact_time
+} FitConfidence;
+
+// Of the fits that pulse_fit_run found; is_form_sure: the best one leaves only noise.
+// STATUS_NO_MEMORY.
+Status pulse_fit_confidence(const FitWindow *window, const PulseFit *fits, size_t count,
+                            bool is_form_sure, FitConfidence *confidence);
 
 #endif

@@ -26,36 +26,36 @@ static const Field trend_fields[] = {
     FIELD_COUNT(Trend, count, NULL, AT_MIN(0), OPTIONAL, "readings with a speed"),
     FIELD_REAL(Trend, least_speed, "m/s", ANY, OPTIONAL, "the slowest of them"),
     FIELD_REAL(Trend, most_speed, "m/s", ANY, OPTIONAL, "the fastest"),
-    FIELD_REAL(Trend, mean_speed, "m/s", ANY, OPTIONAL, "which the line goes through"),
-    FIELD_REAL(Trend, mean_value, NULL, ANY, OPTIONAL, "there"),
-    FIELD_REAL(Trend, slope, NULL, ANY, OPTIONAL, "per m/s, by least squares"),
+    FIELD_REAL(Trend, mean_speed, "m/s", ANY, OPTIONAL, "mean speed of these readings; a point of the line"),
+    FIELD_REAL(Trend, mean_value, NULL, ANY, OPTIONAL, "value of the line at mean_speed"),
+    FIELD_REAL(Trend, slope, NULL, ANY, OPTIONAL, "slope of the line by least squares, per m/s"),
     FIELD_REAL(Trend, standard_error, NULL, ANY, OPTIONAL, "of the slope"),
     FIELD_REAL(Trend, low, NULL, ANY, OPTIONAL, "95 % interval of the slope"),
     FIELD_REAL(Trend, high, NULL, ANY, OPTIONAL, "likewise"),
     FIELD_REAL(Trend, t, NULL, ANY, OPTIONAL, "slope over standard error"),
-    FIELD_REAL(Trend, p, NULL, ANY, OPTIONAL, "chance of at least such a slope where there is none"),
-    FIELD_REAL(Trend, change, NULL, ANY, OPTIONAL, "that the line makes from the slowest to the fastest"),
-    FIELD_REAL(Trend, missed_change, NULL, ANY, OPTIONAL, "the largest such change that the data do not rule out, 95 %"),
-    FIELD_CHOICE(Trend, verdict, trend_verdict_names, OPTIONAL, "not_constant: a slope is shown, p < 0.05; constant: none is, and a change of 20 % would have been seen; undecided: it would not; null: no test can be made"),
+    FIELD_REAL(Trend, p, NULL, ANY, OPTIONAL, "probability of at least such a slope if there is none"),
+    FIELD_REAL(Trend, change, NULL, ANY, OPTIONAL, "change of the line from the slowest to the fastest"),
+    FIELD_REAL(Trend, missed_change, NULL, ANY, OPTIONAL, "largest such change that the data do not rule out, 95 %"),
+    FIELD_CHOICE(Trend, verdict, trend_verdict_names, OPTIONAL, "not_constant: there is a significant slope, p < 0.05; constant: there is none, and a change of 20 % would have been detected; undecided: it would not have been; null: no test is possible"),
     FIELD_TEXT(Trend, detail, 0, PRESENCE_OPTIONAL, 0, "the verdict in words"),
     FIELD_END
 };
 
 const Field reading_statistic_fields[] = {
     FIELD_COUNT(Statistic, count, NULL, AT_MIN(0), OPTIONAL, "readings that count"),
-    FIELD_REAL(Statistic, mean, NULL, ANY, OPTIONAL, "of all that count; where at least four do and all state their uncertainty, weighted by that and scatter"),
-    FIELD_REAL(Statistic, unweighted_mean, NULL, ANY, OPTIONAL, "of the readings as they are"),
+    FIELD_REAL(Statistic, mean, NULL, ANY, OPTIONAL, "mean of the readings that count; weighted by their uncertainty and scatter if at least four count and all state their uncertainty"),
+    FIELD_REAL(Statistic, unweighted_mean, NULL, ANY, OPTIONAL, "unweighted mean of the readings"),
     FIELD_REAL(Statistic, deviation, NULL, ANY, OPTIONAL, "standard deviation of the readings"),
     FIELD_REAL(Statistic, scatter, NULL, ANY, OPTIONAL, "standard deviation beyond the stated uncertainties; null: the mean is not weighted"),
     FIELD_REAL(Statistic, standard_error, NULL, ANY, OPTIONAL, "of the mean"),
     FIELD_REAL(Statistic, spread, NULL, ANY, OPTIONAL, "standard deviation that a revision states beside the mean: scatter where the mean is weighted, else deviation, and standard_error at least"),
     FIELD_REAL(Statistic, low, NULL, ANY, OPTIONAL, "95 % interval of the mean"),
     FIELD_REAL(Statistic, high, NULL, ANY, OPTIONAL, "likewise"),
-    FIELD_REAL(Statistic, minimum, NULL, ANY, OPTIONAL, "the smallest reading"),
-    FIELD_REAL(Statistic, median, NULL, ANY, OPTIONAL, "the middle one"),
-    FIELD_REAL(Statistic, maximum, NULL, ANY, OPTIONAL, "the largest one"),
-    FIELD_COUNT(Statistic, outliers, NULL, AT_MIN(0), OPTIONAL, "outliers; they are in the mean"),
-    FIELD_REAL(Statistic, mean_without_outliers, NULL, ANY, OPTIONAL, "null where there are none"),
+    FIELD_REAL(Statistic, minimum, NULL, ANY, OPTIONAL, "smallest reading"),
+    FIELD_REAL(Statistic, median, NULL, ANY, OPTIONAL, "median reading"),
+    FIELD_REAL(Statistic, maximum, NULL, ANY, OPTIONAL, "largest reading"),
+    FIELD_COUNT(Statistic, outliers, NULL, AT_MIN(0), OPTIONAL, "number of outliers; they are in the mean"),
+    FIELD_REAL(Statistic, mean_without_outliers, NULL, ANY, OPTIONAL, "mean without the outliers; null if there are none"),
     FIELD_TEXT(Statistic, why, 0, PRESENCE_OPTIONAL, 0, "how the interval was made, or why there is none"),
     FIELD_ITEM(Statistic, trend, trend_fields, NULL, PRESENCE_DEFAULT, "whether it is constant over approach speed"),
     FIELD_END
@@ -91,27 +91,20 @@ static double statistic_cut(size_t count) {
     return cuts[i - 1].cut + share * (cuts[i].cut - cuts[i - 1].cut);
 }
 
-static int statistic_compare(const void *a, const void *b) {
-    const double left = *(const double *)a, right = *(const double *)b;
-    return left < right ? -1 : left > right ? 1 : 0;
-}
-
 // Sorts the values.
 static double statistic_median(double *values, size_t count) {
-    qsort(values, count, sizeof *values, statistic_compare);
+    reals_sort(values, count);
     return count % 2 == 1 ? values[count / 2] : values[count / 2 - 1] / 2 + values[count / 2] / 2;
 }
 
-static double statistic_mean(const Reading *readings, size_t count, bool with_outliers) {
+static double statistic_mean(const Reading *readings, size_t count) {
     double sum = 0, rest = 0, n = 0;
+    for (size_t i = 0; i < count; i++) {
+        sum += readings[i].weight * readings[i].value;
+        n += readings[i].weight;
+    }
     for (size_t i = 0; i < count; i++)
-        if (with_outliers || !readings[i].is_outlier) {
-            sum += readings[i].weight * readings[i].value;
-            n += readings[i].weight;
-        }
-    for (size_t i = 0; i < count; i++)
-        if (with_outliers || !readings[i].is_outlier)
-            rest += readings[i].weight * (readings[i].value - sum / n);
+        rest += readings[i].weight * (readings[i].value - sum / n);
     return sum / n + rest / n;
 }
 
@@ -127,7 +120,7 @@ static double statistic_weigh(Reading *readings, size_t count, double scatter) {
     for (size_t i = 0; i < count; i++)
         readings[i].weight =
             1 / (readings[i].uncertainty * readings[i].uncertainty + scatter * scatter);
-    return statistic_squares(readings, count, statistic_mean(readings, count, true));
+    return statistic_squares(readings, count, statistic_mean(readings, count));
 }
 
 // Sets weights and scatter where all readings state their uncertainty.
@@ -208,51 +201,6 @@ static bool statistic_set_interval(const Reading *readings, size_t count, Statis
     return is_made;
 }
 
-// The line through those readings that have a speed.
-typedef struct Line {
-    size_t count;
-    double speed, value; // means
-    double squares;      // of speeds about their mean
-    double slope, left;  // left: sum of squares of the residuals
-    double least, most;  // speeds
-} Line;
-
-static Line line_fit(const Reading *readings, size_t count) {
-    Line line = {.least = (double)INFINITY, .most = -(double)INFINITY};
-    double weights = 0, products = 0;
-    for (size_t i = 0; i < count; i++) {
-        if (isnan(readings[i].speed))
-            continue;
-        line.count++;
-        weights += readings[i].weight;
-        line.speed += readings[i].weight * readings[i].speed;
-        line.value += readings[i].weight * readings[i].value;
-        line.least = fmin(line.least, readings[i].speed);
-        line.most = fmax(line.most, readings[i].speed);
-    }
-    line.speed /= weights;
-    line.value /= weights;
-    for (size_t i = 0; i < count; i++) {
-        if (isnan(readings[i].speed))
-            continue;
-        const double off = readings[i].speed - line.speed;
-        line.squares += readings[i].weight * off * off;
-        products += readings[i].weight * off * (readings[i].value - line.value);
-    }
-    line.slope = line.squares > 0 ? products / line.squares : 0;
-    for (size_t i = 0; i < count; i++) {
-        if (isnan(readings[i].speed))
-            continue;
-        const double off =
-            readings[i].value - line.value - line.slope * (readings[i].speed - line.speed);
-        line.left += readings[i].weight * off * off;
-    }
-    // In units of an average weight.
-    line.left *= (double)line.count / weights;
-    line.squares *= (double)line.count / weights;
-    return line;
-}
-
 static bool trend_describe(const char *name, const char *unit, double mean, Trend *trend) {
     const double percent = 100 / fabs(mean), missed = trend->missed_change * percent;
     if (trend->verdict == TREND_NOT_CONSTANT)
@@ -266,7 +214,7 @@ static bool trend_describe(const char *name, const char *unit, double mean, Tren
         &trend->detail,
         "%s shows no trend from %.3g to %.3g m/s (slope %.2g +- %.2g%s per m/s, p = "
         "%.2g)%s a change of up to %.2g%s (%.3g %%) over these speeds would not have "
-        "been seen",
+        "been detected",
         name, trend->least_speed, trend->most_speed, trend->slope, trend->standard_error, unit,
         trend->p,
         trend->verdict == TREND_CONSTANT
@@ -275,54 +223,88 @@ static bool trend_describe(const char *name, const char *unit, double mean, Tren
         trend->missed_change, unit, missed);
 }
 
-static bool trend_set(const Line *line, const char *name, const char *unit, Statistic *statistic) {
-    Trend *trend = &statistic->trend;
-    trend->count = line->count;
-    if (line->count > 0) {
-        trend->least_speed = line->least;
-        trend->most_speed = line->most;
+// The slope of the line through mean_speed and mean_value, and its standard error, at least
+// `least` relative to the range of speeds.
+static void trend_fit(const Reading *readings, size_t count, double weights, double least,
+                      Trend *trend) {
+    double products = 0, squares = 0, left = 0; // of speeds, of residuals
+    for (size_t i = 0; i < count; i++) {
+        if (isnan(readings[i].speed))
+            continue;
+        const double off = readings[i].speed - trend->mean_speed;
+        squares += readings[i].weight * off * off;
+        products += readings[i].weight * off * (readings[i].value - trend->mean_value);
     }
-    if (line->count < 3)
+    trend->slope = squares > 0 ? products / squares : 0;
+    for (size_t i = 0; i < count; i++) {
+        if (isnan(readings[i].speed))
+            continue;
+        const double off = readings[i].value - trend->mean_value -
+                           trend->slope * (readings[i].speed - trend->mean_speed);
+        left += readings[i].weight * off * off;
+    }
+    // In units of an average weight.
+    left *= (double)trend->count / weights;
+    squares *= (double)trend->count / weights;
+    trend->standard_error = sqrt(fmax(left / (double)(trend->count - 2), least * least) / squares);
+}
+
+static bool trend_set(const Reading *readings, size_t count, const char *name, const char *unit,
+                      Statistic *statistic) {
+    Trend *trend = &statistic->trend;
+    double weights = 0, speed = 0, value = 0;
+    trend->count = 0;
+    for (size_t i = 0; i < count; i++) {
+        if (isnan(readings[i].speed))
+            continue;
+        trend->count++;
+        weights += readings[i].weight;
+        speed += readings[i].weight * readings[i].speed;
+        value += readings[i].weight * readings[i].value;
+        trend->least_speed = fmin(trend->least_speed, readings[i].speed);
+        trend->most_speed = fmax(trend->most_speed, readings[i].speed);
+    }
+    const size_t with_speed = (size_t)trend->count;
+    if (with_speed < 3)
         return text_format(
             &trend->detail,
             "whether %s is constant over speed is unknown: %zu reading%s with a speed, "
             "at least three are needed",
-            name, line->count, line->count == 1 ? "" : "s");
-    const double span = line->most - line->least;
-    if (!(span > span_min * line->speed))
+            name, with_speed, with_speed == 1 ? "" : "s");
+    const double span = trend->most_speed - trend->least_speed, mean = fabs(statistic->mean);
+    speed /= weights;
+    if (!(span > span_min * speed))
         return text_format(
             &trend->detail,
             "whether %s is constant over speed is unknown: all readings were made at "
             "about %.3g m/s",
-            name, line->speed);
-    const double least = resolved * fabs(statistic->mean);
-    const size_t freedom = line->count - 2;
-    const double t = student_t_quantile(EVALUATION_CONFIDENCE, freedom);
-    trend->mean_speed = line->speed;
-    trend->mean_value = line->value;
-    trend->slope = line->slope;
-    trend->standard_error = sqrt(fmax(line->left / (double)freedom, least * least) / line->squares);
-    trend->low = line->slope - t * trend->standard_error;
-    trend->high = line->slope + t * trend->standard_error;
-    trend->t = line->slope / trend->standard_error;
+            name, speed);
+    trend->mean_speed = speed;
+    trend->mean_value = value / weights;
+    trend_fit(readings, count, weights, resolved * mean, trend);
+    const size_t freedom = with_speed - 2;
+    const double half = student_t_quantile(EVALUATION_CONFIDENCE, freedom) * trend->standard_error;
+    trend->low = trend->slope - half;
+    trend->high = trend->slope + half;
+    trend->t = trend->slope / trend->standard_error;
     trend->p = fmax(1 - student_t_probability(fabs(trend->t), freedom), 0);
-    trend->change = line->slope * span;
+    trend->change = trend->slope * span;
     trend->missed_change = fmax(fabs(trend->low), fabs(trend->high)) * span;
-    trend->verdict = trend->p < significance ? TREND_NOT_CONSTANT
-                     : trend->missed_change <= TREND_CHANGE_MAX * fabs(statistic->mean)
-                         ? TREND_CONSTANT
-                         : TREND_UNDECIDED;
+    trend->verdict = trend->p < significance                           ? TREND_NOT_CONSTANT
+                     : trend->missed_change <= TREND_CHANGE_MAX * mean ? TREND_CONSTANT
+                                                                       : TREND_UNDECIDED;
     return trend_describe(name, unit, statistic->mean, trend);
 }
 
 // `scratch` has room for two numbers a reading.
-static void statistic_set_outliers(Reading *readings, size_t count, const Line *line,
-                                   double *scratch, Statistic *statistic) {
+static void statistic_set_outliers(Reading *readings, size_t count, double *scratch,
+                                   Statistic *statistic) {
+    const Trend *trend = &statistic->trend;
     double *values = scratch, *sorted = values + count, mean = 0;
     for (size_t i = 0; i < count; i++) {
         values[i] = readings[i].value;
-        if (statistic->trend.verdict == TREND_NOT_CONSTANT && !isnan(readings[i].speed))
-            values[i] -= line->slope * (readings[i].speed - line->speed);
+        if (trend->verdict == TREND_NOT_CONSTANT && !isnan(readings[i].speed))
+            values[i] -= trend->slope * (readings[i].speed - trend->mean_speed);
         sorted[i] = values[i];
     }
     const double middle = statistic_median(sorted, count);
@@ -338,10 +320,13 @@ static void statistic_set_outliers(Reading *readings, size_t count, const Line *
         const double scale = fmax(fmax(spread, own), resolved * fabs(middle));
         readings[i].score = scale > 0 ? (values[i] - middle) / scale : 0;
         readings[i].is_outlier = fabs(readings[i].score) > statistic_cut(count);
-        statistic->outliers += readings[i].is_outlier ? 1 : 0;
+        if (readings[i].is_outlier) {
+            readings[i].weight = 0;
+            statistic->outliers++;
+        }
     }
     if (statistic->outliers > 0 && statistic->outliers < count)
-        statistic->mean_without_outliers = statistic_mean(readings, count, false);
+        statistic->mean_without_outliers = statistic_mean(readings, count);
 }
 
 static void statistic_set_spread(const Reading *readings, size_t count, double *scratch,
@@ -377,20 +362,19 @@ Status reading_statistics_run(Reading *readings, size_t count, const char *name,
     if (is_made && count == 0) {
         is_made = text_format(&statistic->why, "no reading that counts gives the %s", name);
     } else if (is_made) {
-        statistic->unweighted_mean = statistic_mean(readings, count, true);
+        statistic->unweighted_mean = statistic_mean(readings, count);
         statistic_set_spread(readings, count, scratch, statistic);
         statistic_set_weights(readings, count, statistic);
-        statistic->mean = statistic_mean(readings, count, true);
+        statistic->mean = statistic_mean(readings, count);
         is_made = statistic_set_interval(readings, count, statistic);
     }
     statistic->spread = fmax(isnan(statistic->scatter) ? statistic->deviation : statistic->scatter,
                              statistic->standard_error);
     if (!(statistic->spread > rounding * fabs(statistic->mean)))
         statistic->spread = (double)NAN;
-    const Line line = line_fit(readings, count);
-    is_made = is_made && trend_set(&line, name, unit, statistic);
+    is_made = is_made && trend_set(readings, count, name, unit, statistic);
     if (is_made && count > 2)
-        statistic_set_outliers(readings, count, &line, scratch, statistic);
+        statistic_set_outliers(readings, count, scratch, statistic);
     free(scratch);
     return is_made ? STATUS_OK
                    : problem_set(problem, STATUS_NO_MEMORY, "no memory for the evaluation");

@@ -58,26 +58,32 @@ const Kind *candidate_settings_reference(void) {
     return &solvers[i]->kind;
 }
 
-// A point with nothing but its solver and name; NULL without memory.
-static TradeoffPoint *candidate_add(TradeoffPoints *points, const Kind *solver, const char *format,
-                                    ...) __attribute__((format(printf, 3, 4)));
+// A list under construction, all of the same simulation.
+typedef struct Candidates {
+    TradeoffPoints *points;
+    const Simulation *simulation;
+    bool is_whole;       // false: without memory
+    TradeoffPoint spare; // takes the settings of a point for which there is no memory
+} Candidates;
 
-static TradeoffPoint *candidate_add(TradeoffPoints *points, const Kind *solver, const char *format,
-                                    ...) {
-    TradeoffPoint *at = realloc(points->at, (points->count + 1) * sizeof *at);
-    if (at == NULL)
-        return NULL;
-    points->at = at;
-    TradeoffPoint *point = &at[points->count++];
-    char name[96];
+// Adds a point with nothing but its solver and name.
+__attribute__((format(printf, 3, 4))) static TradeoffPoint *
+candidate_add(Candidates *list, const Kind *solver, const char *format, ...) {
+    TradeoffPoint *point = study_list_add(list->points, sizeof *point, NULL);
+    if (point == NULL) {
+        list->is_whole = false;
+        return &list->spare;
+    }
     va_list arguments;
+    char name[96];
     va_start(arguments, format);
     vsnprintf(name, sizeof name, format, arguments);
     va_end(arguments);
     (void)fields_default(tradeoff_point_fields, point); // absent and 0: nothing to allocate
     point->name = strdup(name);
     point->solver = strdup(solver->name);
-    return point->name == NULL || point->solver == NULL ? NULL : point;
+    list->is_whole = list->is_whole && point->name != NULL && point->solver != NULL;
+    return point;
 }
 
 // Duration of the shortest contact of a buffer, about, for a free mass [s]; NAN: none.
@@ -105,83 +111,55 @@ static Status candidate_finest_step(const Simulation *simulation, double *finest
     return STATUS_OK;
 }
 
-static bool candidate_add_steps(TradeoffPoints *points, const Kind *solver,
-                                const Simulation *simulation, double finest) {
-    double step = 1 / simulation->scene.sample_rate;
+static void candidate_add_steps(Candidates *list, const Kind *solver, double finest) {
+    double step = 1 / list->simulation->scene.sample_rate;
     for (int i = 0; i < DECADES_MAX; i++, step /= 10) {
-        TradeoffPoint *point = candidate_add(points, solver, "%s, step %.4g s", solver->name, step);
-        if (point == NULL)
-            return false;
-        point->step = step;
+        candidate_add(list, solver, "%s, step %.4g s", solver->name, step)->step = step;
         if (step <= finest)
             break;
     }
-    return true;
 }
 
-static bool candidate_add_tolerances(TradeoffPoints *points, const Kind *solver,
-                                     const Range *range) {
-    for (double tolerance = fmin(tolerance_max, range->max);
-         tolerance >= fmax(range->min, tolerance_min) * (1 - 1e-9); tolerance *= tolerance_factor) {
-        TradeoffPoint *point =
-            candidate_add(points, solver, "%s, tolerance %.3g", solver->name, tolerance);
-        if (point == NULL)
-            return false;
-        point->tolerance = tolerance;
-    }
-    return true;
+static void candidate_add_tolerances(Candidates *list, const Kind *solver, const Range *range) {
+    const double min = fmax(range->min, tolerance_min) * (1 - 1e-9);
+    for (double own = fmin(tolerance_max, range->max); own >= min; own *= tolerance_factor)
+        candidate_add(list, solver, "%s, tolerance %.3g", solver->name, own)->tolerance = own;
 }
 
 // Less output at full accuracy.
-static bool candidate_add_outputs(TradeoffPoints *points, const Kind *solver,
-                                  const Simulation *simulation) {
-    const Scene *scene = &simulation->scene;
-    const SpectrumRequest *psd = &simulation->output.psd;
+static void candidate_add_outputs(Candidates *list, const Kind *solver) {
+    const Scene *scene = &list->simulation->scene;
+    const SpectrumRequest *psd = &list->simulation->output.psd;
     const size_t shares = psd->channels.count > 0 ? SHARES : 0;
-    TradeoffPoint *point;
     for (size_t i = 0; i < RATES; i++) {
         const double rate = scene->sample_rate / rate_divisors[i];
         if (rate * scene->duration < SEGMENT_MIN)
             break;
-        point = candidate_add(points, solver, "%s, sampled at %.6g Hz", solver->name, rate);
-        if (point == NULL)
-            return false;
-        point->sample_rate = rate;
+        candidate_add(list, solver, "%s, sampled at %.6g Hz", solver->name, rate)->sample_rate =
+            rate;
     }
     for (size_t i = 0; i < shares; i++) {
         const uint64_t segment = psd->segment / spectrum_divisors[i];
         if (segment < SEGMENT_MIN)
             break;
-        point = candidate_add(points, solver, "%s, segments of %llu", solver->name,
-                              (unsigned long long)segment);
-        if (point == NULL)
-            return false;
-        point->segment = segment;
+        candidate_add(list, solver, "%s, segments of %llu", solver->name,
+                      (unsigned long long)segment)
+            ->segment = segment;
     }
     for (size_t i = 0; i < shares; i++) {
         const double duration = scene->duration / duration_divisors[i];
         if (duration * scene->sample_rate < (double)psd->segment)
             break;
-        point = candidate_add(points, solver, "%s, %.6g s long", solver->name, duration);
-        if (point == NULL)
-            return false;
-        point->duration = duration;
+        candidate_add(list, solver, "%s, %.6g s long", solver->name, duration)->duration = duration;
     }
-    return true;
 }
 
 // Half the modes, a quarter, and so on down to one.
-static bool candidate_add_modes(TradeoffPoints *points, const Kind *solver,
-                                const Simulation *simulation) {
-    const size_t storeys = structure_storeys(scene_structure(&simulation->scene));
-    for (size_t modes = storeys / 2; storeys >= STOREYS_MIN && modes > 0; modes /= 2) {
-        TradeoffPoint *point = candidate_add(points, solver, "%s, %zu mode%s", solver->name, modes,
-                                             modes == 1 ? "" : "s");
-        if (point == NULL)
-            return false;
-        point->modes = modes;
-    }
-    return true;
+static void candidate_add_modes(Candidates *list, const Kind *solver) {
+    const size_t storeys = structure_storeys(scene_structure(&list->simulation->scene));
+    for (size_t modes = storeys / 2; storeys >= STOREYS_MIN && modes > 0; modes /= 2)
+        candidate_add(list, solver, "%s, %zu mode%s", solver->name, modes, modes == 1 ? "" : "s")
+            ->modes = modes;
 }
 
 static bool candidate_has_form(const Simulation *simulation, ContactForm form) {
@@ -197,46 +175,51 @@ static bool candidate_is_requested(const Texts *names, const char *name) {
     return is_named;
 }
 
-static bool candidate_add_solver(TradeoffPoints *points, const Solver *solver,
-                                 const Simulation *simulation, double finest) {
+static void candidate_add_solver(Candidates *list, const Solver *solver, double finest) {
     const Kind *kind = &solver->kind;
     // Some solvers use their settings under power laws alone.
     const bool is_used =
-        solver->forget_unused == NULL || candidate_has_form(simulation, CONTACT_POWER);
+        solver->forget_unused == NULL || candidate_has_form(list->simulation, CONTACT_POWER);
     const Field *tolerance = is_used ? fields_find(kind->fields, "tolerance", NULL) : NULL;
-    if (fields_find(kind->fields, "step", NULL) != NULL)
-        return candidate_add_steps(points, kind, simulation, finest);
-    if (tolerance != NULL && !candidate_add_tolerances(points, kind, &tolerance->range))
-        return false;
+    if (fields_find(kind->fields, "step", NULL) != NULL) {
+        candidate_add_steps(list, kind, finest);
+        return;
+    }
+    if (tolerance != NULL)
+        candidate_add_tolerances(list, kind, &tolerance->range);
     // Without its tolerance, if that may be left out.
-    return (tolerance != NULL && tolerance->presence != PRESENCE_OPTIONAL) ||
-           candidate_add(points, kind, "%s", kind->name) != NULL;
+    if (tolerance == NULL || tolerance->presence == PRESENCE_OPTIONAL)
+        candidate_add(list, kind, "%s", kind->name);
 }
 
-static bool candidate_add_reference(TradeoffPoints *points, const Kind *solver,
-                                    const Simulation *simulation) {
-    if (candidate_has_form(simulation, CONTACT_LINEAR)) {
+static void candidate_add_reference(Candidates *list, const Kind *solver) {
+    if (candidate_has_form(list->simulation, CONTACT_LINEAR)) {
         const char *model = contact_impulse.kind.name;
-        TradeoffPoint *point = candidate_add(points, solver, "%s, contact %s", solver->name, model);
-        if (point == NULL || (point->contact_model = strdup(model)) == NULL)
-            return false;
+        char **own =
+            &candidate_add(list, solver, "%s, contact %s", solver->name, model)->contact_model;
+        *own = strdup(model);
+        list->is_whole = list->is_whole && *own != NULL;
     }
-    return candidate_add_modes(points, solver, simulation) &&
-           candidate_add_outputs(points, solver, simulation);
+    candidate_add_modes(list, solver);
+    candidate_add_outputs(list, solver);
 }
 
 Status candidate_settings_list(const Texts *names, const Simulation *simulation,
                                TradeoffPoints *points, Problem *problem) {
     const Kind *reference = candidate_settings_reference();
-    double finest;
+    Candidates list = {.points = points, .simulation = simulation};
+    double finest = 0;
     *points = (TradeoffPoints){NULL, 0};
-    bool is_whole = candidate_finest_step(simulation, &finest) == STATUS_OK;
-    for (size_t i = 0; solvers[i] != NULL && is_whole; i++)
+    list.is_whole = candidate_finest_step(simulation, &finest) == STATUS_OK;
+    for (size_t i = 0; solvers[i] != NULL && list.is_whole; i++)
         if (solvers[i]->run != NULL && candidate_is_requested(names, solvers[i]->kind.name))
-            is_whole = candidate_add_solver(points, solvers[i], simulation, finest);
-    if (is_whole && candidate_is_requested(names, reference->name))
-        is_whole = candidate_add_reference(points, reference, simulation);
-    return is_whole ? STATUS_OK : study_no_memory(problem);
+            candidate_add_solver(&list, solvers[i], finest);
+    if (list.is_whole && candidate_is_requested(names, reference->name))
+        candidate_add_reference(&list, reference);
+    for (size_t i = 0; i < points->count && list.is_whole; i++)
+        points->at[i].estimate = candidate_settings_cost(simulation, &points->at[i]);
+    free(list.spare.contact_model);
+    return list.is_whole ? STATUS_OK : study_no_memory(problem);
 }
 
 // Sets a member of a solver's settings, if it has one of this name.

@@ -29,6 +29,8 @@ typedef struct TradeoffPoint {
     double steps;                   // solver steps
     Errors errors;
     bool is_best; // nothing is both cheaper and closer by the metric
+    // Not written to JSON:
+    double estimate; // of its solver steps
 } TradeoffPoint;
 
 typedef struct TradeoffPoints {

@@ -3,11 +3,8 @@
 #include "core/study/ensemble.h"
 
 #include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 
 #include "core/excitation/random.h"
-#include "core/study/spectrum_accumulator.h"
 
 enum { RUNS_MAX = 10000 };
 
@@ -41,7 +38,7 @@ static const Field ensemble_statistic_fields[] = {
 };
 
 static const Field ensemble_statistics_fields[] = {
-    FIELD_ITEM(EnsembleStatistics, peak_displacement, ensemble_statistic_fields, NULL, PRESENCE_DEFAULT, "of this number of the summary"),
+    FIELD_ITEM(EnsembleStatistics, peak_displacement, ensemble_statistic_fields, NULL, PRESENCE_DEFAULT, "statistics of this metric of the summary"),
     FIELD_ITEM(EnsembleStatistics, rms_displacement, ensemble_statistic_fields, NULL, PRESENCE_DEFAULT, "likewise"),
     FIELD_ITEM(EnsembleStatistics, peak_acceleration, ensemble_statistic_fields, NULL, PRESENCE_DEFAULT, "likewise"),
     FIELD_ITEM(EnsembleStatistics, rms_acceleration, ensemble_statistic_fields, NULL, PRESENCE_DEFAULT, "likewise"),
@@ -94,7 +91,7 @@ static const Field ensemble_target_fields[] = {
     FIELD_COUNT(EnsembleTarget, predicted_runs, NULL, AT_MIN(0), OPTIONAL, "predicted number of runs that keep the target, the pilot included"),
     FIELD_REAL(EnsembleTarget, estimated_error, NULL, ANY, OPTIONAL, "of the mean of the runs made; 0 if all were made"),
     FIELD_FLAG(EnsembleTarget, is_kept, false, "the estimated error is within the wanted error"),
-    FIELD_TEXT(EnsembleTarget, why, 0, PRESENCE_OPTIONAL, 0, "explanation"),
+    FIELD_TEXT(EnsembleTarget, why, 0, PRESENCE_OPTIONAL, 0, "explanation in words"),
     FIELD_END
 };
 
@@ -159,7 +156,7 @@ static Status ensemble_complete(void *request, const Simulation *simulation,
             : study_run_check_metric(simulation, statistics_metric_names[study->metric], problem);
     const Status densities =
         study_run_check_densities(simulation, study_run_densities(simulation), problem);
-    return seeds != STATUS_OK ? seeds : metric != STATUS_OK ? metric : densities;
+    return study_first_failure(study_first_failure(seeds, metric), densities);
 }
 
 // Of all runs: how many of them a target needs is unknown before the first are made.
@@ -177,7 +174,7 @@ static Status ensemble_cost(const void *request, const Simulation *simulation,
 typedef struct EnsembleWork {
     StudyWork work;
     const EnsembleStudy *study;
-    Ensemble *answer; // whose table has room for all runs
+    Ensemble *answer;
     bool has_force;
     SpectrumAccumulator sums;
     Spectrum like; // of the first run that ended
@@ -191,8 +188,8 @@ Status ensemble_scene(const Simulation *simulation, uint64_t seed, Simulation *t
     return STATUS_OK;
 }
 
-static Status ensemble_member_scene(const void *of, size_t member, Simulation *scene, void *part,
-                                    Problem *problem) {
+static Status ensemble_member_scene(const void *of, size_t member, Simulation *scene,
+                                    StudyPart *part, Problem *problem) {
     const EnsembleWork *work = of;
     (void)part;
     return ensemble_scene(work->work.simulation, work->study->first_seed + member, scene, problem);
@@ -249,15 +246,12 @@ static void ensemble_extend(EnsembleWork *ensemble) {
         work->expected = work->wanted;
 }
 
-static Status ensemble_fold(void *of, size_t member, void *made, Problem *problem) {
+static Status ensemble_fold(void *of, size_t member, StudyPart *part, Problem *problem) {
     EnsembleWork *work = of;
-    StudyPart *part = made;
     Ensemble *answer = work->answer;
+    const uint64_t seed = work->study->first_seed + member;
+    TRY(run_table_add(&answer->table, &part->run, seed, problem));
     RunRecord *run = &answer->table.at[member];
-    *run = part->run;
-    run->number = work->study->first_seed + member;
-    part->run.why = NULL;
-    answer->table.count = member + 1;
     answer->made++;
     if (run->why != NULL) {
         answer->failed++;
@@ -265,8 +259,8 @@ static Status ensemble_fold(void *of, size_t member, void *made, Problem *proble
         answer->steps += run->steps;
         if (!work->has_force)
             run->summary.peak_contact_force = (double)NAN;
-        const bool keeps_first = ensemble_has_target(work) && work->study->metric == STATISTICS_PSD;
-        TRY(spectrum_accumulator_add(&work->sums, &part->spectrum, keeps_first, problem));
+        const size_t kept = work->study->metric == STATISTICS_PSD ? SPECTRUM_ACCUMULATOR_FIRST : 0;
+        TRY(spectrum_accumulator_add(&work->sums, &part->spectrum, kept, problem));
         if (work->like.densities.count == 0) {
             work->like = part->spectrum;
             part->spectrum = (Spectrum){0};
@@ -285,23 +279,24 @@ static Status ensemble_fill_target(const EnsembleWork *work, Problem *problem) {
     const char *name = statistics_metric_names[work->study->metric];
     const unsigned long long made = (unsigned long long)work->answer->made,
                              all = (unsigned long long)work->study->runs;
-    char text[320];
     target->error = work->study->target;
     target->metric = work->study->metric;
     target->confidence = STOPPING_RULE_CONFIDENCE;
     target->is_kept = target->estimated_error <= target->error;
-    if (isnan(target->estimated_error))
-        snprintf(text, sizeof text, "no run of %llu came to an end that tells %s", all, name);
-    else if (made == all)
-        snprintf(text, sizeof text,
-                 "all %llu runs were made: no fewer were sure to keep the mean of %s within %g",
-                 all, name, target->error);
-    else
-        snprintf(text, sizeof text,
-                 "%llu of %llu runs keep the mean of %s within %g of that of all: within %.2g with "
-                 "%g %% confidence",
-                 made, all, name, target->error, target->estimated_error, 100 * target->confidence);
-    return study_copy_text(text, &target->why, problem);
+    return study_status(
+        isnan(target->estimated_error)
+            ? text_format(&target->why, "none of the %llu runs ended with a known %s", all, name)
+        : made == all
+            ? text_format(&target->why,
+                          "all %llu runs were made: with fewer, the mean of %s might not be "
+                          "within %g",
+                          all, name, target->error)
+            : text_format(&target->why,
+                          "%llu of %llu runs keep the mean of %s within %g of that of all: within "
+                          "%.2g with %g %% confidence",
+                          made, all, name, target->error, target->estimated_error,
+                          100 * target->confidence),
+        problem);
 }
 
 static Status ensemble_end(void *of, const StudyTools *tools, Problem *problem) {
@@ -315,7 +310,7 @@ static Status ensemble_end(void *of, const StudyTools *tools, Problem *problem) 
                             problem));
     statistics_trust(&answer->table, &answer->trust);
     TRY(study_failures_fill(&answer->table, &answer->failures, problem));
-    return spectrum_accumulator_report(&work->sums, &work->like, &answer->frequency,
+    return spectrum_accumulator_report(&work->sums, &work->like, false, NULL, &answer->frequency,
                                        &answer->spectra, problem);
 }
 
@@ -330,6 +325,7 @@ static Status ensemble_begin(void *of, const StudyTools *tools, Problem *problem
     const EnsembleStudy *study = work->study = work->work.study;
     Ensemble *answer = work->answer = work->work.answer;
     (void)tools;
+    (void)problem;
     work->has_force = study_run_has_force(work->work.simulation);
     work->check = STOPPING_RULE_PILOT;
     work->work.members = (size_t)study->runs;
@@ -340,17 +336,14 @@ static Status ensemble_begin(void *of, const StudyTools *tools, Problem *problem
     answer->runs = study->runs;
     answer->first_seed = study->first_seed;
     answer->confidence = STATISTICS_CONFIDENCE;
-    answer->table.at = calloc((size_t)study->runs, sizeof *answer->table.at);
-    return answer->table.at != NULL ? STATUS_OK : study_no_memory(problem);
+    return STATUS_OK;
 }
-
-static const Kind ensemble_answer = {"ensemble", "results of many seeds", ensemble_answer_fields,
-                                     sizeof(Ensemble)};
 
 const StudyKind study_ensemble = {
     .kind = {"ensemble", "many seeds of a random base: means with their confidence, and spread",
              ensemble_study_fields, sizeof(EnsembleStudy)},
-    .answer = &ensemble_answer,
+    .answer = &(const Kind){"ensemble", "results of many seeds", ensemble_answer_fields,
+                            sizeof(Ensemble)},
     .shorten = "ask for fewer runs",
     .complete = ensemble_complete,
     .cost = ensemble_cost,

@@ -3,6 +3,7 @@
 #ifndef CORE_STUDY_ENSEMBLE_H
 #define CORE_STUDY_ENSEMBLE_H
 
+#include "core/study/spectrum_accumulator.h"
 #include "core/study/statistics.h"
 #include "core/study/study.h"
 

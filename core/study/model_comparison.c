@@ -5,7 +5,6 @@
 
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "core/simulation/channel_names.h"
@@ -49,7 +48,7 @@ static const Field compare_divergence_fields[] = {
     FIELD_REAL(CompareDivergence, time, "s", ANY, OPTIONAL, "first time at which the displacements differ by the stated part of the largest; unknown: not within the run"),
     FIELD_REAL(CompareDivergence, horizon, "s", ANY, OPTIONAL, "the earlier trust horizon of the two; unknown: neither has one within the run"),
     FIELD_FLAG(CompareDivergence, is_trusted, false, "the time is within the horizon: the contact causes the difference, not rounding"),
-    FIELD_TEXT(CompareDivergence, why, 0, PRESENCE_OPTIONAL, 0, "explanation"),
+    FIELD_TEXT(CompareDivergence, why, 0, PRESENCE_OPTIONAL, 0, "explanation in words"),
     FIELD_END
 };
 
@@ -159,10 +158,8 @@ static Status comparison_complete(void *request, const Simulation *simulation,
     const double variants = (double)study->models.count + (double)study->separations.count;
     const double values = psd->channels.count > 0 ? (double)(psd->segment / 2 + 1) * variants : 0;
     const Status densities = study_run_check_densities(simulation, values, problem);
-    return models != STATUS_OK   ? models
-           : storey != STATUS_OK ? storey
-           : band != STATUS_OK   ? band
-                                 : densities;
+    return study_first_failure(study_first_failure(models, storey),
+                               study_first_failure(band, densities));
 }
 
 // A rule of separation belongs to linear contacts alone: any other law makes one entry.
@@ -177,11 +174,9 @@ static Status comparison_add(CompareEntries *entries, const ContactLaw *law, int
             return STATUS_OK;
     if (entries->count == ENTRIES_MAX)
         return STATUS_OK;
-    CompareEntry *at = realloc(entries->at, (entries->count + 1) * sizeof *at);
-    if (at == NULL)
-        return study_no_memory(problem);
-    entries->at = at;
-    CompareEntry *entry = &at[entries->count++];
+    CompareEntry *entry = study_list_add(entries, sizeof *entry, problem);
+    if (entry == NULL)
+        return STATUS_NO_MEMORY;
     (void)fields_default(compare_entry_fields, entry); // absent and 0: nothing to allocate
     entry->separation = separation;
     snprintf(name, sizeof name, "%s%s%s", law->kind.name, separation == CHOICE_ABSENT ? "" : ", ",
@@ -229,9 +224,7 @@ static Status comparison_set_channel(const Scene *scene, ChannelId channel, uint
                                      Texts *names, Problem *problem) {
     char name[CHANNEL_NAME];
     channel_names_write(scene, channel, (size_t)storey, name);
-    for (size_t i = 0; i < names->count; i++)
-        free(names->at[i]);
-    names->count = 0;
+    study_clear_texts(names);
     return study_add_text(name, names, problem);
 }
 
@@ -346,50 +339,39 @@ static Status comparison_fill_divergence(const CompareWork *work, const Outcome 
     const double percent = 100 * work->study->part, time = entry->displacement.parting;
     const double horizon =
         fmin(work->reference->summary.trust_horizon, outcome->summary.trust_horizon);
-    char text[240];
     divergence->time = time;
     divergence->horizon = horizon;
     divergence->is_trusted = !isnan(time) && !(time > horizon);
-    if (isnan(time))
-        snprintf(text, sizeof text,
-                 "the displacements never differ by more than %g %% of the largest within the run",
-                 percent);
-    else if (divergence->is_trusted)
-        snprintf(text, sizeof text,
-                 "the displacements differ by more than %g %% of the largest from %.6g s on, where "
-                 "both trajectories can be trusted: it is the contact's doing",
-                 percent, time);
-    else
-        snprintf(text, sizeof text,
-                 "the displacements differ by more than %g %% of the largest from %.6g s on, "
-                 "beyond the trust horizon of %.6g s: rounding alone may have parted them, compare "
-                 "statistics",
-                 percent, time, horizon);
-    return study_copy_text(text, &divergence->why, problem);
+    return study_status(
+        isnan(time) ? text_format(&divergence->why,
+                                  "the displacements never differ by more than %g %% of the "
+                                  "largest within the run",
+                                  percent)
+        : divergence->is_trusted
+            ? text_format(&divergence->why,
+                          "the displacements differ by more than %g %% of the largest from %.6g s "
+                          "on, where both trajectories can be trusted: the contact model is the "
+                          "cause",
+                          percent, time)
+            : text_format(&divergence->why,
+                          "the displacements differ by more than %g %% of the largest from %.6g s "
+                          "on, beyond the trust horizon of %.6g s: rounding alone may be the "
+                          "cause, compare statistics",
+                          percent, time, horizon),
+        problem);
 }
 
 static Status comparison_fill_trace(const Signal *signal, size_t bucket, CompareTrace *trace,
                                     Problem *problem) {
-    const size_t count = (signal->count + bucket - 1) / bucket;
-    if (!reals_allocate(&trace->minimum, count) || !reals_allocate(&trace->maximum, count))
-        return study_no_memory(problem);
-    for (size_t i = 0; i < count; i++) {
+    for (size_t from = 0; from < signal->count; from += bucket) {
         double min = INFINITY, max = -INFINITY;
-        for (size_t k = i * bucket; k < signal->count && k < (i + 1) * bucket; k++) {
+        for (size_t k = from; k < signal->count && k < from + bucket; k++) {
             min = fmin(min, signal->values[k]);
             max = fmax(max, signal->values[k]);
         }
-        trace->minimum.at[i] = min;
-        trace->maximum.at[i] = max;
+        TRY(study_add_real(min, &trace->minimum, problem));
+        TRY(study_add_real(max, &trace->maximum, problem));
     }
-    return STATUS_OK;
-}
-
-static Status comparison_copy_reals(const double *values, size_t count, Reals *target,
-                                    Problem *problem) {
-    if (!reals_allocate(target, count))
-        return study_no_memory(problem);
-    memcpy(target->at, values, count * sizeof *values);
     return STATUS_OK;
 }
 
@@ -410,20 +392,19 @@ static Status comparison_measure(const CompareWork *work, const Outcome *outcome
         &reference->spectrum, reference->spectrum.densities.at[0].values, spectrum, density,
         band->count == 2 ? band->at[0] : (double)NAN, band->count == 2 ? band->at[1] : (double)NAN);
     entry->displacement = signal_comparison_measure(&from, &to, work->study->part, progress);
-    if (!progress_advance(progress, 1))
-        return problem_set(problem, STATUS_CANCELLED, "the study was stopped");
+    TRY(study_advance(progress, 1, problem));
     TRY(comparison_fill_divergence(work, outcome, entry, problem));
     if (fields_copy(rows, &outcome->plan, &plan) != STATUS_OK)
         return study_no_memory(problem);
     entry->derived = plan.derived;
-    TRY(comparison_copy_reals(density, spectrum->densities.rows, &entry->density, problem));
+    TRY(study_copy_reals(density, spectrum->densities.rows, &entry->density, problem));
     return comparison_fill_trace(&to, (size_t)work->answer->trace_samples, &entry->trace, problem);
 }
 
-static Status comparison_scene(const void *of, size_t member, Simulation *scene, void *made,
+static Status comparison_scene(const void *of, size_t member, Simulation *scene, StudyPart *made,
                                Problem *problem) {
     const CompareWork *work = of;
-    ComparePart *part = made;
+    ComparePart *part = (ComparePart *)(void *)made;
     (void)fields_default(compare_entry_fields, &part->entry); // nothing to allocate
     return comparison_apply(work->study, work->work.simulation,
                             &work->answer->entries.at[member + 1], work->work.limits, scene,
@@ -431,19 +412,19 @@ static Status comparison_scene(const void *of, size_t member, Simulation *scene,
 }
 
 static Status comparison_keep(const void *of, const Outcome *outcome, const StudyTools *tools,
-                              void *made, Problem *problem) {
-    ComparePart *part = made;
+                              StudyPart *made, Problem *problem) {
+    ComparePart *part = (ComparePart *)(void *)made;
     return comparison_measure(of, outcome, tools->progress, &part->entry, problem);
 }
 
-static void comparison_clear(void *made) {
-    ComparePart *part = made;
+static void comparison_clear(StudyPart *made) {
+    ComparePart *part = (ComparePart *)(void *)made;
     fields_clear(compare_entry_fields, &part->entry);
 }
 
-static Status comparison_fold(void *of, size_t member, void *made, Problem *problem) {
+static Status comparison_fold(void *of, size_t member, StudyPart *made, Problem *problem) {
     const CompareWork *work = of;
-    ComparePart *part = made;
+    ComparePart *part = (ComparePart *)(void *)made;
     RunRecord *run = &part->part.run;
     CompareEntry *entry = &work->answer->entries.at[member + 1];
     const CompareEntry listed = *entry;
@@ -504,8 +485,8 @@ static Status comparison_begin(void *of, const StudyTools *tools, Problem *probl
     answer->trace_rate = reference->response.sample_rate / (double)answer->trace_samples;
     TRY(study_copy_text(densities->at[0].name, &answer->channel, problem));
     TRY(study_copy_text(densities->at[0].unit, &answer->unit, problem));
-    TRY(comparison_copy_reals(reference->spectrum.frequency, densities->rows, &answer->frequency,
-                              problem));
+    TRY(study_copy_reals(reference->spectrum.frequency, densities->rows, &answer->frequency,
+                         problem));
     first->steps = reference->steps;
     first->summary = reference->summary;
     TRY(comparison_measure(work, reference, tools->progress, first, problem));
@@ -516,13 +497,11 @@ static Status comparison_begin(void *of, const StudyTools *tools, Problem *probl
     return STATUS_OK;
 }
 
-static const Kind comparison_answer = {"compare", "results of contact models and rules",
-                                       compare_answer_fields, sizeof(Comparison)};
-
 const StudyKind study_compare = {
     .kind = {"compare", "contact models and separation rules over one scene, side by side",
              compare_study_fields, sizeof(CompareStudy)},
-    .answer = &comparison_answer,
+    .answer = &(const Kind){"compare", "results of contact models and rules", compare_answer_fields,
+                            sizeof(Comparison)},
     .shorten = "ask for fewer models",
     .complete = comparison_complete,
     .cost = comparison_cost,

@@ -48,6 +48,10 @@ typedef struct InputUncertainty {
 Status uncertainty_complete(InputUncertainty *uncertainty, const Simulation *simulation,
                             Problem *problem);
 
+// Validates the deviations that are given for all buffers at once.
+Status uncertainty_check_common(const InputUncertainty *uncertainty, const Simulation *simulation,
+                                Problem *problem);
+
 // Whether any number has a deviation.
 bool uncertainty_exists(const InputUncertainty *uncertainty);
 
@@ -66,14 +70,11 @@ double perturbation_max_step(const Simulation *simulation, int parameter, double
 void perturbation_apply(const Simulation *simulation, int parameter, double factor,
                         Simulation *target);
 
-// Number of buffers that are drawn: those that are given, one where both sides share it.
-size_t perturbation_buffers(const Simulation *simulation);
-
-// Draws run `run` into `target`, a copy of `simulation`; restitution[i] and contact_time[i] are the
-// factors of buffer i. They are log-normal with mean 1 and the given relative deviation; a factor
-// that puts a restitution beyond 1 is drawn again.
-void perturbation_draw(const InputUncertainty *uncertainty, uint64_t seed,
-                       const Simulation *simulation, uint64_t run, Simulation *target,
-                       double *restitution, double *contact_time);
+// Draws run `run` into `target`, a copy of `simulation`, and appends the factors of each buffer
+// that is given, one where both sides share it. They are log-normal with mean 1 and the given
+// relative deviation; a factor that puts a restitution beyond 1 is drawn again. STATUS_NO_MEMORY.
+Status perturbation_draw(const InputUncertainty *uncertainty, uint64_t seed,
+                         const Simulation *simulation, uint64_t run, Simulation *target,
+                         Reals *restitution, Reals *contact_time, Problem *problem);
 
 #endif

@@ -7,12 +7,10 @@
 #include "core/study/sensitivity.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/contact/identification.h"
-#include "core/study/uncertainty_bands.h"
 
 enum { RUNS_MAX = 2000, RUNS_DEFAULT = 200, DEVIATIONS_MAX = 1000 };
 
@@ -41,7 +39,7 @@ static const Field sensitivity_study_fields[] = {
     FIELD_REAL(SensitivityStudy, step, NULL, WITHIN(1e-6, 0.2), 0.01, "relative step of the central differences; half and a quarter of it are tried too"),
     FIELD_BASE(SensitivityStudy, uncertainty, sensitivity_input_fields),
     FIELD_COUNT(SensitivityStudy, runs, NULL, WITHIN(0, RUNS_MAX), OPTIONAL, "runs with restitution and contact time drawn at random; 200 if absent, none without a deviation"),
-    FIELD_COUNT(SensitivityStudy, seed, NULL, WITHIN(0, 0x1p53 - 1), 1, "of the draws"),
+    FIELD_COUNT(SensitivityStudy, seed, NULL, WITHIN(0, 0x1p53 - 1), 1, "seed of the draws"),
     FIELD_END
 };
 
@@ -66,7 +64,7 @@ static const Field sensitivity_stop_fields[] = {
 };
 
 static const Field sensitivity_slope_fields[] = {
-    FIELD_CHOICE(SensitivitySlope, metric, statistics_metric_names, OPTIONAL, "number of the summary"),
+    FIELD_CHOICE(SensitivitySlope, metric, statistics_metric_names, OPTIONAL, "metric of the summary"),
     FIELD_REAL(SensitivitySlope, value, NULL, ANY, OPTIONAL, "of the scene itself"),
     FIELD_REAL(SensitivitySlope, derivative, NULL, ANY, OPTIONAL, "relative change over that of the parameter, by the central difference of the middle step"),
     FIELD_REAL(SensitivitySlope, spread, NULL, ANY, OPTIONAL, "largest less smallest difference of all steps"),
@@ -83,7 +81,7 @@ static const Field sensitivity_row_fields[] = {
 };
 
 static const Field sensitivity_statistic_fields[] = {
-    FIELD_CHOICE(RunStatistic, metric, statistics_metric_names, OPTIONAL, "number of the summary"),
+    FIELD_CHOICE(RunStatistic, metric, statistics_metric_names, OPTIONAL, "metric of the summary"),
     FIELD_TEXT(RunStatistic, unit, 0, PRESENCE_OPTIONAL, 0, "of the numbers below"),
     FIELD_COUNT(RunStatistic, count, NULL, AT_MIN(0), 0, "runs in which it is known"),
     FIELD_REAL(RunStatistic, value, NULL, ANY, OPTIONAL, "of the scene itself"),
@@ -112,18 +110,19 @@ static const Field sensitivity_spectrum_fields[] = {
     FIELD_TEXT(RunSpectrum, unit, 0, PRESENCE_OPTIONAL, 0, "of the densities"),
     FIELD_REALS(RunSpectrum, value, NULL, ANY, 0, PRESENCE_OPTIONAL, "of the scene itself"),
     FIELD_REALS(RunSpectrum, mean, NULL, ANY, 0, PRESENCE_OPTIONAL, "mean of the runs' densities at each frequency"),
-    FIELD_REALS(RunSpectrum, q05, NULL, ANY, 0, PRESENCE_OPTIONAL, "5 % of the runs are below, at each frequency for itself"),
+    FIELD_REALS(RunSpectrum, q05, NULL, ANY, 0, PRESENCE_OPTIONAL, "5 % of the runs are below, at each frequency separately"),
     FIELD_REALS(RunSpectrum, median, NULL, ANY, 0, PRESENCE_OPTIONAL, "half of the runs are below"),
     FIELD_REALS(RunSpectrum, q95, NULL, ANY, 0, PRESENCE_OPTIONAL, "95 % of the runs are below"),
     FIELD_END
 };
 
+// The factors are those of the buffers' numbers, damper by damper, buffer by buffer.
 static const Field sensitivity_draw_fields[] = {
-    FIELD_COUNT(SensitivityDraw, run, NULL, AT_MIN(1), OPTIONAL, "its number; number and seed determine the draw"),
-    FIELD_TEXT(SensitivityDraw, why, 0, PRESENCE_OPTIONAL, 0, "reason of its failure"),
-    FIELD_REALS(SensitivityDraw, restitution, NULL, ANY, 0, PRESENCE_OPTIONAL, "factor of each given buffer's restitution: damper by damper, of both sides, left, right"),
-    FIELD_REALS(SensitivityDraw, contact_time, NULL, ANY, 0, PRESENCE_OPTIONAL, "likewise"),
-    FIELD_ITEM(SensitivityDraw, summary, summary_fields, NULL, PRESENCE_DEFAULT, "as in any result"),
+    {.name = "run", .kind = FIELD_KIND_COUNT, .offset = FIELD_AT(RunRecord, number, uint64_t), .range = AT_MIN(1), .presence = PRESENCE_OPTIONAL, .doc = "its number; number and seed determine the draw"},
+    FIELD_TEXT(RunRecord, why, 0, PRESENCE_OPTIONAL, 0, "reason of its failure"),
+    FIELD_REALS(RunRecord, restitution, NULL, ANY, 0, PRESENCE_OPTIONAL, "factor of each given buffer's restitution: damper by damper, of both sides, left, right"),
+    FIELD_REALS(RunRecord, contact_time, NULL, ANY, 0, PRESENCE_OPTIONAL, "likewise"),
+    FIELD_ITEM(RunRecord, summary, summary_fields, NULL, PRESENCE_DEFAULT, "as in any result"),
     FIELD_END
 };
 
@@ -144,7 +143,7 @@ static const Field sensitivity_answer_fields[] = {
     FIELD_COUNT(Sensitivity, runs, NULL, AT_MIN(0), 0, "requested runs with restitution and contact time drawn at random"),
     FIELD_COUNT(Sensitivity, made, NULL, AT_MIN(0), 0, "drawn runs made"),
     FIELD_COUNT(Sensitivity, failed, NULL, AT_MIN(0), 0, "drawn runs that failed; all numbers below are of the others"),
-    FIELD_COUNT(Sensitivity, seed, NULL, AT_MIN(0), OPTIONAL, "of the draws"),
+    FIELD_COUNT(Sensitivity, seed, NULL, AT_MIN(0), OPTIONAL, "seed of the draws"),
     FIELD_BASE(Sensitivity, uncertainty, sensitivity_uncertainty_fields),
     FIELD_TEXT(Sensitivity, distribution, 0, PRESENCE_OPTIONAL, 0, "distribution of the draws"),
     FIELD_REAL(Sensitivity, confidence, NULL, ANY, OPTIONAL, "of the intervals of means"),
@@ -156,14 +155,6 @@ static const Field sensitivity_answer_fields[] = {
     FIELD_END
 };
 // clang-format on
-
-static Status sensitivity_check_deviation(const Simulation *simulation, double deviation,
-                                          int parameter, const char *pointer, Problem *problem) {
-    const char *why = deviation > 0 ? perturbation_refuse(simulation, parameter) : NULL;
-    return why == NULL ? STATUS_OK
-                       : problem_add_real(problem, STATUS_INVALID, pointer, deviation, NULL,
-                                          "must be left out: %s", why);
-}
 
 static Status sensitivity_check_runs(SensitivityStudy *study, const Simulation *simulation,
                                      Problem *problem) {
@@ -178,11 +169,11 @@ static Status sensitivity_check_runs(SensitivityStudy *study, const Simulation *
                                 "whose revisions record theirs");
     if (study->runs > 0)
         TRY(study_run_check_densities(simulation, values, problem));
-    if (values * (double)study->runs > UNCERTAINTY_BANDS_MAX)
+    if (values * (double)study->runs > SPECTRUM_ACCUMULATOR_MAX)
         return problem_add_real(problem, STATUS_INVALID, "/study/runs", (double)study->runs, NULL,
                                 "must be at most %.0f for spectra of %.0f densities, is %llu: ask "
                                 "for fewer, or for shorter segments",
-                                floor(UNCERTAINTY_BANDS_MAX / values), values,
+                                floor(SPECTRUM_ACCUMULATOR_MAX / values), values,
                                 (unsigned long long)study->runs);
     return STATUS_OK;
 }
@@ -195,19 +186,14 @@ static Status sensitivity_complete(void *request, const Simulation *simulation,
         return problem_add(problem, STATUS_INVALID, "/study/kind",
                            "sensitivity needs a damper: the scene has none");
     TRY(uncertainty_complete(&study->uncertainty, simulation, problem));
-    const Status restitution = sensitivity_check_deviation(
-        simulation, study->uncertainty.restitution_deviation, SENSITIVITY_RESTITUTION,
-        "/study/restitution_deviation", problem);
-    const Status contact_time = sensitivity_check_deviation(
-        simulation, study->uncertainty.contact_time_deviation, SENSITIVITY_CONTACT_TIME,
-        "/study/contact_time_deviation", problem);
+    const Status deviations = uncertainty_check_common(&study->uncertainty, simulation, problem);
     const Status runs = sensitivity_check_runs(study, simulation, problem);
     // Defaults are written out, so that equal studies have one canonical form.
     const bool has_parameters = study->parameters.count > 0;
     for (int i = 0; i < SENSITIVITY_PARAMETERS && !has_parameters; i++)
         if (perturbation_refuse(simulation, i) == NULL)
             TRY(study_add_text(sensitivity_parameter_names[i], &study->parameters, problem));
-    return restitution != STATUS_OK ? restitution : contact_time != STATUS_OK ? contact_time : runs;
+    return study_first_failure(deviations, runs);
 }
 
 // Members are steps, parameter by parameter, down and up by each of them, and then the drawn runs.
@@ -223,15 +209,8 @@ typedef struct SensitivityWork {
     size_t rows[SENSITIVITY_PARAMETERS]; // of the answer, those that have steps
     size_t steps;                        // members
     double values[SENSITIVITY_PARAMETERS * ROW_STEPS][STATISTICS_METRICS]; // of each step
-    RunTable runs;                                                         // drawn; texts borrowed
-    UncertaintyBands bands;
+    SpectrumAccumulator sums;                                              // of the drawn runs
 } SensitivityWork;
-
-// A member's run and its draw.
-typedef struct SensitivityPart {
-    StudyPart part;
-    Reals restitution, contact_time;
-} SensitivityPart;
 
 static int sensitivity_parameter(const char *name) {
     int parameter = 0;
@@ -265,15 +244,14 @@ static double sensitivity_step(const SensitivityWork *work, size_t step) {
     return ldexp(work->study->step, -(int)step);
 }
 
-// Up it may be less.
+// The step up is smaller where a restitution would exceed 1.
 static double sensitivity_step_up(const SensitivityWork *work, int parameter, size_t step) {
     return perturbation_max_step(work->simulation, parameter, sensitivity_step(work, step));
 }
 
-static Status sensitivity_scene(const void *of, size_t member, Simulation *scene, void *made,
+static Status sensitivity_scene(const void *of, size_t member, Simulation *scene, StudyPart *part,
                                 Problem *problem) {
     const SensitivityWork *work = of;
-    SensitivityPart *part = made;
     TRY(sensitivity_copy(work->simulation, scene, problem));
     if (member < work->steps) {
         const int parameter = work->answer->response.at[work->rows[member / ROW_STEPS]].parameter;
@@ -283,49 +261,26 @@ static Status sensitivity_scene(const void *of, size_t member, Simulation *scene
         perturbation_apply(work->simulation, parameter, factor, scene);
         return STATUS_OK;
     }
-    const size_t buffers = perturbation_buffers(work->simulation);
-    if (!reals_allocate(&part->restitution, buffers) ||
-        !reals_allocate(&part->contact_time, buffers))
-        return study_no_memory(problem);
-    perturbation_draw(&work->study->uncertainty, work->study->seed, work->simulation,
-                      member - work->steps + 1, scene, part->restitution.at, part->contact_time.at);
+    return perturbation_draw(&work->study->uncertainty, work->study->seed, work->simulation,
+                             member - work->steps + 1, scene, &part->run.restitution,
+                             &part->run.contact_time, problem);
+}
+
+static Status sensitivity_fold_draw(SensitivityWork *work, size_t index, StudyPart *part,
+                                    Problem *problem) {
+    Sensitivity *answer = work->answer;
+    TRY(run_table_add(&answer->table, &part->run, index + 1, problem));
+    answer->made++;
+    if (answer->table.at[index].why == NULL)
+        return spectrum_accumulator_add(&work->sums, &part->spectrum, (size_t)work->study->runs,
+                                        problem);
+    answer->failed++;
     return STATUS_OK;
 }
 
-static void sensitivity_clear(void *made) {
-    SensitivityPart *part = made;
-    free(part->restitution.at);
-    free(part->contact_time.at);
-}
-
-static Status sensitivity_fold_draw(SensitivityWork *work, size_t index, SensitivityPart *part,
-                                    Problem *problem) {
-    Sensitivity *answer = work->answer;
-    SensitivityDraw *draw = &answer->table.at[index];
-    RunRecord *run = &work->runs.at[index];
-    *run = part->part.run;
-    run->number = index + 1;
-    *draw =
-        (SensitivityDraw){index + 1, run->why, part->restitution, part->contact_time, run->summary};
-    part->part.run.why = NULL;
-    part->restitution = part->contact_time = (Reals){NULL, 0};
-    answer->table.count++;
-    work->runs.count++;
-    answer->made++;
-    if (run->why != NULL) {
-        answer->failed++;
-        return STATUS_OK;
-    }
-    if (!work->has_force)
-        run->summary.peak_contact_force = (double)NAN; // in no statistic
-    return uncertainty_bands_add(&work->bands, &part->part.spectrum, (size_t)work->study->runs,
-                                 problem);
-}
-
-static Status sensitivity_fold(void *of, size_t member, void *made, Problem *problem) {
+static Status sensitivity_fold(void *of, size_t member, StudyPart *part, Problem *problem) {
     SensitivityWork *work = of;
-    SensitivityPart *part = made;
-    RunRecord *run = &part->part.run;
+    RunRecord *run = &part->run;
     if (run->why == NULL)
         work->answer->steps += run->steps;
     if (member >= work->steps)
@@ -367,11 +322,8 @@ static void sensitivity_fill_slope(const double quotients[SENSITIVITY_STEPS],
 
 static Status sensitivity_fill_row(const SensitivityWork *work, size_t index, Problem *problem) {
     SensitivityRow *row = &work->answer->response.at[work->rows[index]];
-    row->slopes.at = calloc(STATISTICS_METRICS, sizeof *row->slopes.at);
-    if (row->slopes.at == NULL || !reals_allocate(&row->steps, SENSITIVITY_STEPS))
-        return study_no_memory(problem);
     for (size_t step = 0; step < SENSITIVITY_STEPS; step++)
-        row->steps.at[step] = sensitivity_step(work, step);
+        TRY(study_add_real(sensitivity_step(work, step), &row->steps, problem));
     for (int metric = 0; metric < STATISTICS_METRICS; metric++) {
         const double value = statistics_value(&work->own->summary, metric);
         double quotients[SENSITIVITY_STEPS];
@@ -384,7 +336,9 @@ static Status sensitivity_fill_row(const SensitivityWork *work, size_t index, Pr
             quotients[step] = sensitivity_quotient(work->values[low][metric],
                                                    work->values[low + 1][metric], value, width);
         }
-        SensitivitySlope *slope = &row->slopes.at[row->slopes.count++];
+        SensitivitySlope *slope = study_list_add(&row->slopes, sizeof *slope, problem);
+        if (slope == NULL)
+            return STATUS_NO_MEMORY;
         *slope = (SensitivitySlope){metric, value, (double)NAN, (double)NAN, false};
         sensitivity_fill_slope(quotients, slope);
     }
@@ -392,16 +346,17 @@ static Status sensitivity_fill_row(const SensitivityWork *work, size_t index, Pr
 }
 
 static Status sensitivity_fill_statistics(const SensitivityWork *work, Problem *problem) {
-    SensitivityStatistics *statistics = &work->answer->statistics;
-    statistics->at = calloc(STATISTICS_METRICS, sizeof *statistics->at);
-    if (statistics->at == NULL)
-        return study_no_memory(problem);
+    Sensitivity *answer = work->answer;
+    static const RunTable none = {NULL, 0};
     for (int metric = 0; metric < STATISTICS_METRICS; metric++) {
-        RunStatistic *statistic = &statistics->at[statistics->count++];
+        const bool is_known = metric != STATISTICS_PEAK_CONTACT_FORCE || work->has_force;
+        RunStatistic *statistic = study_list_add(&answer->statistics, sizeof *statistic, problem);
+        if (statistic == NULL)
+            return STATUS_NO_MEMORY;
         (void)fields_default(sensitivity_statistic_fields, statistic); // nothing to allocate
-        if (metric != STATISTICS_PEAK_CONTACT_FORCE || work->has_force)
+        if (is_known)
             statistic->value = statistics_value(&work->own->summary, metric);
-        TRY(statistics_fill(&work->runs, metric, statistic, problem));
+        TRY(statistics_fill(is_known ? &answer->table : &none, metric, statistic, problem));
     }
     return STATUS_OK;
 }
@@ -414,9 +369,9 @@ static Status sensitivity_end(void *of, const StudyTools *tools, Problem *proble
     if (work->study->runs == 0)
         return STATUS_OK;
     TRY(sensitivity_fill_statistics(work, problem));
-    TRY(study_failures_fill(&work->runs, &answer->failures, problem));
-    return uncertainty_bands_report(&work->bands, &work->own->spectrum, tools->progress,
-                                    &answer->frequency, &answer->spectra, problem);
+    TRY(study_failures_fill(&answer->table, &answer->failures, problem));
+    return spectrum_accumulator_report(&work->sums, &work->own->spectrum, true, tools->progress,
+                                       &answer->frequency, &answer->spectra, problem);
 }
 
 // Why a stop has no closed forms; NULL: it has.
@@ -466,15 +421,13 @@ static Status sensitivity_fill_contact(const SensitivityWork *work, Problem *pro
     const DerivedList *derived = &work->own->plan.derived;
     const Contact *contact = scene_contact(scene);
     const ContactLaw *law = dampers_contact_law(&scene->dampers, contact);
-    SensitivityStops *stops = &work->answer->contact;
-    stops->at = calloc(derived->count + 1, sizeof *stops->at);
-    if (stops->at == NULL)
-        return study_no_memory(problem);
     for (size_t i = 0; i < derived->count; i++) {
         const Derived *from = &derived->at[i];
         const Damper *damper = &scene->dampers.at[from->damper - 1];
         const char *why = sensitivity_refuse_stop(law, damper_buffer(damper, (Side)from->side));
-        SensitivityStop *stop = &stops->at[stops->count++];
+        SensitivityStop *stop = study_list_add(&work->answer->contact, sizeof *stop, problem);
+        if (stop == NULL)
+            return STATUS_NO_MEMORY;
         (void)fields_default(sensitivity_stop_fields, stop); // nothing to allocate
         stop->damper = from->damper;
         stop->side = from->side;
@@ -493,13 +446,11 @@ static Status sensitivity_fill_contact(const SensitivityWork *work, Problem *pro
 // Rows of the answer, and those of them that have steps.
 static Status sensitivity_fill_rows(SensitivityWork *work, Problem *problem) {
     const Texts *parameters = &work->study->parameters;
-    SensitivityRows *rows = &work->answer->response;
     size_t stepped = 0;
-    rows->at = calloc(parameters->count + 1, sizeof *rows->at);
-    if (rows->at == NULL)
-        return study_no_memory(problem);
     for (size_t i = 0; i < parameters->count; i++) {
-        SensitivityRow *row = &rows->at[rows->count++];
+        SensitivityRow *row = study_list_add(&work->answer->response, sizeof *row, problem);
+        if (row == NULL)
+            return STATUS_NO_MEMORY;
         row->parameter = sensitivity_parameter(parameters->at[i]);
         const char *refused = perturbation_refuse(work->simulation, row->parameter);
         if (refused == NULL)
@@ -514,7 +465,6 @@ static Status sensitivity_run_scene(SensitivityWork *work, const StudyTools *too
                                     Problem *problem) {
     Sensitivity *answer = work->answer;
     Simulation scene = {0};
-    char text[280];
     Status status = sensitivity_copy(work->simulation, &scene, problem);
     if (status == STATUS_OK)
         status = simulation_run(&scene, tools->limits, tools->progress, tools->workspace,
@@ -525,23 +475,23 @@ static Status sensitivity_run_scene(SensitivityWork *work, const StudyTools *too
     answer->summary = work->own->summary;
     answer->steps = work->own->steps;
     answer->is_chaotic = !isnan(horizon);
-    if (answer->is_chaotic)
-        snprintf(text, sizeof text,
-                 "rounding alone parts the trajectory after %.4g s: beyond that a small step of a "
-                 "parameter makes another trajectory, and slopes of its statistics need not "
-                 "settle; the spread tells which do",
-                 horizon);
-    else
-        snprintf(text, sizeof text,
-                 "the trajectory is the scene's own to the end: slopes that do not settle belong "
-                 "to what jumps, as numbers of impacts do, or to steps that are too large");
-    return study_copy_text(text, &answer->why, problem);
+    return study_status(
+        answer->is_chaotic
+            ? text_format(&answer->why,
+                          "rounding alone changes the trajectory after %.4g s: from there on a "
+                          "small step of a parameter gives another trajectory, and derivatives of "
+                          "its statistics may not exist; the spread shows which do",
+                          horizon)
+            : text_format(&answer->why,
+                          "the trajectory can be trusted to the end: derivatives on which the "
+                          "steps do not agree are those of numbers that jump, such as the number "
+                          "of impacts, or the steps are too large"),
+        problem);
 }
 
 static void sensitivity_free(void *of) {
     SensitivityWork *work = of;
-    free(work->runs.at);
-    uncertainty_bands_clear(&work->bands);
+    spectrum_accumulator_clear(&work->sums);
     outcome_unref(work->own);
 }
 
@@ -557,11 +507,12 @@ static Status sensitivity_begin(void *of, const StudyTools *tools, Problem *prob
     answer->confidence = STATISTICS_CONFIDENCE;
     TRY(study_copy_text(
         study->uncertainty.spread.count == 0
-            ? "log-normal factors of mean 1 and the stated relative deviation, each buffer's "
-              "restitution and contact time for themselves; a restitution beyond 1 is drawn again"
-            : "log-normal factors of mean 1 and the relative deviations of spread, each buffer's "
-              "restitution and contact time for themselves, all rows of a table by one factor; a "
-              "restitution beyond 1 is drawn again",
+            ? "log-normal factors of mean 1 and the stated relative deviation, independent for the "
+              "restitution and the contact time of each buffer; a restitution beyond 1 is drawn "
+              "again"
+            : "log-normal factors of mean 1 and the relative deviations of spread, independent for "
+              "the restitution and the contact time of each buffer, one factor for all rows of a "
+              "table; a restitution beyond 1 is drawn again",
         &answer->distribution, problem));
     if (fields_copy(sensitivity_uncertainty_fields, &study->uncertainty, &answer->uncertainty) !=
         STATUS_OK)
@@ -569,36 +520,29 @@ static Status sensitivity_begin(void *of, const StudyTools *tools, Problem *prob
     TRY(sensitivity_run_scene(work, tools, problem));
     TRY(sensitivity_fill_contact(work, problem));
     TRY(sensitivity_fill_rows(work, problem));
-    work->runs.at = calloc(runs + 1, sizeof *work->runs.at);
-    answer->table.at = calloc(runs + 1, sizeof *answer->table.at);
-    if (work->runs.at == NULL || answer->table.at == NULL)
-        return study_no_memory(problem);
     const size_t densities =
         work->own->spectrum.densities.count * work->own->spectrum.densities.rows;
     work->work.members = work->steps + runs;
     work->work.bytes = outcome_bytes(work->own) + sizeof(double) * densities * runs;
-    work->work.part_bytes = sizeof(SensitivityPart) + sizeof(double) * densities;
+    work->work.part_bytes = sizeof(StudyPart) + sizeof(double) * densities;
     return STATUS_OK;
 }
-
-static const Kind sensitivity_answer = {"sensitivity", "effects of errors of a buffer's numbers",
-                                        sensitivity_answer_fields, sizeof(Sensitivity)};
 
 const StudyKind study_sensitivity = {
     .kind =
         {"sensitivity",
          "effects of errors of restitution, contact time and masses on k_b, c_b and the response",
          sensitivity_study_fields, sizeof(SensitivityStudy)},
-    .answer = &sensitivity_answer,
+    .answer = &(const Kind){"sensitivity", "effects of errors of a buffer's numbers",
+                            sensitivity_answer_fields, sizeof(Sensitivity)},
     .shorten = "ask for fewer runs or parameters",
     .complete = sensitivity_complete,
     .cost = sensitivity_cost,
     .work_size = sizeof(SensitivityWork),
-    .part_size = sizeof(SensitivityPart),
+    .part_size = sizeof(StudyPart),
     .begin = sensitivity_begin,
     .scene = sensitivity_scene,
     .fold = sensitivity_fold,
     .end = sensitivity_end,
-    .clear = sensitivity_clear,
     .free = sensitivity_free,
 };

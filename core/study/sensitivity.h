@@ -4,6 +4,7 @@
 #define CORE_STUDY_SENSITIVITY_H
 
 #include "core/study/parameter_perturbation.h"
+#include "core/study/spectrum_accumulator.h"
 #include "core/study/statistics.h"
 #include "core/study/study.h"
 
@@ -67,19 +68,6 @@ typedef struct SensitivityStatistics {
     size_t count;
 } SensitivityStatistics;
 
-// One drawn run. The factors are those of the buffers' numbers, damper by damper, buffer by buffer.
-typedef struct SensitivityDraw {
-    uint64_t run; // from 1
-    char *why;    // it failed
-    Reals restitution, contact_time;
-    Summary summary;
-} SensitivityDraw;
-
-typedef struct SensitivityDraws {
-    SensitivityDraw *at;
-    size_t count;
-} SensitivityDraws;
-
 // The answer.
 typedef struct Sensitivity {
     Variant variant;
@@ -97,7 +85,7 @@ typedef struct Sensitivity {
     StudyFailures failures;
     Reals frequency; // [Hz]
     RunSpectra spectra;
-    SensitivityDraws table;
+    RunTable table; // the drawn runs, from 1
 } Sensitivity;
 
 #endif

@@ -6,16 +6,14 @@
 
 #include "core/math/student_t.h"
 
-const char *const statistics_metric_names[] = {
-    "peak_displacement",
-    "rms_displacement",
-    "peak_acceleration",
-    "rms_acceleration",
-    "impacts",
-    "peak_contact_force",
-    "psd",
-    NULL,
-};
+const char *const statistics_metric_names[] = {"peak_displacement",
+                                               "rms_displacement",
+                                               "peak_acceleration",
+                                               "rms_acceleration",
+                                               "impacts",
+                                               "peak_contact_force",
+                                               "psd",
+                                               NULL};
 static const char *const statistics_units[] = {"m", "m", "m/s^2", "m/s^2", "1", "N"};
 
 double statistics_value(const Summary *summary, int metric) {
@@ -83,15 +81,6 @@ static Status statistics_collect(const RunTable *table, int metric, Values *valu
     return STATUS_OK;
 }
 
-static int statistics_compare(const void *a, const void *b) {
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-void statistics_sort(double *values, size_t count) {
-    qsort(values, count, sizeof *values, statistics_compare);
-}
-
 double statistics_quantile(const double *sorted, size_t count, double share) {
     const double place = share * (double)(count - 1);
     const size_t below = (size_t)place;
@@ -127,7 +116,7 @@ Status statistics_fill(const RunTable *table, int metric, RunStatistic *statisti
         statistic->high = values.mean + half;
     }
     if (count > 0) {
-        statistics_sort(values.at, count);
+        reals_sort(values.at, count);
         statistic->minimum = values.at[0];
         statistic->q05 = statistics_quantile(values.at, count, 0.05);
         statistic->q25 = statistics_quantile(values.at, count, 0.25);

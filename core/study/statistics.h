@@ -44,8 +44,6 @@ typedef struct RunTrust {
 // One metric of a summary; NAN: unknown.
 double statistics_value(const Summary *summary, int metric);
 
-void statistics_sort(double *values, size_t count); // ascending
-
 // Quantile of sorted values, at least one, linear between order statistics as numpy.quantile.
 double statistics_quantile(const double *sorted, size_t count, double share);
 

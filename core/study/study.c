@@ -89,6 +89,8 @@ void study_part_free(const StudyWork *work, StudyPart *part) {
     if (work->kind->clear != NULL)
         work->kind->clear(part);
     free(part->run.why);
+    free(part->run.restitution.at);
+    free(part->run.contact_time.at);
     spectrum_clear(&part->spectrum);
     free(part);
 }
@@ -107,8 +109,7 @@ static Status study_run_member(StudyWork *work, size_t member, const StudyTools 
     StudyTools own = *tools;
     StudyPart *part = NULL;
     own.progress = &progress;
-    if (!progress_advance(&progress, 0))
-        return problem_set(problem, STATUS_CANCELLED, "the study was stopped");
+    TRY(study_advance(&progress, 0, problem));
     Status status = study_part_make(work, member, &own, &part, problem);
     if (status == STATUS_OK)
         status = study_part_fold(work, member, part, problem);

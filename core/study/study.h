@@ -53,17 +53,17 @@ struct StudyKind {
     Status (*begin)(void *work, const StudyTools *tools, Problem *problem);
     // Makes the scene of a member, from 0; other threads make other members at the same time.
     // `scene` is cleared by the caller. A failure is the member's, unless it ends the study.
-    Status (*scene)(const void *work, size_t member, Simulation *scene, void *part,
+    Status (*scene)(const void *work, size_t member, Simulation *scene, StudyPart *part,
                     Problem *problem);
     // Keeps what the fold needs of a run beside steps and summary. NULL: the spectra.
-    Status (*keep)(const void *work, const Outcome *outcome, const StudyTools *tools, void *part,
-                   Problem *problem);
+    Status (*keep)(const void *work, const Outcome *outcome, const StudyTools *tools,
+                   StudyPart *part, Problem *problem);
     // Adds a part to the answer and may take its contents. May change what is wanted.
-    Status (*fold)(void *work, size_t member, void *part, Problem *problem);
+    Status (*fold)(void *work, size_t member, StudyPart *part, Problem *problem);
     // Completes the answer when all wanted members are folded. May be NULL.
     Status (*end)(void *work, const StudyTools *tools, Problem *problem);
-    void (*clear)(void *part); // what a part owns beside its StudyPart; may be NULL
-    void (*free)(void *work);  // what the work owns; may be NULL
+    void (*clear)(StudyPart *part); // what a part owns beside its StudyPart; may be NULL
+    void (*free)(void *work);       // what the work owns; may be NULL
 };
 
 extern const StudyKind *const studies[]; // NULL-terminated

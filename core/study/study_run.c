@@ -11,18 +11,68 @@ Status study_no_memory(Problem *problem) {
     return problem_set(problem, STATUS_NO_MEMORY, "no memory for the study");
 }
 
+Status study_advance(const Progress *progress, double fraction, Problem *problem) {
+    return progress_advance(progress, fraction)
+               ? STATUS_OK
+               : problem_set(problem, STATUS_CANCELLED, "the study was stopped");
+}
+
 Status study_copy_text(const char *text, char **target, Problem *problem) {
     *target = text != NULL ? strdup(text) : NULL;
     return *target != NULL || text == NULL ? STATUS_OK : study_no_memory(problem);
 }
 
-Status study_add_text(const char *text, Texts *texts, Problem *problem) {
-    char **at = realloc(texts->at, (texts->count + 1) * sizeof *at);
-    if (at == NULL)
+Status study_copy_reals(const double *values, size_t count, Reals *target, Problem *problem) {
+    if (!reals_allocate(target, count))
         return study_no_memory(problem);
-    texts->at = at;
-    TRY(study_copy_text(text, &at[texts->count], problem));
-    texts->count++;
+    memcpy(target->at, values, count * sizeof *values);
+    return STATUS_OK;
+}
+
+// There is room for as many elements as the next power of two.
+void *study_list_add(void *list, size_t size, Problem *problem) {
+    List grown;
+    memcpy(&grown, list, sizeof grown);
+    const size_t count = grown.count;
+    if ((count & (count - 1)) == 0)
+        grown.at = realloc(grown.at, (count == 0 ? 1 : 2 * count) * size);
+    if (grown.at == NULL) {
+        (void)study_no_memory(problem);
+        return NULL;
+    }
+    grown.count++;
+    memcpy(list, &grown, sizeof grown);
+    return memset((char *)grown.at + size * count, 0, size);
+}
+
+Status study_add_text(const char *text, Texts *texts, Problem *problem) {
+    char **added = study_list_add(texts, sizeof *added, problem);
+    return added != NULL ? study_copy_text(text, added, problem) : STATUS_NO_MEMORY;
+}
+
+Status study_add_real(double value, Reals *reals, Problem *problem) {
+    double *added = study_list_add(reals, sizeof *added, problem);
+    if (added == NULL)
+        return STATUS_NO_MEMORY;
+    *added = value;
+    return STATUS_OK;
+}
+
+void study_clear_texts(Texts *texts) {
+    for (size_t i = 0; i < texts->count; i++)
+        free(texts->at[i]);
+    free(texts->at);
+    *texts = (Texts){NULL, 0};
+}
+
+Status run_table_add(RunTable *table, RunRecord *run, uint64_t number, Problem *problem) {
+    RunRecord *added = study_list_add(table, sizeof *added, problem);
+    if (added == NULL)
+        return STATUS_NO_MEMORY;
+    *added = *run;
+    added->number = number;
+    run->why = NULL;
+    run->restitution = run->contact_time = (Reals){NULL, 0};
     return STATUS_OK;
 }
 
@@ -33,11 +83,9 @@ Status study_failures_add(StudyFailures *failures, int status, const char *reaso
             failures->at[i].count++;
             return STATUS_OK;
         }
-    StudyFailure *at = realloc(failures->at, (failures->count + 1) * sizeof *at);
-    if (at == NULL)
-        return study_no_memory(problem);
-    failures->at = at;
-    StudyFailure *failure = &at[failures->count++];
+    StudyFailure *failure = study_list_add(failures, sizeof *failure, problem);
+    if (failure == NULL)
+        return STATUS_NO_MEMORY;
     *failure = (StudyFailure){.status = status, .count = 1, .first = number};
     TRY(study_copy_text(reason, &failure->reason, problem));
     return study_copy_text(why, &failure->detail, problem);
@@ -49,21 +97,6 @@ Status study_failures_fill(const RunTable *table, StudyFailures *failures, Probl
         if (run->why != NULL)
             TRY(study_failures_add(failures, (int)run->status, status_slug(run->status),
                                    run->number, run->why, problem));
-    }
-    return STATUS_OK;
-}
-
-Status run_spectra_make(const Spectrum *like, Reals *frequency, RunSpectra *spectra,
-                        Problem *problem) {
-    const Columns *densities = &like->densities;
-    spectra->at = calloc(densities->count, sizeof *spectra->at);
-    if (spectra->at == NULL || !reals_allocate(frequency, densities->rows))
-        return study_no_memory(problem);
-    memcpy(frequency->at, like->frequency, densities->rows * sizeof *like->frequency);
-    spectra->count = densities->count;
-    for (size_t c = 0; c < densities->count; c++) {
-        TRY(study_copy_text(densities->at[c].name, &spectra->at[c].channel, problem));
-        TRY(study_copy_text(densities->at[c].unit, &spectra->at[c].unit, problem));
     }
     return STATUS_OK;
 }
@@ -128,11 +161,7 @@ Status study_run_check_names(const Texts *given, const char *const *names, const
 Status study_run_copy(const Simulation *simulation, Simulation *target, Problem *problem) {
     if (fields_copy(simulation_fields, simulation, target) != STATUS_OK)
         return study_no_memory(problem);
-    Texts *sampled = &target->output.channels;
-    for (size_t i = 0; i < sampled->count; i++)
-        free(sampled->at[i]);
-    free(sampled->at);
-    *sampled = (Texts){NULL, 0};
+    study_clear_texts(&target->output.channels);
     return STATUS_OK;
 }
 

@@ -17,15 +17,19 @@ typedef struct StudyTools {
 typedef struct RunRecord {
     uint64_t number; // its seed, or its place
     Status status;
-    char *why;       // reason of the failure; NULL: none
-    double steps;    // solver steps; NAN after a failure
-    Summary summary; // absent after a failure
+    char *why;                       // reason of the failure; NULL: none
+    double steps;                    // solver steps; NAN after a failure
+    Summary summary;                 // absent after a failure
+    Reals restitution, contact_time; // factors of a drawn run, buffer by buffer
 } RunRecord;
 
 typedef struct RunTable {
     RunRecord *at;
     size_t count;
 } RunTable;
+
+// Moves the record of a run to the end of the table. STATUS_NO_MEMORY.
+Status run_table_add(RunTable *table, RunRecord *run, uint64_t number, Problem *problem);
 
 // Runs that failed for one reason.
 typedef struct StudyFailure {
@@ -46,22 +50,6 @@ Status study_failures_add(StudyFailures *failures, int status, const char *reaso
 
 // Counts the failures of a table by their status, in its order.
 Status study_failures_fill(const RunTable *table, StudyFailures *failures, Problem *problem);
-
-// Densities of many runs at each frequency; a study fills some of the lists.
-typedef struct RunSpectrum {
-    char *channel, *unit;
-    Reals mean, standard_deviation, low, high; // the last two of the mean
-    Reals value, q05, median, q95;             // the first of the study's own scene
-} RunSpectrum;
-
-typedef struct RunSpectra {
-    RunSpectrum *at;
-    size_t count;
-} RunSpectra;
-
-// Fills the frequencies and the channels' names and units like those of a run. STATUS_NO_MEMORY.
-Status run_spectra_make(const Spectrum *like, Reals *frequency, RunSpectra *spectra,
-                        Problem *problem);
 
 // Densities that a run's spectra hold; 0 without spectra.
 double study_run_densities(const Simulation *simulation);
@@ -94,10 +82,30 @@ static inline bool study_run_ends_study(Status status) {
 
 Status study_no_memory(Problem *problem);
 
-// A copy of `text` (NULL: none). STATUS_NO_MEMORY.
-Status study_copy_text(const char *text, char **target, Problem *problem);
+// STATUS_OK, or STATUS_NO_MEMORY if something could not be made.
+static inline Status study_status(bool is_made, Problem *problem) {
+    return is_made ? STATUS_OK : study_no_memory(problem);
+}
 
-// Appends a copy of `text`. STATUS_NO_MEMORY.
+// STATUS_CANCELLED if the progress, at `fraction`, requests a stop.
+Status study_advance(const Progress *progress, double fraction, Problem *problem);
+
+// The first of two results that is a failure.
+static inline Status study_first_failure(Status first, Status second) {
+    return first != STATUS_OK ? first : second;
+}
+
+// Copies of a text (NULL: none) and of numbers. STATUS_NO_MEMORY.
+Status study_copy_text(const char *text, char **target, Problem *problem);
+Status study_copy_reals(const double *values, size_t count, Reals *target, Problem *problem);
+
+// Appends an element of `size` zeros to a typed list (base/field.h) that only this function has
+// filled. NULL without memory.
+void *study_list_add(void *list, size_t size, Problem *problem);
+
+// The same with a copy of a text, and with a number. STATUS_NO_MEMORY.
 Status study_add_text(const char *text, Texts *texts, Problem *problem);
+Status study_add_real(double value, Reals *reals, Problem *problem);
+void study_clear_texts(Texts *texts);
 
 #endif

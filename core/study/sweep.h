@@ -3,11 +3,60 @@
 #ifndef CORE_STUDY_SWEEP_H
 #define CORE_STUDY_SWEEP_H
 
+#include "core/base/json_pointer.h"
 #include "core/study/study.h"
-#include "core/study/sweep_grid.h"
 
+enum {
+    SWEEP_AXES = 64,
+    SWEEP_AXIS_VALUES = 1 << 20,
+    SWEEP_METRICS = 16,
+    SWEEP_POINTS = 1000000, // where the limits say nothing
+};
+
+typedef enum SweepSpacing { SWEEP_LINEAR, SWEEP_LOGARITHMIC } SweepSpacing;
+typedef enum SweepMode { SWEEP_GRID, SWEEP_LIST } SweepMode;
 extern const char *const sweep_spacing_names[], *const sweep_mode_names[];
+
+// One axis: values, or a range.
+typedef struct SweepAxis {
+    char *pointer; // into the completed scene
+    Texts values;  // scalars as JSON text
+    double from, to;
+    uint64_t count;
+    int spacing; // SweepSpacing; CHOICE_ABSENT beside values
+} SweepAxis;
+
+typedef struct SweepAxes {
+    SweepAxis *at;
+    size_t count;
+} SweepAxes;
+
+typedef struct Buffers {
+    Buffer *at;
+    size_t count;
+} Buffers;
+
+// A record that an axis names, in its version at submission.
+typedef struct PinnedRecord {
+    char *name, *digest;
+    Refcount *named; // a NamedRecord; NULL: not found yet
+} PinnedRecord;
+
+typedef struct PinnedRecords {
+    PinnedRecord *at;
+    size_t count;
+} PinnedRecords;
 extern const Field pinned_record_fields[];
+
+// The request.
+typedef struct SweepStudy {
+    Variant variant;
+    SweepAxes axes; // of a grid the last one varies fastest
+    int mode;       // SweepMode
+    Texts metrics;
+    Buffers materials;     // the numbers of every material that the scene or an axis names
+    PinnedRecords records; // the ground motions that an axis names
+} SweepStudy;
 
 // The metrics of a point: the summary's numbers in their order, then the solver's steps.
 extern const char *const sweep_metric_names[]; // NULL-terminated
@@ -65,5 +114,52 @@ size_t sweep_value_index(const Sweep *sweep, size_t axis, size_t point);
 SweepStatus sweep_status(Status status); // of a run
 // The metrics of a run; NAN where unknown.
 void sweep_values(const Texts *metrics, const RunRecord *run, double *values);
+
+// The values of an axis, parsed.
+typedef struct SweepValues {
+    const char *pointer;
+    size_t count, stride; // point p has value (p / stride) % count
+    JsonScalar *at;
+    char *texts;        // of all its values
+    const Field *field; // NULL: the pointer is faulty, the axis changes nothing
+    bool is_tag;
+} SweepValues;
+
+// Immutable, shared by threads.
+typedef struct SweepGrid {
+    const SweepStudy *study;
+    const Simulation *simulation;
+    size_t points, axis_count;
+    SweepValues axes[];
+} SweepGrid;
+
+// Number of points; SIZE_MAX on overflow.
+size_t sweep_points(const SweepStudy *study);
+
+// Borrows study and simulation, both completed (the study by its rows at least). Adds all faults of
+// axes below "/study/axes"; `limits` NULL: without a limit on the points. *grid is freed by
+// sweep_grid_free also after STATUS_INVALID, where it may be there: then only pointers are faulty.
+Status sweep_grid_new(const SweepStudy *study, const Simulation *simulation,
+                      const SimulationLimits *limits, SweepGrid **grid, Problem *problem);
+void sweep_grid_free(SweepGrid *grid);
+
+// Index of a point's value on an axis.
+size_t sweep_grid_index(const SweepGrid *grid, size_t axis, size_t point);
+
+// The completed scene of a point: the sweep's own with this point's values. `is_bare`: without
+// output, as a row needs it. Cleared by simulation_clear in any case. Faults have the pointers of
+// that scene.
+Status sweep_grid_scene(const SweepGrid *grid, size_t point, bool is_bare,
+                        const SimulationLimits *limits, Simulation *target, Problem *problem);
+
+// Estimated solver steps of all points, from a sample of them.
+double sweep_grid_steps(const SweepGrid *grid, const SimulationLimits *limits);
+
+// Validates every point if that is no more work than `scenes` small scenes, else about as many as
+// that: points where one axis alone leaves its first value, of long axes a sample, and the last
+// one. Each fault has the pointer of the value that causes it, and the number of its point.
+// `progress`, asked before each point, may stop it.
+Status sweep_grid_validate(const SweepGrid *grid, size_t scenes, const SimulationLimits *limits,
+                           const Progress *progress, Problem *problem);
 
 #endif

@@ -1,5 +1,8 @@
 // Every point is run once for its errors and then timed, in `repeats` rounds over all points, which
 // share a temporary slowdown of the machine. Short runs are timed many at once.
+//
+// Cost is the smallest CPU time: disturbances make a run longer, never shorter. Even so similar
+// times change places from one measurement to the next: among those the closest point is best.
 #include "core/study/tradeoff.h"
 
 #include <math.h>
@@ -8,11 +11,11 @@
 #include <string.h>
 
 #include "core/solve/solvers.h"
-#include "core/study/statistics.h"
 
 enum { SOLVERS_MAX = 32, REPEATS_MAX = 1000, BATCH_MAX = 10000 }; // runs of a timing
 static const double batch_seconds = 5e-3;                         // of CPU, at least, of a timing
 static const double batch_steps = 1e5;                            // about as many solver steps
+static const double similar = 1.25; // times as long is within the noise of a measurement
 
 static const double default_errors[METRIC_COUNT] = {1e-3, 1e-2, 1e-2, 0, 0.1, 1e-3};
 
@@ -82,7 +85,7 @@ static Status tradeoff_complete(void *request, const Simulation *simulation,
     const Status metric = study_run_check_metric(simulation, metric_names[study->metric], problem);
     const Status names = tradeoff_check_solvers(study, problem);
     const Status values = tradeoff_check_values(simulation, limits, problem);
-    return metric != STATUS_OK ? metric : names != STATUS_OK ? names : values;
+    return study_first_failure(study_first_failure(metric, names), values);
 }
 
 // Limits of one point.
@@ -108,7 +111,7 @@ static Status tradeoff_cost(const void *request, const Simulation *simulation,
         candidate_settings_list(&study->solvers, simulation, &answer.points, problem);
     *steps = 0;
     for (size_t i = 0; i < answer.points.count && status == STATUS_OK; i++) {
-        const double own = candidate_settings_cost(simulation, &answer.points.at[i]);
+        const double own = answer.points.at[i].estimate;
         if (own <= max)
             *steps += tradeoff_timed_steps(study, own);
     }
@@ -123,7 +126,6 @@ typedef struct TradeoffRun {
     SimulationLimits limits; // of a point
     Tradeoff *answer;
     Outcome *reference;
-    double *steps;    // estimated, of each point
     double *times;    // [s], `repeats` of each point
     double done, all; // estimated steps
     Problem *fault;   // of a point
@@ -135,16 +137,12 @@ static void tradeoff_trim(TradeoffRun *run) {
     size_t count = 0;
     for (size_t i = 0; i < points->count; i++) {
         TradeoffPoint *point = &points->at[i];
-        const bool is_finer = count > 0 && !isnan(point->step) &&
-                              run->steps[i] > run->limits.steps &&
-                              run->steps[count - 1] > run->limits.steps &&
-                              strcmp(point->solver, points->at[count - 1].solver) == 0;
-        if (is_finer) {
+        const TradeoffPoint *before = count > 0 ? &points->at[count - 1] : NULL;
+        if (before != NULL && !isnan(point->step) && point->estimate > run->limits.steps &&
+            before->estimate > run->limits.steps && strcmp(point->solver, before->solver) == 0)
             fields_clear(tradeoff_point_fields, point);
-            continue;
-        }
-        points->at[count] = *point;
-        run->steps[count++] = run->steps[i];
+        else
+            points->at[count++] = *point;
     }
     points->count = count;
 }
@@ -193,15 +191,15 @@ static Compared tradeoff_compared(const Outcome *outcome, const Simulation *simu
 static Status tradeoff_measure(TradeoffRun *run, size_t index, Problem *problem) {
     TradeoffPoint *point = &run->answer->points.at[index];
     Problem *fault = run->fault;
-    const double steps = run->steps[index];
+    const double steps = point->estimate;
     Simulation simulation = {0};
     Outcome *outcome = NULL;
     problem_clear(fault);
     Status status;
     if (steps > run->limits.steps)
         status = problem_set(fault, STATUS_LIMIT,
-                             "would take about %.2g solver steps, more than the %.2g that a point "
-                             "may",
+                             "would take about %.2g solver steps, more than the %.2g that one "
+                             "point may take",
                              steps, run->limits.steps);
     else
         status = candidate_settings_apply(run->simulation, point, &run->limits, &simulation, fault);
@@ -237,7 +235,7 @@ static Status tradeoff_time(TradeoffRun *run, size_t index, size_t round, Proble
     Simulation simulation = {0};
     // Its limits were checked before.
     Status status = candidate_settings_apply(run->simulation, point, NULL, &simulation, problem);
-    const double steps = run->steps[index];
+    const double steps = point->estimate;
     const double end = run->done + fmax(steps, batch_steps);
     size_t runs = 0;
     double took = 0;
@@ -264,8 +262,7 @@ static Status tradeoff_time_all(TradeoffRun *run, Problem *problem) {
     const size_t repeats = run->study->repeats;
     for (size_t round = 0; round < repeats; round++)
         for (size_t i = 0; i < points->count; i++) {
-            if (!progress_advance(run->tools->progress, run->done / run->all))
-                return problem_set(problem, STATUS_CANCELLED, "the study was stopped");
+            TRY(study_advance(run->tools->progress, run->done / run->all, problem));
             if (points->at[i].status == TRADEOFF_MEASURED)
                 TRY(tradeoff_time(run, i, round, problem));
         }
@@ -274,25 +271,104 @@ static Status tradeoff_time_all(TradeoffRun *run, Problem *problem) {
         double *times = &run->times[i * repeats];
         if (point->status != TRADEOFF_MEASURED)
             continue;
-        statistics_sort(times, repeats);
+        reals_sort(times, repeats);
         point->cpu_minimum = times[0];
         point->cpu_median = (times[(repeats - 1) / 2] + times[repeats / 2]) / 2;
     }
     return STATUS_OK;
 }
 
+// A point's error; NAN if it was not measured.
+static double tradeoff_point_error(const TradeoffPoint *point, int metric) {
+    return point->status == TRADEOFF_MEASURED && !isnan(point->cpu_minimum)
+               ? error_metrics_by(&point->errors, metric)
+               : (double)NAN;
+}
+
+void tradeoff_mark_best(TradeoffPoints *points, int metric) {
+    for (size_t i = 0; i < points->count; i++) {
+        TradeoffPoint *point = &points->at[i];
+        const double cpu = point->cpu_minimum, error = tradeoff_point_error(point, metric);
+        point->is_best = !isnan(error);
+        for (size_t j = 0; j < points->count && point->is_best; j++) {
+            const double other = tradeoff_point_error(&points->at[j], metric);
+            const double time = points->at[j].cpu_minimum;
+            point->is_best = !(time <= cpu && other <= error && (time < cpu || other < error));
+        }
+    }
+}
+
+// The cheapest point, or the closest, of those with at most this error and CPU time, without
+// `without`; NULL: none.
+static const TradeoffPoint *tradeoff_find(const TradeoffPoints *points, int metric, bool is_closest,
+                                          double max_error, double max_cpu,
+                                          const TradeoffPoint *without) {
+    const TradeoffPoint *found = NULL;
+    double least = INFINITY;
+    for (size_t i = 0; i < points->count; i++) {
+        const TradeoffPoint *point = &points->at[i];
+        const double error = tradeoff_point_error(point, metric), cpu = point->cpu_minimum;
+        if (point == without || !(error <= max_error && cpu <= max_cpu) ||
+            (found != NULL && !((is_closest ? error : cpu) < least)))
+            continue;
+        found = point;
+        least = is_closest ? error : cpu;
+    }
+    return found;
+}
+
+Status tradeoff_recommend(const TradeoffPoints *points, int metric, double error,
+                          TradeoffRecommendation *recommendation, Problem *problem) {
+    const char *name = metric_names[metric], *unit = metric_units[metric];
+    const TradeoffPoint *cheapest = tradeoff_find(points, metric, false, error, INFINITY, NULL);
+    const TradeoffPoint *best =
+        tradeoff_find(points, metric, true, INFINITY,
+                      cheapest != NULL ? similar * cheapest->cpu_minimum : (double)INFINITY, NULL);
+    char **why = &recommendation->why;
+    recommendation->point = COUNT_ABSENT;
+    if (best == NULL || cheapest == NULL)
+        return study_status(
+            best == NULL
+                ? text_format(why, "no point has an error of %s", name)
+                : text_format(why, "no point keeps %s within %.3g%s; the closest, %s, is at %.2g%s",
+                              name, error, unit, best->name, tradeoff_point_error(best, metric),
+                              unit),
+            problem);
+    if (!(tradeoff_point_error(best, metric) < tradeoff_point_error(cheapest, metric)))
+        best = cheapest;
+    const TradeoffPoint *next = tradeoff_find(points, metric, false, error, INFINITY, best);
+    const double reached = tradeoff_point_error(best, metric), cpu = best->cpu_minimum;
+    recommendation->point = (uint64_t)(best - points->at) + 1;
+    if (best != cheapest)
+        return study_status(
+            text_format(why,
+                        "%s keeps %s within %.3g%s, %.2g%s in %.3g s, and takes hardly longer than "
+                        "the cheapest, %s, %.2g%s in %.3g s",
+                        best->name, name, error, unit, reached, unit, cpu, cheapest->name,
+                        tradeoff_point_error(cheapest, metric), unit, cheapest->cpu_minimum),
+            problem);
+    return study_status(
+        next == NULL
+            ? text_format(why, "%s is the only point that keeps %s within %.3g%s: %.2g%s in %.3g s",
+                          best->name, name, error, unit, reached, unit, cpu)
+            : text_format(why,
+                          "%s is the cheapest that keeps %s within %.3g%s: %.2g%s in %.3g s; the "
+                          "next, %s, takes %.3g times as long",
+                          best->name, name, error, unit, reached, unit, cpu, next->name,
+                          next->cpu_minimum / cpu),
+        problem);
+}
+
 static Status tradeoff_run_all(TradeoffRun *run, Problem *problem) {
     Tradeoff *answer = run->answer;
     const TradeoffStudy *study = run->study;
     TradeoffPoints *points = &answer->points;
-    if (run->steps == NULL || run->times == NULL || run->fault == NULL)
+    if (run->times == NULL || run->fault == NULL)
         return study_no_memory(problem);
-    for (size_t i = 0; i < points->count; i++)
-        run->steps[i] = candidate_settings_cost(run->simulation, &points->at[i]);
     tradeoff_trim(run);
     for (size_t i = 0; i < points->count; i++)
-        if (run->steps[i] <= run->limits.steps)
-            run->all += tradeoff_timed_steps(study, run->steps[i]);
+        if (points->at[i].estimate <= run->limits.steps)
+            run->all += tradeoff_timed_steps(study, points->at[i].estimate);
     TRY(tradeoff_run_reference(run, problem));
     const Compared reference = tradeoff_compared(run->reference, run->simulation, true);
     answer->reference.yardstick = error_metrics_reference(&reference);
@@ -301,8 +377,9 @@ static Status tradeoff_run_all(TradeoffRun *run, Problem *problem) {
     outcome_unref(run->reference);
     run->reference = NULL;
     TRY(tradeoff_time_all(run, problem));
-    pareto_mark(points, study->metric);
-    return pareto_recommend(points, study->metric, study->error, &answer->recommendation, problem);
+    tradeoff_mark_best(points, study->metric);
+    return tradeoff_recommend(points, study->metric, study->error, &answer->recommendation,
+                              problem);
 }
 
 static Status tradeoff_study_run(const void *request, const Simulation *simulation,
@@ -320,26 +397,22 @@ static Status tradeoff_study_run(const void *request, const Simulation *simulati
                        .tools = tools,
                        .limits = tradeoff_limits(study, tools->limits),
                        .answer = answer,
-                       .steps = calloc(count + 1, sizeof(double)),
                        .times = calloc(count * study->repeats + 1, sizeof(double)),
                        .all = batch_steps,
                        .fault = calloc(1, sizeof(Problem))};
     const Status status = tradeoff_run_all(&run, problem);
     outcome_unref(run.reference);
-    free(run.steps);
     free(run.times);
     free(run.fault);
     return status;
 }
 
-static const Kind tradeoff_answer = {"tradeoff", "accuracy against CPU time, measured",
-                                     tradeoff_answer_fields, sizeof(Tradeoff)};
-
 const StudyKind study_tradeoff = {
     .kind = {"tradeoff",
              "error against CPU time over solvers, steps and other settings traded for speed",
              tradeoff_study_fields, sizeof(TradeoffStudy)},
-    .answer = &tradeoff_answer,
+    .answer = &(const Kind){"tradeoff", "accuracy against CPU time, measured",
+                            tradeoff_answer_fields, sizeof(Tradeoff)},
     .shorten = "ask for fewer solvers or repeats, or lower point_steps",
     .is_measured = true,
     .complete = tradeoff_complete,

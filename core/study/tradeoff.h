@@ -2,7 +2,7 @@
 #ifndef CORE_STUDY_TRADEOFF_H
 #define CORE_STUDY_TRADEOFF_H
 
-#include "core/study/pareto.h"
+#include "core/study/candidate_settings.h"
 #include "core/study/study.h"
 
 // The request.
@@ -21,6 +21,11 @@ typedef struct TradeoffReference {
     ReferenceSummary yardstick;
 } TradeoffReference;
 
+typedef struct TradeoffRecommendation {
+    uint64_t point; // its number, from 1; COUNT_ABSENT: none keeps the error
+    char *why;
+} TradeoffRecommendation;
+
 // The answer.
 typedef struct Tradeoff {
     Variant variant;
@@ -31,5 +36,12 @@ typedef struct Tradeoff {
     TradeoffPoints points;
     TradeoffRecommendation recommendation;
 } Tradeoff;
+
+// Marks the Pareto-optimal points: no other is as cheap and as close, and better in one of both.
+void tradeoff_mark_best(TradeoffPoints *points, int metric);
+
+// Recommends the cheapest point that keeps `error`, or a closer one that takes hardly longer.
+Status tradeoff_recommend(const TradeoffPoints *points, int metric, double error,
+                          TradeoffRecommendation *recommendation, Problem *problem);
 
 #endif

@@ -1,5 +1,5 @@
 // A sweep made ready: names on its axes become revisions, materials are pinned, all is judged and
-// completed. Not its points (core/study/sweep_grid.h). Used by prepare.c.
+// completed. Not its points (core/study/sweep.h). Used by prepare.c.
 #ifndef SERVER_JOBS_PREPARE_SWEEP_H
 #define SERVER_JOBS_PREPARE_SWEEP_H
 

@@ -11,7 +11,7 @@
 #include <time.h>
 
 #include "core/math/fft.h"
-#include "core/study/sweep_grid.h"
+#include "core/study/sweep.h"
 #include "server/base/clock.h"
 #include "server/jobs/intake.h"
 #include "server/jobs/sweep.h"

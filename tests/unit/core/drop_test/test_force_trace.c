@@ -1,6 +1,5 @@
 // What a force trace is read as: contacts of either sign above any baseline, what is refused and
 // why. How often its intervals hold is truth/test_traces.c's.
-#include "core/drop_test/contact_detection.h"
 #include "core/drop_test/force_trace.h"
 
 #include <math.h>

@@ -166,7 +166,7 @@ static void where_all_fail_the_study_says_so_and_nothing_else(void **state) {
     assert_true(answer->made == 10 && answer->failed == 10 && !answer->target.is_kept);
     assert_true(isnan(answer->target.estimated_error));
     assert_true(isnan(answer->statistics.rms_displacement.mean) && answer->spectra.count == 0);
-    assert_non_null(strstr(answer->target.why, "no run of 10"));
+    assert_non_null(strstr(answer->target.why, "none of the 10 runs"));
     variant_free(&answer->variant);
     study_request_clear(&inquiry);
 }

@@ -143,6 +143,19 @@ static void chaos_is_told_and_its_slopes_do_not_settle(void **state) {
     clear(&inquiry, answer);
 }
 
+static void draw(const SensitivityStudy *study, const StudyRequest *inquiry, uint64_t run,
+                 Simulation *member, double factors[2]) {
+    Reals drawn[2] = {{NULL, 0}, {NULL, 0}};
+    assert_int_equal(perturbation_draw(&study->uncertainty, study->seed, &inquiry->simulation, run,
+                                       member, &drawn[0], &drawn[1], NULL),
+                     STATUS_OK);
+    for (int i = 0; i < 2; i++) {
+        assert_int_equal(drawn[i].count, 1);
+        factors[i] = drawn[i].at[0];
+        free(drawn[i].at);
+    }
+}
+
 static void draws_have_the_stated_spread_and_stay_below_one(void **state) {
     (void)state;
     StudyRequest inquiry = study_request_make(0.9, 0.025, 1);
@@ -157,8 +170,7 @@ static void draws_have_the_stated_spread_and_stay_below_one(void **state) {
     enum { DRAWN = 20000 };
     for (uint64_t run = 1; run <= DRAWN; run++) {
         double factors[2];
-        perturbation_draw(&study->uncertainty, study->seed, &inquiry.simulation, run, &member,
-                          &factors[0], &factors[1]);
+        draw(study, &inquiry, run, &member, factors);
         const Buffer *buffer = &member.scene.dampers.at[0].buffer;
         assert_true(buffer->restitution == 0.9 * factors[0] && buffer->restitution <= 1);
         assert_true(buffer->contact_time == 0.025 * factors[1]);
@@ -174,8 +186,7 @@ static void draws_have_the_stated_spread_and_stay_below_one(void **state) {
     study->uncertainty.restitution_deviation = 0.5; // most of the upper half is beyond 1
     for (uint64_t run = 1; run <= 200; run++) {
         double factors[2];
-        perturbation_draw(&study->uncertainty, study->seed, &inquiry.simulation, run, &member,
-                          &factors[0], &factors[1]);
+        draw(study, &inquiry, run, &member, factors);
         assert_true(member.scene.dampers.at[0].buffer.restitution <= 1);
     }
     simulation_clear(&member);
@@ -207,7 +218,7 @@ static void each_buffer_is_drawn_by_what_its_material_tells(void **state) {
     Sensitivity *answer = make(&inquiry);
     double most[2] = {0};
     for (size_t i = 0; i < answer->table.count; i++) {
-        const SensitivityDraw *draw = &answer->table.at[i];
+        const RunRecord *draw = &answer->table.at[i];
         assert_int_equal(draw->restitution.count, 2);
         assert_true(draw->contact_time.at[0] == 1 && draw->restitution.at[1] == 1); // they are sure
         most[0] = fmax(most[0], fabs(draw->restitution.at[0] - 1));
@@ -251,8 +262,8 @@ static void a_drawn_run_is_the_scene_with_its_numbers(void **state) {
     complete(&inquiry);
     Sensitivity *answer = make(&inquiry);
     assert_true(answer->made == 20 && answer->failed == 0 && answer->table.count == 20);
-    const SensitivityDraw *draw = &answer->table.at[11];
-    assert_true(draw->run == 12 && draw->restitution.count == 1 && draw->restitution.at[0] == 1);
+    const RunRecord *draw = &answer->table.at[11];
+    assert_true(draw->number == 12 && draw->restitution.count == 1 && draw->restitution.at[0] == 1);
     Simulation simulation;
     Outcome *outcome;
     paper_scene(&simulation, 0.61, 0.025 * draw->contact_time.at[0], 2);

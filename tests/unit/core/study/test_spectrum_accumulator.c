@@ -40,7 +40,9 @@ static SpectrumAccumulator fold_of(size_t runs) {
     for (size_t run = 0; run < runs; run++) {
         Spectrum spectrum;
         spectrum_of(run, &spectrum);
-        assert_int_equal(spectrum_accumulator_add(&fold, &spectrum, true, &problem), STATUS_OK);
+        assert_int_equal(
+            spectrum_accumulator_add(&fold, &spectrum, SPECTRUM_ACCUMULATOR_FIRST, &problem),
+            STATUS_OK);
         columns_clear(&spectrum.densities);
     }
     return fold;
@@ -51,9 +53,9 @@ static Ensemble *tell(const SpectrumAccumulator *fold) {
     spectrum_of(0, &like);
     Ensemble *answer = (Ensemble *)(void *)variant_new(study_ensemble.answer);
     assert_non_null(answer);
-    assert_int_equal(
-        spectrum_accumulator_report(fold, &like, &answer->frequency, &answer->spectra, &problem),
-        STATUS_OK);
+    assert_int_equal(spectrum_accumulator_report(fold, &like, false, NULL, &answer->frequency,
+                                                 &answer->spectra, &problem),
+                     STATUS_OK);
     columns_clear(&like.densities);
     return answer;
 }
@@ -106,7 +108,9 @@ static void the_spread_is_that_of_the_channel_farthest_off(void **state) {
         Spectrum spectrum;
         spectrum_of(run, &spectrum);
         spectrum.densities.count = 1;
-        assert_int_equal(spectrum_accumulator_add(&alone, &spectrum, true, &problem), STATUS_OK);
+        assert_int_equal(
+            spectrum_accumulator_add(&alone, &spectrum, SPECTRUM_ACCUMULATOR_FIRST, &problem),
+            STATUS_OK);
         spectrum.densities.count = 2;
         columns_clear(&spectrum.densities);
     }

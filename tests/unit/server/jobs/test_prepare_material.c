@@ -10,7 +10,7 @@
 #include <cmocka.h>
 
 #include "core/study/sensitivity.h"
-#include "core/study/sweep_grid.h"
+#include "core/study/sweep.h"
 #include "server/codec/read.h"
 #include "server/jobs/documents.h"
 #include "server/jobs/intake.h"

@@ -69,9 +69,8 @@ typedef struct Noted {
     size_t folded, enough, parts, most;
 } Noted;
 
-static Status note(void *work, size_t member, void *made, Problem *fault) {
+static Status note(void *work, size_t member, StudyPart *part, Problem *fault) {
     Noted *noted = work;
-    const StudyPart *part = made;
     (void)fault;
     assert_int_equal(member, noted->folded);
     assert_int_equal(part->run.number, member);
@@ -83,7 +82,7 @@ static Status note(void *work, size_t member, void *made, Problem *fault) {
 
 static Noted *noted_of_all;
 
-static void clear(void *part) {
+static void clear(StudyPart *part) {
     (void)part;
     noted_of_all->parts--;
 }
