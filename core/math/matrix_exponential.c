@@ -47,7 +47,7 @@ static void matrix_exponential_series(const long double *A, size_t n, long doubl
 }
 
 // (I + T)^2 - I = 2 T + T T.
-void matrix_exponential_double(size_t n, long double *increment) {
+static void matrix_exponential_double(size_t n, long double *increment) {
     long double square[SIZE];
     matrix_exponential_multiply(increment, increment, n, square);
     for (size_t i = 0; i < n * n; i++)
@@ -118,25 +118,9 @@ static void matrix_exponential_form_series(const long double *A, size_t n, long 
     }
 }
 
-void matrix_exponential_forms(const long double *A, size_t n, long double h, size_t count,
-                              const long double *const pairs[][2], long double *forms) {
-    const int halved = matrix_exponential_halvings(A, n, h);
-    const long double small = ldexpl(h, -halved);
-    for (size_t i = 0; i < count; i++)
-        matrix_exponential_form_series(A, n, small, pairs[i], forms + i * n * n);
-    if (halved == 0)
-        return;
-    long double T[SIZE];
-    matrix_exponential_series(A, n, small, T);
-    for (int pass = 0; pass < halved; pass++) {
-        for (size_t i = 0; i < count; i++)
-            matrix_exponential_form_double(n, T, forms + i * n * n);
-        matrix_exponential_double(n, T);
-    }
-}
-
 // The integral over twice the time is the sum of both halves: F + (I + T)' F (I + T).
-void matrix_exponential_form_double(size_t n, const long double *increment, long double *form) {
+static void matrix_exponential_form_double(size_t n, const long double *increment,
+                                           long double *form) {
     long double E[SIZE], matrix_exponential_product[SIZE], second[SIZE];
     memcpy(E, increment, n * n * sizeof *E);
     for (size_t i = 0; i < n; i++)
@@ -152,69 +136,19 @@ void matrix_exponential_form_double(size_t n, const long double *increment, long
         form[i] += second[i];
 }
 
-// Approximate number of multiplications between progress calls.
-static const size_t PROGRESS_WORK = 1000000;
-
-// Work since the last progress call.
-typedef struct ExponentialProgress {
-    const Progress *progress;
-    double fraction;
-    size_t work;
-} ExponentialProgress;
-
-// out = left right; zeros in `left` are skipped.
-static bool matrix_exponential_product(const double *left, const double *right, size_t n,
-                                       double *restrict out, ExponentialProgress *state) {
-    for (size_t i = 0; i < n; i++) {
-        double *restrict row = out + i * n;
-        memset(row, 0, n * sizeof *row);
-        for (size_t k = 0; k < n; k++) {
-            const double factor = left[i * n + k], *of = right + k * n;
-            for (size_t j = 0; j < n && factor != 0; j++)
-                row[j] += factor * of[j];
-        }
-        if ((state->work += n * n) < PROGRESS_WORK)
-            continue;
-        state->work = 0;
-        if (!progress_advance(state->progress, state->fraction))
-            return false;
+void matrix_exponential_forms(const long double *A, size_t n, long double h, size_t count,
+                              const long double *const pairs[][2], long double *forms) {
+    const int halved = matrix_exponential_halvings(A, n, h);
+    const long double small = ldexpl(h, -halved);
+    for (size_t i = 0; i < count; i++)
+        matrix_exponential_form_series(A, n, small, pairs[i], forms + i * n * n);
+    if (halved == 0)
+        return;
+    long double T[SIZE];
+    matrix_exponential_series(A, n, small, T);
+    for (int pass = 0; pass < halved; pass++) {
+        for (size_t i = 0; i < count; i++)
+            matrix_exponential_form_double(n, T, forms + i * n * n);
+        matrix_exponential_double(n, T);
     }
-    return true;
-}
-
-bool matrix_exponential_doublings(const double *A, size_t n, double h, double *out, double *scratch,
-                                  const Progress *progress, double fraction) {
-    enum { DOUBLINGS_MIN = 20, DOUBLINGS_MAX = 1000 };
-    ExponentialProgress state = {progress, fraction, 0};
-    double norm = 0, *small = scratch, *next = scratch + n * n;
-    for (size_t i = 0; i < n; i++) {
-        double sum = 0;
-        for (size_t j = 0; j < n; j++)
-            sum += fabs(A[i * n + j]);
-        norm = fmax(norm, sum);
-    }
-    // The remainder of four terms is (|A| h / 2^N)^5 / 120, at most 1e-13 of the first term over
-    // all doublings.
-    int count = DOUBLINGS_MIN;
-    for (double rest = ldexp(norm * h, -DOUBLINGS_MIN); rest > 1e-3 && count < DOUBLINGS_MAX;
-         rest /= 2)
-        count++;
-    for (size_t i = 0; i < n * n; i++) {
-        small[i] = ldexp(A[i] * h, -count);
-        out[i] = small[i] / 4;
-    }
-    // T = S (I + S/2 (I + S/3 (I + S/4)))
-    for (int k = 3; k >= 1; k--) {
-        if (!matrix_exponential_product(small, out, n, next, &state))
-            return false;
-        for (size_t i = 0; i < n * n; i++)
-            out[i] = (small[i] + next[i]) / k;
-    }
-    for (int i = 0; i < count; i++) {
-        if (!matrix_exponential_product(out, out, n, next, &state))
-            return false;
-        for (size_t j = 0; j < n * n; j++)
-            out[j] = 2 * out[j] + next[j];
-    }
-    return true;
 }
