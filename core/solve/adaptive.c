@@ -766,14 +766,14 @@ static const Stepper adaptive_stepper = {.name = "adaptive",
                                          .clear = adaptive_clear,
                                          .cost = adaptive_step_cost};
 
-static Status adaptive_run(Run *run, Response *response, Problem *problem) {
-    return time_stepping_run_pair(&adaptive_stepper, run, 1, 1, adaptive_tolerance(run->accuracy),
+static Status adaptive_run(const Solver *solver, Run *run, Response *response, Problem *problem) {
+    return time_stepping_run_pair(solver->stepper, run, 1, 1, adaptive_tolerance(run->accuracy),
                                   response, problem);
 }
 
-static Status adaptive_decide(const Accuracy *accuracy, double base_interval, Plan *plan,
-                              Problem *problem) {
-    (void)base_interval, (void)problem;
+static Status adaptive_decide(const Solver *solver, const Accuracy *accuracy, double base_interval,
+                              Plan *plan, Problem *problem) {
+    (void)solver, (void)base_interval, (void)problem;
     const double tolerance = adaptive_tolerance(accuracy);
     return decisions_add(
         &plan->report.decisions, "tolerance", tolerance == TOLERANCE_DEFAULT ? "usual" : "asked",
@@ -785,7 +785,9 @@ static Status adaptive_decide(const Accuracy *accuracy, double base_interval, Pl
 // Steps for samples, kinks of the base and the fastest mode; a contact takes a number of steps that
 // depends on the tolerance. Assumed are seven contacts a second, and many of them simultaneous
 // where there are many dampers.
-static double adaptive_cost(const Accuracy *accuracy, double base_interval, const Plan *plan) {
+static double adaptive_cost(const Solver *solver, const Accuracy *accuracy, double base_interval,
+                            const Plan *plan) {
+    (void)solver;
     const double digits = -log10(adaptive_tolerance(accuracy)), each = pow(10, digits / 8) / 2;
     double setup, steps = plan->sample_rate;
     if (base_interval > 0)
@@ -811,4 +813,5 @@ const Solver solver_adaptive = {
     .run = adaptive_run,
     .decide = adaptive_decide,
     .cost = adaptive_cost,
+    .stepper = &adaptive_stepper,
 };

@@ -125,7 +125,7 @@ static void begin_rest(ModalState *state, size_t d, Side side) {
         double *impulses = state->scratch;
         for (size_t e = 0; e < state->dampers; e++)
             impulses[e] = e == d ? damper->w * damper->effective_mass : 0;
-        modal_state_push(state, impulses);
+        collision_push(state, impulses);
         for (size_t e = 0; e < state->dampers; e++)
             if (state->damper[e].phase == PHASE_RESTING)
                 state->damper[e].w = 0;

@@ -10,7 +10,6 @@
 #include <string.h>
 
 #include "core/solve/rounding_growth.h"
-#include "core/solve/step_work.h"
 
 enum { STILL_EVENTS = 1000, STORM_EVENTS = 100, IDLE_STEPS = 1000 };
 
@@ -308,7 +307,7 @@ static size_t event_engine_fly(EventEngine *engine, size_t until) {
     count = engine->flight.length == 0 ? 0 : event_engine_find_slices(state, count, slices);
     state->run->work.stop_searches += count > 0 && state->has_stops;
     if (count > 0)
-        count = flight_run(&engine->flight, &engine->trail, state, slices, count,
+        count = flight_run(&engine->flight, &engine->buffer, state, slices, count,
                            state->is_shadow ? NULL : &work);
     state->sample += count;
     if (count == 0 || state->is_shadow)
@@ -319,8 +318,8 @@ static size_t event_engine_fly(EventEngine *engine, size_t until) {
     done->mode_samples += count * state->mode_count;
     state->base_acceleration = base_cursor_at(&state->base, state->sample);
     impact_log_work(&state->impacts, work.input, work.damping);
-    FlightBuffer *trail = &engine->trail;
-    flight_buffer_feel(trail, state, count);
+    FlightBuffer *buffer = &engine->buffer;
+    flight_buffer_feel(buffer, state, count);
     if (state->sample + 1 - count == record->statistics_start)
         recorder_forget(state);
     recorder_take(record, state, count);
@@ -359,7 +358,7 @@ void event_engine_take_sample(EventEngine *engine) {
     modal_state_forces(state);
     if (state->sample == engine->record.statistics_start && state->sample > 0)
         recorder_forget(state);
-    flight_buffer_take(&engine->trail, state, engine->record.base_speed);
+    flight_buffer_take(&engine->buffer, state, engine->record.base_speed);
     recorder_take(&engine->record, state, 1);
     recorder_peaks(state);
 }
@@ -367,11 +366,11 @@ void event_engine_take_sample(EventEngine *engine) {
 // Notes the samples just passed: so many flown over, or the present one.
 static void event_engine_track(EventEngine *engine, size_t flown) {
     const ModalState *state = &engine->state;
-    const FlightBuffer *trail = &engine->trail;
+    const FlightBuffer *buffer = &engine->buffer;
     for (size_t k = 1; k <= (flown > 0 ? flown : 1); k++) {
         const size_t sample = flown > 0 ? state->sample - flown + k : state->sample;
         memcpy(engine->track + (sample - 1) % FLIGHT_BUFFER_MAX * state->padded,
-               flown > 0 ? trail->q + k * trail->padded : state->q,
+               flown > 0 ? buffer->q + k * buffer->padded : state->q,
                state->mode_count * sizeof *engine->track);
     }
 }
@@ -409,8 +408,8 @@ Status event_engine_make(EventEngine *engine, Run *run, double tolerance, Respon
     TRY(flight_make(&engine->flight, state, problem));
     TRY(sustained_contact_make(&engine->pressing, state, problem));
     TRY(power_contact_make(&engine->ode, state, tolerance, problem));
-    TRY(flight_buffer_make(&engine->trail, state, problem));
-    TRY(recorder_start(&engine->record, &engine->trail, state, response, problem));
+    TRY(flight_buffer_make(&engine->buffer, state, problem));
+    TRY(recorder_start(&engine->record, &engine->buffer, state, response, problem));
     const EnergyState energy = modal_state_energy(state);
     impact_log_start(&state->impacts, response, run->impacts_max, &energy);
     // What contacts may be wrong by each, of many of them.
@@ -427,7 +426,7 @@ Status event_engine_shadow(EventEngine *engine, const EventEngine *of, Run *run,
     engine->arc = of->arc;
     engine->flight = of->flight;
     engine->pressing = of->pressing;
-    engine->trail = of->trail;
+    engine->buffer = of->buffer;
     state->is_shadow = true;
     const EnergyState energy = modal_state_energy(state);
     impact_log_start(&state->impacts, response, run->impacts_max, &energy);
@@ -436,7 +435,7 @@ Status event_engine_shadow(EventEngine *engine, const EventEngine *of, Run *run,
 
 void event_engine_clear(EventEngine *engine) {
     recorder_clear(&engine->record);
-    flight_buffer_clear(&engine->trail);
+    flight_buffer_clear(&engine->buffer);
     flight_clear(&engine->flight);
     sustained_contact_clear(&engine->pressing);
     power_contact_clear(&engine->ode);

@@ -18,7 +18,7 @@ typedef struct EventEngine {
     Flight flight;
     SustainedContact pressing;
     PowerContact ode;
-    FlightBuffer trail;
+    FlightBuffer buffer;
     Recorder record;
     double work;                   // since Progress was asked
     size_t idle;                   // steps of contact in a row that took no time

@@ -12,7 +12,6 @@
 #include "core/solve/event_engine.h"
 #include "core/solve/power_contact.h"
 #include "core/solve/recorder.h"
-#include "core/solve/refine.h"
 #include "core/solve/single_mass.h"
 
 double exact_tolerance(const Accuracy *accuracy) {
@@ -22,14 +21,14 @@ double exact_tolerance(const Accuracy *accuracy) {
 }
 
 // Linear contacts and impulses have closed forms.
-void exact_forget_unused(Accuracy *accuracy, bool has_power_law) {
+static void exact_forget_unused(Accuracy *accuracy, bool has_power_law) {
     if (!has_power_law)
         ((AccuracyExact *)(void *)accuracy)->tolerance = (double)NAN;
 }
 
-Status exact_decide(const Accuracy *accuracy, double base_interval, Plan *plan, Problem *problem) {
-    (void)base_interval;
-    (void)problem;
+static Status exact_decide(const Solver *solver, const Accuracy *accuracy, double base_interval,
+                           Plan *plan, Problem *problem) {
+    (void)solver, (void)base_interval, (void)problem;
     if (plan->form != CONTACT_POWER || plan->damper_count == 0)
         return STATUS_OK;
     const double tolerance = exact_tolerance(accuracy);
@@ -91,11 +90,13 @@ Status exact_run_engine(Run *run, Response *response, Problem *problem) {
     return status;
 }
 
-static Status exact_run(Run *run, Response *response, Problem *problem) {
+static Status exact_run(const Solver *solver, Run *run, Response *response, Problem *problem) {
+    (void)solver;
     if (!single_mass_serves(run->plan, run->is_clear))
         return exact_run_engine(run, response, problem);
     // A base whose samples are further apart than the output's goes by strides once it has them.
-    const size_t fine = refine_count(run->base, run->plan->sample_rate, run->plan->count);
+    const size_t fine =
+        base_cursor_refined_count(run->base, run->plan->sample_rate, run->plan->count);
     Workspace none = {0}, *workspace = run->workspace == NULL ? &none : run->workspace;
     double *const values = fine == 0 ? NULL : workspace_values(workspace, fine);
     if (values == NULL)
@@ -103,8 +104,8 @@ static Status exact_run(Run *run, Response *response, Problem *problem) {
     Base refined;
     Run own = *run;
     own.base = &refined;
-    Status status = refine_base(run->base, run->plan->sample_rate, fine, values, run->progress,
-                                &refined, problem);
+    Status status = base_cursor_refine(run->base, run->plan->sample_rate, fine, values,
+                                       run->progress, &refined, problem);
     if (status == STATUS_OK)
         status = single_mass_run(&own, response, problem);
     run->steps = own.steps;

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/math/linear_system.h"
 #include "core/math/symmetric_matrix.h"
 
 double modal_state_time(const ModalState *state) {
@@ -159,42 +160,22 @@ double modal_state_rate(const ModalState *state) {
     return is_touching ? fmax(fmax(sqrt(stiff), viscous), state->rate) : state->rate;
 }
 
-// The inverse of `yield` among the dampers that rest, by Gauss and Jordan; it is positive definite.
-static void invert_hold(ModalState *state) {
+// constraint_mass is the inverse of delassus among the dampers at rest, and 0 elsewhere.
+void modal_state_constrain(ModalState *state) {
     const size_t n = state->dampers;
     double *left = state->scratch, *right = state->constraint_mass;
-    for (size_t i = 0; i < n; i++) {
-        const bool is_held = state->damper[i].phase == PHASE_RESTING;
-        for (size_t j = 0; j < n; j++) {
-            const bool are_held = is_held && state->damper[j].phase == PHASE_RESTING;
-            left[i * n + j] = are_held ? state->delassus[i * n + j] : i == j;
-            right[i * n + j] = is_held && i == j;
-        }
-    }
-    for (size_t k = 0; k < n; k++) {
-        const double pivot = left[k * n + k];
-        for (size_t j = 0; j < n; j++) {
-            left[k * n + j] /= pivot;
-            right[k * n + j] /= pivot;
-        }
-        for (size_t i = 0; i < n; i++) {
-            const double factor = left[i * n + k];
-            if (i == k || factor == 0)
-                continue;
-            for (size_t j = 0; j < n; j++) {
-                left[i * n + j] -= factor * left[k * n + j];
-                right[i * n + j] -= factor * right[k * n + j];
-            }
-        }
-    }
-}
-
-void modal_state_constrain(ModalState *state) {
     state->resting = 0;
-    for (size_t d = 0; d < state->dampers; d++)
-        state->resting += state->damper[d].phase == PHASE_RESTING;
+    for (size_t i = 0; i < n; i++) {
+        const bool is_resting = state->damper[i].phase == PHASE_RESTING;
+        state->resting += is_resting;
+        for (size_t j = 0; j < n; j++) {
+            const bool are_resting = is_resting && state->damper[j].phase == PHASE_RESTING;
+            left[i * n + j] = are_resting ? state->delassus[i * n + j] : i == j;
+            right[i * n + j] = is_resting && i == j;
+        }
+    }
     if (state->resting > 0)
-        invert_hold(state);
+        (void)linear_system_solve(left, right, n, n); // positive definite
 }
 
 static const double NEARLY = 1e-9;

@@ -189,32 +189,19 @@ static const Stepper precise_stepper = {.name = "precise",
                                         .order = 2, // with a base that is not linear in a step
                                         .between =
                                             "it is rounding, if the base is linear in every step",
-                                        .is_linear_only = true,
                                         .make = precise_make,
                                         .step = precise_step,
                                         .clear = precise_clear,
                                         .cost = precise_step_cost};
-
-static Status precise_run(Run *run, Response *response, Problem *problem) {
-    return time_stepping_run(&precise_stepper, run, response, problem);
-}
-
-static Status precise_decide(const Accuracy *accuracy, double base_interval, Plan *plan,
-                             Problem *problem) {
-    return time_stepping_decide(&precise_stepper, accuracy, base_interval, plan, problem);
-}
-
-static double precise_cost(const Accuracy *accuracy, double base_interval, const Plan *plan) {
-    return time_stepping_cost(&precise_stepper, accuracy, base_interval, plan);
-}
 
 const Solver solver_precise = {
     .kind = {"precise",
              "high precision direct integration (Zhong and Williams 1994), contacts switched at "
              "step ends",
              accuracy_step_fields, sizeof(AccuracyStep)},
-    .run = precise_run,
-    .decide = precise_decide,
-    .cost = precise_cost,
+    .run = time_stepping_run,
+    .decide = time_stepping_decide,
+    .cost = time_stepping_cost,
+    .stepper = &precise_stepper,
     .is_linear_only = true,
 };

@@ -23,16 +23,16 @@ static const double *shape_of(const ModalState *state, const RunColumn *column) 
     }
 }
 
-Status recorder_start(Recorder *record, const FlightBuffer *trail, const ModalState *state,
+Status recorder_start(Recorder *record, const FlightBuffer *buffer, const ModalState *state,
                       Response *response, Problem *problem) {
-    const size_t n = state->mode_count, columns = state->run->column_count, padded = trail->padded;
+    const size_t n = state->mode_count, columns = state->run->column_count, padded = buffer->padded;
     const size_t square = padded * padded;
     memset(record, 0, sizeof *record);
     record->block = calloc(2 * (square + FLIGHT_BUFFER_MAX * padded) + columns * (1 + padded),
                            sizeof *record->block);
     if (record->block == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu modes", n);
-    record->trail = trail;
+    record->buffer = buffer;
     for (size_t k = 0; k < 2; k++) {
         record->squares[k] = record->block + k * square;
         record->batch[k] = record->block + 2 * square + k * FLIGHT_BUFFER_MAX * padded;
@@ -62,7 +62,7 @@ static void take_means(Recorder *record, const ModalState *state, size_t column,
     const double share = state->plan->influence[state->run->columns[column].number];
     for (size_t k = 0; k < count; k++) {
         const double velocity = values[k];
-        values[k] = (velocity - record->last_velocity[column] + share * record->trail->ground[k]) *
+        values[k] = (velocity - record->last_velocity[column] + share * record->buffer->ground[k]) *
                     state->plan->sample_rate;
         record->last_velocity[column] = velocity;
     }
@@ -70,12 +70,12 @@ static void take_means(Recorder *record, const ModalState *state, size_t column,
 
 static void take_storey(Recorder *record, const ModalState *state, size_t column, double *values,
                         size_t count) {
-    const FlightBuffer *trail = record->trail;
+    const FlightBuffer *buffer = record->buffer;
     const ChannelId channel = state->run->columns[column].channel;
-    const size_t padded = trail->padded, storey = state->run->columns[column].number;
-    const double *rows = channel == CHANNEL_ACCELERATION   ? trail->elastic
-                         : channel == CHANNEL_DISPLACEMENT ? trail->q
-                                                           : trail->p;
+    const size_t padded = buffer->padded, storey = state->run->columns[column].number;
+    const double *rows = channel == CHANNEL_ACCELERATION   ? buffer->elastic
+                         : channel == CHANNEL_DISPLACEMENT ? buffer->q
+                                                           : buffer->p;
     const double *shape = record->shapes + column * padded;
     state->lanes->dot(padded, count, shape, rows + padded, values);
     if (channel == CHANNEL_MEAN_ACCELERATION) {
@@ -94,15 +94,15 @@ static void take_storey(Recorder *record, const ModalState *state, size_t column
 
 static void take_damper(Recorder *record, const ModalState *state, size_t column, double *values,
                         size_t count) {
-    const FlightBuffer *trail = record->trail;
+    const FlightBuffer *buffer = record->buffer;
     const RunColumn *wanted = &state->run->columns[column];
     const DamperState *damper = &state->damper[wanted->number];
-    const double *r = trail->r + wanted->number * TRAIL_ROWS + 1;
-    const double *z = trail->z + wanted->number * TRAIL_ROWS + 1;
+    const double *r = buffer->r + wanted->number * FLIGHT_BUFFER_ROWS + 1;
+    const double *z = buffer->z + wanted->number * FLIGHT_BUFFER_ROWS + 1;
     if (wanted->channel == CHANNEL_DAMPER_DISPLACEMENT) {
         const double middle = modal_state_middle(damper);
-        state->lanes->dot(trail->padded, count, record->shapes + column * trail->padded,
-                          trail->q + trail->padded, values);
+        state->lanes->dot(buffer->padded, count, record->shapes + column * buffer->padded,
+                          buffer->q + buffer->padded, values);
         for (size_t k = 0; k < count; k++)
             values[k] += middle + r[k];
         return;
@@ -135,18 +135,18 @@ static void take_column(Recorder *record, const ModalState *state, size_t column
 }
 
 static void add_batch(Recorder *record, const ModalState *state, size_t count) {
-    const FlightBuffer *trail = record->trail;
+    const FlightBuffer *buffer = record->buffer;
     for (size_t k = 0; k < 2; k++)
-        state->lanes->square(state->slot_count, trail->padded, count, record->batch[k],
+        state->lanes->square(state->slot_count, buffer->padded, count, record->batch[k],
                              record->squares[k]);
 }
 
 // Of accelerations the sign does not matter.
 static void add_squares(Recorder *record, const ModalState *state, size_t row) {
-    const size_t padded = record->trail->padded, at = record->count++ % FLIGHT_BUFFER_MAX;
+    const size_t padded = record->buffer->padded, at = record->count++ % FLIGHT_BUFFER_MAX;
     double *restrict pull = record->batch[1] + at * padded;
-    memcpy(record->batch[0] + at * padded, record->trail->q + row * padded, padded * sizeof *pull);
-    memcpy(pull, record->trail->elastic + row * padded, padded * sizeof *pull);
+    memcpy(record->batch[0] + at * padded, record->buffer->q + row * padded, padded * sizeof *pull);
+    memcpy(pull, record->buffer->elastic + row * padded, padded * sizeof *pull);
     for (size_t d = 0; d < state->dampers; d++) {
         const double force = state->damper[d].force, *shape = state->damper[d].shape;
         for (size_t i = 0; i < state->mode_count && force != 0; i++)
@@ -167,7 +167,7 @@ void recorder_take(Recorder *record, ModalState *state, size_t count) {
 
 // The largest shape' squares shape of any storey, over all slots.
 static double largest_sum(const Recorder *record, const double *squares, const ModalState *state) {
-    const size_t n = state->mode_count, padded = record->trail->padded;
+    const size_t n = state->mode_count, padded = record->buffer->padded;
     double most = 0;
     for (size_t j = 0; j < state->storey_count; j++) {
         const double *shape = state->modes->shapes + j * n;
@@ -273,23 +273,24 @@ static double rise(const ModalState *state, const double *rows, size_t count, do
 }
 
 void recorder_flight_peaks(Recorder *record, ModalState *state, size_t count) {
-    const FlightBuffer *trail = record->trail;
+    const FlightBuffer *buffer = record->buffer;
     const Peaks *peaks = &state->impacts.response->peaks;
     double far[FLIGHT_BUFFER_MAX], most[FLIGHT_BUFFER_MAX];
     Instant at = {
-        .v = rise(state, trail->p, count, peaks->velocity, most),
-        .acceleration = rise(state, trail->elastic, count, peaks->acceleration, most),
-        .x = rise(state, trail->q, count, peaks->displacement, far),
+        .v = rise(state, buffer->p, count, peaks->velocity, most),
+        .acceleration = rise(state, buffer->elastic, count, peaks->acceleration, most),
+        .x = rise(state, buffer->q, count, peaks->displacement, far),
         .damper_x = peaks->damper_displacement,
     };
     for (size_t d = 0; d < state->dampers; d++) {
         const DamperState *damper = &state->damper[d];
-        const double *r = trail->r + d * TRAIL_ROWS + 1, middle = modal_state_middle(damper);
+        const double *r = buffer->r + d * FLIGHT_BUFFER_ROWS + 1,
+                     middle = modal_state_middle(damper);
         for (size_t k = 0; k < count; k++)
             if (far[k] + fabs(middle + r[k]) > at.damper_x)
                 at.damper_x =
                     fmax(at.damper_x,
-                         fabs(modal_state_dot(damper->shape, trail->q + (k + 1) * trail->padded,
+                         fabs(modal_state_dot(damper->shape, buffer->q + (k + 1) * buffer->padded,
                                               state->mode_count) +
                               (middle + r[k])));
     }

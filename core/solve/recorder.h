@@ -3,10 +3,10 @@
 #ifndef CORE_SOLVE_RECORDER_H
 #define CORE_SOLVE_RECORDER_H
 
-#include "core/solve/flight_buffer.h"
+#include "core/solve/flight.h"
 
 typedef struct Recorder {
-    const FlightBuffer *trail;
+    const FlightBuffer *buffer;
     size_t statistics_start; // the first sample that counts
     double base_speed;       // integral of a_g since the last sample, where that is no flight [m/s]
     double *last_velocity;   // of each column's storey, at the last sample
@@ -19,11 +19,11 @@ typedef struct Recorder {
 } Recorder;
 
 // Freed by recorder_clear, also after a failure.
-Status recorder_start(Recorder *record, const FlightBuffer *trail, const ModalState *state,
+Status recorder_start(Recorder *record, const FlightBuffer *buffer, const ModalState *state,
                       Response *response, Problem *problem);
 void recorder_clear(Recorder *record);
 
-// Writes down rows 1 to `count` of the trail, the last of them being the present sample, with the
+// Writes down rows 1 to `count` of the buffer, the last of them being the present sample, with the
 // present forces; base_speed goes back to 0.
 void recorder_take(Recorder *record, ModalState *state, size_t count);
 // Takes their peaks, all of them being samples of flight.

@@ -122,23 +122,11 @@ static const Stepper rk4_stepper = {.name = "rk4",
                                     .step = rk4_step,
                                     .cost = rk4_step_cost};
 
-static Status rk4_run(Run *run, Response *response, Problem *problem) {
-    return time_stepping_run(&rk4_stepper, run, response, problem);
-}
-
-static Status rk4_decide(const Accuracy *accuracy, double base_interval, Plan *plan,
-                         Problem *problem) {
-    return time_stepping_decide(&rk4_stepper, accuracy, base_interval, plan, problem);
-}
-
-static double rk4_cost(const Accuracy *accuracy, double base_interval, const Plan *plan) {
-    return time_stepping_cost(&rk4_stepper, accuracy, base_interval, plan);
-}
-
 const Solver solver_rk4 = {
     .kind = {"rk4", "the classical Runge-Kutta method of order 4, contacts switched at step ends",
              accuracy_step_fields, sizeof(AccuracyStep)},
-    .run = rk4_run,
-    .decide = rk4_decide,
-    .cost = rk4_cost,
+    .run = time_stepping_run,
+    .decide = time_stepping_decide,
+    .cost = time_stepping_cost,
+    .stepper = &rk4_stepper,
 };

@@ -41,6 +41,16 @@ typedef struct RunColumn {
 // much CPU time on a middling machine [s].
 #define SOLVER_STEP 3e-8
 
+// Solver steps of the event engine's parts, as measured on frames of 1 to 200 storeys.
+typedef enum StepWorkKind {
+    STEP_WORK_FLIGHT, // a sample interval of flight
+    STEP_WORK_HOLD,   // an attempt at a long step of contact
+    STEP_WORK_ARC,
+    STEP_WORK_EVENT,
+    STEP_WORK_POWER, // a contact under a power law; for predictions only
+} StepWorkKind;
+double step_work_steps(StepWorkKind kind, size_t storeys, size_t dampers, bool is_coupled);
+
 // What is said of a run that takes more than was foretold: steps, the same in seconds, and when.
 #define SOLVER_STOPPED                                                                             \
     "more than %.3g solver steps, about %.3g s of CPU, far more than foretold; stopped at "
@@ -62,19 +72,22 @@ typedef struct Run {
     WorkCounters work;      // out: what was done, kind by kind, but for what is not the solver's
 } Run;
 
+// One solver. Its functions are called with the solver itself.
 typedef struct Solver {
     Kind kind;
     // Fills everything of `response` but its series. The caller clears it, also after a failure.
-    Status (*run)(Run *run, Response *response, Problem *problem);
-    // Judges the settings for a scene made ready and adds what it decides of them to the plan's
-    // report; `base_interval` is that of a base known by samples, else 0 [s]. NULL: nothing to
-    // decide.
-    Status (*decide)(const Accuracy *accuracy, double base_interval, Plan *plan, Problem *problem);
+    Status (*run)(const struct Solver *solver, Run *run, Response *response, Problem *problem);
+    // Validates the settings for a scene made ready and adds its decisions to the plan's report;
+    // `base_interval` is that of a base known by samples, else 0 [s]. NULL: nothing to decide.
+    Status (*decide)(const struct Solver *solver, const Accuracy *accuracy, double base_interval,
+                     Plan *plan, Problem *problem);
     // What a run costs, in solver steps. NULL: as the exact solver's.
-    double (*cost)(const Accuracy *accuracy, double base_interval, const Plan *plan);
+    double (*cost)(const struct Solver *solver, const Accuracy *accuracy, double base_interval,
+                   const Plan *plan);
     // Erases the settings that a scene without a power law has no use for. NULL: there are none.
     void (*forget_unused)(Accuracy *accuracy, bool has_power_law);
-    bool is_linear_only; // serves no contact under a power law
+    bool is_linear_only;           // serves no contact under a power law
+    const struct Stepper *stepper; // of a solver by time steps (time_stepping.h), else NULL
 } Solver;
 
 extern const Solver solver_exact, solver_precise, solver_rk4, solver_newmark, solver_adaptive;

@@ -484,7 +484,7 @@ static StepChoice time_stepping_choose(const Plan *plan, const Accuracy *accurac
     return choice;
 }
 
-Status time_stepping_decide(const Stepper *stepper, const Accuracy *accuracy, double base_interval,
+Status time_stepping_decide(const Solver *solver, const Accuracy *accuracy, double base_interval,
                             Plan *plan, Problem *problem) {
     const StepChoice choice = time_stepping_choose(plan, accuracy, base_interval);
     Decisions *decisions = &plan->report.decisions;
@@ -499,15 +499,15 @@ Status time_stepping_decide(const Stepper *stepper, const Accuracy *accuracy, do
         TRY(decisions_add(decisions, "contact_switching", "step_ends", 1, NULL,
                           "contacts begin and end at step ends only, so across a contact the error "
                           "is of first order in the step; between contacts %s",
-                          stepper->between));
+                          solver->stepper->between));
     return STATUS_OK;
 }
 
-double time_stepping_cost(const Stepper *stepper, const Accuracy *accuracy, double base_interval,
+double time_stepping_cost(const Solver *solver, const Accuracy *accuracy, double base_interval,
                           const Plan *plan) {
     double setup;
-    const double each = stepper->cost(plan_mode_count(plan), plan->damper_count,
-                                      time_stepping_may_couple(plan), &setup);
+    const double each = solver->stepper->cost(plan_mode_count(plan), plan->damper_count,
+                                              time_stepping_may_couple(plan), &setup);
     const StepChoice choice = time_stepping_choose(plan, accuracy, base_interval);
     const double steps = choice.share * plan->duration * plan->sample_rate;
     const double companion = choice.share == choice.kinks && choice.kinks > 1 ? 2 : 0.5;
@@ -746,7 +746,7 @@ Status time_stepping_run_pair(const Stepper *stepper, Run *run, size_t share, si
     return status;
 }
 
-Status time_stepping_run(const Stepper *stepper, Run *run, Response *response, Problem *problem) {
+Status time_stepping_run(const Solver *solver, Run *run, Response *response, Problem *problem) {
     const Base *base = run->base;
     const StepChoice choice = time_stepping_choose(run->plan, run->accuracy,
                                                    base->form == BASE_SAMPLED ? base->interval : 0);
@@ -754,10 +754,11 @@ Status time_stepping_run(const Stepper *stepper, Run *run, Response *response, P
         return problem_set(problem, STATUS_LIMIT,
                            "the scene moves too fast for %s: %.3g steps to a sample interval, at "
                            "most %.3g are possible",
-                           stepper->name, choice.share, SHARE_MAX);
-    if (stepper->is_linear_only && run->plan->form == CONTACT_POWER)
+                           solver->kind.name, choice.share, SHARE_MAX);
+    if (solver->is_linear_only && run->plan->form == CONTACT_POWER)
         return problem_set(problem, STATUS_INVALID,
-                           "%s serves linear contact and impulses, not a power law", stepper->name);
-    return time_stepping_run_pair(stepper, run, (size_t)choice.share, (size_t)choice.kinks, 0,
-                                  response, problem);
+                           "%s serves linear contact and impulses, not a power law",
+                           solver->kind.name);
+    return time_stepping_run_pair(solver->stepper, run, (size_t)choice.share, (size_t)choice.kinks,
+                                  0, response, problem);
 }
