@@ -32,7 +32,6 @@ enum { HALVINGS = 60, RETAKES = 8, ERROR_TEST_FAILURES = 60 };
 // Memory that SUNDIALS needs at most, in values of type double: vectors, and all else of each
 // vector and of the context.
 enum { CLONES_MAX = 40, CLONE_OVERHEAD = 128, CONTEXT_SIZE = 1 << 13 };
-enum { EVENTS_AT_INSTANT_MAX = 1000 }; // of each damper
 static const double TOLERANCE_DEFAULT = 1e-9;
 static const double OUTGROWN = 100;     // motion over that of the last error weights
 static const double POISED = 1e-4;      // of a step
@@ -555,17 +554,6 @@ static bool adaptive_find_overdue(ModalState *state, bool has_moved, ContactEven
     return false;
 }
 
-static Status adaptive_apply(ModalState *state, const ContactEvent *event) {
-    const size_t max = EVENTS_AT_INSTANT_MAX * state->dampers;
-    state->events++;
-    if (++state->events_at_instant > max)
-        return problem_set(state->problem, STATUS_UNSTABLE,
-                           "more than %zu contact events at one instant, t = %.17g s", max,
-                           modal_state_time(state));
-    contact_event_apply(state, event);
-    return impact_log_status(&state->impacts, state->problem);
-}
-
 static double adaptive_step_cost(size_t modes, size_t dampers, bool is_coupled, double *setup) {
     const double n = (double)modes, m = (double)dampers;
     *setup = 0;
@@ -623,7 +611,7 @@ static Status adaptive_step(Adaptive *adaptive, double length) {
         modal_state_forces(state);
         if (adaptive_find_overdue(state, false, &event)) {
             TRY(time_stepping_note(stepping, adaptive_count_cost(adaptive)));
-            return adaptive_apply(state, &event);
+            return contact_event_apply(state, &event);
         }
         TRY(adaptive_restart(adaptive));
     }
@@ -643,9 +631,9 @@ static Status adaptive_step(Adaptive *adaptive, double length) {
     TRY(time_stepping_note(stepping, adaptive_count_cost(adaptive)));
     if (root != NO_ROOT && root % WATCHED != WATCH_PEAK) {
         event = adaptive_event(state, (size_t)root / WATCHED, root % WATCHED);
-        return adaptive_apply(state, &event);
+        return contact_event_apply(state, &event);
     }
-    return adaptive_find_overdue(state, done > 0, &event) ? adaptive_apply(state, &event)
+    return adaptive_find_overdue(state, done > 0, &event) ? contact_event_apply(state, &event)
                                                           : STATUS_OK;
 }
 
@@ -738,7 +726,7 @@ static Status adaptive_make(TimeStepping *stepping) {
     ContactEvent event;
     for (modal_state_forces(state); adaptive_find_overdue(state, false, &event);
          modal_state_forces(state))
-        TRY(adaptive_apply(state, &event));
+        TRY(contact_event_apply(state, &event));
     return STATUS_OK;
 }
 

@@ -30,32 +30,17 @@ static double part_of(const CompanionRun *neighbour) {
     return neighbour->is_stepped ? CAUTION : 1;
 }
 
-// Of the modes' displacements at one sample.
-static void look(CompanionRun *neighbour, const ModalState *state, const double *run,
-                 const double *near) {
-    const size_t n = state->mode_count;
-    double *apart = neighbour->apart, bound = 0, difference = 0;
-    for (size_t i = 0; i < n; i++) {
-        apart[i] = run[i] - near[i];
-        bound += state->max_shape[i] * fabs(apart[i]);
-    }
-    if (bound <= neighbour->worst)
-        return;
-    const double *values = modal_state_expand(state, apart);
-    for (size_t j = 0; j < state->storey_count; j++)
-        difference = fmax(difference, fabs(values[j]));
-    neighbour->worst = fmax(neighbour->worst, difference);
-}
-
 static void compare(CompanionRun *neighbour, const ModalState *state, size_t before) {
     neighbour->largest = fmax(neighbour->largest, state->impacts.response->peaks.displacement);
     if (neighbour->is_stepped) {
         // Such an error is no growing noise: it swings as the motion does.
         const double *run = neighbour->tracks, *near = run + COMPANION_SAMPLES * state->padded;
         for (size_t k = 0; k < state->sample - before; k++)
-            look(neighbour, state, run + k * state->padded, near + k * state->padded);
+            neighbour->worst = modal_state_difference(state, run + k * state->padded,
+                                                      near + k * state->padded, neighbour->worst);
     } else {
-        look(neighbour, state, state->q, neighbour->engine.state.q);
+        neighbour->worst =
+            modal_state_difference(state, state->q, neighbour->engine.state.q, neighbour->worst);
     }
     const double error = part_of(neighbour) * neighbour->worst;
     if (isnan(neighbour->horizon) && !(error <= RESPONSE_DIVERGENCE * neighbour->largest))
@@ -97,9 +82,8 @@ void companion_run_start(CompanionRun *neighbour, EventEngine *engine) {
     neighbour->is_stepped = state->plan->form == CONTACT_POWER && is_loose(engine);
     const size_t tracked = neighbour->is_stepped ? COMPANION_SAMPLES * state->padded : 0;
     neighbour->tracks = calloc(2 * tracked + 1, sizeof *neighbour->tracks);
-    neighbour->apart = calloc(state->padded, sizeof *neighbour->apart);
     neighbour->is_known =
-        neighbour->apart != NULL && neighbour->tracks != NULL &&
+        neighbour->tracks != NULL &&
         event_engine_shadow(&neighbour->engine, engine, &neighbour->run,
                             fmax(engine->ode.tolerance / FINER, POWER_CONTACT_TOLERANCE),
                             &neighbour->response) == STATUS_OK;
@@ -137,6 +121,5 @@ void companion_run_clear(CompanionRun *neighbour) {
     power_contact_clear(&neighbour->engine.ode);
     modal_state_clear(&neighbour->engine.state);
     response_clear(&neighbour->response);
-    free(neighbour->apart);
     free(neighbour->tracks);
 }

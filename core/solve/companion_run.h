@@ -18,7 +18,6 @@ typedef struct CompanionRun {
     bool is_stepped;       // the run keeps a tolerance: this one keeps a finer one
     double largest, worst; // displacement, and difference of displacements, so far [m]
     double horizon;        // [s]; NAN: not reached
-    double *apart;         // scratch, of all modes
     double *tracks;        // of both runs, where every sample is compared
 } CompanionRun;
 

@@ -22,6 +22,7 @@
 #include "core/solve/collision.h"
 #include "core/solve/recorder.h"
 
+enum { EVENTS_AT_INSTANT_MAX = 1000 }; // of each damper
 enum { STILL_BOUNCES = 64 };
 
 static void begin_contact(ModalState *state, size_t d, Side side) {
@@ -224,8 +225,15 @@ static void release(ModalState *state, size_t d, bool is_jump) {
         begin_rest(state, d, damper->side == SIDE_RIGHT ? SIDE_LEFT : SIDE_RIGHT);
 }
 
-void contact_event_apply(ModalState *state, const ContactEvent *event) {
+Status contact_event_apply(ModalState *state, const ContactEvent *event) {
     DamperState *damper = &state->damper[event->damper];
+    const size_t max = EVENTS_AT_INSTANT_MAX * state->dampers;
+    state->events++;
+    state->chatter_events++;
+    if (++state->events_at_instant > max)
+        return problem_set(state->problem, STATUS_UNSTABLE,
+                           "more than %zu contact events at one instant, t = %.17g s", max,
+                           modal_state_time(state));
     recorder_note(state);
     switch (damper->phase) {
     case PHASE_FLIGHT:
@@ -245,6 +253,7 @@ void contact_event_apply(ModalState *state, const ContactEvent *event) {
         break;
     }
     recorder_note(state);
+    return impact_log_status(&state->impacts, state->problem);
 }
 
 bool contact_event_locate(double *gap, size_t degree, ContactEvent candidate, bool *is_found,

@@ -26,7 +26,8 @@ bool contact_event_locate(double *gap, size_t degree, ContactEvent candidate, bo
 bool contact_event_find_touch(const ModalState *state, size_t damper, const double *r,
                               size_t degree, bool *is_found, ContactEvent *first);
 
-// Makes it happen; the state is that of its instant.
-void contact_event_apply(ModalState *state, const ContactEvent *event);
+// Changes the state, which is that of the event's instant, and logs it. STATUS_UNSTABLE after too
+// many events at one instant, or the status of the impact log.
+Status contact_event_apply(ModalState *state, const ContactEvent *event);
 
 #endif

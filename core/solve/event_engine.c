@@ -11,7 +11,7 @@
 
 #include "core/solve/rounding_growth.h"
 
-enum { STILL_EVENTS = 1000, STORM_EVENTS = 100, IDLE_STEPS = 1000 };
+enum { STORM_EVENTS = 100, IDLE_STEPS = 1000 };
 
 // An arc this short would lose its speeds' digits below the smallest doubles: it takes no time.
 static const double SHORTEST = 1e-250; // [s]
@@ -34,14 +34,7 @@ Status event_engine_check(EventEngine *engine) {
         return problem_set(state->problem, STATUS_UNSTABLE,
                            "the motion left what double precision can hold at t = %.6g s",
                            modal_state_time(state));
-    if (state->run->steps_max > 0 && state->run->steps > state->run->steps_max)
-        return problem_set(state->problem, STATUS_LIMIT, SOLVER_STOPPED "t = %.6g s of %.6g s",
-                           state->run->steps_max, state->run->steps_max * SOLVER_STEP,
-                           modal_state_time(state), state->plan->duration);
-    if (!progress_advance(state->run->progress, modal_state_time(state) / state->plan->duration))
-        return problem_set(state->problem, STATUS_CANCELLED, "cancelled at t = %.6g s",
-                           modal_state_time(state));
-    return STATUS_OK;
+    return modal_state_check(state, 0);
 }
 
 static double event_engine_each(const EventEngine *engine, StepWorkKind kind) {
@@ -146,25 +139,16 @@ static void event_engine_grow_over_event(RoundingGrowth *growth, const ModalStat
         rounding_growth_stick(growth);
 }
 
-static Status event_engine_happen(EventEngine *engine, const ContactEvent *event) {
+static Status event_engine_apply(EventEngine *engine, const ContactEvent *event) {
     ModalState *state = &engine->state;
-    const size_t most = STILL_EVENTS * state->dampers;
-    state->events++;
-    state->chatter_events++;
-    if (++state->events_at_instant > most)
-        return problem_set(state->problem, STATUS_UNSTABLE,
-                           "more than %zu contact events at one instant, t = %.17g s", most,
-                           modal_state_time(state));
-    if (engine->growth != NULL) {
-        const ContactPhase phase = state->damper[0].phase;
-        const State before = event_engine_single_state(state);
-        event_engine_grow_to_event(engine->growth, state);
-        contact_event_apply(state, event);
-        event_engine_grow_over_event(engine->growth, state, phase, &before);
-    } else {
-        contact_event_apply(state, event);
-    }
-    return impact_log_status(&state->impacts, state->problem);
+    if (engine->growth == NULL)
+        return contact_event_apply(state, event);
+    const ContactPhase phase = state->damper[0].phase;
+    const State before = event_engine_single_state(state);
+    event_engine_grow_to_event(engine->growth, state);
+    const Status status = contact_event_apply(state, event);
+    event_engine_grow_over_event(engine->growth, state, phase, &before);
+    return status;
 }
 
 // The longest arc: a half-sine of the base is fast only while it lasts.
@@ -187,7 +171,7 @@ static Status event_engine_press(EventEngine *engine, const Slice *slice, double
     engine->idle = state->offset > before ? 0 : engine->idle + 1;
     state->events += engine->idle > 0 && engine->idle < IDLE_STEPS;
     if (step.is_event)
-        TRY(event_engine_happen(engine, &step.event));
+        TRY(event_engine_apply(engine, &step.event));
     else
         recorder_note(state);
     state->run->work.steps++;
@@ -248,7 +232,7 @@ static Status event_engine_advance(EventEngine *engine, double length) {
     if (arc->length > 0)
         event_engine_pass(engine, is_event ? &event : NULL);
     if (is_event)
-        TRY(event_engine_happen(engine, &event));
+        TRY(event_engine_apply(engine, &event));
     return event_engine_count_steps(
         engine, event_engine_each(engine, STEP_WORK_ARC) +
                     (is_event ? event_engine_each(engine, STEP_WORK_EVENT) : 0));
@@ -338,7 +322,7 @@ Status event_engine_settle(EventEngine *engine) {
         is_event = contact_event_find(state, &engine->arc, &event) && event.s == 0 &&
                    state->damper[event.damper].phase == PHASE_FLIGHT;
         if (is_event)
-            TRY(event_engine_happen(engine, &event));
+            TRY(event_engine_apply(engine, &event));
     }
     return STATUS_OK;
 }
@@ -351,16 +335,7 @@ static void event_engine_balance(ModalState *state) {
 }
 
 void event_engine_take_sample(EventEngine *engine) {
-    ModalState *state = &engine->state;
-    if (state->is_shadow)
-        return;
-    state->base_acceleration = base_cursor_at(&state->base, state->sample);
-    modal_state_forces(state);
-    if (state->sample == engine->record.statistics_start && state->sample > 0)
-        recorder_forget(state);
-    flight_buffer_take(&engine->buffer, state, engine->record.base_speed);
-    recorder_take(&engine->record, state, 1);
-    recorder_peaks(state);
+    recorder_sample(&engine->record, &engine->buffer, &engine->state);
 }
 
 // Notes the samples just passed: so many flown over, or the present one.

@@ -16,6 +16,22 @@ double modal_state_clock(const ModalState *state) {
     return 4 * DBL_EPSILON * fmax(modal_state_time(state), state->interval);
 }
 
+Status modal_state_check(const ModalState *state, double step) {
+    const Run *run = state->run;
+    const double now = modal_state_time(state);
+    if (run->steps_max > 0 && run->steps > run->steps_max)
+        return step > 0 ? problem_set(state->problem, STATUS_LIMIT,
+                                      SOLVER_STOPPED "t = %.6g s of %.6g s, by steps of %.4g s",
+                                      run->steps_max, run->steps_max * SOLVER_STEP, now,
+                                      state->plan->duration, step)
+                        : problem_set(state->problem, STATUS_LIMIT,
+                                      SOLVER_STOPPED "t = %.6g s of %.6g s", run->steps_max,
+                                      run->steps_max * SOLVER_STEP, now, state->plan->duration);
+    if (!progress_advance(run->progress, now / state->plan->duration))
+        return problem_set(state->problem, STATUS_CANCELLED, "cancelled at t = %.6g s", now);
+    return impact_log_status(&state->impacts, state->problem);
+}
+
 double modal_state_room(const DamperState *damper, Side side) {
     if (damper->origin == FROM_MIDDLE)
         return damper->plan->clearance / 2;
@@ -80,6 +96,21 @@ const double *modal_state_expand(const ModalState *state, const double *modal) {
     state->lanes->multiply(state->shape_matrix, state->tall, modal,
                            modal_state_even(state->slot_count), state->storey_values);
     return state->storey_values;
+}
+
+double modal_state_difference(const ModalState *state, const double *q, const double *other,
+                              double least) {
+    double bound = 0;
+    for (size_t i = 0; i < state->mode_count; i++) {
+        state->difference[i] = q[i] - other[i];
+        bound += state->max_shape[i] * fabs(state->difference[i]);
+    }
+    if (bound <= least)
+        return least;
+    const double *values = modal_state_expand(state, state->difference);
+    for (size_t j = 0; j < state->storey_count; j++)
+        least = fmax(least, fabs(values[j]));
+    return least;
 }
 
 double modal_state_displacement(const ModalState *state, size_t storey) {
@@ -310,6 +341,7 @@ static Status make_room(ModalState *state) {
                                &state->shapes,
                                &state->shape_matrix,
                                &state->storey_values,
+                               &state->difference,
                                &state->mobility,
                                &state->delassus,
                                &state->constraint_mass,
@@ -317,7 +349,8 @@ static Status make_room(ModalState *state) {
                                &state->residual_influence};
     const size_t tall = state->tall, all = modal_state_even(state->slot_count) * tall;
     const size_t sizes[] = {
-        n, n, n, n, n, n, n, n, m * n, all, FLIGHT_ROWS * tall, m * tall, m * m, m * m, m * m, tall,
+        n, n,        n,     n,     n,     n,    n, n, m * n, all, FLIGHT_ROWS * tall,
+        n, m * tall, m * m, m * m, m * m, tall,
     };
     size_t total = simd_kernels_room(0);
     for (size_t i = 0; i < COUNT(sizes); i++)

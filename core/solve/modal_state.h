@@ -82,6 +82,7 @@ typedef struct ModalState {
     double *shapes;             // of the dampers' storeys
     double *shape_matrix;       // of all storeys: columns of `tall` values, one a slot
     double *storey_values;      // scratch of modal_state_expand
+    double *difference;         // scratch of modal_state_difference
     double *max_shape;          // of each slot, the largest |shape| of any storey
     double *residual_influence; // of the storeys; NULL where all modes are kept [-]
     double
@@ -159,9 +160,17 @@ double modal_state_middle(const DamperState *damper);
 // out = D p + W^2 q; arrays of `padded` values.
 void modal_state_elastic(const ModalState *state, const double *q, const double *p,
                          double *restrict out);
-// Brings elastic and the dampers' forces up to the present state.
+// STATUS_LIMIT, STATUS_CANCELLED or the status of the impact log; `step` is that of a fixed step
+// [s], or 0.
+Status modal_state_check(const ModalState *state, double step);
+
+// Updates `elastic` and the forces of the dampers to the present state.
 void modal_state_forces(ModalState *state);
-// Values of all storeys from those of all modes, until the next call.
+// The largest difference of any storey's displacement between modes q and `other` [m], or `least`
+// if that is larger.
+double modal_state_difference(const ModalState *state, const double *q, const double *other,
+                              double least);
+// Values of all storeys from those of all modes, valid until the next call.
 const double *modal_state_expand(const ModalState *state, const double *modal);
 // Likewise of FLIGHT_ROWS rows of modes, one after the other; `tall` values of each.
 const double *modal_state_expand_four(const ModalState *state, const double *modal);

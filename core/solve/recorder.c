@@ -304,6 +304,18 @@ void recorder_forget(ModalState *state) {
     impact_log_forget_peaks(&state->impacts, &at);
 }
 
+void recorder_sample(Recorder *record, FlightBuffer *buffer, ModalState *state) {
+    if (state->is_shadow)
+        return;
+    state->base_acceleration = base_cursor_at(&state->base, state->sample);
+    modal_state_forces(state);
+    if (state->sample == record->statistics_start && state->sample > 0)
+        recorder_forget(state);
+    flight_buffer_take(buffer, state, record->base_speed);
+    recorder_take(record, state, 1);
+    recorder_peaks(state);
+}
+
 void recorder_note(ModalState *state) {
     if (state->is_shadow)
         return;

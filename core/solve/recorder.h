@@ -26,7 +26,9 @@ void recorder_clear(Recorder *record);
 // Writes down rows 1 to `count` of the buffer, the last of them being the present sample, with the
 // present forces; base_speed goes back to 0.
 void recorder_take(Recorder *record, ModalState *state, size_t count);
-// Takes their peaks, all of them being samples of flight.
+// Records the present sample by way of the buffer, with forces and peaks; of a shadow nothing.
+void recorder_sample(Recorder *record, FlightBuffer *buffer, ModalState *state);
+// Updates the peaks by the same rows, all of them samples of flight.
 void recorder_flight_peaks(Recorder *record, ModalState *state, size_t count);
 void recorder_finish(Recorder *record, const ModalState *state, Response *response);
 // The run is over: the ledger lists what is still open and writes its energies.
