@@ -50,43 +50,43 @@ const Field accuracy_exact_fields[] = {
 };
 // clang-format on
 
-static Status exact_solve(EventEngine *engine, CompanionRun *neighbour) {
+static Status exact_solve(EventEngine *engine, CompanionRun *companion) {
     ModalState *state = &engine->state;
     const Plan *plan = state->plan;
     TRY(event_engine_settle(engine));
     event_engine_take_sample(engine);
-    companion_run_start(neighbour, engine);
+    companion_run_start(companion, engine);
     while (state->sample + 1 < plan->count) {
         const size_t next = (state->sample / COMPANION_SAMPLES + 1) * COMPANION_SAMPLES;
         const size_t until = next < plan->count - 1 ? next : plan->count - 1;
         while (state->sample < until)
             TRY(event_engine_step(engine, until));
-        if (!companion_run_step(neighbour, state))
-            TRY(event_engine_check(engine)); // it may have been told to stop
+        if (!companion_run_step(companion, state))
+            TRY(event_engine_check(engine)); // the cause may be the run's own limit
     }
-    companion_run_tell(neighbour, state, state->impacts.response);
+    companion_run_report(companion, state, state->impacts.response);
     // The duration may end between samples.
     TRY(event_engine_cross(engine, plan->duration - (double)state->sample / plan->sample_rate));
-    recorder_note(state);
+    recorder_update(state);
     TRY(event_engine_check(engine));
-    return recorder_ledger(state);
+    return recorder_finish_log(state);
 }
 
 Status exact_run_engine(Run *run, Response *response, Problem *problem) {
     EventEngine engine;
-    CompanionRun *neighbour = calloc(1, sizeof *neighbour);
-    if (neighbour == NULL)
+    CompanionRun *companion = calloc(1, sizeof *companion);
+    if (companion == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run");
     memset(&engine, 0, sizeof engine);
     Status status =
         event_engine_make(&engine, run, exact_tolerance(run->accuracy), response, problem);
     if (status == STATUS_OK)
-        status = exact_solve(&engine, neighbour);
+        status = exact_solve(&engine, companion);
     if (engine.record.block != NULL)
         recorder_finish(&engine.record, &engine.state, response);
     event_engine_clear(&engine);
-    companion_run_clear(neighbour);
-    free(neighbour);
+    companion_run_clear(companion);
+    free(companion);
     return status;
 }
 
@@ -94,7 +94,7 @@ static Status exact_run(const Solver *solver, Run *run, Response *response, Prob
     (void)solver;
     if (!single_mass_serves(run->plan, run->is_clear))
         return exact_run_engine(run, response, problem);
-    // A base whose samples are further apart than the output's goes by strides once it has them.
+    // With values at all output samples single_mass.h moves over many of them at once.
     const size_t fine =
         base_cursor_refined_count(run->base, run->plan->sample_rate, run->plan->count);
     Workspace none = {0}, *workspace = run->workspace == NULL ? &none : run->workspace;

@@ -1,8 +1,8 @@
 // Each mode is a system of its own, q'' = -d q' - w^2 q - participation a_g. The free masses feel
 // the base alone: z'' = -a_g, and r = z - x.
 //
-// With V^2 = p'p + q'W^2 q, V grows by no more than |participation| |a_g| in unit time, and
-// |r''| <= reach V + |base_coupling| |a_g|. So r stays within length^2 max|r''| / 8 of its chord.
+// With V^2 = p'p + q'W^2 q, V' <= growth V + |participation| |a_g|, and |r''| <= elastic_bound V +
+// |base_coupling| |a_g|. So r stays within length^2 max|r''| / 8 of its chord.
 #include "core/solve/flight.h"
 
 #include <math.h>
@@ -100,7 +100,7 @@ static void flight_make_mode(Flight *flight, const ModalState *state, size_t i) 
     const long double speed[SIZE] = {[P] = 1}, base[SIZE] = {[A] = 1};
     const long double *const pairs[2][2] = {{speed, speed}, {base, speed}};
     matrix_exponential_forms(system, SIZE, flight->length, 2, pairs, forms[0]);
-    // Off the diagonal both halves count.
+    // Off the diagonal both halves of a form count.
     static const int places[7][2] = {{Q, Q}, {Q, P}, {P, P}, {Q, A}, {Q, B}, {P, A}, {P, B}};
     for (int k = 0; k < 7; k++)
         flight->loss[k][i] = (double)(damping * forms[0][places[k][0] * SIZE + places[k][1]] *
@@ -121,14 +121,14 @@ Status flight_make(Flight *flight, const ModalState *state, Problem *problem) {
     const size_t n = state->mode_count;
     memset(flight, 0, sizeof *flight);
     if (state->base.base->form == BASE_SAMPLED && state->base.ratio == 0)
-        return STATUS_OK; // a_g has its kinks inside the intervals
+        return STATUS_OK; // a_g has kinks inside the intervals
     if (state->diagonal == NULL) {
-        // Where making it would cost more than it saves there is none.
+        // None where making the transition costs more than it saves.
         if (state->plan->count < WORTH * n || !(state->interval * state->rate < 0x1p40))
             return STATUS_OK;
         TRY(transition_make(&flight->transition, 1, state, NULL, problem));
     }
-    // Gains, loss and input; whole vectors, filled up with zeros.
+    // Gains, loss and input, in whole vectors filled up with zeros.
     double **arrays[8 + FLIGHT_SUMS + 4];
     for (size_t i = 0; i < 4; i++) {
         arrays[i] = &flight->gains.q[i];
@@ -161,7 +161,7 @@ void flight_clear(Flight *flight) {
     free(flight->block);
 }
 
-// Rows 1 to count of the buffer.
+// Fills rows 1 to count of the buffer.
 static void flight_step_coupled(const Flight *flight, FlightBuffer *buffer, const ModalState *state,
                                 size_t count) {
     const size_t n = state->mode_count, padded = buffer->padded;
@@ -252,12 +252,12 @@ static void flight_add_work(const Flight *flight, const FlightBuffer *buffer,
     }
 }
 
-double flight_shaken(const Slice *slice, double length) {
+double flight_max_ground(const Slice *slice, double length) {
     const double first = fabs(slice->value), last = fabs(slice->value + slice->slope * length);
     return slice->omega > 0 ? first + fabs(slice->slope) : fmax(first, last);
 }
 
-// Of one damper along the buffer: rows 1 to count of r and z. Its absolute velocity stays.
+// Rows 1 to count of r and z of one damper, whose absolute velocity is constant.
 static void flight_move_damper(const Flight *flight, FlightBuffer *buffer, const ModalState *state,
                                size_t d, size_t count, const Slice *slices) {
     const DamperState *damper = &state->damper[d];
@@ -275,16 +275,16 @@ static void flight_move_damper(const Flight *flight, FlightBuffer *buffer, const
     }
 }
 
-// sqrt(p'p + q'W^2 q) over an interval that begins with such a size, or over `many`.
+// Bound of sqrt(p'p + q'W^2 q) over `many` intervals that begin with `size`.
 static double flight_bound_size(const Flight *flight, const ModalState *state, double size,
-                                double shaken, size_t many) {
+                                double max_ground, size_t many) {
     const double length = (double)many * flight->length;
     const double left = 1 - state->growth * length; // exp(growth length) < 1 / left
-    return left > 0.5 ? (size + length * state->participation_norm * shaken) / left : INFINITY;
+    return left > 0.5 ? (size + length * state->participation_norm * max_ground) / left : INFINITY;
 }
 
-// Of one damper, how many of `count` intervals surely keep it between its stops, bent by no more
-// than `bend`.
+// The number of intervals, at most `count`, that surely keep a damper between its stops; |r''| is
+// at most `bend`.
 static size_t flight_count_clear(const Flight *flight, const FlightBuffer *buffer,
                                  const ModalState *state, size_t d, double bend,
                                  const Slice *slices, size_t count) {
@@ -301,19 +301,19 @@ static size_t flight_count_clear(const Flight *flight, const FlightBuffer *buffe
         if (flight_is_clear(damper, r[k], r[k + 1], bend, length))
             continue;
         // The bound of this interval alone is closer.
-        const double shaken = flight_shaken(&slices[k], length);
+        const double max_ground = flight_max_ground(&slices[k], length);
         const double size = modal_state_size_of(state, buffer->q + k * buffer->padded,
                                                 buffer->p + k * buffer->padded);
         const double own =
-            damper->elastic_bound * flight_bound_size(flight, state, size, shaken, 1) +
-            fabs(damper->base_coupling) * shaken;
+            damper->elastic_bound * flight_bound_size(flight, state, size, max_ground, 1) +
+            fabs(damper->base_coupling) * max_ground;
         if (!flight_is_clear(damper, r[k], r[k + 1], own, length))
             return k;
     }
     return count;
 }
 
-// A guess of how many intervals it takes to the next stop: to fly further would be in vain.
+// An estimate of the number of intervals until the next stop: more would be computed in vain.
 static size_t flight_guess_count(const Flight *flight, const ModalState *state, size_t count) {
     for (size_t d = 0; d < state->dampers; d++) {
         const DamperState *damper = &state->damper[d];
@@ -329,18 +329,18 @@ static size_t flight_guess_count(const Flight *flight, const ModalState *state, 
 size_t flight_run(Flight *flight, FlightBuffer *buffer, ModalState *state, const Slice *slices,
                   size_t count, StepWork *work) {
     const size_t n = state->mode_count;
-    double shaken = 0;
+    double max_ground = 0;
     if (state->has_stops)
         count = flight_guess_count(flight, state, count);
     flight_step(flight, buffer, state, slices, count);
     for (size_t k = 0; k < count; k++)
-        shaken = fmax(shaken, flight_shaken(&slices[k], flight->length));
-    const double most =
-        state->has_stops ? flight_bound_size(flight, state, modal_state_size(state), shaken, count)
-                         : 0;
+        max_ground = fmax(max_ground, flight_max_ground(&slices[k], flight->length));
+    const double most = state->has_stops ? flight_bound_size(flight, state, modal_state_size(state),
+                                                             max_ground, count)
+                                         : 0;
     for (size_t d = 0; d < state->dampers; d++) {
         const DamperState *damper = &state->damper[d];
-        const double bend = damper->elastic_bound * most + fabs(damper->base_coupling) * shaken;
+        const double bend = damper->elastic_bound * most + fabs(damper->base_coupling) * max_ground;
         flight_move_damper(flight, buffer, state, d, count, slices);
         if (state->has_stops)
             count = flight_count_clear(flight, buffer, state, d, bend, slices, count);

@@ -63,6 +63,6 @@ bool flight_is_clear(const DamperState *damper, double from, double to, double b
 // (0: linear).
 void flight_ground(double omega, double length, double ground[2], double fall[2]);
 // An upper bound of |a_g| over `length` [m/s^2].
-double flight_shaken(const Slice *slice, double length);
+double flight_max_ground(const Slice *slice, double length);
 
 #endif

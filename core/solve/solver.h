@@ -1,5 +1,4 @@
-// What ONE solver is; solvers.c lists all. A solver turns a plan and a base's motion into a
-// response.
+// A solver computes the response of a plan to the motion of its base. solvers.c lists all of them.
 #ifndef CORE_SOLVE_SOLVER_H
 #define CORE_SOLVE_SOLVER_H
 
@@ -18,27 +17,27 @@ typedef struct Accuracy {
 } Accuracy;
 extern const Field accuracy_fields[]; // the rows that every solver has
 
-// How many modes a run keeps of a structure with so many storeys.
+// Number of modes that a run keeps of a structure with so many storeys.
 static inline size_t accuracy_modes(const Accuracy *accuracy, size_t storeys) {
     return accuracy == NULL || accuracy->modes >= storeys ? storeys : (size_t)accuracy->modes;
 }
 
-// Of "auto", which has no run of its own.
+// Settings of "auto", which has no run of its own.
 typedef struct AccuracyAuto {
     Accuracy accuracy;
     double target; // NAN: none
     int metric;    // Metric
 } AccuracyAuto;
 
-// Where the samples of one channel go.
+// Destination of the samples of one channel.
 typedef struct RunColumn {
     ChannelId channel;
     size_t number;  // of the storey or damper, from 0
     double *values; // plan->count of them
 } RunColumn;
 
-// Work is foretold and counted in solver steps, whatever the solver: each stands for about this
-// much CPU time on a middling machine [s].
+// Work is predicted and counted in solver steps for all solvers: about the CPU time of one on a
+// typical machine [s].
 #define SOLVER_STEP 3e-8
 
 // Solver steps of the event engine's parts, as measured on frames of 1 to 200 storeys.
@@ -51,25 +50,25 @@ typedef enum StepWorkKind {
 } StepWorkKind;
 double step_work_steps(StepWorkKind kind, size_t storeys, size_t dampers, bool is_coupled);
 
-// What is said of a run that takes more than was foretold: steps, the same in seconds, and when.
+// Message of a run that exceeds its predicted work: steps, seconds, and the time reached.
 #define SOLVER_STOPPED                                                                             \
     "more than %.3g solver steps, about %.3g s of CPU, far more than foretold; stopped at "
 
-// One run: borrowed inputs, and where samples go.
+// One run: borrowed inputs, and the destination of samples.
 typedef struct Run {
     const Plan *plan;
     const Base *base;
     const Progress *progress;
     const Accuracy *accuracy; // the solver's settings; NULL: its defaults
     Workspace *workspace;     // or NULL
-    const RunColumn *columns; // what is wanted, each once
+    const RunColumn *columns; // wanted channels, each once
     size_t column_count;
     double statistics_from; // [s]
-    size_t impacts_max;     // ledger rows; 0: no limit
+    size_t impacts_max;     // listed impacts; 0: no limit
     double steps_max;       // solver steps; 0: no limit
-    bool is_clear;          // no mass comes to a stop: none has to be searched for
+    bool is_clear;          // no mass reaches a stop
     double steps;           // out: work counted, in solver steps of SOLVER_STEP
-    WorkCounters work;      // out: what was done, kind by kind, but for what is not the solver's
+    WorkCounters work;      // out: work of the solver by kind
 } Run;
 
 // One solver. Its functions are called with the solver itself.

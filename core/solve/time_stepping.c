@@ -687,7 +687,7 @@ static Status pair_run(Pair *pair, Response *response) {
     // The duration may end between samples.
     TRY(time_stepping_finish(&pair->run,
                              plan->duration - (double)state->sample / plan->sample_rate));
-    return recorder_ledger(state);
+    return recorder_finish_log(state);
 }
 
 Status time_stepping_run_pair(const Stepper *stepper, Run *run, size_t share, size_t kinks,
