@@ -63,6 +63,17 @@ static ContactForce modal_state_power_force(const ModalState *state, const Dampe
     return state->plan->law->force(&damper->contact, sign * damper->r, sign * damper->w);
 }
 
+double modal_state_constraint(const ModalState *state, size_t d, const double *elastic,
+                              double ground) {
+    double force = 0;
+    for (size_t e = 0; e < state->dampers; e++)
+        if (state->damper[e].phase == PHASE_RESTING)
+            force += state->constraint_mass[d * state->dampers + e] *
+                     (modal_state_dot(state->damper[e].shape, elastic, state->mode_count) +
+                      state->damper[e].base_coupling * ground);
+    return force;
+}
+
 void modal_state_forces(ModalState *state) {
     modal_state_elastic(state, state->q, state->p, state->elastic);
     if (state->residual_influence != NULL)
@@ -76,14 +87,9 @@ void modal_state_forces(ModalState *state) {
         else if (damper->phase == PHASE_CONTACT)
             damper->force =
                 damper->contact.stiffness * damper->r + damper->contact.damping * damper->w;
-        if (damper->phase != PHASE_RESTING)
-            continue;
-        for (size_t e = 0; e < state->dampers; e++)
-            if (state->damper[e].phase == PHASE_RESTING)
-                damper->force +=
-                    state->constraint_mass[d * state->dampers + e] *
-                    (modal_state_dot(state->damper[e].shape, state->elastic, state->mode_count) +
-                     state->damper[e].base_coupling * state->base_acceleration);
+        else if (damper->phase == PHASE_RESTING)
+            damper->force =
+                modal_state_constraint(state, d, state->elastic, state->base_acceleration);
     }
 }
 

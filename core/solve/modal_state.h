@@ -160,6 +160,9 @@ void modal_state_elastic(const ModalState *state, const double *q, const double 
 // [s], or 0.
 Status modal_state_check(const ModalState *state, double step);
 
+// N that keeps a damper at rest on its stop [N].
+double modal_state_constraint(const ModalState *state, size_t damper, const double *elastic,
+                              double ground);
 // Updates `elastic` and the forces of the dampers to the present state.
 void modal_state_forces(ModalState *state);
 // The largest difference of any storey's displacement between modes q and `other` [m], or `least`

@@ -72,6 +72,23 @@ void time_stepping_rate(TimeStepping *stepping, const double *y, double ground, 
     }
 }
 
+void time_stepping_powers(const TimeStepping *stepping, const double *y, double ground,
+                          const double *force, double *restrict out) {
+    const ModalState *state = &stepping->state;
+    const size_t n = state->mode_count, m = state->dampers;
+    const double *p = y + n, *w = p + n + m;
+    double momentum = modal_state_dot(state->momentum_weights, p, n), loss = 0;
+    for (size_t d = 0; d < m; d++) {
+        out[d] = force[d];
+        out[m + d] = force[d] * w[d];
+        momentum += state->damper[d].plan->mass * w[d];
+    }
+    for (size_t i = 0; i < n; i++)
+        loss += (stepping->elastic[i] - state->omega2[i] * y[i]) * p[i];
+    out[2 * m] = -ground * momentum;
+    out[2 * m + 1] = loss;
+}
+
 void time_stepping_integrate(TimeStepping *stepping, const double *from, const double *to,
                              double length, bool is_corrected) {
     const ModalState *state = &stepping->state;
@@ -200,7 +217,7 @@ Status time_stepping_note(TimeStepping *stepping, double cost) {
     return stepping->unchecked_cost > CHECK_COST ? time_stepping_check(stepping) : STATUS_OK;
 }
 
-static void time_stepping_gather(const ModalState *state, double *y) {
+void time_stepping_gather(const ModalState *state, double *y) {
     const size_t n = state->mode_count, m = state->dampers;
     memcpy(y, state->q, n * sizeof *y);
     memcpy(y + n, state->p, n * sizeof *y);
@@ -210,7 +227,7 @@ static void time_stepping_gather(const ModalState *state, double *y) {
     }
 }
 
-static void time_stepping_scatter(ModalState *state, const double *y) {
+void time_stepping_scatter(ModalState *state, const double *y) {
     const size_t n = state->mode_count, m = state->dampers;
     memcpy(state->q, y, n * sizeof *y);
     memcpy(state->p, y + n, n * sizeof *y);
