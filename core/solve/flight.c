@@ -11,7 +11,7 @@
 
 #include "core/math/matrix_exponential.h"
 
-enum { Q, P, A, B, SIZE, WORTH = 32 };
+enum { Q, P, A, B, WORTH = 32 };
 enum { VALUE, SLOPE, SUM, FALL, GROUND };
 
 Status flight_buffer_make(FlightBuffer *buffer, const ModalState *state, Problem *problem) {
@@ -80,41 +80,30 @@ void flight_ground(double omega, double length, double ground[2], double fall[2]
     }
 }
 
-static void flight_make_mode(Flight *flight, const ModalState *state, size_t i) {
-    const long double share = state->modes->participation[i], damping = state->diagonal[i];
-    const double omega = state->base_omega;
-    const bool is_sine = omega > 0;
-    long double system[SIZE * SIZE] = {0};
-    system[Q * SIZE + P] = 1;
-    system[P * SIZE + Q] = -(long double)state->omega2[i];
-    system[P * SIZE + P] = -damping;
-    system[P * SIZE + A] = -share;
-    system[A * SIZE + B] = is_sine ? omega : 1;
-    system[B * SIZE + A] = is_sine ? -(long double)omega : 0;
-    long double gain[SIZE * SIZE], forms[2][SIZE * SIZE];
-    matrix_exponential_increment(system, SIZE, flight->length, gain);
-    for (int column = 0; column < 4; column++) {
-        flight->gains.q[column][i] = (double)gain[Q * SIZE + column];
-        flight->gains.p[column][i] = (double)gain[P * SIZE + column];
+static Status flight_make_mode(Flight *flight, const ModalState *state, size_t i,
+                               Problem *problem) {
+    Transition mode;
+    TRY(transition_make_mode(&mode, state, i, problem));
+    for (size_t column = 0; column < 4; column++) {
+        flight->gains.q[column][i] = mode.gain[column * mode.rows + Q];
+        flight->gains.p[column][i] = mode.gain[column * mode.rows + P];
     }
-    const long double speed[SIZE] = {[P] = 1}, base[SIZE] = {[A] = 1};
-    const long double *const pairs[2][2] = {{speed, speed}, {base, speed}};
-    matrix_exponential_forms(system, SIZE, flight->length, 2, pairs, forms[0]);
     // Off the diagonal both halves of a form count.
-    static const int places[7][2] = {{Q, Q}, {Q, P}, {P, P}, {Q, A}, {Q, B}, {P, A}, {P, B}};
-    for (int k = 0; k < 7; k++)
-        flight->loss[k][i] = (double)(damping * forms[0][places[k][0] * SIZE + places[k][1]] *
-                                      (places[k][0] == places[k][1] ? 1 : 2));
-    static const int works[4][2] = {{A, Q}, {B, Q}, {A, P}, {B, P}};
-    for (int k = 0; k < 4; k++)
-        flight->input[k][i] = (double)(share * 2 * forms[1][works[k][0] * SIZE + works[k][1]]);
-    static const int bases[3][2] = {{A, A}, {A, B}, {B, B}};
-    for (int k = 0; k < 3; k++) {
-        const int at = bases[k][0] * SIZE + bases[k][1];
-        const long double twice = bases[k][0] == bases[k][1] ? 1 : 2;
-        flight->loss_base[k] += (double)(damping * twice * forms[0][at]);
-        flight->input_base[k] += (double)(share * twice * forms[1][at]);
-    }
+    static const size_t places[FLIGHT_SUMS][2] = {{Q, Q}, {Q, P}, {P, P}, {Q, A},
+                                                  {Q, B}, {P, A}, {P, B}};
+    for (size_t k = 0; k < FLIGHT_SUMS; k++)
+        flight->loss[k][i] = mode.loss[places[k][0] * mode.rows + places[k][1]] *
+                             (places[k][0] == places[k][1] ? 1 : 2);
+    for (size_t k = 0; k < 4; k++)
+        flight->input[k][i] = mode.input[k % 2][k / 2];
+    flight->loss_base[0] += mode.loss[A * mode.rows + A];
+    flight->loss_base[1] += 2 * mode.loss[A * mode.rows + B];
+    flight->loss_base[2] += mode.loss[B * mode.rows + B];
+    flight->input_base[0] += mode.input[0][A];
+    flight->input_base[1] += mode.input[0][B] + mode.input[1][A];
+    flight->input_base[2] += mode.input[1][B];
+    transition_clear(&mode);
+    return STATUS_OK;
 }
 
 Status flight_make(Flight *flight, const ModalState *state, Problem *problem) {
@@ -152,7 +141,7 @@ Status flight_make(Flight *flight, const ModalState *state, Problem *problem) {
     flight->length = state->interval;
     flight_ground(state->base_omega, flight->length, flight->ground, flight->fall);
     for (size_t i = 0; i < n && count > 0; i++)
-        flight_make_mode(flight, state, i);
+        TRY(flight_make_mode(flight, state, i, problem));
     return STATUS_OK;
 }
 

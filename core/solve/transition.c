@@ -16,7 +16,8 @@ typedef long double Real;
 typedef struct TransitionWork {
     const ModalState *state;
     const DamperState *dampers;
-    size_t modes, count; // of the modes and dampers
+    size_t first, modes; // the modes
+    size_t count;        // of the dampers
     size_t n, size;      // modes + count, and 2 n + 2
     Real h, omega;       // omega: of the base, 0 where it is linear
     Real *A, *T;
@@ -65,10 +66,11 @@ static void transition_make_system(TransitionWork *work) {
         A[i * size + n + i] = 1;
     for (size_t i = 0; i < modes; i++) {
         Real *row = A + (n + i) * size;
-        row[i] = -(Real)state->omega2[i];
+        row[i] = -(Real)state->omega2[work->first + i];
         for (size_t l = 0; l < modes; l++)
-            row[n + l] = -(Real)state->damping[i * modes + l];
-        row[a] = -(Real)state->modes->participation[i];
+            row[n + l] =
+                -(Real)state->damping[(work->first + i) * state->mode_count + work->first + l];
+        row[a] = -(Real)state->modes->participation[work->first + i];
     }
     for (size_t d = 0; d < work->count; d++) { // w' without N is base_coupling a_g - shape . q''
         const DamperState *damper = &work->dampers[d];
@@ -100,13 +102,16 @@ static void transition_make_system(TransitionWork *work) {
 // T, and the rows of exp(A t) of p, w and a_g at the nodes.
 static bool transition_make_series(TransitionWork *work, const Quadrature *rule) {
     const size_t size = work->size, square = size * size, rows = (work->n + 1) * size;
+    Real power[NODES];
     for (size_t i = 0; i < size; i++)
         work->term[i * size + i] = 1;
+    for (size_t node = 0; node < NODES; node++)
+        power[node] = 1;
     for (int k = 0; k < TERMS; k++) {
         for (size_t node = 0; node < rule->count; node++) {
-            const Real power = powl(rule->node[node], k);
             for (size_t i = 0; i < rows; i++)
-                work->rows[node * rows + i] += power * work->term[work->n * size + i];
+                work->rows[node * rows + i] += power[node] * work->term[work->n * size + i];
+            power[node] *= rule->node[node];
         }
         memset(work->product, 0, square * sizeof *work->product);
         if (!transition_add(work, work->A, false, size, size, work->term, work->product))
@@ -138,7 +143,7 @@ static bool transition_make_forms(TransitionWork *work, const Quadrature *rule) 
             return false;
         memset(product, 0, size * sizeof *product);
         for (size_t i = 0; i < modes; i++) {
-            const Real share = state->modes->participation[i] +
+            const Real share = state->modes->participation[work->first + i] +
                                (work->count > 0 ? (Real)damper->plan->mass * damper->shape[i] : 0);
             for (size_t j = 0; j < size; j++)
                 product[j] += weight * share * p[i * size + j];
@@ -220,7 +225,10 @@ static Status transition_store(Transition *transition, const TransitionWork *wor
 static Status transition_run(TransitionWork *work, Transition *transitions, size_t levels,
                              double *increment) {
     const ModalState *state = work->state;
-    const Real rate = fmaxl(modal_state_rate(state), work->omega);
+    const double own = fmax(sqrt(state->omega2[work->first]),
+                            state->damping[work->first * (state->mode_count + 1)]);
+    const Real rate =
+        fmaxl(work->modes < state->mode_count ? own : modal_state_rate(state), work->omega);
     size_t left = 0; // doublings
     for (; work->h * rate > 0.5L && left < 16000; work->h /= 2)
         left++;
@@ -239,16 +247,18 @@ static Status transition_run(TransitionWork *work, Transition *transitions, size
     return is_whole ? STATUS_OK : STATUS_CANCELLED;
 }
 
-static Status transition_start(const ModalState *state, const DamperState *dampers, size_t count,
-                               double length, Transition *transitions, size_t levels,
-                               double *increment, Problem *problem) {
-    const size_t n = state->mode_count + count, size = 2 * n + 2, square = size * size;
+static Status transition_start(const ModalState *state, size_t first, size_t modes,
+                               const DamperState *dampers, size_t count, double length,
+                               Transition *transitions, size_t levels, double *increment,
+                               Problem *problem) {
+    const size_t n = modes + count, size = 2 * n + 2, square = size * size;
     Real *block =
         calloc((levels > 0 ? 6 : 4) * square + 2 * size + (levels > 0 ? NODES * (n + 1) * size : 0),
                sizeof *block);
     TransitionWork work = {.state = state,
                            .dampers = dampers,
-                           .modes = state->mode_count,
+                           .first = first,
+                           .modes = modes,
                            .count = count,
                            .n = n,
                            .size = size,
@@ -278,14 +288,20 @@ static Status transition_start(const ModalState *state, const DamperState *dampe
 Status transition_make(Transition *transitions, size_t levels, const ModalState *state,
                        const DamperState *contact, Problem *problem) {
     memset(transitions, 0, levels * sizeof *transitions);
-    return transition_start(state, contact, contact != NULL, state->interval, transitions, levels,
-                            NULL, problem);
+    return transition_start(state, 0, state->mode_count, contact, contact != NULL, state->interval,
+                            transitions, levels, NULL, problem);
+}
+
+Status transition_make_mode(Transition *transition, const ModalState *state, size_t mode,
+                            Problem *problem) {
+    *transition = (Transition){0};
+    return transition_start(state, mode, 1, NULL, 0, state->interval, transition, 1, NULL, problem);
 }
 
 Status transition_increment(const ModalState *state, double length, double *increment,
                             Problem *problem) {
-    return transition_start(state, state->damper, state->dampers, length, NULL, 0, increment,
-                            problem);
+    return transition_start(state, 0, state->mode_count, state->damper, state->dampers, length,
+                            NULL, 0, increment, problem);
 }
 
 double transition_form(const Transition *transition, const SimdKernels *lanes, const double *form,

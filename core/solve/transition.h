@@ -23,6 +23,9 @@ typedef struct Transition {
 // also after a failure.
 Status transition_make(Transition *transitions, size_t levels, const ModalState *state,
                        const DamperState *contact, Problem *problem);
+// Likewise of the sample interval and one mode in flight, which damping does not couple to others.
+Status transition_make_mode(Transition *transition, const ModalState *state, size_t mode,
+                            Problem *problem);
 void transition_clear(Transition *transition);
 
 // The increment of y over `length` [s] with r and w of all dampers and a base that is linear in

@@ -9,6 +9,7 @@
 #include <cmocka.h>
 
 #include "core/math/matrix_exponential.h"
+#include "tests/support/matrix_forms.h"
 
 static void an_oscillator_turns(void **state) {
     (void)state;
