@@ -35,17 +35,15 @@ static Status exact_decide(const Solver *solver, const Accuracy *accuracy, doubl
     const bool is_asked = tolerance > POWER_CONTACT_TOLERANCE;
     return decisions_add(&plan->report.decisions, "tolerance", is_asked ? "asked" : "rounding",
                          tolerance, NULL,
-                         is_asked ? "relative error that a contact may end with; flight between "
-                                    "contacts is exact, and instants are found as well as these "
-                                    "contacts are known"
-                                  : "each contact as exact as rounding lets it be, for none asked "
-                                    "for less");
+                         is_asked ? "relative error of a contact at its end; flight is exact, and "
+                                    "contacts are located as accurately as they are integrated"
+                                  : "contacts are accurate to rounding, for no tolerance is given");
 }
 
 // clang-format off
 const Field accuracy_exact_fields[] = {
     FIELD_BASE(AccuracyExact, accuracy, accuracy_fields),
-    FIELD_REAL(AccuracyExact, tolerance, NULL, WITHIN(1e-15, 1e-1), OPTIONAL, "relative error that a contact under a power law may end with; if absent none but rounding's; of no use to other laws, whose contacts have closed forms"),
+    FIELD_REAL(AccuracyExact, tolerance, NULL, WITHIN(1e-15, 1e-1), OPTIONAL, "relative error of a contact under a power law at its end; if absent that of rounding; not used by other laws, whose contacts have closed forms"),
     FIELD_END
 };
 // clang-format on

@@ -52,7 +52,7 @@ double step_work_steps(StepWorkKind kind, size_t storeys, size_t dampers, bool i
 
 // Message of a run that exceeds its predicted work: steps, seconds, and the time reached.
 #define SOLVER_STOPPED                                                                             \
-    "more than %.3g solver steps, about %.3g s of CPU, far more than foretold; stopped at "
+    "more than %.3g solver steps, about %.3g s of CPU, far more than predicted; stopped at "
 
 // One run: borrowed inputs, and the destination of samples.
 typedef struct Run {
