@@ -1,4 +1,4 @@
-// An integration step is a row of Taylor polynomials in the transformed time (power_series.c). It
+// An integration step is a row of Taylor polynomials in the transformed time (power_series.h). It
 // is as long as the truncation error allows, at most as long as requested, and ends at the first of
 //
 //   in contact:  p falls to 0, the release;  p' passes the kink of the law;  N is no more

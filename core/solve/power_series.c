@@ -7,7 +7,7 @@
 // whose Taylor coefficients follow from each other by products of series. If no small root makes
 // root n an integer, root = 4 makes N ~ Y^(4n) so smooth that a step may pass the end of the
 // contact within the error. Powers u = Y^n then follow from u' Y = n u Y', which holds while Y > 0.
-#include "core/solve/power_contact.h"
+#include "core/solve/power_series.h"
 
 #include <math.h>
 #include <stdlib.h>

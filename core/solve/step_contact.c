@@ -13,12 +13,13 @@
 // p is the penetration and N the contact force. A resting mass moves freely during a step; then an
 // impulse returns it to its stop, simultaneously with all other dampers in collision. It leaves
 // when a step moves it away from the stop.
+#include "core/solve/step_contact.h"
+
 #include <math.h>
 #include <string.h>
 
 #include "core/plan/plan.h"
 #include "core/solve/collision.h"
-#include "core/solve/time_stepping.h"
 
 ContactForce step_contact_force(const ModalState *state, size_t d, double r, double w) {
     const DamperState *damper = &state->damper[d];

@@ -5,6 +5,7 @@
 #define CORE_SOLVE_TIME_STEPPING_H
 
 #include "core/solve/recorder.h"
+#include "core/solve/step_contact.h"
 
 // The "accuracy" object of a solver with fixed steps.
 typedef struct AccuracyStep {
@@ -38,16 +39,6 @@ typedef struct Stepper {
     // Solver steps that a step costs; *setup is the cost of the tables.
     double (*cost)(size_t modes, size_t dampers, bool is_coupled, double *setup);
 } Stepper;
-
-// One step's integrals of the contact force, damper by damper.
-typedef struct StepContact {
-    double *impulse;       // integral of N [N s]
-    double *work;          // integral of N r' [J]
-    double *strain_before; // strain energy of the buffer at the step's start [J]
-    // The method derives N from the penetration at each stage and freezes the contact parameters
-    // itself. False: the contacts at the step's start last until its end.
-    bool is_by_place;
-} StepContact;
 
 struct TimeStepping {
     ModalState state;
@@ -111,16 +102,5 @@ void time_stepping_integrate(TimeStepping *stepping, const double *from, const d
 // Updates peaks and energy balance after a step of `cost` solver steps. STATUS_UNSTABLE where the
 // energy has no bound; STATUS_LIMIT and STATUS_CANCELLED as for the run.
 Status time_stepping_note(TimeStepping *stepping, double cost);
-
-// step_contact.c: contact state changes at the ends of steps.
-
-// N of a damper in contact at the relative displacement r [m] and velocity w [m/s], its derivatives
-// and the strain energy.
-ContactForce step_contact_force(const ModalState *state, size_t damper, double r, double w);
-
-// Clears the integrals and stores the strain energies, before a step.
-void step_contact_begin(const ModalState *state, StepContact *contact);
-// Begins and ends contacts after a step of `length` seconds, and logs them.
-void step_contact_end(ModalState *state, const StepContact *contact, double length);
 
 #endif
