@@ -13,6 +13,8 @@ enum { TERMS = 22, NODES = 8, PROGRESS_WORK = 1000000 };
 
 typedef long double Real;
 
+static const Real NEGLIGIBLE = 1e-23L; // last term of a series over its sum
+
 typedef struct TransitionWork {
     const ModalState *state;
     const DamperState *dampers;
@@ -107,7 +109,8 @@ static bool transition_make_series(TransitionWork *work, const Quadrature *rule)
         work->term[i * size + i] = 1;
     for (size_t node = 0; node < NODES; node++)
         power[node] = 1;
-    for (int k = 0; k < TERMS; k++) {
+    bool is_done = false;
+    for (int k = 0; k < TERMS && !is_done; k++) {
         for (size_t node = 0; node < rule->count; node++) {
             for (size_t i = 0; i < rows; i++)
                 work->rows[node * rows + i] += power[node] * work->term[work->n * size + i];
@@ -116,9 +119,11 @@ static bool transition_make_series(TransitionWork *work, const Quadrature *rule)
         memset(work->product, 0, square * sizeof *work->product);
         if (!transition_add(work, work->A, false, size, size, work->term, work->product))
             return false;
+        is_done = true;
         for (size_t i = 0; i < square; i++) {
-            work->term[i] = work->h / (Real)(k + 1) * work->product[i];
-            work->T[i] += work->term[i];
+            const Real term = work->term[i] = work->h / (Real)(k + 1) * work->product[i];
+            work->T[i] += term;
+            is_done = is_done && fabsl(term) <= NEGLIGIBLE * fabsl(work->T[i]);
         }
     }
     return true;
