@@ -1,9 +1,8 @@
 #include "core/math/matrix_exponential.h"
 
 #include <math.h>
-#include <string.h>
 
-enum { SIZE = MATRIX_EXPONENTIAL_MAX * MATRIX_EXPONENTIAL_MAX, TERMS = 18, NODES = 8 };
+enum { SIZE = MATRIX_EXPONENTIAL_MAX * MATRIX_EXPONENTIAL_MAX, TERMS = 18 };
 
 static void matrix_exponential_multiply(const long double *a, const long double *b, size_t n,
                                         long double *out) {
@@ -46,175 +45,14 @@ static void matrix_exponential_series(const long double *A, size_t n, long doubl
     }
 }
 
-// (I + T)^2 - I = 2 T + T T.
-void matrix_exponential_double(size_t n, long double *increment) {
-    long double square[SIZE];
-    matrix_exponential_multiply(increment, increment, n, square);
-    for (size_t i = 0; i < n * n; i++)
-        increment[i] = 2 * increment[i] + square[i];
-}
-
 void matrix_exponential_increment(const long double *A, size_t n, long double h,
                                   long double *increment) {
     const int count = matrix_exponential_halvings(A, n, h);
+    long double square[SIZE];
     matrix_exponential_series(A, n, ldexpl(h, -count), increment);
-    for (int i = 0; i < count; i++)
-        matrix_exponential_double(n, increment);
-}
-
-void matrix_exponential(const long double *A, size_t n, long double h, long double *transition) {
-    matrix_exponential_increment(A, n, h, transition);
-    for (size_t i = 0; i < n; i++)
-        transition[i * n + i] += 1;
-}
-
-// Gauss-Legendre quadrature on [0, 1]; the error for products of two solutions over |A| h <= 1/2 is
-// below 1e-22.
-// clang-format off
-static const long double matrix_exponential_gauss[NODES][2] = {
-    {0.0198550717512318841582L, 0.0506142681451881295763L},
-    {0.1016667612931866302042L, 0.1111905172266872352722L},
-    {0.2372337950418355070911L, 0.1568533229389436436690L},
-    {0.4082826787521750975303L, 0.1813418916891809914826L},
-    {0.5917173212478249024697L, 0.1813418916891809914826L},
-    {0.7627662049581644929089L, 0.1568533229389436436690L},
-    {0.8983332387068133697958L, 0.1111905172266872352722L},
-    {0.9801449282487681158418L, 0.0506142681451881295763L},
-};
-// clang-format on
-
-// rows[k] = v' A^k h^k / k!, so that v' exp(A s h) = sum of rows[k] s^k.
-static void matrix_exponential_row_series(const long double *A, size_t n, long double h,
-                                          const long double *v,
-                                          long double rows[TERMS][MATRIX_EXPONENTIAL_MAX]) {
-    memcpy(rows[0], v, n * sizeof *v);
-    for (int k = 1; k < TERMS; k++)
-        for (size_t j = 0; j < n; j++) {
-            long double sum = 0;
-            for (size_t i = 0; i < n; i++)
-                sum += rows[k - 1][i] * A[i * n + j];
-            rows[k][j] = sum * h / (long double)k;
-        }
-}
-
-// The form of one pair by the Taylor series; |A| h <= 1/2.
-static void matrix_exponential_form_series(const long double *A, size_t n, long double h,
-                                           const long double *const pair[2], long double *form) {
-    long double left[TERMS][MATRIX_EXPONENTIAL_MAX], right[TERMS][MATRIX_EXPONENTIAL_MAX];
-    matrix_exponential_row_series(A, n, h, pair[0], left);
-    matrix_exponential_row_series(A, n, h, pair[1], right);
-    memset(form, 0, n * n * sizeof *form);
-    for (int q = 0; q < NODES; q++) {
-        long double a[MATRIX_EXPONENTIAL_MAX] = {0}, b[MATRIX_EXPONENTIAL_MAX] = {0};
-        for (int k = TERMS; k-- > 0;)
-            for (size_t j = 0; j < n; j++) {
-                a[j] = a[j] * matrix_exponential_gauss[q][0] + left[k][j];
-                b[j] = b[j] * matrix_exponential_gauss[q][0] + right[k][j];
-            }
-        for (size_t i = 0; i < n; i++)
-            for (size_t j = 0; j < n; j++)
-                form[i * n + j] +=
-                    matrix_exponential_gauss[q][1] * h * (a[i] * b[j] + a[j] * b[i]) / 2;
-    }
-}
-
-void matrix_exponential_forms(const long double *A, size_t n, long double h, size_t count,
-                              const long double *const pairs[][2], long double *forms) {
-    const int halved = matrix_exponential_halvings(A, n, h);
-    const long double small = ldexpl(h, -halved);
-    for (size_t i = 0; i < count; i++)
-        matrix_exponential_form_series(A, n, small, pairs[i], forms + i * n * n);
-    if (halved == 0)
-        return;
-    long double T[SIZE];
-    matrix_exponential_series(A, n, small, T);
-    for (int pass = 0; pass < halved; pass++) {
-        for (size_t i = 0; i < count; i++)
-            matrix_exponential_form_double(n, T, forms + i * n * n);
-        matrix_exponential_double(n, T);
-    }
-}
-
-// The integral over twice the time is the sum of both halves: F + (I + T)' F (I + T).
-void matrix_exponential_form_double(size_t n, const long double *increment, long double *form) {
-    long double E[SIZE], matrix_exponential_product[SIZE], second[SIZE];
-    memcpy(E, increment, n * n * sizeof *E);
-    for (size_t i = 0; i < n; i++)
-        E[i * n + i] += 1;
-    matrix_exponential_multiply(form, E, n, matrix_exponential_product);
-    for (size_t i = 0; i < n; i++)
-        for (size_t j = 0; j < n; j++) {
-            second[i * n + j] = 0;
-            for (size_t k = 0; k < n; k++)
-                second[i * n + j] += E[k * n + i] * matrix_exponential_product[k * n + j];
-        }
-    for (size_t i = 0; i < n * n; i++)
-        form[i] += second[i];
-}
-
-// Approximate number of multiplications between progress calls.
-static const size_t PROGRESS_WORK = 1000000;
-
-// Work since the last progress call.
-typedef struct ExponentialProgress {
-    const Progress *progress;
-    double fraction;
-    size_t work;
-} ExponentialProgress;
-
-// out = left right; zeros in `left` are skipped.
-static bool matrix_exponential_product(const double *left, const double *right, size_t n,
-                                       double *restrict out, ExponentialProgress *state) {
-    for (size_t i = 0; i < n; i++) {
-        double *restrict row = out + i * n;
-        memset(row, 0, n * sizeof *row);
-        for (size_t k = 0; k < n; k++) {
-            const double factor = left[i * n + k], *of = right + k * n;
-            for (size_t j = 0; j < n && factor != 0; j++)
-                row[j] += factor * of[j];
-        }
-        if ((state->work += n * n) < PROGRESS_WORK)
-            continue;
-        state->work = 0;
-        if (!progress_advance(state->progress, state->fraction))
-            return false;
-    }
-    return true;
-}
-
-bool matrix_exponential_doublings(const double *A, size_t n, double h, double *out, double *scratch,
-                                  const Progress *progress, double fraction) {
-    enum { DOUBLINGS_MIN = 20, DOUBLINGS_MAX = 1000 };
-    ExponentialProgress state = {progress, fraction, 0};
-    double norm = 0, *small = scratch, *next = scratch + n * n;
-    for (size_t i = 0; i < n; i++) {
-        double sum = 0;
-        for (size_t j = 0; j < n; j++)
-            sum += fabs(A[i * n + j]);
-        norm = fmax(norm, sum);
-    }
-    // The remainder of four terms is (|A| h / 2^N)^5 / 120, at most 1e-13 of the first term over
-    // all doublings.
-    int count = DOUBLINGS_MIN;
-    for (double rest = ldexp(norm * h, -DOUBLINGS_MIN); rest > 1e-3 && count < DOUBLINGS_MAX;
-         rest /= 2)
-        count++;
-    for (size_t i = 0; i < n * n; i++) {
-        small[i] = ldexp(A[i] * h, -count);
-        out[i] = small[i] / 4;
-    }
-    // T = S (I + S/2 (I + S/3 (I + S/4)))
-    for (int k = 3; k >= 1; k--) {
-        if (!matrix_exponential_product(small, out, n, next, &state))
-            return false;
-        for (size_t i = 0; i < n * n; i++)
-            out[i] = (small[i] + next[i]) / k;
-    }
-    for (int i = 0; i < count; i++) {
-        if (!matrix_exponential_product(out, out, n, next, &state))
-            return false;
+    for (int i = 0; i < count; i++) { // (I + T)^2 - I = 2 T + T T
+        matrix_exponential_multiply(increment, increment, n, square);
         for (size_t j = 0; j < n * n; j++)
-            out[j] = 2 * out[j] + next[j];
+            increment[j] = 2 * increment[j] + square[j];
     }
-    return true;
 }

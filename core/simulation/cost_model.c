@@ -4,7 +4,6 @@
 
 #include "core/simulation/internal.h"
 #include "core/solve/exact.h"
-#include "core/solve/step_work.h"
 
 static const double TURN = 6.28318530717958647693;
 
@@ -156,9 +155,9 @@ static double cost_own_steps(const Simulation *simulation) {
     const size_t storeys = structure_storeys(scene_structure(&simulation->scene));
     if (plan_sketch(&simulation->scene, simulation_modes(simulation, storeys), &plan) != STATUS_OK)
         return 0; // the run reports why
-    const double steps =
-        simulation_solver(simulation)
-            ->cost(simulation_settings(simulation), simulation_base_interval(simulation), plan);
+    const Solver *solver = simulation_solver(simulation);
+    const double steps = solver->cost(solver, simulation_settings(simulation),
+                                      simulation_base_interval(simulation), plan);
     plan_free(plan);
     return steps;
 }

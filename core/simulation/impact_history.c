@@ -376,7 +376,7 @@ static Status impact_run_fine(ImpactRun *run, const SimulationLimits *limits,
                       .column_count = COUNT(columns),
                       .impacts_max = limits == NULL ? 0 : limits->impacts,
                       .steps_max = limits == NULL ? 0 : SIMULATION_PATIENCE * limits->steps};
-    TRY(solver_exact.run(&solver_run, &run->response, problem));
+    TRY(solver_exact.run(&solver_exact, &solver_run, &run->response, problem));
     const Impacts *impacts = &run->response.impacts;
     const double wanted = run->impact->start - run->start;
     for (const Impact *at = impacts->at; at < impacts->at + impacts->count; at++)

@@ -9,7 +9,6 @@
 #include "core/plan/reachability.h"
 #include "core/simulation/channel_names.h"
 #include "core/simulation/internal.h"
-#include "core/solve/rest.h"
 
 static double omission_share(double left_out, double remaining) {
     return left_out > 0 ? left_out / (left_out + fmax(remaining, 0)) : 0;
@@ -96,7 +95,7 @@ static Status run_make_plan(const Simulation *simulation, Plan **plan, Problem *
     Status status = plan_keep(*plan, &simulation->scene,
                               simulation_modes(simulation, (*plan)->storeys), problem);
     if (status == STATUS_OK && solver->decide != NULL)
-        status = solver->decide(simulation_settings(simulation),
+        status = solver->decide(solver, simulation_settings(simulation),
                                 simulation_base_interval(simulation), *plan, problem);
     if (status == STATUS_OK)
         return STATUS_OK;
@@ -291,18 +290,19 @@ static Status run_make_approaches(const Scene *scene, Response *response, Proble
     return STATUS_OK;
 }
 
-// Runs the solver, or only fills the response if nothing moves.
 static Status run_solve(RunContext *context, const Regime *regime, Workspace *workspace,
                         Problem *problem) {
     const Simulation *simulation = context->simulation;
     const SimulationLimits *limits = context->limits;
     Outcome *outcome = context->outcome;
+    // Where nothing moves the exact solver is the fastest.
+    const Solver *solver = regime->is_at_rest ? &solver_exact : simulation_solver(simulation);
     ProgressRange range = progress_range(context->progress, 0.2, 0.7);
     const Progress progress = progress_range_view(&range);
     Run run = {.plan = context->plan,
                .base = &context->base,
                .progress = &progress,
-               .accuracy = simulation_settings(simulation),
+               .accuracy = regime->is_at_rest ? NULL : simulation_settings(simulation),
                .workspace = workspace,
                .columns = context->wanted,
                .column_count = context->wanted_count,
@@ -310,10 +310,7 @@ static Status run_solve(RunContext *context, const Regime *regime, Workspace *wo
                .impacts_max = limits == NULL ? 0 : limits->impacts,
                .steps_max = run_steps_max(limits),
                .is_clear = regime->is_clear};
-    if (regime->is_at_rest)
-        TRY(rest_run(&run, &outcome->response, problem));
-    else
-        TRY(simulation_solver(simulation)->run(&run, &outcome->response, problem));
+    TRY(solver->run(solver, &run, &outcome->response, problem));
     outcome->steps = run.steps;
     outcome->work = run.work;
     outcome->work.base_samples = context->base.count;

@@ -32,7 +32,6 @@ enum { HALVINGS = 60, RETAKES = 8, ERROR_TEST_FAILURES = 60 };
 // Memory that SUNDIALS needs at most, in values of type double: vectors, and all else of each
 // vector and of the context.
 enum { CLONES_MAX = 40, CLONE_OVERHEAD = 128, CONTEXT_SIZE = 1 << 13 };
-enum { EVENTS_AT_INSTANT_MAX = 1000 }; // of each damper
 static const double TOLERANCE_DEFAULT = 1e-9;
 static const double OUTGROWN = 100;     // motion over that of the last error weights
 static const double POISED = 1e-4;      // of a step
@@ -108,63 +107,36 @@ static double *adaptive_data(N_Vector vector) {
     return N_VGetArrayPointer(vector);
 }
 
-// Where the parts of y begin.
-static size_t adaptive_at_r(const ModalState *state) {
-    return 2 * state->mode_count;
-}
-static size_t adaptive_at_impulse(const ModalState *state) {
-    return adaptive_at_r(state) + 2 * state->dampers;
-}
-static size_t adaptive_at_totals(const ModalState *state) {
-    return adaptive_at_impulse(state) + 2 * state->dampers;
-}
-
 // N of all dampers at y.
 static void adaptive_forces(const Adaptive *adaptive, const double *y, double ground) {
     TimeStepping *stepping = adaptive->stepping;
     const ModalState *state = &stepping->state;
     const size_t n = state->mode_count, m = state->dampers;
-    const double *r = y + adaptive_at_r(state), *w = r + m;
+    const double *r = y + 2 * state->mode_count, *w = r + m;
     if (state->resting > 0)
         time_stepping_elastic(state, y, y + n, stepping->elastic);
     for (size_t d = 0; d < m; d++) {
-        adaptive->force[d] = 0;
-        if (state->damper[d].phase == PHASE_CONTACT)
-            adaptive->force[d] = step_contact_force(state, d, r[d], w[d]).value;
-        if (state->damper[d].phase != PHASE_RESTING)
-            continue;
-        for (size_t e = 0; e < m; e++)
-            if (state->damper[e].phase == PHASE_RESTING)
-                adaptive->force[d] +=
-                    state->constraint_mass[d * m + e] *
-                    (modal_state_dot(state->damper[e].shape, stepping->elastic, n) +
-                     state->damper[e].base_coupling * ground);
+        const ContactPhase phase = state->damper[d].phase;
+        adaptive->force[d] = phase == PHASE_CONTACT ? step_contact_force(state, d, r[d], w[d]).value
+                             : phase == PHASE_RESTING
+                                 ? modal_state_constraint(state, d, stepping->elastic, ground)
+                                 : 0;
     }
 }
 
 static void adaptive_rate(Adaptive *adaptive, double t, const double *y, double *out) {
     TimeStepping *stepping = adaptive->stepping;
     const ModalState *state = &stepping->state;
-    const size_t n = state->mode_count, m = state->dampers;
-    const double *p = y + n, *w = y + adaptive_at_r(state) + m;
-    double *impulse = out + adaptive_at_impulse(state), *total = out + adaptive_at_totals(state);
+    const size_t m = state->dampers, at_r = 2 * state->mode_count;
     const double ground = slice_at(&adaptive->slice, t - adaptive->t0);
     adaptive->rate_calls++;
     adaptive_forces(adaptive, y, ground);
     time_stepping_rate(stepping, y, ground, adaptive->force, out);
-    double momentum = modal_state_dot(state->momentum_weights, p, n), loss = 0;
-    for (size_t i = 0; i < n; i++)
-        loss += (stepping->elastic[i] - state->omega2[i] * y[i]) * p[i];
-    for (size_t d = 0; d < m; d++) {
-        momentum += state->damper[d].plan->mass * w[d];
-        impulse[d] = adaptive->force[d];
-        impulse[m + d] = adaptive->force[d] * w[d];
+    time_stepping_powers(stepping, y, ground, adaptive->force, out + stepping->size);
+    for (size_t d = 0; d < m; d++)
         if (state->damper[d].phase == PHASE_RESTING) // zero but for rounding
-            out[adaptive_at_r(state) + d] = out[adaptive_at_r(state) + m + d] = 0;
-    }
-    total[0] = -ground * momentum;
-    total[1] = loss;
-    total[2] = ground;
+            out[at_r + d] = out[at_r + m + d] = 0;
+    out[adaptive->size - 1] = ground;
 }
 
 static int adaptive_arkode_rate(realtype t, N_Vector y, N_Vector out, void *user) {
@@ -176,7 +148,7 @@ static int adaptive_arkode_rate(realtype t, N_Vector y, N_Vector out, void *user
 static void adaptive_watch(Adaptive *adaptive, double t, const double *y, double *value,
                            double *slope) {
     const ModalState *state = &adaptive->stepping->state;
-    const size_t m = state->dampers, at_r = adaptive_at_r(state);
+    const size_t m = state->dampers, at_r = 2 * state->mode_count;
     const double *r = y + at_r, *w = r + m;
     adaptive_rate(adaptive, t, y, adaptive->rates);
     for (size_t d = 0; d < m && state->has_stops; d++) {
@@ -237,10 +209,10 @@ static double adaptive_push(const Adaptive *adaptive) {
 // Sets the absolute tolerances from a typical magnitude of each component and returns a first step.
 static double adaptive_set_tolerances(Adaptive *adaptive) {
     const ModalState *state = &adaptive->stepping->state;
-    const size_t n = state->mode_count, m = state->dampers, at_r = adaptive_at_r(state);
+    const size_t n = state->mode_count, m = state->dampers, at_r = 2 * state->mode_count;
     double *scale = adaptive_data(adaptive->absolute), *r = scale + at_r, *w = r + m;
-    double *impulse = scale + adaptive_at_impulse(state),
-           *totals = scale + adaptive_at_totals(state);
+    double *impulse = scale + adaptive->stepping->size,
+           *totals = scale + adaptive->stepping->size + 2 * state->dampers;
     double time = state->interval, energy = 0;
     adaptive->push = fmax(adaptive->push, adaptive_push(adaptive));
     adaptive->speed =
@@ -291,15 +263,11 @@ static double adaptive_set_tolerances(Adaptive *adaptive) {
 // Restarts the integration from the present state.
 static Status adaptive_restart(Adaptive *adaptive) {
     const ModalState *state = &adaptive->stepping->state;
-    const size_t n = state->mode_count, m = state->dampers;
-    double *y = adaptive_data(adaptive->y), *r = y + adaptive_at_r(state);
+    double *y = adaptive_data(adaptive->y);
     memset(y, 0, adaptive->size * sizeof *y);
-    memcpy(y, state->q, n * sizeof *y);
-    memcpy(y + n, state->p, n * sizeof *y);
-    for (size_t d = 0; d < m; d++) {
+    time_stepping_gather(state, y);
+    for (size_t d = 0; d < state->dampers; d++) {
         const DamperState *damper = &state->damper[d];
-        r[d] = damper->r;
-        r[m + d] = damper->w;
         adaptive->strain[d] = damper->phase == PHASE_CONTACT
                                   ? step_contact_force(state, d, damper->r, damper->w).strain
                                   : 0;
@@ -459,18 +427,15 @@ static void adaptive_release(ModalState *state, DamperState *damper) {
 // Copies a step of `length` seconds from y to the state and the logs.
 static void adaptive_accept(Adaptive *adaptive, double length) {
     ModalState *state = &adaptive->stepping->state;
-    const size_t n = state->mode_count, m = state->dampers;
+    const size_t m = state->dampers;
     const double *y = adaptive_data(adaptive->y), *before = adaptive_data(adaptive->from);
-    const double *r = y + adaptive_at_r(state);
-    const size_t sums = adaptive_at_impulse(state), totals = adaptive_at_totals(state);
-    memcpy(state->q, y, n * sizeof *y);
-    memcpy(state->p, y + n, n * sizeof *y);
+    const size_t sums = adaptive->stepping->size,
+                 totals = adaptive->stepping->size + 2 * state->dampers;
+    time_stepping_scatter(state, y);
     for (size_t d = 0; d < m; d++) {
         DamperState *damper = &state->damper[d];
         const double impulse = y[sums + d] - before[sums + d];
         double work = y[sums + m + d] - before[sums + m + d];
-        damper->r = r[d];
-        damper->w = r[m + d];
         if (damper->zero_gap_terms > 0)
             adaptive_release(state, damper);
         if (damper->phase == PHASE_CONTACT) {
@@ -555,17 +520,6 @@ static bool adaptive_find_overdue(ModalState *state, bool has_moved, ContactEven
     return false;
 }
 
-static Status adaptive_apply(ModalState *state, const ContactEvent *event) {
-    const size_t max = EVENTS_AT_INSTANT_MAX * state->dampers;
-    state->events++;
-    if (++state->events_at_instant > max)
-        return problem_set(state->problem, STATUS_UNSTABLE,
-                           "more than %zu contact events at one instant, t = %.17g s", max,
-                           modal_state_time(state));
-    contact_event_apply(state, event);
-    return impact_log_status(&state->impacts, state->problem);
-}
-
 static double adaptive_step_cost(size_t modes, size_t dampers, bool is_coupled, double *setup) {
     const double n = (double)modes, m = (double)dampers;
     *setup = 0;
@@ -623,7 +577,7 @@ static Status adaptive_step(Adaptive *adaptive, double length) {
         modal_state_forces(state);
         if (adaptive_find_overdue(state, false, &event)) {
             TRY(time_stepping_note(stepping, adaptive_count_cost(adaptive)));
-            return adaptive_apply(state, &event);
+            return contact_event_apply(state, &event);
         }
         TRY(adaptive_restart(adaptive));
     }
@@ -643,9 +597,9 @@ static Status adaptive_step(Adaptive *adaptive, double length) {
     TRY(time_stepping_note(stepping, adaptive_count_cost(adaptive)));
     if (root != NO_ROOT && root % WATCHED != WATCH_PEAK) {
         event = adaptive_event(state, (size_t)root / WATCHED, root % WATCHED);
-        return adaptive_apply(state, &event);
+        return contact_event_apply(state, &event);
     }
-    return adaptive_find_overdue(state, done > 0, &event) ? adaptive_apply(state, &event)
+    return adaptive_find_overdue(state, done > 0, &event) ? contact_event_apply(state, &event)
                                                           : STATUS_OK;
 }
 
@@ -729,7 +683,7 @@ static Status adaptive_make(TimeStepping *stepping) {
     stepping->method = adaptive;
     if (adaptive != NULL) {
         adaptive->stepping = stepping;
-        adaptive->size = adaptive_at_totals(state) + TOTALS;
+        adaptive->size = stepping->size + 2 * state->dampers + TOTALS;
         adaptive->events = SIZE_MAX;
     }
     if (adaptive == NULL || !adaptive_allocate(adaptive))
@@ -738,7 +692,7 @@ static Status adaptive_make(TimeStepping *stepping) {
     ContactEvent event;
     for (modal_state_forces(state); adaptive_find_overdue(state, false, &event);
          modal_state_forces(state))
-        TRY(adaptive_apply(state, &event));
+        TRY(contact_event_apply(state, &event));
     return STATUS_OK;
 }
 
@@ -766,14 +720,14 @@ static const Stepper adaptive_stepper = {.name = "adaptive",
                                          .clear = adaptive_clear,
                                          .cost = adaptive_step_cost};
 
-static Status adaptive_run(Run *run, Response *response, Problem *problem) {
-    return time_stepping_run_pair(&adaptive_stepper, run, 1, 1, adaptive_tolerance(run->accuracy),
+static Status adaptive_run(const Solver *solver, Run *run, Response *response, Problem *problem) {
+    return time_stepping_run_pair(solver->stepper, run, 1, 1, adaptive_tolerance(run->accuracy),
                                   response, problem);
 }
 
-static Status adaptive_decide(const Accuracy *accuracy, double base_interval, Plan *plan,
-                              Problem *problem) {
-    (void)base_interval, (void)problem;
+static Status adaptive_decide(const Solver *solver, const Accuracy *accuracy, double base_interval,
+                              Plan *plan, Problem *problem) {
+    (void)solver, (void)base_interval, (void)problem;
     const double tolerance = adaptive_tolerance(accuracy);
     return decisions_add(
         &plan->report.decisions, "tolerance", tolerance == TOLERANCE_DEFAULT ? "usual" : "asked",
@@ -785,7 +739,9 @@ static Status adaptive_decide(const Accuracy *accuracy, double base_interval, Pl
 // Steps for samples, kinks of the base and the fastest mode; a contact takes a number of steps that
 // depends on the tolerance. Assumed are seven contacts a second, and many of them simultaneous
 // where there are many dampers.
-static double adaptive_cost(const Accuracy *accuracy, double base_interval, const Plan *plan) {
+static double adaptive_cost(const Solver *solver, const Accuracy *accuracy, double base_interval,
+                            const Plan *plan) {
+    (void)solver;
     const double digits = -log10(adaptive_tolerance(accuracy)), each = pow(10, digits / 8) / 2;
     double setup, steps = plan->sample_rate;
     if (base_interval > 0)
@@ -811,4 +767,5 @@ const Solver solver_adaptive = {
     .run = adaptive_run,
     .decide = adaptive_decide,
     .cost = adaptive_cost,
+    .stepper = &adaptive_stepper,
 };

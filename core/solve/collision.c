@@ -1,25 +1,28 @@
-// At the stops that are met at one instant, impulses only press, and each damper parts at least as
-// fast as its stop's restitution says (a resting one: not inwards):
+// The collision of all masses that reach their stops at one instant. Impulses only press, and each
+// damper parts at least as fast as the restitution of its stop demands (a resting one: not
+// inwards):
 //
-//   0 <= pressed_d   and   parting speed after >= e_d closing speed before,  one of them equal.
+//   impulse_d >= 0   and   separation speed >= e_d approach speed,   one of them equal.
 //
-// Between stops without clearance the other stop would press where one would have to pull, so there
-// the impulse may have any sign. The impulses act through M^-1, so one on any storey may press or
-// free a mass on another. The conditions are those of the least squares problem with matrix
-// `yield`, positive definite, so they have one solution. It is found as of any such problem with
-// signs (Lawson and Hanson 1974): the stop that lacks most joins those that press, these are solved
-// for all at once, and whoever would have to pull drops out on the way there. Each round comes
-// nearer, so none comes twice. Momentum is conserved whatever the impulses are; no energy is
-// gained, for each pressed stop takes pressed (closing - parting) / 2.
+// Between stops without clearance the other stop presses where one would have to pull, so there the
+// impulse may have any sign. The impulses act through M^-1, so one on any storey may press or free
+// a mass on another. These are the conditions of a least squares problem with the positive definite
+// matrix `delassus`, so the solution is unique. It is found by the active set method of Lawson and
+// Hanson (1974): the stop that lacks most speed joins those that press, all of these are solved for
+// at once, and a stop that would have to pull leaves. Each round reduces the residual, so no set
+// occurs twice. Momentum is conserved for any impulses. No energy is gained, for each stop that
+// presses takes impulse (approach - separation) / 2.
 #include "core/solve/collision.h"
 
 #include <float.h>
 #include <math.h>
 
-// Only rounding could make so many rounds of a few dampers.
+#include "core/math/linear_system.h"
+
+// Never reached but for rounding.
 enum { ROUNDS_MAX = 100000 };
 
-void modal_state_push(ModalState *state, const double *impulses) {
+void collision_push(ModalState *state, const double *impulses) {
     for (size_t d = 0; d < state->dampers; d++) {
         const double impulse = impulses[d];
         if (impulse == 0)
@@ -32,58 +35,44 @@ void modal_state_push(ModalState *state, const double *impulses) {
     }
 }
 
-static double coupling(const ModalState *state, size_t d, size_t e) {
+static double collision_coupling(const ModalState *state, size_t d, size_t e) {
     return modal_state_sign(state->damper[d].side) * modal_state_sign(state->damper[e].side) *
            state->delassus[d * state->dampers + e];
 }
 
 // Relative speed that stop d lacks with the present impulses; 0 where that is rounding.
-static double lack(const ModalState *state, size_t d) {
+static double collision_lack(const ModalState *state, size_t d) {
     const double asked = state->damper[d].approach_speed + state->damper[d].separation_speed;
     double sum = asked, size = asked;
     for (size_t e = 0; e < state->dampers; e++) {
-        const double given = coupling(state, d, e) * state->damper[e].impulse;
+        const double given = collision_coupling(state, d, e) * state->damper[e].impulse;
         sum -= given;
         size += fabs(given);
     }
     return fabs(sum) <= 4 * DBL_EPSILON * size ? 0 : sum;
 }
 
-// `wanted` of all stops that press, were it to them alone: coupling = L D L', row after row.
-static void solve(ModalState *state) {
-    const size_t n = state->dampers;
-    double *L = state->scratch;
-    for (size_t i = 0; i < n; i++) {
-        DamperState *damper = &state->damper[i];
-        if (!damper->is_pressing)
-            continue;
-        damper->wanted = damper->approach_speed + damper->separation_speed;
-        for (size_t j = 0; j <= i; j++) {
-            if (!state->damper[j].is_pressing)
-                continue;
-            double sum = coupling(state, i, j);
-            for (size_t k = 0; k < j; k++)
-                if (state->damper[k].is_pressing)
-                    sum -= L[i * n + k] * L[k * n + k] * L[j * n + k];
-            L[i * n + j] = i == j ? sum : sum / L[j * n + j];
-            if (j < i)
-                damper->wanted -= L[i * n + j] * state->damper[j].wanted;
-        }
+// The impulses that all stops that press would have without the condition that impulses only press.
+static void collision_solve(ModalState *state) {
+    double *matrix = state->scratch, wanted[SCENE_DAMPERS];
+    size_t count = 0, pressing[SCENE_DAMPERS];
+    for (size_t d = 0; d < state->dampers; d++)
+        if (state->damper[d].is_pressing)
+            pressing[count++] = d;
+    for (size_t i = 0; i < count; i++) {
+        const DamperState *damper = &state->damper[pressing[i]];
+        wanted[i] = damper->approach_speed + damper->separation_speed;
+        for (size_t j = 0; j < count; j++)
+            matrix[i * count + j] = collision_coupling(state, pressing[i], pressing[j]);
     }
-    for (size_t i = n; i-- > 0;) {
-        DamperState *damper = &state->damper[i];
-        if (!damper->is_pressing)
-            continue;
-        damper->wanted /= L[i * n + i];
-        for (size_t j = i + 1; j < n; j++)
-            if (state->damper[j].is_pressing)
-                damper->wanted -= L[j * n + i] * state->damper[j].wanted;
-    }
+    (void)linear_system_solve(matrix, wanted, count, 1); // positive definite
+    for (size_t i = 0; i < count; i++)
+        state->damper[pressing[i]].wanted = wanted[i];
 }
 
-// From the present impulses as far towards the wanted ones as all only press; false: one that no
-// longer does has dropped out.
-static bool approach(ModalState *state) {
+// Moves the impulses towards the wanted ones until the first of them is 0. False: that one has left
+// the set.
+static bool collision_approach(ModalState *state) {
     double share = 1;
     DamperState *least = NULL;
     for (size_t d = 0; d < state->dampers; d++) {
@@ -110,15 +99,16 @@ static bool approach(ModalState *state) {
     return false;
 }
 
-// The stop that lacks most; NULL where none does.
-static DamperState *find_lacking(ModalState *state) {
+// The stop that lacks most speed; NULL where none does.
+static DamperState *collision_find_lacking(ModalState *state) {
     DamperState *most = NULL;
     double largest = 0;
     for (size_t d = 0; d < state->dampers; d++) {
         DamperState *damper = &state->damper[d];
         if (!damper->in_collision || damper->is_pressing || damper->is_finished)
             continue;
-        const double weight = lack(state, d) / sqrt(state->delassus[d * state->dampers + d]);
+        const double weight =
+            collision_lack(state, d) / sqrt(state->delassus[d * state->dampers + d]);
         if (weight > largest) {
             largest = weight;
             most = damper;
@@ -127,11 +117,11 @@ static DamperState *find_lacking(ModalState *state) {
     return most;
 }
 
-// One stop more presses. Where it would pull, what it lacked was rounding: it stays out until
-// another joins.
-static void join(ModalState *state, DamperState *damper) {
+// Adds a stop to the set. If it would pull, what it lacked was rounding: it stays out until another
+// one joins.
+static void collision_join(ModalState *state, DamperState *damper) {
     damper->is_pressing = true;
-    solve(state);
+    collision_solve(state);
     if (!(damper->wanted > 0)) {
         damper->is_pressing = false;
         damper->is_finished = true;
@@ -139,8 +129,8 @@ static void join(ModalState *state, DamperState *damper) {
     }
     for (size_t d = 0; d < state->dampers; d++)
         state->damper[d].is_finished = false;
-    while (!approach(state))
-        solve(state);
+    while (!collision_approach(state))
+        collision_solve(state);
 }
 
 void collision_resolve(ModalState *state) {
@@ -151,16 +141,16 @@ void collision_resolve(ModalState *state) {
         damper->is_pressing = damper->in_collision && damper->plan->clearance == 0;
         damper->is_finished = false;
     }
-    solve(state);
-    (void)approach(state); // these may pull
+    collision_solve(state);
+    (void)collision_approach(state); // these may pull
     DamperState *next = NULL;
-    for (size_t i = 0; i < ROUNDS_MAX && (next = find_lacking(state)) != NULL; i++)
-        join(state, next);
+    for (size_t i = 0; i < ROUNDS_MAX && (next = collision_find_lacking(state)) != NULL; i++)
+        collision_join(state, next);
     for (size_t d = 0; d < state->dampers; d++) {
         const DamperState *damper = &state->damper[d];
         impulses[d] = damper->in_collision ? modal_state_sign(damper->side) * damper->impulse : 0;
     }
-    modal_state_push(state, impulses);
+    collision_push(state, impulses);
     for (size_t d = 0; d < state->dampers; d++) {
         DamperState *damper = &state->damper[d];
         if (damper->in_collision && damper->impulse != 0)

@@ -1,14 +1,15 @@
-// Impulses between masses that stops keep apart: what collisions do to all speeds at once. Not
-// when they happen nor what follows (contact_events.c).
+// Impulses between masses and their stops, and what they do to all speeds. contact_events.c decides
+// when they happen and what follows.
 #ifndef CORE_SOLVE_COLLISION_H
 #define CORE_SOLVE_COLLISION_H
 
 #include "core/solve/modal_state.h"
 
-// Of all dampers with is_met, each at its `side`: finds `pressed` and changes all speeds, p and w.
+// Finds the impulses of all dampers with in_collision, each at its `side`, from their
+// approach_speed and separation_speed, and changes all speeds, p and w.
 void collision_resolve(ModalState *state);
 
-// N's impulses [N s], one per damper, change all speeds.
-void modal_state_push(ModalState *state, const double *impulses);
+// Changes all speeds by one impulse per damper [N s].
+void collision_push(ModalState *state, const double *impulses);
 
 #endif

@@ -9,10 +9,10 @@
 //        +--(impulse)--> u' -> -e u' -----------------------------------> RESTING(side)
 //                                                push becomes tensile -> FLIGHT
 //
-// An impact is a collision (collision_resolve.h) of all masses that reach their stops within the
-// clock's resolution, and of all that rest: a resting one is pressed on, or parts and flies.
-// Bounces towards a pushing stop follow each other in a geometric series; when all that are left
-// take less time than the clock resolves, or many have taken none, they are one and the mass rests.
+// Under the impulse law an impact is a collision (collision.h) of all masses that reach their stops
+// within the clock's resolution, and of all that rest: a resting one stays or parts. Bounces
+// against a stop that pushes form a geometric series. The mass rests when the rest of the series
+// takes less time than the clock resolves, or after many bounces at one instant.
 #include "core/solve/contact_events.h"
 
 #include <float.h>
@@ -22,9 +22,10 @@
 #include "core/solve/collision.h"
 #include "core/solve/recorder.h"
 
+enum { EVENTS_AT_INSTANT_MAX = 1000 }; // of each damper
 enum { STILL_BOUNCES = 64 };
 
-static void begin_contact(ModalState *state, size_t d, Side side) {
+static void contact_event_begin_contact(ModalState *state, size_t d, Side side) {
     DamperState *damper = &state->damper[d];
     const double speed = fabs(damper->w);
     damper->phase = PHASE_CONTACT;
@@ -37,24 +38,24 @@ static void begin_contact(ModalState *state, size_t d, Side side) {
     impact_log_force(&state->impacts, &damper->row, damper->contact.damping * speed);
 }
 
-// The spring that is taken into a contact or left behind in it [J].
-static double spring(const DamperState *damper) {
+// Elastic energy in the buffer at the start or end of a contact [J].
+static double contact_event_strain(const DamperState *damper) {
     return 0.5 * damper->contact.stiffness * damper->r * damper->r;
 }
 
-// N rises again while the mass is still in the buffer: the impact's parameters go on.
-static void resume_contact(ModalState *state, size_t d) {
+// N rises again while the mass is still in the buffer: the parameters of the impact remain.
+static void contact_event_resume_contact(ModalState *state, size_t d) {
     DamperState *damper = &state->damper[d];
     damper->phase = PHASE_CONTACT;
     damper->just_begun = true;
     impact_log_open(&damper->row, IMPACT_IMPACT, modal_state_time(state), d, damper->side,
                     fmax(modal_state_sign(damper->side) * damper->w, 0));
     damper->row.impact.is_resumed = true;
-    impact_log_stretch(&state->impacts, &damper->row, 0, 0, -spring(damper));
+    impact_log_stretch(&state->impacts, &damper->row, 0, 0, -contact_event_strain(damper));
 }
 
-// Out of the buffer; an inward speed is rounding, for the gap does open.
-static void fly_off(DamperState *damper) {
+// Leaves the buffer. The gap opens, so an inward speed is rounding.
+static void contact_event_fly_off(DamperState *damper) {
     const double sign = modal_state_sign(damper->side);
     damper->phase = PHASE_FLIGHT;
     damper->just_begun = false;
@@ -62,27 +63,27 @@ static void fly_off(DamperState *damper) {
     damper->w = sign * fmin(sign * damper->w, 0);
 }
 
-static void end_contact(ModalState *state, size_t d) {
+static void contact_event_end_contact(ModalState *state, size_t d) {
     DamperState *damper = &state->damper[d];
     const double sign = modal_state_sign(damper->side);
     const bool stays = state->plan->separation == SEPARATION_ZERO_FORCE &&
                        damper->contact.damping > 0 && sign * damper->r > 0;
     if (stays) {
-        impact_log_stretch(&state->impacts, &damper->row, 0, 0, spring(damper));
+        impact_log_stretch(&state->impacts, &damper->row, 0, 0, contact_event_strain(damper));
         damper->phase = PHASE_INSIDE;
         damper->just_begun = true;
     } else {
-        fly_off(damper);
+        contact_event_fly_off(damper);
     }
     impact_log_close(&state->impacts, &damper->row, modal_state_time(state),
                      fmax(-sign * damper->w, 0));
 }
 
-// After a collision: which resting mass was pressed, which one parts.
-static void sort_resting(ModalState *state) {
+// After a collision a resting mass was pressed or parts.
+static void contact_event_sort_resting(ModalState *state) {
     for (size_t e = 0; e < state->dampers; e++) {
         DamperState *damper = &state->damper[e];
-        if (damper->zero_gap_terms > 0) // its gap's speed, or at least its curvature, has changed
+        if (damper->zero_gap_terms > 0) // the gap's speed, or at least its curvature, has changed
             damper->zero_gap_terms = damper->w == 0 ? 2 : 0;
         if (damper->phase != PHASE_RESTING)
             continue;
@@ -98,7 +99,7 @@ static void sort_resting(ModalState *state) {
     modal_state_constrain(state);
 }
 
-static void meet_resting(ModalState *state) {
+static void contact_event_meet_resting(ModalState *state) {
     for (size_t e = 0; e < state->dampers; e++) {
         DamperState *damper = &state->damper[e];
         damper->in_collision = damper->phase == PHASE_RESTING;
@@ -106,26 +107,26 @@ static void meet_resting(ModalState *state) {
     }
 }
 
-// What relative momentum is left goes over, conserved.
-static void begin_rest(ModalState *state, size_t d, Side side) {
+// The remaining relative momentum is transferred.
+static void contact_event_begin_rest(ModalState *state, size_t d, Side side) {
     DamperState *damper = &state->damper[d];
     const double sign = modal_state_sign(side), speed = fabs(damper->w);
     damper->side = side;
     damper->origin = (ContactOrigin)side;
     damper->r = 0;
     damper->zero_gap_terms = 0;
-    meet_resting(state);
+    contact_event_meet_resting(state);
     if (sign * damper->w > 0) {
         damper->in_collision = true;
         damper->approach_speed = speed;
         collision_resolve(state);
-        sort_resting(state);
-    } else { // the last of a series of bounces: what is below the clock may act on all alike
+        contact_event_sort_resting(state);
+    } else { // the end of a series of bounces, too short for the clock to distinguish the masses
         damper->impulse = speed * damper->effective_mass;
         double *impulses = state->scratch;
         for (size_t e = 0; e < state->dampers; e++)
             impulses[e] = e == d ? damper->w * damper->effective_mass : 0;
-        modal_state_push(state, impulses);
+        collision_push(state, impulses);
         for (size_t e = 0; e < state->dampers; e++)
             if (state->damper[e].phase == PHASE_RESTING)
                 state->damper[e].w = 0;
@@ -141,22 +142,22 @@ static void begin_rest(ModalState *state, size_t d, Side side) {
 }
 
 // Whether a damper in flight reaches that stop within the clock's resolution.
-static bool reaches(const DamperState *damper, Side side, double clock) {
+static bool contact_event_reaches(const DamperState *damper, Side side, double clock) {
     const double sign = modal_state_sign(side), closing = sign * damper->w;
     return damper->phase == PHASE_FLIGHT && damper->plan->clearance > 0 && closing > 0 &&
            modal_state_room(damper, side) - sign * damper->r <= closing * clock;
 }
 
-static void bounce(ModalState *state, size_t d, Side side) {
+static void contact_event_bounce(ModalState *state, size_t d, Side side) {
     const double clock = modal_state_clock(state);
-    meet_resting(state);
+    contact_event_meet_resting(state);
     for (size_t e = 0; e < state->dampers; e++) {
         DamperState *damper = &state->damper[e];
         Side at = side;
         damper->is_bounced = false;
         if (e != d) {
             at = damper->w > 0 ? SIDE_RIGHT : SIDE_LEFT;
-            if (!reaches(damper, at, clock))
+            if (!contact_event_reaches(damper, at, clock))
                 continue;
         }
         damper->in_collision = damper->is_bounced = true;
@@ -170,7 +171,7 @@ static void bounce(ModalState *state, size_t d, Side side) {
                                        : damper->contact.restitution * damper->approach_speed;
     }
     collision_resolve(state);
-    sort_resting(state);
+    contact_event_sort_resting(state);
     for (size_t e = 0; e < state->dampers; e++) {
         DamperState *damper = &state->damper[e];
         if (!damper->is_bounced)
@@ -183,8 +184,8 @@ static void bounce(ModalState *state, size_t d, Side side) {
     }
 }
 
-// Of the dampers that have just bounced, those that rest from now on.
-static void rest_bounced(ModalState *state) {
+// Which of the dampers that have just bounced rest from now on.
+static void contact_event_rest_bounced(ModalState *state) {
     for (size_t d = 0; d < state->dampers; d++) {
         DamperState *damper = &state->damper[d];
         if (!damper->is_bounced)
@@ -193,27 +194,27 @@ static void rest_bounced(ModalState *state) {
         const double pull = modal_state_sign(damper->side) * modal_state_acceleration(state, d);
         const double left =
             2 * damper->separation_speed / (pull * (1 - damper->contact.restitution));
-        // Without a pull only a mass without speed rests; left is not a number where e = 1 and it
-        // has none.
+        // Without a pull only a mass without speed rests. `left` is NaN where e = 1 and it has
+        // none.
         if (pull > 0 ? !(left > modal_state_clock(state))
                      : pull == 0 && damper->separation_speed == 0)
-            begin_rest(state, d, damper->side);
+            contact_event_begin_rest(state, d, damper->side);
     }
 }
 
-static void touch(ModalState *state, size_t d, Side side) {
+static void contact_event_touch(ModalState *state, size_t d, Side side) {
     state->damper[d].zero_gap_terms = 0;
     if (state->plan->form != CONTACT_IMPULSIVE) {
-        begin_contact(state, d, side);
+        contact_event_begin_contact(state, d, side);
     } else if (state->damper[d].plan->clearance == 0) {
-        begin_rest(state, d, side);
+        contact_event_begin_rest(state, d, side);
     } else {
-        bounce(state, d, side);
-        rest_bounced(state);
+        contact_event_bounce(state, d, side);
+        contact_event_rest_bounced(state);
     }
 }
 
-static void release(ModalState *state, size_t d, bool is_jump) {
+static void contact_event_release(ModalState *state, size_t d, bool is_jump) {
     DamperState *damper = &state->damper[d];
     damper->phase = PHASE_FLIGHT;
     damper->zero_gap_terms = is_jump ? 2 : 3;
@@ -221,30 +222,38 @@ static void release(ModalState *state, size_t d, bool is_jump) {
     impact_log_close(&state->impacts, &damper->row, modal_state_time(state), NAN);
     modal_state_constrain(state);
     if (damper->plan->clearance == 0) // between stops without clearance the other one takes over
-        begin_rest(state, d, damper->side == SIDE_RIGHT ? SIDE_LEFT : SIDE_RIGHT);
+        contact_event_begin_rest(state, d, damper->side == SIDE_RIGHT ? SIDE_LEFT : SIDE_RIGHT);
 }
 
-void contact_event_apply(ModalState *state, const ContactEvent *event) {
+Status contact_event_apply(ModalState *state, const ContactEvent *event) {
     DamperState *damper = &state->damper[event->damper];
-    recorder_note(state);
+    const size_t max = EVENTS_AT_INSTANT_MAX * state->dampers;
+    state->events++;
+    state->chatter_events++;
+    if (++state->events_at_instant > max)
+        return problem_set(state->problem, STATUS_UNSTABLE,
+                           "more than %zu contact events at one instant, t = %.17g s", max,
+                           modal_state_time(state));
+    recorder_update(state);
     switch (damper->phase) {
     case PHASE_FLIGHT:
-        touch(state, event->damper, event->side);
+        contact_event_touch(state, event->damper, event->side);
         break;
     case PHASE_CONTACT:
-        end_contact(state, event->damper);
+        contact_event_end_contact(state, event->damper);
         break;
     case PHASE_INSIDE:
         if (event->is_inwards)
-            resume_contact(state, event->damper);
+            contact_event_resume_contact(state, event->damper);
         else
-            fly_off(damper);
+            contact_event_fly_off(damper);
         break;
     case PHASE_RESTING:
-        release(state, event->damper, event->is_jump);
+        contact_event_release(state, event->damper, event->is_jump);
         break;
     }
-    recorder_note(state);
+    recorder_update(state);
+    return impact_log_status(&state->impacts, state->problem);
 }
 
 bool contact_event_locate(double *gap, size_t degree, ContactEvent candidate, bool *is_found,
@@ -282,19 +291,19 @@ bool contact_event_find_touch(const ModalState *state, size_t d, const double *r
 }
 
 // k p + c p' as coefficients, times `sign`.
-static void spring_series(const DamperState *damper, const TaylorStep *arc, const double *r,
-                          double sign, double *out) {
+static void contact_event_spring_series(const DamperState *damper, const TaylorStep *arc,
+                                        const double *r, double sign, double *out) {
     for (size_t k = 0; k < arc->degree; k++)
         out[k] = sign * (damper->contact.stiffness * r[k] +
                          damper->contact.damping * (double)(k + 1) * r[k + 1] / arc->length);
 }
 
-static void find_inside(const ModalState *state, const TaylorStep *arc, size_t d, bool *is_found,
-                        ContactEvent *first) {
+static void contact_event_find_inside(const ModalState *state, const TaylorStep *arc, size_t d,
+                                      bool *is_found, ContactEvent *first) {
     const DamperState *damper = &state->damper[d];
     const double *r = taylor_step_r(arc, d), sign = modal_state_sign(damper->side);
     double gap[POLYNOMIAL_DEGREE_MAX + 1];
-    spring_series(damper, arc, r, -sign, gap);
+    contact_event_spring_series(damper, arc, r, -sign, gap);
     if (damper->just_begun)
         gap[0] = 0;
     (void)contact_event_locate(
@@ -306,8 +315,8 @@ static void find_inside(const ModalState *state, const TaylorStep *arc, size_t d
                                is_found, first);
 }
 
-static void find_end(const ModalState *state, const TaylorStep *arc, size_t d, bool *is_found,
-                     ContactEvent *first) {
+static void contact_event_find_end(const ModalState *state, const TaylorStep *arc, size_t d,
+                                   bool *is_found, ContactEvent *first) {
     const DamperState *damper = &state->damper[d];
     const double sign = modal_state_sign(damper->side);
     const bool by_force =
@@ -326,7 +335,7 @@ static void find_end(const ModalState *state, const TaylorStep *arc, size_t d, b
         *first = event;
         return;
     }
-    // A contact that N's own zero has just begun again.
+    // A contact that has just begun again at N = 0.
     if (damper->phase == PHASE_CONTACT && by_force && damper->just_begun && damper->r != 0)
         gap[0] = 0;
     (void)contact_event_locate(gap, degree, event, is_found, first);
@@ -342,9 +351,9 @@ bool contact_event_find(const ModalState *state, const TaylorStep *arc, ContactE
             (void)contact_event_find_touch(state, d, taylor_step_r(arc, d), arc->degree, &is_found,
                                            event);
         else if (state->damper[d].phase == PHASE_INSIDE)
-            find_inside(state, arc, d, &is_found, event);
+            contact_event_find_inside(state, arc, d, &is_found, event);
         else
-            find_end(state, arc, d, &is_found, event);
+            contact_event_find_end(state, arc, d, &is_found, event);
     }
     return is_found;
 }

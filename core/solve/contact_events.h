@@ -1,5 +1,5 @@
-// Touching, bouncing, resting and leaving: how an event changes the state of the masses, and the
-// location of the first event on a Taylor step.
+// Contact events: how they change the state of the masses, and the location of the first one on a
+// Taylor step.
 #ifndef CORE_SOLVE_CONTACT_EVENTS_H
 #define CORE_SOLVE_CONTACT_EVENTS_H
 
@@ -10,11 +10,11 @@ typedef struct ContactEvent {
     size_t damper;
     double s;
     Side side;       // of the stop
-    bool is_inwards; // out of PHASE_INSIDE: back into contact
-    bool is_jump;    // out of PHASE_RESTING: the force is already below 0
+    bool is_inwards; // of PHASE_INSIDE: back into contact
+    bool is_jump;    // of PHASE_RESTING: the force is already below 0
 } ContactEvent;
 
-// Finds the first event on the arc; of several at once the one of the first damper.
+// Finds the first event on the step; of simultaneous ones that of the first damper.
 bool contact_event_find(const ModalState *state, const TaylorStep *arc, ContactEvent *event);
 
 // Locates the first zero crossing of the polynomial `gap`, whose start is not negative; a negative
@@ -26,7 +26,8 @@ bool contact_event_locate(double *gap, size_t degree, ContactEvent candidate, bo
 bool contact_event_find_touch(const ModalState *state, size_t damper, const double *r,
                               size_t degree, bool *is_found, ContactEvent *first);
 
-// Makes it happen; the state is that of its instant.
-void contact_event_apply(ModalState *state, const ContactEvent *event);
+// Changes the state, which is that of the event's instant, and logs it. STATUS_UNSTABLE after too
+// many events at one instant, or the status of the impact log.
+Status contact_event_apply(ModalState *state, const ContactEvent *event);
 
 #endif

@@ -1,8 +1,9 @@
-// Flight of all masses over a whole sample interval is one step where bounds on the gaps'
-// curvature prove that no stop can be reached (flight.h); a mass pressed to a stiff stop that it
-// surely does not leave has long steps too (sustained_contact.h); everything else goes by arcs
-// (taylor_step.h), whose polynomials locate events to rounding. Time is a sample's number and an
-// offset from it, so that short contacts keep their digits late in a run.
+// The motion between two events takes one of four kinds of step: whole sample intervals of flight,
+// where a bound on the curvature of the gaps proves that no stop is reached (flight.h); long steps
+// of a mass pressed to a stiff stop that it surely does not leave (sustained_contact.h); steps of
+// contact under power laws (power_contact.h); and Taylor steps, whose polynomials locate events to
+// rounding (taylor_step.h). Time is the number of a sample and an offset, so that short contacts
+// keep their digits late in a run.
 #include "core/solve/event_engine.h"
 
 #include <float.h>
@@ -10,17 +11,16 @@
 #include <string.h>
 
 #include "core/solve/rounding_growth.h"
-#include "core/solve/step_work.h"
 
-enum { STILL_EVENTS = 1000, STORM_EVENTS = 100, IDLE_STEPS = 1000 };
+enum { STORM_EVENTS = 100, IDLE_STEPS = 1000 };
 
-// An arc this short would lose its speeds' digits below the smallest doubles: it takes no time.
+// The speeds of a shorter step would underflow: it takes no time.
 static const double SHORTEST = 1e-250; // [s]
 
-static const double GAIN_CONTACTS = 1e3;
+static const double GAIN_CONTACTS = 1e3; // energy gain allowed, over the tolerance of one contact
 
-static const double WATCH_STEPS = 3e4; // between looks at the progress
-static const double WORK_OF_STEP = 60; // multiplications
+static const double CHECK_STEPS = 3e4; // solver steps between checks of limits and progress
+static const double STEP_COST = 60;    // multiplications in a solver step
 
 Status event_engine_check(EventEngine *engine) {
     const ModalState *state = &engine->state;
@@ -35,17 +35,10 @@ Status event_engine_check(EventEngine *engine) {
         return problem_set(state->problem, STATUS_UNSTABLE,
                            "the motion left what double precision can hold at t = %.6g s",
                            modal_state_time(state));
-    if (state->run->steps_max > 0 && state->run->steps > state->run->steps_max)
-        return problem_set(state->problem, STATUS_LIMIT, SOLVER_STOPPED "t = %.6g s of %.6g s",
-                           state->run->steps_max, state->run->steps_max * SOLVER_STEP,
-                           modal_state_time(state), state->plan->duration);
-    if (!progress_advance(state->run->progress, modal_state_time(state) / state->plan->duration))
-        return problem_set(state->problem, STATUS_CANCELLED, "cancelled at t = %.6g s",
-                           modal_state_time(state));
-    return STATUS_OK;
+    return modal_state_check(state, 0);
 }
 
-static double event_engine_each(const EventEngine *engine, StepWorkKind kind) {
+static double event_engine_cost(const EventEngine *engine, StepWorkKind kind) {
     const ModalState *state = &engine->state;
     return step_work_steps(kind, state->mode_count, state->dampers, state->diagonal == NULL);
 }
@@ -53,16 +46,16 @@ static double event_engine_each(const EventEngine *engine, StepWorkKind kind) {
 static Status event_engine_count_steps(EventEngine *engine, double steps) {
     engine->state.run->steps += steps;
     engine->work += steps;
-    return engine->work > WATCH_STEPS ? event_engine_check(engine) : STATUS_OK;
+    return engine->work > CHECK_STEPS ? event_engine_check(engine) : STATUS_OK;
 }
 
-static void event_engine_take_work(EventEngine *engine, const StepWork *work) {
+static void event_engine_add_work(EventEngine *engine, const StepWork *work) {
     impact_log_work(&engine->state.impacts, work->input, work->damping);
     engine->record.base_speed += work->ground;
 }
 
-// What a stretch of contact or rest adds to a damper's row; the state becomes that of a new peak.
-static void event_engine_take_contact(EventEngine *engine, size_t d) {
+// Adds a step of contact or rest to the row of a damper. The state becomes that of a new peak.
+static void event_engine_log_contact(EventEngine *engine, size_t d) {
     ModalState *state = &engine->state;
     DamperState *damper = &state->damper[d];
     const TaylorStep *arc = &engine->arc;
@@ -80,8 +73,8 @@ static void event_engine_take_contact(EventEngine *engine, size_t d) {
     impact_log_stretch(&state->impacts, &damper->row, arc->length, impulse, lost);
 }
 
-// After an arc: has the gap of a mass released from rest opened beyond rounding yet? Where the arc
-// ends by closing it, the speed stays.
+// After a step: whether the gap of a mass released from rest has opened beyond rounding. If the
+// step ends by closing it, the speed remains.
 static void event_engine_leave(DamperState *damper, bool is_hit) {
     const double sign = modal_state_sign((Side)damper->origin);
     if (sign * damper->r < 0)
@@ -90,17 +83,17 @@ static void event_engine_leave(DamperState *damper, bool is_hit) {
         damper->r = damper->w = 0;
 }
 
-// Takes what lies on the arc and moves to its end, where `hit` (or none) has its event.
-static void event_engine_pass(EventEngine *engine, const ContactEvent *hit) {
+// Logs the step and moves to its end, where event `hit`, or none, occurs.
+static void event_engine_accept(EventEngine *engine, const ContactEvent *hit) {
     ModalState *state = &engine->state;
     const TaylorStep *arc = &engine->arc;
     if (!state->is_shadow) {
         const StepWork work = taylor_step_work(arc, state);
-        event_engine_take_work(engine, &work);
+        event_engine_add_work(engine, &work);
     }
     for (size_t d = 0; d < state->dampers && !state->is_shadow; d++)
         if (state->damper[d].row.is_open)
-            event_engine_take_contact(engine, d);
+            event_engine_log_contact(engine, d);
     taylor_step_state(arc, state, 1);
     state->offset += arc->length;
     state->events_at_instant = 0;
@@ -117,7 +110,7 @@ static void event_engine_pass(EventEngine *engine, const ContactEvent *hit) {
     }
 }
 
-// Of the one mass that there is.
+// Of a single mass on a single storey.
 static State event_engine_single_state(const ModalState *state) {
     const double shape = state->modes->shapes[0];
     return (State){state->q[0] * shape, state->p[0] * shape, state->damper[0].r,
@@ -148,75 +141,65 @@ static void event_engine_grow_over_event(RoundingGrowth *growth, const ModalStat
         rounding_growth_stick(growth);
 }
 
-static Status event_engine_happen(EventEngine *engine, const ContactEvent *event) {
+static Status event_engine_apply(EventEngine *engine, const ContactEvent *event) {
     ModalState *state = &engine->state;
-    const size_t most = STILL_EVENTS * state->dampers;
-    state->events++;
-    state->chatter_events++;
-    if (++state->events_at_instant > most)
-        return problem_set(state->problem, STATUS_UNSTABLE,
-                           "more than %zu contact events at one instant, t = %.17g s", most,
-                           modal_state_time(state));
-    if (engine->growth != NULL) {
-        const ContactPhase phase = state->damper[0].phase;
-        const State before = event_engine_single_state(state);
-        event_engine_grow_to_event(engine->growth, state);
-        contact_event_apply(state, event);
-        event_engine_grow_over_event(engine->growth, state, phase, &before);
-    } else {
-        contact_event_apply(state, event);
-    }
-    return impact_log_status(&state->impacts, state->problem);
+    if (engine->growth == NULL)
+        return contact_event_apply(state, event);
+    const ContactPhase phase = state->damper[0].phase;
+    const State before = event_engine_single_state(state);
+    event_engine_grow_to_event(engine->growth, state);
+    const Status status = contact_event_apply(state, event);
+    event_engine_grow_over_event(engine->growth, state, phase, &before);
+    return status;
 }
 
-// The longest arc: a half-sine of the base is fast only while it lasts.
+// The longest Taylor step. A half-sine of the base is fast only while it lasts.
 static double event_engine_arc_max(const ModalState *state, const Slice *slice) {
     return 1 / fmax(modal_state_rate(state), slice->omega);
 }
 
 // One step of contact under a power law, at most `length` long.
-static Status event_engine_press(EventEngine *engine, const Slice *slice, double length) {
+static Status event_engine_step_power(EventEngine *engine, const Slice *slice, double length) {
     ModalState *state = &engine->state;
     PowerContactStep step;
     power_contact_step(&engine->ode, slice, length, &step);
-    event_engine_take_work(engine, &step.work);
+    event_engine_add_work(engine, &step.work);
     const double before = state->offset;
     state->offset += step.length;
     state->base_acceleration = slice_at(slice, step.length);
     state->events_at_instant = 0;
-    // A step may be shorter than what the clock tells, or end where it began; not very many in
-    // turn.
+    // Only so many steps in a row may be too short for the clock.
     engine->idle = state->offset > before ? 0 : engine->idle + 1;
     state->events += engine->idle > 0 && engine->idle < IDLE_STEPS;
     if (step.is_event)
-        TRY(event_engine_happen(engine, &step.event));
+        TRY(event_engine_apply(engine, &step.event));
     else
-        recorder_note(state);
+        recorder_update(state);
     state->run->work.steps++;
-    return event_engine_count_steps(engine, step.cost / WORK_OF_STEP);
+    return event_engine_count_steps(engine, step.cost / STEP_COST);
 }
 
-// A long step of contact. False: it must go by arcs.
-static bool event_engine_hold(EventEngine *engine, const Slice *slice, double length) {
+// A long step of contact. False: it takes Taylor steps.
+static bool event_engine_step_sustained(EventEngine *engine, const Slice *slice, double length) {
     ModalState *state = &engine->state;
     StepWork work;
     if (slice->omega > 0 && state->base_omega == 0)
-        return false; // its steps know no such base
+        return false; // the tables have no such base
     const double taken = sustained_contact_step(&engine->pressing, state, slice, length,
                                                 state->is_shadow ? NULL : &work);
     if (taken == 0)
         return false;
     if (!state->is_shadow)
-        event_engine_take_work(engine, &work);
+        event_engine_add_work(engine, &work);
     state->offset += taken;
     state->base_acceleration = slice_at(slice, taken);
     return true;
 }
 
-// Masses that touch and part at one instant again and again do so by rounding alone: between stops
-// without clearance, say, of a storey that hardly moves yet. They stay as they are for a while that
-// is longer each time, until the motion itself decides. (Impulses close such series themselves.)
-static bool event_engine_is_stalled(ModalState *state) {
+// Chatter at one instant is rounding noise, for example between stops without clearance on a storey
+// that hardly moves yet. Contact events are suppressed for a time that doubles until the motion
+// resolves them. (The impulse law ends such series itself.)
+static bool event_engine_is_suppressed(ModalState *state) {
     if (state->chatter_events < STORM_EVENTS * state->dampers ||
         state->plan->form == CONTACT_IMPULSIVE)
         return false;
@@ -227,7 +210,7 @@ static bool event_engine_is_stalled(ModalState *state) {
     return true;
 }
 
-// One arc, at most `length` long, up to its end or the first event.
+// One step of at most `length`, up to the first event.
 static Status event_engine_advance(EventEngine *engine, double length) {
     ModalState *state = &engine->state;
     TaylorStep *arc = &engine->arc;
@@ -235,30 +218,30 @@ static Status event_engine_advance(EventEngine *engine, double length) {
     const double knot = base_cursor_slice(&state->base, state->sample, state->offset, &slice);
     state->base_acceleration = slice.value;
     if (power_contact_is_active(&engine->ode))
-        return event_engine_press(engine, &slice, fmin(length, knot));
-    if (event_engine_hold(engine, &slice, fmin(length, knot)))
-        return event_engine_count_steps(engine, event_engine_each(engine, STEP_WORK_HOLD));
-    const bool stays = event_engine_is_stalled(state);
-    const double most = fmin(fmin(length, knot), stays ? state->suppress_time : INFINITY);
-    taylor_step_make(arc, state, &slice, fmin(most, event_engine_arc_max(state, &slice)));
+        return event_engine_step_power(engine, &slice, fmin(length, knot));
+    if (event_engine_step_sustained(engine, &slice, fmin(length, knot)))
+        return event_engine_count_steps(engine, event_engine_cost(engine, STEP_WORK_HOLD));
+    const bool is_suppressed = event_engine_is_suppressed(state);
+    const double max = fmin(fmin(length, knot), is_suppressed ? state->suppress_time : INFINITY);
+    taylor_step_make(arc, state, &slice, fmin(max, event_engine_arc_max(state, &slice)));
     state->run->work.arcs++;
     ContactEvent event;
     const bool is_event = contact_event_find(state, arc, &event) &&
-                          !(stays && event.s * arc->length <= modal_state_clock(state));
+                          !(is_suppressed && event.s * arc->length <= modal_state_clock(state));
     if (is_event)
         taylor_step_cut(arc, state, event.s * arc->length < SHORTEST ? 0 : event.s);
     if (arc->length > 0)
-        event_engine_pass(engine, is_event ? &event : NULL);
+        event_engine_accept(engine, is_event ? &event : NULL);
     if (is_event)
-        TRY(event_engine_happen(engine, &event));
+        TRY(event_engine_apply(engine, &event));
     return event_engine_count_steps(
-        engine, event_engine_each(engine, STEP_WORK_ARC) +
-                    (is_event ? event_engine_each(engine, STEP_WORK_EVENT) : 0));
+        engine, event_engine_cost(engine, STEP_WORK_ARC) +
+                    (is_event ? event_engine_cost(engine, STEP_WORK_EVENT) : 0));
 }
 
 Status event_engine_cross(EventEngine *engine, double length) {
     ModalState *state = &engine->state;
-    // Less than this cannot be told from nothing: the clock's resolution at the interval's end.
+    // The clock's resolution at the end of the interval.
     const double clock = 2 * DBL_EPSILON * length;
     while (length - state->offset > clock) {
         const double before = state->offset;
@@ -273,7 +256,7 @@ Status event_engine_cross(EventEngine *engine, double length) {
     return STATUS_OK;
 }
 
-// a_g over whole intervals from the present sample on; returns over how many it has no kinks.
+// a_g over whole intervals from the present sample on. Returns the number of those without a kink.
 static size_t event_engine_find_slices(const ModalState *state, size_t count, Slice *slices) {
     size_t found = 0;
     for (; found < count; found++) {
@@ -289,8 +272,8 @@ static size_t event_engine_find_slices(const ModalState *state, size_t count, Sl
     return found;
 }
 
-// Whole intervals at once, up to sample `until`, and writes them down. Returns how many; 0: it must
-// go by arcs.
+// Moves over whole intervals of flight, up to sample `until`, and records them. Returns their
+// number.
 static size_t event_engine_fly(EventEngine *engine, size_t until) {
     ModalState *state = &engine->state;
     Recorder *record = &engine->record;
@@ -302,14 +285,14 @@ static size_t event_engine_fly(EventEngine *engine, size_t until) {
     size_t count = until - state->sample;
     if (count > FLIGHT_BUFFER_MAX)
         count = FLIGHT_BUFFER_MAX;
-    // Statistics begin with a stretch.
+    // Statistics begin at the first row of a buffer.
     if (state->sample + 1 < record->statistics_start &&
         state->sample + count >= record->statistics_start)
         count = record->statistics_start - 1 - state->sample;
     count = engine->flight.length == 0 ? 0 : event_engine_find_slices(state, count, slices);
     state->run->work.stop_searches += count > 0 && state->has_stops;
     if (count > 0)
-        count = flight_run(&engine->flight, &engine->trail, state, slices, count,
+        count = flight_run(&engine->flight, &engine->buffer, state, slices, count,
                            state->is_shadow ? NULL : &work);
     state->sample += count;
     if (count == 0 || state->is_shadow)
@@ -320,11 +303,11 @@ static size_t event_engine_fly(EventEngine *engine, size_t until) {
     done->mode_samples += count * state->mode_count;
     state->base_acceleration = base_cursor_at(&state->base, state->sample);
     impact_log_work(&state->impacts, work.input, work.damping);
-    FlightBuffer *trail = &engine->trail;
-    flight_buffer_feel(trail, state, count);
+    FlightBuffer *buffer = &engine->buffer;
+    flight_buffer_feel(buffer, state, count);
     if (state->sample + 1 - count == record->statistics_start)
-        recorder_forget(state);
-    recorder_take(record, state, count);
+        recorder_restart_peaks(state);
+    recorder_write(record, state, count);
     recorder_flight_peaks(record, state, count);
     return count;
 }
@@ -340,7 +323,7 @@ Status event_engine_settle(EventEngine *engine) {
         is_event = contact_event_find(state, &engine->arc, &event) && event.s == 0 &&
                    state->damper[event.damper].phase == PHASE_FLIGHT;
         if (is_event)
-            TRY(event_engine_happen(engine, &event));
+            TRY(event_engine_apply(engine, &event));
     }
     return STATUS_OK;
 }
@@ -353,26 +336,17 @@ static void event_engine_balance(ModalState *state) {
 }
 
 void event_engine_take_sample(EventEngine *engine) {
-    ModalState *state = &engine->state;
-    if (state->is_shadow)
-        return;
-    state->base_acceleration = base_cursor_at(&state->base, state->sample);
-    modal_state_forces(state);
-    if (state->sample == engine->record.statistics_start && state->sample > 0)
-        recorder_forget(state);
-    flight_buffer_take(&engine->trail, state, engine->record.base_speed);
-    recorder_take(&engine->record, state, 1);
-    recorder_peaks(state);
+    recorder_sample(&engine->record, &engine->buffer, &engine->state);
 }
 
-// Notes the samples just passed: so many flown over, or the present one.
+// Stores the modes of the last `flown` samples, or of the present one.
 static void event_engine_track(EventEngine *engine, size_t flown) {
     const ModalState *state = &engine->state;
-    const FlightBuffer *trail = &engine->trail;
+    const FlightBuffer *buffer = &engine->buffer;
     for (size_t k = 1; k <= (flown > 0 ? flown : 1); k++) {
         const size_t sample = flown > 0 ? state->sample - flown + k : state->sample;
         memcpy(engine->track + (sample - 1) % FLIGHT_BUFFER_MAX * state->padded,
-               flown > 0 ? trail->q + k * trail->padded : state->q,
+               flown > 0 ? buffer->q + k * buffer->padded : state->q,
                state->mode_count * sizeof *engine->track);
     }
 }
@@ -392,7 +366,7 @@ Status event_engine_step(EventEngine *engine, size_t until) {
     const size_t flown = event_engine_fly(engine, until);
     if (flown > 0) {
         TRY(event_engine_count_steps(engine,
-                                     (double)flown * event_engine_each(engine, STEP_WORK_FLIGHT)));
+                                     (double)flown * event_engine_cost(engine, STEP_WORK_FLIGHT)));
     } else {
         TRY(event_engine_finish_interval(engine));
     }
@@ -406,15 +380,15 @@ Status event_engine_make(EventEngine *engine, Run *run, double tolerance, Respon
                          Problem *problem) {
     ModalState *state = &engine->state;
     TRY(modal_state_make(state, run, problem));
-    TRY(taylor_step_room(&engine->arc, state, problem));
+    TRY(taylor_step_allocate(&engine->arc, state, problem));
     TRY(flight_make(&engine->flight, state, problem));
     TRY(sustained_contact_make(&engine->pressing, state, problem));
     TRY(power_contact_make(&engine->ode, state, tolerance, problem));
-    TRY(flight_buffer_make(&engine->trail, state, problem));
-    TRY(recorder_start(&engine->record, &engine->trail, state, response, problem));
+    TRY(flight_buffer_make(&engine->buffer, state, problem));
+    TRY(recorder_start(&engine->record, &engine->buffer, state, response, problem));
     const EnergyState energy = modal_state_energy(state);
     impact_log_start(&state->impacts, response, run->impacts_max, &energy);
-    // What contacts may be wrong by each, of many of them.
+    // The errors of many contacts.
     state->impacts.gain_max = fmax(
         IMPACT_LOG_GAIN_EXACT, tolerance > POWER_CONTACT_TOLERANCE ? GAIN_CONTACTS * tolerance : 0);
     return STATUS_OK;
@@ -428,7 +402,7 @@ Status event_engine_shadow(EventEngine *engine, const EventEngine *of, Run *run,
     engine->arc = of->arc;
     engine->flight = of->flight;
     engine->pressing = of->pressing;
-    engine->trail = of->trail;
+    engine->buffer = of->buffer;
     state->is_shadow = true;
     const EnergyState energy = modal_state_energy(state);
     impact_log_start(&state->impacts, response, run->impacts_max, &energy);
@@ -437,7 +411,7 @@ Status event_engine_shadow(EventEngine *engine, const EventEngine *of, Run *run,
 
 void event_engine_clear(EventEngine *engine) {
     recorder_clear(&engine->record);
-    flight_buffer_clear(&engine->trail);
+    flight_buffer_clear(&engine->buffer);
     flight_clear(&engine->flight);
     sustained_contact_clear(&engine->pressing);
     power_contact_clear(&engine->ode);

@@ -1,5 +1,4 @@
-// The event engine: steps the modal state from sample to sample, past all events between. The
-// motions are those of taylor_step.h, flight.h, sustained_contact.h and power_contact.h.
+// The event engine: moves the modal state from sample to sample through all contact events.
 #ifndef CORE_SOLVE_EVENT_ENGINE_H
 #define CORE_SOLVE_EVENT_ENGINE_H
 
@@ -18,11 +17,11 @@ typedef struct EventEngine {
     Flight flight;
     SustainedContact pressing;
     PowerContact ode;
-    FlightBuffer trail;
+    FlightBuffer buffer;
     Recorder record;
-    double work;                   // since Progress was asked
-    size_t idle;                   // steps of contact in a row that took no time
-    struct RoundingGrowth *growth; // of a single mass, told of each event; NULL: none
+    double work;                   // solver steps since the last check
+    size_t idle;                   // steps of contact in a row without time passing
+    struct RoundingGrowth *growth; // of a single mass, or NULL
     double *track; // of the last FLIGHT_BUFFER_MAX samples, all modes: sample k at (k - 1) %
                    // FLIGHT_BUFFER_MAX; NULL: not wanted
 } EventEngine;
@@ -33,26 +32,25 @@ Status event_engine_make(EventEngine *engine, Run *run, double tolerance, Respon
                          Problem *problem);
 void event_engine_clear(EventEngine *engine);
 
-// A run of its own that shares what the other has made once, and of which only the motion matters.
-// Its own are `state` and `ode`; the rest is the other's to clear.
+// A second run of the same scene without any record. It owns `state` and `ode` and borrows the
+// rest.
 Status event_engine_shadow(EventEngine *engine, const EventEngine *of, Run *run, double tolerance,
                            Response *response);
 
-// A mass that starts on a stop may touch it at t = 0; the first sample shows the moment after.
+// Applies the events at t = 0 of masses that start on a stop; the first sample is the state after.
 Status event_engine_settle(EventEngine *engine);
 
-// To the next sample or several, but not beyond sample `until`, and takes them; a shadow takes
-// none.
+// Moves to the next sample or several, at most to sample `until`, and records them.
 Status event_engine_step(EventEngine *engine, size_t until);
 void event_engine_take_sample(EventEngine *engine);
 
-// From the present instant to the next sample, and takes it.
+// Moves from the present instant to the next sample, and records it.
 Status event_engine_finish_interval(EventEngine *engine);
 
-// From the present sample over `length` [s].
+// Moves from the present sample over `length` [s].
 Status event_engine_cross(EventEngine *engine, double length);
 
-// Whether the motion is finite, the limits are kept and Progress lets the run go on.
+// STATUS_UNSTABLE where the motion is not finite, else as modal_state_check.
 Status event_engine_check(EventEngine *engine);
 
 #endif

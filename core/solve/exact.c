@@ -12,7 +12,6 @@
 #include "core/solve/event_engine.h"
 #include "core/solve/power_contact.h"
 #include "core/solve/recorder.h"
-#include "core/solve/refine.h"
 #include "core/solve/single_mass.h"
 
 double exact_tolerance(const Accuracy *accuracy) {
@@ -22,80 +21,80 @@ double exact_tolerance(const Accuracy *accuracy) {
 }
 
 // Linear contacts and impulses have closed forms.
-void exact_forget_unused(Accuracy *accuracy, bool has_power_law) {
+static void exact_forget_unused(Accuracy *accuracy, bool has_power_law) {
     if (!has_power_law)
         ((AccuracyExact *)(void *)accuracy)->tolerance = (double)NAN;
 }
 
-Status exact_decide(const Accuracy *accuracy, double base_interval, Plan *plan, Problem *problem) {
-    (void)base_interval;
-    (void)problem;
+static Status exact_decide(const Solver *solver, const Accuracy *accuracy, double base_interval,
+                           Plan *plan, Problem *problem) {
+    (void)solver, (void)base_interval, (void)problem;
     if (plan->form != CONTACT_POWER || plan->damper_count == 0)
         return STATUS_OK;
     const double tolerance = exact_tolerance(accuracy);
     const bool is_asked = tolerance > POWER_CONTACT_TOLERANCE;
     return decisions_add(&plan->report.decisions, "tolerance", is_asked ? "asked" : "rounding",
                          tolerance, NULL,
-                         is_asked ? "relative error that a contact may end with; flight between "
-                                    "contacts is exact, and instants are found as well as these "
-                                    "contacts are known"
-                                  : "each contact as exact as rounding lets it be, for none asked "
-                                    "for less");
+                         is_asked ? "relative error of a contact at its end; flight is exact, and "
+                                    "contacts are located as accurately as they are integrated"
+                                  : "contacts are accurate to rounding, for no tolerance is given");
 }
 
 // clang-format off
 const Field accuracy_exact_fields[] = {
     FIELD_BASE(AccuracyExact, accuracy, accuracy_fields),
-    FIELD_REAL(AccuracyExact, tolerance, NULL, WITHIN(1e-15, 1e-1), OPTIONAL, "relative error that a contact under a power law may end with; if absent none but rounding's; of no use to other laws, whose contacts have closed forms"),
+    FIELD_REAL(AccuracyExact, tolerance, NULL, WITHIN(1e-15, 1e-1), OPTIONAL, "relative error of a contact under a power law at its end; if absent that of rounding; not used by other laws, whose contacts have closed forms"),
     FIELD_END
 };
 // clang-format on
 
-static Status exact_solve(EventEngine *engine, CompanionRun *neighbour) {
+static Status exact_solve(EventEngine *engine, CompanionRun *companion) {
     ModalState *state = &engine->state;
     const Plan *plan = state->plan;
     TRY(event_engine_settle(engine));
     event_engine_take_sample(engine);
-    companion_run_start(neighbour, engine);
+    companion_run_start(companion, engine);
     while (state->sample + 1 < plan->count) {
         const size_t next = (state->sample / COMPANION_SAMPLES + 1) * COMPANION_SAMPLES;
         const size_t until = next < plan->count - 1 ? next : plan->count - 1;
         while (state->sample < until)
             TRY(event_engine_step(engine, until));
-        if (!companion_run_step(neighbour, state))
-            TRY(event_engine_check(engine)); // it may have been told to stop
+        if (!companion_run_step(companion, state))
+            TRY(event_engine_check(engine)); // the cause may be the run's own limit
     }
-    companion_run_tell(neighbour, state, state->impacts.response);
+    companion_run_report(companion, state, state->impacts.response);
     // The duration may end between samples.
     TRY(event_engine_cross(engine, plan->duration - (double)state->sample / plan->sample_rate));
-    recorder_note(state);
+    recorder_update(state);
     TRY(event_engine_check(engine));
-    return recorder_ledger(state);
+    return recorder_finish_log(state);
 }
 
 Status exact_run_engine(Run *run, Response *response, Problem *problem) {
     EventEngine engine;
-    CompanionRun *neighbour = calloc(1, sizeof *neighbour);
-    if (neighbour == NULL)
+    CompanionRun *companion = calloc(1, sizeof *companion);
+    if (companion == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run");
     memset(&engine, 0, sizeof engine);
     Status status =
         event_engine_make(&engine, run, exact_tolerance(run->accuracy), response, problem);
     if (status == STATUS_OK)
-        status = exact_solve(&engine, neighbour);
+        status = exact_solve(&engine, companion);
     if (engine.record.block != NULL)
         recorder_finish(&engine.record, &engine.state, response);
     event_engine_clear(&engine);
-    companion_run_clear(neighbour);
-    free(neighbour);
+    companion_run_clear(companion);
+    free(companion);
     return status;
 }
 
-static Status exact_run(Run *run, Response *response, Problem *problem) {
+static Status exact_run(const Solver *solver, Run *run, Response *response, Problem *problem) {
+    (void)solver;
     if (!single_mass_serves(run->plan, run->is_clear))
         return exact_run_engine(run, response, problem);
-    // A base whose samples are further apart than the output's goes by strides once it has them.
-    const size_t fine = refine_count(run->base, run->plan->sample_rate, run->plan->count);
+    // With values at all output samples single_mass.h moves over many of them at once.
+    const size_t fine =
+        base_cursor_refined_count(run->base, run->plan->sample_rate, run->plan->count);
     Workspace none = {0}, *workspace = run->workspace == NULL ? &none : run->workspace;
     double *const values = fine == 0 ? NULL : workspace_values(workspace, fine);
     if (values == NULL)
@@ -103,8 +102,8 @@ static Status exact_run(Run *run, Response *response, Problem *problem) {
     Base refined;
     Run own = *run;
     own.base = &refined;
-    Status status = refine_base(run->base, run->plan->sample_rate, fine, values, run->progress,
-                                &refined, problem);
+    Status status = base_cursor_refine(run->base, run->plan->sample_rate, fine, values,
+                                       run->progress, &refined, problem);
     if (status == STATUS_OK)
         status = single_mass_run(&own, response, problem);
     run->steps = own.steps;

@@ -13,11 +13,7 @@ extern const Field accuracy_exact_fields[];
 // What a contact under a power law may be wrong by; `accuracy` is the exact solver's, or NULL.
 double exact_tolerance(const Accuracy *accuracy);
 
-// Solver.decide and .forget_unused of the exact solver.
-Status exact_decide(const Accuracy *accuracy, double base_interval, Plan *plan, Problem *problem);
-void exact_forget_unused(Accuracy *accuracy, bool has_power_law);
-
-// As Solver.run, by the event engine for every plan, also where single_mass.h serves.
+// As Solver.run, but by the event engine for every plan, also where single_mass.h is faster.
 Status exact_run_engine(Run *run, Response *response, Problem *problem);
 
 #endif

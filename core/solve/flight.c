@@ -1,8 +1,8 @@
 // Each mode is a system of its own, q'' = -d q' - w^2 q - participation a_g. The free masses feel
 // the base alone: z'' = -a_g, and r = z - x.
 //
-// With V^2 = p'p + q'W^2 q, V grows by no more than |participation| |a_g| in unit time, and
-// |r''| <= reach V + |base_coupling| |a_g|. So r stays within length^2 max|r''| / 8 of its chord.
+// With V^2 = p'p + q'W^2 q, V' <= growth V + |participation| |a_g|, and |r''| <= elastic_bound V +
+// |base_coupling| |a_g|. So r stays within length^2 max|r''| / 8 of its chord.
 #include "core/solve/flight.h"
 
 #include <math.h>
@@ -11,8 +11,60 @@
 
 #include "core/math/matrix_exponential.h"
 
-enum { Q, P, A, B, SIZE, WORTH = 32 };
+enum { Q, P, A, B, WORTH = 32 };
 enum { VALUE, SLOPE, SUM, FALL, GROUND };
+
+Status flight_buffer_make(FlightBuffer *buffer, const ModalState *state, Problem *problem) {
+    const size_t m = state->dampers, padded = state->padded;
+    buffer->padded = padded;
+    buffer->block = calloc(simd_kernels_room((5 * padded + 2 * m + 3) * FLIGHT_BUFFER_ROWS),
+                           sizeof *buffer->block);
+    if (buffer->block == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu modes",
+                           state->mode_count);
+    double *at = simd_kernels_start(buffer->block);
+    double **const stretches[] = {&buffer->q, &buffer->p, &buffer->moved, &buffer->sped,
+                                  &buffer->elastic};
+    for (size_t i = 0; i < COUNT(stretches); i++, at += FLIGHT_BUFFER_ROWS * padded)
+        *stretches[i] = at;
+    buffer->r = at;
+    buffer->z = buffer->r + m * FLIGHT_BUFFER_ROWS;
+    buffer->a = buffer->z + m * FLIGHT_BUFFER_ROWS;
+    buffer->b = buffer->a + FLIGHT_BUFFER_ROWS;
+    buffer->ground = buffer->b + FLIGHT_BUFFER_ROWS;
+    return STATUS_OK;
+}
+
+void flight_buffer_clear(FlightBuffer *buffer) {
+    free(buffer->block);
+}
+
+void flight_buffer_feel(FlightBuffer *buffer, const ModalState *state, size_t count) {
+    const size_t padded = buffer->padded;
+    const double *q = buffer->q + padded, *p = buffer->p + padded;
+    if (state->diagonal != NULL)
+        state->lanes->mix(padded, count, state->diagonal, p, state->omega2, q,
+                          buffer->elastic + padded);
+    for (size_t at = padded; at <= count * padded && state->diagonal == NULL; at += padded)
+        modal_state_elastic(state, buffer->q + at, buffer->p + at, buffer->elastic + at);
+    for (size_t k = 1; k <= count && state->residual_influence != NULL; k++)
+        buffer->elastic[k * padded + state->mode_count] =
+            base_cursor_at(&state->base, state->sample - count + k);
+}
+
+void flight_buffer_take(FlightBuffer *buffer, const ModalState *state, double ground) {
+    const size_t at = buffer->padded;
+    memcpy(buffer->q + at, state->q, at * sizeof *state->q);
+    memcpy(buffer->p + at, state->p, at * sizeof *state->p);
+    memcpy(buffer->elastic + at, state->elastic, at * sizeof *state->elastic);
+    buffer->ground[0] = ground;
+    for (size_t d = 0; d < state->dampers; d++) {
+        const DamperState *damper = &state->damper[d];
+        buffer->r[d * FLIGHT_BUFFER_ROWS + 1] = damper->r;
+        buffer->z[d * FLIGHT_BUFFER_ROWS + 1] =
+            modal_state_dot(damper->shape, state->p, state->mode_count) + damper->w;
+    }
+}
 
 void flight_ground(double omega, double length, double ground[2], double fall[2]) {
     const bool is_sine = omega > 0;
@@ -28,55 +80,44 @@ void flight_ground(double omega, double length, double ground[2], double fall[2]
     }
 }
 
-static void make_mode(Flight *flight, const ModalState *state, size_t i) {
-    const long double share = state->modes->participation[i], damping = state->diagonal[i];
-    const double omega = state->base_omega;
-    const bool is_sine = omega > 0;
-    long double system[SIZE * SIZE] = {0};
-    system[Q * SIZE + P] = 1;
-    system[P * SIZE + Q] = -(long double)state->omega2[i];
-    system[P * SIZE + P] = -damping;
-    system[P * SIZE + A] = -share;
-    system[A * SIZE + B] = is_sine ? omega : 1;
-    system[B * SIZE + A] = is_sine ? -(long double)omega : 0;
-    long double gain[SIZE * SIZE], forms[2][SIZE * SIZE];
-    matrix_exponential_increment(system, SIZE, flight->length, gain);
-    for (int column = 0; column < 4; column++) {
-        flight->gains.q[column][i] = (double)gain[Q * SIZE + column];
-        flight->gains.p[column][i] = (double)gain[P * SIZE + column];
+static Status flight_make_mode(Flight *flight, const ModalState *state, size_t i,
+                               Problem *problem) {
+    Transition mode;
+    TRY(transition_make_mode(&mode, state, i, problem));
+    for (size_t column = 0; column < 4; column++) {
+        flight->gains.q[column][i] = mode.gain[column * mode.rows + Q];
+        flight->gains.p[column][i] = mode.gain[column * mode.rows + P];
     }
-    const long double speed[SIZE] = {[P] = 1}, base[SIZE] = {[A] = 1};
-    const long double *const pairs[2][2] = {{speed, speed}, {base, speed}};
-    matrix_exponential_forms(system, SIZE, flight->length, 2, pairs, forms[0]);
-    // Off the diagonal both halves count.
-    static const int places[7][2] = {{Q, Q}, {Q, P}, {P, P}, {Q, A}, {Q, B}, {P, A}, {P, B}};
-    for (int k = 0; k < 7; k++)
-        flight->loss[k][i] = (double)(damping * forms[0][places[k][0] * SIZE + places[k][1]] *
-                                      (places[k][0] == places[k][1] ? 1 : 2));
-    static const int works[4][2] = {{A, Q}, {B, Q}, {A, P}, {B, P}};
-    for (int k = 0; k < 4; k++)
-        flight->input[k][i] = (double)(share * 2 * forms[1][works[k][0] * SIZE + works[k][1]]);
-    static const int bases[3][2] = {{A, A}, {A, B}, {B, B}};
-    for (int k = 0; k < 3; k++) {
-        const int at = bases[k][0] * SIZE + bases[k][1];
-        const long double twice = bases[k][0] == bases[k][1] ? 1 : 2;
-        flight->loss_base[k] += (double)(damping * twice * forms[0][at]);
-        flight->input_base[k] += (double)(share * twice * forms[1][at]);
-    }
+    // Off the diagonal both halves of a form count.
+    static const size_t places[FLIGHT_SUMS][2] = {{Q, Q}, {Q, P}, {P, P}, {Q, A},
+                                                  {Q, B}, {P, A}, {P, B}};
+    for (size_t k = 0; k < FLIGHT_SUMS; k++)
+        flight->loss[k][i] = mode.loss[places[k][0] * mode.rows + places[k][1]] *
+                             (places[k][0] == places[k][1] ? 1 : 2);
+    for (size_t k = 0; k < 4; k++)
+        flight->input[k][i] = mode.input[k % 2][k / 2];
+    flight->loss_base[0] += mode.loss[A * mode.rows + A];
+    flight->loss_base[1] += 2 * mode.loss[A * mode.rows + B];
+    flight->loss_base[2] += mode.loss[B * mode.rows + B];
+    flight->input_base[0] += mode.input[0][A];
+    flight->input_base[1] += mode.input[0][B] + mode.input[1][A];
+    flight->input_base[2] += mode.input[1][B];
+    transition_clear(&mode);
+    return STATUS_OK;
 }
 
 Status flight_make(Flight *flight, const ModalState *state, Problem *problem) {
     const size_t n = state->mode_count;
     memset(flight, 0, sizeof *flight);
     if (state->base.base->form == BASE_SAMPLED && state->base.ratio == 0)
-        return STATUS_OK; // a_g has its kinks inside the intervals
+        return STATUS_OK; // a_g has kinks inside the intervals
     if (state->diagonal == NULL) {
-        // Where making it would cost more than it saves there is none.
+        // None where making the transition costs more than it saves.
         if (state->plan->count < WORTH * n || !(state->interval * state->rate < 0x1p40))
             return STATUS_OK;
-        TRY(transition_make(&flight->dense, 1, state, NULL, problem));
+        TRY(transition_make(&flight->transition, 1, state, NULL, problem));
     }
-    // Gains, loss and input; whole vectors, filled up with zeros.
+    // Gains, loss and input, in whole vectors filled up with zeros.
     double **arrays[8 + FLIGHT_SUMS + 4];
     for (size_t i = 0; i < 4; i++) {
         arrays[i] = &flight->gains.q[i];
@@ -100,52 +141,53 @@ Status flight_make(Flight *flight, const ModalState *state, Problem *problem) {
     flight->length = state->interval;
     flight_ground(state->base_omega, flight->length, flight->ground, flight->fall);
     for (size_t i = 0; i < n && count > 0; i++)
-        make_mode(flight, state, i);
+        TRY(flight_make_mode(flight, state, i, problem));
     return STATUS_OK;
 }
 
 void flight_clear(Flight *flight) {
-    transition_clear(&flight->dense);
+    transition_clear(&flight->transition);
     free(flight->block);
 }
 
-// Rows 1 to count of the trail.
-static void fly_dense(const Flight *flight, FlightBuffer *trail, const ModalState *state,
-                      size_t count) {
-    const size_t n = state->mode_count, padded = trail->padded;
+// Fills rows 1 to count of the buffer.
+static void flight_step_coupled(const Flight *flight, FlightBuffer *buffer, const ModalState *state,
+                                size_t count) {
+    const size_t n = state->mode_count, padded = buffer->padded;
     double *start = flight->start, *gained = flight->gained;
     for (size_t k = 0; k < count; k++) {
         const size_t now = k * padded, next = now + padded;
-        memcpy(start, trail->q + now, n * sizeof *start);
-        memcpy(start + n, trail->p + now, n * sizeof *start);
-        start[2 * n] = trail->a[k];
-        start[2 * n + 1] = trail->b[k];
-        state->lanes->multiply(flight->dense.gain, flight->dense.rows, start, 2 * n + 2, gained);
+        memcpy(start, buffer->q + now, n * sizeof *start);
+        memcpy(start + n, buffer->p + now, n * sizeof *start);
+        start[2 * n] = buffer->a[k];
+        start[2 * n + 1] = buffer->b[k];
+        state->lanes->multiply(flight->transition.gain, flight->transition.rows, start, 2 * n + 2,
+                               gained);
         for (size_t i = 0; i < n; i++) {
-            trail->q[next + i] = trail->q[now + i] + gained[i];
-            trail->p[next + i] = trail->p[now + i] + gained[n + i];
-            trail->moved[next + i] = trail->moved[now + i] + gained[i];
-            trail->sped[next + i] = trail->sped[now + i] + gained[n + i];
+            buffer->q[next + i] = buffer->q[now + i] + gained[i];
+            buffer->p[next + i] = buffer->p[now + i] + gained[n + i];
+            buffer->moved[next + i] = buffer->moved[now + i] + gained[i];
+            buffer->sped[next + i] = buffer->sped[now + i] + gained[n + i];
         }
     }
 }
 
-static void fly(const Flight *flight, FlightBuffer *trail, const ModalState *state,
-                const Slice *slices, size_t count) {
+static void flight_step(const Flight *flight, FlightBuffer *buffer, const ModalState *state,
+                        const Slice *slices, size_t count) {
     const size_t n = state->mode_count;
-    memcpy(trail->q, state->q, n * sizeof *trail->q);
-    memcpy(trail->p, state->p, n * sizeof *trail->p);
+    memcpy(buffer->q, state->q, n * sizeof *buffer->q);
+    memcpy(buffer->p, state->p, n * sizeof *buffer->p);
     for (size_t k = 0; k < count; k++) {
-        trail->a[k] = slices[k].value;
-        trail->b[k] = slices[k].slope;
-        trail->ground[k] =
+        buffer->a[k] = slices[k].value;
+        buffer->b[k] = slices[k].slope;
+        buffer->ground[k] =
             flight->ground[0] * slices[k].value + flight->ground[1] * slices[k].slope;
     }
-    if (flight->dense.block != NULL)
-        fly_dense(flight, trail, state, count);
+    if (flight->transition.block != NULL)
+        flight_step_coupled(flight, buffer, state, count);
     else
-        state->lanes->fly(&flight->gains, trail->padded, count, trail->a, trail->b, trail->q,
-                          trail->p, trail->moved, trail->sped);
+        state->lanes->fly(&flight->gains, buffer->padded, count, buffer->a, buffer->b, buffer->q,
+                          buffer->p, buffer->moved, buffer->sped);
 }
 
 bool flight_is_clear(const DamperState *damper, double from, double to, double bend,
@@ -156,36 +198,36 @@ bool flight_is_clear(const DamperState *damper, double from, double to, double b
     return from < most && to < most && from > least && to > least;
 }
 
-static void add_dense_work(const Flight *flight, const FlightBuffer *trail, const ModalState *state,
-                           size_t count, StepWork *work) {
-    const Transition *dense = &flight->dense;
-    const size_t n = state->mode_count, size = dense->size;
+static void flight_add_coupled_work(const Flight *flight, const FlightBuffer *buffer,
+                                    const ModalState *state, size_t count, StepWork *work) {
+    const Transition *transition = &flight->transition;
+    const size_t n = state->mode_count, size = transition->size;
     for (size_t from = 0; from < count; from += FLIGHT_ROWS) {
         const size_t many = count - from < FLIGHT_ROWS ? count - from : FLIGHT_ROWS;
         for (size_t k = from; k < from + many; k++) {
             double *start = flight->start + (k - from) * size;
-            memcpy(start, trail->q + k * trail->padded, n * sizeof *start);
-            memcpy(start + n, trail->p + k * trail->padded, n * sizeof *start);
-            start[2 * n] = trail->a[k];
-            start[2 * n + 1] = trail->b[k];
-            work->input -= trail->a[k] * modal_state_dot(dense->input[0], start, size) +
-                           trail->b[k] * modal_state_dot(dense->input[1], start, size);
+            memcpy(start, buffer->q + k * buffer->padded, n * sizeof *start);
+            memcpy(start + n, buffer->p + k * buffer->padded, n * sizeof *start);
+            start[2 * n] = buffer->a[k];
+            start[2 * n + 1] = buffer->b[k];
+            work->input -= buffer->a[k] * modal_state_dot(transition->input[0], start, size) +
+                           buffer->b[k] * modal_state_dot(transition->input[1], start, size);
         }
-        state->lanes->multiply_four(dense->loss, dense->rows, flight->start, size, size,
+        state->lanes->multiply_four(transition->loss, transition->rows, flight->start, size, size,
                                     flight->gained);
         for (size_t k = 0; k < many; k++)
-            work->damping +=
-                modal_state_dot(flight->gained + k * dense->rows, flight->start + k * size, size);
+            work->damping += modal_state_dot(flight->gained + k * transition->rows,
+                                             flight->start + k * size, size);
     }
 }
 
-static void add_work(const Flight *flight, const FlightBuffer *trail, const ModalState *state,
-                     size_t count, StepWork *work) {
+static void flight_add_work(const Flight *flight, const FlightBuffer *buffer,
+                            const ModalState *state, size_t count, StepWork *work) {
     const size_t n = state->mode_count;
-    const size_t padded = trail->padded;
+    const size_t padded = buffer->padded;
     double *sums = flight->sums;
     memset(sums, 0, FLIGHT_SUMS * padded * sizeof *sums);
-    state->lanes->sum(padded, count, trail->a, trail->b, trail->q, trail->p, sums);
+    state->lanes->sum(padded, count, buffer->a, buffer->b, buffer->q, buffer->p, sums);
     for (size_t j = 0; j < FLIGHT_SUMS; j++)
         work->damping += modal_state_dot(flight->loss[j], sums + j * padded, n);
     // The sums' last four are over (q value, q slope, p value, p slope).
@@ -193,48 +235,50 @@ static void add_work(const Flight *flight, const FlightBuffer *trail, const Moda
         work->input -= modal_state_dot(flight->input[j], sums + (3 + j) * padded, n);
     const double *lb = flight->loss_base, *ib = flight->input_base;
     for (size_t k = 0; k < count; k++) {
-        const double a = trail->a[k], b = trail->b[k];
+        const double a = buffer->a[k], b = buffer->b[k];
         work->damping += a * (lb[0] * a + lb[1] * b) + lb[2] * b * b;
         work->input -= a * (ib[0] * a + ib[1] * b) + ib[2] * b * b;
     }
 }
 
-double flight_shaken(const Slice *slice, double length) {
+double flight_max_ground(const Slice *slice, double length) {
     const double first = fabs(slice->value), last = fabs(slice->value + slice->slope * length);
     return slice->omega > 0 ? first + fabs(slice->slope) : fmax(first, last);
 }
 
-// Of one damper along the trail: rows 1 to count of r and z. Its absolute velocity stays.
-static void follow(const Flight *flight, FlightBuffer *trail, const ModalState *state, size_t d,
-                   size_t count, const Slice *slices) {
+// Rows 1 to count of r and z of one damper, whose absolute velocity is constant.
+static void flight_move_damper(const Flight *flight, FlightBuffer *buffer, const ModalState *state,
+                               size_t d, size_t count, const Slice *slices) {
     const DamperState *damper = &state->damper[d];
-    double *r = trail->r + d * TRAIL_ROWS, *z = trail->z + d * TRAIL_ROWS, far = damper->r;
-    double moved[TRAIL_ROWS];
-    state->lanes->dot(trail->padded, count, damper->shape, trail->moved + trail->padded, moved);
+    double *r = buffer->r + d * FLIGHT_BUFFER_ROWS, *z = buffer->z + d * FLIGHT_BUFFER_ROWS,
+           far = damper->r;
+    double moved[FLIGHT_BUFFER_ROWS];
+    state->lanes->dot(buffer->padded, count, damper->shape, buffer->moved + buffer->padded, moved);
     r[0] = damper->r;
-    z[0] = modal_state_dot(damper->shape, trail->p, state->mode_count) + damper->w;
+    z[0] = modal_state_dot(damper->shape, buffer->p, state->mode_count) + damper->w;
     for (size_t k = 0; k < count; k++) {
         far += flight->length * z[k] -
                (flight->fall[0] * slices[k].value + flight->fall[1] * slices[k].slope);
         r[k + 1] = far - moved[k];
-        z[k + 1] = z[k] - trail->ground[k];
+        z[k + 1] = z[k] - buffer->ground[k];
     }
 }
 
-// sqrt(p'p + q'W^2 q) over an interval that begins with such a size, or over `many`.
-static double grown(const Flight *flight, const ModalState *state, double size, double shaken,
-                    size_t many) {
+// Bound of sqrt(p'p + q'W^2 q) over `many` intervals that begin with `size`.
+static double flight_bound_size(const Flight *flight, const ModalState *state, double size,
+                                double max_ground, size_t many) {
     const double length = (double)many * flight->length;
     const double left = 1 - state->growth * length; // exp(growth length) < 1 / left
-    return left > 0.5 ? (size + length * state->participation_norm * shaken) / left : INFINITY;
+    return left > 0.5 ? (size + length * state->participation_norm * max_ground) / left : INFINITY;
 }
 
-// Of one damper, how many of `count` intervals surely keep it between its stops, bent by no more
-// than `bend`.
-static size_t count_clear(const Flight *flight, const FlightBuffer *trail, const ModalState *state,
-                          size_t d, double bend, const Slice *slices, size_t count) {
+// The number of intervals, at most `count`, that surely keep a damper between its stops; |r''| is
+// at most `bend`.
+static size_t flight_count_clear(const Flight *flight, const FlightBuffer *buffer,
+                                 const ModalState *state, size_t d, double bend,
+                                 const Slice *slices, size_t count) {
     const DamperState *damper = &state->damper[d];
-    const double *r = trail->r + d * TRAIL_ROWS, length = flight->length;
+    const double *r = buffer->r + d * FLIGHT_BUFFER_ROWS, length = flight->length;
     double least = r[0], most = r[0];
     for (size_t k = 1; k <= count; k++) {
         least = r[k] < least ? r[k] : least;
@@ -246,19 +290,20 @@ static size_t count_clear(const Flight *flight, const FlightBuffer *trail, const
         if (flight_is_clear(damper, r[k], r[k + 1], bend, length))
             continue;
         // The bound of this interval alone is closer.
-        const double shaken = flight_shaken(&slices[k], length);
-        const double size =
-            modal_state_size_of(state, trail->q + k * trail->padded, trail->p + k * trail->padded);
-        const double own = damper->elastic_bound * grown(flight, state, size, shaken, 1) +
-                           fabs(damper->base_coupling) * shaken;
+        const double max_ground = flight_max_ground(&slices[k], length);
+        const double size = modal_state_size_of(state, buffer->q + k * buffer->padded,
+                                                buffer->p + k * buffer->padded);
+        const double own =
+            damper->elastic_bound * flight_bound_size(flight, state, size, max_ground, 1) +
+            fabs(damper->base_coupling) * max_ground;
         if (!flight_is_clear(damper, r[k], r[k + 1], own, length))
             return k;
     }
     return count;
 }
 
-// A guess of how many intervals it takes to the next stop: to fly further would be in vain.
-static size_t guess(const Flight *flight, const ModalState *state, size_t count) {
+// An estimate of the number of intervals until the next stop: more would be computed in vain.
+static size_t flight_guess_count(const Flight *flight, const ModalState *state, size_t count) {
     for (size_t d = 0; d < state->dampers; d++) {
         const DamperState *damper = &state->damper[d];
         const double step = fabs(damper->w) * flight->length;
@@ -270,47 +315,48 @@ static size_t guess(const Flight *flight, const ModalState *state, size_t count)
     return count;
 }
 
-size_t flight_run(Flight *flight, FlightBuffer *trail, ModalState *state, const Slice *slices,
+size_t flight_run(Flight *flight, FlightBuffer *buffer, ModalState *state, const Slice *slices,
                   size_t count, StepWork *work) {
     const size_t n = state->mode_count;
-    double shaken = 0;
+    double max_ground = 0;
     if (state->has_stops)
-        count = guess(flight, state, count);
-    fly(flight, trail, state, slices, count);
+        count = flight_guess_count(flight, state, count);
+    flight_step(flight, buffer, state, slices, count);
     for (size_t k = 0; k < count; k++)
-        shaken = fmax(shaken, flight_shaken(&slices[k], flight->length));
-    const double most =
-        state->has_stops ? grown(flight, state, modal_state_size(state), shaken, count) : 0;
+        max_ground = fmax(max_ground, flight_max_ground(&slices[k], flight->length));
+    const double most = state->has_stops ? flight_bound_size(flight, state, modal_state_size(state),
+                                                             max_ground, count)
+                                         : 0;
     for (size_t d = 0; d < state->dampers; d++) {
         const DamperState *damper = &state->damper[d];
-        const double bend = damper->elastic_bound * most + fabs(damper->base_coupling) * shaken;
-        follow(flight, trail, state, d, count, slices);
+        const double bend = damper->elastic_bound * most + fabs(damper->base_coupling) * max_ground;
+        flight_move_damper(flight, buffer, state, d, count, slices);
         if (state->has_stops)
-            count = count_clear(flight, trail, state, d, bend, slices, count);
+            count = flight_count_clear(flight, buffer, state, d, bend, slices, count);
     }
     if (count == 0)
         return 0;
     if (work != NULL) {
         *work = (StepWork){0};
-        if (flight->dense.block != NULL)
-            add_dense_work(flight, trail, state, count, work);
+        if (flight->transition.block != NULL)
+            flight_add_coupled_work(flight, buffer, state, count, work);
         else
-            add_work(flight, trail, state, count, work);
+            flight_add_work(flight, buffer, state, count, work);
     }
-    const size_t end = count * trail->padded;
+    const size_t end = count * buffer->padded;
     double speed = 0;
     for (size_t k = 0; k < count; k++)
-        speed += trail->ground[k];
+        speed += buffer->ground[k];
     for (size_t d = 0; d < state->dampers; d++) {
         DamperState *damper = &state->damper[d];
-        const double *z = trail->z + d * TRAIL_ROWS;
+        const double *z = buffer->z + d * FLIGHT_BUFFER_ROWS;
         for (size_t k = 0; k < count && work != NULL; k++)
-            work->input -= damper->plan->mass * trail->ground[k] * (z[k] - trail->ground[k] / 2);
-        damper->r = trail->r[d * TRAIL_ROWS + count];
-        damper->w -= speed + modal_state_dot(damper->shape, trail->sped + end, n);
+            work->input -= damper->plan->mass * buffer->ground[k] * (z[k] - buffer->ground[k] / 2);
+        damper->r = buffer->r[d * FLIGHT_BUFFER_ROWS + count];
+        damper->w -= speed + modal_state_dot(damper->shape, buffer->sped + end, n);
         damper->force = 0;
     }
-    memcpy(state->q, trail->q + end, n * sizeof *state->q);
-    memcpy(state->p, trail->p + end, n * sizeof *state->p);
+    memcpy(state->q, buffer->q + end, n * sizeof *state->q);
+    memcpy(state->p, buffer->p + end, n * sizeof *state->p);
     return count;
 }

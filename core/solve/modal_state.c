@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/math/linear_system.h"
 #include "core/math/symmetric_matrix.h"
 
 double modal_state_time(const ModalState *state) {
@@ -13,6 +14,22 @@ double modal_state_time(const ModalState *state) {
 
 double modal_state_clock(const ModalState *state) {
     return 4 * DBL_EPSILON * fmax(modal_state_time(state), state->interval);
+}
+
+Status modal_state_check(const ModalState *state, double step) {
+    const Run *run = state->run;
+    const double now = modal_state_time(state);
+    if (run->steps_max > 0 && run->steps > run->steps_max)
+        return step > 0 ? problem_set(state->problem, STATUS_LIMIT,
+                                      SOLVER_STOPPED "t = %.6g s of %.6g s, by steps of %.4g s",
+                                      run->steps_max, run->steps_max * SOLVER_STEP, now,
+                                      state->plan->duration, step)
+                        : problem_set(state->problem, STATUS_LIMIT,
+                                      SOLVER_STOPPED "t = %.6g s of %.6g s", run->steps_max,
+                                      run->steps_max * SOLVER_STEP, now, state->plan->duration);
+    if (!progress_advance(run->progress, now / state->plan->duration))
+        return problem_set(state->problem, STATUS_CANCELLED, "cancelled at t = %.6g s", now);
+    return impact_log_status(&state->impacts, state->problem);
 }
 
 double modal_state_room(const DamperState *damper, Side side) {
@@ -40,10 +57,21 @@ void modal_state_elastic(const ModalState *state, const double *q, const double 
         out[i] += state->omega2[i] * q[i];
 }
 
-// What a power law says of the present contact.
-static ContactForce power_now(const ModalState *state, const DamperState *damper) {
+// The force of the present contact under a power law.
+static ContactForce modal_state_power_force(const ModalState *state, const DamperState *damper) {
     const double sign = modal_state_sign(damper->side);
     return state->plan->law->force(&damper->contact, sign * damper->r, sign * damper->w);
+}
+
+double modal_state_constraint(const ModalState *state, size_t d, const double *elastic,
+                              double ground) {
+    double force = 0;
+    for (size_t e = 0; e < state->dampers; e++)
+        if (state->damper[e].phase == PHASE_RESTING)
+            force += state->constraint_mass[d * state->dampers + e] *
+                     (modal_state_dot(state->damper[e].shape, elastic, state->mode_count) +
+                      state->damper[e].base_coupling * ground);
+    return force;
 }
 
 void modal_state_forces(ModalState *state) {
@@ -54,18 +82,14 @@ void modal_state_forces(ModalState *state) {
         DamperState *damper = &state->damper[d];
         damper->force = 0;
         if (damper->phase == PHASE_CONTACT && state->plan->form == CONTACT_POWER)
-            damper->force = modal_state_sign(damper->side) * power_now(state, damper).value;
+            damper->force =
+                modal_state_sign(damper->side) * modal_state_power_force(state, damper).value;
         else if (damper->phase == PHASE_CONTACT)
             damper->force =
                 damper->contact.stiffness * damper->r + damper->contact.damping * damper->w;
-        if (damper->phase != PHASE_RESTING)
-            continue;
-        for (size_t e = 0; e < state->dampers; e++)
-            if (state->damper[e].phase == PHASE_RESTING)
-                damper->force +=
-                    state->constraint_mass[d * state->dampers + e] *
-                    (modal_state_dot(state->damper[e].shape, state->elastic, state->mode_count) +
-                     state->damper[e].base_coupling * state->base_acceleration);
+        else if (damper->phase == PHASE_RESTING)
+            damper->force =
+                modal_state_constraint(state, d, state->elastic, state->base_acceleration);
     }
 }
 
@@ -79,6 +103,21 @@ const double *modal_state_expand(const ModalState *state, const double *modal) {
     state->lanes->multiply(state->shape_matrix, state->tall, modal,
                            modal_state_even(state->slot_count), state->storey_values);
     return state->storey_values;
+}
+
+double modal_state_difference(const ModalState *state, const double *q, const double *other,
+                              double least) {
+    double bound = 0;
+    for (size_t i = 0; i < state->mode_count; i++) {
+        state->difference[i] = q[i] - other[i];
+        bound += state->max_shape[i] * fabs(state->difference[i]);
+    }
+    if (bound <= least)
+        return least;
+    const double *values = modal_state_expand(state, state->difference);
+    for (size_t j = 0; j < state->storey_count; j++)
+        least = fmax(least, fabs(values[j]));
+    return least;
 }
 
 double modal_state_displacement(const ModalState *state, size_t storey) {
@@ -119,7 +158,7 @@ EnergyState modal_state_energy(const ModalState *state) {
         const double z = modal_state_dot(damper->shape, state->p, state->mode_count) + damper->w;
         energy.kinetic += 0.5 * damper->plan->mass * z * z;
         if (damper->phase == PHASE_CONTACT && state->plan->form == CONTACT_POWER)
-            energy.strain += power_now(state, damper).strain;
+            energy.strain += modal_state_power_force(state, damper).strain;
         else if (damper->phase == PHASE_CONTACT)
             energy.strain += 0.5 * damper->contact.stiffness * damper->r * damper->r;
     }
@@ -159,49 +198,29 @@ double modal_state_rate(const ModalState *state) {
     return is_touching ? fmax(fmax(sqrt(stiff), viscous), state->rate) : state->rate;
 }
 
-// The inverse of `yield` among the dampers that rest, by Gauss and Jordan; it is positive definite.
-static void invert_hold(ModalState *state) {
+// constraint_mass is the inverse of delassus among the dampers at rest, and 0 elsewhere.
+void modal_state_constrain(ModalState *state) {
     const size_t n = state->dampers;
     double *left = state->scratch, *right = state->constraint_mass;
-    for (size_t i = 0; i < n; i++) {
-        const bool is_held = state->damper[i].phase == PHASE_RESTING;
-        for (size_t j = 0; j < n; j++) {
-            const bool are_held = is_held && state->damper[j].phase == PHASE_RESTING;
-            left[i * n + j] = are_held ? state->delassus[i * n + j] : i == j;
-            right[i * n + j] = is_held && i == j;
-        }
-    }
-    for (size_t k = 0; k < n; k++) {
-        const double pivot = left[k * n + k];
-        for (size_t j = 0; j < n; j++) {
-            left[k * n + j] /= pivot;
-            right[k * n + j] /= pivot;
-        }
-        for (size_t i = 0; i < n; i++) {
-            const double factor = left[i * n + k];
-            if (i == k || factor == 0)
-                continue;
-            for (size_t j = 0; j < n; j++) {
-                left[i * n + j] -= factor * left[k * n + j];
-                right[i * n + j] -= factor * right[k * n + j];
-            }
-        }
-    }
-}
-
-void modal_state_constrain(ModalState *state) {
     state->resting = 0;
-    for (size_t d = 0; d < state->dampers; d++)
-        state->resting += state->damper[d].phase == PHASE_RESTING;
+    for (size_t i = 0; i < n; i++) {
+        const bool is_resting = state->damper[i].phase == PHASE_RESTING;
+        state->resting += is_resting;
+        for (size_t j = 0; j < n; j++) {
+            const bool are_resting = is_resting && state->damper[j].phase == PHASE_RESTING;
+            left[i * n + j] = are_resting ? state->delassus[i * n + j] : i == j;
+            right[i * n + j] = is_resting && i == j;
+        }
+    }
     if (state->resting > 0)
-        invert_hold(state);
+        (void)linear_system_solve(left, right, n, n); // positive definite
 }
 
-static const double NEARLY = 1e-9;
+static const double NEARLY = 1e-9; // relative
 
-// (M^-1)_jk from the modes; 0 where it is no more than rounding, lest a hit on one storey stir a
-// mass that rests on another.
-static double mobility(const Modes *modes, size_t j, size_t k) {
+// (M^-1)_jk from the modes; 0 where it is only rounding, so that an impact on one storey does not
+// move a mass that rests on another.
+static double modal_state_mobility(const Modes *modes, size_t j, size_t k) {
     const double *a = modes->shapes + j * modes->count, *b = modes->shapes + k * modes->count;
     long double sum = 0, size = 0;
     for (size_t i = 0; i < modes->count; i++) {
@@ -212,7 +231,7 @@ static double mobility(const Modes *modes, size_t j, size_t k) {
     return fabsl(sum) <= 4 * DBL_EPSILON * size ? 0 : (double)sum;
 }
 
-static void make_damper(ModalState *state, size_t d) {
+static void modal_state_make_damper(ModalState *state, size_t d) {
     const Plan *plan = state->plan;
     const size_t n = state->mode_count, storeys = state->storey_count;
     DamperState *damper = &state->damper[d];
@@ -230,12 +249,12 @@ static void make_damper(ModalState *state, size_t d) {
     memcpy(state->shapes + d * state->padded, state->modes->shapes + planned->storey * n,
            n * sizeof *state->shapes);
     for (size_t j = 0; j < storeys; j++) {
-        state->mobility[d * storeys + j] = mobility(state->modes, planned->storey, j);
+        state->mobility[d * storeys + j] = modal_state_mobility(state->modes, planned->storey, j);
         damper->max_mobility = fmax(damper->max_mobility, fabs(state->mobility[d * storeys + j]));
     }
     for (size_t e = 0; e < state->dampers; e++)
         state->delassus[d * state->dampers + e] =
-            mobility(state->modes, planned->storey, plan->dampers[e].storey) +
+            modal_state_mobility(state->modes, planned->storey, plan->dampers[e].storey) +
             (d == e ? 1 / planned->mass : 0);
     damper->effective_mass = 1 / state->delassus[d * state->dampers + d];
     double stiff = 0, size = 0;
@@ -247,9 +266,9 @@ static void make_damper(ModalState *state, size_t d) {
     damper->elastic_bound = sqrt(stiff) + sqrt(size) * state->viscous;
 }
 
-// How fast energy may grow by what of D gives it, though D should only take: of D's symmetric part,
-// `even_part`.
-static double find_growth(const double *even_part, size_t n) {
+// Growth rate of the energy by a damping matrix that is not quite positive, from its symmetric
+// part.
+static double modal_state_find_growth(const double *even_part, size_t n) {
     double lowest = 0, largest = 0;
     for (size_t i = 0; i < n; i++) {
         const double own = even_part[i * n + i];
@@ -259,12 +278,13 @@ static double find_growth(const double *even_part, size_t n) {
         lowest = fmin(lowest, own - others); // Gershgorin
         largest = fmax(largest, own);
     }
-    // D takes energy, or nearly: scaled to a unit diagonal, D + NEARLY I is positive definite.
+    // D dissipates but for rounding if, scaled to a unit diagonal, D + NEARLY I is positive
+    // definite.
     return symmetric_matrix_find_indefinite(n, even_part, NEARLY) == 0 ? NEARLY * largest : -lowest;
 }
 
-// D, which need not be symmetric, its norm and how far it is from only taking energy.
-static Status make_damping(ModalState *state) {
+// D, which need not be symmetric, its norm and the growth rate.
+static Status modal_state_make_damping(ModalState *state) {
     const size_t n = state->mode_count;
     const double *damping = state->damping = state->modes->damping;
     double *even_part = calloc(n * n, sizeof *even_part);
@@ -285,7 +305,7 @@ static Status make_damping(ModalState *state) {
         state->diagonal[i] = damping[i * n + i];
     }
     state->viscous = fmin(sqrt(rows * columns), sqrt(squares));
-    state->growth = find_growth(even_part, n);
+    state->growth = modal_state_find_growth(even_part, n);
     free(even_part);
     if (state->modes->is_classical)
         return STATUS_OK;
@@ -299,24 +319,24 @@ static Status make_damping(ModalState *state) {
     return STATUS_OK;
 }
 
-// q = shapes' M x: the modes are normal. `carried` is scratch.
-static void make_modal(const ModalState *state, const double *values, long double *carried,
-                       double *modal) {
+// q = shapes' M x, as the modes are normalised. `momentum` is scratch.
+static void modal_state_make_modal(const ModalState *state, const double *values,
+                                   long double *momentum, double *modal) {
     const size_t n = state->mode_count, storeys = state->storey_count;
     for (size_t j = 0; j < storeys; j++) {
-        carried[j] = 0;
+        momentum[j] = 0;
         for (size_t k = 0; k < storeys; k++)
-            carried[j] += (long double)state->plan->mass[j * storeys + k] * values[k];
+            momentum[j] += (long double)state->plan->mass[j * storeys + k] * values[k];
     }
     for (size_t i = 0; i < n; i++) {
         long double sum = 0;
         for (size_t j = 0; j < storeys; j++)
-            sum += state->modes->shapes[j * n + i] * carried[j];
+            sum += state->modes->shapes[j * n + i] * momentum[j];
         modal[i] = (double)sum;
     }
 }
 
-static Status make_room(ModalState *state) {
+static Status modal_state_allocate(ModalState *state) {
     const size_t n = state->padded, m = state->dampers;
     double **const arrays[] = {&state->omega2,
                                &state->diagonal,
@@ -329,6 +349,7 @@ static Status make_room(ModalState *state) {
                                &state->shapes,
                                &state->shape_matrix,
                                &state->storey_values,
+                               &state->difference,
                                &state->mobility,
                                &state->delassus,
                                &state->constraint_mass,
@@ -336,7 +357,8 @@ static Status make_room(ModalState *state) {
                                &state->residual_influence};
     const size_t tall = state->tall, all = modal_state_even(state->slot_count) * tall;
     const size_t sizes[] = {
-        n, n, n, n, n, n, n, n, m * n, all, FLIGHT_ROWS * tall, m * tall, m * m, m * m, m * m, tall,
+        n, n,        n,     n,     n,     n,    n, n, m * n, all, FLIGHT_ROWS * tall,
+        n, m * tall, m * m, m * m, m * m, tall,
     };
     size_t total = simd_kernels_room(0);
     for (size_t i = 0; i < COUNT(sizes); i++)
@@ -353,9 +375,8 @@ static Status make_room(ModalState *state) {
     return STATUS_OK;
 }
 
-// What the base does to storeys through modes that are left out; 0 where it is no more than
-// rounding.
-static void make_unmoved(ModalState *state) {
+// residual_influence; 0 where it is only rounding.
+static void modal_state_make_residual(ModalState *state) {
     const size_t n = state->mode_count;
     double most = 0;
     for (size_t j = 0; j < state->storey_count; j++) {
@@ -374,8 +395,8 @@ static void make_unmoved(ModalState *state) {
     state->max_shape[n] = most;
 }
 
-// Shapes and what is made of them.
-static void make_modes(ModalState *state) {
+// Copies of the modes, padded, and what follows from them.
+static void modal_state_make_modes(ModalState *state) {
     const size_t n = state->mode_count;
     const Modes *modes = state->modes;
     for (size_t i = 0; i < n; i++) {
@@ -389,12 +410,12 @@ static void make_modes(ModalState *state) {
         }
     }
     if (state->slot_count > n)
-        make_unmoved(state);
+        modal_state_make_residual(state);
     else
         state->residual_influence = NULL;
 }
 
-static void modal_state_of(ModalState *state, Run *run, Problem *problem) {
+static void modal_state_start(ModalState *state, Run *run, Problem *problem) {
     const Plan *plan = run->plan;
     memset(state, 0, sizeof *state);
     state->run = run;
@@ -415,17 +436,17 @@ static void modal_state_of(ModalState *state, Run *run, Problem *problem) {
 Status modal_state_make(ModalState *state, Run *run, Problem *problem) {
     const Plan *plan = run->plan;
     const size_t n = plan->storeys;
-    modal_state_of(state, run, problem);
+    modal_state_start(state, run, problem);
     if (plan->modes.count == 0)
         TRY(modes_make(&state->own_modes, n, plan->mass, plan->stiffness, plan->damping,
                        plan->influence, problem));
-    if (make_room(state) != STATUS_OK || make_damping(state) != STATUS_OK)
+    if (modal_state_allocate(state) != STATUS_OK || modal_state_make_damping(state) != STATUS_OK)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys", n);
-    make_modes(state);
+    modal_state_make_modes(state);
     state->participation_norm = sqrt(modal_state_dot(
         state->modes->participation, state->modes->participation, state->mode_count));
     state->rate = fmax(fmax(sqrt(state->stiff), state->viscous), 1e-300);
-    // A pulse that is over sooner is flown through by arcs alone.
+    // During a shorter pulse there are only Taylor steps.
     state->base_omega = run->base->omega * state->interval <= 4 || run->base->form == BASE_SINE
                             ? run->base->omega
                             : 0;
@@ -434,7 +455,7 @@ Status modal_state_make(ModalState *state, Run *run, Problem *problem) {
     state->base_rotation[1] = (double)sinl(turn);
     bool is_sound = isfinite(state->rate) && isfinite(run->base->omega);
     for (size_t d = 0; d < state->dampers; d++) {
-        make_damper(state, d);
+        modal_state_make_damper(state, d);
         const double m = state->damper[d].effective_mass;
         is_sound = is_sound && m > 0 && isfinite(m);
     }
@@ -442,12 +463,12 @@ Status modal_state_make(ModalState *state, Run *run, Problem *problem) {
         return problem_set(
             problem, STATUS_UNSTABLE,
             "the scene's masses and stiffnesses are too far apart for double precision");
-    long double *carried = malloc(n * sizeof *carried);
-    if (carried == NULL)
+    long double *momentum = malloc(n * sizeof *momentum);
+    if (momentum == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys", n);
-    make_modal(state, plan->displacement, carried, state->q);
-    make_modal(state, plan->velocity, carried, state->p);
-    free(carried);
+    modal_state_make_modal(state, plan->displacement, momentum, state->q);
+    modal_state_make_modal(state, plan->velocity, momentum, state->p);
+    free(momentum);
     base_cursor_make(&state->base, run->base, plan->sample_rate);
     state->base_acceleration = base_cursor_at(&state->base, 0);
     return STATUS_OK;

@@ -1,6 +1,5 @@
-// What the general engine knows while it runs, and how it looks from outside: rooms, forces,
-// energies. Not the stepping (event_engine.c), the events (contact_events.c) nor what is written
-// down of it (recorder.c).
+// The modal state of a run: structure, dampers and contacts at one instant, with gaps, forces and
+// energies.
 #ifndef CORE_SOLVE_MODAL_STATE_H
 #define CORE_SOLVE_MODAL_STATE_H
 
@@ -10,7 +9,7 @@
 #include "core/solve/simd_kernels.h"
 #include "core/solve/solver.h"
 
-// PHASE_INSIDE: out of contact by the force's end, but not yet out of the buffer.
+// PHASE_INSIDE: the contact has ended by its force, but the mass is still inside the buffer.
 typedef enum ContactPhase { PHASE_FLIGHT, PHASE_CONTACT, PHASE_INSIDE, PHASE_RESTING } ContactPhase;
 typedef enum ContactOrigin {
     FROM_LEFT = SIDE_LEFT,
@@ -21,77 +20,75 @@ typedef enum ContactOrigin {
 typedef struct DamperState {
     const PlanDamper *plan;
     const double *shape;   // of its storey, mode after mode
-    double base_coupling;  // a_g's part in r''
-    double effective_mass; // m_e, 1 / (1/m + (M^-1)_jj), of the modes kept [kg]
-    double max_mobility;   // a force N on its storey accelerates none by more than this N [1/kg]
-    double elastic_bound;  // |[M^-1 (C v + K x)]_j| is at most this times sqrt(p'p + q'W^2 q) [1/s]
+    double base_coupling;  // coefficient of a_g in r''
+    double effective_mass; // m_e, 1 / (1/m + (M^-1)_jj), with the modes kept [kg]
+    double max_mobility; // acceleration of any storey by a force on this one is at most this [1/kg]
+    double elastic_bound; // |[M^-1 (C v + K x)]_j| is at most this times sqrt(p'p + q'W^2 q) [1/s]
 
     ContactPhase phase;
     Side side;            // of all phases but flight
-    ContactOrigin origin; // what r is counted from
-    int zero_gap_terms;   // terms of the gap, from the constant one on, that are exactly 0: it was
-                          // released from rest a moment ago
-    bool just_begun;      // the present phase has lasted for no time yet
+    ContactOrigin origin; // origin of r
+    int zero_gap_terms;   // number of leading terms of the gap that are exactly 0, just after a
+                          // release from rest
+    bool just_begun;      // the present phase has no duration yet
     double r, w;          // displacement and speed relative to the storey [m], [m/s]
     double force;         // N on the structure as of the last modal_state_forces [N]
     ContactParameters contact; // frozen at the touch
     ImpactRow row;             // of the present contact or rest
 
-    // Of a long step beside another's contact (sustained_contact.c): speed of the storey before it,
-    // and what r gains.
+    // Of a long step in flight (sustained_contact.c): speed of the storey before it, increment of
+    // r.
     double storey_speed, gained;
-    // Of a collision: speed towards the stop, speed away from it that is asked for, and the impulse
-    // that presses it [m/s], [m/s], [N s]; the rest is collision_resolve's own.
-    bool in_collision, is_bounced; // in_collision: takes part; is_bounced: not from rest
+    // Of a collision: speed towards the stop and required speed away from it [m/s], and the impulse
+    // [N s]. is_pressing, is_finished and wanted are scratch of collision_resolve.
+    bool in_collision, is_bounced; // is_bounced: takes part, not from rest
     double approach_speed, separation_speed, impulse;
     bool is_pressing, is_finished;
     double wanted;
-    bool is_locked; // taken into `constraint_mass`
 } DamperState;
 
 // In modal coordinates, x = shapes q:
 //   q'' = -(D q' + W^2 q) - participation a_g + sum of shape_d N_d
 //   r_d'' = base_coupling_d a_g + shape_d . (D q' + W^2 q) - sum over e of delassus_de N_e
-// with base_coupling_d = shape_d . participation - 1, which is r_j - 1 where all modes are kept.
-// Where they are not, what the base does to the others is theirs: a storey's absolute acceleration
-// is
-//   residual_influence_j a_g - shape_j . (D q' + W^2 q) + ...,   residual_influence_j = r_j -
-//   shape_j . participation,
-// and arrays over modes have a_g in one slot more behind `elastic`, which the storeys see with
-// -residual_influence.
+// with base_coupling_d = shape_d . participation - 1, which is influence_j - 1 where all modes are
+// kept. Modes that are left out move with the base: a storey's absolute acceleration is
+//   residual_influence_j a_g - shape_j . (D q' + W^2 q) + ...,   residual_influence_j = influence_j
+//   - shape_j . participation,
+// and `elastic` has one more slot with a_g, whose shape is -residual_influence.
 typedef struct ModalState {
     Run *run;
     const Plan *plan;
     const Modes *modes;
-    Modes own_modes; // where the plan has none
+    Modes own_modes; // if the plan has none
     Problem *problem;
 
-    bool has_stops; // that a mass may reach
-    bool is_shadow; // only the motion is wanted: no peaks, no energies
+    bool has_stops; // a mass may reach a stop
+    bool is_shadow; // without record: no peaks, no energies
 
     size_t storey_count, mode_count;
-    size_t slot_count;          // mode_count, and a_g's slot where modes are left out
-    size_t padded;              // values of each array over modes here, zeros behind the slots
-    size_t tall;                // likewise of an array over storeys
-    const SimdKernels *lanes;   // what this processor has
-    double *omega2;             // [1/s^2]
-    const double *damping;      // D, modes x modes
-    double *diagonal;           // of D, where it is diagonal; else NULL
-    double *coupled;            // D, where it is not: columns of `padded` values; else NULL
-    double *participation;      // participation
+    size_t slot_count;        // mode_count, and a_g's slot where modes are left out
+    size_t padded;            // values of each array over modes here, zeros behind the slots
+    size_t tall;              // likewise of an array over storeys
+    const SimdKernels *lanes; // for this processor
+    double *omega2;           // [1/s^2]
+    const double *damping;    // D, modes x modes
+    double *diagonal;         // of D, where it is diagonal; else NULL
+    double *coupled;          // D, where it is not: columns of `padded` values; else NULL
+    double *participation;
     double *shapes;             // of the dampers' storeys
-    double *shape_matrix;       // of all storeys: columns of `tall` values, one a slot
+    double *shape_matrix;       // of all storeys: a column of `tall` values for each slot
     double *storey_values;      // scratch of modal_state_expand
+    double *difference;         // scratch of modal_state_difference
     double *max_shape;          // of each slot, the largest |shape| of any storey
     double *residual_influence; // of the storeys; NULL where all modes are kept [-]
-    double
-        *momentum_weights; // participation + sum of m_d shape_d: -a_g carry . p is the base's work
-    double rate;           // no eigenvalue of flight is larger [1/s]
-    double base_omega;     // of a base that turns over whole sample intervals, else 0 [rad/s]
-    double base_rotation[2];   // cosine and sine of what it turns in one of them
-    double stiff, viscous;     // largest of W^2 and of D
-    double participation_norm; // |participation|
-    double growth;             // sqrt(p'p + q'W^2 q) grows by no more than this in flight [1/s]
+    double *momentum_weights;   // participation + sum of m_d shape_d; -a_g momentum_weights . p is
+                                // the power of the base
+    double rate;                // bound of the eigenvalues in flight [1/s]
+    double base_omega;          // of a sine base over whole sample intervals, else 0 [rad/s]
+    double base_rotation[2];    // cosine and sine of its phase in one interval
+    double stiff, viscous;      // largest of W^2 and of D
+    double participation_norm;  // |participation|
+    double growth;              // bound of the growth rate of sqrt(p'p + q'W^2 q) in flight [1/s]
 
     size_t dampers;
     DamperState *damper;
@@ -101,7 +98,7 @@ typedef struct ModalState {
                              // `delassus` of the modes kept
     double *constraint_mass; // dampers x dampers: constraint forces are constraint_mass . (r''
                              // without them) [kg]
-    size_t resting;          // how many are
+    size_t resting;          // number of dampers at rest
 
     double *q, *p;            // modal displacements and speeds
     double *elastic;          // D p + W^2 q, as of the last modal_state_forces
@@ -116,10 +113,10 @@ typedef struct ModalState {
     ImpactLog impacts;
     size_t events;            // all so far
     size_t events_at_instant; // in a row, without time passing
-    size_t chatter_events;    // without more time passing than the clock tells from none
-    double chatter_time;      // what has passed nevertheless [s]
+    size_t chatter_events;    // within less time than the clock's resolution
+    double chatter_time;      // time since the first of them [s]
     double suppress_time,
-        suppressed_at; // how long events were last passed over, and when that was [s]
+        suppressed_at; // duration and start of the last suppression of events [s]
 } ModalState;
 
 // +1 for the right stop, -1 for the left.
@@ -132,7 +129,7 @@ static inline size_t modal_state_even(size_t count) {
     return count + count % 2;
 }
 
-// In a fixed order that processors can do two by two.
+// In a fixed order that suits vectors.
 static inline double modal_state_dot(const double *a, const double *b, size_t count) {
     double sum[4] = {0, 0, 0, 0};
     size_t i = 0;
@@ -144,14 +141,14 @@ static inline double modal_state_dot(const double *a, const double *b, size_t co
     return (sum[0] + sum[1]) + (sum[2] + sum[3]);
 }
 
-// Everything but the ledger. Freed by modal_state_clear, also after a failure.
+// Everything but the impact log. Freed by modal_state_clear, also after a failure.
 Status modal_state_make(ModalState *state, Run *run, Problem *problem);
 void modal_state_clear(ModalState *state);
 
 double modal_state_time(const ModalState *state); // [s]
-// The shortest time that can be told from none, at the present one [s].
+// The clock's resolution at the present time [s].
 double modal_state_clock(const ModalState *state);
-// Between free mass and stop at r = 0 of the present origin [m].
+// Gap between free mass and stop at r = 0 of the present origin [m].
 double modal_state_room(const DamperState *damper, Side side);
 // Displacement of the free mass relative to its storey at r = 0 [m].
 double modal_state_middle(const DamperState *damper);
@@ -159,9 +156,20 @@ double modal_state_middle(const DamperState *damper);
 // out = D p + W^2 q; arrays of `padded` values.
 void modal_state_elastic(const ModalState *state, const double *q, const double *p,
                          double *restrict out);
-// Brings elastic and the dampers' forces up to the present state.
+// STATUS_LIMIT, STATUS_CANCELLED or the status of the impact log; `step` is that of a fixed step
+// [s], or 0.
+Status modal_state_check(const ModalState *state, double step);
+
+// N that keeps a damper at rest on its stop [N].
+double modal_state_constraint(const ModalState *state, size_t damper, const double *elastic,
+                              double ground);
+// Updates `elastic` and the forces of the dampers to the present state.
 void modal_state_forces(ModalState *state);
-// Values of all storeys from those of all modes, until the next call.
+// The largest difference of any storey's displacement between modes q and `other` [m], or `least`
+// if that is larger.
+double modal_state_difference(const ModalState *state, const double *q, const double *other,
+                              double least);
+// Values of all storeys from those of all modes, valid until the next call.
 const double *modal_state_expand(const ModalState *state, const double *modal);
 // Likewise of FLIGHT_ROWS rows of modes, one after the other; `tall` values of each.
 const double *modal_state_expand_four(const ModalState *state, const double *modal);
@@ -175,11 +183,10 @@ EnergyState modal_state_energy(const ModalState *state);
 double modal_state_size(const ModalState *state); // sqrt(p'p + q'W^2 q)
 double modal_state_size_of(const ModalState *state, const double *q, const double *p);
 
-// No eigenvalue of the present motion is larger [1/s].
+// Bound of the eigenvalues of the present motion [1/s].
 double modal_state_rate(const ModalState *state);
 
-// Makes `constraint_mass` anew, the inverse of `delassus` between those that rest: after every
-// change of who does.
+// Updates `constraint_mass` and `resting`, after every change of the dampers at rest.
 void modal_state_constrain(ModalState *state);
 
 #endif

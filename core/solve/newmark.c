@@ -15,6 +15,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/math/linear_system.h"
 #include "core/solve/time_stepping.h"
 
 enum { NEWTON_MAX = 60 };
@@ -33,12 +34,6 @@ typedef struct Newmark {
     double *bare;         // b: r'' at the step's end without contact forces [m/s^2]
     double values[];
 } Newmark;
-
-static void newmark_swap(double *a, double *b) {
-    const double kept = *a;
-    *a = *b;
-    *b = kept;
-}
 
 static Status newmark_no_memory(const TimeStepping *stepping) {
     return problem_set(stepping->state.problem, STATUS_NO_MEMORY,
@@ -72,39 +67,6 @@ static Status newmark_make(TimeStepping *stepping) {
     return STATUS_OK;
 }
 
-// Solves left x = right by Gaussian elimination with pivoting. `right` has rows of `columns` values
-// and is overwritten by x. False: singular.
-static bool newmark_eliminate(double *left, double *right, size_t n, size_t columns) {
-    for (size_t k = 0; k < n; k++) {
-        size_t pivot = k;
-        for (size_t i = k + 1; i < n; i++)
-            if (fabs(left[i * n + k]) > fabs(left[pivot * n + k]))
-                pivot = i;
-        if (!(fabs(left[pivot * n + k]) > 0) || !isfinite(left[pivot * n + k]))
-            return false;
-        for (size_t j = k; j < n && pivot != k; j++)
-            newmark_swap(&left[k * n + j], &left[pivot * n + j]);
-        for (size_t j = 0; j < columns && pivot != k; j++)
-            newmark_swap(&right[k * columns + j], &right[pivot * columns + j]);
-        for (size_t i = k + 1; i < n; i++) {
-            const double factor = left[i * n + k] / left[k * n + k];
-            for (size_t j = k; j < n && factor != 0; j++)
-                left[i * n + j] -= factor * left[k * n + j];
-            for (size_t j = 0; j < columns && factor != 0; j++)
-                right[i * columns + j] -= factor * right[k * columns + j];
-        }
-    }
-    for (size_t i = n; i-- > 0;) {
-        double *row = right + i * columns;
-        for (size_t k = i + 1; k < n; k++)
-            for (size_t j = 0; j < columns; j++)
-                row[j] -= left[i * n + k] * right[k * columns + j];
-        for (size_t j = 0; j < columns; j++)
-            row[j] /= left[i * n + i];
-    }
-    return true;
-}
-
 static Status newmark_invert(const TimeStepping *stepping, double length) {
     const Newmark *newmark = stepping->method;
     const ModalState *state = &stepping->state;
@@ -124,7 +86,7 @@ static Status newmark_invert(const TimeStepping *stepping, double length) {
                 half * state->damping[i * n + j] + (i == j ? 1 + quarter * state->omega2[i] : 0);
             newmark->inverse[i * n + j] = i == j;
         }
-    const bool is_found = newmark_eliminate(G, newmark->inverse, n, n);
+    const bool is_found = linear_system_solve(G, newmark->inverse, n, n);
     free(G);
     return is_found ? STATUS_OK
                     : problem_set(state->problem, STATUS_UNSTABLE,
@@ -187,7 +149,7 @@ static Status newmark_find_forces(TimeStepping *stepping, double length, const d
             for (size_t e = 0; e < m; e++)
                 newmark->left[d * m + e] += yielding * newmark->soften[d * m + e];
         }
-        if (!newmark_eliminate(newmark->left, newmark->right, m, 1))
+        if (!linear_system_solve(newmark->left, newmark->right, m, 1))
             break;
         bool is_done = true;
         for (size_t d = 0; d < m; d++) {
@@ -264,24 +226,12 @@ static const Stepper newmark_stepper = {.name = "newmark",
                                         .step = newmark_step,
                                         .cost = newmark_step_cost};
 
-static Status newmark_run(Run *run, Response *response, Problem *problem) {
-    return time_stepping_run(&newmark_stepper, run, response, problem);
-}
-
-static Status newmark_decide(const Accuracy *accuracy, double base_interval, Plan *plan,
-                             Problem *problem) {
-    return time_stepping_decide(&newmark_stepper, accuracy, base_interval, plan, problem);
-}
-
-static double newmark_cost(const Accuracy *accuracy, double base_interval, const Plan *plan) {
-    return time_stepping_cost(&newmark_stepper, accuracy, base_interval, plan);
-}
-
 const Solver solver_newmark = {
     .kind = {"newmark",
              "Newmark's method with the average acceleration, contacts switched at step ends",
              accuracy_step_fields, sizeof(AccuracyStep)},
-    .run = newmark_run,
-    .decide = newmark_decide,
-    .cost = newmark_cost,
+    .run = time_stepping_run,
+    .decide = time_stepping_decide,
+    .cost = time_stepping_cost,
+    .stepper = &newmark_stepper,
 };

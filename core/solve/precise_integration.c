@@ -10,8 +10,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/math/matrix_exponential.h"
 #include "core/solve/time_stepping.h"
+#include "core/solve/transition.h"
 
 // Limits of the cache: tables, and their values together; two tables fit in any case.
 enum { TABLES_MAX = 64 };
@@ -31,7 +31,6 @@ typedef struct Precise {
     size_t key_size;
     double *key;  // of the table for this step
     double *from; // (y, g, s) at the step's start
-    double *y, *force, *rate;
     PreciseTable tables[TABLES_MAX];
     double values[];
 } Precise;
@@ -44,8 +43,7 @@ static Status precise_no_memory(const TimeStepping *stepping) {
 static Status precise_make(TimeStepping *stepping) {
     const size_t m = stepping->state.dampers, size = stepping->size, wide = size + 2;
     const size_t key_size = 1 + 2 * m, fit = VALUES_MAX / (wide * wide);
-    Precise *precise =
-        calloc(1, sizeof *precise + (key_size + wide + 2 * size + m) * sizeof *precise->values);
+    Precise *precise = calloc(1, sizeof *precise + (key_size + wide) * sizeof *precise->values);
     stepping->method = precise;
     if (precise == NULL)
         return precise_no_memory(stepping);
@@ -54,9 +52,6 @@ static Status precise_make(TimeStepping *stepping) {
     precise->max = fit < 2 ? 2 : fit > TABLES_MAX ? TABLES_MAX : fit;
     precise->key = precise->values;
     precise->from = precise->key + key_size;
-    precise->y = precise->from + wide;
-    precise->rate = precise->y + size;
-    precise->force = precise->rate + size;
     return STATUS_OK;
 }
 
@@ -74,75 +69,58 @@ static void precise_clear(TimeStepping *stepping) {
         precise_table_clear(&precise->tables[i]);
 }
 
-// Column i of A is y' of unit state i; the last two columns are those of g and s.
-static void precise_make_system(TimeStepping *stepping, double *A) {
-    Precise *precise = stepping->method;
-    const ModalState *state = &stepping->state;
-    const size_t n = state->mode_count, m = state->dampers, size = stepping->size,
-                 wide = precise->wide;
-    for (size_t column = 0; column <= size; column++) {
-        memset(precise->y, 0, size * sizeof *precise->y);
-        if (column < size)
-            precise->y[column] = 1;
-        for (size_t d = 0; d < m; d++)
-            precise->force[d] = precise->key[1 + d] * precise->y[2 * n + d] +
-                                precise->key[1 + m + d] * precise->y[2 * n + m + d];
-        time_stepping_rate(stepping, precise->y, column == size ? 1 : 0, precise->force,
-                           precise->rate);
-        for (size_t i = 0; i < size; i++)
-            A[i * wide + column] = precise->rate[i];
-    }
-    A[size * wide + size + 1] = 1;
+// The place of a component of y = (q, p, r, w; g, s) in the rows of transition.h.
+static size_t precise_place(const ModalState *state, size_t i) {
+    const size_t n = state->mode_count, m = state->dampers;
+    return i < n || i >= 2 * n + m ? i : i < 2 * n ? i + m : i - n;
 }
 
 // Stores the nonzero values of the state's rows of T.
-static Status precise_compress(const Precise *precise, size_t size, const double *T,
-                               PreciseTable *table) {
+static Status precise_compress(const TimeStepping *stepping, const double *T, PreciseTable *table) {
+    const Precise *precise = stepping->method;
+    const size_t wide = precise->wide;
     size_t count = 0;
-    for (size_t i = 0; i < size * precise->wide; i++)
+    for (size_t i = 0; i < wide * wide; i++)
         count += T[i] != 0;
-    table->starts = malloc((size + 1) * sizeof *table->starts);
+    table->starts = malloc((stepping->size + 1) * sizeof *table->starts);
     table->columns = malloc((count + 1) * sizeof *table->columns);
     table->values = malloc((count + 1) * sizeof *table->values);
     if (table->starts == NULL || table->columns == NULL || table->values == NULL)
-        return STATUS_NO_MEMORY;
+        return precise_no_memory(stepping);
     count = 0;
-    for (size_t i = 0; i < size; i++) {
+    for (size_t i = 0; i < stepping->size; i++) {
+        const double *row = T + precise_place(&stepping->state, i) * wide;
         table->starts[i] = count;
-        for (size_t j = 0; j < precise->wide; j++)
-            if (T[i * precise->wide + j] != 0) {
+        for (size_t j = 0; j < wide; j++) {
+            const double value = row[precise_place(&stepping->state, j)];
+            if (value != 0) {
                 table->columns[count] = (uint32_t)j;
-                table->values[count++] = T[i * precise->wide + j];
+                table->values[count++] = value;
             }
+        }
     }
-    table->starts[size] = count;
+    table->starts[stepping->size] = count;
     return STATUS_OK;
 }
 
 static Status precise_make_table(TimeStepping *stepping, PreciseTable *table) {
     const Precise *precise = stepping->method;
-    const ModalState *state = &stepping->state;
-    const size_t square = precise->wide * precise->wide;
-    double *A = calloc(square, 4 * sizeof *A);
+    ModalState *state = &stepping->state;
+    double *T = malloc(precise->wide * precise->wide * sizeof *T);
     table->key = malloc(precise->key_size * sizeof *table->key);
     Status status = STATUS_NO_MEMORY;
-    if (A != NULL && table->key != NULL) {
+    if (T == NULL || table->key == NULL) {
+        status = precise_no_memory(stepping);
+    } else {
         memcpy(table->key, precise->key, precise->key_size * sizeof *table->key);
-        precise_make_system(stepping, A);
-        status = matrix_exponential_doublings(A, precise->wide, precise->key[0], A + square,
-                                              A + 2 * square, state->run->progress,
-                                              modal_state_time(state) / state->plan->duration)
-                     ? precise_compress(precise, stepping->size, A + square, table)
-                     : STATUS_CANCELLED;
+        status = transition_increment(state, precise->key[0], T, state->problem);
     }
-    free(A);
     if (status == STATUS_OK)
-        return STATUS_OK;
-    precise_table_clear(table);
-    return status == STATUS_CANCELLED
-               ? problem_set(state->problem, status, "cancelled at t = %.6g s",
-                             modal_state_time(state))
-               : precise_no_memory(stepping);
+        status = precise_compress(stepping, T, table);
+    if (status != STATUS_OK)
+        precise_table_clear(table);
+    free(T);
+    return status;
 }
 
 // At least two tables, mostly zeros where modes do not couple.
@@ -211,32 +189,19 @@ static const Stepper precise_stepper = {.name = "precise",
                                         .order = 2, // with a base that is not linear in a step
                                         .between =
                                             "it is rounding, if the base is linear in every step",
-                                        .is_linear_only = true,
                                         .make = precise_make,
                                         .step = precise_step,
                                         .clear = precise_clear,
                                         .cost = precise_step_cost};
-
-static Status precise_run(Run *run, Response *response, Problem *problem) {
-    return time_stepping_run(&precise_stepper, run, response, problem);
-}
-
-static Status precise_decide(const Accuracy *accuracy, double base_interval, Plan *plan,
-                             Problem *problem) {
-    return time_stepping_decide(&precise_stepper, accuracy, base_interval, plan, problem);
-}
-
-static double precise_cost(const Accuracy *accuracy, double base_interval, const Plan *plan) {
-    return time_stepping_cost(&precise_stepper, accuracy, base_interval, plan);
-}
 
 const Solver solver_precise = {
     .kind = {"precise",
              "high precision direct integration (Zhong and Williams 1994), contacts switched at "
              "step ends",
              accuracy_step_fields, sizeof(AccuracyStep)},
-    .run = precise_run,
-    .decide = precise_decide,
-    .cost = precise_cost,
+    .run = time_stepping_run,
+    .decide = time_stepping_decide,
+    .cost = time_stepping_cost,
+    .stepper = &precise_stepper,
     .is_linear_only = true,
 };

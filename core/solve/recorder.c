@@ -1,15 +1,15 @@
-// The summary names one number for a whole structure: the largest over its storeys. Most samples
-// hold no new peak, and the sum over modes of |q_i| times the mode's widest shape tells so without
-// a look at any storey. Sums of squares are taken over pairs of modes, several samples at a time,
-// and become the storeys' in the end.
+// The summary has one value for a structure: the largest over its storeys. Most samples hold no new
+// peak, and the bound "sum over modes of |q_i| times the largest |shape| of any storey" shows it
+// without the storeys. Sums of squares are taken over pairs of modes, several samples at a time,
+// and converted to the storeys at the end.
 #include "core/solve/recorder.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-// Of the storey that a column is of, or its damper's.
-static const double *shape_of(const ModalState *state, const RunColumn *column) {
+// The mode shape at a column's storey, or at the storey of its damper.
+static const double *recorder_shape(const ModalState *state, const RunColumn *column) {
     switch (column->channel) {
     case CHANNEL_DISPLACEMENT:
     case CHANNEL_VELOCITY:
@@ -17,22 +17,22 @@ static const double *shape_of(const ModalState *state, const RunColumn *column) 
     case CHANNEL_MEAN_ACCELERATION:
         return state->modes->shapes + column->number * state->mode_count;
     case CHANNEL_BASE_ACCELERATION:
-        return state->modes->shapes; // of no use
+        return state->modes->shapes; // not used
     default:
         return state->damper[column->number].shape;
     }
 }
 
-Status recorder_start(Recorder *record, const FlightBuffer *trail, const ModalState *state,
+Status recorder_start(Recorder *record, const FlightBuffer *buffer, const ModalState *state,
                       Response *response, Problem *problem) {
-    const size_t n = state->mode_count, columns = state->run->column_count, padded = trail->padded;
+    const size_t n = state->mode_count, columns = state->run->column_count, padded = buffer->padded;
     const size_t square = padded * padded;
     memset(record, 0, sizeof *record);
     record->block = calloc(2 * (square + FLIGHT_BUFFER_MAX * padded) + columns * (1 + padded),
                            sizeof *record->block);
     if (record->block == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu modes", n);
-    record->trail = trail;
+    record->buffer = buffer;
     for (size_t k = 0; k < 2; k++) {
         record->squares[k] = record->block + k * square;
         record->batch[k] = record->block + 2 * square + k * FLIGHT_BUFFER_MAX * padded;
@@ -41,7 +41,8 @@ Status recorder_start(Recorder *record, const FlightBuffer *trail, const ModalSt
     record->last_velocity = record->shapes + columns * padded;
     for (size_t i = 0; i < columns; i++) {
         const RunColumn *column = &state->run->columns[i];
-        memcpy(record->shapes + i * padded, shape_of(state, column), n * sizeof *record->shapes);
+        memcpy(record->shapes + i * padded, recorder_shape(state, column),
+               n * sizeof *record->shapes);
         if (state->residual_influence != NULL && column->channel == CHANNEL_ACCELERATION)
             record->shapes[i * padded + n] = -state->residual_influence[column->number];
     }
@@ -56,30 +57,30 @@ void recorder_clear(Recorder *record) {
     free(record->block);
 }
 
-// Speeds to means over the intervals before.
-static void take_means(Recorder *record, const ModalState *state, size_t column, double *values,
-                       size_t count) {
+// Replaces velocities by mean accelerations over the intervals before.
+static void recorder_write_means(Recorder *record, const ModalState *state, size_t column,
+                                 double *values, size_t count) {
     const double share = state->plan->influence[state->run->columns[column].number];
     for (size_t k = 0; k < count; k++) {
         const double velocity = values[k];
-        values[k] = (velocity - record->last_velocity[column] + share * record->trail->ground[k]) *
+        values[k] = (velocity - record->last_velocity[column] + share * record->buffer->ground[k]) *
                     state->plan->sample_rate;
         record->last_velocity[column] = velocity;
     }
 }
 
-static void take_storey(Recorder *record, const ModalState *state, size_t column, double *values,
-                        size_t count) {
-    const FlightBuffer *trail = record->trail;
+static void recorder_write_storey(Recorder *record, const ModalState *state, size_t column,
+                                  double *values, size_t count) {
+    const FlightBuffer *buffer = record->buffer;
     const ChannelId channel = state->run->columns[column].channel;
-    const size_t padded = trail->padded, storey = state->run->columns[column].number;
-    const double *rows = channel == CHANNEL_ACCELERATION   ? trail->elastic
-                         : channel == CHANNEL_DISPLACEMENT ? trail->q
-                                                           : trail->p;
+    const size_t padded = buffer->padded, storey = state->run->columns[column].number;
+    const double *rows = channel == CHANNEL_ACCELERATION   ? buffer->elastic
+                         : channel == CHANNEL_DISPLACEMENT ? buffer->q
+                                                           : buffer->p;
     const double *shape = record->shapes + column * padded;
     state->lanes->dot(padded, count, shape, rows + padded, values);
     if (channel == CHANNEL_MEAN_ACCELERATION) {
-        take_means(record, state, column, values, count);
+        recorder_write_means(record, state, column, values, count);
         if (state->sample == 0)
             values[0] = modal_state_storey_acceleration(state, storey);
     }
@@ -92,17 +93,17 @@ static void take_storey(Recorder *record, const ModalState *state, size_t column
         values[k] = push - values[k];
 }
 
-static void take_damper(Recorder *record, const ModalState *state, size_t column, double *values,
-                        size_t count) {
-    const FlightBuffer *trail = record->trail;
+static void recorder_write_damper(Recorder *record, const ModalState *state, size_t column,
+                                  double *values, size_t count) {
+    const FlightBuffer *buffer = record->buffer;
     const RunColumn *wanted = &state->run->columns[column];
     const DamperState *damper = &state->damper[wanted->number];
-    const double *r = trail->r + wanted->number * TRAIL_ROWS + 1;
-    const double *z = trail->z + wanted->number * TRAIL_ROWS + 1;
+    const double *r = buffer->r + wanted->number * FLIGHT_BUFFER_ROWS + 1;
+    const double *z = buffer->z + wanted->number * FLIGHT_BUFFER_ROWS + 1;
     if (wanted->channel == CHANNEL_DAMPER_DISPLACEMENT) {
         const double middle = modal_state_middle(damper);
-        state->lanes->dot(trail->padded, count, record->shapes + column * trail->padded,
-                          trail->q + trail->padded, values);
+        state->lanes->dot(buffer->padded, count, record->shapes + column * buffer->padded,
+                          buffer->q + buffer->padded, values);
         for (size_t k = 0; k < count; k++)
             values[k] += middle + r[k];
         return;
@@ -115,7 +116,8 @@ static void take_damper(Recorder *record, const ModalState *state, size_t column
                                 : 0;
 }
 
-static void take_column(Recorder *record, const ModalState *state, size_t column, size_t count) {
+static void recorder_write_column(Recorder *record, const ModalState *state, size_t column,
+                                  size_t count) {
     const size_t first = state->sample + 1 - count;
     double *values = state->run->columns[column].values + first;
     switch (state->run->columns[column].channel) {
@@ -123,51 +125,52 @@ static void take_column(Recorder *record, const ModalState *state, size_t column
     case CHANNEL_VELOCITY:
     case CHANNEL_ACCELERATION:
     case CHANNEL_MEAN_ACCELERATION:
-        take_storey(record, state, column, values, count);
+        recorder_write_storey(record, state, column, values, count);
         return;
     case CHANNEL_BASE_ACCELERATION:
         for (size_t k = 0; k < count; k++)
             values[k] = base_cursor_at(&state->base, first + k);
         return;
     default:
-        take_damper(record, state, column, values, count);
+        recorder_write_damper(record, state, column, values, count);
     }
 }
 
-static void add_batch(Recorder *record, const ModalState *state, size_t count) {
-    const FlightBuffer *trail = record->trail;
+static void recorder_add_batch(Recorder *record, const ModalState *state, size_t count) {
+    const FlightBuffer *buffer = record->buffer;
     for (size_t k = 0; k < 2; k++)
-        state->lanes->square(state->slot_count, trail->padded, count, record->batch[k],
+        state->lanes->square(state->slot_count, buffer->padded, count, record->batch[k],
                              record->squares[k]);
 }
 
-// Of accelerations the sign does not matter.
-static void add_squares(Recorder *record, const ModalState *state, size_t row) {
-    const size_t padded = record->trail->padded, at = record->count++ % FLIGHT_BUFFER_MAX;
+// The sign of the accelerations does not matter.
+static void recorder_add_squares(Recorder *record, const ModalState *state, size_t row) {
+    const size_t padded = record->buffer->padded, at = record->count++ % FLIGHT_BUFFER_MAX;
     double *restrict pull = record->batch[1] + at * padded;
-    memcpy(record->batch[0] + at * padded, record->trail->q + row * padded, padded * sizeof *pull);
-    memcpy(pull, record->trail->elastic + row * padded, padded * sizeof *pull);
+    memcpy(record->batch[0] + at * padded, record->buffer->q + row * padded, padded * sizeof *pull);
+    memcpy(pull, record->buffer->elastic + row * padded, padded * sizeof *pull);
     for (size_t d = 0; d < state->dampers; d++) {
         const double force = state->damper[d].force, *shape = state->damper[d].shape;
         for (size_t i = 0; i < state->mode_count && force != 0; i++)
             pull[i] -= shape[i] * force;
     }
     if (at + 1 == FLIGHT_BUFFER_MAX)
-        add_batch(record, state, FLIGHT_BUFFER_MAX);
+        recorder_add_batch(record, state, FLIGHT_BUFFER_MAX);
 }
 
-void recorder_take(Recorder *record, ModalState *state, size_t count) {
+void recorder_write(Recorder *record, ModalState *state, size_t count) {
     for (size_t i = 0; i < state->run->column_count; i++)
-        take_column(record, state, i, count);
+        recorder_write_column(record, state, i, count);
     if (state->sample >= record->statistics_start)
         for (size_t k = 1; k <= count; k++)
-            add_squares(record, state, k);
+            recorder_add_squares(record, state, k);
     record->base_speed = 0;
 }
 
-// The largest shape' squares shape of any storey, over all slots.
-static double largest_sum(const Recorder *record, const double *squares, const ModalState *state) {
-    const size_t n = state->mode_count, padded = record->trail->padded;
+// The largest shape' squares shape of any storey.
+static double recorder_largest_sum(const Recorder *record, const double *squares,
+                                   const ModalState *state) {
+    const size_t n = state->mode_count, padded = record->buffer->padded;
     double most = 0;
     for (size_t j = 0; j < state->storey_count; j++) {
         const double *shape = state->modes->shapes + j * n;
@@ -186,21 +189,21 @@ static double largest_sum(const Recorder *record, const double *squares, const M
 }
 
 void recorder_finish(Recorder *record, const ModalState *state, Response *response) {
-    add_batch(record, state, record->count % FLIGHT_BUFFER_MAX);
-    response->sum_squares_displacement = largest_sum(record, record->squares[0], state);
-    response->sum_squares_acceleration = largest_sum(record, record->squares[1], state);
+    recorder_add_batch(record, state, record->count % FLIGHT_BUFFER_MAX);
+    response->sum_squares_displacement = recorder_largest_sum(record, record->squares[0], state);
+    response->sum_squares_acceleration = recorder_largest_sum(record, record->squares[1], state);
     response->statistics_count = record->count;
 }
 
-// No storey's value can be larger where its modes' are these.
-static double bound(const ModalState *state, const double *modal) {
+// An upper bound of the values of all storeys.
+static double recorder_bound(const ModalState *state, const double *modal) {
     double most;
     state->lanes->weighted_abs(state->padded, 1, state->max_shape, modal, &most);
     return most;
 }
 
-// Eight at a time: behind `count` values come zeros to whole vectors.
-static double largest_of(const double *values, size_t count) {
+// Eight at a time: zeros follow `count` values up to whole vectors.
+static double recorder_largest_value(const double *values, size_t count) {
     double most[SIMD_WIDTH] = {0};
     for (size_t j = 0; j < count; j += SIMD_WIDTH)
         for (size_t i = 0; i < SIMD_WIDTH; i++)
@@ -211,12 +214,12 @@ static double largest_of(const double *values, size_t count) {
 }
 
 // The largest of all storeys.
-static double largest(const ModalState *state, const double *modal) {
-    return largest_of(modal_state_expand(state, modal), state->storey_count);
+static double recorder_largest_storey(const ModalState *state, const double *modal) {
+    return recorder_largest_value(modal_state_expand(state, modal), state->storey_count);
 }
 
 void recorder_acceleration(ModalState *state) {
-    double most = bound(state, state->elastic), at = 0;
+    double most = recorder_bound(state, state->elastic), at = 0;
     for (size_t d = 0; d < state->dampers; d++)
         most += state->damper[d].max_mobility * fabs(state->damper[d].force);
     if (!(most > state->impacts.response->peaks.acceleration))
@@ -233,12 +236,12 @@ void recorder_acceleration(ModalState *state) {
 
 void recorder_peaks(ModalState *state) {
     const Peaks *peaks = &state->impacts.response->peaks;
-    const double far = bound(state, state->q);
+    const double far = recorder_bound(state, state->q);
     Instant at = {0};
     if (far > peaks->displacement)
-        at.x = largest(state, state->q);
-    if (bound(state, state->p) > peaks->velocity)
-        at.v = largest(state, state->p);
+        at.x = recorder_largest_storey(state, state->q);
+    if (recorder_bound(state, state->p) > peaks->velocity)
+        at.v = recorder_largest_storey(state, state->p);
     for (size_t d = 0; d < state->dampers; d++) {
         const DamperState *damper = &state->damper[d];
         const double relative = modal_state_middle(damper) + damper->r;
@@ -251,59 +254,72 @@ void recorder_peaks(ModalState *state) {
     recorder_acceleration(state);
 }
 
-// The largest of all storeys in rows 1 to `count`, where that is more than `least`; `most` gets
-// what no row can be beyond.
-static double rise(const ModalState *state, const double *rows, size_t count, double least,
-                   double *most) {
+// The largest value of any storey in rows 1 to `count`, or `least` if that is larger. `bounds`
+// becomes an upper bound for each row.
+static double recorder_find_peak(const ModalState *state, const double *rows, size_t count,
+                                 double least, double *bounds) {
     const size_t padded = state->padded;
-    state->lanes->weighted_abs(padded, count, state->max_shape, rows + padded, most);
+    state->lanes->weighted_abs(padded, count, state->max_shape, rows + padded, bounds);
     for (size_t k = 0; k < count; k += FLIGHT_ROWS) {
         bool may_rise = false;
         for (size_t j = k; j < k + FLIGHT_ROWS && j < count; j++)
-            may_rise = may_rise || most[j] > least;
+            may_rise = may_rise || bounds[j] > least;
         if (!may_rise)
             continue;
-        // Of rows behind the last one no use is made.
         const double *values = modal_state_expand_four(state, rows + (k + 1) * padded);
         for (size_t j = k; j < k + FLIGHT_ROWS && j < count; j++)
             least = impact_log_larger(
-                least, largest_of(values + (j - k) * state->tall, state->storey_count));
+                least, recorder_largest_value(values + (j - k) * state->tall, state->storey_count));
     }
     return least;
 }
 
 void recorder_flight_peaks(Recorder *record, ModalState *state, size_t count) {
-    const FlightBuffer *trail = record->trail;
+    const FlightBuffer *buffer = record->buffer;
     const Peaks *peaks = &state->impacts.response->peaks;
-    double far[FLIGHT_BUFFER_MAX], most[FLIGHT_BUFFER_MAX];
+    double far[FLIGHT_BUFFER_MAX], bounds[FLIGHT_BUFFER_MAX];
     Instant at = {
-        .v = rise(state, trail->p, count, peaks->velocity, most),
-        .acceleration = rise(state, trail->elastic, count, peaks->acceleration, most),
-        .x = rise(state, trail->q, count, peaks->displacement, far),
+        .v = recorder_find_peak(state, buffer->p, count, peaks->velocity, bounds),
+        .acceleration =
+            recorder_find_peak(state, buffer->elastic, count, peaks->acceleration, bounds),
+        .x = recorder_find_peak(state, buffer->q, count, peaks->displacement, far),
         .damper_x = peaks->damper_displacement,
     };
     for (size_t d = 0; d < state->dampers; d++) {
         const DamperState *damper = &state->damper[d];
-        const double *r = trail->r + d * TRAIL_ROWS + 1, middle = modal_state_middle(damper);
+        const double *r = buffer->r + d * FLIGHT_BUFFER_ROWS + 1,
+                     middle = modal_state_middle(damper);
         for (size_t k = 0; k < count; k++)
             if (far[k] + fabs(middle + r[k]) > at.damper_x)
                 at.damper_x =
                     fmax(at.damper_x,
-                         fabs(modal_state_dot(damper->shape, trail->q + (k + 1) * trail->padded,
+                         fabs(modal_state_dot(damper->shape, buffer->q + (k + 1) * buffer->padded,
                                               state->mode_count) +
                               (middle + r[k])));
     }
     impact_log_peaks(&state->impacts, &at);
 }
 
-void recorder_forget(ModalState *state) {
+void recorder_restart_peaks(ModalState *state) {
     Instant at = {0};
     for (size_t d = 0; d < state->dampers; d++)
         at.force = fmax(at.force, fabs(state->damper[d].force));
     impact_log_forget_peaks(&state->impacts, &at);
 }
 
-void recorder_note(ModalState *state) {
+void recorder_sample(Recorder *record, FlightBuffer *buffer, ModalState *state) {
+    if (state->is_shadow)
+        return;
+    state->base_acceleration = base_cursor_at(&state->base, state->sample);
+    modal_state_forces(state);
+    if (state->sample == record->statistics_start && state->sample > 0)
+        recorder_restart_peaks(state);
+    flight_buffer_take(buffer, state, record->base_speed);
+    recorder_write(record, state, 1);
+    recorder_peaks(state);
+}
+
+void recorder_update(ModalState *state) {
     if (state->is_shadow)
         return;
     modal_state_forces(state);
@@ -312,7 +328,7 @@ void recorder_note(ModalState *state) {
     impact_log_balance(&state->impacts, &energy);
 }
 
-Status recorder_ledger(ModalState *state) {
+Status recorder_finish_log(ModalState *state) {
     ImpactRow *rows = calloc(state->dampers + 1, sizeof *rows);
     if (rows == NULL)
         return problem_set(state->problem, STATUS_NO_MEMORY, "no memory for the list of impacts");

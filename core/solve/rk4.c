@@ -6,18 +6,18 @@
 #include "core/plan/plan.h"
 #include "core/solve/time_stepping.h"
 
-enum { STAGES = 4, TOTALS = 2 };
+enum { STAGES = 4 };
 
 typedef struct Rk4 {
     double *stage;  // the state at a stage
-    double *slopes; // of all stages: y', work of the base, loss, and each damper's N and N r'
+    double *slopes; // of all stages: y' and the rates of the energy integrals
     double *force;
     size_t row; // from one stage's slopes to the next
     double values[];
 } Rk4;
 
 static Status rk4_make(TimeStepping *stepping) {
-    const size_t size = stepping->size, m = stepping->state.dampers, row = size + TOTALS + 2 * m;
+    const size_t size = stepping->size, m = stepping->state.dampers, row = size + 2 * m + 2;
     Rk4 *rk4 = calloc(1, sizeof *rk4 + (size + STAGES * row + m) * sizeof *rk4->values);
     if (rk4 == NULL)
         return problem_set(stepping->state.problem, STATUS_NO_MEMORY, "no memory for a run");
@@ -55,23 +55,13 @@ static double rk4_force(const TimeStepping *stepping, size_t d, double r, double
 static void rk4_slope(TimeStepping *stepping, const double *y, double ground,
                       double *restrict out) {
     const Rk4 *rk4 = stepping->method;
-    const ModalState *state = &stepping->state;
-    const size_t n = state->mode_count, m = state->dampers;
-    const double *p = y + n, *r = y + 2 * n, *w = r + m, *approach = stepping->y + 2 * n + m;
-    double *totals = out + stepping->size,
-           momentum = modal_state_dot(state->momentum_weights, p, n), loss = 0;
-    for (size_t d = 0; d < m; d++) {
+    const size_t n = stepping->state.mode_count, m = stepping->state.dampers;
+    const double *r = y + 2 * n, *w = r + m, *approach = stepping->y + 2 * n + m;
+    for (size_t d = 0; d < m; d++)
         rk4->force[d] =
             rk4_force(stepping, d, r[d], w[d], approach[d] < 0 ? -approach[d] : approach[d]);
-        momentum += state->damper[d].plan->mass * w[d];
-        totals[TOTALS + d] = rk4->force[d];
-        totals[TOTALS + m + d] = rk4->force[d] * w[d];
-    }
     time_stepping_rate(stepping, y, ground, rk4->force, out);
-    for (size_t i = 0; i < n; i++)
-        loss += (stepping->elastic[i] - state->omega2[i] * y[i]) * p[i];
-    totals[0] = -ground * momentum;
-    totals[1] = loss;
+    time_stepping_powers(stepping, y, ground, rk4->force, out + stepping->size);
 }
 
 // The step times the stages' weighted mean of slope i; `sixth` is a sixth of the step.
@@ -92,11 +82,11 @@ static Status rk4_step(TimeStepping *stepping, double length) {
         rk4_slope(stepping, rk4->stage, stepping->ground[(k + 1) / 2], rk4->slopes + k * rk4->row);
     }
     const double sixth = length / 6;
-    stepping->input = rk4_gain(rk4, size, sixth);
-    stepping->damping = rk4_gain(rk4, size + 1, sixth);
+    stepping->input = rk4_gain(rk4, size + 2 * m, sixth);
+    stepping->damping = rk4_gain(rk4, size + 2 * m + 1, sixth);
     for (size_t d = 0; d < m; d++) {
-        stepping->contact.impulse[d] = rk4_gain(rk4, size + TOTALS + d, sixth);
-        stepping->contact.work[d] = rk4_gain(rk4, size + TOTALS + m + d, sixth);
+        stepping->contact.impulse[d] = rk4_gain(rk4, size + d, sixth);
+        stepping->contact.work[d] = rk4_gain(rk4, size + m + d, sixth);
         const double w = stepping->y[2 * n + m + d], approach = w < 0 ? -w : w;
         // The step's end may be the first point inside a stop: this freezes the parameters there.
         (void)rk4_force(stepping, d, stepping->y[2 * n + d] + rk4_gain(rk4, 2 * n + d, sixth), w,
@@ -122,23 +112,11 @@ static const Stepper rk4_stepper = {.name = "rk4",
                                     .step = rk4_step,
                                     .cost = rk4_step_cost};
 
-static Status rk4_run(Run *run, Response *response, Problem *problem) {
-    return time_stepping_run(&rk4_stepper, run, response, problem);
-}
-
-static Status rk4_decide(const Accuracy *accuracy, double base_interval, Plan *plan,
-                         Problem *problem) {
-    return time_stepping_decide(&rk4_stepper, accuracy, base_interval, plan, problem);
-}
-
-static double rk4_cost(const Accuracy *accuracy, double base_interval, const Plan *plan) {
-    return time_stepping_cost(&rk4_stepper, accuracy, base_interval, plan);
-}
-
 const Solver solver_rk4 = {
     .kind = {"rk4", "the classical Runge-Kutta method of order 4, contacts switched at step ends",
              accuracy_step_fields, sizeof(AccuracyStep)},
-    .run = rk4_run,
-    .decide = rk4_decide,
-    .cost = rk4_cost,
+    .run = time_stepping_run,
+    .decide = time_stepping_decide,
+    .cost = time_stepping_cost,
+    .stepper = &rk4_stepper,
 };

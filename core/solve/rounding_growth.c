@@ -1,17 +1,17 @@
-// Small errors y = (x, v, r, w) go along with the motion. Over a stretch they follow its
-// homogeneous system; where the motion jumps or its equations change they change by what the
-// shifted event makes of them (saltation). Each stretch adds about one rounding of what it held,
-// each time with other signs that are the same in every run.
+// Small errors y = (x, v, r, w) follow the homogeneous system of the motion over a phase. Where the
+// motion jumps or its equations change they change by what the shifted event makes of them
+// (saltation). Each phase adds about one rounding of its own size, with signs that differ from
+// phase to phase but are the same in every run.
 //
 // In contact  x' = v, v' = -s + share n, r' = w, w' = s - n,  n = c w + k r.  The force jumps by c
-// w at touch and exit, and an event that comes dt = -dr / w late leaves dw - c dr behind: that is
-// what V = v - share c r, W = w + c r are, which go through touch and exit unchanged:
+// w at touch and exit, and an event that comes dt = -dr / w late leaves dw - c dr behind. So V = v
+// - share c r and W = w + c r go through touch and exit unchanged:
 //   x' = v, V' = -s + share k r, r' = W - c r, W' = s - k r,  v = V + share c r.
-// So a contact's map is exp(A T) in these, and the state does not enter.
+// In these the map of a contact is exp(A T), and the state does not enter.
 //
-// exp(A T) y: exp(A D) to the power of the whole number next to T / D, looked up, and for the rest,
-// at most D / 2, a short series. In contact it must be a good one: r hardly matters to the speed
-// that is left, and what the series misses of it is multiplied by the contact's rate.
+// exp(A T) y is exp(A D) to the power of the integer next to T / D, from a table, and a short
+// series for the rest, at most D / 2. In contact the series has order 4: r hardly matters to the
+// speed that is left, and the series' error in it is multiplied by the contact's rate.
 #include "core/solve/rounding_growth.h"
 
 #include <float.h>
@@ -22,11 +22,11 @@
 
 enum { X, V, R, W, SIZE };
 
-// D times the system's rate.
+// D times the rate of the system.
 static const double SWING_STEP = 0.2, CONTACT_STEP = 0.1;
 static const double ROUNDING = DBL_EPSILON;
 
-// n steps of D and what is left.
+// The number of steps D in `length`, and the rest.
 INLINE uint64_t rounding_growth_divide(double length, double frequency, double step, double *rest) {
     const double most = 4294967295; // GROWTH_NEAR << GROWTH_LEVELS, less 1
     const double count = length * frequency + 0.5;
@@ -39,14 +39,32 @@ INLINE uint64_t rounding_growth_divide(double length, double frequency, double s
     return (uint64_t)n;
 }
 
-static void swing_multiply(double p[2][2], double q[2][2], double out[2][2]) {
-    for (int i = 0; i < 2; i++)
-        for (int j = 0; j < 2; j++)
-            out[i][j] = p[i][0] * q[0][j] + p[i][1] * q[1][j];
+static void rounding_growth_multiply(const double *p, const double *q, size_t size, double *out) {
+    for (size_t i = 0; i < size; i++)
+        for (size_t j = 0; j < size; j++) {
+            double sum = p[i * size] * q[j];
+            for (size_t k = 1; k < size; k++)
+                sum += p[i * size + k] * q[k * size + j];
+            out[i * size + j] = sum;
+        }
 }
 
-// All powers up to n.
-static __attribute__((noinline)) void swing_make(GrowthStructure *swing, uint64_t n) {
+// Makes all powers up to n of matrices of size x size, of which near[1] is known.
+static void rounding_growth_extend(double *near, double *power, size_t size, int *known,
+                                   int *levels, uint64_t n) {
+    const size_t square = size * size;
+    for (const int wanted = n < GROWTH_NEAR ? (int)n + 1 : GROWTH_NEAR; *known < wanted; ++*known)
+        rounding_growth_multiply(near + (size_t)(*known - 1) * square, near + square, size,
+                                 near + (size_t)*known * square);
+    for (; n >> *levels >= GROWTH_NEAR; ++*levels) {
+        double *next = power + (size_t)*levels * square;
+        const double *last = *levels == 0 ? near + GROWTH_NEAR / 2 * square : next - square;
+        rounding_growth_multiply(last, last, size, next);
+    }
+}
+
+static __attribute__((noinline)) void rounding_growth_make_structure(GrowthStructure *swing,
+                                                                     uint64_t n) {
     double(*const near)[2][2] = swing->near;
     if (swing->known == 0) {
         // A Taylor series of exp(A D): |A D| is below 0.2 in the units of the rate.
@@ -67,22 +85,16 @@ static __attribute__((noinline)) void swing_make(GrowthStructure *swing, uint64_
         }
         swing->known = 2;
     }
-    const int wanted = n < GROWTH_NEAR ? (int)n + 1 : GROWTH_NEAR;
-    for (; swing->known < wanted; swing->known++)
-        swing_multiply(near[swing->known - 1], near[1], near[swing->known]);
-    for (; n >> swing->levels >= GROWTH_NEAR; swing->levels++) {
-        const bool is_first = swing->levels == 0;
-        double(*const last)[2] = is_first ? near[GROWTH_NEAR / 2] : swing->power[swing->levels - 1];
-        swing_multiply(last, last, swing->power[swing->levels]);
-    }
+    rounding_growth_extend(near[0][0], swing->power[0][0], 2, &swing->known, &swing->levels, n);
 }
 
-// The structure's errors; the free mass's are the caller's.
-INLINE void swing_go(GrowthStructure *swing, Four *at_x, Four *at_v, double length) {
+// Errors of the structure over `length`.
+INLINE void rounding_growth_move_structure(GrowthStructure *swing, Four *at_x, Four *at_v,
+                                           double length) {
     double h;
     const uint64_t n = rounding_growth_divide(length, swing->frequency, swing->step, &h);
     if ((int)(n % GROWTH_NEAR) >= swing->known || n >> swing->levels >= GROWTH_NEAR)
-        swing_make(swing, n);
+        rounding_growth_make_structure(swing, n);
     const double half = h * h / 2;
     Four x = *at_x, v = *at_v;
     const Four a = -swing->omega2 * x - swing->damping * v;
@@ -108,7 +120,7 @@ typedef struct Errors {
 } Errors;
 
 // A y in the coordinates (x, V, r, W).
-INLINE void contact_slope(const Motion *m, const Errors *y, Errors *slope) {
+INLINE void rounding_growth_slope(const Motion *m, const Errors *y, Errors *slope) {
     const Four v = y->v + m->share * m->contact_damping * y->r;
     const Four push = m->omega2 * y->x + m->damping * v, spring = m->contact_omega2 * y->r;
     slope->x = v;
@@ -117,15 +129,8 @@ INLINE void contact_slope(const Motion *m, const Errors *y, Errors *slope) {
     slope->w = push - spring;
 }
 
-static void contact_multiply(double p[4][4], double q[4][4], double out[4][4]) {
-    for (int i = 0; i < SIZE; i++)
-        for (int j = 0; j < SIZE; j++)
-            out[i][j] =
-                p[i][0] * q[0][j] + p[i][1] * q[1][j] + p[i][2] * q[2][j] + p[i][3] * q[3][j];
-}
-
-// All powers up to n.
-static __attribute__((noinline)) void contact_make(GrowthContact *contact, uint64_t n) {
+static __attribute__((noinline)) void rounding_growth_make_contact(GrowthContact *contact,
+                                                                   uint64_t n) {
     double(*const near)[4][4] = contact->near;
     if (contact->known == 0) {
         // A Taylor series, each lane a column.
@@ -135,25 +140,18 @@ static __attribute__((noinline)) void contact_make(GrowthContact *contact, uint6
         Errors sum = term;
         for (int i = 1; i < 12; i++) {
             const double share = contact->step / i;
-            contact_slope(&contact->motion, &term, &slope);
+            rounding_growth_slope(&contact->motion, &term, &slope);
             term = (Errors){share * slope.x, share * slope.v, share * slope.r, share * slope.w};
             sum = (Errors){sum.x + term.x, sum.v + term.v, sum.r + term.r, sum.w + term.w};
         }
         memcpy(near[1], &sum, sizeof near[1]);
         contact->known = 2;
     }
-    const int wanted = n < GROWTH_NEAR ? (int)n + 1 : GROWTH_NEAR;
-    for (; contact->known < wanted; contact->known++)
-        contact_multiply(near[contact->known - 1], near[1], near[contact->known]);
-    for (; n >> contact->levels >= GROWTH_NEAR; contact->levels++) {
-        const bool is_first = contact->levels == 0;
-        double(*const last)[4] =
-            (is_first ? near[GROWTH_NEAR / 2] : contact->power[contact->levels - 1]);
-        contact_multiply(last, last, contact->power[contact->levels]);
-    }
+    rounding_growth_extend(near[0][0], contact->power[0][0], SIZE, &contact->known,
+                           &contact->levels, n);
 }
 
-INLINE void contact_map(double p[4][4], Errors *y) {
+INLINE void rounding_growth_map(double p[4][4], Errors *y) {
     const Errors from = *y;
     y->x = (p[0][0] * from.x + p[0][1] * from.v) + (p[0][2] * from.r + p[0][3] * from.w);
     y->v = (p[1][0] * from.x + p[1][1] * from.v) + (p[1][2] * from.r + p[1][3] * from.w);
@@ -161,33 +159,34 @@ INLINE void contact_map(double p[4][4], Errors *y) {
     y->w = (p[3][0] * from.x + p[3][1] * from.v) + (p[3][2] * from.r + p[3][3] * from.w);
 }
 
-INLINE void contact_go(GrowthContact *contact, double (*at)[GROWTH_LANES], double length) {
+INLINE void rounding_growth_move_contact(GrowthContact *contact, double (*at)[GROWTH_LANES],
+                                         double length) {
     double h;
     const uint64_t n = rounding_growth_divide(length, contact->frequency, contact->step, &h);
     if ((int)(n % GROWTH_NEAR) >= contact->known || n >> contact->levels >= GROWTH_NEAR)
-        contact_make(contact, n);
+        rounding_growth_make_contact(contact, n);
     const double half = h * h / 2, sixth = half * h * (1.0 / 3), last = half * half * (1.0 / 6);
     const Motion *m = &contact->motion;
     Errors y = {FOUR(at[X]), FOUR(at[V]), FOUR(at[R]), FOUR(at[W])}, a, b, c, d;
-    contact_slope(m, &y, &a);
-    contact_slope(m, &a, &b);
-    contact_slope(m, &b, &c);
-    contact_slope(m, &c, &d);
+    rounding_growth_slope(m, &y, &a);
+    rounding_growth_slope(m, &a, &b);
+    rounding_growth_slope(m, &b, &c);
+    rounding_growth_slope(m, &c, &d);
     y.x += (h * a.x + half * b.x) + (sixth * c.x + last * d.x);
     y.v += (h * a.v + half * b.v) + (sixth * c.v + last * d.v);
     y.r += (h * a.r + half * b.r) + (sixth * c.r + last * d.r);
     y.w += (h * a.w + half * b.w) + (sixth * c.w + last * d.w);
-    contact_map(contact->near[n % GROWTH_NEAR], &y);
+    rounding_growth_map(contact->near[n % GROWTH_NEAR], &y);
     for (uint64_t level = 0, left = n / GROWTH_NEAR; left > 0; level++, left >>= 1)
         if ((left & 1) != 0)
-            contact_map(contact->power[level], &y);
+            rounding_growth_map(contact->power[level], &y);
     PUT_FOUR(at[X], y.x);
     PUT_FOUR(at[V], y.v);
     PUT_FOUR(at[R], y.r);
     PUT_FOUR(at[W], y.w);
 }
 
-// Adds `size` to each lane, with signs of its own.
+// Adds +-size to each lane.
 INLINE void rounding_growth_scatter(RoundingGrowth *growth, int row, double size) {
     static const double signs[16][GROWTH_LANES] = {
         {-1, -1, -1, -1}, {-1, -1, -1, 1}, {-1, -1, 1, -1}, {-1, -1, 1, 1},
@@ -198,13 +197,13 @@ INLINE void rounding_growth_scatter(RoundingGrowth *growth, int row, double size
     PUT_FOUR(growth->y[row], FOUR(growth->y[row]) + FOUR(sign) * size);
 }
 
-// One rounding of what a stretch of this length held, `speed` being the relative one.
+// One rounding of the size of a phase of this length.
 INLINE void rounding_growth_add_rounding(RoundingGrowth *growth, double length,
                                          const State *state) {
     const double reach = growth->reach;
     const double speed = fabs(state->w), own_speed = fabs(state->v);
     const double size = fabs(state->x) + reach * own_speed;
-    // Systematic ones, of the structure's own numbers, grow for as long as it remembers.
+    // The rounding of the structure's own numbers is systematic and adds up within its memory.
     const double lasting = length < growth->memory ? length : growth->memory;
     const double own = ROUNDING * (size + lasting * growth->rate * size);
     growth->signs = growth->signs * 6364136223846793005U + 1442695040888963407U;
@@ -217,7 +216,7 @@ INLINE void rounding_growth_add_rounding(RoundingGrowth *growth, double length,
             (speed + (growth->flying.omega2 * size + growth->flying.damping * own_speed) * length));
 }
 
-// The end of a stretch: what it adds, and how far the estimate is now.
+// The end of a phase: adds its rounding and updates the estimate.
 INLINE void rounding_growth_end_phase(RoundingGrowth *growth, double time, const State *state,
                                       double largest) {
     const double length = time - growth->time;
@@ -227,7 +226,7 @@ INLINE void rounding_growth_end_phase(RoundingGrowth *growth, double time, const
         growth->largest = known;
     const Four x = FOUR(growth->y[X]), v = growth->reach * FOUR(growth->y[V]);
     const Four square = x * x + v * v;
-    // What is not a number counts as the most.
+    // NaN counts as the largest.
     const double one = square[0] <= square[1] ? square[1] : square[0];
     const double other = square[2] <= square[3] ? square[3] : square[2];
     const double most = one <= other ? other : one;
@@ -244,7 +243,7 @@ void rounding_growth_start(RoundingGrowth *growth, const Motion *flying, const M
                            double duration) {
     const double rate = fmax(fmax(sqrt(flying->omega2), flying->damping), 1 / duration);
     GrowthStructure *const swings[2] = {&growth->flying, &growth->resting};
-    // What an earlier run of the same system has made is still right.
+    // Tables of an earlier run of the same system remain valid.
     for (int i = 0; i < 2; i++) {
         GrowthStructure *swing = swings[i];
         const double free = i == 0 ? 1 : 1 - resting->share; // M / (M + m) while the mass rests
@@ -293,9 +292,9 @@ INLINE void rounding_growth_over_flight(RoundingGrowth *growth, double time, con
                                         double largest) {
     const double length = time - growth->time;
     Four x = FOUR(growth->y[X]), v = FOUR(growth->y[V]);
-    // The free mass goes straight on.
+    // The free mass keeps its velocity.
     const Four speed = v + FOUR(growth->y[W]), z = x + FOUR(growth->y[R]) + length * speed;
-    swing_go(&growth->flying, &x, &v, length);
+    rounding_growth_move_structure(&growth->flying, &x, &v, length);
     PUT_FOUR(growth->y[X], x);
     PUT_FOUR(growth->y[V], v);
     PUT_FOUR(growth->y[R], z - x);
@@ -305,7 +304,7 @@ INLINE void rounding_growth_over_flight(RoundingGrowth *growth, double time, con
 
 INLINE void rounding_growth_over_contact(RoundingGrowth *growth, Side side, double time,
                                          const State *state, double largest) {
-    contact_go(&growth->touching[side], growth->y, time - growth->time);
+    rounding_growth_move_contact(&growth->touching[side], growth->y, time - growth->time);
     rounding_growth_end_phase(growth, time, state, largest);
 }
 
@@ -343,7 +342,7 @@ void rounding_growth_rest(RoundingGrowth *growth, double time, const State *stat
     if (growth->is_spent)
         return;
     Four x = FOUR(growth->y[X]), v = FOUR(growth->y[V]);
-    swing_go(&growth->resting, &x, &v, time - growth->time);
+    rounding_growth_move_structure(&growth->resting, &x, &v, time - growth->time);
     PUT_FOUR(growth->y[X], x);
     PUT_FOUR(growth->y[V], v);
     rounding_growth_end_phase(growth, time, state, largest);
@@ -355,7 +354,7 @@ void rounding_growth_bounce(RoundingGrowth *growth, double restitution, double w
     if (growth->is_spent)
         return;
     const double gain = growth->share * (1 + restitution);
-    // s itself jumps, by what the structure's damper feels.
+    // s jumps too, by the damping of the structure's velocity change.
     const double kick = growth->flying.damping * gain * w;
     for (int i = 0; i < GROWTH_LANES; i++) {
         const double r = growth->y[R][i];
@@ -379,7 +378,7 @@ void rounding_growth_report(const RoundingGrowth *growth, Response *response) {
     const double size = fmax(growth->largest, response->peaks.displacement);
     double error = size > 0 ? sqrt(growth->worst) / size : growth->worst == 0 ? 0 : 1;
     response->trust_horizon = growth->horizon;
-    // Without any event a rounded frequency still turns the phase.
+    // The rounding of the frequency shifts the phase even without an event.
     const double drift = size > 0 ? ROUNDING * (1 + growth->phase * growth->lasting) : 0;
     const double adrift = (RESPONSE_DIVERGENCE / ROUNDING - 1) / growth->phase;
     if (drift > RESPONSE_DIVERGENCE && !(growth->horizon <= adrift))

@@ -1,6 +1,5 @@
-// How long a trajectory can be trusted: what rounding does to it, to first order, carried along the
-// events. Not an error control: nothing of the motion depends on it, and a per cent is enough here.
-//
+// The predictability horizon of a run of one mass: rounding errors to first order, carried along
+// the events. The motion does not depend on it, and an accuracy of one per cent is enough.
 #ifndef CORE_SOLVE_ROUNDING_GROWTH_H
 #define CORE_SOLVE_ROUNDING_GROWTH_H
 
@@ -10,11 +9,11 @@
 #include "core/result/response.h"
 #include "core/solve/linear_motion.h"
 
-// So many roundings are followed at once, each with signs of its own; the first to part counts.
+// So many errors are followed at once, with different signs; the largest counts.
 enum { GROWTH_LANES = 4, GROWTH_NEAR = 64, GROWTH_LEVELS = 26 };
 
-// exp(A D) to the powers 0, 1, 2 ... and from GROWTH_NEAR on to 1, 2, 4 ... times that; made as
-// they are needed.
+// exp(A D) to the powers 0, 1, 2 ... GROWTH_NEAR - 1 in `near`, and GROWTH_NEAR times 1, 2, 4 ...
+// in `power`; made as they are needed.
 typedef struct GrowthStructure { // of the structure alone
     double omega2, damping, rate;
     double step, frequency; // D [s], 1 / D
@@ -32,14 +31,14 @@ typedef struct GrowthContact { // of both bodies
 } GrowthContact;
 
 typedef struct RoundingGrowth {
-    bool is_wide;   // the processor has wide.h's registers
-    bool is_spent;  // the estimate has reached the motion's own size: nothing is left to carry
+    bool is_wide;   // the processor has the registers of wide.h
+    bool is_spent;  // the estimate is as large as the motion: finished
     double time;    // of the last event [s]
     double share;   // m / (M + m) [-]
     double rate;    // the structure's [1/s]
-    double reach;   // 1 / rate: a velocity lasts for about this long as a displacement [s]
-    double memory;  // the structure remembers for about this long [s]
-    double phase;   // by how much a rounded rate turns the phase in a second, in roundings [1/s]
+    double reach;   // 1 / rate: displacement by a velocity [s]
+    double memory;  // of the structure's initial state [s]
+    double phase;   // phase shift in a second by the rounding of the rate, over the rounding [1/s]
     double lasting; // and for how long [s]
     double largest; // displacement so far [m]
     double worst;   // square of the largest estimate so far [m^2]
@@ -50,25 +49,25 @@ typedef struct RoundingGrowth {
     GrowthContact touching[2];
 } RoundingGrowth;
 
-// `touching` by Side. `size` is the clearance [m]; `is_driven`: the base is a sine. Writes all that
-// is read later, but keeps the tables of a system that it finds again.
+// `touching` by Side. `size` is the clearance [m]; `is_driven`: the base is a sine. Keeps the
+// tables of an equal system.
 void rounding_growth_start(RoundingGrowth *growth, const Motion *flying, const Motion *touching,
                            const Motion *resting, const State *state, double size, bool is_driven,
                            double duration);
 
-// A stretch ends at `time` in `state`; `largest` is the largest displacement the caller knows of.
+// A phase ends at `time` in `state`; `largest` is the largest displacement so far.
 void rounding_growth_flight(RoundingGrowth *growth, double time, const State *state,
                             double largest);
 void rounding_growth_contact(RoundingGrowth *growth, Side side, double time, const State *state,
                              double largest);
 void rounding_growth_rest(RoundingGrowth *growth, double time, const State *state, double largest);
 
-// w becomes -restitution w at once, under the structure's push s; `w` is the one before.
+// w becomes -restitution w; `w` is the one before, `push` is s.
 void rounding_growth_bounce(RoundingGrowth *growth, double restitution, double w, double push);
-// The free mass stays at its stop: gap and relative speed are exactly 0.
+// The mass rests at its stop: gap and relative speed are exactly 0.
 void rounding_growth_stick(RoundingGrowth *growth);
 
-// What the run says of itself in the end.
+// Writes error estimate and horizon into the response.
 void rounding_growth_report(const RoundingGrowth *growth, Response *response);
 
 #endif

@@ -1,5 +1,5 @@
-// Products and sums are of one lane each and none are contracted, and what is summed over lanes is
-// summed in one order, so every width of vector gives the same bytes.
+// Products and sums are never contracted, and sums over lanes have one order, so every width of
+// vector gives the same bytes.
 #include "core/solve/simd_kernels.h"
 
 #include <stdint.h>
@@ -9,7 +9,7 @@
 enum { LARGE = 4096 };
 _Static_assert((int)LANES == (int)SIMD_WIDTH, "one width for both");
 
-static inline double total(const double s[LANES]) {
+static inline double simd_kernels_total(const double s[LANES]) {
     return ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7]));
 }
 

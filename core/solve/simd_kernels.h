@@ -1,5 +1,4 @@
-// The general engine's long loops over modes, eight at once, by whatever vectors the processor
-// has. Not their physics: flight.h, recorder.h.
+// Loops over all modes, eight at once, by the vectors that the processor has.
 #ifndef CORE_SOLVE_SIMD_KERNELS_H
 #define CORE_SOLVE_SIMD_KERNELS_H
 
@@ -8,13 +7,12 @@
 
 enum { SIMD_WIDTH = 8 };
 
-// Values of all modes, filled up with zeros to whole vectors.
+// Number of values in whole vectors that hold `modes` values.
 static inline size_t simd_kernels_padded(size_t modes) {
     return (modes + SIMD_WIDTH - 1) / SIMD_WIDTH * SIMD_WIDTH;
 }
 
-// Whole vectors lie in whole lines of the processor's memory: how much to ask for, and where such
-// room begins.
+// Allocate simd_kernels_room(n) values for n values that begin at a cache line.
 static inline size_t simd_kernels_room(size_t values) {
     return values + SIMD_WIDTH;
 }
@@ -23,16 +21,16 @@ static inline double *simd_kernels_start(double *room) {
     return room + (line - (uintptr_t)room % line) % line / sizeof *room;
 }
 
-// What q and p of each mode gain in a step from (q, p, a, b).
+// Increments of q and p of each mode in a step, as factors of (q, p, a, b).
 typedef struct FlightGains {
     double *q[4], *p[4];
 } FlightGains;
 enum { FLIGHT_ROWS = 4 };
 enum { FLIGHT_SUMS = 7 }; // over (q q, q p, p p, q a, q b, p a, p b)
 
-// One order of an arc's series (taylor_step.h): from q's orders k and k + 1, which follow each
-// other, elastic = viscous per_time q_{k+1} + omega2 q_k, after = -scale (elastic + share base) and
-// push[d] = shapes_d . elastic. Where viscous is NULL elastic is given.
+// One order of a Taylor step: from orders k and k + 1 of q, which follow each other, elastic =
+// viscous per_time q_{k+1} + omega2 q_k, after = -scale (elastic + share base) and push[d] =
+// shapes_d . elastic. Where viscous is NULL elastic is given.
 typedef struct TaylorOrder {
     size_t padded, dampers;
     const double *viscous, *omega2, *share, *shapes, *q;
@@ -42,8 +40,8 @@ typedef struct TaylorOrder {
 
 // Rows are of `padded` values each, one after the other. The bytes are the same with all vectors.
 typedef struct SimdKernels {
-    // Rows 1 to count of q and p, and of what they have gained since row 0, from the one before
-    // each; a and b have one value a step.
+    // Rows 1 to count of q and p, and of their increments since row 0, each from the row before it.
+    // a and b have one value per step.
     void (*fly)(const FlightGains *gains, size_t padded, size_t count, const double *a,
                 const double *b, double *q, double *p, double *moved, double *sped);
     // FLIGHT_SUMS rows of sums over rows 0 to count - 1.
@@ -65,8 +63,8 @@ typedef struct SimdKernels {
     // out[k] = sum of weights |rows[k]|.
     void (*weighted_abs)(size_t padded, size_t count, const double *weights, const double *rows,
                          double *out);
-    // squares += rows' rows, of the first `modes` columns: row after row, whole vectors of rows,
-    // those beyond the diagonal being of no use.
+    // squares += rows' rows of the first `modes` columns, row after row. Only the lower triangle is
+    // complete.
     void (*square)(size_t modes, size_t padded, size_t count, const double *rows, double *squares);
     // out = matrix y, column after column of `rows` values, whole vectors; an even number of
     // columns.

@@ -1,5 +1,4 @@
-// What ONE solver is; solvers.c lists all. A solver turns a plan and a base's motion into a
-// response.
+// A solver computes the response of a plan to the motion of its base. solvers.c lists all of them.
 #ifndef CORE_SOLVE_SOLVER_H
 #define CORE_SOLVE_SOLVER_H
 
@@ -18,63 +17,76 @@ typedef struct Accuracy {
 } Accuracy;
 extern const Field accuracy_fields[]; // the rows that every solver has
 
-// How many modes a run keeps of a structure with so many storeys.
+// Number of modes that a run keeps of a structure with so many storeys.
 static inline size_t accuracy_modes(const Accuracy *accuracy, size_t storeys) {
     return accuracy == NULL || accuracy->modes >= storeys ? storeys : (size_t)accuracy->modes;
 }
 
-// Of "auto", which has no run of its own.
+// Settings of "auto", which has no run of its own.
 typedef struct AccuracyAuto {
     Accuracy accuracy;
     double target; // NAN: none
     int metric;    // Metric
 } AccuracyAuto;
 
-// Where the samples of one channel go.
+// Destination of the samples of one channel.
 typedef struct RunColumn {
     ChannelId channel;
     size_t number;  // of the storey or damper, from 0
     double *values; // plan->count of them
 } RunColumn;
 
-// Work is foretold and counted in solver steps, whatever the solver: each stands for about this
-// much CPU time on a middling machine [s].
+// Work is predicted and counted in solver steps for all solvers: about the CPU time of one on a
+// typical machine [s].
 #define SOLVER_STEP 3e-8
 
-// What is said of a run that takes more than was foretold: steps, the same in seconds, and when.
-#define SOLVER_STOPPED                                                                             \
-    "more than %.3g solver steps, about %.3g s of CPU, far more than foretold; stopped at "
+// Solver steps of the event engine's parts, as measured on frames of 1 to 200 storeys.
+typedef enum StepWorkKind {
+    STEP_WORK_FLIGHT, // a sample interval of flight
+    STEP_WORK_HOLD,   // an attempt at a long step of contact
+    STEP_WORK_ARC,
+    STEP_WORK_EVENT,
+    STEP_WORK_POWER, // a contact under a power law; for predictions only
+} StepWorkKind;
+double step_work_steps(StepWorkKind kind, size_t storeys, size_t dampers, bool is_coupled);
 
-// One run: borrowed inputs, and where samples go.
+// Message of a run that exceeds its predicted work: steps, seconds, and the time reached.
+#define SOLVER_STOPPED                                                                             \
+    "more than %.3g solver steps, about %.3g s of CPU, far more than predicted; stopped at "
+
+// One run: borrowed inputs, and the destination of samples.
 typedef struct Run {
     const Plan *plan;
     const Base *base;
     const Progress *progress;
     const Accuracy *accuracy; // the solver's settings; NULL: its defaults
     Workspace *workspace;     // or NULL
-    const RunColumn *columns; // what is wanted, each once
+    const RunColumn *columns; // wanted channels, each once
     size_t column_count;
     double statistics_from; // [s]
-    size_t impacts_max;     // ledger rows; 0: no limit
+    size_t impacts_max;     // listed impacts; 0: no limit
     double steps_max;       // solver steps; 0: no limit
-    bool is_clear;          // no mass comes to a stop: none has to be searched for
+    bool is_clear;          // no mass reaches a stop
     double steps;           // out: work counted, in solver steps of SOLVER_STEP
-    WorkCounters work;      // out: what was done, kind by kind, but for what is not the solver's
+    WorkCounters work;      // out: work of the solver by kind
 } Run;
 
+// One solver. Its functions are called with the solver itself.
 typedef struct Solver {
     Kind kind;
     // Fills everything of `response` but its series. The caller clears it, also after a failure.
-    Status (*run)(Run *run, Response *response, Problem *problem);
-    // Judges the settings for a scene made ready and adds what it decides of them to the plan's
-    // report; `base_interval` is that of a base known by samples, else 0 [s]. NULL: nothing to
-    // decide.
-    Status (*decide)(const Accuracy *accuracy, double base_interval, Plan *plan, Problem *problem);
+    Status (*run)(const struct Solver *solver, Run *run, Response *response, Problem *problem);
+    // Validates the settings for a scene made ready and adds its decisions to the plan's report;
+    // `base_interval` is that of a base known by samples, else 0 [s]. NULL: nothing to decide.
+    Status (*decide)(const struct Solver *solver, const Accuracy *accuracy, double base_interval,
+                     Plan *plan, Problem *problem);
     // What a run costs, in solver steps. NULL: as the exact solver's.
-    double (*cost)(const Accuracy *accuracy, double base_interval, const Plan *plan);
+    double (*cost)(const struct Solver *solver, const Accuracy *accuracy, double base_interval,
+                   const Plan *plan);
     // Erases the settings that a scene without a power law has no use for. NULL: there are none.
     void (*forget_unused)(Accuracy *accuracy, bool has_power_law);
-    bool is_linear_only; // serves no contact under a power law
+    bool is_linear_only;           // serves no contact under a power law
+    const struct Stepper *stepper; // of a solver by time steps (time_stepping.h), else NULL
 } Solver;
 
 extern const Solver solver_exact, solver_precise, solver_rk4, solver_newmark, solver_adaptive;

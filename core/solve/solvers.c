@@ -5,14 +5,14 @@
 // clang-format off
 static const Field auto_fields[] = {
     FIELD_BASE(AccuracyAuto, accuracy, accuracy_fields),
-    FIELD_REAL(AccuracyAuto, target, NULL, WITHIN(1e-15, 1), OPTIONAL, "relative error wanted: the cheapest way foretold to keep it is taken, and the answer says what error it came to; if absent all that double precision gives"),
-    FIELD_CHOICE(AccuracyAuto, metric, metric_names, OPTIONAL, "what the target is of; displacement if absent"),
+    FIELD_REAL(AccuracyAuto, target, NULL, WITHIN(1e-15, 1), OPTIONAL, "relative error wanted: the cheapest settings predicted to keep it are used, and the result has an estimate of its error; if absent full double precision"),
+    FIELD_CHOICE(AccuracyAuto, metric, metric_names, OPTIONAL, "quantity of the target; displacement if absent"),
     FIELD_END
 };
 // clang-format on
 
 static const Solver solver_auto = {
-    .kind = {"auto", "the solver that the plan finds best, or the cheapest way to a target",
+    .kind = {"auto", "the best solver for the scene, or the cheapest settings for a target",
              auto_fields, sizeof(AccuracyAuto)},
 };
 

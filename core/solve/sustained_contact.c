@@ -1,28 +1,28 @@
-// With s = shape . (D p + W^2 q) + base_coupling a_g the contact is r'' = s - N / m_e, N = k r + c
-// w, and its size E^2 = w^2 + (k / m_e) r^2 grows by no more than |s| in unit time. The structure's
-// V^2 = p'p + q'W^2 q grows by no more than growth V + |participation| |a_g| + |shape| |N|, while
-// |s| <= reach V + |base_coupling| |a_g| and |N| <= hard E. That bounds V, E, s and N over a step.
+// With s = shape . (D p + W^2 q) + base_coupling a_g a contact is r'' = s - N / m_e, N = k r + c w,
+// and E^2 = w^2 + (k / m_e) r^2 gives |E'| <= |s|. For the structure, V^2 = p'p + q'W^2 q gives V'
+// <= growth V + |participation| |a_g| + |shape| |N|, while |s| <= elastic_bound V + |base_coupling|
+// |a_g| and |N| <= (k / omega + c) E, omega^2 = k / m_e. So V, E, s and N have bounds over a step.
 //
-// A stiff contact is taken apart: y = q + m_e shape r feels N only through its damping, and
-//   r'' + slack w + spring r = S,   S = base_coupling a_g + shape . (D y' + W^2 y),
-//   slack = c / m_e + m_e shape . D shape,   spring = k / m_e + m_e shape . W^2 shape.
-// Were S a straight line, a mass that is merely pressed would ride at (S - slack S' / spring) /
-// spring. How far r strays from there grows with what S bends, and that is slow: of such a bend d
-// the mass follows all but (d'' + slack d') / spring.
+// A stiff contact is split: y = q + m_e shape r feels N only by its damping, and
+//   r'' + drag w + spring r = S,   S = base_coupling a_g + shape . (D y' + W^2 y),
+//   drag = c / m_e + m_e shape . D shape,   spring = k / m_e + m_e shape . W^2 shape.
+// If S were linear in time, a mass that is pressed quasi-statically would stay at
+// (S - drag S' / spring) / spring. The distance of r from there grows with the curvature of S,
+// which is small: of a deviation d of S the mass follows all but (d'' + drag d') / spring.
 //
-// A softer contact, one that does not get far in a step, lasts where r at both ends is further from
-// 0 than r'' can bend it; and where N surely only rises or falls its peak is at an end.
+// A softer contact lasts through a step where r at both ends is further from 0 than r'' can bend
+// it. Where N is surely monotonic its peak is at an end.
 #include "core/solve/sustained_contact.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-// Of FEW_STOREYS a step takes less than a single arc.
-enum { FEW_STOREYS = 24, SOFT_LEVEL = 1 };
-static const double SHORT_ARC = 0.25; // steps beyond SOFT_LEVEL are no shorter, over the rate
+// With FEW_MODES a step is cheaper than a single Taylor step.
+enum { FEW_MODES = 24, SOFT_LEVEL = 1 };
+static const double SHORT_STEP = 0.25; // shortest soft step beyond SOFT_LEVEL, times the rate
 
-// Of N: what a mass that rides on a stiff stop may add to a peak without being looked at.
+// Relative oscillation of N about its quasi-static value that a peak may miss.
 static const double RIPPLE_MAX = 1e-9;
 
 Status sustained_contact_make(SustainedContact *press, const ModalState *state, Problem *problem) {
@@ -46,7 +46,7 @@ Status sustained_contact_make(SustainedContact *press, const ModalState *state, 
     return STATUS_OK;
 }
 
-static void clear_stop(SustainedStop *stop) {
+static void sustained_contact_clear_stop(SustainedStop *stop) {
     for (size_t i = 0; i < PRESS_LEVELS; i++)
         transition_clear(&stop->levels[i]);
     free(stop->damped);
@@ -54,13 +54,13 @@ static void clear_stop(SustainedStop *stop) {
 
 void sustained_contact_clear(SustainedContact *press) {
     for (size_t i = 0; i < press->count; i++)
-        clear_stop(&press->stops[i]);
+        sustained_contact_clear_stop(&press->stops[i]);
     free(press->stops);
     free(press->block);
 }
 
 // The only damper in contact where all others fly; NULL otherwise.
-static DamperState *find_alone(const ModalState *state) {
+static DamperState *sustained_contact_find(const ModalState *state) {
     DamperState *alone = NULL;
     for (size_t d = 0; d < state->dampers; d++) {
         DamperState *damper = &state->damper[d];
@@ -73,34 +73,35 @@ static DamperState *find_alone(const ModalState *state) {
     return alone;
 }
 
-// A step takes some products for each two modes, an arc more of them for each mode.
-static bool is_worth(const ModalState *state, double arcs) {
-    return state->mode_count <= FEW_STOREYS || arcs > 2 + (double)state->mode_count / 30;
+// A step costs some products per pair of modes, a Taylor step more of them per mode.
+static bool sustained_contact_is_worth(const ModalState *state, double arcs) {
+    return state->mode_count <= FEW_MODES || arcs > 2 + (double)state->mode_count / 30;
 }
 
-static double size_of(const double *values, size_t count) {
+static double sustained_contact_norm(const double *values, size_t count) {
     return sqrt(modal_state_dot(values, values, count));
 }
 
-// Tables of many storeys are large.
-static size_t levels_of(const ModalState *state) {
-    return state->mode_count <= FEW_STOREYS ? PRESS_LEVELS : 3;
+// The tables of many modes are large.
+static size_t sustained_contact_levels(const ModalState *state) {
+    return state->mode_count <= FEW_MODES ? PRESS_LEVELS : 3;
 }
 
-// Makes the stop's transitions when arcs have cost about as much as it does. False: there is none.
-static bool prepare(SustainedStop *stop, const ModalState *state, const DamperState *damper) {
+// Makes the transitions of a stop once Taylor steps have cost about as much. False: there are none.
+static bool sustained_contact_prepare(SustainedStop *stop, const ModalState *state,
+                                      const DamperState *damper) {
     if (stop->levels[0].block != NULL)
         return true;
     const double n = (double)state->mode_count, arcs = state->interval * modal_state_rate(state);
     if (stop->is_given_up || !isfinite(damper->plan->stops[damper->side].stiffness) ||
-        !is_worth(state, arcs) || !(arcs < 0x1p20))
+        !sustained_contact_is_worth(state, arcs) || !(arcs < 0x1p20))
         return false;
     if ((stop->spent += n) < 4 * n * n * n)
         return false;
     stop->damped = calloc(2 * state->mode_count, sizeof *stop->damped);
-    if (stop->damped == NULL ||
-        transition_make(stop->levels, levels_of(state), state, damper, NULL) != STATUS_OK) {
-        clear_stop(stop);
+    if (stop->damped == NULL || transition_make(stop->levels, sustained_contact_levels(state),
+                                                state, damper, NULL) != STATUS_OK) {
+        sustained_contact_clear_stop(stop);
         *stop = (SustainedStop){.is_given_up = true};
         return false;
     }
@@ -110,43 +111,43 @@ static bool prepare(SustainedStop *stop, const ModalState *state, const DamperSt
             stop->damped[i] += state->modes->damping[l * state->mode_count + i] * damper->shape[l];
     for (size_t i = 0; i < state->mode_count; i++)
         stop->bent[i] = state->omega2[i] * damper->shape[i];
-    stop->wide = size_of(damper->shape, state->mode_count);
-    stop->most_damped = size_of(stop->damped, state->mode_count);
-    stop->most_bent = size_of(stop->bent, state->mode_count);
+    stop->wide = sustained_contact_norm(damper->shape, state->mode_count);
+    stop->most_damped = sustained_contact_norm(stop->damped, state->mode_count);
+    stop->most_bent = sustained_contact_norm(stop->bent, state->mode_count);
     stop->coupling = modal_state_dot(damper->shape, stop->damped, state->mode_count);
     stop->bending = modal_state_dot(damper->shape, stop->bent, state->mode_count);
     return true;
 }
 
-// What holds over the whole step.
-typedef struct Bounds {
-    double size, pull; // V, and |p'| without N
-    double shaken;     // |a_g|
-    double shaking;    // |a_g'|
-    double force;      // |N|
-} Bounds;
+// Upper bounds over the whole step.
+typedef struct SustainedBounds {
+    double size, pull;          // V, and |p'| without N
+    double ground, ground_rate; // |a_g|, |a_g'|
+    double force;               // |N|
+} SustainedBounds;
 
-// |p'| is not larger but for N.
-static double pull_of(const ModalState *state, const Bounds *at) {
+// |p'| without N.
+static double sustained_contact_pull(const ModalState *state, const SustainedBounds *at) {
     return (state->viscous + sqrt(state->stiff)) * at->size +
-           state->participation_norm * at->shaken;
+           state->participation_norm * at->ground;
 }
 
-// Of V and p' as they are without N.
-static bool find_bounds(const ModalState *state, const Slice *slice, double h, Bounds *at) {
+// SustainedBounds without N. False: V may grow too much.
+static bool sustained_contact_find_bounds(const ModalState *state, const Slice *slice, double h,
+                                          SustainedBounds *at) {
     const double left = 1 - h * state->growth;
-    at->shaken = flight_shaken(slice, h);
-    at->shaking = slice->omega > 0 ? slice->omega * at->shaken : fabs(slice->slope);
-    at->size = (modal_state_size(state) + h * state->participation_norm * at->shaken) / left;
-    at->pull = pull_of(state, at);
+    at->ground = flight_max_ground(slice, h);
+    at->ground_rate = slice->omega > 0 ? slice->omega * at->ground : fabs(slice->slope);
+    at->size = (modal_state_size(state) + h * state->participation_norm * at->ground) / left;
+    at->pull = sustained_contact_pull(state, at);
     at->force = 0;
     return left > 0.5;
 }
 
-// s' now; p' but for what N does to it is -elastic - participation a_g.
-static double change_now(const SustainedStop *stop, const ModalState *state,
-                         const DamperState *damper, const Slice *slice, const double *elastic,
-                         double coupled_force) {
+// s' now. `coupled_force` is the part of N; p' without N is -elastic - participation a_g.
+static double sustained_contact_rate(const SustainedStop *stop, const ModalState *state,
+                                     const DamperState *damper, const Slice *slice,
+                                     const double *elastic, double coupled_force) {
     const double *share = state->modes->participation;
     const double rate = slice->omega > 0 ? slice->omega * slice->slope : slice->slope;
     double sum = damper->base_coupling * rate + coupled_force;
@@ -156,67 +157,69 @@ static double change_now(const SustainedStop *stop, const ModalState *state,
     return sum;
 }
 
-// At the start of a step: a_g, D p + W^2 q, and s.
-typedef struct Start {
+// The start of a step: a_g, D p + W^2 q, and s.
+typedef struct SustainedStart {
     const Slice *slice;
     const double *elastic;
     double s;
-} Start;
+} SustainedStart;
 
-// |s''| is not larger but for what N' does to it, N being no larger than `force`.
-static double bow_of(const SustainedStop *stop, const ModalState *state, const DamperState *damper,
-                     const Slice *slice, const Bounds *at, double force) {
+// |s''| without the part of N', for |N| <= force.
+static double sustained_contact_curvature(const SustainedStop *stop, const ModalState *state,
+                                          const DamperState *damper, const Slice *slice,
+                                          const SustainedBounds *at, double force) {
     const double pull = at->pull + stop->wide * force;
-    return fabs(damper->base_coupling) * slice->omega * at->shaking + stop->most_bent * pull +
+    return fabs(damper->base_coupling) * slice->omega * at->ground_rate + stop->most_bent * pull +
            stop->most_damped * (state->viscous * pull + state->stiff * at->size +
-                                state->participation_norm * at->shaking);
+                                state->participation_norm * at->ground_rate);
 }
 
-static bool stiff_lasts(const SustainedStop *stop, const ModalState *state,
-                        const DamperState *damper, const Start *from, double h, Bounds *at) {
+static bool sustained_contact_stiff_lasts(const SustainedStop *stop, const ModalState *state,
+                                          const DamperState *damper, const SustainedStart *from,
+                                          double h, SustainedBounds *at) {
     const double r = damper->r, w = damper->w, sign = modal_state_sign(damper->side);
     const double k = damper->contact.stiffness, c = damper->contact.damping;
     const double mass = damper->effective_mass,
                  extra = mass * fabs(damper->base_coupling) * stop->wide;
     const double spring = k / mass + mass * stop->bending, omega = sqrt(spring);
-    const double slack = c / mass + mass * stop->coupling, hard = k / omega + c;
+    const double drag = c / mass + mass * stop->coupling, hard = k / omega + c;
     const double S = from->s + mass * (stop->coupling * w + stop->bending * r);
-    const double slope = change_now(stop, state, damper, from->slice, from->elastic,
-                                    mass * stop->coupling * from->s) +
+    const double slope = sustained_contact_rate(stop, state, damper, from->slice, from->elastic,
+                                                mass * stop->coupling * from->s) +
                          mass * stop->bending * w;
-    // |S''| <= bow + more |N|; and what of it the mass does not follow.
+    // |S''| <= bow + more |N|, and the part of it that the mass does not follow.
     const double swing = state->viscous + sqrt(state->stiff), lift = 2 * h * stop->wide; // of V
     const double more = stop->most_damped * state->viscous * stop->wide +
                         lift * (stop->most_bent * swing +
                                 stop->most_damped * (state->viscous * swing + state->stiff));
-    const double bow = bow_of(stop, state, damper, from->slice, at, 0) +
-                       extra * (stop->most_bent * at->shaken + stop->most_damped * at->shaking);
+    const double bow = sustained_contact_curvature(stop, state, damper, from->slice, at, 0) +
+                       extra * (stop->most_bent * at->ground + stop->most_damped * at->ground_rate);
     const double left =
-        fmin((2 * h + slack * h * h / 2) / spring + h * h / 2 / omega, h * h * h / 6);
-    // r and N of a mass that is merely pressed, at both ends.
-    const double start = (S - slack * slope / spring) / spring, end = start + h * slope / spring;
-    const double rides[2] = {k * start + c * slope / spring, k * end + c * slope / spring};
-    const double astray = hypot(w - slope / spring, omega * (r - start));
-    const double largest = fmax(fabs(rides[0]), fabs(rides[1])), share = hard * left * more;
+        fmin((2 * h + drag * h * h / 2) / spring + h * h / 2 / omega, h * h * h / 6);
+    // r and N of a mass pressed quasi-statically, at both ends.
+    const double start = (S - drag * slope / spring) / spring, end = start + h * slope / spring;
+    const double forces[2] = {k * start + c * slope / spring, k * end + c * slope / spring};
+    const double deviation = hypot(w - slope / spring, omega * (r - start));
+    const double largest = fmax(fabs(forces[0]), fabs(forces[1])), share = hard * left * more;
     if (!(share < 0.5))
         return false;
-    at->force = (largest + hard * (astray + left * bow)) / (1 - share);
-    const double bent = bow + more * at->force, stirred = astray + left * bent;
+    at->force = (largest + hard * (deviation + left * bow)) / (1 - share);
+    const double bent = bow + more * at->force, excited = deviation + left * bent;
     at->size += lift * at->force;
-    // A force that may be the largest so far is to be seen where it is so: at an end, once the mass
-    // merely rides and S only rises or falls.
+    // A force that may be the largest so far must be at an end of the step: the mass is pressed
+    // quasi-statically and S is monotonic.
     if (!state->is_shadow && at->force > impact_log_least_force(&state->impacts, &damper->row) &&
-        !(hard * astray <= RIPPLE_MAX * largest && fabs(slope) > h * bent))
+        !(hard * deviation <= RIPPLE_MAX * largest && fabs(slope) > h * bent))
         return false;
     if (state->plan->separation == SEPARATION_ZERO_FORCE)
-        return fmin(sign * rides[0], sign * rides[1]) > hard * stirred;
-    return fmin(sign * start, sign * end) > stirred / omega;
+        return fmin(sign * forces[0], sign * forces[1]) > hard * excited;
+    return fmin(sign * start, sign * end) > excited / omega;
 }
 
-// r and w gain `moved` and `sped`.
-static bool soft_lasts(const SustainedStop *stop, const ModalState *state,
-                       const DamperState *damper, const Start *from, double moved, double sped,
-                       double h, Bounds *at) {
+// `moved` and `sped` are the increments of r and w.
+static bool sustained_contact_soft_lasts(const SustainedStop *stop, const ModalState *state,
+                                         const DamperState *damper, const SustainedStart *from,
+                                         double moved, double sped, double h, SustainedBounds *at) {
     const double sign = modal_state_sign(damper->side), mass = damper->effective_mass;
     const double k = damper->contact.stiffness, c = damper->contact.damping;
     const double omega = sqrt(k / mass), hard = k / omega + c,
@@ -227,17 +230,17 @@ static bool soft_lasts(const SustainedStop *stop, const ModalState *state,
     const double left = 1 - lift * h * damper->elastic_bound;
     if (!(left > 0.25))
         return false;
-    at->size = (at->size + lift * (size + h * base_coupling * at->shaken)) / left;
-    at->pull = pull_of(state, at);
-    const double push = base_coupling * at->shaken + damper->elastic_bound * at->size,
+    at->size = (at->size + lift * (size + h * base_coupling * at->ground)) / left;
+    at->pull = sustained_contact_pull(state, at);
+    const double push = base_coupling * at->ground + damper->elastic_bound * at->size,
                  most = size + h * push;
     at->force = hard * most;
     const double bend = push + at->force / mass; // |r''|
     const double change = stop->most_damped * (at->pull + stop->wide * at->force) +
-                          stop->most_bent * at->size + base_coupling * at->shaking; // |s'|
-    const double rate = k * most + c * bend;                                        // |N'|
-    const double turn = change + rate / mass;                                       // |r'''|
-    const double climb = k * bend + c * turn;                                       // |N''|
+                          stop->most_bent * at->size + base_coupling * at->ground_rate; // |s'|
+    const double rate = k * most + c * bend;                                            // |N'|
+    const double turn = change + rate / mass;                                           // |r'''|
+    const double climb = k * bend + c * turn;                                           // |N''|
     if (state->plan->separation == SEPARATION_ZERO_FORCE
             ? !(sign * now > sag * climb && sign * then > sag * climb)
             : !(r > sag * bend && r + sign * moved > sag * bend))
@@ -245,31 +248,32 @@ static bool soft_lasts(const SustainedStop *stop, const ModalState *state,
     if (state->is_shadow || fmax(fabs(now), fabs(then)) + sag * climb <=
                                 impact_log_least_force(&state->impacts, &damper->row))
         return true;
-    // N only rises or falls where N' keeps its sign.
+    // N is monotonic where N' keeps its sign.
     const double leap = from->s - now / mass, rise = k * damper->w + c * leap; // r'', N'
     if (fabs(rise) > h * climb)
         return true;
-    const double slope =
-        change_now(stop, state, damper, from->slice, from->elastic, stop->coupling * now);
+    const double slope = sustained_contact_rate(stop, state, damper, from->slice, from->elastic,
+                                                stop->coupling * now);
     const double curve = k * leap + c * (slope - rise / mass); // N''
     const double bow =
-        bow_of(stop, state, damper, from->slice, at, at->force) + stop->coupling * rate;
+        sustained_contact_curvature(stop, state, damper, from->slice, at, at->force) +
+        stop->coupling * rate;
     const double stray = k * turn + c * (bow + climb / mass); // |N'''|
     const double up = rise > 0 ? 1 : -1;
     return fmin(up * rise, up * (rise + h * curve)) > h * h / 2 * stray;
 }
 
-// Whether all others stay in flight; they are ready to be moved then.
-static bool others_are_clear(const SustainedContact *press, ModalState *state,
-                             const DamperState *alone, const Bounds *at, double length,
-                             double fallen) {
+// Whether all other masses stay in flight. Sets their storey_speed and gained.
+static bool sustained_contact_others_are_clear(const SustainedContact *press, ModalState *state,
+                                               const DamperState *alone, const SustainedBounds *at,
+                                               double length, double fallen) {
     const size_t n = state->mode_count, a = (size_t)(alone - state->damper);
     for (size_t d = 0; d < state->dampers; d++) {
         DamperState *damper = &state->damper[d];
         if (d == a)
             continue;
         const double bend = damper->elastic_bound * at->size +
-                            fabs(damper->base_coupling) * at->shaken +
+                            fabs(damper->base_coupling) * at->ground +
                             fabs(state->delassus[d * state->dampers + a]) * at->force;
         damper->storey_speed = modal_state_dot(damper->shape, state->p, n);
         damper->gained = length * (damper->storey_speed + damper->w) - fallen -
@@ -280,32 +284,36 @@ static bool others_are_clear(const SustainedContact *press, ModalState *state,
     return true;
 }
 
-static void add_work(const SustainedContact *press, const Transition *dense, ModalState *state,
-                     DamperState *alone, const Slice *slice, double length, StepWork *work) {
+static void sustained_contact_add_work(const SustainedContact *press, const Transition *transition,
+                                       ModalState *state, DamperState *alone, const Slice *slice,
+                                       double length, StepWork *work) {
     const size_t n = state->mode_count;
     const double *start = press->start, *gained = press->gained;
-    work->damping = transition_form(dense, state->lanes, dense->loss, start, press->pulled);
-    work->input = -(slice->value * modal_state_dot(dense->input[0], start, dense->size) +
-                    slice->slope * modal_state_dot(dense->input[1], start, dense->size));
+    work->damping =
+        transition_form(transition, state->lanes, transition->loss, start, press->pulled);
+    work->input = -(slice->value * modal_state_dot(transition->input[0], start, transition->size) +
+                    slice->slope * modal_state_dot(transition->input[1], start, transition->size));
     for (size_t d = 0; d < state->dampers; d++) {
         const DamperState *damper = &state->damper[d];
         if (damper != alone)
             work->input -= damper->plan->mass * work->ground *
                            (damper->storey_speed + damper->w - work->ground / 2);
     }
-    // What the free mass's own momentum has lost to it.
+    // From the change of the mass's own momentum.
     const double impulse = -alone->plan->mass * (modal_state_dot(alone->shape, gained + n + 1, n) +
                                                  gained[2 * n + 1] + work->ground);
     const double force = alone->contact.stiffness * (alone->r + gained[n]) +
                          alone->contact.damping * (alone->w + gained[2 * n + 1]);
     impact_log_force(&state->impacts, &alone->row, fabs(force));
-    impact_log_stretch(&state->impacts, &alone->row, length, impulse,
-                       transition_form(dense, state->lanes, dense->contact, start, press->pulled));
+    impact_log_stretch(
+        &state->impacts, &alone->row, length, impulse,
+        transition_form(transition, state->lanes, transition->contact, start, press->pulled));
 }
 
-// What (q, r, p, w) gain over one level's length.
-static void find_gained(SustainedContact *press, const Transition *dense, const ModalState *state,
-                        const DamperState *alone, const Slice *slice) {
+// The increments of (q, r, p, w) over a step.
+static void sustained_contact_find_gained(SustainedContact *press, const Transition *transition,
+                                          const ModalState *state, const DamperState *alone,
+                                          const Slice *slice) {
     const size_t n = state->mode_count, freedoms = n + 1;
     double *start = press->start;
     memcpy(start, state->q, n * sizeof *start);
@@ -314,11 +322,12 @@ static void find_gained(SustainedContact *press, const Transition *dense, const 
     start[freedoms + n] = alone->w;
     start[2 * freedoms] = slice->value;
     start[2 * freedoms + 1] = slice->slope;
-    state->lanes->multiply(dense->gain, dense->rows, start, dense->size, press->gained);
+    state->lanes->multiply(transition->gain, transition->rows, start, transition->size,
+                           press->gained);
 }
 
-static void move(const SustainedContact *press, ModalState *state, DamperState *alone,
-                 double ground) {
+static void sustained_contact_move(const SustainedContact *press, ModalState *state,
+                                   DamperState *alone, double ground) {
     const size_t n = state->mode_count;
     const double *gained = press->gained, *speed = gained + n + 1;
     for (size_t d = 0; d < state->dampers; d++) {
@@ -340,50 +349,54 @@ static void move(const SustainedContact *press, ModalState *state, DamperState *
 
 double sustained_contact_step(SustainedContact *press, ModalState *state, const Slice *slice,
                               double length, StepWork *work) {
-    DamperState *alone = press->count > 0 ? find_alone(state) : NULL;
+    DamperState *alone = press->count > 0 ? sustained_contact_find(state) : NULL;
     if (alone == NULL)
         return 0;
-    // Where its buffers are alike they share one.
+    // Equal buffers of a damper share one.
     const PlanStop *stops = alone->plan->stops;
     const bool are_alike = stops[0].stiffness == stops[1].stiffness && //
                            stops[0].damping == stops[1].damping;
     SustainedStop *stop =
         &press->stops[2 * (size_t)(alone - state->damper) + (are_alike ? 0 : alone->side)];
-    if (!prepare(stop, state, alone))
+    if (!sustained_contact_prepare(stop, state, alone))
         return 0;
     modal_state_elastic(state, state->q, state->p, press->elastic);
-    const Start from = {slice, press->elastic,
-                        alone->base_coupling * slice->value +
-                            modal_state_dot(alone->shape, press->elastic, state->mode_count)};
+    const SustainedStart from = {
+        slice, press->elastic,
+        alone->base_coupling * slice->value +
+            modal_state_dot(alone->shape, press->elastic, state->mode_count)};
     const double rate = modal_state_rate(state);
     const double omega = sqrt(alone->contact.stiffness / alone->effective_mass);
-    for (size_t i = 0; i < levels_of(state) && is_worth(state, press->length[i] * rate); i++) {
-        const Transition *dense = &stop->levels[i];
+    for (size_t i = 0; i < sustained_contact_levels(state) &&
+                       sustained_contact_is_worth(state, press->length[i] * rate);
+         i++) {
+        const Transition *transition = &stop->levels[i];
         const double h = press->length[i];
         const bool is_soft = h * omega < 1;
-        Bounds at;
-        if (is_soft && i > SOFT_LEVEL && h * rate < SHORT_ARC)
+        SustainedBounds at;
+        if (is_soft && i > SOFT_LEVEL && h * rate < SHORT_STEP)
             break;
-        if (h > length * (1 + 1e-15) || dense->block == NULL)
+        if (h > length * (1 + 1e-15) || transition->block == NULL)
             continue;
-        if (!find_bounds(state, slice, h, &at))
+        if (!sustained_contact_find_bounds(state, slice, h, &at))
             continue;
-        if (!is_soft && !stiff_lasts(stop, state, alone, &from, h, &at))
+        if (!is_soft && !sustained_contact_stiff_lasts(stop, state, alone, &from, h, &at))
             continue;
-        find_gained(press, dense, state, alone, slice);
-        if (is_soft && !soft_lasts(stop, state, alone, &from, press->gained[state->mode_count],
-                                   press->gained[2 * state->mode_count + 1], h, &at))
+        sustained_contact_find_gained(press, transition, state, alone, slice);
+        if (is_soft && !sustained_contact_soft_lasts(
+                           stop, state, alone, &from, press->gained[state->mode_count],
+                           press->gained[2 * state->mode_count + 1], h, &at))
             continue;
         const double *ground = press->ground[i], *fall = press->fall[i];
         const double fallen = fall[0] * slice->value + fall[1] * slice->slope;
-        if (!others_are_clear(press, state, alone, &at, h, fallen))
+        if (!sustained_contact_others_are_clear(press, state, alone, &at, h, fallen))
             continue;
         const double sum = ground[0] * slice->value + ground[1] * slice->slope;
         if (work != NULL) {
             work->ground = sum;
-            add_work(press, dense, state, alone, slice, h, work);
+            sustained_contact_add_work(press, transition, state, alone, slice, h, work);
         }
-        move(press, state, alone, sum);
+        sustained_contact_move(press, state, alone, sum);
         return h;
     }
     return 0;

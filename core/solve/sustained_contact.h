@@ -1,6 +1,5 @@
-// Long steps of one damper's contact, a sample interval or some halves of it, where the contact
-// is so stiff that arcs would be many; with a proof that it lasts. Not for contacts whose
-// parameters depend on the impact, nor for several at once: those go by arcs.
+// Long steps of one damper's contact with a linear buffer, a sample interval or some halves of it,
+// where the contact is so stiff that it takes many Taylor steps; with a proof that it lasts.
 #ifndef CORE_SOLVE_SUSTAINED_CONTACT_H
 #define CORE_SOLVE_SUSTAINED_CONTACT_H
 
@@ -10,10 +9,10 @@
 
 enum { PRESS_LEVELS = 8 };
 
-// Of one stop, made once contacts with it have lasted for long enough.
+// The tables of one stop, made once contacts with it have lasted long enough.
 typedef struct SustainedStop {
-    double spent;     // on arcs
-    bool is_given_up; // no memory for it
+    double spent;     // cost of Taylor steps so far
+    bool is_given_up; // no memory
     Transition levels[PRESS_LEVELS];
     double *damped, *bent;               // D shape, W^2 shape
     double wide, most_damped, most_bent; // |shape|, |D shape|, |W^2 shape|
@@ -24,7 +23,7 @@ typedef struct SustainedContact {
     SustainedStop *stops; // damper after damper, by Side
     size_t count;
     double length[PRESS_LEVELS];                           // the interval, its half, ...
-    double ground[PRESS_LEVELS][2], fall[PRESS_LEVELS][2]; // as Flight's
+    double ground[PRESS_LEVELS][2], fall[PRESS_LEVELS][2]; // as those of Flight
     double *start, *gained, *pulled, *elastic;             // scratch
     double *block;
 } SustainedContact;
@@ -33,9 +32,9 @@ typedef struct SustainedContact {
 Status sustained_contact_make(SustainedContact *press, const ModalState *state, Problem *problem);
 void sustained_contact_clear(SustainedContact *press);
 
-// Moves the state by at most `length` if surely no contact begins or ends meanwhile, and says what
-// that adds up to, if `work` is not NULL; the damper's row is written. Returns the time it takes;
-// 0: it must go by arcs, and nothing has changed.
+// Moves the state by at most `length` if surely no contact begins or ends meanwhile, and returns
+// the length of the step [s]. Its integrals are in *work if that is not NULL, and in the damper's
+// row. 0: nothing has changed.
 double sustained_contact_step(SustainedContact *press, ModalState *state, const Slice *slice,
                               double length, StepWork *work);
 

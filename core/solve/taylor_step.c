@@ -1,9 +1,10 @@
-// Order after order, e_k being the coefficients of D q' + W^2 q and t = length s:
+// The coefficients of order k + 2 follow from those of lower orders. With e_k of D q' + W^2 q and
+// t = length s:
 //   (k + 1)(k + 2) q_{k+2} = length^2 (-e_k - participation a_k + sum of shape_d N_dk)
-//   (k + 1)(k + 2) r_{k+2} = length^2 (base_coupling a_k + shape . e_k - sum over e of yield_de
+//   (k + 1)(k + 2) r_{k+2} = length^2 (base_coupling a_k + shape . e_k - sum over e of delassus_de
 //   N_ek)
-// with N_k = k r_k + c (k + 1) r_{k+1} / length in contact, and while resting hold . (base_coupling
-// a_k + shape . e_k), which makes r_{k+2} 0.
+// with N_k = k r_k + c (k + 1) r_{k+1} / length in contact. At rest N_k = constraint_mass .
+// (base_coupling a_k + shape . e_k), which makes r_{k+2} 0.
 #include "core/solve/taylor_step.h"
 
 #include <math.h>
@@ -13,7 +14,7 @@
 enum { ROW = POLYNOMIAL_DEGREE_MAX + 1, NODES = 8, MODES = 4 };
 
 // s^k and its derivative.
-static void powers(size_t degree, double s, double *power, double *slope) {
+static void taylor_step_powers(size_t degree, double s, double *power, double *slope) {
     power[0] = 1;
     slope[0] = 0;
     for (size_t k = 1; k <= degree; k++) {
@@ -22,7 +23,7 @@ static void powers(size_t degree, double s, double *power, double *slope) {
     }
 }
 
-Status taylor_step_room(TaylorStep *arc, const ModalState *state, Problem *problem) {
+Status taylor_step_allocate(TaylorStep *arc, const ModalState *state, Problem *problem) {
     const size_t n = state->padded, m = state->dampers;
     arc->block = calloc(simd_kernels_room((ROW + 1 + NODES + 2) * n + (2 * ROW + 1) * m +
                                           LINEAR_MOTION_RULES * NODES * ROW),
@@ -31,7 +32,7 @@ Status taylor_step_room(TaylorStep *arc, const ModalState *state, Problem *probl
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu modes",
                            state->mode_count);
     arc->q = simd_kernels_start(arc->block);
-    arc->work = arc->q + (ROW + 1) * n; // an order more is written than is kept
+    arc->work = arc->q + (ROW + 1) * n; // one order more is written than kept
     arc->r = arc->work + (NODES + 2) * n;
     arc->force = arc->r + ROW * m;
     arc->slopes = arc->force + ROW * m + m;
@@ -39,8 +40,8 @@ Status taylor_step_room(TaylorStep *arc, const ModalState *state, Problem *probl
         const Quadrature *rule = &linear_motion_rules[kind];
         for (size_t node = 0; node < rule->count; node++) {
             double power[ROW];
-            powers(POLYNOMIAL_DEGREE_MAX, rule->node[node], power,
-                   arc->slopes + (kind * NODES + node) * ROW);
+            taylor_step_powers(POLYNOMIAL_DEGREE_MAX, rule->node[node], power,
+                               arc->slopes + (kind * NODES + node) * ROW);
         }
     }
     return STATUS_OK;
@@ -50,9 +51,9 @@ void taylor_step_clear(TaylorStep *arc) {
     free(arc->block);
 }
 
-// The elastic forces e_k of all modes, what q_{k+2} is without the dampers, and what pushes these.
-static void elastic_order(TaylorStep *arc, const ModalState *state, size_t k, double scale,
-                          double *speed, double *elastic, double *push) {
+// The elastic forces e_k of all modes, q_{k+2} without the dampers, and shape . e_k of the dampers.
+static void taylor_step_make_elastic(TaylorStep *arc, const ModalState *state, size_t k,
+                                     double scale, double *speed, double *elastic, double *push) {
     const size_t n = state->padded;
     const double *q = arc->q + k * n;
     const TaylorOrder order = {.padded = n,
@@ -76,8 +77,9 @@ static void elastic_order(TaylorStep *arc, const ModalState *state, size_t k, do
     state->lanes->order(&order);
 }
 
-// N of order k of all dampers, from the orders of r up to k + 1 and from shape . e_k.
-static void forces(TaylorStep *arc, const ModalState *state, size_t k, double *push) {
+// N of order k of all dampers. `push` holds shape . e_k and becomes r'' without N.
+static void taylor_step_make_forces(TaylorStep *arc, const ModalState *state, size_t k,
+                                    double *push) {
     const size_t m = state->dampers;
     for (size_t d = 0; d < m; d++) {
         const DamperState *damper = &state->damper[d];
@@ -97,9 +99,9 @@ static void forces(TaylorStep *arc, const ModalState *state, size_t k, double *p
     }
 }
 
-// What the dampers do to order k + 2.
-static void answer(TaylorStep *arc, const ModalState *state, size_t k, double scale,
-                   const double *push) {
+// Order k + 2 of r, and the part of the dampers in that of q.
+static void taylor_step_make_order(TaylorStep *arc, const ModalState *state, size_t k, double scale,
+                                   const double *push) {
     const size_t n = state->padded, m = state->dampers;
     double *restrict after = arc->q + (k + 2) * n;
     for (size_t d = 0; d < m; d++) {
@@ -133,10 +135,10 @@ void taylor_step_make(TaylorStep *arc, const ModalState *state, const Slice *sli
     }
     for (size_t k = 0; k < arc->degree; k++) {
         const double scale = length * length / (double)((k + 1) * (k + 2));
-        elastic_order(arc, state, k, scale, speed, elastic, push);
-        forces(arc, state, k, push);
+        taylor_step_make_elastic(arc, state, k, scale, speed, elastic, push);
+        taylor_step_make_forces(arc, state, k, push);
         if (k + 2 <= arc->degree)
-            answer(arc, state, k, scale, push);
+            taylor_step_make_order(arc, state, k, scale, push);
     }
 }
 
@@ -159,8 +161,8 @@ void taylor_step_cut(TaylorStep *arc, const ModalState *state, double s) {
 void taylor_step_state(const TaylorStep *arc, ModalState *state, double s) {
     const size_t n = state->padded;
     double factors[2 * ROW], *const power = factors, *const slope = factors + ROW;
-    // Small terms first, and by powers rather than Horner's scheme, where s is 1.
-    powers(arc->degree, s, power, slope);
+    // By powers rather than Horner's scheme, which adds the small terms first where s is 1.
+    taylor_step_powers(arc->degree, s, power, slope);
     state->lanes->series(n, arc->degree, arc->q, 2, factors, ROW, arc->work);
     memcpy(state->q, arc->work, n * sizeof *arc->work);
     for (size_t i = 0; i < n; i++)
@@ -181,19 +183,19 @@ void taylor_step_state(const TaylorStep *arc, ModalState *state, double s) {
     state->base_acceleration = polynomial_value(arc->base, arc->base_degree, s);
 }
 
-// The derivatives of s^k at a rule's nodes, node after node; after an odd one's last come zeros.
-static const double *node_slopes(const TaylorStep *arc, const Quadrature *rule) {
+// The derivatives of s^k at the nodes of a rule, node after node; zeros follow.
+static const double *taylor_step_node_slopes(const TaylorStep *arc, const Quadrature *rule) {
     return arc->slopes + (size_t)(rule - linear_motion_rules) * NODES * ROW;
 }
 
 // The derivative of a series at a node.
-static double slope_of(const TaylorStep *arc, const double *series, const double *slope) {
+static double taylor_step_slope(const TaylorStep *arc, const double *series, const double *slope) {
     return modal_state_dot(series + 1, slope + 1, arc->degree);
 }
 
 // p . D p at all nodes.
-static void damping_power(const ModalState *state, const double *p, size_t count, double *scratch,
-                          double *power) {
+static void taylor_step_damping_power(const ModalState *state, const double *p, size_t count,
+                                      double *scratch, double *power) {
     const size_t n = state->padded;
     if (state->diagonal != NULL) {
         state->lanes->weigh(n, count, state->diagonal, p, power);
@@ -212,10 +214,10 @@ StepWork taylor_step_work(const TaylorStep *arc, const ModalState *state) {
         return work;
     const size_t n = state->padded;
     const Quadrature *rule = linear_motion_quadrature(arc->rho);
-    const double *slopes = node_slopes(arc, rule);
+    const double *slopes = taylor_step_node_slopes(arc, rule);
     double *p = arc->work, power[NODES], momentum[NODES]; // times the arc's length
     state->lanes->series(n, arc->degree, arc->q, rule->count, slopes, ROW, p);
-    damping_power(state, p, rule->count, p + NODES * n, power);
+    taylor_step_damping_power(state, p, rule->count, p + NODES * n, power);
     for (size_t j = 0; j < rule->count; j++)
         work.damping += rule->weight[j] * power[j] / arc->length;
     if (arc->base[0] == 0 && arc->base[1] == 0)
@@ -224,7 +226,7 @@ StepWork taylor_step_work(const TaylorStep *arc, const ModalState *state) {
     for (size_t j = 0; j < rule->count; j++) {
         for (size_t d = 0; d < state->dampers; d++)
             momentum[j] += state->damper[d].plan->mass *
-                           slope_of(arc, taylor_step_r(arc, d), slopes + j * ROW);
+                           taylor_step_slope(arc, taylor_step_r(arc, d), slopes + j * ROW);
         work.input -= rule->weight[j] *
                       polynomial_value(arc->base, arc->base_degree, rule->node[j]) * momentum[j];
     }
@@ -240,7 +242,8 @@ void taylor_step_contact(const TaylorStep *arc, const ModalState *state, size_t 
         return;
     const Quadrature *rule = linear_motion_quadrature(arc->rho);
     for (size_t j = 0; j < rule->count; j++) {
-        const double w = slope_of(arc, taylor_step_r(arc, d), node_slopes(arc, rule) + j * ROW);
+        const double w = taylor_step_slope(arc, taylor_step_r(arc, d),
+                                           taylor_step_node_slopes(arc, rule) + j * ROW);
         *lost += rule->weight[j] * w * w;
     }
     *lost *= damper->contact.damping / arc->length;

@@ -1,6 +1,6 @@
-// An arc of the general engine: all modes and dampers over a stretch in which no contact state
-// changes and the base is linear or a sine, as Taylor polynomials that are exact to rounding.
-// Not for whole intervals of flight: flight.h.
+// A Taylor step: the motion of all modes and dampers over a time in which no contact state changes
+// and the base is linear or a sine, as polynomials that are exact to rounding. Whole intervals of
+// flight: flight.h.
 #ifndef CORE_SOLVE_TAYLOR_STEP_H
 #define CORE_SOLVE_TAYLOR_STEP_H
 
@@ -20,28 +20,28 @@ typedef struct TaylorStep {
     double *block;
 } TaylorStep;
 
-// Room for the arcs of one run; freed by taylor_step_clear, also after a failure.
-Status taylor_step_room(TaylorStep *arc, const ModalState *state, Problem *problem);
+// Allocates the steps of one run. Freed by taylor_step_clear, also after a failure.
+Status taylor_step_allocate(TaylorStep *arc, const ModalState *state, Problem *problem);
 void taylor_step_clear(TaylorStep *arc);
 
 // From the present state; length * modal_state_rate() and length * slice->omega must be at most 1.
 void taylor_step_make(TaylorStep *arc, const ModalState *state, const Slice *slice, double length);
 
-// Keeps only the part up to s.
+// Reduces the step to 0 to s, and scales the series so that s = 1 is its end again.
 void taylor_step_cut(TaylorStep *arc, const ModalState *state, double s);
 
-// The state at s (0 to 1), into q and p and the dampers' r and w; not of those that rest.
+// Sets q and p, and r and w of the dampers that do not rest, to the state at s (0 to 1).
 void taylor_step_state(const TaylorStep *arc, ModalState *state, double s);
 
-// What an arc adds up to.
+// Integrals over a step.
 typedef struct StepWork {
-    double input;   // the base's work [J]
+    double input;   // work of the base [J]
     double damping; // lost in the structure [J]
     double ground;  // integral of a_g [m/s]
 } StepWork;
 StepWork taylor_step_work(const TaylorStep *arc, const ModalState *state);
 
-// A damper's part: integral of N [N s] and work lost in its contact [J].
+// Of one damper: the integral of N [N s] and the energy lost in its contact [J].
 void taylor_step_contact(const TaylorStep *arc, const ModalState *state, size_t damper,
                          double *impulse, double *lost);
 

@@ -72,6 +72,23 @@ void time_stepping_rate(TimeStepping *stepping, const double *y, double ground, 
     }
 }
 
+void time_stepping_powers(const TimeStepping *stepping, const double *y, double ground,
+                          const double *force, double *restrict out) {
+    const ModalState *state = &stepping->state;
+    const size_t n = state->mode_count, m = state->dampers;
+    const double *p = y + n, *w = p + n + m;
+    double momentum = modal_state_dot(state->momentum_weights, p, n), loss = 0;
+    for (size_t d = 0; d < m; d++) {
+        out[d] = force[d];
+        out[m + d] = force[d] * w[d];
+        momentum += state->damper[d].plan->mass * w[d];
+    }
+    for (size_t i = 0; i < n; i++)
+        loss += (stepping->elastic[i] - state->omega2[i] * y[i]) * p[i];
+    out[2 * m] = -ground * momentum;
+    out[2 * m + 1] = loss;
+}
+
 void time_stepping_integrate(TimeStepping *stepping, const double *from, const double *to,
                              double length, bool is_corrected) {
     const ModalState *state = &stepping->state;
@@ -165,20 +182,9 @@ static void time_stepping_find_missed(TimeStepping *stepping, double length, dou
         fmax(stepping->max_missed_velocity, fabs(stepping->missed_velocity));
 }
 
-// STATUS_LIMIT, STATUS_CANCELLED or the status of the impact log.
 static Status time_stepping_check(TimeStepping *stepping) {
-    ModalState *state = &stepping->state;
-    const Run *run = state->run;
     stepping->unchecked_cost = 0;
-    if (run->steps_max > 0 && run->steps > run->steps_max)
-        return problem_set(state->problem, STATUS_LIMIT,
-                           SOLVER_STOPPED "t = %.6g s of %.6g s, by steps of %.4g s",
-                           run->steps_max, run->steps_max * SOLVER_STEP, modal_state_time(state),
-                           state->plan->duration, stepping->length);
-    if (!progress_advance(run->progress, modal_state_time(state) / state->plan->duration))
-        return problem_set(state->problem, STATUS_CANCELLED, "cancelled at t = %.6g s",
-                           modal_state_time(state));
-    return impact_log_status(&state->impacts, state->problem);
+    return modal_state_check(&stepping->state, stepping->length);
 }
 
 static Status time_stepping_unstable(const TimeStepping *stepping) {
@@ -211,7 +217,7 @@ Status time_stepping_note(TimeStepping *stepping, double cost) {
     return stepping->unchecked_cost > CHECK_COST ? time_stepping_check(stepping) : STATUS_OK;
 }
 
-static void time_stepping_gather(const ModalState *state, double *y) {
+void time_stepping_gather(const ModalState *state, double *y) {
     const size_t n = state->mode_count, m = state->dampers;
     memcpy(y, state->q, n * sizeof *y);
     memcpy(y + n, state->p, n * sizeof *y);
@@ -221,7 +227,7 @@ static void time_stepping_gather(const ModalState *state, double *y) {
     }
 }
 
-static void time_stepping_scatter(ModalState *state, const double *y) {
+void time_stepping_scatter(ModalState *state, const double *y) {
     const size_t n = state->mode_count, m = state->dampers;
     memcpy(state->q, y, n * sizeof *y);
     memcpy(state->p, y + n, n * sizeof *y);
@@ -265,19 +271,6 @@ static Status time_stepping_step(TimeStepping *stepping, double length, double o
     return time_stepping_note(stepping, time_stepping_step_cost(stepping));
 }
 
-static void time_stepping_record(TimeStepping *stepping) {
-    ModalState *state = &stepping->state;
-    if (state->is_shadow)
-        return;
-    state->base_acceleration = base_cursor_at(&state->base, state->sample);
-    modal_state_forces(state);
-    if (state->sample == stepping->recorder.statistics_start && state->sample > 0)
-        recorder_forget(state);
-    flight_buffer_take(&stepping->samples, state, stepping->recorder.base_speed);
-    recorder_take(&stepping->recorder, state, 1);
-    recorder_peaks(state);
-}
-
 // Advances to the next sample and records it.
 static Status time_stepping_interval(TimeStepping *stepping) {
     ModalState *state = &stepping->state;
@@ -288,7 +281,7 @@ static Status time_stepping_interval(TimeStepping *stepping) {
     state->sample++;
     state->offset = 0;
     state->run->work.mode_samples += state->mode_count;
-    time_stepping_record(stepping);
+    recorder_sample(&stepping->recorder, &stepping->samples, state);
     return STATUS_OK;
 }
 
@@ -484,7 +477,7 @@ static StepChoice time_stepping_choose(const Plan *plan, const Accuracy *accurac
     return choice;
 }
 
-Status time_stepping_decide(const Stepper *stepper, const Accuracy *accuracy, double base_interval,
+Status time_stepping_decide(const Solver *solver, const Accuracy *accuracy, double base_interval,
                             Plan *plan, Problem *problem) {
     const StepChoice choice = time_stepping_choose(plan, accuracy, base_interval);
     Decisions *decisions = &plan->report.decisions;
@@ -499,15 +492,15 @@ Status time_stepping_decide(const Stepper *stepper, const Accuracy *accuracy, do
         TRY(decisions_add(decisions, "contact_switching", "step_ends", 1, NULL,
                           "contacts begin and end at step ends only, so across a contact the error "
                           "is of first order in the step; between contacts %s",
-                          stepper->between));
+                          solver->stepper->between));
     return STATUS_OK;
 }
 
-double time_stepping_cost(const Stepper *stepper, const Accuracy *accuracy, double base_interval,
+double time_stepping_cost(const Solver *solver, const Accuracy *accuracy, double base_interval,
                           const Plan *plan) {
     double setup;
-    const double each = stepper->cost(plan_mode_count(plan), plan->damper_count,
-                                      time_stepping_may_couple(plan), &setup);
+    const double each = solver->stepper->cost(plan_mode_count(plan), plan->damper_count,
+                                              time_stepping_may_couple(plan), &setup);
     const StepChoice choice = time_stepping_choose(plan, accuracy, base_interval);
     const double steps = choice.share * plan->duration * plan->sample_rate;
     const double companion = choice.share == choice.kinks && choice.kinks > 1 ? 2 : 0.5;
@@ -529,7 +522,6 @@ typedef struct Pair {
     double horizon;                // [s]; NAN: not reached
     double first_contact;          // no contact has begun before [s]; NAN: none has
     double slowest[SCENE_DAMPERS]; // approach speed of any contact, as seen at samples [m/s]
-    double *difference;            // of the modes
 } Pair;
 
 static bool pair_has_contact(const Pair *pair) {
@@ -551,22 +543,14 @@ static double pair_factor(const Pair *pair) {
 }
 
 static void pair_compare(Pair *pair) {
-    const ModalState *state = &pair->run.state, *companion = &pair->companion.state;
-    const size_t n = state->mode_count;
-    double difference = 0, bound = 0;
+    const ModalState *state = &pair->run.state;
+    const double before = pair->worst;
     pair->compared++;
-    for (size_t i = 0; i < n; i++) {
-        pair->difference[i] = state->q[i] - companion->q[i];
-        bound += state->max_shape[i] * fabs(pair->difference[i]);
-    }
     pair->largest = fmax(pair->largest, state->impacts.response->peaks.displacement);
-    if (bound <= pair->worst)
+    pair->worst = modal_state_difference(state, state->q, pair->companion.state.q, before);
+    if (pair->worst <= before)
         return;
-    for (size_t j = 0; j < state->storey_count; j++)
-        difference = fmax(difference,
-                          fabs(modal_state_dot(state->modes->shapes + j * n, pair->difference, n)));
-    pair->worst = fmax(pair->worst, difference);
-    const double error = pair_factor(pair) * difference;
+    const double error = pair_factor(pair) * pair->worst;
     if (isnan(pair->horizon) && !(error <= RESPONSE_DIVERGENCE * pair->largest))
         pair->horizon = (double)(state->sample - pair->stride) / state->plan->sample_rate;
     pair->is_finished = error > pair->largest;
@@ -625,9 +609,7 @@ static void pair_start_companion(Pair *pair, size_t kinks) {
     pair->is_kinked = base->form == BASE_PIECES ||
                       (base->form == BASE_SAMPLED && kinks == 1 && state->base.ratio == 0);
     pair->horizon = pair->first_contact = NAN;
-    pair->difference = malloc(state->mode_count * sizeof *pair->difference);
-    Status status =
-        pair->difference == NULL ? STATUS_NO_MEMORY : pair_make_companion(pair, stride, share);
+    Status status = pair_make_companion(pair, stride, share);
     if (status == STATUS_UNSTABLE && share < pair->run.share * stride) {
         // Longer steps are unstable where the run's are not: take shorter ones.
         time_stepping_clear(&pair->companion);
@@ -705,7 +687,7 @@ static void pair_report(const Pair *pair, Response *response) {
 static Status pair_run(Pair *pair, Response *response) {
     ModalState *state = &pair->run.state;
     const Plan *plan = state->plan;
-    time_stepping_record(&pair->run);
+    recorder_sample(&pair->run.recorder, &pair->run.samples, state);
     while (state->sample + 1 < plan->count) {
         const double before = modal_state_time(state);
         TRY(time_stepping_interval(&pair->run));
@@ -722,7 +704,7 @@ static Status pair_run(Pair *pair, Response *response) {
     // The duration may end between samples.
     TRY(time_stepping_finish(&pair->run,
                              plan->duration - (double)state->sample / plan->sample_rate));
-    return recorder_ledger(state);
+    return recorder_finish_log(state);
 }
 
 Status time_stepping_run_pair(const Stepper *stepper, Run *run, size_t share, size_t kinks,
@@ -741,12 +723,11 @@ Status time_stepping_run_pair(const Stepper *stepper, Run *run, size_t share, si
     time_stepping_clear(&pair->run);
     time_stepping_clear(&pair->companion);
     response_clear(&pair->companion_response);
-    free(pair->difference);
     free(pair);
     return status;
 }
 
-Status time_stepping_run(const Stepper *stepper, Run *run, Response *response, Problem *problem) {
+Status time_stepping_run(const Solver *solver, Run *run, Response *response, Problem *problem) {
     const Base *base = run->base;
     const StepChoice choice = time_stepping_choose(run->plan, run->accuracy,
                                                    base->form == BASE_SAMPLED ? base->interval : 0);
@@ -754,10 +735,11 @@ Status time_stepping_run(const Stepper *stepper, Run *run, Response *response, P
         return problem_set(problem, STATUS_LIMIT,
                            "the scene moves too fast for %s: %.3g steps to a sample interval, at "
                            "most %.3g are possible",
-                           stepper->name, choice.share, SHARE_MAX);
-    if (stepper->is_linear_only && run->plan->form == CONTACT_POWER)
+                           solver->kind.name, choice.share, SHARE_MAX);
+    if (solver->is_linear_only && run->plan->form == CONTACT_POWER)
         return problem_set(problem, STATUS_INVALID,
-                           "%s serves linear contact and impulses, not a power law", stepper->name);
-    return time_stepping_run_pair(stepper, run, (size_t)choice.share, (size_t)choice.kinks, 0,
-                                  response, problem);
+                           "%s serves linear contact and impulses, not a power law",
+                           solver->kind.name);
+    return time_stepping_run_pair(solver->stepper, run, (size_t)choice.share, (size_t)choice.kinks,
+                                  0, response, problem);
 }

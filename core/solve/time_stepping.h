@@ -28,7 +28,6 @@ typedef struct Stepper {
     int order;              // of the error between contacts
     const char *between;    // a clause for the plan's report that states this error
     bool is_by_place;       // see StepContact
-    bool is_linear_only;    // serves no power law
     double stability_limit; // of |eigenvalue| times step; 0: unconditionally stable
     // Sets `method` to an allocated block, or leaves it NULL. The driver frees it.
     Status (*make)(TimeStepping *stepping);
@@ -67,10 +66,10 @@ struct TimeStepping {
 };
 
 // Solver.run, .decide and .cost of a solver with fixed steps.
-Status time_stepping_run(const Stepper *stepper, Run *run, Response *response, Problem *problem);
-Status time_stepping_decide(const Stepper *stepper, const Accuracy *accuracy, double base_interval,
+Status time_stepping_run(const Solver *solver, Run *run, Response *response, Problem *problem);
+Status time_stepping_decide(const Solver *solver, const Accuracy *accuracy, double base_interval,
                             Plan *plan, Problem *problem);
-double time_stepping_cost(const Stepper *stepper, const Accuracy *accuracy, double base_interval,
+double time_stepping_cost(const Solver *solver, const Accuracy *accuracy, double base_interval,
                           const Plan *plan);
 
 // A run with `share` steps in a sample interval and its companion. `kinks` divides `share`: kinks
@@ -89,6 +88,13 @@ void time_stepping_elastic(const ModalState *state, const double *q, const doubl
 // out = y' under the forces N of the dampers; `elastic` becomes that of y.
 void time_stepping_rate(TimeStepping *stepping, const double *y, double ground, const double *force,
                         double *restrict out);
+// The rates of the energy integrals at y, after time_stepping_rate: N and N r' of the dampers, then
+// the power of the base and the loss in the structure; 2 dampers + 2 values.
+void time_stepping_powers(const TimeStepping *stepping, const double *y, double ground,
+                          const double *force, double *restrict out);
+// Copies the state to y, and y to the state.
+void time_stepping_gather(const ModalState *state, double *y);
+void time_stepping_scatter(ModalState *state, const double *y);
 // Adds the energy integrals of a step from the states at its two ends: by the trapezoidal rule, or
 // with its end correction (Euler-Maclaurin), which is of order 4.
 void time_stepping_integrate(TimeStepping *stepping, const double *from, const double *to,

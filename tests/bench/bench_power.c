@@ -94,9 +94,10 @@ static double bench_measure(const Case *from, const char *model, const char *sol
         response_clear(&result->response);
         run.steps = 0;
         const int64_t start = clock_thread_cpu_ns();
-        const Status status = strcmp(solver, "exact") == 0
-                                  ? exact_run_engine(&run, &result->response, &problem)
-                                  : solver_adaptive.run(&run, &result->response, &problem);
+        const Status status =
+            strcmp(solver, "exact") == 0
+                ? exact_run_engine(&run, &result->response, &problem)
+                : solver_adaptive.run(&solver_adaptive, &run, &result->response, &problem);
         if (status != STATUS_OK) {
             printf("%s\n", problem.detail);
             break;

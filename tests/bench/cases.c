@@ -125,7 +125,7 @@ bool bench_run(BenchScene *scene, BenchTimes *times) {
                    .column_count = BENCH_CHANNELS};
         const int64_t ready = clock_thread_cpu_ns();
         if (status == STATUS_OK)
-            status = solver_exact.run(&run, &response, &problem);
+            status = solver_exact.run(&solver_exact, &run, &response, &problem);
         times->run = least(times->run, since(ready) / (double)scene->count);
         times->whole = least(times->whole, since(start) / (double)scene->count);
         times->impacts = response.impacts.count;

@@ -335,7 +335,7 @@ static size_t run_line(bool is_cut, double *values, size_t *impacts) {
         columns[i] = (RunColumn){i < 3 ? CHANNEL_ACCELERATION : CHANNEL_CONTACT_FORCE,
                                  i < 3 ? i : 0, values + i * SAMPLES};
     Run run_of = {.plan = plan, .base = &base, .columns = columns, .column_count = 4};
-    assert_int_equal(solver_exact.run(&run_of, &response, &problem), STATUS_OK);
+    assert_int_equal(solver_exact.run(&solver_exact, &run_of, &response, &problem), STATUS_OK);
     const size_t modes = plan->modes.count;
     *impacts = response.impacts.count;
     response_clear(&response);

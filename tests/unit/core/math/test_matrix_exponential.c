@@ -9,6 +9,7 @@
 #include <cmocka.h>
 
 #include "core/math/matrix_exponential.h"
+#include "tests/support/matrix_forms.h"
 
 static void an_oscillator_turns(void **state) {
     (void)state;
@@ -55,55 +56,9 @@ static void a_form_is_the_integral_of_the_product(void **state) {
     }
 }
 
-static void doublings_in_double_are_as_good_as_double(void **state) {
-    (void)state;
-    double out[9], scratch[18];
-    for (double h = 1e-6; h < 1e3; h *= 9) {
-        const double w = 7, A[4] = {0, 1, -w * w, 0}, most = 1e-14 * (10 + w * h);
-        assert_true(matrix_exponential_doublings(A, 2, h, out, scratch, NULL, 0));
-        assert_true(fabs(out[0] + 1 - cos(w * h)) < most);
-        assert_true(fabs(out[1] * w - sin(w * h)) < most);
-        assert_true(fabs(out[2] / w + sin(w * h)) < most);
-    }
-    // Nothing is lost to the identity.
-    const double slow[1] = {-1e-9};
-    assert_true(matrix_exponential_doublings(slow, 1, 1e-6, out, scratch, NULL, 0));
-    assert_true(fabs(out[0] + 1e-15) < 1e-28);
-    const double chain[9] = {0, 1, 0, 0, 0, 1, 0, 0, 0};
-    assert_true(matrix_exponential_doublings(chain, 3, 100, out, scratch, NULL, 0));
-    assert_true(out[1] == 100 && fabs(out[2] - 5000) < 1e-9 && out[0] == 0 && out[3] == 0);
-    const double stiff[4] = {-1e12, 1e12, 0, -1}; // y1 follows y2
-    assert_true(matrix_exponential_doublings(stiff, 2, 1, out, scratch, NULL, 0));
-    assert_true(fabs(out[0] + 1) < 1e-12);
-    assert_true(fabs(out[3] + 1 - exp(-1)) < 1e-12 && fabs(out[1] - exp(-1)) < 1e-11);
-}
-
-static bool refuse(void *context, double fraction) {
-    assert_true(fraction == 0.25);
-    ++*(int *)context;
-    return false;
-}
-
-static void a_long_doubling_stops_when_told(void **state) {
-    (void)state;
-    enum { SIZE = 120 };
-    double *room = calloc(4 * SIZE * SIZE, sizeof *room);
-    assert_non_null(room);
-    for (size_t i = 0; i < SIZE * SIZE; i++)
-        room[i] = 1e-3 * sin((double)i);
-    int asked = 0;
-    const Progress progress = {&asked, refuse};
-    assert_false(matrix_exponential_doublings(room, SIZE, 1, room + SIZE * SIZE,
-                                              room + 2 * SIZE * SIZE, &progress, 0.25));
-    assert_int_equal(asked, 1);
-    free(room);
-}
-
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(an_oscillator_turns),
-        cmocka_unit_test(a_long_doubling_stops_when_told),
-        cmocka_unit_test(doublings_in_double_are_as_good_as_double),
         cmocka_unit_test(a_singular_system_is_as_good_as_any),
         cmocka_unit_test(a_stiff_system_decays_and_keeps_its_slow_part),
         cmocka_unit_test(a_form_is_the_integral_of_the_product),

@@ -10,7 +10,6 @@
 #include <cmocka.h>
 
 #include "core/math/fft.h"
-#include "core/solve/step_work.h"
 #include "tests/support/document.h"
 #include "tests/support/fields.h"
 

@@ -7,7 +7,7 @@
 
 #include <math.h>
 
-#include "core/solve/refine.h"
+#include "core/solve/base_motion_cursor.h"
 #include "tests/support/base_at.h"
 
 static double given[4] = {1, -2, 0.5, 4};
@@ -16,9 +16,9 @@ static const Base coarse = {.form = BASE_SAMPLED, .values = given, .count = 4, .
 static void a_refined_base_goes_through_the_same_points(void **state) {
     (void)state;
     double values[16];
-    assert_int_equal(refine_count(&coarse, 1000, 100), 16);
+    assert_int_equal(base_cursor_refined_count(&coarse, 1000, 100), 16);
     Base fine;
-    assert_int_equal(refine_base(&coarse, 1000, 16, values, NULL, &fine, NULL), STATUS_OK);
+    assert_int_equal(base_cursor_refine(&coarse, 1000, 16, values, NULL, &fine, NULL), STATUS_OK);
     assert_int_equal(fine.count, 16);
     for (int i = 0; i < 15; i++)
         assert_true(fabs(fine.values[i] - base_at(&coarse, i * 0.001)) < 1e-14);
@@ -29,9 +29,9 @@ static void a_refined_base_goes_through_the_same_points(void **state) {
 static void a_short_run_takes_no_more_than_it_sees(void **state) {
     (void)state;
     double values[9];
-    assert_int_equal(refine_count(&coarse, 1000, 7), 9);
+    assert_int_equal(base_cursor_refined_count(&coarse, 1000, 7), 9);
     Base fine;
-    assert_int_equal(refine_base(&coarse, 1000, 9, values, NULL, &fine, NULL), STATUS_OK);
+    assert_int_equal(base_cursor_refine(&coarse, 1000, 9, values, NULL, &fine, NULL), STATUS_OK);
     assert_true(fabs(fine.values[8] - base_at(&coarse, 0.008)) < 1e-14);
 }
 
@@ -56,7 +56,7 @@ static void a_long_one_stops_soon_when_it_is_told_to(void **state) {
         const Progress progress = {&looks, stop_at_third};
         Base fine;
         values[MANY / 4] = 7;
-        assert_int_equal(refine_base(&base, 1000, MANY, values, &progress, &fine, NULL),
+        assert_int_equal(base_cursor_refine(&base, 1000, MANY, values, &progress, &fine, NULL),
                          STATUS_CANCELLED);
         assert_int_equal(looks, 3);
         assert_true(values[MANY / 4] == 7); // nothing was made that far behind
@@ -68,10 +68,11 @@ static void a_long_one_stops_soon_when_it_is_told_to(void **state) {
 static void other_grids_are_left_alone(void **state) {
     (void)state;
     const Base still = {.form = BASE_STILL};
-    assert_int_equal(refine_count(&coarse, 200, 100), 0); // the same grid
-    assert_int_equal(refine_count(&coarse, 100, 100), 0); // a coarser one
-    assert_int_equal(refine_count(&coarse, 300, 100), 0); // no whole number of times as fine
-    assert_int_equal(refine_count(&still, 1000, 100), 0);
+    assert_int_equal(base_cursor_refined_count(&coarse, 200, 100), 0); // the same grid
+    assert_int_equal(base_cursor_refined_count(&coarse, 100, 100), 0); // a coarser one
+    assert_int_equal(base_cursor_refined_count(&coarse, 300, 100),
+                     0); // no whole number of times as fine
+    assert_int_equal(base_cursor_refined_count(&still, 1000, 100), 0);
 }
 
 int main(void) {

@@ -12,8 +12,8 @@
 
 #include "core/excitation/random.h"
 #include "core/math/fft.h"
-#include "core/math/matrix_exponential.h"
 #include "core/solve/rounding_growth.h"
+#include "tests/support/matrix_forms.h"
 #include "tests/support/paper.h"
 
 static const double RESTITUTION = 0.46, CONTACT_TIME = 0.0003, PI = 3.141592653589793;

@@ -47,7 +47,7 @@ static Answer solve(const Solver *solver, double knob, const Plan *plan, const B
                .columns = columns,
                .column_count = plan->storeys};
     problem_clear(&problem);
-    answer.status = solver->run(&run, &answer.response, &problem);
+    answer.status = solver->run(solver, &run, &answer.response, &problem);
     answer.steps = run.steps;
     return answer;
 }
@@ -477,7 +477,7 @@ static void what_a_run_costs_is_foretold(void **state) {
             const AccuracyStep step = {.step = knob};
             const AccuracyTolerance tolerance = {.tolerance = knob};
             const double foretold = solver->cost(
-                solver == &solver_adaptive ? &tolerance.accuracy : &step.accuracy, 0, plan);
+                solver, solver == &solver_adaptive ? &tolerance.accuracy : &step.accuracy, 0, plan);
             Answer answer = solve(solver, knob, plan, &sine);
             if (!(answer.steps > foretold / 2 && answer.steps < 2 * foretold))
                 fail_msg("%s: %g steps, foretold %g", solver->kind.name, answer.steps, foretold);
@@ -517,7 +517,7 @@ static void runs_stop_when_told_or_at_a_limit(void **state) {
                    .accuracy = is_adaptive ? &tolerance.accuracy : &step.accuracy};
         Response response = {0};
         problem_clear(&problem);
-        assert_int_equal((*at)->run(&run, &response, &problem), STATUS_CANCELLED);
+        assert_int_equal((*at)->run(*at, &run, &response, &problem), STATUS_CANCELLED);
         assert_true(watcher.looks <= 4 && watcher.last < 0.9);
         response_clear(&response);
         response = (Response){0};
@@ -525,14 +525,14 @@ static void runs_stop_when_told_or_at_a_limit(void **state) {
         run.steps = 0;
         run.steps_max = 30000;
         problem_clear(&problem);
-        assert_int_equal((*at)->run(&run, &response, &problem), STATUS_LIMIT);
+        assert_int_equal((*at)->run(*at, &run, &response, &problem), STATUS_LIMIT);
         assert_true(run.steps < 200000);
         response_clear(&response);
         response = (Response){0};
         run.steps_max = 0;
         run.impacts_max = 1;
         problem_clear(&problem);
-        assert_int_equal((*at)->run(&run, &response, &problem), STATUS_LIMIT);
+        assert_int_equal((*at)->run(*at, &run, &response, &problem), STATUS_LIMIT);
         assert_non_null(strstr(problem.detail, "impacts"));
         response_clear(&response);
     }
