@@ -91,6 +91,55 @@ Status exact_run_engine(Run *run, Response *response, Problem *problem) {
     return status;
 }
 
+static Status exact_advance(EventEngine *engine, double time) {
+    const ModalState *state = &engine->state;
+    const double rate = state->plan->sample_rate;
+    const size_t sample = (size_t)floor(time * rate);
+    if (state->offset > 0 && state->sample < sample)
+        TRY(event_engine_finish_interval(engine));
+    while (state->sample < sample)
+        TRY(event_engine_step(engine, sample));
+    return event_engine_cross(engine, time - (double)sample / rate);
+}
+
+static ContactPoint exact_point(ModalState *state, size_t index, Side side, double time) {
+    const DamperState *damper = &state->damper[index];
+    const double sign = modal_state_sign(side);
+    const bool is_inside = damper->phase == PHASE_CONTACT || damper->phase == PHASE_INSIDE;
+    Slice slice;
+    (void)base_cursor_slice(&state->base, state->sample, state->offset, &slice);
+    state->base_acceleration = slice.value;
+    modal_state_forces(state);
+    return (ContactPoint){time, sign * damper->force, is_inside ? fmax(sign * damper->r, 0) : 0,
+                          sign * damper->w};
+}
+
+static Status exact_sample(EventEngine *engine, const OutputWindow *window) {
+    engine->state.sample = window->first;
+    if (window->first == 0)
+        TRY(event_engine_settle(engine));
+    for (size_t k = 0; k < window->count; k++) {
+        const double time = window->start + (double)(k + 1) * window->interval;
+        TRY(exact_advance(engine, time));
+        window->points[k] = exact_point(&engine->state, window->damper, window->side, time);
+    }
+    TRY(exact_advance(engine, window->end));
+    TRY(event_engine_check(engine));
+    return recorder_ledger(&engine->state);
+}
+
+Status exact_run_window(Run *run, const OutputWindow *window, Response *response,
+                        Problem *problem) {
+    EventEngine engine;
+    memset(&engine, 0, sizeof engine);
+    Status status =
+        event_engine_make(&engine, run, exact_tolerance(run->accuracy), response, problem);
+    if (status == STATUS_OK)
+        status = exact_sample(&engine, window);
+    event_engine_clear(&engine);
+    return status;
+}
+
 static Status exact_run(Run *run, Response *response, Problem *problem) {
     if (!single_mass_serves(run->plan, run->is_clear))
         return exact_run_engine(run, response, problem);

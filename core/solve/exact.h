@@ -17,6 +17,28 @@ double exact_tolerance(const Accuracy *accuracy);
 Status exact_decide(const Accuracy *accuracy, double base_interval, Plan *plan, Problem *problem);
 void exact_forget_unused(Accuracy *accuracy, bool has_power_law);
 
+// Samples of one damper's contact at evenly spaced instants of a run.
+typedef struct ContactPoint {
+    double time; // [s]
+    // Force of the stop on the damper away from the stop [N], penetration [m], speed towards it
+    // [m/s]
+    double force, penetration, speed;
+} ContactPoint;
+typedef struct OutputWindow {
+    size_t first; // sample at which the plan's initial state is
+    double start; // the first instant is `interval` later [s]
+    double interval;
+    size_t count; // instants; 0: only the impacts are of interest
+    double end;   // of the run, not before the last instant [s]
+    size_t damper;
+    Side side;
+    ContactPoint *points; // count of them
+} OutputWindow;
+
+// A run by the event engine over part of the plan's time, sampled at the window's instants only.
+// The response holds its impacts.
+Status exact_run_window(Run *run, const OutputWindow *window, Response *response, Problem *problem);
+
 // As Solver.run, by the event engine for every plan, also where single_mass.h serves.
 Status exact_run_engine(Run *run, Response *response, Problem *problem);
 
