@@ -21,7 +21,7 @@ const Field decision_fields[] = {
     FIELD_TEXT(Decision, why, 0, PRESENCE_OPTIONAL, 0, "the reason"),
     FIELD_REAL(Decision, value, NULL, ANY, OPTIONAL, "the number that decided"),
     FIELD_TEXT(Decision, unit, 0, PRESENCE_OPTIONAL, 0, "of that number"),
-    FIELD_REAL(Decision, saving, NULL, ANY, OPTIONAL, "of what is left out: the part of the foretold cost that this saves"),
+    FIELD_REAL(Decision, saving, NULL, ANY, OPTIONAL, "of an omission: share of the predicted cost that it saves"),
     FIELD_END
 };
 // clang-format on

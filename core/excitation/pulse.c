@@ -31,7 +31,7 @@ static Status pulse_complete(Excitation *excitation, const Span *span, const cha
     json_pointer_join(place, sizeof place, pointer, "length");
     if (pulse->length < least)
         return problem_add_real(problem, STATUS_INVALID, place, pulse->length, "s",
-                                "must be at least %s s, what a clock can tell at that start, is %s",
+                                "must be at least %s s, the resolution of time at that start, is %s",
                                 text_real(limit, least), text_real(is, pulse->length));
     if (isfinite(pulse->start + pulse->length) && isfinite(2 * pulse->amplitude / pulse->length))
         return STATUS_OK;

@@ -28,7 +28,7 @@ const Field damper_fields[] = {
     FIELD_ITEM(Damper, left_buffer, buffer_fields, "material", PRESENCE_OPTIONAL, "what stands at the left stop"),
     FIELD_ITEM(Damper, right_buffer, buffer_fields, "material", PRESENCE_OPTIONAL, "what stands at the right stop"),
     FIELD_CHOICE(Damper, identified_for, identified_for_names, 0, "the pair of masses for which restitution and contact time hold"),
-    FIELD_ITEM(Damper, rig, rig_fields, NULL, PRESENCE_OPTIONAL, "masses of the test that measured them, for identified_for rig: what they come to there is carried over; if absent those that the material's revision tells"),
+    FIELD_ITEM(Damper, rig, rig_fields, NULL, PRESENCE_OPTIONAL, "masses of the test that measured the buffers, for identified_for rig: the parameters identified there are carried over; if absent those of the material's revision"),
     FIELD_END
 };
 // clang-format on
@@ -230,7 +230,7 @@ static Status refuse_rig(const Damper *damper, const char *place, Problem *probl
                            "unless it was fixed, the base_mass of the test that measured "
                            "restitution and contact time");
     return problem_add(problem, STATUS_INVALID, place,
-                       "is required by identified_for \"rig\": %.64s does not tell %s; give the "
+                       "is required by identified_for \"rig\": %.64s does not state %s; give the "
                        "impactor_mass [kg] and, unless it was fixed, the base_mass of its test",
                        untold->material,
                        !isnan(untold->test.base_mass)       ? "the mass of the impactor"

@@ -41,7 +41,7 @@ const Field material_fields[] = {
     FIELD_REAL(Material, contact_time, "s", ABOVE(0), OPTIONAL, "contact time T_c of an isolated impact, for every approach speed"),
     FIELD_REAL(Material, contact_time_deviation, "s", AT_MIN(0), OPTIONAL, "standard deviation of contact_time"),
     TABLE,
-    FIELD_CHOICE(Material, separation, separation_names, OPTIONAL, "the rule by which the end of a contact was told, where contact_time was fitted to a force trace"),
+    FIELD_CHOICE(Material, separation, separation_names, OPTIONAL, "rule for the end of a contact, where contact_time was fitted to a force trace"),
     FIELD_REAL(Material, least_speed, "m/s", AT_MIN(0), OPTIONAL, "least approach speed that was measured"),
     FIELD_REAL(Material, most_speed, "m/s", AT_MIN(0), OPTIONAL, "largest approach speed that was measured"),
     FIELD_REAL(Material, least_temperature, "degC", AT_MIN(-273.15), OPTIONAL, "lowest temperature at which it was measured"),

@@ -328,7 +328,7 @@ static Status target_add_decisions(const AccuracyTarget *target, const Candidate
             Decision *decision = &decisions->at[i];
             if (strcmp(decision->about, chosen[k]) != 0)
                 continue;
-            char *why = strdup("accuracy.target chose it");
+            char *why = strdup("chosen by accuracy.target");
             if (why == NULL)
                 return STATUS_NO_MEMORY;
             free(decision->why);
@@ -337,14 +337,14 @@ static Status target_add_decisions(const AccuracyTarget *target, const Candidate
     const char *metric = metric_names[target->asked->metric];
     const bool is_whole = candidate_is_whole(candidate);
     const size_t before = decisions->count;
-    TRY(decisions_add(decisions, "target", name, candidate->predicted, NULL,
-                      !is_whole ? "the cheapest way that is foretold to keep an error of %.3g of %s"
-                      : target->has_tolerance || target->plan->storeys > 1
-                          ? "nothing that could be given up is foretold to keep an error of %.3g "
-                            "of %s"
-                          : "no cheaper way keeps an error of %.3g of %s: its contacts and its "
-                            "flight are known exactly, step for step",
-                      target->asked->target, metric));
+    TRY(decisions_add(
+        decisions, "target", name, candidate->predicted, NULL,
+        !is_whole ? "the cheapest settings that are predicted to keep an error of %.3g of %s"
+        : target->has_tolerance || target->plan->storeys > 1
+            ? "no cheaper settings are predicted to keep an error of %.3g of %s"
+            : "no cheaper settings keep an error of %.3g of %s: contacts and flight "
+              "have exact solutions",
+        target->asked->target, metric));
     if (is_whole || decisions->count == before)
         return STATUS_OK;
     const Candidate whole = candidate_whole(target);
@@ -481,20 +481,21 @@ static Status search_warn(const TargetSearch *search) {
     const AccuracyTarget *target = &search->target;
     const Summary *summary = &search->outcome->summary;
     const char *metric = metric_names[target->asked->metric];
-    char until[64] = "";
+    char until[80] = "";
     if (search->estimated <= target->asked->target)
         return STATUS_OK;
     if (!isnan(summary->trust_horizon))
-        snprintf(until, sizeof until, "; to t = %.6g s the path is known to %g",
+        snprintf(until, sizeof until, "; up to t = %.6g s the trajectory is valid to %g",
                  summary->trust_horizon, RESPONSE_DIVERGENCE);
     if (isnan(search->estimated))
-        return warnings_add(&search->outcome->warnings, "/accuracy/target",
-                            "whether the error of %s is below %.3g is not known: rounding parts "
-                            "the path from the scene's own within the run%s",
-                            metric, target->asked->target, until);
+        return warnings_add(
+            &search->outcome->warnings, "/accuracy/target",
+            "whether the error of %s is below %.3g is unknown: rounding errors grow "
+            "until the trajectory diverges within the run%s",
+            metric, target->asked->target, until);
     return warnings_add(&search->outcome->warnings, "/accuracy/target",
-                        "the error of %s is about %.2g, more than %.3g: double precision gives no "
-                        "better%s",
+                        "the error of %s is about %.2g, more than %.3g: double precision allows no "
+                        "smaller one%s",
                         metric, search->estimated, target->asked->target, until);
 }
 

@@ -36,17 +36,16 @@ Status exact_decide(const Accuracy *accuracy, double base_interval, Plan *plan, 
     const bool is_asked = tolerance > POWER_CONTACT_TOLERANCE;
     return decisions_add(&plan->report.decisions, "tolerance", is_asked ? "asked" : "rounding",
                          tolerance, NULL,
-                         is_asked ? "relative error that a contact may end with; flight between "
-                                    "contacts is exact, and instants are found as well as these "
-                                    "contacts are known"
-                                  : "each contact as exact as rounding lets it be, for none asked "
-                                    "for less");
+                         is_asked ? "relative error of a contact at its end; flight is exact, and "
+                                    "events are located as accurately as the contacts"
+                                  : "contacts are exact to rounding, since no tolerance is "
+                                    "requested");
 }
 
 // clang-format off
 const Field accuracy_exact_fields[] = {
     FIELD_BASE(AccuracyExact, accuracy, accuracy_fields),
-    FIELD_REAL(AccuracyExact, tolerance, NULL, WITHIN(1e-15, 1e-1), OPTIONAL, "relative error that a contact under a power law may end with; if absent none but rounding's; of no use to other laws, whose contacts have closed forms"),
+    FIELD_REAL(AccuracyExact, tolerance, NULL, WITHIN(1e-15, 1e-1), OPTIONAL, "relative error of a contact under a power law at its end; if absent that of rounding; without effect on other laws, whose contacts have closed forms"),
     FIELD_END
 };
 // clang-format on

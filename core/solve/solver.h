@@ -37,13 +37,13 @@ typedef struct RunColumn {
     double *values; // plan->count of them
 } RunColumn;
 
-// Work is foretold and counted in solver steps, whatever the solver: each stands for about this
+// Work is predicted and counted in solver steps, whatever the solver: each stands for about this
 // much CPU time on a middling machine [s].
 #define SOLVER_STEP 3e-8
 
-// What is said of a run that takes more than was foretold: steps, the same in seconds, and when.
+// Message for a run that takes more steps than predicted: steps, the same in seconds, and when.
 #define SOLVER_STOPPED                                                                             \
-    "more than %.3g solver steps, about %.3g s of CPU, far more than foretold; stopped at "
+    "more than %.3g solver steps, about %.3g s of CPU, far more than predicted; stopped at "
 
 // One run: borrowed inputs, and where samples go.
 typedef struct Run {

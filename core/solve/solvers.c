@@ -5,7 +5,7 @@
 // clang-format off
 static const Field auto_fields[] = {
     FIELD_BASE(AccuracyAuto, accuracy, accuracy_fields),
-    FIELD_REAL(AccuracyAuto, target, NULL, WITHIN(1e-15, 1), OPTIONAL, "relative error wanted: the cheapest way foretold to keep it is taken, and the answer says what error it came to; if absent all that double precision gives"),
+    FIELD_REAL(AccuracyAuto, target, NULL, WITHIN(1e-15, 1), OPTIONAL, "relative error requested: the cheapest settings that are predicted to keep it are run, and the result states the estimated error; if absent the accuracy of double precision"),
     FIELD_CHOICE(AccuracyAuto, metric, metric_names, OPTIONAL, "what the target is of; displacement if absent"),
     FIELD_END
 };

@@ -182,7 +182,7 @@ def test_a_rig_is_the_revisions():
         assert dry(daemon, rig("loose"))["scene"]["dampers"][0]["rig"] == {"impactor_mass": 0.11, "base_mass": 0.5}
         assert dry(daemon, rig("loose", rig={"impactor_mass": 3}))["scene"]["dampers"][0]["rig"] == {"impactor_mass": 3}
         fault = problem(daemon.request("POST", "/v1/jobs", json=rig("sponge")), 422, "/dampers/0/rig")["errors"][0]
-        assert "sponge@1 does not tell the base that it lay on" in fault["detail"], fault
+        assert "sponge@1 does not state the base that it lay on" in fault["detail"], fault
         given, taken = program.finished(daemon, rig("felt", rig={"impactor_mass": 0.11})), program.finished(daemon, rig("felt"))
         assert taken["cached"] and taken["result"] == given["result"], taken
 
