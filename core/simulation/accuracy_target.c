@@ -416,18 +416,13 @@ typedef struct TargetSearch {
 
 static Status search_add_attempt(TargetSearch *search, const Candidate *candidate, double estimated,
                                  double steps) {
-    PlanAttempts *attempts = &search->attempts;
-    PlanAttempt *at = realloc(attempts->at, (attempts->count + 1) * sizeof *at);
-    if (at == NULL)
-        return STATUS_NO_MEMORY;
-    attempts->at = at;
     char name[NAME];
-    candidate_name(candidate, name);
-    char *text = strdup(name);
-    if (text == NULL)
+    PlanAttempt *attempt = list_append(&search->attempts, sizeof *attempt);
+    if (attempt == NULL)
         return STATUS_NO_MEMORY;
-    at[attempts->count++] = (PlanAttempt){text, candidate->predicted, estimated, steps};
-    return STATUS_OK;
+    candidate_name(candidate, name);
+    *attempt = (PlanAttempt){strdup(name), candidate->predicted, estimated, steps};
+    return attempt->way != NULL ? STATUS_OK : STATUS_NO_MEMORY;
 }
 
 // Runs one candidate. A run that fails and gives something up leaves no outcome; the search goes

@@ -46,7 +46,7 @@ static Status impact_run_add_states(const Scene *scene, Output *output) {
         TRY(channel_names_add(scene, (ChannelId)(channel - channels), number > 0 ? number : 1,
                               names));
     }
-    channel_names_clear(transformed);
+    texts_clear(transformed);
     for (size_t k = 0; k < COUNT(states); k++) {
         const size_t count =
             k < 2 ? structure_storeys(scene_structure(scene)) : scene->dampers.count;
