@@ -414,17 +414,6 @@ typedef struct TargetSearch {
     PlanAttempts attempts;
 } TargetSearch;
 
-static Status search_add_attempt(TargetSearch *search, const Candidate *candidate, double estimated,
-                                 double steps) {
-    char name[NAME];
-    PlanAttempt *attempt = list_append(&search->attempts, sizeof *attempt);
-    if (attempt == NULL)
-        return STATUS_NO_MEMORY;
-    candidate_name(candidate, name);
-    *attempt = (PlanAttempt){strdup(name), candidate->predicted, estimated, steps};
-    return attempt->way != NULL ? STATUS_OK : STATUS_NO_MEMORY;
-}
-
 // Runs one candidate. A run that fails and gives something up leaves no outcome; the search goes
 // on.
 static Status search_run(TargetSearch *search, const Candidate *candidate, Problem *problem) {
@@ -437,29 +426,31 @@ static Status search_run(TargetSearch *search, const Candidate *candidate, Probl
     outcome_unref(search->outcome);
     search->outcome = NULL;
     search->estimated = 1;
-    Problem *fault = is_whole ? problem : calloc(1, sizeof *fault);
+    search->done = range.from + range.share;
+    Problem *fault = is_whole ? problem : NULL; // another candidate follows
     Status status = candidate_apply(search->target.simulation, candidate, &applied, fault);
     if (status == STATUS_OK)
         status = run_scene(&applied, search->limits, &progress, search->workspace, NULL,
                            &search->outcome, fault);
     simulation_clear(&applied);
+    PlanAttempt attempt = {NULL, candidate->predicted, (double)NAN, (double)NAN};
     if (status == STATUS_OK) {
-        search->estimated = target_estimate(&search->target, candidate, search->outcome);
-        search->steps += search->outcome->steps;
+        attempt.estimated_error = search->estimated =
+            target_estimate(&search->target, candidate, search->outcome);
+        attempt.steps = search->outcome->steps;
+        search->steps += attempt.steps;
         work_counters_add(&search->work, &search->outcome->work);
-        if (search_add_attempt(search, candidate, search->estimated, search->outcome->steps) !=
-            STATUS_OK)
-            status = problem_set(fault, STATUS_NO_MEMORY, "no memory for a run");
-    } else if (!is_whole && status != STATUS_CANCELLED && status != STATUS_NO_MEMORY) {
-        status = search_add_attempt(search, candidate, (double)NAN, (double)NAN);
+    } else if (is_whole || status == STATUS_CANCELLED || status == STATUS_NO_MEMORY) {
+        return problem_set(problem, status,
+                           status == STATUS_CANCELLED ? "cancelled" : "no memory for a run");
     }
-    if (fault != problem) {
-        if (status != STATUS_OK)
-            problem_set(problem, status, "%s", fault != NULL ? fault->detail : "no memory");
-        free(fault);
-    }
-    search->done = range.from + range.share;
-    return status;
+    char name[NAME];
+    candidate_name(candidate, name);
+    PlanAttempt *added = list_append(&search->attempts, sizeof *added);
+    if (added == NULL || (attempt.way = strdup(name)) == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run");
+    *added = attempt;
+    return STATUS_OK;
 }
 
 // The next candidate: tightened by the factor that the last one missed, with a margin.

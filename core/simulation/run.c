@@ -314,7 +314,7 @@ static Status run_solve(RunContext *context, const Regime *regime, Workspace *wo
         TRY(rest_run(&run, &outcome->response, problem));
     else
         TRY(simulation_solver(simulation)->run(&run, &outcome->response, problem));
-    outcome->steps = run.steps;
+    outcome->steps = run.steps * cost_step(simulation);
     outcome->work = run.work;
     outcome->work.base_samples = context->base.count;
     outcome->work.channel_values = run.column_count * context->plan->count;
