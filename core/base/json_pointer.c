@@ -421,6 +421,34 @@ void json_pointer_index(char *target, size_t size, const char *pointer, size_t i
     json_pointer_join(target, size, pointer, name);
 }
 
+Status json_pointer_fault(Problem *problem, const char *pointer, const char *name,
+                          const char *format, ...) {
+    char place[sizeof((Fault){0}.pointer)], detail[2 * sizeof((Fault){0}.detail)];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(detail, sizeof detail, format, arguments);
+    va_end(arguments);
+    json_pointer_join(place, sizeof place, pointer, name);
+    return problem_add(problem, STATUS_INVALID, place, "%s", detail);
+}
+
+Status json_pointer_fault_real(Problem *problem, const char *pointer, const char *name,
+                               double value, const char *unit, const char *format, ...) {
+    char place[sizeof((Fault){0}.pointer)], detail[2 * sizeof((Fault){0}.detail)];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(detail, sizeof detail, format, arguments);
+    va_end(arguments);
+    json_pointer_join(place, sizeof place, pointer, name);
+    return problem_add_real(problem, STATUS_INVALID, place, value, unit, "%s", detail);
+}
+
+bool json_pointer_concerns(const Problem *problem, const char *pointer, const char *name) {
+    char place[sizeof((Fault){0}.pointer)];
+    json_pointer_join(place, sizeof place, pointer, name);
+    return problem_concerns(problem, place);
+}
+
 JsonScalar json_scalar_number(double number) {
     const bool is_whole = number >= 0 && number < 0x1p63 && floor(number) == number;
     return (JsonScalar){.kind = JSON_SCALAR_NUMBER,
