@@ -1,5 +1,5 @@
-// What all kinds share, and the kind without motion of the base: free vibration from the initial
-// state.
+// Functions shared by all kinds, and the kind without motion of the base: free vibration from the
+// initial state.
 #include "core/excitation/excitation.h"
 
 #include "core/base/json_pointer.h"

@@ -1,4 +1,4 @@
-// The coarser signal's samples are the grid: to look between them would be to compare a line.
+// Signals are compared at the samples of the coarser one, because it is unknown between them.
 #include "core/result/signal_comparison.h"
 
 #include <math.h>
@@ -23,13 +23,13 @@ const Field signal_comparison_fields[] = {
 };
 // clang-format on
 
-enum { WATCH_SAMPLES = 1 << 16 }; // compared between two looks at the progress
+enum { WATCH_SAMPLES = 1 << 16 }; // compared between two checks of the progress
 
 // A time within this part of a sample interval of a sample is that sample's.
 static const double snap = 1e-6;
 
 static double signal_value_at(const Signal *signal, double time) {
-    // Far from time 0 a time has few digits: what rounding puts beside the signal is its end's.
+    // Far from time 0 rounding may put a time outside the signal: it belongs to the end.
     const double last = (double)(signal->count - 1);
     const double index = fmin(fmax((time - signal->start) * signal->rate, 0), last);
     const double near = nearbyint(index);
@@ -141,10 +141,10 @@ Status signal_comparison_align(const Signal *reference, const Signal *other, siz
     return STATUS_OK;
 }
 
-// What is left of a constant when its mean is taken off is its rounding, and no motion.
+// A constant without its mean is rounding noise, not motion.
 static const double motionless = 1e-24; // of the energy
 
-// On a grid of `rate` from the signal's own start, its mean taken off; zeros behind it.
+// On a grid of `rate` from the signal's own start, without its mean; zeros behind it.
 static void signal_put_centred(const Signal *signal, double rate, size_t count, double *target,
                                size_t size) {
     double sum = 0, whole = 0, rest = 0;
@@ -172,7 +172,7 @@ static double signal_share(const double *energy, ptrdiff_t from, ptrdiff_t to) {
     return energy[to] - energy[from];
 }
 
-// What a correlation needs: the lag is in samples, of `other` behind the reference's start.
+// Inputs of a correlation. Lags are in samples, of `other` behind the start of the reference.
 typedef struct Lags {
     const double *products;     // by lag, negative ones from the end
     size_t size;                // of those
@@ -218,8 +218,8 @@ static double signal_moved_correlation(const Signal *reference, const Signal *ot
     return signal_comparison_measure(reference, &moved, 1, NULL).correlation;
 }
 
-// The parabola leans where an end of one comes into the other's span: of its vertex and the whole
-// sample beside it, that at which both are more alike.
+// The parabola is skewed where one signal ends within the other's span: of its vertex and the
+// nearest sample, the one with the larger correlation.
 static double signal_better_shift(const Signal *reference, const Signal *other, double whole,
                                   double vertex) {
     return signal_moved_correlation(reference, other, whole) >=

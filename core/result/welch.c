@@ -15,7 +15,7 @@
 
 #define PI 3.14159265358979323846264338328
 
-enum { WATCH_SAMPLES = 1 << 16 }; // transformed between two looks at the progress
+enum { WATCH_SAMPLES = 1 << 16 }; // transformed between two checks of the progress
 
 const char *const welch_window_names[] = {"hann", "boxcar", "hamming", "blackman", NULL};
 const char *const welch_detrend_names[] = {"constant", "linear", "none", NULL};
@@ -28,7 +28,7 @@ static const double window_terms[][3] = {
     [WELCH_BLACKMAN] = {0.42, 0.5, 0.08},
 };
 
-// A sum with the roundings added up beside it (Neumaier 1974), for millions of terms.
+// A sum with a second sum of its rounding errors (Neumaier 1974), for millions of terms.
 typedef struct Sum {
     double value, rest;
 } Sum;
@@ -49,7 +49,7 @@ static void welch_make_window(int window, double *w, size_t length) {
     fft_cosines(0, 2 * PI / (double)length, length, w);
     for (size_t n = 0; n < length; n++) {
         const double c = w[n];
-        // A window of one sample is 1, whatever its name.
+        // Every window of one sample is 1.
         w[n] = length == 1 ? 1 : a[0] - a[1] * c + a[2] * (2 * c * c - 1);
     }
 }
@@ -77,7 +77,7 @@ static void welch_remove_trend(int detrend, double *x, size_t length) {
         x[n] -= slope * ((double)n - middle);
 }
 
-// What the columns share.
+// Data shared by all columns.
 typedef struct Welch {
     WelchSettings settings;
     size_t segments, bins;

@@ -122,7 +122,7 @@ ContactNumbers buffer_numbers(const Buffer *buffer) {
                             buffer->damping,     buffer->exponent,     buffer->table};
 }
 
-// Whether the numbers make one of the ways, whatever the law.
+// Whether the numbers form one of these combinations, under any law.
 static Status buffer_check_way(const Buffer *buffer, const ContactLaw *law, const char *pointer,
                                Problem *problem) {
     if (!buffer_has_numbers(buffer)) {
@@ -140,7 +140,7 @@ static Status buffer_check_way(const Buffer *buffer, const ContactLaw *law, cons
                            "contact_time, stiffness and damping");
     if (law->form == CONTACT_POWER || has_table)
         return STATUS_OK;
-    // A power law's way; under impulse all but the restitution is left out.
+    // The combination of a power law; under impulse only the restitution is kept.
     if (law->form == CONTACT_IMPULSIVE && buffer_has(buffer->restitution) &&
         buffer_has(buffer->stiffness) && !buffer_has(buffer->damping) &&
         !buffer_has(buffer->contact_time))

@@ -60,11 +60,11 @@ const ContactLaw *dampers_contact_law(const Dampers *dampers, const Contact *con
 static Status damper_check_buffers(Damper *damper, const ContactLaw *law, const char *pointer,
                                    Problem *problem) {
     char places[BUFFERS][sizeof((Fault){0}.pointer)];
-    bool is_given[BUFFERS], is_told = false;
+    bool is_given[BUFFERS], has_fault = false;
     for (size_t i = 0; i < BUFFERS; i++) {
         json_pointer_join(places[i], sizeof places[i], pointer, buffer_names[i]);
         is_given[i] = buffer_is_given(damper_buffer_at(damper, i));
-        is_told = is_told || problem_concerns(problem, places[i]);
+        has_fault = has_fault || problem_concerns(problem, places[i]);
     }
     Status status = STATUS_OK;
     for (size_t i = 0; i < BUFFERS; i++)
@@ -72,7 +72,7 @@ static Status damper_check_buffers(Damper *damper, const ContactLaw *law, const 
             buffer_validate(damper_buffer_at(damper, i), law, places[i], problem) != STATUS_OK)
             status = STATUS_INVALID;
     // A buffer that could not be read may be the one that seems to be missing.
-    if (is_told)
+    if (has_fault)
         return STATUS_INVALID;
     if (is_given[0] && is_given[1] && is_given[2])
         return problem_add(problem, STATUS_INVALID, places[0],
@@ -149,8 +149,8 @@ static bool rig_is_given(const Damper *damper) {
     return !isnan(damper->rig.impactor_mass) || !isnan(damper->rig.base_mass);
 }
 
-// The first side whose material does not tell all of the masses that it was tested with; NULL: all
-// that were measured tell the same ones, *test.
+// The first measured buffer without the masses of its test. NULL: all have them; *test is the first
+// test, and *is_alike whether the others had the same masses.
 static const Buffer *damper_find_unstated(const Damper *damper, const BufferTest **test,
                                           bool *is_alike) {
     *test = NULL;
@@ -199,8 +199,8 @@ void damper_reset_rig(const Damper *base, Damper *damper) {
     if (base->identified_for != IDENTIFIED_FOR_RIG || !rig_is_same(&base->rig, &damper->rig) ||
         damper_find_unstated(base, &test, &is_alike) != NULL || test == NULL || !is_alike)
         return;
-    const Rig told = rig_of(test);
-    if (!rig_is_same(&base->rig, &told))
+    const Rig tested = rig_of(test);
+    if (!rig_is_same(&base->rig, &tested))
         return;
     for (int side = 0; side < 2; side++) {
         const Buffer *buffer = damper_buffer(damper, (Side)side);
@@ -214,14 +214,14 @@ void damper_reset_rig(const Damper *base, Damper *damper) {
 static Status rig_refuse(const Damper *damper, const char *place, Problem *problem) {
     const BufferTest *test;
     bool is_alike;
-    const Buffer *untold = damper_find_unstated(damper, &test, &is_alike);
-    if (untold == NULL)
+    const Buffer *unstated = damper_find_unstated(damper, &test, &is_alike);
+    if (unstated == NULL)
         return problem_add(problem, STATUS_INVALID, place,
                            "is required by identified_for \"rig\": %.64s and %.64s were measured "
                            "with other masses, and a damper has one rig",
                            damper_buffer(damper, SIDE_LEFT)->material,
                            damper_buffer(damper, SIDE_RIGHT)->material);
-    if (untold->material == NULL)
+    if (unstated->material == NULL)
         return problem_add(problem, STATUS_INVALID, place,
                            "is required by identified_for \"rig\": the impactor_mass [kg] and, "
                            "unless it was fixed, the base_mass of the test that measured "
@@ -229,10 +229,11 @@ static Status rig_refuse(const Damper *damper, const char *place, Problem *probl
     return problem_add(problem, STATUS_INVALID, place,
                        "is required by identified_for \"rig\": %.64s does not state %s; give the "
                        "impactor_mass [kg] and, unless it was fixed, the base_mass of its test",
-                       untold->material,
-                       !isnan(untold->test.base_mass)       ? "the mass of the impactor"
-                       : !isnan(untold->test.impactor_mass) ? "the base that it lay on"
-                                                            : "the masses that it was tested with");
+                       unstated->material,
+                       !isnan(unstated->test.base_mass) ? "the mass of the impactor"
+                       : !isnan(unstated->test.impactor_mass)
+                           ? "the base that it lay on"
+                           : "the masses that it was tested with");
 }
 
 static Status rig_check(const Damper *damper, const ContactLaw *law, const char *pointer,

@@ -1,5 +1,5 @@
-// A material says e and T_c once, for every approach speed, or as a table; what it does not know it
-// does not say.
+// A material has e and T_c once, for every approach speed, or as a table. Unknown values are
+// absent.
 #include "core/scene/material.h"
 #include "core/base/json_pointer.h"
 
@@ -111,7 +111,7 @@ static Status material_check_table(const Material *material, const char *pointer
             status = json_pointer_fault(problem, at, "contact_time_deviation",
                                         "needs a contact_time that it belongs to");
         if (i == 0 || !(row->approach_speed <= rows->at[i - 1].approach_speed))
-            continue; // also where one is not known
+            continue; // also where one is unknown
         status = json_pointer_fault_real(problem, at, "approach_speed", row->approach_speed, "m/s",
                                          "must be above the row before, %s m/s, is %s",
                                          text_real(than, rows->at[i - 1].approach_speed),
@@ -173,7 +173,7 @@ static Status material_check_measurements(const Material *material, const char *
         json_pointer_join(list, sizeof list, pointer, "measurements");
         json_pointer_index(place, sizeof place, list, i);
         status = problem_add_real(problem, STATUS_INVALID, place, number, NULL,
-                                  is_again ? "stands there twice, %s"
+                                  is_again ? "is listed twice, %s"
                                            : "must be the number of a measurement, is %s",
                                   text_real(is, number));
     }

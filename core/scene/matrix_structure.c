@@ -1,7 +1,7 @@
-// Any linear structure by its matrices. What makes them one: M and K symmetric, M positive
+// Any linear structure by its matrices. Requirements: M and K symmetric, M positive
 // definite, K positive semi-definite, and v'Cv never negative, that is C's symmetric part positive
-// semi-definite; C itself need not be symmetric. All to rounding, judged on matrices scaled to a
-// unit diagonal, so that units and heavy beside light storeys change nothing.
+// semi-definite; C itself need not be symmetric. All are checked to rounding on matrices scaled to
+// a unit diagonal, so that units and the ratios of masses have no effect.
 #include "core/scene/structure.h"
 
 #include <float.h>
@@ -118,7 +118,7 @@ static Status matrix_check(const Checked *matrix, size_t storeys, const char *po
     char place[sizeof((Fault){0}.pointer)];
     json_pointer_join(place, sizeof place, pointer, matrix->name);
     if (problem_concerns(problem, place))
-        return STATUS_OK; // told by the rows
+        return STATUS_OK; // reported by the rows
     TRY(matrix_check_square(matrix, storeys, place, problem));
     if (matrix->is_symmetric)
         TRY(matrix_check_symmetry(matrix, place, problem));
@@ -146,7 +146,7 @@ static Status matrices_complete(Structure *structure, const char *pointer, Probl
     const size_t n = matrix->mass.count;
     const double rounding = 8 * DBL_EPSILON * (double)n;
     if (n == 0 || n > STRUCTURE_STOREYS)
-        return STATUS_OK; // told by the rows
+        return STATUS_OK; // reported by the rows
     const Checked checked[] = {
         {&matrix->mass, "mass", "kg", true, -distance, "positive definite"},
         {&matrix->stiffness, "stiffness", "N/m", true, rounding, "positive semi-definite"},
@@ -156,7 +156,7 @@ static Status matrices_complete(Structure *structure, const char *pointer, Probl
     Status status = STATUS_OK;
     for (size_t i = 0; i < COUNT(checked); i++) {
         const Status found = checked[i].rows->count == 0
-                                 ? STATUS_OK // missing: told by the rows
+                                 ? STATUS_OK // missing: reported by the rows
                                  : matrix_check(&checked[i], n, pointer, problem);
         status = found != STATUS_OK ? found : status;
     }

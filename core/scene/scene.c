@@ -1,5 +1,5 @@
-// Judging what rows cannot see. Each part is judged on its own, so that all faults are told at
-// once; a part that could not be read, or has a fault already, is passed over.
+// Validation beyond single fields. Each part is validated on its own, so that all faults are
+// reported at once; a part that could not be read, or already has a fault, is skipped.
 #include "core/scene/scene.h"
 #include "core/base/json_pointer.h"
 
@@ -49,7 +49,7 @@ static Status scene_check_samples(const Scene *scene, size_t most, Problem *prob
                             duration, rate, count, most);
 }
 
-// Whether numbers that each are in range come to parameters that doubles can hold: of a power law
+// Whether numbers that are in range give parameters that doubles can hold: of a power law
 // between a slow impact and a fast one, an isolated contact lasting 1 to 1e3 of its own units.
 static bool scene_is_sound(const ContactLaw *law, int separation, double mass,
                            const ContactNumbers *numbers) {
@@ -99,12 +99,12 @@ static Status scene_check_contacts(const Scene *scene, Problem *problem) {
     for (size_t i = 0; law->form != CONTACT_IMPULSIVE && i < scene->dampers.count; i++) {
         const Damper *damper = &scene->dampers.at[i];
         if (damper->storey < 1 || damper->storey > structure_storeys(structure))
-            continue; // told by the rows
+            continue; // reported by the rows
         double moved;
-        const Status known =
+        const Status found =
             structure_kind(structure)->moved_mass(structure, (size_t)damper->storey - 1, &moved);
-        if (known == STATUS_NO_MEMORY)
-            return problem_set(problem, known, "no memory for a scene");
+        if (found == STATUS_NO_MEMORY)
+            return problem_set(problem, found, "no memory for a scene");
         const double mass = contact_effective_mass(moved, damper->mass);
         TRY(scene_check_contact(scene, law, i, SIDE_LEFT, mass, problem));
         if (damper_buffer(damper, SIDE_RIGHT) != damper_buffer(damper, SIDE_LEFT))
@@ -116,7 +116,7 @@ static Status scene_check_contacts(const Scene *scene, Problem *problem) {
 static Status scene_complete_dampers(Scene *scene, size_t storeys, Problem *problem) {
     const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
     Status status = STATUS_OK;
-    // More than the rows allow were told by the rows.
+    // Dampers beyond the limit were reported by the rows.
     for (size_t i = 0; i < scene->dampers.count && i < SCENE_DAMPERS; i++) {
         char place[sizeof((Fault){0}.pointer)];
         json_pointer_index(place, sizeof place, "/dampers", i);
@@ -131,7 +131,7 @@ static Status scene_complete_dampers(Scene *scene, size_t storeys, Problem *prob
     return status;
 }
 
-// Without dampers nothing ever meets: whatever was said of contacts means the same.
+// Without dampers there are no contacts, so every contact model means the same.
 static Status scene_reset_contact(Scene *scene, Problem *problem) {
     Variant *usual = variant_new(contact_kinds.at(0));
     if (usual == NULL)
@@ -141,7 +141,7 @@ static Status scene_reset_contact(Scene *scene, Problem *problem) {
     return STATUS_OK;
 }
 
-// The initial state has one number per storey; a lone 0 means rest whatever their number.
+// The initial state has one number per storey; a single 0 means rest for any number of storeys.
 static Status scene_complete_start(Reals *start, const char *name, const char *unit, size_t storeys,
                                    Problem *problem) {
     if (start->count == 0 || (start->count == 1 && start->at[0] == 0))

@@ -2,7 +2,7 @@
 //
 //   M = diag(m_1 ... m_n),  K_ii = k_i + k_i+1,  K_i,i+1 = K_i+1,i = -k_i+1,  C likewise,  r = 1
 //
-// Such a K is positive semi-definite whatever its springs, if none is negative.
+// Such a K is positive semi-definite if no spring is negative.
 #include "core/scene/structure.h"
 
 #include "core/base/json_pointer.h"
@@ -50,7 +50,7 @@ static Status frame_complete(Structure *structure, const char *pointer, Problem 
     const size_t storeys = frame->masses.count;
     if (storeys == 0 || storeys > STRUCTURE_STOREYS ||
         json_pointer_concerns(problem, pointer, "masses"))
-        return STATUS_OK; // told by the rows
+        return STATUS_OK; // reported by the rows
     if (frame->dampings.count == 0 && isnan(structure->damping_ratio))
         TRY(structure_zeros(&frame->dampings, storeys, problem));
     const Status faults[] = {

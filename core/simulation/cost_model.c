@@ -12,10 +12,10 @@ static const double TURN = 6.28318530717958647693;
 // and after it.
 static const double SAMPLE = 0.08, SAMPLE_NEAR_STOPS = 0.15, ARC = 8, IMPACT = 50;
 // A value of a channel: 2 ns a byte for memory that is new to the process, and its sum over modes.
-static const double VALUE = 0.55, VALUE_MODE = 0.04;
+static const double VALUE = 0.5, VALUE_MODE = 0.04;
 // CPU time of a step that the solvers count, over SOLVER_STEP: exact, exact with a power law, and
 // solvers that step. Measured by tests/bench/bench_cost.c.
-static const double EXACT_STEP = 0.65, POWER_STEP = 0.75, STEPPED_STEP = 1.4;
+static const double EXACT_STEP = 0.65, POWER_STEP = 0.75, STEPPED_STEP = 1.15;
 static const double MODES = 2; // storeys cubed
 static const double RUN = 200; // plan, memory and summary
 static const double RUN_BYTES = 1e5;
@@ -233,10 +233,11 @@ Cost cost_scene(const Simulation *simulation) {
     const Output *output = &simulation->output;
     const double samples = (double)scene_sample_count(scene);
     const double storeys = (double)structure_storeys(scene_structure(scene));
-    const double columns = (double)(output->channels.count + output->psd.channels.count);
     const double modes = storeys > 1 ? storeys : 0;
-    Cost cost = {.spectra = cost_spectra(&output->psd, scene_sample_count(scene)),
-                 .output = samples * columns * (VALUE + VALUE_MODE * modes)};
+    const double channel = samples * (VALUE + VALUE_MODE * modes);
+    Cost cost = {.spectra = cost_spectra(&output->psd, scene_sample_count(scene)) +
+                            channel * (double)output->psd.channels.count,
+                 .output = channel * (double)output->channels.count};
     cost_add_bytes(simulation, &cost);
     cost.base = cost_base_samples(simulation) * excitation_kind(scene_excitation(scene))->effort;
     cost.steps = RUN + cost.output + cost.spectra + cost.base + MODES * modes * modes * modes +

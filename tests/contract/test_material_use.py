@@ -147,7 +147,7 @@ def test_impacts_outside_the_measured_speeds_are_told():
             assert named["summary"] == own["summary"] and named["result"] != own["result"]
             [first] = warned(named, "/dampers/0/buffer")
             [second] = warned(own, "/dampers/0/buffer/table")
-            assert first.endswith("the nearest row is used there") and first.replace("rubber@1 was measured", "the table tells") == second
+            assert first.endswith("the nearest row is used there") and first.replace("rubber@1 was measured", "the table covers") == second
 
             # Within the range nothing is said, and one warning stands for each buffer.
             add(daemon, "cork", least_speed=0, most_speed=9)
