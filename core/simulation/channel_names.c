@@ -148,7 +148,7 @@ static Status channel_names_check(const char *name, const ChannelCounts *counts,
                  names, counts->storeys, counts->storeys == 1 ? "" : "s", counts->dampers,
                  counts->dampers == 1 ? "" : "s");
     else
-        snprintf(detail, sizeof detail, "must be %s, without a number: there is but one", meant);
+        snprintf(detail, sizeof detail, "must be %s, without a number: there is only one", meant);
     Fault fault = {0};
     text_fit(fault.pointer, sizeof fault.pointer, pointer);
     text_quote(fault.value, sizeof fault.value, name);

@@ -266,7 +266,8 @@ static void impact_run_add_peak(ImpactRun *run) {
     for (size_t i = 1; i < run->count; i++)
         if (fabs(points[i].force) > fabs(points[top].force))
             top = i;
-    if (top == 0 || top + 1 >= run->count || isnan(run->again.peak_force))
+    if (top == 0 || top + 1 >= run->count || isnan(run->again.peak_force) ||
+        !(points[top - 1].time < points[top].time && points[top].time < points[top + 1].time))
         return;
     const ContactPoint peak =
         impact_run_vertex(&points[top - 1], &points[top], &points[top + 1], run->again.peak_force);
