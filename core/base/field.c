@@ -84,13 +84,9 @@ static void fields_free(const Field *fields, void *item) {
             free(rows->at);
             break;
         }
-        case FIELD_KIND_TEXTS: {
-            const Texts *texts = member;
-            for (size_t i = 0; i < texts->count; i++)
-                free(texts->at[i]);
-            free(texts->at);
+        case FIELD_KIND_TEXTS:
+            texts_clear(member);
             break;
-        }
         case FIELD_KIND_LIST: {
             const List list = field_list(member);
             for (size_t i = 0; i < list.count; i++)
@@ -119,21 +115,6 @@ void fields_clear(const Field *fields, void *item) {
         return;
     fields_free(fields, item);
     fields_set_absent(fields, item);
-}
-
-static Status field_copy_texts(const char *const *source, size_t count, Texts *target) {
-    if (count == 0)
-        return STATUS_OK;
-    target->at = calloc(count, sizeof *target->at);
-    if (target->at == NULL)
-        return STATUS_NO_MEMORY;
-    for (; target->count < count; target->count++) {
-        char *text = strdup(source[target->count]);
-        if (text == NULL)
-            return STATUS_NO_MEMORY;
-        target->at[target->count] = text;
-    }
-    return STATUS_OK;
 }
 
 static Status field_copy_reals(const Reals *source, Reals *target) {
@@ -166,13 +147,11 @@ static Status fields_set_defaults(const Field *fields, void *item) {
         case FIELD_KIND_CHOICE:
             *(int *)member = (int)field->initial;
             break;
-        case FIELD_KIND_TEXTS: {
-            size_t count = 0;
-            while (field->initial_texts != NULL && field->initial_texts[count] != NULL)
-                count++;
-            TRY(field_copy_texts(field->initial_texts, count, member));
+        case FIELD_KIND_TEXTS:
+            for (const char *const *text = field->initial_texts; text != NULL && *text != NULL;
+                 text++)
+                TRY(texts_append(member, *text));
             break;
-        }
         case FIELD_KIND_VARIANT: {
             Variant *variant = variant_new(field->kinds->at(0));
             if (variant == NULL)
@@ -232,11 +211,10 @@ static Status fields_copy_members(const Field *fields, const void *source, void 
                 TRY(field_copy_reals(&rows->at[copy->count], &copy->at[copy->count]));
             break;
         }
-        case FIELD_KIND_TEXTS: {
-            const Texts *texts = from;
-            TRY(field_copy_texts((const char *const *)texts->at, texts->count, to));
+        case FIELD_KIND_TEXTS:
+            for (size_t i = 0; i < ((const Texts *)from)->count; i++)
+                TRY(texts_append(to, ((const Texts *)from)->at[i]));
             break;
-        }
         case FIELD_KIND_LIST: {
             const List list = field_list(from);
             if (list.count == 0)
@@ -365,6 +343,34 @@ static int reals_compare(const void *a, const void *b) {
 void reals_sort(double *values, size_t count) {
     if (count > 0)
         qsort(values, count, sizeof *values, reals_compare);
+}
+
+void *list_append(void *list, size_t element_size) {
+    List grown = field_list(list);
+    char *at = realloc(grown.at, (grown.count + 1) * element_size);
+    if (at == NULL)
+        return NULL;
+    void *const element = memset(at + grown.count * element_size, 0, element_size);
+    grown = (List){at, grown.count + 1};
+    memcpy(list, &grown, sizeof grown);
+    return element;
+}
+
+Status texts_append(Texts *texts, const char *text) {
+    char *copy = strdup(text), **at = copy == NULL ? NULL : list_append(texts, sizeof *at);
+    if (at == NULL) {
+        free(copy);
+        return STATUS_NO_MEMORY;
+    }
+    *at = copy;
+    return STATUS_OK;
+}
+
+void texts_clear(Texts *texts) {
+    for (size_t i = 0; i < texts->count; i++)
+        free(texts->at[i]);
+    free(texts->at);
+    *texts = (Texts){NULL, 0};
 }
 
 Variant *variant_new(const Kind *kind) {

@@ -246,6 +246,11 @@ bool reals_allocate(Reals *reals, size_t count);
 
 // Sorts numbers in ascending order.
 void reals_sort(double *values, size_t count);
+// Appends an element of zeros to a typed list. Returns it, or NULL without memory.
+void *list_append(void *list, size_t element_size);
+// Appends a copy of the text. STATUS_OK or STATUS_NO_MEMORY, which leaves the list unchanged.
+Status texts_append(Texts *texts, const char *text);
+void texts_clear(Texts *texts);
 
 // Creates a value of `kind` with its defaults; freed by variant_free. NULL without memory.
 Variant *variant_new(const Kind *kind);

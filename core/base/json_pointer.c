@@ -82,6 +82,17 @@ static bool json_pointer_element(const Reals *reals, const char *token, const ch
     return true;
 }
 
+static void json_pointer_note_shorthand(PointerTarget *target, const Field *field, void *member) {
+    size_t offset = 0;
+    const Field *name =
+        field->shorthand != NULL ? fields_find(field->fields, field->shorthand, &offset) : NULL;
+    if (name == NULL)
+        return;
+    target->name = (char **)(void *)((char *)member + offset + name->offset);
+    target->around = member;
+    target->item = field;
+}
+
 // Resolves the tokens below a member that is an item, variant, list or array.
 static bool json_pointer_descend(PointerTarget *target, const Field *field, void *member,
                                  const char *pointer, char message[JSON_POINTER_MESSAGE_MAX]);
@@ -107,6 +118,8 @@ static bool json_pointer_step(PointerTarget *target, const Field *fields, void *
     if (field == NULL)
         return json_pointer_fail_name(fields, token, of, message);
     void *member = (char *)item + offset + field->offset;
+    if (field->kind == FIELD_KIND_ITEM)
+        json_pointer_note_shorthand(target, field, member);
     if (*pointer != '\0')
         return json_pointer_descend(target, field, member, pointer, message);
     target->field = field;
@@ -120,18 +133,9 @@ static bool json_pointer_descend(PointerTarget *target, const Field *field, void
     List list;
     size_t index;
     switch (field->kind) {
-    case FIELD_KIND_ITEM: {
-        size_t offset = 0;
-        const Field *name =
-            field->shorthand != NULL ? fields_find(field->fields, field->shorthand, &offset) : NULL;
-        if (name != NULL) {
-            target->name = (char **)(void *)((char *)member + offset + name->offset);
-            target->around = member;
-            target->item = field;
-        }
+    case FIELD_KIND_ITEM:
         return json_pointer_step(target, field->fields, member, NULL, NULL, pointer, field->name,
                                  message);
-    }
     case FIELD_KIND_VARIANT: {
         Variant **variant = member;
         if (*variant == NULL)
@@ -292,14 +296,15 @@ static Status json_pointer_set_kind(const KindTable *kinds, Variant **variant,
 }
 
 // Replaces the whole item by its shorthand name.
-static Status json_pointer_set_name(const Field *field, void *item, char **name,
-                                    const JsonScalar *value,
+static Status json_pointer_set_name(const PointerTarget *target, const JsonScalar *value,
                                     char message[JSON_POINTER_MESSAGE_MAX]) {
+    const Field *item = target->item;
     if (value->kind != JSON_SCALAR_TEXT)
-        return json_pointer_fail_kind("a name", field, value, message);
-    if (fields_default(field->fields, item) != STATUS_OK)
+        return json_pointer_fail_kind("a name", item, value, message);
+    fields_clear(item->fields, target->around);
+    if (fields_default(item->fields, target->around) != STATUS_OK)
         return STATUS_NO_MEMORY;
-    return json_pointer_set_text(name, value->text);
+    return json_pointer_set_text(target->name, value->text);
 }
 
 static Status json_pointer_set_member(const Field *field, void *member, const JsonScalar *value,
@@ -371,19 +376,9 @@ Status json_pointer_set(const Field *fields, void *item, const char *pointer,
         *(double *)target.member = value->number;
         return STATUS_OK;
     }
-    if (target.field->kind == FIELD_KIND_ITEM) {
-        size_t offset = 0;
-        const Field *name = fields_find(target.field->fields, target.field->shorthand, &offset);
-        char **text = (char **)(void *)((char *)target.member + offset + name->offset);
-        if (value->kind == JSON_SCALAR_TEXT)
-            fields_clear(target.field->fields, target.member);
-        return json_pointer_set_name(target.field, target.member, text, value, message);
-    }
-    if (target.name != NULL && target.member == (void *)target.name) {
-        if (value->kind == JSON_SCALAR_TEXT)
-            fields_clear(target.item->fields, target.around);
-        return json_pointer_set_name(target.item, target.around, target.name, value, message);
-    }
+    if (target.name != NULL &&
+        (target.field == target.item || target.member == (void *)target.name))
+        return json_pointer_set_name(&target, value, message);
     TRY(json_pointer_set_member(target.field, target.member, value, message));
     if (target.name != NULL) {
         free(*target.name);
@@ -419,6 +414,34 @@ void json_pointer_index(char *target, size_t size, const char *pointer, size_t i
         *--name = (char)('0' + index % 10);
     while ((index /= 10) > 0);
     json_pointer_join(target, size, pointer, name);
+}
+
+Status json_pointer_fault(Problem *problem, const char *pointer, const char *name,
+                          const char *format, ...) {
+    char place[sizeof((Fault){0}.pointer)], detail[2 * sizeof((Fault){0}.detail)];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(detail, sizeof detail, format, arguments);
+    va_end(arguments);
+    json_pointer_join(place, sizeof place, pointer, name);
+    return problem_add(problem, STATUS_INVALID, place, "%s", detail);
+}
+
+Status json_pointer_fault_real(Problem *problem, const char *pointer, const char *name,
+                               double value, const char *unit, const char *format, ...) {
+    char place[sizeof((Fault){0}.pointer)], detail[2 * sizeof((Fault){0}.detail)];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(detail, sizeof detail, format, arguments);
+    va_end(arguments);
+    json_pointer_join(place, sizeof place, pointer, name);
+    return problem_add_real(problem, STATUS_INVALID, place, value, unit, "%s", detail);
+}
+
+bool json_pointer_concerns(const Problem *problem, const char *pointer, const char *name) {
+    char place[sizeof((Fault){0}.pointer)];
+    json_pointer_join(place, sizeof place, pointer, name);
+    return problem_concerns(problem, place);
 }
 
 JsonScalar json_scalar_number(double number) {

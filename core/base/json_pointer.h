@@ -9,6 +9,15 @@
 void json_pointer_join(char *target, size_t size, const char *pointer, const char *name);
 void json_pointer_index(char *target, size_t size, const char *pointer, size_t index);
 
+// Adds a fault at "pointer/name", as problem_add and problem_add_real. Returns STATUS_INVALID.
+Status json_pointer_fault(Problem *problem, const char *pointer, const char *name,
+                          const char *format, ...) __attribute__((format(printf, 4, 5)));
+Status json_pointer_fault_real(Problem *problem, const char *pointer, const char *name,
+                               double value, const char *unit, const char *format, ...)
+    __attribute__((format(printf, 6, 7)));
+// Whether there is a fault at "pointer/name" or below.
+bool json_pointer_concerns(const Problem *problem, const char *pointer, const char *name);
+
 // One number, text or truth value. The text is borrowed.
 typedef enum JsonScalarKind {
     JSON_SCALAR_NUMBER,

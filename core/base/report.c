@@ -21,7 +21,7 @@ const Field decision_fields[] = {
     FIELD_TEXT(Decision, why, 0, PRESENCE_OPTIONAL, 0, "the reason"),
     FIELD_REAL(Decision, value, NULL, ANY, OPTIONAL, "the number that decided"),
     FIELD_TEXT(Decision, unit, 0, PRESENCE_OPTIONAL, 0, "of that number"),
-    FIELD_REAL(Decision, saving, NULL, ANY, OPTIONAL, "of what is left out: the part of the foretold cost that this saves"),
+    FIELD_REAL(Decision, saving, NULL, ANY, OPTIONAL, "of an omission: share of the predicted cost that it saves"),
     FIELD_END
 };
 // clang-format on
@@ -39,21 +39,18 @@ static char *report_text(const char *format, va_list arguments) {
 Status warnings_add(Warnings *warnings, const char *pointer, const char *format, ...) {
     if (warnings == NULL || warnings->count >= REPORT_LINES_MAX)
         return STATUS_OK;
-    Warning *at = realloc(warnings->at, (warnings->count + 1) * sizeof *at);
-    if (at == NULL)
+    Warning *warning = list_append(warnings, sizeof *warning);
+    if (warning == NULL)
         return STATUS_NO_MEMORY;
-    warnings->at = at;
     va_list arguments;
     va_start(arguments, format);
-    const Warning warning = {.pointer = strdup(pointer), .detail = report_text(format, arguments)};
+    *warning = (Warning){.pointer = strdup(pointer), .detail = report_text(format, arguments)};
     va_end(arguments);
-    at[warnings->count] = warning;
-    if (warning.pointer == NULL || warning.detail == NULL) {
-        fields_clear(warning_fields, &at[warnings->count]);
-        return STATUS_NO_MEMORY;
-    }
-    warnings->count++;
-    return STATUS_OK;
+    if (warning->pointer != NULL && warning->detail != NULL)
+        return STATUS_OK;
+    fields_clear(warning_fields, warning);
+    warnings->count--;
+    return STATUS_NO_MEMORY;
 }
 
 void warnings_clear(Warnings *warnings) {
@@ -67,11 +64,10 @@ static Status decisions_append(Decisions *decisions, const Decision *given, cons
                                va_list arguments) {
     if (decisions == NULL || decisions->count >= REPORT_LINES_MAX)
         return STATUS_OK;
-    Decision *at = realloc(decisions->at, (decisions->count + 1) * sizeof *at);
-    if (at == NULL)
+    Decision *decision = list_append(decisions, sizeof *decision);
+    if (decision == NULL)
         return STATUS_NO_MEMORY;
-    decisions->at = at;
-    const Decision decision = {
+    *decision = (Decision){
         .about = strdup(given->about),
         .chose = strdup(given->chose),
         .why = report_text(format, arguments),
@@ -79,14 +75,12 @@ static Status decisions_append(Decisions *decisions, const Decision *given, cons
         .unit = given->unit != NULL ? strdup(given->unit) : NULL,
         .saving = given->saving,
     };
-    at[decisions->count] = decision;
-    if (decision.about == NULL || decision.chose == NULL || decision.why == NULL ||
-        (given->unit != NULL && decision.unit == NULL)) {
-        fields_clear(decision_fields, &at[decisions->count]);
-        return STATUS_NO_MEMORY;
-    }
-    decisions->count++;
-    return STATUS_OK;
+    if (decision->about != NULL && decision->chose != NULL && decision->why != NULL &&
+        (given->unit == NULL || decision->unit != NULL))
+        return STATUS_OK;
+    fields_clear(decision_fields, decision);
+    decisions->count--;
+    return STATUS_NO_MEMORY;
 }
 
 Status decisions_add(Decisions *decisions, const char *about, const char *chose, double value,

@@ -57,26 +57,26 @@ static Status chirp_complete(Excitation *excitation, const Span *span, const cha
     if (!(chirp->start_frequency >= 0) || !(chirp->end_frequency >= 0) ||
         !isfinite(chirp_highest(chirp)) || !(chirp->sweep_time > 0) || !isfinite(chirp->sweep_time))
         return STATUS_OK; // the row adds the fault
-    char place[sizeof((Fault){0}.pointer)], is[32], limit[32];
-    json_pointer_join(place, sizeof place, pointer, "end_frequency");
+    char is[32], limit[32];
     if (chirp_highest(chirp) == 0)
-        return problem_add_real(problem, STATUS_INVALID, place, chirp->end_frequency, "Hz",
-                                "must be above 0 Hz where the start frequency is 0 Hz");
+        return json_pointer_fault_real(problem, pointer, "end_frequency", chirp->end_frequency,
+                                       "Hz",
+                                       "must be above 0 Hz where the start frequency is 0 Hz");
     if (isnan(chirp->rate))
         chirp->rate = span->sample_rate *
                       fmax(ceil(KNOTS_A_CYCLE * chirp_highest(chirp) / span->sample_rate), 1);
     const size_t most = span->most != 0 && span->most < KNOTS_MAX ? span->most : KNOTS_MAX;
-    json_pointer_join(place, sizeof place, pointer, "rate");
     if (chirp_highest(chirp) > chirp->rate / 2)
-        return problem_add_real(problem, STATUS_INVALID, place, chirp->rate, "Hz",
-                                "must be at least twice the highest frequency, %s Hz, is %s",
-                                text_real(limit, 2 * chirp_highest(chirp)),
-                                text_real(is, chirp->rate));
+        return json_pointer_fault_real(problem, pointer, "rate", chirp->rate, "Hz",
+                                       "must be at least twice the highest frequency, %s Hz, is %s",
+                                       text_real(limit, 2 * chirp_highest(chirp)),
+                                       text_real(is, chirp->rate));
     if (!(chirp_knots(chirp, span) - 2 <= (double)most))
-        return problem_add_real(problem, STATUS_INVALID, place, chirp->rate, "Hz",
-                                "must make at most %zu knots of the base's acceleration, %s makes "
-                                "%.0f",
-                                most, text_real(is, chirp->rate), chirp_knots(chirp, span) - 2);
+        return json_pointer_fault_real(
+            problem, pointer, "rate", chirp->rate, "Hz",
+            "must make at most %zu knots of the base's acceleration, %s makes "
+            "%.0f",
+            most, text_real(is, chirp->rate), chirp_knots(chirp, span) - 2);
     return STATUS_OK;
 }
 
@@ -129,14 +129,13 @@ static void chirp_doubt(const Excitation *excitation, const Span *span, const ch
                         Problem *doubts) {
     const ExcitationChirp *chirp = chirp_of(excitation);
     const double omega = 2 * (double)PI * chirp_highest(chirp), turn = omega / chirp->rate;
-    char place[sizeof((Fault){0}.pointer)], is[32], limit[32];
-    json_pointer_join(place, sizeof place, pointer, "rate");
+    char is[32], limit[32];
     if (turn * turn / 12 > 1e-3)
-        (void)problem_add(doubts, STATUS_INVALID, place,
-                          "is %s Hz, too few for %s Hz: the lines between the knots miss the sweep "
-                          "by up to %.2g of its amplitude",
-                          text_real(is, chirp->rate), text_real(limit, chirp_highest(chirp)),
-                          turn * turn / 12);
+        (void)json_pointer_fault(
+            doubts, pointer, "rate",
+            "is %s Hz, too few for %s Hz: the lines between the knots miss the sweep "
+            "by up to %.2g of its amplitude",
+            text_real(is, chirp->rate), text_real(limit, chirp_highest(chirp)), turn * turn / 12);
     const bool is_end = chirp->end_frequency >= chirp->start_frequency;
     excitation_doubt_frequency(chirp_highest(chirp), span, pointer,
                                is_end ? "end_frequency" : "start_frequency", doubts);

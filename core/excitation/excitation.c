@@ -1,5 +1,5 @@
-// What all kinds share, and the kind without motion of the base: free vibration from the initial
-// state.
+// Functions shared by all kinds, and the kind without motion of the base: free vibration from the
+// initial state.
 #include "core/excitation/excitation.h"
 
 #include "core/base/json_pointer.h"
@@ -18,10 +18,9 @@ void excitation_doubt_frequency(double frequency, const Span *span, const char *
                                 const char *name, Problem *doubts) {
     if (!(frequency > span->sample_rate / 2))
         return;
-    char place[sizeof((Fault){0}.pointer)], is[32], limit[32];
-    json_pointer_join(place, sizeof place, pointer, name);
-    (void)problem_add(
-        doubts, STATUS_INVALID, place,
+    char is[32], limit[32];
+    (void)json_pointer_fault(
+        doubts, pointer, name,
         "is %s Hz, above half the sample rate, %s Hz: the output's samples do not show "
         "the motion",
         text_real(is, frequency), text_real(limit, span->sample_rate / 2));

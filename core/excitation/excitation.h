@@ -25,9 +25,9 @@ typedef struct Span {
 
 typedef struct ExcitationKind {
     Kind kind;
-    // Validates what does not depend on the run and no row can express. NULL: nothing.
+    // Validates relations between fields that do not depend on the run. NULL: none.
     Status (*check)(const Excitation *excitation, const char *pointer, Problem *problem);
-    // Validates what depends on the run and completes its defaults, below `pointer`. NULL: nothing.
+    // Validates fields that depend on the run and sets their defaults, below `pointer`. NULL: none.
     Status (*complete)(Excitation *excitation, const Span *span, const char *pointer,
                        Problem *problem);
     // The highest frequency of the base's motion [rad/s]. NULL: no higher than its samples show.

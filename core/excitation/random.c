@@ -86,13 +86,12 @@ static bool random_check_rate(const ExcitationRandom *random, const Span *span, 
     // The sample past the end of the run does not count against the limit.
     if (!isfinite(span->duration) || random_sample_count(random, span) - 1 <= (double)most)
         return true;
-    char place[256], rate[32], limit[32];
-    json_pointer_join(place, sizeof place, pointer, "rate");
-    problem_add_real(problem, STATUS_INVALID, place, random->rate, "Hz",
-                     "must be at most %s Hz, which makes %zu samples of the base in this duration, "
-                     "is %s",
-                     text_real(limit, ((double)most - 1) / span->duration), most,
-                     text_real(rate, random->rate));
+    char rate[32], limit[32];
+    json_pointer_fault_real(
+        problem, pointer, "rate", random->rate, "Hz",
+        "must be at most %s Hz, which makes %zu samples of the base in this duration, "
+        "is %s",
+        text_real(limit, ((double)most - 1) / span->duration), most, text_real(rate, random->rate));
     return false;
 }
 

@@ -66,11 +66,9 @@ static const ExcitationRecord *record_of(const Excitation *excitation) {
 // A fault at pointer/name, unless that place has one.
 static Status record_refuse(const char *pointer, const char *name, const char *detail,
                             Problem *problem) {
-    char place[sizeof((Fault){0}.pointer)];
-    json_pointer_join(place, sizeof place, pointer, name);
-    return problem_concerns(problem, place)
+    return json_pointer_concerns(problem, pointer, name)
                ? STATUS_INVALID
-               : problem_add(problem, STATUS_INVALID, place, "%s", detail);
+               : json_pointer_fault(problem, pointer, name, "%s", detail);
 }
 
 // A name replaces samples. A name that was not found may have its fault from the search.
@@ -86,9 +84,7 @@ static Status record_check_named(const ExcitationRecord *record, const char *poi
             record_refuse(pointer, "interval",
                           "must not stand beside the name of a record, which has its own", problem);
     if (named == NULL || strcmp(named->name, record->name) != 0) {
-        char place[sizeof((Fault){0}.pointer)];
-        json_pointer_join(place, sizeof place, pointer, "digest");
-        return problem_concerns(problem, place)
+        return json_pointer_concerns(problem, pointer, "digest")
                    ? STATUS_INVALID
                    : record_refuse(pointer, "name", "is not known here", problem);
     }
@@ -129,10 +125,8 @@ static Status record_complete(Excitation *excitation, const Span *span, const ch
     for (size_t i = 0; i < samples->count; i++) {
         if (isfinite(samples->at[i] * record->scale) || !isfinite(samples->at[i]))
             continue;
-        char place[sizeof((Fault){0}.pointer)];
-        json_pointer_join(place, sizeof place, pointer, "scale");
-        return problem_add_real(problem, STATUS_INVALID, place, record->scale, NULL,
-                                "must leave every sample finite, sample %zu is not", i);
+        return json_pointer_fault_real(problem, pointer, "scale", record->scale, NULL,
+                                       "must leave every sample finite, sample %zu is not", i);
     }
     return STATUS_OK;
 }

@@ -38,16 +38,14 @@ static Status sine_complete(Excitation *excitation, const Span *span, const char
         sine->quantity = SINE_ACCELERATION;
     if (!isfinite(sine->frequency) || !isfinite(sine->amplitude))
         return STATUS_OK; // the row adds the fault
-    char place[sizeof((Fault){0}.pointer)];
     if (!isfinite(sine_omega(sine))) {
-        json_pointer_join(place, sizeof place, pointer, "frequency");
-        return problem_add_real(problem, STATUS_INVALID, place, sine->frequency, "Hz",
-                                "is too high to compute with");
+        return json_pointer_fault_real(problem, pointer, "frequency", sine->frequency, "Hz",
+                                       "is too high to compute with");
     }
     if (!isfinite(sine_amplitude(sine))) {
-        json_pointer_join(place, sizeof place, pointer, "amplitude");
-        return problem_add_real(problem, STATUS_INVALID, place, sine->amplitude, "m",
-                                "must give a finite acceleration, amplitude * (2 pi frequency)^2");
+        return json_pointer_fault_real(
+            problem, pointer, "amplitude", sine->amplitude, "m",
+            "must give a finite acceleration, amplitude * (2 pi frequency)^2");
     }
     return STATUS_OK;
 }

@@ -9,7 +9,6 @@ enum { UNIT_MAX = 12 }; // bytes; longer text in brackets is not a unit
 
 // A force in "[kN]" would be a thousand times too small.
 static Status force_trace_check_header(const TextLine *line, Problem *problem) {
-    char place[64];
     for (const char *at = line->at; at < line->end; at++) {
         if (*at != '[' && *at != '(')
             continue;
@@ -20,9 +19,9 @@ static Status force_trace_check_header(const TextLine *line, Problem *problem) {
         const bool is_right = size == 1 && (*begin == 's' || *begin == 'N');
         if (is_right || size > UNIT_MAX)
             continue;
-        return problem_add(problem, STATUS_UNREADABLE, text_table_place(place, line->number, 0),
-                           "must have times in [s] and forces in [N], has [%.*s]", (int)size,
-                           begin);
+        return text_table_fault(problem, STATUS_UNREADABLE, line->number, 0,
+                                "must have times in [s] and forces in [N], has [%.*s]", (int)size,
+                                begin);
     }
     return STATUS_OK;
 }
@@ -30,9 +29,8 @@ static Status force_trace_check_header(const TextLine *line, Problem *problem) {
 static Status force_trace_read_rows(TextReader reader, size_t samples_max, NumberTable *table,
                                     Problem *problem) {
     TextLine line;
-    char place[64];
     while (text_table_next_line(&reader, &line)) {
-        if (table->rows == 0 && text_table_count(&line) == 0) {
+        if (table->rows == 0 && text_table_numbers(&line, NULL, 0) == 0) {
             TRY(force_trace_check_header(&line, problem));
             continue;
         }
@@ -40,14 +38,14 @@ static Status force_trace_read_rows(TextReader reader, size_t samples_max, Numbe
         TRY(text_table_add_row(table, &line, problem));
         const size_t columns = table->count - before;
         if (columns > 2 || (columns > 0 && columns != table->columns))
-            return problem_add(problem, STATUS_UNREADABLE, text_table_place(place, line.number, 0),
-                               "must have %s, has %zu numbers",
-                               columns > 2 ? "a time and its force, or the force alone"
-                                           : "as many numbers as the rows above",
-                               columns);
+            return text_table_fault(problem, STATUS_UNREADABLE, line.number, 0,
+                                    "must have %s, has %zu numbers",
+                                    columns > 2 ? "a time and its force, or the force alone"
+                                                : "as many numbers as the rows above",
+                                    columns);
         if (table->rows > samples_max)
-            return problem_add(problem, STATUS_TOO_LARGE, text_table_place(place, line.number, 0),
-                               "must have at most %zu samples up to here", samples_max);
+            return text_table_fault(problem, STATUS_TOO_LARGE, line.number, 0,
+                                    "must have at most %zu samples up to here", samples_max);
     }
     return STATUS_OK;
 }
@@ -82,19 +80,11 @@ Status force_trace_text_read(const char *text, size_t size, size_t samples_max, 
                              Reals *force, Problem *problem) {
     *force = (Reals){NULL, 0};
     TextReader reader;
-    TRY(text_table_open(text, size, &reader, problem));
-    const size_t length = (size_t)(reader.end - reader.at);
-    char *spaced = malloc(length + 1);
-    if (spaced == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a trace");
-    for (size_t i = 0; i < length; i++)
-        spaced[i] = (char)(reader.at[i] == ',' || reader.at[i] == ';' ? ' ' : reader.at[i]);
-    reader = (TextReader){spaced, spaced + length, 0};
+    TRY(text_table_open(text, size, ",;", &reader, problem));
     NumberTable table = {.count_max = 2 * samples_max + 2};
     Status status = force_trace_read_rows(reader, samples_max, &table, problem);
     if (status == STATUS_OK)
         status = force_trace_take_table(&table, reader, interval, problem);
-    free(spaced);
     if (status == STATUS_OK)
         *force = (Reals){table.at, table.count};
     else

@@ -51,49 +51,43 @@ static const char *motion_find_word(const char *line, const char *from, const ch
     return NULL;
 }
 
-// The number after `at`, blanks, equals signs and colons; NAN: none.
-static double motion_number_at(const char *at) {
-    while (*at == ' ' || *at == '\t' || *at == '=' || *at == ':')
-        at++;
-    TextWord word = {at, at};
+// The number that follows `at` in a line; NAN: none.
+static double motion_number_at(const TextLine *line, const char *at) {
+    TextWord word;
     double value;
-    while (*word.end != '\0' && strchr(" \t,;", *word.end) == NULL)
-        word.end++;
-    return word.end > word.at && text_table_number(&word, &value) ? value : (double)NAN;
+    return text_table_next_word(line, &at, &word) && text_table_number(&word, &value) ? value
+                                                                                      : (double)NAN;
 }
 
 // "NPTS=  4000, DT= .01000 SEC" or "4096    0.0100    NPTS, DT".
-static void motion_read_count(const char *line, MotionHeader *header) {
-    const char *dt = motion_find_word(line, line, "DT");
-    header->count = motion_number_at(line);
-    header->interval = NAN;
-    header->layout = "at2_value_first";
-    if (!isnan(header->count)) {
-        const char *at = line + strspn(line, " \t");
-        at += strcspn(at, " \t,;");
-        header->interval = motion_number_at(at + strspn(at, " \t,;"));
+static void motion_read_count(const char *seen, MotionHeader *header) {
+    const TextLine line = {seen, seen + strlen(seen), 0, "=:,;"};
+    const char *points = motion_find_word(seen, seen, "NPTS"),
+               *step = motion_find_word(seen, seen, "DT"), *second = seen;
+    TextWord first;
+    header->count = motion_number_at(&line, seen);
+    header->layout = isnan(header->count) ? "at2" : "at2_value_first";
+    if (!isnan(header->count) && text_table_next_word(&line, &second, &first)) {
+        header->interval = motion_number_at(&line, second);
         return;
     }
-    header->layout = "at2";
-    header->count = motion_number_at(motion_find_word(line, line, "NPTS") + strlen("NPTS"));
-    if (dt != NULL)
-        header->interval = motion_number_at(dt + strlen("DT"));
+    header->count = motion_number_at(&line, points + strlen("NPTS"));
+    header->interval = step != NULL ? motion_number_at(&line, step + strlen("DT")) : (double)NAN;
 }
 
 static Status motion_check_count(const MotionHeader *header, Problem *problem) {
-    char place[64], is[32];
-    (void)text_table_place(place, header->count_line, 0);
+    char is[32];
     if (isnan(header->count))
-        return problem_add(problem, STATUS_UNREADABLE, place,
-                           "must state the number of values after NPTS, or before it");
+        return text_table_fault(problem, STATUS_UNREADABLE, header->count_line, 0,
+                                "must state the number of values after NPTS, or before it");
     if (header->count < 1 || header->count != floor(header->count))
-        return problem_add(problem, STATUS_UNREADABLE, place,
-                           "must state a whole number of values of at least 1, states %s",
-                           text_real(is, header->count));
+        return text_table_fault(problem, STATUS_UNREADABLE, header->count_line, 0,
+                                "must state a whole number of values of at least 1, states %s",
+                                text_real(is, header->count));
     if (!isnan(header->interval) && !(header->interval > 0))
-        return problem_add(problem, STATUS_UNREADABLE, place,
-                           "must state an interval above 0 s, states %s",
-                           text_real(is, header->interval));
+        return text_table_fault(problem, STATUS_UNREADABLE, header->count_line, 0,
+                                "must state an interval above 0 s, states %s",
+                                text_real(is, header->interval));
     return STATUS_OK;
 }
 
@@ -147,10 +141,9 @@ static Status motion_check_quantity(const char *line, size_t number, Problem *pr
         strstr(line, "ACC") != NULL ||
         (strstr(line, "UNITS") == NULL && strstr(line, "TIME") == NULL))
         return STATUS_OK;
-    char place[64];
-    return problem_add(problem, STATUS_UNREADABLE, text_table_place(place, number, 0),
-                       "must be of an acceleration, is of a %s",
-                       is_velocity ? "velocity" : "displacement");
+    return text_table_fault(problem, STATUS_UNREADABLE, number, 0,
+                            "must be of an acceleration, is of a %s",
+                            is_velocity ? "velocity" : "displacement");
 }
 
 // Printable ASCII only: the text is copied into others whose limits are in bytes.
@@ -171,7 +164,6 @@ static void motion_keep_text(MotionHeader *header, const TextLine *line) {
 static Status motion_refuse_text(TextReader reader, size_t lines, Problem *problem) {
     TextLine line;
     TextWord word;
-    char place[64];
     while (reader.line < HEADER_LINES && text_table_next_line(&reader, &line)) {
         const char *at = line.at;
         while (text_table_next_word(&line, &at, &word))
@@ -179,10 +171,9 @@ static Status motion_refuse_text(TextReader reader, size_t lines, Problem *probl
                 memchr(word.at, ',', (size_t)(word.end - word.at)) != NULL)
                 return text_table_refuse(&line, &word, problem);
     }
-    return problem_add(
-        problem, STATUS_UNREADABLE, text_table_place(place, lines > 0 ? lines : 1, 0),
-        lines < HEADER_LINES ? "must hold a line of numbers up to here, the end of the file"
-                             : "must hold a line of numbers up to here");
+    return text_table_fault(problem, STATUS_UNREADABLE, lines > 0 ? lines : 1, 0,
+                            "must hold a line of numbers up to here%s",
+                            lines < HEADER_LINES ? ", the end of the file" : "");
 }
 
 // The number of lines above the numbers, and the one that names NPTS (0: none).
@@ -197,9 +188,9 @@ static Status motion_find_data(TextReader reader, size_t *lines, size_t *count_l
         text_table_upper(&line, seen, sizeof seen);
         if (motion_find_word(seen, seen, "NPTS") != NULL)
             *lines = *count_line = line.number;
-        else if (text_table_is_marker(&line) && strstr(seen, "BEGIN") != NULL)
+        else if (text_table_is_marker(&line, "BEGIN"))
             *lines = line.number;
-        if (first_numbers == 0 && text_table_count(&line) > 0)
+        if (first_numbers == 0 && text_table_numbers(&line, NULL, 0) > 0)
             first_numbers = line.number;
         text_lines = line.number;
     }
@@ -215,22 +206,19 @@ static Status motion_find_data(TextReader reader, size_t *lines, size_t *count_l
 static void motion_read_count_line(MotionHeader *header) {
     TextReader reader = header->data;
     TextLine line, next = {0};
-    TextWord word;
-    if (!text_table_next_line(&reader, &line) || text_table_count(&line) != 2)
+    double pair[2]; // count and interval
+    if (!text_table_next_line(&reader, &line) || text_table_numbers(&line, pair, 2) != 2)
         return;
     const TextReader behind = reader;
-    const char *at = line.at;
-    double count = 0, interval = 0;
-    (void)(text_table_next_word(&line, &at, &word) && text_table_number(&word, &count));
-    (void)(text_table_next_word(&line, &at, &word) && text_table_number(&word, &interval));
     while (text_table_next_line(&reader, &next) && next.at == next.end)
         ;
-    if (text_table_count(&next) != 1 || count < 2 || count != floor(count) || !(interval > 0))
+    if (text_table_numbers(&next, NULL, 0) != 1 || pair[0] < 2 || pair[0] != floor(pair[0]) ||
+        !(pair[1] > 0))
         return;
     header->layout = "count_line";
     header->count_line = line.number;
-    header->count = count;
-    header->interval = interval;
+    header->count = pair[0];
+    header->interval = pair[1];
     header->data = behind;
 }
 
@@ -262,13 +250,11 @@ static Status motion_read_header(TextReader reader, MotionHeader *header, Proble
 static Status motion_read_numbers(TextReader reader, NumberTable *table, Problem *problem) {
     TextLine line;
     bool is_ended = false;
-    char place[64], seen[64];
     while (text_table_next_line(&reader, &line)) {
-        text_table_upper(&line, seen, sizeof seen);
         if (is_ended && line.at < line.end)
-            return problem_add(problem, STATUS_UNREADABLE, text_table_place(place, line.number, 0),
-                               "must be empty: the line that ends the numbers is above");
-        if (text_table_is_marker(&line) && strstr(seen, "END") != NULL)
+            return text_table_fault(problem, STATUS_UNREADABLE, line.number, 0,
+                                    "must be empty: the line that ends the numbers is above");
+        if (text_table_is_marker(&line, "END"))
             is_ended = true;
         else if (!is_ended)
             TRY(text_table_add_row(table, &line, problem));
@@ -279,7 +265,8 @@ static Status motion_read_numbers(TextReader reader, NumberTable *table, Problem
 // Whether the first column is a time: more than half of its steps equal its first one.
 static bool motion_has_times(const NumberTable *table) {
     const size_t columns = table->columns;
-    if (table->rows < 3 || columns < 2 || table->uneven_line != 0 || table->last_columns != columns)
+    size_t uneven;
+    if (table->rows < 3 || columns < 2 || text_table_uneven_line(table, false, &uneven) != 0)
         return false;
     const double *at = table->at, step = at[columns] - at[0];
     size_t alike = 0;
@@ -290,96 +277,86 @@ static bool motion_has_times(const NumberTable *table) {
 
 static Status motion_take_times(NumberTable *table, const MotionHeader *header,
                                 GroundMotionText *motion, Problem *problem) {
-    if (table->columns == 2 && table->uneven_line == 0 && table->last_columns == 2 &&
-        table->rows >= 2)
+    size_t columns;
+    const size_t line = text_table_uneven_line(table, false, &columns);
+    if (line == 0 && columns == 2 && table->rows >= 2)
         return text_table_split_times(table, header->data, &motion->start, &motion->interval,
                                       problem);
-    const bool is_uneven = table->uneven_line != 0;
-    char place[64];
-    return problem_add(
-        problem, STATUS_UNREADABLE,
-        text_table_place(place, is_uneven ? table->uneven_line : table->last_line, 0),
-        "must hold two columns, a time and its acceleration, as every row; has %zu",
-        is_uneven ? table->uneven_columns : table->last_columns);
+    return text_table_fault(
+        problem, STATUS_UNREADABLE, line > 0 ? line : table->last_line, 0,
+        "must hold two columns, a time and its acceleration, as every row; has %zu", columns);
 }
 
 static Status motion_check_rows(const NumberTable *table, const MotionHeader *header,
                                 Problem *problem) {
-    char place[64], count[32];
-    if (!isnan(header->count)) {
-        if (header->count == (double)table->count)
-            return STATUS_OK;
-        return problem_add(
-            problem, STATUS_UNREADABLE, text_table_place(place, header->count_line, 0),
+    char count[32];
+    size_t columns;
+    if (header->count == (double)table->count)
+        return STATUS_OK;
+    if (!isnan(header->count))
+        return text_table_fault(
+            problem, STATUS_UNREADABLE, header->count_line, 0,
             "must state how many values follow: states %s, but %zu follow, the last on line %zu",
             text_real(count, header->count), table->count, table->last_line);
-    }
-    const bool is_uneven = table->uneven_line != 0;
-    if (!is_uneven && table->last_columns <= table->columns)
-        return STATUS_OK;
-    return problem_add(
-        problem, STATUS_UNREADABLE,
-        text_table_place(place, is_uneven ? table->uneven_line : table->last_line, 0),
-        "must have %zu numbers, as the rows before, has %zu", table->columns,
-        is_uneven ? table->uneven_columns : table->last_columns);
+    const size_t line = text_table_uneven_line(table, true, &columns);
+    return line == 0 ? STATUS_OK
+                     : text_table_fault(problem, STATUS_UNREADABLE, line, 0,
+                                        "must have %zu numbers, as the rows before, has %zu",
+                                        table->columns, columns);
 }
 
 static Status motion_choose_interval(const GroundMotionOptions *options, const MotionHeader *header,
                                      GroundMotionText *motion, Problem *problem) {
-    const double told = !isnan(motion->interval) ? motion->interval : header->interval;
-    char place[64], is[32], asked[32];
-    (void)text_table_place(place,
-                           header->count_line > 0 ? header->count_line : header->data.line + 1, 0);
-    if (isnan(told) && isnan(options->interval))
-        return problem_add(problem, STATUS_UNREADABLE, place,
-                           "must state the interval of the samples, or interval must be given");
-    if (!isnan(told) && !isnan(options->interval) &&
-        !(fabs(told - options->interval) <= 1e-6 * told))
-        return problem_add(problem, STATUS_UNREADABLE, place,
-                           "states an interval of %s s, but %s s is given", text_real(is, told),
-                           text_real(asked, options->interval));
-    motion->interval = isnan(told) ? options->interval : told;
+    const double stated = !isnan(motion->interval) ? motion->interval : header->interval;
+    const size_t line = header->count_line > 0 ? header->count_line : header->data.line + 1;
+    char is[32], asked[32];
+    motion->interval = isnan(stated) ? options->interval : stated;
+    if (isnan(motion->interval))
+        return text_table_fault(problem, STATUS_UNREADABLE, line, 0,
+                                "must state the interval of the samples, or interval must be "
+                                "given");
+    if (fabs(stated - options->interval) > 1e-6 * stated) // false where one of them is NAN
+        return text_table_fault(problem, STATUS_UNREADABLE, line, 0,
+                                "states an interval of %s s, but %s s is given",
+                                text_real(is, stated), text_real(asked, options->interval));
     return STATUS_OK;
 }
 
 static Status motion_choose_unit(const GroundMotionOptions *options, const MotionHeader *header,
                                  GroundMotionText *motion, Problem *problem) {
-    char place[64];
     motion->stated_unit = header->unit;
-    motion->unit = options->unit;
-    if (options->unit != CHOICE_ABSENT)
-        return STATUS_OK;
-    motion->unit = header->unit;
-    if (header->conflict_line != 0)
-        return problem_add(problem, STATUS_UNREADABLE,
-                           text_table_place(place, header->conflict_line, 0),
-                           "states another unit than line %zu, %s: unit must be given",
-                           header->unit_line, acceleration_unit_names[header->unit]);
-    if (header->unit != CHOICE_ABSENT)
+    motion->unit = options->unit != CHOICE_ABSENT ? options->unit : header->unit;
+    if (options->unit == CHOICE_ABSENT && header->conflict_line != 0)
+        return text_table_fault(problem, STATUS_UNREADABLE, header->conflict_line, 0,
+                                "states another unit than line %zu, %s: unit must be given",
+                                header->unit_line, acceleration_unit_names[header->unit]);
+    if (motion->unit != CHOICE_ABSENT)
         return STATUS_OK;
     // PEER's files are in g.
     motion->unit = ACCELERATION_G;
-    if (strncmp(motion->layout, "at2", 3) == 0)
-        return STATUS_OK;
-    return problem_add(problem, STATUS_UNREADABLE, text_table_place(place, 1, 0),
-                       "must state the unit, or unit must be given: g, m/s^2 or cm/s^2");
+    return strncmp(motion->layout, "at2", 3) == 0
+               ? STATUS_OK
+               : text_table_fault(problem, STATUS_UNREADABLE, 1, 0,
+                                  "must state the unit, or unit must be given: g, m/s^2 or "
+                                  "cm/s^2");
 }
 
 static Status motion_convert(NumberTable *table, const MotionHeader *header, size_t samples_max,
                              GroundMotionText *motion, Problem *problem) {
-    char place[64], is[32];
-    if (table->count < 2 || table->count > samples_max)
-        return problem_add(
-            problem, table->count < 2 ? STATUS_UNREADABLE : STATUS_TOO_LARGE,
-            text_table_place(place, table->count < 2 ? header->data.line + 1 : table->last_line, 0),
-            "must hold 2 to %zu samples from here on, holds %zu", samples_max, table->count);
+    const bool is_short = table->count < 2;
+    char is[32];
+    if (is_short || table->count > samples_max)
+        return text_table_fault(problem, is_short ? STATUS_UNREADABLE : STATUS_TOO_LARGE,
+                                is_short ? header->data.line + 1 : table->last_line, 0,
+                                "must hold 2 to %zu samples from here on, holds %zu", samples_max,
+                                table->count);
     for (size_t i = 0; i < table->count; i++) {
         const double value = table->at[i];
         table->at[i] *= unit_sizes[motion->unit];
         if (!isfinite(table->at[i]))
-            return problem_add(problem, STATUS_UNREADABLE,
-                               text_table_place(place, table->last_line, 0),
-                               "sample %zu, %s, must be finite in m/s^2", i, text_real(is, value));
+            return text_table_fault(problem, STATUS_UNREADABLE, table->last_line, 0,
+                                    "sample %zu, %s, must be finite in m/s^2", i,
+                                    text_real(is, value));
     }
     motion->samples = (Reals){table->at, table->count};
     table->at = NULL;
@@ -416,7 +393,7 @@ Status ground_motion_text_read(const char *text, size_t size, size_t samples_max
     *motion = (GroundMotionText){0};
     NumberTable table = {.count_max = 2 * samples_max};
     TextReader reader;
-    Status status = text_table_open(text, size, &reader, problem);
+    Status status = text_table_open(text, size, "", &reader, problem);
     if (status == STATUS_OK)
         status = motion_read(reader, options, &table, motion, problem);
     free(table.at);

@@ -3,6 +3,7 @@
 
 #include <ctype.h>
 #include <math.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,9 +16,27 @@ static bool text_is_blank(char c) {
     return c == ' ' || c == '\t' || c == '\r' || c == '\f' || c == '\v';
 }
 
-Status text_table_open(const char *text, size_t size, TextReader *reader, Problem *problem) {
+static bool text_is_between(const TextLine *line, char c) {
+    return text_is_blank(c) || (c != '\0' && strchr(line->separators, c) != NULL);
+}
+
+Status text_table_fault(Problem *problem, Status status, size_t line, size_t column,
+                        const char *format, ...) {
+    char place[64], detail[sizeof((Fault){0}.detail)];
+    const int used = snprintf(place, sizeof place, "line %zu", line);
+    if (column > 0)
+        snprintf(place + used, sizeof place - (size_t)used, ", column %zu", column);
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(detail, sizeof detail, format, arguments);
+    va_end(arguments);
+    return problem_add(problem, status, place, "%s", detail);
+}
+
+Status text_table_open(const char *text, size_t size, const char *separators, TextReader *reader,
+                       Problem *problem) {
     const size_t mark = size >= 3 && memcmp(text, "\xEF\xBB\xBF", 3) == 0 ? 3 : 0;
-    *reader = (TextReader){text + mark, text + size, 0};
+    *reader = (TextReader){text + mark, text + size, 0, separators};
     size_t line = 1;
     const char *start = reader->at;
     for (const char *at = start; at < reader->end; at++) {
@@ -26,11 +45,9 @@ Status text_table_open(const char *text, size_t size, TextReader *reader, Proble
             line++;
             start = at + 1;
         } else if ((byte < ' ' && !text_is_blank(*at)) || byte == 0x7f) {
-            char place[64];
-            return problem_add(problem, STATUS_UNREADABLE,
-                               text_table_place(place, line, (size_t)(at - start) + 1),
-                               "must be text, holds the byte 0x%02X%s", byte,
-                               byte == 0 ? " (a binary file, or UTF-16)" : "");
+            return text_table_fault(problem, STATUS_UNREADABLE, line, (size_t)(at - start) + 1,
+                                    "must be text, holds the byte 0x%02X%s", byte,
+                                    byte == 0 ? " (a binary file, or UTF-16)" : "");
         }
     }
     return STATUS_OK;
@@ -41,7 +58,7 @@ bool text_table_next_line(TextReader *reader, TextLine *line) {
         return false;
     const char *end = memchr(reader->at, '\n', (size_t)(reader->end - reader->at));
     const char *last = end != NULL ? end : reader->end;
-    *line = (TextLine){reader->at, last, ++reader->line};
+    *line = (TextLine){reader->at, last, ++reader->line, reader->separators};
     while (line->end > line->at && text_is_blank(line->end[-1]))
         line->end--;
     reader->at = end != NULL ? end + 1 : reader->end;
@@ -49,10 +66,10 @@ bool text_table_next_line(TextReader *reader, TextLine *line) {
 }
 
 bool text_table_next_word(const TextLine *line, const char **at, TextWord *word) {
-    while (*at < line->end && text_is_blank(**at))
+    while (*at < line->end && text_is_between(line, **at))
         ++*at;
     word->at = *at;
-    while (*at < line->end && !text_is_blank(**at))
+    while (*at < line->end && !text_is_between(line, **at))
         ++*at;
     word->end = *at;
     return word->end > word->at;
@@ -100,14 +117,17 @@ bool text_table_number(const TextWord *word, double *value) {
     return isfinite(*value);
 }
 
-size_t text_table_count(const TextLine *line) {
+size_t text_table_numbers(const TextLine *line, double *values, size_t max) {
     const char *at = line->at;
     TextWord word;
     double value;
     size_t count = 0;
-    for (; text_table_next_word(line, &at, &word); count++)
+    for (; text_table_next_word(line, &at, &word); count++) {
         if (!text_table_number(&word, &value))
             return 0;
+        if (count < max)
+            values[count] = value;
+    }
     return count;
 }
 
@@ -118,26 +138,17 @@ void text_table_upper(const TextLine *line, char *target, size_t size) {
     target[length] = '\0';
 }
 
-bool text_table_is_marker(const TextLine *line) {
-    const char *at = line->at;
-    TextWord word;
-    return text_table_next_word(line, &at, &word) && word.end - word.at >= 3 &&
-           memcmp(word.at, "***", 3) == 0;
-}
-
-const char *text_table_place(char target[64], size_t line, size_t column) {
-    if (column > 0)
-        snprintf(target, 64, "line %zu, column %zu", line, column);
-    else
-        snprintf(target, 64, "line %zu", line);
-    return target;
+bool text_table_is_marker(const TextLine *line, const char *word) {
+    char seen[64];
+    text_table_upper(line, seen, sizeof seen);
+    return strncmp(seen + strspn(seen, " \t\r\f\v"), "***", 3) == 0 && strstr(seen, word) != NULL;
 }
 
 // Why a word is not a number.
 static const char *text_refusal(const TextWord *word) {
     const size_t length = (size_t)(word->end - word->at);
     char copy[8];
-    text_table_upper(&(TextLine){word->at, word->end, 0}, copy, sizeof copy);
+    text_table_upper(&(TextLine){word->at, word->end, 0, ""}, copy, sizeof copy);
     const char *letters = copy[0] == '-' || copy[0] == '+' ? copy + 1 : copy;
     if (strncmp(letters, "NAN", 3) == 0 || strncmp(letters, "INF", 3) == 0)
         return "must be a finite number";
@@ -155,23 +166,21 @@ static const char *text_refusal(const TextWord *word) {
 }
 
 Status text_table_refuse(const TextLine *line, const TextWord *word, Problem *problem) {
-    char place[64], shown[40];
+    char shown[40];
     size_t length = 0;
     for (const char *c = word->at; c < word->end && length < 32; c++)
         shown[length++] = isprint((unsigned char)*c) ? *c : '?';
     snprintf(shown + length, sizeof shown - length, "%s",
              word->at + length < word->end ? "..." : "");
-    return problem_add(problem, STATUS_UNREADABLE,
-                       text_table_place(place, line->number, (size_t)(word->at - line->at) + 1),
-                       "%s, is %s", text_refusal(word), shown);
+    return text_table_fault(problem, STATUS_UNREADABLE, line->number,
+                            (size_t)(word->at - line->at) + 1, "%s, is %s", text_refusal(word),
+                            shown);
 }
 
 static Status text_add_number(NumberTable *table, double value, size_t line, Problem *problem) {
-    if (table->count == table->count_max) {
-        char place[64];
-        return problem_add(problem, STATUS_TOO_LARGE, text_table_place(place, line, 0),
-                           "must hold at most %zu numbers up to here", table->count_max);
-    }
+    if (table->count == table->count_max)
+        return text_table_fault(problem, STATUS_TOO_LARGE, line, 0,
+                                "must hold at most %zu numbers up to here", table->count_max);
     if (table->count == table->room) {
         const size_t room = table->room > 0 ? 2 * table->room : 4096;
         double *at = realloc(table->at, room * sizeof *at);
@@ -209,6 +218,16 @@ Status text_table_add_row(NumberTable *table, const TextLine *line, Problem *pro
     return STATUS_OK;
 }
 
+size_t text_table_uneven_line(const NumberTable *table, bool may_end_short, size_t *columns) {
+    const bool is_last = table->uneven_line == 0;
+    *columns = is_last ? table->last_columns : table->uneven_columns;
+    if (!is_last)
+        return table->uneven_line;
+    return *columns == table->columns || (may_end_short && *columns < table->columns)
+               ? 0
+               : table->last_line;
+}
+
 // Adds the fault at the row whose step differs most from the mean: a wrong time bends the mean, and
 // with it the distance of all later times from the line.
 static Status text_refuse_times(const NumberTable *table, double mean, TextReader reader,
@@ -221,12 +240,12 @@ static Status text_refuse_times(const NumberTable *table, double mean, TextReade
     TextLine line = {0};
     size_t rows = 0;
     while (rows <= row && text_table_next_line(&reader, &line))
-        rows += text_table_count(&line) > 0;
-    char place[64], is[32], before[32];
-    return problem_add(problem, STATUS_UNREADABLE, text_table_place(place, line.number, 0),
-                       "times must rise evenly: is %s s after %s s, where steps are %.4g s",
-                       text_real(is, at[2 * row]), text_real(before, at[2 * row - 2]),
-                       row > 1 ? at[2] - at[0] : mean);
+        rows += text_table_numbers(&line, NULL, 0) > 0;
+    char is[32], before[32];
+    return text_table_fault(problem, STATUS_UNREADABLE, line.number, 0,
+                            "times must rise evenly: is %s s after %s s, where steps are %.4g s",
+                            text_real(is, at[2 * row]), text_real(before, at[2 * row - 2]),
+                            row > 1 ? at[2] - at[0] : mean);
 }
 
 Status text_table_split_times(NumberTable *table, TextReader reader, double *start,

@@ -104,18 +104,18 @@ static Status mode_decide_unseen(Plan *plan, const double *seen, const size_t *l
     return decisions_omit(
         &plan->report.decisions, "unseen_modes", (double)(count - found), "modes",
         1 - mode_work((double)found, is_coupled) / mode_work((double)count, is_coupled),
-        "nothing sets them moving: not the base, nor the start, nor a damper; each sees at most "
-        "%.2g of these",
+        "neither the base nor the initial state nor a damper excites them: their relative "
+        "participation is at most %.2g",
         largest);
 }
 
 static Status mode_decide_lowest(Plan *plan, const TruncationError *error, size_t modes,
                                  double moved) {
     const char *about =
-        plan->damper_count == 0 ? "" : ", and neither move nor give way at the dampers' storeys";
+        plan->damper_count == 0 ? "" : " and add no compliance at the dampers' storeys";
     return decisions_add(&plan->report.decisions, "modes", "lowest", (double)modes, "modes",
                          "the scene asks for these of %zu; they hold %.4g of the mass that the "
-                         "base moves; the others stay at rest%s: foretold errors are %.2g of "
+                         "base moves; the others stay at rest%s: predicted errors are %.2g of "
                          "displacement, %.2g of mean_acceleration",
                          plan->storeys, moved, about, error->displacement,
                          error->mean_acceleration);

@@ -16,8 +16,8 @@ const Field derived_fields[] = {
     FIELD_REAL(Derived, stiffness, "N/m", ANY, OPTIONAL, "contact stiffness k_b"),
     FIELD_REAL(Derived, damping, "N s/m", ANY, OPTIONAL, "contact damping c_b"),
     FIELD_REAL(Derived, damping_ratio, NULL, ANY, OPTIONAL, "damping ratio Z of the contact"),
-    FIELD_REAL(Derived, reached_restitution, NULL, ANY, OPTIONAL, "restitution that an isolated contact really reaches under a power law, or with what was carried over from a rig"),
-    FIELD_REAL(Derived, reached_contact_time, "s", ANY, OPTIONAL, "contact time that it really has"),
+    FIELD_REAL(Derived, reached_restitution, NULL, ANY, OPTIONAL, "restitution of an isolated contact under a power law, or with parameters carried over from a rig"),
+    FIELD_REAL(Derived, reached_contact_time, "s", ANY, OPTIONAL, "contact time of that contact"),
     FIELD_REAL(Derived, identified_mass, "kg", ANY, OPTIONAL, "effective mass of the rig"),
     FIELD_REAL(Derived, exponent, NULL, ANY, OPTIONAL, "exponent n of a power law"),
     FIELD_REAL(Derived, factor, NULL, ANY, OPTIONAL, "a power law's dissipation factor: D, or xi"),
@@ -31,9 +31,9 @@ const Field mode_fields[] = {
 };
 
 static const Field attempt_fields[] = {
-    FIELD_TEXT(PlanAttempt, way, 0, PRESENCE_OPTIONAL, 0, "what was run"),
-    FIELD_REAL(PlanAttempt, predicted_error, NULL, ANY, OPTIONAL, "relative error foretold"),
-    FIELD_REAL(PlanAttempt, estimated_error, NULL, ANY, OPTIONAL, "relative error estimated of the run"),
+    FIELD_TEXT(PlanAttempt, way, 0, PRESENCE_OPTIONAL, 0, "settings of the run"),
+    FIELD_REAL(PlanAttempt, predicted_error, NULL, ANY, OPTIONAL, "predicted relative error"),
+    FIELD_REAL(PlanAttempt, estimated_error, NULL, ANY, OPTIONAL, "relative error estimated by the run"),
     FIELD_REAL(PlanAttempt, steps, NULL, ANY, OPTIONAL, "solver steps, counted"),
     FIELD_END
 };
@@ -41,20 +41,20 @@ static const Field attempt_fields[] = {
 static const char *const verdict_names[] = {"kept", "missed", "unknown", NULL};
 
 const Field target_fields[] = {
-    FIELD_REAL(PlanTarget, error, NULL, ANY, OPTIONAL, "relative error wanted"),
-    FIELD_CHOICE(PlanTarget, metric, metric_names, OPTIONAL, "what it is of"),
-    FIELD_TEXT(PlanTarget, way, 0, PRESENCE_OPTIONAL, 0, "the way chosen; after a run the one that this answer came by"),
-    FIELD_REAL(PlanTarget, predicted_error, NULL, ANY, OPTIONAL, "relative error foretold for that way"),
-    FIELD_REAL(PlanTarget, estimated_error, NULL, ANY, OPTIONAL, "relative error estimated of the run"),
-    FIELD_CHOICE(PlanTarget, verdict, verdict_names, OPTIONAL, "whether the estimated error keeps the one wanted; unknown where it could not be estimated"),
-    FIELD_LIST(PlanTarget, attempts, attempt_fields, 0, PRESENCE_OPTIONAL, "all runs that were needed"),
+    FIELD_REAL(PlanTarget, error, NULL, ANY, OPTIONAL, "requested relative error"),
+    FIELD_CHOICE(PlanTarget, metric, metric_names, OPTIONAL, "quantity that has the error"),
+    FIELD_TEXT(PlanTarget, way, 0, PRESENCE_OPTIONAL, 0, "settings chosen; after a run those of the result"),
+    FIELD_REAL(PlanTarget, predicted_error, NULL, ANY, OPTIONAL, "predicted relative error of these settings"),
+    FIELD_REAL(PlanTarget, estimated_error, NULL, ANY, OPTIONAL, "relative error estimated by the run"),
+    FIELD_CHOICE(PlanTarget, verdict, verdict_names, OPTIONAL, "whether the estimated error keeps the requested one; unknown where it could not be estimated"),
+    FIELD_LIST(PlanTarget, attempts, attempt_fields, 0, PRESENCE_OPTIONAL, "all runs of the search"),
     FIELD_END
 };
 
 const Field plan_report_fields[] = {
-    FIELD_TEXT(PlanReport, contact_model, 0, PRESENCE_OPTIONAL, 0, "the contact model that is run"),
-    FIELD_TEXT(PlanReport, solver, 0, PRESENCE_OPTIONAL, 0, "the solver that is run"),
-    FIELD_ITEM(PlanReport, target, target_fields, NULL, PRESENCE_OPTIONAL, "what accuracy.target came to; null without one"),
+    FIELD_TEXT(PlanReport, contact_model, 0, PRESENCE_OPTIONAL, 0, "contact model of the run"),
+    FIELD_TEXT(PlanReport, solver, 0, PRESENCE_OPTIONAL, 0, "solver of the run"),
+    FIELD_ITEM(PlanReport, target, target_fields, NULL, PRESENCE_OPTIONAL, "outcome of accuracy.target; null without one"),
     FIELD_LIST(PlanReport, decisions, decision_fields, 0, PRESENCE_DEFAULT, "choices with their reasons"),
     FIELD_LIST(PlanReport, derived, derived_fields, 0, PRESENCE_DEFAULT, "contact parameters for this pair of masses"),
     FIELD_LIST(PlanReport, modes, mode_fields, 0, PRESENCE_DEFAULT, "natural modes of the structure, the slowest first"),
@@ -169,19 +169,19 @@ static Status plan_decide_contact(const Scene *scene, Plan *plan) {
                              "the scene asks for it");
     if (law->form == CONTACT_IMPULSIVE)
         return decisions_add(decisions, "contact_model", law->kind.name, NAN, NULL,
-                             "only restitution is known, no contact time");
+                             "the buffers have a restitution but no contact time");
     for (size_t i = 0; i < 2 * scene->dampers.count; i++) {
         const Buffer *buffer = damper_buffer(&scene->dampers.at[i / 2], (Side)(i % 2));
         if (buffer->table.count > 0)
             return decisions_add(decisions, "contact_model", law->kind.name, NAN, NULL,
-                                 "contact times over approach speed are known");
+                                 "contact times are given over the approach speed");
         if (!isnan(buffer->contact_time))
             return decisions_add(decisions, "contact_model", law->kind.name, buffer->contact_time,
-                                 "s", "a contact time is known");
+                                 "s", "a contact time is given");
     }
     return decisions_add(decisions, "contact_model", law->kind.name,
                          damper_buffer(&scene->dampers.at[0], SIDE_LEFT)->stiffness, "N/m",
-                         "a contact stiffness is known");
+                         "a contact stiffness is given");
 }
 
 // Matrices and vectors in one block, dampers in another.
@@ -329,12 +329,13 @@ static Status plan_fill(const Scene *scene, const char *asked, const char *solve
     TRY(plan_values(scene, plan));
     TRY(plan_decide_contact(scene, plan));
     TRY(plan_modes(scene_structure(scene), plan, problem));
-    TRY(decisions_add(&plan->report.decisions, "solver", solver, NAN, NULL,
-                      strcmp(asked, solver) == 0 ? "the scene asks for it"
-                      : plan->form == CONTACT_POWER
-                          ? "flight is linear, so its motion is known exactly; contacts under a "
-                            "power law are integrated to rounding's edge"
-                          : "every contact state is linear, so its motion is known exactly"));
+    TRY(decisions_add(
+        &plan->report.decisions, "solver", solver, NAN, NULL,
+        strcmp(asked, solver) == 0 ? "the scene asks for it"
+        : plan->form == CONTACT_POWER
+            ? "flight is linear and has an exact solution; contacts under a power law "
+              "are integrated to the limit of rounding"
+            : "every contact state is linear and has an exact solution"));
     plan->report.contact_model = strdup(plan->damper_count > 0 ? plan->law->kind.name : "none");
     plan->report.solver = strdup(solver);
     return plan->report.contact_model != NULL && plan->report.solver != NULL ? STATUS_OK

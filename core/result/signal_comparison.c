@@ -1,4 +1,4 @@
-// The coarser signal's samples are the grid: to look between them would be to compare a line.
+// Signals are compared at the samples of the coarser one, because it is unknown between them.
 #include "core/result/signal_comparison.h"
 
 #include <math.h>
@@ -23,13 +23,13 @@ const Field signal_comparison_fields[] = {
 };
 // clang-format on
 
-enum { WATCH_SAMPLES = 1 << 16 }; // compared between two looks at the progress
+enum { WATCH_SAMPLES = 1 << 16 }; // compared between two checks of the progress
 
 // A time within this part of a sample interval of a sample is that sample's.
 static const double snap = 1e-6;
 
-static double value_at(const Signal *signal, double time) {
-    // Far from time 0 a time has few digits: what rounding puts beside the signal is its end's.
+static double signal_value_at(const Signal *signal, double time) {
+    // Far from time 0 rounding may put a time outside the signal: it belongs to the end.
     const double last = (double)(signal->count - 1);
     const double index = fmin(fmax((time - signal->start) * signal->rate, 0), last);
     const double near = nearbyint(index);
@@ -40,7 +40,7 @@ static double value_at(const Signal *signal, double time) {
     return from + part * (signal->values[at + 1] - from);
 }
 
-static double end_of(const Signal *signal) {
+static double signal_end(const Signal *signal) {
     return signal->start + (double)(signal->count - 1) / signal->rate;
 }
 
@@ -50,11 +50,11 @@ typedef struct Grid {
     size_t first, count;
 } Grid;
 
-static Grid grid_of(const Signal *a, const Signal *b) {
+static Grid grid_make(const Signal *a, const Signal *b) {
     Grid grid = {a->rate <= b->rate ? a : b, 0, 0};
     if (a->count == 0 || b->count == 0)
         return grid;
-    const double from = fmax(a->start, b->start), to = fmin(end_of(a), end_of(b));
+    const double from = fmax(a->start, b->start), to = fmin(signal_end(a), signal_end(b));
     const double first = ceil((from - grid.coarse->start) * grid.coarse->rate - snap);
     const double last = fmin(floor((to - grid.coarse->start) * grid.coarse->rate + snap),
                              (double)(grid.coarse->count - 1));
@@ -65,28 +65,29 @@ static Grid grid_of(const Signal *a, const Signal *b) {
     return grid;
 }
 
-static double time_of(const Grid *grid, size_t i) {
+static double grid_time(const Grid *grid, size_t i) {
     return grid->coarse->start + (double)(grid->first + i) / grid->coarse->rate;
 }
 
 // Before sample i.
-static bool goes_on(const Progress *progress, size_t i) {
+static bool signal_goes_on(const Progress *progress, size_t i) {
     return i % WATCH_SAMPLES != 0 || progress_advance(progress, 1);
 }
 
 SignalComparison signal_comparison_measure(const Signal *reference, const Signal *other,
                                            double part, const Progress *progress) {
-    const Grid grid = grid_of(reference, other);
+    const Grid grid = grid_make(reference, other);
     const double none = (double)NAN;
-    SignalComparison told = {none, none, grid.count, none, none, none,
-                             none, none, none,       none, none, none};
+    SignalComparison found = {none, none, grid.count, none, none, none,
+                              none, none, none,       none, none, none};
     if (grid.count == 0)
-        return told;
+        return found;
     double sx = 0, sy = 0, sxx = 0, syy = 0, sdd = 0, most_x = 0, most_y = 0, most_d = 0;
     for (size_t i = 0; i < grid.count; i++) {
-        if (!goes_on(progress, i))
-            return told;
-        const double t = time_of(&grid, i), x = value_at(reference, t), y = value_at(other, t);
+        if (!signal_goes_on(progress, i))
+            return found;
+        const double t = grid_time(&grid, i), x = signal_value_at(reference, t),
+                     y = signal_value_at(other, t);
         sx += x;
         sy += y;
         sxx += x * x;
@@ -99,34 +100,34 @@ SignalComparison signal_comparison_measure(const Signal *reference, const Signal
     const double n = (double)grid.count, mean_x = sx / n, mean_y = sy / n;
     double vxx = 0, vyy = 0, vxy = 0;
     for (size_t i = 0; i < grid.count; i++) {
-        if (!goes_on(progress, i))
-            return told;
-        const double t = time_of(&grid, i);
-        const double x = value_at(reference, t), y = value_at(other, t);
+        if (!signal_goes_on(progress, i))
+            return found;
+        const double t = grid_time(&grid, i);
+        const double x = signal_value_at(reference, t), y = signal_value_at(other, t);
         vxx += (x - mean_x) * (x - mean_x);
         vyy += (y - mean_y) * (y - mean_y);
         vxy += (x - mean_x) * (y - mean_y);
-        if (isnan(told.parting) && fabs(y - x) > part * most_x)
-            told.parting = t;
+        if (isnan(found.parting) && fabs(y - x) > part * most_x)
+            found.parting = t;
     }
-    told.from = time_of(&grid, 0);
-    told.to = time_of(&grid, grid.count - 1);
-    told.rms = sqrt(sxx / n);
-    told.other_rms = sqrt(syy / n);
-    told.peak = most_x;
-    told.other_peak = most_y;
-    told.difference_rms = sqrt(sdd / n);
-    told.difference_peak = most_d;
+    found.from = grid_time(&grid, 0);
+    found.to = grid_time(&grid, grid.count - 1);
+    found.rms = sqrt(sxx / n);
+    found.other_rms = sqrt(syy / n);
+    found.peak = most_x;
+    found.other_peak = most_y;
+    found.difference_rms = sqrt(sdd / n);
+    found.difference_peak = most_d;
     if (sxx > 0)
-        told.relative = sqrt(sdd / sxx);
+        found.relative = sqrt(sdd / sxx);
     if (vxx > 0 && vyy > 0)
-        told.correlation = fmin(fmax(vxy / (sqrt(vxx) * sqrt(vyy)), -1), 1);
-    return told;
+        found.correlation = fmin(fmax(vxy / (sqrt(vxx) * sqrt(vyy)), -1), 1);
+    return found;
 }
 
 Status signal_comparison_align(const Signal *reference, const Signal *other, size_t least,
                                Columns *pair, double *rate, Problem *problem) {
-    const Grid grid = grid_of(reference, other);
+    const Grid grid = grid_make(reference, other);
     *rate = grid.coarse->rate;
     if (grid.count < least)
         return problem_set(problem, STATUS_LIMIT,
@@ -134,21 +135,21 @@ Status signal_comparison_align(const Signal *reference, const Signal *other, siz
                            least);
     TRY(columns_allocate(pair, 2, grid.count, 0, problem));
     for (size_t i = 0; i < grid.count; i++) {
-        pair->at[0].values[i] = value_at(reference, time_of(&grid, i));
-        pair->at[1].values[i] = value_at(other, time_of(&grid, i));
+        pair->at[0].values[i] = signal_value_at(reference, grid_time(&grid, i));
+        pair->at[1].values[i] = signal_value_at(other, grid_time(&grid, i));
     }
     return STATUS_OK;
 }
 
-// What is left of a constant when its mean is taken off is its rounding, and no motion.
+// A constant without its mean is rounding noise, not motion.
 static const double motionless = 1e-24; // of the energy
 
-// On a grid of `rate` from the signal's own start, its mean taken off; zeros behind it.
-static void put_centred(const Signal *signal, double rate, size_t count, double *target,
-                        size_t size) {
+// On a grid of `rate` from the signal's own start, without its mean; zeros behind it.
+static void signal_put_centred(const Signal *signal, double rate, size_t count, double *target,
+                               size_t size) {
     double sum = 0, whole = 0, rest = 0;
     for (size_t i = 0; i < count; i++) {
-        target[i] = value_at(signal, signal->start + (double)i / rate);
+        target[i] = signal_value_at(signal, signal->start + (double)i / rate);
         sum += target[i];
         whole += target[i] * target[i];
     }
@@ -161,17 +162,17 @@ static void put_centred(const Signal *signal, double rate, size_t count, double 
 }
 
 // energy[i]: of the first i values.
-static void sum_energy(const double *values, size_t count, double *energy) {
+static void signal_energy(const double *values, size_t count, double *energy) {
     energy[0] = 0;
     for (size_t i = 0; i < count; i++)
         energy[i + 1] = energy[i] + values[i] * values[i];
 }
 
-static double share_of(const double *energy, ptrdiff_t from, ptrdiff_t to) {
+static double signal_share(const double *energy, ptrdiff_t from, ptrdiff_t to) {
     return energy[to] - energy[from];
 }
 
-// What a correlation needs: the lag is in samples, of `other` behind the reference's start.
+// Inputs of a correlation. Lags are in samples, of `other` behind the start of the reference.
 typedef struct Lags {
     const double *products;     // by lag, negative ones from the end
     size_t size;                // of those
@@ -180,30 +181,30 @@ typedef struct Lags {
 } Lags;
 
 // NAN with less than half of the shorter one in common.
-static double at_lag(const Lags *lags, ptrdiff_t lag) {
+static double signal_at_lag(const Lags *lags, ptrdiff_t lag) {
     const ptrdiff_t from = lag > 0 ? lag : 0;
     const ptrdiff_t to = lag + lags->b_count < lags->a_count ? lag + lags->b_count : lags->a_count;
     const ptrdiff_t shorter = lags->a_count < lags->b_count ? lags->a_count : lags->b_count;
     if (2 * (to - from) < shorter || to - from < 2)
         return (double)NAN;
     const double scale =
-        sqrt(share_of(lags->a, from, to)) * sqrt(share_of(lags->b, from - lag, to - lag));
+        sqrt(signal_share(lags->a, from, to)) * sqrt(signal_share(lags->b, from - lag, to - lag));
     const double product = lags->products[lag >= 0 ? (size_t)lag : lags->size - (size_t)(-lag)];
     return scale > 0 ? product / (double)lags->size / scale : (double)NAN;
 }
 
 // The lag of the largest correlation, on the parabola through it and its neighbours.
-static double best_lag(const Lags *lags, double centre, double most) {
+static double signal_best_lag(const Lags *lags, double centre, double most) {
     double best = (double)NAN, largest = -2;
     const ptrdiff_t from = (ptrdiff_t)ceil(fmax(centre - most, -(double)lags->b_count));
     const ptrdiff_t to = (ptrdiff_t)floor(fmin(centre + most, (double)lags->a_count));
     for (ptrdiff_t lag = from; lag <= to; lag++) {
-        const double value = at_lag(lags, lag);
+        const double value = signal_at_lag(lags, lag);
         if (!(value > largest))
             continue;
         largest = value;
         best = (double)lag;
-        const double before = at_lag(lags, lag - 1), after = at_lag(lags, lag + 1);
+        const double before = signal_at_lag(lags, lag - 1), after = signal_at_lag(lags, lag + 1);
         const double curve = before - 2 * value + after;
         if (curve < 0 && before <= value && after <= value)
             best += 0.5 * (before - after) / curve;
@@ -211,17 +212,18 @@ static double best_lag(const Lags *lags, double centre, double most) {
     return best;
 }
 
-static double moved_correlation(const Signal *reference, const Signal *other, double shift) {
+static double signal_moved_correlation(const Signal *reference, const Signal *other, double shift) {
     Signal moved = *other;
     moved.start += shift;
     return signal_comparison_measure(reference, &moved, 1, NULL).correlation;
 }
 
-// The parabola leans where an end of one comes into the other's span: of its vertex and the whole
-// sample beside it, that at which both are more alike.
-static double better_shift(const Signal *reference, const Signal *other, double whole,
-                           double vertex) {
-    return moved_correlation(reference, other, whole) >= moved_correlation(reference, other, vertex)
+// The parabola is skewed where one signal ends within the other's span: of its vertex and the
+// nearest sample, the one with the larger correlation.
+static double signal_better_shift(const Signal *reference, const Signal *other, double whole,
+                                  double vertex) {
+    return signal_moved_correlation(reference, other, whole) >=
+                   signal_moved_correlation(reference, other, vertex)
                ? whole
                : vertex;
 }
@@ -257,8 +259,8 @@ Status signal_comparison_shift(const Signal *reference, const Signal *other, dou
         first == NULL)
         status = problem_set(problem, STATUS_NO_MEMORY, "no memory to find a shift");
     for (int i = 0; i < 2 && status == STATUS_OK; i++) {
-        put_centred(both[i], rate, counts[i], fft_real(forward), size);
-        sum_energy(fft_real(forward), counts[i], energies[i]);
+        signal_put_centred(both[i], rate, counts[i], fft_real(forward), size);
+        signal_energy(fft_real(forward), counts[i], energies[i]);
         fft_run(forward);
         const double *made = fft_complex(forward);
         for (size_t k = 0; k < size + 2 && i == 0; k++)
@@ -277,15 +279,15 @@ Status signal_comparison_shift(const Signal *reference, const Signal *other, dou
                            (ptrdiff_t)counts[0], (ptrdiff_t)counts[1]};
         // Without a shift `other` begins so many samples behind the reference.
         const double centre = (other->start - reference->start) * rate;
-        const double lag = best_lag(&lags, centre, most * rate);
+        const double lag = signal_best_lag(&lags, centre, most * rate);
         if (isnan(lag))
             status = problem_set(problem, STATUS_LIMIT,
                                  "no shift within %g s leaves half of the shorter one in common "
                                  "with the other, and both moving there",
                                  most);
         else
-            *shift = better_shift(reference, other, (nearbyint(lag) - centre) / rate,
-                                  (lag - centre) / rate);
+            *shift = signal_better_shift(reference, other, (nearbyint(lag) - centre) / rate,
+                                         (lag - centre) / rate);
     }
     fft_free(forward);
     fft_free(backward);

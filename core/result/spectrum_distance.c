@@ -1,5 +1,5 @@
-// A ratio of densities says how far they are at every frequency alike; a difference of powers says
-// how much of the motion is elsewhere. Bin 0 is left out: the mean is taken off there.
+// A ratio of densities weights all frequencies equally; a difference of powers weights them by
+// their share of the motion. Bin 0 is left out, because spectra have no mean.
 #include "core/result/spectrum_distance.h"
 
 #include <math.h>
@@ -37,7 +37,7 @@ double spectrum_distance_density_at(const Spectrum *spectrum, const double *dens
         return (double)NAN;
     const double index = frequency / spectrum->frequency[1];
     if (index <= 1)
-        return density[1]; // the mean is taken off: bin 0 says nothing of what is beside it
+        return density[1]; // bin 0 lacks the mean and does not describe its neighbour
     const size_t at = index * (1 + 1e-12) >= (double)last ? last : (size_t)(index * (1 + 1e-12));
     const double part = index - (double)at;
     return at == last || part < 1e-9 ? density[at]

@@ -15,7 +15,7 @@
 
 #define PI 3.14159265358979323846264338328
 
-enum { WATCH_SAMPLES = 1 << 16 }; // transformed between two looks at the progress
+enum { WATCH_SAMPLES = 1 << 16 }; // transformed between two checks of the progress
 
 const char *const welch_window_names[] = {"hann", "boxcar", "hamming", "blackman", NULL};
 const char *const welch_detrend_names[] = {"constant", "linear", "none", NULL};
@@ -28,40 +28,40 @@ static const double window_terms[][3] = {
     [WELCH_BLACKMAN] = {0.42, 0.5, 0.08},
 };
 
-// A sum with the roundings added up beside it (Neumaier 1974), for millions of terms.
+// A sum with a second sum of its rounding errors (Neumaier 1974), for millions of terms.
 typedef struct Sum {
     double value, rest;
 } Sum;
 
-static void sum_add(Sum *sum, double term) {
+static void welch_sum_add(Sum *sum, double term) {
     const double value = sum->value + term;
     sum->rest +=
         fabs(sum->value) >= fabs(term) ? (sum->value - value) + term : (term - value) + sum->value;
     sum->value = value;
 }
 
-static double sum_total(const Sum *sum) {
+static double welch_sum_total(const Sum *sum) {
     return sum->value + sum->rest;
 }
 
-static void make_window(int window, double *w, size_t length) {
+static void welch_make_window(int window, double *w, size_t length) {
     const double *a = window_terms[window];
     fft_cosines(0, 2 * PI / (double)length, length, w);
     for (size_t n = 0; n < length; n++) {
         const double c = w[n];
-        // A window of one sample is 1, whatever its name.
+        // Every window of one sample is 1.
         w[n] = length == 1 ? 1 : a[0] - a[1] * c + a[2] * (2 * c * c - 1);
     }
 }
 
 // Takes the mean or the least squares line off x[length].
-static void remove_trend(int detrend, double *x, size_t length) {
+static void welch_remove_trend(int detrend, double *x, size_t length) {
     if (detrend == WELCH_DETREND_NONE)
         return;
     Sum sum = {0};
     for (size_t n = 0; n < length; n++)
-        sum_add(&sum, x[n]);
-    const double mean = sum_total(&sum) / (double)length;
+        welch_sum_add(&sum, x[n]);
+    const double mean = welch_sum_total(&sum) / (double)length;
     for (size_t n = 0; n < length; n++)
         x[n] -= mean;
     if (detrend == WELCH_DETREND_CONSTANT || length == 1)
@@ -71,13 +71,13 @@ static void remove_trend(int detrend, double *x, size_t length) {
     const double L = (double)length, middle = (L - 1) / 2;
     Sum moment = {0};
     for (size_t n = 0; n < length; n++)
-        sum_add(&moment, ((double)n - middle) * x[n]);
-    const double slope = sum_total(&moment) / (L * (L * L - 1) / 12);
+        welch_sum_add(&moment, ((double)n - middle) * x[n]);
+    const double slope = welch_sum_total(&moment) / (L * (L * L - 1) / 12);
     for (size_t n = 0; n < length; n++)
         x[n] -= slope * ((double)n - middle);
 }
 
-// What the columns share.
+// Data shared by all columns.
 typedef struct Welch {
     WelchSettings settings;
     size_t segments, bins;
@@ -87,21 +87,21 @@ typedef struct Welch {
     Fft *fourier;
 } Welch;
 
-static void add_segment(Welch *welch, const double *x) {
+static void welch_add_segment(Welch *welch, const double *x) {
     const size_t length = welch->settings.segment;
     double *real = fft_real(welch->fourier);
     const double *bin = fft_complex(welch->fourier);
     memcpy(real, x, length * sizeof *real);
-    remove_trend(welch->settings.detrend, real, length);
+    welch_remove_trend(welch->settings.detrend, real, length);
     for (size_t n = 0; n < length; n++)
         real[n] *= welch->window[n];
     fft_run(welch->fourier);
     for (size_t k = 0; k < welch->bins; k++)
-        sum_add(&welch->power[k], bin[2 * k] * bin[2 * k] + bin[2 * k + 1] * bin[2 * k + 1]);
+        welch_sum_add(&welch->power[k], bin[2 * k] * bin[2 * k] + bin[2 * k + 1] * bin[2 * k + 1]);
 }
 
-static Status run_columns(Welch *welch, const Columns *series, const Progress *progress,
-                          Columns *densities, Problem *problem) {
+static Status welch_run_columns(Welch *welch, const Columns *series, const Progress *progress,
+                                Columns *densities, Problem *problem) {
     const size_t length = welch->settings.segment, step = length - welch->settings.overlap;
     size_t unwatched = WATCH_SAMPLES;
     for (size_t c = 0; c < series->count; c++) {
@@ -114,19 +114,19 @@ static Status run_columns(Welch *welch, const Columns *series, const Progress *p
                 unwatched = 0;
             }
             unwatched += length;
-            add_segment(welch, series->at[c].values + s * step);
+            welch_add_segment(welch, series->at[c].values + s * step);
         }
         double *density = densities->at[c].values;
         for (size_t k = 0; k < welch->bins; k++) {
             const bool has_mirror = k != 0 && 2 * k != length;
-            density[k] = sum_total(&welch->power[k]) * welch->scale * (has_mirror ? 2 : 1);
+            density[k] = welch_sum_total(&welch->power[k]) * welch->scale * (has_mirror ? 2 : 1);
         }
     }
     return STATUS_OK;
 }
 
-static Status check_settings(const Columns *series, const WelchSettings *settings,
-                             Problem *problem) {
+static Status welch_check_settings(const Columns *series, const WelchSettings *settings,
+                                   Problem *problem) {
     if (settings->segment < 1 || settings->segment > series->rows)
         return problem_set(problem, STATUS_INVALID,
                            "a segment of the spectra must have 1 to %zu samples, has %zu",
@@ -141,9 +141,9 @@ static Status check_settings(const Columns *series, const WelchSettings *setting
     return STATUS_OK;
 }
 
-static Status make_spectrum(Welch *welch, const Columns *series, const char *const *units,
-                            double sample_rate, const Progress *progress, Spectrum *spectrum,
-                            Problem *problem) {
+static Status welch_make_spectrum(Welch *welch, const Columns *series, const char *const *units,
+                                  double sample_rate, const Progress *progress, Spectrum *spectrum,
+                                  Problem *problem) {
     const size_t length = welch->settings.segment;
     welch->bins = length / 2 + 1;
     welch->segments = (series->rows - welch->settings.overlap) / (length - welch->settings.overlap);
@@ -156,29 +156,29 @@ static Status make_spectrum(Welch *welch, const Columns *series, const char *con
                            length);
     TRY(columns_allocate(&spectrum->densities, series->count, welch->bins, 0, problem));
 
-    make_window(welch->settings.window, welch->window, length);
+    welch_make_window(welch->settings.window, welch->window, length);
     Sum squares = {0};
     for (size_t n = 0; n < length; n++)
-        sum_add(&squares, welch->window[n] * welch->window[n]);
-    welch->scale = 1 / (sample_rate * sum_total(&squares) * (double)welch->segments);
+        welch_sum_add(&squares, welch->window[n] * welch->window[n]);
+    welch->scale = 1 / (sample_rate * welch_sum_total(&squares) * (double)welch->segments);
     for (size_t k = 0; k < welch->bins; k++)
         spectrum->frequency[k] = (double)k * sample_rate / (double)length;
     for (size_t c = 0; c < series->count; c++)
         columns_name(&spectrum->densities, c, series->at[c].name, units[c]);
     spectrum->settings = welch->settings;
     spectrum->segments = welch->segments;
-    return run_columns(welch, series, progress, &spectrum->densities, problem);
+    return welch_run_columns(welch, series, progress, &spectrum->densities, problem);
 }
 
 Status welch_spectrum(const Columns *series, const char *const *units, double sample_rate,
                       const WelchSettings *settings, const Progress *progress, FftCache *stock,
                       Spectrum *spectrum, Problem *problem) {
     *spectrum = (Spectrum){0};
-    TRY(check_settings(series, settings, problem));
+    TRY(welch_check_settings(series, settings, problem));
     Welch welch = {.settings = *settings,
                    .fourier = fft_acquire(stock, settings->segment, FFT_FORWARD)};
     const Status status =
-        make_spectrum(&welch, series, units, sample_rate, progress, spectrum, problem);
+        welch_make_spectrum(&welch, series, units, sample_rate, progress, spectrum, problem);
     free(welch.window);
     free(welch.power);
     fft_release(stock, welch.fourier);

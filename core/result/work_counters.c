@@ -13,7 +13,7 @@ const Field work_counters_fields[] = {
     FIELD_COUNT(WorkCounters, contacts, NULL, AT_MIN(0), 0, "contacts that have a length, followed from touch to release"),
     FIELD_COUNT(WorkCounters, bounces, NULL, AT_MIN(0), 0, "impacts without a length"),
     FIELD_COUNT(WorkCounters, rests, NULL, AT_MIN(0), 0, "intervals of a mass at rest at its stop"),
-    FIELD_COUNT(WorkCounters, neighbour_samples, "samples", AT_MIN(0), 0, "of the run beside this one that tells its error"),
+    FIELD_COUNT(WorkCounters, neighbour_samples, "samples", AT_MIN(0), 0, "of the companion run that estimates the error"),
     FIELD_COUNT(WorkCounters, ledger_rows, NULL, AT_MIN(0), 0, "rows kept in the ledger of impacts"),
     FIELD_COUNT(WorkCounters, channel_values, NULL, AT_MIN(0), 0, "values written into channels, those for spectra included"),
     FIELD_COUNT(WorkCounters, spectrum_segments, NULL, AT_MIN(0), 0, "segments transformed for spectra"),

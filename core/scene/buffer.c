@@ -40,40 +40,42 @@ const Field buffer_fields[] = {
 };
 // clang-format on
 
-static bool has(double value) {
+static bool buffer_has(double value) {
     return !isnan(value);
 }
 
 bool buffer_is_measured(const Buffer *buffer) {
-    return buffer->table.count > 0 || has(buffer->contact_time);
+    return buffer->table.count > 0 || buffer_has(buffer->contact_time);
 }
 
-static bool has_numbers(const Buffer *buffer) {
-    return has(buffer->restitution) || buffer_has_contact_data(buffer) || buffer->table.count > 0;
+static bool buffer_has_numbers(const Buffer *buffer) {
+    return buffer_has(buffer->restitution) || buffer_has_contact_data(buffer) ||
+           buffer->table.count > 0;
 }
 
 bool buffer_is_given(const Buffer *buffer) {
-    return buffer->material != NULL || has_numbers(buffer);
+    return buffer->material != NULL || buffer_has_numbers(buffer);
 }
 
 bool buffer_has_contact_data(const Buffer *buffer) {
     for (size_t i = 0; i < buffer->table.count; i++)
-        if (has(buffer->table.at[i].contact_time))
+        if (buffer_has(buffer->table.at[i].contact_time))
             return true;
-    return has(buffer->contact_time) || has(buffer->stiffness) || has(buffer->damping);
+    return buffer_has(buffer->contact_time) || buffer_has(buffer->stiffness) ||
+           buffer_has(buffer->damping);
 }
 
-static bool is_same(double a, double b) {
+static bool buffer_is_same(double a, double b) {
     return a == b || (isnan(a) && isnan(b));
 }
 
-static bool is_same_table(const ContactRows *a, const ContactRows *b) {
+static bool buffer_has_same_table(const ContactRows *a, const ContactRows *b) {
     if (a->count != b->count)
         return false;
     for (size_t i = 0; i < a->count; i++)
-        if (!is_same(a->at[i].approach_speed, b->at[i].approach_speed) ||
-            !is_same(a->at[i].restitution, b->at[i].restitution) ||
-            !is_same(a->at[i].contact_time, b->at[i].contact_time))
+        if (!buffer_is_same(a->at[i].approach_speed, b->at[i].approach_speed) ||
+            !buffer_is_same(a->at[i].restitution, b->at[i].restitution) ||
+            !buffer_is_same(a->at[i].contact_time, b->at[i].contact_time))
             return false;
     return true;
 }
@@ -82,10 +84,10 @@ bool buffer_equals(const Buffer *a, const Buffer *b) {
     const bool is_same_material = a->material == NULL || b->material == NULL
                                       ? a->material == b->material
                                       : strcmp(a->material, b->material) == 0;
-    return is_same_material && is_same(a->restitution, b->restitution) &&
-           is_same(a->contact_time, b->contact_time) && is_same(a->stiffness, b->stiffness) &&
-           is_same(a->damping, b->damping) && is_same(a->exponent, b->exponent) &&
-           is_same_table(&a->table, &b->table);
+    return is_same_material && buffer_is_same(a->restitution, b->restitution) &&
+           buffer_is_same(a->contact_time, b->contact_time) &&
+           buffer_is_same(a->stiffness, b->stiffness) && buffer_is_same(a->damping, b->damping) &&
+           buffer_is_same(a->exponent, b->exponent) && buffer_has_same_table(&a->table, &b->table);
 }
 
 void buffer_speed_range(const Buffer *buffer, double *least, double *most) {
@@ -120,77 +122,76 @@ ContactNumbers buffer_numbers(const Buffer *buffer) {
                             buffer->damping,     buffer->exponent,     buffer->table};
 }
 
-static Status missing(const char *pointer, const char *name, const char *model,
-                      const char *sentence, Problem *problem) {
-    char place[sizeof((Fault){0}.pointer)];
-    json_pointer_join(place, sizeof place, pointer, name);
-    return problem_add(problem, STATUS_INVALID, place, sentence, model);
-}
-
-// Whether the numbers make one of the ways, whatever the law.
-static Status check_way(const Buffer *buffer, const ContactLaw *law, const char *pointer,
-                        Problem *problem) {
-    if (!has_numbers(buffer)) {
+// Whether the numbers form one of these combinations, under any law.
+static Status buffer_check_way(const Buffer *buffer, const ContactLaw *law, const char *pointer,
+                               Problem *problem) {
+    if (!buffer_has_numbers(buffer)) {
         char material[64];
         text_quote(material, sizeof material, buffer->material);
         return problem_add(problem, STATUS_INVALID, pointer,
                            "material %s is not resolved to its numbers", material);
     }
     const bool has_table = buffer->table.count > 0;
-    const bool is_known = has(buffer->stiffness) || has(buffer->damping);
-    if (has_table && (has(buffer->restitution) || has(buffer->contact_time) || is_known))
+    const bool is_known = buffer_has(buffer->stiffness) || buffer_has(buffer->damping);
+    if (has_table &&
+        (buffer_has(buffer->restitution) || buffer_has(buffer->contact_time) || is_known))
         return problem_add(problem, STATUS_INVALID, pointer,
                            "must be given in one way: a table stands in place of restitution, "
                            "contact_time, stiffness and damping");
     if (law->form == CONTACT_POWER || has_table)
         return STATUS_OK;
-    // A power law's way; under impulse all but the restitution is left out.
-    if (law->form == CONTACT_IMPULSIVE && has(buffer->restitution) && has(buffer->stiffness) &&
-        !has(buffer->damping) && !has(buffer->contact_time))
+    // The combination of a power law; under impulse only the restitution is kept.
+    if (law->form == CONTACT_IMPULSIVE && buffer_has(buffer->restitution) &&
+        buffer_has(buffer->stiffness) && !buffer_has(buffer->damping) &&
+        !buffer_has(buffer->contact_time))
         return STATUS_OK;
-    const bool is_measured = has(buffer->restitution) || has(buffer->contact_time);
+    const bool is_measured = buffer_has(buffer->restitution) || buffer_has(buffer->contact_time);
     if (is_measured && is_known)
         return problem_add(problem, STATUS_INVALID, pointer,
                            "must be given in one way: restitution and contact_time, restitution "
                            "alone, or stiffness and damping (restitution and stiffness are for "
                            "power laws such as hunt_crossley)");
-    if (is_measured && !has(buffer->restitution))
-        return missing(pointer, "restitution", "contact_time",
-                       "is required beside %s: coefficient of restitution e", problem);
-    if (is_known && !has(buffer->stiffness))
-        return missing(pointer, "stiffness", "damping",
-                       "is required beside %s: contact stiffness k_b [N/m]", problem);
-    if (is_known && !has(buffer->damping))
-        return missing(pointer, "damping", "stiffness",
-                       "is required beside %s: contact damping c_b [N s/m]", problem);
+    if (is_measured && !buffer_has(buffer->restitution))
+        return json_pointer_fault(problem, pointer, "restitution",
+                                  "is required beside %s: coefficient of restitution e",
+                                  "contact_time");
+    if (is_known && !buffer_has(buffer->stiffness))
+        return json_pointer_fault(problem, pointer, "stiffness",
+                                  "is required beside %s: contact stiffness k_b [N/m]", "damping");
+    if (is_known && !buffer_has(buffer->damping))
+        return json_pointer_fault(problem, pointer, "damping",
+                                  "is required beside %s: contact damping c_b [N s/m]",
+                                  "stiffness");
     return STATUS_OK;
 }
 
 // Whether the law can have this restitution.
-static Status check_restitution(double restitution, const ContactLaw *law, const char *pointer,
-                                Problem *problem) {
-    char place[sizeof((Fault){0}.pointer)], is[32], least[32];
-    json_pointer_join(place, sizeof place, pointer, "restitution");
+static Status buffer_check_restitution(double restitution, const ContactLaw *law,
+                                       const char *pointer, Problem *problem) {
+    char is[32], least[32];
     text_real(is, restitution);
     if (law->form == CONTACT_LINEAR && restitution == 0)
-        return problem_add_real(problem, STATUS_INVALID, place, 0, NULL,
-                                "must be above 0 for the contact model spring_damper, is 0: its "
-                                "damping would be infinite (impulse allows 0)");
+        return json_pointer_fault_real(
+            problem, pointer, "restitution", 0, NULL,
+            "must be above 0 for the contact model spring_damper, is 0: its "
+            "damping would be infinite (impulse allows 0)");
     if (law->form != CONTACT_POWER || !(restitution < law->restitution_min))
         return STATUS_OK;
     if (law->restitution_min == 1)
-        return problem_add_real(problem, STATUS_INVALID, place, restitution, NULL,
-                                "must be 1 or left out for the contact model %s, which gives all "
-                                "energy back, is %s",
-                                law->kind.name, is);
-    return problem_add_real(problem, STATUS_INVALID, place, restitution, NULL,
-                            "must be at least %s for the contact model %s, is %s: its damping "
-                            "grows beyond all bounds",
-                            text_real(least, law->restitution_min), law->kind.name, is);
+        return json_pointer_fault_real(
+            problem, pointer, "restitution", restitution, NULL,
+            "must be 1 or left out for the contact model %s, which gives all "
+            "energy back, is %s",
+            law->kind.name, is);
+    return json_pointer_fault_real(
+        problem, pointer, "restitution", restitution, NULL,
+        "must be at least %s for the contact model %s, is %s: its damping "
+        "grows beyond all bounds",
+        text_real(least, law->restitution_min), law->kind.name, is);
 }
 
-static Status check_table(const Buffer *buffer, const ContactLaw *law, const char *pointer,
-                          Problem *problem) {
+static Status buffer_check_table(const Buffer *buffer, const ContactLaw *law, const char *pointer,
+                                 Problem *problem) {
     const ContactRows *rows = &buffer->table;
     Status status = STATUS_OK;
     char table[sizeof((Fault){0}.pointer)];
@@ -201,76 +202,78 @@ static Status check_table(const Buffer *buffer, const ContactLaw *law, const cha
                            "alone hold for every approach speed",
                            rows->count);
     for (size_t i = 0; i < rows->count; i++) {
-        char row[sizeof((Fault){0}.pointer)], place[sizeof((Fault){0}.pointer)];
+        char row[sizeof((Fault){0}.pointer)];
         json_pointer_index(row, sizeof row, table, i);
-        if (check_restitution(rows->at[i].restitution, law, row, problem) != STATUS_OK)
+        if (buffer_check_restitution(rows->at[i].restitution, law, row, problem) != STATUS_OK)
             status = STATUS_INVALID;
-        if (law->form != CONTACT_IMPULSIVE && !has(rows->at[i].contact_time))
-            status = missing(row, "contact_time", law->kind.name,
-                             "is required by the contact model %s: contact time T_c of an "
-                             "isolated impact [s]",
-                             problem);
+        if (law->form != CONTACT_IMPULSIVE && !buffer_has(rows->at[i].contact_time))
+            status =
+                json_pointer_fault(problem, row, "contact_time",
+                                   "is required by the contact model %s: contact time T_c of an "
+                                   "isolated impact [s]",
+                                   law->kind.name);
         if (i == 0 || rows->at[i].approach_speed > rows->at[i - 1].approach_speed)
             continue;
         char is[32], than[32];
-        json_pointer_join(place, sizeof place, row, "approach_speed");
-        status = problem_add_real(problem, STATUS_INVALID, place, rows->at[i].approach_speed, "m/s",
-                                  "must be above the row before, %s m/s, is %s",
-                                  text_real(than, rows->at[i - 1].approach_speed),
-                                  text_real(is, rows->at[i].approach_speed));
+        status = json_pointer_fault_real(problem, row, "approach_speed", rows->at[i].approach_speed,
+                                         "m/s", "must be above the row before, %s m/s, is %s",
+                                         text_real(than, rows->at[i - 1].approach_speed),
+                                         text_real(is, rows->at[i].approach_speed));
     }
     return status;
 }
 
-static Status check_power(const Buffer *buffer, const ContactLaw *law, const char *pointer,
-                          Problem *problem) {
+static Status buffer_check_power(const Buffer *buffer, const ContactLaw *law, const char *pointer,
+                                 Problem *problem) {
     const char *model = law->kind.name;
-    char place[sizeof((Fault){0}.pointer)];
-    if (has(buffer->damping)) {
-        json_pointer_join(place, sizeof place, pointer, "damping");
-        return problem_add_real(problem, STATUS_INVALID, place, buffer->damping, "N s/m",
-                                "is not for the contact model %s, whose damping follows from "
-                                "restitution: choose spring_damper, or give that instead",
-                                model);
+    if (buffer_has(buffer->damping)) {
+        return json_pointer_fault_real(
+            problem, pointer, "damping", buffer->damping, "N s/m",
+            "is not for the contact model %s, whose damping follows from "
+            "restitution: choose spring_damper, or give that instead",
+            model);
     }
-    if (has(buffer->stiffness) && has(buffer->contact_time))
+    if (buffer_has(buffer->stiffness) && buffer_has(buffer->contact_time))
         return problem_add(problem, STATUS_INVALID, pointer,
                            "must be given in one way: contact_time, from which the stiffness of "
                            "each impact follows, or stiffness");
-    if (!has(buffer->stiffness) && !has(buffer->contact_time))
-        return missing(pointer, "contact_time", model,
-                       "is required by the contact model %s (or a stiffness in N/m^n): contact "
-                       "time T_c of an isolated impact [s]",
-                       problem);
-    if (law->factor != NULL && !has(buffer->restitution))
-        return missing(pointer, "restitution", model,
-                       "is required by the contact model %s: coefficient of restitution e",
-                       problem);
-    return check_restitution(buffer->restitution, law, pointer, problem);
+    if (!buffer_has(buffer->stiffness) && !buffer_has(buffer->contact_time))
+        return json_pointer_fault(
+            problem, pointer, "contact_time",
+            "is required by the contact model %s (or a stiffness in N/m^n): contact "
+            "time T_c of an isolated impact [s]",
+            model);
+    if (law->factor != NULL && !buffer_has(buffer->restitution))
+        return json_pointer_fault(
+            problem, pointer, "restitution",
+            "is required by the contact model %s: coefficient of restitution e", model);
+    return buffer_check_restitution(buffer->restitution, law, pointer, problem);
 }
 
 Status buffer_validate(const Buffer *buffer, const ContactLaw *law, const char *pointer,
                        Problem *problem) {
     if (problem_concerns(problem, pointer))
         return STATUS_INVALID;
-    TRY(check_way(buffer, law, pointer, problem));
+    TRY(buffer_check_way(buffer, law, pointer, problem));
     if (buffer->table.count > 0)
-        return check_table(buffer, law, pointer, problem);
+        return buffer_check_table(buffer, law, pointer, problem);
     if (law->form == CONTACT_POWER)
-        return check_power(buffer, law, pointer, problem);
-    if (law->form == CONTACT_IMPULSIVE && !has(buffer->restitution))
-        return missing(pointer, "restitution", law->kind.name,
-                       "is required by the contact model %s, which takes no stiffness and "
-                       "damping: give a restitution, or choose spring_damper",
-                       problem);
-    if (law->form != CONTACT_LINEAR || has(buffer->stiffness))
+        return buffer_check_power(buffer, law, pointer, problem);
+    if (law->form == CONTACT_IMPULSIVE && !buffer_has(buffer->restitution))
+        return json_pointer_fault(
+            problem, pointer, "restitution",
+            "is required by the contact model %s, which takes no stiffness and "
+            "damping: give a restitution, or choose spring_damper",
+            law->kind.name);
+    if (law->form != CONTACT_LINEAR || buffer_has(buffer->stiffness))
         return STATUS_OK;
-    TRY(check_restitution(buffer->restitution, law, pointer, problem));
-    if (!has(buffer->contact_time))
-        return missing(pointer, "contact_time", law->kind.name,
-                       "is required by the contact model %s: contact time T_c of an isolated "
-                       "impact [s]",
-                       problem);
+    TRY(buffer_check_restitution(buffer->restitution, law, pointer, problem));
+    if (!buffer_has(buffer->contact_time))
+        return json_pointer_fault(
+            problem, pointer, "contact_time",
+            "is required by the contact model %s: contact time T_c of an isolated "
+            "impact [s]",
+            law->kind.name);
     return STATUS_OK;
 }
 
@@ -282,7 +285,7 @@ void buffer_normalise(Buffer *buffer, const ContactLaw *law) {
     }
     if (law->form != CONTACT_POWER)
         buffer->exponent = (double)NAN;
-    else if (!has(buffer->exponent))
+    else if (!buffer_has(buffer->exponent))
         buffer->exponent = POWER_LAW_EXPONENT;
     if (law->form == CONTACT_POWER && law->factor == NULL && buffer->table.count == 0)
         buffer->restitution = 1;

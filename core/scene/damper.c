@@ -28,7 +28,7 @@ const Field damper_fields[] = {
     FIELD_ITEM(Damper, left_buffer, buffer_fields, "material", PRESENCE_OPTIONAL, "what stands at the left stop"),
     FIELD_ITEM(Damper, right_buffer, buffer_fields, "material", PRESENCE_OPTIONAL, "what stands at the right stop"),
     FIELD_CHOICE(Damper, identified_for, identified_for_names, 0, "the pair of masses for which restitution and contact time hold"),
-    FIELD_ITEM(Damper, rig, rig_fields, NULL, PRESENCE_OPTIONAL, "masses of the test that measured them, for identified_for rig: what they come to there is carried over; if absent those that the material's revision tells"),
+    FIELD_ITEM(Damper, rig, rig_fields, NULL, PRESENCE_OPTIONAL, "masses of the test that measured the buffers, for identified_for rig: the parameters identified there are carried over; if absent those of the material's revision"),
     FIELD_END
 };
 // clang-format on
@@ -36,7 +36,7 @@ const Field damper_fields[] = {
 enum { BUFFERS = 3 };
 static const char *const buffer_names[BUFFERS] = {"buffer", "left_buffer", "right_buffer"};
 
-static Buffer *buffer_at(Damper *damper, size_t index) {
+static Buffer *damper_buffer_at(Damper *damper, size_t index) {
     Buffer *const buffers[BUFFERS] = {&damper->buffer, &damper->left_buffer, &damper->right_buffer};
     return buffers[index];
 }
@@ -57,22 +57,22 @@ const ContactLaw *dampers_contact_law(const Dampers *dampers, const Contact *con
     return &contact_impulse;
 }
 
-static Status check_buffers(Damper *damper, const ContactLaw *law, const char *pointer,
-                            Problem *problem) {
+static Status damper_check_buffers(Damper *damper, const ContactLaw *law, const char *pointer,
+                                   Problem *problem) {
     char places[BUFFERS][sizeof((Fault){0}.pointer)];
-    bool is_given[BUFFERS], is_told = false;
+    bool is_given[BUFFERS], has_fault = false;
     for (size_t i = 0; i < BUFFERS; i++) {
         json_pointer_join(places[i], sizeof places[i], pointer, buffer_names[i]);
-        is_given[i] = buffer_is_given(buffer_at(damper, i));
-        is_told = is_told || problem_concerns(problem, places[i]);
+        is_given[i] = buffer_is_given(damper_buffer_at(damper, i));
+        has_fault = has_fault || problem_concerns(problem, places[i]);
     }
     Status status = STATUS_OK;
     for (size_t i = 0; i < BUFFERS; i++)
         if (is_given[i] &&
-            buffer_validate(buffer_at(damper, i), law, places[i], problem) != STATUS_OK)
+            buffer_validate(damper_buffer_at(damper, i), law, places[i], problem) != STATUS_OK)
             status = STATUS_INVALID;
     // A buffer that could not be read may be the one that seems to be missing.
-    if (is_told)
+    if (has_fault)
         return STATUS_INVALID;
     if (is_given[0] && is_given[1] && is_given[2])
         return problem_add(problem, STATUS_INVALID, places[0],
@@ -87,53 +87,47 @@ static Status check_buffers(Damper *damper, const ContactLaw *law, const char *p
     return status;
 }
 
-static Status check_position(const Damper *damper, const char *pointer, Problem *problem) {
+static Status damper_check_position(const Damper *damper, const char *pointer, Problem *problem) {
     const double most = damper->clearance / 2;
     if (!(most >= 0) || !isfinite(damper->position) || fabs(damper->position) <= most)
         return STATUS_OK;
-    char place[sizeof((Fault){0}.pointer)], limit[32], is[32];
-    json_pointer_join(place, sizeof place, pointer, "position");
+    char limit[32], is[32];
     text_real(limit, most);
     text_real(is, damper->position);
-    return problem_add_real(problem, STATUS_INVALID, place, damper->position, "m",
-                            "must be between the stops, within [-%s, %s] m, is %s", limit, limit,
-                            is);
+    return json_pointer_fault_real(problem, pointer, "position", damper->position, "m",
+                                   "must be between the stops, within [-%s, %s] m, is %s", limit,
+                                   limit, is);
 }
 
 // A power law's parameters are those of an approach speed; between stops that always touch there is
 // none.
-static Status check_clearance(const Damper *damper, const ContactLaw *law, const char *pointer,
-                              Problem *problem) {
+static Status damper_check_clearance(const Damper *damper, const ContactLaw *law,
+                                     const char *pointer, Problem *problem) {
     if (law->form != CONTACT_POWER || damper->clearance != 0)
         return STATUS_OK;
-    char place[sizeof((Fault){0}.pointer)];
-    json_pointer_join(place, sizeof place, pointer, "clearance");
-    return problem_add_real(problem, STATUS_INVALID, place, 0, "m",
-                            "must be above 0 m for the contact model %s, is 0: its parameters are "
-                            "those of an approach speed (spring_damper and impulse allow 0)",
-                            law->kind.name);
+    return json_pointer_fault_real(
+        problem, pointer, "clearance", 0, "m",
+        "must be above 0 m for the contact model %s, is 0: its parameters are "
+        "those of an approach speed (spring_damper and impulse allow 0)",
+        law->kind.name);
 }
 
 // A sum of finite numbers may not be finite.
-static Status check_stops(const Damper *damper, const char *pointer, Problem *problem) {
+static Status damper_check_stops(const Damper *damper, const char *pointer, Problem *problem) {
     const double furthest = fabs(damper->offset) + damper->clearance;
     if (!isfinite(damper->offset) || !isfinite(damper->clearance) || isfinite(furthest))
         return STATUS_OK;
-    char place[sizeof((Fault){0}.pointer)];
-    json_pointer_join(place, sizeof place, pointer, "offset");
-    return problem_add_real(problem, STATUS_INVALID, place, damper->offset, "m",
-                            "puts a stop beyond all numbers");
+    return json_pointer_fault_real(problem, pointer, "offset", damper->offset, "m",
+                                   "puts a stop beyond all numbers");
 }
 
-static Status check_storey(const Damper *damper, size_t storeys, const char *pointer,
-                           Problem *problem) {
+static Status damper_check_storey(const Damper *damper, size_t storeys, const char *pointer,
+                                  Problem *problem) {
     if (storeys == 0 || damper->storey <= storeys)
         return STATUS_OK;
-    char place[sizeof((Fault){0}.pointer)];
-    json_pointer_join(place, sizeof place, pointer, "storey");
-    return problem_add_real(problem, STATUS_INVALID, place, (double)damper->storey, NULL,
-                            "must be at most %zu, the number of storeys, is %llu", storeys,
-                            (unsigned long long)damper->storey);
+    return json_pointer_fault_real(problem, pointer, "storey", (double)damper->storey, NULL,
+                                   "must be at most %zu, the number of storeys, is %llu", storeys,
+                                   (unsigned long long)damper->storey);
 }
 
 double damper_identified_mass(const Damper *damper, double own) {
@@ -145,19 +139,20 @@ double damper_identified_mass(const Damper *damper, double own) {
 }
 
 // Restitution alone, and stiffness and damping, hold for any pair of masses.
-static bool is_carried(const Damper *damper, const ContactLaw *law) {
+static bool damper_is_carried(const Damper *damper, const ContactLaw *law) {
     return law->form != CONTACT_IMPULSIVE &&
            (buffer_is_measured(damper_buffer(damper, SIDE_LEFT)) ||
             buffer_is_measured(damper_buffer(damper, SIDE_RIGHT)));
 }
 
-static bool is_rig_given(const Damper *damper) {
+static bool rig_is_given(const Damper *damper) {
     return !isnan(damper->rig.impactor_mass) || !isnan(damper->rig.base_mass);
 }
 
-// The first side whose material does not tell all of the masses that it was tested with; NULL: all
-// that were measured tell the same ones, *test.
-static const Buffer *find_untold(const Damper *damper, const BufferTest **test, bool *is_alike) {
+// The first measured buffer without the masses of its test. NULL: all have them; *test is the first
+// test, and *is_alike whether the others had the same masses.
+static const Buffer *damper_find_unstated(const Damper *damper, const BufferTest **test,
+                                          bool *is_alike) {
     *test = NULL;
     *is_alike = true;
     for (int side = 0; side < 2; side++) {
@@ -174,12 +169,13 @@ static const Buffer *find_untold(const Damper *damper, const BufferTest **test, 
     return NULL;
 }
 
-static bool is_same(double a, double b) {
+static bool rig_is_same_mass(double a, double b) {
     return a == b || (isnan(a) && isnan(b));
 }
 
-static bool is_same_rig(const Rig *a, const Rig *b) {
-    return is_same(a->impactor_mass, b->impactor_mass) && is_same(a->base_mass, b->base_mass);
+static bool rig_is_same(const Rig *a, const Rig *b) {
+    return rig_is_same_mass(a->impactor_mass, b->impactor_mass) &&
+           rig_is_same_mass(a->base_mass, b->base_mass);
 }
 
 static Rig rig_of(const BufferTest *test) {
@@ -187,11 +183,12 @@ static Rig rig_of(const BufferTest *test) {
 }
 
 // A rig that is not given is that of the materials' tests.
-static void fill_rig(Damper *damper, const ContactLaw *law) {
+static void rig_fill(Damper *damper, const ContactLaw *law) {
     const BufferTest *test;
     bool is_alike;
-    if (damper->identified_for != IDENTIFIED_FOR_RIG || is_rig_given(damper) ||
-        !is_carried(damper, law) || find_untold(damper, &test, &is_alike) != NULL || !is_alike)
+    if (damper->identified_for != IDENTIFIED_FOR_RIG || rig_is_given(damper) ||
+        !damper_is_carried(damper, law) || damper_find_unstated(damper, &test, &is_alike) != NULL ||
+        !is_alike)
         return;
     damper->rig = rig_of(test);
 }
@@ -199,11 +196,11 @@ static void fill_rig(Damper *damper, const ContactLaw *law) {
 void damper_reset_rig(const Damper *base, Damper *damper) {
     const BufferTest *test;
     bool is_alike;
-    if (base->identified_for != IDENTIFIED_FOR_RIG || !is_same_rig(&base->rig, &damper->rig) ||
-        find_untold(base, &test, &is_alike) != NULL || test == NULL || !is_alike)
+    if (base->identified_for != IDENTIFIED_FOR_RIG || !rig_is_same(&base->rig, &damper->rig) ||
+        damper_find_unstated(base, &test, &is_alike) != NULL || test == NULL || !is_alike)
         return;
-    const Rig told = rig_of(test);
-    if (!is_same_rig(&base->rig, &told))
+    const Rig tested = rig_of(test);
+    if (!rig_is_same(&base->rig, &tested))
         return;
     for (int side = 0; side < 2; side++) {
         const Buffer *buffer = damper_buffer(damper, (Side)side);
@@ -214,56 +211,57 @@ void damper_reset_rig(const Damper *base, Damper *damper) {
 }
 
 // Why the materials could not stand for it.
-static Status refuse_rig(const Damper *damper, const char *place, Problem *problem) {
+static Status rig_refuse(const Damper *damper, const char *place, Problem *problem) {
     const BufferTest *test;
     bool is_alike;
-    const Buffer *untold = find_untold(damper, &test, &is_alike);
-    if (untold == NULL)
+    const Buffer *unstated = damper_find_unstated(damper, &test, &is_alike);
+    if (unstated == NULL)
         return problem_add(problem, STATUS_INVALID, place,
                            "is required by identified_for \"rig\": %.64s and %.64s were measured "
                            "with other masses, and a damper has one rig",
                            damper_buffer(damper, SIDE_LEFT)->material,
                            damper_buffer(damper, SIDE_RIGHT)->material);
-    if (untold->material == NULL)
+    if (unstated->material == NULL)
         return problem_add(problem, STATUS_INVALID, place,
                            "is required by identified_for \"rig\": the impactor_mass [kg] and, "
                            "unless it was fixed, the base_mass of the test that measured "
                            "restitution and contact time");
     return problem_add(problem, STATUS_INVALID, place,
-                       "is required by identified_for \"rig\": %.64s does not tell %s; give the "
+                       "is required by identified_for \"rig\": %.64s does not state %s; give the "
                        "impactor_mass [kg] and, unless it was fixed, the base_mass of its test",
-                       untold->material,
-                       !isnan(untold->test.base_mass)       ? "the mass of the impactor"
-                       : !isnan(untold->test.impactor_mass) ? "the base that it lay on"
-                                                            : "the masses that it was tested with");
+                       unstated->material,
+                       !isnan(unstated->test.base_mass) ? "the mass of the impactor"
+                       : !isnan(unstated->test.impactor_mass)
+                           ? "the base that it lay on"
+                           : "the masses that it was tested with");
 }
 
-static Status check_rig(const Damper *damper, const ContactLaw *law, const char *pointer,
+static Status rig_check(const Damper *damper, const ContactLaw *law, const char *pointer,
                         Problem *problem) {
     char place[sizeof((Fault){0}.pointer)];
     json_pointer_join(place, sizeof place, pointer, "rig");
-    const bool is_given = is_rig_given(damper);
-    if (!is_carried(damper, law) || problem_concerns(problem, place) ||
+    const bool is_given = rig_is_given(damper);
+    if (!damper_is_carried(damper, law) || problem_concerns(problem, place) ||
         is_given == (damper->identified_for == IDENTIFIED_FOR_RIG))
         return STATUS_OK;
     if (is_given)
         return problem_add(problem, STATUS_INVALID, place,
                            "is used only with identified_for \"rig\": give that, or leave out the "
                            "rig");
-    return refuse_rig(damper, place, problem);
+    return rig_refuse(damper, place, problem);
 }
 
-static void normalise_rig(Damper *damper, const ContactLaw *law) {
-    if (is_carried(damper, law))
+static void rig_normalise(Damper *damper, const ContactLaw *law) {
+    if (damper_is_carried(damper, law))
         return;
     damper->identified_for = IDENTIFIED_FOR_SCENE;
     fields_clear(rig_fields, &damper->rig);
 }
 
-static void normalise_buffers(Damper *damper, const ContactLaw *law) {
+static void damper_normalise_buffers(Damper *damper, const ContactLaw *law) {
     for (size_t i = 0; i < BUFFERS; i++)
-        if (buffer_is_given(buffer_at(damper, i)))
-            buffer_normalise(buffer_at(damper, i), law);
+        if (buffer_is_given(damper_buffer_at(damper, i)))
+            buffer_normalise(damper_buffer_at(damper, i), law);
     if (buffer_is_given(&damper->buffer)) {
         if (buffer_is_given(&damper->left_buffer))
             buffer_move(&damper->right_buffer, &damper->buffer);
@@ -283,18 +281,18 @@ Status damper_complete(Damper *damper, const ContactLaw *law, size_t storeys, co
         damper->storey = storeys;
     if (damper->identified_for == CHOICE_ABSENT)
         damper->identified_for = IDENTIFIED_FOR_SCENE;
-    fill_rig(damper, law);
+    rig_fill(damper, law);
     const Status faults[] = {
-        check_position(damper, pointer, problem),
-        check_stops(damper, pointer, problem),
-        check_clearance(damper, law, pointer, problem),
-        check_storey(damper, storeys, pointer, problem),
-        check_buffers(damper, law, pointer, problem),
-        check_rig(damper, law, pointer, problem),
+        damper_check_position(damper, pointer, problem),
+        damper_check_stops(damper, pointer, problem),
+        damper_check_clearance(damper, law, pointer, problem),
+        damper_check_storey(damper, storeys, pointer, problem),
+        damper_check_buffers(damper, law, pointer, problem),
+        rig_check(damper, law, pointer, problem),
     };
     for (size_t i = 0; i < COUNT(faults); i++)
         TRY(faults[i]);
-    normalise_buffers(damper, law);
-    normalise_rig(damper, law);
+    damper_normalise_buffers(damper, law);
+    rig_normalise(damper, law);
     return STATUS_OK;
 }

@@ -1,5 +1,5 @@
-// A material says e and T_c once, for every approach speed, or as a table; what it does not know it
-// does not say.
+// A material has e and T_c once, for every approach speed, or as a table. Unknown values are
+// absent.
 #include "core/scene/material.h"
 #include "core/base/json_pointer.h"
 
@@ -41,7 +41,7 @@ const Field material_fields[] = {
     FIELD_REAL(Material, contact_time, "s", ABOVE(0), OPTIONAL, "contact time T_c of an isolated impact, for every approach speed"),
     FIELD_REAL(Material, contact_time_deviation, "s", AT_MIN(0), OPTIONAL, "standard deviation of contact_time"),
     TABLE,
-    FIELD_CHOICE(Material, separation, separation_names, OPTIONAL, "the rule by which the end of a contact was told, where contact_time was fitted to a force trace"),
+    FIELD_CHOICE(Material, separation, separation_names, OPTIONAL, "rule for the end of a contact, where contact_time was fitted to a force trace"),
     FIELD_REAL(Material, least_speed, "m/s", AT_MIN(0), OPTIONAL, "least approach speed that was measured"),
     FIELD_REAL(Material, most_speed, "m/s", AT_MIN(0), OPTIONAL, "largest approach speed that was measured"),
     FIELD_REAL(Material, least_temperature, "degC", AT_MIN(-273.15), OPTIONAL, "lowest temperature at which it was measured"),
@@ -58,7 +58,7 @@ const Field material_fields[] = {
 const Field material_list_fields[] = {TAGS, TABLE, MEASUREMENTS, FIELD_END};
 // clang-format on
 
-static bool has(double value) {
+static bool material_has(double value) {
     return !isnan(value);
 }
 
@@ -68,38 +68,25 @@ bool material_slug_is_valid(const char *slug) {
            strspn(slug, "abcdefghijklmnopqrstuvwxyz0123456789_-") == size;
 }
 
-static Status fault(const char *pointer, const char *name, Problem *problem, const char *detail) {
-    char place[sizeof((Fault){0}.pointer)];
-    json_pointer_join(place, sizeof place, pointer, name);
-    return problem_add(problem, STATUS_INVALID, place, "%s", detail);
-}
-
-// Whether the member `name` could not be read, which is told: what depends on it cannot be judged.
-static bool is_unread(const char *pointer, const char *name, const Problem *problem) {
-    char place[sizeof((Fault){0}.pointer)];
-    json_pointer_join(place, sizeof place, pointer, name);
-    return problem_concerns(problem, place);
-}
-
-static Status check_text(const char *text, const char *pointer, const char *name,
-                         Problem *problem) {
+static Status material_check_text(const char *text, const char *pointer, const char *name,
+                                  Problem *problem) {
     if (text == NULL || text[strspn(text, " \t\r\n")] != '\0')
         return STATUS_OK;
-    return fault(pointer, name, problem, "must not be empty");
+    return json_pointer_fault(problem, pointer, name, "must not be empty");
 }
 
-static Status check_order(double least, double most, const char *unit, const char *pointer,
-                          const char *name, Problem *problem) {
-    char place[sizeof((Fault){0}.pointer)], is[32], than[32];
+static Status material_check_order(double least, double most, const char *unit, const char *pointer,
+                                   const char *name, Problem *problem) {
+    char is[32], than[32];
     if (!(most < least))
         return STATUS_OK;
-    json_pointer_join(place, sizeof place, pointer, name);
-    return problem_add_real(problem, STATUS_INVALID, place, most, unit,
-                            "must be at least %s %s, the range's other end, is %s",
-                            text_real(than, least), unit, text_real(is, most));
+    return json_pointer_fault_real(problem, pointer, name, most, unit,
+                                   "must be at least %s %s, the range's other end, is %s",
+                                   text_real(than, least), unit, text_real(is, most));
 }
 
-static Status check_table(const Material *material, const char *pointer, Problem *problem) {
+static Status material_check_table(const Material *material, const char *pointer,
+                                   Problem *problem) {
     const MaterialRows *rows = &material->table;
     char table[sizeof((Fault){0}.pointer)];
     Status status = STATUS_OK;
@@ -110,35 +97,36 @@ static Status check_table(const Material *material, const char *pointer, Problem
                              "alone hold for every approach speed");
     char first[sizeof((Fault){0}.pointer)];
     json_pointer_index(first, sizeof first, table, 0);
-    const bool is_first_unread = is_unread(first, "contact_time", problem);
+    const bool is_first_unread = json_pointer_concerns(problem, first, "contact_time");
     for (size_t i = 0; i < rows->count; i++) {
         const MaterialRow *row = &rows->at[i];
-        char at[sizeof((Fault){0}.pointer)], place[sizeof((Fault){0}.pointer)], is[32], than[32];
+        char at[sizeof((Fault){0}.pointer)], is[32], than[32];
         json_pointer_index(at, sizeof at, table, i);
-        if (has(row->contact_time) != has(rows->at[0].contact_time) && !is_first_unread)
-            status = fault(at, "contact_time", problem,
-                           "must be given in every row of the table or in none");
-        if (has(row->contact_time_deviation) && !has(row->contact_time) &&
-            !is_unread(at, "contact_time", problem))
-            status = fault(at, "contact_time_deviation", problem,
-                           "needs a contact_time that it belongs to");
+        if (material_has(row->contact_time) != material_has(rows->at[0].contact_time) &&
+            !is_first_unread)
+            status = json_pointer_fault(problem, at, "contact_time",
+                                        "must be given in every row of the table or in none");
+        if (material_has(row->contact_time_deviation) && !material_has(row->contact_time) &&
+            !json_pointer_concerns(problem, at, "contact_time"))
+            status = json_pointer_fault(problem, at, "contact_time_deviation",
+                                        "needs a contact_time that it belongs to");
         if (i == 0 || !(row->approach_speed <= rows->at[i - 1].approach_speed))
-            continue; // also where one is not known
-        json_pointer_join(place, sizeof place, at, "approach_speed");
-        status = problem_add_real(problem, STATUS_INVALID, place, row->approach_speed, "m/s",
-                                  "must be above the row before, %s m/s, is %s",
-                                  text_real(than, rows->at[i - 1].approach_speed),
-                                  text_real(is, row->approach_speed));
+            continue; // also where one is unknown
+        status = json_pointer_fault_real(problem, at, "approach_speed", row->approach_speed, "m/s",
+                                         "must be above the row before, %s m/s, is %s",
+                                         text_real(than, rows->at[i - 1].approach_speed),
+                                         text_real(is, row->approach_speed));
     }
     return status;
 }
 
 // e and T_c once or as a table; a deviation belongs to its value.
-static Status check_ways(const Material *material, const char *pointer, Problem *problem) {
+static Status material_check_ways(const Material *material, const char *pointer, Problem *problem) {
     const bool has_table = material->table.count > 0;
-    const bool has_numbers = has(material->restitution) || has(material->contact_time) ||
-                             has(material->restitution_deviation) ||
-                             has(material->contact_time_deviation);
+    const bool has_numbers = material_has(material->restitution) ||
+                             material_has(material->contact_time) ||
+                             material_has(material->restitution_deviation) ||
+                             material_has(material->contact_time_deviation);
     char table[sizeof((Fault){0}.pointer)];
     json_pointer_join(table, sizeof table, pointer, "table");
     if (has_table && has_numbers)
@@ -148,28 +136,31 @@ static Status check_ways(const Material *material, const char *pointer, Problem 
     if (has_table || problem_concerns(problem, table))
         return STATUS_OK;
     Status status = STATUS_OK;
-    if (!has(material->restitution))
-        status = fault(pointer, "restitution", problem,
-                       "is required, or a table over approach speed: coefficient of restitution e");
-    if (has(material->contact_time_deviation) && !has(material->contact_time) &&
-        !is_unread(pointer, "contact_time", problem))
-        status = fault(pointer, "contact_time_deviation", problem,
-                       "needs a contact_time that it belongs to");
+    if (!material_has(material->restitution))
+        status = json_pointer_fault(
+            problem, pointer, "restitution",
+            "is required, or a table over approach speed: coefficient of restitution e");
+    if (material_has(material->contact_time_deviation) && !material_has(material->contact_time) &&
+        !json_pointer_concerns(problem, pointer, "contact_time"))
+        status = json_pointer_fault(problem, pointer, "contact_time_deviation",
+                                    "needs a contact_time that it belongs to");
     return status;
 }
 
-static Status check_base(const Material *material, const char *pointer, Problem *problem) {
+static Status material_check_base(const Material *material, const char *pointer, Problem *problem) {
     char base[sizeof((Fault){0}.pointer)];
     json_pointer_join(base, sizeof base, pointer, "base");
     if (problem_concerns(problem, base))
         return STATUS_OK;
-    if (has(material->base_mass) && material->base != MATERIAL_BASE_FREE)
-        return fault(pointer, "base_mass", problem,
-                     "is the mass of a free base: say \"base\": \"free\", or leave it out");
+    if (material_has(material->base_mass) && material->base != MATERIAL_BASE_FREE)
+        return json_pointer_fault(
+            problem, pointer, "base_mass",
+            "is the mass of a free base: say \"base\": \"free\", or leave it out");
     return STATUS_OK;
 }
 
-static Status check_measurements(const Material *material, const char *pointer, Problem *problem) {
+static Status material_check_measurements(const Material *material, const char *pointer,
+                                          Problem *problem) {
     Status status = STATUS_OK;
     for (size_t i = 0; i < material->measurements.count; i++) {
         const double number = material->measurements.at[i];
@@ -182,14 +173,14 @@ static Status check_measurements(const Material *material, const char *pointer, 
         json_pointer_join(list, sizeof list, pointer, "measurements");
         json_pointer_index(place, sizeof place, list, i);
         status = problem_add_real(problem, STATUS_INVALID, place, number, NULL,
-                                  is_again ? "stands there twice, %s"
+                                  is_again ? "is listed twice, %s"
                                            : "must be the number of a measurement, is %s",
                                   text_real(is, number));
     }
     return status;
 }
 
-static Status check_tags(const Material *material, const char *pointer, Problem *problem) {
+static Status material_check_tags(const Material *material, const char *pointer, Problem *problem) {
     Status status = STATUS_OK;
     for (size_t i = 0; i < material->tags.count; i++) {
         const char *tag = material->tags.at[i];
@@ -208,18 +199,18 @@ static Status check_tags(const Material *material, const char *pointer, Problem 
 Status material_validate(const Material *material, const char *pointer, Problem *problem) {
     const Status faults[] = {
         fields_validate(material_fields, material, pointer, problem),
-        check_text(material->name, pointer, "name", problem),
-        check_text(material->kind, pointer, "kind", problem),
-        check_text(material->source, pointer, "source", problem),
-        check_tags(material, pointer, problem),
-        check_ways(material, pointer, problem),
-        check_table(material, pointer, problem),
-        check_order(material->least_speed, material->most_speed, "m/s", pointer, "most_speed",
-                    problem),
-        check_order(material->least_temperature, material->most_temperature, "degC", pointer,
-                    "most_temperature", problem),
-        check_base(material, pointer, problem),
-        check_measurements(material, pointer, problem),
+        material_check_text(material->name, pointer, "name", problem),
+        material_check_text(material->kind, pointer, "kind", problem),
+        material_check_text(material->source, pointer, "source", problem),
+        material_check_tags(material, pointer, problem),
+        material_check_ways(material, pointer, problem),
+        material_check_table(material, pointer, problem),
+        material_check_order(material->least_speed, material->most_speed, "m/s", pointer,
+                             "most_speed", problem),
+        material_check_order(material->least_temperature, material->most_temperature, "degC",
+                             pointer, "most_temperature", problem),
+        material_check_base(material, pointer, problem),
+        material_check_measurements(material, pointer, problem),
     };
     for (size_t i = 0; i < COUNT(faults); i++)
         TRY(faults[i]);
@@ -230,17 +221,17 @@ void material_speed_range(const Material *material, double *least, double *most)
     const MaterialRows *rows = &material->table;
     *least = material->least_speed;
     *most = material->most_speed;
-    if (!has(*least) && rows->count > 0)
+    if (!material_has(*least) && rows->count > 0)
         *least = rows->at[0].approach_speed;
-    if (!has(*most) && rows->count > 0)
+    if (!material_has(*most) && rows->count > 0)
         *most = rows->at[rows->count - 1].approach_speed;
 }
 
 double material_test_mass(const Material *material) {
     if (material->base == MATERIAL_BASE_FIXED)
         return material->impactor_mass;
-    if (material->base == MATERIAL_BASE_FREE && has(material->impactor_mass) &&
-        has(material->base_mass))
+    if (material->base == MATERIAL_BASE_FREE && material_has(material->impactor_mass) &&
+        material_has(material->base_mass))
         return contact_effective_mass(material->impactor_mass, material->base_mass);
     return (double)NAN;
 }

@@ -1,7 +1,7 @@
-// Any linear structure by its matrices. What makes them one: M and K symmetric, M positive
+// Any linear structure by its matrices. Requirements: M and K symmetric, M positive
 // definite, K positive semi-definite, and v'Cv never negative, that is C's symmetric part positive
-// semi-definite; C itself need not be symmetric. All to rounding, judged on matrices scaled to a
-// unit diagonal, so that units and heavy beside light storeys change nothing.
+// semi-definite; C itself need not be symmetric. All are checked to rounding on matrices scaled to
+// a unit diagonal, so that units and the ratios of masses have no effect.
 #include "core/scene/structure.h"
 
 #include <float.h>
@@ -46,8 +46,8 @@ typedef struct Checked {
 } Checked;
 
 // As many rows as storeys, and as many numbers in each.
-static Status check_square(const Checked *matrix, size_t storeys, const char *place,
-                           Problem *problem) {
+static Status matrix_check_square(const Checked *matrix, size_t storeys, const char *place,
+                                  Problem *problem) {
     if (matrix->rows->count != storeys)
         return problem_add(problem, STATUS_INVALID, place,
                            "must have %zu row%s, as many as mass, has %zu", storeys,
@@ -65,7 +65,7 @@ static Status check_square(const Checked *matrix, size_t storeys, const char *pl
     return status;
 }
 
-static Status check_symmetry(const Checked *matrix, const char *place, Problem *problem) {
+static Status matrix_check_symmetry(const Checked *matrix, const char *place, Problem *problem) {
     const Rows *rows = matrix->rows;
     for (size_t i = 1; i < rows->count; i++)
         for (size_t j = 0; j < i; j++) {
@@ -85,18 +85,18 @@ static Status check_symmetry(const Checked *matrix, const char *place, Problem *
     return STATUS_OK;
 }
 
-static void flatten(const Rows *rows, double *matrix) {
+static void matrix_flatten(const Rows *rows, double *matrix) {
     for (size_t i = 0; i < rows->count; i++)
         for (size_t j = 0; j < rows->count; j++)
             matrix[i * rows->count + j] = rows->at[i].at[j];
 }
 
-static Status check_definite(const Checked *matrix, const char *place, Problem *problem) {
+static Status matrix_check_definite(const Checked *matrix, const char *place, Problem *problem) {
     const size_t n = matrix->rows->count;
     double *flat = malloc(n * n * sizeof *flat);
     if (flat == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a matrix");
-    flatten(matrix->rows, flat);
+    matrix_flatten(matrix->rows, flat);
     const int block = symmetric_matrix_find_indefinite(n, flat, matrix->margin);
     free(flat);
     if (block == 0)
@@ -113,26 +113,26 @@ static Status check_definite(const Checked *matrix, const char *place, Problem *
                             matrix->margin < 0 ? " (or is within 1e-12 of singular)" : "");
 }
 
-static Status check_matrix(const Checked *matrix, size_t storeys, const char *pointer,
+static Status matrix_check(const Checked *matrix, size_t storeys, const char *pointer,
                            Problem *problem) {
     char place[sizeof((Fault){0}.pointer)];
     json_pointer_join(place, sizeof place, pointer, matrix->name);
     if (problem_concerns(problem, place))
-        return STATUS_OK; // told by the rows
-    TRY(check_square(matrix, storeys, place, problem));
+        return STATUS_OK; // reported by the rows
+    TRY(matrix_check_square(matrix, storeys, place, problem));
     if (matrix->is_symmetric)
-        TRY(check_symmetry(matrix, place, problem));
-    return check_definite(matrix, place, problem);
+        TRY(matrix_check_symmetry(matrix, place, problem));
+    return matrix_check_definite(matrix, place, problem);
 }
 
-static Status fill_influence(Reals *influence, size_t storeys, Problem *problem) {
+static Status matrices_fill_influence(Reals *influence, size_t storeys, Problem *problem) {
     TRY(structure_zeros(influence, storeys, problem));
     for (size_t i = 0; i < storeys; i++)
         influence->at[i] = 1;
     return STATUS_OK;
 }
 
-static Status fill_damping(Rows *damping, size_t storeys, Problem *problem) {
+static Status matrices_fill_damping(Rows *damping, size_t storeys, Problem *problem) {
     damping->at = calloc(storeys, sizeof *damping->at);
     if (damping->at == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a scene");
@@ -146,7 +146,7 @@ static Status matrices_complete(Structure *structure, const char *pointer, Probl
     const size_t n = matrix->mass.count;
     const double rounding = 8 * DBL_EPSILON * (double)n;
     if (n == 0 || n > STRUCTURE_STOREYS)
-        return STATUS_OK; // told by the rows
+        return STATUS_OK; // reported by the rows
     const Checked checked[] = {
         {&matrix->mass, "mass", "kg", true, -distance, "positive definite"},
         {&matrix->stiffness, "stiffness", "N/m", true, rounding, "positive semi-definite"},
@@ -156,14 +156,14 @@ static Status matrices_complete(Structure *structure, const char *pointer, Probl
     Status status = STATUS_OK;
     for (size_t i = 0; i < COUNT(checked); i++) {
         const Status found = checked[i].rows->count == 0
-                                 ? STATUS_OK // missing: told by the rows
-                                 : check_matrix(&checked[i], n, pointer, problem);
+                                 ? STATUS_OK // missing: reported by the rows
+                                 : matrix_check(&checked[i], n, pointer, problem);
         status = found != STATUS_OK ? found : status;
     }
     if (matrix->influence.count == 0)
-        TRY(fill_influence(&matrix->influence, n, problem));
+        TRY(matrices_fill_influence(&matrix->influence, n, problem));
     if (matrix->damping.count == 0 && isnan(structure->damping_ratio))
-        TRY(fill_damping(&matrix->damping, n, problem));
+        TRY(matrices_fill_damping(&matrix->damping, n, problem));
     TRY(structure_validate_count(&matrix->influence, n, pointer, "influence", problem));
     return status;
 }
@@ -171,9 +171,9 @@ static Status matrices_complete(Structure *structure, const char *pointer, Probl
 static void matrices_fill(const Structure *structure, const StructureMatrices *matrices) {
     const MatrixStructure *matrix = matrix_of(structure);
     const size_t n = matrix->mass.count;
-    flatten(&matrix->mass, matrices->mass);
-    flatten(&matrix->stiffness, matrices->stiffness);
-    flatten(&matrix->damping, matrices->damping);
+    matrix_flatten(&matrix->mass, matrices->mass);
+    matrix_flatten(&matrix->stiffness, matrices->stiffness);
+    matrix_flatten(&matrix->damping, matrices->damping);
     for (size_t i = 0; i < n; i++) {
         matrices->influence[i] = matrix->influence.at[i];
         for (size_t j = 0; j < i; j++) {
@@ -192,7 +192,7 @@ static Status matrices_moved_mass(const Structure *structure, size_t storey, dou
     if (room == NULL)
         return STATUS_NO_MEMORY;
     double *force = room + n * n, *moved = force + n;
-    flatten(rows, room);
+    matrix_flatten(rows, room);
     force[storey] = 1;
     const Status status = symmetric_matrix_solve(n, room, force, moved);
     *mass = 1 / moved[storey];

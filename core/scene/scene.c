@@ -1,5 +1,5 @@
-// Judging what rows cannot see. Each part is judged on its own, so that all faults are told at
-// once; a part that could not be read, or has a fault already, is passed over.
+// Validation beyond single fields. Each part is validated on its own, so that all faults are
+// reported at once; a part that could not be read, or already has a fault, is skipped.
 #include "core/scene/scene.h"
 #include "core/base/json_pointer.h"
 
@@ -20,51 +20,51 @@ const Field scene_fields[] = {
 // clang-format on
 
 // The index of the last sample, not yet an integer type's.
-static double last_sample(const Scene *scene) {
+static double scene_last_sample(const Scene *scene) {
     return floor(scene->duration * scene->sample_rate * (1 + 1e-12));
 }
 
 size_t scene_sample_count(const Scene *scene) {
-    const double last = last_sample(scene);
+    const double last = scene_last_sample(scene);
     if (!(last >= 0))
         return 0;
     return last < 0x1p62 ? (size_t)last + 1 : SIZE_MAX;
 }
 
-static bool is_positive(double value) {
+static bool scene_is_positive(double value) {
     return isfinite(value) && value > 0;
 }
 
-static Status check_samples(const Scene *scene, size_t most, Problem *problem) {
-    if (!is_positive(scene->duration) || !is_positive(scene->sample_rate) || most == 0 ||
-        scene_sample_count(scene) <= most)
+static Status scene_check_samples(const Scene *scene, size_t most, Problem *problem) {
+    if (!scene_is_positive(scene->duration) || !scene_is_positive(scene->sample_rate) ||
+        most == 0 || scene_sample_count(scene) <= most)
         return STATUS_OK;
     char duration[32], rate[32], count[32];
     text_real(duration, scene->duration);
     text_real(rate, scene->sample_rate);
-    const double samples = last_sample(scene) + 1;
+    const double samples = scene_last_sample(scene) + 1;
     snprintf(count, sizeof count, samples < 1e15 ? "%.0f" : "%.3g", samples);
     return problem_add_real(problem, STATUS_INVALID, "/duration", scene->duration, "s",
                             "%s s at a sample_rate of %s Hz are %s samples, must be at most %zu",
                             duration, rate, count, most);
 }
 
-// Whether numbers that each are in range come to parameters that doubles can hold: of a power law
+// Whether numbers that are in range give parameters that doubles can hold: of a power law
 // between a slow impact and a fast one, an isolated contact lasting 1 to 1e3 of its own units.
-static bool is_sound(const ContactLaw *law, int separation, double mass,
-                     const ContactNumbers *numbers) {
+static bool scene_is_sound(const ContactLaw *law, int separation, double mass,
+                           const ContactNumbers *numbers) {
     if (law->form == CONTACT_POWER) {
         const double n = numbers->exponent, T_c = numbers->contact_time;
-        return is_positive(mass * pow(1 / T_c, n + 1) * pow(1e3, 1 - n)) &&
-               is_positive(mass * pow(1e3 / T_c, n + 1) * pow(CONTACT_SPEED_MIN, 1 - n));
+        return scene_is_positive(mass * pow(1 / T_c, n + 1) * pow(1e3, 1 - n)) &&
+               scene_is_positive(mass * pow(1e3 / T_c, n + 1) * pow(CONTACT_SPEED_MIN, 1 - n));
     }
     const Identification found = identification_from_restitution(
         mass, numbers->restitution, numbers->contact_time, (Separation)separation);
-    return is_positive(found.stiffness) && isfinite(found.damping);
+    return scene_is_positive(found.stiffness) && isfinite(found.damping);
 }
 
-static Status check_contact(const Scene *scene, const ContactLaw *law, size_t index, Side side,
-                            double own_mass, Problem *problem) {
+static Status scene_check_contact(const Scene *scene, const ContactLaw *law, size_t index,
+                                  Side side, double own_mass, Problem *problem) {
     const Damper *damper = &scene->dampers.at[index];
     const Buffer *buffer = damper_buffer(damper, side);
     const double mass = damper_identified_mass(damper, own_mass);
@@ -79,7 +79,7 @@ static Status check_contact(const Scene *scene, const ContactLaw *law, size_t in
             numbers.contact_time = rows.at[i].contact_time;
             snprintf(row, sizeof row, "/table/%zu", i);
         }
-        if (isnan(numbers.contact_time) || is_sound(law, separation, mass, &numbers))
+        if (isnan(numbers.contact_time) || scene_is_sound(law, separation, mass, &numbers))
             continue;
         snprintf(place, sizeof place, "/dampers/%zu/%s%s/contact_time", index,
                  buffer == &damper->buffer        ? "buffer"
@@ -93,30 +93,30 @@ static Status check_contact(const Scene *scene, const ContactLaw *law, size_t in
     return STATUS_OK;
 }
 
-static Status check_contacts(const Scene *scene, Problem *problem) {
+static Status scene_check_contacts(const Scene *scene, Problem *problem) {
     const Structure *structure = scene_structure(scene);
     const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
     for (size_t i = 0; law->form != CONTACT_IMPULSIVE && i < scene->dampers.count; i++) {
         const Damper *damper = &scene->dampers.at[i];
         if (damper->storey < 1 || damper->storey > structure_storeys(structure))
-            continue; // told by the rows
+            continue; // reported by the rows
         double moved;
-        const Status known =
+        const Status found =
             structure_kind(structure)->moved_mass(structure, (size_t)damper->storey - 1, &moved);
-        if (known == STATUS_NO_MEMORY)
-            return problem_set(problem, known, "no memory for a scene");
+        if (found == STATUS_NO_MEMORY)
+            return problem_set(problem, found, "no memory for a scene");
         const double mass = contact_effective_mass(moved, damper->mass);
-        TRY(check_contact(scene, law, i, SIDE_LEFT, mass, problem));
+        TRY(scene_check_contact(scene, law, i, SIDE_LEFT, mass, problem));
         if (damper_buffer(damper, SIDE_RIGHT) != damper_buffer(damper, SIDE_LEFT))
-            TRY(check_contact(scene, law, i, SIDE_RIGHT, mass, problem));
+            TRY(scene_check_contact(scene, law, i, SIDE_RIGHT, mass, problem));
     }
     return STATUS_OK;
 }
 
-static Status complete_dampers(Scene *scene, size_t storeys, Problem *problem) {
+static Status scene_complete_dampers(Scene *scene, size_t storeys, Problem *problem) {
     const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
     Status status = STATUS_OK;
-    // More than the rows allow were told by the rows.
+    // Dampers beyond the limit were reported by the rows.
     for (size_t i = 0; i < scene->dampers.count && i < SCENE_DAMPERS; i++) {
         char place[sizeof((Fault){0}.pointer)];
         json_pointer_index(place, sizeof place, "/dampers", i);
@@ -131,8 +131,8 @@ static Status complete_dampers(Scene *scene, size_t storeys, Problem *problem) {
     return status;
 }
 
-// Without dampers nothing ever meets: whatever was said of contacts means the same.
-static Status reset_contact(Scene *scene, Problem *problem) {
+// Without dampers there are no contacts, so every contact model means the same.
+static Status scene_reset_contact(Scene *scene, Problem *problem) {
     Variant *usual = variant_new(contact_kinds.at(0));
     if (usual == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a scene");
@@ -141,37 +141,35 @@ static Status reset_contact(Scene *scene, Problem *problem) {
     return STATUS_OK;
 }
 
-// The initial state has one number per storey; a lone 0 means rest whatever their number.
-static Status complete_start(Reals *start, const char *name, const char *unit, size_t storeys,
-                             Problem *problem) {
+// The initial state has one number per storey; a single 0 means rest for any number of storeys.
+static Status scene_complete_start(Reals *start, const char *name, const char *unit, size_t storeys,
+                                   Problem *problem) {
     if (start->count == 0 || (start->count == 1 && start->at[0] == 0))
         return structure_zeros(start, storeys, problem);
     if (start->count != 1 || storeys == 1)
         return structure_validate_count(start, storeys, "/excitation", name, problem);
-    char place[sizeof((Fault){0}.pointer)];
-    json_pointer_join(place, sizeof place, "/excitation", name);
-    return problem_add_real(problem, STATUS_INVALID, place, start->at[0], unit,
-                            "must be a list of %zu numbers, one per storey, or 0", storeys);
+    return json_pointer_fault_real(problem, "/excitation", name, start->at[0], unit,
+                                   "must be a list of %zu numbers, one per storey, or 0", storeys);
 }
 
-static Status complete_starts(Scene *scene, size_t storeys, Problem *problem) {
+static Status scene_complete_starts(Scene *scene, size_t storeys, Problem *problem) {
     Excitation *excitation = (Excitation *)(void *)scene->excitation;
     if (storeys == 0)
         return STATUS_OK;
     const Status displacement =
-        complete_start(&excitation->displacement, "displacement", "m", storeys, problem);
+        scene_complete_start(&excitation->displacement, "displacement", "m", storeys, problem);
     const Status velocity =
-        complete_start(&excitation->velocity, "velocity", "m/s", storeys, problem);
+        scene_complete_start(&excitation->velocity, "velocity", "m/s", storeys, problem);
     return displacement != STATUS_OK ? displacement : velocity;
 }
 
-static Status complete_excitation(Scene *scene, size_t most_samples, Problem *problem) {
+static Status scene_complete_excitation(Scene *scene, size_t most_samples, Problem *problem) {
     Excitation *excitation = (Excitation *)(void *)scene->excitation;
     const ExcitationKind *kind = excitation_kind(excitation);
     if (kind->check != NULL)
         TRY(kind->check(excitation, "/excitation", problem));
-    if (kind->complete == NULL || !is_positive(scene->duration) ||
-        !is_positive(scene->sample_rate) || problem_concerns(problem, "/duration"))
+    if (kind->complete == NULL || !scene_is_positive(scene->duration) ||
+        !scene_is_positive(scene->sample_rate) || problem_concerns(problem, "/duration"))
         return STATUS_OK;
     const Span span = {
         .duration = scene->duration, .sample_rate = scene->sample_rate, .most = most_samples};
@@ -191,17 +189,17 @@ Status scene_complete(Scene *scene, size_t most_samples, Problem *problem) {
             structure_complete((Structure *)(void *)scene->structure, "/structure", problem);
     const size_t storeys = scene_storeys(scene, problem);
     if (scene->contact != NULL)
-        faults[1] = scene->dampers.count > 0 ? complete_dampers(scene, storeys, problem)
-                                             : reset_contact(scene, problem);
-    faults[2] = check_samples(scene, most_samples, problem);
+        faults[1] = scene->dampers.count > 0 ? scene_complete_dampers(scene, storeys, problem)
+                                             : scene_reset_contact(scene, problem);
+    faults[2] = scene_check_samples(scene, most_samples, problem);
     if (scene->excitation != NULL) {
-        faults[3] = complete_excitation(scene, most_samples, problem);
-        faults[4] = complete_starts(scene, storeys, problem);
+        faults[3] = scene_complete_excitation(scene, most_samples, problem);
+        faults[4] = scene_complete_starts(scene, storeys, problem);
     }
     for (size_t i = 0; i < COUNT(faults); i++)
         TRY(faults[i]);
     if (problem_concerns(problem, "/structure") || problem_concerns(problem, "/dampers") ||
         scene->structure == NULL || scene->contact == NULL)
         return STATUS_OK;
-    return check_contacts(scene, problem);
+    return scene_check_contacts(scene, problem);
 }

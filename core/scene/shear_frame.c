@@ -2,7 +2,7 @@
 //
 //   M = diag(m_1 ... m_n),  K_ii = k_i + k_i+1,  K_i,i+1 = K_i+1,i = -k_i+1,  C likewise,  r = 1
 //
-// Such a K is positive semi-definite whatever its springs, if none is negative.
+// Such a K is positive semi-definite if no spring is negative.
 #include "core/scene/structure.h"
 
 #include "core/base/json_pointer.h"
@@ -30,8 +30,8 @@ static bool frame_has_damping(const Structure *structure) {
 }
 
 // A sum of finite numbers may not be finite.
-static Status check_sums(const Reals *links, const char *unit, const char *pointer,
-                         const char *name, Problem *problem) {
+static Status frame_check_sums(const Reals *links, const char *unit, const char *pointer,
+                               const char *name, Problem *problem) {
     for (size_t i = 1; i < links->count; i++) {
         if (!isfinite(links->at[i]) || !isfinite(links->at[i - 1]) ||
             isfinite(links->at[i] + links->at[i - 1]))
@@ -48,10 +48,9 @@ static Status check_sums(const Reals *links, const char *unit, const char *point
 static Status frame_complete(Structure *structure, const char *pointer, Problem *problem) {
     ShearFrame *frame = (ShearFrame *)(void *)structure;
     const size_t storeys = frame->masses.count;
-    char masses[sizeof((Fault){0}.pointer)];
-    json_pointer_join(masses, sizeof masses, pointer, "masses");
-    if (storeys == 0 || storeys > STRUCTURE_STOREYS || problem_concerns(problem, masses))
-        return STATUS_OK; // told by the rows
+    if (storeys == 0 || storeys > STRUCTURE_STOREYS ||
+        json_pointer_concerns(problem, pointer, "masses"))
+        return STATUS_OK; // reported by the rows
     if (frame->dampings.count == 0 && isnan(structure->damping_ratio))
         TRY(structure_zeros(&frame->dampings, storeys, problem));
     const Status faults[] = {
@@ -59,15 +58,15 @@ static Status frame_complete(Structure *structure, const char *pointer, Problem 
         frame->dampings.count == 0
             ? STATUS_OK
             : structure_validate_count(&frame->dampings, storeys, pointer, "dampings", problem),
-        check_sums(&frame->stiffnesses, "N/m", pointer, "stiffnesses", problem),
-        check_sums(&frame->dampings, "N s/m", pointer, "dampings", problem),
+        frame_check_sums(&frame->stiffnesses, "N/m", pointer, "stiffnesses", problem),
+        frame_check_sums(&frame->dampings, "N s/m", pointer, "dampings", problem),
     };
     for (size_t i = 0; i < COUNT(faults); i++)
         TRY(faults[i]);
     return STATUS_OK;
 }
 
-static void fill_links(const Reals *links, size_t n, double *matrix) {
+static void frame_fill_links(const Reals *links, size_t n, double *matrix) {
     for (size_t i = 0; i < links->count; i++) {
         matrix[i * n + i] += links->at[i];
         if (i == 0)
@@ -84,8 +83,8 @@ static void frame_fill(const Structure *structure, const StructureMatrices *matr
         matrices->mass[i * n + i] = frame->masses.at[i];
         matrices->influence[i] = 1;
     }
-    fill_links(&frame->stiffnesses, n, matrices->stiffness);
-    fill_links(&frame->dampings, n, matrices->damping);
+    frame_fill_links(&frame->stiffnesses, n, matrices->stiffness);
+    frame_fill_links(&frame->dampings, n, matrices->damping);
 }
 
 static Status frame_moved_mass(const Structure *structure, size_t storey, double *mass) {

@@ -21,10 +21,9 @@ Status structure_complete(Structure *structure, const char *pointer, Problem *pr
     const StructureKind *kind = structure_kind(structure);
     Status status = STATUS_OK;
     if (!isnan(structure->damping_ratio) && kind->has_damping(structure)) {
-        char place[sizeof((Fault){0}.pointer)];
-        json_pointer_join(place, sizeof place, pointer, "damping_ratio");
-        status = problem_add_real(problem, STATUS_INVALID, place, structure->damping_ratio, NULL,
-                                  "excludes %s: give one of the two", kind->damping_name);
+        status =
+            json_pointer_fault_real(problem, pointer, "damping_ratio", structure->damping_ratio,
+                                    NULL, "excludes %s: give one of the two", kind->damping_name);
     }
     const Status own = kind->complete(structure, pointer, problem);
     return own != STATUS_OK ? own : status;
@@ -40,7 +39,8 @@ void structure_assemble(const Structure *structure, const StructureMatrices *mat
 
 // The square of the first frequency by Rayleigh's quotient of the shape x that the load M r bends
 // the structure to, x'Kx / x'Mx; 0 where K is singular.
-static Status slowest_square(size_t n, const StructureMatrices *all, double *load, double *square) {
+static Status structure_slowest_square(size_t n, const StructureMatrices *all, double *load,
+                                       double *square) {
     double *shape = load + n, above = 0, below = 0;
     *square = 0;
     if (symmetric_matrix_find_indefinite(n, all->stiffness, 0) != 0)
@@ -59,7 +59,7 @@ static Status slowest_square(size_t n, const StructureMatrices *all, double *loa
 }
 
 // Gershgorin's circles of a matrix, scaled by M's diagonal.
-static double largest_circle(size_t n, const double *mass, const double *matrix) {
+static double structure_largest_circle(size_t n, const double *mass, const double *matrix) {
     double most = 0;
     for (size_t i = 0; i < n; i++) {
         double sum = 0;
@@ -70,16 +70,16 @@ static double largest_circle(size_t n, const double *mass, const double *matrix)
     return most;
 }
 
-static Status find_rates(const Structure *structure, size_t n, double *room,
-                         StructureRates *rates) {
+static Status structure_find_rates(const Structure *structure, size_t n, double *room,
+                                   StructureRates *rates) {
     const StructureMatrices all = {room, room + n * n, room + 2 * n * n, room + 3 * n * n};
     structure_assemble(structure, &all);
     double square = n == 1 ? all.stiffness[0] / all.mass[0] : 0;
     Status status = STATUS_OK;
     if (n > 1)
-        status = slowest_square(n, &all, room + 3 * n * n + n, &square);
-    const double own = sqrt(largest_circle(n, all.mass, all.stiffness));
-    double decay = largest_circle(n, all.mass, all.damping);
+        status = structure_slowest_square(n, &all, room + 3 * n * n + n, &square);
+    const double own = sqrt(structure_largest_circle(n, all.mass, all.stiffness));
+    double decay = structure_largest_circle(n, all.mass, all.damping);
     if (!isnan(structure->damping_ratio))
         decay = 2 * structure->damping_ratio * own;
     *rates = (StructureRates){sqrt(square), fmax(own, decay)};
@@ -90,20 +90,21 @@ Status structure_rates(const Structure *structure, StructureRates *rates) {
     const size_t n = structure_storeys(structure);
     if (n == 1) {
         double room[4] = {0};
-        return find_rates(structure, n, room, rates);
+        return structure_find_rates(structure, n, room, rates);
     }
     double *room = calloc(n, (3 * n + 3) * sizeof *room);
     *rates = (StructureRates){0, 0};
     if (room == NULL)
         return STATUS_NO_MEMORY;
-    const Status status = find_rates(structure, n, room, rates);
+    const Status status = structure_find_rates(structure, n, room, rates);
     free(room);
     return status;
 }
 
 // How many squares of natural frequencies are below one: as many as K - square M has negative
 // pivots (Sylvester). `room` is as large as K.
-static size_t count_below(size_t n, const StructureMatrices *all, double square, double *room) {
+static size_t structure_count_below(size_t n, const StructureMatrices *all, double square,
+                                    double *room) {
     size_t count = 0;
     for (size_t i = 0; i < n * n; i++)
         room[i] = all->stiffness[i] - square * all->mass[i];
@@ -136,7 +137,7 @@ Status structure_rates_of(const Structure *structure, size_t modes, StructureRat
     double least = -10, most = 0;
     for (int i = 0; i < HALVINGS; i++) {
         const double middle = (least + most) / 2, rate = rates->fastest * exp(middle);
-        if (count_below(n, &all, rate * rate, room + 3 * n * n + n) >= modes)
+        if (structure_count_below(n, &all, rate * rate, room + 3 * n * n + n) >= modes)
             most = middle;
         else
             least = middle;
@@ -157,11 +158,9 @@ Status structure_zeros(Reals *reals, size_t count, Problem *problem) {
 
 Status structure_validate_count(const Reals *reals, size_t storeys, const char *pointer,
                                 const char *name, Problem *problem) {
-    char place[sizeof((Fault){0}.pointer)];
-    json_pointer_join(place, sizeof place, pointer, name);
-    if (reals->count == storeys || problem_concerns(problem, place))
+    if (reals->count == storeys || json_pointer_concerns(problem, pointer, name))
         return STATUS_OK;
-    return problem_add(problem, STATUS_INVALID, place,
-                       "must have %zu number%s, one per storey, has %zu", storeys,
-                       storeys == 1 ? "" : "s", reals->count);
+    return json_pointer_fault(problem, pointer, name,
+                              "must have %zu number%s, one per storey, has %zu", storeys,
+                              storeys == 1 ? "" : "s", reals->count);
 }

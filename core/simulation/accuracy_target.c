@@ -328,7 +328,7 @@ static Status target_add_decisions(const AccuracyTarget *target, const Candidate
             Decision *decision = &decisions->at[i];
             if (strcmp(decision->about, chosen[k]) != 0)
                 continue;
-            char *why = strdup("accuracy.target chose it");
+            char *why = strdup("chosen by accuracy.target");
             if (why == NULL)
                 return STATUS_NO_MEMORY;
             free(decision->why);
@@ -337,14 +337,14 @@ static Status target_add_decisions(const AccuracyTarget *target, const Candidate
     const char *metric = metric_names[target->asked->metric];
     const bool is_whole = candidate_is_whole(candidate);
     const size_t before = decisions->count;
-    TRY(decisions_add(decisions, "target", name, candidate->predicted, NULL,
-                      !is_whole ? "the cheapest way that is foretold to keep an error of %.3g of %s"
-                      : target->has_tolerance || target->plan->storeys > 1
-                          ? "nothing that could be given up is foretold to keep an error of %.3g "
-                            "of %s"
-                          : "no cheaper way keeps an error of %.3g of %s: its contacts and its "
-                            "flight are known exactly, step for step",
-                      target->asked->target, metric));
+    TRY(decisions_add(
+        decisions, "target", name, candidate->predicted, NULL,
+        !is_whole ? "the cheapest settings that are predicted to keep an error of %.3g of %s"
+        : target->has_tolerance || target->plan->storeys > 1
+            ? "no cheaper settings are predicted to keep an error of %.3g of %s"
+            : "no cheaper settings keep an error of %.3g of %s: contacts and flight "
+              "have exact solutions",
+        target->asked->target, metric));
     if (is_whole || decisions->count == before)
         return STATUS_OK;
     const Candidate whole = candidate_whole(target);
@@ -414,22 +414,6 @@ typedef struct TargetSearch {
     PlanAttempts attempts;
 } TargetSearch;
 
-static Status search_add_attempt(TargetSearch *search, const Candidate *candidate, double estimated,
-                                 double steps) {
-    PlanAttempts *attempts = &search->attempts;
-    PlanAttempt *at = realloc(attempts->at, (attempts->count + 1) * sizeof *at);
-    if (at == NULL)
-        return STATUS_NO_MEMORY;
-    attempts->at = at;
-    char name[NAME];
-    candidate_name(candidate, name);
-    char *text = strdup(name);
-    if (text == NULL)
-        return STATUS_NO_MEMORY;
-    at[attempts->count++] = (PlanAttempt){text, candidate->predicted, estimated, steps};
-    return STATUS_OK;
-}
-
 // Runs one candidate. A run that fails and gives something up leaves no outcome; the search goes
 // on.
 static Status search_run(TargetSearch *search, const Candidate *candidate, Problem *problem) {
@@ -442,29 +426,31 @@ static Status search_run(TargetSearch *search, const Candidate *candidate, Probl
     outcome_unref(search->outcome);
     search->outcome = NULL;
     search->estimated = 1;
-    Problem *fault = is_whole ? problem : calloc(1, sizeof *fault);
+    search->done = range.from + range.share;
+    Problem *fault = is_whole ? problem : NULL; // another candidate follows
     Status status = candidate_apply(search->target.simulation, candidate, &applied, fault);
     if (status == STATUS_OK)
         status = run_scene(&applied, search->limits, &progress, search->workspace, NULL,
                            &search->outcome, fault);
     simulation_clear(&applied);
+    PlanAttempt attempt = {NULL, candidate->predicted, (double)NAN, (double)NAN};
     if (status == STATUS_OK) {
-        search->estimated = target_estimate(&search->target, candidate, search->outcome);
-        search->steps += search->outcome->steps;
+        attempt.estimated_error = search->estimated =
+            target_estimate(&search->target, candidate, search->outcome);
+        attempt.steps = search->outcome->steps;
+        search->steps += attempt.steps;
         work_counters_add(&search->work, &search->outcome->work);
-        if (search_add_attempt(search, candidate, search->estimated, search->outcome->steps) !=
-            STATUS_OK)
-            status = problem_set(fault, STATUS_NO_MEMORY, "no memory for a run");
-    } else if (!is_whole && status != STATUS_CANCELLED && status != STATUS_NO_MEMORY) {
-        status = search_add_attempt(search, candidate, (double)NAN, (double)NAN);
+    } else if (is_whole || status == STATUS_CANCELLED || status == STATUS_NO_MEMORY) {
+        return problem_set(problem, status,
+                           status == STATUS_CANCELLED ? "cancelled" : "no memory for a run");
     }
-    if (fault != problem) {
-        if (status != STATUS_OK)
-            problem_set(problem, status, "%s", fault != NULL ? fault->detail : "no memory");
-        free(fault);
-    }
-    search->done = range.from + range.share;
-    return status;
+    char name[NAME];
+    candidate_name(candidate, name);
+    PlanAttempt *added = list_append(&search->attempts, sizeof *added);
+    if (added == NULL || (attempt.way = strdup(name)) == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run");
+    *added = attempt;
+    return STATUS_OK;
 }
 
 // The next candidate: tightened by the factor that the last one missed, with a margin.
@@ -481,20 +467,21 @@ static Status search_warn(const TargetSearch *search) {
     const AccuracyTarget *target = &search->target;
     const Summary *summary = &search->outcome->summary;
     const char *metric = metric_names[target->asked->metric];
-    char until[64] = "";
+    char until[80] = "";
     if (search->estimated <= target->asked->target)
         return STATUS_OK;
     if (!isnan(summary->trust_horizon))
-        snprintf(until, sizeof until, "; to t = %.6g s the path is known to %g",
+        snprintf(until, sizeof until, "; up to t = %.6g s the trajectory is valid to %g",
                  summary->trust_horizon, RESPONSE_DIVERGENCE);
     if (isnan(search->estimated))
-        return warnings_add(&search->outcome->warnings, "/accuracy/target",
-                            "whether the error of %s is below %.3g is not known: rounding parts "
-                            "the path from the scene's own within the run%s",
-                            metric, target->asked->target, until);
+        return warnings_add(
+            &search->outcome->warnings, "/accuracy/target",
+            "whether the error of %s is below %.3g is unknown: rounding errors grow "
+            "until the trajectory diverges within the run%s",
+            metric, target->asked->target, until);
     return warnings_add(&search->outcome->warnings, "/accuracy/target",
-                        "the error of %s is about %.2g, more than %.3g: double precision gives no "
-                        "better%s",
+                        "the error of %s is about %.2g, more than %.3g: double precision allows no "
+                        "smaller one%s",
                         metric, search->estimated, target->asked->target, until);
 }
 

@@ -57,29 +57,13 @@ size_t channel_names_usual_count(const Scene *scene) {
     return count;
 }
 
-void channel_names_clear(Texts *names) {
-    for (size_t i = 0; i < names->count; i++)
-        free(names->at[i]);
-    free(names->at);
-    *names = (Texts){NULL, 0};
-}
-
-static Status channel_names_append(Texts *names, const char *name) {
-    char **at = realloc(names->at, (names->count + 1) * sizeof *at);
-    if (at == NULL)
-        return STATUS_NO_MEMORY;
-    names->at = at;
-    at[names->count] = strdup(name);
-    return at[names->count] == NULL ? STATUS_NO_MEMORY : (names->count++, STATUS_OK);
-}
-
 Status channel_names_add(const Scene *scene, ChannelId channel, size_t number, Texts *names) {
     char name[CHANNEL_NAME];
     channel_names_write(scene, channel, number, name);
     for (size_t i = 0; i < names->count; i++)
         if (strcmp(names->at[i], name) == 0)
             return STATUS_OK;
-    return channel_names_append(names, name);
+    return texts_append(names, name);
 }
 
 static Status channel_names_append_usual(Texts *names, const ChannelCounts *counts,
@@ -92,7 +76,7 @@ static Status channel_names_append_usual(Texts *names, const ChannelCounts *coun
         for (size_t number = is_spectrum ? last : 1; number <= last; number++) {
             char name[CHANNEL_NAME];
             channel_counts_name(counts, channel, number, name);
-            TRY(channel_names_append(names, name));
+            TRY(texts_append(names, name));
         }
     }
     return STATUS_OK;
@@ -122,13 +106,13 @@ static Status channel_names_expand(Texts *names, const ChannelCounts *counts, bo
     Status status = STATUS_OK;
     for (size_t i = 0; i < names->count && status == STATUS_OK; i++)
         status = i == place ? channel_names_append_usual(&all, counts, is_spectrum)
-                            : channel_names_append(&all, names->at[i]);
+                            : texts_append(&all, names->at[i]);
     if (status != STATUS_OK) {
-        channel_names_clear(&all);
+        texts_clear(&all);
         return problem_set(problem, status, "no memory for the channels");
     }
     *expanded = (ExpandedNames){place, all.count - names->count + 1};
-    channel_names_clear(names);
+    texts_clear(names);
     *names = all;
     return STATUS_OK;
 }
@@ -164,7 +148,7 @@ static Status channel_names_check(const char *name, const ChannelCounts *counts,
                  names, counts->storeys, counts->storeys == 1 ? "" : "s", counts->dampers,
                  counts->dampers == 1 ? "" : "s");
     else
-        snprintf(detail, sizeof detail, "must be %s, without a number: there is but one", meant);
+        snprintf(detail, sizeof detail, "must be %s, without a number: there is only one", meant);
     Fault fault = {0};
     text_fit(fault.pointer, sizeof fault.pointer, pointer);
     text_quote(fault.value, sizeof fault.value, name);

@@ -14,7 +14,6 @@ void channel_names_write(const Scene *scene, ChannelId channel, size_t number,
 
 // Appends that name to a list that does not have it yet. STATUS_OK or STATUS_NO_MEMORY.
 Status channel_names_add(const Scene *scene, ChannelId channel, size_t number, Texts *names);
-void channel_names_clear(Texts *names);
 
 // Replaces CHANNEL_USUAL by the names of the default channels, or of the default spectrum's one,
 // and validates all names; their pointers are below `pointer`. Names are not compared with the

@@ -10,9 +10,14 @@ static const double TURN = 6.28318530717958647693;
 // Steps of the engine for one mass: a sample, a Taylor step, and an impact with the flight before
 // and after it.
 static const double SAMPLE = 0.08, SAMPLE_NEAR_STOPS = 0.15, ARC = 8, IMPACT = 50;
-static const double VALUE = 0.02;                   // a value of a channel
-static const double MODES = 2;                      // storeys cubed
-static const double RUN = 200;                      // plan, memory and summary
+// A value of a channel: 2 ns a byte for memory that is new to the process, and its sum over modes.
+static const double VALUE = 0.5, VALUE_MODE = 0.04;
+// CPU time of a step that the solvers count, over SOLVER_STEP: exact, exact with a power law, and
+// solvers that step. Measured by tests/bench/bench_cost.c.
+static const double EXACT_STEP = 0.65, POWER_STEP = 0.75, STEPPED_STEP = 1.15;
+static const double MODES = 2; // storeys cubed
+static const double RUN = 200; // plan, memory and summary
+static const double RUN_BYTES = 1e5;
 static const double FRAME_ARCS = 14, BLOW_ARCS = 5; // Taylor steps of a contact, of an impulse
 static const double NEIGHBOUR = 1.6; // a frame with dampers and its companion until they diverge
 static const double IMPACTS_A_CYCLE = 2;
@@ -128,7 +133,15 @@ static bool cost_is_single(const Scene *scene) {
            damper_buffer(damper, SIDE_RIGHT)->table.count == 0;
 }
 
-// Steps of the exact solver.
+double cost_step(const Simulation *simulation) {
+    if (simulation_solver(simulation)->cost != NULL)
+        return STEPPED_STEP;
+    return simulation->scene.dampers.count > 0 && simulation_law(simulation)->form == CONTACT_POWER
+               ? POWER_STEP
+               : EXACT_STEP;
+}
+
+// Steps that the exact solver counts.
 static double cost_exact_steps(const Simulation *simulation, bool *is_fast) {
     const Scene *scene = &simulation->scene;
     const Structure *structure = scene_structure(scene);
@@ -201,7 +214,7 @@ static void cost_add_bytes(const Simulation *simulation, Cost *cost) {
     StructureRates rates;
     if (structure_rates(scene_structure(scene), &rates) != STATUS_OK)
         rates = (StructureRates){0};
-    cost->bytes = sizeof(Outcome) +
+    cost->bytes = RUN_BYTES +
                   sizeof(double) * (samples * columns + base + refined + 60 * size * size) +
                   sizeof(Impact) * fmin(cost_impacts(scene, &rates), IMPACTS_KEPT);
     if (psd->channels.count == 0)
@@ -219,15 +232,17 @@ Cost cost_scene(const Simulation *simulation) {
     const Output *output = &simulation->output;
     const double samples = (double)scene_sample_count(scene);
     const double storeys = (double)structure_storeys(scene_structure(scene));
-    const double columns = (double)(output->channels.count + output->psd.channels.count);
-    Cost cost = {.spectra = cost_spectra(&output->psd, scene_sample_count(scene))};
+    const double modes = storeys > 1 ? storeys : 0;
+    const double channel = samples * (VALUE + VALUE_MODE * modes);
+    Cost cost = {.spectra = cost_spectra(&output->psd, scene_sample_count(scene)) +
+                            channel * (double)output->psd.channels.count,
+                 .output = channel * (double)output->channels.count};
     cost_add_bytes(simulation, &cost);
     cost.base = cost_base_samples(simulation) * excitation_kind(scene_excitation(scene))->effort;
-    cost.steps =
-        RUN + samples * VALUE * columns + cost.spectra + cost.base +
-        (storeys > 1 ? MODES * storeys * storeys * storeys : 0) +
-        (simulation_solver(simulation)->cost != NULL ? cost_own_steps(simulation)
-                                                     : cost_exact_steps(simulation, &cost.is_fast));
+    cost.steps = RUN + cost.output + cost.spectra + cost.base + MODES * modes * modes * modes +
+                 cost_step(simulation) * (simulation_solver(simulation)->cost != NULL
+                                              ? cost_own_steps(simulation)
+                                              : cost_exact_steps(simulation, &cost.is_fast));
     cost.cpu_seconds = cost.steps * SOLVER_STEP;
     return cost;
 }

@@ -207,7 +207,7 @@ Status error_metrics_request(Simulation *simulation, Problem *problem) {
     const size_t storeys = structure_storeys(scene_structure(&simulation->scene));
     static const ChannelId wanted[] = {CHANNEL_DISPLACEMENT, CHANNEL_MEAN_ACCELERATION};
     Texts *names = &simulation->output.channels;
-    channel_names_clear(names);
+    texts_clear(names);
     for (size_t i = 0; i < COUNT(wanted) * storeys; i++)
         if (channel_names_add(&simulation->scene, wanted[i / storeys], i % storeys + 1, names) !=
             STATUS_OK)

@@ -1,13 +1,13 @@
-// The run keeps no history of its contacts. The scene is run again for the state at a sample before
-// the impact, at which the base has a sample of its own and no stop is touched. From there the
-// exact solver continues with a finer clock:
+// A result keeps no history of its contacts. The scene is run again with all states as channels.
+// From a sample before the impact at which no stop is touched, the event engine continues with an
+// output window over the contact:
 //
 //     samples      |.........|.........|.........|
 //     contact                     [=========]
-//     fine run               |''''''''''''''''|
+//     window                      ''''''''''
 //
-// Force and penetration at the ends follow from the contact law and the speed, because a sample at
-// a release shows the flight after it.
+// Force and penetration at the ends follow from the contact law and the speed, because an instant
+// at a release shows the flight after it.
 #include "core/simulation/impact_history.h"
 
 #include <math.h>
@@ -16,148 +16,29 @@
 
 #include "core/simulation/channel_names.h"
 #include "core/simulation/internal.h"
+#include "core/solve/exact.h"
 
-enum { FINE_MAX = 1 << 22 }; // samples of the fine run
 enum { TIME, FORCE, PENETRATION, SPEED, COLUMNS };
-enum { FINE_FORCE, FINE_PENETRATION, FINE_VELOCITY, FINE_DAMPER_VELOCITY, FINE_COLUMNS };
 
-static const double states_bytes_max = 1e9; // columns of the first run
+static const double states_bytes_max = 1e9; // columns of the run
 
 typedef struct ImpactRun {
     Simulation simulation; // with all states as channels
-    Outcome *outcome;      // of the first run
+    Outcome *outcome;      // of the run
     const Impact *impact;  // in it
-    RunInputs inputs;      // of the first run; the plan is changed to that of the fine run
-    Base shifted;          // the base from the fine run's start; borrows its samples
-    size_t sample;         // at that start
-    double start;          // the same [s]
-    Columns fine;          // FINE_COLUMNS
-    Response response;     // of the fine run
-    const Impact *again;   // the impact in it, in its time
+    RunInputs inputs;      // of the run; the plan then starts at `sample`
+    size_t sample;
+    Impact again;              // the impact in the run from there
+    ContactParameters contact; // of it
+    ContactPoint *points;      // with room for two ends and the peak
+    size_t count;
 } ImpactRun;
-
-typedef struct Point {
-    double time, force, penetration, speed; // time of the fine run
-} Point;
-
-static Point impact_run_sample(const ImpactRun *run, size_t i) {
-    const Column *fine = run->fine.at;
-    const double sign = run->again->side == SIDE_RIGHT ? 1 : -1;
-    return (Point){.time = (double)i / run->inputs.plan->sample_rate,
-                   .force = sign * fine[FINE_FORCE].values[i],
-                   .penetration = fine[FINE_PENETRATION].values[i],
-                   .speed = sign *
-                            (fine[FINE_DAMPER_VELOCITY].values[i] - fine[FINE_VELOCITY].values[i])};
-}
-
-// The contact's side of one of its ends; `near` is the nearest sample inside. The contact may have
-// begun before a pause of its force, and its parameters are those of its beginning.
-static Point impact_run_end(const ImpactRun *run, double time, double speed, bool has_force,
-                            const Point *near) {
-    const Plan *plan = run->inputs.plan;
-    const Impact *first = run->again;
-    for (const Impact *at = first; at > run->response.impacts.at && first->is_resumed; at--)
-        if (at[-1].damper == first->damper && at[-1].side == first->side)
-            first = &at[-1];
-    const PlanStop *stop = &plan->dampers[first->damper - 1].stops[first->side];
-    const ContactParameters own = contact_parameters_at(&stop->contact, first->approach_speed);
-    Point point = {.time = time, .speed = speed};
-    if (plan->form == CONTACT_LINEAR) {
-        point.force = has_force ? own.damping * speed : 0;
-        point.penetration = has_force ? 0 : fmax(-own.damping * speed / own.stiffness, 0);
-    } else {
-        point.penetration = fmax(near->penetration + near->speed * (time - near->time), 0);
-        point.force = fmax(plan->law->force(&own, point.penetration, point.speed).value, 0);
-    }
-    return point;
-}
-
-// The vertex of the parabola through three points. Its force is the listed peak, which the solver
-// has located.
-static Point impact_run_vertex(const Point *a, const Point *b, const Point *c, double force) {
-    const double left = a->time - b->time, right = c->time - b->time;
-    const double low = (a->force - b->force) / left, high = (c->force - b->force) / right;
-    const double bend = (high - low) / (right - left), slope = low - bend * left;
-    const double t = bend != 0 ? fmin(fmax(-slope / (2 * bend), left), right) : 0;
-    const double by_a = t * (t - right) / (left * (left - right)),
-                 by_c = t * (t - left) / (right * (right - left)), by_b = 1 - by_a - by_c;
-    return (Point){.time = b->time + t,
-                   .force = copysign(force, b->force),
-                   .penetration =
-                       by_a * a->penetration + by_b * b->penetration + by_c * c->penetration,
-                   .speed = by_a * a->speed + by_b * b->speed + by_c * c->speed};
-}
-
-// All points but the peak. Returns their number.
-static size_t impact_run_gather(const ImpactRun *run, Point *points) {
-    const Impact *again = run->again;
-    const Plan *plan = run->inputs.plan;
-    const double rate = plan->sample_rate;
-    const bool is_open = isnan(again->end), has_ends = again->kind == IMPACT_IMPACT;
-    const double end = is_open ? plan->duration : again->end, edge = 1e-6 / rate;
-    const size_t last = plan->count - 1;
-    size_t count = has_ends ? 1 : 0, i = (size_t)fmax(ceil((again->start + edge) * rate), 0);
-    for (; i <= last && ((double)i / rate < end - edge || (is_open && i == last)); i++)
-        points[count++] = impact_run_sample(run, i);
-    if (!has_ends)
-        return count;
-    const Point none = {.time = again->start};
-    points[0] = impact_run_end(run, again->start, again->approach_speed, !again->is_resumed,
-                               count > 1 ? &points[1] : &none);
-    if (is_open)
-        return count;
-    const bool pulls = plan->separation == SEPARATION_ZERO_PENETRATION;
-    points[count] = impact_run_end(run, end, -again->separation_speed, pulls, &points[count - 1]);
-    return count + 1;
-}
-
-static size_t impact_run_add_peak(const ImpactRun *run, Point *points, size_t count) {
-    size_t top = 0;
-    for (size_t i = 1; i < count; i++)
-        if (fabs(points[i].force) > fabs(points[top].force))
-            top = i;
-    if (top == 0 || top + 1 >= count || isnan(run->again->peak_force))
-        return count;
-    const Point peak =
-        impact_run_vertex(&points[top - 1], &points[top], &points[top + 1], run->again->peak_force);
-    const double apart = peak.time - points[top].time;
-    if (fabs(apart) * run->inputs.plan->sample_rate < 1e-6) {
-        points[top] = peak;
-        return count;
-    }
-    const size_t at = apart > 0 ? top + 1 : top;
-    memmove(&points[at + 1], &points[at], (count - at) * sizeof *points);
-    points[at] = peak;
-    return count + 1;
-}
-
-static Status impact_run_fill(const ImpactRun *run, Columns *columns, Problem *problem) {
-    static const struct {
-        const char *name, *unit;
-    } names[COLUMNS] = {[TIME] = {"time", "s"},
-                        [FORCE] = {"contact_force", "N"},
-                        [PENETRATION] = {"penetration", "m"},
-                        [SPEED] = {"approach_speed", "m/s"}};
-    Point *points = malloc((run->inputs.plan->count + 3) * sizeof *points);
-    if (points == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the contact");
-    const size_t count = impact_run_add_peak(run, points, impact_run_gather(run, points));
-    const Status status = columns_allocate(columns, COLUMNS, count, 0, problem);
-    for (size_t c = 0; c < COLUMNS && status == STATUS_OK; c++)
-        columns_name(columns, c, names[c].name, names[c].unit);
-    for (size_t i = 0; i < count && status == STATUS_OK; i++) {
-        columns->at[TIME].values[i] = run->start + points[i].time;
-        columns->at[FORCE].values[i] = points[i].force;
-        columns->at[PENETRATION].values[i] = points[i].penetration;
-        columns->at[SPEED].values[i] = points[i].speed;
-    }
-    free(points);
-    return status;
-}
 
 // Adds all states to the channels. Channels of spectra stay, because a mean acceleration changes
 // the solver's path and with it the last digits; the spectra themselves are not made.
 static Status impact_run_add_states(const Scene *scene, Output *output) {
+    static const ChannelId states[] = {CHANNEL_DISPLACEMENT, CHANNEL_VELOCITY,
+                                       CHANNEL_DAMPER_DISPLACEMENT, CHANNEL_DAMPER_VELOCITY};
     Texts *names = &output->channels, *transformed = &output->psd.channels;
     for (size_t i = 0; i < transformed->count; i++) {
         size_t number;
@@ -165,24 +46,14 @@ static Status impact_run_add_states(const Scene *scene, Output *output) {
         TRY(channel_names_add(scene, (ChannelId)(channel - channels), number > 0 ? number : 1,
                               names));
     }
-    channel_names_clear(transformed);
-    for (size_t i = 1; i <= structure_storeys(scene_structure(scene)); i++) {
-        TRY(channel_names_add(scene, CHANNEL_DISPLACEMENT, i, names));
-        TRY(channel_names_add(scene, CHANNEL_VELOCITY, i, names));
-    }
-    for (size_t i = 1; i <= scene->dampers.count; i++) {
-        TRY(channel_names_add(scene, CHANNEL_DAMPER_DISPLACEMENT, i, names));
-        TRY(channel_names_add(scene, CHANNEL_DAMPER_VELOCITY, i, names));
+    texts_clear(transformed);
+    for (size_t k = 0; k < COUNT(states); k++) {
+        const size_t count =
+            k < 2 ? structure_storeys(scene_structure(scene)) : scene->dampers.count;
+        for (size_t i = 1; i <= count; i++)
+            TRY(channel_names_add(scene, states[k], i, names));
     }
     return STATUS_OK;
-}
-
-// Value of a state of the first run; `index` is from 0.
-static double impact_run_state(const ImpactRun *run, ChannelId channel, size_t index,
-                               size_t sample) {
-    char name[CHANNEL_NAME];
-    channel_names_write(&run->simulation.scene, channel, index + 1, name);
-    return columns_find(&run->outcome->response.series, name)->values[sample];
 }
 
 // The scene as it was run. The settings of an accuracy target are known only after a run.
@@ -229,108 +100,100 @@ static Status impact_run_find(ImpactRun *run, size_t number, Problem *problem) {
                        "its impulse is in the list of impacts");
 }
 
-// Number of the base's own sample at a sample of the output; -1: it has none there.
-static double impact_run_base_sample(const ImpactRun *run, size_t sample) {
-    const Base *base = &run->inputs.base;
-    if (base->form != BASE_SAMPLED)
-        return 0;
-    const double number = (double)sample / (run->outcome->response.sample_rate * base->interval);
-    const double nearest = round(number);
-    return fabs(number - nearest) <= 1e-9 ? nearest : -1;
+// Value of a state at run->sample; `index` is from 0.
+static double impact_run_state(const ImpactRun *run, ChannelId channel, size_t index) {
+    char name[CHANNEL_NAME];
+    channel_names_write(&run->simulation.scene, channel, index + 1, name);
+    return columns_find(&run->outcome->response.series, name)->values[run->sample];
 }
 
-static bool impact_run_is_free(const ImpactRun *run, size_t sample) {
+static bool impact_run_is_free(const ImpactRun *run) {
     for (size_t i = 0; i < run->inputs.plan->damper_count; i++) {
         const PlanDamper *damper = &run->inputs.plan->dampers[i];
-        const double u = impact_run_state(run, CHANNEL_DAMPER_DISPLACEMENT, i, sample) -
-                         impact_run_state(run, CHANNEL_DISPLACEMENT, damper->storey, sample);
+        const double u = impact_run_state(run, CHANNEL_DAMPER_DISPLACEMENT, i) -
+                         impact_run_state(run, CHANNEL_DISPLACEMENT, damper->storey);
         if (!(fabs(u - damper->offset) < 0.5 * damper->clearance))
             return false;
     }
     return true;
 }
 
-// The last sample before the impact from which a run can start: no contact is open, all masses are
-// between their stops and the base has a sample. Sample 0 always serves.
-static void impact_run_find_start(ImpactRun *run) {
+// The last sample before the impact at which no contact is open and all masses are between their
+// stops, and the plan from there. Sample 0 always serves.
+static void impact_run_start(ImpactRun *run) {
     const Impacts *impacts = &run->outcome->response.impacts;
-    const double rate = run->outcome->response.sample_rate;
-    size_t sample = (size_t)floor(run->impact->start * rate);
-    while (sample > 0) {
-        const double time = (double)sample / rate;
+    Plan *plan = run->inputs.plan;
+    run->sample = (size_t)floor(run->impact->start * plan->sample_rate);
+    while (run->sample > 0) {
+        const double time = (double)run->sample / plan->sample_rate;
         double earliest = time;
         for (const Impact *other = impacts->at;
              other < impacts->at + impacts->count && other->start < time; other++)
             if (!(other->end <= time) && other->start < earliest)
                 earliest = other->start;
         if (earliest < time)
-            sample = (size_t)floor(earliest * rate);
-        else if (!impact_run_is_free(run, sample) || impact_run_base_sample(run, sample) < 0)
-            sample--;
+            run->sample = (size_t)floor(earliest * plan->sample_rate);
+        else if (!impact_run_is_free(run))
+            run->sample--;
         else
             break;
     }
-    run->sample = sample;
-    run->start = (double)sample / rate;
-}
-
-// Moves the start of a piece by `after` [s].
-static void impact_run_shift_piece(BasePiece *piece, double omega, double after) {
-    const double value = piece->value, slope = piece->slope;
-    const double c = cos(omega * after), s = sin(omega * after);
-    piece->value = omega > 0 ? value * c + slope * s : value + slope * after;
-    piece->slope = omega > 0 ? slope * c - value * s : slope;
-}
-
-static void impact_run_shift_base(ImpactRun *run) {
-    const Base *base = &run->inputs.base;
-    Base *shifted = &run->shifted;
-    *shifted = *base;
-    if (base->form == BASE_SAMPLED) {
-        const size_t first = (size_t)impact_run_base_sample(run, run->sample);
-        const size_t passed = first < base->count ? first : base->count;
-        shifted->values += passed;
-        shifted->count -= passed;
-        if (shifted->count == 0)
-            *shifted = (Base){.form = BASE_STILL};
-    } else if (base->form == BASE_SINE) {
-        shifted->form = BASE_PIECES;
-        shifted->pieces[0] = (BasePiece){0, 0, base->amplitude};
-        shifted->piece_count = 1;
-        impact_run_shift_piece(&shifted->pieces[0], base->omega, run->start);
-    } else if (base->form == BASE_PIECES) {
-        shifted->piece_count = 0;
-        for (size_t i = 0; i < base->piece_count; i++) {
-            BasePiece piece = base->pieces[i];
-            piece.time -= run->start;
-            if (piece.time <= 0) {
-                impact_run_shift_piece(&piece, base->omega, -piece.time);
-                piece.time = 0;
-                shifted->piece_count = 0;
-            }
-            shifted->pieces[shifted->piece_count++] = piece;
-        }
-    }
-}
-
-// The plan belongs to this run alone: it continues from the state at the sample.
-static void impact_run_set_state(const ImpactRun *run) {
-    Plan *plan = run->inputs.plan;
     for (size_t i = 0; i < plan->storeys && run->sample > 0; i++) {
-        plan->displacement[i] = impact_run_state(run, CHANNEL_DISPLACEMENT, i, run->sample);
-        plan->velocity[i] = impact_run_state(run, CHANNEL_VELOCITY, i, run->sample);
+        plan->displacement[i] = impact_run_state(run, CHANNEL_DISPLACEMENT, i);
+        plan->velocity[i] = impact_run_state(run, CHANNEL_VELOCITY, i);
     }
     for (size_t i = 0; i < plan->damper_count && run->sample > 0; i++) {
         PlanDamper *damper = &plan->dampers[i];
-        damper->position = impact_run_state(run, CHANNEL_DAMPER_DISPLACEMENT, i, run->sample) -
+        damper->position = impact_run_state(run, CHANNEL_DAMPER_DISPLACEMENT, i) -
                            plan->displacement[damper->storey] - damper->offset;
-        damper->velocity = impact_run_state(run, CHANNEL_DAMPER_VELOCITY, i, run->sample) -
-                           plan->velocity[damper->storey];
+        damper->velocity =
+            impact_run_state(run, CHANNEL_DAMPER_VELOCITY, i) - plan->velocity[damper->storey];
     }
 }
 
-static Status impact_run_set_clock(const ImpactRun *run, size_t points, Problem *problem) {
-    Plan *plan = run->inputs.plan;
+// Finds the impact in the run from the sample on. It may have begun before a pause of its force;
+// its contact parameters are those of its beginning.
+static Status impact_run_recognise(ImpactRun *run, const Impacts *impacts, Problem *problem) {
+    const Impact *impact = run->impact, *again = NULL;
+    for (const Impact *at = impacts->at; at < impacts->at + impacts->count; at++)
+        if (at->damper == impact->damper && at->side == impact->side && at->kind == impact->kind &&
+            (again == NULL || fabs(at->start - impact->start) < fabs(again->start - impact->start)))
+            again = at;
+    if (again == NULL)
+        return problem_set(problem, STATUS_UNSTABLE,
+                           "the impact does not occur again in a run from the sample before it, "
+                           "at %.17g s: the solver's steps were too coarse",
+                           (double)run->sample / run->inputs.plan->sample_rate);
+    const Impact *first = again;
+    for (const Impact *at = again; at > impacts->at && first->is_resumed; at--)
+        if (at[-1].damper == first->damper && at[-1].side == first->side)
+            first = &at[-1];
+    run->again = *again;
+    run->contact = contact_parameters_at(
+        &run->inputs.plan->dampers[again->damper - 1].stops[again->side].contact,
+        first->approach_speed);
+    return STATUS_OK;
+}
+
+// The contact's side of one of its ends; `near` is the nearest point inside.
+static ContactPoint impact_run_end(const ImpactRun *run, double time, double speed, bool has_force,
+                                   const ContactPoint *near) {
+    const Plan *plan = run->inputs.plan;
+    const ContactParameters *own = &run->contact;
+    ContactPoint point = {.time = time, .speed = speed};
+    if (plan->form == CONTACT_LINEAR) {
+        point.force = has_force ? own->damping * speed : 0;
+        point.penetration = has_force ? 0 : fmax(-own->damping * speed / own->stiffness, 0);
+    } else {
+        point.penetration = fmax(near->penetration + near->speed * (time - near->time), 0);
+        point.force = fmax(plan->law->force(own, point.penetration, point.speed).value, 0);
+    }
+    return point;
+}
+
+// Runs from the sample on, first for the impact and then for points inside it.
+static Status impact_run_sample(ImpactRun *run, size_t points, const SimulationLimits *limits,
+                                const Progress *progress, Workspace *workspace, Problem *problem) {
     const double total = run->simulation.scene.duration;
     const double end = isnan(run->impact->end) ? total : run->impact->end;
     const double length = end - run->impact->start;
@@ -338,57 +201,102 @@ static Status impact_run_set_clock(const ImpactRun *run, size_t points, Problem 
         return problem_set(problem, STATUS_NOT_FOUND,
                            "the contact has no duration: from %.17g s to %.17g s",
                            run->impact->start, end);
-    const double left = total - run->start;
-    plan->sample_rate = (double)(points - 2) / length;
-    plan->duration = fmin(end - run->start + 2 / plan->sample_rate, left);
-    // At the end of the run the last sample must be at its end.
-    if (plan->duration == left)
-        plan->sample_rate = ceil(left * plan->sample_rate) / left;
-    const double samples = plan->duration * plan->sample_rate * (1 + 1e-12) + 1;
-    if (samples > FINE_MAX)
-        return problem_set(
-            problem, STATUS_LIMIT,
-            "a contact of %.3g s is too short for %zu points, because the run has to "
-            "start %.3g s before it: ask for fewer points",
-            length, points, run->impact->start - run->start);
-    plan->count = (size_t)samples;
-    return STATUS_OK;
-}
-
-static Status impact_run_fine(ImpactRun *run, const SimulationLimits *limits,
-                              const Progress *progress, Workspace *workspace, Problem *problem) {
-    const Plan *plan = run->inputs.plan;
-    const size_t number = (size_t)run->impact->damper - 1;
-    TRY(columns_allocate(&run->fine, FINE_COLUMNS, plan->count, 0, problem));
-    const Column *fine = run->fine.at;
-    const RunColumn columns[FINE_COLUMNS] = {
-        {CHANNEL_CONTACT_FORCE, number, fine[FINE_FORCE].values},
-        {CHANNEL_PENETRATION, number, fine[FINE_PENETRATION].values},
-        {CHANNEL_VELOCITY, plan->dampers[number].storey, fine[FINE_VELOCITY].values},
-        {CHANNEL_DAMPER_VELOCITY, number, fine[FINE_DAMPER_VELOCITY].values}};
     const bool is_exact = simulation_solver(&run->simulation) == &solver_exact;
-    Run solver_run = {.plan = plan,
-                      .base = &run->shifted,
+    const Run from = {.plan = run->inputs.plan,
+                      .base = &run->inputs.base,
                       .progress = progress,
                       .accuracy = is_exact ? simulation_settings(&run->simulation) : NULL,
                       .workspace = workspace,
-                      .columns = columns,
-                      .column_count = COUNT(columns),
                       .impacts_max = limits == NULL ? 0 : limits->impacts,
                       .steps_max = limits == NULL ? 0 : SIMULATION_PATIENCE * limits->steps};
-    TRY(solver_exact.run(&solver_exact, &solver_run, &run->response, problem));
-    const Impacts *impacts = &run->response.impacts;
-    const double wanted = run->impact->start - run->start;
-    for (const Impact *at = impacts->at; at < impacts->at + impacts->count; at++)
-        if (at->damper == run->impact->damper && at->side == run->impact->side &&
-            at->kind == run->impact->kind &&
-            (run->again == NULL || fabs(at->start - wanted) < fabs(run->again->start - wanted)))
-            run->again = at;
-    if (run->again == NULL)
-        return problem_set(problem, STATUS_UNSTABLE,
-                           "the impact does not occur again in a run from the sample before it, "
-                           "at %.17g s: the solver's steps were too coarse",
-                           run->start);
+    Run search = from, sampled = from;
+    Response response = {0};
+    OutputWindow window = {.first = run->sample, .end = fmin(end + length, total)};
+    Status status = exact_run_window(&search, &window, &response, problem);
+    if (status == STATUS_OK)
+        status = impact_run_recognise(run, &response.impacts, problem);
+    response_clear(&response);
+    TRY(status);
+    const Impact *again = &run->again;
+    const bool is_open = isnan(again->end);
+    window.start = again->start;
+    window.end = is_open ? total : again->end;
+    window.interval = (window.end - window.start) / (double)(points - 1);
+    window.count = is_open ? points - 1 : points - 2;
+    window.damper = (size_t)again->damper - 1;
+    window.side = (Side)again->side;
+    if ((run->points = malloc((points + 2) * sizeof *run->points)) == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the contact");
+    const bool has_ends = again->kind == IMPACT_IMPACT;
+    window.points = run->points + has_ends;
+    status = exact_run_window(&sampled, &window, &response, problem);
+    response_clear(&response);
+    TRY(status);
+    ContactPoint *const last = &window.points[window.count - 1];
+    const bool pulls = run->inputs.plan->separation == SEPARATION_ZERO_PENETRATION;
+    if (has_ends)
+        run->points[0] = impact_run_end(run, again->start, again->approach_speed,
+                                        !again->is_resumed, &window.points[0]);
+    if (has_ends && !is_open)
+        last[1] = impact_run_end(run, again->end, -again->separation_speed, pulls, last);
+    run->count = window.count + has_ends + (has_ends && !is_open);
+    return STATUS_OK;
+}
+
+// The vertex of the parabola through three points. Its force is the listed peak, which the solver
+// has located.
+static ContactPoint impact_run_vertex(const ContactPoint *a, const ContactPoint *b,
+                                      const ContactPoint *c, double force) {
+    const double left = a->time - b->time, right = c->time - b->time;
+    const double low = (a->force - b->force) / left, high = (c->force - b->force) / right;
+    const double bend = (high - low) / (right - left), slope = low - bend * left;
+    const double t = bend != 0 ? fmin(fmax(-slope / (2 * bend), left), right) : 0;
+    const double by_a = t * (t - right) / (left * (left - right)),
+                 by_c = t * (t - left) / (right * (right - left)), by_b = 1 - by_a - by_c;
+    return (ContactPoint){.time = b->time + t,
+                          .force = copysign(force, b->force),
+                          .penetration =
+                              by_a * a->penetration + by_b * b->penetration + by_c * c->penetration,
+                          .speed = by_a * a->speed + by_b * b->speed + by_c * c->speed};
+}
+
+static void impact_run_add_peak(ImpactRun *run) {
+    ContactPoint *points = run->points;
+    size_t top = 0;
+    for (size_t i = 1; i < run->count; i++)
+        if (fabs(points[i].force) > fabs(points[top].force))
+            top = i;
+    if (top == 0 || top + 1 >= run->count || isnan(run->again.peak_force) ||
+        !(points[top - 1].time < points[top].time && points[top].time < points[top + 1].time))
+        return;
+    const ContactPoint peak =
+        impact_run_vertex(&points[top - 1], &points[top], &points[top + 1], run->again.peak_force);
+    const double apart = peak.time - points[top].time;
+    if (fabs(apart) < 1e-6 * (points[top].time - points[top - 1].time)) {
+        points[top] = peak;
+        return;
+    }
+    top += apart > 0;
+    memmove(&points[top + 1], &points[top], (run->count++ - top) * sizeof *points);
+    points[top] = peak;
+}
+
+static Status impact_run_write(const ImpactRun *run, Columns *columns, Problem *problem) {
+    static const struct {
+        const char *name, *unit;
+    } names[COLUMNS] = {[TIME] = {"time", "s"},
+                        [FORCE] = {"contact_force", "N"},
+                        [PENETRATION] = {"penetration", "m"},
+                        [SPEED] = {"approach_speed", "m/s"}};
+    TRY(columns_allocate(columns, COLUMNS, run->count, 0, problem));
+    for (size_t c = 0; c < COLUMNS; c++)
+        columns_name(columns, c, names[c].name, names[c].unit);
+    for (size_t i = 0; i < run->count; i++) {
+        columns->at[TIME].values[i] = run->points[i].time;
+        columns->at[FORCE].values[i] = run->points[i].force;
+        columns->at[PENETRATION].values[i] = run->points[i].penetration;
+        columns->at[SPEED].values[i] = run->points[i].speed;
+    }
     return STATUS_OK;
 }
 
@@ -400,13 +308,11 @@ static Status impact_run_all(ImpactRun *run, const Simulation *simulation, size_
     TRY(run_scene(&run->simulation, limits, progress, workspace, &run->inputs, &run->outcome,
                   problem));
     TRY(impact_run_find(run, number, problem));
-    impact_run_find_start(run);
-    impact_run_shift_base(run);
-    impact_run_set_state(run);
-    TRY(impact_run_set_clock(run, points, problem));
-    TRY(impact_run_fine(run, limits, progress, workspace, problem));
+    impact_run_start(run);
+    TRY(impact_run_sample(run, points, limits, progress, workspace, problem));
+    impact_run_add_peak(run);
     history->impact = *run->impact;
-    return impact_run_fill(run, &history->columns, problem);
+    return impact_run_write(run, &history->columns, problem);
 }
 
 Status impact_history_make(const Simulation *simulation, size_t number, size_t points,
@@ -420,8 +326,7 @@ Status impact_history_make(const Simulation *simulation, size_t number, size_t p
     simulation_clear(&run.simulation);
     outcome_unref(run.outcome);
     run_inputs_clear(&run.inputs);
-    columns_clear(&run.fine);
-    response_clear(&run.response);
+    free(run.points);
     if (status != STATUS_OK)
         impact_history_clear(history);
     return status;

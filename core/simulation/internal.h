@@ -52,6 +52,7 @@ Status scene_warnings_of_result(const Scene *scene, const DerivedList *derived, 
 // ignored.
 Status plan_scene(const Simulation *simulation, PlanReport *report, Problem *problem);
 Cost cost_scene(const Simulation *simulation);
+double cost_step(const Simulation *simulation); // steps for one that the solver counts
 // Predicted steps of parts: spectra, contacts, the list of impacts, the motion of the base in
 // flight, and of the whole with other numbers of channels, spectra and dampers.
 double cost_spectra(const SpectrumRequest *psd, size_t samples);

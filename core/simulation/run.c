@@ -27,7 +27,7 @@ static Status omissions_of_output(const Simulation *simulation, const Plan *plan
                                               simulation->scene.dampers.count) -
                                asked,
                            asked),
-            "%zu of the %zu usual channels are asked for", output->channels.count, usual));
+            "%zu of the %zu usual channels are requested", output->channels.count, usual));
     if (output->psd.channels.count == 0) {
         Simulation view = *simulation;
         SpectrumRequest *psd = &view.output.psd;
@@ -38,12 +38,12 @@ static Status omissions_of_output(const Simulation *simulation, const Plan *plan
             decisions, "psd",
             floor((double)(plan->count - psd->overlap) / (double)(psd->segment - psd->overlap)),
             "segments", omission_share(cost_scene(&view).steps - asked, asked),
-            "no spectrum is asked for"));
+            "no spectrum is requested"));
     }
     if (!output->impacts && plan->damper_count > 0)
         TRY(decisions_omit(decisions, "impacts", cost_listed_impacts(simulation), "rows",
                            omission_share(cost_listing_steps(simulation), asked),
-                           "no ledger is asked for: impacts are counted, not listed"));
+                           "no list of impacts is requested: impacts are counted, not listed"));
     return STATUS_OK;
 }
 
@@ -53,15 +53,15 @@ static Status omissions_of_contacts(const Simulation *simulation, const Plan *pl
         return STATUS_OK;
     if (regime == NULL)
         return decisions_add(decisions, "contacts", "open", NAN, NULL,
-                             "whether a mass can reach a stop is looked into when the base's "
-                             "motion is made");
+                             "whether a mass can reach a stop is determined when the base's motion "
+                             "is made");
     if (!regime->is_clear)
         return STATUS_OK;
     const double saved = cost_contact_steps(simulation);
     return decisions_omit(
         decisions, "contacts", regime->reach, NULL, omission_share(saved, asked - saved),
-        "%s at most %.3g of the way to a stop",
-        plan->damper_count == 1 ? "the mass comes" : "the masses come", regime->reach);
+        "%s at most %.3g of the distance to a stop",
+        plan->damper_count == 1 ? "the mass moves" : "the masses move", regime->reach);
 }
 
 // Adds what a run leaves out to the plan's decisions. `regime` NULL: the base is not made yet, and
@@ -74,7 +74,7 @@ static Status omissions_add(const Simulation *simulation, Plan *plan, const Regi
         const double moving = cost_variant_steps(
             simulation, 0, simulation->output.psd.channels.count, plan->damper_count);
         return decisions_omit(decisions, "motion", 0, "J", omission_share(moving, asked - moving),
-                              "nothing moves and nothing sets it moving");
+                              "nothing moves and nothing excites a motion");
     }
     TRY(omissions_of_contacts(simulation, plan, asked, regime, decisions));
     // Solvers with fixed steps make them in any case.
@@ -85,7 +85,7 @@ static Status omissions_add(const Simulation *simulation, Plan *plan, const Regi
         return STATUS_OK;
     const double saved = cost_forcing_steps(simulation);
     return decisions_omit(decisions, "forcing", 0, "m/s^2", omission_share(saved, asked - saved),
-                          "the base is still: flight goes in closed form");
+                          "the base is still: flight has a closed form");
 }
 
 static Status run_make_plan(const Simulation *simulation, Plan **plan, Problem *problem) {
@@ -311,7 +311,7 @@ static Status run_solve(RunContext *context, const Regime *regime, Workspace *wo
                .steps_max = run_steps_max(limits),
                .is_clear = regime->is_clear};
     TRY(solver->run(solver, &run, &outcome->response, problem));
-    outcome->steps = run.steps;
+    outcome->steps = run.steps * cost_step(simulation);
     outcome->work = run.work;
     outcome->work.base_samples = context->base.count;
     outcome->work.channel_values = run.column_count * context->plan->count;

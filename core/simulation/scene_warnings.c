@@ -168,8 +168,8 @@ static Status warnings_of_rest(const Scene *scene, Warnings *warnings) {
         if (scene->dampers.at[i].velocity != 0)
             return STATUS_OK;
     return warnings_add(warnings, "/excitation",
-                        "is free vibration from rest: nothing will move; give an initial "
-                        "displacement or velocity, or a kind that shakes the base");
+                        "is free vibration from rest: nothing moves; give an initial "
+                        "displacement or velocity, or a kind that moves the base");
 }
 
 Status scene_warnings_of_input(const Simulation *simulation, Warnings *warnings) {
@@ -187,9 +187,9 @@ static Status warnings_of_modes(Outcome *outcome) {
     if (!(error > RESPONSE_DIVERGENCE))
         return STATUS_OK;
     return warnings_add(&outcome->warnings, "/accuracy/modes",
-                        "with the modes left out the displacement is wrong by up to %.2g of its "
-                        "largest value%s: more modes are closer",
-                        error, error > 0.1 ? ", and only statistics hold" : "");
+                        "the modes left out change the displacement by up to %.2g of its largest "
+                        "value%s: keep more modes for a smaller error",
+                        error, error > 0.1 ? "; only statistics are valid" : "");
 }
 
 static Status warnings_of_horizon(Outcome *outcome) {
@@ -197,9 +197,9 @@ static Status warnings_of_horizon(Outcome *outcome) {
         outcome->response.truncation_error > RESPONSE_DIVERGENCE)
         return STATUS_OK;
     return warnings_add(&outcome->warnings, "/duration",
-                        "the run goes on beyond t = %.6g s: there rounding has moved the "
-                        "displacement by %g of its largest value, and from there on only "
-                        "statistics hold",
+                        "the run continues beyond t = %.6g s, where rounding has changed the "
+                        "displacement by %g of its largest value: from there on only statistics "
+                        "are valid",
                         outcome->summary.trust_horizon, RESPONSE_DIVERGENCE);
 }
 
@@ -207,17 +207,18 @@ static Status warnings_of_horizon(Outcome *outcome) {
 static Status warnings_of_steps(Outcome *outcome) {
     const Summary *summary = &outcome->summary;
     if (isnan(summary->error_estimate))
-        return warnings_add(&outcome->warnings, "/accuracy",
-                            "the error of these steps is not known: the run beside this one that "
-                            "would tell it came to no end");
+        return warnings_add(
+            &outcome->warnings, "/accuracy",
+            "the error of these steps is unknown: the companion run that estimates it "
+            "failed");
     const double error = summary->error_estimate - outcome->response.truncation_error;
     if (error <= RESPONSE_DIVERGENCE)
         return STATUS_OK;
-    return warnings_add(&outcome->warnings, "/accuracy",
-                        "with these steps the displacement is wrong by about %.2g of its largest "
-                        "value%s: shorter steps, a smaller tolerance, or the solver exact "
-                        "without one, are closer",
-                        error, error > 0.1 ? ", and only statistics hold" : "");
+    return warnings_add(
+        &outcome->warnings, "/accuracy",
+        "the error of these steps is about %.2g of the largest displacement%s: take "
+        "shorter steps, a smaller tolerance, or the solver exact without one",
+        error, error > 0.1 ? "; only statistics are valid" : "");
 }
 
 // A buffer of a damper, and the stops that have it.
@@ -304,7 +305,7 @@ static Status warnings_of_stops(const BufferStops *stops, size_t damper, const A
         "%llu of %llu impacts at the %s of damper %zu were %s than %.80s%s (%s), %s m/s: %s",
         (unsigned long long)(met.below > 0 ? met.below : met.above), (unsigned long long)met.count,
         stops->where, damper + 1, which, is_named ? stops->buffer->material : "the table",
-        is_named ? " was measured" : " tells", range, reach,
+        is_named ? " was measured" : " covers", range, reach,
         stops->buffer->table.count > 0 ? "the nearest row is used there"
                                        : "its numbers are used there without a measurement");
 }

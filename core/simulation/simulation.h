@@ -133,6 +133,7 @@ typedef struct Cost {
     double document_bytes; // size of that document
     double spectra;        // the part of `steps` for spectra
     double base;           // the part of `steps` for the motion of the base
+    double output;         // the part of `steps` for channels
     bool is_fast;          // motion within sample intervals dominates
 } Cost;
 Cost simulation_cost(const Simulation *simulation);

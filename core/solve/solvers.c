@@ -5,8 +5,8 @@
 // clang-format off
 static const Field auto_fields[] = {
     FIELD_BASE(AccuracyAuto, accuracy, accuracy_fields),
-    FIELD_REAL(AccuracyAuto, target, NULL, WITHIN(1e-15, 1), OPTIONAL, "relative error wanted: the cheapest settings predicted to keep it are used, and the result has an estimate of its error; if absent full double precision"),
-    FIELD_CHOICE(AccuracyAuto, metric, metric_names, OPTIONAL, "quantity of the target; displacement if absent"),
+    FIELD_REAL(AccuracyAuto, target, NULL, WITHIN(1e-15, 1), OPTIONAL, "relative error requested: the cheapest settings that are predicted to keep it are run, and the result states the estimated error; if absent the accuracy of double precision"),
+    FIELD_CHOICE(AccuracyAuto, metric, metric_names, OPTIONAL, "what the target is of; displacement if absent"),
     FIELD_END
 };
 // clang-format on

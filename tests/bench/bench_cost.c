@@ -310,7 +310,7 @@ static bool cost_compare(const Simulation *simulation, Row *row, const char *tex
     const Cost cost = simulation_cost(simulation);
     if (cost.cpu_seconds > PREDICTED_MAX || !cost_measure(simulation, &measured))
         return false;
-    const double counted = (measured.steps + cost.spectra + cost.base) * SOLVER_STEP;
+    const double counted = (measured.steps + cost.spectra + cost.base + cost.output) * SOLVER_STEP;
     row->ratio[RATIO_CPU_COUNTED] = counted / measured.cpu;
     row->ratio[RATIO_CPU] = cost.cpu_seconds / measured.cpu;
     row->ratio[RATIO_BYTES] = cost.bytes / measured.bytes;

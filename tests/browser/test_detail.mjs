@@ -16,7 +16,7 @@ test("A result says how exact it is, what it cost, and where the energy went", a
   await says(summary, /10 s of motion, 22 contacts and 10001 samples, computed in [\d.]+ .?s/);
   await says(region(page, "Energy").getByRole("row", { name: /^Contact/ }), /−55\.68 mJ\s+−57\.2 %/);
   const plan = region(page, "How it was computed");
-  await says(plan, /spring damper: a contact time is known \(25 ms\)/);
+  await says(plan, /spring damper: a contact time is given \(25 ms\)/);
   await says(plan.getByRole("row", { name: /^1, right sponge@1/ }), /1\.656 kN\/m\s+4\.046 N s\/m/);
 });
 

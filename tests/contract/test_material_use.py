@@ -147,7 +147,7 @@ def test_impacts_outside_the_measured_speeds_are_told():
             assert named["summary"] == own["summary"] and named["result"] != own["result"]
             [first] = warned(named, "/dampers/0/buffer")
             [second] = warned(own, "/dampers/0/buffer/table")
-            assert first.endswith("the nearest row is used there") and first.replace("rubber@1 was measured", "the table tells") == second
+            assert first.endswith("the nearest row is used there") and first.replace("rubber@1 was measured", "the table covers") == second
 
             # Within the range nothing is said, and one warning stands for each buffer.
             add(daemon, "cork", least_speed=0, most_speed=9)
@@ -182,7 +182,7 @@ def test_a_rig_is_the_revisions():
         assert dry(daemon, rig("loose"))["scene"]["dampers"][0]["rig"] == {"impactor_mass": 0.11, "base_mass": 0.5}
         assert dry(daemon, rig("loose", rig={"impactor_mass": 3}))["scene"]["dampers"][0]["rig"] == {"impactor_mass": 3}
         fault = problem(daemon.request("POST", "/v1/jobs", json=rig("sponge")), 422, "/dampers/0/rig")["errors"][0]
-        assert "sponge@1 does not tell the base that it lay on" in fault["detail"], fault
+        assert "sponge@1 does not state the base that it lay on" in fault["detail"], fault
         given, taken = program.finished(daemon, rig("felt", rig={"impactor_mass": 0.11})), program.finished(daemon, rig("felt"))
         assert taken["cached"] and taken["result"] == given["result"], taken
 

@@ -166,7 +166,7 @@ def test_faults_and_limits_are_told_before_anything_runs():
                                (study(parameters=["masss"]), "/study/parameters/0"), (bare, "/study/kind"),
                                ({**rigid, "study": {"kind": "sensitivity", "contact_time_deviation": 0.1}},
                                 "/study/contact_time_deviation"), (study(restitution_deviation=-1), "/study/restitution_deviation"),
-                               (study(duration=20000, contact_time_deviation=0.1, runs=2000), "/study")):
+                               (study(duration=5000, contact_time_deviation=0.1, runs=2000), "/study")):
             reply = daemon.submit(scene)
             assert reply.status == 422 and reply.json()["errors"][0]["pointer"] == pointer, (scene["study"], reply)
         assert "fewer runs" in reply.json()["errors"][0]["detail"]

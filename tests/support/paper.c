@@ -48,30 +48,16 @@ void paper_model(Simulation *simulation, const char *model) {
     scene_choose(&simulation->scene.contact, &contact_kinds, model);
 }
 
-static void texts_free(Texts *texts) {
-    for (size_t i = 0; i < texts->count; i++)
-        free(texts->at[i]);
-    free(texts->at);
-    *texts = (Texts){NULL, 0};
-}
-
 void paper_channels(Simulation *simulation, const char *const *names, size_t count) {
     Texts *channels_wanted = &simulation->output.channels;
-    texts_free(channels_wanted);
-    channels_wanted->at = calloc(count > 0 ? count : 1, sizeof *channels_wanted->at);
-    if (channels_wanted->at == NULL)
-        abort();
-    for (size_t i = 0; i < count; i++) {
-        const size_t size = strlen(names[i]) + 1;
-        if ((channels_wanted->at[i] = malloc(size)) == NULL)
+    texts_clear(channels_wanted);
+    for (size_t i = 0; i < count; i++)
+        if (texts_append(channels_wanted, names[i]) != STATUS_OK)
             abort();
-        memcpy(channels_wanted->at[i], names[i], size);
-    }
-    channels_wanted->count = count;
 }
 
 void paper_no_psd(Simulation *simulation) {
-    texts_free(&simulation->output.psd.channels);
+    texts_clear(&simulation->output.psd.channels);
 }
 
 double paper_distance(const Outcome *a, const Outcome *b, double from, double to) {

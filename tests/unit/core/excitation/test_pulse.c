@@ -60,7 +60,7 @@ static void a_pulse_that_no_clock_can_tell_is_refused(void **state) {
     ExcitationPulse late = pulse(&excitation_half_sine, 1, 1e6, 1e-7);
     assert_int_equal(complete(&late), STATUS_INVALID);
     assert_string_equal(detail_at(&problem, "/excitation/length"),
-                        "must be at least 1e-06 s, what a clock can tell at that start, is 1e-07");
+                        "must be at least 1e-06 s, the resolution of time at that start, is 1e-07");
     ExcitationPulse steep = pulse(&excitation_triangular, 1e300, 0, 1e-10);
     assert_int_equal(complete(&steep), STATUS_INVALID);
     assert_string_equal(detail_at(&problem, "/excitation/length"),

@@ -56,7 +56,7 @@ static void linear_contact_is_run_exactly_and_says_so(void **state) {
     assert_true(target->error == 1e-3 && target->estimated_error < 1e-9);
     assert_int_equal(target->attempts.count, 1);
     assert_string_equal(find(&outcome->plan, "solver")->chose, "exact");
-    assert_non_null(strstr(find(&outcome->plan, "target")->why, "no cheaper way"));
+    assert_non_null(strstr(find(&outcome->plan, "target")->why, "no cheaper settings"));
     assert_true(isnan(find(&outcome->plan, "target")->saving));
     assert_true(isnan(plain->plan.target.error));
     assert_memory_equal(outcome->response.series.block, plain->response.series.block,
@@ -104,7 +104,7 @@ static void contacts_are_impulses_where_that_keeps_the_target(void **state) {
     assert_string_equal(struck->plan.target.way, "exact, impulses");
     assert_int_equal(struck->plan.target.verdict, VERDICT_KEPT);
     assert_string_equal(struck->plan.contact_model, "impulse");
-    assert_string_equal(find(&struck->plan, "contact_model")->why, "accuracy.target chose it");
+    assert_string_equal(find(&struck->plan, "contact_model")->why, "chosen by accuracy.target");
     assert_true(find(&struck->plan, "target")->saving > 0 && struck->steps < whole->steps);
     const double *x = struck->response.series.at[0].values,
                  *y = whole->response.series.at[0].values;

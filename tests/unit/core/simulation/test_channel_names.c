@@ -41,7 +41,7 @@ static void one_storey_and_one_damper_have_bare_names(void **state) {
                  "mean_acceleration");
     assert_names(ONE, "displacement velocity acceleration", "mean_acceleration");
     document_refuse(ONE WANT("\"velocity_1\""), "/output/channels/0",
-                    "must be velocity, without a number: there is but one");
+                    "must be velocity, without a number: there is only one");
     document_refuse(ONE WANT("\"penetration\""), "/output/channels/0",
                     "penetration needs a damper, the scene has none");
 }
@@ -71,7 +71,7 @@ static void a_bare_name_among_several_is_a_fault(void **state) {
     document_refuse(FRAME WANT("\"displacement_4\""), "/output/channels/0", detail);
     document_refuse(FRAME WANT_PSD("\"displacement\""), "/output/psd/channels/0", detail);
     document_refuse(FRAME WANT("\"base_acceleration_1\""), "/output/channels/0",
-                    "must be base_acceleration, without a number: there is but one");
+                    "must be base_acceleration, without a number: there is only one");
     document_refuse(FRAME ", \"dampers\": [" DAMPER "]" WANT("\"contact_force\""),
                     "/output/channels/0",
                     "must be contact_force_1: the scene has 3 storeys and 1 damper");
@@ -110,7 +110,7 @@ static void faults_beside_the_usual_ones_stand_where_the_document_has_them(void 
     document_refuse(ONE WANT("\"penetration\", \"usual\""), "/output/channels/0",
                     "penetration needs a damper, the scene has none");
     document_refuse(ONE WANT("\"usual\", \"base_acceleration\", \"velocity_3\""),
-                    "/output/channels/2", "must be velocity, without a number: there is but one");
+                    "/output/channels/2", "must be velocity, without a number: there is only one");
     document_refuse(ONE WANT("\"base_acceleration\", \"velocity\", \"usual\""),
                     "/output/channels/2",
                     "velocity is asked for twice, first at /output/channels/1");

@@ -53,7 +53,7 @@ static void work_counted_is_about_what_was_foretold(void **state) {
         problem_clear(&told);
         assert_int_equal(simulation_run(&simulation, NULL, NULL, NULL, &outcome, &told), STATUS_OK);
         const Cost cost = simulation_cost(&simulation);
-        const double solving = cost.steps - cost.base;
+        const double solving = cost.steps - cost.base - cost.output;
         if (!(outcome->steps > solving / 3 && outcome->steps < 3 * solving))
             fail_msg("%zu: %g steps, foretold %g", i, outcome->steps, solving);
         assert_true(cost.cpu_seconds == cost.steps * SOLVER_STEP);
@@ -118,7 +118,7 @@ static void what_takes_too_much_memory_is_refused(void **state) {
     (void)state;
     const SimulationLimits limits = {.bytes = 1e6};
     refuse(SDOF "," DAMPER "," NO_PSD, &limits, 100, 1000, "/output/channels",
-           "would take about 4.01 MB of memory, at most 1 MB are allowed");
+           "would take about 4.11 MB of memory, at most 1 MB are allowed");
 }
 
 #define SPECTRUM                                                                                   \
@@ -247,7 +247,7 @@ static void many_dampers_on_many_storeys_are_foretold_to_take_long(void **state)
     (void)snprintf(text + used, SIZE - used,
                    "], " RANDOM
                    ", \"output\": {\"channels\": [\"displacement_200\"], \"psd\": null}");
-    assert_true(cost_of(text, 30, 1000).cpu_seconds > 20);
+    assert_true(cost_of(text, 30, 1000).cpu_seconds > 10);
     free(text);
 }
 

@@ -88,7 +88,7 @@ static void a_scene_in_which_nothing_moves_gets_a_warning(void **state) {
     scene_start(&simulation, 0, 0);
     assert_int_equal(complete(&simulation), STATUS_OK);
     verdict_begins(verdict_warning(&seen, "/excitation"),
-                   "is free vibration from rest: nothing will move");
+                   "is free vibration from rest: nothing moves");
     assert_int_equal(seen.warnings.count, 1);
     verdict_clear(&seen);
     scene_start(&simulation, 0, 0.1);
@@ -193,7 +193,7 @@ static void expect(char *target, size_t size, const Outcome *outcome, size_t dam
 static void expect_table(char *target, size_t size, const Outcome *outcome, size_t damper,
                          int sides, double from, double to) {
     char whose[96];
-    snprintf(whose, sizeof whose, "the table tells (%g to %g m/s)", from, to);
+    snprintf(whose, sizeof whose, "the table covers (%g to %g m/s)", from, to);
     expect(target, size, outcome, damper, sides, from, to, whose, "the nearest row is used there");
 }
 

@@ -8,8 +8,8 @@
 
 #include <cmocka.h>
 
-#include "core/math/matrix_exponential.h"
 #include "core/solve/motion_table.h"
+#include "tests/support/matrix_forms.h"
 
 enum { X, V, R, W, A, B, SIZE };
 

@@ -261,11 +261,11 @@ static void a_rig_that_is_not_given_is_that_of_the_revision(void **state) {
         {"table", SAID(TABLE_MEMBERS ", \"impactor_mass\": 0.3, \"base\": \"fixed\""),
          "\"rig\": {\"impactor_mass\": 0.3}", NULL},
         {"no_base", SAID(MEASURED ", \"impactor_mass\": 0.3"), NULL,
-         "no_base@1 does not tell the base that it lay on"},
+         "no_base@1 does not state the base that it lay on"},
         {"no_mass", SAID(MEASURED ", \"base\": \"fixed\""), NULL,
-         "no_mass@1 does not tell the mass of the impactor"},
+         "no_mass@1 does not state the mass of the impactor"},
         {"nothing", SAID(MEASURED), NULL,
-         "nothing@1 does not tell the masses that it was tested with"},
+         "nothing@1 does not state the masses that it was tested with"},
     };
     char text[512];
     for (size_t i = 0; i < COUNT(cases); i++) {
