@@ -105,8 +105,7 @@ static MotionTable *single_mass_table(SingleMass *single, const Slice *slice) {
     const bool is_contact = single->phase == PHASE_CONTACT;
     const Motion *m = is_contact ? &single->touching[single->side] : &single->flying;
     MotionTable *table = &single->tables[is_contact ? single->contact_table[single->side] : 0];
-    const bool is_still = slice->value == 0 && slice->slope == 0;
-    if (!table->is_made || (!is_still && table->base_omega != slice->omega)) {
+    if (!table->is_made || table->base_omega != slice->omega) {
         const double rate = single_mass_larger(m->rate, slice->omega), h = single->interval;
         motion_table_make(table, m, slice->omega, rate * h > PIECE_REACH ? PIECE_REACH / rate : h);
     }
