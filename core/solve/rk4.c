@@ -76,7 +76,8 @@ static Status rk4_step(TimeStepping *stepping, double length) {
     const Rk4 *rk4 = stepping->method;
     const size_t size = stepping->size, n = stepping->state.mode_count, m = stepping->state.dampers;
     for (size_t k = 0; k < STAGES; k++) {
-        const double *last = rk4->slopes + (k - 1) * rk4->row, part = nodes[k] * length;
+        const double *last = rk4->slopes + (k > 0 ? k - 1 : 0) * rk4->row;
+        const double part = nodes[k] * length;
         for (size_t i = 0; i < size; i++)
             rk4->stage[i] = k == 0 ? stepping->y[i] : stepping->y[i] + part * last[i];
         rk4_slope(stepping, rk4->stage, stepping->ground[(k + 1) / 2], rk4->slopes + k * rk4->row);
