@@ -132,16 +132,16 @@ static double identification_phase_slope(double Z) {
 
 IdentificationSensitivity identification_sensitivity(double restitution, Separation separation) {
     const double L = -log(restitution);
-    IdentificationSensitivity told = {.stiffness_by_contact_time = -2,
-                                      .damping_by_restitution = L > 0 ? -1 / L : (double)NAN,
-                                      .damping_by_contact_time = -1};
+    IdentificationSensitivity sensitivity = {.stiffness_by_contact_time = -2,
+                                             .damping_by_restitution = L > 0 ? -1 / L : (double)NAN,
+                                             .damping_by_contact_time = -1};
     if (separation == SEPARATION_ZERO_PENETRATION) {
-        told.stiffness_by_restitution = -2 * L / (pi * pi + L * L);
-        return told;
+        sensitivity.stiffness_by_restitution = -2 * L / (pi * pi + L * L);
+        return sensitivity;
     }
     // The damping ratio does not depend on mass and contact time.
     const double Z = identification_from_restitution(1, restitution, 1, separation).damping_ratio;
     const double h = identification_zero_force_phase(Z), slope = identification_phase_slope(Z);
-    told.stiffness_by_restitution = -2 * slope / (h * (h + Z * slope));
-    return told;
+    sensitivity.stiffness_by_restitution = -2 * slope / (h * (h + Z * slope));
+    return sensitivity;
 }

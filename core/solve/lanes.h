@@ -27,7 +27,7 @@ typedef enum LanePeak {
     LANE_PEAKS
 } LanePeak;
 
-// What a stretch starts from and what it comes to.
+// Start, limits and accumulated sums of a stretch of free flight.
 typedef struct FlightBlock {
     double x, v, r;                 // as in State
     double z;                       // velocity of the free mass relative to the base [m/s]

@@ -146,7 +146,7 @@ test("Where no pulse fits a contact, or nothing is one, the page says why", asyn
   await page.goto(url("#/materials/soft_rubber/measure"));
   await page.getByRole("button", { name: "Add trace" }).click();
   await choose(page, folder, "saturated.csv", csv(pulses(1e-3).map(([time, force]) => [time, Math.min(force, 2.5)])));
-  await says(main(page), /Contacts detected: 2; 2\.5 N at .*, the trace is hardly a pulse .*; \S+ N at 400 ms, T_c/);
+  await says(main(page), /Contacts detected: 2; 2\.5 N at .*, the trace differs from every pulse .*; \S+ N at 400 ms, T_c/);
   await choose(page, folder, "still.csv", csv(pulses(1e-3).slice(150, 390).map(([time, force]) => [time - 0.15, force])));
   await says(main(page), /Contacts detected: 0; no force exceeds the threshold/);
 });
