@@ -35,14 +35,16 @@ static void motion_table_column(MotionTable *table, int column) {
         }
     }
     double *gain = table->gain[column];
-    for (size_t k = degree; k > 0; k--) { // small terms first
+    for (size_t k = degree; k > 1; k--) { // small terms first; v's and w's own are no gains
         gain[0] += x[k];
         gain[1] += (double)k * x[k];
         gain[2] += r[k];
         gain[3] += (double)k * r[k];
     }
-    gain[1] = gain[1] / T - (column == 1);
-    gain[3] = gain[3] / T - (column == 3);
+    gain[0] += x[1];
+    gain[1] /= T;
+    gain[2] += r[1];
+    gain[3] /= T;
 }
 
 void motion_table_make(MotionTable *table, const Motion *motion, double base_omega, double length) {

@@ -24,11 +24,11 @@ static Motion contact_motion(double contact_omega, double contact_ratio) {
     return motion;
 }
 
-// The state after `length` by exp(A t) in long double.
-static State by_exponential(const Motion *m, const State *start, const Slice *slice,
-                            double length) {
-    long double system[SIZE * SIZE] = {0}, transition[SIZE * SIZE], end[SIZE];
+// y' = A y for y = (x, v, r, w) and the base's value and slope.
+static void make_system(const Motion *m, double omega, long double *system) {
     const long double share = m->share;
+    for (int i = 0; i < SIZE * SIZE; i++)
+        system[i] = 0;
     system[X * SIZE + V] = 1;
     system[V * SIZE + X] = -(long double)m->omega2;
     system[V * SIZE + V] = -(long double)m->damping;
@@ -40,8 +40,15 @@ static State by_exponential(const Motion *m, const State *start, const Slice *sl
     system[W * SIZE + V] = m->damping;
     system[W * SIZE + R] = -(long double)m->contact_omega2;
     system[W * SIZE + W] = -(long double)m->contact_damping;
-    system[A * SIZE + B] = slice->omega > 0 ? slice->omega : 1;
-    system[B * SIZE + A] = -(long double)slice->omega;
+    system[A * SIZE + B] = omega > 0 ? omega : 1;
+    system[B * SIZE + A] = -(long double)omega;
+}
+
+// The state after `length` by exp(A t) in long double.
+static State by_exponential(const Motion *m, const State *start, const Slice *slice,
+                            double length) {
+    long double system[SIZE * SIZE], transition[SIZE * SIZE], end[SIZE];
+    make_system(m, slice->omega, system);
     matrix_exponential(system, SIZE, length, transition);
     const double y[SIZE] = {start->x, start->v, start->r, start->w, slice->value, slice->slope};
     for (int i = 0; i < SIZE; i++) {
@@ -96,6 +103,25 @@ static void a_piece_is_where_the_exponential_is(void **state) {
                         assert_state(&at, &wanted, motion.rate);
                     }
                 }
+}
+
+// Over a short length a state changes little: the change must have digits of its own.
+static void gains_are_exact_to_their_own_rounding(void **state) {
+    (void)state;
+    const Motion motion = contact_motion(127, 0.155);
+    for (double rho = 1; rho > 1e-4; rho /= 10) {
+        static MotionTable table;
+        make(&table, &motion, 0, rho);
+        long double system[SIZE * SIZE], transition[SIZE * SIZE];
+        make_system(&motion, 0, system);
+        matrix_exponential(system, SIZE, table.length, transition);
+        for (int column = 0; column < 4; column++)
+            for (int c = 0; c < 4; c++) {
+                const double wanted = (double)(transition[c * SIZE + column] - (c == column));
+                // The reference has 1, too, and so the rounding of a long double.
+                assert_close(table.gain[column][c], wanted, fabs(wanted) + 1e-4);
+            }
+    }
 }
 
 // Lengths side by side against the same lengths one after the other.
@@ -157,17 +183,8 @@ static void integrals_are_exact(void **state) {
             PieceSums integrals;
             piece_make(&piece, &table, &start, &slices[k]);
             piece_sums(&piece, 1, &integrals);
-            long double system[SIZE * SIZE] = {0}, form[SIZE * SIZE];
-            system[X * SIZE + V] = system[R * SIZE + W] = system[A * SIZE + B] = 1;
-            system[V * SIZE + X] = -(long double)m.omega2;
-            system[V * SIZE + V] = -(long double)m.damping;
-            system[V * SIZE + R] = (long double)m.share * m.contact_omega2;
-            system[V * SIZE + W] = (long double)m.share * m.contact_damping;
-            system[V * SIZE + A] = -1;
-            system[W * SIZE + X] = m.omega2;
-            system[W * SIZE + V] = m.damping;
-            system[W * SIZE + R] = -(long double)m.contact_omega2;
-            system[W * SIZE + W] = -(long double)m.contact_damping;
+            long double system[SIZE * SIZE], form[SIZE * SIZE];
+            make_system(&m, 0, system);
             const long double y[SIZE] = {start.x, start.v,         start.r,
                                          start.w, slices[k].value, slices[k].slope};
             const long double rows[3][SIZE] = {{[V] = 1}, {[W] = 1}, {[A] = 1}};
@@ -232,6 +249,7 @@ static void the_first_root_is_found(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_piece_is_where_the_exponential_is),
+        cmocka_unit_test(gains_are_exact_to_their_own_rounding),
         cmocka_unit_test(a_block_is_so_many_pieces),
         cmocka_unit_test(integrals_are_exact),
         cmocka_unit_test(the_first_root_is_found),
