@@ -114,15 +114,6 @@ static inline void single_mass_turn(const Slice *slice, double t, Slice *turned)
                       slice->slope - (slice->slope * less + slice->value * sine), slice->omega};
 }
 
-// Its integral.
-static inline double single_mass_turned(const Slice *slice, double t) {
-    const double angle = slice->omega * t, square = angle * angle, fourth = square * square;
-    const double sine = 1 - square * (1.0 / 6 - square * (1.0 / 120)) -
-                        fourth * square * (1.0 / 5040); // over the angle
-    const double less = angle * (1.0 / 2 - square * (1.0 / 24) + fourth * (1.0 / 720));
-    return t * (slice->value * sine + slice->slope * less);
-}
-
 // The base from this instant on to the next sample, where has_blocks and is_short.
 static inline void single_mass_slice(SingleMass *single, Slice *slice) {
     const Base *base = single->run->base;
