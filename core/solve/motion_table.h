@@ -103,7 +103,8 @@ INLINE void piece_end(const MotionTable *table, const double *start, State *end)
 // The state at s, 0 < s <= 1.
 INLINE void piece_at(const Piece *piece, double s, State *at) {
     const double s2 = s * s, s4 = s2 * s2;
-    Four power = {0, s, s2, s2 * s}, slope = {0, 1, s, s2};
+    // Of the gains alone: v and w themselves would be rounded alike in each of many pieces.
+    Four power = {0, s, s2, s2 * s}, slope = {0, 0, s, s2};
     Four x = FOUR(piece->x) * power, v = FOUR(piece->kx) * slope;
     Four r = FOUR(piece->r) * power, w = FOUR(piece->kr) * slope, sum;
     power = (Four){s4, s4 * s, s4 * s2, s4 * (s2 * s)};
@@ -118,7 +119,8 @@ INLINE void piece_at(const Piece *piece, double s, State *at) {
     }
     const double rate = 1 / piece->table->length;
     wide_sum(&x, &v, &r, &w, &sum);
-    *at = (State){piece->start[0] + sum[0], sum[1] * rate, piece->start[2] + sum[2], sum[3] * rate};
+    *at = (State){piece->start[0] + sum[0], piece->start[1] + sum[1] * rate,
+                  piece->start[2] + sum[2], piece->start[3] + sum[3] * rate};
 }
 
 INLINE void piece_sums_at(const Piece *piece, double s, const Quadrature *rule, size_t groups,
