@@ -224,7 +224,7 @@ static Status comparison_set_channel(const Scene *scene, ChannelId channel, uint
                                      Texts *names, Problem *problem) {
     char name[CHANNEL_NAME];
     channel_names_write(scene, channel, (size_t)storey, name);
-    study_clear_texts(names);
+    texts_clear(names);
     return study_add_text(name, names, problem);
 }
 

@@ -46,8 +46,7 @@ void *study_list_add(void *list, size_t size, Problem *problem) {
 }
 
 Status study_add_text(const char *text, Texts *texts, Problem *problem) {
-    char **added = study_list_add(texts, sizeof *added, problem);
-    return added != NULL ? study_copy_text(text, added, problem) : STATUS_NO_MEMORY;
+    return texts_append(texts, text) == STATUS_OK ? STATUS_OK : study_no_memory(problem);
 }
 
 Status study_add_real(double value, Reals *reals, Problem *problem) {
@@ -56,13 +55,6 @@ Status study_add_real(double value, Reals *reals, Problem *problem) {
         return STATUS_NO_MEMORY;
     *added = value;
     return STATUS_OK;
-}
-
-void study_clear_texts(Texts *texts) {
-    for (size_t i = 0; i < texts->count; i++)
-        free(texts->at[i]);
-    free(texts->at);
-    *texts = (Texts){NULL, 0};
 }
 
 Status run_table_add(RunTable *table, RunRecord *run, uint64_t number, Problem *problem) {
@@ -161,7 +153,7 @@ Status study_run_check_names(const Texts *given, const char *const *names, const
 Status study_run_copy(const Simulation *simulation, Simulation *target, Problem *problem) {
     if (fields_copy(simulation_fields, simulation, target) != STATUS_OK)
         return study_no_memory(problem);
-    study_clear_texts(&target->output.channels);
+    texts_clear(&target->output.channels);
     return STATUS_OK;
 }
 

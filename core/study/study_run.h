@@ -106,6 +106,5 @@ void *study_list_add(void *list, size_t size, Problem *problem);
 // The same with a copy of a text, and with a number. STATUS_NO_MEMORY.
 Status study_add_text(const char *text, Texts *texts, Problem *problem);
 Status study_add_real(double value, Reals *reals, Problem *problem);
-void study_clear_texts(Texts *texts);
 
 #endif

@@ -282,8 +282,8 @@ Status sweep_grid_scene(const SweepGrid *grid, size_t point, bool is_bare,
     if (status != STATUS_OK)
         return study_no_memory(problem);
     if (is_bare) {
-        study_clear_texts(&target->output.channels);
-        study_clear_texts(&target->output.psd.channels);
+        texts_clear(&target->output.channels);
+        texts_clear(&target->output.psd.channels);
         target->output.impacts = false;
     }
     return simulation_complete(target, limits, NULL, problem);
