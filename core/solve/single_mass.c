@@ -401,11 +401,17 @@ INLINE void single_mass_block_forces(const Motion *m, size_t count, BlockRows y,
 // times s'' + c |r'''| + k |r''|. s'' is bounded by the storey's own motion V and the contact's N,
 // each of which drives the other.
 INLINE size_t single_mass_block_inside(const SingleMass *single, const MotionTable *table,
-                                       size_t count, BlockRows y, const BlockForces *f) {
+                                       const Slice *slice, double left, size_t count, BlockRows y,
+                                       const BlockForces *f) {
     const Motion *m = &table->motion;
     const double h = table->length, omega = sqrt(m->omega2), stiff = sqrt(m->contact_omega2);
-    const double sign = single_mass_sign(single->side), base = single->stretch.base_max;
-    const double base_slope = single->base_slope * (table->base_omega > 0 ? table->base_omega : 1);
+    const double sign = single_mass_sign(single->side);
+    // Of a_g and its slope: those of the whole run, which are not known of pulses, or of the slice.
+    const double value = fabs(slice->value), slope = fabs(slice->slope), turn = table->base_omega;
+    const double base =
+        single_mass_larger(single->stretch.base_max, value + (turn > 0 ? slope : slope * left));
+    const double base_slope = single_mass_larger(single->base_slope * (turn > 0 ? turn : 1),
+                                                 turn > 0 ? turn * (value + slope) : slope);
     const double own = m->damping + omega, contact = stiff + m->contact_damping;
     const double both = own * h * h * m->share * contact, per_both = 1 / (1 - both);
     const double k2 = m->contact_omega2;
@@ -558,7 +564,7 @@ INLINE size_t single_mass_contact_block(SingleMass *single, size_t most) {
         single_mass_block_states(table, &single->state, sign, has_base, values != NULL, most, y);
     BlockForces forces;
     single_mass_block_forces(m, count, y, &forces);
-    count = single_mass_block_inside(single, table, count, y, &forces);
+    count = single_mass_block_inside(single, table, &slice, left, count, y, &forces);
     if (count == 0)
         return 0;
     const size_t padded = (count + 1 + 7) / 8 * 8;
