@@ -164,6 +164,7 @@ test_ended() {
     fi
     passed=$((passed + good))
     failed=$((failed + bad))
+    [ "$bad" -eq 0 ] || { echo "-- ${one#* } (${one% *})" && grep -E 'FAIL|\*\*\*(Failed|Exception|Timeout)' "$said"; } >>"$work/failures"
 }
 
 making=0
@@ -180,6 +181,7 @@ while true; do
 done
 
 echo
+[ ! -f "$work/failures" ] || cat "$work/failures"
 echo "took $SECONDS s"
 echo "$passed passed, $failed failed"
 [ "$failed" -eq 0 ] && [ "$passed" -gt 0 ]
