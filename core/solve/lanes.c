@@ -20,16 +20,10 @@
 #define UNROLL _Pragma("GCC unroll 8")
 #endif
 
-// So many samples go at once: LANES blocks of LANES samples.
+// Samples between two bounds of r''.
 enum { GROUP = LANES * LANES };
 
 typedef enum BaseKind { STILL, LINEAR, SINE } BaseKind;
-
-// The state before or after each block of a group; under a sine its b and a too.
-enum { PART_X, PART_V, PART_R, PART_Z, PART_B, PART_A, PARTS };
-typedef struct Ends {
-    _Alignas(64) double of[PARTS][LANES];
-} Ends;
 
 INLINE double lanes_greater(double a, double b) {
     return a > b ? a : b;
@@ -114,10 +108,10 @@ static void lanes_step(const MotionTable *one, long double value, long double sl
     memcpy(at, next, sizeof next);
 }
 
-// Powers 1 to 8, less the identity, of a step of `length` that gives x and v `step`, less the
-// identity, from x and v; `step` becomes the last of them.
-static void lanes_make_map(LanesMap *map, long double step[2][2], long double length) {
-    const long double one[2][2] = {{step[0][0], step[0][1]}, {step[1][0], step[1][1]}};
+// Powers 1 to 8, less the identity, of a step of `length` that gives x and v `one`, less the
+// identity, from x and v.
+static void lanes_make_map(LanesMap *map, const long double one[2][2], long double length) {
+    long double step[2][2] = {{one[0][0], one[0][1]}, {one[1][0], one[1][1]}};
     for (int j = 0; j < LANES; j++) {
         for (int c = 0; c < 2 && j > 0; c++) {
             const long double x = step[0][c], v = step[1][c];
@@ -132,26 +126,21 @@ static void lanes_make_map(LanesMap *map, long double step[2][2], long double le
     }
 }
 
-// What the halves of a sine at the start give after 1 to 8 samples and 1 to 8 blocks.
+// What the halves of a sine at the start give after 1 to 8 samples.
 static void lanes_make_sine(Lanes *lanes, const MotionTable *one) {
     const long double angle = (long double)lanes->base_omega * lanes->interval;
     for (int half = 0; half < 2; half++) {
         long double at[4] = {0}, cosine = 1, sine = 0;
-        for (int j = 0; j < LANES * LANES; j++) {
+        for (int j = 0; j < LANES; j++) {
+            LanesMap *map = &lanes->sample;
             lanes_step(one, half == 0 ? cosine : sine, half == 0 ? -sine : cosine, at);
             cosine = cosl((j + 1) * angle);
             sine = sinl((j + 1) * angle);
-            for (int i = 0; i < 2; i++) {
-                LanesMap *map = i == 0 ? &lanes->sample : &lanes->block;
-                const int k = i == 0 ? j : j / LANES;
-                if (k >= LANES || (i == 1 && j % LANES != LANES - 1))
-                    continue;
-                map->x_s[half][k] = (double)at[0];
-                map->v_s[half][k] = (double)at[1];
-                map->z_s[half][k] = (double)(at[0] + at[2]);
-                map->speed_s[half][k] = (double)(at[1] + at[3]);
-                map->turn[half][k] = (double)(half == 0 ? cosine : sine);
-            }
+            map->x_s[half][j] = (double)at[0];
+            map->v_s[half][j] = (double)at[1];
+            map->z_s[half][j] = (double)(at[0] + at[2]);
+            map->speed_s[half][j] = (double)(at[1] + at[3]);
+            map->turn[half][j] = (double)(half == 0 ? cosine : sine);
         }
     }
 }
@@ -212,10 +201,9 @@ void lanes_make(Lanes *lanes, const MotionTable *one, bool is_sampled, LanesWidt
     lanes->omega2 = flying->omega2;
     lanes->damping = flying->damping;
     lanes->omega = omega;
-    long double step[2][2] = {{one->gain[0][0], one->gain[1][0]},
-                              {one->gain[0][1], one->gain[1][1]}};
+    const long double step[2][2] = {{one->gain[0][0], one->gain[1][0]},
+                                    {one->gain[0][1], one->gain[1][1]}};
     lanes_make_map(&lanes->sample, step, interval);
-    lanes_make_map(&lanes->block, step, (long double)LANES * interval);
     if (one->base_omega > 0)
         lanes_make_sine(lanes, one);
     else if (is_sampled)

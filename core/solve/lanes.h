@@ -56,7 +56,7 @@ typedef struct LanesMap {
 } LanesMap;
 
 struct Lanes {
-    LanesMap sample, block; // in steps of a sample, and of a block of LANES samples
+    LanesMap sample;
     // What i + 1 samples on a_g at samples 0 to LANES has given.
     double x_a[LANES + 1][LANES], v_a[LANES + 1][LANES];
     double z_a[LANES + 1][LANES], speed_a[LANES + 1][LANES];
