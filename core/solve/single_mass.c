@@ -27,8 +27,6 @@ enum {
 static const double SAMPLE_STEPS = 0.1;
 // The longest piece, times the system's rate.
 static const double PIECE_REACH = 1.0;
-// Intervals shorter than this, times the structure's rate and a sine's, are short.
-static const double SHORT_REACH = 0.04;
 
 // The base from the present sample on: over how many intervals it goes on in one way, and its
 // samples, or NULL where it is still or a sine.
@@ -235,10 +233,6 @@ static bool single_mass_touch(SingleMass *single, Side side) {
 // present sample at most [s].
 INLINE double single_mass_slice_until(SingleMass *single, double h, Slice *slice) {
     const double left = h - single->offset;
-    if (single->has_blocks && single->is_short && single->run->base->form != BASE_PIECES) {
-        single_mass_slice(single, slice);
-        return left;
-    }
     const double knot = base_cursor_slice(&single->base, single->sample, single->offset, slice);
     return knot < left ? knot : left;
 }
@@ -953,7 +947,6 @@ static Status single_mass_start(SingleMass *single, Run *run, Response *response
     }
     if (base->form == BASE_SINE)
         stretch->base_max = single->base_slope = fabs(base->amplitude);
-    single->is_short = fmax(flying->rate, base->omega) * single->interval <= SHORT_REACH;
     stretch->base = &single->base;
     memcpy(stretch->columns, single->columns, sizeof stretch->columns);
     stretch->left = stretch->right = INFINITY;

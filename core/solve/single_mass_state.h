@@ -44,10 +44,7 @@ struct SingleMass {
     size_t statistics_start, statistics_count;
     double base_speed, last_velocity; // since the last sample, for mean accelerations [m/s]
     double squares[2];                // sums of displacement^2 and acceleration^2
-    bool is_short;                    // sample intervals are, for the structure and a sine
     double base_slope;   // of the base, no larger over the whole run: [m/s^3], of a sine [m/s^2]
-    Slice sine;          // at sample sine_sample - 1
-    size_t sine_sample;  // 0: none yet
     int pieces, events;  // of the present contact, of the present interval
     EventEngine *engine; // made when it is first needed
     // Tables, kept for the next run of the same system.
@@ -101,36 +98,6 @@ static inline double single_mass_contact_term(const SingleMass *single, const St
         return 0;
     const Motion *m = &single->touching[single->side];
     return m->contact_damping * at->w + m->contact_omega2 * at->r;
-}
-
-// A sine seen from t on; t is at most an interval that is short.
-static inline void single_mass_turn(const Slice *slice, double t, Slice *turned) {
-    const double angle = slice->omega * t, square = angle * angle, fourth = square * square;
-    const double sine = angle - angle * (square * (1.0 / 6 - square * (1.0 / 120)) +
-                                         fourth * square * (1.0 / 5040));
-    const double less = square * (1.0 / 2 - square * (1.0 / 24)) +
-                        fourth * square * (1.0 / 720 - square * (1.0 / 40320)); // 1 less the cosine
-    *turned = (Slice){slice->value - (slice->value * less - slice->slope * sine),
-                      slice->slope - (slice->slope * less + slice->value * sine), slice->omega};
-}
-
-// The base from this instant on to the next sample, where has_blocks and is_short.
-static inline void single_mass_slice(SingleMass *single, Slice *slice) {
-    const Base *base = single->run->base;
-    if (single->stretch.base_max == 0 ||
-        (base->form == BASE_SAMPLED && single->sample + 1 >= base->count)) {
-        *slice = (Slice){0, 0, 0};
-    } else if (base->form == BASE_SAMPLED) {
-        const double *a = base->values + single->sample;
-        const double slope = (a[1] - a[0]) * single->plan->sample_rate;
-        *slice = (Slice){a[0] + slope * single->offset, slope, 0};
-    } else {
-        if (single->sine_sample != single->sample + 1) {
-            (void)base_cursor_interval(&single->base, single->sample, &single->sine);
-            single->sine_sample = single->sample + 1;
-        }
-        single_mass_turn(&single->sine, single->offset, slice);
-    }
 }
 
 #define SINGLE_MASS_STEPS 5 // solver steps of a piece or of a stretch of contact
