@@ -37,7 +37,7 @@ INLINE double lanes_size(double a) {
 INLINE double lanes_push_bound(const Lanes *t, double x, double v, size_t count, double base_max) {
     const double reach =
         lanes_size(v) + t->omega * lanes_size(x) + (double)count * t->interval * base_max;
-    return (t->damping + t->omega) * reach;
+    return (t->motion.damping + t->omega) * reach;
 }
 
 // A sine's b and a from `sample` on.
@@ -190,16 +190,20 @@ static void lanes_make_forms(Lanes *lanes, const Motion *flying) {
 void lanes_make(Lanes *lanes, const MotionTable *one, bool is_sampled, LanesWidth width) {
     const Motion *flying = &one->motion;
     const double omega = sqrt(flying->omega2), interval = one->length;
+    if (lanes->run == lanes_run_of(width) && lanes->is_sampled == is_sampled &&
+        lanes->interval == interval && lanes->base_omega == one->base_omega &&
+        motion_is_same(&lanes->motion, flying))
+        return;
     memset(lanes, 0, sizeof *lanes);
     if (!(LANES * interval *
               lanes_greater(lanes_greater(omega, flying->damping), one->base_omega) <=
           1))
         return;
+    lanes->motion = *flying;
+    lanes->is_sampled = is_sampled;
     lanes->base_omega = one->base_omega;
     lanes->interval = interval;
     lanes->per_interval = 1 / interval;
-    lanes->omega2 = flying->omega2;
-    lanes->damping = flying->damping;
     lanes->omega = omega;
     const long double step[2][2] = {{one->gain[0][0], one->gain[1][0]},
                                     {one->gain[0][1], one->gain[1][1]}};

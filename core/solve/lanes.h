@@ -62,14 +62,17 @@ struct Lanes {
     double z_a[LANES + 1][LANES], speed_a[LANES + 1][LANES];
     double base_omega;                   // of a sine, or 0 [rad/s]
     double interval, per_interval;       // [s], [1/s]
-    double omega2, damping, omega;       // of the structure: K / M, C / M, sqrt(K / M)
+    double omega;                        // sqrt(K / M)
     double vv[LANE_SUMS], av[LANE_SUMS]; // integrals of v^2 and a_g v are these times the sums
+    Motion motion;
+    bool is_sampled;
     LanesWidth width;
     LanesRun *run; // NULL: the interval is too long for the structure
 };
 
 LanesWidth lanes_widest(void); // on this processor
-// `one` is the table of flight over one sample interval; `is_sampled`: the base may be linear.
+// `one` is the table of flight over one sample interval; `is_sampled`: the base may be linear. All
+// zero is no table; one that was made for the same motion is kept.
 void lanes_make(Lanes *lanes, const MotionTable *one, bool is_sampled, LanesWidth width);
 
 // Flies from `sample` over at most `count` intervals, as far as surely no stop is reached on the

@@ -30,6 +30,12 @@ typedef struct Motion {
     double rate; // no eigenvalue of the system, without the base, is larger [1/s]
 } Motion;
 
+static inline bool motion_is_same(const Motion *a, const Motion *b) {
+    return a->omega2 == b->omega2 && a->damping == b->damping && a->share == b->share &&
+           a->contact_omega2 == b->contact_omega2 && a->contact_damping == b->contact_damping &&
+           a->is_resting == b->is_resting;
+}
+
 // The base over a stretch: a_g(t) = value + slope t, or, with omega > 0, value cos(omega t) + slope
 // sin(omega t).
 typedef struct Slice {

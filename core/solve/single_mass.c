@@ -873,36 +873,27 @@ static void single_mass_make_motions(SingleMass *single) {
 
 // Tables of another system are forgotten.
 static void single_mass_keep_tables(SingleMass *single) {
-    const Motion *left = &single->touching[SIDE_LEFT], *right = &single->touching[SIDE_RIGHT];
+    const Motion *touching = single->touching;
+    const bool is_alike = motion_is_same(&touching[SIDE_LEFT], &touching[SIDE_RIGHT]);
+    const Motion *const motions[] = {&single->flying, &touching[SIDE_LEFT], &touching[SIDE_RIGHT]};
     const Base *base = single->run->base;
-    const SingleMassKey key = {.omega2 = single->flying.omega2,
-                               .damping = single->flying.damping,
-                               .share = single->flying.share,
-                               .contact_omega2 = {left->contact_omega2, right->contact_omega2},
-                               .contact_damping = {left->contact_damping, right->contact_damping},
-                               .interval = single->interval,
-                               .base_omega = base->form == BASE_SINE ? base->omega : 0,
-                               .is_sampled = base->form == BASE_SAMPLED};
-    if (single->has_tables && memcmp(&key, &single->key, sizeof key) == 0)
-        return;
-    single->key = key;
-    single->has_tables = true;
-    for (size_t i = 0; i < COUNT(single->tables); i++)
-        single->tables[i].is_made = false;
+    for (size_t i = 0; i < COUNT(motions); i++)
+        single->tables[i].is_made &= single->table_interval == single->interval &&
+                                     motion_is_same(&single->tables[i].motion, motions[i]);
+    single->table_interval = single->interval;
     single->contact_table[SIDE_LEFT] = 1;
-    single->contact_table[SIDE_RIGHT] = left->contact_omega2 == right->contact_omega2 &&
-                                                left->contact_damping == right->contact_damping
-                                            ? 1
-                                            : 2;
-    const Slice form = {0, key.base_omega > 0, key.base_omega};
-    lanes_make(&single->lanes, single_mass_table(single, &form), key.is_sampled, lanes_widest());
+    single->contact_table[SIDE_RIGHT] = is_alike ? 1 : 2;
+    const double omega = base->form == BASE_SINE ? base->omega : 0;
+    const Slice form = {0, omega > 0, omega};
+    lanes_make(&single->lanes, single_mass_table(single, &form), base->form == BASE_SAMPLED,
+               lanes_widest());
 }
 
 static Status single_mass_start(SingleMass *single, Run *run, Response *response,
                                 Problem *problem) {
     const Plan *plan = run->plan;
     const Base *base = run->base;
-    memset(single, 0, offsetof(SingleMass, key));
+    memset(single, 0, offsetof(SingleMass, table_interval));
     single->run = run;
     single->plan = plan;
     single->damper = plan->dampers;

@@ -95,9 +95,9 @@ void single_mass_flush(SingleMass *single) {
     single_mass_work(single, vv, av, single->free_work);
     if (single->sample >= single->statistics_start) {
         single->squares[0] += sums[XX];
-        single->squares[1] += lanes->damping * lanes->damping * sums[VV] +
-                              2 * lanes->damping * lanes->omega2 * sums[XV] +
-                              lanes->omega2 * lanes->omega2 * sums[XX];
+        single->squares[1] += lanes->motion.damping * lanes->motion.damping * sums[VV] +
+                              2 * lanes->motion.damping * lanes->motion.omega2 * sums[XV] +
+                              lanes->motion.omega2 * lanes->motion.omega2 * sums[XX];
         single->statistics_count += single->pending;
     }
     // It may all be gone again by the time that the balance is taken.

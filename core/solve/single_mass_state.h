@@ -10,14 +10,6 @@
 #include "core/solve/motion_table.h"
 #include "core/solve/rounding_growth.h"
 
-// All that the tables depend on.
-typedef struct SingleMassKey {
-    double omega2, damping, share;
-    double contact_omega2[2], contact_damping[2]; // by Side
-    double interval, base_omega;
-    uint64_t is_sampled; // without padding: keys are compared as bytes
-} SingleMassKey;
-
 typedef struct SingleMass SingleMass;
 struct SingleMass {
     Run *run;
@@ -48,8 +40,7 @@ struct SingleMass {
     int pieces, events;  // of the present contact, of the present interval
     EventEngine *engine; // made when it is first needed
     // Tables, kept for the next run of the same system.
-    SingleMassKey key;
-    bool has_tables;
+    double table_interval;
     Lanes lanes;
     size_t contact_table[2]; // by Side: which of the tables
     MotionTable tables[3];   // of flight and of contacts

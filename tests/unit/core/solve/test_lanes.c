@@ -63,7 +63,7 @@ static void lanes_agree_with_pieces(void **state) {
     for (int kind = 0; kind < 6; kind++) {
         const bool is_still = kind < 4 && kind % 2 == 0, is_sine = kind >= 4;
         const Motion motion = structure(kind < 2 || kind == 4 ? 0.8 : 0);
-        Lanes lanes;
+        Lanes lanes = {0};
         static MotionTable table;
         motion_table_make(&table, &motion, is_sine ? sine.omega : 0, INTERVAL);
         lanes_make(&lanes, &table, true, lanes_widest());
@@ -120,7 +120,7 @@ static void no_width_of_vector_moves_a_bit(void **state) {
         const State start = {0.015, -0.1, 0.002, 0.03};
         static Flown flown[3];
         for (LanesWidth width = LANES_PLAIN; width <= lanes_widest(); width++) {
-            Lanes lanes;
+            Lanes lanes = {0};
             static MotionTable table;
             motion_table_make(&table, &motion, kind < 4 ? 0 : sine.omega, INTERVAL);
             lanes_make(&lanes, &table, true, width);
@@ -138,7 +138,7 @@ static void no_width_of_vector_moves_a_bit(void **state) {
 static void lanes_end_before_a_stop(void **state) {
     (void)state;
     const Motion motion = structure(0.8);
-    Lanes lanes;
+    Lanes lanes = {0};
     static MotionTable table;
     motion_table_make(&table, &motion, 0, INTERVAL);
     lanes_make(&lanes, &table, true, lanes_widest());
@@ -162,7 +162,7 @@ static void lanes_end_before_a_stop(void **state) {
 static void an_interval_too_long_for_the_structure_is_refused(void **state) {
     (void)state;
     const Motion motion = structure(0.8);
-    Lanes lanes;
+    Lanes lanes = {0};
     static MotionTable table;
     motion_table_make(&table, &motion, 0, 0.02);
     lanes_make(&lanes, &table, true, lanes_widest());
