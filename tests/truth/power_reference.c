@@ -23,6 +23,8 @@ enum {
     ROOTS
 }; // in flight the left and right gap; in contact p, and dN/dt or the kink
 
+enum { FLIGHT_PARTS = 16 }; // of a step, in which dips are looked for
+
 typedef struct Walk {
     const Plan *plan;
     const Base *base;
@@ -161,27 +163,35 @@ static bool advance(Walk *walk, double until, double *t, double *y, int *root) {
     for (int i = 0; i < ROOTS; i++) {
         if (!(from[i] > 0 || (from[i] == 0 && from_slope[i] > 0)))
             continue;
-        double low = 0, high = first;
-        look(walk, &system, t0, y0, high, at, value, slope);
-        // A dip below zero within the step: its lowest point is where the slope changes sign.
-        const bool is_dip = value[i] > 0 && from_slope[i] < 0 && slope[i] > 0;
-        for (double middle = high / 2; is_dip && low < middle && middle < high;
-             middle = low + (high - low) / 2) {
-            look(walk, &system, t0, y0, middle, at, value, slope);
-            *(slope[i] < 0 ? &low : &high) = middle;
-        }
-        if (is_dip)
+        // In flight a mass may leave a stop and come back to it within a step.
+        const int parts = walk->side < 0 ? FLIGHT_PARTS : 1;
+        double begin = 0, slope_before = from_slope[i];
+        for (int part = 1; part <= parts && *root != i; part++) {
+            double low = begin, high = first * part / parts;
             look(walk, &system, t0, y0, high, at, value, slope);
-        if (value[i] > 0)
-            continue;
-        low = 0;
-        for (double middle = high / 2; low < middle && middle < high;
-             middle = low + (high - low) / 2) {
-            look(walk, &system, t0, y0, middle, at, value, slope);
-            *(value[i] > 0 ? &low : &high) = middle;
+            begin = high;
+            // A dip below zero within the part: its lowest point is where the slope changes sign.
+            const bool is_dip = value[i] > 0 && slope_before < 0 && slope[i] > 0;
+            slope_before = slope[i];
+            const double left = low;
+            for (double middle = low + (high - low) / 2; is_dip && low < middle && middle < high;
+                 middle = low + (high - low) / 2) {
+                look(walk, &system, t0, y0, middle, at, value, slope);
+                *(slope[i] < 0 ? &low : &high) = middle;
+            }
+            if (is_dip)
+                look(walk, &system, t0, y0, high, at, value, slope);
+            if (value[i] > 0)
+                continue;
+            low = left;
+            for (double middle = low + (high - low) / 2; low < middle && middle < high;
+                 middle = low + (high - low) / 2) {
+                look(walk, &system, t0, y0, middle, at, value, slope);
+                *(value[i] > 0 ? &low : &high) = middle;
+            }
+            *root = i;
+            first = high;
         }
-        *root = i;
-        first = high;
     }
     if (*root != NO_ROOT) {
         look(walk, &system, t0, y0, first, y, value, slope);
