@@ -170,6 +170,25 @@ test("What was typed last is there again, though a link was followed at once", a
   await leads(page, /#\/scene\?s=/);
 });
 
+test("What was typed last is there again, though a link was followed while it was on its way into the URL", async ({ page, url }) => {
+  await page.addInitScript(() => {
+    const pack = Response.prototype.arrayBuffer;
+    Response.prototype.arrayBuffer = async function () {
+      globalThis.isPacking = true;
+      await new Promise((resolve) => setTimeout(resolve, 3000));
+      return pack.call(this);
+    };
+  });
+  await page.goto(url("#/scene"));
+  const mass = page.getByRole("group", { name: "Damper 1" }).getByLabel(/^Mass/);
+  await mass.fill("0.2");
+  await until("the scene on its way", () => page.evaluate(() => globalThis.isPacking));
+  await menu(page, "Records");
+  await heading(page, "Ground motions").waitFor();
+  await page.goBack();
+  await until("the mass", async () => (await mass.inputValue()) === "0.2");
+});
+
 test("The revisions of another material are not offered", async ({ page, url }) => {
   await page.goto(url("#/scene"));
   const revision = page.getByRole("combobox", { name: "Revision" }).first(), count = () => revision.locator("option").count();

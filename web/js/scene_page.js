@@ -47,7 +47,7 @@ async function show(host, address, signal) {
   const picture = drawing(drawn), draw = () => picture.show(draft.scene, { plan: draft.check?.plan });
   draw();
 
-  let timer = null, turn = 0, isEdited = false, loading;
+  let timer = null, turn = 0, isEdited = false, isUnkept = false, loading; // isUnkept: the URL has not what is typed
   const goTo = (pointer) => focusField(steps, pointer);
 
   // Keeps the scene and asks the service; only the last question's answer counts.
@@ -56,7 +56,9 @@ async function show(host, address, signal) {
     clearTimeout(timer);
     timer = null;
     try {
-      const fits = !isEdited || await keep(draft.scene, isLast), answer = await question(draft.scene);
+      const fits = !isEdited || await keep(draft.scene, isLast);
+      if (isLast()) isUnkept = false;
+      const answer = await question(draft.scene);
       if (!isLast()) return;
       state.textContent = fits ? "" : "Too long for a link: copy the JSON to keep it.";
       answered(answer);
@@ -78,7 +80,7 @@ async function show(host, address, signal) {
   }
   draft.onChange(({ pointer }) => {
     if (pointer === undefined) return;
-    isEdited = true;
+    isEdited = isUnkept = true;
     draw();
     json.refresh();
     clearTimeout(timer);
@@ -99,7 +101,7 @@ async function show(host, address, signal) {
     runScene();
   }, { signal });
   // Leaving a field keeps it at once: a link may be followed before the URL has it.
-  steps.addEventListener("change", () => timer && (history.replaceState(draft.scene, ""), settle()));
+  steps.addEventListener("change", () => isUnkept && (history.replaceState(draft.scene, ""), settle()));
 
   async function load(query) {
     fill(told);
@@ -110,6 +112,7 @@ async function show(host, address, signal) {
     const wasEdited = isEdited || history.state; // the URL may hold what was there before
     draft.replace(scene);
     isEdited = wasEdited;
+    isUnkept = false;
   }
   Promise.all([schema("scene"), load(address.query)]).then(([scene]) => {
     fill(steps);
