@@ -4,7 +4,7 @@
 #define CORE_SIMULATION_INTERNAL_H
 
 #include "core/simulation/simulation.h"
-#include "core/solve/solvers.h"
+#include "core/solve/solver.h"
 
 enum { SPECTRUM_SEGMENT = 4096 }; // default length [samples]
 

@@ -10,7 +10,6 @@
 #include "core/result/work_counters.h"
 #include "core/scene/scene.h"
 #include "core/solve/solver.h"
-#include "core/solve/workspace.h"
 
 // Name and version of the engine, part of the id of every result. It must change with every change
 // that may alter any bit of any result.

@@ -62,40 +62,18 @@ static double base_cursor_piece_slice(const BaseCursor *cursor, size_t n, double
     return INFINITY;
 }
 
-bool base_cursor_interval(const BaseCursor *cursor, size_t n, Slice *slice) {
-    switch (cursor->base->form) {
-    case BASE_STILL:
-        *slice = (Slice){0, 0, 0};
-        return true;
-    case BASE_SINE:
-        *slice = base_cursor_sine_slice(cursor, n, 0);
-        return true;
-    case BASE_PIECES:
-        return base_cursor_piece_slice(cursor, n, 0, slice) >=
-               (1 - 8 * DBL_EPSILON * (double)(n + 1)) / cursor->sample_rate;
-    case BASE_SAMPLED:
-        break;
-    }
-    if (cursor->ratio == 0)
-        return false;
-    *slice = base_cursor_aligned_slice(cursor, n, 0);
-    return true;
-}
-
 double base_cursor_slice(const BaseCursor *cursor, size_t n, double offset, Slice *slice) {
     const Base *base = cursor->base;
-    const double time = (double)n / cursor->sample_rate + offset;
     *slice = (Slice){0, 0, 0};
     if (base->form == BASE_PIECES)
         return base_cursor_piece_slice(cursor, n, offset, slice);
     if (base->form == BASE_SINE)
         *slice = base_cursor_sine_slice(cursor, n, offset);
-    if (base->form != BASE_SAMPLED)
-        return INFINITY;
-    if (cursor->ratio > 0) {
+    if (cursor->ratio > 0)
         *slice = base_cursor_aligned_slice(cursor, n, offset);
+    if (base->form != BASE_SAMPLED || cursor->ratio > 0)
         return INFINITY;
-    }
+    const double time = (double)n / cursor->sample_rate + offset;
     const double place = floor(time / base->interval);
     if (place >= (double)base->count)
         return INFINITY;
@@ -109,10 +87,16 @@ double base_cursor_slice(const BaseCursor *cursor, size_t n, double offset, Slic
     return j + 1 >= base->count ? INFINITY : knot;
 }
 
+bool base_cursor_interval(const BaseCursor *cursor, size_t n, Slice *slice) {
+    const double knot = base_cursor_slice(cursor, n, 0, slice);
+    return cursor->base->form == BASE_SAMPLED
+               ? cursor->ratio > 0
+               : knot >= (1 - 8 * DBL_EPSILON * (double)(n + 1)) / cursor->sample_rate;
+}
+
 double base_cursor_at(const BaseCursor *cursor, size_t n) {
     Slice slice;
-    if (!base_cursor_interval(cursor, n, &slice))
-        (void)base_cursor_slice(cursor, n, 0, &slice);
+    (void)base_cursor_slice(cursor, n, 0, &slice);
     return slice.value;
 }
 
@@ -129,25 +113,16 @@ size_t base_cursor_refined_count(const Base *base, double sample_rate, size_t sa
 Status base_cursor_refine(const Base *base, double sample_rate, size_t count, double *values,
                           const Progress *progress, Base *fine, Problem *problem) {
     const size_t ratio = (size_t)nearbyint(base->interval * sample_rate);
-    size_t unreported = 0;
-    for (size_t j = 0, n = 0; n < count; j++) {
+    for (size_t n = 0, j = 0, i = 0; n < count; n++, i++) {
+        if (i == ratio) {
+            i = 0;
+            j++;
+        }
         const double from = base->values[j];
         const double step = j + 1 < base->count ? base->values[j + 1] - from : 0;
-        // In parts, for an interval may be as long as the run.
-        for (size_t i = 0; i < ratio && n < count;) {
-            const size_t left = ratio - i < count - n ? ratio - i : count - n;
-            const size_t part = left < PROGRESS_VALUES ? left : PROGRESS_VALUES;
-            for (size_t k = 0; k < part; k++)
-                values[n + k] = from + (double)(i + k) / (double)ratio * step;
-            i += part;
-            n += part;
-            unreported += part;
-            if (unreported < PROGRESS_VALUES)
-                continue;
-            unreported = 0;
-            if (!progress_advance(progress, 0))
-                return problem_set(problem, STATUS_CANCELLED, "cancelled before the first step");
-        }
+        values[n] = from + (double)i / (double)ratio * step;
+        if ((n + 1) % PROGRESS_VALUES == 0 && !progress_advance(progress, 0))
+            return problem_set(problem, STATUS_CANCELLED, "cancelled before the first step");
     }
     *fine = *base;
     fine->values = values;

@@ -4,15 +4,35 @@
 // trusted.
 #include "core/solve/exact.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/solve/companion_run.h"
 #include "core/solve/event_engine.h"
 #include "core/solve/power_contact.h"
 #include "core/solve/recorder.h"
 #include "core/solve/single_mass.h"
+
+enum { COMPANION_SAMPLES = FLIGHT_BUFFER_MAX };
+static const double NUDGE = 4 * DBL_EPSILON;
+static const double PARTED = 0.01; // of the largest displacement: larger differences are chance
+static const double FINER = 30;    // tolerance of the run over that of the companion
+static const double CAUTION = 3;   // error of the run over the difference of two stepped runs
+
+// A second run that differs by a few roundings follows the first one, COMPANION_SAMPLES behind,
+// until the two have parted.
+typedef struct Companion {
+    EventEngine engine;
+    Run run;
+    Response response;
+    bool is_finished;      // parted or failed
+    bool is_known;         // has not failed
+    bool is_stepped;       // contacts have a tolerance, and this run a finer one
+    double largest, worst; // displacement, and difference of displacements, so far [m]
+    double horizon;        // [s]; NAN: not reached
+    double *tracks;        // of both runs, where every sample is compared
+} Companion;
 
 double exact_tolerance(const Accuracy *accuracy) {
     const double asked =
@@ -49,21 +69,135 @@ const Field accuracy_exact_fields[] = {
 };
 // clang-format on
 
-static Status exact_solve(EventEngine *engine, CompanionRun *companion) {
+// Changes the modes by a few roundings of either sign.
+static void exact_companion_nudge(ModalState *state) {
+    const double by = NUDGE;
+    for (size_t i = 0; i < state->mode_count; i++) {
+        const double sign = (state->sample / COMPANION_SAMPLES + i) % 2 == 0 ? 1 : -1;
+        state->q[i] *= 1 + sign * by;
+        state->p[i] *= 1 - sign * by;
+    }
+}
+
+// Error of the run over the difference of the two runs.
+static double exact_companion_factor(const Companion *companion) {
+    return companion->is_stepped ? CAUTION : 1;
+}
+
+static void exact_companion_compare(Companion *companion, const ModalState *state, size_t before) {
+    companion->largest = fmax(companion->largest, state->impacts.response->peaks.displacement);
+    if (companion->is_stepped) {
+        // This error oscillates with the motion, so every sample is compared.
+        const double *run = companion->tracks, *near = run + COMPANION_SAMPLES * state->padded;
+        for (size_t k = 0; k < state->sample - before; k++)
+            companion->worst = modal_state_difference(state, run + k * state->padded,
+                                                      near + k * state->padded, companion->worst);
+    } else {
+        companion->worst =
+            modal_state_difference(state, state->q, companion->engine.state.q, companion->worst);
+    }
+    const double error = exact_companion_factor(companion) * companion->worst;
+    if (isnan(companion->horizon) && !(error <= RESPONSE_DIVERGENCE * companion->largest))
+        companion->horizon = (double)before / state->plan->sample_rate;
+    companion->is_finished = error > (companion->is_stepped ? 1 : PARTED) * companion->largest;
+}
+
+// Follows the run to its present sample; the steps count as the run's. False: it has failed just
+// now, perhaps by the run's own limit.
+static bool exact_companion_step(Companion *companion, const ModalState *state) {
+    if (companion->is_finished)
+        return true;
+    companion->run.steps = state->run->steps;
+    ModalState *own = &companion->engine.state;
+    const size_t from = own->sample;
+    exact_companion_nudge(own);
+    while (own->sample < state->sample && companion->is_known)
+        companion->is_known = event_engine_step(&companion->engine, state->sample) == STATUS_OK;
+    state->run->work.neighbour_samples += own->sample - from;
+    state->run->steps = companion->run.steps;
+    if (companion->is_known)
+        exact_companion_compare(companion, state, from);
+    else
+        companion->is_finished = true;
+    return companion->is_known;
+}
+
+// Starts beside an engine that has settled. A failure only leaves the run without an estimate.
+static void exact_companion_start(Companion *companion, EventEngine *engine) {
+    const ModalState *state = &engine->state;
+    memset(companion, 0, sizeof *companion);
+    companion->horizon = NAN;
+    companion->is_known = companion->is_finished = true;
+    if (!state->has_stops)
+        return;
+    companion->run = (Run){.plan = state->plan,
+                           .base = state->run->base,
+                           .progress = state->run->progress,
+                           .steps_max = state->run->steps_max};
+    companion->response.is_unlisted = true;
+    ModalState *own = &companion->engine.state;
+    companion->is_stepped =
+        state->plan->form == CONTACT_POWER && engine->ode.tolerance > POWER_CONTACT_TOLERANCE;
+    const size_t tracked = companion->is_stepped ? COMPANION_SAMPLES * state->padded : 0;
+    companion->tracks = calloc(2 * tracked + 1, sizeof *companion->tracks);
+    companion->is_known =
+        companion->tracks != NULL &&
+        event_engine_shadow(&companion->engine, engine, &companion->run,
+                            fmax(engine->ode.tolerance / FINER, POWER_CONTACT_TOLERANCE),
+                            &companion->response) == STATUS_OK;
+    if (!companion->is_known)
+        return;
+    if (companion->is_stepped) {
+        engine->track = companion->tracks;
+        companion->engine.track = companion->tracks + tracked;
+    }
+    exact_companion_nudge(own);
+    for (size_t d = 0; d < own->dampers; d++)
+        own->damper[d].r +=
+            (own->damper[d].r > 0 ? -1 : 1) * NUDGE * own->damper[d].plan->clearance;
+    companion->is_known = event_engine_settle(&companion->engine) == STATUS_OK;
+    companion->is_finished = !companion->is_known;
+}
+
+// Error estimate and horizon.
+static void exact_companion_report(const Companion *companion, const ModalState *state,
+                                   Response *response) {
+    const double size = fmax(companion->largest, response->peaks.displacement);
+    // The rounding of a frequency shifts the phase; a pulse is too short for that.
+    const Base *base = state->run->base;
+    const double rate = fmax(state->rate, base->form == BASE_SINE ? base->omega : 0);
+    const double drift = DBL_EPSILON * (1 + rate * state->plan->duration);
+    const double worst = exact_companion_factor(companion) * companion->worst;
+    const double error = size > 0 ? fmax(worst / size, drift) : 0;
+    response->has_trust = companion->is_known;
+    response->is_stepped = companion->is_stepped;
+    response->error_estimate = error < (companion->is_stepped ? 1 : PARTED) ? error : 1;
+    // A horizon in spite of a small error was found before the displacement had grown.
+    response->trust_horizon = error <= RESPONSE_DIVERGENCE ? (double)NAN : companion->horizon;
+}
+
+static void exact_companion_clear(Companion *companion) {
+    power_contact_clear(&companion->engine.ode);
+    modal_state_clear(&companion->engine.state);
+    response_clear(&companion->response);
+    free(companion->tracks);
+}
+
+static Status exact_solve(EventEngine *engine, Companion *companion) {
     ModalState *state = &engine->state;
     const Plan *plan = state->plan;
     TRY(event_engine_settle(engine));
     event_engine_take_sample(engine);
-    companion_run_start(companion, engine);
+    exact_companion_start(companion, engine);
     while (state->sample + 1 < plan->count) {
         const size_t next = (state->sample / COMPANION_SAMPLES + 1) * COMPANION_SAMPLES;
         const size_t until = next < plan->count - 1 ? next : plan->count - 1;
         while (state->sample < until)
             TRY(event_engine_step(engine, until));
-        if (!companion_run_step(companion, state))
+        if (!exact_companion_step(companion, state))
             TRY(event_engine_check(engine)); // the cause may be the run's own limit
     }
-    companion_run_report(companion, state, state->impacts.response);
+    exact_companion_report(companion, state, state->impacts.response);
     // The duration may end between samples.
     TRY(event_engine_cross(engine, plan->duration - (double)state->sample / plan->sample_rate));
     recorder_update(state);
@@ -73,7 +207,7 @@ static Status exact_solve(EventEngine *engine, CompanionRun *companion) {
 
 Status exact_run_engine(Run *run, Response *response, Problem *problem) {
     EventEngine engine;
-    CompanionRun *companion = calloc(1, sizeof *companion);
+    Companion *companion = calloc(1, sizeof *companion);
     if (companion == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run");
     memset(&engine, 0, sizeof engine);
@@ -84,7 +218,7 @@ Status exact_run_engine(Run *run, Response *response, Problem *problem) {
     if (engine.record.block != NULL)
         recorder_finish(&engine.record, &engine.state, response);
     event_engine_clear(&engine);
-    companion_run_clear(companion);
+    exact_companion_clear(companion);
     free(companion);
     return status;
 }
@@ -145,8 +279,7 @@ static Status exact_run(const Solver *solver, Run *run, Response *response, Prob
     // With values at all output samples single_mass.h moves over many of them at once.
     const size_t fine =
         base_cursor_refined_count(run->base, run->plan->sample_rate, run->plan->count);
-    Workspace none = {0}, *workspace = run->workspace == NULL ? &none : run->workspace;
-    double *const values = fine == 0 ? NULL : workspace_values(workspace, fine);
+    double *const values = fine == 0 ? NULL : malloc(fine * sizeof *values);
     if (values == NULL)
         return single_mass_run(run, response, problem);
     Base refined;
@@ -158,8 +291,7 @@ static Status exact_run(const Solver *solver, Run *run, Response *response, Prob
         status = single_mass_run(&own, response, problem);
     run->steps = own.steps;
     run->work = own.work;
-    workspace_tidy(workspace);
-    workspace_clear(&none);
+    free(values);
     return status;
 }
 

@@ -12,7 +12,6 @@
 // where the contact law is linear. N. M. Newmark, J. Eng. Mech. Div. ASCE 85 (1959) 67-94.
 #include <float.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "core/math/linear_system.h"
@@ -23,47 +22,32 @@ enum { NEWTON_MAX = 60 };
 typedef struct Newmark {
     double length;        // step of the tables [s]
     double *inverse;      // G^-1: its diagonal where D is diagonal, else all of it
+    double *matrix;       // scratch: G
     double *lift;         // G^-1 S, damper after damper
     double *soften;       // Q, dampers x dampers
-    double *shift;        // of the dampers: a_g's coefficient in r'' apart from a1
-    double *rates;        // y' at the step's start
-    double *from;         // y there
+    double *from;         // y at the step's start
     double *end;          // a1 of the modes [m/s^2]
-    double *force;        // N of the dampers at the step's end [N]
     double *left, *right; // Newton's linear system
     double *bare;         // b: r'' at the step's end without contact forces [m/s^2]
     double values[];
 } Newmark;
 
-static Status newmark_no_memory(const TimeStepping *stepping) {
-    return problem_set(stepping->state.problem, STATUS_NO_MEMORY,
-                       "no memory for a run of %zu modes", stepping->state.mode_count);
-}
-
 static Status newmark_make(TimeStepping *stepping) {
     const ModalState *state = &stepping->state;
     const size_t n = state->mode_count, m = state->dampers, size = stepping->size;
     const size_t square = state->diagonal != NULL ? n : n * n;
-    const size_t sizes[] = {square, m * n, m * m, m, size, size, n, m, m * m, m, m};
-    size_t total = 0;
-    for (size_t i = 0; i < COUNT(sizes); i++)
-        total += sizes[i];
-    Newmark *newmark = calloc(1, sizeof *newmark + total * sizeof *newmark->values);
-    stepping->method = newmark;
-    if (newmark == NULL)
-        return newmark_no_memory(stepping);
-    double **const arrays[] = {&newmark->inverse, &newmark->lift,  &newmark->soften,
-                               &newmark->shift,   &newmark->rates, &newmark->from,
-                               &newmark->end,     &newmark->force, &newmark->left,
-                               &newmark->right,   &newmark->bare};
-    double *at = newmark->values;
-    for (size_t i = 0; i < COUNT(sizes); i++) {
-        *arrays[i] = at;
-        at += sizes[i];
-    }
-    for (size_t d = 0; d < m; d++)
-        newmark->shift[d] = state->damper[d].base_coupling -
-                            modal_state_dot(state->damper[d].shape, state->modes->participation, n);
+    const size_t values = 2 * square + m * n + 2 * m * m + size + n + 2 * m;
+    TRY(time_stepping_make_method(stepping, sizeof(Newmark) + values * sizeof(double)));
+    Newmark *newmark = stepping->method;
+    newmark->inverse = newmark->values;
+    newmark->matrix = newmark->inverse + square;
+    newmark->lift = newmark->matrix + square;
+    newmark->soften = newmark->lift + m * n;
+    newmark->left = newmark->soften + m * m;
+    newmark->from = newmark->left + m * m;
+    newmark->end = newmark->from + size;
+    newmark->right = newmark->end + n;
+    newmark->bare = newmark->right + m;
     return STATUS_OK;
 }
 
@@ -77,22 +61,18 @@ static Status newmark_invert(const TimeStepping *stepping, double length) {
             newmark->inverse[i] = 1 / (1 + half * state->diagonal[i] + quarter * state->omega2[i]);
         return STATUS_OK;
     }
-    double *G = malloc(n * n * sizeof *G);
-    if (G == NULL)
-        return newmark_no_memory(stepping);
-    for (size_t i = 0; i < n; i++)
-        for (size_t j = 0; j < n; j++) {
-            G[i * n + j] =
-                half * state->damping[i * n + j] + (i == j ? 1 + quarter * state->omega2[i] : 0);
-            newmark->inverse[i * n + j] = i == j;
-        }
-    const bool is_found = linear_system_solve(G, newmark->inverse, n, n);
-    free(G);
-    return is_found ? STATUS_OK
-                    : problem_set(state->problem, STATUS_UNSTABLE,
-                                  "newmark's matrices leave what double precision can hold with a "
-                                  "step of %.4g s",
-                                  length);
+    for (size_t i = 0; i < n * n; i++) {
+        const bool is_diagonal = i % (n + 1) == 0;
+        newmark->inverse[i] = is_diagonal;
+        newmark->matrix[i] =
+            half * state->damping[i] + (is_diagonal ? 1 + quarter * state->omega2[i / n] : 0);
+    }
+    return linear_system_solve(newmark->matrix, newmark->inverse, n, n)
+               ? STATUS_OK
+               : problem_set(state->problem, STATUS_UNSTABLE,
+                             "newmark's matrices leave what double precision can hold with a step "
+                             "of %.4g s",
+                             length);
 }
 
 // out = G^-1 in.
@@ -136,7 +116,7 @@ static Status newmark_find_forces(TimeStepping *stepping, double length, const d
         for (size_t d = 0; d < m; d++) {
             double pull = newmark->bare[d];
             for (size_t e = 0; e < m; e++) {
-                pull -= newmark->soften[d * m + e] * newmark->force[e];
+                pull -= newmark->soften[d * m + e] * stepping->force[e];
                 newmark->left[d * m + e] = d == e;
             }
             newmark->right[d] = 0;
@@ -144,7 +124,7 @@ static Status newmark_find_forces(TimeStepping *stepping, double length, const d
                 continue;
             const ContactForce law =
                 step_contact_force(state, d, r[d] + quarter * pull, w[d] + half * pull);
-            newmark->right[d] = law.value - newmark->force[d];
+            newmark->right[d] = law.value - stepping->force[d];
             const double yielding = quarter * law.by_penetration + half * law.by_speed;
             for (size_t e = 0; e < m; e++)
                 newmark->left[d * m + e] += yielding * newmark->soften[d * m + e];
@@ -153,9 +133,9 @@ static Status newmark_find_forces(TimeStepping *stepping, double length, const d
             break;
         bool is_done = true;
         for (size_t d = 0; d < m; d++) {
-            newmark->force[d] += newmark->right[d];
+            stepping->force[d] += newmark->right[d];
             is_done =
-                is_done && fabs(newmark->right[d]) <= 1e-13 * fabs(newmark->force[d]) + DBL_MIN;
+                is_done && fabs(newmark->right[d]) <= 1e-13 * fabs(stepping->force[d]) + DBL_MIN;
         }
         if (is_done || (is_linear && round == 1))
             return STATUS_OK;
@@ -174,17 +154,15 @@ static Status newmark_step(TimeStepping *stepping, double length) {
     const double half = length / 2, quarter = length * length / 4, ground = stepping->ground[2];
     if (length != newmark->length)
         TRY(newmark_make_tables(stepping, length));
-    double *q = stepping->y, *p = q + n, *r = p + n, *w = r + m;
+    double *q = stepping->y, *p = q + n, *r = p + n, *w = r + m, *rates = stepping->rows;
+    const double *force = stepping->force;
     memcpy(newmark->from, stepping->y, stepping->size * sizeof *newmark->from);
-    for (size_t d = 0; d < m; d++)
-        newmark->force[d] = state->damper[d].phase == PHASE_CONTACT
-                                ? step_contact_force(state, d, r[d], w[d]).value
-                                : 0;
-    time_stepping_rate(stepping, stepping->y, stepping->ground[0], newmark->force, newmark->rates);
+    time_stepping_forces(stepping, stepping->y);
+    time_stepping_rate(stepping, stepping->y, stepping->ground[0], rates);
     // Predict the end without its acceleration.
     for (size_t i = 0; i < n + m; i++) {
         double *place = i < n ? q + i : r + (i - n), *speed = i < n ? p + i : w + (i - n);
-        const double a = i < n ? newmark->rates[n + i] : newmark->rates[2 * n + m + (i - n)];
+        const double a = i < n ? rates[n + i] : rates[2 * n + m + (i - n)];
         *place += length * *speed + quarter * a;
         *speed += half * a;
     }
@@ -192,18 +170,21 @@ static Status newmark_step(TimeStepping *stepping, double length) {
     for (size_t i = 0; i < n; i++)
         stepping->elastic[i] = -stepping->elastic[i] - state->modes->participation[i] * ground;
     newmark_solve(stepping, stepping->elastic, newmark->end);
-    for (size_t d = 0; d < m; d++)
-        newmark->bare[d] =
-            newmark->shift[d] * ground - modal_state_dot(state->damper[d].shape, newmark->end, n);
+    for (size_t d = 0; d < m; d++) {
+        const DamperState *damper = &state->damper[d];
+        const double shift =
+            damper->base_coupling - modal_state_dot(damper->shape, state->modes->participation, n);
+        newmark->bare[d] = shift * ground - modal_state_dot(damper->shape, newmark->end, n);
+    }
     TRY(newmark_find_forces(stepping, length, r, w));
     for (size_t d = 0; d < m; d++) {
         double pull = newmark->bare[d];
         for (size_t e = 0; e < m; e++)
-            pull -= newmark->soften[d * m + e] * newmark->force[e];
+            pull -= newmark->soften[d * m + e] * force[e];
         r[d] += quarter * pull;
         w[d] += half * pull;
-        for (size_t i = 0; i < n && newmark->force[d] != 0; i++)
-            newmark->end[i] += newmark->lift[d * n + i] * newmark->force[d];
+        for (size_t i = 0; i < n && force[d] != 0; i++)
+            newmark->end[i] += newmark->lift[d * n + i] * force[d];
     }
     for (size_t i = 0; i < n; i++) {
         q[i] += quarter * newmark->end[i];
@@ -219,8 +200,7 @@ static double newmark_step_cost(size_t modes, size_t dampers, bool is_coupled, d
     return 4 + 0.15 * n * (1 + m) + (is_coupled ? 0.02 : 0.008) * n * n;
 }
 
-static const Stepper newmark_stepper = {.name = "newmark",
-                                        .order = 2,
+static const Stepper newmark_stepper = {.order = 2,
                                         .between = "it is of order 2",
                                         .make = newmark_make,
                                         .step = newmark_step,

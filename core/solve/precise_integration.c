@@ -19,10 +19,10 @@ static const size_t VALUES_MAX = (size_t)1 << 20;
 
 // The state's rows of exp(A h) - I, as a sparse matrix in compressed rows.
 typedef struct PreciseTable {
-    double *key;    // step, then stiffness and damping of each damper in contact, else zeros
-    size_t *starts; // of the rows, and their end
-    uint32_t *columns;
-    double *values;
+    double *key;       // step, then stiffness and damping of each damper in contact, else zeros
+    double *values;    // behind the key
+    uint32_t *starts;  // of the rows, and their end
+    uint32_t *columns; // behind the starts
 } PreciseTable;
 
 typedef struct Precise {
@@ -35,18 +35,11 @@ typedef struct Precise {
     double values[];
 } Precise;
 
-static Status precise_no_memory(const TimeStepping *stepping) {
-    return problem_set(stepping->state.problem, STATUS_NO_MEMORY,
-                       "no memory for the exponentials of %zu modes", stepping->state.mode_count);
-}
-
 static Status precise_make(TimeStepping *stepping) {
-    const size_t m = stepping->state.dampers, size = stepping->size, wide = size + 2;
+    const size_t m = stepping->state.dampers, wide = stepping->size + 2;
     const size_t key_size = 1 + 2 * m, fit = VALUES_MAX / (wide * wide);
-    Precise *precise = calloc(1, sizeof *precise + (key_size + wide) * sizeof *precise->values);
-    stepping->method = precise;
-    if (precise == NULL)
-        return precise_no_memory(stepping);
+    TRY(time_stepping_make_method(stepping, sizeof(Precise) + (key_size + wide) * sizeof(double)));
+    Precise *precise = stepping->method;
     precise->wide = wide;
     precise->key_size = key_size;
     precise->max = fit < 2 ? 2 : fit > TABLES_MAX ? TABLES_MAX : fit;
@@ -58,9 +51,7 @@ static Status precise_make(TimeStepping *stepping) {
 static void precise_table_clear(PreciseTable *table) {
     free(table->key);
     free(table->starts);
-    free(table->columns);
-    free(table->values);
-    memset(table, 0, sizeof *table);
+    *table = (PreciseTable){0};
 }
 
 static void precise_clear(TimeStepping *stepping) {
@@ -76,22 +67,16 @@ static size_t precise_place(const ModalState *state, size_t i) {
 }
 
 // Stores the nonzero values of the state's rows of T.
-static Status precise_compress(const TimeStepping *stepping, const double *T, PreciseTable *table) {
+static void precise_compress(const TimeStepping *stepping, const double *T, PreciseTable *table) {
     const Precise *precise = stepping->method;
-    const size_t wide = precise->wide;
-    size_t count = 0;
-    for (size_t i = 0; i < wide * wide; i++)
-        count += T[i] != 0;
-    table->starts = malloc((stepping->size + 1) * sizeof *table->starts);
-    table->columns = malloc((count + 1) * sizeof *table->columns);
-    table->values = malloc((count + 1) * sizeof *table->values);
-    if (table->starts == NULL || table->columns == NULL || table->values == NULL)
-        return precise_no_memory(stepping);
-    count = 0;
+    uint32_t count = 0;
+    table->values = table->key + precise->key_size;
+    table->columns = table->starts + stepping->size + 1;
+    memcpy(table->key, precise->key, precise->key_size * sizeof *table->key);
     for (size_t i = 0; i < stepping->size; i++) {
-        const double *row = T + precise_place(&stepping->state, i) * wide;
+        const double *row = T + precise_place(&stepping->state, i) * precise->wide;
         table->starts[i] = count;
-        for (size_t j = 0; j < wide; j++) {
+        for (size_t j = 0; j < precise->wide; j++) {
             const double value = row[precise_place(&stepping->state, j)];
             if (value != 0) {
                 table->columns[count] = (uint32_t)j;
@@ -100,27 +85,34 @@ static Status precise_compress(const TimeStepping *stepping, const double *T, Pr
         }
     }
     table->starts[stepping->size] = count;
-    return STATUS_OK;
 }
 
 static Status precise_make_table(TimeStepping *stepping, PreciseTable *table) {
     const Precise *precise = stepping->method;
     ModalState *state = &stepping->state;
-    double *T = malloc(precise->wide * precise->wide * sizeof *T);
-    table->key = malloc(precise->key_size * sizeof *table->key);
+    const size_t square = precise->wide * precise->wide;
+    double *T = malloc(square * sizeof *T);
     Status status = STATUS_NO_MEMORY;
-    if (T == NULL || table->key == NULL) {
-        status = precise_no_memory(stepping);
-    } else {
-        memcpy(table->key, precise->key, precise->key_size * sizeof *table->key);
+    if (T != NULL)
         status = transition_increment(state, precise->key[0], T, state->problem);
+    if (status == STATUS_OK) {
+        size_t count = 0;
+        for (size_t i = 0; i < square; i++)
+            count += T[i] != 0;
+        table->key = malloc((precise->key_size + count) * sizeof *table->key);
+        table->starts = malloc((stepping->size + 1 + count) * sizeof *table->starts);
+        if (table->key != NULL && table->starts != NULL) {
+            precise_compress(stepping, T, table);
+        } else {
+            precise_table_clear(table);
+            status = STATUS_NO_MEMORY;
+        }
     }
-    if (status == STATUS_OK)
-        status = precise_compress(stepping, T, table);
-    if (status != STATUS_OK)
-        precise_table_clear(table);
     free(T);
-    return status;
+    return status != STATUS_NO_MEMORY
+               ? status
+               : problem_set(state->problem, status, "no memory for the exponentials of %zu modes",
+                             state->mode_count);
 }
 
 // At least two tables, mostly zeros where modes do not couple.
@@ -185,8 +177,7 @@ static Status precise_step(TimeStepping *stepping, double length) {
     return STATUS_OK;
 }
 
-static const Stepper precise_stepper = {.name = "precise",
-                                        .order = 2, // with a base that is not linear in a step
+static const Stepper precise_stepper = {.order = 2, // with a base that is not linear in a step
                                         .between =
                                             "it is rounding, if the base is linear in every step",
                                         .make = precise_make,

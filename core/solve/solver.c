@@ -1,6 +1,7 @@
 #include "core/solve/solver.h"
 
 #include <math.h>
+#include <stdlib.h>
 
 // clang-format off
 const Field accuracy_fields[] = {
@@ -24,4 +25,10 @@ double step_work_steps(StepWorkKind kind, size_t storeys, size_t dampers, bool i
         return 300 + 1000 * ceil(n / 8) + 20 * pairs + fmax(m - 1, 0) * (200 + 3 * n);
     }
     return 0;
+}
+
+void workspace_clear(Workspace *workspace) {
+    fft_cache_clear(&workspace->transforms);
+    free(workspace->single);
+    workspace->single = NULL;
 }

@@ -5,10 +5,10 @@
 #include "core/base/field.h"
 #include "core/base/progress.h"
 #include "core/excitation/base_motion.h"
+#include "core/math/fft.h"
 #include "core/plan/plan.h"
 #include "core/result/response.h"
 #include "core/result/work_counters.h"
-#include "core/solve/workspace.h"
 
 // First member of every solver's settings, the scene's "accuracy" object.
 typedef struct Accuracy {
@@ -54,6 +54,14 @@ double step_work_steps(StepWorkKind kind, size_t storeys, size_t dampers, bool i
 #define SOLVER_STOPPED                                                                             \
     "more than %.3g solver steps, about %.3g s of CPU, far more than predicted; stopped at "
 
+// Memory of a run that the next run can use again. It never changes a result. One per worker, used
+// by one run at a time. All zero is empty.
+typedef struct Workspace {
+    FftCache transforms;
+    struct SingleMass *single; // tables of the last system of one mass
+} Workspace;
+void workspace_clear(Workspace *workspace);
+
 // One run: borrowed inputs, and the destination of samples.
 typedef struct Run {
     const Plan *plan;
@@ -90,5 +98,10 @@ typedef struct Solver {
 } Solver;
 
 extern const Solver solver_exact, solver_precise, solver_rk4, solver_newmark, solver_adaptive;
+
+// All solvers, in the order they are offered, NULL-terminated. "auto" is first and has no run of
+// its own: the planner chooses.
+extern const Solver *const solvers[];
+extern const KindTable solver_kinds;
 
 #endif

@@ -1,4 +1,4 @@
-#include "core/solve/solvers.h"
+#include "core/solve/solver.h"
 
 #include "core/result/response.h"
 

@@ -16,7 +16,6 @@
 #include "core/solve/step_contact.h"
 
 #include <math.h>
-#include <string.h>
 
 #include "core/plan/plan.h"
 #include "core/solve/collision.h"
@@ -44,10 +43,7 @@ static double step_contact_magnitude(const ModalState *state, size_t d) {
 }
 
 void step_contact_begin(const ModalState *state, StepContact *contact) {
-    const size_t m = state->dampers;
-    memset(contact->impulse, 0, m * sizeof *contact->impulse);
-    memset(contact->work, 0, m * sizeof *contact->work);
-    for (size_t d = 0; d < m && state->has_stops; d++)
+    for (size_t d = 0; d < state->dampers && state->has_stops; d++)
         contact->strain_before[d] = step_contact_strain(state, d);
 }
 
@@ -105,9 +101,7 @@ static void step_contact_enter(ModalState *state, size_t d, Side side, bool is_b
     damper->row.impact.is_resumed = !is_new;
 }
 
-// Adds `length` seconds of contact to the log.
-static void step_contact_log(ModalState *state, const StepContact *contact, size_t d,
-                             double length) {
+void step_contact_log(ModalState *state, const StepContact *contact, size_t d, double length) {
     DamperState *damper = &state->damper[d];
     impact_log_stretch(&state->impacts, &damper->row, length, contact->impulse[d],
                        contact->work[d] -
@@ -116,56 +110,32 @@ static void step_contact_log(ModalState *state, const StepContact *contact, size
         impact_log_force(&state->impacts, &damper->row, step_contact_magnitude(state, d));
 }
 
-// Of a method whose contacts last for whole steps.
-static void step_contact_switch_by_phase(ModalState *state, const StepContact *contact, size_t d,
-                                         ContactPhase next, Side side, double length) {
+// Of a method whose stages follow the penetration, the integrals of a step in which a contact
+// begins or ends cover the contact's part of it. Other contacts last for whole steps.
+static void step_contact_switch(ModalState *state, const StepContact *contact, size_t d,
+                                ContactPhase next, Side side, double length) {
     DamperState *damper = &state->damper[d];
-    if (damper->phase == PHASE_CONTACT)
-        step_contact_log(state, contact, d, length);
-    if (damper->phase == next)
-        return;
-    if (next == PHASE_CONTACT) {
-        const bool is_resumed = damper->phase == PHASE_INSIDE;
-        step_contact_enter(state, d, side, contact->is_by_place);
-        if (is_resumed)
-            impact_log_stretch(&state->impacts, &damper->row, 0, 0, -step_contact_strain(state, d));
-        impact_log_force(&state->impacts, &damper->row, step_contact_magnitude(state, d));
-        return;
-    }
     if (damper->phase == PHASE_CONTACT) {
-        if (next == PHASE_INSIDE) // the strain energy left in the buffer
-            impact_log_stretch(&state->impacts, &damper->row, 0, 0, step_contact_strain(state, d));
-        step_contact_close_row(state, d);
-    }
-    damper->phase = next;
-}
-
-// Of a method whose stages follow the penetration: the integrals of a step in which a contact
-// begins or ends cover the contact's part of it.
-static void step_contact_switch_by_place(ModalState *state, const StepContact *contact, size_t d,
-                                         ContactPhase next, Side side, double length) {
-    DamperState *damper = &state->damper[d];
-    const ContactPhase last = damper->phase;
-    if (last == PHASE_CONTACT) {
-        damper->phase = next;
+        if (contact->is_by_place || next == PHASE_INSIDE) // the strain left in the buffer is lost
+            damper->phase = next;
         step_contact_log(state, contact, d, length);
         if (next != PHASE_CONTACT)
             step_contact_close_row(state, d);
     } else if (next == PHASE_CONTACT) {
+        const bool is_resumed = damper->phase == PHASE_INSIDE;
         step_contact_enter(state, d, side, contact->is_by_place);
-        step_contact_log(state, contact, d, 0);
+        if (contact->is_by_place || is_resumed)
+            step_contact_log(state, contact, d, 0);
+        impact_log_force(&state->impacts, &damper->row, step_contact_magnitude(state, d));
     } else if (contact->impulse[d] != 0) { // it began and ended within the step
         damper->side = contact->impulse[d] > 0 ? SIDE_RIGHT : SIDE_LEFT;
         step_contact_open_row(state, d, length);
         damper->row.impact.approach_speed = fabs(damper->w);
-        damper->phase = PHASE_FLIGHT;
         step_contact_log(state, contact, d, length);
         impact_log_force(&state->impacts, &damper->row, fabs(contact->impulse[d]) / length);
         step_contact_close_row(state, d);
-        damper->phase = next;
-    } else {
-        damper->phase = next;
     }
+    damper->phase = next;
 }
 
 // Selects the dampers that collide under the impulse law, and sets the separation speed of each.
@@ -268,9 +238,6 @@ void step_contact_end(ModalState *state, const StepContact *contact, double leng
     for (size_t d = 0; d < state->dampers; d++) {
         Side side = state->damper[d].side;
         const ContactPhase next = step_contact_next_phase(state, d, &side);
-        if (contact->is_by_place)
-            step_contact_switch_by_place(state, contact, d, next, side, length);
-        else
-            step_contact_switch_by_phase(state, contact, d, next, side, length);
+        step_contact_switch(state, contact, d, next, side, length);
     }
 }

@@ -18,8 +18,10 @@ typedef struct StepContact {
 // and the strain energy.
 ContactForce step_contact_force(const ModalState *state, size_t damper, double r, double w);
 
-// Clears the integrals and stores the strain energies, before a step.
+// Stores the strain energies, before a step.
 void step_contact_begin(const ModalState *state, StepContact *contact);
+// Adds a step of `length` seconds of contact or rest to the row of a damper.
+void step_contact_log(ModalState *state, const StepContact *contact, size_t damper, double length);
 // Begins and ends contacts after a step of `length` seconds, and logs them.
 void step_contact_end(ModalState *state, const StepContact *contact, double length);
 

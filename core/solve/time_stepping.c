@@ -49,20 +49,26 @@ void time_stepping_elastic(const ModalState *state, const double *q, const doubl
         out[i] += modal_state_dot(state->damping + i * n, p, n);
 }
 
-void time_stepping_rate(TimeStepping *stepping, const double *y, double ground, const double *force,
+void time_stepping_rate(TimeStepping *stepping, const double *y, double ground,
                         double *restrict out) {
     const ModalState *state = &stepping->state;
     const size_t n = state->mode_count, m = state->dampers;
-    double *p1 = out + n, *w1 = out + 2 * n + m;
-    time_stepping_elastic(state, y, y + n, stepping->elastic);
-    memcpy(out, y + n, n * sizeof *y);
-    memcpy(out + 2 * n, y + 2 * n + m, m * sizeof *y);
+    const double *p = y + n, *w = p + n + m;
+    double *p1 = out + n, *w1 = out + 2 * n + m, *sums = out + stepping->size;
+    const double *force = stepping->force;
+    double momentum = modal_state_dot(state->momentum_weights, p, n), loss = 0;
+    time_stepping_elastic(state, y, p, stepping->elastic);
+    memcpy(out, p, n * sizeof *y);
+    memcpy(out + 2 * n, w, m * sizeof *y);
     for (size_t i = 0; i < n; i++)
         p1[i] = -stepping->elastic[i] - state->modes->participation[i] * ground;
     for (size_t d = 0; d < m; d++)
         w1[d] = state->damper[d].base_coupling * ground +
                 modal_state_dot(state->damper[d].shape, stepping->elastic, n);
     for (size_t d = 0; d < m; d++) {
+        sums[d] = force[d];
+        sums[m + d] = force[d] * w[d];
+        momentum += state->damper[d].plan->mass * w[d];
         if (force[d] == 0)
             continue;
         for (size_t i = 0; i < n; i++)
@@ -70,69 +76,50 @@ void time_stepping_rate(TimeStepping *stepping, const double *y, double ground, 
         for (size_t e = 0; e < m; e++)
             w1[e] -= state->delassus[e * m + d] * force[d];
     }
-}
-
-void time_stepping_powers(const TimeStepping *stepping, const double *y, double ground,
-                          const double *force, double *restrict out) {
-    const ModalState *state = &stepping->state;
-    const size_t n = state->mode_count, m = state->dampers;
-    const double *p = y + n, *w = p + n + m;
-    double momentum = modal_state_dot(state->momentum_weights, p, n), loss = 0;
-    for (size_t d = 0; d < m; d++) {
-        out[d] = force[d];
-        out[m + d] = force[d] * w[d];
-        momentum += state->damper[d].plan->mass * w[d];
-    }
     for (size_t i = 0; i < n; i++)
         loss += (stepping->elastic[i] - state->omega2[i] * y[i]) * p[i];
-    out[2 * m] = -ground * momentum;
-    out[2 * m + 1] = loss;
+    sums[2 * m] = -ground * momentum;
+    sums[2 * m + 1] = loss;
+}
+
+void time_stepping_forces(TimeStepping *stepping, const double *y) {
+    const ModalState *state = &stepping->state;
+    const size_t m = state->dampers;
+    const double *r = y + 2 * state->mode_count, *w = r + m;
+    for (size_t d = 0; d < m; d++)
+        stepping->force[d] = state->damper[d].phase == PHASE_CONTACT
+                                 ? step_contact_force(state, d, r[d], w[d]).value
+                                 : 0;
+}
+
+// Adds to the integrals of the step `weight` seconds at y; `rates` becomes y' and the rates there.
+static void time_stepping_add(TimeStepping *stepping, const double *y, double ground, double weight,
+                              double *rates) {
+    const size_t m = stepping->state.dampers;
+    const double *w = y + stepping->size - m;
+    double *integrals = stepping->integrals;
+    time_stepping_forces(stepping, y);
+    time_stepping_rate(stepping, y, ground, rates);
+    for (size_t d = 0; d < m; d++) {
+        integrals[d] += weight * stepping->force[d];
+        integrals[m + d] += weight * stepping->force[d] * w[d];
+    }
+    integrals[2 * m] += weight * rates[stepping->size + 2 * m];
+    integrals[2 * m + 1] += weight * rates[stepping->size + 2 * m + 1];
 }
 
 void time_stepping_integrate(TimeStepping *stepping, const double *from, const double *to,
-                             double length, bool is_corrected) {
-    const ModalState *state = &stepping->state;
-    const size_t n = state->mode_count, m = state->dampers;
-    const double ground_slope = (stepping->ground[2] - stepping->ground[0]) / length;
-    const double half = length / 2, twelfth = is_corrected ? length * length / 12 : 0;
-    double *N = stepping->force, *rates = N + m;
-    for (int k = 0; k < 2; k++) {
-        const double *y = k == 0 ? from : to, *p = y + n, *r = p + n, *w = r + m;
-        const double ground = stepping->ground[2 * k], correction = k == 0 ? twelfth : -twelfth;
-        for (size_t d = 0; d < m; d++)
-            N[d] = state->damper[d].phase == PHASE_CONTACT
-                       ? step_contact_force(state, d, r[d], w[d]).value
-                       : 0;
-        time_stepping_rate(stepping, y, ground, N, rates);
-        double momentum = modal_state_dot(state->momentum_weights, p, n),
-               momentum_rate = modal_state_dot(state->momentum_weights, rates + n, n);
-        for (size_t d = 0; d < m; d++) {
-            momentum += state->damper[d].plan->mass * w[d];
-            momentum_rate += state->damper[d].plan->mass * rates[2 * n + m + d];
-        }
-        double loss = 0, loss_rate = 0;
-        for (size_t i = 0; i < n; i++) { // D need not be symmetric
-            const double drag = stepping->elastic[i] - state->omega2[i] * y[i];
-            const double drag_rate = state->diagonal != NULL
-                                         ? state->diagonal[i] * rates[n + i]
-                                         : modal_state_dot(state->damping + i * n, rates + n, n);
-            loss += drag * p[i];
-            loss_rate += drag * rates[n + i] + drag_rate * p[i];
-        }
-        stepping->input += half * (-ground * momentum) +
-                           correction * (-ground_slope * momentum - ground * momentum_rate);
-        stepping->damping += half * loss + correction * loss_rate;
-        for (size_t d = 0; d < m; d++) {
-            if (state->damper[d].phase != PHASE_CONTACT)
-                continue;
-            const ContactForce force = step_contact_force(state, d, r[d], w[d]);
-            const double w1 = rates[2 * n + m + d];
-            const double N1 = force.by_penetration * w[d] + force.by_speed * w1;
-            stepping->contact.impulse[d] += half * force.value + correction * N1;
-            stepping->contact.work[d] +=
-                half * force.value * w[d] + correction * (N1 * w[d] + force.value * w1);
-        }
-    }
+                             double length, bool is_order_4) {
+    const double weight = is_order_4 ? length / 6 : length / 2;
+    double *first = stepping->rows, *last = first + stepping->row;
+    time_stepping_add(stepping, from, stepping->ground[0], weight, first);
+    time_stepping_add(stepping, to, stepping->ground[2], weight, last);
+    if (!is_order_4)
+        return;
+    for (size_t i = 0; i < stepping->size; i++) // Hermite's cubic in the middle
+        first[i] = (from[i] + to[i]) / 2 + length / 8 * (first[i] - last[i]);
+    time_stepping_add(stepping, first, (stepping->ground[0] + stepping->ground[2]) / 2, 4 * weight,
+                      last);
 }
 
 static void time_stepping_read_base(TimeStepping *stepping, double length) {
@@ -151,37 +138,6 @@ static void time_stepping_read_base(TimeStepping *stepping, double length) {
     }
 }
 
-// Ground velocity gained in a step, integrated exactly [m/s].
-static double time_stepping_ground_gain(const ModalState *state, double length) {
-    double gain = 0, done = 0;
-    while (length - done > 1e-12 * length) {
-        Slice slice;
-        const double knot =
-            base_cursor_slice(&state->base, state->sample, state->offset + done, &slice);
-        const double h = fmin(knot, length - done), turn = slice.omega * h;
-        gain += slice.omega > 0
-                    ? (slice.value * sin(turn) + slice.slope * (1 - cos(turn))) / slice.omega
-                    : (slice.value + slice.slope * h / 2) * h;
-        done += h;
-    }
-    return gain;
-}
-
-// A pulse shorter than a step may lie between all instants at which the run and its companion
-// evaluate the base.
-static void time_stepping_find_missed(TimeStepping *stepping, double length, double seen) {
-    const ModalState *state = &stepping->state;
-    Slice slice;
-    if (state->base.base->form != BASE_PIECES ||
-        !(base_cursor_slice(&state->base, state->sample, state->offset, &slice) < length))
-        return;
-    if (stepping->max_missed_velocity == 0)
-        stepping->missed_since = modal_state_time(state);
-    stepping->missed_velocity += time_stepping_ground_gain(state, length) - seen;
-    stepping->max_missed_velocity =
-        fmax(stepping->max_missed_velocity, fabs(stepping->missed_velocity));
-}
-
 static Status time_stepping_check(TimeStepping *stepping) {
     stepping->unchecked_cost = 0;
     return modal_state_check(&stepping->state, stepping->length);
@@ -193,7 +149,7 @@ static Status time_stepping_unstable(const TimeStepping *stepping) {
     return problem_set(state->problem, STATUS_UNSTABLE,
                        "%s leaves all bounds at t = %.6g s with a step of %.4g s: the motion has a "
                        "rate of %.4g 1/s, take a step of %.2g s or less, or the solver \"exact\"",
-                       stepping->stepper->name, modal_state_time(state), stepping->length, rate,
+                       stepping->solver->kind.name, modal_state_time(state), stepping->length, rate,
                        fmin(0.2 / rate, stepping->length / 4));
 }
 
@@ -217,7 +173,7 @@ Status time_stepping_note(TimeStepping *stepping, double cost) {
     return stepping->unchecked_cost > CHECK_COST ? time_stepping_check(stepping) : STATUS_OK;
 }
 
-void time_stepping_gather(const ModalState *state, double *y) {
+static void time_stepping_gather(const ModalState *state, double *y) {
     const size_t n = state->mode_count, m = state->dampers;
     memcpy(y, state->q, n * sizeof *y);
     memcpy(y + n, state->p, n * sizeof *y);
@@ -225,6 +181,13 @@ void time_stepping_gather(const ModalState *state, double *y) {
         y[2 * n + d] = state->damper[d].r;
         y[2 * n + m + d] = state->damper[d].w;
     }
+}
+
+void time_stepping_begin(TimeStepping *stepping, double *y) {
+    const ModalState *state = &stepping->state;
+    time_stepping_gather(state, y);
+    memset(stepping->integrals, 0, (2 * state->dampers + 2) * sizeof *stepping->integrals);
+    step_contact_begin(state, &stepping->contact);
 }
 
 void time_stepping_scatter(ModalState *state, const double *y) {
@@ -249,21 +212,18 @@ static double time_stepping_step_cost(const TimeStepping *stepping) {
 }
 
 // `offset`: the step's end, from the last sample [s].
-static Status time_stepping_step(TimeStepping *stepping, double length, double offset) {
+static Status time_stepping_advance(TimeStepping *stepping, double length, double offset) {
     ModalState *state = &stepping->state;
-    const double *ground = stepping->ground;
+    const double *ground = stepping->ground, *integrals = stepping->integrals;
+    const size_t m = state->dampers;
     time_stepping_read_base(stepping, length);
-    time_stepping_gather(state, stepping->y);
-    stepping->input = stepping->damping = 0;
-    step_contact_begin(state, &stepping->contact);
-    const double gain = length / 6 * (ground[0] + 4 * ground[1] + ground[2]);
-    time_stepping_find_missed(stepping, length, gain);
+    time_stepping_begin(stepping, stepping->y);
     TRY(stepping->stepper->step(stepping, length));
     time_stepping_scatter(state, stepping->y);
     state->offset = offset;
     state->base_acceleration = ground[2];
-    impact_log_work(&state->impacts, stepping->input, stepping->damping);
-    stepping->recorder.base_speed += gain;
+    impact_log_work(&state->impacts, integrals[2 * m], integrals[2 * m + 1]);
+    stepping->recorder.base_speed += length / 6 * (ground[0] + 4 * ground[1] + ground[2]);
     if (state->has_stops) {
         state->run->work.stop_searches++;
         step_contact_end(state, &stepping->contact, length);
@@ -271,13 +231,35 @@ static Status time_stepping_step(TimeStepping *stepping, double length, double o
     return time_stepping_note(stepping, time_stepping_step_cost(stepping));
 }
 
+// A step, in parts where a pulse of the base has kinks inside.
+static Status time_stepping_step(TimeStepping *stepping, double length, double offset) {
+    const ModalState *state = &stepping->state;
+    for (Slice slice; state->base.base->form == BASE_PIECES;) {
+        const double knot = base_cursor_slice(&state->base, state->sample, state->offset, &slice);
+        if (!(knot < length * (1 - 1e-9)))
+            break;
+        TRY(time_stepping_advance(stepping, knot, state->offset + knot));
+        length -= knot;
+    }
+    return time_stepping_advance(stepping, length, offset);
+}
+
+// Advances by `length` seconds from the last sample.
+static Status time_stepping_cross(TimeStepping *stepping, double length) {
+    const double clock = 8 * DBL_EPSILON * stepping->state.plan->duration; // less is rounding
+    if (stepping->stepper->interval != NULL)
+        return length > clock ? stepping->stepper->interval(stepping, length) : STATUS_OK;
+    const double step = stepping->length, whole = floor(length / step * (1 + 1e-9));
+    for (double k = 1; k <= whole; k++)
+        TRY(time_stepping_step(stepping, step, k * step));
+    const double rest = length - whole * step;
+    return rest > clock ? time_stepping_step(stepping, rest, length) : STATUS_OK;
+}
+
 // Advances to the next sample and records it.
 static Status time_stepping_interval(TimeStepping *stepping) {
     ModalState *state = &stepping->state;
-    if (stepping->stepper->interval != NULL)
-        TRY(stepping->stepper->interval(stepping, state->interval));
-    for (size_t k = 1; k <= stepping->share && stepping->stepper->interval == NULL; k++)
-        TRY(time_stepping_step(stepping, stepping->length, (double)k * stepping->length));
+    TRY(time_stepping_cross(stepping, state->interval));
     state->sample++;
     state->offset = 0;
     state->run->work.mode_samples += state->mode_count;
@@ -285,21 +267,15 @@ static Status time_stepping_interval(TimeStepping *stepping) {
     return STATUS_OK;
 }
 
-// Advances to the end of a run that ends `length` seconds after its last sample.
-static Status time_stepping_finish(TimeStepping *stepping, double length) {
-    const double clock = 8 * DBL_EPSILON * stepping->state.plan->duration; // less is rounding
-    const double whole = floor(length / stepping->length * (1 + 1e-9));
-    if (stepping->stepper->interval != NULL) {
-        if (length > clock)
-            TRY(stepping->stepper->interval(stepping, length));
-        return time_stepping_check(stepping);
-    }
-    for (double k = 1; k <= whole; k++)
-        TRY(time_stepping_step(stepping, stepping->length, k * stepping->length));
-    const double rest = length - whole * stepping->length;
-    if (rest > clock)
-        TRY(time_stepping_step(stepping, rest, length));
-    return time_stepping_check(stepping);
+// The contact of stop i of all dampers, two to each, in row k of its table over the approach speed,
+// or its only one, at 1 m/s.
+static bool time_stepping_contact_at(const Plan *plan, size_t i, size_t k, ContactParameters *at) {
+    const PlanStop *stop = &plan->dampers[i / 2].stops[i % 2];
+    const ContactRows *rows = &stop->contact.numbers.rows;
+    if (k >= (rows->count > 0 ? rows->count : 1))
+        return false;
+    *at = stops_freeze(stop, rows->count > 0 ? rows->at[k].approach_speed : 1);
+    return true;
 }
 
 // Rejects steps outside the explicit method's stability limit.
@@ -312,55 +288,61 @@ static Status time_stepping_check_stability(const TimeStepping *stepping) {
         return problem_set(state->problem, STATUS_UNSTABLE,
                            "%s is unstable with a step of %.4g s: the structure's motion has a "
                            "rate of up to %.4g 1/s, so a step must be at most %.3g s",
-                           stepping->stepper->name, stepping->length, state->rate,
+                           stepping->solver->kind.name, stepping->length, state->rate,
                            limit / state->rate);
     double rate = 0;
-    for (size_t d = 0;
-         d < state->dampers && state->has_stops && state->plan->form == CONTACT_LINEAR; d++)
-        for (int side = 0; side < 2; side++) {
-            const double mass = state->damper[d].effective_mass;
-            const PlanStop *stop = &state->damper[d].plan->stops[side];
-            const ContactRows *rows = &stop->contact.numbers.rows;
-            for (size_t i = 0; i < (rows->count > 0 ? rows->count : 1); i++) {
-                const ContactParameters at =
-                    stops_freeze(stop, rows->count > 0 ? rows->at[i].approach_speed : 1);
-                rate = fmax(rate, fmax(sqrt(state->stiff + at.stiffness / mass),
-                                       state->viscous + at.damping / mass));
-            }
-        }
+    const bool has_rate = state->has_stops && state->plan->form == CONTACT_LINEAR;
+    for (size_t i = 0; i < 2 * state->dampers && has_rate; i++) {
+        const double mass = state->damper[i / 2].effective_mass;
+        ContactParameters at;
+        for (size_t k = 0; time_stepping_contact_at(state->plan, i, k, &at); k++)
+            rate = fmax(rate, fmax(sqrt(state->stiff + at.stiffness / mass),
+                                   state->viscous + at.damping / mass));
+    }
     if (rate > max)
         return problem_set(state->problem, STATUS_UNSTABLE,
                            "%s is unstable with a step of %.4g s: a contact has a rate of up to "
                            "%.4g 1/s, so a step must be at most %.3g s",
-                           stepping->stepper->name, stepping->length, rate, limit / rate);
+                           stepping->solver->kind.name, stepping->length, rate, limit / rate);
     return STATUS_OK;
+}
+
+Status time_stepping_make_method(TimeStepping *stepping, size_t size) {
+    stepping->method = calloc(1, size);
+    return stepping->method != NULL
+               ? STATUS_OK
+               : problem_set(stepping->state.problem, STATUS_NO_MEMORY,
+                             "no memory for a run of %zu modes", stepping->state.mode_count);
 }
 
 static Status time_stepping_allocate(TimeStepping *stepping) {
     const size_t n = stepping->state.mode_count, m = stepping->state.dampers;
     stepping->size = 2 * (n + m);
-    // y; impulse, work and strain; force and a derivative of y; elastic
-    stepping->block = calloc(2 * stepping->size + 4 * m + n + 1, sizeof *stepping->block);
+    stepping->row = stepping->size + 2 * m + 2;
+    stepping->block = calloc(3 * stepping->row + 2 * m + n, sizeof *stepping->block);
     if (stepping->block == NULL)
         return problem_set(stepping->state.problem, STATUS_NO_MEMORY,
                            "no memory for a run of %zu modes", n);
     stepping->y = stepping->block;
-    stepping->contact.impulse = stepping->y + stepping->size;
-    stepping->contact.work = stepping->contact.impulse + m;
-    stepping->contact.strain_before = stepping->contact.work + m;
-    stepping->contact.is_by_place = stepping->stepper->is_by_place;
-    stepping->force = stepping->contact.strain_before + m;
-    stepping->elastic = stepping->force + m + stepping->size;
+    stepping->integrals = stepping->y + stepping->size;
+    stepping->rows = stepping->y + stepping->row;
+    stepping->force = stepping->rows + 2 * stepping->row;
+    stepping->elastic = stepping->force + m;
+    stepping->contact = (StepContact){.impulse = stepping->integrals,
+                                      .work = stepping->integrals + m,
+                                      .strain_before = stepping->elastic + n,
+                                      .is_by_place = stepping->stepper->is_by_place};
     return STATUS_OK;
 }
 
 // `is_shadow`: nothing is recorded. Cleared by time_stepping_clear, also after a failure.
-static Status time_stepping_make(TimeStepping *stepping, const Stepper *stepper, Run *run,
+static Status time_stepping_make(TimeStepping *stepping, const Solver *solver, Run *run,
                                  size_t share, double tolerance, bool is_shadow, Response *response,
                                  Problem *problem) {
     ModalState *state = &stepping->state;
     memset(stepping, 0, sizeof *stepping);
-    stepping->stepper = stepper;
+    stepping->solver = solver;
+    stepping->stepper = solver->stepper;
     stepping->tolerance = tolerance;
     TRY(modal_state_make(state, run, problem));
     state->is_shadow = is_shadow;
@@ -391,32 +373,29 @@ static void time_stepping_clear(TimeStepping *stepping) {
     free(stepping->block);
 }
 
-// Duration of an isolated contact; under a power law of one with an approach speed of 1 m/s [s].
-static double time_stepping_contact_time_at(const PlanDamper *damper, const PlanStop *stop,
-                                            double speed) {
-    const ContactParameters at = stops_freeze(stop, speed);
+// Duration of an isolated contact [s].
+static double time_stepping_duration(const PlanDamper *damper, const PlanStop *stop,
+                                     const ContactParameters *at) {
     const double mass = damper->effective_mass;
     if (stop->contact.law != NULL && stop->contact.law->form == CONTACT_POWER)
         return stop->contact.duration *
-               pow(mass * speed * speed / at.stiffness, 1 / (at.exponent + 1)) / speed;
+               pow(mass * at->speed * at->speed / at->stiffness, 1 / (at->exponent + 1)) /
+               at->speed;
     const Identification found = identification_from_stiffness(
-        mass, at.stiffness, at.damping, (Separation)stop->contact.separation);
+        mass, at->stiffness, at->damping, (Separation)stop->contact.separation);
     // The damping sets the rate of an overdamped one.
-    return isfinite(found.contact_time) ? found.contact_time : mass / at.damping;
+    return isfinite(found.contact_time) ? found.contact_time : mass / at->damping;
 }
 
 // The shortest of all contacts [s]; INFINITY without any.
 static double time_stepping_contact_time(const Plan *plan) {
     double min = INFINITY;
-    for (size_t d = 0; d < plan->damper_count && plan->form != CONTACT_IMPULSIVE; d++)
-        for (int side = 0; side < 2; side++) {
-            const PlanStop *stop = &plan->dampers[d].stops[side];
-            const ContactRows *rows = &stop->contact.numbers.rows;
-            for (size_t i = 0; i < (rows->count > 0 ? rows->count : 1); i++)
-                min = fmin(min, time_stepping_contact_time_at(
-                                    &plan->dampers[d], stop,
-                                    rows->count > 0 ? rows->at[i].approach_speed : 1));
-        }
+    for (size_t i = 0; i < 2 * plan->damper_count && plan->form != CONTACT_IMPULSIVE; i++) {
+        const PlanDamper *damper = &plan->dampers[i / 2];
+        ContactParameters at;
+        for (size_t k = 0; time_stepping_contact_at(plan, i, k, &at); k++)
+            min = fmin(min, time_stepping_duration(damper, &damper->stops[i % 2], &at));
+    }
     return min;
 }
 
@@ -517,7 +496,6 @@ typedef struct Pair {
     bool is_kinked;                // the base has kinks within steps
     bool is_known;                 // the companion has not failed
     bool is_finished;              // the companion is no longer needed
-    size_t compared;               // samples
     double largest, worst;         // displacement, and difference of displacements [m]
     double horizon;                // [s]; NAN: not reached
     double first_contact;          // no contact has begun before [s]; NAN: none has
@@ -539,13 +517,13 @@ static double pair_factor(const Pair *pair) {
     if (pair_has_contact(pair))
         return CONTACT_FACTOR;
     // With a kink of the base inside a step, the error depends on the kink's place.
-    return pair->is_kinked ? 1 : 1 / fabs(pow(pair->step_ratio, pair->run.stepper->order) - 1);
+    return pair->is_kinked ? 1
+                           : 1 / fabs(pow(pair->step_ratio, pair->run.solver->stepper->order) - 1);
 }
 
 static void pair_compare(Pair *pair) {
     const ModalState *state = &pair->run.state;
     const double before = pair->worst;
-    pair->compared++;
     pair->largest = fmax(pair->largest, state->impacts.response->peaks.displacement);
     pair->worst = modal_state_difference(state, state->q, pair->companion.state.q, before);
     if (pair->worst <= before)
@@ -590,7 +568,7 @@ static Status pair_make_companion(Pair *pair, size_t stride, size_t share) {
                                 .steps_max = run->steps_max,
                                 .is_clear = run->is_clear};
     pair->companion_response.is_unlisted = true;
-    return time_stepping_make(&pair->companion, pair->run.stepper, &pair->companion_run, share,
+    return time_stepping_make(&pair->companion, pair->run.solver, &pair->companion_run, share,
                               tolerance > 0 ? fmax(tolerance / COMPANION_FINER, TOLERANCE_MIN) : 0,
                               true, &pair->companion_response, NULL);
 }
@@ -606,8 +584,7 @@ static void pair_start_companion(Pair *pair, size_t kinks) {
                          : kinks > 1   ? 2 * kinks // kinks exclude longer steps
                                        : 1;
     const size_t stride = pair->run.share > 1 || is_controlled ? 1 : 2;
-    pair->is_kinked = base->form == BASE_PIECES ||
-                      (base->form == BASE_SAMPLED && kinks == 1 && state->base.ratio == 0);
+    pair->is_kinked = base->form == BASE_SAMPLED && kinks == 1 && state->base.ratio == 0;
     pair->horizon = pair->first_contact = NAN;
     Status status = pair_make_companion(pair, stride, share);
     if (status == STATUS_UNSTABLE && share < pair->run.share * stride) {
@@ -622,63 +599,45 @@ static void pair_start_companion(Pair *pair, size_t kinks) {
 
 // Displacement of a storey by one contact that begins a step late [m]: both runs may be equally
 // late by chance. The velocity change acts until the motion reverses.
-static double pair_delay_error(const Pair *pair, const DamperState *damper, double impulse) {
+static double pair_delay_error(const Pair *pair) {
     const ModalState *state = &pair->run.state;
     const Peaks *peaks = &state->impacts.response->peaks;
-    const double h = pair->run.length, speed = pair->slowest[damper - state->damper];
-    double slowest = INFINITY, delay = h / 2;
-    for (size_t i = 0; i < state->mode_count; i++)
-        slowest = fmin(slowest, sqrt(state->omega2[i]));
+    const double h = pair->run.length;
     // Peaks may cover the end of the run only.
     const bool is_whole = !(state->run->statistics_from > 0);
     const double velocity = is_whole ? peaks->velocity : pair->largest * state->rate;
-    // Of a long contact the force acts for a part of the slowest period only.
-    if (is_whole && state->plan->form != CONTACT_IMPULSIVE &&
-        peaks->contact_force < impulse * slowest)
-        impulse = peaks->contact_force / slowest;
-    // The parameters of a power law depend on the approach speed, which changes during the delay.
-    if (state->plan->form == CONTACT_POWER && speed > 0)
-        delay = fmax(delay, fmin(velocity * state->rate * h / speed, 1) *
-                                fmin(1 / slowest, state->plan->duration));
-    return impulse * damper->max_mobility * delay;
-}
-
-static double pair_max_delay_error(const Pair *pair) {
-    const ModalState *state = &pair->run.state;
-    double max = 0;
+    double slowest = INFINITY, max = 0;
+    for (size_t i = 0; i < state->mode_count; i++)
+        slowest = fmin(slowest, sqrt(state->omega2[i]));
     for (size_t d = 0; d < state->dampers && !(pair->run.tolerance > 0); d++) {
         const DamperState *damper = &state->damper[d];
         const double open = damper->row.is_open ? fabs(damper->row.impact.impulse) : 0;
-        max = fmax(max, pair_delay_error(pair, damper, fmax(state->impacts.impulse[d], open)));
+        double impulse = fmax(state->impacts.impulse[d], open), delay = h / 2;
+        // Of a long contact the force acts for a part of the slowest period only.
+        if (is_whole && state->plan->form != CONTACT_IMPULSIVE)
+            impulse = fmin(impulse, peaks->contact_force / slowest);
+        // The parameters of a power law depend on the approach speed, which changes during the
+        // delay.
+        if (state->plan->form == CONTACT_POWER && pair->slowest[d] > 0)
+            delay = fmax(delay, fmin(velocity * state->rate * h / pair->slowest[d], 1) *
+                                    fmin(1 / slowest, state->plan->duration));
+        max = fmax(max, impulse * damper->max_mobility * delay);
     }
     return max;
 }
 
-// Bound on the displacement of a storey by the ground velocity that the steps missed [m].
-static double pair_missed_error(const Pair *pair) {
-    const ModalState *state = &pair->run.state;
-    double bound = 0;
-    for (size_t i = 0; i < state->mode_count && pair->run.max_missed_velocity > 0; i++)
-        bound += state->max_shape[i] * fabs(state->modes->participation[i]) *
-                 fmin(1 / sqrt(state->omega2[i]), state->plan->duration);
-    return bound * pair->run.max_missed_velocity;
-}
-
 static void pair_report(const Pair *pair, Response *response) {
-    const double missed = pair_missed_error(pair), delay = pair_max_delay_error(pair);
-    const double size = fmax(fmax(pair->largest, response->peaks.displacement), missed);
+    const double delay = pair_delay_error(pair);
+    const double size = fmax(pair->largest, response->peaks.displacement);
     const ImpactLog *log = &pair->run.state.impacts;
     const double balance = log->largest_energy > 0 ? log->largest_balance / log->largest_energy : 0;
-    const double error =
-        size > 0 ? fmax(fmax(pair_factor(pair) * pair->worst, delay), missed) / size : 0;
-    response->has_trust = pair->is_known && pair->compared > 0;
+    const double error = size > 0 ? fmax(pair_factor(pair) * pair->worst, delay) / size : 0;
+    response->has_trust = pair->is_known && pair->companion.state.sample > 0;
     response->is_stepped = true;
     response->error_estimate = fmin(fmax(error, balance / 2), 1);
     response->trust_horizon = pair->horizon;
     if (delay > RESPONSE_DIVERGENCE * size)
         response->trust_horizon = fmin(response->trust_horizon, pair->first_contact);
-    if (missed > RESPONSE_DIVERGENCE * size)
-        response->trust_horizon = fmin(response->trust_horizon, pair->run.missed_since);
     // The horizon was found before the displacement had grown.
     if (response->error_estimate <= RESPONSE_DIVERGENCE)
         response->trust_horizon = NAN;
@@ -702,18 +661,19 @@ static Status pair_run(Pair *pair, Response *response) {
     }
     pair_report(pair, response);
     // The duration may end between samples.
-    TRY(time_stepping_finish(&pair->run,
-                             plan->duration - (double)state->sample / plan->sample_rate));
+    const double rest = plan->duration - (double)state->sample / plan->sample_rate;
+    TRY(time_stepping_cross(&pair->run, rest));
+    TRY(time_stepping_check(&pair->run));
     return recorder_finish_log(state);
 }
 
-Status time_stepping_run_pair(const Stepper *stepper, Run *run, size_t share, size_t kinks,
+Status time_stepping_run_pair(const Solver *solver, Run *run, size_t share, size_t kinks,
                               double tolerance, Response *response, Problem *problem) {
     Pair *pair = calloc(1, sizeof *pair);
     if (pair == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run");
     Status status =
-        time_stepping_make(&pair->run, stepper, run, share, tolerance, false, response, problem);
+        time_stepping_make(&pair->run, solver, run, share, tolerance, false, response, problem);
     if (status == STATUS_OK) {
         pair_start_companion(pair, kinks);
         status = pair_run(pair, response);
@@ -731,15 +691,6 @@ Status time_stepping_run(const Solver *solver, Run *run, Response *response, Pro
     const Base *base = run->base;
     const StepChoice choice = time_stepping_choose(run->plan, run->accuracy,
                                                    base->form == BASE_SAMPLED ? base->interval : 0);
-    if (!(choice.share <= SHARE_MAX))
-        return problem_set(problem, STATUS_LIMIT,
-                           "the scene moves too fast for %s: %.3g steps to a sample interval, at "
-                           "most %.3g are possible",
-                           solver->kind.name, choice.share, SHARE_MAX);
-    if (solver->is_linear_only && run->plan->form == CONTACT_POWER)
-        return problem_set(problem, STATUS_INVALID,
-                           "%s serves linear contact and impulses, not a power law",
-                           solver->kind.name);
-    return time_stepping_run_pair(solver->stepper, run, (size_t)choice.share, (size_t)choice.kinks,
-                                  0, response, problem);
+    return time_stepping_run_pair(solver, run, (size_t)choice.share, (size_t)choice.kinks, 0,
+                                  response, problem);
 }

@@ -24,14 +24,13 @@ typedef struct TimeStepping TimeStepping;
 
 // One method. It has either `step`, for fixed steps, or `interval`.
 typedef struct Stepper {
-    const char *name;       // of its solver
     int order;              // of the error between contacts
     const char *between;    // a clause for the plan's report that states this error
     bool is_by_place;       // see StepContact
     double stability_limit; // of |eigenvalue| times step; 0: unconditionally stable
-    // Sets `method` to an allocated block, or leaves it NULL. The driver frees it.
+    // Sets `method`, which the driver frees.
     Status (*make)(TimeStepping *stepping);
-    // Advances y by `length` seconds and sets the step's integrals.
+    // Advances y by `length` seconds and adds to the step's integrals.
     Status (*step)(TimeStepping *stepping, double length);
     // Advances the state itself by `length` seconds from the last sample, with steps of its own.
     Status (*interval)(TimeStepping *stepping, double length);
@@ -44,23 +43,24 @@ struct TimeStepping {
     ModalState state;
     FlightBuffer samples; // one sample
     Recorder recorder;
-    const Stepper *stepper;
-    void *method;          // the stepper's data
-    size_t share;          // steps in a sample interval
-    double length;         // of a step [s]
-    double tolerance;      // relative error of a step under error control, else 0
-    double unchecked_cost; // work since the last check of limits and progress [multiplications]
+    const Solver *solver;
+    const Stepper *stepper; // of the solver
+    void *method;           // the stepper's data
+    size_t share;           // steps in a sample interval
+    double length;          // of a step [s]
+    double tolerance;       // relative error of a step under error control, else 0
+    double unchecked_cost;  // work since the last check of limits and progress [multiplications]
 
-    size_t size;           // of y
-    double *y;             // q, p, r, w of all modes and dampers
-    double ground[3];      // a_g at the step's start, middle and end [m/s^2]
-    double input, damping; // work of the base and loss in the structure in one step [J]
-    StepContact contact;   // the same step's contact integrals
-    double *force;         // scratch: N of the dampers [N], then one derivative of y
-    double *elastic;       // scratch: D p + W^2 q
-    // Ground velocity that a step's quadrature misses where a pulse begins or ends within the step:
-    // now and at most so far [m/s], and the time of the first miss [s].
-    double missed_velocity, max_missed_velocity, missed_since;
+    size_t size;      // of y
+    size_t row;       // of y and its integrals
+    double *y;        // q, p, r, w of all modes and dampers
+    double ground[3]; // a_g at the step's start, middle and end [m/s^2]
+    // Of one step: N [N s] and N r' [J] of the dampers, work of the base and loss in the structure.
+    double *integrals;
+    StepContact contact;  // the first two of these
+    double *force;        // scratch: N of the dampers [N]
+    double *elastic;      // scratch: D p + W^2 q
+    double *rows;         // scratch of time_stepping_integrate
     double largest_input; // largest |work of the base| [J]
     double *block;
 };
@@ -74,7 +74,7 @@ double time_stepping_cost(const Solver *solver, const Accuracy *accuracy, double
 
 // A run with `share` steps in a sample interval and its companion. `kinks` divides `share`: kinks
 // of the base in a sample interval. `tolerance` is that of error control, 0 for fixed steps.
-Status time_stepping_run_pair(const Stepper *stepper, Run *run, size_t share, size_t kinks,
+Status time_stepping_run_pair(const Solver *solver, Run *run, size_t share, size_t kinks,
                               double tolerance, Response *response, Problem *problem);
 
 // Shortest period or decay time of a mode [s].
@@ -85,20 +85,21 @@ bool time_stepping_may_couple(const Plan *plan);
 // out = D p + W^2 q.
 void time_stepping_elastic(const ModalState *state, const double *q, const double *p,
                            double *restrict out);
-// out = y' under the forces N of the dampers; `elastic` becomes that of y.
-void time_stepping_rate(TimeStepping *stepping, const double *y, double ground, const double *force,
+// out = y' under the dampers' forces `force`, then the rates of the integrals, `row` values;
+// `elastic` becomes that of y.
+void time_stepping_rate(TimeStepping *stepping, const double *y, double ground,
                         double *restrict out);
-// The rates of the energy integrals at y, after time_stepping_rate: N and N r' of the dampers, then
-// the power of the base and the loss in the structure; 2 dampers + 2 values.
-void time_stepping_powers(const TimeStepping *stepping, const double *y, double ground,
-                          const double *force, double *restrict out);
-// Copies the state to y, and y to the state.
-void time_stepping_gather(const ModalState *state, double *y);
+// `force` becomes N of the dampers that are in contact at the step's start.
+void time_stepping_forces(TimeStepping *stepping, const double *y);
+// Copies the state to y, and y to the state. A step begins with integrals of zero.
+void time_stepping_begin(TimeStepping *stepping, double *y);
 void time_stepping_scatter(ModalState *state, const double *y);
-// Adds the energy integrals of a step from the states at its two ends: by the trapezoidal rule, or
-// with its end correction (Euler-Maclaurin), which is of order 4.
+// Adds the integrals of a step from the states at its two ends: by the trapezoidal rule, or by
+// Simpson's with the middle of the cubic through both, which is of order 4.
 void time_stepping_integrate(TimeStepping *stepping, const double *from, const double *to,
-                             double length, bool is_corrected);
+                             double length, bool is_order_4);
+// Sets `method` to `size` bytes of zeros.
+Status time_stepping_make_method(TimeStepping *stepping, size_t size);
 // Updates peaks and energy balance after a step of `cost` solver steps. STATUS_UNSTABLE where the
 // energy has no bound; STATUS_LIMIT and STATUS_CANCELLED as for the run.
 Status time_stepping_note(TimeStepping *stepping, double cost);

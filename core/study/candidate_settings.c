@@ -9,7 +9,7 @@
 #include <string.h>
 
 #include "core/simulation/impulse_variant.h"
-#include "core/solve/solvers.h"
+#include "core/solve/solver.h"
 #include "core/study/study_run.h"
 
 enum {

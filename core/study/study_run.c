@@ -5,7 +5,7 @@
 
 #include "core/base/json_pointer.h"
 #include "core/base/spelling.h"
-#include "core/solve/solvers.h"
+#include "core/solve/solver.h"
 
 Status study_no_memory(Problem *problem) {
     return problem_set(problem, STATUS_NO_MEMORY, "no memory for the study");

@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/solve/solvers.h"
+#include "core/solve/solver.h"
 
 enum { SOLVERS_MAX = 32, REPEATS_MAX = 1000, BATCH_MAX = 10000 }; // runs of a timing
 static const double batch_seconds = 5e-3;                         // of CPU, at least, of a timing

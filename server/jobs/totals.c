@@ -3,7 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "core/solve/solvers.h"
+#include "core/solve/solver.h"
 
 void totals_ended(Totals *totals, int state, bool is_known) {
     counter_add(&totals->ended[state], 1);

@@ -9,7 +9,7 @@
 
 #include "core/math/fft.h"
 #include "core/solve/exact.h"
-#include "core/solve/solvers.h"
+#include "core/solve/solver.h"
 #include "core/solve/time_stepping.h"
 #include "server/base/clock.h"
 #include "tests/support/paper.h"

@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "core/simulation/simulation.h"
-#include "core/solve/solvers.h"
+#include "core/solve/solver.h"
 #include "core/solve/time_stepping.h"
 #include "server/base/clock.h"
 #include "server/codec/read.h"

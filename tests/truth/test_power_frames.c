@@ -14,7 +14,7 @@
 
 #include "core/math/fft.h"
 #include "core/solve/exact.h"
-#include "core/solve/solvers.h"
+#include "core/solve/solver.h"
 #include "core/solve/time_stepping.h"
 #include "tests/support/document.h"
 #include "tests/support/scenes.h"

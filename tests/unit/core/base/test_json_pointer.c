@@ -9,7 +9,7 @@
 
 #include "core/base/json_pointer.h"
 #include "core/simulation/simulation.h"
-#include "core/solve/solvers.h"
+#include "core/solve/solver.h"
 #include "tests/support/fields.h"
 #include "tests/support/scenes.h"
 

@@ -11,7 +11,7 @@
 #include "core/base/canonical.h"
 #include "core/result/response.h"
 #include "core/simulation/simulation.h"
-#include "core/solve/solvers.h"
+#include "core/solve/solver.h"
 #include "tests/support/document.h"
 
 #define LINEAR                                                                                     \

@@ -12,7 +12,7 @@
 #include <cmocka.h>
 
 #include "core/simulation/simulation.h"
-#include "core/solve/solvers.h"
+#include "core/solve/solver.h"
 #include "server/codec/read.h"
 
 static Problem told;

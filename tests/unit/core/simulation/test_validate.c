@@ -10,7 +10,7 @@
 #include "core/base/canonical.h"
 #include "core/simulation/simulation.h"
 #include "core/solve/exact.h"
-#include "core/solve/solvers.h"
+#include "core/solve/solver.h"
 #include "tests/support/fields.h"
 #include "tests/support/scenes.h"
 #include "tests/support/verdict.h"

@@ -9,7 +9,7 @@
 #include <cmocka.h>
 
 #include "core/solve/exact.h"
-#include "core/solve/solvers.h"
+#include "core/solve/solver.h"
 #include "tests/support/frames.h"
 
 enum { RUNS = IMPACTD_SANITIZED ? 200 : 500 };

@@ -10,7 +10,7 @@
 
 #include <cmocka.h>
 
-#include "core/solve/solvers.h"
+#include "core/solve/solver.h"
 #include "core/solve/time_stepping.h"
 #include "tests/support/frames.h"
 #include "tests/support/paper.h"
