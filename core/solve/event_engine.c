@@ -117,39 +117,23 @@ static State event_engine_single_state(const ModalState *state) {
                    state->damper[0].w};
 }
 
-static void event_engine_grow_to_event(RoundingGrowth *growth, const ModalState *state) {
-    const DamperState *damper = &state->damper[0];
-    const State at = event_engine_single_state(state);
-    const double time = modal_state_time(state),
-                 largest = state->impacts.response->peaks.displacement;
-    if (damper->phase == PHASE_FLIGHT)
-        rounding_growth_flight(growth, time, &at, largest);
-    else if (damper->phase == PHASE_CONTACT)
-        rounding_growth_contact(growth, damper->side, time, &at, largest);
-    else
-        rounding_growth_rest(growth, time, &at, largest);
-}
-
-static void event_engine_grow_over_event(RoundingGrowth *growth, const ModalState *state,
-                                         ContactPhase phase, const State *before) {
-    const DamperState *damper = &state->damper[0];
-    if (phase == PHASE_FLIGHT && state->plan->form == CONTACT_IMPULSIVE &&
-        damper->plan->clearance > 0)
-        rounding_growth_bounce(growth, damper->contact.restitution, before->w,
-                               state->diagonal[0] * before->v + state->omega2[0] * before->x);
-    if (damper->phase == PHASE_RESTING)
-        rounding_growth_stick(growth);
-}
-
 static Status event_engine_apply(EventEngine *engine, const ContactEvent *event) {
     ModalState *state = &engine->state;
-    if (engine->growth == NULL)
+    RoundingGrowth *growth = engine->growth;
+    if (growth == NULL)
         return contact_event_apply(state, event);
-    const ContactPhase phase = state->damper[0].phase;
+    const DamperState *damper = &state->damper[0];
+    const ContactPhase phase = damper->phase;
     const State before = event_engine_single_state(state);
-    event_engine_grow_to_event(engine->growth, state);
+    rounding_growth_end_phase(growth, phase, damper->side, modal_state_time(state), &before,
+                              state->impacts.response->peaks.displacement);
     const Status status = contact_event_apply(state, event);
-    event_engine_grow_over_event(engine->growth, state, phase, &before);
+    if (phase == PHASE_FLIGHT && state->plan->form == CONTACT_IMPULSIVE &&
+        damper->plan->clearance > 0)
+        rounding_growth_bounce(growth, damper->contact.restitution, before.w,
+                               state->diagonal[0] * before.v + state->omega2[0] * before.x);
+    if (damper->phase == PHASE_RESTING)
+        rounding_growth_stick(growth);
     return status;
 }
 

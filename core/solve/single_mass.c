@@ -865,8 +865,7 @@ static void single_mass_make_motions(SingleMass *single) {
                      .share = share};
     const double own = fmax(sqrt(flying.omega2), flying.damping);
     flying.rate = fmax(own, 1e-300);
-    single->flying = single->resting = flying;
-    single->resting.is_resting = true;
+    single->flying = flying;
     for (int side = 0; side < 2 && plan->form == CONTACT_LINEAR && single->has_stops; side++) {
         Motion *touching = &single->touching[side];
         *touching = flying;
@@ -929,9 +928,8 @@ static Status single_mass_start(SingleMass *single, Run *run, Response *response
     single_mass_keep_tables(single);
     single->state = (State){plan->displacement[0], plan->velocity[0], single->damper->position,
                             single->damper->velocity};
-    rounding_growth_start(&single->growth, flying, single->touching, &single->resting,
-                          &single->state, single->damper->clearance, base->form == BASE_SINE,
-                          plan->duration);
+    rounding_growth_start(&single->growth, flying, single->touching, &single->state,
+                          single->damper->clearance, base->form == BASE_SINE, plan->duration);
     const EnergyState energy = single_mass_energy(single);
     impact_log_start(&single->impacts, response, run->impacts_max, &energy);
     single->impacts.gain_max = IMPACT_LOG_GAIN_EXACT;

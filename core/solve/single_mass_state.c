@@ -111,14 +111,9 @@ void single_mass_flush(SingleMass *single) {
 }
 
 void single_mass_end_phase(SingleMass *single) {
-    const double time = single_mass_time(single),
-                 largest = single->impacts.response->peaks.displacement;
-    if (single->phase == PHASE_FLIGHT)
-        rounding_growth_flight(&single->growth, time, &single->state, largest);
-    else if (single->phase == PHASE_CONTACT)
-        rounding_growth_contact(&single->growth, single->side, time, &single->state, largest);
-    else
-        rounding_growth_rest(&single->growth, time, &single->state, largest);
+    rounding_growth_end_phase(&single->growth, single->phase, single->side,
+                              single_mass_time(single), &single->state,
+                              single->impacts.response->peaks.displacement);
 }
 
 void single_mass_note_force(SingleMass *single) {

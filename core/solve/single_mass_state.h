@@ -24,7 +24,7 @@ struct SingleMass {
     const Plan *plan;
     const PlanDamper *damper; // all zero where there is none
     Problem *problem;
-    Motion flying, touching[2], resting;
+    Motion flying, touching[2];
     FlightBlock stretch;
     bool has_stops;     // that the mass may reach
     bool has_blocks;    // of flight
