@@ -276,7 +276,7 @@ static size_t event_engine_fly(EventEngine *engine, size_t until) {
     count = engine->flight.length == 0 ? 0 : event_engine_find_slices(state, count, slices);
     state->run->work.stop_searches += count > 0 && state->has_stops;
     if (count > 0)
-        count = flight_run(&engine->flight, &engine->buffer, state, slices, count,
+        count = flight_run(&engine->flight, &record->buffer, state, slices, count,
                            state->is_shadow ? NULL : &work);
     state->sample += count;
     if (count == 0 || state->is_shadow)
@@ -285,14 +285,8 @@ static size_t event_engine_fly(EventEngine *engine, size_t until) {
     *(state->base.base->form == BASE_STILL ? &done->unforced_samples : &done->flight_samples) +=
         count;
     done->mode_samples += count * state->mode_count;
-    state->base_acceleration = base_cursor_at(&state->base, state->sample);
     impact_log_work(&state->impacts, work.input, work.damping);
-    FlightBuffer *buffer = &engine->buffer;
-    flight_buffer_feel(buffer, state, count);
-    if (state->sample + 1 - count == record->statistics_start)
-        recorder_restart_peaks(state);
-    recorder_write(record, state, count);
-    recorder_flight_peaks(record, state, count);
+    recorder_flight(record, state, count);
     return count;
 }
 
@@ -320,17 +314,17 @@ static void event_engine_balance(ModalState *state) {
 }
 
 void event_engine_take_sample(EventEngine *engine) {
-    recorder_sample(&engine->record, &engine->buffer, &engine->state);
+    recorder_sample(&engine->record, &engine->state);
 }
 
 // Stores the modes of the last `flown` samples, or of the present one.
 static void event_engine_track(EventEngine *engine, size_t flown) {
     const ModalState *state = &engine->state;
-    const FlightBuffer *buffer = &engine->buffer;
+    const FlightBuffer *buffer = &engine->record.buffer;
     for (size_t k = 1; k <= (flown > 0 ? flown : 1); k++) {
         const size_t sample = flown > 0 ? state->sample - flown + k : state->sample;
         memcpy(engine->track + (sample - 1) % FLIGHT_BUFFER_MAX * state->padded,
-               flown > 0 ? buffer->q + k * buffer->padded : state->q,
+               flown > 0 ? buffer->q + k * state->padded : state->q,
                state->mode_count * sizeof *engine->track);
     }
 }
@@ -368,8 +362,7 @@ Status event_engine_make(EventEngine *engine, Run *run, double tolerance, Respon
     TRY(flight_make(&engine->flight, state, problem));
     TRY(sustained_contact_make(&engine->pressing, state, problem));
     TRY(power_contact_make(&engine->ode, state, tolerance, problem));
-    TRY(flight_buffer_make(&engine->buffer, state, problem));
-    TRY(recorder_start(&engine->record, &engine->buffer, state, response, problem));
+    TRY(recorder_start(&engine->record, state, response, problem));
     const EnergyState energy = modal_state_energy(state);
     impact_log_start(&state->impacts, response, run->impacts_max, &energy);
     // The errors of many contacts.
@@ -386,7 +379,7 @@ Status event_engine_shadow(EventEngine *engine, const EventEngine *of, Run *run,
     engine->arc = of->arc;
     engine->flight = of->flight;
     engine->pressing = of->pressing;
-    engine->buffer = of->buffer;
+    engine->record.buffer = of->record.buffer;
     state->is_shadow = true;
     const EnergyState energy = modal_state_energy(state);
     impact_log_start(&state->impacts, response, run->impacts_max, &energy);
@@ -395,7 +388,6 @@ Status event_engine_shadow(EventEngine *engine, const EventEngine *of, Run *run,
 
 void event_engine_clear(EventEngine *engine) {
     recorder_clear(&engine->record);
-    flight_buffer_clear(&engine->buffer);
     flight_clear(&engine->flight);
     sustained_contact_clear(&engine->pressing);
     power_contact_clear(&engine->ode);

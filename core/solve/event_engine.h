@@ -17,7 +17,6 @@ typedef struct EventEngine {
     Flight flight;
     SustainedContact pressing;
     PowerContact ode;
-    FlightBuffer buffer;
     Recorder record;
     double work;                   // solver steps since the last check
     size_t idle;                   // steps of contact in a row without time passing

@@ -12,27 +12,16 @@
 enum { FLIGHT_BUFFER_MAX = 16, FLIGHT_BUFFER_ROWS = FLIGHT_BUFFER_MAX + 1 };
 
 // The last samples of the motion, before they are recorded: those of whole intervals of flight, or
-// one. Row 0 is the state before, row k that k samples later; each row has all modes.
+// one. Row 0 is the state before, row k that k samples later; each row of `padded` values has all
+// modes. (recorder.h)
 typedef struct FlightBuffer {
-    size_t padded; // values of a row
     double *q, *p;
     double *moved, *sped;   // increments of q and p since row 0
     double *elastic;        // D p + W^2 q
     double *r;              // of the dampers, FLIGHT_BUFFER_ROWS each, from the present origins
     double *z;              // likewise, their velocities relative to the base
     double *a, *b, *ground; // of each interval: value and slope of a_g, and its integral
-    double *block;
 } FlightBuffer;
-
-// Freed by flight_buffer_clear, also after a failure.
-Status flight_buffer_make(FlightBuffer *buffer, const ModalState *state, Problem *problem);
-void flight_buffer_clear(FlightBuffer *buffer);
-
-// The elastic forces of rows 1 to `count`, the last of them being the present sample.
-void flight_buffer_feel(FlightBuffer *buffer, const ModalState *state, size_t count);
-
-// Row 1 becomes the present state, after modal_state_forces.
-void flight_buffer_take(FlightBuffer *buffer, const ModalState *state, double ground);
 
 typedef struct Flight {
     double length;         // of the interval [s]; 0: there are no such steps

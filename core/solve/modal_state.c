@@ -93,15 +93,14 @@ void modal_state_forces(ModalState *state) {
     }
 }
 
-const double *modal_state_expand_four(const ModalState *state, const double *modal) {
-    state->lanes->multiply_four(state->shape_matrix, state->tall, modal, state->padded,
-                                modal_state_even(state->slot_count), state->storey_values);
-    return state->storey_values;
-}
-
-const double *modal_state_expand(const ModalState *state, const double *modal) {
-    state->lanes->multiply(state->shape_matrix, state->tall, modal,
-                           modal_state_even(state->slot_count), state->storey_values);
+const double *modal_state_expand(const ModalState *state, const double *modal, size_t rows) {
+    const size_t slots = modal_state_even(state->slot_count);
+    if (rows == 1)
+        state->lanes->multiply(state->shape_matrix, state->tall, modal, slots,
+                               state->storey_values);
+    else
+        state->lanes->multiply_four(state->shape_matrix, state->tall, modal, state->padded, slots,
+                                    state->storey_values);
     return state->storey_values;
 }
 
@@ -114,7 +113,7 @@ double modal_state_difference(const ModalState *state, const double *q, const do
     }
     if (bound <= least)
         return least;
-    const double *values = modal_state_expand(state, state->difference);
+    const double *values = modal_state_expand(state, state->difference, 1);
     for (size_t j = 0; j < state->storey_count; j++)
         least = fmax(least, fabs(values[j]));
     return least;
@@ -122,11 +121,6 @@ double modal_state_difference(const ModalState *state, const double *q, const do
 
 double modal_state_displacement(const ModalState *state, size_t storey) {
     return modal_state_dot(state->modes->shapes + storey * state->mode_count, state->q,
-                           state->mode_count);
-}
-
-double modal_state_velocity(const ModalState *state, size_t storey) {
-    return modal_state_dot(state->modes->shapes + storey * state->mode_count, state->p,
                            state->mode_count);
 }
 
@@ -337,42 +331,29 @@ static void modal_state_make_modal(const ModalState *state, const double *values
 }
 
 static Status modal_state_allocate(ModalState *state) {
-    const size_t n = state->padded, m = state->dampers;
-    double **const arrays[] = {&state->omega2,
-                               &state->diagonal,
-                               &state->momentum_weights,
-                               &state->participation,
-                               &state->q,
-                               &state->p,
-                               &state->elastic,
-                               &state->max_shape,
-                               &state->shapes,
-                               &state->shape_matrix,
-                               &state->storey_values,
-                               &state->difference,
-                               &state->mobility,
-                               &state->delassus,
-                               &state->constraint_mass,
-                               &state->scratch,
-                               &state->residual_influence};
-    const size_t tall = state->tall, all = modal_state_even(state->slot_count) * tall;
-    const size_t sizes[] = {
-        n, n,        n,     n,     n,     n,    n, n, m * n, all, FLIGHT_ROWS * tall,
-        n, m * tall, m * m, m * m, m * m, tall,
+    const size_t n = state->padded, m = state->dampers, tall = state->tall;
+    const SimdArray arrays[] = {
+        {&state->omega2, n},
+        {&state->diagonal, n},
+        {&state->momentum_weights, n},
+        {&state->participation, n},
+        {&state->q, n},
+        {&state->p, n},
+        {&state->elastic, n},
+        {&state->max_shape, n},
+        {&state->shapes, m * n},
+        {&state->shape_matrix, modal_state_even(state->slot_count) * tall},
+        {&state->storey_values, FLIGHT_ROWS * tall},
+        {&state->difference, n},
+        {&state->mobility, m * tall},
+        {&state->delassus, m * m},
+        {&state->constraint_mass, m * m},
+        {&state->scratch, m * m},
+        {&state->residual_influence, tall},
     };
-    size_t total = simd_kernels_room(0);
-    for (size_t i = 0; i < COUNT(sizes); i++)
-        total += sizes[i];
-    state->block = calloc(total, sizeof *state->block);
+    state->block = simd_kernels_allocate(arrays, COUNT(arrays));
     state->damper = calloc(m > 0 ? m : 1, sizeof *state->damper);
-    if (state->block == NULL || state->damper == NULL)
-        return STATUS_NO_MEMORY;
-    double *at = simd_kernels_start(state->block);
-    for (size_t i = 0; i < COUNT(sizes); i++) {
-        *arrays[i] = at;
-        at += sizes[i];
-    }
-    return STATUS_OK;
+    return state->block == NULL || state->damper == NULL ? STATUS_NO_MEMORY : STATUS_OK;
 }
 
 // residual_influence; 0 where it is only rounding.

@@ -169,13 +169,11 @@ void modal_state_forces(ModalState *state);
 // if that is larger.
 double modal_state_difference(const ModalState *state, const double *q, const double *other,
                               double least);
-// Values of all storeys from those of all modes, valid until the next call.
-const double *modal_state_expand(const ModalState *state, const double *modal);
-// Likewise of FLIGHT_ROWS rows of modes, one after the other; `tall` values of each.
-const double *modal_state_expand_four(const ModalState *state, const double *modal);
-// Of one storey, relative to the base [m], [m/s]; absolute, after modal_state_forces [m/s^2].
+// Values of all storeys, `tall` of each row, from those of all modes in 1 or FLIGHT_ROWS rows, one
+// after the other; valid until the next call.
+const double *modal_state_expand(const ModalState *state, const double *modal, size_t rows);
+// Of one storey, relative to the base [m]; absolute, after modal_state_forces [m/s^2].
 double modal_state_displacement(const ModalState *state, size_t storey);
-double modal_state_velocity(const ModalState *state, size_t storey);
 double modal_state_storey_acceleration(const ModalState *state, size_t storey);
 // r'' of a damper in flight, after modal_state_forces [m/s^2].
 double modal_state_acceleration(const ModalState *state, size_t damper);

@@ -438,18 +438,18 @@ Status power_contact_make(PowerContact *contact, ModalState *state, double toler
     series->stride = (series->at_r + (m > 1 ? m : 0) + 3) / 4 * 4;
     series->all = calloc(m, sizeof *series->all);
     series->contact = calloc(m, sizeof *series->contact);
-    contact->block = calloc(simd_kernels_room((2 * SERIES_ROW + 1) * series->stride + 2 * n +
-                                              state->padded + SERIES_NODES * (m + n)),
-                            sizeof *contact->block);
+    const SimdArray arrays[] = {
+        {&series->z, SERIES_ROW * series->stride},
+        {&series->rate, SERIES_ROW * series->stride},
+        {&contact->row, series->stride},
+        {&contact->elastic, state->padded},
+        {&series->elastic, n},
+        {&series->inverse_modal, n},
+        {&contact->nodes, SERIES_NODES * (m + n)},
+    };
+    contact->block = simd_kernels_allocate(arrays, COUNT(arrays));
     if (series->all == NULL || series->contact == NULL || contact->block == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for contacts of %zu dampers", m);
-    series->z = simd_kernels_start(contact->block);
-    series->rate = series->z + SERIES_ROW * series->stride;
-    contact->row = series->rate + SERIES_ROW * series->stride;
-    contact->elastic = contact->row + series->stride;
-    series->elastic = contact->elastic + state->padded;
-    series->inverse_modal = series->elastic + n;
-    contact->nodes = series->inverse_modal + n;
     for (size_t d = 0; d < m; d++)
         series->all[d].damper = d;
     for (size_t i = 0; i < LINEAR_MOTION_RULES; i++)

@@ -6,7 +6,7 @@
 #include "core/solve/flight.h"
 
 typedef struct Recorder {
-    const FlightBuffer *buffer;
+    FlightBuffer buffer;     // of the last samples
     size_t statistics_start; // first sample
     double base_speed;       // integral of a_g since the last sample, except in flight [m/s]
     double *last_velocity;   // of each column's storey, at the last sample
@@ -19,17 +19,14 @@ typedef struct Recorder {
 } Recorder;
 
 // Freed by recorder_clear, also after a failure.
-Status recorder_start(Recorder *record, const FlightBuffer *buffer, const ModalState *state,
-                      Response *response, Problem *problem);
+Status recorder_start(Recorder *record, const ModalState *state, Response *response,
+                      Problem *problem);
 void recorder_clear(Recorder *record);
 
-// Writes rows 1 to `count` of the buffer, of which the last is the present sample, with the present
-// forces. Resets base_speed.
-void recorder_write(Recorder *record, ModalState *state, size_t count);
-// Records the present sample by way of the buffer, with forces and peaks; of a shadow nothing.
-void recorder_sample(Recorder *record, FlightBuffer *buffer, ModalState *state);
-// Updates the peaks by the same rows, all of them samples of flight.
-void recorder_flight_peaks(Recorder *record, ModalState *state, size_t count);
+// Records the present sample with forces and peaks; of a shadow nothing. Resets base_speed.
+void recorder_sample(Recorder *record, ModalState *state);
+// Records rows 1 to `count` of the buffer, samples of flight of which the last is the present one.
+void recorder_flight(Recorder *record, ModalState *state, size_t count);
 void recorder_finish(Recorder *record, const ModalState *state, Response *response);
 // Ends the impact log of a run.
 Status recorder_finish_log(ModalState *state);
@@ -37,8 +34,6 @@ Status recorder_finish_log(ModalState *state);
 // Updates the peaks by the present state, after modal_state_forces; those of accelerations only.
 void recorder_peaks(ModalState *state);
 void recorder_acceleration(ModalState *state);
-// Statistics begin here: restarts the peaks.
-void recorder_restart_peaks(ModalState *state);
 // Updates forces, peaks and the energy balance.
 void recorder_update(ModalState *state);
 

@@ -16,6 +16,7 @@ typedef struct TaylorStep {
     double *q;                              // order after order, `padded` values each
     double *r, *force; // damper after damper, POLYNOMIAL_DEGREE_MAX + 1 each; force is N
     double *work;      // modes x nodes of a quadrature
+    double *push;      // scratch, one per damper
     double *slopes;    // of s^k at the nodes of all rules
     double *block;
 } TaylorStep;

@@ -42,7 +42,6 @@ typedef struct Stepper {
 
 struct TimeStepping {
     ModalState state;
-    FlightBuffer samples; // one sample
     Recorder recorder;
     const Stepper *stepper;
     void *method;          // the stepper's data
