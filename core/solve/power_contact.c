@@ -407,14 +407,6 @@ static const double ORDER_BASE = 2.5,
 static const double SPAN = 0.3;         // usual step, in (root of depth) / speed
 static const double ONSET_MARGIN = 0.9; // N is left out below this part of the onset
 
-// What ends a step early: the onset of N, a kink of the law (passed upwards 1, downwards -1), or
-// else the event.
-typedef struct StepEnd {
-    bool is_found, is_onset;
-    int kink;
-    ContactEvent event;
-} StepEnd;
-
 Status power_contact_make(PowerContact *contact, ModalState *state, double tolerance,
                           Problem *problem) {
     memset(contact, 0, sizeof *contact);
@@ -670,46 +662,37 @@ static bool power_contact_cut_time(PowerSeries *series, double length, bool *is_
     return true;
 }
 
-// Locates the first crossing of a polynomial if it comes before *end. Returns whether it does.
-static bool power_contact_locate(double *c, size_t degree, ContactEvent candidate, StepEnd *end) {
-    if (!contact_event_locate(c, degree, candidate, &end->is_found, &end->event))
-        return false;
-    end->is_onset = false;
-    end->kink = 0;
-    return true;
-}
-
 // The release of a contact that does not lead, and the onset of a force that is left out.
-static void power_contact_find_release(const PowerContact *contact, size_t c, StepEnd *end) {
+static void power_contact_find_release(const PowerContact *contact, size_t c, bool *is_found,
+                                       ContactEvent *first) {
     const PowerSeries *series = &contact->series;
     const SeriesContact *at = series->contact[c];
-    const ContactEvent event = {.damper = at->damper,
-                                .side = contact->state->damper[at->damper].side};
+    ContactEvent event = {.damper = at->damper, .side = contact->state->damper[at->damper].side};
     double gap[SERIES_ROW];
-    if (c == 0)
+    if (c == 0) {
         memcpy(gap, power_series_leader(series), (series->degree + 1) * sizeof *gap);
-    else
+    } else {
         power_series_column(series, series->at_r + at->damper, gap);
-    for (size_t k = 0; k <= series->degree && c > 0; k++)
-        gap[k] *= at->sign;
-    if (c > 0)
-        (void)power_contact_locate(gap, series->degree, event, end);
+        for (size_t k = 0; k <= series->degree; k++)
+            gap[k] *= at->sign;
+        contact_event_locate(gap, series->degree, event, is_found, first);
+    }
     if (at->has_force)
         return;
     for (size_t k = 0; k <= series->degree; k++)
         gap[k] = -gap[k];
     gap[0] += at->onset;
-    if (power_contact_locate(gap, series->degree, event, end))
-        end->is_onset = true;
+    event.is_onset = true;
+    contact_event_locate(gap, series->degree, event, is_found, first);
 }
 
-static void power_contact_find_kink(const PowerContact *contact, size_t c, StepEnd *end) {
+static void power_contact_find_kink(const PowerContact *contact, const SeriesContact *at,
+                                    bool *is_found, ContactEvent *first) {
     const PowerSeries *series = &contact->series;
-    const SeriesContact *at = series->contact[c];
     double above[SERIES_ROW];
     if (!(at->terms.viscous > 0) || !at->has_force || contact->kinks > KINKS_MAX)
         return;
-    const double sign = at->is_damped ? 1 : -1;
+    const int sign = at->is_damped ? 1 : -1;
     power_series_column(series, at->damper, above);
     for (size_t k = 0; k <= series->degree; k++)
         above[k] *= sign * at->sign;
@@ -717,8 +700,8 @@ static void power_contact_find_kink(const PowerContact *contact, size_t c, StepE
     above[0] -= sign * at->terms.turn;
     if (fabs(above[0]) <= 4 * DBL_EPSILON * size)
         above[0] = 0;
-    if (power_contact_locate(above, series->degree, (ContactEvent){.damper = at->damper}, end))
-        end->kink = at->is_damped ? -1 : 1;
+    contact_event_locate(above, series->degree, (ContactEvent){.damper = at->damper, .kink = -sign},
+                         is_found, first);
 }
 
 // A contact that is over already: the gap opens from the first instant on.
@@ -737,30 +720,25 @@ static bool power_contact_find_open(const PowerContact *contact, PowerContactSte
     return false;
 }
 
-// The first event on the step. is_released: the leading contact is at its end.
-static void power_contact_find(const PowerContact *contact, bool is_released, StepEnd *end) {
+// What ends the step first. is_released: the leading contact is at its end.
+static bool power_contact_find(const PowerContact *contact, bool is_released, ContactEvent *first) {
     const ModalState *state = contact->state;
     const PowerSeries *series = &contact->series;
-    *end = (StepEnd){0};
-    if (is_released) {
-        const size_t d = series->contact[0]->damper;
-        end->is_found = true;
-        end->event = (ContactEvent){.damper = d, .s = 1, .side = state->damper[d].side};
-    }
+    const size_t leader = series->contact[0]->damper;
+    bool is_found = is_released;
+    *first = (ContactEvent){.damper = leader, .s = 1, .side = state->damper[leader].side};
     for (size_t c = 0; c < series->contact_count; c++) {
-        power_contact_find_release(contact, c, end);
-        power_contact_find_kink(contact, c, end);
+        power_contact_find_release(contact, c, &is_found, first);
+        power_contact_find_kink(contact, series->contact[c], &is_found, first);
     }
     for (size_t d = 0; d < state->dampers; d++) {
         double r[SERIES_ROW];
         if (state->damper[d].phase != PHASE_FLIGHT)
             continue;
         power_series_column(series, series->at_r + d, r);
-        if (contact_event_find_touch(state, d, r, series->degree, &end->is_found, &end->event)) {
-            end->is_onset = false;
-            end->kink = 0;
-        }
+        contact_event_find_touch(state, d, r, series->degree, &is_found, first);
     }
+    return is_found;
 }
 
 // Sets the state to that at s. is_released: the leading contact's p is exactly 0 there.
@@ -901,7 +879,7 @@ void power_contact_step(PowerContact *contact, const Slice *slice, double length
             power_contact_update(contact, d);
     if (power_contact_find_open(contact, step))
         return;
-    StepEnd end;
+    ContactEvent end;
     const double Y = power_contact_list(contact);
     const double span = power_contact_scale(contact, Y, length);
     power_series_cut(series, power_series_expand(series, state, slice, Y, span));
@@ -910,19 +888,19 @@ void power_contact_step(PowerContact *contact, const Slice *slice, double length
     const bool is_released = power_contact_cut_release(series);
     bool is_cut;
     const bool is_whole = power_contact_cut_time(series, length, &is_cut);
-    power_contact_find(contact, is_released && !is_cut, &end);
-    if (end.is_found && end.event.s < 1)
-        power_series_cut(series, end.event.s);
+    const bool is_found = power_contact_find(contact, is_released && !is_cut, &end);
+    if (is_found && end.s < 1)
+        power_series_cut(series, end.s);
     if (!state->is_shadow) {
         power_contact_integrate(contact, slice, &step->work);
         power_contact_peaks(contact, slice);
     }
-    step->is_event = end.is_found && !end.is_onset && end.kink == 0;
-    step->event = end.event;
+    step->is_event = is_found && !end.is_onset && end.kink == 0;
+    step->event = end;
     step->event.s = 1;
     power_contact_state(contact, slice, 1,
-                        step->is_event && end.event.damper == series->contact[0]->damper);
-    step->length = is_whole && !end.is_found ? length : contact->row[series->at_t];
+                        step->is_event && end.damper == series->contact[0]->damper);
+    step->length = is_whole && !is_found ? length : contact->row[series->at_t];
     if (!state->is_shadow)
         power_contact_log(contact, step->length);
     contact->kinks = step->length > 0 ? 0 : contact->kinks + 1;
@@ -930,8 +908,8 @@ void power_contact_step(PowerContact *contact, const Slice *slice, double length
         if (step->length > 0)
             series->contact[c]->kink_passed = 0;
     if (end.kink != 0) {
-        DamperState *damper = &state->damper[end.event.damper];
-        SeriesContact *at = &series->all[end.event.damper];
+        DamperState *damper = &state->damper[end.damper];
+        SeriesContact *at = &series->all[end.damper];
         damper->w = modal_state_sign(damper->side) * at->terms.turn;
         at->kink_passed = end.kink;
     }
