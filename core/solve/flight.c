@@ -65,30 +65,25 @@ Status flight_make(Flight *flight, const ModalState *state, Problem *problem) {
             return STATUS_OK;
         TRY(transition_make(&flight->transition, 1, state, NULL, problem));
     }
-    // Gains, loss and input, in whole vectors filled up with zeros.
-    double **arrays[8 + FLIGHT_SUMS + 4];
+    SimdArray arrays[8 + FLIGHT_SUMS + 4 + 3];
+    size_t count = 0;
+    const size_t padded = state->padded, own = state->diagonal == NULL ? 0 : padded;
     for (size_t i = 0; i < 4; i++) {
-        arrays[i] = &flight->gains.q[i];
-        arrays[4 + i] = &flight->gains.p[i];
-        arrays[8 + FLIGHT_SUMS + i] = &flight->input[i];
+        arrays[count++] = (SimdArray){&flight->gains.q[i], own};
+        arrays[count++] = (SimdArray){&flight->gains.p[i], own};
+        arrays[count++] = (SimdArray){&flight->input[i], own};
     }
     for (size_t i = 0; i < FLIGHT_SUMS; i++)
-        arrays[8 + i] = &flight->loss[i];
-    const size_t count = state->diagonal == NULL ? 0 : COUNT(arrays);
-    const size_t padded = state->padded;
-    const size_t starts = FLIGHT_ROWS * (2 * n + 2);
-    const size_t ends = FLIGHT_ROWS * simd_kernels_padded(2 * n + 2);
-    flight->block = calloc((count + FLIGHT_SUMS) * padded + starts + ends, sizeof *flight->block);
+        arrays[count++] = (SimdArray){&flight->loss[i], own};
+    arrays[count++] = (SimdArray){&flight->sums, FLIGHT_SUMS * padded};
+    arrays[count++] = (SimdArray){&flight->gained, FLIGHT_ROWS * simd_kernels_padded(2 * n + 2)};
+    arrays[count++] = (SimdArray){&flight->start, FLIGHT_ROWS * (2 * n + 2)};
+    flight->block = simd_kernels_allocate(arrays, count);
     if (flight->block == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu modes", n);
-    for (size_t i = 0; i < count; i++)
-        *arrays[i] = flight->block + i * padded;
-    flight->sums = flight->block + count * padded;
-    flight->start = flight->sums + FLIGHT_SUMS * padded;
-    flight->gained = flight->start + starts;
     flight->length = state->interval;
     flight_ground(state->base_omega, flight->length, flight->ground, flight->fall);
-    for (size_t i = 0; i < n && count > 0; i++)
+    for (size_t i = 0; i < n && own > 0; i++)
         TRY(flight_make_mode(flight, state, i, problem));
     return STATUS_OK;
 }

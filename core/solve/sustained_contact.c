@@ -30,15 +30,15 @@ Status sustained_contact_make(SustainedContact *press, const ModalState *state, 
     memset(press, 0, sizeof *press);
     if (state->plan->form != CONTACT_LINEAR || state->dampers == 0)
         return STATUS_OK;
+    const SimdArray arrays[] = {{&press->start, size},
+                                {&press->gained, size},
+                                {&press->pulled, size},
+                                {&press->elastic, state->padded}};
     press->stops = calloc(2 * state->dampers, sizeof *press->stops);
-    press->block = calloc(3 * size + state->padded, sizeof *press->block);
+    press->block = simd_kernels_allocate(arrays, COUNT(arrays));
     if (press->stops == NULL || press->block == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu modes", n);
     press->count = 2 * state->dampers;
-    press->start = press->block;
-    press->gained = press->start + size;
-    press->pulled = press->gained + size;
-    press->elastic = press->pulled + size;
     for (size_t i = 0; i < PRESS_LEVELS; i++) {
         press->length[i] = ldexp(state->interval, -(int)i);
         flight_ground(state->base_omega, press->length[i], press->ground[i], press->fall[i]);

@@ -12,7 +12,7 @@ typedef struct Transition {
     size_t rows;      // of the matrices, filled up with zeros: each component of y has a column
     double *gain;     // increment of (q, r, p, w)
     double *loss;     // symmetric: y' loss y is lost in the structure
-    double *contact;  // likewise: in the contact; NULL in flight
+    double *contact;  // likewise: in the contact
     double *input[2]; // -(value input[0] + slope input[1]) . y is the base's work on the structure,
                       // and on the damper in contact
     double *block;    // NULL where there is none
