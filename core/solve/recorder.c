@@ -294,12 +294,11 @@ void recorder_peaks(ModalState *state) {
     recorder_acceleration(state);
 }
 
-// Statistics begin here.
 static void recorder_restart_peaks(ModalState *state) {
-    Instant at = {0};
+    double force = 0;
     for (size_t d = 0; d < state->dampers; d++)
-        at.force = fmax(at.force, fabs(state->damper[d].force));
-    impact_log_forget_peaks(&state->impacts, &at);
+        force = fmax(force, fabs(state->damper[d].force));
+    impact_log_restart_peaks(&state->impacts, force);
 }
 
 void recorder_flight(Recorder *record, ModalState *state, size_t count) {
@@ -359,15 +358,9 @@ void recorder_update(ModalState *state) {
 }
 
 Status recorder_finish_log(ModalState *state) {
-    ImpactRow *rows = calloc(state->dampers + 1, sizeof *rows);
-    if (rows == NULL)
-        return problem_set(state->problem, STATUS_NO_MEMORY, "no memory for the list of impacts");
     for (size_t d = 0; d < state->dampers; d++)
-        rows[d] = state->damper[d].row;
+        impact_log_end(&state->impacts, &state->damper[d].row);
     const EnergyState energy = modal_state_energy(state);
-    const Status status =
-        impact_log_finish(&state->impacts, rows, state->dampers, &energy, state->problem);
-    impact_log_count(&state->impacts, &state->run->work);
-    free(rows);
-    return status;
+    return impact_log_finish(&state->impacts, state->dampers, &energy, &state->run->work,
+                             state->problem);
 }

@@ -1001,10 +1001,8 @@ static Status single_mass_solve(SingleMass *single) {
     rounding_growth_report(&single->growth, single->impacts.response);
     TRY(single_mass_check(single));
     const EnergyState energy = single_mass_energy(single);
-    const Status status =
-        impact_log_finish(&single->impacts, &single->row, 1, &energy, single->problem);
-    impact_log_count(&single->impacts, &single->run->work);
-    return status;
+    impact_log_end(&single->impacts, &single->row);
+    return impact_log_finish(&single->impacts, 1, &energy, &single->run->work, single->problem);
 }
 
 static Status single_mass_run_with(SingleMass *single, Run *run, Response *response,

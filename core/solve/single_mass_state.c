@@ -142,9 +142,7 @@ void single_mass_pass(SingleMass *single) {
         single_mass_flush(single);
     single->sample++;
     single->offset = 0;
-    if (is_start) {
-        const Instant at = single_mass_instant(single);
-        impact_log_forget_peaks(&single->impacts, &at);
-    }
+    if (is_start)
+        impact_log_restart_peaks(&single->impacts, single_mass_instant(single).force);
     single_mass_record(single);
 }
