@@ -12,7 +12,7 @@
 // at once, and a stop that would have to pull leaves. Each round reduces the residual, so no set
 // occurs twice. Momentum is conserved for any impulses. No energy is gained, for each stop that
 // presses takes impulse (approach - separation) / 2.
-#include "core/solve/collision.h"
+#include "core/solve/engine.h"
 
 #include <float.h>
 #include <math.h>

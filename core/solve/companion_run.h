@@ -4,7 +4,7 @@
 #ifndef CORE_SOLVE_COMPANION_RUN_H
 #define CORE_SOLVE_COMPANION_RUN_H
 
-#include "core/solve/event_engine.h"
+#include "core/solve/engine.h"
 
 enum { COMPANION_SAMPLES = FLIGHT_BUFFER_MAX };
 

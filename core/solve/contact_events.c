@@ -9,18 +9,16 @@
 //        +--(impulse)--> u' -> -e u' -----------------------------------> RESTING(side)
 //                                                push becomes tensile -> FLIGHT
 //
-// Under the impulse law an impact is a collision (collision.h) of all masses that reach their stops
+// Under the impulse law an impact is a collision (collision.c) of all masses that reach their stops
 // within the clock's resolution, and of all that rest: a resting one stays or parts. Bounces
 // against a stop that pushes form a geometric series. The mass rests when the rest of the series
 // takes less time than the clock resolves, or after many bounces at one instant.
-#include "core/solve/contact_events.h"
+#include "core/solve/engine.h"
 
 #include <float.h>
 #include <math.h>
 
 #include "core/plan/plan.h"
-#include "core/solve/collision.h"
-#include "core/solve/recorder.h"
 
 enum { EVENTS_AT_INSTANT_MAX = 1000 }; // of each damper
 enum { STILL_BOUNCES = 64 };

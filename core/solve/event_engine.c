@@ -1,10 +1,10 @@
 // The motion between two events takes one of four kinds of step: whole sample intervals of flight,
-// where a bound on the curvature of the gaps proves that no stop is reached (flight.h); long steps
-// of a mass pressed to a stiff stop that it surely does not leave (sustained_contact.h); steps of
-// contact under power laws (power_contact.h); and Taylor steps, whose polynomials locate events to
-// rounding (taylor_step.h). Time is the number of a sample and an offset, so that short contacts
+// where a bound on the curvature of the gaps proves that no stop is reached (flight.c); long steps
+// of a mass pressed to a stiff stop that it surely does not leave (sustained_contact.c); steps of
+// contact under power laws (power_contact.c); and Taylor steps, whose polynomials locate events to
+// rounding (taylor_step.c). Time is the number of a sample and an offset, so that short contacts
 // keep their digits late in a run.
-#include "core/solve/event_engine.h"
+#include "core/solve/engine.h"
 
 #include <float.h>
 #include <math.h>

@@ -9,9 +9,7 @@
 #include <string.h>
 
 #include "core/solve/companion_run.h"
-#include "core/solve/event_engine.h"
-#include "core/solve/power_contact.h"
-#include "core/solve/recorder.h"
+#include "core/solve/engine.h"
 #include "core/solve/single_mass.h"
 
 double exact_tolerance(const Accuracy *accuracy) {

@@ -3,7 +3,7 @@
 //
 // With V^2 = p'p + q'W^2 q, V' <= growth V + |participation| |a_g|, and |r''| <= elastic_bound V +
 // |base_coupling| |a_g|. So r stays within length^2 max|r''| / 8 of its chord.
-#include "core/solve/flight.h"
+#include "core/solve/engine.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -15,7 +15,7 @@
 // forces are smooth enough meanwhile. N is left out below the penetration where it would change the
 // mass's speed by less than the error. This starts contacts that have no series: a touch without
 // speed, or an exponent that no root makes an integer.
-#include "core/solve/power_contact.h"
+#include "core/solve/engine.h"
 
 #include <float.h>
 #include <math.h>
@@ -23,7 +23,6 @@
 #include <string.h>
 
 #include "core/contact/power_law.h"
-#include "core/solve/recorder.h"
 #include "core/solve/wide.h"
 
 // Pairs fill the registers that every processor has.

@@ -2,7 +2,7 @@
 // peak, and the bound "sum over modes of |q_i| times the largest |shape| of any storey" shows it
 // without the storeys. Sums of squares are taken over pairs of modes, several samples at a time,
 // and converted to the storeys at the end.
-#include "core/solve/recorder.h"
+#include "core/solve/engine.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -5,7 +5,7 @@
 #include <math.h>
 
 #include "core/solve/base_motion_cursor.h"
-#include "core/solve/event_engine.h"
+#include "core/solve/engine.h"
 #include "core/solve/lanes.h"
 #include "core/solve/motion_table.h"
 #include "core/solve/rounding_growth.h"

@@ -19,7 +19,7 @@
 #include <string.h>
 
 #include "core/plan/plan.h"
-#include "core/solve/collision.h"
+#include "core/solve/engine.h"
 
 ContactForce step_contact_force(const ModalState *state, size_t d, double r, double w) {
     const DamperState *damper = &state->damper[d];

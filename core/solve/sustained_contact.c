@@ -12,7 +12,7 @@
 //
 // A softer contact lasts through a step where r at both ends is further from 0 than r'' can bend
 // it. Where N is surely monotonic its peak is at an end.
-#include "core/solve/sustained_contact.h"
+#include "core/solve/engine.h"
 
 #include <math.h>
 #include <stdlib.h>

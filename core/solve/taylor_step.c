@@ -5,7 +5,7 @@
 //   N_ek)
 // with N_k = k r_k + c (k + 1) r_{k+1} / length in contact. At rest N_k = constraint_mass .
 // (base_coupling a_k + shape . e_k), which makes r_{k+2} 0.
-#include "core/solve/taylor_step.h"
+#include "core/solve/engine.h"
 
 #include <math.h>
 #include <stdlib.h>

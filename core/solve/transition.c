@@ -3,7 +3,7 @@
 // the time is doubled: T becomes 2 T + T T, and F becomes F + (I + T)' F (I + T). Zhong and
 // Williams, Computers & Structures 56 (1995) 113-120. All in long double. Products skip the zeros
 // of their left factor, so that uncoupled modes stay apart.
-#include "core/solve/transition.h"
+#include "core/solve/engine.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "core/solve/collision.h"
+#include "core/solve/engine.h"
 #include "tests/support/frames.h"
 
 static const Base still = {.form = BASE_STILL};

@@ -10,7 +10,7 @@
 
 #include <cmocka.h>
 
-#include "core/solve/power_contact.h"
+#include "core/solve/engine.h"
 #include "tests/support/frames.h"
 
 static Problem problem;
