@@ -6,7 +6,6 @@
 #include <string.h>
 
 #include "core/math/linear_system.h"
-#include "core/math/symmetric_matrix.h"
 
 double modal_state_time(const ModalState *state) {
     return (double)state->sample / state->plan->sample_rate + state->offset;
@@ -210,8 +209,6 @@ void modal_state_constrain(ModalState *state) {
         (void)linear_system_solve(left, right, n, n); // positive definite
 }
 
-static const double NEARLY = 1e-9; // relative
-
 // (M^-1)_jk from the modes; 0 where it is only rounding, so that an impact on one storey does not
 // move a mass that rests on another.
 static double modal_state_mobility(const Modes *modes, size_t j, size_t k) {
@@ -260,47 +257,29 @@ static void modal_state_make_damper(ModalState *state, size_t d) {
     damper->elastic_bound = sqrt(stiff) + sqrt(size) * state->viscous;
 }
 
-// Growth rate of the energy by a damping matrix that is not quite positive, from its symmetric
-// part.
-static double modal_state_find_growth(const double *even_part, size_t n) {
-    double lowest = 0, largest = 0;
-    for (size_t i = 0; i < n; i++) {
-        const double own = even_part[i * n + i];
-        double others = 0;
-        for (size_t j = 0; j < n; j++)
-            others += j == i ? 0 : fabs(even_part[i * n + j]);
-        lowest = fmin(lowest, own - others); // Gershgorin
-        largest = fmax(largest, own);
-    }
-    // D dissipates but for rounding if, scaled to a unit diagonal, D + NEARLY I is positive
-    // definite.
-    return symmetric_matrix_find_indefinite(n, even_part, NEARLY) == 0 ? NEARLY * largest : -lowest;
-}
+// Growth rate of the energy over the largest damping of a mode: a scene's damping dissipates but
+// for rounding.
+static const double NEARLY = 1e-9;
 
-// D, which need not be symmetric, its norm and the growth rate.
+// D, which need not be symmetric, and its norm.
 static Status modal_state_make_damping(ModalState *state) {
     const size_t n = state->mode_count;
     const double *damping = state->damping = state->modes->damping;
-    double *even_part = calloc(n * n, sizeof *even_part);
-    if (even_part == NULL)
-        return STATUS_NO_MEMORY;
-    double rows = 0, columns = 0, squares = 0;
+    double rows = 0, columns = 0, squares = 0, largest = 0;
     for (size_t i = 0; i < n; i++) {
         double row = 0, column = 0;
         for (size_t j = 0; j < n; j++) {
-            const double here = damping[i * n + j], there = damping[j * n + i];
-            row += fabs(here);
-            column += fabs(there);
-            squares += here * here;
-            even_part[i * n + j] = (here + there) / 2;
+            row += fabs(damping[i * n + j]);
+            column += fabs(damping[j * n + i]);
+            squares += damping[i * n + j] * damping[i * n + j];
         }
         rows = fmax(rows, row);
         columns = fmax(columns, column);
         state->diagonal[i] = damping[i * n + i];
+        largest = fmax(largest, state->diagonal[i]);
     }
     state->viscous = fmin(sqrt(rows * columns), sqrt(squares));
-    state->growth = modal_state_find_growth(even_part, n);
-    free(even_part);
+    state->growth = NEARLY * largest;
     if (state->modes->is_classical)
         return STATUS_OK;
     state->diagonal = NULL;
