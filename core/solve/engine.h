@@ -222,7 +222,7 @@ double sustained_contact_step(SustainedContact *press, ModalState *state, const 
 // which the motion is analytic at the start and at the end of a contact, with the events located on
 // the series. Flight has steps of its own.
 
-enum { SERIES_ROW = 28, SERIES_NODES = 8, SERIES_POWERS = 20 };
+enum { SERIES_ROW = 28, SERIES_POWERS = 20 };
 
 // The contact force in terms of Y = p^(1/root).
 typedef struct SeriesLaw {
@@ -287,8 +287,6 @@ typedef struct PowerSeries {
     size_t contact_count;
     int root;                           // of the leading contact; 1: tau is t
     SeriesFactor powers[SERIES_POWERS]; // of Y
-    double node_power[LINEAR_MOTION_RULES]
-                     [SERIES_ROW * SERIES_NODES]; // powers of the nodes of linear_motion_rules
 } PowerSeries;
 
 // Expands the motion from the present state, with the leading contact at Y, over `length` in tau.
@@ -310,13 +308,13 @@ static inline const double *power_series_leader(const PowerSeries *series) {
 
 typedef struct PowerContact {
     ModalState *state;
-    double tolerance;              // relative error of one contact
-    PowerSeries series;            // of the last integration step
-    double *row, *elastic, *nodes; // scratch; speeds of all modes or dampers at quadrature nodes
-    double last_length;            // of the last series in its tau, before events cut it
-    int last_root;                 // its root
-    size_t kinks;                  // passed in a row in no time
-    double *block;                 // NULL if no contact is under a power law
+    double tolerance;      // relative error of one contact
+    PowerSeries series;    // of the last integration step
+    double *row, *elastic; // scratch
+    double last_length;    // of the last series in its tau, before events cut it
+    int last_root;         // its root
+    size_t kinks;          // passed in a row in no time
+    double *block;         // NULL if no contact is under a power law
 } PowerContact;
 
 // One integration step.

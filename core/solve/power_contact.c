@@ -379,23 +379,6 @@ void power_series_at(const PowerSeries *series, double s, double *row) {
     }
 }
 
-// Evaluates the polynomial c, whose coefficients are `stride` values apart, at the nodes of
-// linear_motion_rules[rule]; writes SERIES_NODES values.
-static void power_series_nodes(const PowerSeries *series, size_t rule, const double *c,
-                               size_t stride, size_t degree, double *out) {
-    const double *power = series->node_power[rule];
-    Two sum[SERIES_NODES / 2] = {{0}};
-    for (size_t k = 0; k <= degree; k++, power += SERIES_NODES) {
-        const double of = c[k * stride];
-        sum[0] += of * TWO(power);
-        sum[1] += of * TWO(power + 2);
-        sum[2] += of * TWO(power + 4);
-        sum[3] += of * TWO(power + 6);
-    }
-    for (size_t i = 0; i < SERIES_NODES / 2; i++)
-        PUT_TWO(out + 2 * i, sum[i]);
-}
-
 enum { ORDER_MAX = 22, KINKS_MAX = 8 };
 
 static const double STEP_PART = 0.1; // truncation error of a step over the contact's tolerance
@@ -436,18 +419,12 @@ Status power_contact_make(PowerContact *contact, ModalState *state, double toler
         {&contact->elastic, state->padded},
         {&series->elastic, n},
         {&series->inverse_modal, n},
-        {&contact->nodes, SERIES_NODES * (m + n)},
     };
     contact->block = simd_kernels_allocate(arrays, COUNT(arrays));
     if (series->all == NULL || series->contact == NULL || contact->block == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for contacts of %zu dampers", m);
     for (size_t d = 0; d < m; d++)
         series->all[d].damper = d;
-    for (size_t i = 0; i < LINEAR_MOTION_RULES; i++)
-        for (size_t node = 0; node < linear_motion_rules[i].count; node++)
-            for (size_t k = 0; k < SERIES_ROW; k++)
-                series->node_power[i][k * SERIES_NODES + node] =
-                    pow(linear_motion_rules[i].node[node], (double)k);
     return STATUS_OK;
 }
 
@@ -763,72 +740,48 @@ static void power_contact_state(PowerContact *contact, const Slice *slice, doubl
     state->base_acceleration = slice_at(slice, row[series->at_t]);
 }
 
-// Evaluates the modal speeds at the nodes of a rule, and p' D p there into `loss`.
-static void power_contact_losses(PowerContact *contact, size_t rule, double *loss) {
-    const ModalState *state = contact->state;
-    const PowerSeries *series = &contact->series;
-    const size_t n = state->mode_count, count = linear_motion_rules[rule].count;
-    memset(loss, 0, SERIES_NODES * sizeof *loss);
-    for (size_t i = 0; i < n; i++) {
-        double *p = contact->nodes + i * SERIES_NODES;
-        power_series_nodes(series, rule, series->z + series->at_p + i, series->stride,
-                           series->degree, p);
-        for (size_t k = 0; k < count && state->diagonal != NULL; k++)
-            loss[k] += state->diagonal[i] * p[k] * p[k];
-    }
-    for (size_t i = 0; i < n && state->diagonal == NULL; i++)
-        for (size_t j = 0; j < n; j++) {
-            const double *a = contact->nodes + i * SERIES_NODES,
-                         *b = contact->nodes + j * SERIES_NODES;
-            for (size_t k = 0; k < count; k++)
-                loss[k] += state->damping[i * n + j] * a[k] * b[k];
-        }
+// p' D p.
+static double power_contact_loss(const ModalState *state, const double *p) {
+    const size_t n = state->mode_count;
+    double loss = 0;
+    for (size_t i = 0; i < n; i++)
+        loss += p[i] * (state->diagonal != NULL ? state->diagonal[i] * p[i]
+                                                : modal_state_dot(state->damping + i * n, p, n));
+    return loss;
 }
 
 // Integrates over the step by Gauss-Legendre quadrature: the work of the base, the losses, and
 // impulse and work of each N.
 static void power_contact_integrate(PowerContact *contact, const Slice *slice, StepWork *work) {
     const ModalState *state = contact->state;
-    const PowerSeries *series = &contact->series;
-    const size_t rule = contact->series.error > 1e-8 ? 0 : LINEAR_MOTION_RULES - 1,
-                 count = linear_motion_rules[rule].count;
-    const size_t n = state->mode_count, m = state->dampers, degree = series->degree;
-    double weight[SERIES_NODES], Y[SERIES_NODES], ground[SERIES_NODES], loss[SERIES_NODES],
-        momentum[SERIES_NODES] = {0};
-    power_series_nodes(series, rule, power_series_leader(series), 1, degree, Y);
-    power_series_nodes(series, rule, series->z + (series->is_sine ? series->at_a : series->at_t),
-                       series->stride, degree, ground);
-    power_contact_losses(contact, rule, loss);
-    for (size_t i = 0; i < n; i++)
-        for (size_t k = 0; k < count; k++)
-            momentum[k] += state->momentum_weights[i] * contact->nodes[i * SERIES_NODES + k];
-    for (size_t d = 0; d < m; d++) {
-        double *w = contact->nodes + d * SERIES_NODES; // the modal speeds are used up
-        power_series_nodes(series, rule, series->z + d, series->stride, degree, w);
-        for (size_t k = 0; k < count; k++)
-            momentum[k] += state->damper[d].plan->mass * w[k];
-    }
-    for (size_t k = 0; k < count; k++) {
-        weight[k] = linear_motion_rules[rule].weight[k] * series->length * series->root;
+    PowerSeries *series = &contact->series;
+    const Quadrature *rule =
+        &linear_motion_rules[series->error > 1e-8 ? 0 : LINEAR_MOTION_RULES - 1];
+    const double *w = contact->row, *p = w + series->at_p;
+    for (size_t c = 0; c < series->contact_count; c++)
+        series->contact[c]->impulse = series->contact[c]->work = 0;
+    for (size_t k = 0; k < rule->count; k++) {
+        const double s = rule->node[k];
+        power_series_at(series, s, contact->row);
+        const double Y = polynomial_value(power_series_leader(series), series->degree, s);
+        const double ground = series->is_sine ? w[series->at_a] : slice_at(slice, w[series->at_t]);
+        double weight = rule->weight[k] * series->length * series->root;
         for (int i = 1; i < series->root; i++)
-            weight[k] *= Y[k];
-        ground[k] = series->is_sine ? ground[k] : slice_at(slice, ground[k]);
-        work->input -= weight[k] * ground[k] * momentum[k];
-        work->damping += weight[k] * loss[k];
-        work->ground += weight[k] * ground[k];
-    }
-    for (size_t c = 0; c < series->contact_count; c++) {
-        SeriesContact *at = series->contact[c];
-        const double *w = contact->nodes + at->damper * SERIES_NODES;
-        double force[SERIES_NODES];
-        at->impulse = at->work = 0;
-        if (!at->has_force)
-            continue;
-        power_series_nodes(series, rule, at->force, 1, degree - 1, force);
-        for (size_t k = 0; k < count; k++) {
-            const double impulse = weight[k] * at->sign * force[k];
+            weight *= Y;
+        double momentum = modal_state_dot(state->momentum_weights, p, state->mode_count);
+        for (size_t d = 0; d < state->dampers; d++)
+            momentum += state->damper[d].plan->mass * w[d];
+        work->input -= weight * ground * momentum;
+        work->damping += weight * power_contact_loss(state, p);
+        work->ground += weight * ground;
+        for (size_t c = 0; c < series->contact_count; c++) {
+            SeriesContact *at = series->contact[c];
+            if (!at->has_force)
+                continue;
+            const double impulse =
+                weight * at->sign * polynomial_value(at->force, series->degree - 1, s);
             at->impulse += impulse;
-            at->work += impulse * w[k];
+            at->work += impulse * w[at->damper];
         }
     }
 }
