@@ -8,21 +8,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-// The mode shape at a column's storey, or at the storey of its damper.
-static const double *recorder_shape(const ModalState *state, const RunColumn *column) {
-    switch (column->channel) {
-    case CHANNEL_DISPLACEMENT:
-    case CHANNEL_VELOCITY:
-    case CHANNEL_ACCELERATION:
-    case CHANNEL_MEAN_ACCELERATION:
-        return state->modes->shapes + column->number * state->mode_count;
-    case CHANNEL_BASE_ACCELERATION:
-        return state->modes->shapes; // not used
-    default:
-        return state->damper[column->number].shape;
-    }
-}
-
 Status recorder_start(Recorder *record, const ModalState *state, Response *response,
                       Problem *problem) {
     const size_t n = state->mode_count, columns = state->run->column_count, padded = state->padded;
@@ -52,7 +37,12 @@ Status recorder_start(Recorder *record, const ModalState *state, Response *respo
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu modes", n);
     for (size_t i = 0; i < columns; i++) {
         const RunColumn *column = &state->run->columns[i];
-        memcpy(record->shapes + i * padded, recorder_shape(state, column),
+        const ChannelOwner owner = channels[column->channel].owner;
+        const size_t storey = owner == CHANNEL_OF_STOREY ? column->number
+                              : owner == CHANNEL_OF_DAMPER
+                                  ? state->plan->dampers[column->number].storey
+                                  : 0;
+        memcpy(record->shapes + i * padded, state->modes->shapes + storey * n,
                n * sizeof *record->shapes);
         if (state->residual_influence != NULL && column->channel == CHANNEL_ACCELERATION)
             record->shapes[i * padded + n] = -state->residual_influence[column->number];
@@ -127,24 +117,18 @@ static void recorder_write_damper(Recorder *record, const ModalState *state, siz
                                 : 0;
 }
 
+// Writes rows 1 to `count` of the buffer with the present forces.
 static void recorder_write_column(Recorder *record, const ModalState *state, size_t column,
                                   size_t count) {
     const size_t first = state->sample + 1 - count;
     double *values = state->run->columns[column].values + first;
-    switch (state->run->columns[column].channel) {
-    case CHANNEL_DISPLACEMENT:
-    case CHANNEL_VELOCITY:
-    case CHANNEL_ACCELERATION:
-    case CHANNEL_MEAN_ACCELERATION:
+    const ChannelOwner owner = channels[state->run->columns[column].channel].owner;
+    if (owner == CHANNEL_OF_STOREY)
         recorder_write_storey(record, state, column, values, count);
-        return;
-    case CHANNEL_BASE_ACCELERATION:
-        for (size_t k = 0; k < count; k++)
-            values[k] = base_cursor_at(&state->base, first + k);
-        return;
-    default:
+    else if (owner == CHANNEL_OF_DAMPER)
         recorder_write_damper(record, state, column, values, count);
-    }
+    for (size_t k = 0; k < count && owner == CHANNEL_OF_BASE; k++)
+        values[k] = base_cursor_at(&state->base, first + k);
 }
 
 static void recorder_add_batch(Recorder *record, const ModalState *state, size_t count) {
@@ -168,7 +152,6 @@ static void recorder_add_squares(Recorder *record, const ModalState *state, size
         recorder_add_batch(record, state, FLIGHT_BUFFER_MAX);
 }
 
-// Writes rows 1 to `count` of the buffer with the present forces.
 static void recorder_write(Recorder *record, const ModalState *state, size_t count) {
     for (size_t i = 0; i < state->run->column_count; i++)
         recorder_write_column(record, state, i, count);
