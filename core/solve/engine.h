@@ -264,6 +264,7 @@ typedef struct SeriesContact {
     double inverse_speed, inverse_force;   // 1 / scale of p' [s/m], of N [1/N]
     SeriesFactor speeds, elastic, viscous; // p', and the powers of p in N
     double force[SERIES_ROW];              // N
+    double node_force[8];                  // at the nodes of a Quadrature
 } SeriesContact;
 
 // The series of one integration step in s = tau / length, 0 <= s <= 1. The transformed time tau has

@@ -740,6 +740,16 @@ static void power_contact_state(PowerContact *contact, const Slice *slice, doubl
     state->base_acceleration = slice_at(slice, row[series->at_t]);
 }
 
+// Horner's scheme at all nodes of a rule.
+static void power_contact_nodes(const Quadrature *rule, const double *c, size_t degree,
+                                double *values) {
+    for (size_t k = 0; k < COUNT(rule->node); k++)
+        values[k] = c[degree];
+    for (size_t i = degree; i-- > 0;)
+        for (size_t k = 0; k < COUNT(rule->node); k++)
+            values[k] = values[k] * rule->node[k] + c[i];
+}
+
 // p' D p.
 static double power_contact_loss(const ModalState *state, const double *p) {
     const size_t n = state->mode_count;
@@ -758,16 +768,19 @@ static void power_contact_integrate(PowerContact *contact, const Slice *slice, S
     const Quadrature *rule =
         &linear_motion_rules[series->error > 1e-8 ? 0 : LINEAR_MOTION_RULES - 1];
     const double *w = contact->row, *p = w + series->at_p;
-    for (size_t c = 0; c < series->contact_count; c++)
-        series->contact[c]->impulse = series->contact[c]->work = 0;
+    double Y[COUNT(rule->node)];
+    power_contact_nodes(rule, power_series_leader(series), series->degree, Y);
+    for (size_t c = 0; c < series->contact_count; c++) {
+        SeriesContact *at = series->contact[c];
+        at->impulse = at->work = 0;
+        power_contact_nodes(rule, at->force, series->degree - 1, at->node_force);
+    }
     for (size_t k = 0; k < rule->count; k++) {
-        const double s = rule->node[k];
-        power_series_at(series, s, contact->row);
-        const double Y = polynomial_value(power_series_leader(series), series->degree, s);
+        power_series_at(series, rule->node[k], contact->row);
         const double ground = series->is_sine ? w[series->at_a] : slice_at(slice, w[series->at_t]);
         double weight = rule->weight[k] * series->length * series->root;
         for (int i = 1; i < series->root; i++)
-            weight *= Y;
+            weight *= Y[k];
         double momentum = modal_state_dot(state->momentum_weights, p, state->mode_count);
         for (size_t d = 0; d < state->dampers; d++)
             momentum += state->damper[d].plan->mass * w[d];
@@ -776,10 +789,7 @@ static void power_contact_integrate(PowerContact *contact, const Slice *slice, S
         work->ground += weight * ground;
         for (size_t c = 0; c < series->contact_count; c++) {
             SeriesContact *at = series->contact[c];
-            if (!at->has_force)
-                continue;
-            const double impulse =
-                weight * at->sign * polynomial_value(at->force, series->degree - 1, s);
+            const double impulse = weight * at->sign * at->node_force[k];
             at->impulse += impulse;
             at->work += impulse * w[at->damper];
         }
