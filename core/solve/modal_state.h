@@ -40,11 +40,10 @@ typedef struct DamperState {
     // r.
     double storey_speed, gained;
     // Of a collision: speed towards the stop and required speed away from it [m/s], and the impulse
-    // [N s]. is_pressing, is_finished and wanted are scratch of collision_resolve.
+    // [N s].
     bool in_collision, is_bounced; // is_bounced: takes part, not from rest
     double approach_speed, separation_speed, impulse;
-    bool is_pressing, is_finished;
-    double wanted;
+    bool is_pressing; // scratch of collision_resolve
 } DamperState;
 
 // In modal coordinates, x = shapes q:
