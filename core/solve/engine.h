@@ -128,10 +128,6 @@ void transition_clear(Transition *transition);
 Status transition_increment(const ModalState *state, double length, double *increment,
                             Problem *problem);
 
-// y' form y; `scratch` has `rows` values.
-double transition_form(const Transition *transition, const SimdKernels *lanes, const double *form,
-                       const double *y, double *scratch);
-
 // --- flight.c: flight of all masses over whole sample intervals, one step each, with tables made
 // once per run. Exact for a still base, one that is linear over the interval, and a sine. A bound
 // on the curvature of each gap proves that no stop is reached. Contacts and parts of intervals:
@@ -413,7 +409,6 @@ Status event_engine_settle(EventEngine *engine);
 
 // Moves to the next sample or several, at most to sample `until`, and records them.
 Status event_engine_step(EventEngine *engine, size_t until);
-void event_engine_take_sample(EventEngine *engine);
 
 // Moves from the present instant to the next sample, and records it.
 Status event_engine_finish_interval(EventEngine *engine);

@@ -110,13 +110,7 @@ static void event_engine_accept(EventEngine *engine, const ContactEvent *hit) {
     }
 }
 
-// Of a single mass on a single storey.
-static State event_engine_single_state(const ModalState *state) {
-    const double shape = state->modes->shapes[0];
-    return (State){state->q[0] * shape, state->p[0] * shape, state->damper[0].r,
-                   state->damper[0].w};
-}
-
+// `growth` is that of a single mass on a single storey.
 static Status event_engine_apply(EventEngine *engine, const ContactEvent *event) {
     ModalState *state = &engine->state;
     RoundingGrowth *growth = engine->growth;
@@ -124,7 +118,8 @@ static Status event_engine_apply(EventEngine *engine, const ContactEvent *event)
         return contact_event_apply(state, event);
     const DamperState *damper = &state->damper[0];
     const ContactPhase phase = damper->phase;
-    const State before = event_engine_single_state(state);
+    const double shape = state->modes->shapes[0];
+    const State before = {state->q[0] * shape, state->p[0] * shape, damper->r, damper->w};
     rounding_growth_end_phase(growth, phase, damper->side, modal_state_time(state), &before,
                               state->impacts.response->peaks.displacement);
     const Status status = contact_event_apply(state, event);
@@ -313,10 +308,6 @@ static void event_engine_balance(ModalState *state) {
     impact_log_balance(&state->impacts, &energy);
 }
 
-void event_engine_take_sample(EventEngine *engine) {
-    recorder_sample(&engine->record, &engine->state);
-}
-
 // Stores the modes of the last `flown` samples, or of the present one.
 static void event_engine_track(EventEngine *engine, size_t flown) {
     const ModalState *state = &engine->state;
@@ -335,7 +326,7 @@ Status event_engine_finish_interval(EventEngine *engine) {
     state->run->work.mode_samples += state->mode_count;
     state->sample++;
     state->offset = 0;
-    event_engine_take_sample(engine);
+    recorder_sample(&engine->record, state);
     return STATUS_OK;
 }
 

@@ -51,7 +51,7 @@ static Status exact_solve(EventEngine *engine, CompanionRun *companion) {
     ModalState *state = &engine->state;
     const Plan *plan = state->plan;
     TRY(event_engine_settle(engine));
-    event_engine_take_sample(engine);
+    recorder_sample(&engine->record, state);
     companion_run_start(companion, engine);
     while (state->sample + 1 < plan->count) {
         const size_t next = (state->sample / COMPANION_SAMPLES + 1) * COMPANION_SAMPLES;

@@ -37,13 +37,6 @@ double modal_state_room(const DamperState *damper, Side side) {
     return damper->origin == (ContactOrigin)side ? 0 : damper->plan->clearance;
 }
 
-double modal_state_middle(const DamperState *damper) {
-    const double stop = damper->plan->clearance / 2;
-    const double origin =
-        damper->origin == FROM_MIDDLE ? 0 : modal_state_sign((Side)damper->origin) * stop;
-    return damper->plan->offset + origin;
-}
-
 void modal_state_elastic(const ModalState *state, const double *q, const double *p,
                          double *restrict out) {
     const size_t padded = state->padded;
@@ -118,21 +111,6 @@ double modal_state_difference(const ModalState *state, const double *q, const do
     return least;
 }
 
-double modal_state_displacement(const ModalState *state, size_t storey) {
-    return modal_state_dot(state->modes->shapes + storey * state->mode_count, state->q,
-                           state->mode_count);
-}
-
-double modal_state_storey_acceleration(const ModalState *state, size_t storey) {
-    const size_t n = state->mode_count;
-    double sum = -modal_state_dot(state->modes->shapes + storey * n, state->elastic, n);
-    if (state->residual_influence != NULL)
-        sum += state->residual_influence[storey] * state->base_acceleration;
-    for (size_t d = 0; d < state->dampers; d++)
-        sum += state->mobility[d * state->storey_count + storey] * state->damper[d].force;
-    return sum;
-}
-
 double modal_state_acceleration(const ModalState *state, size_t d) {
     const DamperState *damper = &state->damper[d];
     double sum = damper->base_coupling * state->base_acceleration +
@@ -169,10 +147,6 @@ double modal_state_size_of(const ModalState *state, const double *q, const doubl
     if (i < state->mode_count)
         squares[0] += p[i] * p[i] + state->omega2[i] * q[i] * q[i];
     return sqrt((squares[0] + squares[1]) + (squares[2] + squares[3]));
-}
-
-double modal_state_size(const ModalState *state) {
-    return modal_state_size_of(state, state->q, state->p);
 }
 
 // With lambda^2 + c lambda + k = 0 for the Rayleigh quotients c and k of any mode, |lambda| is at

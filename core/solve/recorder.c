@@ -8,6 +8,14 @@
 #include <stdlib.h>
 #include <string.h>
 
+// Displacement of the free mass relative to its storey at r = 0 [m].
+static double recorder_middle(const DamperState *damper) {
+    const double stop = damper->plan->clearance / 2;
+    const double origin =
+        damper->origin == FROM_MIDDLE ? 0 : modal_state_sign((Side)damper->origin) * stop;
+    return damper->plan->offset + origin;
+}
+
 Status recorder_start(Recorder *record, const ModalState *state, Response *response,
                       Problem *problem) {
     const size_t n = state->mode_count, columns = state->run->column_count, padded = state->padded;
@@ -44,7 +52,9 @@ Status recorder_start(Recorder *record, const ModalState *state, Response *respo
                                   : 0;
         memcpy(record->shapes + i * padded, state->modes->shapes + storey * n,
                n * sizeof *record->shapes);
-        if (state->residual_influence != NULL && column->channel == CHANNEL_ACCELERATION)
+        // Row p has 0 in the slot of a_g.
+        if (state->residual_influence != NULL && (column->channel == CHANNEL_ACCELERATION ||
+                                                  column->channel == CHANNEL_MEAN_ACCELERATION))
             record->shapes[i * padded + n] = -state->residual_influence[column->number];
     }
     record->statistics_start =
@@ -80,12 +90,11 @@ static void recorder_write_storey(Recorder *record, const ModalState *state, siz
                                                            : buffer->p;
     const double *shape = record->shapes + column * padded;
     state->lanes->dot(padded, count, shape, rows + padded, values);
-    if (channel == CHANNEL_MEAN_ACCELERATION) {
+    if (channel == CHANNEL_MEAN_ACCELERATION)
         recorder_write_means(record, state, column, values, count);
-        if (state->sample == 0)
-            values[0] = modal_state_storey_acceleration(state, storey);
-    }
-    if (channel != CHANNEL_ACCELERATION)
+    if (channel == CHANNEL_MEAN_ACCELERATION && state->sample == 0)
+        state->lanes->dot(padded, 1, shape, buffer->elastic + padded, values);
+    else if (channel != CHANNEL_ACCELERATION)
         return;
     double push = 0;
     for (size_t d = 0; d < state->dampers; d++)
@@ -102,7 +111,7 @@ static void recorder_write_damper(Recorder *record, const ModalState *state, siz
     const double *r = buffer->r + wanted->number * FLIGHT_BUFFER_ROWS + 1;
     const double *z = buffer->z + wanted->number * FLIGHT_BUFFER_ROWS + 1;
     if (wanted->channel == CHANNEL_DAMPER_DISPLACEMENT) {
-        const double middle = modal_state_middle(damper);
+        const double middle = recorder_middle(damper);
         state->lanes->dot(state->padded, count, record->shapes + column * state->padded,
                           buffer->q + state->padded, values);
         for (size_t k = 0; k < count; k++)
@@ -256,7 +265,7 @@ static void recorder_find_peaks(ModalState *state, const double *q, const double
     };
     for (size_t d = 0; d < state->dampers; d++) {
         const DamperState *damper = &state->damper[d];
-        const double middle = modal_state_middle(damper);
+        const double middle = recorder_middle(damper);
         for (size_t k = 0; k < count; k++) {
             const double relative = middle + r[d * stride + k];
             if (far[k] + fabs(relative) > at.damper_x)

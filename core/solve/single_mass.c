@@ -974,7 +974,7 @@ static Status single_mass_first_sample(SingleMass *single) {
     TRY(single_mass_need_engine(single));
     single_mass_to_engine(single);
     TRY(event_engine_settle(single->engine));
-    event_engine_take_sample(single->engine);
+    recorder_sample(&single->engine->record, &single->engine->state);
     if (!single_mass_from_engine(single) && single->plan->count > 1)
         return single_mass_by_engine(single);
     return STATUS_OK;

@@ -284,13 +284,19 @@ static bool sustained_contact_others_are_clear(const SustainedContact *press, Mo
     return true;
 }
 
+// y' form y with y at the start.
+static double sustained_contact_form(const SustainedContact *press, const Transition *transition,
+                                     const SimdKernels *lanes, const double *form) {
+    lanes->multiply(form, transition->rows, press->start, transition->size, press->pulled);
+    return modal_state_dot(press->start, press->pulled, transition->size);
+}
+
 static void sustained_contact_add_work(const SustainedContact *press, const Transition *transition,
                                        ModalState *state, DamperState *alone, const Slice *slice,
                                        double length, StepWork *work) {
     const size_t n = state->mode_count;
     const double *start = press->start, *gained = press->gained;
-    work->damping =
-        transition_form(transition, state->lanes, transition->loss, start, press->pulled);
+    work->damping = sustained_contact_form(press, transition, state->lanes, transition->loss);
     work->input = -(slice->value * modal_state_dot(transition->input[0], start, transition->size) +
                     slice->slope * modal_state_dot(transition->input[1], start, transition->size));
     for (size_t d = 0; d < state->dampers; d++) {
@@ -307,7 +313,7 @@ static void sustained_contact_add_work(const SustainedContact *press, const Tran
     impact_log_force(&state->impacts, &alone->row, fabs(force));
     impact_log_stretch(
         &state->impacts, &alone->row, length, impulse,
-        transition_form(transition, state->lanes, transition->contact, start, press->pulled));
+        sustained_contact_form(press, transition, state->lanes, transition->contact));
 }
 
 // The increments of (q, r, p, w) over a step.

@@ -308,12 +308,6 @@ Status transition_increment(const ModalState *state, double length, double *incr
                             NULL, 0, increment, problem);
 }
 
-double transition_form(const Transition *transition, const SimdKernels *lanes, const double *form,
-                       const double *y, double *scratch) {
-    lanes->multiply(form, transition->rows, y, transition->size, scratch);
-    return modal_state_dot(y, scratch, transition->size);
-}
-
 void transition_clear(Transition *transition) {
     free(transition->block);
 }
