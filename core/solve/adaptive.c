@@ -1,6 +1,6 @@
 // Error-controlled steps by ARKODE's explicit Runge-Kutta stepper (SUNDIALS) over all modes and
 // dampers together. A step ends at every sample, at every kink of the base and where a contact
-// begins or ends. Contact events follow the rules of contact_events.h, but a stop that is only
+// begins or ends. Contact events follow the rules of contact_events.c, but a stop that is only
 // grazed within a step is missed.
 //
 // The integrated vector is (q, p; r, w), then the integrals of N and N r' of each damper, the work
@@ -16,7 +16,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/solve/contact_events.h"
+#include "core/solve/engine.h"
 #include "core/solve/time_stepping.h"
 
 enum { STAGES = 13, ORDER = 8, EMBEDDED_ORDER = 7 };

@@ -9,18 +9,16 @@
 //        +--(impulse)--> u' -> -e u' -----------------------------------> RESTING(side)
 //                                                push becomes tensile -> FLIGHT
 //
-// Under the impulse law an impact is a collision (collision.h) of all masses that reach their stops
+// Under the impulse law an impact is a collision (collision.c) of all masses that reach their stops
 // within the clock's resolution, and of all that rest: a resting one stays or parts. Bounces
 // against a stop that pushes form a geometric series. The mass rests when the rest of the series
 // takes less time than the clock resolves, or after many bounces at one instant.
-#include "core/solve/contact_events.h"
+#include "core/solve/engine.h"
 
 #include <float.h>
 #include <math.h>
 
 #include "core/plan/plan.h"
-#include "core/solve/collision.h"
-#include "core/solve/recorder.h"
 
 enum { EVENTS_AT_INSTANT_MAX = 1000 }; // of each damper
 enum { STILL_BOUNCES = 64 };
@@ -256,20 +254,18 @@ Status contact_event_apply(ModalState *state, const ContactEvent *event) {
     return impact_log_status(&state->impacts, state->problem);
 }
 
-bool contact_event_locate(double *gap, size_t degree, ContactEvent candidate, bool *is_found,
+void contact_event_locate(double *gap, size_t degree, ContactEvent candidate, bool *is_found,
                           ContactEvent *first) {
     gap[0] = fmax(gap[0], 0);
     if (!polynomial_root_first(gap, degree, &candidate.s) || (*is_found && candidate.s >= first->s))
-        return false;
+        return;
     *is_found = true;
     *first = candidate;
-    return true;
 }
 
-bool contact_event_find_touch(const ModalState *state, size_t d, const double *r, size_t degree,
+void contact_event_find_touch(const ModalState *state, size_t d, const double *r, size_t degree,
                               bool *is_found, ContactEvent *first) {
     const DamperState *damper = &state->damper[d];
-    bool is_first = false;
     double reach = 0;
     for (size_t k = 0; k <= degree; k++)
         reach += fabs(r[k]);
@@ -284,10 +280,9 @@ bool contact_event_find_touch(const ModalState *state, size_t d, const double *r
         gap[0] += room;
         for (int k = 0; k < damper->zero_gap_terms && damper->origin == (ContactOrigin)side; k++)
             gap[k] = 0;
-        is_first |= contact_event_locate(
-            gap, degree, (ContactEvent){.damper = d, .side = (Side)side}, is_found, first);
+        contact_event_locate(gap, degree, (ContactEvent){.damper = d, .side = (Side)side}, is_found,
+                             first);
     }
-    return is_first;
 }
 
 // k p + c p' as coefficients, times `sign`.
@@ -306,13 +301,13 @@ static void contact_event_find_inside(const ModalState *state, const TaylorStep 
     contact_event_spring_series(damper, arc, r, -sign, gap);
     if (damper->just_begun)
         gap[0] = 0;
-    (void)contact_event_locate(
-        gap, arc->degree - 1, (ContactEvent){.damper = d, .side = damper->side, .is_inwards = true},
-        is_found, first);
+    contact_event_locate(gap, arc->degree - 1,
+                         (ContactEvent){.damper = d, .side = damper->side, .is_inwards = true},
+                         is_found, first);
     for (size_t k = 0; k <= arc->degree; k++)
         gap[k] = sign * r[k];
-    (void)contact_event_locate(gap, arc->degree, (ContactEvent){.damper = d, .side = damper->side},
-                               is_found, first);
+    contact_event_locate(gap, arc->degree, (ContactEvent){.damper = d, .side = damper->side},
+                         is_found, first);
 }
 
 static void contact_event_find_end(const ModalState *state, const TaylorStep *arc, size_t d,
@@ -338,7 +333,7 @@ static void contact_event_find_end(const ModalState *state, const TaylorStep *ar
     // A contact that has just begun again at N = 0.
     if (damper->phase == PHASE_CONTACT && by_force && damper->just_begun && damper->r != 0)
         gap[0] = 0;
-    (void)contact_event_locate(gap, degree, event, is_found, first);
+    contact_event_locate(gap, degree, event, is_found, first);
 }
 
 bool contact_event_find(const ModalState *state, const TaylorStep *arc, ContactEvent *event) {
@@ -348,8 +343,8 @@ bool contact_event_find(const ModalState *state, const TaylorStep *arc, ContactE
     state->run->work.stop_searches++;
     for (size_t d = 0; d < state->dampers && !(is_found && event->s == 0); d++) {
         if (state->damper[d].phase == PHASE_FLIGHT)
-            (void)contact_event_find_touch(state, d, taylor_step_r(arc, d), arc->degree, &is_found,
-                                           event);
+            contact_event_find_touch(state, d, taylor_step_r(arc, d), arc->degree, &is_found,
+                                     event);
         else if (state->damper[d].phase == PHASE_INSIDE)
             contact_event_find_inside(state, arc, d, &is_found, event);
         else

@@ -1,10 +1,10 @@
 // The motion between two events takes one of four kinds of step: whole sample intervals of flight,
-// where a bound on the curvature of the gaps proves that no stop is reached (flight.h); long steps
-// of a mass pressed to a stiff stop that it surely does not leave (sustained_contact.h); steps of
-// contact under power laws (power_contact.h); and Taylor steps, whose polynomials locate events to
-// rounding (taylor_step.h). Time is the number of a sample and an offset, so that short contacts
+// where a bound on the curvature of the gaps proves that no stop is reached (flight.c); long steps
+// of a mass pressed to a stiff stop that it surely does not leave (sustained_contact.c); steps of
+// contact under power laws (power_contact.c); and Taylor steps, whose polynomials locate events to
+// rounding (taylor_step.c). Time is the number of a sample and an offset, so that short contacts
 // keep their digits late in a run.
-#include "core/solve/event_engine.h"
+#include "core/solve/engine.h"
 
 #include <float.h>
 #include <math.h>
@@ -110,46 +110,25 @@ static void event_engine_accept(EventEngine *engine, const ContactEvent *hit) {
     }
 }
 
-// Of a single mass on a single storey.
-static State event_engine_single_state(const ModalState *state) {
-    const double shape = state->modes->shapes[0];
-    return (State){state->q[0] * shape, state->p[0] * shape, state->damper[0].r,
-                   state->damper[0].w};
-}
-
-static void event_engine_grow_to_event(RoundingGrowth *growth, const ModalState *state) {
-    const DamperState *damper = &state->damper[0];
-    const State at = event_engine_single_state(state);
-    const double time = modal_state_time(state),
-                 largest = state->impacts.response->peaks.displacement;
-    if (damper->phase == PHASE_FLIGHT)
-        rounding_growth_flight(growth, time, &at, largest);
-    else if (damper->phase == PHASE_CONTACT)
-        rounding_growth_contact(growth, damper->side, time, &at, largest);
-    else
-        rounding_growth_rest(growth, time, &at, largest);
-}
-
-static void event_engine_grow_over_event(RoundingGrowth *growth, const ModalState *state,
-                                         ContactPhase phase, const State *before) {
-    const DamperState *damper = &state->damper[0];
-    if (phase == PHASE_FLIGHT && state->plan->form == CONTACT_IMPULSIVE &&
-        damper->plan->clearance > 0)
-        rounding_growth_bounce(growth, damper->contact.restitution, before->w,
-                               state->diagonal[0] * before->v + state->omega2[0] * before->x);
-    if (damper->phase == PHASE_RESTING)
-        rounding_growth_stick(growth);
-}
-
+// `growth` is that of a single mass on a single storey.
 static Status event_engine_apply(EventEngine *engine, const ContactEvent *event) {
     ModalState *state = &engine->state;
-    if (engine->growth == NULL)
+    RoundingGrowth *growth = engine->growth;
+    if (growth == NULL)
         return contact_event_apply(state, event);
-    const ContactPhase phase = state->damper[0].phase;
-    const State before = event_engine_single_state(state);
-    event_engine_grow_to_event(engine->growth, state);
+    const DamperState *damper = &state->damper[0];
+    const ContactPhase phase = damper->phase;
+    const double shape = state->modes->shapes[0];
+    const State before = {state->q[0] * shape, state->p[0] * shape, damper->r, damper->w};
+    rounding_growth_end_phase(growth, phase, damper->side, modal_state_time(state), &before,
+                              state->impacts.response->peaks.displacement);
     const Status status = contact_event_apply(state, event);
-    event_engine_grow_over_event(engine->growth, state, phase, &before);
+    if (phase == PHASE_FLIGHT && state->plan->form == CONTACT_IMPULSIVE &&
+        damper->plan->clearance > 0)
+        rounding_growth_bounce(growth, damper->contact.restitution, before.w,
+                               state->diagonal[0] * before.v + state->omega2[0] * before.x);
+    if (damper->phase == PHASE_RESTING)
+        rounding_growth_stick(growth);
     return status;
 }
 
@@ -292,7 +271,7 @@ static size_t event_engine_fly(EventEngine *engine, size_t until) {
     count = engine->flight.length == 0 ? 0 : event_engine_find_slices(state, count, slices);
     state->run->work.stop_searches += count > 0 && state->has_stops;
     if (count > 0)
-        count = flight_run(&engine->flight, &engine->buffer, state, slices, count,
+        count = flight_run(&engine->flight, &record->buffer, state, slices, count,
                            state->is_shadow ? NULL : &work);
     state->sample += count;
     if (count == 0 || state->is_shadow)
@@ -301,14 +280,8 @@ static size_t event_engine_fly(EventEngine *engine, size_t until) {
     *(state->base.base->form == BASE_STILL ? &done->unforced_samples : &done->flight_samples) +=
         count;
     done->mode_samples += count * state->mode_count;
-    state->base_acceleration = base_cursor_at(&state->base, state->sample);
     impact_log_work(&state->impacts, work.input, work.damping);
-    FlightBuffer *buffer = &engine->buffer;
-    flight_buffer_feel(buffer, state, count);
-    if (state->sample + 1 - count == record->statistics_start)
-        recorder_restart_peaks(state);
-    recorder_write(record, state, count);
-    recorder_flight_peaks(record, state, count);
+    recorder_flight(record, state, count);
     return count;
 }
 
@@ -335,18 +308,14 @@ static void event_engine_balance(ModalState *state) {
     impact_log_balance(&state->impacts, &energy);
 }
 
-void event_engine_take_sample(EventEngine *engine) {
-    recorder_sample(&engine->record, &engine->buffer, &engine->state);
-}
-
 // Stores the modes of the last `flown` samples, or of the present one.
 static void event_engine_track(EventEngine *engine, size_t flown) {
     const ModalState *state = &engine->state;
-    const FlightBuffer *buffer = &engine->buffer;
+    const FlightBuffer *buffer = &engine->record.buffer;
     for (size_t k = 1; k <= (flown > 0 ? flown : 1); k++) {
         const size_t sample = flown > 0 ? state->sample - flown + k : state->sample;
         memcpy(engine->track + (sample - 1) % FLIGHT_BUFFER_MAX * state->padded,
-               flown > 0 ? buffer->q + k * buffer->padded : state->q,
+               flown > 0 ? buffer->q + k * state->padded : state->q,
                state->mode_count * sizeof *engine->track);
     }
 }
@@ -357,7 +326,7 @@ Status event_engine_finish_interval(EventEngine *engine) {
     state->run->work.mode_samples += state->mode_count;
     state->sample++;
     state->offset = 0;
-    event_engine_take_sample(engine);
+    recorder_sample(&engine->record, state);
     return STATUS_OK;
 }
 
@@ -384,8 +353,7 @@ Status event_engine_make(EventEngine *engine, Run *run, double tolerance, Respon
     TRY(flight_make(&engine->flight, state, problem));
     TRY(sustained_contact_make(&engine->pressing, state, problem));
     TRY(power_contact_make(&engine->ode, state, tolerance, problem));
-    TRY(flight_buffer_make(&engine->buffer, state, problem));
-    TRY(recorder_start(&engine->record, &engine->buffer, state, response, problem));
+    TRY(recorder_start(&engine->record, state, response, problem));
     const EnergyState energy = modal_state_energy(state);
     impact_log_start(&state->impacts, response, run->impacts_max, &energy);
     // The errors of many contacts.
@@ -402,7 +370,7 @@ Status event_engine_shadow(EventEngine *engine, const EventEngine *of, Run *run,
     engine->arc = of->arc;
     engine->flight = of->flight;
     engine->pressing = of->pressing;
-    engine->buffer = of->buffer;
+    engine->record.buffer = of->record.buffer;
     state->is_shadow = true;
     const EnergyState energy = modal_state_energy(state);
     impact_log_start(&state->impacts, response, run->impacts_max, &energy);
@@ -411,7 +379,6 @@ Status event_engine_shadow(EventEngine *engine, const EventEngine *of, Run *run,
 
 void event_engine_clear(EventEngine *engine) {
     recorder_clear(&engine->record);
-    flight_buffer_clear(&engine->buffer);
     flight_clear(&engine->flight);
     sustained_contact_clear(&engine->pressing);
     power_contact_clear(&engine->ode);

@@ -9,9 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/solve/event_engine.h"
-#include "core/solve/power_contact.h"
-#include "core/solve/recorder.h"
+#include "core/solve/engine.h"
 #include "core/solve/single_mass.h"
 
 enum { COMPANION_SAMPLES = FLIGHT_BUFFER_MAX };
@@ -187,7 +185,7 @@ static Status exact_solve(EventEngine *engine, Companion *companion) {
     ModalState *state = &engine->state;
     const Plan *plan = state->plan;
     TRY(event_engine_settle(engine));
-    event_engine_take_sample(engine);
+    recorder_sample(&engine->record, state);
     exact_companion_start(companion, engine);
     while (state->sample + 1 < plan->count) {
         const size_t next = (state->sample / COMPANION_SAMPLES + 1) * COMPANION_SAMPLES;

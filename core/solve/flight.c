@@ -3,7 +3,7 @@
 //
 // With V^2 = p'p + q'W^2 q, V' <= growth V + |participation| |a_g|, and |r''| <= elastic_bound V +
 // |base_coupling| |a_g|. So r stays within length^2 max|r''| / 8 of its chord.
-#include "core/solve/flight.h"
+#include "core/solve/engine.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -13,58 +13,6 @@
 
 enum { Q, P, A, B, WORTH = 32 };
 enum { VALUE, SLOPE, SUM, FALL, GROUND };
-
-Status flight_buffer_make(FlightBuffer *buffer, const ModalState *state, Problem *problem) {
-    const size_t m = state->dampers, padded = state->padded;
-    buffer->padded = padded;
-    buffer->block = calloc(simd_kernels_room((5 * padded + 2 * m + 3) * FLIGHT_BUFFER_ROWS),
-                           sizeof *buffer->block);
-    if (buffer->block == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu modes",
-                           state->mode_count);
-    double *at = simd_kernels_start(buffer->block);
-    double **const stretches[] = {&buffer->q, &buffer->p, &buffer->moved, &buffer->sped,
-                                  &buffer->elastic};
-    for (size_t i = 0; i < COUNT(stretches); i++, at += FLIGHT_BUFFER_ROWS * padded)
-        *stretches[i] = at;
-    buffer->r = at;
-    buffer->z = buffer->r + m * FLIGHT_BUFFER_ROWS;
-    buffer->a = buffer->z + m * FLIGHT_BUFFER_ROWS;
-    buffer->b = buffer->a + FLIGHT_BUFFER_ROWS;
-    buffer->ground = buffer->b + FLIGHT_BUFFER_ROWS;
-    return STATUS_OK;
-}
-
-void flight_buffer_clear(FlightBuffer *buffer) {
-    free(buffer->block);
-}
-
-void flight_buffer_feel(FlightBuffer *buffer, const ModalState *state, size_t count) {
-    const size_t padded = buffer->padded;
-    const double *q = buffer->q + padded, *p = buffer->p + padded;
-    if (state->diagonal != NULL)
-        state->lanes->mix(padded, count, state->diagonal, p, state->omega2, q,
-                          buffer->elastic + padded);
-    for (size_t at = padded; at <= count * padded && state->diagonal == NULL; at += padded)
-        modal_state_elastic(state, buffer->q + at, buffer->p + at, buffer->elastic + at);
-    for (size_t k = 1; k <= count && state->residual_influence != NULL; k++)
-        buffer->elastic[k * padded + state->mode_count] =
-            base_cursor_at(&state->base, state->sample - count + k);
-}
-
-void flight_buffer_take(FlightBuffer *buffer, const ModalState *state, double ground) {
-    const size_t at = buffer->padded;
-    memcpy(buffer->q + at, state->q, at * sizeof *state->q);
-    memcpy(buffer->p + at, state->p, at * sizeof *state->p);
-    memcpy(buffer->elastic + at, state->elastic, at * sizeof *state->elastic);
-    buffer->ground[0] = ground;
-    for (size_t d = 0; d < state->dampers; d++) {
-        const DamperState *damper = &state->damper[d];
-        buffer->r[d * FLIGHT_BUFFER_ROWS + 1] = damper->r;
-        buffer->z[d * FLIGHT_BUFFER_ROWS + 1] =
-            modal_state_dot(damper->shape, state->p, state->mode_count) + damper->w;
-    }
-}
 
 void flight_ground(double omega, double length, double ground[2], double fall[2]) {
     const bool is_sine = omega > 0;
@@ -117,30 +65,25 @@ Status flight_make(Flight *flight, const ModalState *state, Problem *problem) {
             return STATUS_OK;
         TRY(transition_make(&flight->transition, 1, state, NULL, problem));
     }
-    // Gains, loss and input, in whole vectors filled up with zeros.
-    double **arrays[8 + FLIGHT_SUMS + 4];
+    SimdArray arrays[8 + FLIGHT_SUMS + 4 + 3];
+    size_t count = 0;
+    const size_t padded = state->padded, own = state->diagonal == NULL ? 0 : padded;
     for (size_t i = 0; i < 4; i++) {
-        arrays[i] = &flight->gains.q[i];
-        arrays[4 + i] = &flight->gains.p[i];
-        arrays[8 + FLIGHT_SUMS + i] = &flight->input[i];
+        arrays[count++] = (SimdArray){&flight->gains.q[i], own};
+        arrays[count++] = (SimdArray){&flight->gains.p[i], own};
+        arrays[count++] = (SimdArray){&flight->input[i], own};
     }
     for (size_t i = 0; i < FLIGHT_SUMS; i++)
-        arrays[8 + i] = &flight->loss[i];
-    const size_t count = state->diagonal == NULL ? 0 : COUNT(arrays);
-    const size_t padded = state->padded;
-    const size_t starts = FLIGHT_ROWS * (2 * n + 2);
-    const size_t ends = FLIGHT_ROWS * simd_kernels_padded(2 * n + 2);
-    flight->block = calloc((count + FLIGHT_SUMS) * padded + starts + ends, sizeof *flight->block);
+        arrays[count++] = (SimdArray){&flight->loss[i], own};
+    arrays[count++] = (SimdArray){&flight->sums, FLIGHT_SUMS * padded};
+    arrays[count++] = (SimdArray){&flight->gained, FLIGHT_ROWS * simd_kernels_padded(2 * n + 2)};
+    arrays[count++] = (SimdArray){&flight->start, FLIGHT_ROWS * (2 * n + 2)};
+    flight->block = simd_kernels_allocate(arrays, count);
     if (flight->block == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu modes", n);
-    for (size_t i = 0; i < count; i++)
-        *arrays[i] = flight->block + i * padded;
-    flight->sums = flight->block + count * padded;
-    flight->start = flight->sums + FLIGHT_SUMS * padded;
-    flight->gained = flight->start + starts;
     flight->length = state->interval;
     flight_ground(state->base_omega, flight->length, flight->ground, flight->fall);
-    for (size_t i = 0; i < n && count > 0; i++)
+    for (size_t i = 0; i < n && own > 0; i++)
         TRY(flight_make_mode(flight, state, i, problem));
     return STATUS_OK;
 }
@@ -153,7 +96,7 @@ void flight_clear(Flight *flight) {
 // Fills rows 1 to count of the buffer.
 static void flight_step_coupled(const Flight *flight, FlightBuffer *buffer, const ModalState *state,
                                 size_t count) {
-    const size_t n = state->mode_count, padded = buffer->padded;
+    const size_t n = state->mode_count, padded = state->padded;
     double *start = flight->start, *gained = flight->gained;
     for (size_t k = 0; k < count; k++) {
         const size_t now = k * padded, next = now + padded;
@@ -186,7 +129,7 @@ static void flight_step(const Flight *flight, FlightBuffer *buffer, const ModalS
     if (flight->transition.block != NULL)
         flight_step_coupled(flight, buffer, state, count);
     else
-        state->lanes->fly(&flight->gains, buffer->padded, count, buffer->a, buffer->b, buffer->q,
+        state->lanes->fly(&flight->gains, state->padded, count, buffer->a, buffer->b, buffer->q,
                           buffer->p, buffer->moved, buffer->sped);
 }
 
@@ -206,8 +149,8 @@ static void flight_add_coupled_work(const Flight *flight, const FlightBuffer *bu
         const size_t many = count - from < FLIGHT_ROWS ? count - from : FLIGHT_ROWS;
         for (size_t k = from; k < from + many; k++) {
             double *start = flight->start + (k - from) * size;
-            memcpy(start, buffer->q + k * buffer->padded, n * sizeof *start);
-            memcpy(start + n, buffer->p + k * buffer->padded, n * sizeof *start);
+            memcpy(start, buffer->q + k * state->padded, n * sizeof *start);
+            memcpy(start + n, buffer->p + k * state->padded, n * sizeof *start);
             start[2 * n] = buffer->a[k];
             start[2 * n + 1] = buffer->b[k];
             work->input -= buffer->a[k] * modal_state_dot(transition->input[0], start, size) +
@@ -224,7 +167,7 @@ static void flight_add_coupled_work(const Flight *flight, const FlightBuffer *bu
 static void flight_add_work(const Flight *flight, const FlightBuffer *buffer,
                             const ModalState *state, size_t count, StepWork *work) {
     const size_t n = state->mode_count;
-    const size_t padded = buffer->padded;
+    const size_t padded = state->padded;
     double *sums = flight->sums;
     memset(sums, 0, FLIGHT_SUMS * padded * sizeof *sums);
     state->lanes->sum(padded, count, buffer->a, buffer->b, buffer->q, buffer->p, sums);
@@ -253,7 +196,7 @@ static void flight_move_damper(const Flight *flight, FlightBuffer *buffer, const
     double *r = buffer->r + d * FLIGHT_BUFFER_ROWS, *z = buffer->z + d * FLIGHT_BUFFER_ROWS,
            far = damper->r;
     double moved[FLIGHT_BUFFER_ROWS];
-    state->lanes->dot(buffer->padded, count, damper->shape, buffer->moved + buffer->padded, moved);
+    state->lanes->dot(state->padded, count, damper->shape, buffer->moved + state->padded, moved);
     r[0] = damper->r;
     z[0] = modal_state_dot(damper->shape, buffer->p, state->mode_count) + damper->w;
     for (size_t k = 0; k < count; k++) {
@@ -291,8 +234,8 @@ static size_t flight_count_clear(const Flight *flight, const FlightBuffer *buffe
             continue;
         // The bound of this interval alone is closer.
         const double max_ground = flight_max_ground(&slices[k], length);
-        const double size = modal_state_size_of(state, buffer->q + k * buffer->padded,
-                                                buffer->p + k * buffer->padded);
+        const double size = modal_state_size_of(state, buffer->q + k * state->padded,
+                                                buffer->p + k * state->padded);
         const double own =
             damper->elastic_bound * flight_bound_size(flight, state, size, max_ground, 1) +
             fabs(damper->base_coupling) * max_ground;
@@ -343,7 +286,7 @@ size_t flight_run(Flight *flight, FlightBuffer *buffer, ModalState *state, const
         else
             flight_add_work(flight, buffer, state, count, work);
     }
-    const size_t end = count * buffer->padded;
+    const size_t end = count * state->padded;
     double speed = 0;
     for (size_t k = 0; k < count; k++)
         speed += buffer->ground[k];

@@ -84,21 +84,13 @@ void impact_log_close(ImpactLog *log, ImpactRow *row, double time, double separa
 
 void impact_log_bounce(ImpactLog *log, double time, size_t damper, Side side, double approach,
                        double separation, double mass) {
-    const Impact impact = {.kind = IMPACT_IMPACT,
-                           .start = time,
-                           .end = time,
-                           .damper = damper + 1,
-                           .side = (int)side,
-                           .approach_speed = approach,
-                           .separation_speed = separation,
-                           .restitution = approach > 0 ? separation / approach : NAN,
-                           .peak_force = NAN,
-                           .impulse = mass * (approach + separation),
-                           .energy_lost =
-                               0.5 * mass * (approach - separation) * (approach + separation)};
-    log->energy.contact += impact.energy_lost;
+    ImpactRow row;
+    impact_log_open(&row, IMPACT_IMPACT, time, damper, side, approach);
+    row.impact.peak_force = NAN;
+    impact_log_stretch(log, &row, 0, mass * (approach + separation),
+                       0.5 * mass * (approach - separation) * (approach + separation));
     log->bounces++;
-    impact_log_add(log, &impact);
+    impact_log_close(log, &row, time, separation);
 }
 
 void impact_log_balance(ImpactLog *log, const EnergyState *state) {
@@ -112,19 +104,11 @@ void impact_log_balance(ImpactLog *log, const EnergyState *state) {
     log->largest_gain = impact_log_larger(log->largest_gain, balance);
 }
 
-void impact_log_count(const ImpactLog *log, WorkCounters *work) {
-    const Response *response = log->response;
-    work->contacts = response->impact_count - log->bounces;
-    work->bounces = log->bounces;
-    work->rests = response->resting_count;
-    work->ledger_rows = response->impacts.count;
-}
-
-void impact_log_forget_peaks(ImpactLog *log, const Instant *at) {
+void impact_log_restart_peaks(ImpactLog *log, double force) {
     Response *response = log->response;
     response->peak_before_window =
         impact_log_larger(response->peak_before_window, response->peaks.displacement);
-    response->peaks = (Peaks){.contact_force = fabs(at->force)};
+    response->peaks = (Peaks){.contact_force = fabs(force)};
 }
 
 Status impact_log_status(const ImpactLog *log, Problem *problem) {
@@ -153,24 +137,29 @@ static int impact_log_compare(const void *a, const void *b) {
     return (first->side > second->side) - (first->side < second->side);
 }
 
-Status impact_log_finish(ImpactLog *log, ImpactRow *rows, size_t count, const EnergyState *state,
-                         Problem *problem) {
-    for (size_t i = 0; i < count; i++) {
-        if (!rows[i].is_open)
-            continue;
-        rows[i].impact.duration = NAN;
-        rows[i].impact.impulse = fabs(rows[i].impact.impulse);
-        impact_log_add(log, &rows[i].impact);
-    }
+void impact_log_end(ImpactLog *log, ImpactRow *row) {
+    if (!row->is_open)
+        return;
+    row->impact.duration = NAN;
+    row->impact.impulse = fabs(row->impact.impulse);
+    impact_log_add(log, &row->impact);
+}
+
+Status impact_log_finish(ImpactLog *log, size_t dampers, const EnergyState *state,
+                         WorkCounters *work, Problem *problem) {
+    Response *response = log->response;
     // The rows of one damper are in order: each ends before the next begins.
-    Impacts *impacts = &log->response->impacts;
-    if (count > 1 && impacts->count > 1)
-        qsort(impacts->at, impacts->count, sizeof *impacts->at, impact_log_compare);
+    if (dampers > 1 && response->impacts.count > 1)
+        qsort(response->impacts.at, response->impacts.count, sizeof *response->impacts.at,
+              impact_log_compare);
     impact_log_balance(log, state);
-    Energy *energy = &log->energy;
-    energy->kinetic = state->kinetic;
-    energy->strain = state->strain;
-    energy->residual = log->largest_energy > 0 ? log->largest_balance / log->largest_energy : 0;
-    log->response->energy = *energy;
+    log->energy.kinetic = state->kinetic;
+    log->energy.strain = state->strain;
+    log->energy.residual = log->largest_energy > 0 ? log->largest_balance / log->largest_energy : 0;
+    response->energy = log->energy;
+    work->contacts = response->impact_count - log->bounces;
+    work->bounces = log->bounces;
+    work->rests = response->resting_count;
+    work->ledger_rows = response->impacts.count;
     return impact_log_status(log, problem);
 }

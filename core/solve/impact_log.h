@@ -99,23 +99,22 @@ static inline void impact_log_peaks(ImpactLog *log, const Instant *at) {
     peaks->damper_displacement = impact_log_larger(peaks->damper_displacement, fabs(at->damper_x));
 }
 
-// Statistics begin here: restarts the peaks.
-void impact_log_forget_peaks(ImpactLog *log, const Instant *at);
+// Statistics begin here: restarts the peaks. `force` is the largest one now [N].
+void impact_log_restart_peaks(ImpactLog *log, double force);
 
 static inline void impact_log_acceleration(ImpactLog *log, double acceleration) {
     Peaks *peaks = &log->response->peaks;
     peaks->acceleration = impact_log_larger(peaks->acceleration, fabs(acceleration));
 }
 
-// Writes the counts of a finished run.
-void impact_log_count(const ImpactLog *log, WorkCounters *work);
-
 // STATUS_LIMIT or STATUS_NO_MEMORY once an impact could not be listed, STATUS_UNSTABLE once the
 // energy gain exceeds gain_max.
 Status impact_log_status(const ImpactLog *log, Problem *problem);
-// Lists the open ones of `rows`, sorts all (by start, then damper, then left before right) and
-// writes the energies into the response.
-Status impact_log_finish(ImpactLog *log, ImpactRow *rows, size_t count, const EnergyState *energy,
-                         Problem *problem);
+// The run ends: lists a contact or rest that is still open.
+void impact_log_end(ImpactLog *log, ImpactRow *row);
+// Then sorts the list (by start, then damper, then left before right) and writes energies and
+// counts.
+Status impact_log_finish(ImpactLog *log, size_t dampers, const EnergyState *energy,
+                         WorkCounters *work, Problem *problem);
 
 #endif

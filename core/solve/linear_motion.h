@@ -19,15 +19,13 @@ typedef struct State {
 // The linear system of one contact state, divided by the masses.
 //   x'' = -a_g - s + share n,  r'' = s - n,  s = damping x' + omega2 x,  n = contact_damping r' +
 //   contact_omega2 r
-// and while resting on a stop x'' = -a_g - (1 - share) s, r'' = 0.
 typedef struct Motion {
     double omega2;          // K / M [1/s^2]
     double damping;         // C / M [1/s]
     double share;           // m / (M + m) = m_e / M [-]
     double contact_omega2;  // k / m_e [1/s^2], 0 in flight
     double contact_damping; // c / m_e [1/s]
-    bool is_resting;
-    double rate; // no eigenvalue of the system, without the base, is larger [1/s]
+    double rate;            // no eigenvalue of the system, without the base, is larger [1/s]
 } Motion;
 
 static inline bool motion_is_same(const Motion *a, const Motion *b) {

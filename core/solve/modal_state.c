@@ -6,7 +6,6 @@
 #include <string.h>
 
 #include "core/math/linear_system.h"
-#include "core/math/symmetric_matrix.h"
 
 double modal_state_time(const ModalState *state) {
     return (double)state->sample / state->plan->sample_rate + state->offset;
@@ -36,13 +35,6 @@ double modal_state_room(const DamperState *damper, Side side) {
     if (damper->origin == FROM_MIDDLE)
         return damper->plan->clearance / 2;
     return damper->origin == (ContactOrigin)side ? 0 : damper->plan->clearance;
-}
-
-double modal_state_middle(const DamperState *damper) {
-    const double stop = damper->plan->clearance / 2;
-    const double origin =
-        damper->origin == FROM_MIDDLE ? 0 : modal_state_sign((Side)damper->origin) * stop;
-    return damper->plan->offset + origin;
 }
 
 void modal_state_elastic(const ModalState *state, const double *q, const double *p,
@@ -93,15 +85,14 @@ void modal_state_forces(ModalState *state) {
     }
 }
 
-const double *modal_state_expand_four(const ModalState *state, const double *modal) {
-    state->lanes->multiply_four(state->shape_matrix, state->tall, modal, state->padded,
-                                modal_state_even(state->slot_count), state->storey_values);
-    return state->storey_values;
-}
-
-const double *modal_state_expand(const ModalState *state, const double *modal) {
-    state->lanes->multiply(state->shape_matrix, state->tall, modal,
-                           modal_state_even(state->slot_count), state->storey_values);
+const double *modal_state_expand(const ModalState *state, const double *modal, size_t rows) {
+    const size_t slots = modal_state_even(state->slot_count);
+    if (rows == 1)
+        state->lanes->multiply(state->shape_matrix, state->tall, modal, slots,
+                               state->storey_values);
+    else
+        state->lanes->multiply_four(state->shape_matrix, state->tall, modal, state->padded, slots,
+                                    state->storey_values);
     return state->storey_values;
 }
 
@@ -114,30 +105,10 @@ double modal_state_difference(const ModalState *state, const double *q, const do
     }
     if (bound <= least)
         return least;
-    const double *values = modal_state_expand(state, state->difference);
+    const double *values = modal_state_expand(state, state->difference, 1);
     for (size_t j = 0; j < state->storey_count; j++)
         least = fmax(least, fabs(values[j]));
     return least;
-}
-
-double modal_state_displacement(const ModalState *state, size_t storey) {
-    return modal_state_dot(state->modes->shapes + storey * state->mode_count, state->q,
-                           state->mode_count);
-}
-
-double modal_state_velocity(const ModalState *state, size_t storey) {
-    return modal_state_dot(state->modes->shapes + storey * state->mode_count, state->p,
-                           state->mode_count);
-}
-
-double modal_state_storey_acceleration(const ModalState *state, size_t storey) {
-    const size_t n = state->mode_count;
-    double sum = -modal_state_dot(state->modes->shapes + storey * n, state->elastic, n);
-    if (state->residual_influence != NULL)
-        sum += state->residual_influence[storey] * state->base_acceleration;
-    for (size_t d = 0; d < state->dampers; d++)
-        sum += state->mobility[d * state->storey_count + storey] * state->damper[d].force;
-    return sum;
 }
 
 double modal_state_acceleration(const ModalState *state, size_t d) {
@@ -178,10 +149,6 @@ double modal_state_size_of(const ModalState *state, const double *q, const doubl
     return sqrt((squares[0] + squares[1]) + (squares[2] + squares[3]));
 }
 
-double modal_state_size(const ModalState *state) {
-    return modal_state_size_of(state, state->q, state->p);
-}
-
 // With lambda^2 + c lambda + k = 0 for the Rayleigh quotients c and k of any mode, |lambda| is at
 // most the larger of c and sqrt(k); a contact adds to each quotient no more than its own over m_e.
 double modal_state_rate(const ModalState *state) {
@@ -215,8 +182,6 @@ void modal_state_constrain(ModalState *state) {
     if (state->resting > 0)
         (void)linear_system_solve(left, right, n, n); // positive definite
 }
-
-static const double NEARLY = 1e-9; // relative
 
 // (M^-1)_jk from the modes; 0 where it is only rounding, so that an impact on one storey does not
 // move a mass that rests on another.
@@ -266,47 +231,29 @@ static void modal_state_make_damper(ModalState *state, size_t d) {
     damper->elastic_bound = sqrt(stiff) + sqrt(size) * state->viscous;
 }
 
-// Growth rate of the energy by a damping matrix that is not quite positive, from its symmetric
-// part.
-static double modal_state_find_growth(const double *even_part, size_t n) {
-    double lowest = 0, largest = 0;
-    for (size_t i = 0; i < n; i++) {
-        const double own = even_part[i * n + i];
-        double others = 0;
-        for (size_t j = 0; j < n; j++)
-            others += j == i ? 0 : fabs(even_part[i * n + j]);
-        lowest = fmin(lowest, own - others); // Gershgorin
-        largest = fmax(largest, own);
-    }
-    // D dissipates but for rounding if, scaled to a unit diagonal, D + NEARLY I is positive
-    // definite.
-    return symmetric_matrix_find_indefinite(n, even_part, NEARLY) == 0 ? NEARLY * largest : -lowest;
-}
+// Growth rate of the energy over the largest damping of a mode: a scene's damping dissipates but
+// for rounding.
+static const double NEARLY = 1e-9;
 
-// D, which need not be symmetric, its norm and the growth rate.
+// D, which need not be symmetric, and its norm.
 static Status modal_state_make_damping(ModalState *state) {
     const size_t n = state->mode_count;
     const double *damping = state->damping = state->modes->damping;
-    double *even_part = calloc(n * n, sizeof *even_part);
-    if (even_part == NULL)
-        return STATUS_NO_MEMORY;
-    double rows = 0, columns = 0, squares = 0;
+    double rows = 0, columns = 0, squares = 0, largest = 0;
     for (size_t i = 0; i < n; i++) {
         double row = 0, column = 0;
         for (size_t j = 0; j < n; j++) {
-            const double here = damping[i * n + j], there = damping[j * n + i];
-            row += fabs(here);
-            column += fabs(there);
-            squares += here * here;
-            even_part[i * n + j] = (here + there) / 2;
+            row += fabs(damping[i * n + j]);
+            column += fabs(damping[j * n + i]);
+            squares += damping[i * n + j] * damping[i * n + j];
         }
         rows = fmax(rows, row);
         columns = fmax(columns, column);
         state->diagonal[i] = damping[i * n + i];
+        largest = fmax(largest, state->diagonal[i]);
     }
     state->viscous = fmin(sqrt(rows * columns), sqrt(squares));
-    state->growth = modal_state_find_growth(even_part, n);
-    free(even_part);
+    state->growth = NEARLY * largest;
     if (state->modes->is_classical)
         return STATUS_OK;
     state->diagonal = NULL;
@@ -337,42 +284,29 @@ static void modal_state_make_modal(const ModalState *state, const double *values
 }
 
 static Status modal_state_allocate(ModalState *state) {
-    const size_t n = state->padded, m = state->dampers;
-    double **const arrays[] = {&state->omega2,
-                               &state->diagonal,
-                               &state->momentum_weights,
-                               &state->participation,
-                               &state->q,
-                               &state->p,
-                               &state->elastic,
-                               &state->max_shape,
-                               &state->shapes,
-                               &state->shape_matrix,
-                               &state->storey_values,
-                               &state->difference,
-                               &state->mobility,
-                               &state->delassus,
-                               &state->constraint_mass,
-                               &state->scratch,
-                               &state->residual_influence};
-    const size_t tall = state->tall, all = modal_state_even(state->slot_count) * tall;
-    const size_t sizes[] = {
-        n, n,        n,     n,     n,     n,    n, n, m * n, all, FLIGHT_ROWS * tall,
-        n, m * tall, m * m, m * m, m * m, tall,
+    const size_t n = state->padded, m = state->dampers, tall = state->tall;
+    const SimdArray arrays[] = {
+        {&state->omega2, n},
+        {&state->diagonal, n},
+        {&state->momentum_weights, n},
+        {&state->participation, n},
+        {&state->q, n},
+        {&state->p, n},
+        {&state->elastic, n},
+        {&state->max_shape, n},
+        {&state->shapes, m * n},
+        {&state->shape_matrix, modal_state_even(state->slot_count) * tall},
+        {&state->storey_values, FLIGHT_ROWS * tall},
+        {&state->difference, n},
+        {&state->mobility, m * tall},
+        {&state->delassus, m * m},
+        {&state->constraint_mass, m * m},
+        {&state->scratch, m * m},
+        {&state->residual_influence, tall},
     };
-    size_t total = simd_kernels_room(0);
-    for (size_t i = 0; i < COUNT(sizes); i++)
-        total += sizes[i];
-    state->block = calloc(total, sizeof *state->block);
+    state->block = simd_kernels_allocate(arrays, COUNT(arrays));
     state->damper = calloc(m > 0 ? m : 1, sizeof *state->damper);
-    if (state->block == NULL || state->damper == NULL)
-        return STATUS_NO_MEMORY;
-    double *at = simd_kernels_start(state->block);
-    for (size_t i = 0; i < COUNT(sizes); i++) {
-        *arrays[i] = at;
-        at += sizes[i];
-    }
-    return STATUS_OK;
+    return state->block == NULL || state->damper == NULL ? STATUS_NO_MEMORY : STATUS_OK;
 }
 
 // residual_influence; 0 where it is only rounding.

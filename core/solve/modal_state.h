@@ -40,11 +40,10 @@ typedef struct DamperState {
     // r.
     double storey_speed, gained;
     // Of a collision: speed towards the stop and required speed away from it [m/s], and the impulse
-    // [N s]. is_pressing, is_finished and wanted are scratch of collision_resolve.
+    // [N s].
     bool in_collision, is_bounced; // is_bounced: takes part, not from rest
     double approach_speed, separation_speed, impulse;
-    bool is_pressing, is_finished;
-    double wanted;
+    bool is_pressing; // scratch of collision_resolve
 } DamperState;
 
 // In modal coordinates, x = shapes q:
@@ -150,8 +149,6 @@ double modal_state_time(const ModalState *state); // [s]
 double modal_state_clock(const ModalState *state);
 // Gap between free mass and stop at r = 0 of the present origin [m].
 double modal_state_room(const DamperState *damper, Side side);
-// Displacement of the free mass relative to its storey at r = 0 [m].
-double modal_state_middle(const DamperState *damper);
 
 // out = D p + W^2 q; arrays of `padded` values.
 void modal_state_elastic(const ModalState *state, const double *q, const double *p,
@@ -169,19 +166,17 @@ void modal_state_forces(ModalState *state);
 // if that is larger.
 double modal_state_difference(const ModalState *state, const double *q, const double *other,
                               double least);
-// Values of all storeys from those of all modes, valid until the next call.
-const double *modal_state_expand(const ModalState *state, const double *modal);
-// Likewise of FLIGHT_ROWS rows of modes, one after the other; `tall` values of each.
-const double *modal_state_expand_four(const ModalState *state, const double *modal);
-// Of one storey, relative to the base [m], [m/s]; absolute, after modal_state_forces [m/s^2].
-double modal_state_displacement(const ModalState *state, size_t storey);
-double modal_state_velocity(const ModalState *state, size_t storey);
-double modal_state_storey_acceleration(const ModalState *state, size_t storey);
+// Values of all storeys, `tall` of each row, from those of all modes in 1 or FLIGHT_ROWS rows, one
+// after the other; valid until the next call.
+const double *modal_state_expand(const ModalState *state, const double *modal, size_t rows);
 // r'' of a damper in flight, after modal_state_forces [m/s^2].
 double modal_state_acceleration(const ModalState *state, size_t damper);
 EnergyState modal_state_energy(const ModalState *state);
-double modal_state_size(const ModalState *state); // sqrt(p'p + q'W^2 q)
+// sqrt(p'p + q'W^2 q).
 double modal_state_size_of(const ModalState *state, const double *q, const double *p);
+static inline double modal_state_size(const ModalState *state) {
+    return modal_state_size_of(state, state->q, state->p);
+}
 
 // Bound of the eigenvalues of the present motion [1/s].
 double modal_state_rate(const ModalState *state);

@@ -1,14 +1,21 @@
-// An integration step is a row of Taylor polynomials in the transformed time (power_series.h). It
-// is as long as the truncation error allows, at most as long as requested, and ends at the first of
+// N ~ p^n is not smooth in time where p = 0. With Y = p^(1/root) and dt = root Y^(root - 1) dtau
+// the motion is analytic in tau wherever root n is an integer. Y' = p' is the speed, which is not 0
+// at the start and at the end of a contact. For Hertz's law and its relatives (n = 3/2, root 2)
 //
-//   in contact:  p falls to 0, the release;  p' passes the kink of the law;  N is no more
-//   negligible in flight:   the gap to a stop closes, a touch
+//   Y' = w,   t' = 2 Y,   w' = 2 Y (s - (k / m_e) Y^3 (1 + a w)),   x' = 2 Y v,  ...
 //
-// located as roots of the polynomials. The contact nearest to its start or end leads: its p defines
-// the transformed time, and the other forces are smooth enough meanwhile. N is left out below the
-// penetration where it would change the mass's speed by less than the error. This starts contacts
-// that have no series: a touch without speed, or an exponent that no root makes an integer.
-#include "core/solve/power_contact.h"
+// whose Taylor coefficients follow from each other by products of series. If no small root makes
+// root n an integer, root = 4 makes N ~ Y^(4n) so smooth that a step may pass the end of the
+// contact within the error. Powers u = Y^n then follow from u' Y = n u Y', which holds while Y > 0.
+//
+// An integration step is as long as the truncation error allows, at most as long as requested, and
+// ends where p of a contact falls to 0 (the release), p' passes the kink of the law, N is no more
+// negligible, or the gap of a mass in flight closes (a touch): roots of the polynomials. The
+// contact nearest to its start or end leads: its p defines the transformed time, and the other
+// forces are smooth enough meanwhile. N is left out below the penetration where it would change the
+// mass's speed by less than the error. This starts contacts that have no series: a touch without
+// speed, or an exponent that no root makes an integer.
+#include "core/solve/engine.h"
 
 #include <float.h>
 #include <math.h>
@@ -16,7 +23,361 @@
 #include <string.h>
 
 #include "core/contact/power_law.h"
-#include "core/solve/recorder.h"
+#include "core/solve/wide.h"
+
+// Pairs fill the registers that every processor has.
+typedef double Two __attribute__((vector_size(16), aligned(8), may_alias));
+#define TWO(values) (*(const Two *)(values))
+#define PUT_TWO(values, two) (*(Two *)(values) = (two))
+
+enum { ROOT_MAX = 4, POWER_MAX = 18, WINDOW_MIN = 3 };
+static const double NEAR = 0.3; // relative Y, below which coefficients are as sparse as at Y = 0
+
+static bool series_law_is_integer(double value) {
+    return fabs(value - nearbyint(value)) <= 1e-12 * value;
+}
+
+// The entry of Y^power, which is added if it is missing.
+static int series_law_power(SeriesLaw *law, int power) {
+    for (int i = 0; i < law->count; i++)
+        if (law->power[i] == power)
+            return i;
+    const int left = series_law_power(law, power - power / 2),
+              right = series_law_power(law, power / 2);
+    law->power[law->count] = power;
+    law->left[law->count] = left;
+    law->right[law->count] = right;
+    return law->count++;
+}
+
+void series_law_make(SeriesLaw *law, const ContactTerms *terms) {
+    const double n = terms->exponent, viscous = terms->viscous > 0 ? terms->viscous_exponent : n;
+    *law = (SeriesLaw){.exponents = {n, viscous}, .count = 2, .power = {0, 1}};
+    for (law->root = 1; law->root <= ROOT_MAX; law->root++)
+        if (series_law_is_integer(law->root * n) && series_law_is_integer(law->root * viscous) &&
+            law->root * n <= POWER_MAX)
+            break;
+    law->is_integer = law->root <= ROOT_MAX;
+    if (!law->is_integer)
+        law->root = n < 3.5 ? ROOT_MAX : n < 8 ? 2 : 1;
+    law->time_factor = series_law_power(law, law->root - 1);
+    if (!law->is_integer)
+        return;
+    law->elastic = series_law_power(law, (int)nearbyint(law->root * n));
+    law->viscous = series_law_power(law, (int)nearbyint(law->root * viscous));
+}
+
+// Starts a series whose order 0 is `first`.
+INLINE void series_factor_start(SeriesFactor *factor, double first) {
+    memset(factor->up, 0, sizeof factor->up);
+    memset(factor->down, 0, sizeof factor->down);
+    factor->now = first;
+}
+
+// A coefficient is stored only when its order is complete. Until then it is in `now`: loading a
+// pair that was just stored one by one stalls the processor.
+INLINE void series_factor_store(SeriesFactor *factor, size_t k) {
+    factor->up[k] = factor->down[SERIES_ROW - 1 - k] = factor->now;
+}
+
+// Order k of a product.
+INLINE double series_factor_product(const SeriesFactor *a, const SeriesFactor *b, size_t k) {
+    if (k == 0)
+        return a->now * b->now;
+    const double *up = a->up, *down = b->down + SERIES_ROW - 1 - k;
+    Two sum[2] = {{0}};
+    for (size_t j = 0; j < k; j += 4) {
+        sum[0] += TWO(up + j) * TWO(down + j);
+        sum[1] += TWO(up + j + 2) * TWO(down + j + 2);
+    }
+    sum[0] += sum[1];
+    return (sum[0][0] + sum[0][1]) + (a->up[0] * b->now + a->now * b->up[0]);
+}
+
+// Order k of b^exponent, b[0] > 0, from its lower orders.
+static double power_series_power(const double *b, double exponent, const double *power, size_t k) {
+    if (k == 0)
+        return exponent == 0 ? 1 : pow(b[0], exponent);
+    double sum = 0;
+    for (size_t j = 0; j < k; j++)
+        sum += (exponent * (double)(k - j) - (double)j) * b[k - j] * power[j];
+    return sum / ((double)k * b[0]);
+}
+
+// Order k of N.
+INLINE void power_series_force(PowerSeries *series, SeriesContact *contact, size_t k,
+                               bool is_leader) {
+    const SeriesLaw *law = &contact->law;
+    if (!contact->has_force) {
+        contact->force[k] = 0;
+        return;
+    }
+    SeriesFactor *elastic = &contact->elastic, *viscous = &contact->viscous;
+    contact->speeds.now = contact->sign * series->z[k * series->stride + contact->damper];
+    if (is_leader && law->is_integer) {
+        elastic = &series->powers[law->elastic];
+        viscous = &series->powers[law->viscous];
+    } else {
+        // Powers of Y of the leader, and of p of the others.
+        double own[SERIES_ROW];
+        const double root = is_leader ? law->root : 1;
+        for (size_t j = 0; j < k && is_leader; j++)
+            own[j] = series->powers[1].up[j];
+        if (is_leader)
+            own[k] = series->powers[1].now;
+        for (size_t j = 0; j <= k && !is_leader; j++)
+            own[j] = contact->sign * series->z[j * series->stride + series->at_r + contact->damper];
+        elastic->now = power_series_power(own, root * law->exponents[0], elastic->up, k);
+        viscous->now = law->exponents[1] == law->exponents[0]
+                           ? elastic->now
+                           : power_series_power(own, root * law->exponents[1], viscous->up, k);
+    }
+    double force = contact->terms.stiffness * elastic->now;
+    if (contact->is_damped && contact->terms.viscous > 0)
+        force += contact->terms.viscous * series_factor_product(&contact->speeds, viscous, k);
+    else if (!contact->is_damped && !contact->terms.is_elastic_below)
+        force = 0;
+    contact->force[k] = force;
+}
+
+// D p + W^2 q.
+INLINE void power_series_elastic(PowerSeries *series, const ModalState *state, const double *row,
+                                 size_t n) {
+    const double *q = row + series->at_q, *p = row + series->at_p;
+    double *restrict out = series->elastic;
+    if (n == 1 || state->diagonal != NULL) {
+        for (size_t i = 0; i < n; i++)
+            out[i] =
+                (n == 1 ? state->damping[0] : state->diagonal[i]) * p[i] + state->omega2[i] * q[i];
+        return;
+    }
+    for (size_t i = 0; i < n; i++)
+        out[i] = state->omega2[i] * q[i];
+    for (size_t j = 0; j < n; j++) {
+        const double *column = state->coupled + j * state->padded;
+        for (size_t i = 0; i < n; i++)
+            out[i] += column[i] * p[j];
+    }
+}
+
+// Order k of the derivative in t.
+INLINE void power_series_rate(PowerSeries *series, const ModalState *state, const Slice *slice,
+                              size_t k, size_t n, size_t m) {
+    const double *row = series->z + k * series->stride;
+    double *restrict rate = series->rate + k * series->stride;
+    const double *elastic = series->elastic;
+    const double base = series->is_sine ? row[series->at_a]
+                        : k == 0        ? slice->value
+                                        : slice->slope * row[series->at_t];
+    power_series_elastic(series, state, row, n);
+    for (size_t i = 0; i < n; i++) {
+        rate[series->at_q + i] = row[series->at_p + i];
+        rate[series->at_p + i] = -elastic[i] - state->participation[i] * base;
+    }
+    for (size_t d = 0; d < m; d++) {
+        const DamperState *damper = &state->damper[d];
+        double acceleration = damper->base_coupling * base;
+        for (size_t i = 0; i < n; i++)
+            acceleration += damper->shape[i] * elastic[i];
+        rate[d] = acceleration;
+        if (m > 1)
+            rate[series->at_r + d] = row[d];
+    }
+    for (size_t c = 0; c < (m == 1 ? 1 : series->contact_count); c++) {
+        const SeriesContact *contact = series->contact[c];
+        const double force = contact->sign * contact->force[k];
+        const double *shape = state->damper[contact->damper].shape;
+        for (size_t i = 0; i < n; i++)
+            rate[series->at_p + i] += shape[i] * force;
+        for (size_t d = 0; d < m; d++)
+            rate[d] -= state->delassus[d * m + contact->damper] * force;
+    }
+    rate[series->at_t] = k == 0;
+    if (series->is_sine) {
+        rate[series->at_a] = slice->omega * row[series->at_a + 1];
+        rate[series->at_a + 1] = -slice->omega * row[series->at_a];
+    }
+}
+
+// Order k + 1 of the state, which is that of the integral of rate * time_factor * root * length.
+INLINE void power_series_state(PowerSeries *series, const SeriesFactor *time_factor, size_t k,
+                               size_t stride) {
+    const double scale = series->length * series->root / (double)(k + 1);
+    double *restrict next = series->z + (k + 1) * stride;
+    const double *rate = series->rate, *last = rate + k * stride;
+    const double *down = time_factor->down + SERIES_ROW - 1 - k;
+    if (series->root == 1 || k == 0) {
+        const double times = series->root == 1 ? scale : scale * time_factor->now;
+        for (size_t i = 0; i < stride; i++)
+            next[i] = times * last[i];
+        return;
+    }
+    const double first = time_factor->up[0], now = time_factor->now;
+    for (size_t i = 0; i < stride; i += 4) {
+        const double *at = rate + i;
+        Two sum[4] = {now * TWO(at), now * TWO(at + 2), {0}, {0}};
+        size_t j = 1;
+        for (at += stride; j + 2 <= k; j += 2, at += 2 * stride) {
+            sum[0] += down[j] * TWO(at);
+            sum[1] += down[j] * TWO(at + 2);
+            sum[2] += down[j + 1] * TWO(at + stride);
+            sum[3] += down[j + 1] * TWO(at + stride + 2);
+        }
+        if (j < k) {
+            sum[2] += down[j] * TWO(at);
+            sum[3] += down[j] * TWO(at + 2);
+        }
+        sum[0] += sum[2];
+        sum[1] += sum[3];
+        next[i] = scale * (sum[0][0] + first * last[i]);
+        next[i + 1] = scale * (sum[0][1] + first * last[i + 1]);
+        next[i + 2] = scale * (sum[1][0] + first * last[i + 2]);
+        next[i + 3] = scale * (sum[1][1] + first * last[i + 3]);
+    }
+}
+
+// The largest scaled coefficient of order k.
+INLINE double power_series_largest(const PowerSeries *series, size_t k, size_t n, size_t m) {
+    const double *row = series->z + k * series->stride;
+    double largest = impact_log_larger(fabs(series->powers[1].now) * series->inverse_root,
+                                       fabs(row[series->at_t]) * series->inverse_time);
+    for (size_t c = 0; c < (m == 1 ? 1 : series->contact_count); c++) {
+        const SeriesContact *contact = series->contact[c];
+        largest = impact_log_larger(largest, fabs(row[contact->damper]) * contact->inverse_speed);
+        // Powers by recurrence spread their rounding errors, which w need not show.
+        if (c > 0 || !contact->law.is_integer)
+            largest =
+                impact_log_larger(largest, fabs(contact->force[k - 1]) * contact->inverse_force);
+    }
+    for (size_t i = 0; i < n; i++)
+        largest =
+            impact_log_larger(largest, fabs(row[series->at_p + i]) * series->inverse_modal[i]);
+    return largest;
+}
+
+INLINE double power_series_orders(PowerSeries *series, const ModalState *state, const Slice *slice,
+                                  size_t n, size_t m, size_t stride) {
+    const SeriesContact *leader = series->contact[0];
+    const SeriesLaw *law = &leader->law;
+    const SeriesFactor *time_factor = &series->powers[series->root == 1 ? 0 : law->time_factor];
+    const size_t contact_count = m == 1 ? 1 : series->contact_count;
+    // From Y = 0 only one order in `gap` is not 0. As many in a row have to be small.
+    const size_t gap = leader->has_force && law->is_integer
+                           ? (size_t)(law->power[law->elastic] + law->root)
+                           : WINDOW_MIN;
+    const size_t window =
+        series->powers[1].now * series->inverse_root > NEAR || gap < WINDOW_MIN ? WINDOW_MIN : gap;
+    const size_t order = series->order_max > window ? series->order_max : window + 1;
+    size_t small = 0; // orders in a row
+    double size[SERIES_ROW];
+    const int powers = leader->has_force ? law->count : 2;
+    for (int i = 2; i < powers; i++)
+        series_factor_start(&series->powers[i], 0);
+    for (size_t c = 0; c < contact_count; c++) {
+        series_factor_start(&series->contact[c]->speeds, 0);
+        if (c == 0 && law->is_integer)
+            continue; // its powers are those of Y
+        series_factor_start(&series->contact[c]->elastic, 0);
+        series_factor_start(&series->contact[c]->viscous, 0);
+    }
+    size_t k = 0;
+    for (; k < order; k++) {
+        for (int i = 2; i < powers; i++)
+            series->powers[i].now = series_factor_product(&series->powers[law->left[i]],
+                                                          &series->powers[law->right[i]], k);
+        for (size_t c = 0; c < contact_count; c++)
+            power_series_force(series, series->contact[c], k, c == 0);
+        power_series_rate(series, state, slice, k, n, m);
+        power_series_state(series, time_factor, k, stride);
+        for (int i = 0; i < powers; i++)
+            series_factor_store(&series->powers[i], k);
+        for (size_t c = 0; c < contact_count; c++) {
+            series_factor_store(&series->contact[c]->speeds, k);
+            if (c == 0 && law->is_integer)
+                continue;
+            series_factor_store(&series->contact[c]->elastic, k);
+            series_factor_store(&series->contact[c]->viscous, k);
+        }
+        series->powers[0].now = 0;
+        series->powers[1].now = series->length / (double)(k + 1) * leader->sign *
+                                series->z[k * stride + leader->damper];
+        size[k + 1] = power_series_largest(series, k + 1, n, m);
+        small = size[k + 1] <= series->error ? small + 1 : 0;
+        if (small >= window) {
+            k++;
+            break;
+        }
+    }
+    series_factor_store(&series->powers[1], k);
+    series->degree = k;
+    // Coefficients fall like R^-k. The first order left out shall be below the error.
+    double log_radius = INFINITY;
+    for (size_t j = k - window + 1; j <= k; j++)
+        log_radius = fmin(log_radius, -log(size[j]) / (double)j);
+    return exp(fmin(log_radius + log(series->error) / (double)(k + 1), 1));
+}
+
+double power_series_expand(PowerSeries *series, const ModalState *state, const Slice *slice,
+                           double Y, double length) {
+    double *row = series->z;
+    const size_t n = series->modes, m = series->dampers;
+    series->length = length;
+    memset(row, 0, series->stride * sizeof *row);
+    for (size_t d = 0; d < m; d++) {
+        row[d] = state->damper[d].w;
+        if (m > 1)
+            row[series->at_r + d] = state->damper[d].r;
+    }
+    memcpy(row + series->at_q, state->q, n * sizeof *row);
+    memcpy(row + series->at_p, state->p, n * sizeof *row);
+    if (series->is_sine) {
+        row[series->at_a] = slice->value;
+        row[series->at_a + 1] = slice->slope;
+    }
+    series_factor_start(&series->powers[0], 1);
+    series_factor_start(&series->powers[1], Y);
+    // Constant sizes make contacts of one mode and one damper some 5 % faster (bench_power).
+    if (n == 1 && m == 1 && series->stride == 4)
+        return power_series_orders(series, state, slice, 1, 1, 4);
+    if (n == 1 && m == 1 && series->stride == 8)
+        return power_series_orders(series, state, slice, 1, 1, 8);
+    return power_series_orders(series, state, slice, n, m, series->stride);
+}
+
+void power_series_cut(PowerSeries *series, double s) {
+    double power = s;
+    series->length *= s;
+    for (size_t k = 1; k <= series->degree; k++, power *= s) {
+        double *row = series->z + k * series->stride;
+        for (size_t i = 0; i < series->stride; i++)
+            row[i] *= power;
+        series->powers[1].up[k] *= power;
+        for (size_t c = 0; c < series->contact_count && k < series->degree; c++)
+            series->contact[c]->force[k] *= power;
+    }
+}
+
+// Copies the coefficients of one column, degree + 1 values.
+static void power_series_column(const PowerSeries *series, size_t column, double *out) {
+    for (size_t k = 0; k <= series->degree; k++)
+        out[k] = series->z[k * series->stride + column];
+}
+
+// Horner's scheme. At s = 1 it adds the small terms first.
+void power_series_at(const PowerSeries *series, double s, double *row) {
+    const size_t stride = series->stride;
+    for (size_t i = 0; i < stride; i += 4) {
+        const double *at = series->z + series->degree * stride + i;
+        Two sum[2] = {TWO(at), TWO(at + 2)};
+        for (size_t k = series->degree; k > 0; k--) {
+            at -= stride;
+            sum[0] = sum[0] * s + TWO(at);
+            sum[1] = sum[1] * s + TWO(at + 2);
+        }
+        PUT_TWO(row + i, sum[0]);
+        PUT_TWO(row + i + 2, sum[1]);
+    }
+}
 
 enum { ORDER_MAX = 22, KINKS_MAX = 8 };
 
@@ -28,61 +389,53 @@ static const double ORDER_BASE = 2.5,
 static const double SPAN = 0.3;         // usual step, in (root of depth) / speed
 static const double ONSET_MARGIN = 0.9; // N is left out below this part of the onset
 
-// Scales and sums of a damper's contact.
-typedef struct PowerContactDamper {
-    ContactParameters parameters; // that terms and law are made of
-    ContactTerms terms;
-    SeriesLaw law;
-    double speed;         // scale of p' [m/s]
-    double depth;         // scale of p [m]
-    double acceleration;  // p'' without N [m/s^2]
-    double onset;         // N is negligible below this p [m]
-    int kink_passed;      // at the end of the last step: 1 upwards, -1 downwards, 0 none
-    double strain;        // energy in the buffer at the start of the step [J]
-    double impulse, work; // of N over the step [N s], [J]
-} PowerContactDamper;
-
-// What ends a step early: the onset of N, a kink of the law (passed upwards 1, downwards -1), or
-// else the event.
-typedef struct StepEnd {
-    bool is_found, is_onset;
-    int kink;
-    ContactEvent event;
-} StepEnd;
-
 Status power_contact_make(PowerContact *contact, ModalState *state, double tolerance,
                           Problem *problem) {
     memset(contact, 0, sizeof *contact);
     contact->state = state;
     contact->tolerance = tolerance;
-    contact->error = fmax(STEP_PART * tolerance, ROUNDING);
-    const double order = ORDER_BASE - ORDER_SLOPE * log(contact->error);
-    contact->order_max = order > ORDER_MAX ? ORDER_MAX : (size_t)order;
     if (state->plan->form != CONTACT_POWER || state->dampers == 0)
         return STATUS_OK;
     const size_t n = state->mode_count, m = state->dampers;
-    TRY(power_series_make(&contact->series, state, problem));
-    contact->damper = calloc(m, sizeof *contact->damper);
-    contact->block = calloc(m + n + state->padded + contact->series.stride + SERIES_NODES * (m + n),
-                            sizeof *contact->block);
-    if (contact->damper == NULL || contact->block == NULL)
+    PowerSeries *series = &contact->series;
+    series->error = fmax(STEP_PART * tolerance, ROUNDING);
+    const double order = ORDER_BASE - ORDER_SLOPE * log(series->error);
+    series->order_max = order > ORDER_MAX ? ORDER_MAX : (size_t)order;
+    series->modes = n;
+    series->dampers = m;
+    series->is_sine = state->base.base->omega > 0;
+    series->at_t = m;
+    series->at_q = m + 1;
+    series->at_p = series->at_q + n;
+    series->at_a = series->at_p + n;
+    series->at_r = series->at_a + (series->is_sine ? 2 : 0);
+    series->stride = (series->at_r + (m > 1 ? m : 0) + 3) / 4 * 4;
+    series->all = calloc(m, sizeof *series->all);
+    series->contact = calloc(m, sizeof *series->contact);
+    const SimdArray arrays[] = {
+        {&series->z, SERIES_ROW * series->stride},
+        {&series->rate, SERIES_ROW * series->stride},
+        {&contact->row, series->stride},
+        {&contact->elastic, state->padded},
+        {&series->elastic, n},
+        {&series->inverse_modal, n},
+    };
+    contact->block = simd_kernels_allocate(arrays, COUNT(arrays));
+    if (series->all == NULL || series->contact == NULL || contact->block == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for contacts of %zu dampers", m);
-    contact->row = contact->block;
-    contact->elastic = contact->row + contact->series.stride;
-    contact->inverse_modal = contact->elastic + state->padded;
-    contact->inverse_speed = contact->inverse_modal + n;
-    contact->nodes = contact->inverse_speed + m;
+    for (size_t d = 0; d < m; d++)
+        series->all[d].damper = d;
     return STATUS_OK;
 }
 
 void power_contact_clear(PowerContact *contact) {
-    power_series_clear(&contact->series);
-    free(contact->damper);
+    free(contact->series.all);
+    free(contact->series.contact);
     free(contact->block);
 }
 
 bool power_contact_is_active(const PowerContact *contact) {
-    for (size_t d = 0; contact->damper != NULL && d < contact->state->dampers; d++)
+    for (size_t d = 0; contact->block != NULL && d < contact->state->dampers; d++)
         if (contact->state->damper[d].phase == PHASE_CONTACT)
             return true;
     return false;
@@ -105,20 +458,19 @@ static double power_contact_depth(const ContactTerms *terms, double force) {
 }
 
 // Energy in the buffer [J].
-static double power_contact_strain(const PowerContactDamper *at, double p) {
+static double power_contact_strain(const SeriesContact *at, double p) {
     const double n = at->terms.exponent;
     return at->terms.stiffness * power_law_pow(p, n) * p / (n + 1);
 }
 
 // Penetration up to which N changes the speed of an impact by at most the part `error`.
-static double power_contact_impact_onset(const PowerContactDamper *at, double error) {
+static double power_contact_impact_onset(const SeriesContact *at, double error) {
     const double n = at->terms.exponent, m = at->terms.viscous_exponent;
     return at->depth * pow(error, 1 / ((at->terms.viscous > 0 ? fmin(n, m) : n) + 1));
 }
 
 // Penetration below which N is negligible in a contact with the present speed w.
-static double power_contact_onset(const PowerContactDamper *at, double error, double w,
-                                  double mass) {
+static double power_contact_onset(const SeriesContact *at, double error, double w, double mass) {
     const double m = at->terms.viscous_exponent;
     double p = at->law.is_integer ? 0 : power_contact_impact_onset(at, error);
     // A mass that is pressed in almost without speed: p = acceleration t^2 / 2.
@@ -135,9 +487,10 @@ static double power_contact_onset(const PowerContactDamper *at, double error, do
 static void power_contact_update(PowerContact *contact, size_t d) {
     const ModalState *state = contact->state;
     const DamperState *damper = &state->damper[d];
-    PowerContactDamper *at = &contact->damper[d];
+    SeriesContact *at = &contact->series.all[d];
     const double mass = damper->effective_mass, w = modal_state_sign(damper->side) * damper->w;
     const ContactParameters *now = &damper->contact;
+    at->sign = modal_state_sign(damper->side);
     if (memcmp(now, &at->parameters, sizeof *now) != 0) {
         at->parameters = *now;
         at->terms = state->plan->law->terms(now);
@@ -160,12 +513,12 @@ static void power_contact_update(PowerContact *contact, size_t d) {
         at->speed = fmax(speed, sqrt(2 * fabs(at->acceleration) * at->depth));
     }
     at->depth = fmax(at->depth, p);
-    at->onset = power_contact_onset(at, contact->error, w, mass);
+    at->onset = power_contact_onset(at, contact->series.error, w, mass);
     at->strain = power_contact_strain(at, p);
 }
 
 // On which side of the law's kink the motion is. At a kink just passed w shows only rounding.
-static bool power_contact_is_damped(const PowerContactDamper *at, const DamperState *damper) {
+static bool power_contact_is_damped(const SeriesContact *at, const DamperState *damper) {
     const double w = modal_state_sign(damper->side) * damper->w, above = w - at->terms.turn;
     if (fabs(above) > 4 * DBL_EPSILON * fabs(w))
         return above > 0;
@@ -182,80 +535,66 @@ static bool power_contact_is_damped(const PowerContactDamper *at, const DamperSt
 static double power_contact_list(PowerContact *contact) {
     const ModalState *state = contact->state;
     PowerSeries *series = &contact->series;
-    SeriesContact *const all = series->contact;
+    SeriesContact **const list = series->contact;
     size_t leader = 0;
     double smallest = INFINITY;
     series->contact_count = 0;
     for (size_t d = 0; d < state->dampers; d++) {
         const DamperState *damper = &state->damper[d];
-        const PowerContactDamper *at = &contact->damper[d];
+        SeriesContact *at = &series->all[d];
         if (damper->phase != PHASE_CONTACT)
             continue;
         const double p = power_contact_penetration(damper);
-        SeriesContact *next = &all[series->contact_count];
-        next->damper = d;
-        next->sign = modal_state_sign(damper->side);
-        next->terms = at->terms;
-        next->law = &at->law;
-        next->has_force = p >= ONSET_MARGIN * at->onset;
-        next->is_damped = power_contact_is_damped(at, damper);
-        const double relative = next->has_force ? p / at->depth : 0x1p1000;
+        at->has_force = p >= ONSET_MARGIN * at->onset;
+        at->is_damped = power_contact_is_damped(at, damper);
+        const double relative = at->has_force ? p / at->depth : 0x1p1000;
         if (relative < smallest) {
             smallest = relative;
             leader = series->contact_count;
         }
-        series->contact_count++;
+        list[series->contact_count++] = at;
     }
-    if (leader > 0) {
-        const SeriesContact moved = all[0];
-        all[0] = all[leader];
-        all[leader] = moved;
-    }
+    SeriesContact *const first = list[leader];
+    list[leader] = list[0];
+    list[0] = first;
     // Another contact at p = 0 has no series in the leader's time before its onset.
     for (size_t c = 1; c < series->contact_count; c++) {
-        PowerContactDamper *at = &contact->damper[all[c].damper];
-        if (power_contact_penetration(&state->damper[all[c].damper]) > 0)
+        if (power_contact_penetration(&state->damper[list[c]->damper]) > 0)
             continue;
-        all[c].has_force = false;
-        at->onset = fmax(at->onset, power_contact_impact_onset(at, contact->error));
+        list[c]->has_force = false;
+        list[c]->onset = fmax(list[c]->onset, power_contact_impact_onset(list[c], series->error));
     }
-    series->root = all[0].has_force ? all[0].law->root : 1;
-    return power_contact_root(power_contact_penetration(&state->damper[all[0].damper]),
+    series->root = first->has_force ? first->law.root : 1;
+    return power_contact_root(power_contact_penetration(&state->damper[first->damper]),
                               series->root);
 }
 
-// Fills in the scales of the series. Returns the length in tau to try.
-static double power_contact_scale(PowerContact *contact, double Y, double length,
-                                  SeriesScale *scale) {
+// Updates the scales of the series. Returns the length in tau to try.
+static double power_contact_scale(PowerContact *contact, double Y, double length) {
     const ModalState *state = contact->state;
     PowerSeries *series = &contact->series;
     const size_t n = state->mode_count;
     const int root = series->root;
     double time = INFINITY;
     for (size_t i = 0; i < n; i++)
-        contact->inverse_modal[i] = fabs(state->p[i]) + DBL_MIN;
+        series->inverse_modal[i] = fabs(state->p[i]) + DBL_MIN;
     for (size_t c = 0; c < series->contact_count; c++) {
-        const size_t d = series->contact[c].damper;
-        const DamperState *damper = &state->damper[d];
-        const PowerContactDamper *at = &contact->damper[d];
+        SeriesContact *at = series->contact[c];
+        const DamperState *damper = &state->damper[at->damper];
         const double speed = at->speed + DBL_MIN, own = at->depth / speed;
-        contact->inverse_speed[d] = 1 / speed;
         for (size_t i = 0; i < n; i++)
-            contact->inverse_modal[i] += fabs(damper->shape[i]) * damper->effective_mass * speed;
-        series->contact[c].inverse_force = own / (damper->effective_mass * speed);
+            series->inverse_modal[i] += fabs(damper->shape[i]) * damper->effective_mass * speed;
+        at->inverse_speed = 1 / speed;
+        at->inverse_force = own / (damper->effective_mass * speed);
         time = own < time ? own : time;
     }
     for (size_t i = 0; i < n; i++)
-        contact->inverse_modal[i] = 1 / contact->inverse_modal[i];
-    const size_t d = series->contact[0].damper;
-    const double w = series->contact[0].sign * state->damper[d].w;
-    const double Y_scale = power_contact_root(contact->damper[d].depth, root) + DBL_MIN;
-    *scale = (SeriesScale){.error = contact->error,
-                           .inverse_root = 1 / Y_scale,
-                           .inverse_time = 1 / (time + DBL_MIN),
-                           .inverse_speed = contact->inverse_speed,
-                           .inverse_modal = contact->inverse_modal,
-                           .order_max = contact->order_max};
+        series->inverse_modal[i] = 1 / series->inverse_modal[i];
+    const SeriesContact *leader = series->contact[0];
+    const double w = leader->sign * state->damper[leader->damper].w;
+    const double Y_scale = power_contact_root(leader->depth, root) + DBL_MIN;
+    series->inverse_root = 1 / Y_scale;
+    series->inverse_time = 1 / (time + DBL_MIN);
     // `length` at constant speed is (E - Y) / w in tau, E^root = Y^root + w length. Division by the
     // sum of Y^i E^(root - 1 - i) avoids the cancellation.
     double p = Y;
@@ -265,7 +604,7 @@ static double power_contact_scale(PowerContact *contact, double Y, double length
     double sum = 0, power = 1;
     for (int i = 0; i < root; i++, power *= Y)
         sum = sum * E + power;
-    const double usual = SPAN * Y_scale * contact->inverse_speed[d];
+    const double usual = SPAN * Y_scale * leader->inverse_speed;
     const double reach =
         root == contact->last_root && contact->last_length > usual ? contact->last_length : usual;
     return fmin(reach, 1.02 * length / sum);
@@ -299,46 +638,37 @@ static bool power_contact_cut_time(PowerSeries *series, double length, bool *is_
     return true;
 }
 
-// Locates the first crossing of a polynomial if it comes before *end. Returns whether it does.
-static bool power_contact_locate(double *c, size_t degree, ContactEvent candidate, StepEnd *end) {
-    if (!contact_event_locate(c, degree, candidate, &end->is_found, &end->event))
-        return false;
-    end->is_onset = false;
-    end->kink = 0;
-    return true;
-}
-
 // The release of a contact that does not lead, and the onset of a force that is left out.
-static void power_contact_find_release(const PowerContact *contact, size_t c, StepEnd *end) {
+static void power_contact_find_release(const PowerContact *contact, size_t c, bool *is_found,
+                                       ContactEvent *first) {
     const PowerSeries *series = &contact->series;
-    const SeriesContact *at = &series->contact[c];
-    const ContactEvent event = {.damper = at->damper,
-                                .side = contact->state->damper[at->damper].side};
+    const SeriesContact *at = series->contact[c];
+    ContactEvent event = {.damper = at->damper, .side = contact->state->damper[at->damper].side};
     double gap[SERIES_ROW];
-    if (c == 0)
+    if (c == 0) {
         memcpy(gap, power_series_leader(series), (series->degree + 1) * sizeof *gap);
-    else
+    } else {
         power_series_column(series, series->at_r + at->damper, gap);
-    for (size_t k = 0; k <= series->degree && c > 0; k++)
-        gap[k] *= at->sign;
-    if (c > 0)
-        (void)power_contact_locate(gap, series->degree, event, end);
+        for (size_t k = 0; k <= series->degree; k++)
+            gap[k] *= at->sign;
+        contact_event_locate(gap, series->degree, event, is_found, first);
+    }
     if (at->has_force)
         return;
     for (size_t k = 0; k <= series->degree; k++)
         gap[k] = -gap[k];
-    gap[0] += contact->damper[at->damper].onset;
-    if (power_contact_locate(gap, series->degree, event, end))
-        end->is_onset = true;
+    gap[0] += at->onset;
+    event.is_onset = true;
+    contact_event_locate(gap, series->degree, event, is_found, first);
 }
 
-static void power_contact_find_kink(const PowerContact *contact, size_t c, StepEnd *end) {
+static void power_contact_find_kink(const PowerContact *contact, const SeriesContact *at,
+                                    bool *is_found, ContactEvent *first) {
     const PowerSeries *series = &contact->series;
-    const SeriesContact *at = &series->contact[c];
     double above[SERIES_ROW];
     if (!(at->terms.viscous > 0) || !at->has_force || contact->kinks > KINKS_MAX)
         return;
-    const double sign = at->is_damped ? 1 : -1;
+    const int sign = at->is_damped ? 1 : -1;
     power_series_column(series, at->damper, above);
     for (size_t k = 0; k <= series->degree; k++)
         above[k] *= sign * at->sign;
@@ -346,8 +676,8 @@ static void power_contact_find_kink(const PowerContact *contact, size_t c, StepE
     above[0] -= sign * at->terms.turn;
     if (fabs(above[0]) <= 4 * DBL_EPSILON * size)
         above[0] = 0;
-    if (power_contact_locate(above, series->degree, (ContactEvent){.damper = at->damper}, end))
-        end->kink = at->is_damped ? -1 : 1;
+    contact_event_locate(above, series->degree, (ContactEvent){.damper = at->damper, .kink = -sign},
+                         is_found, first);
 }
 
 // A contact that is over already: the gap opens from the first instant on.
@@ -357,7 +687,7 @@ static bool power_contact_find_open(const PowerContact *contact, PowerContactSte
         const DamperState *damper = &state->damper[d];
         const double sign = modal_state_sign(damper->side), w = sign * damper->w;
         if (damper->phase != PHASE_CONTACT || sign * damper->r > 0 ||
-            !(w < 0 || (w == 0 && !(contact->damper[d].acceleration > 0))))
+            !(w < 0 || (w == 0 && !(contact->series.all[d].acceleration > 0))))
             continue;
         step->is_event = true;
         step->event = (ContactEvent){.damper = d, .s = 1, .side = damper->side};
@@ -366,30 +696,25 @@ static bool power_contact_find_open(const PowerContact *contact, PowerContactSte
     return false;
 }
 
-// The first event on the step. is_released: the leading contact is at its end.
-static void power_contact_find(const PowerContact *contact, bool is_released, StepEnd *end) {
+// What ends the step first. is_released: the leading contact is at its end.
+static bool power_contact_find(const PowerContact *contact, bool is_released, ContactEvent *first) {
     const ModalState *state = contact->state;
     const PowerSeries *series = &contact->series;
-    *end = (StepEnd){0};
-    if (is_released) {
-        const size_t d = series->contact[0].damper;
-        end->is_found = true;
-        end->event = (ContactEvent){.damper = d, .s = 1, .side = state->damper[d].side};
-    }
+    const size_t leader = series->contact[0]->damper;
+    bool is_found = is_released;
+    *first = (ContactEvent){.damper = leader, .s = 1, .side = state->damper[leader].side};
     for (size_t c = 0; c < series->contact_count; c++) {
-        power_contact_find_release(contact, c, end);
-        power_contact_find_kink(contact, c, end);
+        power_contact_find_release(contact, c, &is_found, first);
+        power_contact_find_kink(contact, series->contact[c], &is_found, first);
     }
     for (size_t d = 0; d < state->dampers; d++) {
         double r[SERIES_ROW];
         if (state->damper[d].phase != PHASE_FLIGHT)
             continue;
         power_series_column(series, series->at_r + d, r);
-        if (contact_event_find_touch(state, d, r, series->degree, &end->is_found, &end->event)) {
-            end->is_onset = false;
-            end->kink = 0;
-        }
+        contact_event_find_touch(state, d, r, series->degree, &is_found, first);
     }
+    return is_found;
 }
 
 // Sets the state to that at s. is_released: the leading contact's p is exactly 0 there.
@@ -397,7 +722,7 @@ static void power_contact_state(PowerContact *contact, const Slice *slice, doubl
                                 bool is_released) {
     ModalState *state = contact->state;
     const PowerSeries *series = &contact->series;
-    const SeriesContact *leader = &series->contact[0];
+    const SeriesContact *leader = series->contact[0];
     const double *row = contact->row;
     power_series_at(series, s, contact->row);
     memcpy(state->q, row + series->at_q, state->mode_count * sizeof *state->q);
@@ -415,73 +740,58 @@ static void power_contact_state(PowerContact *contact, const Slice *slice, doubl
     state->base_acceleration = slice_at(slice, row[series->at_t]);
 }
 
-// Evaluates the modal speeds at the nodes of a rule, and p' D p there into `loss`.
-static void power_contact_losses(PowerContact *contact, size_t rule, double *loss) {
-    const ModalState *state = contact->state;
-    const PowerSeries *series = &contact->series;
-    const size_t n = state->mode_count, count = linear_motion_rules[rule].count;
-    memset(loss, 0, SERIES_NODES * sizeof *loss);
-    for (size_t i = 0; i < n; i++) {
-        double *p = contact->nodes + i * SERIES_NODES;
-        power_series_nodes(series, rule, series->z + series->at_p + i, series->stride,
-                           series->degree, p);
-        for (size_t k = 0; k < count && state->diagonal != NULL; k++)
-            loss[k] += state->diagonal[i] * p[k] * p[k];
-    }
-    for (size_t i = 0; i < n && state->diagonal == NULL; i++)
-        for (size_t j = 0; j < n; j++) {
-            const double *a = contact->nodes + i * SERIES_NODES,
-                         *b = contact->nodes + j * SERIES_NODES;
-            for (size_t k = 0; k < count; k++)
-                loss[k] += state->damping[i * n + j] * a[k] * b[k];
-        }
+// Horner's scheme at all nodes of a rule.
+static void power_contact_nodes(const Quadrature *rule, const double *c, size_t degree,
+                                double *values) {
+    for (size_t k = 0; k < COUNT(rule->node); k++)
+        values[k] = c[degree];
+    for (size_t i = degree; i-- > 0;)
+        for (size_t k = 0; k < COUNT(rule->node); k++)
+            values[k] = values[k] * rule->node[k] + c[i];
+}
+
+// p' D p.
+static double power_contact_loss(const ModalState *state, const double *p) {
+    const size_t n = state->mode_count;
+    double loss = 0;
+    for (size_t i = 0; i < n; i++)
+        loss += p[i] * (state->diagonal != NULL ? state->diagonal[i] * p[i]
+                                                : modal_state_dot(state->damping + i * n, p, n));
+    return loss;
 }
 
 // Integrates over the step by Gauss-Legendre quadrature: the work of the base, the losses, and
 // impulse and work of each N.
 static void power_contact_integrate(PowerContact *contact, const Slice *slice, StepWork *work) {
     const ModalState *state = contact->state;
-    const PowerSeries *series = &contact->series;
-    const size_t rule = contact->error > 1e-8 ? 0 : LINEAR_MOTION_RULES - 1,
-                 count = linear_motion_rules[rule].count;
-    const size_t n = state->mode_count, m = state->dampers, degree = series->degree;
-    double weight[SERIES_NODES], Y[SERIES_NODES], ground[SERIES_NODES], loss[SERIES_NODES],
-        momentum[SERIES_NODES] = {0};
-    power_series_nodes(series, rule, power_series_leader(series), 1, degree, Y);
-    power_series_nodes(series, rule, series->z + (series->is_sine ? series->at_a : series->at_t),
-                       series->stride, degree, ground);
-    power_contact_losses(contact, rule, loss);
-    for (size_t i = 0; i < n; i++)
-        for (size_t k = 0; k < count; k++)
-            momentum[k] += state->momentum_weights[i] * contact->nodes[i * SERIES_NODES + k];
-    for (size_t d = 0; d < m; d++) {
-        double *w = contact->nodes + d * SERIES_NODES; // the modal speeds are used up
-        power_series_nodes(series, rule, series->z + d, series->stride, degree, w);
-        for (size_t k = 0; k < count; k++)
-            momentum[k] += state->damper[d].plan->mass * w[k];
-    }
-    for (size_t k = 0; k < count; k++) {
-        weight[k] = linear_motion_rules[rule].weight[k] * series->length * series->root;
-        for (int i = 1; i < series->root; i++)
-            weight[k] *= Y[k];
-        ground[k] = series->is_sine ? ground[k] : slice_at(slice, ground[k]);
-        work->input -= weight[k] * ground[k] * momentum[k];
-        work->damping += weight[k] * loss[k];
-        work->ground += weight[k] * ground[k];
-    }
+    PowerSeries *series = &contact->series;
+    const Quadrature *rule =
+        &linear_motion_rules[series->error > 1e-8 ? 0 : LINEAR_MOTION_RULES - 1];
+    const double *w = contact->row, *p = w + series->at_p;
+    double Y[COUNT(rule->node)];
+    power_contact_nodes(rule, power_series_leader(series), series->degree, Y);
     for (size_t c = 0; c < series->contact_count; c++) {
-        const SeriesContact *of = &series->contact[c];
-        PowerContactDamper *at = &contact->damper[of->damper];
-        const double *w = contact->nodes + of->damper * SERIES_NODES;
-        double force[SERIES_NODES];
+        SeriesContact *at = series->contact[c];
         at->impulse = at->work = 0;
-        if (!of->has_force)
-            continue;
-        power_series_nodes(series, rule, of->force, 1, degree - 1, force);
-        for (size_t k = 0; k < count; k++) {
-            const double impulse = weight[k] * of->sign * force[k];
+        power_contact_nodes(rule, at->force, series->degree - 1, at->node_force);
+    }
+    for (size_t k = 0; k < rule->count; k++) {
+        power_series_at(series, rule->node[k], contact->row);
+        const double ground = series->is_sine ? w[series->at_a] : slice_at(slice, w[series->at_t]);
+        double weight = rule->weight[k] * series->length * series->root;
+        for (int i = 1; i < series->root; i++)
+            weight *= Y[k];
+        double momentum = modal_state_dot(state->momentum_weights, p, state->mode_count);
+        for (size_t d = 0; d < state->dampers; d++)
+            momentum += state->damper[d].plan->mass * w[d];
+        work->input -= weight * ground * momentum;
+        work->damping += weight * power_contact_loss(state, p);
+        work->ground += weight * ground;
+        for (size_t c = 0; c < series->contact_count; c++) {
+            SeriesContact *at = series->contact[c];
+            const double impulse = weight * at->sign * at->node_force[k];
             at->impulse += impulse;
-            at->work += impulse * w[k];
+            at->work += impulse * w[at->damper];
         }
     }
 }
@@ -491,7 +801,7 @@ static void power_contact_peaks(PowerContact *contact, const Slice *slice) {
     ModalState *state = contact->state;
     const PowerSeries *series = &contact->series;
     for (size_t c = 0; c < series->contact_count; c++) {
-        const SeriesContact *of = &series->contact[c];
+        const SeriesContact *of = series->contact[c];
         DamperState *damper = &state->damper[of->damper];
         double s = -1;
         if (!of->has_force)
@@ -512,9 +822,8 @@ static void power_contact_peaks(PowerContact *contact, const Slice *slice) {
 static void power_contact_log(PowerContact *contact, double length) {
     ModalState *state = contact->state;
     for (size_t c = 0; c < contact->series.contact_count; c++) {
-        const size_t d = contact->series.contact[c].damper;
-        DamperState *damper = &state->damper[d];
-        const PowerContactDamper *at = &contact->damper[d];
+        const SeriesContact *at = contact->series.contact[c];
+        DamperState *damper = &state->damper[at->damper];
         const double strain = power_contact_strain(at, power_contact_penetration(damper));
         impact_log_stretch(&state->impacts, &damper->row, length, at->impulse,
                            at->work - (strain - at->strain));
@@ -532,38 +841,37 @@ void power_contact_step(PowerContact *contact, const Slice *slice, double length
             power_contact_update(contact, d);
     if (power_contact_find_open(contact, step))
         return;
-    SeriesScale scale;
-    StepEnd end;
+    ContactEvent end;
     const double Y = power_contact_list(contact);
-    const double span = power_contact_scale(contact, Y, length, &scale);
-    power_series_cut(series, power_series_expand(series, state, slice, Y, span, &scale));
+    const double span = power_contact_scale(contact, Y, length);
+    power_series_cut(series, power_series_expand(series, state, slice, Y, span));
     contact->last_length = series->length;
     contact->last_root = series->root;
     const bool is_released = power_contact_cut_release(series);
     bool is_cut;
     const bool is_whole = power_contact_cut_time(series, length, &is_cut);
-    power_contact_find(contact, is_released && !is_cut, &end);
-    if (end.is_found && end.event.s < 1)
-        power_series_cut(series, end.event.s);
+    const bool is_found = power_contact_find(contact, is_released && !is_cut, &end);
+    if (is_found && end.s < 1)
+        power_series_cut(series, end.s);
     if (!state->is_shadow) {
         power_contact_integrate(contact, slice, &step->work);
         power_contact_peaks(contact, slice);
     }
-    step->is_event = end.is_found && !end.is_onset && end.kink == 0;
-    step->event = end.event;
+    step->is_event = is_found && !end.is_onset && end.kink == 0;
+    step->event = end;
     step->event.s = 1;
     power_contact_state(contact, slice, 1,
-                        step->is_event && end.event.damper == series->contact[0].damper);
-    step->length = is_whole && !end.is_found ? length : contact->row[series->at_t];
+                        step->is_event && end.damper == series->contact[0]->damper);
+    step->length = is_whole && !is_found ? length : contact->row[series->at_t];
     if (!state->is_shadow)
         power_contact_log(contact, step->length);
     contact->kinks = step->length > 0 ? 0 : contact->kinks + 1;
     for (size_t c = 0; c < series->contact_count; c++)
         if (step->length > 0)
-            contact->damper[series->contact[c].damper].kink_passed = 0;
+            series->contact[c]->kink_passed = 0;
     if (end.kink != 0) {
-        DamperState *damper = &state->damper[end.event.damper];
-        PowerContactDamper *at = &contact->damper[end.event.damper];
+        DamperState *damper = &state->damper[end.damper];
+        SeriesContact *at = &series->all[end.damper];
         damper->w = modal_state_sign(damper->side) * at->terms.turn;
         at->kink_passed = end.kink;
     }

@@ -10,8 +10,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/solve/engine.h"
 #include "core/solve/time_stepping.h"
-#include "core/solve/transition.h"
 
 // Limits of the cache: tables, and their values together; two tables fit in any case.
 enum { TABLES_MAX = 64 };
@@ -60,7 +60,7 @@ static void precise_clear(TimeStepping *stepping) {
         precise_table_clear(&precise->tables[i]);
 }
 
-// The place of a component of y = (q, p, r, w; g, s) in the rows of transition.h.
+// The place of a component of y = (q, p, r, w; g, s) in the rows of transition.c.
 static size_t precise_place(const ModalState *state, size_t i) {
     const size_t n = state->mode_count, m = state->dampers;
     return i < n || i >= 2 * n + m ? i : i < 2 * n ? i + m : i - n;

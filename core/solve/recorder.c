@@ -2,48 +2,59 @@
 // peak, and the bound "sum over modes of |q_i| times the largest |shape| of any storey" shows it
 // without the storeys. Sums of squares are taken over pairs of modes, several samples at a time,
 // and converted to the storeys at the end.
-#include "core/solve/recorder.h"
+#include "core/solve/engine.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-// The mode shape at a column's storey, or at the storey of its damper.
-static const double *recorder_shape(const ModalState *state, const RunColumn *column) {
-    switch (column->channel) {
-    case CHANNEL_DISPLACEMENT:
-    case CHANNEL_VELOCITY:
-    case CHANNEL_ACCELERATION:
-    case CHANNEL_MEAN_ACCELERATION:
-        return state->modes->shapes + column->number * state->mode_count;
-    case CHANNEL_BASE_ACCELERATION:
-        return state->modes->shapes; // not used
-    default:
-        return state->damper[column->number].shape;
-    }
+// Displacement of the free mass relative to its storey at r = 0 [m].
+static double recorder_middle(const DamperState *damper) {
+    const double stop = damper->plan->clearance / 2;
+    const double origin =
+        damper->origin == FROM_MIDDLE ? 0 : modal_state_sign((Side)damper->origin) * stop;
+    return damper->plan->offset + origin;
 }
 
-Status recorder_start(Recorder *record, const FlightBuffer *buffer, const ModalState *state,
-                      Response *response, Problem *problem) {
-    const size_t n = state->mode_count, columns = state->run->column_count, padded = buffer->padded;
-    const size_t square = padded * padded;
+Status recorder_start(Recorder *record, const ModalState *state, Response *response,
+                      Problem *problem) {
+    const size_t n = state->mode_count, columns = state->run->column_count, padded = state->padded;
+    const size_t m = state->dampers, rows = FLIGHT_BUFFER_ROWS;
+    FlightBuffer *buffer = &record->buffer;
     memset(record, 0, sizeof *record);
-    record->block = calloc(2 * (square + FLIGHT_BUFFER_MAX * padded) + columns * (1 + padded),
-                           sizeof *record->block);
+    const SimdArray arrays[] = {
+        {&buffer->q, rows * padded},
+        {&buffer->p, rows * padded},
+        {&buffer->moved, rows * padded},
+        {&buffer->sped, rows * padded},
+        {&buffer->elastic, rows * padded},
+        {&buffer->r, rows * m},
+        {&buffer->z, rows * m},
+        {&buffer->a, rows},
+        {&buffer->b, rows},
+        {&buffer->ground, rows},
+        {&record->squares[0], padded * padded},
+        {&record->squares[1], padded * padded},
+        {&record->batch[0], FLIGHT_BUFFER_MAX * padded},
+        {&record->batch[1], FLIGHT_BUFFER_MAX * padded},
+        {&record->shapes, columns * padded},
+        {&record->last_velocity, columns},
+    };
+    record->block = simd_kernels_allocate(arrays, COUNT(arrays));
     if (record->block == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu modes", n);
-    record->buffer = buffer;
-    for (size_t k = 0; k < 2; k++) {
-        record->squares[k] = record->block + k * square;
-        record->batch[k] = record->block + 2 * square + k * FLIGHT_BUFFER_MAX * padded;
-    }
-    record->shapes = record->batch[1] + FLIGHT_BUFFER_MAX * padded;
-    record->last_velocity = record->shapes + columns * padded;
     for (size_t i = 0; i < columns; i++) {
         const RunColumn *column = &state->run->columns[i];
-        memcpy(record->shapes + i * padded, recorder_shape(state, column),
+        const ChannelOwner owner = channels[column->channel].owner;
+        const size_t storey = owner == CHANNEL_OF_STOREY ? column->number
+                              : owner == CHANNEL_OF_DAMPER
+                                  ? state->plan->dampers[column->number].storey
+                                  : 0;
+        memcpy(record->shapes + i * padded, state->modes->shapes + storey * n,
                n * sizeof *record->shapes);
-        if (state->residual_influence != NULL && column->channel == CHANNEL_ACCELERATION)
+        // Row p has 0 in the slot of a_g.
+        if (state->residual_influence != NULL && (column->channel == CHANNEL_ACCELERATION ||
+                                                  column->channel == CHANNEL_MEAN_ACCELERATION))
             record->shapes[i * padded + n] = -state->residual_influence[column->number];
     }
     record->statistics_start =
@@ -63,7 +74,7 @@ static void recorder_write_means(Recorder *record, const ModalState *state, size
     const double share = state->plan->influence[state->run->columns[column].number];
     for (size_t k = 0; k < count; k++) {
         const double velocity = values[k];
-        values[k] = (velocity - record->last_velocity[column] + share * record->buffer->ground[k]) *
+        values[k] = (velocity - record->last_velocity[column] + share * record->buffer.ground[k]) *
                     state->plan->sample_rate;
         record->last_velocity[column] = velocity;
     }
@@ -71,20 +82,19 @@ static void recorder_write_means(Recorder *record, const ModalState *state, size
 
 static void recorder_write_storey(Recorder *record, const ModalState *state, size_t column,
                                   double *values, size_t count) {
-    const FlightBuffer *buffer = record->buffer;
+    const FlightBuffer *buffer = &record->buffer;
     const ChannelId channel = state->run->columns[column].channel;
-    const size_t padded = buffer->padded, storey = state->run->columns[column].number;
+    const size_t padded = state->padded, storey = state->run->columns[column].number;
     const double *rows = channel == CHANNEL_ACCELERATION   ? buffer->elastic
                          : channel == CHANNEL_DISPLACEMENT ? buffer->q
                                                            : buffer->p;
     const double *shape = record->shapes + column * padded;
     state->lanes->dot(padded, count, shape, rows + padded, values);
-    if (channel == CHANNEL_MEAN_ACCELERATION) {
+    if (channel == CHANNEL_MEAN_ACCELERATION)
         recorder_write_means(record, state, column, values, count);
-        if (state->sample == 0)
-            values[0] = modal_state_storey_acceleration(state, storey);
-    }
-    if (channel != CHANNEL_ACCELERATION)
+    if (channel == CHANNEL_MEAN_ACCELERATION && state->sample == 0)
+        state->lanes->dot(padded, 1, shape, buffer->elastic + padded, values);
+    else if (channel != CHANNEL_ACCELERATION)
         return;
     double push = 0;
     for (size_t d = 0; d < state->dampers; d++)
@@ -95,15 +105,15 @@ static void recorder_write_storey(Recorder *record, const ModalState *state, siz
 
 static void recorder_write_damper(Recorder *record, const ModalState *state, size_t column,
                                   double *values, size_t count) {
-    const FlightBuffer *buffer = record->buffer;
+    const FlightBuffer *buffer = &record->buffer;
     const RunColumn *wanted = &state->run->columns[column];
     const DamperState *damper = &state->damper[wanted->number];
     const double *r = buffer->r + wanted->number * FLIGHT_BUFFER_ROWS + 1;
     const double *z = buffer->z + wanted->number * FLIGHT_BUFFER_ROWS + 1;
     if (wanted->channel == CHANNEL_DAMPER_DISPLACEMENT) {
-        const double middle = modal_state_middle(damper);
-        state->lanes->dot(buffer->padded, count, record->shapes + column * buffer->padded,
-                          buffer->q + buffer->padded, values);
+        const double middle = recorder_middle(damper);
+        state->lanes->dot(state->padded, count, record->shapes + column * state->padded,
+                          buffer->q + state->padded, values);
         for (size_t k = 0; k < count; k++)
             values[k] += middle + r[k];
         return;
@@ -116,39 +126,32 @@ static void recorder_write_damper(Recorder *record, const ModalState *state, siz
                                 : 0;
 }
 
+// Writes rows 1 to `count` of the buffer with the present forces.
 static void recorder_write_column(Recorder *record, const ModalState *state, size_t column,
                                   size_t count) {
     const size_t first = state->sample + 1 - count;
     double *values = state->run->columns[column].values + first;
-    switch (state->run->columns[column].channel) {
-    case CHANNEL_DISPLACEMENT:
-    case CHANNEL_VELOCITY:
-    case CHANNEL_ACCELERATION:
-    case CHANNEL_MEAN_ACCELERATION:
+    const ChannelOwner owner = channels[state->run->columns[column].channel].owner;
+    if (owner == CHANNEL_OF_STOREY)
         recorder_write_storey(record, state, column, values, count);
-        return;
-    case CHANNEL_BASE_ACCELERATION:
-        for (size_t k = 0; k < count; k++)
-            values[k] = base_cursor_at(&state->base, first + k);
-        return;
-    default:
+    else if (owner == CHANNEL_OF_DAMPER)
         recorder_write_damper(record, state, column, values, count);
-    }
+    for (size_t k = 0; k < count && owner == CHANNEL_OF_BASE; k++)
+        values[k] = base_cursor_at(&state->base, first + k);
 }
 
 static void recorder_add_batch(Recorder *record, const ModalState *state, size_t count) {
-    const FlightBuffer *buffer = record->buffer;
     for (size_t k = 0; k < 2; k++)
-        state->lanes->square(state->slot_count, buffer->padded, count, record->batch[k],
+        state->lanes->square(state->slot_count, state->padded, count, record->batch[k],
                              record->squares[k]);
 }
 
 // The sign of the accelerations does not matter.
 static void recorder_add_squares(Recorder *record, const ModalState *state, size_t row) {
-    const size_t padded = record->buffer->padded, at = record->count++ % FLIGHT_BUFFER_MAX;
+    const size_t padded = state->padded, at = record->count++ % FLIGHT_BUFFER_MAX;
     double *restrict pull = record->batch[1] + at * padded;
-    memcpy(record->batch[0] + at * padded, record->buffer->q + row * padded, padded * sizeof *pull);
-    memcpy(pull, record->buffer->elastic + row * padded, padded * sizeof *pull);
+    memcpy(record->batch[0] + at * padded, record->buffer.q + row * padded, padded * sizeof *pull);
+    memcpy(pull, record->buffer.elastic + row * padded, padded * sizeof *pull);
     for (size_t d = 0; d < state->dampers; d++) {
         const double force = state->damper[d].force, *shape = state->damper[d].shape;
         for (size_t i = 0; i < state->mode_count && force != 0; i++)
@@ -158,7 +161,7 @@ static void recorder_add_squares(Recorder *record, const ModalState *state, size
         recorder_add_batch(record, state, FLIGHT_BUFFER_MAX);
 }
 
-void recorder_write(Recorder *record, ModalState *state, size_t count) {
+static void recorder_write(Recorder *record, const ModalState *state, size_t count) {
     for (size_t i = 0; i < state->run->column_count; i++)
         recorder_write_column(record, state, i, count);
     if (state->sample >= record->statistics_start)
@@ -168,9 +171,8 @@ void recorder_write(Recorder *record, ModalState *state, size_t count) {
 }
 
 // The largest shape' squares shape of any storey.
-static double recorder_largest_sum(const Recorder *record, const double *squares,
-                                   const ModalState *state) {
-    const size_t n = state->mode_count, padded = record->buffer->padded;
+static double recorder_largest_sum(const ModalState *state, const double *squares) {
+    const size_t n = state->mode_count, padded = state->padded;
     double most = 0;
     for (size_t j = 0; j < state->storey_count; j++) {
         const double *shape = state->modes->shapes + j * n;
@@ -190,8 +192,8 @@ static double recorder_largest_sum(const Recorder *record, const double *squares
 
 void recorder_finish(Recorder *record, const ModalState *state, Response *response) {
     recorder_add_batch(record, state, record->count % FLIGHT_BUFFER_MAX);
-    response->sum_squares_displacement = recorder_largest_sum(record, record->squares[0], state);
-    response->sum_squares_acceleration = recorder_largest_sum(record, record->squares[1], state);
+    response->sum_squares_displacement = recorder_largest_sum(state, record->squares[0]);
+    response->sum_squares_acceleration = recorder_largest_sum(state, record->squares[1]);
     response->statistics_count = record->count;
 }
 
@@ -213,18 +215,13 @@ static double recorder_largest_value(const double *values, size_t count) {
     return most[0];
 }
 
-// The largest of all storeys.
-static double recorder_largest_storey(const ModalState *state, const double *modal) {
-    return recorder_largest_value(modal_state_expand(state, modal), state->storey_count);
-}
-
 void recorder_acceleration(ModalState *state) {
     double most = recorder_bound(state, state->elastic), at = 0;
     for (size_t d = 0; d < state->dampers; d++)
         most += state->damper[d].max_mobility * fabs(state->damper[d].force);
     if (!(most > state->impacts.response->peaks.acceleration))
         return;
-    const double *pull = modal_state_expand(state, state->elastic);
+    const double *pull = modal_state_expand(state, state->elastic, 1);
     for (size_t j = 0; j < state->storey_count; j++) {
         double sum = -pull[j];
         for (size_t d = 0; d < state->dampers; d++)
@@ -234,39 +231,20 @@ void recorder_acceleration(ModalState *state) {
     impact_log_acceleration(&state->impacts, at);
 }
 
-void recorder_peaks(ModalState *state) {
-    const Peaks *peaks = &state->impacts.response->peaks;
-    const double far = recorder_bound(state, state->q);
-    Instant at = {0};
-    if (far > peaks->displacement)
-        at.x = recorder_largest_storey(state, state->q);
-    if (recorder_bound(state, state->p) > peaks->velocity)
-        at.v = recorder_largest_storey(state, state->p);
-    for (size_t d = 0; d < state->dampers; d++) {
-        const DamperState *damper = &state->damper[d];
-        const double relative = modal_state_middle(damper) + damper->r;
-        if (far + fabs(relative) > peaks->damper_displacement)
-            at.damper_x =
-                fmax(at.damper_x,
-                     fabs(modal_state_displacement(state, damper->plan->storey) + relative));
-    }
-    impact_log_peaks(&state->impacts, &at);
-    recorder_acceleration(state);
-}
-
-// The largest value of any storey in rows 1 to `count`, or `least` if that is larger. `bounds`
-// becomes an upper bound for each row.
+// The largest value of any storey in `count` rows, or `least` if that is larger. `bounds` becomes
+// an upper bound for each row.
 static double recorder_find_peak(const ModalState *state, const double *rows, size_t count,
                                  double least, double *bounds) {
     const size_t padded = state->padded;
-    state->lanes->weighted_abs(padded, count, state->max_shape, rows + padded, bounds);
+    state->lanes->weighted_abs(padded, count, state->max_shape, rows, bounds);
     for (size_t k = 0; k < count; k += FLIGHT_ROWS) {
         bool may_rise = false;
         for (size_t j = k; j < k + FLIGHT_ROWS && j < count; j++)
             may_rise = may_rise || bounds[j] > least;
         if (!may_rise)
             continue;
-        const double *values = modal_state_expand_four(state, rows + (k + 1) * padded);
+        const double *values =
+            modal_state_expand(state, rows + k * padded, count == 1 ? 1 : FLIGHT_ROWS);
         for (size_t j = k; j < k + FLIGHT_ROWS && j < count; j++)
             least = impact_log_larger(
                 least, recorder_largest_value(values + (j - k) * state->tall, state->storey_count));
@@ -274,47 +252,90 @@ static double recorder_find_peak(const ModalState *state, const double *rows, si
     return least;
 }
 
-void recorder_flight_peaks(Recorder *record, ModalState *state, size_t count) {
-    const FlightBuffer *buffer = record->buffer;
+// Updates all peaks but those of accelerations by `count` rows of q and p, and of the dampers' r,
+// each damper's `stride` values apart.
+static void recorder_find_peaks(ModalState *state, const double *q, const double *p,
+                                const double *r, size_t stride, size_t count) {
     const Peaks *peaks = &state->impacts.response->peaks;
     double far[FLIGHT_BUFFER_MAX], bounds[FLIGHT_BUFFER_MAX];
     Instant at = {
-        .v = recorder_find_peak(state, buffer->p, count, peaks->velocity, bounds),
-        .acceleration =
-            recorder_find_peak(state, buffer->elastic, count, peaks->acceleration, bounds),
-        .x = recorder_find_peak(state, buffer->q, count, peaks->displacement, far),
+        .v = recorder_find_peak(state, p, count, peaks->velocity, bounds),
+        .x = recorder_find_peak(state, q, count, peaks->displacement, far),
         .damper_x = peaks->damper_displacement,
     };
     for (size_t d = 0; d < state->dampers; d++) {
         const DamperState *damper = &state->damper[d];
-        const double *r = buffer->r + d * FLIGHT_BUFFER_ROWS + 1,
-                     middle = modal_state_middle(damper);
-        for (size_t k = 0; k < count; k++)
-            if (far[k] + fabs(middle + r[k]) > at.damper_x)
-                at.damper_x =
-                    fmax(at.damper_x,
-                         fabs(modal_state_dot(damper->shape, buffer->q + (k + 1) * buffer->padded,
-                                              state->mode_count) +
-                              (middle + r[k])));
+        const double middle = recorder_middle(damper);
+        for (size_t k = 0; k < count; k++) {
+            const double relative = middle + r[d * stride + k];
+            if (far[k] + fabs(relative) > at.damper_x)
+                at.damper_x = fmax(
+                    at.damper_x,
+                    fabs(modal_state_dot(damper->shape, q + k * state->padded, state->mode_count) +
+                         relative));
+        }
     }
     impact_log_peaks(&state->impacts, &at);
 }
 
-void recorder_restart_peaks(ModalState *state) {
-    Instant at = {0};
+void recorder_peaks(ModalState *state) {
+    double r[SCENE_DAMPERS];
     for (size_t d = 0; d < state->dampers; d++)
-        at.force = fmax(at.force, fabs(state->damper[d].force));
-    impact_log_forget_peaks(&state->impacts, &at);
+        r[d] = state->damper[d].r;
+    recorder_find_peaks(state, state->q, state->p, r, 1, 1);
+    recorder_acceleration(state);
 }
 
-void recorder_sample(Recorder *record, FlightBuffer *buffer, ModalState *state) {
+static void recorder_restart_peaks(ModalState *state) {
+    double force = 0;
+    for (size_t d = 0; d < state->dampers; d++)
+        force = fmax(force, fabs(state->damper[d].force));
+    impact_log_restart_peaks(&state->impacts, force);
+}
+
+void recorder_flight(Recorder *record, ModalState *state, size_t count) {
+    const FlightBuffer *buffer = &record->buffer;
+    const size_t padded = state->padded;
+    const double *q = buffer->q + padded, *p = buffer->p + padded;
+    double *elastic = buffer->elastic + padded, bounds[FLIGHT_BUFFER_MAX];
+    state->base_acceleration = base_cursor_at(&state->base, state->sample);
+    if (state->diagonal != NULL)
+        state->lanes->mix(padded, count, state->diagonal, p, state->omega2, q, elastic);
+    for (size_t k = 0; k < count; k++) {
+        if (state->diagonal == NULL)
+            modal_state_elastic(state, q + k * padded, p + k * padded, elastic + k * padded);
+        if (state->residual_influence != NULL)
+            elastic[k * padded + state->mode_count] =
+                base_cursor_at(&state->base, state->sample + 1 - count + k);
+    }
+    if (state->sample + 1 - count == record->statistics_start)
+        recorder_restart_peaks(state);
+    recorder_write(record, state, count);
+    recorder_find_peaks(state, q, p, buffer->r + 1, FLIGHT_BUFFER_ROWS, count);
+    impact_log_acceleration(
+        &state->impacts, recorder_find_peak(state, elastic, count,
+                                            state->impacts.response->peaks.acceleration, bounds));
+}
+
+void recorder_sample(Recorder *record, ModalState *state) {
+    const FlightBuffer *buffer = &record->buffer;
+    const size_t at = state->padded;
     if (state->is_shadow)
         return;
     state->base_acceleration = base_cursor_at(&state->base, state->sample);
     modal_state_forces(state);
     if (state->sample == record->statistics_start && state->sample > 0)
         recorder_restart_peaks(state);
-    flight_buffer_take(buffer, state, record->base_speed);
+    memcpy(buffer->q + at, state->q, at * sizeof *state->q);
+    memcpy(buffer->p + at, state->p, at * sizeof *state->p);
+    memcpy(buffer->elastic + at, state->elastic, at * sizeof *state->elastic);
+    buffer->ground[0] = record->base_speed;
+    for (size_t d = 0; d < state->dampers; d++) {
+        const DamperState *damper = &state->damper[d];
+        buffer->r[d * FLIGHT_BUFFER_ROWS + 1] = damper->r;
+        buffer->z[d * FLIGHT_BUFFER_ROWS + 1] =
+            modal_state_dot(damper->shape, state->p, state->mode_count) + damper->w;
+    }
     recorder_write(record, state, 1);
     recorder_peaks(state);
 }
@@ -329,15 +350,9 @@ void recorder_update(ModalState *state) {
 }
 
 Status recorder_finish_log(ModalState *state) {
-    ImpactRow *rows = calloc(state->dampers + 1, sizeof *rows);
-    if (rows == NULL)
-        return problem_set(state->problem, STATUS_NO_MEMORY, "no memory for the list of impacts");
     for (size_t d = 0; d < state->dampers; d++)
-        rows[d] = state->damper[d].row;
+        impact_log_end(&state->impacts, &state->damper[d].row);
     const EnergyState energy = modal_state_energy(state);
-    const Status status =
-        impact_log_finish(&state->impacts, rows, state->dampers, &energy, state->problem);
-    impact_log_count(&state->impacts, &state->run->work);
-    free(rows);
-    return status;
+    return impact_log_finish(&state->impacts, state->dampers, &energy, &state->run->work,
+                             state->problem);
 }

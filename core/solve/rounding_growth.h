@@ -8,33 +8,26 @@
 
 #include "core/result/response.h"
 #include "core/solve/linear_motion.h"
+#include "core/solve/modal_state.h"
+#include "core/solve/wide.h"
 
 // So many errors are followed at once, with different signs; the largest counts.
-enum { GROWTH_LANES = 4, GROWTH_NEAR = 64, GROWTH_LEVELS = 26 };
+enum { GROWTH_LANES = 4, GROWTH_LEVELS = 32 };
 
-// exp(A D) to the powers 0, 1, 2 ... GROWTH_NEAR - 1 in `near`, and GROWTH_NEAR times 1, 2, 4 ...
-// in `power`; made as they are needed.
-typedef struct GrowthStructure { // of the structure alone
-    double omega2, damping, rate;
-    double step, frequency; // D [s], 1 / D
-    int known, levels;
-    double near[GROWTH_NEAR][2][2];
-    double power[GROWTH_LEVELS][2][2];
-} GrowthStructure;
+// The systems: contacts by Side, flight, and rest.
+enum { GROWTH_FLIGHT = SIDE_RIGHT + 1, GROWTH_REST, GROWTH_SYSTEMS };
 
-typedef struct GrowthContact { // of both bodies
+typedef struct GrowthSystem {
     Motion motion;
-    double step, frequency; // D [s], 1 / D
-    int known, levels;
-    double near[GROWTH_NEAR][4][4];
-    double power[GROWTH_LEVELS][4][4];
-} GrowthContact;
+    double step, frequency;            // D [s], 1 / D
+    int levels;                        // of `power` so far; made as they are needed
+    double power[GROWTH_LEVELS][4][4]; // exp(A D) to the powers 1, 2, 4 ...
+} GrowthSystem;
 
 typedef struct RoundingGrowth {
     bool is_wide;   // the processor has the registers of wide.h
     bool is_spent;  // the estimate is as large as the motion: finished
     double time;    // of the last event [s]
-    double share;   // m / (M + m) [-]
     double rate;    // the structure's [1/s]
     double reach;   // 1 / rate: displacement by a velocity [s]
     double memory;  // of the structure's initial state [s]
@@ -44,23 +37,19 @@ typedef struct RoundingGrowth {
     double worst;   // square of the largest estimate so far [m^2]
     double horizon; // [s]; NAN: not reached
     uint64_t signs;
-    double y[4][GROWTH_LANES]; // errors of x, v, r, w
-    GrowthStructure flying, resting;
-    GrowthContact touching[2];
+    Four y[4]; // errors of x, v, r, w
+    GrowthSystem systems[GROWTH_SYSTEMS];
 } RoundingGrowth;
 
 // `touching` by Side. `size` is the clearance [m]; `is_driven`: the base is a sine. Keeps the
 // tables of an equal system.
 void rounding_growth_start(RoundingGrowth *growth, const Motion *flying, const Motion *touching,
-                           const Motion *resting, const State *state, double size, bool is_driven,
-                           double duration);
+                           const State *state, double size, bool is_driven, double duration);
 
-// A phase ends at `time` in `state`; `largest` is the largest displacement so far.
-void rounding_growth_flight(RoundingGrowth *growth, double time, const State *state,
-                            double largest);
-void rounding_growth_contact(RoundingGrowth *growth, Side side, double time, const State *state,
-                             double largest);
-void rounding_growth_rest(RoundingGrowth *growth, double time, const State *state, double largest);
+// A phase, a contact at `side`, ends at `time` in `state`; `largest` is the largest displacement so
+// far.
+void rounding_growth_end_phase(RoundingGrowth *growth, ContactPhase phase, Side side, double time,
+                               const State *state, double largest);
 
 // w becomes -restitution w; `w` is the one before, `push` is s.
 void rounding_growth_bounce(RoundingGrowth *growth, double restitution, double w, double push);

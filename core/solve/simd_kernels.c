@@ -3,6 +3,7 @@
 #include "core/solve/simd_kernels.h"
 
 #include <stdint.h>
+#include <stdlib.h>
 
 #include "core/solve/lanes.h"
 
@@ -40,6 +41,20 @@ const SimdKernels simd_kernels_kinds[SIMD_KINDS] = {KIND(plain), KIND(avx2), KIN
 #else
 const SimdKernels simd_kernels_kinds[SIMD_KINDS] = {KIND(plain), KIND(plain), KIND(plain)};
 #endif
+
+double *simd_kernels_allocate(const SimdArray *arrays, size_t count) {
+    const size_t line = SIMD_WIDTH * sizeof(double);
+    size_t total = SIMD_WIDTH;
+    for (size_t i = 0; i < count; i++)
+        total += arrays[i].size;
+    double *const block = calloc(total, sizeof *block);
+    if (block == NULL)
+        return NULL;
+    double *at = block + (line - (uintptr_t)block % line) % line / sizeof *block;
+    for (size_t i = 0; i < count; at += arrays[i++].size)
+        *arrays[i].values = at;
+    return block;
+}
 
 size_t simd_kernels_widest(void) {
     return (size_t)lanes_widest();

@@ -3,7 +3,6 @@
 #define CORE_SOLVE_SIMD_KERNELS_H
 
 #include <stddef.h>
-#include <stdint.h>
 
 enum { SIMD_WIDTH = 8 };
 
@@ -12,14 +11,14 @@ static inline size_t simd_kernels_padded(size_t modes) {
     return (modes + SIMD_WIDTH - 1) / SIMD_WIDTH * SIMD_WIDTH;
 }
 
-// Allocate simd_kernels_room(n) values for n values that begin at a cache line.
-static inline size_t simd_kernels_room(size_t values) {
-    return values + SIMD_WIDTH;
-}
-static inline double *simd_kernels_start(double *room) {
-    const size_t line = SIMD_WIDTH * sizeof *room;
-    return room + (line - (uintptr_t)room % line) % line / sizeof *room;
-}
+// One of several arrays in one block.
+typedef struct SimdArray {
+    double **values;
+    size_t size;
+} SimdArray;
+// Makes the arrays, one after the other from a cache line on, all values 0. Returns the block,
+// which the caller frees; NULL: no memory.
+double *simd_kernels_allocate(const SimdArray *arrays, size_t count);
 
 // Increments of q and p of each mode in a step, as factors of (q, p, a, b).
 typedef struct FlightGains {

@@ -859,8 +859,7 @@ static void single_mass_make_motions(SingleMass *single) {
                      .share = share};
     const double own = fmax(sqrt(flying.omega2), flying.damping);
     flying.rate = fmax(own, 1e-300);
-    single->flying = single->resting = flying;
-    single->resting.is_resting = true;
+    single->flying = flying;
     for (int side = 0; side < 2 && plan->form == CONTACT_LINEAR && single->has_stops; side++) {
         Motion *touching = &single->touching[side];
         *touching = flying;
@@ -914,9 +913,8 @@ static Status single_mass_start(SingleMass *single, Run *run, Response *response
     single_mass_keep_tables(single);
     single->state = (State){plan->displacement[0], plan->velocity[0], single->damper->position,
                             single->damper->velocity};
-    rounding_growth_start(&single->growth, flying, single->touching, &single->resting,
-                          &single->state, single->damper->clearance, base->form == BASE_SINE,
-                          plan->duration);
+    rounding_growth_start(&single->growth, flying, single->touching, &single->state,
+                          single->damper->clearance, base->form == BASE_SINE, plan->duration);
     const EnergyState energy = single_mass_energy(single);
     impact_log_start(&single->impacts, response, run->impacts_max, &energy);
     single->impacts.gain_max = IMPACT_LOG_GAIN_EXACT;
@@ -960,7 +958,7 @@ static Status single_mass_first_sample(SingleMass *single) {
     TRY(single_mass_need_engine(single));
     single_mass_to_engine(single);
     TRY(event_engine_settle(single->engine));
-    event_engine_take_sample(single->engine);
+    recorder_sample(&single->engine->record, &single->engine->state);
     if (!single_mass_from_engine(single) && single->plan->count > 1)
         return single_mass_by_engine(single);
     return STATUS_OK;
@@ -987,10 +985,8 @@ static Status single_mass_solve(SingleMass *single) {
     rounding_growth_report(&single->growth, single->impacts.response);
     TRY(single_mass_check(single));
     const EnergyState energy = single_mass_energy(single);
-    const Status status =
-        impact_log_finish(&single->impacts, &single->row, 1, &energy, single->problem);
-    impact_log_count(&single->impacts, &single->run->work);
-    return status;
+    impact_log_end(&single->impacts, &single->row);
+    return impact_log_finish(&single->impacts, 1, &energy, &single->run->work, single->problem);
 }
 
 static Status single_mass_run_with(SingleMass *single, Run *run, Response *response,

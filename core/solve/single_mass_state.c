@@ -111,14 +111,9 @@ void single_mass_flush(SingleMass *single) {
 }
 
 void single_mass_end_phase(SingleMass *single) {
-    const double time = single_mass_time(single),
-                 largest = single->impacts.response->peaks.displacement;
-    if (single->phase == PHASE_FLIGHT)
-        rounding_growth_flight(&single->growth, time, &single->state, largest);
-    else if (single->phase == PHASE_CONTACT)
-        rounding_growth_contact(&single->growth, single->side, time, &single->state, largest);
-    else
-        rounding_growth_rest(&single->growth, time, &single->state, largest);
+    rounding_growth_end_phase(&single->growth, single->phase, single->side,
+                              single_mass_time(single), &single->state,
+                              single->impacts.response->peaks.displacement);
 }
 
 void single_mass_note_force(SingleMass *single) {
@@ -147,9 +142,7 @@ void single_mass_pass(SingleMass *single) {
         single_mass_flush(single);
     single->sample++;
     single->offset = 0;
-    if (is_start) {
-        const Instant at = single_mass_instant(single);
-        impact_log_forget_peaks(&single->impacts, &at);
-    }
+    if (is_start)
+        impact_log_restart_peaks(&single->impacts, single_mass_instant(single).force);
     single_mass_record(single);
 }

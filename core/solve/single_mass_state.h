@@ -5,7 +5,7 @@
 #include <math.h>
 
 #include "core/solve/base_motion_cursor.h"
-#include "core/solve/event_engine.h"
+#include "core/solve/engine.h"
 #include "core/solve/lanes.h"
 #include "core/solve/motion_table.h"
 #include "core/solve/rounding_growth.h"
@@ -16,7 +16,7 @@ struct SingleMass {
     const Plan *plan;
     const PlanDamper *damper; // all zero where there is none
     Problem *problem;
-    Motion flying, touching[2], resting;
+    Motion flying, touching[2];
     FlightBlock stretch;
     bool has_stops;     // that the mass may reach
     bool has_blocks;    // of flight

@@ -18,7 +18,7 @@
 #include <math.h>
 
 #include "core/plan/plan.h"
-#include "core/solve/collision.h"
+#include "core/solve/engine.h"
 
 ContactForce step_contact_force(const ModalState *state, size_t d, double r, double w) {
     const DamperState *damper = &state->damper[d];

@@ -12,7 +12,7 @@
 //
 // A softer contact lasts through a step where r at both ends is further from 0 than r'' can bend
 // it. Where N is surely monotonic its peak is at an end.
-#include "core/solve/sustained_contact.h"
+#include "core/solve/engine.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -30,15 +30,15 @@ Status sustained_contact_make(SustainedContact *press, const ModalState *state, 
     memset(press, 0, sizeof *press);
     if (state->plan->form != CONTACT_LINEAR || state->dampers == 0)
         return STATUS_OK;
+    const SimdArray arrays[] = {{&press->start, size},
+                                {&press->gained, size},
+                                {&press->pulled, size},
+                                {&press->elastic, state->padded}};
     press->stops = calloc(2 * state->dampers, sizeof *press->stops);
-    press->block = calloc(3 * size + state->padded, sizeof *press->block);
+    press->block = simd_kernels_allocate(arrays, COUNT(arrays));
     if (press->stops == NULL || press->block == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu modes", n);
     press->count = 2 * state->dampers;
-    press->start = press->block;
-    press->gained = press->start + size;
-    press->pulled = press->gained + size;
-    press->elastic = press->pulled + size;
     for (size_t i = 0; i < PRESS_LEVELS; i++) {
         press->length[i] = ldexp(state->interval, -(int)i);
         flight_ground(state->base_omega, press->length[i], press->ground[i], press->fall[i]);
@@ -284,13 +284,19 @@ static bool sustained_contact_others_are_clear(const SustainedContact *press, Mo
     return true;
 }
 
+// y' form y with y at the start.
+static double sustained_contact_form(const SustainedContact *press, const Transition *transition,
+                                     const SimdKernels *lanes, const double *form) {
+    lanes->multiply(form, transition->rows, press->start, transition->size, press->pulled);
+    return modal_state_dot(press->start, press->pulled, transition->size);
+}
+
 static void sustained_contact_add_work(const SustainedContact *press, const Transition *transition,
                                        ModalState *state, DamperState *alone, const Slice *slice,
                                        double length, StepWork *work) {
     const size_t n = state->mode_count;
     const double *start = press->start, *gained = press->gained;
-    work->damping =
-        transition_form(transition, state->lanes, transition->loss, start, press->pulled);
+    work->damping = sustained_contact_form(press, transition, state->lanes, transition->loss);
     work->input = -(slice->value * modal_state_dot(transition->input[0], start, transition->size) +
                     slice->slope * modal_state_dot(transition->input[1], start, transition->size));
     for (size_t d = 0; d < state->dampers; d++) {
@@ -307,7 +313,7 @@ static void sustained_contact_add_work(const SustainedContact *press, const Tran
     impact_log_force(&state->impacts, &alone->row, fabs(force));
     impact_log_stretch(
         &state->impacts, &alone->row, length, impulse,
-        transition_form(transition, state->lanes, transition->contact, start, press->pulled));
+        sustained_contact_form(press, transition, state->lanes, transition->contact));
 }
 
 // The increments of (q, r, p, w) over a step.

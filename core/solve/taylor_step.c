@@ -5,7 +5,7 @@
 //   N_ek)
 // with N_k = k r_k + c (k + 1) r_{k+1} / length in contact. At rest N_k = constraint_mass .
 // (base_coupling a_k + shape . e_k), which makes r_{k+2} 0.
-#include "core/solve/taylor_step.h"
+#include "core/solve/engine.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -25,17 +25,18 @@ static void taylor_step_powers(size_t degree, double s, double *power, double *s
 
 Status taylor_step_allocate(TaylorStep *arc, const ModalState *state, Problem *problem) {
     const size_t n = state->padded, m = state->dampers;
-    arc->block = calloc(simd_kernels_room((ROW + 1 + NODES + 2) * n + (2 * ROW + 1) * m +
-                                          LINEAR_MOTION_RULES * NODES * ROW),
-                        sizeof *arc->block);
+    const SimdArray arrays[] = {
+        {&arc->q, (ROW + 1) * n}, // one order more is written than kept
+        {&arc->work, (NODES + 2) * n},
+        {&arc->r, ROW * m},
+        {&arc->force, ROW * m},
+        {&arc->push, m},
+        {&arc->slopes, LINEAR_MOTION_RULES * NODES * ROW},
+    };
+    arc->block = simd_kernels_allocate(arrays, COUNT(arrays));
     if (arc->block == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu modes",
                            state->mode_count);
-    arc->q = simd_kernels_start(arc->block);
-    arc->work = arc->q + (ROW + 1) * n; // one order more is written than kept
-    arc->r = arc->work + (NODES + 2) * n;
-    arc->force = arc->r + ROW * m;
-    arc->slopes = arc->force + ROW * m + m;
     for (size_t kind = 0; kind < LINEAR_MOTION_RULES; kind++) {
         const Quadrature *rule = &linear_motion_rules[kind];
         for (size_t node = 0; node < rule->count; node++) {
@@ -123,7 +124,7 @@ void taylor_step_make(TaylorStep *arc, const ModalState *state, const Slice *sli
     arc->degree = linear_motion_degree(arc->rho);
     linear_motion_base_series(arc->base, arc->degree, slice, length);
     arc->base_degree = slice->omega > 0 ? arc->degree : 1;
-    double *speed = arc->work, *elastic = arc->work + n, *push = arc->force + ROW * m;
+    double *speed = arc->work, *elastic = arc->work + n, *push = arc->push;
     for (size_t i = 0; i < n; i++) {
         arc->q[i] = state->q[i];
         arc->q[n + i] = state->p[i] * length;

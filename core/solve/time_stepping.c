@@ -263,7 +263,7 @@ static Status time_stepping_interval(TimeStepping *stepping) {
     state->sample++;
     state->offset = 0;
     state->run->work.mode_samples += state->mode_count;
-    recorder_sample(&stepping->recorder, &stepping->samples, state);
+    recorder_sample(&stepping->recorder, state);
     return STATUS_OK;
 }
 
@@ -350,10 +350,8 @@ static Status time_stepping_make(TimeStepping *stepping, const Solver *solver, R
     stepping->length = state->interval / (double)share;
     TRY(time_stepping_allocate(stepping));
     TRY(time_stepping_check_stability(stepping));
-    if (!is_shadow) {
-        TRY(flight_buffer_make(&stepping->samples, state, problem));
-        TRY(recorder_start(&stepping->recorder, &stepping->samples, state, response, problem));
-    }
+    if (!is_shadow)
+        TRY(recorder_start(&stepping->recorder, state, response, problem));
     const EnergyState energy = modal_state_energy(state);
     impact_log_start(&state->impacts, response, run->impacts_max, &energy);
     double setup = 0;
@@ -368,7 +366,6 @@ static void time_stepping_clear(TimeStepping *stepping) {
         stepping->stepper->clear(stepping);
     free(stepping->method);
     recorder_clear(&stepping->recorder);
-    flight_buffer_clear(&stepping->samples);
     modal_state_clear(&stepping->state);
     free(stepping->block);
 }
@@ -646,7 +643,7 @@ static void pair_report(const Pair *pair, Response *response) {
 static Status pair_run(Pair *pair, Response *response) {
     ModalState *state = &pair->run.state;
     const Plan *plan = state->plan;
-    recorder_sample(&pair->run.recorder, &pair->run.samples, state);
+    recorder_sample(&pair->run.recorder, state);
     while (state->sample + 1 < plan->count) {
         const double before = modal_state_time(state);
         TRY(time_stepping_interval(&pair->run));

@@ -4,7 +4,7 @@
 #ifndef CORE_SOLVE_TIME_STEPPING_H
 #define CORE_SOLVE_TIME_STEPPING_H
 
-#include "core/solve/recorder.h"
+#include "core/solve/engine.h"
 #include "core/solve/step_contact.h"
 
 // The "accuracy" object of a solver with fixed steps.
@@ -41,7 +41,6 @@ typedef struct Stepper {
 
 struct TimeStepping {
     ModalState state;
-    FlightBuffer samples; // one sample
     Recorder recorder;
     const Solver *solver;
     const Stepper *stepper; // of the solver

@@ -3,7 +3,7 @@
 // the time is doubled: T becomes 2 T + T T, and F becomes F + (I + T)' F (I + T). Zhong and
 // Williams, Computers & Structures 56 (1995) 113-120. All in long double. Products skip the zeros
 // of their left factor, so that uncoupled modes stay apart.
-#include "core/solve/transition.h"
+#include "core/solve/engine.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -202,17 +202,16 @@ static bool transition_double(TransitionWork *work, bool has_forms) {
 static Status transition_store(Transition *transition, const TransitionWork *work) {
     const size_t size = work->size, rows = simd_kernels_padded(size);
     const bool is_contact = work->count > 0;
-    transition->block =
-        calloc((is_contact ? 3 : 2) * rows * size + 2 * size, sizeof *transition->block);
+    const SimdArray arrays[] = {{&transition->gain, rows * size},
+                                {&transition->loss, rows * size},
+                                {&transition->contact, is_contact ? rows * size : 0},
+                                {&transition->input[0], size},
+                                {&transition->input[1], size}};
+    transition->block = simd_kernels_allocate(arrays, COUNT(arrays));
     if (transition->block == NULL)
         return STATUS_NO_MEMORY;
     transition->size = size;
     transition->rows = rows;
-    transition->gain = transition->block;
-    transition->loss = transition->gain + rows * size;
-    transition->input[0] = transition->loss + rows * size;
-    transition->input[1] = transition->input[0] + size;
-    transition->contact = is_contact ? transition->input[1] + size : NULL;
     for (size_t j = 0; j < size; j++) {
         for (size_t i = 0; i < 2 * work->n; i++)
             transition->gain[j * rows + i] = (double)work->T[i * size + j];
@@ -307,12 +306,6 @@ Status transition_increment(const ModalState *state, double length, double *incr
                             Problem *problem) {
     return transition_start(state, 0, state->mode_count, state->damper, state->dampers, length,
                             NULL, 0, increment, problem);
-}
-
-double transition_form(const Transition *transition, const SimdKernels *lanes, const double *form,
-                       const double *y, double *scratch) {
-    lanes->multiply(form, transition->rows, y, transition->size, scratch);
-    return modal_state_dot(y, scratch, transition->size);
 }
 
 void transition_clear(Transition *transition) {

@@ -17,12 +17,13 @@ static Problem problem;
 static Status balance(double end, double input, double gain_max) {
     Response response = {0};
     ImpactLog ledger;
+    WorkCounters work;
     const EnergyState first = {1.5, 0.5}, last = {end, 0};
     problem_clear(&problem);
     impact_log_start(&ledger, &response, 0, &first);
     ledger.gain_max = gain_max;
     impact_log_work(&ledger, input, 0);
-    const Status status = impact_log_finish(&ledger, NULL, 0, &last, &problem);
+    const Status status = impact_log_finish(&ledger, 0, &last, &work, &problem);
     response_clear(&response);
     return status;
 }
@@ -50,6 +51,7 @@ static void a_gain_on_the_way_fails_even_if_it_is_lost_again(void **state) {
     (void)state;
     Response response = {0};
     ImpactLog ledger;
+    WorkCounters work;
     const EnergyState first = {2, 0}, middle = {3, 0};
     problem_clear(&problem);
     impact_log_start(&ledger, &response, 0, &first);
@@ -57,7 +59,7 @@ static void a_gain_on_the_way_fails_even_if_it_is_lost_again(void **state) {
     assert_int_equal(impact_log_status(&ledger, &problem), STATUS_OK);
     impact_log_balance(&ledger, &middle);
     assert_int_equal(impact_log_status(&ledger, &problem), STATUS_UNSTABLE);
-    assert_int_equal(impact_log_finish(&ledger, NULL, 0, &first, &problem), STATUS_UNSTABLE);
+    assert_int_equal(impact_log_finish(&ledger, 0, &first, &work, &problem), STATUS_UNSTABLE);
     response_clear(&response);
 }
 

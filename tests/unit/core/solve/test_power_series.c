@@ -10,7 +10,7 @@
 
 #include <cmocka.h>
 
-#include "core/solve/power_contact.h"
+#include "core/solve/engine.h"
 #include "tests/support/frames.h"
 
 static Problem problem;
@@ -198,25 +198,25 @@ static void the_order_is_integer_over_a_whole_contact(void **state) {
             pair_make(&pair, &contact_hertz, 1.5, 0, POWER_CONTACT_TOLERANCE);
             PowerSeries *series = &pair.ode.series;
             // Equal steps in tau; the last is cut where Y is 0.
-            SeriesLaw law;
             const ContactTerms terms = {.stiffness = 1, .exponent = 1.5};
-            const double one[1] = {1}, length = half ? 0.1 : 0.2;
-            const SeriesScale scale = {.error = 1e-300,
-                                       .inverse_root = 1,
-                                       .inverse_time = 1,
-                                       .inverse_speed = one,
-                                       .inverse_modal = one,
-                                       .order_max = orders[i]};
+            const double length = half ? 0.1 : 0.2;
             const Slice still = {0, 0, 0};
-            series_law_make(&law, &terms);
+            series->error = 1e-300;
+            series->order_max = orders[i];
+            series->inverse_root = series->inverse_time = series->inverse_modal[0] = 1;
             series->contact_count = 1;
             series->root = 2;
-            series->contact[0] = (SeriesContact){
-                .sign = 1, .terms = terms, .law = &law, .has_force = true, .is_damped = true};
+            series->contact[0] = series->all;
+            *series->all = (SeriesContact){.sign = 1,
+                                           .terms = terms,
+                                           .has_force = true,
+                                           .is_damped = true,
+                                           .inverse_speed = 1};
+            series_law_make(&series->all->law, &terms);
             double Y = 0, s = 0;
             for (int step = 0; step < 100 && !(s > 0); step++) {
                 double row[8];
-                (void)power_series_expand(series, &pair.frame, &still, Y, length, &scale);
+                (void)power_series_expand(series, &pair.frame, &still, Y, length);
                 if (polynomial_root_first(power_series_leader(series), series->degree, &s))
                     power_series_cut(series, s);
                 power_series_at(series, 1, row);
