@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "core/base/canonical.h"
-#include "core/drop_test/gravity_correction.h"
+#include "core/drop_test/pulse_model.h"
 #include "core/scene/material.h"
 
 enum { OUTLIERS_MAX = 5, POINTER_SIZE = sizeof((Fault){0}.pointer) };
@@ -81,11 +81,6 @@ void ranges_extend(Ranges *ranges, const EvaluationRow *row, const Measurement *
     ranges->most_temperature = fmax(ranges->most_temperature, temperature);
 }
 
-static Status reading_status(bool is_made, Problem *problem) {
-    return is_made ? STATUS_OK
-                   : problem_set(problem, STATUS_NO_MEMORY, "no memory for the evaluation");
-}
-
 // The JSON Pointer of a measurement, with `rest` behind it: "/measurements/3/gravity"; without a
 // number only the rest.
 static void measurement_pointer(uint64_t number, const char *rest, char pointer[POINTER_SIZE]) {
@@ -119,10 +114,9 @@ static bool reading_copy(const char *text, char **target) {
     return text == NULL || (*target = strdup(text)) != NULL;
 }
 
-static Status reading_add_note(EvaluationRow *row, const char *text, Problem *problem) {
-    return reading_status(text_format(&row->note, "%s%s%s", row->note != NULL ? row->note : "",
-                                      row->note != NULL ? "; " : "", text),
-                          problem);
+static Status reading_add_note(EvaluationRow *row, const char *text) {
+    return status_made(text_format(&row->note, "%s%s%s", row->note != NULL ? row->note : "",
+                                   row->note != NULL ? "; " : "", text));
 }
 
 // A list of rows under construction, of one test.
@@ -142,13 +136,14 @@ static Status reading_new(const ReadingList *list, size_t place, bool is_of_trac
     const DropTest *test = list->of->test;
     const char *excluded =
         is_of_trace ? test->traces.at[place].excluded : test->drops.at[place].excluded;
+    *added = NULL;
     if (rows->count == EVALUATION_ROWS_MAX)
         return problem_set(list->problem, STATUS_LIMIT,
                            "more than %d readings: evaluate fewer measurements at a time",
                            EVALUATION_ROWS_MAX);
     if ((rows->count & (rows->count - 1)) == 0) {
         EvaluationRow *at = realloc(rows->at, (2 * rows->count + 1) * sizeof *at);
-        TRY(reading_status(at != NULL, list->problem));
+        TRY(status_made(at != NULL));
         rows->at = at;
     }
     EvaluationRow *row = *added = &rows->at[rows->count++];
@@ -160,9 +155,8 @@ static Status reading_new(const ReadingList *list, size_t place, bool is_of_trac
     const bool is_made =
         contact > 0 ? text_format(&row->from, "trace %zu, contact %zu", place + 1, contact)
                     : text_format(&row->from, "%s %zu", is_of_trace ? "trace" : "drop", place + 1);
-    return reading_status(is_made && reading_copy(excluded, &row->excluded) &&
-                              reading_copy(note, &row->note),
-                          list->problem);
+    return status_made(is_made && reading_copy(excluded, &row->excluded) &&
+                       reading_copy(note, &row->note));
 }
 
 static void reading_set_counts(EvaluationRow *row) {
@@ -271,15 +265,15 @@ static Status reading_add_trace(const ReadingList *list, size_t place) {
 }
 
 // Of a drop with both e and T_c.
-static Status reading_correct_both(const GravityLoad *load, EvaluationRow *row, Problem *problem) {
+static Status reading_correct_both(const GravityLoad *load, EvaluationRow *row) {
     const GravityCorrected read = {row->restitution, row->contact_time,
                                    row->restitution_uncertainty / row->restitution,
                                    row->contact_time_uncertainty / row->contact_time};
     GravityCorrected isolated;
     if (!(row->restitution > 0) || !gravity_correct(load, &read, &isolated)) {
         row->restitution_counts = row->contact_time_counts = false;
-        return reading_add_note(
-            row, "does not count: no contact has this e and T_c under that gravity", problem);
+        return reading_add_note(row,
+                                "does not count: no contact has this e and T_c under that gravity");
     }
     row->read_restitution = row->restitution;
     row->read_contact_time = row->contact_time;
@@ -291,19 +285,16 @@ static Status reading_correct_both(const GravityLoad *load, EvaluationRow *row, 
 }
 
 // Of a drop with one of e and T_c; `other` is the mean of the other one, NAN: unknown.
-static Status reading_correct_one(const GravityLoad *load, double other, EvaluationRow *row,
-                                  Problem *problem) {
+static Status reading_correct_one(const GravityLoad *load, double other, EvaluationRow *row) {
     const bool is_time = isnan(row->restitution), is_known = !isnan(other) && !isnan(load->speed);
     double *value = is_time ? &row->contact_time : &row->restitution;
     double *read = is_time ? &row->read_contact_time : &row->read_restitution;
     double isolated;
     if (!is_known || !gravity_correct_one(load, is_time, *value, other, &isolated))
         return reading_add_note(
-            row,
-            is_known  ? "gravity is not corrected: no contact has this value under it"
-            : is_time ? "gravity is not corrected: this needs a speed and a restitution"
-                      : "gravity is not corrected: this needs a contact time",
-            problem);
+            row, is_known  ? "gravity is not corrected: no contact has this value under it"
+                 : is_time ? "gravity is not corrected: this needs a speed and a restitution"
+                           : "gravity is not corrected: this needs a contact time");
     // Errors grow with the correction.
     *(is_time ? &row->contact_time_uncertainty : &row->restitution_uncertainty) *=
         isolated / *value;
@@ -331,8 +322,7 @@ static double reading_mean(const EvaluationRows *rows, size_t test, bool is_time
 // drop with only one of e and T_c borrows the mean of the other from its test's readings without
 // gravity.
 static Status readings_correct_gravity(const Measurement *tests, size_t count, int separation,
-                                       const Progress *progress, EvaluationRows *rows,
-                                       Problem *problem) {
+                                       const Progress *progress, EvaluationRows *rows) {
     for (int pass = 0; pass < 2; pass++)
         for (size_t test = 0; test < count; test++) {
             // First drops with both, from which the others borrow.
@@ -349,9 +339,8 @@ static Status readings_correct_gravity(const Measurement *tests, size_t count, i
                 const GravityLoad load = {tests[test].test->gravity, row->approach_speed,
                                           (Separation)separation,
                                           row->restitution_by == RESTITUTION_BY_HEIGHTS};
-                TRY(pass == 0 ? reading_correct_both(&load, row, problem)
-                              : reading_correct_one(&load, isnan(row->restitution) ? e : T, row,
-                                                    problem));
+                TRY(pass == 0 ? reading_correct_both(&load, row)
+                              : reading_correct_one(&load, isnan(row->restitution) ? e : T, row));
             }
         }
     return STATUS_OK;
@@ -377,8 +366,7 @@ static void evaluation_choose_restitutions(EvaluationRows *rows) {
 
 // The statistic of T_c or e, and the scores of its readings. `readings` has room for all rows and
 // one more.
-static Status evaluation_set_statistic(bool is_time, Reading *readings, Evaluation *evaluation,
-                                       Problem *problem) {
+static Status evaluation_set_statistic(bool is_time, Reading *readings, Evaluation *evaluation) {
     EvaluationRow *rows = evaluation->rows.at;
     Statistic *statistic = is_time ? &evaluation->contact_time : &evaluation->restitution;
     size_t count = 0;
@@ -386,7 +374,7 @@ static Status evaluation_set_statistic(bool is_time, Reading *readings, Evaluati
         if (reading_get(&rows[i], is_time, &readings[count]))
             readings[count++].row = i;
     TRY(reading_statistics_run(readings, count, is_time ? "contact time" : "restitution",
-                               is_time ? " s" : "", statistic, problem));
+                               is_time ? " s" : "", statistic));
     // The fit of a single pulse has a better interval than two deviations.
     const EvaluationRow *only = is_time && count == 1 ? &rows[readings[0].row] : NULL;
     if (only != NULL && only->contact_time_by == CONTACT_TIME_BY_PULSE &&
@@ -628,6 +616,28 @@ static Status evaluation_warn(const Measurement *tests, size_t count, Evaluation
     return evaluation_warn_of_outliers(evaluation);
 }
 
+static Status evaluation_add_rows(const Measurement *tests, size_t count, Separation separation,
+                                  const Progress *progress, EvaluationRows *rows,
+                                  Problem *problem) {
+    for (size_t i = 0; i < count; i++) {
+        const ReadingList list = {&tests[i], i, (int)separation, progress, rows, problem};
+        for (size_t k = 0; k < tests[i].test->drops.count; k++)
+            TRY(reading_add_drop(&list, k));
+        for (size_t k = 0; k < tests[i].test->traces.count; k++)
+            TRY(reading_add_trace(&list, k));
+    }
+    return readings_correct_gravity(tests, count, (int)separation, progress, rows);
+}
+
+static Status evaluation_add_statistics(Evaluation *evaluation) {
+    Reading *readings = calloc(evaluation->rows.count + 1, sizeof *readings);
+    Status status = status_made(readings != NULL);
+    for (int is_time = 0; is_time < 2 && status == STATUS_OK; is_time++)
+        status = evaluation_set_statistic(is_time == 1, readings, evaluation);
+    free(readings);
+    return status;
+}
+
 Status evaluation_run(const Measurement *tests, size_t count, Separation separation,
                       const Progress *progress, Evaluation *evaluation, Problem *problem) {
     *evaluation = (Evaluation){.separation = (int)separation,
@@ -640,26 +650,16 @@ Status evaluation_run(const Measurement *tests, size_t count, Separation separat
                            "more than %d samples in traces, %zu: evaluate fewer measurements at a "
                            "time",
                            EVALUATION_SAMPLES_MAX, samples);
-    for (size_t i = 0; i < count; i++) {
-        const ReadingList list = {&tests[i], i, (int)separation, progress, rows, problem};
-        for (size_t k = 0; k < tests[i].test->drops.count; k++)
-            TRY(reading_add_drop(&list, k));
-        for (size_t k = 0; k < tests[i].test->traces.count; k++)
-            TRY(reading_add_trace(&list, k));
+    Status status = evaluation_add_rows(tests, count, separation, progress, rows, problem);
+    if (status == STATUS_OK) {
+        evaluation_choose_restitutions(rows);
+        for (size_t i = 0; i < rows->count; i++)
+            if (reading_counts(&rows->at[i]))
+                ranges_extend(&evaluation->ranges, &rows->at[i], tests);
+        status = evaluation_add_statistics(evaluation);
     }
-    TRY(readings_correct_gravity(tests, count, (int)separation, progress, rows, problem));
-    evaluation_choose_restitutions(rows);
-    for (size_t i = 0; i < rows->count; i++)
-        if (reading_counts(&rows->at[i]))
-            ranges_extend(&evaluation->ranges, &rows->at[i], tests);
-    Reading *readings = calloc(rows->count + 1, sizeof *readings);
-    Status status = readings != NULL ? STATUS_OK : STATUS_NO_MEMORY;
-    for (int is_time = 0; is_time < 2 && status == STATUS_OK; is_time++)
-        status = evaluation_set_statistic(is_time == 1, readings, evaluation, problem);
-    free(readings);
     if (status == STATUS_OK)
         status = evaluation_warn(tests, count, evaluation);
-    return status == STATUS_OK
-               ? STATUS_OK
-               : problem_set(problem, STATUS_NO_MEMORY, "no memory for the evaluation");
+    return status == STATUS_NO_MEMORY ? problem_set(problem, status, "no memory for the evaluation")
+                                      : status;
 }

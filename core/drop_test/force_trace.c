@@ -325,10 +325,6 @@ static Status detection_run(const Reals *force, double threshold, ContactDetecti
     return STATUS_OK;
 }
 
-static Status trace_status(bool is_made) {
-    return is_made ? STATUS_OK : STATUS_NO_MEMORY;
-}
-
 // The largest part of a contact below `level` of its peak, and its largest part before the visible
 // one, both relative to the visible part.
 static double trace_hidden(double level, int separation, double *before) {
@@ -440,7 +436,7 @@ static Status trace_conclude(const FitConfidence *likely, bool is_form_sure, dou
     if (!is_form_sure) {
         if (is_wide)
             trace_withdraw(counted, contact);
-        return trace_status(text_format(
+        return status_made(text_format(
             &contact->why,
             "the trace differs from every pulse of the model under the rule %s: the rms "
             "residual of the best one is %.2g %% of the peak, and the noise is %.2g %% of it",
@@ -448,7 +444,7 @@ static Status trace_conclude(const FitConfidence *likely, bool is_form_sure, dou
     }
     if (is_wide) {
         trace_withdraw(counted, contact);
-        return trace_status(text_format(
+        return status_made(text_format(
             &contact->why,
             "pulses from %.3g s to %.3g s fit the trace about equally well: less noise or "
             "more samples in contact would distinguish them",
@@ -456,7 +452,7 @@ static Status trace_conclude(const FitConfidence *likely, bool is_form_sure, dou
     }
     if (likely->decay.mean + 2 * likely->decay.deviation > decay_max) {
         trace_withdraw(counted, contact);
-        return trace_status(text_format(
+        return status_made(text_format(
             &contact->why, "the force has no distinct end: pulses with a restitution of "
                            "nearly 0 fit the trace as well"));
     }
@@ -484,7 +480,7 @@ static Status trace_fit_contact(FitWindow *window, const ContactDetection *found
                                 const DetectedContact *run, double origin, double interval,
                                 const PulseFit *fits, size_t count, TraceContact *contact) {
     if (count == 0)
-        return trace_status(text_format(&contact->why, "no pulse of the model fits"));
+        return status_made(text_format(&contact->why, "no pulse of the model fits"));
     const PulseFit *fit = &fits[0];
     contact->seen.samples = (uint64_t)(fit->last - fit->first + 1);
     contact->seen.first = (origin + (double)fit->first) * interval;
@@ -501,13 +497,13 @@ static Status trace_fit_contact(FitWindow *window, const ContactDetection *found
     const double noise = found->noise / fabs(run->peak) / sqrt((double)window->per_block);
     contact->seen.misfit = noise > 0 ? contact->seen.misfit_share / noise : (double)NAN;
     if (contact->seen.samples < SAMPLES_MIN)
-        return trace_status(
+        return status_made(
             text_format(&contact->why,
                         "only %d samples are in contact, and pulses of very different "
                         "length fit so few: at least 5 are needed, 20 are better",
                         (int)contact->seen.samples));
     if (contact->seen.misfit_share > misfit_max && contact->seen.misfit_share > 2 * noise)
-        return trace_status(
+        return status_made(
             text_format(&contact->why,
                         "the trace is no pulse of the model under the separation rule "
                         "%s: the rms residual of the best one is %.2g %% of the peak",
@@ -602,8 +598,8 @@ static Status trace_read_contact(double interval, const TraceOptions *options,
     trace_count_samples(found, run, options->separation, interval, contact);
     if (run->first == 0 || run->last == found->samples - 1) {
         contact->most_contact_time = (double)NAN;
-        return trace_status(text_format(&contact->why, "the trace %s during the contact",
-                                        run->first == 0 ? "begins" : "ends"));
+        return status_made(text_format(&contact->why, "the trace %s during the contact",
+                                       run->first == 0 ? "begins" : "ends"));
     }
     const size_t from = trace_fill_window(found, number, options->separation, window);
     PulseFit fits[FITS_MAX];
@@ -614,11 +610,11 @@ static Status trace_read_contact(double interval, const TraceOptions *options,
                              : pulse_fit_run(window, fits);
     TRY(trace_fit_contact(window, found, run, (double)from, interval, fits, count, contact));
     if (!is_settled && !isnan(contact->contact_time))
-        return trace_status(text_format(
+        return status_made(text_format(
             &contact->why, "gravity is only partly corrected: the masses and this force "
                            "do not lead to one approach speed; check them, or give it"));
     if (options->gravity > 0 && !(window->pull_rate > 0) && !isnan(contact->contact_time))
-        return trace_status(text_format(
+        return status_made(text_format(
             &contact->why,
             "gravity is not corrected: neither the approach speed nor the masses are known"));
     return STATUS_OK;
@@ -658,11 +654,11 @@ Status trace_analysis_run(double interval, const Reals *force, const TraceOption
         status = trace_read_contact(interval, options, &found, i, window, &list->at[i]);
     }
     if (status == STATUS_OK && found.count == 0)
-        status = trace_status(text_format(
-            &analysis->why, "no force exceeds the threshold of %.3g N", found.threshold));
+        status = status_made(text_format(&analysis->why, "no force exceeds the threshold of %.3g N",
+                                         found.threshold));
     if (status == STATUS_OK && found.is_full)
-        status = trace_status(text_format(
-            &analysis->why, "only the first %d contacts are evaluated", TRACE_CONTACTS_MAX));
+        status = status_made(text_format(&analysis->why, "only the first %d contacts are evaluated",
+                                         TRACE_CONTACTS_MAX));
     free(found.force);
     free(window);
     return status;

@@ -123,10 +123,6 @@ static Status proposal_set_basis(Proposal *proposal) {
     return proposal_set_source(proposal);
 }
 
-static Status proposal_refuse(bool is_made) {
-    return is_made ? STATUS_OK : STATUS_NO_MEMORY;
-}
-
 static Status proposal_set_constant(Proposal *proposal) {
     Material *material = &proposal->result->material;
     const EvaluationRows *rows = &proposal->evaluation->rows;
@@ -134,10 +130,10 @@ static Status proposal_set_constant(Proposal *proposal) {
     const Statistic *e = &proposal->evaluation->restitution,
                     *T = &proposal->evaluation->contact_time;
     if (e->count == 0)
-        return proposal_refuse(text_format(&proposal->result->why,
-                                           "no reading that counts gives the restitution, which a "
-                                           "revision needs: add a measurement with heights or "
-                                           "speeds"));
+        return status_made(text_format(&proposal->result->why,
+                                       "no reading that counts gives the restitution, which a "
+                                       "revision needs: add a measurement with heights or "
+                                       "speeds"));
     for (size_t i = 0; i < rows->count; i++)
         if (reading_counts(&rows->at[i]))
             proposal->rows[proposal->row_count++] = &rows->at[i];
@@ -188,7 +184,7 @@ static Status proposal_mean(const Proposal *proposal, size_t first, size_t count
         found += reading_get(proposal->rows[i], is_time, &proposal->readings[found]);
     Statistic statistic;
     const Status status =
-        reading_statistics_run(proposal->readings, found, "reading", "", &statistic, NULL);
+        reading_statistics_run(proposal->readings, found, "reading", "", &statistic);
     *mean = statistic.mean;
     *deviation = statistic.spread;
     fields_clear(reading_statistic_fields, &statistic);
@@ -234,7 +230,7 @@ static Status proposal_set_table(Proposal *proposal) {
         has_time = has_time || proposal->rows[i]->contact_time_counts;
     TRY(proposal_fill_table(proposal, has_time, &all));
     if (*kept < 2 || *kept > MATERIAL_ROWS)
-        return proposal_refuse(text_format(
+        return status_made(text_format(
             &proposal->result->why,
             "a table needs e%s at two approach speeds at least (%g times one another), %d at most; "
             "the readings have %zu",

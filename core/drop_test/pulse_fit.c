@@ -203,30 +203,34 @@ static bool fit_derive(const FitWindow *window, const FitBox *box, PulseFit *fit
     return true;
 }
 
-// (curvature + damping diagonal) step = -slope over the free parts, by elimination; the others do
-// not move.
+// The inverse and the determinant; false: it is not a covariance.
+static bool fit_invert(double a[FIT_PARTS][FIT_PARTS], double inverse[FIT_PARTS][FIT_PARTS],
+                       double *det) {
+    *det = a[0][0] * (a[1][1] * a[2][2] - a[1][2] * a[2][1]) -
+           a[0][1] * (a[1][0] * a[2][2] - a[1][2] * a[2][0]) +
+           a[0][2] * (a[1][0] * a[2][1] - a[1][1] * a[2][0]);
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            const int p = (j + 1) % 3, q = (j + 2) % 3, r = (i + 1) % 3, s = (i + 2) % 3;
+            inverse[i][j] = (a[p][r] * a[q][s] - a[p][s] * a[q][r]) / *det;
+        }
+    return *det > 0 && inverse[0][0] > 0 && inverse[1][1] > 0 && inverse[2][2] > 0;
+}
+
+// (curvature + damping diagonal) step = -slope over the free parts; the others do not move.
 static bool fit_solve(const PulseFit *fit, const bool *is_free, double damping, double *step) {
-    double a[FIT_PARTS][FIT_PARTS + 1];
+    double a[FIT_PARTS][FIT_PARTS], inverse[FIT_PARTS][FIT_PARTS], det;
     for (int i = 0; i < FIT_PARTS; i++) {
         for (int j = 0; j < FIT_PARTS; j++)
             a[i][j] = is_free[i] && is_free[j] ? fit->curvature[i][j] : 0;
         a[i][i] = is_free[i] ? a[i][i] * (1 + damping) : 1;
-        a[i][FIT_PARTS] = is_free[i] ? -fit->slope[i] : 0;
     }
+    if (!fit_invert(a, inverse, &det))
+        return false;
     for (int i = 0; i < FIT_PARTS; i++) {
-        if (!(a[i][i] > 0))
-            return false;
-        for (int j = i + 1; j < FIT_PARTS; j++) {
-            const double factor = a[j][i] / a[i][i];
-            for (int k = i; k <= FIT_PARTS; k++)
-                a[j][k] -= factor * a[i][k];
-        }
-    }
-    for (int i = FIT_PARTS; i-- > 0;) {
-        step[i] = a[i][FIT_PARTS];
-        for (int j = i + 1; j < FIT_PARTS; j++)
-            step[i] -= a[i][j] * step[j];
-        step[i] /= a[i][i];
+        step[i] = 0;
+        for (int j = 0; j < FIT_PARTS; j++)
+            step[i] -= is_free[j] ? inverse[i][j] * fit->slope[j] : 0;
     }
     return true;
 }
@@ -424,19 +428,6 @@ typedef struct Gaps {
     double middle, half;
 } Gaps;
 
-// False: the inverse is not a covariance.
-static bool fit_confidence_invert(double a[3][3], double inverse[3][3], double *det) {
-    *det = a[0][0] * (a[1][1] * a[2][2] - a[1][2] * a[2][1]) -
-           a[0][1] * (a[1][0] * a[2][2] - a[1][2] * a[2][0]) +
-           a[0][2] * (a[1][0] * a[2][1] - a[1][1] * a[2][0]);
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            const int p = (j + 1) % 3, q = (j + 2) % 3, r = (i + 1) % 3, s = (i + 2) % 3;
-            inverse[i][j] = (a[p][r] * a[q][s] - a[p][s] * a[q][r]) / *det;
-        }
-    return *det > 0 && inverse[0][0] > 0 && inverse[1][1] > 0 && inverse[2][2] > 0;
-}
-
 // The probability of [a, b] under a standard normal distribution, accurate in the tails.
 static double fit_confidence_normal(double a, double b) {
     if (a > 0)
@@ -497,7 +488,7 @@ static bool fit_confidence_weigh(const FitWindow *window, const FitBox *box, con
         return false;
     // Limits the step to a part of the contact, over which the pulse is linear.
     curvature[FIT_START][FIT_START] += variance / pow(1 + step_max * T, 2);
-    if (!fit_confidence_invert(curvature, inverse, &det))
+    if (!fit_invert(curvature, inverse, &det))
         return false;
     piece->mean[CONTACT_TIME] = T;
     for (int i = 0; i < FIT_PARTS; i++) {
@@ -606,7 +597,7 @@ static long fit_confidence_gap_count(const FitWindow *window, const PulseFit *fi
     double curvature[3][3], spread[3][3], det;
     const double variance = fit_variance(window, fit->residual.sum);
     memcpy(curvature, fit->curvature, sizeof curvature);
-    if (!fit_confidence_invert(curvature, spread, &det))
+    if (!fit_invert(curvature, spread, &det))
         return 1;
     PulseModel model;
     double T;
