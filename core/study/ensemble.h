@@ -3,9 +3,7 @@
 #ifndef CORE_STUDY_ENSEMBLE_H
 #define CORE_STUDY_ENSEMBLE_H
 
-#include "core/study/spectrum_accumulator.h"
 #include "core/study/statistics.h"
-#include "core/study/study.h"
 
 // The request.
 typedef struct EnsembleStudy {
@@ -53,7 +51,6 @@ typedef struct Ensemble {
 
 // The scene of one run: with this seed and without sampled channels. `simulation` must have a
 // random base; `target` is cleared by simulation_clear in any case.
-Status ensemble_scene(const Simulation *simulation, uint64_t seed, Simulation *target,
-                      Problem *problem);
+Status ensemble_scene(const Simulation *simulation, uint64_t seed, Simulation *target);
 
 #endif

@@ -156,7 +156,7 @@ static Status sweep_axis_read(const SweepAxis *axis, SweepValues *values, Proble
     values->at = calloc(values->count, sizeof *values->at);
     values->texts = malloc(room);
     if (values->at == NULL || values->texts == NULL)
-        return study_no_memory(problem);
+        return STATUS_NO_MEMORY;
     char *text = values->texts;
     for (size_t i = 0; i < values->count; i++) {
         if (sweep_axis_is_range(axis)) {
@@ -280,7 +280,7 @@ Status sweep_grid_scene(const SweepGrid *grid, size_t point, bool is_bare,
     if (status == STATUS_INVALID)
         return problem_add(problem, status, grid->axes[axis].pointer, "%s", why);
     if (status != STATUS_OK)
-        return study_no_memory(problem);
+        return STATUS_NO_MEMORY;
     if (is_bare) {
         texts_clear(&target->output.channels);
         texts_clear(&target->output.psd.channels);
@@ -416,7 +416,7 @@ static Status sweep_grid_find_fields(SweepGrid *grid, Problem *problem) {
             status = set;
     }
     simulation_clear(&scene);
-    return status == STATUS_NO_MEMORY ? study_no_memory(problem) : status;
+    return status == STATUS_NO_MEMORY ? STATUS_NO_MEMORY : status;
 }
 
 Status sweep_grid_new(const SweepStudy *study, const Simulation *simulation,
@@ -426,7 +426,7 @@ Status sweep_grid_new(const SweepStudy *study, const Simulation *simulation,
     TRY(sweep_grid_check_size(study, limits, problem));
     SweepGrid *grid = calloc(1, sizeof *grid + study->axes.count * sizeof *grid->axes);
     if (grid == NULL)
-        return study_no_memory(problem);
+        return STATUS_NO_MEMORY;
     grid->study = study;
     grid->simulation = simulation;
     grid->points = sweep_points(study);
@@ -529,7 +529,7 @@ Status sweep_grid_validate(const SweepGrid *grid, size_t scenes, const Simulatio
     Validation of = {grid, limits, progress, malloc(sizeof(Problem)), problem, false};
     Status status = STATUS_OK;
     if (of.fault == NULL)
-        return study_no_memory(problem);
+        return STATUS_NO_MEMORY;
     const size_t max = sweep_grid_affordable(grid, scenes);
     if (grid->points > max)
         status = sweep_grid_validate_sample(&of, max);
@@ -575,9 +575,9 @@ static Status sweep_complete(void *request, const Simulation *simulation,
 }
 
 static Status sweep_cost(const void *request, const Simulation *simulation,
-                         const SimulationLimits *limits, double *steps, Problem *problem) {
+                         const SimulationLimits *limits, double *steps) {
     SweepGrid *grid;
-    const Status status = sweep_grid_new(request, simulation, limits, &grid, problem);
+    const Status status = sweep_grid_new(request, simulation, limits, &grid, NULL);
     if (status == STATUS_OK)
         *steps = sweep_grid_steps(grid, limits);
     sweep_grid_free(grid);
@@ -593,31 +593,31 @@ size_t sweep_value_index(const Sweep *sweep, size_t axis, size_t point) {
     return point / stride % sweep->axes.at[axis].values.count;
 }
 
-static Status sweep_fill_axis(const Texts *texts, const SweepValues *values, SweepAxisValues *axis,
-                              Problem *problem) {
-    TRY(study_copy_text(values->pointer, &axis->pointer, problem));
-    TRY(study_copy_text(values->is_tag ? NULL : values->field->unit, &axis->unit, problem));
+static Status sweep_fill_axis(const Texts *texts, const SweepValues *values,
+                              SweepAxisValues *axis) {
+    TRY(study_copy_text(values->pointer, &axis->pointer));
+    TRY(study_copy_text(values->is_tag ? NULL : values->field->unit, &axis->unit));
     for (size_t i = 0; i < values->count; i++) {
         char digits[32];
-        TRY(study_add_text(texts->count > 0 ? texts->at[i]
-                                            : text_real(digits, values->at[i].number),
-                           &axis->values, problem));
+        TRY(texts_append(&axis->values, texts->count > 0
+                                            ? texts->at[i]
+                                            : text_real(digits, values->at[i].number)));
     }
     return STATUS_OK;
 }
 
-static Status sweep_fill(const SweepGrid *grid, Sweep *sweep, Problem *problem) {
+static Status sweep_fill(const SweepGrid *grid, Sweep *sweep) {
     const SweepStudy *study = grid->study;
     sweep->points = grid->points;
     sweep->mode = study->mode;
     for (size_t i = 0; i < grid->axis_count; i++) {
-        SweepAxisValues *axis = study_list_add(&sweep->axes, sizeof *axis, problem);
+        SweepAxisValues *axis = study_list_add(&sweep->axes, sizeof *axis);
         if (axis == NULL)
             return STATUS_NO_MEMORY;
-        TRY(sweep_fill_axis(&study->axes.at[i].values, &grid->axes[i], axis, problem));
+        TRY(sweep_fill_axis(&study->axes.at[i].values, &grid->axes[i], axis));
     }
     for (size_t i = 0; i < study->metrics.count; i++)
-        TRY(study_add_text(study->metrics.at[i], &sweep->metrics, problem));
+        TRY(texts_append(&sweep->metrics, study->metrics.at[i]));
     return STATUS_OK;
 }
 
@@ -626,7 +626,7 @@ Status sweep_describe(const SweepStudy *study, const Simulation *simulation, Swe
     SweepGrid *grid;
     Status status = sweep_grid_new(study, simulation, NULL, &grid, problem);
     if (status == STATUS_OK)
-        status = sweep_fill(grid, sweep, problem);
+        status = sweep_fill(grid, sweep);
     sweep_grid_free(grid);
     return status;
 }
@@ -668,7 +668,7 @@ static Status sweep_scene(const void *of, size_t member, Simulation *scene, Stud
     return sweep_grid_scene(work->grid, member, true, work->work.limits, scene, problem);
 }
 
-static Status sweep_fold(void *of, size_t member, StudyPart *part, Problem *problem) {
+static Status sweep_fold(void *of, size_t member, StudyPart *part) {
     SweepWork *work = of;
     const Texts *metrics = &work->grid->study->metrics;
     const RunRecord *run = &part->run;
@@ -676,16 +676,16 @@ static Status sweep_fold(void *of, size_t member, StudyPart *part, Problem *prob
     SweepTable *table = &work->answer->table;
     double values[SWEEP_METRICS];
     sweep_values(metrics, run, values);
-    TRY(study_add_real((double)member, &table->points, problem));
-    TRY(study_add_real(status, &table->statuses, problem));
+    TRY(study_add_real((double)member, &table->points));
+    TRY(study_add_real(status, &table->statuses));
     for (size_t i = 0; i < metrics->count; i++)
-        TRY(study_add_real(values[i], &table->values, problem));
+        TRY(study_add_real(values[i], &table->values));
     if (member == 0)
         table->failed = 0;
     if (status == SWEEP_MADE)
         return STATUS_OK;
     table->failed++;
-    return study_failures_add(&table->failures, (int)status, NULL, member, run->why, problem);
+    return study_failures_add(&table->failures, (int)status, NULL, member, run->why);
 }
 
 static void sweep_free(void *of) {
@@ -701,7 +701,7 @@ static Status sweep_begin(void *of, const StudyTools *tools, Problem *problem) {
     TRY(sweep_grid_validate(work->grid, SIZE_MAX, tools->limits, tools->progress, problem));
     work->work.members = work->grid->points;
     work->work.part_bytes = sizeof(StudyPart);
-    return sweep_fill(work->grid, work->answer, problem);
+    return sweep_fill(work->grid, work->answer);
 }
 
 const StudyKind study_sweep = {

@@ -22,7 +22,7 @@
 #include "core/math/fft.h"
 #include "core/math/student_t.h"
 #include "core/study/ensemble.h"
-#include "core/study/stopping_rule.h"
+#include "core/study/statistics.h"
 #include "core/study/study.h"
 #include "server/codec/read.h"
 #include "tests/truth/drawn.h"

@@ -10,7 +10,6 @@
 #include <string.h>
 
 #include "core/math/fft.h"
-#include "core/study/parameter_perturbation.h"
 #include "core/study/sensitivity.h"
 #include "core/study/study.h"
 #include "tests/support/paper.h"

@@ -9,7 +9,7 @@
 #include <string.h>
 
 #include "core/study/ensemble.h"
-#include "core/study/spectrum_accumulator.h"
+#include "core/study/statistics.h"
 
 static Problem problem;
 
