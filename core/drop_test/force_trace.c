@@ -13,6 +13,7 @@
 #include <string.h>
 
 #include "core/drop_test/pulse_fit.h"
+#include "core/math/linear_system.h"
 
 enum { SAMPLES_MIN = 5, TRACE_MIN = 8, PARTS = 16, PART_MIN = 16, TERMS = 3 };
 
@@ -150,7 +151,7 @@ static void detection_subtract(ContactDetection *detection, const Reals *force, 
 // Adds to c a polynomial of `terms` terms through the samples outside contacts, by least squares.
 // Returns the sum of squares of the residuals.
 static double detection_fit(const Reals *force, const bool *is_inside, size_t terms, double *c) {
-    double a[TERMS][TERMS + 1] = {{0}};
+    double a[TERMS * TERMS] = {0}, b[TERMS] = {0};
     for (size_t i = 0; i < force->count; i++) {
         if (is_inside[i])
             continue;
@@ -158,21 +159,13 @@ static double detection_fit(const Reals *force, const bool *is_inside, size_t te
         const double left = detection_residual(force, i, c);
         for (size_t j = 0; j < terms; j++) {
             for (size_t k = 0; k < terms; k++)
-                a[j][k] += power[j] * power[k];
-            a[j][TERMS] += power[j] * left;
+                a[j * terms + k] += power[j] * power[k];
+            b[j] += power[j] * left;
         }
     }
-    for (size_t j = 0; j < terms; j++)
-        for (size_t i = 0; i < terms; i++) {
-            if (i == j)
-                continue;
-            const double factor = a[i][j] / a[j][j];
-            for (size_t k = 0; k <= TERMS; k++)
-                a[i][k] -= factor * a[j][k];
-        }
-    for (size_t j = 0; j < terms; j++)
-        if (isfinite(a[j][TERMS] / a[j][j]))
-            c[j] += a[j][TERMS] / a[j][j];
+    if (linear_system_solve(a, b, terms, 1))
+        for (size_t j = 0; j < terms; j++)
+            c[j] += b[j];
     double sum = 0;
     for (size_t i = 0; i < force->count; i++) {
         const double left = detection_residual(force, i, c);

@@ -113,15 +113,6 @@ static const Field ensemble_answer_fields[] = {
 };
 // clang-format on
 
-RunStatistic *ensemble_statistic(EnsembleStatistics *statistics, int metric) {
-    RunStatistic *const all[] = {
-        &statistics->peak_displacement, &statistics->rms_displacement,
-        &statistics->peak_acceleration, &statistics->rms_acceleration,
-        &statistics->impacts,           &statistics->peak_contact_force,
-    };
-    return all[metric];
-}
-
 static Status ensemble_check_seeds(const EnsembleStudy *study, Problem *problem) {
     if (!((double)study->first_seed + (double)(study->runs - 1) > 0x1p53 - 1))
         return STATUS_OK;
@@ -304,8 +295,7 @@ static Status ensemble_end(void *of, const StudyTools *tools, Problem *problem) 
     if (ensemble_has_target(work))
         TRY(ensemble_fill_target(work));
     for (int metric = 0; metric < STATISTICS_METRICS; metric++)
-        TRY(statistics_fill(&answer->table, metric,
-                            ensemble_statistic(&answer->statistics, metric)));
+        TRY(statistics_fill(&answer->table, metric, &answer->statistics.of[metric]));
     statistics_trust(&answer->table, &answer->trust);
     TRY(study_failures_fill(&answer->table, &answer->failures));
     return spectrum_accumulator_report(&work->sums, &work->like, false, NULL, &answer->frequency,

@@ -14,12 +14,13 @@ typedef struct EnsembleStudy {
     int metric;          // StatisticsMetric of the target; CHOICE_ABSENT without one
 } EnsembleStudy;
 
-typedef struct EnsembleStatistics {
-    RunStatistic peak_displacement, rms_displacement, peak_acceleration, rms_acceleration, impacts,
-        peak_contact_force;
+typedef union EnsembleStatistics {
+    struct {
+        RunStatistic peak_displacement, rms_displacement, peak_acceleration, rms_acceleration,
+            impacts, peak_contact_force;
+    };
+    RunStatistic of[STATISTICS_METRICS];
 } EnsembleStatistics;
-
-RunStatistic *ensemble_statistic(EnsembleStatistics *statistics, int metric);
 
 // Result of the target; all absent without one.
 typedef struct EnsembleTarget {

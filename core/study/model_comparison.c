@@ -173,8 +173,7 @@ static Status comparison_add(CompareEntries *entries, const ContactLaw *law, int
     if (entries->count == ENTRIES_MAX)
         return STATUS_OK;
     CompareEntry *entry = study_list_add(entries, sizeof *entry);
-    if (entry == NULL)
-        return STATUS_NO_MEMORY;
+    TRY(status_made(entry != NULL));
     (void)fields_default(compare_entry_fields, entry); // absent and 0: nothing to allocate
     entry->separation = separation;
     snprintf(name, sizeof name, "%s%s%s", law->kind.name, separation == CHOICE_ABSENT ? "" : ", ",
@@ -208,8 +207,7 @@ static Status comparison_set_contact(Simulation *target, const ContactLaw *law, 
     if (law->form == CONTACT_IMPULSIVE)
         return impulse_variant_apply(target, problem);
     Variant *contact = variant_new(&law->kind);
-    if (contact == NULL)
-        return STATUS_NO_MEMORY;
+    TRY(status_made(contact != NULL));
     if (law->form == CONTACT_LINEAR)
         ((Contact *)(void *)contact)->separation = separation;
     variant_free(target->scene.contact);
@@ -389,8 +387,7 @@ static Status comparison_measure(const CompareWork *work, const Outcome *outcome
     entry->displacement = signal_comparison_measure(&from, &to, work->study->part, progress);
     TRY(study_advance(progress, 1, problem));
     TRY(comparison_fill_divergence(work, outcome, entry));
-    if (fields_copy(rows, &outcome->plan, &plan) != STATUS_OK)
-        return STATUS_NO_MEMORY;
+    TRY(fields_copy(rows, &outcome->plan, &plan));
     entry->derived = plan.derived;
     TRY(study_copy_reals(density, spectrum->densities.rows, &entry->density));
     return comparison_fill_trace(&to, (size_t)work->answer->trace_samples, &entry->trace);

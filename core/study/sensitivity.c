@@ -223,8 +223,7 @@ static Status uncertainty_fill_recorded(InputUncertainty *uncertainty,
         if (buffer->material == NULL || (isnan(recorded[0]) && isnan(recorded[1])))
             continue;
         InputDeviation *added = study_list_add(&uncertainty->spread, sizeof *added);
-        if (added == NULL)
-            return STATUS_NO_MEMORY;
+        TRY(status_made(added != NULL));
         *added = (InputDeviation){.damper = i / BUFFERS + 1,
                                   .buffer = (int)(i % BUFFERS),
                                   .restitution = recorded[0],
@@ -680,8 +679,7 @@ static Status sensitivity_fill_row(const SensitivityWork *work, size_t index) {
                                                    work->values[low + 1][metric], value, width);
         }
         SensitivitySlope *slope = study_list_add(&row->slopes, sizeof *slope);
-        if (slope == NULL)
-            return STATUS_NO_MEMORY;
+        TRY(status_made(slope != NULL));
         *slope = (SensitivitySlope){metric, value, (double)NAN, (double)NAN, false};
         sensitivity_fill_slope(quotients, slope);
     }
@@ -694,8 +692,7 @@ static Status sensitivity_fill_statistics(const SensitivityWork *work) {
     for (int metric = 0; metric < STATISTICS_METRICS; metric++) {
         const bool is_known = metric != STATISTICS_PEAK_CONTACT_FORCE || work->has_force;
         RunStatistic *statistic = study_list_add(&answer->statistics, sizeof *statistic);
-        if (statistic == NULL)
-            return STATUS_NO_MEMORY;
+        TRY(status_made(statistic != NULL));
         (void)fields_default(sensitivity_statistic_fields, statistic); // nothing to allocate
         if (is_known)
             statistic->value = statistics_value(&work->own->summary, metric);
@@ -769,8 +766,7 @@ static Status sensitivity_fill_contact(const SensitivityWork *work) {
         const Damper *damper = &scene->dampers.at[from->damper - 1];
         const char *why = sensitivity_refuse_stop(law, damper_buffer(damper, (Side)from->side));
         SensitivityStop *stop = study_list_add(&work->answer->contact, sizeof *stop);
-        if (stop == NULL)
-            return STATUS_NO_MEMORY;
+        TRY(status_made(stop != NULL));
         (void)fields_default(sensitivity_stop_fields, stop); // nothing to allocate
         stop->damper = from->damper;
         stop->side = from->side;
@@ -792,8 +788,7 @@ static Status sensitivity_fill_rows(SensitivityWork *work) {
     size_t stepped = 0;
     for (size_t i = 0; i < parameters->count; i++) {
         SensitivityRow *row = study_list_add(&work->answer->response, sizeof *row);
-        if (row == NULL)
-            return STATUS_NO_MEMORY;
+        TRY(status_made(row != NULL));
         row->parameter = sensitivity_parameter(parameters->at[i]);
         const char *refused = perturbation_refuse(work->simulation, row->parameter);
         if (refused == NULL)
@@ -856,9 +851,7 @@ static Status sensitivity_begin(void *of, const StudyTools *tools, Problem *prob
               "the restitution and the contact time of each buffer, one factor for all rows of a "
               "table; a restitution beyond 1 is drawn again",
         &answer->distribution));
-    if (fields_copy(sensitivity_uncertainty_fields, &study->uncertainty, &answer->uncertainty) !=
-        STATUS_OK)
-        return STATUS_NO_MEMORY;
+    TRY(fields_copy(sensitivity_uncertainty_fields, &study->uncertainty, &answer->uncertainty));
     TRY(sensitivity_run_scene(work, tools, problem));
     TRY(sensitivity_fill_contact(work));
     TRY(sensitivity_fill_rows(work));

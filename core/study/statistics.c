@@ -58,26 +58,10 @@ size_t stopping_rule_next_check(size_t count) {
     return count < STOPPING_RULE_PILOT ? STOPPING_RULE_PILOT : count + (count + 3) / 4;
 }
 
-const char *const statistics_metric_names[] = {"peak_displacement",
-                                               "rms_displacement",
-                                               "peak_acceleration",
-                                               "rms_acceleration",
-                                               "impacts",
-                                               "peak_contact_force",
-                                               "psd",
-                                               NULL};
-static const char *const statistics_units[] = {"m", "m", "m/s^2", "m/s^2", "1", "N"};
+const char *const statistics_metric_names[] = {STUDY_METRICS, "psd", NULL};
 
 double statistics_value(const Summary *summary, int metric) {
-    const double all[] = {
-        summary->peak_displacement,
-        summary->rms_displacement,
-        summary->peak_acceleration,
-        summary->rms_acceleration,
-        summary->impacts == COUNT_ABSENT ? (double)NAN : (double)summary->impacts,
-        summary->peak_contact_force,
-    };
-    return all[metric];
+    return study_summary_value(summary, statistics_metric_names[metric]);
 }
 
 static bool statistics_is_known(const RunRecord *run, int metric) {
@@ -122,8 +106,7 @@ static Status statistics_collect(const RunTable *table, int metric, Values *valu
     *values = (Values){.at = calloc(table->count + 1, sizeof *values->at),
                        .mean = (double)NAN,
                        .deviation = (double)NAN};
-    if (values->at == NULL)
-        return STATUS_NO_MEMORY;
+    TRY(status_made(values->at != NULL));
     for (size_t i = 0; i < table->count; i++)
         if (statistics_is_known(&table->at[i], metric))
             values->at[values->count++] = statistics_value(&table->at[i].summary, metric);
@@ -152,7 +135,8 @@ Status statistics_fill(const RunTable *table, int metric, RunStatistic *statisti
     Values values;
     free(statistic->unit);
     statistic->metric = metric;
-    TRY(study_copy_text(statistics_units[metric], &statistic->unit));
+    const char *unit = fields_find(summary_fields, statistics_metric_names[metric], NULL)->unit;
+    TRY(study_copy_text(unit != NULL ? unit : "1", &statistic->unit));
     TRY(statistics_collect(table, metric, &values));
     const size_t count = values.count;
     statistic->count = count;
@@ -319,8 +303,7 @@ static Status spectrum_accumulator_make_report(const Spectrum *like, Reals *freq
     TRY(study_copy_reals(like->frequency, densities->rows, frequency));
     for (size_t c = 0; c < densities->count; c++) {
         RunSpectrum *spectrum = study_list_add(spectra, sizeof *spectrum);
-        if (spectrum == NULL)
-            return STATUS_NO_MEMORY;
+        TRY(status_made(spectrum != NULL));
         TRY(study_copy_text(densities->at[c].name, &spectrum->channel));
         TRY(study_copy_text(densities->at[c].unit, &spectrum->unit));
     }

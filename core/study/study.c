@@ -44,16 +44,14 @@ void *study_list_add(void *list, size_t size) {
 
 Status study_add_real(double value, Reals *reals) {
     double *added = study_list_add(reals, sizeof *added);
-    if (added == NULL)
-        return STATUS_NO_MEMORY;
+    TRY(status_made(added != NULL));
     *added = value;
     return STATUS_OK;
 }
 
 Status run_table_add(RunTable *table, RunRecord *run, uint64_t number) {
     RunRecord *added = study_list_add(table, sizeof *added);
-    if (added == NULL)
-        return STATUS_NO_MEMORY;
+    TRY(status_made(added != NULL));
     *added = *run;
     added->number = number;
     run->why = NULL;
@@ -69,8 +67,7 @@ Status study_failures_add(StudyFailures *failures, int status, const char *reaso
             return STATUS_OK;
         }
     StudyFailure *failure = study_list_add(failures, sizeof *failure);
-    if (failure == NULL)
-        return STATUS_NO_MEMORY;
+    TRY(status_made(failure != NULL));
     *failure = (StudyFailure){.status = status, .count = 1, .first = number};
     TRY(study_copy_text(reason, &failure->reason));
     return study_copy_text(why, &failure->detail);
@@ -84,6 +81,16 @@ Status study_failures_fill(const RunTable *table, StudyFailures *failures) {
                                    run->number, run->why));
     }
     return STATUS_OK;
+}
+
+double study_summary_value(const Summary *summary, const char *name) {
+    size_t offset = 0;
+    const Field *row = fields_find(summary_fields, name, &offset);
+    const void *member = (const char *)summary + offset + row->offset;
+    if (row->kind == FIELD_KIND_REAL)
+        return *(const double *)member;
+    const uint64_t count = *(const uint64_t *)member;
+    return count != COUNT_ABSENT ? (double)count : (double)NAN;
 }
 
 double study_run_densities(const Simulation *simulation) {
@@ -153,8 +160,7 @@ Status study_run_fix_solver(Simulation *target) {
     if (!simulation_has_target(target))
         return STATUS_OK;
     Variant *accuracy = variant_new(solver_kinds.at(0));
-    if (accuracy == NULL)
-        return STATUS_NO_MEMORY;
+    TRY(status_made(accuracy != NULL));
     variant_free(target->accuracy);
     target->accuracy = accuracy;
     ((AccuracyAuto *)(void *)accuracy)->metric = CHOICE_ABSENT; // as in a completed scene

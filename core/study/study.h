@@ -51,6 +51,14 @@ Status study_failures_add(StudyFailures *failures, int status, const char *reaso
 // Counts the failures of a table by their status, in its order.
 Status study_failures_fill(const RunTable *table, StudyFailures *failures);
 
+// The metrics of a summary that studies compare, by their names there.
+#define STUDY_METRICS                                                                              \
+    "peak_displacement", "rms_displacement", "peak_acceleration", "rms_acceleration", "impacts",   \
+        "peak_contact_force"
+
+// A number of a summary by its name; NAN: unknown.
+double study_summary_value(const Summary *summary, const char *name);
+
 // Densities that a run's spectra hold; 0 without spectra.
 double study_run_densities(const Simulation *simulation);
 

@@ -241,8 +241,7 @@ static void candidate_set(Variant *accuracy, const char *name, double real, uint
 
 static Status candidate_apply_solver(const TradeoffPoint *point, Simulation *target) {
     Variant *accuracy = variant_new(kind_find(&solver_kinds, point->solver));
-    if (accuracy == NULL)
-        return STATUS_NO_MEMORY;
+    TRY(status_made(accuracy != NULL));
     variant_free(target->accuracy);
     target->accuracy = accuracy;
     candidate_set(accuracy, "step", point->step, COUNT_ABSENT);
@@ -283,8 +282,6 @@ Status candidate_settings_apply(const Simulation *simulation, const TradeoffPoin
         status = candidate_apply_solver(point, target);
     if (status == STATUS_OK && point->contact_model != NULL)
         status = impulse_variant_apply(target, problem);
-    if (status == STATUS_NO_MEMORY)
-        return STATUS_NO_MEMORY;
     TRY(status);
     candidate_apply_output(point, target);
     return simulation_complete(target, limits, NULL, problem);
@@ -504,6 +501,7 @@ static Status tradeoff_measure(TradeoffRun *run, size_t index, Problem *problem)
         point->steps = floor(outcome->steps + 0.5); // parts of one are counted too
         point->errors = error_metrics_measure(&from, &to);
     } else if (study_run_ends_study(status)) {
+        (void)study_result(status, fault);
         (void)problem_set(problem, status, "%s", fault->detail);
     } else {
         status = study_copy_text(fault->count > 0 ? fault->faults[0].detail : fault->detail,
