@@ -495,7 +495,7 @@ static Status evaluation_warn_of_copies(const Measurement *tests, size_t count,
                                         Evaluation *evaluation) {
     const EvaluationRows *rows = &evaluation->rows;
     uint64_t *sums = calloc(count + 1, sizeof *sums); // 0: does not count
-    Status status = sums != NULL ? STATUS_OK : STATUS_NO_MEMORY;
+    Status status = status_made(sums != NULL);
     for (size_t i = 0; i < rows->count && status == STATUS_OK; i++)
         if (reading_counts(&rows->at[i]))
             sums[rows->at[i].test] = 14695981039346656037u;

@@ -223,8 +223,7 @@ static size_t detection_mark(const ContactDetection *detection, size_t count, do
 static Status detection_find_baseline(const Reals *force, ContactDetection *detection) {
     const size_t n = force->count;
     double *scratch = malloc(n * (sizeof *scratch + sizeof(bool)));
-    if (scratch == NULL)
-        return STATUS_NO_MEMORY;
+    TRY(status_made(scratch != NULL));
     bool *is_inside = (bool *)(void *)(scratch + n);
     double level[TERMS] = {0}, width, line[TERMS] = {0}, line_width;
     memcpy(scratch, force->at, n * sizeof *scratch);
@@ -309,8 +308,7 @@ static void detection_find_runs(size_t count, ContactDetection *detection) {
 static Status detection_run(const Reals *force, double threshold, ContactDetection *detection) {
     *detection = (ContactDetection){.noise_count = 0};
     detection->force = malloc((force->count + 1) * sizeof *detection->force);
-    if (detection->force == NULL)
-        return STATUS_NO_MEMORY;
+    TRY(status_made(detection->force != NULL));
     TRY(detection_find_baseline(force, detection));
     detection->threshold =
         isnan(threshold) ? fmax(6 * detection->noise, 0.002 * detection->largest) : threshold;
@@ -426,38 +424,32 @@ static Status trace_conclude(const FitConfidence *likely, bool is_form_sure, dou
                              int separation, const TraceContact *counted, TraceContact *contact) {
     const double width = contact->most_contact_time - contact->least_contact_time;
     const bool is_wide = !(width < width_max * contact->contact_time);
-    if (!is_form_sure) {
-        if (is_wide)
-            trace_withdraw(counted, contact);
-        return status_made(text_format(
-            &contact->why,
-            "the trace differs from every pulse of the model under the rule %s: the rms "
-            "residual of the best one is %.2g %% of the peak, and the noise is %.2g %% of it",
-            separation_names[separation], 100 * contact->seen.misfit_share, 100 * noise));
-    }
-    if (is_wide) {
+    const bool is_endless = likely->decay.mean + 2 * likely->decay.deviation > decay_max;
+    if (is_wide || (is_form_sure && is_endless))
         trace_withdraw(counted, contact);
-        return status_made(text_format(
-            &contact->why,
-            "pulses from %.3g s to %.3g s fit the trace about equally well: less noise or "
-            "more samples in contact would distinguish them",
-            contact->least_contact_time, contact->most_contact_time));
-    }
-    if (likely->decay.mean + 2 * likely->decay.deviation > decay_max) {
-        trace_withdraw(counted, contact);
-        return status_made(text_format(
-            &contact->why, "the force has no distinct end: pulses with a restitution of "
-                           "nearly 0 fit the trace as well"));
-    }
-    return STATUS_OK;
+    return status_made(
+        !is_form_sure
+            ? text_format(&contact->why,
+                          "the trace differs from every pulse of the model under the rule %s: the "
+                          "rms residual of the best one is %.2g %% of the peak, and the noise is "
+                          "%.2g %% of it",
+                          separation_names[separation], 100 * contact->seen.misfit_share,
+                          100 * noise)
+        : is_wide
+            ? text_format(&contact->why,
+                          "pulses from %.3g s to %.3g s fit the trace about equally well: "
+                          "less noise or more samples in contact would distinguish them",
+                          contact->least_contact_time, contact->most_contact_time)
+            : !is_endless || text_format(&contact->why,
+                                         "the force has no distinct end: pulses with a restitution "
+                                         "of nearly 0 fit the trace as well"));
 }
 
 // The best pulse on the baseline, from its start to its end; the window begins at sample `origin`.
 static Status trace_draw(const PulseFit *fit, const PulseModel *model,
                          const ContactDetection *found, const DetectedContact *run, double origin,
                          Reals *pulse) {
-    if (!reals_allocate(pulse, TRACE_PULSE))
-        return STATUS_NO_MEMORY;
+    TRY(status_made(reals_allocate(pulse, TRACE_PULSE)));
     for (size_t i = 0; i < TRACE_PULSE; i++) {
         const double share = (double)i / (TRACE_PULSE - 1), *part = fit->at.part;
         const double place = origin + part[0] + share * (part[1] - part[0]);

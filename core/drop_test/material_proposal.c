@@ -91,8 +91,7 @@ static Status proposal_set_source(const Proposal *proposal) {
         }
     }
     material->source = strdup(text);
-    if (material->source == NULL || !reals_allocate(&material->measurements, count))
-        return STATUS_NO_MEMORY;
+    TRY(status_made(material->source != NULL && reals_allocate(&material->measurements, count)));
     for (size_t i = 0; i < count; i++)
         material->measurements.at[i] = (double)sources[i]->number;
     return STATUS_OK;
@@ -198,8 +197,7 @@ static Status proposal_fill_table(Proposal *proposal, bool has_time, size_t *all
     size_t kept = 0;
     *all = 0;
     table->at = calloc(proposal->row_count + 1, sizeof *table->at);
-    if (table->at == NULL)
-        return STATUS_NO_MEMORY;
+    TRY(status_made(table->at != NULL));
     for (size_t first = 0, count; first < proposal->row_count; first += count, ++*all) {
         MaterialRow row = {0};
         count = proposal_bin(proposal, first);

@@ -694,8 +694,7 @@ Status pulse_fit_confidence(const FitWindow *window, const PulseFit *fits, size_
                             bool is_form_sure, FitConfidence *confidence) {
     Piece *pieces = malloc(SIDE * SIDE * sizeof *pieces);
     *confidence = (FitConfidence){.least = (double)NAN, .most = (double)NAN};
-    if (pieces == NULL)
-        return STATUS_NO_MEMORY;
+    TRY(status_made(pieces != NULL));
     const size_t found = fit_confidence_explore(window, fits, count, pieces);
     double height = -(double)INFINITY, sum = 0;
     for (size_t i = 0; i < found; i++)

@@ -58,7 +58,7 @@ static const Field compare_trace_fields[] = {
     FIELD_END
 };
 
-const Field compare_entry_fields[] = {
+static const Field compare_entry_fields[] = {
     FIELD_TEXT(CompareEntry, name, 0, PRESENCE_OPTIONAL, 0, "name for display"),
     FIELD_TEXT(CompareEntry, contact_model, 0, PRESENCE_OPTIONAL, 0, "contact model"),
     FIELD_CHOICE(CompareEntry, separation, separation_names, OPTIONAL, "rule by which its contacts end; unknown if the model needs none"),

@@ -7,11 +7,10 @@
 #include "core/study/sensitivity.h"
 
 #include <math.h>
-#include <stdarg.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/base/json_pointer.h"
 #include "core/base/philox.h"
 #include "core/contact/identification.h"
 
@@ -29,36 +28,33 @@ static Buffer *perturbation_buffer(const Damper *damper, size_t index) {
     return (Buffer *)(void *)((char *)damper + offsets[index]);
 }
 
-// The number of a buffer (0) and those of the rows of its table (from 1); NULL beyond the last.
-static double *perturbation_number(const Buffer *buffer, int parameter, size_t index) {
+// The numbers of a parameter in one buffer and the rows of its table, or in its damper, from 0;
+// NULL beyond the last.
+static double *perturbation_number(const Damper *damper, size_t buffer, int parameter,
+                                   size_t index) {
     static const size_t offsets[] = {
         [SENSITIVITY_RESTITUTION] = offsetof(Buffer, restitution),
         [SENSITIVITY_CONTACT_TIME] = offsetof(Buffer, contact_time),
         [SENSITIVITY_STIFFNESS] = offsetof(Buffer, stiffness),
         [SENSITIVITY_DAMPING] = offsetof(Buffer, damping),
+        [SENSITIVITY_MASS] = offsetof(Damper, mass),
+        [SENSITIVITY_CLEARANCE] = offsetof(Damper, clearance),
     };
-    const bool has_rows =
-        parameter == SENSITIVITY_RESTITUTION || parameter == SENSITIVITY_CONTACT_TIME;
-    if (index == 0)
-        return (double *)(void *)((char *)buffer + offsets[parameter]);
-    if (!has_rows || index > buffer->table.count)
+    Buffer *of = perturbation_buffer(damper, buffer);
+    const bool is_dampers = parameter >= SENSITIVITY_MASS;
+    if (index == 0 && !(is_dampers && buffer > 0))
+        return (double *)(void *)((is_dampers ? (char *)damper : (char *)of) + offsets[parameter]);
+    if (parameter > SENSITIVITY_CONTACT_TIME || index > of->table.count)
         return NULL;
-    ContactRow *row = &buffer->table.at[index - 1];
+    ContactRow *row = &of->table.at[index - 1];
     return parameter == SENSITIVITY_RESTITUTION ? &row->restitution : &row->contact_time;
 }
 
-// The number of a damper; NULL: the parameter is one of buffers.
-static double *perturbation_damper_number(Damper *damper, int parameter) {
-    return parameter == SENSITIVITY_MASS        ? &damper->mass
-           : parameter == SENSITIVITY_CLEARANCE ? &damper->clearance
-                                                : NULL;
-}
-
-// Largest value of a parameter in a buffer and its table; NAN: none.
-static double perturbation_buffer_max(const Buffer *buffer, int parameter) {
+// The largest of them; NAN: none.
+static double perturbation_buffer_max(const Damper *damper, size_t buffer, int parameter) {
     double max = (double)NAN;
     const double *number;
-    for (size_t i = 0; (number = perturbation_number(buffer, parameter, i)) != NULL; i++)
+    for (size_t i = 0; (number = perturbation_number(damper, buffer, parameter, i)) != NULL; i++)
         max = fmax(max, *number);
     return max;
 }
@@ -67,14 +63,8 @@ static double perturbation_buffer_max(const Buffer *buffer, int parameter) {
 static double perturbation_max(const Simulation *simulation, int parameter) {
     const Dampers *dampers = &simulation->scene.dampers;
     double max = (double)NAN;
-    for (size_t i = 0; i < dampers->count; i++) {
-        const double *own = perturbation_damper_number(&dampers->at[i], parameter);
-        if (own != NULL)
-            max = fmax(max, *own);
-        for (size_t k = 0; k < BUFFERS && own == NULL; k++)
-            max = fmax(max,
-                       perturbation_buffer_max(perturbation_buffer(&dampers->at[i], k), parameter));
-    }
+    for (size_t i = 0; i < BUFFERS * dampers->count; i++)
+        max = fmax(max, perturbation_buffer_max(&dampers->at[i / BUFFERS], i % BUFFERS, parameter));
     return max;
 }
 
@@ -101,26 +91,21 @@ double perturbation_max_step(const Simulation *simulation, int parameter, double
                : step;
 }
 
-static void perturbation_scale(const Buffer *from, int parameter, double factor, Buffer *to) {
+static void perturbation_scale(const Damper *from, size_t buffer, int parameter, double factor,
+                               Damper *to) {
     const double max = parameter == SENSITIVITY_RESTITUTION ? 1 : (double)INFINITY;
     const double *number;
-    for (size_t i = 0; (number = perturbation_number(from, parameter, i)) != NULL; i++)
-        *perturbation_number(to, parameter, i) =
+    for (size_t i = 0; (number = perturbation_number(from, buffer, parameter, i)) != NULL; i++)
+        *perturbation_number(to, buffer, parameter, i) =
             *number * factor > max ? max : *number * factor; // NAN remains
 }
 
 void perturbation_apply(const Simulation *simulation, int parameter, double factor,
                         Simulation *target) {
     const Dampers *dampers = &simulation->scene.dampers;
-    for (size_t i = 0; i < dampers->count; i++) {
-        Damper *from = &dampers->at[i], *to = &target->scene.dampers.at[i];
-        const double *own = perturbation_damper_number(from, parameter);
-        if (own != NULL)
-            *perturbation_damper_number(to, parameter) = *own * factor;
-        for (size_t k = 0; k < BUFFERS && own == NULL; k++)
-            perturbation_scale(perturbation_buffer(from, k), parameter, factor,
-                               perturbation_buffer(to, k));
-    }
+    for (size_t i = 0; i < BUFFERS * dampers->count; i++)
+        perturbation_scale(&dampers->at[i / BUFFERS], i % BUFFERS, parameter, factor,
+                           &target->scene.dampers.at[i / BUFFERS]);
 }
 
 // Log-normal, of mean 1 and relative deviation s.
@@ -152,20 +137,20 @@ Status perturbation_draw(const InputUncertainty *uncertainty, uint64_t seed,
     size_t drawn = 0;
     for (size_t i = 0; i < BUFFERS * dampers->count; i++) {
         const size_t damper = i / BUFFERS, k = i % BUFFERS;
-        const Buffer *from = perturbation_buffer(&dampers->at[damper], k);
-        Buffer *to = perturbation_buffer(&target->scene.dampers.at[damper], k);
+        const Damper *from = &dampers->at[damper];
         double deviation[2], factor[2];
-        if (!buffer_is_given(from))
+        if (!buffer_is_given(perturbation_buffer(from, k)))
             continue;
         for (int parameter = 0; parameter < 2; parameter++)
             deviation[parameter] =
                 uncertainty_find(uncertainty, damper, (SensitivityBuffer)k, parameter);
         perturbation_draw_factors(seed, run, drawn++,
-                                  perturbation_buffer_max(from, SENSITIVITY_RESTITUTION), deviation,
-                                  factor);
+                                  perturbation_buffer_max(from, k, SENSITIVITY_RESTITUTION),
+                                  deviation, factor);
         for (int parameter = 0; parameter < 2; parameter++)
             if (deviation[parameter] > 0)
-                perturbation_scale(from, parameter, factor[parameter], to);
+                perturbation_scale(from, k, parameter, factor[parameter],
+                                   &target->scene.dampers.at[damper]);
         TRY(study_add_real(factor[0], restitution));
         TRY(study_add_real(factor[1], contact_time));
     }
@@ -174,15 +159,6 @@ Status perturbation_draw(const InputUncertainty *uncertainty, uint64_t seed,
 
 // Below, a parameter is SENSITIVITY_RESTITUTION or SENSITIVITY_CONTACT_TIME.
 
-static double uncertainty_value(const InputDeviation *deviation, int parameter) {
-    return parameter == SENSITIVITY_RESTITUTION ? deviation->restitution : deviation->contact_time;
-}
-
-static double uncertainty_common(const InputUncertainty *uncertainty, int parameter) {
-    return parameter == SENSITIVITY_RESTITUTION ? uncertainty->restitution_deviation
-                                                : uncertainty->contact_time_deviation;
-}
-
 static double uncertainty_recorded(const Buffer *buffer, int parameter) {
     return parameter == SENSITIVITY_RESTITUTION ? buffer->test.restitution_deviation
                                                 : buffer->test.contact_time_deviation;
@@ -190,20 +166,21 @@ static double uncertainty_recorded(const Buffer *buffer, int parameter) {
 
 double uncertainty_find(const InputUncertainty *uncertainty, size_t damper,
                         SensitivityBuffer buffer, int parameter) {
-    double found = uncertainty_common(uncertainty, parameter);
+    double found = uncertainty->common[parameter];
     for (size_t i = 0; i < uncertainty->spread.count && isnan(found); i++) {
         const InputDeviation *deviation = &uncertainty->spread.at[i];
         if (deviation->damper == damper + 1 && deviation->buffer == (int)buffer)
-            found = uncertainty_value(deviation, parameter);
+            found = deviation->of[parameter];
     }
     return isnan(found) ? 0 : found;
 }
 
-bool uncertainty_exists(const InputUncertainty *uncertainty) {
-    bool exists = uncertainty->restitution_deviation > 0 || uncertainty->contact_time_deviation > 0;
+// Whether any number has a deviation.
+static bool uncertainty_exists(const InputUncertainty *uncertainty) {
+    bool exists = uncertainty->common[0] > 0 || uncertainty->common[1] > 0;
     for (size_t i = 0; i < uncertainty->spread.count; i++)
-        exists = exists || uncertainty->spread.at[i].restitution > 0 ||
-                 uncertainty->spread.at[i].contact_time > 0;
+        exists =
+            exists || uncertainty->spread.at[i].of[0] > 0 || uncertainty->spread.at[i].of[1] > 0;
     return exists;
 }
 
@@ -216,7 +193,7 @@ static Status uncertainty_fill_recorded(InputUncertainty *uncertainty,
         double recorded[2];
         for (int parameter = 0; parameter < 2; parameter++) {
             recorded[parameter] = uncertainty_recorded(buffer, parameter);
-            if (!(recorded[parameter] > 0) || !isnan(uncertainty_common(uncertainty, parameter)) ||
+            if (!(recorded[parameter] > 0) || !isnan(uncertainty->common[parameter]) ||
                 perturbation_refuse(simulation, parameter) != NULL)
                 recorded[parameter] = (double)NAN;
         }
@@ -233,55 +210,43 @@ static Status uncertainty_fill_recorded(InputUncertainty *uncertainty,
     return STATUS_OK;
 }
 
-// Adds a fault at a member of an entry of the list; without a name at the entry.
-__attribute__((format(printf, 4, 5))) static Status
-uncertainty_fault(size_t index, const char *member, Problem *problem, const char *format, ...) {
-    char place[sizeof((Fault){0}.pointer)], sentence[sizeof((Fault){0}.detail)];
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(sentence, sizeof sentence, format, arguments);
-    va_end(arguments);
-    snprintf(place, sizeof place, "/study/spread/%zu%s%s", index, member != NULL ? "/" : "",
-             member != NULL ? member : "");
-    return problem_add(problem, STATUS_INVALID, place, "%s", sentence);
-}
-
 static Status uncertainty_check_number(const InputUncertainty *uncertainty,
-                                       const Simulation *simulation, size_t index, int parameter,
-                                       Problem *problem) {
-    const InputDeviation *deviation = &uncertainty->spread.at[index];
-    const double value = uncertainty_value(deviation, parameter);
+                                       const InputDeviation *deviation,
+                                       const Simulation *simulation, int parameter,
+                                       const char *place, Problem *problem) {
+    const double value = deviation->of[parameter];
     const char *why = perturbation_refuse(simulation, parameter);
     const char *name = sensitivity_parameter_names[parameter];
     if (value > 0 && why != NULL)
-        return uncertainty_fault(index, name, problem, "must be left out: %s", why);
-    if (!isnan(value) && !isnan(uncertainty_common(uncertainty, parameter)))
-        return uncertainty_fault(index, name, problem,
-                                 "must be left out: %s_deviation gives it for all buffers", name);
+        return json_pointer_fault(problem, place, name, "must be left out: %s", why);
+    if (!isnan(value) && !isnan(uncertainty->common[parameter]))
+        return json_pointer_fault(problem, place, name,
+                                  "must be left out: %s_deviation gives it for all buffers", name);
     if (value > 1)
-        return uncertainty_fault(index, name, problem,
-                                 "is %.3g of its value, as %.64s records, and must be at most 1 to "
-                                 "be drawn from: give %s_deviation",
-                                 value, deviation->source, name);
+        return json_pointer_fault(
+            problem, place, name,
+            "is %.3g of its value, as %.64s records, and must be at most 1 to "
+            "be drawn from: give %s_deviation",
+            value, deviation->source, name);
     return STATUS_OK;
 }
 
 // A source that is named must be the buffer's material, and the numbers must be its own.
 static Status uncertainty_check_source(const InputDeviation *deviation, const Buffer *buffer,
-                                       size_t index, Problem *problem) {
+                                       const char *place, Problem *problem) {
     if (deviation->source == NULL)
         return STATUS_OK;
     if (!text_same(deviation->source, buffer->material))
-        return uncertainty_fault(
-            index, "source", problem,
+        return json_pointer_fault(
+            problem, place, "source",
             "is not the material of that buffer: leave it out, or name its material and revision");
     for (int parameter = 0; parameter < 2; parameter++) {
-        const double value = uncertainty_value(deviation, parameter),
+        const double value = deviation->of[parameter],
                      recorded = uncertainty_recorded(buffer, parameter);
         if (!isnan(value) && value != recorded)
-            return uncertainty_fault(index, sensitivity_parameter_names[parameter], problem,
-                                     "is %.6g, but %.80s records %.6g: leave out the source", value,
-                                     deviation->source, recorded);
+            return json_pointer_fault(problem, place, sensitivity_parameter_names[parameter],
+                                      "is %.6g, but %.80s records %.6g: leave out the source",
+                                      value, deviation->source, recorded);
     }
     return STATUS_OK;
 }
@@ -290,25 +255,29 @@ static Status uncertainty_check(const InputUncertainty *uncertainty, const Simul
                                 size_t index, Problem *problem) {
     const Dampers *dampers = &simulation->scene.dampers;
     const InputDeviation *deviation = &uncertainty->spread.at[index];
+    char place[sizeof((Fault){0}.pointer)];
+    json_pointer_index(place, sizeof place, "/study/spread", index);
     if (deviation->damper > dampers->count)
-        return uncertainty_fault(index, "damper", problem, "must be the number of a damper");
+        return json_pointer_fault(problem, place, "damper", "must be the number of a damper");
     const Buffer *buffer =
         perturbation_buffer(&dampers->at[deviation->damper - 1], (size_t)deviation->buffer);
     if (!buffer_is_given(buffer))
-        return uncertainty_fault(index, "buffer", problem,
-                                 "is not given: if both stops have the same it is \"buffer\", else "
-                                 "\"left_buffer\" and \"right_buffer\"");
+        return json_pointer_fault(
+            problem, place, "buffer",
+            "is not given: if both stops have the same it is \"buffer\", else "
+            "\"left_buffer\" and \"right_buffer\"");
     for (size_t i = 0; i < index; i++)
         if (uncertainty->spread.at[i].damper == deviation->damper &&
             uncertainty->spread.at[i].buffer == deviation->buffer)
-            return uncertainty_fault(index, NULL, problem,
-                                     "names the buffer of another entry: give one each");
-    TRY(uncertainty_check_source(deviation, buffer, index, problem));
-    const Status restitution =
-        uncertainty_check_number(uncertainty, simulation, index, SENSITIVITY_RESTITUTION, problem);
-    return study_first_failure(restitution,
-                               uncertainty_check_number(uncertainty, simulation, index,
-                                                        SENSITIVITY_CONTACT_TIME, problem));
+            return problem_add(problem, STATUS_INVALID, place,
+                               "names the buffer of another entry: give one each");
+    TRY(uncertainty_check_source(deviation, buffer, place, problem));
+    Status status = STATUS_OK;
+    for (int parameter = 0; parameter < 2; parameter++)
+        status =
+            study_first_failure(status, uncertainty_check_number(uncertainty, deviation, simulation,
+                                                                 parameter, place, problem));
+    return status;
 }
 
 static int uncertainty_compare(const void *a, const void *b) {
@@ -318,34 +287,36 @@ static int uncertainty_compare(const void *a, const void *b) {
     return (first->buffer > second->buffer) - (first->buffer < second->buffer);
 }
 
-Status uncertainty_complete(InputUncertainty *uncertainty, const Simulation *simulation,
-                            Problem *problem) {
+// Validates and completes it for a completed simulation, below "/study". A number without a
+// deviation is exact.
+static Status uncertainty_complete(InputUncertainty *uncertainty, const Simulation *simulation,
+                                   Problem *problem) {
     InputDeviations *spread = &uncertainty->spread;
-    bool is_exact[2] = {true, true}; // no entry has a deviation of it
     Status status = STATUS_OK;
     if (spread->count == 0)
         TRY(uncertainty_fill_recorded(uncertainty, simulation));
-    for (size_t i = 0; i < spread->count; i++) {
+    for (size_t i = 0; i < spread->count; i++)
         status =
             study_first_failure(status, uncertainty_check(uncertainty, simulation, i, problem));
-        is_exact[0] = is_exact[0] && isnan(spread->at[i].restitution);
-        is_exact[1] = is_exact[1] && isnan(spread->at[i].contact_time);
-    }
     TRY(status);
     if (spread->count > 1)
         qsort(spread->at, spread->count, sizeof *spread->at, uncertainty_compare);
-    if (is_exact[0] && isnan(uncertainty->restitution_deviation))
-        uncertainty->restitution_deviation = 0;
-    if (is_exact[1] && isnan(uncertainty->contact_time_deviation))
-        uncertainty->contact_time_deviation = 0;
+    for (int parameter = 0; parameter < 2; parameter++) {
+        bool is_exact = isnan(uncertainty->common[parameter]);
+        for (size_t i = 0; i < spread->count; i++)
+            is_exact = is_exact && isnan(spread->at[i].of[parameter]);
+        if (is_exact)
+            uncertainty->common[parameter] = 0;
+    }
     return STATUS_OK;
 }
 
-Status uncertainty_check_common(const InputUncertainty *uncertainty, const Simulation *simulation,
-                                Problem *problem) {
+// Validates the deviations that are given for all buffers at once.
+static Status uncertainty_check_common(const InputUncertainty *uncertainty,
+                                       const Simulation *simulation, Problem *problem) {
     Status status = STATUS_OK;
     for (int parameter = 0; parameter < 2; parameter++) {
-        const double deviation = uncertainty_common(uncertainty, parameter);
+        const double deviation = uncertainty->common[parameter];
         const char *why = deviation > 0 ? perturbation_refuse(simulation, parameter) : NULL;
         if (why != NULL)
             status = problem_add_real(problem, STATUS_INVALID,

@@ -5,8 +5,6 @@
 
 #include "core/study/statistics.h"
 
-// A scene with one parameter scaled, or with restitutions and contact times drawn at random, and
-// the uncertainty of these inputs.
 // A parameter stands for that of all dampers and sides.
 typedef enum SensitivityParameter {
     SENSITIVITY_RESTITUTION,
@@ -30,7 +28,12 @@ typedef struct InputDeviation {
     uint64_t damper; // from 1
     int buffer;      // SensitivityBuffer
     char *source;    // "sponge@1"; NULL: given by the user
-    double restitution, contact_time;
+    union {
+        struct {
+            double restitution, contact_time;
+        };
+        double of[2]; // by SensitivityParameter
+    };
 } InputDeviation;
 
 typedef struct InputDeviations {
@@ -41,21 +44,14 @@ typedef struct InputDeviations {
 // Each of the two deviations is given for all buffers at once (0: exact), or, where that is NAN,
 // buffer by buffer in `spread`.
 typedef struct InputUncertainty {
-    double restitution_deviation, contact_time_deviation;
+    union {
+        struct {
+            double restitution_deviation, contact_time_deviation;
+        };
+        double common[2]; // by SensitivityParameter
+    };
     InputDeviations spread; // none until completed: from the revisions of the buffers' materials
 } InputUncertainty;
-
-// Validates and completes it for a completed simulation, below "/study". A number without a
-// deviation is exact.
-Status uncertainty_complete(InputUncertainty *uncertainty, const Simulation *simulation,
-                            Problem *problem);
-
-// Validates the deviations that are given for all buffers at once.
-Status uncertainty_check_common(const InputUncertainty *uncertainty, const Simulation *simulation,
-                                Problem *problem);
-
-// Whether any number has a deviation.
-bool uncertainty_exists(const InputUncertainty *uncertainty);
 
 // Relative standard deviation of a buffer's SENSITIVITY_RESTITUTION or SENSITIVITY_CONTACT_TIME;
 // dampers from 0.

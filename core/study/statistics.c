@@ -115,7 +115,8 @@ static Status statistics_collect(const RunTable *table, int metric, Values *valu
     return STATUS_OK;
 }
 
-double statistics_quantile(const double *sorted, size_t count, double share) {
+// Quantile of sorted values, at least one, linear between order statistics as numpy.quantile.
+static double statistics_quantile(const double *sorted, size_t count, double share) {
     const double place = share * (double)(count - 1);
     const size_t below = (size_t)place;
     const double from = sorted[below], to = below + 1 < count ? sorted[below + 1] : from;
@@ -220,8 +221,7 @@ static Status spectrum_accumulator_start(SpectrumAccumulator *sums, const Column
         .kept_max = kept_max,
         .kept = calloc(kept_max * values + 1, sizeof *sums->kept),
     };
-    return sums->mean != NULL && sums->squares != NULL && sums->kept != NULL ? STATUS_OK
-                                                                             : STATUS_NO_MEMORY;
+    return status_made(sums->mean != NULL && sums->squares != NULL && sums->kept != NULL);
 }
 
 Status spectrum_accumulator_add(SpectrumAccumulator *sums, const Spectrum *spectrum,
@@ -296,20 +296,6 @@ RunSpread spectrum_accumulator_spread(const SpectrumAccumulator *sums, size_t al
     return worst;
 }
 
-// Fills the frequencies and the channels' names and units like those of a run.
-static Status spectrum_accumulator_make_report(const Spectrum *like, Reals *frequency,
-                                               RunSpectra *spectra) {
-    const Columns *densities = &like->densities;
-    TRY(study_copy_reals(like->frequency, densities->rows, frequency));
-    for (size_t c = 0; c < densities->count; c++) {
-        RunSpectrum *spectrum = study_list_add(spectra, sizeof *spectrum);
-        TRY(status_made(spectrum != NULL));
-        TRY(study_copy_text(densities->at[c].name, &spectrum->channel));
-        TRY(study_copy_text(densities->at[c].unit, &spectrum->unit));
-    }
-    return STATUS_OK;
-}
-
 static Status spectrum_accumulator_report_channel(const SpectrumAccumulator *sums, size_t channel,
                                                   RunSpectrum *spectrum, Problem *problem) {
     const double *mean = sums->mean + channel * sums->rows;
@@ -318,9 +304,9 @@ static Status spectrum_accumulator_report_channel(const SpectrumAccumulator *sum
     TRY(study_copy_reals(mean, sums->rows, &spectrum->mean));
     if (sums->count < 2)
         return STATUS_OK;
-    if (!reals_allocate(&spectrum->standard_deviation, sums->rows) ||
-        !reals_allocate(&spectrum->low, sums->rows) || !reals_allocate(&spectrum->high, sums->rows))
-        return STATUS_NO_MEMORY;
+    TRY(status_made(reals_allocate(&spectrum->standard_deviation, sums->rows) &&
+                    reals_allocate(&spectrum->low, sums->rows) &&
+                    reals_allocate(&spectrum->high, sums->rows)));
     const double t = student_t_quantile(STATISTICS_CONFIDENCE, sums->count - 1);
     for (size_t k = 0; k < sums->rows; k++) {
         const double deviation = sqrt(squares[k] / (n - 1));
@@ -336,47 +322,50 @@ static Status spectrum_accumulator_report_channel(const SpectrumAccumulator *sum
     return STATUS_OK;
 }
 
-// `values` has room for all runs.
 static Status spectrum_accumulator_report_quantiles(const SpectrumAccumulator *sums, size_t channel,
-                                                    const Progress *progress, double *values,
-                                                    RunSpectrum *spectrum, Problem *problem) {
+                                                    const Progress *progress, RunSpectrum *spectrum,
+                                                    Problem *problem) {
     const size_t rows = sums->rows, runs = sums->count;
-    for (size_t k = 0; k < rows; k++) {
-        double sum = 0;
-        if (k % FREQUENCIES_PER_CHECK == 0)
-            TRY(study_advance(progress, 1, problem));
+    double *values = calloc(runs, sizeof *values);
+    Status status = status_made(values != NULL && reals_allocate(&spectrum->mean, rows) &&
+                                reals_allocate(&spectrum->q05, rows) &&
+                                reals_allocate(&spectrum->median, rows) &&
+                                reals_allocate(&spectrum->q95, rows));
+    for (size_t k = 0; k < rows && status == STATUS_OK; k++) {
         for (size_t i = 0; i < runs; i++) {
             values[i] = sums->kept[(i * sums->channels + channel) * rows + k];
-            sum += values[i] / (double)runs;
+            spectrum->mean.at[k] += values[i] / (double)runs;
         }
         reals_sort(values, runs);
-        TRY(study_add_real(sum, &spectrum->mean));
-        TRY(study_add_real(statistics_quantile(values, runs, 0.05), &spectrum->q05));
-        TRY(study_add_real(statistics_quantile(values, runs, 0.5), &spectrum->median));
-        TRY(study_add_real(statistics_quantile(values, runs, 0.95), &spectrum->q95));
+        spectrum->q05.at[k] = statistics_quantile(values, runs, 0.05);
+        spectrum->median.at[k] = statistics_quantile(values, runs, 0.5);
+        spectrum->q95.at[k] = statistics_quantile(values, runs, 0.95);
+        if (k % FREQUENCIES_PER_CHECK == 0)
+            status = study_advance(progress, 1, problem);
     }
-    return STATUS_OK;
+    free(values);
+    return status;
 }
 
 Status spectrum_accumulator_report(const SpectrumAccumulator *sums, const Spectrum *like,
                                    bool has_quantiles, const Progress *progress, Reals *frequency,
                                    RunSpectra *spectra, Problem *problem) {
+    const Columns *densities = &like->densities;
     if (sums->count == 0)
         return STATUS_OK;
-    double *values = calloc(sums->count, sizeof *values);
-    Status status = values == NULL ? STATUS_NO_MEMORY
-                                   : spectrum_accumulator_make_report(like, frequency, spectra);
-    for (size_t c = 0; c < sums->channels && status == STATUS_OK; c++) {
-        RunSpectrum *spectrum = &spectra->at[c];
-        status = has_quantiles
-                     ? study_copy_reals(like->densities.at[c].values, sums->rows, &spectrum->value)
-                     : spectrum_accumulator_report_channel(sums, c, spectrum, problem);
-        if (has_quantiles && status == STATUS_OK)
-            status =
-                spectrum_accumulator_report_quantiles(sums, c, progress, values, spectrum, problem);
+    TRY(study_copy_reals(like->frequency, densities->rows, frequency));
+    for (size_t c = 0; c < densities->count; c++) {
+        RunSpectrum *spectrum = study_list_add(spectra, sizeof *spectrum);
+        TRY(status_made(spectrum != NULL));
+        TRY(study_copy_text(densities->at[c].name, &spectrum->channel));
+        TRY(study_copy_text(densities->at[c].unit, &spectrum->unit));
+        if (has_quantiles)
+            TRY(study_copy_reals(densities->at[c].values, sums->rows, &spectrum->value));
+        TRY(has_quantiles
+                ? spectrum_accumulator_report_quantiles(sums, c, progress, spectrum, problem)
+                : spectrum_accumulator_report_channel(sums, c, spectrum, problem));
     }
-    free(values);
-    return status;
+    return STATUS_OK;
 }
 
 void spectrum_accumulator_clear(SpectrumAccumulator *sums) {

@@ -170,7 +170,8 @@ Status study_run_fix_solver(Simulation *target) {
 Status study_begin(const Variant *study, const Simulation *simulation, const StudyTools *tools,
                    Variant **answer, StudyWork **work, Problem *problem) {
     const StudyKind *kind = study_kind(study);
-    ProgressRange range = progress_range(tools->progress, 0, STUDY_BEGUN);
+    ProgressRange range =
+        progress_range(tools->progress, 0, study_has_members(study) ? STUDY_BEGUN : 1);
     const Progress progress = progress_range_view(&range);
     StudyTools own = *tools;
     own.progress = &progress;
@@ -278,8 +279,8 @@ static Status study_run_member(StudyWork *work, size_t member, const StudyTools 
     return status;
 }
 
-static Status study_run_members(const Variant *study, const Simulation *simulation,
-                                const StudyTools *tools, Variant **answer, Problem *problem) {
+Status study_run(const Variant *study, const Simulation *simulation, const StudyTools *tools,
+                 Variant **answer, Problem *problem) {
     StudyWork *work;
     Status status = study_begin(study, simulation, tools, answer, &work, problem);
     for (size_t i = 0; status == STATUS_OK && i < work->wanted; i++)
@@ -287,23 +288,9 @@ static Status study_run_members(const Variant *study, const Simulation *simulati
     if (status == STATUS_OK)
         status = study_end(work, tools, problem);
     study_free(work);
-    return status;
-}
-
-Status study_run(const Variant *study, const Simulation *simulation, const StudyTools *tools,
-                 Variant **answer, Problem *problem) {
-    const StudyKind *kind = study_kind(study);
-    Status status;
-    if (kind->run == NULL) {
-        status = study_run_members(study, simulation, tools, answer, problem);
-    } else {
-        *answer = variant_new(kind->answer);
-        status = *answer == NULL ? STATUS_NO_MEMORY
-                                 : kind->run(study, simulation, tools, *answer, problem);
-    }
     if (status != STATUS_OK) {
         variant_free(*answer);
         *answer = NULL;
     }
-    return study_result(status, problem);
+    return status;
 }

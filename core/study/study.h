@@ -152,13 +152,10 @@ struct StudyKind {
     // Estimated cost of a completed study in solver steps. STATUS_NO_MEMORY.
     Status (*cost)(const void *study, const Simulation *simulation, const SimulationLimits *limits,
                    double *steps);
-    // Runs a study without members on one thread. Fills `answer`, which holds its defaults, in part
-    // after a failure. The functions below are NULL then.
-    Status (*run)(const void *study, const Simulation *simulation, const StudyTools *tools,
-                  void *answer, Problem *problem);
     size_t work_size, part_size; // of the kind's structs, which begin zeroed
-    // Validates, runs what all members need, fills `members` and the first part of the answer.
-    // `free` follows also after a failure.
+    // Validates, runs what all members need, fills `members` and the first part of the answer. A
+    // study without members is made here, on one thread: the functions below are NULL then, but for
+    // `free`, which follows also after a failure.
     Status (*begin)(void *work, const StudyTools *tools, Problem *problem);
     // Makes the scene of a member, from 0; other threads make other members at the same time.
     // `scene` is cleared by the caller. A failure is the member's, unless it ends the study.
@@ -187,7 +184,7 @@ static inline const StudyKind *study_kind(const Variant *study) {
 
 // Whether a study has members, which threads can share.
 static inline bool study_has_members(const Variant *study) {
-    return study_kind(study)->run == NULL;
+    return study_kind(study)->scene != NULL;
 }
 
 // An answer as a document: {"study": {"kind": ...}}. Cleared by fields_clear.

@@ -27,12 +27,13 @@ enum {
     RANGE_SAMPLES = 512,
 };
 
-const char *const sweep_spacing_names[] = {"linear", "logarithmic", NULL};
+static const char *const sweep_spacing_names[] = {"linear", "logarithmic", NULL};
 const char *const sweep_mode_names[] = {"grid", "list", NULL};
 const char *const sweep_status_names[] = {"made",   "invalid", "unstable", "limit",
                                           "failed", "pending", NULL};
-const char *const sweep_metric_names[] = {STUDY_METRICS,   "energy_residual", "error_estimate",
-                                          "trust_horizon", "steps",           NULL};
+// The metrics of a point: the summary's numbers in their order, then the solver's steps.
+static const char *const sweep_metric_names[] = {
+    STUDY_METRICS, "energy_residual", "error_estimate", "trust_horizon", "steps", NULL};
 static const char *const sweep_default_metrics[] = {STUDY_METRICS, NULL};
 
 const char *sweep_metric_unit(const char *name) {
@@ -51,7 +52,7 @@ static const Field sweep_axis_fields[] = {
     FIELD_END
 };
 
-const Field pinned_record_fields[] = {
+static const Field pinned_record_fields[] = {
     FIELD_TEXT(PinnedRecord, name, RECORD_NAME_SIZE - 1, PRESENCE_REQUIRED, 0, "of an uploaded record"),
     FIELD_TEXT(PinnedRecord, digest, RECORD_DIGEST_SIZE - 1, PRESENCE_OPTIONAL, 0, "SHA-256 of its interval and samples"),
     FIELD_REFCOUNT(PinnedRecord, named),

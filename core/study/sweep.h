@@ -15,7 +15,7 @@ enum {
 
 typedef enum SweepSpacing { SWEEP_LINEAR, SWEEP_LOGARITHMIC } SweepSpacing;
 typedef enum SweepMode { SWEEP_GRID, SWEEP_LIST } SweepMode;
-extern const char *const sweep_spacing_names[], *const sweep_mode_names[];
+extern const char *const sweep_mode_names[];
 
 // One axis: values, or a range.
 typedef struct SweepAxis {
@@ -46,7 +46,6 @@ typedef struct PinnedRecords {
     PinnedRecord *at;
     size_t count;
 } PinnedRecords;
-extern const Field pinned_record_fields[];
 
 // The request.
 typedef struct SweepStudy {
@@ -58,8 +57,6 @@ typedef struct SweepStudy {
     PinnedRecords records; // the ground motions that an axis names
 } SweepStudy;
 
-// The metrics of a point: the summary's numbers in their order, then the solver's steps.
-extern const char *const sweep_metric_names[]; // NULL-terminated
 const char *sweep_metric_unit(const char *name);
 
 // Result of a point. The numbers are stored: never change them.

@@ -55,7 +55,8 @@ const Field tradeoff_point_fields[] = {
 };
 // clang-format on
 
-const Kind *candidate_settings_reference(void) {
+// The reference solver: the first of the table that can run.
+static const Kind *candidate_settings_reference(void) {
     size_t i = 0;
     while (solvers[i]->run == NULL)
         i++;
@@ -405,6 +406,7 @@ static Status tradeoff_cost(const void *request, const Simulation *simulation,
 }
 
 typedef struct TradeoffRun {
+    StudyWork work;
     const TradeoffStudy *study;
     const Simulation *simulation;
     const StudyTools *tools;
@@ -646,8 +648,6 @@ static Status tradeoff_run_all(TradeoffRun *run, Problem *problem) {
     Tradeoff *answer = run->answer;
     const TradeoffStudy *study = run->study;
     TradeoffPoints *points = &answer->points;
-    if (run->times == NULL || run->fault == NULL)
-        return STATUS_NO_MEMORY;
     tradeoff_trim(run);
     for (size_t i = 0; i < points->count; i++)
         if (points->at[i].estimate <= run->limits.steps)
@@ -664,29 +664,30 @@ static Status tradeoff_run_all(TradeoffRun *run, Problem *problem) {
     return tradeoff_recommend(points, study->metric, study->error, &answer->recommendation);
 }
 
-static Status tradeoff_study_run(const void *request, const Simulation *simulation,
-                                 const StudyTools *tools, void *made, Problem *problem) {
-    const TradeoffStudy *study = request;
-    Tradeoff *answer = made;
+static Status tradeoff_begin(void *of, const StudyTools *tools, Problem *problem) {
+    TradeoffRun *run = of;
+    const TradeoffStudy *study = run->study = run->work.study;
+    Tradeoff *answer = run->answer = run->work.answer;
     answer->metric = study->metric;
     answer->error = study->error;
     answer->repeats = study->repeats;
     answer->trial = study->trial;
-    TRY(candidate_settings_list(&study->solvers, simulation, &answer->points));
-    const size_t count = answer->points.count;
-    TradeoffRun run = {.study = study,
-                       .simulation = simulation,
-                       .tools = tools,
-                       .limits = tradeoff_limits(study, tools->limits),
-                       .answer = answer,
-                       .times = calloc(count * study->repeats + 1, sizeof(double)),
-                       .all = batch_steps,
-                       .fault = calloc(1, sizeof(Problem))};
-    const Status status = tradeoff_run_all(&run, problem);
-    outcome_unref(run.reference);
-    free(run.times);
-    free(run.fault);
-    return status;
+    run->simulation = run->work.simulation;
+    run->tools = tools;
+    run->limits = tradeoff_limits(study, tools->limits);
+    run->all = batch_steps;
+    TRY(candidate_settings_list(&study->solvers, run->simulation, &answer->points));
+    run->times = calloc(answer->points.count * study->repeats + 1, sizeof *run->times);
+    run->fault = calloc(1, sizeof *run->fault);
+    TRY(status_made(run->times != NULL && run->fault != NULL));
+    return tradeoff_run_all(run, problem);
+}
+
+static void tradeoff_free(void *of) {
+    TradeoffRun *run = of;
+    outcome_unref(run->reference);
+    free(run->times);
+    free(run->fault);
 }
 
 const StudyKind study_tradeoff = {
@@ -699,5 +700,7 @@ const StudyKind study_tradeoff = {
     .is_measured = true,
     .complete = tradeoff_complete,
     .cost = tradeoff_cost,
-    .run = tradeoff_study_run,
+    .work_size = sizeof(TradeoffRun),
+    .begin = tradeoff_begin,
+    .free = tradeoff_free,
 };

@@ -42,9 +42,6 @@ typedef struct TradeoffPoints {
 
 extern const Field tradeoff_point_fields[];
 
-// The reference solver: the first of the table that can run.
-const Kind *candidate_settings_reference(void);
-
 // The candidates of a completed simulation without results, of the named solvers (none: all).
 // Cleared by fields_clear; after STATUS_NO_MEMORY those made so far.
 Status candidate_settings_list(const Texts *names, const Simulation *simulation,
