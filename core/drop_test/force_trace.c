@@ -322,7 +322,7 @@ static double trace_hidden(double level, int separation, double *before) {
     double most = 0;
     *before = 0;
     for (int i = 0; i <= 4; i++) {
-        const PulseModel model = pulse_model_make(i * 0.75, 0, separation);
+        const PulseModel model = pulse_model_make(i * 0.75, 0, false, separation);
         const PulseVisible visible = pulse_model_visible(&model, fmin(level, 0.95));
         const double seen = fmax(visible.to - visible.from, 0.02);
         most = fmax(most, (1 - seen) / seen);

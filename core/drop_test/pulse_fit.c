@@ -49,8 +49,8 @@ static FitBox fit_box_make(long first, long last, long gaps) {
 bool pulse_fit_model(const FitWindow *window, const FitPoint *point, PulseModel *model,
                      double *contact_time) {
     const double length = point->part[FIT_END] - point->part[FIT_START];
-    *model = pulse_model_make_lasting(point->part[FIT_DECAY], window->pull_rate * length,
-                                      window->separation);
+    *model = pulse_model_make(point->part[FIT_DECAY], window->pull_rate * length, true,
+                              window->separation);
     *contact_time = length / model->length;
     return length > 0 && isfinite(model->length);
 }

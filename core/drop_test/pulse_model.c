@@ -6,14 +6,15 @@
 // T_c is the time unit: S(1) = 0 under zero penetration, hence turn = pi^2. Under zero force and
 // without gravity F(1) = 0: with x = sqrt(turn) / 2 that is x cot(x) = L / 2.
 //
-// Newton's method in ln e and ln T_c inverts the effect of gravity on both.
+// With the duration of the contact under gravity as the time unit of the pull, e of the isolated
+// pair is the one unknown of its inverse.
 #include "core/drop_test/pulse_model.h"
 
 #include <math.h>
 
 static const double pi = 3.14159265358979323846;
 
-enum { NEWTON = 60, HALVINGS = 52 };
+enum { HALVINGS = 52 };
 
 // x cot(x) of x^2 = u, which may be negative, and its derivative.
 static double pulse_cotangent(double u, double *slope) {
@@ -111,10 +112,11 @@ static double pulse_length(double decay, double turn, int separation, double pus
     return (double)INFINITY;
 }
 
-static PulseModel pulse_model_of(double decay, double push, int separation, bool is_total) {
+PulseModel pulse_model_make(double decay, double pull, bool is_total, int separation) {
     const double turn = pulse_turn(decay, separation);
-    const double length = pulse_length(decay, turn, separation, push, is_total);
-    const double pull = is_total ? push / length : push;
+    const double length = pulse_length(decay, turn, separation, pull, is_total);
+    if (is_total)
+        pull /= length;
     return (PulseModel){
         .decay = decay,
         .turn = turn,
@@ -123,14 +125,6 @@ static PulseModel pulse_model_of(double decay, double push, int separation, bool
         .cosine = 2 * decay - pull,
         .length = length,
     };
-}
-
-PulseModel pulse_model_make(double decay, double pull, int separation) {
-    return pulse_model_of(decay, pull, separation, false);
-}
-
-PulseModel pulse_model_make_lasting(double decay, double pull, int separation) {
-    return pulse_model_of(decay, pull, separation, true);
 }
 
 // y [v0 T_c] and y' [v0] where the contact ends.
@@ -168,95 +162,66 @@ PulseVisible pulse_model_visible(const PulseModel *model, double level) {
     return visible;
 }
 
+// e with gravity of a contact; 0: it does not end, or the impactor stays in the buffer.
+static double gravity_rebound(const GravityLoad *load, const PulseModel *model) {
+    if (!isfinite(model->length))
+        return 0;
+    double speed;
+    const double depth = fmax(pulse_end(model, &speed), 0);
+    // An impactor that separates inside the buffer has to rise out of it.
+    const double square = speed * speed - (load->is_by_height ? 2 * model->pull * depth : 0);
+    return speed < 0 && square > 0 ? sqrt(square) : 0;
+}
+
 GravityContact gravity_apply(const GravityLoad *load, double restitution, double contact_time) {
     const double pull = load->gravity * contact_time / load->speed;
-    const PulseModel model = pulse_model_make(-log(restitution), pull, (int)load->separation);
-    if (!isfinite(model.length))
-        return (GravityContact){0, (double)INFINITY};
-    double speed;
-    const double depth = fmax(pulse_end(&model, &speed), 0);
-    // An impactor that separates inside the buffer has to rise out of it.
-    const double square = speed * speed - (load->is_by_height ? 2 * pull * depth : 0);
-    return (GravityContact){speed < 0 && square > 0 ? sqrt(square) : 0,
-                            model.length * contact_time};
+    const PulseModel model = pulse_model_make(-log(restitution), pull, false, load->separation);
+    return (GravityContact){gravity_rebound(load, &model), model.length * contact_time};
 }
 
-// ln of e and T_c with gravity over those read; false: the contact does not end.
-static bool gravity_residual(const GravityLoad *load, const double x[2],
-                             const GravityCorrected *read, double off[2]) {
-    const GravityContact with = gravity_apply(load, exp(x[0]), exp(x[1]));
-    off[0] = log(with.restitution / read->restitution);
-    off[1] = log(with.contact_time / read->contact_time);
-    return isfinite(off[0]) && isfinite(off[1]);
-}
-
-// d(off) / d(ln e, ln T_c), by differences towards shorter contacts, which end.
-static bool gravity_jacobian(const GravityLoad *load, const double x[2],
-                             const GravityCorrected *read, const double off[2], double by[2][2]) {
-    const double h = 1e-5;
-    for (int i = 0; i < 2; i++) {
-        const double low[2] = {x[0] - (i == 0 ? h : 0), x[1] - (i == 1 ? h : 0)};
-        double there[2];
-        if (!gravity_residual(load, low, read, there))
-            return false;
-        by[0][i] = (off[0] - there[0]) / h;
-        by[1][i] = (off[1] - there[1]) / h;
+// e and T_c of the isolated pair from e with gravity and `time`, T_c with gravity or, unless
+// is_total, without it. False: there is none.
+static bool gravity_find(const GravityLoad *load, double read, double time, bool is_total,
+                         double *restitution, double *contact_time) {
+    const double pull = load->gravity * time / load->speed;
+    double least = read, most = 1; // gravity only lowers e
+    PulseModel model = pulse_model_make(0, pull, is_total, load->separation);
+    if (!(gravity_rebound(load, &model) >= read * (1 - 1e-12)))
+        return false;
+    for (int i = 0; i < HALVINGS; i++) {
+        const double middle = (least + most) / 2;
+        model = pulse_model_make(-log(middle), pull, is_total, load->separation);
+        *(gravity_rebound(load, &model) < read ? &least : &most) = middle;
     }
-    return true;
+    model = pulse_model_make(-log(most), pull, is_total, load->separation);
+    *restitution = most;
+    *contact_time = is_total ? time / model.length : time;
+    return most > 0 && *contact_time > 0;
 }
 
 bool gravity_correct(const GravityLoad *load, const GravityCorrected *read,
                      GravityCorrected *isolated) {
-    // Starts with less damping and shorter until the contact ends.
-    double x[2] = {log(read->restitution), log(read->contact_time)}, off[2], by[2][2];
-    for (int i = 0; !gravity_residual(load, x, read, off); i++) {
-        x[0] /= 2;
-        x[1] -= 0.5;
-        if (i == 20)
-            return false;
-    }
-    for (int step = 0; step < NEWTON; step++) {
-        const double before = hypot(off[0], off[1]);
-        if (!gravity_jacobian(load, x, read, off, by))
-            return false;
-        const double area = by[0][0] * by[1][1] - by[0][1] * by[1][0];
-        const double move[2] = {-(by[1][1] * off[0] - by[0][1] * off[1]) / area,
-                                -(by[0][0] * off[1] - by[1][0] * off[0]) / area};
-        if (before < 1e-9)
-            break;
-        double share = 1, next[2];
-        for (;; share /= 2) {
-            next[0] = fmin(x[0] + share * move[0], 0);
-            next[1] = x[1] + share * move[1];
-            if (gravity_residual(load, next, read, off) && hypot(off[0], off[1]) < before)
-                break;
-            if (share < 1e-6)
-                return false;
-        }
-        x[0] = next[0];
-        x[1] = next[1];
-    }
-    if (!(hypot(off[0], off[1]) < 1e-6))
+    // Errors of the readings by differences towards less e and a shorter contact.
+    const double h = 1e-5, factor = exp(-h);
+    double e, T, by_e[2], by_T[2];
+    if (!gravity_find(load, read->restitution, read->contact_time, true, &e, &T) ||
+        !gravity_find(load, read->restitution * factor, read->contact_time, true, &by_e[0],
+                      &by_T[0]) ||
+        !gravity_find(load, read->restitution, read->contact_time * factor, true, &by_e[1],
+                      &by_T[1]))
         return false;
-    const double area = fabs(by[0][0] * by[1][1] - by[0][1] * by[1][0]);
-    const double e = read->restitution_uncertainty, T = read->contact_time_uncertainty;
-    *isolated = (GravityCorrected){exp(x[0]), exp(x[1]), hypot(by[1][1] * e, by[0][1] * T) / area,
-                                   hypot(by[0][0] * T, by[1][0] * e) / area};
-    return isfinite(isolated->restitution) && isfinite(isolated->contact_time);
+    const double r_e = read->restitution_uncertainty / h, r_T = read->contact_time_uncertainty / h;
+    *isolated = (GravityCorrected){e, T, hypot(log(e / by_e[0]) * r_e, log(e / by_e[1]) * r_T),
+                                   hypot(log(T / by_T[0]) * r_e, log(T / by_T[1]) * r_T)};
+    return true;
 }
 
 bool gravity_correct_one(const GravityLoad *load, bool is_time, double read, double other,
                          double *isolated) {
-    if (!is_time && gravity_apply(load, 1, other).restitution < read)
-        return false;
-    // Gravity only lowers e and only lengthens T_c.
-    double least = is_time ? 0 : read, most = is_time ? read : 1;
-    for (int i = 0; i < HALVINGS; i++) {
-        const double middle = (least + most) / 2;
-        const bool is_low = is_time ? gravity_apply(load, other, middle).contact_time < read
-                                    : gravity_apply(load, middle, other).restitution < read;
-        *(is_low ? &least : &most) = middle;
-    }
-    *isolated = most;
-    return most > 0;
+    double ignored;
+    if (!is_time)
+        return gravity_find(load, read, other, false, isolated, &ignored);
+    const double pull = load->gravity * read / load->speed;
+    *isolated = read / pulse_model_make(-log(other), pull, true, load->separation).length;
+    return *isolated > 0;
 }

@@ -18,11 +18,9 @@ typedef struct PulseModel {
     double length;       // of the contact with gravity [T_c]; 1 without, INFINITY: it does not end
 } PulseModel;
 
-// `pull` is g T_c / v0 of the gravity that acts during contact; 0: none.
-PulseModel pulse_model_make(double decay, double pull, int separation);
-
-// The same with `pull` as g / v0 times the duration of the contact, length * T_c.
-PulseModel pulse_model_make_lasting(double decay, double pull, int separation);
+// `pull` is g T_c / v0 of the gravity that acts during contact, 0: none; or, if is_total, g / v0
+// times the duration of the contact, length * T_c.
+PulseModel pulse_model_make(double decay, double pull, bool is_total, int separation);
 
 // F at s [m_e v0 / T_c].
 double pulse_model_force(const PulseModel *model, double s);

@@ -95,7 +95,7 @@ static Status comparison_check_models(const CompareStudy *study, Problem *proble
     for (size_t i = 0, count = 0; contacts[i] != NULL && count < NAMES_MAX; i++)
         if (contacts[i]->form != CONTACT_CHOSEN)
             names[count++] = contacts[i]->kind.name;
-    return study_run_check_names(&study->models, names, "/study/models", problem);
+    return study_run_check_names(&study->models, names, "models", problem);
 }
 
 static Status comparison_check_storey(CompareStudy *study, const Simulation *simulation,

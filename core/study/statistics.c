@@ -64,10 +64,6 @@ double statistics_value(const Summary *summary, int metric) {
     return study_summary_value(summary, statistics_metric_names[metric]);
 }
 
-static bool statistics_is_known(const RunRecord *run, int metric) {
-    return run->why == NULL && !isnan(statistics_value(&run->summary, metric));
-}
-
 // Known values of a metric, in the order of the table.
 typedef struct Values {
     double *at;
@@ -107,9 +103,11 @@ static Status statistics_collect(const RunTable *table, int metric, Values *valu
                        .mean = (double)NAN,
                        .deviation = (double)NAN};
     TRY(status_made(values->at != NULL));
-    for (size_t i = 0; i < table->count; i++)
-        if (statistics_is_known(&table->at[i], metric))
-            values->at[values->count++] = statistics_value(&table->at[i].summary, metric);
+    for (size_t i = 0; i < table->count; i++) {
+        const double value = statistics_value(&table->at[i].summary, metric);
+        if (!isnan(value))
+            values->at[values->count++] = value;
+    }
     if (values->count > 0)
         statistics_measure(values);
     return STATUS_OK;
@@ -126,8 +124,7 @@ static double statistics_quantile(const double *sorted, size_t count, double sha
 // Number of the first run with this value.
 static uint64_t statistics_find_run(const RunTable *table, int metric, double value) {
     for (size_t i = 0; i < table->count; i++)
-        if (statistics_is_known(&table->at[i], metric) &&
-            statistics_value(&table->at[i].summary, metric) == value)
+        if (statistics_value(&table->at[i].summary, metric) == value)
             return table->at[i].number;
     return COUNT_ABSENT;
 }

@@ -6,8 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/base/json_pointer.h"
-#include "core/base/spelling.h"
 #include "core/solve/solvers.h"
 
 Status study_advance(const Progress *progress, double fraction, Problem *problem) {
@@ -134,20 +132,12 @@ Status study_run_check_metric(const Simulation *simulation, const char *metric, 
     return STATUS_OK;
 }
 
-Status study_run_check_names(const Texts *given, const char *const *names, const char *pointer,
+Status study_run_check_names(const Texts *given, const char *const *names, const char *member,
                              Problem *problem) {
-    Status status = STATUS_OK;
-    for (size_t i = 0; i < given->count; i++) {
-        size_t at = 0;
-        while (names[at] != NULL && strcmp(names[at], given->at[i]) != 0)
-            at++;
-        if (names[at] != NULL)
-            continue;
-        char place[sizeof((Fault){0}.pointer)];
-        json_pointer_index(place, sizeof place, pointer, i);
-        status = spelling_reject(names, given->at[i], place, problem);
-    }
-    return status;
+    const Field rows[] = {
+        {.name = member, .kind = FIELD_KIND_TEXTS, .presence = PRESENCE_OPTIONAL, .choices = names},
+        FIELD_END};
+    return fields_validate(rows, given, "/study", problem);
 }
 
 Status study_run_copy(const Simulation *simulation, Simulation *target) {

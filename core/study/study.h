@@ -71,8 +71,8 @@ bool study_run_has_force(const Simulation *simulation);
 // Validates that the scene can have a metric, the value of /study/metric.
 Status study_run_check_metric(const Simulation *simulation, const char *metric, Problem *problem);
 
-// Validates a list of names below `pointer` against a NULL-terminated list.
-Status study_run_check_names(const Texts *given, const char *const *names, const char *pointer,
+// Validates a list of names, a member of the study, against a NULL-terminated list.
+Status study_run_check_names(const Texts *given, const char *const *names, const char *member,
                              Problem *problem);
 
 // The scene without sampled channels; spectra and impacts as in the original. `target` is cleared

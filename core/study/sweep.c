@@ -258,7 +258,7 @@ Status sweep_grid_scene(const SweepGrid *grid, size_t point, bool is_bare,
     if (status == STATUS_INVALID)
         return problem_add(problem, status, grid->axes[axis].axis->pointer, "%s", why);
     if (status != STATUS_OK)
-        return STATUS_NO_MEMORY;
+        return study_result(STATUS_NO_MEMORY, problem);
     if (is_bare) {
         texts_clear(&target->output.channels);
         texts_clear(&target->output.psd.channels);
@@ -416,7 +416,7 @@ Status sweep_grid_new(const SweepStudy *study, const Simulation *simulation,
         stride *= values->count;
     }
     *made = grid;
-    return sweep_grid_find_fields(grid, problem);
+    return study_result(sweep_grid_find_fields(grid, problem), problem);
 }
 
 // Whether `pointer` is `above` or below it.
@@ -467,7 +467,7 @@ static Status sweep_grid_validate_point(Validation *of, size_t point) {
     if (status == STATUS_OK)
         return status;
     if (status != STATUS_INVALID)
-        return problem_set(of->problem, study_result(status, of->fault), "%s", of->fault->detail);
+        return problem_set(of->problem, status, "%s", of->fault->detail);
     for (size_t i = 0; i < of->fault->count && i < PROBLEM_FAULTS; i++)
         sweep_grid_add_fault(of->grid, point, &of->fault->faults[i], of->problem);
     of->is_faulty = true;
@@ -595,7 +595,7 @@ Status sweep_describe(const SweepStudy *study, const Simulation *simulation, Swe
     if (status == STATUS_OK)
         status = sweep_fill(grid, sweep);
     sweep_grid_free(grid);
-    return status;
+    return study_result(status, problem);
 }
 
 SweepStatus sweep_status(Status status) {

@@ -346,7 +346,7 @@ static Status tradeoff_check_solvers(const TradeoffStudy *study, Problem *proble
     for (size_t i = 0, count = 0; solvers[i] != NULL && count < SOLVERS_MAX; i++)
         if (solvers[i]->run != NULL)
             names[count++] = solvers[i]->kind.name;
-    return study_run_check_names(&study->solvers, names, "/study/solvers", problem);
+    return study_run_check_names(&study->solvers, names, "solvers", problem);
 }
 
 // All storeys are compared, whatever channels the scene requests.

@@ -118,7 +118,7 @@ static void whole_make(const StudyRequest *inquiry, Whole *whole) {
         Simulation member;
         Outcome *outcome;
         assert_int_equal(
-            ensemble_scene(&inquiry->simulation, study->first_seed + i, &member, &problem),
+            ensemble_scene(&inquiry->simulation, study->first_seed + i, &member),
             STATUS_OK);
         if (simulation_run(&member, NULL, NULL, &workspace, &outcome, &problem) != STATUS_OK)
             fail_msg("%s", problem.detail);
