@@ -217,20 +217,30 @@ static bool fit_invert(double a[FIT_PARTS][FIT_PARTS], double inverse[FIT_PARTS]
     return *det > 0 && inverse[0][0] > 0 && inverse[1][1] > 0 && inverse[2][2] > 0;
 }
 
-// (curvature + damping diagonal) step = -slope over the free parts; the others do not move.
+// (curvature + damping diagonal) step = -slope over the free parts, by elimination; the others do
+// not move.
 static bool fit_solve(const PulseFit *fit, const bool *is_free, double damping, double *step) {
-    double a[FIT_PARTS][FIT_PARTS], inverse[FIT_PARTS][FIT_PARTS], det;
+    double a[FIT_PARTS][FIT_PARTS + 1];
     for (int i = 0; i < FIT_PARTS; i++) {
         for (int j = 0; j < FIT_PARTS; j++)
             a[i][j] = is_free[i] && is_free[j] ? fit->curvature[i][j] : 0;
         a[i][i] = is_free[i] ? a[i][i] * (1 + damping) : 1;
+        a[i][FIT_PARTS] = is_free[i] ? -fit->slope[i] : 0;
     }
-    if (!fit_invert(a, inverse, &det))
-        return false;
     for (int i = 0; i < FIT_PARTS; i++) {
-        step[i] = 0;
-        for (int j = 0; j < FIT_PARTS; j++)
-            step[i] -= is_free[j] ? inverse[i][j] * fit->slope[j] : 0;
+        if (!(a[i][i] > 0))
+            return false;
+        for (int j = i + 1; j < FIT_PARTS; j++) {
+            const double factor = a[j][i] / a[i][i];
+            for (int k = i; k <= FIT_PARTS; k++)
+                a[j][k] -= factor * a[i][k];
+        }
+    }
+    for (int i = FIT_PARTS; i-- > 0;) {
+        step[i] = a[i][FIT_PARTS];
+        for (int j = i + 1; j < FIT_PARTS; j++)
+            step[i] -= a[i][j] * step[j];
+        step[i] /= a[i][i];
     }
     return true;
 }

@@ -11,8 +11,6 @@
 
 #include "core/study/statistics.h"
 
-static Problem problem;
-
 static void assert_near(double is, double should) {
     if (!(fabs(is / should - 1) <= 1e-10))
         fail_msg("is %.17g, should be %.17g", is, should);
