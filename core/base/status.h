@@ -118,6 +118,11 @@ bool text_format(char **target, const char *format, ...) __attribute__((format(p
             return try_status;                                                                     \
     } while (0)
 
+// Whether something could be allocated, as a status.
+static inline Status status_made(bool is_made) {
+    return is_made ? STATUS_OK : STATUS_NO_MEMORY;
+}
+
 #define COUNT(array) (sizeof(array) / sizeof((array)[0]))
 
 #endif

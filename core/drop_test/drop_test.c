@@ -7,10 +7,6 @@
 // which is e v. On a fixed base it is u v.
 #include "core/drop_test/drop_test.h"
 
-#include <stdarg.h>
-#include <stdio.h>
-#include <string.h>
-
 #include "core/base/json_pointer.h"
 #include "core/base/rfc3339.h"
 #include "core/drop_test/force_trace.h"
@@ -87,28 +83,13 @@ double drop_rebound_speed(const DropTest *test, const Drop *drop) {
     return (m * drop_approach_speed(drop) + (m + M) * rise) / M;
 }
 
-// Adds a fault at a member; `unit` NULL: without its value.
-__attribute__((format(printf, 6, 7))) static Status
-drop_fault(Problem *problem, const char *pointer, const char *name, double value, const char *unit,
-           const char *format, ...) {
-    char place[POINTER_SIZE], sentence[300];
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(sentence, sizeof sentence, format, arguments);
-    va_end(arguments);
-    json_pointer_join(place, sizeof place, pointer, name);
-    return unit != NULL
-               ? problem_add_real(problem, STATUS_INVALID, place, value, unit, "%s", sentence)
-               : problem_add(problem, STATUS_INVALID, place, "%s", sentence);
-}
-
 // Refuses a speed that its height contradicts.
 static Status drop_check_speed(double height, double speed, const char *name, const char *pointer,
                                Problem *problem) {
     const double falls = drop_fall_speed(height);
     if (!(fabs(speed - falls) > height_tolerance * fmax(speed, falls)))
         return STATUS_OK;
-    return drop_fault(
+    return json_pointer_fault_real(
         problem, pointer, name, speed, "m/s",
         "must be within %.0f %% of the %.4g m/s that a height of %.4g m gives, is %.4g "
         "m/s",
@@ -119,24 +100,27 @@ static Status drop_check_rebound(const DropTest *test, const Drop *drop, const c
                                  Problem *problem) {
     const bool has_rise = !isnan(drop->rebound_height), has_speed = !isnan(drop->rebound_speed);
     if (has_rise && !isnan(drop->drop_height) && drop->rebound_height > drop->drop_height)
-        return drop_fault(problem, pointer, "rebound_height", drop->rebound_height, "m",
-                          "must be at most the drop_height of %.6g m, is %.6g m: a rebound cannot "
-                          "exceed the drop; a drop that does not count needs \"excluded\" with the "
-                          "reason",
-                          drop->drop_height, drop->rebound_height);
+        return json_pointer_fault_real(
+            problem, pointer, "rebound_height", drop->rebound_height, "m",
+            "must be at most the drop_height of %.6g m, is %.6g m: a rebound cannot "
+            "exceed the drop; a drop that does not count needs \"excluded\" with the "
+            "reason",
+            drop->drop_height, drop->rebound_height);
     if (has_rise && !has_speed && test->base == MATERIAL_BASE_FREE &&
         isnan(drop_test_effective_mass(test)))
-        return drop_fault(problem, pointer, "rebound_height", 0, NULL,
-                          "needs impactor_mass and base_mass on a free base, which moves after the "
-                          "contact; or give rebound_speed relative to the base instead");
+        return json_pointer_fault(
+            problem, pointer, "rebound_height",
+            "needs impactor_mass and base_mass on a free base, which moves after the "
+            "contact; or give rebound_speed relative to the base instead");
     const double before = drop_approach_speed(drop), after = drop_rebound_speed(test, drop);
     if (!(after > before * (1 + 1e-9)))
         return STATUS_OK;
-    return drop_fault(problem, pointer, has_speed ? "rebound_speed" : "rebound_height",
-                      has_speed ? after : drop->rebound_height, has_speed ? "m/s" : "m",
-                      "must be at most the speed of approach, %.6g m/s, gives %.6g m/s: a rebound "
-                      "cannot exceed the approach",
-                      before, after);
+    return json_pointer_fault_real(
+        problem, pointer, has_speed ? "rebound_speed" : "rebound_height",
+        has_speed ? after : drop->rebound_height, has_speed ? "m/s" : "m",
+        "must be at most the speed of approach, %.6g m/s, gives %.6g m/s: a rebound "
+        "cannot exceed the approach",
+        before, after);
 }
 
 // Of a drop that counts and whose members are valid one by one.
@@ -149,9 +133,9 @@ static Status drop_check(const DropTest *test, const Drop *drop, const char *poi
             problem, STATUS_INVALID, pointer,
             "must have a rebound (rebound_height or rebound_speed), a contact_time, or both");
     if (has_after && !has_before)
-        return drop_fault(problem, pointer,
-                          !isnan(drop->rebound_height) ? "drop_height" : "approach_speed", 0, NULL,
-                          "is required with a rebound");
+        return json_pointer_fault(problem, pointer,
+                                  !isnan(drop->rebound_height) ? "drop_height" : "approach_speed",
+                                  "is required with a rebound");
     Status status = STATUS_OK;
     if (drop_check_speed(drop->drop_height, drop->approach_speed, "approach_speed", pointer,
                          problem) != STATUS_OK)
@@ -166,9 +150,10 @@ static Status drop_check(const DropTest *test, const Drop *drop, const char *poi
     return status;
 }
 
-static Status drop_test_check_drops(const DropTest *test, const char *drops, Problem *problem) {
+static Status drop_test_check_drops(const DropTest *test, const char *pointer, Problem *problem) {
     Status status = STATUS_OK;
-    char place[POINTER_SIZE];
+    char drops[POINTER_SIZE], place[POINTER_SIZE];
+    json_pointer_join(drops, sizeof drops, pointer, "drops");
     for (size_t i = 0; i < test->drops.count; i++) {
         json_pointer_index(place, sizeof place, drops, i);
         const Drop *drop = &test->drops.at[i];
@@ -186,9 +171,10 @@ size_t drop_test_sample_count(const DropTest *test) {
     return samples;
 }
 
-static Status drop_test_check_traces(const DropTest *test, const char *traces, Problem *problem) {
+static Status drop_test_check_traces(const DropTest *test, const char *pointer, Problem *problem) {
     Status status = STATUS_OK;
-    char trace[POINTER_SIZE], place[POINTER_SIZE];
+    char traces[POINTER_SIZE], trace[POINTER_SIZE], place[POINTER_SIZE];
+    json_pointer_join(traces, sizeof traces, pointer, "traces");
     for (size_t i = 0; i < test->traces.count; i++) {
         const Trace *of = &test->traces.at[i];
         json_pointer_index(trace, sizeof trace, traces, i);
@@ -198,51 +184,49 @@ static Status drop_test_check_traces(const DropTest *test, const char *traces, P
             status = STATUS_INVALID;
     }
     const size_t samples = drop_test_sample_count(test);
-    if (samples > TRACE_SAMPLES_MAX)
-        status = problem_add(problem, STATUS_INVALID, traces,
-                             "must have at most %d samples in all, have %zu: cut the traces to the "
-                             "contacts, or send them as several measurements",
-                             TRACE_SAMPLES_MAX, samples);
-    return status;
+    if (samples <= TRACE_SAMPLES_MAX)
+        return status;
+    return problem_add(problem, STATUS_INVALID, traces,
+                       "must have at most %d samples in all, have %zu: cut the traces to the "
+                       "contacts, or send them as several measurements",
+                       TRACE_SAMPLES_MAX, samples);
 }
 
-static Status drop_test_check_date(const DropTest *test, const char *place, Problem *problem) {
+static Status drop_test_check_date(const DropTest *test, const char *pointer, Problem *problem) {
     int64_t unix_ms;
-    if (test->date == NULL || problem_concerns(problem, place) ||
+    if (test->date == NULL || json_pointer_concerns(problem, pointer, "date") ||
         rfc3339_read(test->date, &unix_ms))
         return STATUS_OK;
     Fault fault = {
         .detail = "must be a date as 2026-11-21, or with a time of day as 2026-11-21T09:30:00Z"};
-    text_fit(fault.pointer, sizeof fault.pointer, place);
+    json_pointer_join(fault.pointer, sizeof fault.pointer, pointer, "date");
     text_quote(fault.value, sizeof fault.value, test->date);
     return problem_add_fault(problem, STATUS_INVALID, &fault);
 }
 
 static Status drop_test_check_base(const DropTest *test, const char *pointer, Problem *problem) {
-    if (!isnan(test->base_mass) && test->base != MATERIAL_BASE_FREE)
-        return drop_fault(problem, pointer, "base_mass", test->base_mass, "kg",
-                          test->base == MATERIAL_BASE_FIXED
-                              ? "must be absent with \"base\": \"fixed\", which does not move"
-                              : "needs \"base\": \"free\": it is the mass of a base that moves");
-    return STATUS_OK;
+    if (isnan(test->base_mass) || test->base == MATERIAL_BASE_FREE)
+        return STATUS_OK;
+    return json_pointer_fault_real(
+        problem, pointer, "base_mass", test->base_mass, "kg",
+        test->base == MATERIAL_BASE_FIXED
+            ? "must be absent with \"base\": \"fixed\", which does not move"
+            : "needs \"base\": \"free\": it is the mass of a base that moves");
 }
 
 Status drop_test_validate(const DropTest *test, const char *pointer, Problem *problem) {
     bool is_valid = fields_validate(drop_test_fields, test, pointer, problem) == STATUS_OK;
-    char drops[POINTER_SIZE], traces[POINTER_SIZE], date[POINTER_SIZE];
-    json_pointer_join(drops, sizeof drops, pointer, "drops");
-    json_pointer_join(traces, sizeof traces, pointer, "traces");
-    json_pointer_join(date, sizeof date, pointer, "date");
     // A list that could not be read is empty too.
-    if (test->drops.count == 0 && test->traces.count == 0 && !problem_concerns(problem, drops) &&
-        !problem_concerns(problem, traces)) {
+    if (test->drops.count == 0 && test->traces.count == 0 &&
+        !json_pointer_concerns(problem, pointer, "drops") &&
+        !json_pointer_concerns(problem, pointer, "traces")) {
         is_valid = false;
-        (void)problem_add(problem, STATUS_INVALID, drops,
-                          "is required unless there are traces: at least one drop");
+        (void)json_pointer_fault(problem, pointer, "drops",
+                                 "is required unless there are traces: at least one drop");
     }
-    is_valid = drop_test_check_date(test, date, problem) == STATUS_OK && is_valid;
+    is_valid = drop_test_check_date(test, pointer, problem) == STATUS_OK && is_valid;
     is_valid = drop_test_check_base(test, pointer, problem) == STATUS_OK && is_valid;
-    is_valid = drop_test_check_traces(test, traces, problem) == STATUS_OK && is_valid;
-    is_valid = drop_test_check_drops(test, drops, problem) == STATUS_OK && is_valid;
+    is_valid = drop_test_check_traces(test, pointer, problem) == STATUS_OK && is_valid;
+    is_valid = drop_test_check_drops(test, pointer, problem) == STATUS_OK && is_valid;
     return is_valid ? STATUS_OK : STATUS_INVALID;
 }

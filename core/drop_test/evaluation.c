@@ -7,8 +7,7 @@
 #include <string.h>
 
 #include "core/base/canonical.h"
-#include "core/drop_test/gravity_correction.h"
-#include "core/scene/material.h"
+#include "core/drop_test/pulse_model.h"
 
 enum { OUTLIERS_MAX = 5, POINTER_SIZE = sizeof((Fault){0}.pointer) };
 
@@ -71,19 +70,14 @@ void evaluation_clear(Evaluation *evaluation) {
     warnings_clear(&evaluation->warnings);
 }
 
-const Ranges ranges_unknown = {(double)NAN, (double)NAN, (double)NAN, (double)NAN};
+static const Ranges ranges_unknown = {(double)NAN, (double)NAN, (double)NAN, (double)NAN};
 
-void ranges_extend(Ranges *ranges, const EvaluationRow *row, const Measurement *tests) {
+static void ranges_extend(Ranges *ranges, const EvaluationRow *row, const Measurement *tests) {
     const double temperature = tests[row->test].test->temperature;
     ranges->least_speed = fmin(ranges->least_speed, row->approach_speed);
     ranges->most_speed = fmax(ranges->most_speed, row->approach_speed);
     ranges->least_temperature = fmin(ranges->least_temperature, temperature);
     ranges->most_temperature = fmax(ranges->most_temperature, temperature);
-}
-
-static Status reading_status(bool is_made, Problem *problem) {
-    return is_made ? STATUS_OK
-                   : problem_set(problem, STATUS_NO_MEMORY, "no memory for the evaluation");
 }
 
 // The JSON Pointer of a measurement, with `rest` behind it: "/measurements/3/gravity"; without a
@@ -102,11 +96,13 @@ static void reading_pointer(const EvaluationRow *row, char pointer[POINTER_SIZE]
     measurement_pointer(row->measurement, rest, pointer);
 }
 
-bool reading_counts(const EvaluationRow *row) {
+// Whether e or T_c of a row counts.
+static bool reading_counts(const EvaluationRow *row) {
     return row->restitution_counts || row->contact_time_counts;
 }
 
-bool reading_get(const EvaluationRow *row, bool is_time, Reading *reading) {
+// T_c or e of a row; false: it does not count.
+static bool reading_get(const EvaluationRow *row, bool is_time, Reading *reading) {
     *reading = (Reading){
         .value = is_time ? row->contact_time : row->restitution,
         .uncertainty = is_time ? row->contact_time_uncertainty : row->restitution_uncertainty,
@@ -119,10 +115,9 @@ static bool reading_copy(const char *text, char **target) {
     return text == NULL || (*target = strdup(text)) != NULL;
 }
 
-static Status reading_add_note(EvaluationRow *row, const char *text, Problem *problem) {
-    return reading_status(text_format(&row->note, "%s%s%s", row->note != NULL ? row->note : "",
-                                      row->note != NULL ? "; " : "", text),
-                          problem);
+static Status reading_add_note(EvaluationRow *row, const char *text) {
+    return status_made(text_format(&row->note, "%s%s%s", row->note != NULL ? row->note : "",
+                                   row->note != NULL ? "; " : "", text));
 }
 
 // A list of rows under construction, of one test.
@@ -142,13 +137,14 @@ static Status reading_new(const ReadingList *list, size_t place, bool is_of_trac
     const DropTest *test = list->of->test;
     const char *excluded =
         is_of_trace ? test->traces.at[place].excluded : test->drops.at[place].excluded;
+    *added = NULL;
     if (rows->count == EVALUATION_ROWS_MAX)
         return problem_set(list->problem, STATUS_LIMIT,
                            "more than %d readings: evaluate fewer measurements at a time",
                            EVALUATION_ROWS_MAX);
     if ((rows->count & (rows->count - 1)) == 0) {
         EvaluationRow *at = realloc(rows->at, (2 * rows->count + 1) * sizeof *at);
-        TRY(reading_status(at != NULL, list->problem));
+        TRY(status_made(at != NULL));
         rows->at = at;
     }
     EvaluationRow *row = *added = &rows->at[rows->count++];
@@ -160,9 +156,8 @@ static Status reading_new(const ReadingList *list, size_t place, bool is_of_trac
     const bool is_made =
         contact > 0 ? text_format(&row->from, "trace %zu, contact %zu", place + 1, contact)
                     : text_format(&row->from, "%s %zu", is_of_trace ? "trace" : "drop", place + 1);
-    return reading_status(is_made && reading_copy(excluded, &row->excluded) &&
-                              reading_copy(note, &row->note),
-                          list->problem);
+    return status_made(is_made && reading_copy(excluded, &row->excluded) &&
+                       reading_copy(note, &row->note));
 }
 
 static void reading_set_counts(EvaluationRow *row) {
@@ -271,15 +266,15 @@ static Status reading_add_trace(const ReadingList *list, size_t place) {
 }
 
 // Of a drop with both e and T_c.
-static Status reading_correct_both(const GravityLoad *load, EvaluationRow *row, Problem *problem) {
+static Status reading_correct_both(const GravityLoad *load, EvaluationRow *row) {
     const GravityCorrected read = {row->restitution, row->contact_time,
                                    row->restitution_uncertainty / row->restitution,
                                    row->contact_time_uncertainty / row->contact_time};
     GravityCorrected isolated;
     if (!(row->restitution > 0) || !gravity_correct(load, &read, &isolated)) {
         row->restitution_counts = row->contact_time_counts = false;
-        return reading_add_note(
-            row, "does not count: no contact has this e and T_c under that gravity", problem);
+        return reading_add_note(row,
+                                "does not count: no contact has this e and T_c under that gravity");
     }
     row->read_restitution = row->restitution;
     row->read_contact_time = row->contact_time;
@@ -291,19 +286,16 @@ static Status reading_correct_both(const GravityLoad *load, EvaluationRow *row, 
 }
 
 // Of a drop with one of e and T_c; `other` is the mean of the other one, NAN: unknown.
-static Status reading_correct_one(const GravityLoad *load, double other, EvaluationRow *row,
-                                  Problem *problem) {
+static Status reading_correct_one(const GravityLoad *load, double other, EvaluationRow *row) {
     const bool is_time = isnan(row->restitution), is_known = !isnan(other) && !isnan(load->speed);
     double *value = is_time ? &row->contact_time : &row->restitution;
     double *read = is_time ? &row->read_contact_time : &row->read_restitution;
     double isolated;
     if (!is_known || !gravity_correct_one(load, is_time, *value, other, &isolated))
         return reading_add_note(
-            row,
-            is_known  ? "gravity is not corrected: no contact has this value under it"
-            : is_time ? "gravity is not corrected: this needs a speed and a restitution"
-                      : "gravity is not corrected: this needs a contact time",
-            problem);
+            row, is_known  ? "gravity is not corrected: no contact has this value under it"
+                 : is_time ? "gravity is not corrected: this needs a speed and a restitution"
+                           : "gravity is not corrected: this needs a contact time");
     // Errors grow with the correction.
     *(is_time ? &row->contact_time_uncertainty : &row->restitution_uncertainty) *=
         isolated / *value;
@@ -331,8 +323,7 @@ static double reading_mean(const EvaluationRows *rows, size_t test, bool is_time
 // drop with only one of e and T_c borrows the mean of the other from its test's readings without
 // gravity.
 static Status readings_correct_gravity(const Measurement *tests, size_t count, int separation,
-                                       const Progress *progress, EvaluationRows *rows,
-                                       Problem *problem) {
+                                       const Progress *progress, EvaluationRows *rows) {
     for (int pass = 0; pass < 2; pass++)
         for (size_t test = 0; test < count; test++) {
             // First drops with both, from which the others borrow.
@@ -349,9 +340,8 @@ static Status readings_correct_gravity(const Measurement *tests, size_t count, i
                 const GravityLoad load = {tests[test].test->gravity, row->approach_speed,
                                           (Separation)separation,
                                           row->restitution_by == RESTITUTION_BY_HEIGHTS};
-                TRY(pass == 0 ? reading_correct_both(&load, row, problem)
-                              : reading_correct_one(&load, isnan(row->restitution) ? e : T, row,
-                                                    problem));
+                TRY(pass == 0 ? reading_correct_both(&load, row)
+                              : reading_correct_one(&load, isnan(row->restitution) ? e : T, row));
             }
         }
     return STATUS_OK;
@@ -377,8 +367,7 @@ static void evaluation_choose_restitutions(EvaluationRows *rows) {
 
 // The statistic of T_c or e, and the scores of its readings. `readings` has room for all rows and
 // one more.
-static Status evaluation_set_statistic(bool is_time, Reading *readings, Evaluation *evaluation,
-                                       Problem *problem) {
+static Status evaluation_set_statistic(bool is_time, Reading *readings, Evaluation *evaluation) {
     EvaluationRow *rows = evaluation->rows.at;
     Statistic *statistic = is_time ? &evaluation->contact_time : &evaluation->restitution;
     size_t count = 0;
@@ -386,7 +375,7 @@ static Status evaluation_set_statistic(bool is_time, Reading *readings, Evaluati
         if (reading_get(&rows[i], is_time, &readings[count]))
             readings[count++].row = i;
     TRY(reading_statistics_run(readings, count, is_time ? "contact time" : "restitution",
-                               is_time ? " s" : "", statistic, problem));
+                               is_time ? " s" : "", statistic));
     // The fit of a single pulse has a better interval than two deviations.
     const EvaluationRow *only = is_time && count == 1 ? &rows[readings[0].row] : NULL;
     if (only != NULL && only->contact_time_by == CONTACT_TIME_BY_PULSE &&
@@ -507,7 +496,7 @@ static Status evaluation_warn_of_copies(const Measurement *tests, size_t count,
                                         Evaluation *evaluation) {
     const EvaluationRows *rows = &evaluation->rows;
     uint64_t *sums = calloc(count + 1, sizeof *sums); // 0: does not count
-    Status status = sums != NULL ? STATUS_OK : STATUS_NO_MEMORY;
+    Status status = status_made(sums != NULL);
     for (size_t i = 0; i < rows->count && status == STATUS_OK; i++)
         if (reading_counts(&rows->at[i]))
             sums[rows->at[i].test] = 14695981039346656037u;
@@ -628,6 +617,28 @@ static Status evaluation_warn(const Measurement *tests, size_t count, Evaluation
     return evaluation_warn_of_outliers(evaluation);
 }
 
+static Status evaluation_add_rows(const Measurement *tests, size_t count, Separation separation,
+                                  const Progress *progress, EvaluationRows *rows,
+                                  Problem *problem) {
+    for (size_t i = 0; i < count; i++) {
+        const ReadingList list = {&tests[i], i, (int)separation, progress, rows, problem};
+        for (size_t k = 0; k < tests[i].test->drops.count; k++)
+            TRY(reading_add_drop(&list, k));
+        for (size_t k = 0; k < tests[i].test->traces.count; k++)
+            TRY(reading_add_trace(&list, k));
+    }
+    return readings_correct_gravity(tests, count, (int)separation, progress, rows);
+}
+
+static Status evaluation_add_statistics(Evaluation *evaluation) {
+    Reading *readings = calloc(evaluation->rows.count + 1, sizeof *readings);
+    Status status = status_made(readings != NULL);
+    for (int is_time = 0; is_time < 2 && status == STATUS_OK; is_time++)
+        status = evaluation_set_statistic(is_time == 1, readings, evaluation);
+    free(readings);
+    return status;
+}
+
 Status evaluation_run(const Measurement *tests, size_t count, Separation separation,
                       const Progress *progress, Evaluation *evaluation, Problem *problem) {
     *evaluation = (Evaluation){.separation = (int)separation,
@@ -640,26 +651,280 @@ Status evaluation_run(const Measurement *tests, size_t count, Separation separat
                            "more than %d samples in traces, %zu: evaluate fewer measurements at a "
                            "time",
                            EVALUATION_SAMPLES_MAX, samples);
-    for (size_t i = 0; i < count; i++) {
-        const ReadingList list = {&tests[i], i, (int)separation, progress, rows, problem};
-        for (size_t k = 0; k < tests[i].test->drops.count; k++)
-            TRY(reading_add_drop(&list, k));
-        for (size_t k = 0; k < tests[i].test->traces.count; k++)
-            TRY(reading_add_trace(&list, k));
+    Status status = evaluation_add_rows(tests, count, separation, progress, rows, problem);
+    if (status == STATUS_OK) {
+        evaluation_choose_restitutions(rows);
+        for (size_t i = 0; i < rows->count; i++)
+            if (reading_counts(&rows->at[i]))
+                ranges_extend(&evaluation->ranges, &rows->at[i], tests);
+        status = evaluation_add_statistics(evaluation);
     }
-    TRY(readings_correct_gravity(tests, count, (int)separation, progress, rows, problem));
-    evaluation_choose_restitutions(rows);
-    for (size_t i = 0; i < rows->count; i++)
-        if (reading_counts(&rows->at[i]))
-            ranges_extend(&evaluation->ranges, &rows->at[i], tests);
-    Reading *readings = calloc(rows->count + 1, sizeof *readings);
-    Status status = readings != NULL ? STATUS_OK : STATUS_NO_MEMORY;
-    for (int is_time = 0; is_time < 2 && status == STATUS_OK; is_time++)
-        status = evaluation_set_statistic(is_time == 1, readings, evaluation, problem);
-    free(readings);
     if (status == STATUS_OK)
         status = evaluation_warn(tests, count, evaluation);
+    return status == STATUS_NO_MEMORY ? problem_set(problem, status, "no memory for the evaluation")
+                                      : status;
+}
+
+const char *const proposal_form_names[] = {"constant", "table", NULL};
+
+enum { SOURCE_MAX = 1000 };
+
+void material_proposal_clear(MaterialProposal *proposal) {
+    fields_clear(material_fields, &proposal->material);
+    free(proposal->why);
+    proposal->why = NULL;
+}
+
+// The description of the material without its figures and their source.
+static Status proposal_describe(const Material *before, Material *material) {
+    Material described = {.name = NULL};
+    fields_clear(material_fields, &described);
+    described.name = before->name;
+    described.kind = before->kind;
+    described.thickness = before->thickness;
+    described.hardness = before->hardness;
+    described.supplier = before->supplier;
+    described.notes = before->notes;
+    described.tags = before->tags;
+    return fields_copy(material_fields, &described, material);
+}
+
+// A proposal in progress. The lists have room for all rows of the evaluation, or all tests.
+typedef struct Proposal {
+    Evaluation *evaluation;
+    const Measurement *tests;
+    size_t test_count;
+    const EvaluationRow **rows; // that the revision is based on; of a table by rising speed
+    size_t row_count;
+    const Measurement **sources; // the tests of these rows, in order
+    size_t source_count;
+    Reading *readings; // scratch
+    MaterialProposal *result;
+} Proposal;
+
+static bool proposal_is_same(double a, double b) {
+    return a == b || (isnan(a) && isnan(b));
+}
+
+// Impactor and base, if all tests have the same.
+static Status proposal_set_pair(const Proposal *proposal) {
+    Material *material = &proposal->result->material;
+    const DropTest *first = proposal->sources[0]->test;
+    for (size_t i = 1; i < proposal->source_count; i++) {
+        const DropTest *test = proposal->sources[i]->test;
+        if (!text_same(test->impactor, first->impactor) || test->base != first->base ||
+            !proposal_is_same(test->impactor_mass, first->impactor_mass) ||
+            !proposal_is_same(test->base_mass, first->base_mass))
+            return warnings_add(&proposal->evaluation->warnings, "/revision/impactor_mass",
+                                "impactor and base are left out: the measurements were made with "
+                                "different ones");
+    }
+    material->impactor_mass = first->impactor_mass;
+    material->base = first->base;
+    material->base_mass = first->base_mass;
+    return first->impactor == NULL || (material->impactor = strdup(first->impactor)) != NULL
+               ? STATUS_OK
+               : STATUS_NO_MEMORY;
+}
+
+// The different sources of the tests, else their numbers.
+static Status proposal_set_source(const Proposal *proposal) {
+    Material *material = &proposal->result->material;
+    const Measurement *const *sources = proposal->sources;
+    const size_t count = proposal->source_count;
+    char text[SOURCE_MAX + 1] = "", number[32];
+    for (size_t i = 0; i < count; i++) {
+        size_t first = 0;
+        while (!text_same(sources[first]->test->source, sources[i]->test->source))
+            first++;
+        if (sources[i]->test->source != NULL && first == i)
+            text_list(text, sizeof text, sources[i]->test->source);
+    }
+    if (text[0] == '\0') {
+        snprintf(text, sizeof text, "measurements of this material:");
+        for (size_t i = 0; i < count && sources[i]->number != COUNT_ABSENT; i++) {
+            snprintf(number, sizeof number, "%s%llu", i > 0 ? ", " : " ",
+                     (unsigned long long)sources[i]->number);
+            if (strlen(text) + strlen(number) < sizeof text)
+                memcpy(text + strlen(text), number, strlen(number) + 1);
+        }
+    }
+    material->source = strdup(text);
+    TRY(status_made(material->source != NULL && reals_allocate(&material->measurements, count)));
+    for (size_t i = 0; i < count; i++)
+        material->measurements.at[i] = (double)sources[i]->number;
+    return STATUS_OK;
+}
+
+// Ranges, separation rule, pair and source.
+static Status proposal_set_basis(Proposal *proposal) {
+    Material *material = &proposal->result->material;
+    Ranges ranges = ranges_unknown;
+    for (size_t i = 0; i < proposal->row_count; i++) {
+        const EvaluationRow *row = proposal->rows[i];
+        ranges_extend(&ranges, row, proposal->tests);
+        if (row->contact_time_counts && row->contact_time_by == (int)CONTACT_TIME_BY_PULSE)
+            material->separation = proposal->evaluation->separation;
+    }
+    for (size_t test = 0; test < proposal->test_count; test++) {
+        size_t i = 0;
+        while (i < proposal->row_count && proposal->rows[i]->test != test)
+            i++;
+        if (i < proposal->row_count)
+            proposal->sources[proposal->source_count++] = &proposal->tests[test];
+    }
+    material->least_speed = ranges.least_speed;
+    material->most_speed = ranges.most_speed;
+    material->least_temperature = ranges.least_temperature;
+    material->most_temperature = ranges.most_temperature;
+    TRY(proposal_set_pair(proposal));
+    return proposal_set_source(proposal);
+}
+
+static Status proposal_set_constant(Proposal *proposal) {
+    Material *material = &proposal->result->material;
+    Warnings *warnings = &proposal->evaluation->warnings;
+    const Statistic *e = &proposal->evaluation->restitution,
+                    *T = &proposal->evaluation->contact_time;
+    if (e->count == 0)
+        return status_made(text_format(&proposal->result->why,
+                                       "no reading that counts gives the restitution, which a "
+                                       "revision needs: add a measurement with heights or "
+                                       "speeds"));
+    material->restitution = e->mean;
+    material->restitution_deviation = e->spread;
+    material->contact_time = T->mean;
+    material->contact_time_deviation = T->spread;
+    if (e->trend.verdict == TREND_NOT_CONSTANT)
+        TRY(warnings_add(warnings, "/revision/restitution", "%s", e->trend.detail));
+    if (T->trend.verdict == TREND_NOT_CONSTANT)
+        TRY(warnings_add(warnings, "/revision/contact_time", "%s", T->trend.detail));
+    return T->count > 0 ? STATUS_OK
+                        : warnings_add(warnings, "/revision/contact_time",
+                                       "no contact time is known: the material can be used with "
+                                       "impulsive contact only");
+}
+
+static int proposal_compare(const void *a, const void *b) {
+    const double left = (*(const EvaluationRow *const *)a)->approach_speed;
+    const double right = (*(const EvaluationRow *const *)b)->approach_speed;
+    return (left > right) - (left < right);
+}
+
+// Collects the rows that count, for a table those with a speed, in its order.
+static void proposal_collect_rows(Proposal *proposal, bool is_table) {
+    const EvaluationRows *rows = &proposal->evaluation->rows;
+    for (size_t i = 0; i < rows->count; i++)
+        if (reading_counts(&rows->at[i]) && !(is_table && isnan(rows->at[i].approach_speed)))
+            proposal->rows[proposal->row_count++] = &rows->at[i];
+    if (is_table && proposal->row_count > 0)
+        qsort(proposal->rows, proposal->row_count, sizeof *proposal->rows, proposal_compare);
+}
+
+// Number of rows from `first` on whose speeds make one row of the table.
+static size_t proposal_bin(const Proposal *proposal, size_t first) {
+    size_t end = first;
+    while (end < proposal->row_count && !(proposal->rows[end]->approach_speed >
+                                          PROPOSAL_BIN * proposal->rows[first]->approach_speed))
+        end++;
+    return end - first;
+}
+
+// Mean and deviation of T_c or e of rows, by the same rule as over all readings.
+static Status proposal_mean(const Proposal *proposal, size_t first, size_t count, bool is_time,
+                            double *mean, double *deviation) {
+    size_t found = 0;
+    for (size_t i = first; i < first + count; i++)
+        found += reading_get(proposal->rows[i], is_time, &proposal->readings[found]);
+    Statistic statistic;
+    const Status status =
+        reading_statistics_run(proposal->readings, found, "reading", "", &statistic);
+    *mean = statistic.mean;
+    *deviation = statistic.spread;
+    fields_clear(reading_statistic_fields, &statistic);
+    return status;
+}
+
+// A row of the table for each bin. Every row needs e, and T_c if any has it: the other bins are
+// left out with their readings. `*all` is the number of bins.
+static Status proposal_fill_table(Proposal *proposal, bool has_time, size_t *all) {
+    MaterialRows *table = &proposal->result->material.table;
+    size_t kept = 0;
+    *all = 0;
+    table->at = calloc(proposal->row_count + 1, sizeof *table->at);
+    TRY(status_made(table->at != NULL));
+    for (size_t first = 0, count; first < proposal->row_count; first += count, ++*all) {
+        MaterialRow row = {0};
+        count = proposal_bin(proposal, first);
+        for (size_t i = first; i < first + count; i++)
+            row.approach_speed += proposal->rows[i]->approach_speed;
+        row.approach_speed /= (double)count;
+        TRY(proposal_mean(proposal, first, count, false, &row.restitution,
+                          &row.restitution_deviation));
+        TRY(proposal_mean(proposal, first, count, true, &row.contact_time,
+                          &row.contact_time_deviation));
+        if (isnan(row.restitution) || (has_time && isnan(row.contact_time)))
+            continue;
+        memmove(&proposal->rows[kept], &proposal->rows[first], count * sizeof *proposal->rows);
+        kept += count;
+        table->at[table->count++] = row;
+    }
+    proposal->row_count = kept;
+    return STATUS_OK;
+}
+
+static Status proposal_set_table(Proposal *proposal) {
+    Warnings *warnings = &proposal->evaluation->warnings;
+    const size_t *kept = &proposal->result->material.table.count;
+    bool has_time = false;
+    size_t all;
+    for (size_t i = 0; i < proposal->row_count; i++)
+        has_time = has_time || proposal->rows[i]->contact_time_counts;
+    TRY(proposal_fill_table(proposal, has_time, &all));
+    if (*kept < 2 || *kept > MATERIAL_ROWS)
+        return status_made(text_format(
+            &proposal->result->why,
+            "a table needs e%s at two approach speeds at least (%g times one another), %d at most; "
+            "the readings have %zu",
+            has_time ? " and T_c" : "", PROPOSAL_BIN, MATERIAL_ROWS, *kept));
+    if (*kept < all)
+        TRY(warnings_add(warnings, "/revision/table",
+                         "%zu of %zu speeds are left out: e%s is not known there", all - *kept, all,
+                         has_time ? " or T_c" : ""));
+    return has_time ? STATUS_OK
+                    : warnings_add(warnings, "/revision/table",
+                                   "no contact time is known at any speed: the material can be "
+                                   "used with impulsive contact only");
+}
+
+Status material_proposal_run(Evaluation *evaluation, const Measurement *tests, size_t count,
+                             const Material *before, ProposalForm form, MaterialProposal *result,
+                             Problem *problem) {
+    *result = (MaterialProposal){.why = NULL};
+    const size_t room = evaluation->rows.count + 1;
+    Proposal proposal = {.evaluation = evaluation,
+                         .tests = tests,
+                         .test_count = count,
+                         .rows = calloc(room, sizeof *proposal.rows),
+                         .sources = calloc(count + 1, sizeof *proposal.sources),
+                         .readings = calloc(room, sizeof *proposal.readings),
+                         .result = result};
+    Status status = proposal.rows != NULL && proposal.sources != NULL && proposal.readings != NULL
+                        ? proposal_describe(before, &result->material)
+                        : STATUS_NO_MEMORY;
+    if (status == STATUS_OK) {
+        proposal_collect_rows(&proposal, form == PROPOSAL_TABLE);
+        status = form == PROPOSAL_TABLE ? proposal_set_table(&proposal)
+                                        : proposal_set_constant(&proposal);
+    }
+    if (status == STATUS_OK && result->why == NULL)
+        status = proposal_set_basis(&proposal);
+    free(proposal.rows);
+    free(proposal.sources);
+    free(proposal.readings);
+    if (status != STATUS_OK || result->why != NULL)
+        fields_clear(material_fields, &result->material);
     return status == STATUS_OK
                ? STATUS_OK
-               : problem_set(problem, STATUS_NO_MEMORY, "no memory for the evaluation");
+               : problem_set(problem, STATUS_NO_MEMORY, "no memory for the proposal");
 }

@@ -1,5 +1,5 @@
 // Evaluation of the drop tests of one material: all readings as rows, mean and interval of e and
-// T_c, their trend over speed, warnings.
+// T_c, their trend over speed, warnings, and the revision of the material that they propose.
 #ifndef CORE_DROP_TEST_EVALUATION_H
 #define CORE_DROP_TEST_EVALUATION_H
 
@@ -9,6 +9,7 @@
 #include "core/drop_test/drop_test.h"
 #include "core/drop_test/force_trace.h"
 #include "core/drop_test/reading_statistics.h"
+#include "core/scene/material.h"
 
 enum { EVALUATION_ROWS_MAX = 20000, EVALUATION_SAMPLES_MAX = 4 * TRACE_SAMPLES_MAX };
 
@@ -83,14 +84,24 @@ Status evaluation_run(const Measurement *tests, size_t count, Separation separat
                       const Progress *progress, Evaluation *evaluation, Problem *problem);
 void evaluation_clear(Evaluation *evaluation);
 
-// Whether e or T_c of a row counts.
-bool reading_counts(const EvaluationRow *row);
+// One e and T_c for every speed, or a table over approach speed.
+typedef enum ProposalForm { PROPOSAL_CONSTANT, PROPOSAL_TABLE } ProposalForm;
+extern const char *const proposal_form_names[]; // "constant", "table"; NULL-terminated
 
-// T_c or e of a row; false: it does not count.
-bool reading_get(const EvaluationRow *row, bool is_time, Reading *reading);
+// Readings whose speeds differ by a smaller factor share one row of a table.
+#define PROPOSAL_BIN 1.1
 
-// All NAN, and extended by a row.
-extern const Ranges ranges_unknown;
-void ranges_extend(Ranges *ranges, const EvaluationRow *row, const Measurement *tests);
+// The revision, or why there is none: then `material` is empty. Warnings go to the evaluation's.
+typedef struct MaterialProposal {
+    Material material;
+    char *why; // NULL: there is one
+} MaterialProposal;
+
+// Name, kind and so on are those of `before`, its figures are not. STATUS_OK or STATUS_NO_MEMORY.
+// Released by material_proposal_clear in any case.
+Status material_proposal_run(Evaluation *evaluation, const Measurement *tests, size_t count,
+                             const Material *before, ProposalForm form, MaterialProposal *proposal,
+                             Problem *problem);
+void material_proposal_clear(MaterialProposal *proposal);
 
 #endif

@@ -13,6 +13,7 @@
 #include <string.h>
 
 #include "core/drop_test/pulse_fit.h"
+#include "core/math/linear_system.h"
 
 enum { SAMPLES_MIN = 5, TRACE_MIN = 8, PARTS = 16, PART_MIN = 16, TERMS = 3 };
 
@@ -150,7 +151,7 @@ static void detection_subtract(ContactDetection *detection, const Reals *force, 
 // Adds to c a polynomial of `terms` terms through the samples outside contacts, by least squares.
 // Returns the sum of squares of the residuals.
 static double detection_fit(const Reals *force, const bool *is_inside, size_t terms, double *c) {
-    double a[TERMS][TERMS + 1] = {{0}};
+    double a[TERMS * TERMS] = {0}, b[TERMS] = {0};
     for (size_t i = 0; i < force->count; i++) {
         if (is_inside[i])
             continue;
@@ -158,21 +159,13 @@ static double detection_fit(const Reals *force, const bool *is_inside, size_t te
         const double left = detection_residual(force, i, c);
         for (size_t j = 0; j < terms; j++) {
             for (size_t k = 0; k < terms; k++)
-                a[j][k] += power[j] * power[k];
-            a[j][TERMS] += power[j] * left;
+                a[j * terms + k] += power[j] * power[k];
+            b[j] += power[j] * left;
         }
     }
-    for (size_t j = 0; j < terms; j++)
-        for (size_t i = 0; i < terms; i++) {
-            if (i == j)
-                continue;
-            const double factor = a[i][j] / a[j][j];
-            for (size_t k = 0; k <= TERMS; k++)
-                a[i][k] -= factor * a[j][k];
-        }
-    for (size_t j = 0; j < terms; j++)
-        if (isfinite(a[j][TERMS] / a[j][j]))
-            c[j] += a[j][TERMS] / a[j][j];
+    if (linear_system_solve(a, b, terms, 1))
+        for (size_t j = 0; j < terms; j++)
+            c[j] += b[j];
     double sum = 0;
     for (size_t i = 0; i < force->count; i++) {
         const double left = detection_residual(force, i, c);
@@ -230,8 +223,7 @@ static size_t detection_mark(const ContactDetection *detection, size_t count, do
 static Status detection_find_baseline(const Reals *force, ContactDetection *detection) {
     const size_t n = force->count;
     double *scratch = malloc(n * (sizeof *scratch + sizeof(bool)));
-    if (scratch == NULL)
-        return STATUS_NO_MEMORY;
+    TRY(status_made(scratch != NULL));
     bool *is_inside = (bool *)(void *)(scratch + n);
     double level[TERMS] = {0}, width, line[TERMS] = {0}, line_width;
     memcpy(scratch, force->at, n * sizeof *scratch);
@@ -316,17 +308,12 @@ static void detection_find_runs(size_t count, ContactDetection *detection) {
 static Status detection_run(const Reals *force, double threshold, ContactDetection *detection) {
     *detection = (ContactDetection){.noise_count = 0};
     detection->force = malloc((force->count + 1) * sizeof *detection->force);
-    if (detection->force == NULL)
-        return STATUS_NO_MEMORY;
+    TRY(status_made(detection->force != NULL));
     TRY(detection_find_baseline(force, detection));
     detection->threshold =
         isnan(threshold) ? fmax(6 * detection->noise, 0.002 * detection->largest) : threshold;
     detection_find_runs(force->count, detection);
     return STATUS_OK;
-}
-
-static Status trace_status(bool is_made) {
-    return is_made ? STATUS_OK : STATUS_NO_MEMORY;
 }
 
 // The largest part of a contact below `level` of its peak, and its largest part before the visible
@@ -335,7 +322,7 @@ static double trace_hidden(double level, int separation, double *before) {
     double most = 0;
     *before = 0;
     for (int i = 0; i <= 4; i++) {
-        const PulseModel model = pulse_model_make(i * 0.75, 0, separation);
+        const PulseModel model = pulse_model_make(i * 0.75, 0, false, separation);
         const PulseVisible visible = pulse_model_visible(&model, fmin(level, 0.95));
         const double seen = fmax(visible.to - visible.from, 0.02);
         most = fmax(most, (1 - seen) / seen);
@@ -437,38 +424,32 @@ static Status trace_conclude(const FitConfidence *likely, bool is_form_sure, dou
                              int separation, const TraceContact *counted, TraceContact *contact) {
     const double width = contact->most_contact_time - contact->least_contact_time;
     const bool is_wide = !(width < width_max * contact->contact_time);
-    if (!is_form_sure) {
-        if (is_wide)
-            trace_withdraw(counted, contact);
-        return trace_status(text_format(
-            &contact->why,
-            "the trace differs from every pulse of the model under the rule %s: the rms "
-            "residual of the best one is %.2g %% of the peak, and the noise is %.2g %% of it",
-            separation_names[separation], 100 * contact->seen.misfit_share, 100 * noise));
-    }
-    if (is_wide) {
+    const bool is_endless = likely->decay.mean + 2 * likely->decay.deviation > decay_max;
+    if (is_wide || (is_form_sure && is_endless))
         trace_withdraw(counted, contact);
-        return trace_status(text_format(
-            &contact->why,
-            "pulses from %.3g s to %.3g s fit the trace about equally well: less noise or "
-            "more samples in contact would distinguish them",
-            contact->least_contact_time, contact->most_contact_time));
-    }
-    if (likely->decay.mean + 2 * likely->decay.deviation > decay_max) {
-        trace_withdraw(counted, contact);
-        return trace_status(text_format(
-            &contact->why, "the force has no distinct end: pulses with a restitution of "
-                           "nearly 0 fit the trace as well"));
-    }
-    return STATUS_OK;
+    return status_made(
+        !is_form_sure
+            ? text_format(&contact->why,
+                          "the trace differs from every pulse of the model under the rule %s: the "
+                          "rms residual of the best one is %.2g %% of the peak, and the noise is "
+                          "%.2g %% of it",
+                          separation_names[separation], 100 * contact->seen.misfit_share,
+                          100 * noise)
+        : is_wide
+            ? text_format(&contact->why,
+                          "pulses from %.3g s to %.3g s fit the trace about equally well: "
+                          "less noise or more samples in contact would distinguish them",
+                          contact->least_contact_time, contact->most_contact_time)
+            : !is_endless || text_format(&contact->why,
+                                         "the force has no distinct end: pulses with a restitution "
+                                         "of nearly 0 fit the trace as well"));
 }
 
 // The best pulse on the baseline, from its start to its end; the window begins at sample `origin`.
 static Status trace_draw(const PulseFit *fit, const PulseModel *model,
                          const ContactDetection *found, const DetectedContact *run, double origin,
                          Reals *pulse) {
-    if (!reals_allocate(pulse, TRACE_PULSE))
-        return STATUS_NO_MEMORY;
+    TRY(status_made(reals_allocate(pulse, TRACE_PULSE)));
     for (size_t i = 0; i < TRACE_PULSE; i++) {
         const double share = (double)i / (TRACE_PULSE - 1), *part = fit->at.part;
         const double place = origin + part[0] + share * (part[1] - part[0]);
@@ -484,7 +465,7 @@ static Status trace_fit_contact(FitWindow *window, const ContactDetection *found
                                 const DetectedContact *run, double origin, double interval,
                                 const PulseFit *fits, size_t count, TraceContact *contact) {
     if (count == 0)
-        return trace_status(text_format(&contact->why, "no pulse of the model fits"));
+        return status_made(text_format(&contact->why, "no pulse of the model fits"));
     const PulseFit *fit = &fits[0];
     contact->seen.samples = (uint64_t)(fit->last - fit->first + 1);
     contact->seen.first = (origin + (double)fit->first) * interval;
@@ -501,13 +482,13 @@ static Status trace_fit_contact(FitWindow *window, const ContactDetection *found
     const double noise = found->noise / fabs(run->peak) / sqrt((double)window->per_block);
     contact->seen.misfit = noise > 0 ? contact->seen.misfit_share / noise : (double)NAN;
     if (contact->seen.samples < SAMPLES_MIN)
-        return trace_status(
+        return status_made(
             text_format(&contact->why,
                         "only %d samples are in contact, and pulses of very different "
                         "length fit so few: at least 5 are needed, 20 are better",
                         (int)contact->seen.samples));
     if (contact->seen.misfit_share > misfit_max && contact->seen.misfit_share > 2 * noise)
-        return trace_status(
+        return status_made(
             text_format(&contact->why,
                         "the trace is no pulse of the model under the separation rule "
                         "%s: the rms residual of the best one is %.2g %% of the peak",
@@ -602,8 +583,8 @@ static Status trace_read_contact(double interval, const TraceOptions *options,
     trace_count_samples(found, run, options->separation, interval, contact);
     if (run->first == 0 || run->last == found->samples - 1) {
         contact->most_contact_time = (double)NAN;
-        return trace_status(text_format(&contact->why, "the trace %s during the contact",
-                                        run->first == 0 ? "begins" : "ends"));
+        return status_made(text_format(&contact->why, "the trace %s during the contact",
+                                       run->first == 0 ? "begins" : "ends"));
     }
     const size_t from = trace_fill_window(found, number, options->separation, window);
     PulseFit fits[FITS_MAX];
@@ -614,11 +595,11 @@ static Status trace_read_contact(double interval, const TraceOptions *options,
                              : pulse_fit_run(window, fits);
     TRY(trace_fit_contact(window, found, run, (double)from, interval, fits, count, contact));
     if (!is_settled && !isnan(contact->contact_time))
-        return trace_status(text_format(
+        return status_made(text_format(
             &contact->why, "gravity is only partly corrected: the masses and this force "
                            "do not lead to one approach speed; check them, or give it"));
     if (options->gravity > 0 && !(window->pull_rate > 0) && !isnan(contact->contact_time))
-        return trace_status(text_format(
+        return status_made(text_format(
             &contact->why,
             "gravity is not corrected: neither the approach speed nor the masses are known"));
     return STATUS_OK;
@@ -658,11 +639,11 @@ Status trace_analysis_run(double interval, const Reals *force, const TraceOption
         status = trace_read_contact(interval, options, &found, i, window, &list->at[i]);
     }
     if (status == STATUS_OK && found.count == 0)
-        status = trace_status(text_format(
-            &analysis->why, "no force exceeds the threshold of %.3g N", found.threshold));
+        status = status_made(text_format(&analysis->why, "no force exceeds the threshold of %.3g N",
+                                         found.threshold));
     if (status == STATUS_OK && found.is_full)
-        status = trace_status(text_format(
-            &analysis->why, "only the first %d contacts are evaluated", TRACE_CONTACTS_MAX));
+        status = status_made(text_format(&analysis->why, "only the first %d contacts are evaluated",
+                                         TRACE_CONTACTS_MAX));
     free(found.force);
     free(window);
     return status;

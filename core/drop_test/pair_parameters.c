@@ -155,8 +155,7 @@ static PairContact pair_contact(const PairCase *pair_case, const PairRow *known)
 static Status pair_fill(const Material *material, int separation, PairParameters *pair) {
     const size_t rows = material->table.count > 0 ? material->table.count : 1;
     pair->contacts.at = calloc(rows * RULES, sizeof *pair->contacts.at);
-    if (pair->contacts.at == NULL)
-        return STATUS_NO_MEMORY;
+    TRY(status_made(pair->contacts.at != NULL));
     for (size_t i = 0; i < rows; i++)
         for (int rule = 0; rule < RULES; rule++) {
             const PairRow known = pair_row(material, i);
@@ -237,7 +236,10 @@ static Status pair_warn_of_material(const Material *material, int separation,
     return STATUS_OK;
 }
 
-static Status pair_warn_of_overdamping(PairParameters *pair) {
+static Status pair_warn(const Material *material, int separation, PairParameters *pair) {
+    TRY(pair_warn_of_mass(material, pair));
+    TRY(pair_warn_of_material(material, separation, pair));
+    // Of overdamping.
     for (size_t i = 0; i < pair->contacts.count; i++) {
         const PairContact *contact = &pair->contacts.at[i];
         if (!isnan(contact->stiffness.value) && isnan(contact->contact_time.value))
@@ -270,11 +272,7 @@ Status pair_parameters_run(const Material *material, double damper_mass, double 
             "base, and base_mass of a free one), from which k_b and c_b of its rig follow");
     Status status = pair_fill(material, separation, pair);
     if (status == STATUS_OK)
-        status = pair_warn_of_mass(material, pair);
-    if (status == STATUS_OK)
-        status = pair_warn_of_material(material, separation, pair);
-    if (status == STATUS_OK)
-        status = pair_warn_of_overdamping(pair);
+        status = pair_warn(material, separation, pair);
     return status == STATUS_OK
                ? STATUS_OK
                : problem_set(problem, STATUS_NO_MEMORY, "no memory for the parameters");

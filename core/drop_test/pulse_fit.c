@@ -49,8 +49,8 @@ static FitBox fit_box_make(long first, long last, long gaps) {
 bool pulse_fit_model(const FitWindow *window, const FitPoint *point, PulseModel *model,
                      double *contact_time) {
     const double length = point->part[FIT_END] - point->part[FIT_START];
-    *model = pulse_model_make_lasting(point->part[FIT_DECAY], window->pull_rate * length,
-                                      window->separation);
+    *model = pulse_model_make(point->part[FIT_DECAY], window->pull_rate * length, true,
+                              window->separation);
     *contact_time = length / model->length;
     return length > 0 && isfinite(model->length);
 }
@@ -201,6 +201,20 @@ static bool fit_derive(const FitWindow *window, const FitBox *box, PulseFit *fit
         }
     }
     return true;
+}
+
+// The inverse and the determinant; false: it is not a covariance.
+static bool fit_invert(double a[FIT_PARTS][FIT_PARTS], double inverse[FIT_PARTS][FIT_PARTS],
+                       double *det) {
+    *det = a[0][0] * (a[1][1] * a[2][2] - a[1][2] * a[2][1]) -
+           a[0][1] * (a[1][0] * a[2][2] - a[1][2] * a[2][0]) +
+           a[0][2] * (a[1][0] * a[2][1] - a[1][1] * a[2][0]);
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            const int p = (j + 1) % 3, q = (j + 2) % 3, r = (i + 1) % 3, s = (i + 2) % 3;
+            inverse[i][j] = (a[p][r] * a[q][s] - a[p][s] * a[q][r]) / *det;
+        }
+    return *det > 0 && inverse[0][0] > 0 && inverse[1][1] > 0 && inverse[2][2] > 0;
 }
 
 // (curvature + damping diagonal) step = -slope over the free parts, by elimination; the others do
@@ -424,19 +438,6 @@ typedef struct Gaps {
     double middle, half;
 } Gaps;
 
-// False: the inverse is not a covariance.
-static bool fit_confidence_invert(double a[3][3], double inverse[3][3], double *det) {
-    *det = a[0][0] * (a[1][1] * a[2][2] - a[1][2] * a[2][1]) -
-           a[0][1] * (a[1][0] * a[2][2] - a[1][2] * a[2][0]) +
-           a[0][2] * (a[1][0] * a[2][1] - a[1][1] * a[2][0]);
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            const int p = (j + 1) % 3, q = (j + 2) % 3, r = (i + 1) % 3, s = (i + 2) % 3;
-            inverse[i][j] = (a[p][r] * a[q][s] - a[p][s] * a[q][r]) / *det;
-        }
-    return *det > 0 && inverse[0][0] > 0 && inverse[1][1] > 0 && inverse[2][2] > 0;
-}
-
 // The probability of [a, b] under a standard normal distribution, accurate in the tails.
 static double fit_confidence_normal(double a, double b) {
     if (a > 0)
@@ -497,7 +498,7 @@ static bool fit_confidence_weigh(const FitWindow *window, const FitBox *box, con
         return false;
     // Limits the step to a part of the contact, over which the pulse is linear.
     curvature[FIT_START][FIT_START] += variance / pow(1 + step_max * T, 2);
-    if (!fit_confidence_invert(curvature, inverse, &det))
+    if (!fit_invert(curvature, inverse, &det))
         return false;
     piece->mean[CONTACT_TIME] = T;
     for (int i = 0; i < FIT_PARTS; i++) {
@@ -606,7 +607,7 @@ static long fit_confidence_gap_count(const FitWindow *window, const PulseFit *fi
     double curvature[3][3], spread[3][3], det;
     const double variance = fit_variance(window, fit->residual.sum);
     memcpy(curvature, fit->curvature, sizeof curvature);
-    if (!fit_confidence_invert(curvature, spread, &det))
+    if (!fit_invert(curvature, spread, &det))
         return 1;
     PulseModel model;
     double T;
@@ -703,8 +704,7 @@ Status pulse_fit_confidence(const FitWindow *window, const PulseFit *fits, size_
                             bool is_form_sure, FitConfidence *confidence) {
     Piece *pieces = malloc(SIDE * SIDE * sizeof *pieces);
     *confidence = (FitConfidence){.least = (double)NAN, .most = (double)NAN};
-    if (pieces == NULL)
-        return STATUS_NO_MEMORY;
+    TRY(status_made(pieces != NULL));
     const size_t found = fit_confidence_explore(window, fits, count, pieces);
     double height = -(double)INFINITY, sum = 0;
     for (size_t i = 0; i < found; i++)

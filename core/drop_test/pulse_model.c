@@ -5,12 +5,16 @@
 //
 // T_c is the time unit: S(1) = 0 under zero penetration, hence turn = pi^2. Under zero force and
 // without gravity F(1) = 0: with x = sqrt(turn) / 2 that is x cot(x) = L / 2.
+//
+// With the duration of the contact under gravity as the time unit of the pull, e of the isolated
+// pair is the one unknown of its inverse.
 #include "core/drop_test/pulse_model.h"
 
 #include <math.h>
-#include <stdbool.h>
 
 static const double pi = 3.14159265358979323846;
+
+enum { HALVINGS = 52 };
 
 // x cot(x) of x^2 = u, which may be negative, and its derivative.
 static double pulse_cotangent(double u, double *slope) {
@@ -108,10 +112,11 @@ static double pulse_length(double decay, double turn, int separation, double pus
     return (double)INFINITY;
 }
 
-static PulseModel pulse_model_of(double decay, double push, int separation, bool is_total) {
+PulseModel pulse_model_make(double decay, double pull, bool is_total, int separation) {
     const double turn = pulse_turn(decay, separation);
-    const double length = pulse_length(decay, turn, separation, push, is_total);
-    const double pull = is_total ? push / length : push;
+    const double length = pulse_length(decay, turn, separation, pull, is_total);
+    if (is_total)
+        pull /= length;
     return (PulseModel){
         .decay = decay,
         .turn = turn,
@@ -122,21 +127,19 @@ static PulseModel pulse_model_of(double decay, double push, int separation, bool
     };
 }
 
-PulseModel pulse_model_make(double decay, double pull, int separation) {
-    return pulse_model_of(decay, pull, separation, false);
-}
-
-PulseModel pulse_model_make_lasting(double decay, double pull, int separation) {
-    return pulse_model_of(decay, pull, separation, true);
+// y [v0 T_c] and y' [v0] where the contact ends.
+static double pulse_end(const PulseModel *model, double *speed) {
+    const Separating at =
+        pulse_separating(model->decay, model->turn, SEPARATION_ZERO_PENETRATION, model->length);
+    *speed = at.slope + model->pull * at.own;
+    return at.own + model->pull * at.pulled;
 }
 
 // The change of momentum, v0 less the final speed, and the impulse of gravity.
 double pulse_model_impulse(const PulseModel *model) {
-    const double s = model->length;
-    double cosine;
-    const double sine = pulse_waves(model->turn, s, &cosine), fall = exp(-model->decay * s);
-    const double speed = fall * (cosine - model->decay * sine) + model->pull * fall * sine;
-    return 1 - speed + model->pull * s;
+    double speed;
+    (void)pulse_end(model, &speed);
+    return 1 - speed + model->pull * model->length;
 }
 
 PulseVisible pulse_model_visible(const PulseModel *model, double level) {
@@ -157,4 +160,68 @@ PulseVisible pulse_model_visible(const PulseModel *model, double level) {
             visible.pressed = s;
     }
     return visible;
+}
+
+// e with gravity of a contact; 0: it does not end, or the impactor stays in the buffer.
+static double gravity_rebound(const GravityLoad *load, const PulseModel *model) {
+    if (!isfinite(model->length))
+        return 0;
+    double speed;
+    const double depth = fmax(pulse_end(model, &speed), 0);
+    // An impactor that separates inside the buffer has to rise out of it.
+    const double square = speed * speed - (load->is_by_height ? 2 * model->pull * depth : 0);
+    return speed < 0 && square > 0 ? sqrt(square) : 0;
+}
+
+GravityContact gravity_apply(const GravityLoad *load, double restitution, double contact_time) {
+    const double pull = load->gravity * contact_time / load->speed;
+    const PulseModel model = pulse_model_make(-log(restitution), pull, false, load->separation);
+    return (GravityContact){gravity_rebound(load, &model), model.length * contact_time};
+}
+
+// e and T_c of the isolated pair from e with gravity and `time`, T_c with gravity or, unless
+// is_total, without it. False: there is none.
+static bool gravity_find(const GravityLoad *load, double read, double time, bool is_total,
+                         double *restitution, double *contact_time) {
+    const double pull = load->gravity * time / load->speed;
+    double least = read, most = 1; // gravity only lowers e
+    PulseModel model = pulse_model_make(0, pull, is_total, load->separation);
+    if (!(gravity_rebound(load, &model) >= read * (1 - 1e-12)))
+        return false;
+    for (int i = 0; i < HALVINGS; i++) {
+        const double middle = (least + most) / 2;
+        model = pulse_model_make(-log(middle), pull, is_total, load->separation);
+        *(gravity_rebound(load, &model) < read ? &least : &most) = middle;
+    }
+    model = pulse_model_make(-log(most), pull, is_total, load->separation);
+    *restitution = most;
+    *contact_time = is_total ? time / model.length : time;
+    return most > 0 && *contact_time > 0;
+}
+
+bool gravity_correct(const GravityLoad *load, const GravityCorrected *read,
+                     GravityCorrected *isolated) {
+    // Errors of the readings by differences towards less e and a shorter contact.
+    const double h = 1e-5, factor = exp(-h);
+    double e, T, by_e[2], by_T[2];
+    if (!gravity_find(load, read->restitution, read->contact_time, true, &e, &T) ||
+        !gravity_find(load, read->restitution * factor, read->contact_time, true, &by_e[0],
+                      &by_T[0]) ||
+        !gravity_find(load, read->restitution, read->contact_time * factor, true, &by_e[1],
+                      &by_T[1]))
+        return false;
+    const double r_e = read->restitution_uncertainty / h, r_T = read->contact_time_uncertainty / h;
+    *isolated = (GravityCorrected){e, T, hypot(log(e / by_e[0]) * r_e, log(e / by_e[1]) * r_T),
+                                   hypot(log(T / by_T[0]) * r_e, log(T / by_T[1]) * r_T)};
+    return true;
+}
+
+bool gravity_correct_one(const GravityLoad *load, bool is_time, double read, double other,
+                         double *isolated) {
+    double ignored;
+    if (!is_time)
+        return gravity_find(load, read, other, false, isolated, &ignored);
+    const double pull = load->gravity * read / load->speed;
+    *isolated = read / pulse_model_make(-log(other), pull, true, load->separation).length;
+    return *isolated > 0;
 }

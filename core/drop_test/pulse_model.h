@@ -1,4 +1,5 @@
-// The force of one linear contact with damping over the time since it began, without dimensions.
+// One linear contact with damping and gravity: its force over the time since it began, without
+// dimensions; the effect of gravity on e and T_c of a drop, and its correction.
 #ifndef CORE_DROP_TEST_PULSE_MODEL_H
 #define CORE_DROP_TEST_PULSE_MODEL_H
 
@@ -17,11 +18,9 @@ typedef struct PulseModel {
     double length;       // of the contact with gravity [T_c]; 1 without, INFINITY: it does not end
 } PulseModel;
 
-// `pull` is g T_c / v0 of the gravity that acts during contact; 0: none.
-PulseModel pulse_model_make(double decay, double pull, int separation);
-
-// The same with `pull` as g / v0 times the duration of the contact, length * T_c.
-PulseModel pulse_model_make_lasting(double decay, double pull, int separation);
+// `pull` is g T_c / v0 of the gravity that acts during contact, 0: none; or, if is_total, g / v0
+// times the duration of the contact, length * T_c.
+PulseModel pulse_model_make(double decay, double pull, bool is_total, int separation);
 
 // F at s [m_e v0 / T_c].
 double pulse_model_force(const PulseModel *model, double s);
@@ -35,5 +34,32 @@ typedef struct PulseVisible {
     double from, pressed, to;
 } PulseVisible;
 PulseVisible pulse_model_visible(const PulseModel *model, double level);
+
+// Gravity that presses the impactor into the buffer, and how the rebound was read.
+typedef struct GravityLoad {
+    double gravity; // [m/s^2]
+    double speed;   // of approach [m/s]
+    Separation separation;
+    bool is_by_height; // the rebound speed is that above the buffer at rest, not at separation
+} GravityLoad;
+
+// e and T_c [s] with gravity; e is 0 and T_c INFINITY where the contact does not end.
+typedef struct GravityContact {
+    double restitution, contact_time;
+} GravityContact;
+GravityContact gravity_apply(const GravityLoad *load, double restitution, double contact_time);
+
+// e and T_c [s] of the isolated pair from those that were read, with relative standard
+// uncertainties, which may be NAN. False: no contact with 0 < e <= 1 has these readings.
+typedef struct GravityCorrected {
+    double restitution, contact_time;
+    double restitution_uncertainty, contact_time_uncertainty; // relative
+} GravityCorrected;
+bool gravity_correct(const GravityLoad *load, const GravityCorrected *read,
+                     GravityCorrected *isolated);
+
+// T_c or e of the isolated pair from the reading of it and the isolated pair's value of the other.
+bool gravity_correct_one(const GravityLoad *load, bool is_time, double read, double other,
+                         double *isolated);
 
 #endif

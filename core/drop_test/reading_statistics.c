@@ -345,7 +345,7 @@ static void statistic_set_spread(const Reading *readings, size_t count, double *
 }
 
 Status reading_statistics_run(Reading *readings, size_t count, const char *name, const char *unit,
-                              Statistic *statistic, Problem *problem) {
+                              Statistic *statistic) {
     *statistic = (Statistic){.why = NULL};
     fields_clear(reading_statistic_fields, statistic);
     statistic->count = count;
@@ -376,6 +376,5 @@ Status reading_statistics_run(Reading *readings, size_t count, const char *name,
     if (is_made && count > 2)
         statistic_set_outliers(readings, count, scratch, statistic);
     free(scratch);
-    return is_made ? STATUS_OK
-                   : problem_set(problem, STATUS_NO_MEMORY, "no memory for the evaluation");
+    return status_made(is_made);
 }

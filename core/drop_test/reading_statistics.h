@@ -55,6 +55,6 @@ extern const Field reading_statistic_fields[];
 // `unit` are words of its sentences ("contact time", " s"). STATUS_NO_MEMORY. Released by
 // fields_clear.
 Status reading_statistics_run(Reading *readings, size_t count, const char *name, const char *unit,
-                              Statistic *statistic, Problem *problem);
+                              Statistic *statistic);
 
 #endif

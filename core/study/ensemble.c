@@ -113,15 +113,6 @@ static const Field ensemble_answer_fields[] = {
 };
 // clang-format on
 
-RunStatistic *ensemble_statistic(EnsembleStatistics *statistics, int metric) {
-    RunStatistic *const all[] = {
-        &statistics->peak_displacement, &statistics->rms_displacement,
-        &statistics->peak_acceleration, &statistics->rms_acceleration,
-        &statistics->impacts,           &statistics->peak_contact_force,
-    };
-    return all[metric];
-}
-
 static Status ensemble_check_seeds(const EnsembleStudy *study, Problem *problem) {
     if (!((double)study->first_seed + (double)(study->runs - 1) > 0x1p53 - 1))
         return STATUS_OK;
@@ -161,11 +152,10 @@ static Status ensemble_complete(void *request, const Simulation *simulation,
 
 // Of all runs: how many of them a target needs is unknown before the first are made.
 static Status ensemble_cost(const void *request, const Simulation *simulation,
-                            const SimulationLimits *limits, double *steps, Problem *problem) {
+                            const SimulationLimits *limits, double *steps) {
     const EnsembleStudy *study = request;
     Simulation member = *simulation; // a borrowed view
     (void)limits;
-    (void)problem;
     member.output.channels = (Texts){NULL, 0};
     *steps = (double)study->runs * simulation_cost(&member).steps;
     return STATUS_OK;
@@ -181,9 +171,8 @@ typedef struct EnsembleWork {
     size_t check;  // ended runs at the next check of the target
 } EnsembleWork;
 
-Status ensemble_scene(const Simulation *simulation, uint64_t seed, Simulation *target,
-                      Problem *problem) {
-    TRY(study_run_copy(simulation, target, problem));
+Status ensemble_scene(const Simulation *simulation, uint64_t seed, Simulation *target) {
+    TRY(study_run_copy(simulation, target));
     ((ExcitationRandom *)(void *)target->scene.excitation)->seed = seed;
     return STATUS_OK;
 }
@@ -192,7 +181,8 @@ static Status ensemble_member_scene(const void *of, size_t member, Simulation *s
                                     StudyPart *part, Problem *problem) {
     const EnsembleWork *work = of;
     (void)part;
-    return ensemble_scene(work->work.simulation, work->study->first_seed + member, scene, problem);
+    (void)problem;
+    return ensemble_scene(work->work.simulation, work->study->first_seed + member, scene);
 }
 
 static bool ensemble_has_target(const EnsembleWork *work) {
@@ -205,7 +195,7 @@ static size_t ensemble_ended(const EnsembleWork *work) {
 
 // Checks the error and predicts the number of runs, all of which are then wanted. Runs that failed
 // do not belong to the population.
-static Status ensemble_check_target(EnsembleWork *work, Problem *problem) {
+static Status ensemble_check_target(EnsembleWork *work) {
     EnsembleTarget *target = &work->answer->target;
     const size_t failed = (size_t)work->answer->failed, count = ensemble_ended(work),
                  all = (size_t)work->study->runs - failed;
@@ -213,7 +203,7 @@ static Status ensemble_check_target(EnsembleWork *work, Problem *problem) {
     if (work->study->metric == STATISTICS_PSD)
         spread = spectrum_accumulator_spread(&work->sums, all);
     else
-        TRY(statistics_spread(&work->answer->table, work->study->metric, &spread, problem));
+        TRY(statistics_spread(&work->answer->table, work->study->metric, &spread));
     // A metric that is unknown in every run has no mean.
     target->estimated_error =
         spread.count > 0 ? stopping_rule_error(&spread, count, all) : (double)NAN;
@@ -246,11 +236,11 @@ static void ensemble_extend(EnsembleWork *ensemble) {
         work->expected = work->wanted;
 }
 
-static Status ensemble_fold(void *of, size_t member, StudyPart *part, Problem *problem) {
+static Status ensemble_fold(void *of, size_t member, StudyPart *part) {
     EnsembleWork *work = of;
     Ensemble *answer = work->answer;
     const uint64_t seed = work->study->first_seed + member;
-    TRY(run_table_add(&answer->table, &part->run, seed, problem));
+    TRY(run_table_add(&answer->table, &part->run, seed));
     RunRecord *run = &answer->table.at[member];
     answer->made++;
     if (run->why != NULL) {
@@ -260,7 +250,7 @@ static Status ensemble_fold(void *of, size_t member, StudyPart *part, Problem *p
         if (!work->has_force)
             run->summary.peak_contact_force = (double)NAN;
         const size_t kept = work->study->metric == STATISTICS_PSD ? SPECTRUM_ACCUMULATOR_FIRST : 0;
-        TRY(spectrum_accumulator_add(&work->sums, &part->spectrum, kept, problem));
+        TRY(spectrum_accumulator_add(&work->sums, &part->spectrum, kept));
         if (work->like.densities.count == 0) {
             work->like = part->spectrum;
             part->spectrum = (Spectrum){0};
@@ -269,12 +259,12 @@ static Status ensemble_fold(void *of, size_t member, StudyPart *part, Problem *p
     if (!ensemble_has_target(work))
         return STATUS_OK;
     if (answer->made == answer->runs || ensemble_ended(work) >= work->check)
-        return ensemble_check_target(work, problem);
+        return ensemble_check_target(work);
     ensemble_extend(work);
     return STATUS_OK;
 }
 
-static Status ensemble_fill_target(const EnsembleWork *work, Problem *problem) {
+static Status ensemble_fill_target(const EnsembleWork *work) {
     EnsembleTarget *target = &work->answer->target;
     const char *name = statistics_metric_names[work->study->metric];
     const unsigned long long made = (unsigned long long)work->answer->made,
@@ -283,7 +273,7 @@ static Status ensemble_fill_target(const EnsembleWork *work, Problem *problem) {
     target->metric = work->study->metric;
     target->confidence = STOPPING_RULE_CONFIDENCE;
     target->is_kept = target->estimated_error <= target->error;
-    return study_status(
+    return status_made(
         isnan(target->estimated_error)
             ? text_format(&target->why, "none of the %llu runs ended with a known %s", all, name)
         : made == all
@@ -295,8 +285,7 @@ static Status ensemble_fill_target(const EnsembleWork *work, Problem *problem) {
                           "%llu of %llu runs keep the mean of %s within %g of that of all: within "
                           "%.2g with %g %% confidence",
                           made, all, name, target->error, target->estimated_error,
-                          100 * target->confidence),
-        problem);
+                          100 * target->confidence));
 }
 
 static Status ensemble_end(void *of, const StudyTools *tools, Problem *problem) {
@@ -304,12 +293,11 @@ static Status ensemble_end(void *of, const StudyTools *tools, Problem *problem) 
     Ensemble *answer = work->answer;
     (void)tools;
     if (ensemble_has_target(work))
-        TRY(ensemble_fill_target(work, problem));
+        TRY(ensemble_fill_target(work));
     for (int metric = 0; metric < STATISTICS_METRICS; metric++)
-        TRY(statistics_fill(&answer->table, metric, ensemble_statistic(&answer->statistics, metric),
-                            problem));
+        TRY(statistics_fill(&answer->table, metric, &answer->statistics.of[metric]));
     statistics_trust(&answer->table, &answer->trust);
-    TRY(study_failures_fill(&answer->table, &answer->failures, problem));
+    TRY(study_failures_fill(&answer->table, &answer->failures));
     return spectrum_accumulator_report(&work->sums, &work->like, false, NULL, &answer->frequency,
                                        &answer->spectra, problem);
 }

@@ -3,9 +3,7 @@
 #ifndef CORE_STUDY_ENSEMBLE_H
 #define CORE_STUDY_ENSEMBLE_H
 
-#include "core/study/spectrum_accumulator.h"
 #include "core/study/statistics.h"
-#include "core/study/study.h"
 
 // The request.
 typedef struct EnsembleStudy {
@@ -16,12 +14,13 @@ typedef struct EnsembleStudy {
     int metric;          // StatisticsMetric of the target; CHOICE_ABSENT without one
 } EnsembleStudy;
 
-typedef struct EnsembleStatistics {
-    RunStatistic peak_displacement, rms_displacement, peak_acceleration, rms_acceleration, impacts,
-        peak_contact_force;
+typedef union EnsembleStatistics {
+    struct {
+        RunStatistic peak_displacement, rms_displacement, peak_acceleration, rms_acceleration,
+            impacts, peak_contact_force;
+    };
+    RunStatistic of[STATISTICS_METRICS];
 } EnsembleStatistics;
-
-RunStatistic *ensemble_statistic(EnsembleStatistics *statistics, int metric);
 
 // Result of the target; all absent without one.
 typedef struct EnsembleTarget {
@@ -53,7 +52,6 @@ typedef struct Ensemble {
 
 // The scene of one run: with this seed and without sampled channels. `simulation` must have a
 // random base; `target` is cleared by simulation_clear in any case.
-Status ensemble_scene(const Simulation *simulation, uint64_t seed, Simulation *target,
-                      Problem *problem);
+Status ensemble_scene(const Simulation *simulation, uint64_t seed, Simulation *target);
 
 #endif

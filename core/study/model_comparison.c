@@ -58,7 +58,7 @@ static const Field compare_trace_fields[] = {
     FIELD_END
 };
 
-const Field compare_entry_fields[] = {
+static const Field compare_entry_fields[] = {
     FIELD_TEXT(CompareEntry, name, 0, PRESENCE_OPTIONAL, 0, "name for display"),
     FIELD_TEXT(CompareEntry, contact_model, 0, PRESENCE_OPTIONAL, 0, "contact model"),
     FIELD_CHOICE(CompareEntry, separation, separation_names, OPTIONAL, "rule by which its contacts end; unknown if the model needs none"),
@@ -95,7 +95,7 @@ static Status comparison_check_models(const CompareStudy *study, Problem *proble
     for (size_t i = 0, count = 0; contacts[i] != NULL && count < NAMES_MAX; i++)
         if (contacts[i]->form != CONTACT_CHOSEN)
             names[count++] = contacts[i]->kind.name;
-    return study_run_check_names(&study->models, names, "/study/models", problem);
+    return study_run_check_names(&study->models, names, "models", problem);
 }
 
 static Status comparison_check_storey(CompareStudy *study, const Simulation *simulation,
@@ -123,23 +123,22 @@ static const ContactLaw *comparison_scene_law(const Simulation *simulation) {
 }
 
 // Defaults are written out, so that equal studies have one canonical form.
-static Status comparison_fill_names(CompareStudy *study, const Simulation *simulation,
-                                    Problem *problem) {
+static Status comparison_fill_names(CompareStudy *study, const Simulation *simulation) {
     const bool has_models = study->models.count > 0, has_rules = study->separations.count > 0;
     const int own = scene_contact(&simulation->scene)->separation;
     if (has_models && has_rules)
         return STATUS_OK;
     if (has_models)
-        return study_add_text(
-            separation_names[own != CHOICE_ABSENT ? own : SEPARATION_ZERO_PENETRATION],
-            &study->separations, problem);
+        return texts_append(
+            &study->separations,
+            separation_names[own != CHOICE_ABSENT ? own : SEPARATION_ZERO_PENETRATION]);
     if (has_rules)
-        return study_add_text(comparison_scene_law(simulation)->kind.name, &study->models, problem);
+        return texts_append(&study->models, comparison_scene_law(simulation)->kind.name);
     for (size_t i = 0; contacts[i] != NULL; i++)
         if (contacts[i]->form != CONTACT_CHOSEN)
-            TRY(study_add_text(contacts[i]->kind.name, &study->models, problem));
+            TRY(texts_append(&study->models, contacts[i]->kind.name));
     for (int i = 0; separation_names[i] != NULL; i++)
-        TRY(study_add_text(separation_names[i], &study->separations, problem));
+        TRY(texts_append(&study->separations, separation_names[i]));
     return STATUS_OK;
 }
 
@@ -153,7 +152,7 @@ static Status comparison_complete(void *request, const Simulation *simulation,
     const Status models = comparison_check_models(study, problem);
     const Status storey = comparison_check_storey(study, simulation, problem);
     const Status band = comparison_check_band(study, problem);
-    TRY(comparison_fill_names(study, simulation, problem));
+    TRY(comparison_fill_names(study, simulation));
     const SpectrumRequest *psd = &simulation->output.psd;
     const double variants = (double)study->models.count + (double)study->separations.count;
     const double values = psd->channels.count > 0 ? (double)(psd->segment / 2 + 1) * variants : 0;
@@ -163,8 +162,7 @@ static Status comparison_complete(void *request, const Simulation *simulation,
 }
 
 // A rule of separation belongs to linear contacts alone: any other law makes one entry.
-static Status comparison_add(CompareEntries *entries, const ContactLaw *law, int separation,
-                             Problem *problem) {
+static Status comparison_add(CompareEntries *entries, const ContactLaw *law, int separation) {
     char name[96];
     if (law->form != CONTACT_LINEAR)
         separation = CHOICE_ABSENT;
@@ -174,30 +172,28 @@ static Status comparison_add(CompareEntries *entries, const ContactLaw *law, int
             return STATUS_OK;
     if (entries->count == ENTRIES_MAX)
         return STATUS_OK;
-    CompareEntry *entry = study_list_add(entries, sizeof *entry, problem);
-    if (entry == NULL)
-        return STATUS_NO_MEMORY;
+    CompareEntry *entry = study_list_add(entries, sizeof *entry);
+    TRY(status_made(entry != NULL));
     (void)fields_default(compare_entry_fields, entry); // absent and 0: nothing to allocate
     entry->separation = separation;
     snprintf(name, sizeof name, "%s%s%s", law->kind.name, separation == CHOICE_ABSENT ? "" : ", ",
              separation == CHOICE_ABSENT ? "" : separation_names[separation]);
-    TRY(study_copy_text(name, &entry->name, problem));
-    return study_copy_text(law->kind.name, &entry->contact_model, problem);
+    TRY(study_copy_text(name, &entry->name));
+    return study_copy_text(law->kind.name, &entry->contact_model);
 }
 
 // The entries of a completed study without results; the first is the scene as it is.
 static Status comparison_list(const CompareStudy *study, const Simulation *simulation,
-                              CompareEntries *entries, Problem *problem) {
+                              CompareEntries *entries) {
     TRY(comparison_add(entries, comparison_scene_law(simulation),
-                       scene_contact(&simulation->scene)->separation, problem));
+                       scene_contact(&simulation->scene)->separation));
     for (size_t i = 0; i < study->models.count; i++) {
         const Kind *kind = kind_find(&contact_kinds, study->models.at[i]);
         for (size_t k = 0; k < study->separations.count && kind != NULL; k++) {
             int separation = 0;
             while (strcmp(separation_names[separation], study->separations.at[k]) != 0)
                 separation++;
-            TRY(comparison_add(entries, (const ContactLaw *)(const void *)kind, separation,
-                               problem));
+            TRY(comparison_add(entries, (const ContactLaw *)(const void *)kind, separation));
         }
     }
     return STATUS_OK;
@@ -211,8 +207,7 @@ static Status comparison_set_contact(Simulation *target, const ContactLaw *law, 
     if (law->form == CONTACT_IMPULSIVE)
         return impulse_variant_apply(target, problem);
     Variant *contact = variant_new(&law->kind);
-    if (contact == NULL)
-        return study_no_memory(problem);
+    TRY(status_made(contact != NULL));
     if (law->form == CONTACT_LINEAR)
         ((Contact *)(void *)contact)->separation = separation;
     variant_free(target->scene.contact);
@@ -221,11 +216,11 @@ static Status comparison_set_contact(Simulation *target, const ContactLaw *law, 
 }
 
 static Status comparison_set_channel(const Scene *scene, ChannelId channel, uint64_t storey,
-                                     Texts *names, Problem *problem) {
+                                     Texts *names) {
     char name[CHANNEL_NAME];
     channel_names_write(scene, channel, (size_t)storey, name);
     texts_clear(names);
-    return study_add_text(name, names, problem);
+    return texts_append(names, name);
 }
 
 // The simulation under an entry's contact, with the compared channels as its output.
@@ -234,22 +229,22 @@ static Status comparison_apply(const CompareStudy *study, const Simulation *simu
                                Simulation *target, Problem *problem) {
     const Kind *kind = kind_find(&contact_kinds, entry->contact_model);
     Output *output = &target->output;
-    TRY(study_run_copy(simulation, target, problem));
-    TRY(study_run_fix_solver(target, problem));
+    TRY(study_run_copy(simulation, target));
+    TRY(study_run_fix_solver(target));
     TRY(comparison_set_contact(target, (const ContactLaw *)(const void *)kind, entry->separation,
                                problem));
     TRY(comparison_set_channel(&target->scene, CHANNEL_DISPLACEMENT, study->storey,
-                               &output->channels, problem));
+                               &output->channels));
     TRY(comparison_set_channel(&target->scene, CHANNEL_MEAN_ACCELERATION, study->storey,
-                               &output->psd.channels, problem));
+                               &output->psd.channels));
     output->impacts = true;
     return simulation_complete(target, limits, NULL, problem);
 }
 
 static Status comparison_cost(const void *request, const Simulation *simulation,
-                              const SimulationLimits *limits, double *steps, Problem *problem) {
+                              const SimulationLimits *limits, double *steps) {
     Comparison answer = {0};
-    Status status = comparison_list(request, simulation, &answer.entries, problem);
+    Status status = comparison_list(request, simulation, &answer.entries);
     *steps = 0;
     for (size_t i = 0; i < answer.entries.count && status == STATUS_OK; i++) {
         Simulation member = {0};
@@ -258,7 +253,7 @@ static Status comparison_cost(const void *request, const Simulation *simulation,
         if (applied == STATUS_OK)
             *steps += simulation_cost(&member).steps;
         else if (applied == STATUS_NO_MEMORY)
-            status = study_no_memory(problem);
+            status = STATUS_NO_MEMORY;
         simulation_clear(&member);
     }
     fields_clear(compare_answer_fields, &answer);
@@ -334,7 +329,7 @@ static Signal comparison_displacement(const Outcome *outcome) {
 }
 
 static Status comparison_fill_divergence(const CompareWork *work, const Outcome *outcome,
-                                         CompareEntry *entry, Problem *problem) {
+                                         CompareEntry *entry) {
     CompareDivergence *divergence = &entry->divergence;
     const double percent = 100 * work->study->part, time = entry->displacement.parting;
     const double horizon =
@@ -342,7 +337,7 @@ static Status comparison_fill_divergence(const CompareWork *work, const Outcome 
     divergence->time = time;
     divergence->horizon = horizon;
     divergence->is_trusted = !isnan(time) && !(time > horizon);
-    return study_status(
+    return status_made(
         isnan(time) ? text_format(&divergence->why,
                                   "the displacements never differ by more than %g %% of the "
                                   "largest within the run",
@@ -357,20 +352,18 @@ static Status comparison_fill_divergence(const CompareWork *work, const Outcome 
                           "the displacements differ by more than %g %% of the largest from %.6g s "
                           "on, beyond the trust horizon of %.6g s: rounding alone may be the "
                           "cause, compare statistics",
-                          percent, time, horizon),
-        problem);
+                          percent, time, horizon));
 }
 
-static Status comparison_fill_trace(const Signal *signal, size_t bucket, CompareTrace *trace,
-                                    Problem *problem) {
+static Status comparison_fill_trace(const Signal *signal, size_t bucket, CompareTrace *trace) {
     for (size_t from = 0; from < signal->count; from += bucket) {
         double min = INFINITY, max = -INFINITY;
         for (size_t k = from; k < signal->count && k < from + bucket; k++) {
             min = fmin(min, signal->values[k]);
             max = fmax(max, signal->values[k]);
         }
-        TRY(study_add_real(min, &trace->minimum, problem));
-        TRY(study_add_real(max, &trace->maximum, problem));
+        TRY(study_add_real(min, &trace->minimum));
+        TRY(study_add_real(max, &trace->maximum));
     }
     return STATUS_OK;
 }
@@ -393,12 +386,11 @@ static Status comparison_measure(const CompareWork *work, const Outcome *outcome
         band->count == 2 ? band->at[0] : (double)NAN, band->count == 2 ? band->at[1] : (double)NAN);
     entry->displacement = signal_comparison_measure(&from, &to, work->study->part, progress);
     TRY(study_advance(progress, 1, problem));
-    TRY(comparison_fill_divergence(work, outcome, entry, problem));
-    if (fields_copy(rows, &outcome->plan, &plan) != STATUS_OK)
-        return study_no_memory(problem);
+    TRY(comparison_fill_divergence(work, outcome, entry));
+    TRY(fields_copy(rows, &outcome->plan, &plan));
     entry->derived = plan.derived;
-    TRY(study_copy_reals(density, spectrum->densities.rows, &entry->density, problem));
-    return comparison_fill_trace(&to, (size_t)work->answer->trace_samples, &entry->trace, problem);
+    TRY(study_copy_reals(density, spectrum->densities.rows, &entry->density));
+    return comparison_fill_trace(&to, (size_t)work->answer->trace_samples, &entry->trace);
 }
 
 static Status comparison_scene(const void *of, size_t member, Simulation *scene, StudyPart *made,
@@ -422,13 +414,12 @@ static void comparison_clear(StudyPart *made) {
     fields_clear(compare_entry_fields, &part->entry);
 }
 
-static Status comparison_fold(void *of, size_t member, StudyPart *made, Problem *problem) {
+static Status comparison_fold(void *of, size_t member, StudyPart *made) {
     const CompareWork *work = of;
     ComparePart *part = (ComparePart *)(void *)made;
     RunRecord *run = &part->part.run;
     CompareEntry *entry = &work->answer->entries.at[member + 1];
     const CompareEntry listed = *entry;
-    (void)problem;
     *entry = part->entry;
     entry->name = listed.name;
     entry->contact_model = listed.contact_model;
@@ -474,7 +465,7 @@ static Status comparison_begin(void *of, const StudyTools *tools, Problem *probl
     Comparison *answer = work->answer = work->work.answer;
     answer->storey = study->storey;
     answer->part = study->part;
-    TRY(comparison_list(study, work->work.simulation, &answer->entries, problem));
+    TRY(comparison_list(study, work->work.simulation, &answer->entries));
     TRY(comparison_run_reference(work, tools, problem));
     const Outcome *reference = work->reference;
     const Columns *densities = &reference->spectrum.densities;
@@ -483,10 +474,9 @@ static Status comparison_begin(void *of, const StudyTools *tools, Problem *probl
     if (answer->trace_samples < 1)
         answer->trace_samples = 1;
     answer->trace_rate = reference->response.sample_rate / (double)answer->trace_samples;
-    TRY(study_copy_text(densities->at[0].name, &answer->channel, problem));
-    TRY(study_copy_text(densities->at[0].unit, &answer->unit, problem));
-    TRY(study_copy_reals(reference->spectrum.frequency, densities->rows, &answer->frequency,
-                         problem));
+    TRY(study_copy_text(densities->at[0].name, &answer->channel));
+    TRY(study_copy_text(densities->at[0].unit, &answer->unit));
+    TRY(study_copy_reals(reference->spectrum.frequency, densities->rows, &answer->frequency));
     first->steps = reference->steps;
     first->summary = reference->summary;
     TRY(comparison_measure(work, reference, tools->progress, first, problem));

@@ -83,6 +83,6 @@ typedef struct Comparison {
     CompareEntries entries;
 } Comparison;
 
-extern const Field compare_entry_fields[], compare_contacts_fields[], compare_differences_fields[];
+extern const Field compare_contacts_fields[], compare_differences_fields[];
 
 #endif

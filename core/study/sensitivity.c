@@ -10,9 +10,323 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/base/json_pointer.h"
+#include "core/base/philox.h"
 #include "core/contact/identification.h"
 
 enum { RUNS_MAX = 2000, RUNS_DEFAULT = 200, DEVIATIONS_MAX = 1000 };
+
+// Every change starts from the numbers of the original scene, so that changes are independent.
+enum { BUFFERS = 3, DRAWS_MAX = 64, STREAM = 0x53454e53 };
+
+const char *const sensitivity_parameter_names[] = {
+    "restitution", "contact_time", "stiffness", "damping", "mass", "clearance", NULL};
+
+static Buffer *perturbation_buffer(const Damper *damper, size_t index) {
+    static const size_t offsets[BUFFERS] = {offsetof(Damper, buffer), offsetof(Damper, left_buffer),
+                                            offsetof(Damper, right_buffer)};
+    return (Buffer *)(void *)((char *)damper + offsets[index]);
+}
+
+// The numbers of a parameter in one buffer and the rows of its table, or in its damper, from 0;
+// NULL beyond the last.
+static double *perturbation_number(const Damper *damper, size_t buffer, int parameter,
+                                   size_t index) {
+    static const size_t offsets[] = {
+        [SENSITIVITY_RESTITUTION] = offsetof(Buffer, restitution),
+        [SENSITIVITY_CONTACT_TIME] = offsetof(Buffer, contact_time),
+        [SENSITIVITY_STIFFNESS] = offsetof(Buffer, stiffness),
+        [SENSITIVITY_DAMPING] = offsetof(Buffer, damping),
+        [SENSITIVITY_MASS] = offsetof(Damper, mass),
+        [SENSITIVITY_CLEARANCE] = offsetof(Damper, clearance),
+    };
+    Buffer *of = perturbation_buffer(damper, buffer);
+    const bool is_dampers = parameter >= SENSITIVITY_MASS;
+    if (index == 0 && !(is_dampers && buffer > 0))
+        return (double *)(void *)((is_dampers ? (char *)damper : (char *)of) + offsets[parameter]);
+    if (parameter > SENSITIVITY_CONTACT_TIME || index > of->table.count)
+        return NULL;
+    ContactRow *row = &of->table.at[index - 1];
+    return parameter == SENSITIVITY_RESTITUTION ? &row->restitution : &row->contact_time;
+}
+
+// The largest of them; NAN: none.
+static double perturbation_buffer_max(const Damper *damper, size_t buffer, int parameter) {
+    double max = (double)NAN;
+    const double *number;
+    for (size_t i = 0; (number = perturbation_number(damper, buffer, parameter, i)) != NULL; i++)
+        max = fmax(max, *number);
+    return max;
+}
+
+// The same of the scene.
+static double perturbation_max(const Simulation *simulation, int parameter) {
+    const Dampers *dampers = &simulation->scene.dampers;
+    double max = (double)NAN;
+    for (size_t i = 0; i < BUFFERS * dampers->count; i++)
+        max = fmax(max, perturbation_buffer_max(&dampers->at[i / BUFFERS], i % BUFFERS, parameter));
+    return max;
+}
+
+const char *perturbation_refuse(const Simulation *simulation, int parameter) {
+    const Dampers *dampers = &simulation->scene.dampers;
+    const ContactLaw *law = dampers_contact_law(dampers, scene_contact(&simulation->scene));
+    const double max = perturbation_max(simulation, parameter);
+    if (isnan(max))
+        return "no buffer of the scene has it, or the contact model does not use it";
+    if (!(max > 0))
+        return "it is 0, which has no relative change";
+    // A law without loss has the restitution 1 and no other.
+    if (parameter == SENSITIVITY_RESTITUTION && law->form == CONTACT_POWER && law->factor == NULL)
+        return "the contact model gives all energy back";
+    for (size_t i = 0; i < dampers->count && parameter == SENSITIVITY_CLEARANCE; i++)
+        if (fabs(dampers->at[i].position) * 2 * (1 + 1e-9) >= dampers->at[i].clearance)
+            return "a free mass starts at a stop, which a smaller one would move past it";
+    return NULL;
+}
+
+double perturbation_max_step(const Simulation *simulation, int parameter, double step) {
+    return parameter == SENSITIVITY_RESTITUTION
+               ? fmax(0, fmin(step, 1 / perturbation_max(simulation, parameter) - 1))
+               : step;
+}
+
+static void perturbation_scale(const Damper *from, size_t buffer, int parameter, double factor,
+                               Damper *to) {
+    const double max = parameter == SENSITIVITY_RESTITUTION ? 1 : (double)INFINITY;
+    const double *number;
+    for (size_t i = 0; (number = perturbation_number(from, buffer, parameter, i)) != NULL; i++)
+        *perturbation_number(to, buffer, parameter, i) =
+            *number * factor > max ? max : *number * factor; // NAN remains
+}
+
+void perturbation_apply(const Simulation *simulation, int parameter, double factor,
+                        Simulation *target) {
+    const Dampers *dampers = &simulation->scene.dampers;
+    for (size_t i = 0; i < BUFFERS * dampers->count; i++)
+        perturbation_scale(&dampers->at[i / BUFFERS], i % BUFFERS, parameter, factor,
+                           &target->scene.dampers.at[i / BUFFERS]);
+}
+
+// Log-normal, of mean 1 and relative deviation s.
+static double perturbation_factor(double normal, double s) {
+    const double variance = log1p(s * s);
+    return exp(sqrt(variance) * normal - variance / 2);
+}
+
+// Draws the factors of restitution and contact time of one buffer, whose largest restitution is
+// `max`.
+static void perturbation_draw_factors(uint64_t seed, uint64_t run, size_t buffer, double max,
+                                      const double deviation[2], double factor[2]) {
+    for (uint64_t again = 0; again < DRAWS_MAX; again++) {
+        double normal[2];
+        philox_normal_pair(seed, STREAM + buffer, DRAWS_MAX * run + again, normal);
+        factor[0] = perturbation_factor(normal[0], deviation[0]);
+        if (again == 0)
+            factor[1] = perturbation_factor(normal[1], deviation[1]);
+        if (!(max * factor[0] > 1))
+            return;
+    }
+    factor[0] = 1 / max; // very rare: the restitution becomes 1
+}
+
+Status perturbation_draw(const InputUncertainty *uncertainty, uint64_t seed,
+                         const Simulation *simulation, uint64_t run, Simulation *target,
+                         Reals *restitution, Reals *contact_time) {
+    const Dampers *dampers = &simulation->scene.dampers;
+    size_t drawn = 0;
+    for (size_t i = 0; i < BUFFERS * dampers->count; i++) {
+        const size_t damper = i / BUFFERS, k = i % BUFFERS;
+        const Damper *from = &dampers->at[damper];
+        double deviation[2], factor[2];
+        if (!buffer_is_given(perturbation_buffer(from, k)))
+            continue;
+        for (int parameter = 0; parameter < 2; parameter++)
+            deviation[parameter] =
+                uncertainty_find(uncertainty, damper, (SensitivityBuffer)k, parameter);
+        perturbation_draw_factors(seed, run, drawn++,
+                                  perturbation_buffer_max(from, k, SENSITIVITY_RESTITUTION),
+                                  deviation, factor);
+        for (int parameter = 0; parameter < 2; parameter++)
+            if (deviation[parameter] > 0)
+                perturbation_scale(from, k, parameter, factor[parameter],
+                                   &target->scene.dampers.at[damper]);
+        TRY(study_add_real(factor[0], restitution));
+        TRY(study_add_real(factor[1], contact_time));
+    }
+    return STATUS_OK;
+}
+
+// Below, a parameter is SENSITIVITY_RESTITUTION or SENSITIVITY_CONTACT_TIME.
+
+static double uncertainty_recorded(const Buffer *buffer, int parameter) {
+    return parameter == SENSITIVITY_RESTITUTION ? buffer->test.restitution_deviation
+                                                : buffer->test.contact_time_deviation;
+}
+
+double uncertainty_find(const InputUncertainty *uncertainty, size_t damper,
+                        SensitivityBuffer buffer, int parameter) {
+    double found = uncertainty->common[parameter];
+    for (size_t i = 0; i < uncertainty->spread.count && isnan(found); i++) {
+        const InputDeviation *deviation = &uncertainty->spread.at[i];
+        if (deviation->damper == damper + 1 && deviation->buffer == (int)buffer)
+            found = deviation->of[parameter];
+    }
+    return isnan(found) ? 0 : found;
+}
+
+// Whether any number has a deviation.
+static bool uncertainty_exists(const InputUncertainty *uncertainty) {
+    bool exists = uncertainty->common[0] > 0 || uncertainty->common[1] > 0;
+    for (size_t i = 0; i < uncertainty->spread.count; i++)
+        exists =
+            exists || uncertainty->spread.at[i].of[0] > 0 || uncertainty->spread.at[i].of[1] > 0;
+    return exists;
+}
+
+// Fills the deviations that are recorded with the buffers' materials, where none is given for all.
+static Status uncertainty_fill_recorded(InputUncertainty *uncertainty,
+                                        const Simulation *simulation) {
+    const Dampers *dampers = &simulation->scene.dampers;
+    for (size_t i = 0; i < BUFFERS * dampers->count; i++) {
+        const Buffer *buffer = perturbation_buffer(&dampers->at[i / BUFFERS], i % BUFFERS);
+        double recorded[2];
+        for (int parameter = 0; parameter < 2; parameter++) {
+            recorded[parameter] = uncertainty_recorded(buffer, parameter);
+            if (!(recorded[parameter] > 0) || !isnan(uncertainty->common[parameter]) ||
+                perturbation_refuse(simulation, parameter) != NULL)
+                recorded[parameter] = (double)NAN;
+        }
+        if (buffer->material == NULL || (isnan(recorded[0]) && isnan(recorded[1])))
+            continue;
+        InputDeviation *added = study_list_add(&uncertainty->spread, sizeof *added);
+        TRY(status_made(added != NULL));
+        *added = (InputDeviation){.damper = i / BUFFERS + 1,
+                                  .buffer = (int)(i % BUFFERS),
+                                  .restitution = recorded[0],
+                                  .contact_time = recorded[1]};
+        TRY(study_copy_text(buffer->material, &added->source));
+    }
+    return STATUS_OK;
+}
+
+static Status uncertainty_check_number(const InputUncertainty *uncertainty,
+                                       const InputDeviation *deviation,
+                                       const Simulation *simulation, int parameter,
+                                       const char *place, Problem *problem) {
+    const double value = deviation->of[parameter];
+    const char *why = perturbation_refuse(simulation, parameter);
+    const char *name = sensitivity_parameter_names[parameter];
+    if (value > 0 && why != NULL)
+        return json_pointer_fault(problem, place, name, "must be left out: %s", why);
+    if (!isnan(value) && !isnan(uncertainty->common[parameter]))
+        return json_pointer_fault(problem, place, name,
+                                  "must be left out: %s_deviation gives it for all buffers", name);
+    if (value > 1)
+        return json_pointer_fault(
+            problem, place, name,
+            "is %.3g of its value, as %.64s records, and must be at most 1 to "
+            "be drawn from: give %s_deviation",
+            value, deviation->source, name);
+    return STATUS_OK;
+}
+
+// A source that is named must be the buffer's material, and the numbers must be its own.
+static Status uncertainty_check_source(const InputDeviation *deviation, const Buffer *buffer,
+                                       const char *place, Problem *problem) {
+    if (deviation->source == NULL)
+        return STATUS_OK;
+    if (!text_same(deviation->source, buffer->material))
+        return json_pointer_fault(
+            problem, place, "source",
+            "is not the material of that buffer: leave it out, or name its material and revision");
+    for (int parameter = 0; parameter < 2; parameter++) {
+        const double value = deviation->of[parameter],
+                     recorded = uncertainty_recorded(buffer, parameter);
+        if (!isnan(value) && value != recorded)
+            return json_pointer_fault(problem, place, sensitivity_parameter_names[parameter],
+                                      "is %.6g, but %.80s records %.6g: leave out the source",
+                                      value, deviation->source, recorded);
+    }
+    return STATUS_OK;
+}
+
+static Status uncertainty_check(const InputUncertainty *uncertainty, const Simulation *simulation,
+                                size_t index, Problem *problem) {
+    const Dampers *dampers = &simulation->scene.dampers;
+    const InputDeviation *deviation = &uncertainty->spread.at[index];
+    char place[sizeof((Fault){0}.pointer)];
+    json_pointer_index(place, sizeof place, "/study/spread", index);
+    if (deviation->damper > dampers->count)
+        return json_pointer_fault(problem, place, "damper", "must be the number of a damper");
+    const Buffer *buffer =
+        perturbation_buffer(&dampers->at[deviation->damper - 1], (size_t)deviation->buffer);
+    if (!buffer_is_given(buffer))
+        return json_pointer_fault(
+            problem, place, "buffer",
+            "is not given: if both stops have the same it is \"buffer\", else "
+            "\"left_buffer\" and \"right_buffer\"");
+    for (size_t i = 0; i < index; i++)
+        if (uncertainty->spread.at[i].damper == deviation->damper &&
+            uncertainty->spread.at[i].buffer == deviation->buffer)
+            return problem_add(problem, STATUS_INVALID, place,
+                               "names the buffer of another entry: give one each");
+    TRY(uncertainty_check_source(deviation, buffer, place, problem));
+    Status status = STATUS_OK;
+    for (int parameter = 0; parameter < 2; parameter++)
+        status =
+            study_first_failure(status, uncertainty_check_number(uncertainty, deviation, simulation,
+                                                                 parameter, place, problem));
+    return status;
+}
+
+static int uncertainty_compare(const void *a, const void *b) {
+    const InputDeviation *first = a, *second = b;
+    if (first->damper != second->damper)
+        return first->damper < second->damper ? -1 : 1;
+    return (first->buffer > second->buffer) - (first->buffer < second->buffer);
+}
+
+// Validates and completes it for a completed simulation, below "/study". A number without a
+// deviation is exact.
+static Status uncertainty_complete(InputUncertainty *uncertainty, const Simulation *simulation,
+                                   Problem *problem) {
+    InputDeviations *spread = &uncertainty->spread;
+    Status status = STATUS_OK;
+    if (spread->count == 0)
+        TRY(uncertainty_fill_recorded(uncertainty, simulation));
+    for (size_t i = 0; i < spread->count; i++)
+        status =
+            study_first_failure(status, uncertainty_check(uncertainty, simulation, i, problem));
+    TRY(status);
+    if (spread->count > 1)
+        qsort(spread->at, spread->count, sizeof *spread->at, uncertainty_compare);
+    for (int parameter = 0; parameter < 2; parameter++) {
+        bool is_exact = isnan(uncertainty->common[parameter]);
+        for (size_t i = 0; i < spread->count; i++)
+            is_exact = is_exact && isnan(spread->at[i].of[parameter]);
+        if (is_exact)
+            uncertainty->common[parameter] = 0;
+    }
+    return STATUS_OK;
+}
+
+// Validates the deviations that are given for all buffers at once.
+static Status uncertainty_check_common(const InputUncertainty *uncertainty,
+                                       const Simulation *simulation, Problem *problem) {
+    Status status = STATUS_OK;
+    for (int parameter = 0; parameter < 2; parameter++) {
+        const double deviation = uncertainty->common[parameter];
+        const char *why = deviation > 0 ? perturbation_refuse(simulation, parameter) : NULL;
+        if (why != NULL)
+            status = problem_add_real(problem, STATUS_INVALID,
+                                      parameter == SENSITIVITY_RESTITUTION
+                                          ? "/study/restitution_deviation"
+                                          : "/study/contact_time_deviation",
+                                      deviation, NULL, "must be left out: %s", why);
+    }
+    return status;
+}
 
 // clang-format off
 static const char *const sensitivity_buffer_names[] = {
@@ -192,7 +506,7 @@ static Status sensitivity_complete(void *request, const Simulation *simulation,
     const bool has_parameters = study->parameters.count > 0;
     for (int i = 0; i < SENSITIVITY_PARAMETERS && !has_parameters; i++)
         if (perturbation_refuse(simulation, i) == NULL)
-            TRY(study_add_text(sensitivity_parameter_names[i], &study->parameters, problem));
+            TRY(texts_append(&study->parameters, sensitivity_parameter_names[i]));
     return study_first_failure(deviations, runs);
 }
 
@@ -219,13 +533,13 @@ static int sensitivity_parameter(const char *name) {
     return parameter;
 }
 
-static Status sensitivity_copy(const Simulation *simulation, Simulation *target, Problem *problem) {
-    TRY(study_run_copy(simulation, target, problem));
-    return study_run_fix_solver(target, problem);
+static Status sensitivity_copy(const Simulation *simulation, Simulation *target) {
+    TRY(study_run_copy(simulation, target));
+    return study_run_fix_solver(target);
 }
 
 static Status sensitivity_cost(const void *request, const Simulation *simulation,
-                               const SimulationLimits *limits, double *steps, Problem *problem) {
+                               const SimulationLimits *limits, double *steps) {
     const SensitivityStudy *study = request;
     uint64_t runs = 1 + study->runs;
     Simulation member = {0};
@@ -233,7 +547,7 @@ static Status sensitivity_cost(const void *request, const Simulation *simulation
     for (size_t i = 0; i < study->parameters.count; i++)
         if (perturbation_refuse(simulation, sensitivity_parameter(study->parameters.at[i])) == NULL)
             runs += ROW_STEPS;
-    const Status status = sensitivity_copy(simulation, &member, problem);
+    const Status status = sensitivity_copy(simulation, &member);
     if (status == STATUS_OK)
         *steps = (double)runs * simulation_cost(&member).steps;
     simulation_clear(&member);
@@ -252,7 +566,8 @@ static double sensitivity_step_up(const SensitivityWork *work, int parameter, si
 static Status sensitivity_scene(const void *of, size_t member, Simulation *scene, StudyPart *part,
                                 Problem *problem) {
     const SensitivityWork *work = of;
-    TRY(sensitivity_copy(work->simulation, scene, problem));
+    (void)problem;
+    TRY(sensitivity_copy(work->simulation, scene));
     if (member < work->steps) {
         const int parameter = work->answer->response.at[work->rows[member / ROW_STEPS]].parameter;
         const size_t step = member % ROW_STEPS / SIDES;
@@ -263,28 +578,26 @@ static Status sensitivity_scene(const void *of, size_t member, Simulation *scene
     }
     return perturbation_draw(&work->study->uncertainty, work->study->seed, work->simulation,
                              member - work->steps + 1, scene, &part->run.restitution,
-                             &part->run.contact_time, problem);
+                             &part->run.contact_time);
 }
 
-static Status sensitivity_fold_draw(SensitivityWork *work, size_t index, StudyPart *part,
-                                    Problem *problem) {
+static Status sensitivity_fold_draw(SensitivityWork *work, size_t index, StudyPart *part) {
     Sensitivity *answer = work->answer;
-    TRY(run_table_add(&answer->table, &part->run, index + 1, problem));
+    TRY(run_table_add(&answer->table, &part->run, index + 1));
     answer->made++;
     if (answer->table.at[index].why == NULL)
-        return spectrum_accumulator_add(&work->sums, &part->spectrum, (size_t)work->study->runs,
-                                        problem);
+        return spectrum_accumulator_add(&work->sums, &part->spectrum, (size_t)work->study->runs);
     answer->failed++;
     return STATUS_OK;
 }
 
-static Status sensitivity_fold(void *of, size_t member, StudyPart *part, Problem *problem) {
+static Status sensitivity_fold(void *of, size_t member, StudyPart *part) {
     SensitivityWork *work = of;
     RunRecord *run = &part->run;
     if (run->why == NULL)
         work->answer->steps += run->steps;
     if (member >= work->steps)
-        return sensitivity_fold_draw(work, member - work->steps, part, problem);
+        return sensitivity_fold_draw(work, member - work->steps, part);
     for (int metric = 0; metric < STATISTICS_METRICS; metric++)
         work->values[member][metric] = statistics_value(&run->summary, metric);
     if (run->why != NULL) {
@@ -320,10 +633,10 @@ static void sensitivity_fill_slope(const double quotients[SENSITIVITY_STEPS],
         slope->spread <= fmax(settled_part * fmax(fabs(min), fabs(max)), settled_min);
 }
 
-static Status sensitivity_fill_row(const SensitivityWork *work, size_t index, Problem *problem) {
+static Status sensitivity_fill_row(const SensitivityWork *work, size_t index) {
     SensitivityRow *row = &work->answer->response.at[work->rows[index]];
     for (size_t step = 0; step < SENSITIVITY_STEPS; step++)
-        TRY(study_add_real(sensitivity_step(work, step), &row->steps, problem));
+        TRY(study_add_real(sensitivity_step(work, step), &row->steps));
     for (int metric = 0; metric < STATISTICS_METRICS; metric++) {
         const double value = statistics_value(&work->own->summary, metric);
         double quotients[SENSITIVITY_STEPS];
@@ -336,27 +649,25 @@ static Status sensitivity_fill_row(const SensitivityWork *work, size_t index, Pr
             quotients[step] = sensitivity_quotient(work->values[low][metric],
                                                    work->values[low + 1][metric], value, width);
         }
-        SensitivitySlope *slope = study_list_add(&row->slopes, sizeof *slope, problem);
-        if (slope == NULL)
-            return STATUS_NO_MEMORY;
+        SensitivitySlope *slope = study_list_add(&row->slopes, sizeof *slope);
+        TRY(status_made(slope != NULL));
         *slope = (SensitivitySlope){metric, value, (double)NAN, (double)NAN, false};
         sensitivity_fill_slope(quotients, slope);
     }
     return STATUS_OK;
 }
 
-static Status sensitivity_fill_statistics(const SensitivityWork *work, Problem *problem) {
+static Status sensitivity_fill_statistics(const SensitivityWork *work) {
     Sensitivity *answer = work->answer;
     static const RunTable none = {NULL, 0};
     for (int metric = 0; metric < STATISTICS_METRICS; metric++) {
         const bool is_known = metric != STATISTICS_PEAK_CONTACT_FORCE || work->has_force;
-        RunStatistic *statistic = study_list_add(&answer->statistics, sizeof *statistic, problem);
-        if (statistic == NULL)
-            return STATUS_NO_MEMORY;
+        RunStatistic *statistic = study_list_add(&answer->statistics, sizeof *statistic);
+        TRY(status_made(statistic != NULL));
         (void)fields_default(sensitivity_statistic_fields, statistic); // nothing to allocate
         if (is_known)
             statistic->value = statistics_value(&work->own->summary, metric);
-        TRY(statistics_fill(is_known ? &answer->table : &none, metric, statistic, problem));
+        TRY(statistics_fill(is_known ? &answer->table : &none, metric, statistic));
     }
     return STATUS_OK;
 }
@@ -365,11 +676,11 @@ static Status sensitivity_end(void *of, const StudyTools *tools, Problem *proble
     const SensitivityWork *work = of;
     Sensitivity *answer = work->answer;
     for (size_t i = 0; i < work->steps / ROW_STEPS; i++)
-        TRY(sensitivity_fill_row(work, i, problem));
+        TRY(sensitivity_fill_row(work, i));
     if (work->study->runs == 0)
         return STATUS_OK;
-    TRY(sensitivity_fill_statistics(work, problem));
-    TRY(study_failures_fill(&answer->table, &answer->failures, problem));
+    TRY(sensitivity_fill_statistics(work));
+    TRY(study_failures_fill(&answer->table, &answer->failures));
     return spectrum_accumulator_report(&work->sums, &work->own->spectrum, true, tools->progress,
                                        &answer->frequency, &answer->spectra, problem);
 }
@@ -416,7 +727,7 @@ static void sensitivity_fill_stop(const SensitivityStudy *study, const Damper *d
     }
 }
 
-static Status sensitivity_fill_contact(const SensitivityWork *work, Problem *problem) {
+static Status sensitivity_fill_contact(const SensitivityWork *work) {
     const Scene *scene = &work->simulation->scene;
     const DerivedList *derived = &work->own->plan.derived;
     const Contact *contact = scene_contact(scene);
@@ -425,9 +736,8 @@ static Status sensitivity_fill_contact(const SensitivityWork *work, Problem *pro
         const Derived *from = &derived->at[i];
         const Damper *damper = &scene->dampers.at[from->damper - 1];
         const char *why = sensitivity_refuse_stop(law, damper_buffer(damper, (Side)from->side));
-        SensitivityStop *stop = study_list_add(&work->answer->contact, sizeof *stop, problem);
-        if (stop == NULL)
-            return STATUS_NO_MEMORY;
+        SensitivityStop *stop = study_list_add(&work->answer->contact, sizeof *stop);
+        TRY(status_made(stop != NULL));
         (void)fields_default(sensitivity_stop_fields, stop); // nothing to allocate
         stop->damper = from->damper;
         stop->side = from->side;
@@ -438,24 +748,23 @@ static Status sensitivity_fill_contact(const SensitivityWork *work, Problem *pro
         stop->damping = from->damping;
         if (why == NULL)
             sensitivity_fill_stop(work->study, damper, (Separation)contact->separation, stop);
-        TRY(study_copy_text(why, &stop->why, problem));
+        TRY(study_copy_text(why, &stop->why));
     }
     return STATUS_OK;
 }
 
 // Rows of the answer, and those of them that have steps.
-static Status sensitivity_fill_rows(SensitivityWork *work, Problem *problem) {
+static Status sensitivity_fill_rows(SensitivityWork *work) {
     const Texts *parameters = &work->study->parameters;
     size_t stepped = 0;
     for (size_t i = 0; i < parameters->count; i++) {
-        SensitivityRow *row = study_list_add(&work->answer->response, sizeof *row, problem);
-        if (row == NULL)
-            return STATUS_NO_MEMORY;
+        SensitivityRow *row = study_list_add(&work->answer->response, sizeof *row);
+        TRY(status_made(row != NULL));
         row->parameter = sensitivity_parameter(parameters->at[i]);
         const char *refused = perturbation_refuse(work->simulation, row->parameter);
         if (refused == NULL)
             work->rows[stepped++] = i;
-        TRY(study_copy_text(refused, &row->why, problem));
+        TRY(study_copy_text(refused, &row->why));
     }
     work->steps = stepped * ROW_STEPS;
     return STATUS_OK;
@@ -465,7 +774,7 @@ static Status sensitivity_run_scene(SensitivityWork *work, const StudyTools *too
                                     Problem *problem) {
     Sensitivity *answer = work->answer;
     Simulation scene = {0};
-    Status status = sensitivity_copy(work->simulation, &scene, problem);
+    Status status = sensitivity_copy(work->simulation, &scene);
     if (status == STATUS_OK)
         status = simulation_run(&scene, tools->limits, tools->progress, tools->workspace,
                                 &work->own, problem);
@@ -475,7 +784,7 @@ static Status sensitivity_run_scene(SensitivityWork *work, const StudyTools *too
     answer->summary = work->own->summary;
     answer->steps = work->own->steps;
     answer->is_chaotic = !isnan(horizon);
-    return study_status(
+    return status_made(
         answer->is_chaotic
             ? text_format(&answer->why,
                           "rounding alone changes the trajectory after %.4g s: from there on a "
@@ -485,8 +794,7 @@ static Status sensitivity_run_scene(SensitivityWork *work, const StudyTools *too
             : text_format(&answer->why,
                           "the trajectory can be trusted to the end: derivatives on which the "
                           "steps do not agree are those of numbers that jump, such as the number "
-                          "of impacts, or the steps are too large"),
-        problem);
+                          "of impacts, or the steps are too large"));
 }
 
 static void sensitivity_free(void *of) {
@@ -513,13 +821,11 @@ static Status sensitivity_begin(void *of, const StudyTools *tools, Problem *prob
             : "log-normal factors of mean 1 and the relative deviations of spread, independent for "
               "the restitution and the contact time of each buffer, one factor for all rows of a "
               "table; a restitution beyond 1 is drawn again",
-        &answer->distribution, problem));
-    if (fields_copy(sensitivity_uncertainty_fields, &study->uncertainty, &answer->uncertainty) !=
-        STATUS_OK)
-        return study_no_memory(problem);
+        &answer->distribution));
+    TRY(fields_copy(sensitivity_uncertainty_fields, &study->uncertainty, &answer->uncertainty));
     TRY(sensitivity_run_scene(work, tools, problem));
-    TRY(sensitivity_fill_contact(work, problem));
-    TRY(sensitivity_fill_rows(work, problem));
+    TRY(sensitivity_fill_contact(work));
+    TRY(sensitivity_fill_rows(work));
     const size_t densities =
         work->own->spectrum.densities.count * work->own->spectrum.densities.rows;
     work->work.members = work->steps + runs;

@@ -3,33 +3,65 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "core/math/student_t.h"
 
-const char *const statistics_metric_names[] = {"peak_displacement",
-                                               "rms_displacement",
-                                               "peak_acceleration",
-                                               "rms_acceleration",
-                                               "impacts",
-                                               "peak_contact_force",
-                                               "psd",
-                                               NULL};
-static const char *const statistics_units[] = {"m", "m", "m/s^2", "m/s^2", "1", "N"};
-
-double statistics_value(const Summary *summary, int metric) {
-    const double all[] = {
-        summary->peak_displacement,
-        summary->rms_displacement,
-        summary->peak_acceleration,
-        summary->rms_acceleration,
-        summary->impacts == COUNT_ABSENT ? (double)NAN : (double)summary->impacts,
-        summary->peak_contact_force,
-    };
-    return all[metric];
+// Of N possible runs n were made, in the order of their seeds, which is random. The mean of the n
+// differs from that of the N by a number of variance s^2 (1/n - 1/N), s the standard deviation of
+// one run; it vanishes at n = N. Student's t gives its quantile. In a skewed distribution the mean
+// and s depend on each other: to first order this adds |g| (2 q^2 + 1) / (6 sqrt(n)) to the
+// quantile q (Johnson 1978).
+//
+// To stop as soon as an estimate is small enough prefers estimates that are too small. Checks are
+// therefore few: at 8 runs and then after every quarter more. Over 1,500 to 6,000 ensembles each of
+// normal, gamma and log-normal numbers, N 64 to 1000, targets 0.2 to 0.01, the error then exceeded
+// the target in 0 to 1.0 %, mostly in 0.3 to 0.5 %, where 1 % is allowed. A pilot of 4 saves almost
+// nothing.
+//
+// Spectra differ in many numbers at once: the sum of the squares of their differences is about
+// chi-square distributed with d degrees of freedom, and its quantile per degree falls with d
+// (Wilson and Hilferty).
+// sqrt(quantile / d) of a chi-square, relative to d = 1.
+static double stopping_rule_narrowing(double d) {
+    const double z = student_t_quantile(2 * STOPPING_RULE_CONFIDENCE - 1, 0);
+    const double of_one = pow(1 - 2 / 9.0 + z * sqrt(2 / 9.0), 1.5);
+    const double part = 2 / (9 * fmax(d, 1));
+    return pow(1 - part + z * sqrt(part), 1.5) / of_one;
 }
 
-static bool statistics_is_known(const RunRecord *run, int metric) {
-    return run->why == NULL && !isnan(statistics_value(&run->summary, metric));
+double stopping_rule_error(const RunSpread *spread, size_t count, size_t all) {
+    if (count >= all)
+        return 0;
+    if (count < 2)
+        return INFINITY;
+    const double n = (double)count;
+    const double t = student_t_quantile(STOPPING_RULE_CONFIDENCE, count - 1);
+    const double q = t * stopping_rule_narrowing(spread->freedom) +
+                     fabs(spread->skewness) * (2 * t * t + 1) / (6 * sqrt(n));
+    return q * spread->relative * sqrt(1 / n - 1 / (double)all);
+}
+
+size_t stopping_rule_predict(const RunSpread *spread, size_t all, double target) {
+    size_t min = spread->count, max = all;
+    while (min < max) {
+        const size_t middle = min + (max - min) / 2;
+        if (stopping_rule_error(spread, middle, all) <= target)
+            max = middle;
+        else
+            min = middle + 1;
+    }
+    return min;
+}
+
+size_t stopping_rule_next_check(size_t count) {
+    return count < STOPPING_RULE_PILOT ? STOPPING_RULE_PILOT : count + (count + 3) / 4;
+}
+
+const char *const statistics_metric_names[] = {STUDY_METRICS, "psd", NULL};
+
+double statistics_value(const Summary *summary, int metric) {
+    return study_summary_value(summary, statistics_metric_names[metric]);
 }
 
 // Known values of a metric, in the order of the table.
@@ -66,22 +98,23 @@ static void statistics_measure(Values *values) {
     values->skewness = sigma > 0 ? cubes / n / (sigma * sigma * sigma) : 0;
 }
 
-static Status statistics_collect(const RunTable *table, int metric, Values *values,
-                                 Problem *problem) {
+static Status statistics_collect(const RunTable *table, int metric, Values *values) {
     *values = (Values){.at = calloc(table->count + 1, sizeof *values->at),
                        .mean = (double)NAN,
                        .deviation = (double)NAN};
-    if (values->at == NULL)
-        return study_no_memory(problem);
-    for (size_t i = 0; i < table->count; i++)
-        if (statistics_is_known(&table->at[i], metric))
-            values->at[values->count++] = statistics_value(&table->at[i].summary, metric);
+    TRY(status_made(values->at != NULL));
+    for (size_t i = 0; i < table->count; i++) {
+        const double value = statistics_value(&table->at[i].summary, metric);
+        if (!isnan(value))
+            values->at[values->count++] = value;
+    }
     if (values->count > 0)
         statistics_measure(values);
     return STATUS_OK;
 }
 
-double statistics_quantile(const double *sorted, size_t count, double share) {
+// Quantile of sorted values, at least one, linear between order statistics as numpy.quantile.
+static double statistics_quantile(const double *sorted, size_t count, double share) {
     const double place = share * (double)(count - 1);
     const size_t below = (size_t)place;
     const double from = sorted[below], to = below + 1 < count ? sorted[below + 1] : from;
@@ -91,19 +124,18 @@ double statistics_quantile(const double *sorted, size_t count, double share) {
 // Number of the first run with this value.
 static uint64_t statistics_find_run(const RunTable *table, int metric, double value) {
     for (size_t i = 0; i < table->count; i++)
-        if (statistics_is_known(&table->at[i], metric) &&
-            statistics_value(&table->at[i].summary, metric) == value)
+        if (statistics_value(&table->at[i].summary, metric) == value)
             return table->at[i].number;
     return COUNT_ABSENT;
 }
 
-Status statistics_fill(const RunTable *table, int metric, RunStatistic *statistic,
-                       Problem *problem) {
+Status statistics_fill(const RunTable *table, int metric, RunStatistic *statistic) {
     Values values;
     free(statistic->unit);
     statistic->metric = metric;
-    TRY(study_copy_text(statistics_units[metric], &statistic->unit, problem));
-    TRY(statistics_collect(table, metric, &values, problem));
+    const char *unit = fields_find(summary_fields, statistics_metric_names[metric], NULL)->unit;
+    TRY(study_copy_text(unit != NULL ? unit : "1", &statistic->unit));
+    TRY(statistics_collect(table, metric, &values));
     const size_t count = values.count;
     statistic->count = count;
     statistic->mean = values.mean;
@@ -131,9 +163,9 @@ Status statistics_fill(const RunTable *table, int metric, RunStatistic *statisti
     return STATUS_OK;
 }
 
-Status statistics_spread(const RunTable *table, int metric, RunSpread *spread, Problem *problem) {
+Status statistics_spread(const RunTable *table, int metric, RunSpread *spread) {
     Values values;
-    TRY(statistics_collect(table, metric, &values, problem));
+    TRY(statistics_collect(table, metric, &values));
     // Equal values say nothing about the spread: rare ones may differ.
     const double relative = values.deviation / fabs(values.mean);
     *spread = (RunSpread){.count = values.count,
@@ -162,4 +194,180 @@ void statistics_trust(const RunTable *table, RunTrust *trust) {
         trust->largest_energy_residual =
             fmax(trust->largest_energy_residual, summary->energy_residual);
     }
+}
+
+// Means and deviations by Welford's recurrence, separately at each frequency.
+//
+// A density is positive and its estimates are skewed, the more so the fewer segments a run has. The
+// interval of its mean m is therefore computed for its logarithm: m exp(+-t s / (m sqrt(n))). Of
+// gamma distributed densities (1, 3 and 10 independent segments in each of 3 to 64 runs) such 95 %
+// intervals contained the true density in 93.0 to 95.1 %, m +- t s / sqrt(n) in 88.6 to 95.0 %, and
+// those of a chi-square with the freedom that m and s give in 81 to 95 %.
+//
+// Quantiles need all densities of a frequency at once, so those of every run are kept.
+enum { FREQUENCIES_PER_CHECK = 64 }; // between checks of the progress
+
+static Status spectrum_accumulator_start(SpectrumAccumulator *sums, const Columns *densities,
+                                         size_t kept_max) {
+    const size_t values = densities->count * densities->rows;
+    *sums = (SpectrumAccumulator){
+        .channels = densities->count,
+        .rows = densities->rows,
+        .mean = calloc(values, sizeof *sums->mean),
+        .squares = calloc(values, sizeof *sums->squares),
+        .kept_max = kept_max,
+        .kept = calloc(kept_max * values + 1, sizeof *sums->kept),
+    };
+    return status_made(sums->mean != NULL && sums->squares != NULL && sums->kept != NULL);
+}
+
+Status spectrum_accumulator_add(SpectrumAccumulator *sums, const Spectrum *spectrum,
+                                size_t kept_max) {
+    const Columns *densities = &spectrum->densities;
+    if (densities->count == 0)
+        return STATUS_OK;
+    if (sums->mean == NULL)
+        TRY(spectrum_accumulator_start(sums, densities, kept_max));
+    const double n = (double)(sums->count + 1);
+    for (size_t c = 0; c < sums->channels; c++) {
+        const double *from = densities->at[c].values;
+        double *mean = sums->mean + c * sums->rows, *squares = sums->squares + c * sums->rows;
+        for (size_t k = 0; k < sums->rows; k++) {
+            const double off = from[k] - mean[k];
+            mean[k] += off / n;
+            squares[k] += off * (from[k] - mean[k]);
+        }
+        if (sums->count < sums->kept_max)
+            memcpy(sums->kept + (sums->count * sums->channels + c) * sums->rows, from,
+                   sums->rows * sizeof *from);
+    }
+    sums->count++;
+    return STATUS_OK;
+}
+
+// (sum of the eigenvalues)^2 / (sum of their squares) of the covariance of the kept runs. It is at
+// most their number less one: an estimate that is too small rather than too large.
+static double spectrum_accumulator_freedom(const SpectrumAccumulator *sums, size_t channel) {
+    enum { KEPT = SPECTRUM_ACCUMULATOR_FIRST };
+    const size_t kept = sums->count < KEPT ? sums->count : KEPT;
+    const size_t stride = sums->channels * sums->rows;
+    const double *at = sums->kept + channel * sums->rows;
+    double gram[KEPT][KEPT] = {{0}}, trace = 0, squares = 0;
+    for (size_t k = 0; k < sums->rows; k++) {
+        double off[KEPT], mean = 0;
+        for (size_t i = 0; i < kept; i++)
+            mean += at[i * stride + k] / (double)kept;
+        for (size_t i = 0; i < kept; i++)
+            off[i] = at[i * stride + k] - mean;
+        for (size_t i = 0; i < kept; i++)
+            for (size_t j = 0; j <= i; j++)
+                gram[i][j] += off[i] * off[j];
+    }
+    for (size_t i = 0; i < kept; i++) {
+        trace += gram[i][i];
+        for (size_t j = 0; j <= i; j++)
+            squares += (j < i ? 2 : 1) * gram[i][j] * gram[i][j];
+    }
+    return squares > 0 ? fmax(trace * trace / squares, 1) : 1;
+}
+
+RunSpread spectrum_accumulator_spread(const SpectrumAccumulator *sums, size_t all) {
+    RunSpread worst = {.count = sums->count, .relative = INFINITY, .freedom = 1};
+    double largest = -1;
+    for (size_t c = 0; c < sums->channels && sums->count > 1; c++) {
+        double variance = 0, norm = 0;
+        for (size_t k = c * sums->rows; k < (c + 1) * sums->rows; k++) {
+            variance += sums->squares[k];
+            norm += sums->mean[k] * sums->mean[k];
+        }
+        const double relative = sqrt(variance / (double)(sums->count - 1)) / sqrt(norm);
+        const RunSpread spread = {.count = sums->count,
+                                  .relative = relative > 0 ? relative : (double)INFINITY,
+                                  .freedom = spectrum_accumulator_freedom(sums, c)};
+        const double error = stopping_rule_error(&spread, sums->count, all);
+        if (error > largest) {
+            largest = error;
+            worst = spread;
+        }
+    }
+    return worst;
+}
+
+static Status spectrum_accumulator_report_channel(const SpectrumAccumulator *sums, size_t channel,
+                                                  RunSpectrum *spectrum, Problem *problem) {
+    const double *mean = sums->mean + channel * sums->rows;
+    const double *squares = sums->squares + channel * sums->rows;
+    const double n = (double)sums->count;
+    TRY(study_copy_reals(mean, sums->rows, &spectrum->mean));
+    if (sums->count < 2)
+        return STATUS_OK;
+    TRY(status_made(reals_allocate(&spectrum->standard_deviation, sums->rows) &&
+                    reals_allocate(&spectrum->low, sums->rows) &&
+                    reals_allocate(&spectrum->high, sums->rows)));
+    const double t = student_t_quantile(STATISTICS_CONFIDENCE, sums->count - 1);
+    for (size_t k = 0; k < sums->rows; k++) {
+        const double deviation = sqrt(squares[k] / (n - 1));
+        const double factor = mean[k] > 0 ? exp(t * deviation / (mean[k] * sqrt(n))) : 1;
+        spectrum->standard_deviation.at[k] = deviation;
+        spectrum->low.at[k] = mean[k] / factor;
+        spectrum->high.at[k] = mean[k] * factor;
+        if (!isfinite(mean[k] + deviation + spectrum->high.at[k]))
+            return problem_set(problem, STATUS_UNSTABLE,
+                               "the spectra are too large: their deviations leave what double "
+                               "precision can hold");
+    }
+    return STATUS_OK;
+}
+
+static Status spectrum_accumulator_report_quantiles(const SpectrumAccumulator *sums, size_t channel,
+                                                    const Progress *progress, RunSpectrum *spectrum,
+                                                    Problem *problem) {
+    const size_t rows = sums->rows, runs = sums->count;
+    double *values = calloc(runs, sizeof *values);
+    Status status = status_made(values != NULL && reals_allocate(&spectrum->mean, rows) &&
+                                reals_allocate(&spectrum->q05, rows) &&
+                                reals_allocate(&spectrum->median, rows) &&
+                                reals_allocate(&spectrum->q95, rows));
+    for (size_t k = 0; k < rows && status == STATUS_OK; k++) {
+        for (size_t i = 0; i < runs; i++) {
+            values[i] = sums->kept[(i * sums->channels + channel) * rows + k];
+            spectrum->mean.at[k] += values[i] / (double)runs;
+        }
+        reals_sort(values, runs);
+        spectrum->q05.at[k] = statistics_quantile(values, runs, 0.05);
+        spectrum->median.at[k] = statistics_quantile(values, runs, 0.5);
+        spectrum->q95.at[k] = statistics_quantile(values, runs, 0.95);
+        if (k % FREQUENCIES_PER_CHECK == 0)
+            status = study_advance(progress, 1, problem);
+    }
+    free(values);
+    return status;
+}
+
+Status spectrum_accumulator_report(const SpectrumAccumulator *sums, const Spectrum *like,
+                                   bool has_quantiles, const Progress *progress, Reals *frequency,
+                                   RunSpectra *spectra, Problem *problem) {
+    const Columns *densities = &like->densities;
+    if (sums->count == 0)
+        return STATUS_OK;
+    TRY(study_copy_reals(like->frequency, densities->rows, frequency));
+    for (size_t c = 0; c < densities->count; c++) {
+        RunSpectrum *spectrum = study_list_add(spectra, sizeof *spectrum);
+        TRY(status_made(spectrum != NULL));
+        TRY(study_copy_text(densities->at[c].name, &spectrum->channel));
+        TRY(study_copy_text(densities->at[c].unit, &spectrum->unit));
+        if (has_quantiles)
+            TRY(study_copy_reals(densities->at[c].values, sums->rows, &spectrum->value));
+        TRY(has_quantiles
+                ? spectrum_accumulator_report_quantiles(sums, c, progress, spectrum, problem)
+                : spectrum_accumulator_report_channel(sums, c, spectrum, problem));
+    }
+    return STATUS_OK;
+}
+
+void spectrum_accumulator_clear(SpectrumAccumulator *sums) {
+    free(sums->mean);
+    free(sums->squares);
+    free(sums->kept);
+    *sums = (SpectrumAccumulator){0};
 }

@@ -1,9 +1,32 @@
-// Statistics over the runs of a study that ended, of the numbers in their summaries.
+// Statistics over the runs of a study that ended: of the numbers in their summaries and of their
+// spectra, and when an ensemble under a target has enough runs.
 #ifndef CORE_STUDY_STATISTICS_H
 #define CORE_STUDY_STATISTICS_H
 
-#include "core/study/stopping_rule.h"
-#include "core/study/study_run.h"
+#include "core/study/study.h"
+
+// When an ensemble under a target has enough runs: how far the mean of the runs made may be from
+// the mean of all runs requested.
+// Differences among the runs made so far.
+typedef struct RunSpread {
+    size_t count;    // runs
+    double relative; // standard deviation of one run over the mean; INFINITY: unknown, or no mean
+    double skewness;
+    double freedom; // independent numbers that share the spread: 1 of a statistic, more of spectra
+} RunSpread;
+
+#define STOPPING_RULE_CONFIDENCE 0.99
+enum { STOPPING_RULE_PILOT = 8 }; // runs before the first check
+
+// Relative error of the mean of `count` of `all` runs against the mean of all, which is exceeded
+// with a probability of 1 - STOPPING_RULE_CONFIDENCE; 0 if count >= all.
+double stopping_rule_error(const RunSpread *spread, size_t count, size_t all);
+
+// Smallest number of runs, at least those made, whose estimated error is within `target`.
+size_t stopping_rule_predict(const RunSpread *spread, size_t all, double target);
+
+// Number of runs at the check that follows the one at `count`.
+size_t stopping_rule_next_check(size_t count);
 
 // The numbers of a summary that have statistics; the spectra have none here.
 typedef enum StatisticsMetric {
@@ -44,17 +67,59 @@ typedef struct RunTrust {
 // One metric of a summary; NAN: unknown.
 double statistics_value(const Summary *summary, int metric);
 
-// Quantile of sorted values, at least one, linear between order statistics as numpy.quantile.
-double statistics_quantile(const double *sorted, size_t count, double share);
-
 // Fills the statistics of a metric. `statistic` holds its defaults, which remain where the known
 // values are too few, and the caller's `value`.
-Status statistics_fill(const RunTable *table, int metric, RunStatistic *statistic,
-                       Problem *problem);
+Status statistics_fill(const RunTable *table, int metric, RunStatistic *statistic);
 
 // Spread of one metric.
-Status statistics_spread(const RunTable *table, int metric, RunSpread *spread, Problem *problem);
+Status statistics_spread(const RunTable *table, int metric, RunSpread *spread);
 
 void statistics_trust(const RunTable *table, RunTrust *trust);
+
+// The spectra of many runs, added one by one: means, deviations and quantiles of their densities.
+// Densities of many runs at each frequency; a study fills some of the lists.
+typedef struct RunSpectrum {
+    char *channel, *unit;
+    Reals mean, standard_deviation, low, high; // the last two of the mean
+    Reals value, q05, median, q95;             // the first of the study's own scene
+} RunSpectrum;
+
+typedef struct RunSpectra {
+    RunSpectrum *at;
+    size_t count;
+} RunSpectra;
+
+enum {
+    SPECTRUM_ACCUMULATOR_FIRST = 16,    // runs kept for spectrum_accumulator_spread
+    SPECTRUM_ACCUMULATOR_MAX = 1 << 22, // limit on the densities kept of all runs
+};
+
+// All zero is empty.
+typedef struct SpectrumAccumulator {
+    size_t channels, rows;
+    size_t count;    // runs
+    double *mean;    // channel by channel
+    double *squares; // sums of squared deviations
+    size_t kept_max; // runs of which all densities are kept, the first ones
+    double *kept;    // run by run
+} SpectrumAccumulator;
+
+// Adds the spectra of a run, of the same shape as those before; the densities of the first
+// `kept_max` runs are kept.
+Status spectrum_accumulator_add(SpectrumAccumulator *sums, const Spectrum *spectrum,
+                                size_t kept_max);
+
+// Spread of the runs: norm of the difference over norm of the mean density, of the channel with the
+// largest error among `all` runs. Needs SPECTRUM_ACCUMULATOR_FIRST kept runs.
+RunSpread spectrum_accumulator_spread(const SpectrumAccumulator *sums, size_t all);
+
+// Fills frequencies and spectra: mean, deviation and confidence interval of the mean. `like` is the
+// spectrum of any of the runs. With quantiles, which need all runs kept: mean and quantiles, and
+// `like` as the value; `progress` may then stop the sorting.
+Status spectrum_accumulator_report(const SpectrumAccumulator *sums, const Spectrum *like,
+                                   bool has_quantiles, const Progress *progress, Reals *frequency,
+                                   RunSpectra *spectra, Problem *problem);
+
+void spectrum_accumulator_clear(SpectrumAccumulator *sums);
 
 #endif

@@ -59,8 +59,9 @@ Status study_request_complete(StudyRequest *request, const SimulationLimits *lim
     // The rest needs a valid scene.
     TRY(status);
     TRY(own);
-    TRY(study_kind(request->study)
-            ->complete(request->study, &request->simulation, limits, problem));
+    TRY(study_result(
+        study_kind(request->study)->complete(request->study, &request->simulation, limits, problem),
+        problem));
     return studies_check_cost(request, limits, problem);
 }
 
@@ -70,8 +71,9 @@ Status study_request_cost(const StudyRequest *request, const SimulationLimits *l
     if (request->study == NULL)
         return STATUS_OK;
     double steps;
-    TRY(study_kind(request->study)
-            ->cost(request->study, &request->simulation, limits, &steps, problem));
+    TRY(study_result(
+        study_kind(request->study)->cost(request->study, &request->simulation, limits, &steps),
+        problem));
     cost->steps += steps;
     cost->cpu_seconds = cost->steps * SOLVER_STEP;
     return STATUS_OK;

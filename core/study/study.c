@@ -6,19 +6,169 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/solve/solver.h"
+
+Status study_advance(const Progress *progress, double fraction, Problem *problem) {
+    return progress_advance(progress, fraction)
+               ? STATUS_OK
+               : problem_set(problem, STATUS_CANCELLED, "the study was stopped");
+}
+
+Status study_copy_text(const char *text, char **target) {
+    *target = text != NULL ? strdup(text) : NULL;
+    return status_made(*target != NULL || text == NULL);
+}
+
+Status study_copy_reals(const double *values, size_t count, Reals *target) {
+    if (!reals_allocate(target, count))
+        return STATUS_NO_MEMORY;
+    memcpy(target->at, values, count * sizeof *values);
+    return STATUS_OK;
+}
+
+// There is room for as many elements as the next power of two.
+void *study_list_add(void *list, size_t size) {
+    List grown;
+    memcpy(&grown, list, sizeof grown);
+    const size_t count = grown.count;
+    if ((count & (count - 1)) == 0)
+        grown.at = realloc(grown.at, (count == 0 ? 1 : 2 * count) * size);
+    if (grown.at == NULL)
+        return NULL;
+    grown.count++;
+    memcpy(list, &grown, sizeof grown);
+    return memset((char *)grown.at + size * count, 0, size);
+}
+
+Status study_add_real(double value, Reals *reals) {
+    double *added = study_list_add(reals, sizeof *added);
+    TRY(status_made(added != NULL));
+    *added = value;
+    return STATUS_OK;
+}
+
+Status run_table_add(RunTable *table, RunRecord *run, uint64_t number) {
+    RunRecord *added = study_list_add(table, sizeof *added);
+    TRY(status_made(added != NULL));
+    *added = *run;
+    added->number = number;
+    run->why = NULL;
+    run->restitution = run->contact_time = (Reals){NULL, 0};
+    return STATUS_OK;
+}
+
+Status study_failures_add(StudyFailures *failures, int status, const char *reason, uint64_t number,
+                          const char *why) {
+    for (size_t i = 0; i < failures->count; i++)
+        if (failures->at[i].status == status) {
+            failures->at[i].count++;
+            return STATUS_OK;
+        }
+    StudyFailure *failure = study_list_add(failures, sizeof *failure);
+    TRY(status_made(failure != NULL));
+    *failure = (StudyFailure){.status = status, .count = 1, .first = number};
+    TRY(study_copy_text(reason, &failure->reason));
+    return study_copy_text(why, &failure->detail);
+}
+
+Status study_failures_fill(const RunTable *table, StudyFailures *failures) {
+    for (size_t i = 0; i < table->count; i++) {
+        const RunRecord *run = &table->at[i];
+        if (run->why != NULL)
+            TRY(study_failures_add(failures, (int)run->status, status_slug(run->status),
+                                   run->number, run->why));
+    }
+    return STATUS_OK;
+}
+
+double study_summary_value(const Summary *summary, const char *name) {
+    size_t offset = 0;
+    const Field *row = fields_find(summary_fields, name, &offset);
+    const void *member = (const char *)summary + offset + row->offset;
+    if (row->kind == FIELD_KIND_REAL)
+        return *(const double *)member;
+    const uint64_t count = *(const uint64_t *)member;
+    return count != COUNT_ABSENT ? (double)count : (double)NAN;
+}
+
+double study_run_densities(const Simulation *simulation) {
+    const SpectrumRequest *psd = &simulation->output.psd;
+    return psd->channels.count == 0
+               ? 0
+               : (double)psd->channels.count * ((double)(psd->segment / 2) + 1);
+}
+
+Status study_run_check_densities(const Simulation *simulation, double densities, Problem *problem) {
+    enum { DENSITIES_MAX = 1 << 18 };
+    if (densities <= DENSITIES_MAX)
+        return STATUS_OK;
+    return problem_add_real(problem, STATUS_INVALID, "/output/psd/segment",
+                            (double)simulation->output.psd.segment, "samples",
+                            "gives %.0f densities in all spectra, at most %d are allowed: ask for "
+                            "shorter segments, or for fewer channels or models",
+                            densities, DENSITIES_MAX);
+}
+
+bool study_run_has_force(const Simulation *simulation) {
+    const Scene *scene = &simulation->scene;
+    return scene->dampers.count > 0 &&
+           dampers_contact_law(&scene->dampers, scene_contact(scene))->form != CONTACT_IMPULSIVE;
+}
+
+Status study_run_check_metric(const Simulation *simulation, const char *metric, Problem *problem) {
+    static const char pointer[] = "/study/metric";
+    const bool has_damper = simulation->scene.dampers.count > 0;
+    if (strcmp(metric, "psd") == 0 && simulation->output.psd.channels.count == 0)
+        return problem_add(problem, STATUS_INVALID, pointer,
+                           "psd needs spectra: ask for some in /output/psd");
+    if (strstr(metric, "force") != NULL && !study_run_has_force(simulation))
+        return problem_add(problem, STATUS_INVALID, pointer, "%s needs contacts with a force: %s",
+                           metric,
+                           has_damper ? "impulses have none, choose another contact model"
+                                      : "the scene has no damper");
+    if (strcmp(metric, "impacts") == 0 && !has_damper)
+        return problem_add(problem, STATUS_INVALID, pointer,
+                           "impacts needs a damper: the scene has none");
+    return STATUS_OK;
+}
+
+Status study_run_check_names(const Texts *given, const char *const *names, const char *member,
+                             Problem *problem) {
+    const Field rows[] = {
+        {.name = member, .kind = FIELD_KIND_TEXTS, .presence = PRESENCE_OPTIONAL, .choices = names},
+        FIELD_END};
+    return fields_validate(rows, given, "/study", problem);
+}
+
+Status study_run_copy(const Simulation *simulation, Simulation *target) {
+    TRY(fields_copy(simulation_fields, simulation, target));
+    texts_clear(&target->output.channels);
+    return STATUS_OK;
+}
+
+Status study_run_fix_solver(Simulation *target) {
+    if (!simulation_has_target(target))
+        return STATUS_OK;
+    Variant *accuracy = variant_new(solver_kinds.at(0));
+    TRY(status_made(accuracy != NULL));
+    variant_free(target->accuracy);
+    target->accuracy = accuracy;
+    ((AccuracyAuto *)(void *)accuracy)->metric = CHOICE_ABSENT; // as in a completed scene
+    return STATUS_OK;
+}
+
 Status study_begin(const Variant *study, const Simulation *simulation, const StudyTools *tools,
                    Variant **answer, StudyWork **work, Problem *problem) {
     const StudyKind *kind = study_kind(study);
-    ProgressRange range = progress_range(tools->progress, 0, STUDY_BEGUN);
+    ProgressRange range =
+        progress_range(tools->progress, 0, study_has_members(study) ? STUDY_BEGUN : 1);
     const Progress progress = progress_range_view(&range);
     StudyTools own = *tools;
     own.progress = &progress;
     *answer = variant_new(kind->answer);
     StudyWork *made = *work = calloc(1, kind->work_size);
     Status status = STATUS_NO_MEMORY;
-    if (*answer == NULL || made == NULL) {
-        (void)study_no_memory(problem);
-    } else {
+    if (*answer != NULL && made != NULL) {
         made->kind = kind;
         made->study = study;
         made->simulation = simulation;
@@ -35,7 +185,7 @@ Status study_begin(const Variant *study, const Simulation *simulation, const Stu
         *work = NULL;
         *answer = NULL;
     }
-    return status;
+    return study_result(status, problem);
 }
 
 Status study_part_make(const StudyWork *work, size_t member, const StudyTools *tools,
@@ -45,7 +195,7 @@ Status study_part_make(const StudyWork *work, size_t member, const StudyTools *t
     Simulation scene = {0};
     Outcome *outcome = NULL;
     if (part == NULL)
-        return study_no_memory(problem);
+        return study_result(STATUS_NO_MEMORY, problem);
     RunRecord *run = &part->run;
     run->steps = (double)NAN;
     (void)fields_default(summary_fields, &run->summary); // absent: nothing to allocate
@@ -56,11 +206,11 @@ Status study_part_make(const StudyWork *work, size_t member, const StudyTools *t
                                      &outcome, problem);
     simulation_clear(&scene);
     if (study_run_ends_study(run->status))
-        return run->status;
+        return study_result(run->status, problem);
     if (run->status != STATUS_OK) {
-        const Status copied = study_copy_text(problem->detail, &run->why, NULL);
+        const Status copied = study_copy_text(problem->detail, &run->why);
         problem_clear(problem);
-        return copied == STATUS_OK ? copied : study_no_memory(problem);
+        return study_result(copied, problem);
     }
     Status status = STATUS_OK;
     run->steps = outcome->steps;
@@ -72,15 +222,16 @@ Status study_part_make(const StudyWork *work, size_t member, const StudyTools *t
         outcome->spectrum = (Spectrum){0};
     }
     outcome_unref(outcome);
-    return status;
+    return study_result(status, problem);
 }
 
 Status study_part_fold(StudyWork *work, size_t member, StudyPart *part, Problem *problem) {
-    return work->kind->fold(work, member, part, problem);
+    return study_result(work->kind->fold(work, member, part), problem);
 }
 
 Status study_end(StudyWork *work, const StudyTools *tools, Problem *problem) {
-    return work->kind->end != NULL ? work->kind->end(work, tools, problem) : STATUS_OK;
+    return work->kind->end != NULL ? study_result(work->kind->end(work, tools, problem), problem)
+                                   : STATUS_OK;
 }
 
 void study_part_free(const StudyWork *work, StudyPart *part) {
@@ -102,9 +253,10 @@ void study_free(StudyWork *work) {
 }
 
 static Status study_run_member(StudyWork *work, size_t member, const StudyTools *tools,
-                               const Progress *whole, Problem *problem) {
-    const double share = 1 / (double)work->expected;
-    ProgressRange range = progress_range(whole, (double)member * share, share);
+                               Problem *problem) {
+    const double share = (1 - STUDY_BEGUN) / (double)work->expected;
+    ProgressRange range =
+        progress_range(tools->progress, STUDY_BEGUN + (double)member * share, share);
     const Progress progress = progress_range_view(&range);
     StudyTools own = *tools;
     StudyPart *part = NULL;
@@ -117,31 +269,15 @@ static Status study_run_member(StudyWork *work, size_t member, const StudyTools 
     return status;
 }
 
-static Status study_run_members(const Variant *study, const Simulation *simulation,
-                                const StudyTools *tools, Variant **answer, Problem *problem) {
+Status study_run(const Variant *study, const Simulation *simulation, const StudyTools *tools,
+                 Variant **answer, Problem *problem) {
     StudyWork *work;
-    ProgressRange range = progress_range(tools->progress, STUDY_BEGUN, 1 - STUDY_BEGUN);
-    const Progress whole = progress_range_view(&range);
     Status status = study_begin(study, simulation, tools, answer, &work, problem);
     for (size_t i = 0; status == STATUS_OK && i < work->wanted; i++)
-        status = study_run_member(work, i, tools, &whole, problem);
+        status = study_run_member(work, i, tools, problem);
     if (status == STATUS_OK)
         status = study_end(work, tools, problem);
     study_free(work);
-    return status;
-}
-
-Status study_run(const Variant *study, const Simulation *simulation, const StudyTools *tools,
-                 Variant **answer, Problem *problem) {
-    const StudyKind *kind = study_kind(study);
-    Status status;
-    if (kind->run == NULL) {
-        status = study_run_members(study, simulation, tools, answer, problem);
-    } else {
-        *answer = variant_new(kind->answer);
-        status = *answer == NULL ? study_no_memory(problem)
-                                 : kind->run(study, simulation, tools, *answer, problem);
-    }
     if (status != STATUS_OK) {
         variant_free(*answer);
         *answer = NULL;

@@ -2,7 +2,116 @@
 #ifndef CORE_STUDY_STUDY_H
 #define CORE_STUDY_STUDY_H
 
-#include "core/study/study_run.h"
+#include "core/simulation/simulation.h"
+
+// The environment of a study.
+typedef struct StudyTools {
+    const SimulationLimits *limits; // of every run, and of the steps of all; may be NULL
+    const Progress *progress;       // may be NULL
+    Workspace *workspace;           // may be NULL
+    double (*cpu)(void *context);   // CPU time of this thread [s]
+    void *cpu_context;
+} StudyTools;
+
+// Result of one run. A run that failed has a reason and no numbers.
+typedef struct RunRecord {
+    uint64_t number; // its seed, or its place
+    Status status;
+    char *why;                       // reason of the failure; NULL: none
+    double steps;                    // solver steps; NAN after a failure
+    Summary summary;                 // absent after a failure
+    Reals restitution, contact_time; // factors of a drawn run, buffer by buffer
+} RunRecord;
+
+typedef struct RunTable {
+    RunRecord *at;
+    size_t count;
+} RunTable;
+
+// Moves the record of a run to the end of the table. STATUS_NO_MEMORY.
+Status run_table_add(RunTable *table, RunRecord *run, uint64_t number);
+
+// Runs that failed for one reason.
+typedef struct StudyFailure {
+    int status;            // the key of the reason
+    char *reason;          // in a word; may be NULL
+    uint64_t count, first; // number of the first of them
+    char *detail;          // its `why`
+} StudyFailure;
+
+typedef struct StudyFailures {
+    StudyFailure *at;
+    size_t count;
+} StudyFailures;
+
+// Counts a failure. STATUS_NO_MEMORY.
+Status study_failures_add(StudyFailures *failures, int status, const char *reason, uint64_t number,
+                          const char *why);
+
+// Counts the failures of a table by their status, in its order.
+Status study_failures_fill(const RunTable *table, StudyFailures *failures);
+
+// The metrics of a summary that studies compare, by their names there.
+#define STUDY_METRICS                                                                              \
+    "peak_displacement", "rms_displacement", "peak_acceleration", "rms_acceleration", "impacts",   \
+        "peak_contact_force"
+
+// A number of a summary by its name; NAN: unknown.
+double study_summary_value(const Summary *summary, const char *name);
+
+// Densities that a run's spectra hold; 0 without spectra.
+double study_run_densities(const Simulation *simulation);
+
+// Validates that a study holds no more than 2^18 densities at a time.
+Status study_run_check_densities(const Simulation *simulation, double densities, Problem *problem);
+
+// Whether the contacts of the simulation have a force.
+bool study_run_has_force(const Simulation *simulation);
+
+// Validates that the scene can have a metric, the value of /study/metric.
+Status study_run_check_metric(const Simulation *simulation, const char *metric, Problem *problem);
+
+// Validates a list of names, a member of the study, against a NULL-terminated list.
+Status study_run_check_names(const Texts *given, const char *const *names, const char *member,
+                             Problem *problem);
+
+// The scene without sampled channels; spectra and impacts as in the original. `target` is cleared
+// by simulation_clear in any case.
+Status study_run_copy(const Simulation *simulation, Simulation *target);
+
+// Replaces an accuracy target by the solver that is chosen without one: otherwise the runs of one
+// study could use different settings, and their differences would not be those of the scenes.
+Status study_run_fix_solver(Simulation *target);
+
+// Whether a failure of one run ends the whole study.
+static inline bool study_run_ends_study(Status status) {
+    return status == STATUS_CANCELLED || status == STATUS_NO_MEMORY;
+}
+
+// `status`, with the text of STATUS_NO_MEMORY: functions that can only fail by it set none.
+static inline Status study_result(Status status, Problem *problem) {
+    return status != STATUS_NO_MEMORY ? status
+                                      : problem_set(problem, status, "no memory for the study");
+}
+
+// STATUS_CANCELLED if the progress, at `fraction`, requests a stop.
+Status study_advance(const Progress *progress, double fraction, Problem *problem);
+
+// The first of two results that is a failure.
+static inline Status study_first_failure(Status first, Status second) {
+    return first != STATUS_OK ? first : second;
+}
+
+// Copies of a text (NULL: none) and of numbers. STATUS_NO_MEMORY, as of all functions below.
+Status study_copy_text(const char *text, char **target);
+Status study_copy_reals(const double *values, size_t count, Reals *target);
+
+// Appends an element of `size` zeros to a typed list (base/field.h) that only this function has
+// filled. NULL without memory.
+void *study_list_add(void *list, size_t size);
+
+// The same with a number.
+Status study_add_real(double value, Reals *reals);
 
 typedef struct StudyKind StudyKind;
 
@@ -40,16 +149,13 @@ struct StudyKind {
     // scene.
     Status (*complete)(void *study, const Simulation *simulation, const SimulationLimits *limits,
                        Problem *problem);
-    // Estimated cost in solver steps.
+    // Estimated cost of a completed study in solver steps. STATUS_NO_MEMORY.
     Status (*cost)(const void *study, const Simulation *simulation, const SimulationLimits *limits,
-                   double *steps, Problem *problem);
-    // Runs a study without members on one thread. Fills `answer`, which holds its defaults, in part
-    // after a failure. The functions below are NULL then.
-    Status (*run)(const void *study, const Simulation *simulation, const StudyTools *tools,
-                  void *answer, Problem *problem);
+                   double *steps);
     size_t work_size, part_size; // of the kind's structs, which begin zeroed
-    // Validates, runs what all members need, fills `members` and the first part of the answer.
-    // `free` follows also after a failure.
+    // Validates, runs what all members need, fills `members` and the first part of the answer. A
+    // study without members is made here, on one thread: the functions below are NULL then, but for
+    // `free`, which follows also after a failure.
     Status (*begin)(void *work, const StudyTools *tools, Problem *problem);
     // Makes the scene of a member, from 0; other threads make other members at the same time.
     // `scene` is cleared by the caller. A failure is the member's, unless it ends the study.
@@ -59,7 +165,8 @@ struct StudyKind {
     Status (*keep)(const void *work, const Outcome *outcome, const StudyTools *tools,
                    StudyPart *part, Problem *problem);
     // Adds a part to the answer and may take its contents. May change what is wanted.
-    Status (*fold)(void *work, size_t member, StudyPart *part, Problem *problem);
+    // STATUS_NO_MEMORY.
+    Status (*fold)(void *work, size_t member, StudyPart *part);
     // Completes the answer when all wanted members are folded. May be NULL.
     Status (*end)(void *work, const StudyTools *tools, Problem *problem);
     void (*clear)(StudyPart *part); // what a part owns beside its StudyPart; may be NULL
@@ -77,7 +184,7 @@ static inline const StudyKind *study_kind(const Variant *study) {
 
 // Whether a study has members, which threads can share.
 static inline bool study_has_members(const Variant *study) {
-    return study_kind(study)->run == NULL;
+    return study_kind(study)->scene != NULL;
 }
 
 // An answer as a document: {"study": {"kind": ...}}. Cleared by fields_clear.

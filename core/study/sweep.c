@@ -27,28 +27,14 @@ enum {
     RANGE_SAMPLES = 512,
 };
 
-const char *const sweep_spacing_names[] = {"linear", "logarithmic", NULL};
+static const char *const sweep_spacing_names[] = {"linear", "logarithmic", NULL};
 const char *const sweep_mode_names[] = {"grid", "list", NULL};
 const char *const sweep_status_names[] = {"made",   "invalid", "unstable", "limit",
                                           "failed", "pending", NULL};
-const char *const sweep_metric_names[] = {"peak_displacement",
-                                          "rms_displacement",
-                                          "peak_acceleration",
-                                          "rms_acceleration",
-                                          "impacts",
-                                          "peak_contact_force",
-                                          "energy_residual",
-                                          "error_estimate",
-                                          "trust_horizon",
-                                          "steps",
-                                          NULL};
-static const char *const sweep_default_metrics[] = {"peak_displacement",
-                                                    "rms_displacement",
-                                                    "peak_acceleration",
-                                                    "rms_acceleration",
-                                                    "impacts",
-                                                    "peak_contact_force",
-                                                    NULL};
+// The metrics of a point: the summary's numbers in their order, then the solver's steps.
+static const char *const sweep_metric_names[] = {
+    STUDY_METRICS, "energy_residual", "error_estimate", "trust_horizon", "steps", NULL};
+static const char *const sweep_default_metrics[] = {STUDY_METRICS, NULL};
 
 const char *sweep_metric_unit(const char *name) {
     const Field *row = fields_find(summary_fields, name, NULL);
@@ -66,7 +52,7 @@ static const Field sweep_axis_fields[] = {
     FIELD_END
 };
 
-const Field pinned_record_fields[] = {
+static const Field pinned_record_fields[] = {
     FIELD_TEXT(PinnedRecord, name, RECORD_NAME_SIZE - 1, PRESENCE_REQUIRED, 0, "of an uploaded record"),
     FIELD_TEXT(PinnedRecord, digest, RECORD_DIGEST_SIZE - 1, PRESENCE_OPTIONAL, 0, "SHA-256 of its interval and samples"),
     FIELD_REFCOUNT(PinnedRecord, named),
@@ -124,7 +110,8 @@ static size_t sweep_axis_length(const SweepAxis *axis) {
     return sweep_axis_is_range(axis) ? (size_t)axis->count : axis->values.count;
 }
 
-size_t sweep_points(const SweepStudy *study) {
+// SIZE_MAX on overflow.
+static size_t sweep_points(const SweepStudy *study) {
     size_t points = study->axes.count > 0;
     for (size_t i = 0; i < study->axes.count; i++) {
         const size_t length = sweep_axis_length(&study->axes.at[i]);
@@ -149,38 +136,31 @@ static double sweep_axis_value(const SweepAxis *axis, size_t index) {
                : axis->from + (axis->to - axis->from) / last * (double)index;
 }
 
-static Status sweep_axis_read(const SweepAxis *axis, SweepValues *values, Problem *problem) {
-    size_t room = 1;
-    for (size_t i = 0; i < axis->values.count; i++)
-        room += strlen(axis->values.at[i]) + 1;
-    values->at = calloc(values->count, sizeof *values->at);
-    values->texts = malloc(room);
-    if (values->at == NULL || values->texts == NULL)
-        return study_no_memory(problem);
-    char *text = values->texts;
-    for (size_t i = 0; i < values->count; i++) {
-        if (sweep_axis_is_range(axis)) {
-            values->at[i] = json_scalar_number(sweep_axis_value(axis, i));
-            continue;
-        }
-        if (!json_scalar_read(axis->values.at[i], &values->at[i], text))
-            return problem_set(problem, STATUS_INTERNAL, "a value of the sweep cannot be read");
-        text += strlen(axis->values.at[i]) + 1;
+// Sets the member that an axis varies to one of its values.
+static Status sweep_axis_set(const SweepAxis *axis, size_t index, Simulation *target,
+                             char why[JSON_POINTER_MESSAGE_MAX]) {
+    if (sweep_axis_is_range(axis)) {
+        const JsonScalar number = json_scalar_number(sweep_axis_value(axis, index));
+        return json_pointer_set(simulation_fields, target, axis->pointer, &number, why);
     }
-    return STATUS_OK;
+    const char *json = axis->values.at[index];
+    char *text = malloc(strlen(json) + 1);
+    JsonScalar value;
+    TRY(status_made(text != NULL));
+    const Status status =
+        json_scalar_read(json, &value, text)
+            ? json_pointer_set(simulation_fields, target, axis->pointer, &value, why)
+            : STATUS_INTERNAL;
+    free(text);
+    return status;
 }
 
 void sweep_grid_free(SweepGrid *grid) {
-    if (grid == NULL)
-        return;
-    for (size_t i = 0; i < grid->axis_count; i++) {
-        free(grid->axes[i].at);
-        free(grid->axes[i].texts);
-    }
     free(grid);
 }
 
-size_t sweep_grid_index(const SweepGrid *grid, size_t axis, size_t point) {
+// Index of a point's value on an axis.
+static size_t sweep_grid_index(const SweepGrid *grid, size_t axis, size_t point) {
     const SweepValues *values = &grid->axes[axis];
     return point / values->stride % values->count;
 }
@@ -218,8 +198,7 @@ static Status sweep_grid_fill_material(const Buffer *pinned, Buffer *buffer) {
         return STATUS_OK;
     const size_t size = pinned->table.count * sizeof *pinned->table.at;
     ContactRow *rows = malloc(size);
-    if (rows == NULL)
-        return STATUS_NO_MEMORY;
+    TRY(status_made(rows != NULL));
     memcpy(rows, pinned->table.at, size);
     free(buffer->table.at);
     buffer->table = (ContactRows){rows, pinned->table.count};
@@ -262,9 +241,8 @@ static Status sweep_grid_apply(const SweepGrid *grid, size_t point, Simulation *
         if (values->field == NULL)
             continue; // its pointer is faulty, which is reported already
         *axis = i;
-        TRY(sweep_grid_split_buffer(values->pointer, target));
-        TRY(json_pointer_set(simulation_fields, target, values->pointer,
-                             &values->at[sweep_grid_index(grid, i, point)], why));
+        TRY(sweep_grid_split_buffer(values->axis->pointer, target));
+        TRY(sweep_axis_set(values->axis, sweep_grid_index(grid, i, point), target, why));
     }
     TRY(sweep_grid_fill_materials(&grid->study->materials, target));
     for (size_t i = 0; i < target->scene.dampers.count; i++)
@@ -278,9 +256,9 @@ Status sweep_grid_scene(const SweepGrid *grid, size_t point, bool is_bare,
     char why[JSON_POINTER_MESSAGE_MAX] = "";
     const Status status = sweep_grid_apply(grid, point, target, &axis, why);
     if (status == STATUS_INVALID)
-        return problem_add(problem, status, grid->axes[axis].pointer, "%s", why);
+        return problem_add(problem, status, grid->axes[axis].axis->pointer, "%s", why);
     if (status != STATUS_OK)
-        return study_no_memory(problem);
+        return study_result(STATUS_NO_MEMORY, problem);
     if (is_bare) {
         texts_clear(&target->output.channels);
         texts_clear(&target->output.psd.channels);
@@ -305,7 +283,8 @@ static size_t sweep_grid_affordable(const SweepGrid *grid, size_t scenes) {
     return max > AFFORDED_MIN ? max : AFFORDED_MIN;
 }
 
-double sweep_grid_steps(const SweepGrid *grid, const SimulationLimits *limits) {
+// Estimated solver steps of all points, from a sample of them.
+static double sweep_grid_steps(const SweepGrid *grid, const SimulationLimits *limits) {
     const size_t afforded = sweep_grid_affordable(grid, COST_SCENES);
     const size_t max = afforded < COST_SAMPLES ? afforded : COST_SAMPLES;
     const size_t samples = grid->points < max ? grid->points : max;
@@ -322,9 +301,7 @@ double sweep_grid_steps(const SweepGrid *grid, const SimulationLimits *limits) {
 }
 
 // Checks of an axis beyond those of its rows.
-static Status sweep_axis_check(const SweepAxis *axis, size_t number, Problem *problem) {
-    char place[PLACE];
-    snprintf(place, sizeof place, "/study/axes/%zu", number);
+static Status sweep_axis_check(const SweepAxis *axis, const char *place, Problem *problem) {
     const bool has_range = !isnan(axis->from) || !isnan(axis->to) || axis->count != COUNT_ABSENT;
     if (axis->values.count > 0 && (has_range || axis->spacing != CHOICE_ABSENT))
         return problem_add(problem, STATUS_INVALID, place,
@@ -346,17 +323,17 @@ static Status sweep_grid_check_axes(const SweepStudy *study, Problem *problem) {
     Status status = STATUS_OK;
     for (size_t i = 0; i < axes->count; i++) {
         char place[PLACE];
-        if (sweep_axis_check(&axes->at[i], i, problem) != STATUS_OK)
+        json_pointer_index(place, sizeof place, "/study/axes", i);
+        if (sweep_axis_check(&axes->at[i], place, problem) != STATUS_OK)
             status = STATUS_INVALID;
         for (size_t k = 0; k < i; k++)
             if (strcmp(axes->at[i].pointer, axes->at[k].pointer) == 0) {
-                snprintf(place, sizeof place, "/study/axes/%zu/pointer", i);
-                status = problem_add(problem, STATUS_INVALID, place,
-                                     "is also the pointer of axis %zu: give one axis each", k);
+                status =
+                    json_pointer_fault(problem, place, "pointer",
+                                       "is also the pointer of axis %zu: give one axis each", k);
             }
         const size_t length = sweep_axis_length(&axes->at[i]),
                      first = sweep_axis_length(&axes->at[0]);
-        snprintf(place, sizeof place, "/study/axes/%zu", i);
         if (status == STATUS_OK && study->mode == SWEEP_LIST && length != first)
             status = problem_add(problem, STATUS_INVALID, place,
                                  "has %zu values, the first axis has %zu: in a list all must "
@@ -366,7 +343,7 @@ static Status sweep_grid_check_axes(const SweepStudy *study, Problem *problem) {
     return status;
 }
 
-// All values of the axes are held in memory.
+// The answer holds all values of the axes.
 static Status sweep_grid_check_size(const SweepStudy *study, const SimulationLimits *limits,
                                     Problem *problem) {
     const size_t points = sweep_points(study);
@@ -394,29 +371,29 @@ static Status sweep_grid_find_fields(SweepGrid *grid, Problem *problem) {
     for (size_t i = 0; i < grid->axis_count && status != STATUS_NO_MEMORY; i++) {
         SweepValues *values = &grid->axes[i];
         char why[JSON_POINTER_MESSAGE_MAX];
-        if (sweep_grid_split_buffer(values->pointer, &scene) != STATUS_OK) {
+        if (sweep_grid_split_buffer(values->axis->pointer, &scene) != STATUS_OK) {
             status = STATUS_NO_MEMORY;
             break;
         }
-        values->field =
-            json_pointer_find(simulation_fields, &scene, values->pointer, &values->is_tag, why);
+        values->field = json_pointer_find(simulation_fields, &scene, values->axis->pointer,
+                                          &values->is_tag, why);
         if (values->field == NULL) {
             Fault fault = {0};
             snprintf(fault.pointer, sizeof fault.pointer, "/study/axes/%zu/pointer", i);
             text_fit(fault.detail, sizeof fault.detail, why);
-            text_quote(fault.value, sizeof fault.value, values->pointer);
+            text_quote(fault.value, sizeof fault.value, values->axis->pointer);
             status = problem_add_fault(problem, STATUS_INVALID, &fault);
             continue;
         }
         // Impossible values are reported point by point; a possible one is enough here.
         Status set = STATUS_INVALID;
         for (size_t k = 0; k < values->count && set == STATUS_INVALID; k++)
-            set = json_pointer_set(simulation_fields, &scene, values->pointer, &values->at[k], why);
+            set = sweep_axis_set(values->axis, k, &scene, why);
         if (set == STATUS_NO_MEMORY)
             status = set;
     }
     simulation_clear(&scene);
-    return status == STATUS_NO_MEMORY ? study_no_memory(problem) : status;
+    return status;
 }
 
 Status sweep_grid_new(const SweepStudy *study, const Simulation *simulation,
@@ -425,28 +402,21 @@ Status sweep_grid_new(const SweepStudy *study, const Simulation *simulation,
     TRY(sweep_grid_check_axes(study, problem));
     TRY(sweep_grid_check_size(study, limits, problem));
     SweepGrid *grid = calloc(1, sizeof *grid + study->axes.count * sizeof *grid->axes);
-    if (grid == NULL)
-        return study_no_memory(problem);
+    TRY(status_made(grid != NULL));
     grid->study = study;
     grid->simulation = simulation;
     grid->points = sweep_points(study);
     grid->axis_count = study->axes.count;
-    Status status = STATUS_OK;
     size_t stride = 1;
-    for (size_t i = grid->axis_count; i-- > 0 && status == STATUS_OK;) {
+    for (size_t i = grid->axis_count; i-- > 0;) {
         SweepValues *values = &grid->axes[i];
-        values->pointer = study->axes.at[i].pointer;
+        values->axis = &study->axes.at[i];
         values->count = sweep_axis_length(&study->axes.at[i]);
         values->stride = study->mode == SWEEP_LIST ? 1 : stride;
         stride *= values->count;
-        status = sweep_axis_read(&study->axes.at[i], values, problem);
-    }
-    if (status != STATUS_OK) {
-        sweep_grid_free(grid);
-        return status;
     }
     *made = grid;
-    return sweep_grid_find_fields(grid, problem);
+    return study_result(sweep_grid_find_fields(grid, problem), problem);
 }
 
 // Whether `pointer` is `above` or below it.
@@ -463,12 +433,12 @@ static void sweep_grid_add_fault(const SweepGrid *grid, size_t point, const Faul
     Fault own = *fault;
     size_t cause = grid->axis_count > 1 ? grid->axis_count : 0;
     for (size_t i = 0; i < grid->axis_count; i++)
-        if (sweep_grid_is_below(fault->pointer, grid->axes[i].pointer) ||
-            sweep_grid_is_below(grid->axes[i].pointer, fault->pointer))
+        if (sweep_grid_is_below(fault->pointer, grid->axes[i].axis->pointer) ||
+            sweep_grid_is_below(grid->axes[i].axis->pointer, fault->pointer))
             cause = i;
     if (cause == grid->axis_count)
         snprintf(own.pointer, PLACE, "/study/axes");
-    else if (sweep_axis_is_range(&grid->study->axes.at[cause]))
+    else if (sweep_axis_is_range(grid->axes[cause].axis))
         snprintf(own.pointer, PLACE, "/study/axes/%zu", cause);
     else
         snprintf(own.pointer, PLACE, "/study/axes/%zu/values/%zu", cause,
@@ -512,7 +482,7 @@ static Status sweep_grid_validate_sample(Validation *of, size_t max) {
     TRY(sweep_grid_validate_point(of, grid->points - 1));
     for (size_t i = 0; i < axes; i++) {
         const size_t count = grid->axes[i].count;
-        const bool is_short = is_list || sweep_axis_is_range(&grid->study->axes.at[i]);
+        const bool is_short = is_list || sweep_axis_is_range(grid->axes[i].axis);
         const size_t wanted = is_short && share > RANGE_SAMPLES ? RANGE_SAMPLES : share;
         const size_t samples = count < wanted ? count : wanted;
         // Both ends are among them.
@@ -528,8 +498,7 @@ Status sweep_grid_validate(const SweepGrid *grid, size_t scenes, const Simulatio
                            const Progress *progress, Problem *problem) {
     Validation of = {grid, limits, progress, malloc(sizeof(Problem)), problem, false};
     Status status = STATUS_OK;
-    if (of.fault == NULL)
-        return study_no_memory(problem);
+    TRY(status_made(of.fault != NULL));
     const size_t max = sweep_grid_affordable(grid, scenes);
     if (grid->points > max)
         status = sweep_grid_validate_sample(&of, max);
@@ -575,9 +544,9 @@ static Status sweep_complete(void *request, const Simulation *simulation,
 }
 
 static Status sweep_cost(const void *request, const Simulation *simulation,
-                         const SimulationLimits *limits, double *steps, Problem *problem) {
+                         const SimulationLimits *limits, double *steps) {
     SweepGrid *grid;
-    const Status status = sweep_grid_new(request, simulation, limits, &grid, problem);
+    const Status status = sweep_grid_new(request, simulation, limits, &grid, NULL);
     if (status == STATUS_OK)
         *steps = sweep_grid_steps(grid, limits);
     sweep_grid_free(grid);
@@ -593,31 +562,29 @@ size_t sweep_value_index(const Sweep *sweep, size_t axis, size_t point) {
     return point / stride % sweep->axes.at[axis].values.count;
 }
 
-static Status sweep_fill_axis(const Texts *texts, const SweepValues *values, SweepAxisValues *axis,
-                              Problem *problem) {
-    TRY(study_copy_text(values->pointer, &axis->pointer, problem));
-    TRY(study_copy_text(values->is_tag ? NULL : values->field->unit, &axis->unit, problem));
+static Status sweep_fill_axis(const SweepValues *values, SweepAxisValues *axis) {
+    TRY(study_copy_text(values->axis->pointer, &axis->pointer));
+    TRY(study_copy_text(values->is_tag ? NULL : values->field->unit, &axis->unit));
     for (size_t i = 0; i < values->count; i++) {
         char digits[32];
-        TRY(study_add_text(texts->count > 0 ? texts->at[i]
-                                            : text_real(digits, values->at[i].number),
-                           &axis->values, problem));
+        TRY(texts_append(&axis->values, sweep_axis_is_range(values->axis)
+                                            ? text_real(digits, sweep_axis_value(values->axis, i))
+                                            : values->axis->values.at[i]));
     }
     return STATUS_OK;
 }
 
-static Status sweep_fill(const SweepGrid *grid, Sweep *sweep, Problem *problem) {
+static Status sweep_fill(const SweepGrid *grid, Sweep *sweep) {
     const SweepStudy *study = grid->study;
     sweep->points = grid->points;
     sweep->mode = study->mode;
     for (size_t i = 0; i < grid->axis_count; i++) {
-        SweepAxisValues *axis = study_list_add(&sweep->axes, sizeof *axis, problem);
-        if (axis == NULL)
-            return STATUS_NO_MEMORY;
-        TRY(sweep_fill_axis(&study->axes.at[i].values, &grid->axes[i], axis, problem));
+        SweepAxisValues *axis = study_list_add(&sweep->axes, sizeof *axis);
+        TRY(status_made(axis != NULL));
+        TRY(sweep_fill_axis(&grid->axes[i], axis));
     }
     for (size_t i = 0; i < study->metrics.count; i++)
-        TRY(study_add_text(study->metrics.at[i], &sweep->metrics, problem));
+        TRY(texts_append(&sweep->metrics, study->metrics.at[i]));
     return STATUS_OK;
 }
 
@@ -626,9 +593,9 @@ Status sweep_describe(const SweepStudy *study, const Simulation *simulation, Swe
     SweepGrid *grid;
     Status status = sweep_grid_new(study, simulation, NULL, &grid, problem);
     if (status == STATUS_OK)
-        status = sweep_fill(grid, sweep, problem);
+        status = sweep_fill(grid, sweep);
     sweep_grid_free(grid);
-    return status;
+    return study_result(status, problem);
 }
 
 SweepStatus sweep_status(Status status) {
@@ -640,19 +607,10 @@ SweepStatus sweep_status(Status status) {
 }
 
 void sweep_values(const Texts *metrics, const RunRecord *run, double *values) {
-    for (size_t i = 0; i < metrics->count; i++) {
-        size_t offset = 0;
-        const Field *row = fields_find(summary_fields, metrics->at[i], &offset);
-        if (row == NULL) {
-            values[i] = run->steps;
-            continue;
-        }
-        const void *member = (const char *)&run->summary + offset + row->offset;
-        const uint64_t count = row->kind == FIELD_KIND_COUNT ? *(const uint64_t *)member : 0;
-        values[i] = row->kind != FIELD_KIND_COUNT ? *(const double *)member
-                    : count == COUNT_ABSENT       ? (double)NAN
-                                                  : (double)count;
-    }
+    for (size_t i = 0; i < metrics->count; i++)
+        values[i] = strcmp(metrics->at[i], "steps") == 0
+                        ? run->steps
+                        : study_summary_value(&run->summary, metrics->at[i]);
 }
 
 typedef struct SweepWork {
@@ -668,7 +626,7 @@ static Status sweep_scene(const void *of, size_t member, Simulation *scene, Stud
     return sweep_grid_scene(work->grid, member, true, work->work.limits, scene, problem);
 }
 
-static Status sweep_fold(void *of, size_t member, StudyPart *part, Problem *problem) {
+static Status sweep_fold(void *of, size_t member, StudyPart *part) {
     SweepWork *work = of;
     const Texts *metrics = &work->grid->study->metrics;
     const RunRecord *run = &part->run;
@@ -676,16 +634,16 @@ static Status sweep_fold(void *of, size_t member, StudyPart *part, Problem *prob
     SweepTable *table = &work->answer->table;
     double values[SWEEP_METRICS];
     sweep_values(metrics, run, values);
-    TRY(study_add_real((double)member, &table->points, problem));
-    TRY(study_add_real(status, &table->statuses, problem));
+    TRY(study_add_real((double)member, &table->points));
+    TRY(study_add_real(status, &table->statuses));
     for (size_t i = 0; i < metrics->count; i++)
-        TRY(study_add_real(values[i], &table->values, problem));
+        TRY(study_add_real(values[i], &table->values));
     if (member == 0)
         table->failed = 0;
     if (status == SWEEP_MADE)
         return STATUS_OK;
     table->failed++;
-    return study_failures_add(&table->failures, (int)status, NULL, member, run->why, problem);
+    return study_failures_add(&table->failures, (int)status, NULL, member, run->why);
 }
 
 static void sweep_free(void *of) {
@@ -701,7 +659,7 @@ static Status sweep_begin(void *of, const StudyTools *tools, Problem *problem) {
     TRY(sweep_grid_validate(work->grid, SIZE_MAX, tools->limits, tools->progress, problem));
     work->work.members = work->grid->points;
     work->work.part_bytes = sizeof(StudyPart);
-    return sweep_fill(work->grid, work->answer, problem);
+    return sweep_fill(work->grid, work->answer);
 }
 
 const StudyKind study_sweep = {

@@ -15,7 +15,7 @@ enum {
 
 typedef enum SweepSpacing { SWEEP_LINEAR, SWEEP_LOGARITHMIC } SweepSpacing;
 typedef enum SweepMode { SWEEP_GRID, SWEEP_LIST } SweepMode;
-extern const char *const sweep_spacing_names[], *const sweep_mode_names[];
+extern const char *const sweep_mode_names[];
 
 // One axis: values, or a range.
 typedef struct SweepAxis {
@@ -46,7 +46,6 @@ typedef struct PinnedRecords {
     PinnedRecord *at;
     size_t count;
 } PinnedRecords;
-extern const Field pinned_record_fields[];
 
 // The request.
 typedef struct SweepStudy {
@@ -58,8 +57,6 @@ typedef struct SweepStudy {
     PinnedRecords records; // the ground motions that an axis names
 } SweepStudy;
 
-// The metrics of a point: the summary's numbers in their order, then the solver's steps.
-extern const char *const sweep_metric_names[]; // NULL-terminated
 const char *sweep_metric_unit(const char *name);
 
 // Result of a point. The numbers are stored: never change them.
@@ -115,13 +112,11 @@ SweepStatus sweep_status(Status status); // of a run
 // The metrics of a run; NAN where unknown.
 void sweep_values(const Texts *metrics, const RunRecord *run, double *values);
 
-// The values of an axis, parsed.
+// An axis of a grid.
 typedef struct SweepValues {
-    const char *pointer;
+    const SweepAxis *axis;
     size_t count, stride; // point p has value (p / stride) % count
-    JsonScalar *at;
-    char *texts;        // of all its values
-    const Field *field; // NULL: the pointer is faulty, the axis changes nothing
+    const Field *field;   // NULL: the pointer is faulty, the axis changes nothing
     bool is_tag;
 } SweepValues;
 
@@ -133,9 +128,6 @@ typedef struct SweepGrid {
     SweepValues axes[];
 } SweepGrid;
 
-// Number of points; SIZE_MAX on overflow.
-size_t sweep_points(const SweepStudy *study);
-
 // Borrows study and simulation, both completed (the study by its rows at least). Adds all faults of
 // axes below "/study/axes"; `limits` NULL: without a limit on the points. *grid is freed by
 // sweep_grid_free also after STATUS_INVALID, where it may be there: then only pointers are faulty.
@@ -143,17 +135,11 @@ Status sweep_grid_new(const SweepStudy *study, const Simulation *simulation,
                       const SimulationLimits *limits, SweepGrid **grid, Problem *problem);
 void sweep_grid_free(SweepGrid *grid);
 
-// Index of a point's value on an axis.
-size_t sweep_grid_index(const SweepGrid *grid, size_t axis, size_t point);
-
 // The completed scene of a point: the sweep's own with this point's values. `is_bare`: without
 // output, as a row needs it. Cleared by simulation_clear in any case. Faults have the pointers of
 // that scene.
 Status sweep_grid_scene(const SweepGrid *grid, size_t point, bool is_bare,
                         const SimulationLimits *limits, Simulation *target, Problem *problem);
-
-// Estimated solver steps of all points, from a sample of them.
-double sweep_grid_steps(const SweepGrid *grid, const SimulationLimits *limits);
 
 // Validates every point if that is no more work than `scenes` small scenes, else about as many as
 // that: points where one axis alone leaves its first value, of long axes a sample, and the last

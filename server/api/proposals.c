@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/drop_test/material_proposal.h"
+#include "core/drop_test/evaluation.h"
 #include "server/api/materials.h"
 #include "server/api/query.h"
 #include "server/base/link.h"

@@ -62,11 +62,10 @@ static void statistic_print(int metric, const RunStatistic *statistic) {
 }
 
 static void statistics_print(const Ensemble *ensemble) {
-    EnsembleStatistics statistics = ensemble->statistics; // a borrowed view
     printf("  %-25s %10s %8s %8s %9s %9s %9s\n", "", "mean", "+-", "s.d.", "smallest", "median",
            "largest");
     for (int metric = 0; metric < STATISTICS_METRICS; metric++)
-        statistic_print(metric, ensemble_statistic(&statistics, metric));
+        statistic_print(metric, &ensemble->statistics.of[metric]);
 }
 
 static void spectrum_print(const Ensemble *ensemble, const RunSpectrum *spectrum) {

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "core/base/spelling.h"
-#include "core/drop_test/material_proposal.h"
+#include "core/drop_test/evaluation.h"
 #include "core/scene/damper.h"
 #include "server/command/materials_ask.h"
 

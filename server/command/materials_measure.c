@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/drop_test/material_proposal.h"
+#include "core/drop_test/evaluation.h"
 #include "core/formats/force_trace_text.h"
 #include "server/codec/amend.h"
 #include "server/codec/write.h"

@@ -45,10 +45,10 @@ static bool has_scale(const RunStatistic *statistic) {
     return statistic->mean > 0 && isfinite(statistic->mean);
 }
 
-static Scale scale_rows(EnsembleStatistics *statistics) {
+static Scale scale_rows(const EnsembleStatistics *statistics) {
     Scale of = {1, 1};
     for (int metric = 0; metric < STATISTICS_METRICS; metric++) {
-        const RunStatistic *statistic = ensemble_statistic(statistics, metric);
+        const RunStatistic *statistic = &statistics->of[metric];
         if (!has_scale(statistic))
             continue;
         of.least = fmin(of.least, fmin(statistic->minimum, statistic->low) / statistic->mean);
@@ -137,7 +137,6 @@ void chart_ensemble(const Ensemble *ensemble, Bytes *bytes) {
                  .decades = PLOT_PSD_DECADES,
                  .x_title = "frequency [Hz]",
                  .bytes = bytes};
-    EnsembleStatistics statistics = ensemble->statistics; // a borrowed view
     plot_begin(&plot);
     for (size_t i = 0; i < drawn(ensemble); i++)
         plot_fit(&plot, &ensemble->frequency, &ensemble->spectra.at[i].mean);
@@ -156,9 +155,9 @@ void chart_ensemble(const Ensemble *ensemble, Bytes *bytes) {
     if (plot_axes(&plot))
         for (size_t i = 0; i < drawn(ensemble); i++)
             put_spectrum(&plot, ensemble, i);
-    const Scale of = scale_rows(&statistics);
+    const Scale of = scale_rows(&ensemble->statistics);
     for (int metric = 0; metric < STATISTICS_METRICS; metric++)
-        put_row(bytes, &of, metric, ensemble_statistic(&statistics, metric),
+        put_row(bytes, &of, metric, &ensemble->statistics.of[metric],
                 from + row_height * (metric + 0.5));
     svg_close(bytes);
 }

@@ -93,8 +93,9 @@ static Status find_failures(SweepShow *show, Problem *problem) {
                 first = &failed[i];
         if (first == NULL)
             return STATUS_OK;
-        TRY(study_failures_add(&table->failures, (int)(first - failed), NULL, first->first,
-                               first->why, problem));
+        TRY(study_result(study_failures_add(&table->failures, (int)(first - failed), NULL,
+                                            first->first, first->why),
+                         problem));
         table->failures.at[table->failures.count - 1].count = first->count;
         table->failed += first->count;
         first->count = 0;

@@ -22,7 +22,7 @@
 #include "core/math/fft.h"
 #include "core/math/student_t.h"
 #include "core/study/ensemble.h"
-#include "core/study/stopping_rule.h"
+#include "core/study/statistics.h"
 #include "core/study/study.h"
 #include "server/codec/read.h"
 #include "tests/truth/drawn.h"
@@ -117,9 +117,8 @@ static void whole_make(const StudyRequest *inquiry, Whole *whole) {
     for (size_t i = 0; i < whole->runs; i++) {
         Simulation member;
         Outcome *outcome;
-        assert_int_equal(
-            ensemble_scene(&inquiry->simulation, study->first_seed + i, &member, &problem),
-            STATUS_OK);
+        assert_int_equal(ensemble_scene(&inquiry->simulation, study->first_seed + i, &member),
+                         STATUS_OK);
         if (simulation_run(&member, NULL, NULL, &workspace, &outcome, &problem) != STATUS_OK)
             fail_msg("%s", problem.detail);
         const Summary *summary = &outcome->summary;

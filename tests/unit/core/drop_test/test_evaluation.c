@@ -10,7 +10,7 @@
 #include <cmocka.h>
 
 #include "core/drop_test/evaluation.h"
-#include "core/drop_test/gravity_correction.h"
+#include "core/drop_test/pulse_model.h"
 #include "server/base/bytes.h"
 #include "tests/support/drops.h"
 

@@ -25,7 +25,7 @@ static const double interval = 1e-3, T_c = 0.02, m_e = 0.1, v0 = 0.5;
 static size_t work(double pull, int separation, bool by_mass) {
     double values[COUNT_MAX];
     philox_normal_pairs(5, 7, 0, COUNT_MAX / 2, values);
-    const PulseModel shape = pulse_model_make(0.25, pull, separation);
+    const PulseModel shape = pulse_model_make(0.25, pull, false, separation);
     for (size_t i = 0; i < COUNT_MAX; i++) {
         const double s = ((double)i - 290.37) * interval / T_c;
         values[i] *= 0.02;

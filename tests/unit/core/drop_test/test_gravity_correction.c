@@ -7,7 +7,7 @@
 #include <cmocka.h>
 
 #include "core/base/status.h"
-#include "core/drop_test/gravity_correction.h"
+#include "core/drop_test/pulse_model.h"
 #include "tests/support/drops.h"
 
 static void assert_near(double is, double should, double within) {

@@ -9,7 +9,7 @@
 
 #include <cmocka.h>
 
-#include "core/drop_test/material_proposal.h"
+#include "core/drop_test/evaluation.h"
 #include "tests/support/drops.h"
 
 static Problem problem;

@@ -39,7 +39,7 @@ static void a_pull_lengthens_a_pulse_as_the_motion_says(void **state) {
     for (int rule = 0; rule < 2; rule++)
         for (size_t i = 0; i < COUNT(decays); i++)
             for (size_t j = 0; j < COUNT(pulls); j++) {
-                const PulseModel shape = pulse_model_make(decays[i], pulls[j], rule);
+                const PulseModel shape = pulse_model_make(decays[i], pulls[j], false, rule);
                 const double should = last(&shape, rule);
                 if (isinf(should)) {
                     assert_true(isinf(shape.length));
@@ -57,18 +57,18 @@ static void the_pull_is_known_by_how_long_the_pulse_lasts(void **state) {
     for (int rule = 0; rule < 2; rule++)
         for (size_t i = 0; i < COUNT(decays); i++)
             for (size_t j = 0; j < COUNT(pulls); j++) {
-                const PulseModel shape = pulse_model_make(decays[i], pulls[j], rule);
+                const PulseModel shape = pulse_model_make(decays[i], pulls[j], false, rule);
                 if (isinf(shape.length))
                     continue;
                 const PulseModel same =
-                    pulse_model_make_lasting(decays[i], pulls[j] * shape.length, rule);
+                    pulse_model_make(decays[i], pulls[j] * shape.length, true, rule);
                 if (!(fabs(same.length - shape.length) < 1e-9))
                     fail_msg("rule %d, L = %g, pull %g: %.12g should be %.12g", rule, decays[i],
                              pulls[j], same.length, shape.length);
                 assert_true(fabs(same.pull / shape.pull - 1) < 1e-9);
             }
-    assert_true(isinf(pulse_model_make_lasting(0.7, 100, SEPARATION_ZERO_PENETRATION).length));
-    assert_true(isinf(pulse_model_make_lasting(0.7, 100, SEPARATION_ZERO_FORCE).length));
+    assert_true(isinf(pulse_model_make(0.7, 100, true, SEPARATION_ZERO_PENETRATION).length));
+    assert_true(isinf(pulse_model_make(0.7, 100, true, SEPARATION_ZERO_FORCE).length));
 }
 
 int main(void) {

@@ -14,8 +14,8 @@
 #include "core/simulation/error_metrics.h"
 #include "core/solve/exact.h"
 #include "core/solve/solver.h"
-#include "core/study/candidate_settings.h"
-#include "core/study/study_run.h"
+#include "core/study/study.h"
+#include "core/study/tradeoff.h"
 #include "tests/support/document.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
@@ -37,7 +37,7 @@ static void complete(Simulation *simulation) {
 static TradeoffPoints make(const Simulation *simulation) {
     const Texts all = {NULL, 0};
     TradeoffPoints points;
-    assert_int_equal(candidate_settings_list(&all, simulation, &points, &problem), STATUS_OK);
+    assert_int_equal(candidate_settings_list(&all, simulation, &points), STATUS_OK);
     return points;
 }
 

@@ -47,7 +47,7 @@ static void what_was_not_measured_is_neither_best_nor_taken(void **state) {
     tradeoff_mark_best(&points, METRIC_DISPLACEMENT);
     assert_false(all[0].is_best || all[1].is_best);
     assert_true(all[2].is_best);
-    assert_int_equal(tradeoff_recommend(&points, METRIC_DISPLACEMENT, 1, &choice, NULL), STATUS_OK);
+    assert_int_equal(tradeoff_recommend(&points, METRIC_DISPLACEMENT, 1, &choice), STATUS_OK);
     assert_int_equal(choice.point, 3);
     assert_non_null(strstr(choice.why, "sound is the only point"));
     free(choice.why);
@@ -72,14 +72,13 @@ static void the_cheapest_that_keeps_the_error_is_taken(void **state) {
     };
     TradeoffRecommendation choice = {COUNT_ABSENT, NULL};
     for (size_t i = 0; i < COUNT(cases); i++) {
-        assert_int_equal(
-            tradeoff_recommend(&points, METRIC_DISPLACEMENT, cases[i].error, &choice, NULL),
-            STATUS_OK);
+        assert_int_equal(tradeoff_recommend(&points, METRIC_DISPLACEMENT, cases[i].error, &choice),
+                         STATUS_OK);
         if (choice.point != cases[i].point || strstr(choice.why, cases[i].says) == NULL)
             fail_msg("%g: point %llu, %s", cases[i].error, (unsigned long long)choice.point,
                      choice.why);
     }
-    assert_int_equal(tradeoff_recommend(&points, METRIC_PSD, 1, &choice, NULL), STATUS_OK);
+    assert_int_equal(tradeoff_recommend(&points, METRIC_PSD, 1, &choice), STATUS_OK);
     assert_true(choice.point == COUNT_ABSENT);
     assert_string_equal(choice.why, "no point has an error of psd");
     free(choice.why);
@@ -91,8 +90,7 @@ static void of_times_that_are_nearly_alike_the_closest_is_taken(void **state) {
                            point("closer still", 1.3, 1e-14), point("far", 0.9, 1)};
     TradeoffPoints points = {all, COUNT(all)};
     TradeoffRecommendation choice = {COUNT_ABSENT, NULL};
-    assert_int_equal(tradeoff_recommend(&points, METRIC_DISPLACEMENT, 1e-3, &choice, NULL),
-                     STATUS_OK);
+    assert_int_equal(tradeoff_recommend(&points, METRIC_DISPLACEMENT, 1e-3, &choice), STATUS_OK);
     assert_int_equal(choice.point, 2);
     assert_non_null(strstr(choice.why, "hardly longer than the cheapest, coarse"));
     free(choice.why);

@@ -10,7 +10,6 @@
 #include <string.h>
 
 #include "core/math/fft.h"
-#include "core/study/parameter_perturbation.h"
 #include "core/study/sensitivity.h"
 #include "core/study/study.h"
 #include "tests/support/paper.h"
@@ -147,7 +146,7 @@ static void draw(const SensitivityStudy *study, const StudyRequest *inquiry, uin
                  Simulation *member, double factors[2]) {
     Reals drawn[2] = {{NULL, 0}, {NULL, 0}};
     assert_int_equal(perturbation_draw(&study->uncertainty, study->seed, &inquiry->simulation, run,
-                                       member, &drawn[0], &drawn[1], NULL),
+                                       member, &drawn[0], &drawn[1]),
                      STATUS_OK);
     for (int i = 0; i < 2; i++) {
         assert_int_equal(drawn[i].count, 1);

@@ -7,7 +7,7 @@
 
 #include <math.h>
 
-#include "core/study/stopping_rule.h"
+#include "core/study/statistics.h"
 
 // The numbers are computed apart, with scipy.stats.
 static void assert_near(double is, double should, double most) {
