@@ -6,7 +6,7 @@
 // so that the mean error over each line is 0 to the fourth order and the largest is (p' h)^2 / 12
 // of the amplitude instead of / 8. A structure that is far slower than the knots responds to the
 // mean.
-#include "core/excitation/chirp.h"
+#include "core/excitation/excitation.h"
 
 #include "core/base/json_pointer.h"
 
@@ -141,10 +141,6 @@ static void chirp_doubt(const Excitation *excitation, const Span *span, const ch
                                is_end ? "end_frequency" : "start_frequency", doubts);
 }
 
-static bool chirp_is_still(const Excitation *excitation) {
-    return chirp_of(excitation)->amplitude == 0;
-}
-
 const ExcitationKind excitation_chirp = {
     .kind = {"chirp", "a sine of the base's acceleration whose frequency sweeps evenly",
              chirp_fields, sizeof(ExcitationChirp)},
@@ -153,7 +149,7 @@ const ExcitationKind excitation_chirp = {
     .interval = chirp_interval,
     .lasts = chirp_lasts,
     .effort = 1.5,
-    .is_still = chirp_is_still,
+    .amplitude = offsetof(ExcitationChirp, amplitude),
     .make = chirp_make,
     .doubt = chirp_doubt,
 };

@@ -36,14 +36,8 @@ static Status free_make(const Excitation *excitation, const Span *span, const Pr
     return STATUS_OK;
 }
 
-static bool free_is_still(const Excitation *excitation) {
-    (void)excitation;
-    return true;
-}
-
 const ExcitationKind excitation_free = {
     .kind = {"free", "free vibration from the initial state", excitation_fields,
              sizeof(Excitation)},
-    .is_still = free_is_still,
     .make = free_make,
 };

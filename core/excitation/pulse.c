@@ -1,6 +1,6 @@
 // Single pulses of the base's acceleration: half a sine, a_g = amplitude sin(pi (t - start) /
 // length), and a triangle that reaches the amplitude at the middle.
-#include "core/excitation/pulse.h"
+#include "core/excitation/excitation.h"
 
 #include "core/base/json_pointer.h"
 
@@ -56,10 +56,6 @@ static void pulse_doubt(const Excitation *excitation, const Span *span, const ch
             text_real(is, pulse->length), 2 / span->sample_rate);
 }
 
-static bool pulse_is_still(const Excitation *excitation) {
-    return pulse_of(excitation)->amplitude == 0;
-}
-
 static Status half_sine_make(const Excitation *excitation, const Span *span,
                              const Progress *progress, Base *base, Problem *problem) {
     (void)span;
@@ -78,7 +74,7 @@ const ExcitationKind excitation_half_sine = {
     .kind = {"half_sine", "half a sine of the base's acceleration, once", pulse_fields,
              sizeof(ExcitationPulse)},
     .complete = pulse_complete,
-    .is_still = pulse_is_still,
+    .amplitude = offsetof(ExcitationPulse, amplitude),
     .make = half_sine_make,
     .doubt = pulse_doubt,
 };
@@ -104,7 +100,7 @@ const ExcitationKind excitation_triangular = {
     .kind = {"triangular", "a triangular pulse of the base's acceleration, once", pulse_fields,
              sizeof(ExcitationPulse)},
     .complete = pulse_complete,
-    .is_still = pulse_is_still,
+    .amplitude = offsetof(ExcitationPulse, amplitude),
     .make = triangular_make,
     .doubt = pulse_doubt,
 };

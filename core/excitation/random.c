@@ -17,7 +17,7 @@
 // The fade smears the band's edges: d bins outside, the density is 0.0085 / d^3 of that inside
 // (20 bins: -60 dB). A block has at least 256 bins in the band or, where B meets its limit, 8.
 // Bins 0 and B/2 are left out: no mean, and no bin with half the variance.
-#include "core/excitation/random.h"
+#include "core/excitation/excitation.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -231,10 +231,6 @@ static double random_interval(const Excitation *excitation) {
     return 1 / random_of(excitation)->rate;
 }
 
-static bool random_is_still(const Excitation *excitation) {
-    return random_of(excitation)->rms == 0;
-}
-
 const ExcitationKind excitation_random = {
     .kind = {.name = "random",
              .doc = "band-limited Gaussian acceleration of the base, the same for the same seed",
@@ -243,6 +239,6 @@ const ExcitationKind excitation_random = {
     .complete = random_complete,
     .interval = random_interval,
     .effort = 0.06,
-    .is_still = random_is_still,
+    .amplitude = offsetof(ExcitationRandom, rms),
     .make = random_make,
 };

@@ -1,6 +1,6 @@
 // A sine of the base, amplitude * sin(2 pi f t), of its acceleration or of its displacement. For
 // the latter a_g = -amplitude (2 pi f)^2 sin(2 pi f t).
-#include "core/excitation/sine.h"
+#include "core/excitation/excitation.h"
 
 #include "core/base/json_pointer.h"
 
@@ -69,16 +69,12 @@ static void sine_doubt(const Excitation *excitation, const Span *span, const cha
     excitation_doubt_frequency(sine_of(excitation)->frequency, span, pointer, "frequency", doubts);
 }
 
-static bool sine_is_still(const Excitation *excitation) {
-    return sine_of(excitation)->amplitude == 0;
-}
-
 const ExcitationKind excitation_sine = {
     .kind = {"sine", "a sine of the base's acceleration or displacement", sine_fields,
              sizeof(ExcitationSine)},
     .complete = sine_complete,
     .fastest = sine_fastest,
-    .is_still = sine_is_still,
+    .amplitude = offsetof(ExcitationSine, amplitude),
     .make = sine_make,
     .doubt = sine_doubt,
 };

@@ -7,7 +7,6 @@
 #include "core/excitation/base_motion.h"
 #include "core/plan/plan.h"
 #include "core/result/response.h"
-#include "core/result/work_counters.h"
 #include "core/solve/workspace.h"
 
 // First member of every solver's settings, the scene's "accuracy" object.

@@ -14,7 +14,7 @@
 
 #include <cmocka.h>
 
-#include "core/excitation/random.h"
+#include "core/excitation/excitation.h"
 #include "core/math/fft.h"
 #include "tests/support/paper.h"
 #include "tests/truth/drawn.h"
