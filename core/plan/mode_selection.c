@@ -1,3 +1,6 @@
+// Modes left out of a plan: modes above the number asked for, and modes that nothing sets in
+// motion.
+//
 // A mode moves if the base or the initial state excites it, if a damper is where its shape is not
 // 0, or if damping couples it to a mode that moves. In doubles these quantities are never exactly
 // 0:
@@ -6,6 +9,17 @@
 //
 // counts as 0, as does a shape so small beside its largest value. The other modes stay at rest
 // whatever these do, so that leaving them out changes no more than rounding does.
+//
+// The error of keeping only the lowest modes is predicted from one run of all modes without dampers
+// and without coupled damping. A mode obeys, with a_g linear within a step,
+//
+//   q'' + D q' + w^2 q = -share a_g,
+//
+// so that the increment of (q, q') over a step is a block of exp(A h) - I times (q, q', a_g, a_g').
+// At sample instants the modes left out are summed at every storey, for every number of modes kept.
+// Impacts are estimated from that run (truncation_impacts). SAFETY covers what sampling, coupled
+// damping and dampers change in the whole motion; its values and GROWTH are calibrated with
+// tests/truth/test_modes.c.
 #include "core/plan/mode_selection.h"
 
 #include <float.h>
@@ -13,10 +27,363 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/plan/modal_truncation.h"
+#include "core/math/matrix_exponential.h"
 
 enum { ROUNDINGS = 64 };
 static const double NEGLIGIBLE = ROUNDINGS * DBL_EPSILON;
+
+static const double PI = 3.14159265358979323846;
+static const double SAFETY = 1.25, SAFETY_IMPACTS = 2;
+static const double STEPS_MAX = 2e7; // steps of modes: about 40 ms
+static const double SUMS_MAX = 1e6;  // samples times modes times storeys: about 2 ms
+static const double STEPS_A_RADIAN = 5;
+
+// All modes in motion, and the sums over its samples.
+typedef struct ModalRun {
+    const Plan *plan;
+    const Base *base;
+    size_t n, m;    // modes, storeys
+    double *shapes; // n x m
+    double *q, *p;  // the state
+    double step;    // [s]
+    // Eight rows of n numbers: what (q, q', a_g, a_g') add to q and to q' in a step.
+    double *recurrence;
+    double *before, *accelerated; // q' at the start of a sample interval, mean q'' over it
+    double *x, *left, *pull;      // by storey: the motion; displacement and acceleration left out
+    // By first mode left out and storey: largest displacement, sums of its square, of its product
+    // with the whole motion, and of the acceleration's square. Row 0 is the whole motion.
+    double *peak, *square, *cross, *pulls;
+    double *mode_peak;    // by mode: largest q
+    double *storey_speed; // by damper: largest speed of its storey [m/s]
+    double acceleration;  // sum of squares of the whole absolute acceleration
+    double count;         // samples summed
+} ModalRun;
+
+static void modal_run_recurrence(ModalRun *run) {
+    enum { Q, P, A, B, SIZE };
+    const Modes *modes = &run->plan->modes;
+    const size_t n = run->n;
+    for (size_t k = 0; k < n; k++) {
+        long double system[SIZE * SIZE] = {0}, gain[SIZE * SIZE];
+        system[Q * SIZE + P] = system[A * SIZE + B] = 1;
+        system[P * SIZE + Q] = -(long double)modes->omega[k] * modes->omega[k];
+        system[P * SIZE + P] = -(long double)modes->damping[k * (n + 1)];
+        system[P * SIZE + A] = -(long double)modes->participation[k];
+        matrix_exponential_increment(system, SIZE, run->step, gain);
+        for (size_t i = 0; i < 2 * SIZE; i++)
+            run->recurrence[i * n + k] = (double)gain[i];
+    }
+}
+
+// Sums the motion at a sample instant for every number of modes kept; `base` is the mean of a_g
+// over the sample interval.
+static void modal_run_sum(ModalRun *run, double base) {
+    const Plan *plan = run->plan;
+    const size_t n = run->n, m = run->m;
+    double *restrict x = run->x, *restrict left = run->left, *restrict pull = run->pull;
+    memset(x, 0, 3 * m * sizeof *x); // left and pull follow
+    for (size_t k = 0; k < n; k++)
+        for (size_t j = 0; j < m; j++)
+            x[j] += run->shapes[k * m + j] * run->q[k];
+    for (size_t k = n; k-- > 0;) {
+        const double q = run->q[k], accelerated = run->accelerated[k];
+        const double *restrict shape = &run->shapes[k * m];
+        double *restrict peak = &run->peak[k * m], *restrict square = &run->square[k * m];
+        double *restrict cross = &run->cross[k * m], *restrict pulls = &run->pulls[k * m];
+        for (size_t j = 0; j < m; j++) {
+            left[j] += shape[j] * q;
+            pull[j] += shape[j] * accelerated;
+            const double size = fabs(left[j]);
+            peak[j] = size > peak[j] ? size : peak[j];
+            square[j] += left[j] * left[j];
+            cross[j] += left[j] * x[j];
+            pulls[j] += pull[j] * pull[j];
+        }
+    }
+    for (size_t j = 0; j < m; j++) {
+        const double absolute = pull[j] + plan->influence[j] * base;
+        run->acceleration += absolute * absolute;
+    }
+    for (size_t d = 0; d < plan->damper_count; d++) {
+        double speed = 0;
+        for (size_t k = 0; k < n; k++)
+            speed += run->shapes[k * m + plan->dampers[d].storey] * run->p[k];
+        run->storey_speed[d] = fmax(run->storey_speed[d], fabs(speed));
+    }
+    run->count++;
+}
+
+// One step from a_g = a, a_g' = b.
+static void modal_run_step(ModalRun *run, double a, double b) {
+    const size_t n = run->n;
+    const double *g = run->recurrence;
+    double *restrict q = run->q, *restrict p = run->p, *restrict peak = run->mode_peak;
+    for (size_t k = 0; k < n; k++) {
+        const double dq = g[k] * q[k] + g[n + k] * p[k] + (g[2 * n + k] * a + g[3 * n + k] * b);
+        const double dp =
+            g[4 * n + k] * q[k] + g[5 * n + k] * p[k] + (g[6 * n + k] * a + g[7 * n + k] * b);
+        q[k] += dq;
+        p[k] += dp;
+        const double size = fabs(q[k]);
+        peak[k] = size > peak[k] ? size : peak[k];
+    }
+}
+
+// The integral of a_g up to t, of a base in closed form [m/s].
+static double modal_run_base_speed(const Base *base, double t) {
+    const double omega = base->omega;
+    double speed = 0;
+    if (base->form == BASE_SINE)
+        return t > 0 ? base->amplitude / omega * (1 - cos(omega * t)) : 0;
+    for (size_t i = 0; i < base->piece_count && t > base->pieces[i].time; i++) {
+        const BasePiece *piece = &base->pieces[i];
+        const double end = i + 1 < base->piece_count ? fmin(t, base->pieces[i + 1].time) : t;
+        const double length = end - piece->time;
+        speed +=
+            omega == 0
+                ? length * (piece->value + length / 2 * piece->slope)
+                : (piece->value * sin(omega * length) + piece->slope * (1 - cos(omega * length))) /
+                      omega;
+    }
+    return speed;
+}
+
+// a_g at t; of a base in closed form the mean over a step around t, because a pulse may be shorter
+// than that.
+static double modal_run_base(const Base *base, double t, double step) {
+    if (base->form != BASE_SAMPLED)
+        return (modal_run_base_speed(base, t + step / 2) -
+                modal_run_base_speed(base, t - step / 2)) /
+               step;
+    const double index = t / base->interval;
+    const size_t at = (size_t)index;
+    if (at + 1 >= base->count)
+        return at + 1 == base->count ? base->values[at] : 0;
+    return base->values[at] + (index - (double)at) * (base->values[at + 1] - base->values[at]);
+}
+
+// The first of `count` steps: a sampled base that has more of them than that is followed around its
+// largest acceleration.
+static double modal_run_first(const ModalRun *run, double count) {
+    const Base *base = run->base;
+    const double all = run->plan->duration / run->step;
+    size_t largest = 0;
+    if (base->form != BASE_SAMPLED || count >= all)
+        return 0;
+    for (size_t i = 0; i < base->count; i++)
+        if (fabs(base->values[i]) > fabs(base->values[largest]))
+            largest = i;
+    const double middle = (double)largest * base->interval / run->step;
+    return floor(fmax(fmin(middle - count / 2, all - count), 0));
+}
+
+static void modal_run_all(ModalRun *run) {
+    const Base *base = run->base;
+    const Modes *modes = &run->plan->modes;
+    const double duration = run->plan->duration, interval = 1 / run->plan->sample_rate;
+    const size_t n = run->n;
+    const double steps_max = STEPS_MAX / (double)n;
+    double step = fmin(base->form == BASE_SAMPLED ? base->interval : interval, interval);
+    if (base->omega > 0)
+        step = fmin(step, 1 / (STEPS_A_RADIAN * base->omega));
+    if (base->form == BASE_SAMPLED)
+        step = base->interval / ceil(base->interval / step * (1 - 1e-9));
+    else
+        step = fmax(step, duration / steps_max);
+    run->step = step;
+    modal_run_recurrence(run);
+    // The first sample has no interval: its acceleration is q'' itself.
+    double a = modal_run_base(base, 0, step);
+    for (size_t k = 0; k < n; k++) {
+        run->mode_peak[k] = fabs(run->q[k]);
+        run->accelerated[k] = -modes->damping[k * (n + 1)] * run->p[k] -
+                              modes->omega[k] * modes->omega[k] * run->q[k] -
+                              modes->participation[k] * a;
+    }
+    modal_run_sum(run, a);
+    const double count = fmin(ceil(duration / step * (1 - 1e-9)), steps_max);
+    const double first = modal_run_first(run, count);
+    const size_t ratio = (size_t)fmax(nearbyint(interval / step), 1);
+    const size_t every = (size_t)ceil(count / (double)ratio * (double)(n * run->m) / SUMS_MAX);
+    double speed = 0; // of the base, over the sample interval
+    a = modal_run_base(base, first * step, step);
+    for (size_t i = 0; (double)i < count; i++) {
+        const double next = modal_run_base(base, (first + (double)i + 1) * step, step);
+        if (i % ratio == 0)
+            memcpy(run->before, run->p, n * sizeof *run->p);
+        modal_run_step(run, a, (next - a) / step);
+        speed += (a + next) / 2 * step;
+        a = next;
+        if ((i + 1) % ratio != 0)
+            continue;
+        const double length = step * (double)ratio;
+        if ((i + 1) / ratio % every == 0) {
+            for (size_t k = 0; k < n; k++)
+                run->accelerated[k] = (run->p[k] - run->before[k]) / length;
+            modal_run_sum(run, speed / length);
+        }
+        speed = 0;
+    }
+}
+
+static double truncation_square(double x) {
+    return x * x;
+}
+
+// A damper meets its stops about twice a swing and leaves an impulse J = m_e (1 + e) V, V being the
+// storey's speed, of which a mode takes phi J / w. Part of each impulse is wrong: the share that
+// the modes left out have in the mobility 1 / m_e and in V. Each later impact amplifies what was
+// wrong by exp(GROWTH).
+typedef struct ImpactEffect {
+    double displacement, acceleration;
+} ImpactEffect;
+
+static const double GROWTH = 0.5, ROUNDING = 1e-15;
+
+// Adds one damper's effect on effects[k], of a run that keeps the modes below k.
+static void truncation_impacts(const ModalRun *run, size_t damper, ImpactEffect *effects) {
+    const Plan *plan = run->plan;
+    const Modes *modes = &plan->modes;
+    const PlanDamper *of = &plan->dampers[damper];
+    const Derived *derived = &plan->report.derived.at[2 * damper];
+    const size_t n = run->n, j = of->storey;
+    const double duration = plan->duration, slowest = 1 / duration;
+    const double speed = run->storey_speed[damper] + fabs(of->velocity), reach = run->peak[j];
+    const double drift = fabs(plan->velocity[j] + of->velocity) * duration;
+    const bool is_free = run->base->form == BASE_STILL;
+    if (!(speed > 0) || (is_free && 2 * reach + drift < of->clearance / 2 - fabs(of->position)))
+        return;
+    const double restitution = fmax(derived[0].restitution, derived[1].restitution);
+    const double impulse =
+        of->effective_mass * (1 + (isnan(restitution) ? 0.7 : restitution)) * speed;
+    const double rate = reach > 0 ? speed / reach / PI : 0; // impacts per second
+    const double remembered = rate * fmin(duration, 2 / fmax(modes->damping[0], 1e-300));
+    double moved = 0, pulled = 0, missed = 0, missed_pull = 0, mobility = 0, still = 0;
+    for (size_t k = 0; k < n; k++) {
+        const double omega = fmax(modes->omega[k], slowest);
+        const double taken = truncation_square(run->shapes[k * run->m + j]) * impulse;
+        moved += taken / omega;
+        pulled += truncation_square(taken * omega);
+    }
+    for (size_t k = n - 1; k > 0; k--) {
+        const double omega = fmax(modes->omega[k], slowest);
+        const double shape = run->shapes[k * run->m + j];
+        const double taken = truncation_square(shape) * impulse;
+        missed += taken / omega;
+        missed_pull = hypot(missed_pull, taken * omega);
+        mobility += truncation_square(shape);
+        still = hypot(still, shape * run->mode_peak[k] * omega);
+        const double wrong = ROUNDING + mobility * of->effective_mass + still / speed;
+        const double grown = wrong * exp(fmin(GROWTH * rate * duration, 40));
+        const double part = fmin(grown, 1) * sqrt(1 + remembered);
+        effects[k].displacement += missed + moved * part;
+        effects[k].acceleration = hypot(effects[k].acceleration, missed_pull + sqrt(pulled) * part);
+    }
+}
+
+// a / b, at most 1, which is also the answer where b is unknown; 0 where there is nothing.
+static double truncation_ratio(double a, double b) {
+    return a == 0 ? 0 : b > 0 && a < b ? a / b : 1;
+}
+
+// errors[k] of the run that keeps the modes up to k. `impacts` holds n.
+static void truncation_conclude(const ModalRun *run, ImpactEffect *impacts,
+                                TruncationError *errors) {
+    const size_t n = run->n, m = run->m, dampers = run->plan->damper_count;
+    const double safety = dampers > 0 ? SAFETY_IMPACTS : SAFETY;
+    double whole = 0, whole_rms = 0;
+    for (size_t j = 0; j < m; j++) {
+        whole = fmax(whole, run->peak[j]);
+        whole_rms = fmax(whole_rms, sqrt(run->square[j] / run->count));
+    }
+    for (size_t d = 0; d < dampers; d++)
+        truncation_impacts(run, d, impacts);
+    errors[n - 1] = (TruncationError){0};
+    for (size_t k = n - 1; k > 0; k--) {
+        double peak = 0, rms = 0, pull = 0, kept = 0;
+        for (size_t j = 0; j < m; j++) {
+            const size_t at = k * m + j;
+            const double left = run->square[at] / run->count;
+            const double rest = (run->square[j] - 2 * run->cross[at]) / run->count + left;
+            peak = fmax(peak, fmax(run->peak[at], fabs(run->shapes[at]) * run->mode_peak[k]));
+            kept = fmax(kept, sqrt(fmax(rest, 0)));
+            rms = fmax(rms, left / (2 * whole_rms));
+            pull += run->pulls[at] / run->count;
+        }
+        const TruncationError *more = &errors[k];
+        const double displacement = safety * peak + impacts[k].displacement;
+        const double acceleration = safety * sqrt(pull) + impacts[k].acceleration;
+        const double displacement_rms =
+            safety * fmax(rms, fabs(kept - whole_rms)) + impacts[k].displacement;
+        errors[k - 1] = (TruncationError){
+            fmax(truncation_ratio(displacement, whole), more->displacement),
+            fmax(truncation_ratio(acceleration, sqrt(run->acceleration / run->count)),
+                 more->mean_acceleration),
+            fmax(truncation_ratio(displacement_rms, whole_rms), more->rms_displacement),
+        };
+    }
+}
+
+static Status truncation_run(const Plan *plan, const Base *base, TruncationError *errors) {
+    const size_t n = plan->modes.count, m = plan->storeys;
+    double *block = calloc(n * (5 * m + 13) + 3 * m + plan->damper_count, sizeof *block);
+    ImpactEffect *impacts = calloc(n, sizeof *impacts);
+    if (block == NULL || impacts == NULL) {
+        free(block);
+        free(impacts);
+        return STATUS_NO_MEMORY;
+    }
+    ModalRun run = {.plan = plan, .base = base, .n = n, .m = m};
+    double **const arrays[] = {&run.shapes, &run.peak, &run.square, &run.cross, &run.pulls};
+    double **const rows[] = {&run.q, &run.p, &run.before, &run.accelerated, &run.mode_peak};
+    double *next = block;
+    for (size_t i = 0; i < COUNT(arrays); i++, next += n * m)
+        *arrays[i] = next;
+    for (size_t i = 0; i < COUNT(rows); i++, next += n)
+        *rows[i] = next;
+    run.recurrence = next;
+    run.x = next + 8 * n;
+    run.left = run.x + m;
+    run.pull = run.left + m;
+    run.storey_speed = run.pull + m;
+    for (size_t k = 0; k < n; k++)
+        for (size_t j = 0; j < m; j++) {
+            run.shapes[k * m + j] = plan->modes.shapes[j * n + k];
+            for (size_t l = 0; l < m; l++) {
+                const double carried = plan->modes.shapes[j * n + k] * plan->mass[j * m + l];
+                run.q[k] += carried * plan->displacement[l];
+                run.p[k] += carried * plan->velocity[l];
+            }
+        }
+    modal_run_all(&run);
+    truncation_conclude(&run, impacts, errors);
+    free(impacts);
+    free(block);
+    return STATUS_OK;
+}
+
+Status truncation_predict(const Plan *plan, const Scene *scene, TruncationError *errors) {
+    const Excitation *excitation = scene_excitation(scene);
+    const Span span = {.duration = plan->duration, .sample_rate = plan->sample_rate};
+    Base base = {0};
+    if (plan->modes.count == 0)
+        return STATUS_OK;
+    TRY(excitation_kind(excitation)->make(excitation, &span, NULL, &base, NULL));
+    const Status status = truncation_run(plan, &base, errors);
+    base_clear(&base);
+    return status;
+}
+
+double truncation_moved_mass(const Plan *plan, size_t kept) {
+    const Modes *modes = &plan->modes;
+    double sum = 0, all = 0;
+    for (size_t k = 0; k < modes->count; k++) {
+        const double mass = modes->participation[k] * modes->participation[k];
+        all += mass;
+        sum += k < kept ? mass : 0;
+    }
+    return all > 0 ? sum / all : 1;
+}
 
 // |phi_k' v| over |phi_k|' |v|; 0 where both are 0.
 static double mode_share(const Plan *plan, size_t k, const double *v) {
@@ -87,13 +454,8 @@ static size_t mode_list_moving(const Modes *modes, size_t count, double *seen, s
     return found;
 }
 
-// Predicted cost: a step for each mode, or a matrix product where they are coupled.
-static double mode_work(double modes, bool is_coupled) {
-    return modes + (is_coupled ? modes * modes / 4 : 0);
-}
-
 static Status mode_decide_unseen(Plan *plan, const double *seen, const size_t *list, size_t found,
-                                 size_t count, bool is_coupled) {
+                                 size_t count) {
     double largest = 0;
     for (size_t k = 0, i = 0; k < count; k++) {
         if (i < found && list[i] == k)
@@ -101,9 +463,8 @@ static Status mode_decide_unseen(Plan *plan, const double *seen, const size_t *l
         else
             largest = fmax(largest, seen[k]);
     }
-    return decisions_omit(
-        &plan->report.decisions, "unseen_modes", (double)(count - found), "modes",
-        1 - mode_work((double)found, is_coupled) / mode_work((double)count, is_coupled),
+    return decisions_add(
+        &plan->report.decisions, "unseen_modes", "left_out", (double)(count - found), "modes",
         "neither the base nor the initial state nor a damper excites them: their relative "
         "participation is at most %.2g",
         largest);
@@ -124,7 +485,6 @@ static Status mode_decide_lowest(Plan *plan, const TruncationError *error, size_
 static Status mode_select(Plan *plan, const Scene *scene, size_t modes, double *room,
                           size_t *list) {
     const size_t n = plan->storeys;
-    const bool is_coupled = !plan->modes.is_classical;
     TruncationError *errors = NULL;
     Status status = STATUS_OK;
     if (modes < n) {
@@ -146,7 +506,7 @@ static Status mode_select(Plan *plan, const Scene *scene, size_t modes, double *
         seen[k] = mode_visibility(plan, k, room, count);
     const size_t found = mode_list_moving(&plan->modes, modes, seen, list);
     if (found < modes)
-        status = mode_decide_unseen(plan, seen, list, found, modes, is_coupled);
+        status = mode_decide_unseen(plan, seen, list, found, modes);
     modes_keep(&plan->modes, n, list, found);
     return status;
 }

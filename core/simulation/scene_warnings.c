@@ -100,7 +100,7 @@ static Status warnings_of_rows(const Field *fields, const void *item, const char
 
 static Status warnings_of_times(const Scene *scene, Warnings *warnings) {
     StructureRates rates;
-    TRY(structure_rates(scene_structure(scene), &rates));
+    TRY(structure_rates(scene_structure(scene), SIZE_MAX, &rates));
     if (!(rates.slowest > 0))
         return STATUS_OK;
     const double frequency = rates.slowest / (2 * 3.14159265358979323846);

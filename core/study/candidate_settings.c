@@ -8,7 +8,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/simulation/impulse_variant.h"
 #include "core/solve/solvers.h"
 #include "core/study/study_run.h"
 
@@ -99,7 +98,7 @@ static double candidate_contact_time(const Buffer *buffer, double mass) {
 
 static Status candidate_finest_step(const Simulation *simulation, double *finest) {
     StructureRates rates;
-    TRY(structure_rates(scene_structure(&simulation->scene), &rates));
+    TRY(structure_rates(scene_structure(&simulation->scene), SIZE_MAX, &rates));
     *finest = rates.fastest > 0 ? radian_part / rates.fastest : (double)INFINITY;
     for (size_t i = 0; i < simulation->scene.dampers.count; i++) {
         const Damper *damper = &simulation->scene.dampers.at[i];
@@ -278,7 +277,7 @@ Status candidate_settings_apply(const Simulation *simulation, const TradeoffPoin
     if (status == STATUS_OK)
         status = candidate_apply_solver(point, target);
     if (status == STATUS_OK && point->contact_model != NULL)
-        status = impulse_variant_apply(target, problem);
+        status = simulation_use_impulses(target, problem);
     if (status == STATUS_NO_MEMORY)
         return study_no_memory(problem);
     TRY(status);
