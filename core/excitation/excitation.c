@@ -18,12 +18,11 @@ void excitation_doubt_frequency(double frequency, const Span *span, const char *
                                 const char *name, Problem *doubts) {
     if (!(frequency > span->sample_rate / 2))
         return;
-    char is[32], limit[32];
     (void)json_pointer_fault(
         doubts, pointer, name,
         "is %s Hz, above half the sample rate, %s Hz: the output's samples do not show "
         "the motion",
-        text_real(is, frequency), text_real(limit, span->sample_rate / 2));
+        real_text(frequency).at, real_text(span->sample_rate / 2).at);
 }
 
 static Status free_make(const Excitation *excitation, const Span *span, const Progress *progress,

@@ -27,33 +27,31 @@ static Status pulse_complete(Excitation *excitation, const Span *span, const cha
         !(pulse->start >= 0) || !(pulse->length > 0))
         return STATUS_OK; // the row adds the fault
     const double least = fmax(1e-12 * pulse->start, 1e-12);
-    char is[32], limit[32];
     if (pulse->length < least)
         return json_pointer_fault_real(
             problem, pointer, "length", pulse->length, "s",
             "must be at least %s s, the resolution of time at that start, is %s",
-            text_real(limit, least), text_real(is, pulse->length));
+            real_text(least).at, real_text(pulse->length).at);
     if (isfinite(pulse->start + pulse->length) && isfinite(2 * pulse->amplitude / pulse->length))
         return STATUS_OK;
     return json_pointer_fault_real(problem, pointer, "length", pulse->length, "s",
                                    "must leave the pulse's end and slope finite, is %s",
-                                   text_real(is, pulse->length));
+                                   real_text(pulse->length).at);
 }
 
 static void pulse_doubt(const Excitation *excitation, const Span *span, const char *pointer,
                         Problem *doubts) {
     const ExcitationPulse *pulse = pulse_of(excitation);
-    char is[32], limit[32];
     if (pulse->start >= span->duration)
         (void)json_pointer_fault(doubts, pointer, "start",
                                  "is %s s: the run ends at %s s, before the pulse begins",
-                                 text_real(is, pulse->start), text_real(limit, span->duration));
+                                 real_text(pulse->start).at, real_text(span->duration).at);
     if (pulse->length * span->sample_rate < 2)
         (void)json_pointer_fault(
             doubts, pointer, "length",
             "is %s s, less than two samples of the output, %.3g s: the motion is "
             "exact, but its samples hardly show the pulse",
-            text_real(is, pulse->length), 2 / span->sample_rate);
+            real_text(pulse->length).at, 2 / span->sample_rate);
 }
 
 static Status half_sine_make(const Excitation *excitation, const Span *span,

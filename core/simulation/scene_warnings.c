@@ -43,11 +43,10 @@ static Status warnings_of_real(const Field *field, double value, const char *poi
     const TypicalLimit *limit = warnings_find_limit(field->name);
     if (limit == NULL || !(fabs(value) > limit->max))
         return STATUS_OK;
-    char is[32], most[32];
     const char *space = field->unit != NULL ? " " : "";
     const char *unit = field->unit != NULL ? field->unit : "";
-    return warnings_add(warnings, pointer, "is %s%s%s, more than %s%s%s: %s", text_real(is, value),
-                        space, unit, text_real(most, limit->max), space, unit, limit->hint);
+    return warnings_add(warnings, pointer, "is %s%s%s, more than %s%s%s: %s", real_text(value).at,
+                        space, unit, real_text(limit->max).at, space, unit, limit->hint);
 }
 
 static Status warnings_of_reals(const Field *field, const Reals *reals, const char *pointer,
@@ -55,9 +54,8 @@ static Status warnings_of_reals(const Field *field, const Reals *reals, const ch
     if (reals->count == 1)
         return warnings_of_real(field, reals->at[0], pointer, warnings);
     for (size_t i = 0; i < reals->count && warnings_find_limit(field->name) != NULL; i++) {
-        char place[sizeof((Fault){0}.pointer)];
-        json_pointer_index(place, sizeof place, pointer, i);
-        TRY(warnings_of_real(field, reals->at[i], place, warnings));
+        const JsonPointer place = json_pointer_at(pointer, i);
+        TRY(warnings_of_real(field, reals->at[i], place.at, warnings));
     }
     return STATUS_OK;
 }
@@ -104,15 +102,14 @@ static Status warnings_of_times(const Scene *scene, Warnings *warnings) {
     if (!(rates.slowest > 0))
         return STATUS_OK;
     const double frequency = rates.slowest / (2 * 3.14159265358979323846);
-    char is[32];
     if (scene->duration * frequency < 1)
         TRY(warnings_add(warnings, "/duration",
                          "is %s s, less than one period of the structure, %.3g s",
-                         text_real(is, scene->duration), 1 / frequency));
+                         real_text(scene->duration).at, 1 / frequency));
     if (scene->sample_rate < 2 * frequency)
         TRY(warnings_add(warnings, "/sample_rate",
                          "is %s Hz, fewer than two samples in a period of the structure, %.3g s",
-                         text_real(is, scene->sample_rate), 1 / frequency));
+                         real_text(scene->sample_rate).at, 1 / frequency));
     return STATUS_OK;
 }
 
@@ -126,12 +123,11 @@ static Status warnings_of_masses(const Scene *scene, Warnings *warnings) {
         TRY(structure_kind(structure)->moved_mass(structure, (size_t)on->storey - 1, &moved));
         if (mass <= moved)
             continue;
-        char damper[64], place[sizeof((Fault){0}.pointer)], is[32], than[32];
-        json_pointer_index(damper, sizeof damper, "/dampers", i);
-        json_pointer_join(place, sizeof place, damper, "mass");
-        TRY(warnings_add(warnings, place, "is %s kg, more than the %s's %s kg", text_real(is, mass),
-                         structure_storeys(structure) > 1 ? "storey" : "structure",
-                         text_real(than, moved)));
+        const JsonPointer damper = json_pointer_at("/dampers", i);
+        const JsonPointer place = json_pointer_of(damper.at, "mass");
+        TRY(warnings_add(
+            warnings, place.at, "is %s kg, more than the %s's %s kg", real_text(mass).at,
+            structure_storeys(structure) > 1 ? "storey" : "structure", real_text(moved).at));
     }
     return STATUS_OK;
 }
