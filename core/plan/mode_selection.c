@@ -5,7 +5,7 @@
 // 0, or if damping couples it to a mode that moves. In doubles these quantities are never exactly
 // 0:
 //
-//   |phi' v| <= ROUNDINGS eps |phi|' |v|
+//   |phi' M v| <= ROUNDINGS eps sqrt(v' M v)
 //
 // counts as 0, as does a shape so small beside its largest value. The other modes stay at rest
 // whatever these do, so that leaving them out changes no more than rounding does.
@@ -347,14 +347,10 @@ static Status truncation_run(const Plan *plan, const Base *base, TruncationError
     run.pull = run.left + m;
     run.storey_speed = run.pull + m;
     for (size_t k = 0; k < n; k++)
-        for (size_t j = 0; j < m; j++) {
+        for (size_t j = 0; j < m; j++)
             run.shapes[k * m + j] = plan->modes.shapes[j * n + k];
-            for (size_t l = 0; l < m; l++) {
-                const double carried = plan->modes.shapes[j * n + k] * plan->mass[j * m + l];
-                run.q[k] += carried * plan->displacement[l];
-                run.p[k] += carried * plan->velocity[l];
-            }
-        }
+    modes_coordinates(&plan->modes, m, plan->mass, plan->displacement, run.q);
+    modes_coordinates(&plan->modes, m, plan->mass, plan->velocity, run.p);
     modal_run_all(&run);
     truncation_conclude(&run, impacts, errors);
     free(impacts);
@@ -385,49 +381,30 @@ double truncation_moved_mass(const Plan *plan, size_t kept) {
     return all > 0 ? sum / all : 1;
 }
 
-// |phi_k' v| over |phi_k|' |v|; 0 where both are 0.
-static double mode_share(const Plan *plan, size_t k, const double *v) {
+// seen[k]: the largest share that base, initial state and dampers have in mode k without coupling.
+static void mode_see(const Plan *plan, const Scene *scene, double *seen, double *coordinates) {
     const Modes *modes = &plan->modes;
-    long double sum = 0, size = 0;
-    for (size_t j = 0; j < plan->storeys; j++) {
-        const long double term = (long double)modes->shapes[j * modes->count + k] * v[j];
-        sum += term;
-        size += fabsl(term);
-    }
-    return size > 0 ? (double)(fabsl(sum) / size) : 0;
-}
-
-// The largest share that base, initial state and dampers have in mode k without coupling. `sources`
-// holds `count` vectors.
-static double mode_visibility(const Plan *plan, size_t k, const double *sources, size_t count) {
-    const Modes *modes = &plan->modes;
-    double most = 0, widest = 0;
-    for (size_t i = 0; i < count; i++)
-        most = fmax(most, mode_share(plan, k, sources + i * plan->storeys));
-    for (size_t j = 0; j < plan->storeys; j++)
-        widest = fmax(widest, fabs(modes->shapes[j * modes->count + k]));
-    for (size_t d = 0; d < plan->damper_count; d++)
-        most = fmax(most, fabs(modes->shapes[plan->dampers[d].storey * modes->count + k]) / widest);
-    return most;
-}
-
-// M times the initial displacement and velocity, and M r where the base moves. Returns how many.
-static size_t mode_sources(const Plan *plan, const Scene *scene, double *sources) {
     const double *const from[] = {plan->displacement, plan->velocity, plan->influence};
     const size_t n = plan->storeys, count = excitation_is_still(scene_excitation(scene)) ? 2 : 3;
-    for (size_t i = 0; i < count; i++)
-        for (size_t j = 0; j < n; j++) {
-            long double sum = 0;
-            for (size_t l = 0; l < n; l++)
-                sum += (long double)plan->mass[j * n + l] * from[i][l];
-            sources[i * n + j] = (double)sum;
-        }
-    return count;
+    for (size_t i = 0; i < count; i++) {
+        double squares = 0;
+        modes_coordinates(modes, n, plan->mass, from[i], coordinates);
+        for (size_t k = 0; k < n; k++)
+            squares += coordinates[k] * coordinates[k];
+        for (size_t k = 0; k < n && squares > 0; k++)
+            seen[k] = fmax(seen[k], fabs(coordinates[k]) / sqrt(squares));
+    }
+    for (size_t k = 0; k < n; k++) {
+        double widest = 0;
+        for (size_t j = 0; j < n; j++)
+            widest = fmax(widest, fabs(modes->shapes[j * n + k]));
+        for (size_t d = 0; d < plan->damper_count; d++)
+            seen[k] = fmax(seen[k], fabs(modes->shapes[plan->dampers[d].storey * n + k]) / widest);
+    }
 }
 
-// Lists, by rising index, those of the first `count` modes that may move; `seen` holds the
-// visibility of each. Returns how many; at least one.
-static size_t mode_list_moving(const Modes *modes, size_t count, double *seen, size_t *list) {
+// Raises seen[k] of the first `count` modes that damping couples to a mode that moves.
+static void mode_couple(const Modes *modes, size_t count, double *seen) {
     const double *D = modes->damping;
     const size_t all = modes->count;
     for (bool grows = !modes->is_classical; grows;) {
@@ -445,82 +422,62 @@ static size_t mode_list_moving(const Modes *modes, size_t count, double *seen, s
             }
         }
     }
+}
+
+static Status mode_keep_moving(Plan *plan, const Scene *scene, size_t count, double *seen,
+                               double *coordinates, size_t *list) {
+    double largest = 0;
     size_t found = 0;
+    mode_see(plan, scene, seen, coordinates);
+    mode_couple(&plan->modes, count, seen);
     for (size_t k = 0; k < count; k++)
         if (seen[k] > NEGLIGIBLE)
             list[found++] = k;
-    if (found == 0)
-        list[found++] = 0;
-    return found;
-}
-
-static Status mode_decide_unseen(Plan *plan, const double *seen, const size_t *list, size_t found,
-                                 size_t count) {
-    double largest = 0;
-    for (size_t k = 0, i = 0; k < count; k++) {
-        if (i < found && list[i] == k)
-            i++;
         else
             largest = fmax(largest, seen[k]);
-    }
+    if (found == 0)
+        list[found++] = 0;
+    modes_keep(&plan->modes, plan->storeys, list, found);
+    return found == count
+               ? STATUS_OK
+               : decisions_add(&plan->report.decisions, "unseen_modes", "left_out",
+                               (double)(count - found), "modes",
+                               "neither the base nor the initial state nor a damper excites them: "
+                               "their relative participation is at most %.2g",
+                               largest);
+}
+
+static Status mode_keep_lowest(Plan *plan, const Scene *scene, size_t count,
+                               TruncationError *errors) {
+    TRY(truncation_predict(plan, scene, errors));
+    const TruncationError *error = &errors[count - 1];
+    plan->is_truncated = true;
+    plan->given_up = error->displacement;
     return decisions_add(
-        &plan->report.decisions, "unseen_modes", "left_out", (double)(count - found), "modes",
-        "neither the base nor the initial state nor a damper excites them: their relative "
-        "participation is at most %.2g",
-        largest);
-}
-
-static Status mode_decide_lowest(Plan *plan, const TruncationError *error, size_t modes,
-                                 double moved) {
-    const char *about =
-        plan->damper_count == 0 ? "" : " and add no compliance at the dampers' storeys";
-    return decisions_add(&plan->report.decisions, "modes", "lowest", (double)modes, "modes",
-                         "the scene asks for these of %zu; they hold %.4g of the mass that the "
-                         "base moves; the others stay at rest%s: predicted errors are %.2g of "
-                         "displacement, %.2g of mean_acceleration",
-                         plan->storeys, moved, about, error->displacement,
-                         error->mean_acceleration);
-}
-
-static Status mode_select(Plan *plan, const Scene *scene, size_t modes, double *room,
-                          size_t *list) {
-    const size_t n = plan->storeys;
-    TruncationError *errors = NULL;
-    Status status = STATUS_OK;
-    if (modes < n) {
-        errors = malloc(n * sizeof *errors);
-        status = errors == NULL ? STATUS_NO_MEMORY : truncation_predict(plan, scene, errors);
-        if (status == STATUS_OK) {
-            plan->is_truncated = true;
-            plan->given_up = errors[modes - 1].displacement;
-            status = mode_decide_lowest(plan, &errors[modes - 1], modes,
-                                        truncation_moved_mass(plan, modes));
-        }
-        free(errors);
-    }
-    if (status != STATUS_OK)
-        return status;
-    double *seen = room + 3 * n;
-    const size_t count = mode_sources(plan, scene, room);
-    for (size_t k = 0; k < modes; k++)
-        seen[k] = mode_visibility(plan, k, room, count);
-    const size_t found = mode_list_moving(&plan->modes, modes, seen, list);
-    if (found < modes)
-        status = mode_decide_unseen(plan, seen, list, found, modes);
-    modes_keep(&plan->modes, n, list, found);
-    return status;
+        &plan->report.decisions, "modes", "lowest", (double)count, "modes",
+        "the scene asks for these of %zu; they hold %.4g of the mass that the base moves; the "
+        "others stay at rest%s: predicted errors are %.2g of displacement, %.2g of "
+        "mean_acceleration",
+        plan->storeys, truncation_moved_mass(plan, count),
+        plan->damper_count == 0 ? "" : " and add no compliance at the dampers' storeys",
+        error->displacement, error->mean_acceleration);
 }
 
 Status plan_keep(Plan *plan, const Scene *scene, size_t modes, Problem *problem) {
-    const size_t n = plan->storeys;
+    const size_t n = plan->storeys, count = modes == 0 || modes > n ? n : modes;
     if (plan->modes.count == 0)
         return STATUS_OK;
-    double *room = calloc(n, 4 * sizeof *room);
+    double *seen = calloc(n, 2 * sizeof *seen);
     size_t *list = calloc(n, sizeof *list);
+    TruncationError *errors = calloc(n, sizeof *errors);
     Status status = STATUS_NO_MEMORY;
-    if (room != NULL && list != NULL)
-        status = mode_select(plan, scene, modes == 0 || modes > n ? n : modes, room, list);
-    free(room);
+    if (seen != NULL && list != NULL && errors != NULL) {
+        status = count < n ? mode_keep_lowest(plan, scene, count, errors) : STATUS_OK;
+        if (status == STATUS_OK)
+            status = mode_keep_moving(plan, scene, count, seen, seen + n, list);
+    }
+    free(seen);
     free(list);
+    free(errors);
     return status == STATUS_OK ? status : problem_set(problem, status, "no memory for the modes");
 }

@@ -11,6 +11,7 @@
 #include "core/plan/reachability.h"
 
 #include <math.h>
+#include <stdlib.h>
 
 static const double MARGIN = 1e-6; // of the way to a stop, for roundings here and in the run
 
@@ -45,23 +46,21 @@ static double reach_of_storey(const Plan *plan, size_t storey, const Base *base)
                          : fabs(q) + speed * plan->duration;
     }
     double squares = 0, shares = 0, compliance = 0, rigid = 0, start = 0;
+    double *q = calloc(count, 2 * sizeof *q), *p = q + count;
+    if (q == NULL)
+        return INFINITY; // not known to be clear
+    modes_coordinates(modes, n, plan->mass, plan->displacement, q);
+    modes_coordinates(modes, n, plan->mass, plan->velocity, p);
     for (size_t k = 0; k < count; k++) {
         const double omega = modes->omega[k], share = modes->participation[k];
         const double shape = fabs(modes->shapes[storey * count + k]);
-        double q = 0, p = 0;
-        for (size_t j = 0; j < n; j++)
-            for (size_t i = 0; i < n && (plan->displacement[j] != 0 || plan->velocity[j] != 0);
-                 i++) {
-                const double moved = modes->shapes[i * count + k] * plan->mass[i * n + j];
-                q += moved * plan->displacement[j];
-                p += moved * plan->velocity[j];
-            }
-        squares += p * p + omega * q * (omega * q);
+        squares += p[k] * p[k] + omega * q[k] * (omega * q[k]);
         shares += share * share;
         compliance += omega > 0 ? shape / omega * (shape / omega) : 0;
         rigid += omega > 0 ? 0 : shape;
-        start += omega > 0 ? 0 : shape * fabs(q);
+        start += omega > 0 ? 0 : shape * fabs(q[k]);
     }
+    free(q);
     const double speed = sqrt(squares) + sqrt(shares) * base_integral;
     return sqrt(compliance) * speed + start + rigid * plan->duration * speed;
 }
