@@ -91,7 +91,6 @@ static double chirp_lasts(const Excitation *excitation) {
 static Status chirp_make(const Excitation *excitation, const Span *span, const Progress *progress,
                          Base *base, Problem *problem) {
     const ExcitationChirp *chirp = chirp_of(excitation);
-    *base = (Base){0};
     const double wanted = chirp_knots(chirp, span);
     if (!(wanted <= KNOTS_MAX + 2))
         return problem_set(problem, STATUS_LIMIT, "the base may have at most %d knots, not %.0f",

@@ -25,18 +25,18 @@ void excitation_doubt_frequency(double frequency, const Span *span, const char *
         real_text(frequency).at, real_text(span->sample_rate / 2).at);
 }
 
-static Status free_make(const Excitation *excitation, const Span *span, const Progress *progress,
-                        Base *base, Problem *problem) {
-    (void)excitation;
-    (void)span;
-    (void)progress;
-    (void)problem;
+Status excitation_make(const Excitation *excitation, const Span *span, const Progress *progress,
+                       Base *base, Problem *problem) {
+    const ExcitationKind *kind = excitation_kind(excitation);
     *base = (Base){0};
+    if (kind->make != NULL)
+        return kind->make(excitation, span, progress, base, problem);
+    if (kind->form != NULL)
+        *base = kind->form(excitation);
     return STATUS_OK;
 }
 
 const ExcitationKind excitation_free = {
     .kind = {"free", "free vibration from the initial state", excitation_fields,
              sizeof(Excitation)},
-    .make = free_make,
 };

@@ -38,8 +38,10 @@ typedef struct ExcitationKind {
     double (*lasts)(const Excitation *excitation);
     double effort;    // cost of one sample, in solver steps
     size_t amplitude; // offset of the double that the motion is proportional to; 0: none
-    // Makes the base's motion over span->duration; the caller clears `base` with base_clear.
-    // STATUS_CANCELLED where `progress` stops it.
+    // The motion in closed form. NULL, and no make(): the base is still.
+    Base (*form)(const Excitation *excitation);
+    // Makes the samples of the motion over span->duration into an empty base, which the caller
+    // clears. STATUS_CANCELLED where `progress` stops it. NULL: it has a closed form.
     Status (*make)(const Excitation *excitation, const Span *span, const Progress *progress,
                    Base *base, Problem *problem);
     // Adds values that are allowed but hardly intended to `doubts`, below `pointer`. NULL: none.
@@ -97,6 +99,11 @@ typedef struct ExcitationPulse {
     double start;     // [s]
     double length;    // [s]
 } ExcitationPulse;
+
+// Makes the base's motion over span->duration; the caller clears `base` with base_clear, also after
+// a failure. STATUS_CANCELLED where `progress` stops it.
+Status excitation_make(const Excitation *excitation, const Span *span, const Progress *progress,
+                       Base *base, Problem *problem);
 
 // Adds a doubt at pointer/name where the output's samples cannot show motion of this frequency.
 void excitation_doubt_frequency(double frequency, const Span *span, const char *pointer,

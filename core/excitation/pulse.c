@@ -54,18 +54,13 @@ static void pulse_doubt(const Excitation *excitation, const Span *span, const ch
             real_text(pulse->length).at, 2 / span->sample_rate);
 }
 
-static Status half_sine_make(const Excitation *excitation, const Span *span,
-                             const Progress *progress, Base *base, Problem *problem) {
-    (void)span;
-    (void)progress;
-    (void)problem;
+static Base half_sine_form(const Excitation *excitation) {
     const ExcitationPulse *pulse = pulse_of(excitation);
-    *base = (Base){.form = BASE_PIECES,
-                   .omega = 3.14159265358979323846 / pulse->length,
-                   .pieces = {{.time = pulse->start, .slope = pulse->amplitude},
-                              {.time = pulse->start + pulse->length}},
-                   .piece_count = 2};
-    return STATUS_OK;
+    return (Base){.form = BASE_PIECES,
+                  .omega = 3.14159265358979323846 / pulse->length,
+                  .pieces = {{.time = pulse->start, .slope = pulse->amplitude},
+                             {.time = pulse->start + pulse->length}},
+                  .piece_count = 2};
 }
 
 const ExcitationKind excitation_half_sine = {
@@ -73,25 +68,20 @@ const ExcitationKind excitation_half_sine = {
              sizeof(ExcitationPulse)},
     .complete = pulse_complete,
     .amplitude = offsetof(ExcitationPulse, amplitude),
-    .make = half_sine_make,
+    .form = half_sine_form,
     .doubt = pulse_doubt,
 };
 
-static Status triangular_make(const Excitation *excitation, const Span *span,
-                              const Progress *progress, Base *base, Problem *problem) {
-    (void)span;
-    (void)progress;
-    (void)problem;
+static Base triangular_form(const Excitation *excitation) {
     const ExcitationPulse *pulse = pulse_of(excitation);
     const double slope = 2 * pulse->amplitude / pulse->length;
-    *base = (Base){.form = BASE_PIECES,
-                   .pieces = {{.time = pulse->start, .slope = slope},
-                              {.time = pulse->start + pulse->length / 2,
-                               .value = pulse->amplitude,
-                               .slope = -slope},
-                              {.time = pulse->start + pulse->length}},
-                   .piece_count = 3};
-    return STATUS_OK;
+    return (Base){.form = BASE_PIECES,
+                  .pieces = {{.time = pulse->start, .slope = slope},
+                             {.time = pulse->start + pulse->length / 2,
+                              .value = pulse->amplitude,
+                              .slope = -slope},
+                             {.time = pulse->start + pulse->length}},
+                  .piece_count = 3};
 }
 
 const ExcitationKind excitation_triangular = {
@@ -99,6 +89,6 @@ const ExcitationKind excitation_triangular = {
              sizeof(ExcitationPulse)},
     .complete = pulse_complete,
     .amplitude = offsetof(ExcitationPulse, amplitude),
-    .make = triangular_make,
+    .form = triangular_form,
     .doubt = pulse_doubt,
 };

@@ -193,7 +193,6 @@ static Status random_make_samples(const ExcitationRandom *random, const RandomBl
 static Status random_make(const Excitation *excitation, const Span *span, const Progress *progress,
                           Base *base, Problem *problem) {
     const ExcitationRandom *random = random_of(excitation);
-    *base = (Base){0};
     if (random->rms == 0)
         return STATUS_OK; // still
     const double wanted = random_sample_count(random, span);

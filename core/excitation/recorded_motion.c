@@ -137,7 +137,6 @@ static Status record_make(const Excitation *excitation, const Span *span, const 
     (void)progress;
     const ExcitationRecord *record = record_of(excitation);
     const Reals *samples = record_samples(record);
-    *base = (Base){0};
     double *values = malloc(samples->count * sizeof *values);
     if (values == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a record of %zu samples",

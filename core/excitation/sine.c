@@ -50,14 +50,9 @@ static Status sine_complete(Excitation *excitation, const Span *span, const char
     return STATUS_OK;
 }
 
-static Status sine_make(const Excitation *excitation, const Span *span, const Progress *progress,
-                        Base *base, Problem *problem) {
-    (void)span;
-    (void)progress;
-    (void)problem;
+static Base sine_form(const Excitation *excitation) {
     const ExcitationSine *sine = sine_of(excitation);
-    *base = (Base){.form = BASE_SINE, .amplitude = sine_amplitude(sine), .omega = sine_omega(sine)};
-    return STATUS_OK;
+    return (Base){.form = BASE_SINE, .amplitude = sine_amplitude(sine), .omega = sine_omega(sine)};
 }
 
 static double sine_fastest(const Excitation *excitation) {
@@ -75,6 +70,6 @@ const ExcitationKind excitation_sine = {
     .complete = sine_complete,
     .fastest = sine_fastest,
     .amplitude = offsetof(ExcitationSine, amplitude),
-    .make = sine_make,
+    .form = sine_form,
     .doubt = sine_doubt,
 };

@@ -364,7 +364,7 @@ Status truncation_predict(const Plan *plan, const Scene *scene, TruncationError 
     Base base = {0};
     if (plan->modes.count == 0)
         return STATUS_OK;
-    TRY(excitation_kind(excitation)->make(excitation, &span, NULL, &base, NULL));
+    TRY(excitation_make(excitation, &span, NULL, &base, NULL));
     const Status status = truncation_run(plan, &base, errors);
     base_clear(&base);
     return status;

@@ -87,7 +87,7 @@ static Status run_make_base(const Simulation *simulation, size_t samples_max, Ff
                        .most = samples_max,
                        .transforms = transforms};
     const Excitation *excitation = scene_excitation(scene);
-    TRY(excitation_kind(excitation)->make(excitation, &span, progress, base, problem));
+    TRY(excitation_make(excitation, &span, progress, base, problem));
     bool moves = base->form == BASE_SINE && base->amplitude != 0;
     for (size_t i = 0; i < base->count && base->form == BASE_SAMPLED && !moves; i++)
         moves = base->values[i] != 0;

@@ -90,8 +90,7 @@ static void assert_as_with_contacts(const char *members, const Outcome *outcome)
     const Excitation *excitation = scene_excitation(scene);
     const Span span = {.duration = scene->duration, .sample_rate = scene->sample_rate};
     assert_int_equal(plan_new(scene, "auto", "exact", &plan, &problem), STATUS_OK);
-    assert_int_equal(excitation_kind(excitation)->make(excitation, &span, NULL, &base, &problem),
-                     STATUS_OK);
+    assert_int_equal(excitation_make(excitation, &span, NULL, &base, &problem), STATUS_OK);
     const Columns *series = &outcome->response.series;
     RunColumn *columns = calloc(series->count, sizeof *columns);
     double *values = calloc(series->count * series->rows, sizeof *values);
