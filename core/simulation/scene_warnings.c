@@ -38,25 +38,17 @@ static const TypicalLimit *warnings_find_limit(const char *name) {
     return NULL;
 }
 
-static Status warnings_of_real(const Field *field, double value, const char *pointer,
-                               Warnings *warnings) {
+// The pointer of one value among several ends with its index.
+static Status warnings_of_values(const Field *field, const double *values, size_t count,
+                                 const char *pointer, Warnings *warnings) {
     const TypicalLimit *limit = warnings_find_limit(field->name);
-    if (limit == NULL || !(fabs(value) > limit->max))
-        return STATUS_OK;
     const char *space = field->unit != NULL ? " " : "";
     const char *unit = field->unit != NULL ? field->unit : "";
-    return warnings_add(warnings, pointer, "is %s%s%s, more than %s%s%s: %s", real_text(value).at,
-                        space, unit, real_text(limit->max).at, space, unit, limit->hint);
-}
-
-static Status warnings_of_reals(const Field *field, const Reals *reals, const char *pointer,
-                                Warnings *warnings) {
-    if (reals->count == 1)
-        return warnings_of_real(field, reals->at[0], pointer, warnings);
-    for (size_t i = 0; i < reals->count && warnings_find_limit(field->name) != NULL; i++) {
-        const JsonPointer place = json_pointer_at(pointer, i);
-        TRY(warnings_of_real(field, reals->at[i], place.at, warnings));
-    }
+    for (size_t i = 0; i < count && limit != NULL; i++)
+        if (fabs(values[i]) > limit->max)
+            TRY(warnings_add(warnings, count > 1 ? json_pointer_at(pointer, i).at : pointer,
+                             "is %s%s%s, more than %s%s%s: %s", real_text(values[i]).at, space,
+                             unit, real_text(limit->max).at, space, unit, limit->hint));
     return STATUS_OK;
 }
 
@@ -73,9 +65,10 @@ static Status warnings_of_rows(const Field *fields, const void *item, const char
             continue;
         json_pointer_join(place, sizeof place, pointer, field->name);
         if (field->kind == FIELD_KIND_REALS) {
-            TRY(warnings_of_reals(field, member, place, warnings));
+            const Reals *reals = member;
+            TRY(warnings_of_values(field, reals->at, reals->count, place, warnings));
         } else if (field->kind == FIELD_KIND_REAL) {
-            TRY(warnings_of_real(field, *(const double *)member, place, warnings));
+            TRY(warnings_of_values(field, member, 1, place, warnings));
         } else if (field->kind == FIELD_KIND_ITEM) {
             TRY(warnings_of_rows(field->fields, member, place, warnings));
         } else if (field->kind == FIELD_KIND_VARIANT) {
