@@ -63,6 +63,9 @@ Status symmetric_matrix_solve(size_t size, const double *A, const double *b, dou
 
 Status symmetric_matrix_eigenvalues(size_t size, const double *M, const double *K, double *values) {
     const size_t n = size;
+    values[0] = K[0] / M[0];
+    if (n == 1)
+        return STATUS_OK;
     double *scaled = malloc((2 * n * n + n) * sizeof *scaled);
     if (scaled == NULL)
         return STATUS_NO_MEMORY;
@@ -74,11 +77,9 @@ Status symmetric_matrix_eigenvalues(size_t size, const double *M, const double *
             scaled[i * n + j] = symmetric_matrix_entry(K, n, i, j) * scale[i] * scale[j];
             mass[i * n + j] = symmetric_matrix_entry(M, n, i, j) * scale[i] * scale[j];
         }
-    values[0] = scaled[0];
     const lapack_int order = (lapack_int)n,
-                     found = n == 1 ? 0
-                                    : LAPACKE_dsygv(LAPACK_ROW_MAJOR, 1, 'N', 'L', order, scaled,
-                                                    order, mass, order, values);
+                     found = LAPACKE_dsygv(LAPACK_ROW_MAJOR, 1, 'N', 'L', order, scaled, order,
+                                           mass, order, values);
     free(scaled);
     return found == 0 ? STATUS_OK : STATUS_INVALID;
 }

@@ -10,16 +10,16 @@
 // counts as 0, as does a shape so small beside its largest value. The other modes stay at rest
 // whatever these do, so that leaving them out changes no more than rounding does.
 //
-// The error of keeping only the lowest modes is predicted from one run of all modes without dampers
-// and without coupled damping. A mode obeys, with a_g linear within a step,
+// The error of keeping only the lowest modes is predicted from one run of every mode by itself,
+// without dampers. A mode obeys, with a_g linear within a step,
 //
 //   q'' + D q' + w^2 q = -share a_g,
 //
 // so that the increment of (q, q') over a step is a block of exp(A h) - I times (q, q', a_g, a_g').
-// At sample instants the modes left out are summed at every storey, for every number of modes kept.
-// Impacts are estimated from that run (truncation_impacts). SAFETY covers what sampling, coupled
-// damping and dampers change in the whole motion; its values and GROWTH are calibrated with
-// tests/truth/test_modes.c.
+// Peaks and mean squares of the modes are combined at every storey as those of a response spectrum:
+// peaks left out by their sum, all else by the root of the sum of squares. Coupled damping and
+// impacts are estimated from the same numbers. SAFETY covers what they, sampling and the phases of
+// the modes change; its value and GROWTH are calibrated with tests/truth/test_modes.c.
 #include "core/plan/mode_selection.h"
 
 #include <float.h>
@@ -33,30 +33,22 @@ enum { ROUNDINGS = 64 };
 static const double NEGLIGIBLE = ROUNDINGS * DBL_EPSILON;
 
 static const double PI = 3.14159265358979323846;
-static const double SAFETY = 1.25, SAFETY_IMPACTS = 2;
+static const double SAFETY = 2;
 static const double STEPS_MAX = 2e7; // steps of modes: about 40 ms
-static const double SUMS_MAX = 1e6;  // samples times modes times storeys: about 2 ms
-static const double STEPS_A_RADIAN = 5;
+static const double RADIANS = 0.3;   // of the fastest motion in a step
 
-// All modes in motion, and the sums over its samples.
+// All modes in motion. Arrays have a number for each mode.
 typedef struct ModalRun {
     const Plan *plan;
     const Base *base;
-    size_t n, m;    // modes, storeys
-    double *shapes; // n x m
-    double *q, *p;  // the state
-    double step;    // [s]
-    // Eight rows of n numbers: what (q, q', a_g, a_g') add to q and to q' in a step.
-    double *recurrence;
-    double *before, *accelerated; // q' at the start of a sample interval, mean q'' over it
-    double *x, *left, *pull;      // by storey: the motion; displacement and acceleration left out
-    // By first mode left out and storey: largest displacement, sums of its square, of its product
-    // with the whole motion, and of the acceleration's square. Row 0 is the whole motion.
-    double *peak, *square, *cross, *pulls;
-    double *mode_peak;    // by mode: largest q
-    double *storey_speed; // by damper: largest speed of its storey [m/s]
-    double acceleration;  // sum of squares of the whole absolute acceleration
-    double count;         // samples summed
+    size_t n;
+    double step;        // [s]
+    double *q, *p;      // the state
+    double *recurrence; // eight rows: what (q, q', a_g, a_g') add to q and to q' in a step
+    double *peak_q, *peak_p;
+    // Sums of squares of q, q', q'' and q'' + share a_g; sum of the products with q of mode 0.
+    double *squares, *speeds, *pulls, *absolutes, *products;
+    double count; // steps
 } ModalRun;
 
 static void modal_run_recurrence(ModalRun *run) {
@@ -75,58 +67,32 @@ static void modal_run_recurrence(ModalRun *run) {
     }
 }
 
-// Sums the motion at a sample instant for every number of modes kept; `base` is the mean of a_g
-// over the sample interval.
-static void modal_run_sum(ModalRun *run, double base) {
-    const Plan *plan = run->plan;
-    const size_t n = run->n, m = run->m;
-    double *restrict x = run->x, *restrict left = run->left, *restrict pull = run->pull;
-    memset(x, 0, 3 * m * sizeof *x); // left and pull follow
-    for (size_t k = 0; k < n; k++)
-        for (size_t j = 0; j < m; j++)
-            x[j] += run->shapes[k * m + j] * run->q[k];
-    for (size_t k = n; k-- > 0;) {
-        const double q = run->q[k], accelerated = run->accelerated[k];
-        const double *restrict shape = &run->shapes[k * m];
-        double *restrict peak = &run->peak[k * m], *restrict square = &run->square[k * m];
-        double *restrict cross = &run->cross[k * m], *restrict pulls = &run->pulls[k * m];
-        for (size_t j = 0; j < m; j++) {
-            left[j] += shape[j] * q;
-            pull[j] += shape[j] * accelerated;
-            const double size = fabs(left[j]);
-            peak[j] = size > peak[j] ? size : peak[j];
-            square[j] += left[j] * left[j];
-            cross[j] += left[j] * x[j];
-            pulls[j] += pull[j] * pull[j];
-        }
-    }
-    for (size_t j = 0; j < m; j++) {
-        const double absolute = pull[j] + plan->influence[j] * base;
-        run->acceleration += absolute * absolute;
-    }
-    for (size_t d = 0; d < plan->damper_count; d++) {
-        double speed = 0;
-        for (size_t k = 0; k < n; k++)
-            speed += run->shapes[k * m + plan->dampers[d].storey] * run->p[k];
-        run->storey_speed[d] = fmax(run->storey_speed[d], fabs(speed));
-    }
-    run->count++;
-}
-
 // One step from a_g = a, a_g' = b.
 static void modal_run_step(ModalRun *run, double a, double b) {
     const size_t n = run->n;
-    const double *g = run->recurrence;
-    double *restrict q = run->q, *restrict p = run->p, *restrict peak = run->mode_peak;
+    const double *g = run->recurrence, *share = run->plan->modes.participation;
+    const double middle = a + b * run->step / 2, first = run->q[0], rate = 1 / run->step;
+    double *restrict q = run->q, *restrict p = run->p;
+    double *restrict peak_q = run->peak_q, *restrict peak_p = run->peak_p;
+    double *restrict squares = run->squares, *restrict products = run->products;
+    double *restrict pulls = run->pulls, *restrict absolutes = run->absolutes;
+    double *restrict speeds = run->speeds;
     for (size_t k = 0; k < n; k++) {
         const double dq = g[k] * q[k] + g[n + k] * p[k] + (g[2 * n + k] * a + g[3 * n + k] * b);
         const double dp =
             g[4 * n + k] * q[k] + g[5 * n + k] * p[k] + (g[6 * n + k] * a + g[7 * n + k] * b);
+        const double pull = dp * rate, absolute = pull + share[k] * middle;
+        squares[k] += q[k] * q[k];
+        speeds[k] += p[k] * p[k];
+        products[k] += q[k] * first;
+        pulls[k] += pull * pull;
+        absolutes[k] += absolute * absolute;
         q[k] += dq;
         p[k] += dp;
-        const double size = fabs(q[k]);
-        peak[k] = size > peak[k] ? size : peak[k];
+        peak_q[k] = fabs(q[k]) > peak_q[k] ? fabs(q[k]) : peak_q[k];
+        peak_p[k] = fabs(p[k]) > peak_p[k] ? fabs(p[k]) : peak_p[k];
     }
+    run->count++;
 }
 
 // The integral of a_g up to t, of a base in closed form [m/s].
@@ -179,55 +145,67 @@ static double modal_run_first(const ModalRun *run, double count) {
 
 static void modal_run_all(ModalRun *run) {
     const Base *base = run->base;
-    const Modes *modes = &run->plan->modes;
     const double duration = run->plan->duration, interval = 1 / run->plan->sample_rate;
-    const size_t n = run->n;
-    const double steps_max = STEPS_MAX / (double)n;
-    double step = fmin(base->form == BASE_SAMPLED ? base->interval : interval, interval);
-    if (base->omega > 0)
-        step = fmin(step, 1 / (STEPS_A_RADIAN * base->omega));
+    const double steps_max = STEPS_MAX / (double)run->n;
+    double step = interval;
     if (base->form == BASE_SAMPLED)
-        step = base->interval / ceil(base->interval / step * (1 - 1e-9));
-    else
-        step = fmax(step, duration / steps_max);
+        step = base->interval / ceil(base->interval / fmin(interval, base->interval) * (1 - 1e-9));
+    else // no sine, corner of a pulse or release may fall between two steps of the fastest mode
+        step = fmax(fmin(step, RADIANS / fmax(base->omega, run->plan->modes.omega[run->n - 1])),
+                    duration / steps_max);
     run->step = step;
     modal_run_recurrence(run);
-    // The first sample has no interval: its acceleration is q'' itself.
-    double a = modal_run_base(base, 0, step);
-    for (size_t k = 0; k < n; k++) {
-        run->mode_peak[k] = fabs(run->q[k]);
-        run->accelerated[k] = -modes->damping[k * (n + 1)] * run->p[k] -
-                              modes->omega[k] * modes->omega[k] * run->q[k] -
-                              modes->participation[k] * a;
+    // The first sample counts for a whole interval, however fast a mode decays.
+    const Modes *modes = &run->plan->modes;
+    run->count = fmax(interval / step, 1);
+    for (size_t k = 0; k < run->n; k++) {
+        const double q = run->q[k], p = run->p[k];
+        const double absolute =
+            -modes->damping[k * (run->n + 1)] * p - modes->omega[k] * modes->omega[k] * q;
+        run->peak_q[k] = fabs(q);
+        run->peak_p[k] = fabs(p);
+        run->squares[k] = run->count * q * q;
+        run->products[k] = run->count * q * run->q[0];
+        run->pulls[k] = run->absolutes[k] = run->count * absolute * absolute;
     }
-    modal_run_sum(run, a);
     const double count = fmin(ceil(duration / step * (1 - 1e-9)), steps_max);
     const double first = modal_run_first(run, count);
-    const size_t ratio = (size_t)fmax(nearbyint(interval / step), 1);
-    const size_t every = (size_t)ceil(count / (double)ratio * (double)(n * run->m) / SUMS_MAX);
-    double speed = 0; // of the base, over the sample interval
-    a = modal_run_base(base, first * step, step);
-    for (size_t i = 0; (double)i < count; i++) {
-        const double next = modal_run_base(base, (first + (double)i + 1) * step, step);
-        if (i % ratio == 0)
-            memcpy(run->before, run->p, n * sizeof *run->p);
+    double a = modal_run_base(base, first * step, step);
+    for (double i = 1; i <= count; i++) {
+        const double next = modal_run_base(base, (first + i) * step, step);
         modal_run_step(run, a, (next - a) / step);
-        speed += (a + next) / 2 * step;
         a = next;
-        if ((i + 1) % ratio != 0)
-            continue;
-        const double length = step * (double)ratio;
-        if ((i + 1) / ratio % every == 0) {
-            for (size_t k = 0; k < n; k++)
-                run->accelerated[k] = (run->p[k] - run->before[k]) / length;
-            modal_run_sum(run, speed / length);
-        }
-        speed = 0;
     }
 }
 
 static double truncation_square(double x) {
     return x * x;
+}
+
+// Adds what coupled damping makes of the speed of mode j, at the frequency of mode j, to mode k.
+static void truncation_couple(ModalRun *run) {
+    const Modes *modes = &run->plan->modes;
+    const size_t n = run->n;
+    const double slowest = 1 / run->plan->duration;
+    for (size_t i = 0; i < n * n && !modes->is_classical; i++) {
+        const size_t k = i / n, j = i % n;
+        const double own = modes->omega[k], other = fmax(modes->omega[j], slowest);
+        const double away =
+            fabs(own - other) * (own + other) + fmax(modes->damping[k * (n + 1)], slowest) * other;
+        const double part = j == k ? 0 : fabs(modes->damping[i]) / away;
+        run->peak_q[k] += part * run->peak_p[j];
+        run->squares[k] += truncation_square(part) * run->speeds[j];
+        run->pulls[k] += truncation_square(part * other * other) * run->speeds[j];
+    }
+}
+
+// The root of the sum over the modes from `first` on of (shape peak)^2 at a storey.
+static double truncation_combine(const ModalRun *run, size_t storey, size_t first,
+                                 const double *peaks) {
+    double sum = 0;
+    for (size_t k = first; k < run->n; k++)
+        sum += truncation_square(run->plan->modes.shapes[storey * run->n + k] * peaks[k]);
+    return sqrt(sum);
 }
 
 // A damper meets its stops about twice a swing and leaves an impulse J = m_e (1 + e) V, V being the
@@ -248,7 +226,8 @@ static void truncation_impacts(const ModalRun *run, size_t damper, ImpactEffect 
     const Derived *derived = &plan->report.derived.at[2 * damper];
     const size_t n = run->n, j = of->storey;
     const double duration = plan->duration, slowest = 1 / duration;
-    const double speed = run->storey_speed[damper] + fabs(of->velocity), reach = run->peak[j];
+    const double speed = truncation_combine(run, j, 0, run->peak_p) + fabs(of->velocity);
+    const double reach = truncation_combine(run, j, 0, run->peak_q);
     const double drift = fabs(plan->velocity[j] + of->velocity) * duration;
     const bool is_free = run->base->form == BASE_STILL;
     if (!(speed > 0) || (is_free && 2 * reach + drift < of->clearance / 2 - fabs(of->position)))
@@ -258,22 +237,22 @@ static void truncation_impacts(const ModalRun *run, size_t damper, ImpactEffect 
         of->effective_mass * (1 + (isnan(restitution) ? 0.7 : restitution)) * speed;
     const double rate = reach > 0 ? speed / reach / PI : 0; // impacts per second
     const double remembered = rate * fmin(duration, 2 / fmax(modes->damping[0], 1e-300));
-    double moved = 0, pulled = 0, missed = 0, missed_pull = 0, mobility = 0, still = 0;
+    double moved = 0, pulled = 0, missed = 0, missed_pull = 0, mobility = 0;
     for (size_t k = 0; k < n; k++) {
         const double omega = fmax(modes->omega[k], slowest);
-        const double taken = truncation_square(run->shapes[k * run->m + j]) * impulse;
+        const double taken = truncation_square(modes->shapes[j * n + k]) * impulse;
         moved += taken / omega;
         pulled += truncation_square(taken * omega);
     }
     for (size_t k = n - 1; k > 0; k--) {
         const double omega = fmax(modes->omega[k], slowest);
-        const double shape = run->shapes[k * run->m + j];
+        const double shape = modes->shapes[j * n + k];
         const double taken = truncation_square(shape) * impulse;
         missed += taken / omega;
         missed_pull = hypot(missed_pull, taken * omega);
         mobility += truncation_square(shape);
-        still = hypot(still, shape * run->mode_peak[k] * omega);
-        const double wrong = ROUNDING + mobility * of->effective_mass + still / speed;
+        const double wrong = ROUNDING + mobility * of->effective_mass +
+                             truncation_combine(run, j, k, run->peak_p) / speed;
         const double grown = wrong * exp(fmin(GROWTH * rate * duration, 40));
         const double part = fmin(grown, 1) * sqrt(1 + remembered);
         effects[k].displacement += missed + moved * part;
@@ -286,76 +265,73 @@ static double truncation_ratio(double a, double b) {
     return a == 0 ? 0 : b > 0 && a < b ? a / b : 1;
 }
 
-// errors[k] of the run that keeps the modes up to k. `impacts` holds n.
-static void truncation_conclude(const ModalRun *run, ImpactEffect *impacts,
+// errors[k] of the run that keeps the modes up to k. `work` holds two numbers for each storey.
+static void truncation_conclude(const ModalRun *run, double *work, ImpactEffect *impacts,
                                 TruncationError *errors) {
-    const size_t n = run->n, m = run->m, dampers = run->plan->damper_count;
-    const double safety = dampers > 0 ? SAFETY_IMPACTS : SAFETY;
-    double whole = 0, whole_rms = 0;
+    const Plan *plan = run->plan;
+    const size_t n = run->n, m = plan->storeys;
+    double *peaks = work, *left = work + m; // displacement and its mean square left out
+    double whole = 0, whole_rms = 0, absolute = 0, pull = 0;
     for (size_t j = 0; j < m; j++) {
-        whole = fmax(whole, run->peak[j]);
-        whole_rms = fmax(whole_rms, sqrt(run->square[j] / run->count));
+        const double *shape = &plan->modes.shapes[j * n];
+        double square = 0;
+        for (size_t k = 0; k < n; k++) {
+            square += shape[k] *
+                      (shape[k] * run->squares[k] + (k > 0 ? 2 * shape[0] * run->products[k] : 0));
+            absolute += truncation_square(shape[k]) * run->absolutes[k] / run->count;
+        }
+        whole = fmax(whole,
+                     fmax(truncation_combine(run, j, 0, run->peak_q), fabs(plan->displacement[j])));
+        whole_rms = fmax(whole_rms, sqrt(fmax(square, 0) / run->count));
     }
-    for (size_t d = 0; d < dampers; d++)
+    for (size_t d = 0; d < plan->damper_count; d++)
         truncation_impacts(run, d, impacts);
     errors[n - 1] = (TruncationError){0};
     for (size_t k = n - 1; k > 0; k--) {
-        double peak = 0, rms = 0, pull = 0, kept = 0;
+        double peak = 0, rms = 0;
         for (size_t j = 0; j < m; j++) {
-            const size_t at = k * m + j;
-            const double left = run->square[at] / run->count;
-            const double rest = (run->square[j] - 2 * run->cross[at]) / run->count + left;
-            peak = fmax(peak, fmax(run->peak[at], fabs(run->shapes[at]) * run->mode_peak[k]));
-            kept = fmax(kept, sqrt(fmax(rest, 0)));
-            rms = fmax(rms, left / (2 * whole_rms));
-            pull += run->pulls[at] / run->count;
+            const double *shape = &plan->modes.shapes[j * n];
+            peaks[j] += fabs(shape[k]) * run->peak_q[k];
+            left[j] += shape[k] * (shape[k] * run->squares[k] + 2 * shape[0] * run->products[k]) /
+                       run->count;
+            pull += truncation_square(shape[k]) * run->pulls[k] / run->count;
+            peak = fmax(peak, peaks[j]);
+            rms = fmax(rms, plan->modes.is_classical ? fabs(left[j]) / (2 * whole_rms)
+                                                     : sqrt(fabs(left[j])));
         }
         const TruncationError *more = &errors[k];
-        const double displacement = safety * peak + impacts[k].displacement;
-        const double acceleration = safety * sqrt(pull) + impacts[k].acceleration;
-        const double displacement_rms =
-            safety * fmax(rms, fabs(kept - whole_rms)) + impacts[k].displacement;
         errors[k - 1] = (TruncationError){
-            fmax(truncation_ratio(displacement, whole), more->displacement),
-            fmax(truncation_ratio(acceleration, sqrt(run->acceleration / run->count)),
+            fmax(truncation_ratio(SAFETY * peak + impacts[k].displacement, whole),
+                 more->displacement),
+            fmax(truncation_ratio(SAFETY * sqrt(pull) + impacts[k].acceleration, sqrt(absolute)),
                  more->mean_acceleration),
-            fmax(truncation_ratio(displacement_rms, whole_rms), more->rms_displacement),
+            fmax(truncation_ratio(SAFETY * rms + impacts[k].displacement, whole_rms),
+                 more->rms_displacement),
         };
     }
 }
 
 static Status truncation_run(const Plan *plan, const Base *base, TruncationError *errors) {
     const size_t n = plan->modes.count, m = plan->storeys;
-    double *block = calloc(n * (5 * m + 13) + 3 * m + plan->damper_count, sizeof *block);
+    ModalRun run = {.plan = plan, .base = base, .n = n};
+    double **const rows[] = {&run.q,      &run.p,     &run.peak_q,    &run.peak_p,  &run.squares,
+                             &run.speeds, &run.pulls, &run.absolutes, &run.products};
+    double *block = calloc(n * (COUNT(rows) + 8) + 2 * m, sizeof *block);
     ImpactEffect *impacts = calloc(n, sizeof *impacts);
-    if (block == NULL || impacts == NULL) {
-        free(block);
-        free(impacts);
-        return STATUS_NO_MEMORY;
+    if (block != NULL && impacts != NULL) {
+        for (size_t i = 0; i < COUNT(rows); i++)
+            *rows[i] = block + i * n;
+        run.recurrence = block + COUNT(rows) * n;
+        modes_coordinates(&plan->modes, m, plan->mass, plan->displacement, run.q);
+        modes_coordinates(&plan->modes, m, plan->mass, plan->velocity, run.p);
+        modal_run_all(&run);
+        truncation_couple(&run);
+        truncation_conclude(&run, run.recurrence + 8 * n, impacts, errors);
     }
-    ModalRun run = {.plan = plan, .base = base, .n = n, .m = m};
-    double **const arrays[] = {&run.shapes, &run.peak, &run.square, &run.cross, &run.pulls};
-    double **const rows[] = {&run.q, &run.p, &run.before, &run.accelerated, &run.mode_peak};
-    double *next = block;
-    for (size_t i = 0; i < COUNT(arrays); i++, next += n * m)
-        *arrays[i] = next;
-    for (size_t i = 0; i < COUNT(rows); i++, next += n)
-        *rows[i] = next;
-    run.recurrence = next;
-    run.x = next + 8 * n;
-    run.left = run.x + m;
-    run.pull = run.left + m;
-    run.storey_speed = run.pull + m;
-    for (size_t k = 0; k < n; k++)
-        for (size_t j = 0; j < m; j++)
-            run.shapes[k * m + j] = plan->modes.shapes[j * n + k];
-    modes_coordinates(&plan->modes, m, plan->mass, plan->displacement, run.q);
-    modes_coordinates(&plan->modes, m, plan->mass, plan->velocity, run.p);
-    modal_run_all(&run);
-    truncation_conclude(&run, impacts, errors);
+    const Status status = block != NULL && impacts != NULL ? STATUS_OK : STATUS_NO_MEMORY;
     free(impacts);
     free(block);
-    return STATUS_OK;
+    return status;
 }
 
 Status truncation_predict(const Plan *plan, const Scene *scene, TruncationError *errors) {
