@@ -19,6 +19,15 @@ static void *field_element(const Field *field, List list, size_t index) {
     return (char *)list.at + index * field->size;
 }
 
+// Of the members that own no other rows.
+static const size_t field_sizes[] = {
+    [FIELD_KIND_REAL] = sizeof(double),        [FIELD_KIND_COUNT] = sizeof(uint64_t),
+    [FIELD_KIND_FLAG] = sizeof(bool),          [FIELD_KIND_TEXT] = sizeof(char *),
+    [FIELD_KIND_CHOICE] = sizeof(int),         [FIELD_KIND_REALS] = sizeof(Reals),
+    [FIELD_KIND_ROWS] = sizeof(Rows),          [FIELD_KIND_TEXTS] = sizeof(Texts),
+    [FIELD_KIND_LIST] = sizeof(List),          [FIELD_KIND_VARIANT] = sizeof(Variant *),
+    [FIELD_KIND_REFCOUNT] = sizeof(Refcount *)};
+
 // Makes every member absent without freeing it.
 static void fields_set_absent(const Field *fields, void *item) {
     for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
@@ -30,38 +39,15 @@ static void fields_set_absent(const Field *fields, void *item) {
         case FIELD_KIND_COUNT:
             *(uint64_t *)member = COUNT_ABSENT;
             break;
-        case FIELD_KIND_FLAG:
-            *(bool *)member = false;
-            break;
-        case FIELD_KIND_TEXT:
-            *(char **)member = NULL;
-            break;
         case FIELD_KIND_CHOICE:
             *(int *)member = CHOICE_ABSENT;
-            break;
-        case FIELD_KIND_REALS:
-            *(Reals *)member = (Reals){NULL, 0};
-            break;
-        case FIELD_KIND_ROWS:
-            *(Rows *)member = (Rows){NULL, 0};
-            break;
-        case FIELD_KIND_TEXTS:
-            *(Texts *)member = (Texts){NULL, 0};
-            break;
-        case FIELD_KIND_LIST:
-            memset(member, 0, sizeof(List));
-            break;
-        case FIELD_KIND_VARIANT:
-            *(Variant **)member = NULL;
-            break;
-        case FIELD_KIND_REFCOUNT:
-            *(Refcount **)member = NULL;
             break;
         case FIELD_KIND_ITEM:
         case FIELD_KIND_BASE:
             fields_set_absent(field->fields, member);
             break;
-        case FIELD_KIND_END:
+        default: // false, NULL or no elements
+            memset(member, 0, field_sizes[field->kind]);
             break;
         }
     }
@@ -182,16 +168,10 @@ static Status fields_copy_members(const Field *fields, const void *source, void 
         void *to = field_member(field, target);
         switch (field->kind) {
         case FIELD_KIND_REAL:
-            *(double *)to = *(const double *)from;
-            break;
         case FIELD_KIND_COUNT:
-            *(uint64_t *)to = *(const uint64_t *)from;
-            break;
         case FIELD_KIND_FLAG:
-            *(bool *)to = *(const bool *)from;
-            break;
         case FIELD_KIND_CHOICE:
-            *(int *)to = *(const int *)from;
+            memcpy(to, from, field_sizes[field->kind]);
             break;
         case FIELD_KIND_TEXT: {
             const char *text = *(char *const *)from;
@@ -281,11 +261,8 @@ static bool field_is_empty(const Field *field, const void *member) {
     case FIELD_KIND_CHOICE:
         return *(const int *)member == CHOICE_ABSENT;
     case FIELD_KIND_REALS:
-        return ((const Reals *)member)->count == 0;
     case FIELD_KIND_ROWS:
-        return ((const Rows *)member)->count == 0;
     case FIELD_KIND_TEXTS:
-        return ((const Texts *)member)->count == 0;
     case FIELD_KIND_LIST:
         return field_list(member).count == 0;
     case FIELD_KIND_VARIANT:

@@ -21,18 +21,16 @@ static Status field_check_number(const Field *field, double value, const char *p
                                 "must be finite");
     if (field_range_contains(range, value))
         return STATUS_OK;
-    char min[32], max[32], is[32];
-    text_real(min, range->min);
-    text_real(max, range->max);
-    text_real(is, value);
+    const RealText min = real_text(range->min), is = real_text(value);
     const char *space = field->unit != NULL ? " " : "";
     const char *unit = field->unit != NULL ? field->unit : "";
     const char *below = range->is_open_below ? "above" : "at least";
     if (isinf(range->max))
         return problem_add_real(problem, STATUS_INVALID, pointer, value, field->unit,
-                                "must be %s %s%s%s, is %s", below, min, space, unit, is);
+                                "must be %s %s%s%s, is %s", below, min.at, space, unit, is.at);
     return problem_add_real(problem, STATUS_INVALID, pointer, value, field->unit,
-                            "must be within [%s, %s]%s%s, is %s", min, max, space, unit, is);
+                            "must be within [%s, %s]%s%s, is %s", min.at, real_text(range->max).at,
+                            space, unit, is.at);
 }
 
 static Status field_check_length(size_t max, size_t has, const char *what, const char *pointer,
@@ -95,9 +93,8 @@ static Status field_check_texts(const Field *field, const Texts *texts, const ch
             if (field_allows_text(field->choices, text, length))
                 continue;
         }
-        char place[POINTER_SIZE];
-        json_pointer_index(place, sizeof place, pointer, i);
-        status = spelling_reject_numbered(field->choices, text, length, place, problem);
+        const JsonPointer place = json_pointer_at(pointer, i);
+        status = spelling_reject_numbered(field->choices, text, length, place.at, problem);
     }
     return status;
 }
@@ -111,9 +108,8 @@ static Status field_check_reals(const Field *field, const Reals *reals, const ch
         const double value = reals->at[i];
         if (isfinite(value) && field_range_contains(&field->range, value))
             continue;
-        char place[POINTER_SIZE];
-        json_pointer_index(place, sizeof place, pointer, i);
-        status = field_check_number(field, value, place, problem);
+        const JsonPointer place = json_pointer_at(pointer, i);
+        status = field_check_number(field, value, place.at, problem);
     }
     return status;
 }

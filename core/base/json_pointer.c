@@ -317,11 +317,10 @@ static Status json_pointer_set_member(const Field *field, void *member, const Js
         return STATUS_OK;
     case FIELD_KIND_COUNT:
         if (value->kind != JSON_SCALAR_NUMBER || value->whole == COUNT_ABSENT) {
-            char is[32];
             if (value->kind != JSON_SCALAR_NUMBER)
                 return json_pointer_fail_kind("a whole number", field, value, message);
             json_pointer_fail(message, "must be a whole number of at least 0, is %s",
-                              text_real(is, value->number));
+                              real_text(value->number).at);
             return STATUS_INVALID;
         }
         *(uint64_t *)member = value->whole;
@@ -416,32 +415,41 @@ void json_pointer_index(char *target, size_t size, const char *pointer, size_t i
     json_pointer_join(target, size, pointer, name);
 }
 
+JsonPointer json_pointer_of(const char *pointer, const char *name) {
+    JsonPointer place;
+    json_pointer_join(place.at, sizeof place.at, pointer, name);
+    return place;
+}
+
+JsonPointer json_pointer_at(const char *pointer, size_t index) {
+    JsonPointer place;
+    json_pointer_index(place.at, sizeof place.at, pointer, index);
+    return place;
+}
+
 Status json_pointer_fault(Problem *problem, const char *pointer, const char *name,
                           const char *format, ...) {
-    char place[sizeof((Fault){0}.pointer)], detail[2 * sizeof((Fault){0}.detail)];
+    char detail[2 * sizeof((Fault){0}.detail)];
     va_list arguments;
     va_start(arguments, format);
     vsnprintf(detail, sizeof detail, format, arguments);
     va_end(arguments);
-    json_pointer_join(place, sizeof place, pointer, name);
-    return problem_add(problem, STATUS_INVALID, place, "%s", detail);
+    return problem_add(problem, STATUS_INVALID, json_pointer_of(pointer, name).at, "%s", detail);
 }
 
 Status json_pointer_fault_real(Problem *problem, const char *pointer, const char *name,
                                double value, const char *unit, const char *format, ...) {
-    char place[sizeof((Fault){0}.pointer)], detail[2 * sizeof((Fault){0}.detail)];
+    char detail[2 * sizeof((Fault){0}.detail)];
     va_list arguments;
     va_start(arguments, format);
     vsnprintf(detail, sizeof detail, format, arguments);
     va_end(arguments);
-    json_pointer_join(place, sizeof place, pointer, name);
-    return problem_add_real(problem, STATUS_INVALID, place, value, unit, "%s", detail);
+    return problem_add_real(problem, STATUS_INVALID, json_pointer_of(pointer, name).at, value, unit,
+                            "%s", detail);
 }
 
 bool json_pointer_concerns(const Problem *problem, const char *pointer, const char *name) {
-    char place[sizeof((Fault){0}.pointer)];
-    json_pointer_join(place, sizeof place, pointer, name);
-    return problem_concerns(problem, place);
+    return problem_concerns(problem, json_pointer_of(pointer, name).at);
 }
 
 JsonScalar json_scalar_number(double number) {

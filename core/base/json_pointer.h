@@ -9,6 +9,13 @@
 void json_pointer_join(char *target, size_t size, const char *pointer, const char *name);
 void json_pointer_index(char *target, size_t size, const char *pointer, size_t index);
 
+// The same by value, as long as a fault's: json_pointer_of("", "dampers").at.
+typedef struct JsonPointer {
+    char at[sizeof((Fault){0}.pointer)];
+} JsonPointer;
+JsonPointer json_pointer_of(const char *pointer, const char *name);
+JsonPointer json_pointer_at(const char *pointer, size_t index);
+
 // Adds a fault at "pointer/name", as problem_add and problem_add_real. Returns STATUS_INVALID.
 Status json_pointer_fault(Problem *problem, const char *pointer, const char *name,
                           const char *format, ...) __attribute__((format(printf, 4, 5)));

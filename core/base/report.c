@@ -1,6 +1,5 @@
 #include "core/base/report.h"
 
-#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -21,7 +20,6 @@ const Field decision_fields[] = {
     FIELD_TEXT(Decision, why, 0, PRESENCE_OPTIONAL, 0, "the reason"),
     FIELD_REAL(Decision, value, NULL, ANY, OPTIONAL, "the number that decided"),
     FIELD_TEXT(Decision, unit, 0, PRESENCE_OPTIONAL, 0, "of that number"),
-    FIELD_REAL(Decision, saving, NULL, ANY, OPTIONAL, "of an omission: share of the predicted cost that it saves"),
     FIELD_END
 };
 // clang-format on
@@ -60,45 +58,25 @@ void warnings_clear(Warnings *warnings) {
     *warnings = (Warnings){NULL, 0};
 }
 
-static Status decisions_append(Decisions *decisions, const Decision *given, const char *format,
-                               va_list arguments) {
+Status decisions_add(Decisions *decisions, const char *about, const char *chose, double value,
+                     const char *unit, const char *format, ...) {
     if (decisions == NULL || decisions->count >= REPORT_LINES_MAX)
         return STATUS_OK;
     Decision *decision = list_append(decisions, sizeof *decision);
     if (decision == NULL)
         return STATUS_NO_MEMORY;
-    *decision = (Decision){
-        .about = strdup(given->about),
-        .chose = strdup(given->chose),
-        .why = report_text(format, arguments),
-        .value = given->value,
-        .unit = given->unit != NULL ? strdup(given->unit) : NULL,
-        .saving = given->saving,
-    };
+    va_list arguments;
+    va_start(arguments, format);
+    *decision = (Decision){.about = strdup(about),
+                           .chose = strdup(chose),
+                           .why = report_text(format, arguments),
+                           .value = value,
+                           .unit = unit != NULL ? strdup(unit) : NULL};
+    va_end(arguments);
     if (decision->about != NULL && decision->chose != NULL && decision->why != NULL &&
-        (given->unit == NULL || decision->unit != NULL))
+        (unit == NULL || decision->unit != NULL))
         return STATUS_OK;
     fields_clear(decision_fields, decision);
     decisions->count--;
     return STATUS_NO_MEMORY;
-}
-
-Status decisions_add(Decisions *decisions, const char *about, const char *chose, double value,
-                     const char *unit, const char *format, ...) {
-    const Decision given = {(char *)about, (char *)chose, NULL, value, (char *)unit, (double)NAN};
-    va_list arguments;
-    va_start(arguments, format);
-    const Status status = decisions_append(decisions, &given, format, arguments);
-    va_end(arguments);
-    return status;
-}
-
-Status decisions_omit(Decisions *decisions, const char *about, double value, const char *unit,
-                      double saving, const char *format, ...) {
-    const Decision given = {(char *)about, (char *)"left_out", NULL, value, (char *)unit, saving};
-    va_list arguments;
-    va_start(arguments, format);
-    const Status status = decisions_append(decisions, &given, format, arguments);
-    va_end(arguments);
-    return status;
 }

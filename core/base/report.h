@@ -15,10 +15,11 @@ typedef struct Warnings {
 
 // One automatic choice and its reason.
 typedef struct Decision {
-    char *about, *chose, *why;
-    double value;  // the number that decided; NAN: none
-    char *unit;    // of that number; NULL: none
-    double saving; // relative part of the predicted cost that an omission saves; NAN: no omission
+    char *about; // "modes"
+    char *chose; // "left_out" for work that the scene does not require
+    char *why;
+    double value; // the number that decided; NAN: none
+    char *unit;   // of that number; NULL: none
 } Decision;
 typedef struct Decisions {
     Decision *at;
@@ -34,9 +35,6 @@ Status warnings_add(Warnings *warnings, const char *pointer, const char *format,
 Status decisions_add(Decisions *decisions, const char *about, const char *chose, double value,
                      const char *unit, const char *format, ...)
     __attribute__((format(printf, 6, 7)));
-// The same with the choice "left_out", for work that the scene does not require.
-Status decisions_omit(Decisions *decisions, const char *about, double value, const char *unit,
-                      double saving, const char *format, ...) __attribute__((format(printf, 6, 7)));
 
 void warnings_clear(Warnings *warnings);
 

@@ -107,6 +107,12 @@ const char *text_real(char target[32], double value) {
     return target;
 }
 
+RealText real_text(double value) {
+    RealText text;
+    text_real(text.at, value);
+    return text;
+}
+
 void problem_clear(Problem *problem) {
     if (problem == NULL)
         return;

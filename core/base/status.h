@@ -105,6 +105,11 @@ void text_quote(char *target, size_t size, const char *text);
 
 // The shortest of %.15g, %.16g and %.17g that reads back as the same double.
 const char *text_real(char target[32], double value);
+// The same by value, for an argument of a message: real_text(value).at.
+typedef struct RealText {
+    char at[32];
+} RealText;
+RealText real_text(double value);
 
 // Frees *target and sets it to the formatted text, truncated to TEXT_FORMAT_MAX bytes; owned by the
 // caller. Without memory: false, and *target is NULL.

@@ -1,10 +1,24 @@
-// All contact laws, the default first.
+// All contact laws, the default first, and the laws that need no functions.
 #include "core/contact/contact.h"
 
 const ContactLaw contact_auto = {
     .kind = {"auto", "spring_damper wherever a contact time or k, c is known, else impulse",
              contact_fields, sizeof(Contact)},
     .form = CONTACT_CHOSEN,
+};
+
+// Impulse-momentum contact: instantaneous, u' -> -e u', momentum conserved.
+const ContactLaw contact_impulse = {
+    .kind = {"impulse", "instantaneous: the relative velocity turns round, times the restitution",
+             contact_fields, sizeof(Contact)},
+    .form = CONTACT_IMPULSIVE,
+};
+
+// Spring and damper in parallel while the buffer is penetrated: N = k p + c p' (Li and Darby 2009).
+const ContactLaw contact_spring_damper = {
+    .kind = {"spring_damper", "a linear spring and damper for the time of contact", contact_fields,
+             sizeof(Contact)},
+    .form = CONTACT_LINEAR,
 };
 
 const ContactLaw *const contacts[] = {

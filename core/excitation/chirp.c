@@ -6,7 +6,7 @@
 // so that the mean error over each line is 0 to the fourth order and the largest is (p' h)^2 / 12
 // of the amplitude instead of / 8. A structure that is far slower than the knots responds to the
 // mean.
-#include "core/excitation/chirp.h"
+#include "core/excitation/excitation.h"
 
 #include "core/base/json_pointer.h"
 
@@ -57,7 +57,6 @@ static Status chirp_complete(Excitation *excitation, const Span *span, const cha
     if (!(chirp->start_frequency >= 0) || !(chirp->end_frequency >= 0) ||
         !isfinite(chirp_highest(chirp)) || !(chirp->sweep_time > 0) || !isfinite(chirp->sweep_time))
         return STATUS_OK; // the row adds the fault
-    char is[32], limit[32];
     if (chirp_highest(chirp) == 0)
         return json_pointer_fault_real(problem, pointer, "end_frequency", chirp->end_frequency,
                                        "Hz",
@@ -69,14 +68,14 @@ static Status chirp_complete(Excitation *excitation, const Span *span, const cha
     if (chirp_highest(chirp) > chirp->rate / 2)
         return json_pointer_fault_real(problem, pointer, "rate", chirp->rate, "Hz",
                                        "must be at least twice the highest frequency, %s Hz, is %s",
-                                       text_real(limit, 2 * chirp_highest(chirp)),
-                                       text_real(is, chirp->rate));
+                                       real_text(2 * chirp_highest(chirp)).at,
+                                       real_text(chirp->rate).at);
     if (!(chirp_knots(chirp, span) - 2 <= (double)most))
         return json_pointer_fault_real(
             problem, pointer, "rate", chirp->rate, "Hz",
             "must make at most %zu knots of the base's acceleration, %s makes "
             "%.0f",
-            most, text_real(is, chirp->rate), chirp_knots(chirp, span) - 2);
+            most, real_text(chirp->rate).at, chirp_knots(chirp, span) - 2);
     return STATUS_OK;
 }
 
@@ -92,7 +91,6 @@ static double chirp_lasts(const Excitation *excitation) {
 static Status chirp_make(const Excitation *excitation, const Span *span, const Progress *progress,
                          Base *base, Problem *problem) {
     const ExcitationChirp *chirp = chirp_of(excitation);
-    *base = (Base){0};
     const double wanted = chirp_knots(chirp, span);
     if (!(wanted <= KNOTS_MAX + 2))
         return problem_set(problem, STATUS_LIMIT, "the base may have at most %d knots, not %.0f",
@@ -129,20 +127,15 @@ static void chirp_doubt(const Excitation *excitation, const Span *span, const ch
                         Problem *doubts) {
     const ExcitationChirp *chirp = chirp_of(excitation);
     const double omega = 2 * (double)PI * chirp_highest(chirp), turn = omega / chirp->rate;
-    char is[32], limit[32];
     if (turn * turn / 12 > 1e-3)
         (void)json_pointer_fault(
             doubts, pointer, "rate",
             "is %s Hz, too few for %s Hz: the lines between the knots miss the sweep "
             "by up to %.2g of its amplitude",
-            text_real(is, chirp->rate), text_real(limit, chirp_highest(chirp)), turn * turn / 12);
+            real_text(chirp->rate).at, real_text(chirp_highest(chirp)).at, turn * turn / 12);
     const bool is_end = chirp->end_frequency >= chirp->start_frequency;
     excitation_doubt_frequency(chirp_highest(chirp), span, pointer,
                                is_end ? "end_frequency" : "start_frequency", doubts);
-}
-
-static bool chirp_is_still(const Excitation *excitation) {
-    return chirp_of(excitation)->amplitude == 0;
 }
 
 const ExcitationKind excitation_chirp = {
@@ -153,7 +146,7 @@ const ExcitationKind excitation_chirp = {
     .interval = chirp_interval,
     .lasts = chirp_lasts,
     .effort = 1.5,
-    .is_still = chirp_is_still,
+    .amplitude = offsetof(ExcitationChirp, amplitude),
     .make = chirp_make,
     .doubt = chirp_doubt,
 };

@@ -18,32 +18,25 @@ void excitation_doubt_frequency(double frequency, const Span *span, const char *
                                 const char *name, Problem *doubts) {
     if (!(frequency > span->sample_rate / 2))
         return;
-    char is[32], limit[32];
     (void)json_pointer_fault(
         doubts, pointer, name,
         "is %s Hz, above half the sample rate, %s Hz: the output's samples do not show "
         "the motion",
-        text_real(is, frequency), text_real(limit, span->sample_rate / 2));
+        real_text(frequency).at, real_text(span->sample_rate / 2).at);
 }
 
-static Status free_make(const Excitation *excitation, const Span *span, const Progress *progress,
-                        Base *base, Problem *problem) {
-    (void)excitation;
-    (void)span;
-    (void)progress;
-    (void)problem;
+Status excitation_make(const Excitation *excitation, const Span *span, const Progress *progress,
+                       Base *base, Problem *problem) {
+    const ExcitationKind *kind = excitation_kind(excitation);
     *base = (Base){0};
+    if (kind->make != NULL)
+        return kind->make(excitation, span, progress, base, problem);
+    if (kind->form != NULL)
+        *base = kind->form(excitation);
     return STATUS_OK;
-}
-
-static bool free_is_still(const Excitation *excitation) {
-    (void)excitation;
-    return true;
 }
 
 const ExcitationKind excitation_free = {
     .kind = {"free", "free vibration from the initial state", excitation_fields,
              sizeof(Excitation)},
-    .is_still = free_is_still,
-    .make = free_make,
 };

@@ -1,5 +1,5 @@
-// One kind of excitation: the initial state and the base's motion over the whole run. excitations.c
-// lists all kinds.
+// One kind of excitation: the initial state and the base's motion over the whole run, and the
+// settings of each kind except the recorded motion. excitations.c lists all kinds.
 #ifndef CORE_EXCITATION_EXCITATION_H
 #define CORE_EXCITATION_EXCITATION_H
 
@@ -36,11 +36,12 @@ typedef struct ExcitationKind {
     double (*interval)(const Excitation *excitation);
     // The time of its last sample [s]. NULL: the end of the run.
     double (*lasts)(const Excitation *excitation);
-    double effort; // cost of one sample, in solver steps
-    // Whether the base never moves. NULL: it may move.
-    bool (*is_still)(const Excitation *excitation);
-    // Makes the base's motion over span->duration; the caller clears `base` with base_clear.
-    // STATUS_CANCELLED where `progress` stops it.
+    double effort;    // cost of one sample, in solver steps
+    size_t amplitude; // offset of the double that the motion is proportional to; 0: none
+    // The motion in closed form. NULL, and no make(): the base is still.
+    Base (*form)(const Excitation *excitation);
+    // Makes the samples of the motion over span->duration into an empty base, which the caller
+    // clears. STATUS_CANCELLED where `progress` stops it. NULL: it has a closed form.
     Status (*make)(const Excitation *excitation, const Span *span, const Progress *progress,
                    Base *base, Problem *problem);
     // Adds values that are allowed but hardly intended to `doubts`, below `pointer`. NULL: none.
@@ -54,6 +55,56 @@ extern const Field excitation_fields[]; // the rows that every kind has
 extern const ExcitationKind excitation_free, excitation_random, excitation_sine, excitation_record,
     excitation_chirp, excitation_half_sine, excitation_triangular;
 
+// Kind "random": band-limited Gaussian acceleration of the base with a flat one-sided density of
+// rms^2 / (f1 - f0) within [f0, f1]. Its samples do not depend on the solver.
+typedef struct ExcitationRandom {
+    Excitation start;
+    Reals band; // f0, f1 [Hz]
+    double rms; // of the process, not of one sample path [m/s^2]
+    uint64_t seed;
+    double rate; // of the samples [Hz]; absent: the run's sample rate
+} ExcitationRandom;
+
+// The blocks of which the samples are made; they depend on band and rate alone.
+typedef struct RandomBlocks {
+    size_t length;          // B, a power of two; a block begins every B / 2 samples
+    size_t first_bin, bins; // the bins inside the band, without 0 and B / 2
+} RandomBlocks;
+
+RandomBlocks random_blocks(const ExcitationRandom *random);
+
+// Kind "sine".
+typedef enum SineQuantity { SINE_ACCELERATION, SINE_DISPLACEMENT } SineQuantity;
+
+typedef struct ExcitationSine {
+    Excitation excitation;
+    double frequency; // [Hz]
+    double amplitude; // [m/s^2] or [m]
+    int quantity;     // SineQuantity
+} ExcitationSine;
+
+// Kind "chirp": a sweep.
+typedef struct ExcitationChirp {
+    Excitation excitation;
+    double start_frequency, end_frequency; // [Hz]
+    double amplitude;                      // [m/s^2]
+    double sweep_time;                     // [s]
+    double rate;                           // [Hz]
+} ExcitationChirp;
+
+// Kinds "half_sine" and "triangular".
+typedef struct ExcitationPulse {
+    Excitation excitation;
+    double amplitude; // at its middle [m/s^2]
+    double start;     // [s]
+    double length;    // [s]
+} ExcitationPulse;
+
+// Makes the base's motion over span->duration; the caller clears `base` with base_clear, also after
+// a failure. STATUS_CANCELLED where `progress` stops it.
+Status excitation_make(const Excitation *excitation, const Span *span, const Progress *progress,
+                       Base *base, Problem *problem);
+
 // Adds a doubt at pointer/name where the output's samples cannot show motion of this frequency.
 void excitation_doubt_frequency(double frequency, const Span *span, const char *pointer,
                                 const char *name, Problem *doubts);
@@ -62,9 +113,11 @@ static inline const ExcitationKind *excitation_kind(const Excitation *excitation
     return (const ExcitationKind *)(const void *)excitation->variant.kind;
 }
 
+// Whether the base never moves.
 static inline bool excitation_is_still(const Excitation *excitation) {
-    const ExcitationKind *kind = excitation_kind(excitation);
-    return kind->is_still != NULL && kind->is_still(excitation);
+    const size_t at = excitation_kind(excitation)->amplitude;
+    return excitation_kind(excitation) == &excitation_free ||
+           (at != 0 && *(const double *)(const void *)((const char *)excitation + at) == 0);
 }
 
 #endif

@@ -1,6 +1,6 @@
 // Single pulses of the base's acceleration: half a sine, a_g = amplitude sin(pi (t - start) /
 // length), and a triangle that reaches the amplitude at the middle.
-#include "core/excitation/pulse.h"
+#include "core/excitation/excitation.h"
 
 #include "core/base/json_pointer.h"
 
@@ -27,84 +27,68 @@ static Status pulse_complete(Excitation *excitation, const Span *span, const cha
         !(pulse->start >= 0) || !(pulse->length > 0))
         return STATUS_OK; // the row adds the fault
     const double least = fmax(1e-12 * pulse->start, 1e-12);
-    char is[32], limit[32];
     if (pulse->length < least)
         return json_pointer_fault_real(
             problem, pointer, "length", pulse->length, "s",
             "must be at least %s s, the resolution of time at that start, is %s",
-            text_real(limit, least), text_real(is, pulse->length));
+            real_text(least).at, real_text(pulse->length).at);
     if (isfinite(pulse->start + pulse->length) && isfinite(2 * pulse->amplitude / pulse->length))
         return STATUS_OK;
     return json_pointer_fault_real(problem, pointer, "length", pulse->length, "s",
                                    "must leave the pulse's end and slope finite, is %s",
-                                   text_real(is, pulse->length));
+                                   real_text(pulse->length).at);
 }
 
 static void pulse_doubt(const Excitation *excitation, const Span *span, const char *pointer,
                         Problem *doubts) {
     const ExcitationPulse *pulse = pulse_of(excitation);
-    char is[32], limit[32];
     if (pulse->start >= span->duration)
         (void)json_pointer_fault(doubts, pointer, "start",
                                  "is %s s: the run ends at %s s, before the pulse begins",
-                                 text_real(is, pulse->start), text_real(limit, span->duration));
+                                 real_text(pulse->start).at, real_text(span->duration).at);
     if (pulse->length * span->sample_rate < 2)
         (void)json_pointer_fault(
             doubts, pointer, "length",
             "is %s s, less than two samples of the output, %.3g s: the motion is "
             "exact, but its samples hardly show the pulse",
-            text_real(is, pulse->length), 2 / span->sample_rate);
+            real_text(pulse->length).at, 2 / span->sample_rate);
 }
 
-static bool pulse_is_still(const Excitation *excitation) {
-    return pulse_of(excitation)->amplitude == 0;
-}
-
-static Status half_sine_make(const Excitation *excitation, const Span *span,
-                             const Progress *progress, Base *base, Problem *problem) {
-    (void)span;
-    (void)progress;
-    (void)problem;
+static Base half_sine_form(const Excitation *excitation) {
     const ExcitationPulse *pulse = pulse_of(excitation);
-    *base = (Base){.form = BASE_PIECES,
-                   .omega = 3.14159265358979323846 / pulse->length,
-                   .pieces = {{.time = pulse->start, .slope = pulse->amplitude},
-                              {.time = pulse->start + pulse->length}},
-                   .piece_count = 2};
-    return STATUS_OK;
+    return (Base){.form = BASE_PIECES,
+                  .omega = 3.14159265358979323846 / pulse->length,
+                  .pieces = {{.time = pulse->start, .slope = pulse->amplitude},
+                             {.time = pulse->start + pulse->length}},
+                  .piece_count = 2};
 }
 
 const ExcitationKind excitation_half_sine = {
     .kind = {"half_sine", "half a sine of the base's acceleration, once", pulse_fields,
              sizeof(ExcitationPulse)},
     .complete = pulse_complete,
-    .is_still = pulse_is_still,
-    .make = half_sine_make,
+    .amplitude = offsetof(ExcitationPulse, amplitude),
+    .form = half_sine_form,
     .doubt = pulse_doubt,
 };
 
-static Status triangular_make(const Excitation *excitation, const Span *span,
-                              const Progress *progress, Base *base, Problem *problem) {
-    (void)span;
-    (void)progress;
-    (void)problem;
+static Base triangular_form(const Excitation *excitation) {
     const ExcitationPulse *pulse = pulse_of(excitation);
     const double slope = 2 * pulse->amplitude / pulse->length;
-    *base = (Base){.form = BASE_PIECES,
-                   .pieces = {{.time = pulse->start, .slope = slope},
-                              {.time = pulse->start + pulse->length / 2,
-                               .value = pulse->amplitude,
-                               .slope = -slope},
-                              {.time = pulse->start + pulse->length}},
-                   .piece_count = 3};
-    return STATUS_OK;
+    return (Base){.form = BASE_PIECES,
+                  .pieces = {{.time = pulse->start, .slope = slope},
+                             {.time = pulse->start + pulse->length / 2,
+                              .value = pulse->amplitude,
+                              .slope = -slope},
+                             {.time = pulse->start + pulse->length}},
+                  .piece_count = 3};
 }
 
 const ExcitationKind excitation_triangular = {
     .kind = {"triangular", "a triangular pulse of the base's acceleration, once", pulse_fields,
              sizeof(ExcitationPulse)},
     .complete = pulse_complete,
-    .is_still = pulse_is_still,
-    .make = triangular_make,
+    .amplitude = offsetof(ExcitationPulse, amplitude),
+    .form = triangular_form,
     .doubt = pulse_doubt,
 };

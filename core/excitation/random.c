@@ -17,7 +17,7 @@
 // The fade smears the band's edges: d bins outside, the density is 0.0085 / d^3 of that inside
 // (20 bins: -60 dB). A block has at least 256 bins in the band or, where B meets its limit, 8.
 // Bins 0 and B/2 are left out: no mean, and no bin with half the variance.
-#include "core/excitation/random.h"
+#include "core/excitation/excitation.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -86,12 +86,11 @@ static bool random_check_rate(const ExcitationRandom *random, const Span *span, 
     // The sample past the end of the run does not count against the limit.
     if (!isfinite(span->duration) || random_sample_count(random, span) - 1 <= (double)most)
         return true;
-    char rate[32], limit[32];
     json_pointer_fault_real(
         problem, pointer, "rate", random->rate, "Hz",
         "must be at most %s Hz, which makes %zu samples of the base in this duration, "
         "is %s",
-        text_real(limit, ((double)most - 1) / span->duration), most, text_real(rate, random->rate));
+        real_text(((double)most - 1) / span->duration).at, most, real_text(random->rate).at);
     return false;
 }
 
@@ -99,9 +98,8 @@ static Status random_complete(Excitation *excitation, const Span *span, const ch
                               Problem *problem) {
     ExcitationRandom *random = (ExcitationRandom *)(void *)excitation;
     Status status = STATUS_OK;
-    char band[256], highest[256], limit[32], number[32];
-    json_pointer_join(band, sizeof band, pointer, "band");
-    json_pointer_index(highest, sizeof highest, band, 1);
+    const JsonPointer band = json_pointer_of(pointer, "band");
+    const JsonPointer highest = json_pointer_at(band.at, 1);
     if (isnan(random->rate))
         random->rate = span->sample_rate;
     const bool has_rate = random_check_rate(random, span, pointer, problem);
@@ -109,7 +107,7 @@ static Status random_complete(Excitation *excitation, const Span *span, const ch
         status = STATUS_INVALID;
 
     if (random->band.count != 2)
-        return problem_add(problem, STATUS_INVALID, band,
+        return problem_add(problem, STATUS_INVALID, band.at,
                            "must have two entries, the lowest and the highest frequency in Hz, "
                            "has %zu",
                            random->band.count);
@@ -118,19 +116,19 @@ static Status random_complete(Excitation *excitation, const Span *span, const ch
         return STATUS_INVALID; // the row adds the fault
     const double narrowest = random->rate * BINS_MIN / BLOCK_MAX;
     if (!(f0 < f1))
-        status = problem_add_real(problem, STATUS_INVALID, highest, f1, "Hz",
+        status = problem_add_real(problem, STATUS_INVALID, highest.at, f1, "Hz",
                                   "must be above the lowest frequency, %s Hz, is %s",
-                                  text_real(limit, f0), text_real(number, f1));
+                                  real_text(f0).at, real_text(f1).at);
     else if (has_rate && f1 > random->rate / 2)
-        status = problem_add_real(problem, STATUS_INVALID, highest, f1, "Hz",
+        status = problem_add_real(problem, STATUS_INVALID, highest.at, f1, "Hz",
                                   "must be at most half the rate of the base's samples, %s Hz, "
                                   "is %s",
-                                  text_real(limit, random->rate / 2), text_real(number, f1));
+                                  real_text(random->rate / 2).at, real_text(f1).at);
     else if (has_rate && f1 - f0 < narrowest)
-        status = problem_add_real(problem, STATUS_INVALID, band, f1 - f0, "Hz",
+        status = problem_add_real(problem, STATUS_INVALID, band.at, f1 - f0, "Hz",
                                   "must be at least %s Hz wide at this rate, is %s; a lower rate "
                                   "allows a narrower band",
-                                  text_real(limit, narrowest), text_real(number, f1 - f0));
+                                  real_text(narrowest).at, real_text(f1 - f0).at);
     return status;
 }
 
@@ -195,7 +193,6 @@ static Status random_make_samples(const ExcitationRandom *random, const RandomBl
 static Status random_make(const Excitation *excitation, const Span *span, const Progress *progress,
                           Base *base, Problem *problem) {
     const ExcitationRandom *random = random_of(excitation);
-    *base = (Base){0};
     if (random->rms == 0)
         return STATUS_OK; // still
     const double wanted = random_sample_count(random, span);
@@ -231,10 +228,6 @@ static double random_interval(const Excitation *excitation) {
     return 1 / random_of(excitation)->rate;
 }
 
-static bool random_is_still(const Excitation *excitation) {
-    return random_of(excitation)->rms == 0;
-}
-
 const ExcitationKind excitation_random = {
     .kind = {.name = "random",
              .doc = "band-limited Gaussian acceleration of the base, the same for the same seed",
@@ -243,6 +236,6 @@ const ExcitationKind excitation_random = {
     .complete = random_complete,
     .interval = random_interval,
     .effort = 0.06,
-    .is_still = random_is_still,
+    .amplitude = offsetof(ExcitationRandom, rms),
     .make = random_make,
 };

@@ -137,7 +137,6 @@ static Status record_make(const Excitation *excitation, const Span *span, const 
     (void)progress;
     const ExcitationRecord *record = record_of(excitation);
     const Reals *samples = record_samples(record);
-    *base = (Base){0};
     double *values = malloc(samples->count * sizeof *values);
     if (values == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a record of %zu samples",
@@ -204,9 +203,8 @@ static void record_doubt(const Excitation *excitation, const Span *span, const c
     const ExcitationRecord *record = record_of(excitation);
     const RecordLook look =
         record_look(record_samples(record), record_interval(record), record->scale);
-    char place[sizeof((Fault){0}.pointer)];
-    json_pointer_join(place, sizeof place, pointer, record->named != NULL ? "name" : "samples");
-    record_look_doubt(&look, record->named != NULL ? "stands for samples that " : "", place,
+    const JsonPointer place = json_pointer_of(pointer, record->named != NULL ? "name" : "samples");
+    record_look_doubt(&look, record->named != NULL ? "stands for samples that " : "", place.at,
                       doubts);
 }
 

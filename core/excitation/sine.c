@@ -1,6 +1,6 @@
 // A sine of the base, amplitude * sin(2 pi f t), of its acceleration or of its displacement. For
 // the latter a_g = -amplitude (2 pi f)^2 sin(2 pi f t).
-#include "core/excitation/sine.h"
+#include "core/excitation/excitation.h"
 
 #include "core/base/json_pointer.h"
 
@@ -50,14 +50,9 @@ static Status sine_complete(Excitation *excitation, const Span *span, const char
     return STATUS_OK;
 }
 
-static Status sine_make(const Excitation *excitation, const Span *span, const Progress *progress,
-                        Base *base, Problem *problem) {
-    (void)span;
-    (void)progress;
-    (void)problem;
+static Base sine_form(const Excitation *excitation) {
     const ExcitationSine *sine = sine_of(excitation);
-    *base = (Base){.form = BASE_SINE, .amplitude = sine_amplitude(sine), .omega = sine_omega(sine)};
-    return STATUS_OK;
+    return (Base){.form = BASE_SINE, .amplitude = sine_amplitude(sine), .omega = sine_omega(sine)};
 }
 
 static double sine_fastest(const Excitation *excitation) {
@@ -69,16 +64,12 @@ static void sine_doubt(const Excitation *excitation, const Span *span, const cha
     excitation_doubt_frequency(sine_of(excitation)->frequency, span, pointer, "frequency", doubts);
 }
 
-static bool sine_is_still(const Excitation *excitation) {
-    return sine_of(excitation)->amplitude == 0;
-}
-
 const ExcitationKind excitation_sine = {
     .kind = {"sine", "a sine of the base's acceleration or displacement", sine_fields,
              sizeof(ExcitationSine)},
     .complete = sine_complete,
     .fastest = sine_fastest,
-    .is_still = sine_is_still,
-    .make = sine_make,
+    .amplitude = offsetof(ExcitationSine, amplitude),
+    .form = sine_form,
     .doubt = sine_doubt,
 };

@@ -52,7 +52,6 @@ static Status force_trace_read_rows(TextReader reader, size_t samples_max, Numbe
 
 static Status force_trace_take_table(NumberTable *table, TextReader reader, double *interval,
                                      Problem *problem) {
-    char is[32], asked[32];
     if (table->rows == 0)
         return problem_set(problem, STATUS_UNREADABLE,
                            "has no line of numbers: a time in s and a force in N, or the force "
@@ -70,8 +69,8 @@ static Status force_trace_take_table(NumberTable *table, TextReader reader, doub
     TRY(text_table_split_times(table, reader, &start, &found, problem));
     if (!isnan(*interval) && !(fabs(*interval - found) <= 1e-6 * *interval))
         return problem_set(problem, STATUS_UNREADABLE,
-                           "states an interval of %s s, but %s s is given", text_real(is, found),
-                           text_real(asked, *interval));
+                           "states an interval of %s s, but %s s is given", real_text(found).at,
+                           real_text(*interval).at);
     *interval = found;
     return STATUS_OK;
 }

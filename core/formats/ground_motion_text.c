@@ -76,18 +76,17 @@ static void motion_read_count(const char *seen, MotionHeader *header) {
 }
 
 static Status motion_check_count(const MotionHeader *header, Problem *problem) {
-    char is[32];
     if (isnan(header->count))
         return text_table_fault(problem, STATUS_UNREADABLE, header->count_line, 0,
                                 "must state the number of values after NPTS, or before it");
     if (header->count < 1 || header->count != floor(header->count))
         return text_table_fault(problem, STATUS_UNREADABLE, header->count_line, 0,
                                 "must state a whole number of values of at least 1, states %s",
-                                text_real(is, header->count));
+                                real_text(header->count).at);
     if (!isnan(header->interval) && !(header->interval > 0))
         return text_table_fault(problem, STATUS_UNREADABLE, header->count_line, 0,
                                 "must state an interval above 0 s, states %s",
-                                text_real(is, header->interval));
+                                real_text(header->interval).at);
     return STATUS_OK;
 }
 
@@ -289,7 +288,6 @@ static Status motion_take_times(NumberTable *table, const MotionHeader *header,
 
 static Status motion_check_rows(const NumberTable *table, const MotionHeader *header,
                                 Problem *problem) {
-    char count[32];
     size_t columns;
     if (header->count == (double)table->count)
         return STATUS_OK;
@@ -297,7 +295,7 @@ static Status motion_check_rows(const NumberTable *table, const MotionHeader *he
         return text_table_fault(
             problem, STATUS_UNREADABLE, header->count_line, 0,
             "must state how many values follow: states %s, but %zu follow, the last on line %zu",
-            text_real(count, header->count), table->count, table->last_line);
+            real_text(header->count).at, table->count, table->last_line);
     const size_t line = text_table_uneven_line(table, true, &columns);
     return line == 0 ? STATUS_OK
                      : text_table_fault(problem, STATUS_UNREADABLE, line, 0,
@@ -309,7 +307,6 @@ static Status motion_choose_interval(const GroundMotionOptions *options, const M
                                      GroundMotionText *motion, Problem *problem) {
     const double stated = !isnan(motion->interval) ? motion->interval : header->interval;
     const size_t line = header->count_line > 0 ? header->count_line : header->data.line + 1;
-    char is[32], asked[32];
     motion->interval = isnan(stated) ? options->interval : stated;
     if (isnan(motion->interval))
         return text_table_fault(problem, STATUS_UNREADABLE, line, 0,
@@ -318,7 +315,7 @@ static Status motion_choose_interval(const GroundMotionOptions *options, const M
     if (fabs(stated - options->interval) > 1e-6 * stated) // false where one of them is NAN
         return text_table_fault(problem, STATUS_UNREADABLE, line, 0,
                                 "states an interval of %s s, but %s s is given",
-                                text_real(is, stated), text_real(asked, options->interval));
+                                real_text(stated).at, real_text(options->interval).at);
     return STATUS_OK;
 }
 
@@ -344,7 +341,6 @@ static Status motion_choose_unit(const GroundMotionOptions *options, const Motio
 static Status motion_convert(NumberTable *table, const MotionHeader *header, size_t samples_max,
                              GroundMotionText *motion, Problem *problem) {
     const bool is_short = table->count < 2;
-    char is[32];
     if (is_short || table->count > samples_max)
         return text_table_fault(problem, is_short ? STATUS_UNREADABLE : STATUS_TOO_LARGE,
                                 is_short ? header->data.line + 1 : table->last_line, 0,
@@ -356,7 +352,7 @@ static Status motion_convert(NumberTable *table, const MotionHeader *header, siz
         if (!isfinite(table->at[i]))
             return text_table_fault(problem, STATUS_UNREADABLE, table->last_line, 0,
                                     "sample %zu, %s, must be finite in m/s^2", i,
-                                    text_real(is, value));
+                                    real_text(value).at);
     }
     motion->samples = (Reals){table->at, table->count};
     table->at = NULL;

@@ -241,10 +241,9 @@ static Status text_refuse_times(const NumberTable *table, double mean, TextReade
     size_t rows = 0;
     while (rows <= row && text_table_next_line(&reader, &line))
         rows += text_table_numbers(&line, NULL, 0) > 0;
-    char is[32], before[32];
     return text_table_fault(problem, STATUS_UNREADABLE, line.number, 0,
                             "times must rise evenly: is %s s after %s s, where steps are %.4g s",
-                            text_real(is, at[2 * row]), text_real(before, at[2 * row - 2]),
+                            real_text(at[2 * row]).at, real_text(at[2 * row - 2]).at,
                             row > 1 ? at[2] - at[0] : mean);
 }
 

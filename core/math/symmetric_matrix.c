@@ -61,6 +61,29 @@ Status symmetric_matrix_solve(size_t size, const double *A, const double *b, dou
     return found == 0 ? STATUS_OK : STATUS_INVALID;
 }
 
+Status symmetric_matrix_eigenvalues(size_t size, const double *M, const double *K, double *values) {
+    const size_t n = size;
+    values[0] = K[0] / M[0];
+    if (n == 1)
+        return STATUS_OK;
+    double *scaled = malloc((2 * n * n + n) * sizeof *scaled);
+    if (scaled == NULL)
+        return STATUS_NO_MEMORY;
+    double *mass = scaled + n * n, *scale = mass + n * n;
+    for (size_t i = 0; i < n; i++)
+        scale[i] = 1 / sqrt(M[i * n + i]);
+    for (size_t i = 0; i < n; i++)
+        for (size_t j = 0; j < n; j++) {
+            scaled[i * n + j] = symmetric_matrix_entry(K, n, i, j) * scale[i] * scale[j];
+            mass[i * n + j] = symmetric_matrix_entry(M, n, i, j) * scale[i] * scale[j];
+        }
+    const lapack_int order = (lapack_int)n,
+                     found = LAPACKE_dsygv(LAPACK_ROW_MAJOR, 1, 'N', 'L', order, scaled, order,
+                                           mass, order, values);
+    free(scaled);
+    return found == 0 ? STATUS_OK : STATUS_INVALID;
+}
+
 // The scaled problem and the scratch memory of the refinement.
 typedef struct EigenProblem {
     size_t size;

@@ -17,6 +17,10 @@ int symmetric_matrix_find_indefinite(size_t size, const double *A, double margin
 // Solves A x = b for a positive definite A (symmetric_matrix_find_indefinite returned 0).
 Status symmetric_matrix_solve(size_t size, const double *A, const double *b, double *x);
 
+// The values of K y = value M y for a positive definite M, ascending, to double rounding of the
+// largest. STATUS_INVALID if M is not definite or a number overflows.
+Status symmetric_matrix_eigenvalues(size_t size, const double *M, const double *K, double *values);
+
 // Solves K y = value M y with y' M y = 1 for a positive definite M. Values ascend; vectors[size *
 // size] has one per row, with its component of largest magnitude positive. Errors are long double
 // rounding of the largest value. STATUS_INVALID if M is not definite or a number overflows.

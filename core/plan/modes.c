@@ -113,6 +113,18 @@ Status modes_make(Modes *modes, size_t storeys, const double *mass, const double
                              "masses and stiffnesses are too far apart, or not positive definite");
 }
 
+void modes_coordinates(const Modes *modes, size_t storeys, const double *mass, const double *v,
+                       double *coordinates) {
+    memset(coordinates, 0, modes->count * sizeof *coordinates);
+    for (size_t j = 0; j < storeys; j++) {
+        double carried = 0;
+        for (size_t l = 0; l < storeys; l++)
+            carried += mass[j * storeys + l] * v[l];
+        for (size_t k = 0; k < modes->count && carried != 0; k++)
+            coordinates[k] += modes->shapes[j * modes->count + k] * carried;
+    }
+}
+
 // Entries move forward in their arrays, never past entries that are still to be read.
 void modes_keep(Modes *modes, size_t storeys, const size_t *list, size_t count) {
     const size_t all = modes->count;

@@ -25,6 +25,10 @@ Status modes_make(Modes *modes, size_t storeys, const double *mass, const double
                   const double *damping, const double *influence, Problem *problem);
 void modes_clear(Modes *modes);
 
+// The modal coordinates of the storeys' displacements or velocities, shapes' M v, one per mode.
+void modes_coordinates(const Modes *modes, size_t storeys, const double *mass, const double *v,
+                       double *coordinates);
+
 // Keeps the `count` modes listed by rising index and removes the others.
 void modes_keep(Modes *modes, size_t storeys, const size_t *list, size_t count);
 

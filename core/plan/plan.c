@@ -362,7 +362,7 @@ Status plan_sketch(const Scene *scene, size_t modes, Plan **plan) {
     StructureRates rates;
     Status status = plan_values(scene, *plan);
     if (status == STATUS_OK)
-        status = structure_rates_of(scene_structure(scene), modes, &rates);
+        status = structure_rates(scene_structure(scene), modes, &rates);
     if (status == STATUS_OK) {
         (*plan)->fastest = rates.fastest;
         (*plan)->kept = modes;

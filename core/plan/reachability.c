@@ -3,39 +3,25 @@
 //
 //   max |z - middle| + max |x_j| < d / 2,
 //
-// because the first contact would end the motion without contact. z is two integrals of a_g. Of the
-// structure without coupled damping
+// because the first contact would end the motion without contact. z is two integrals of a_g. With
+// any damping V = sqrt(q'q' + q W^2 q) of the structure grows by no more than |Gamma| |a_g| in unit
+// time, so that
 //
-//   |x_j| <= sum over k of |phi_jk| (sqrt(q^2 + (q'/omega)^2) at 0 + |Gamma_k| forced_k),
-//   forced_k = min(max|a_g| integral |h_k|, max|h_k| integral |a_g|),
-//
-// h being the response to a unit impulse: |h| <= min(T, 1/omega, 1/D), and its integral is at most
-// coth(pi xi / (2 sqrt(1 - xi^2))) / omega^2, 1 / omega^2 from xi = 1 on. With coupled damping
-// V = sqrt(q'q' + q W^2 q) grows by no more than |Gamma| |a_g| in unit time.
+//   |x_j| <= sqrt(sum over k of (phi_jk / omega_k)^2) (V(0) + |Gamma| integral |a_g|).
 #include "core/plan/reachability.h"
 
 #include <math.h>
 #include <stdlib.h>
 
-static const double PI = 3.14159265358979323846;
 static const double MARGIN = 1e-6; // of the way to a stop, for roundings here and in the run
 
-// Of the base over the run: |a_g| at most [m/s^2]; integral of |a_g| at most [m/s].
-typedef struct BaseBounds {
-    double max, integral;
-} BaseBounds;
-
-static BaseBounds reach_base_bounds(const Base *base, double duration) {
-    BaseBounds bounds = {0};
-    if (base->form == BASE_SINE)
-        bounds = (BaseBounds){fabs(base->amplitude), fabs(base->amplitude) * duration};
+// The integral of |a_g| over the run at most [m/s].
+static double reach_base_integral(const Base *base, double duration) {
+    double integral = base->form == BASE_SINE ? fabs(base->amplitude) * duration : 0;
     for (size_t i = 0; i < base->count && base->form == BASE_SAMPLED &&
                        ((double)i - 1) * base->interval < duration;
-         i++) {
-        const double size = fabs(base->values[i]);
-        bounds.max = size > bounds.max ? size : bounds.max;
-        bounds.integral += size * base->interval;
-    }
+         i++)
+        integral += fabs(base->values[i]) * base->interval;
     for (size_t i = 0; i < base->piece_count && base->form == BASE_PIECES; i++) {
         const BasePiece *piece = &base->pieces[i];
         const double end = i + 1 < base->piece_count ? base->pieces[i + 1].time : duration;
@@ -43,59 +29,40 @@ static BaseBounds reach_base_bounds(const Base *base, double duration) {
         const double size =
             base->omega > 0 ? hypot(piece->value, piece->slope)
                             : fmax(fabs(piece->value), fabs(piece->value + piece->slope * length));
-        bounds.max = fmax(bounds.max, length > 0 ? size : 0);
-        bounds.integral += length > 0 ? size * length : 0;
+        integral += length > 0 ? size * length : 0;
     }
-    return bounds;
-}
-
-// |q| at most, of a mode with this start and participation.
-static double reach_of_mode(double omega, double damping, double share, double q, double p,
-                            const BaseBounds *base, double duration) {
-    const double xi = damping / (2 * omega); // NAN or infinite for a rigid-body motion
-    const double highest = fmin(duration, fmin(1 / omega, damping > 0 ? 1 / damping : INFINITY));
-    double area = duration * fmin(duration / 2, highest);
-    if (omega > 0 && xi > 0)
-        area = fmin(area,
-                    1 / (omega * omega * (xi < 1 ? tanh(PI * xi / (2 * sqrt(1 - xi * xi))) : 1)));
-    const double free =
-        fmin(fabs(q) + fabs(p) * highest, omega > 0 ? hypot(q, p / omega) : INFINITY);
-    const double forced = fmin(base->max * area, base->integral * highest);
-    return free + (share != 0 && base->max > 0 ? fabs(share) * forced : 0);
+    return integral;
 }
 
 // |x| of a storey at most.
-static double reach_of_storey(const Plan *plan, size_t storey, const BaseBounds *base) {
+static double reach_of_storey(const Plan *plan, size_t storey, const Base *base) {
+    const double base_integral = reach_base_integral(base, plan->duration);
     const Modes *modes = &plan->modes;
     const size_t n = plan->storeys, count = modes->count;
-    const double duration = plan->duration;
-    if (count == 0) // one storey that moves with the base
-        return reach_of_mode(sqrt(plan->stiffness[0] / plan->mass[0]),
-                             plan->damping[0] / plan->mass[0], plan->influence[0],
-                             plan->displacement[0], plan->velocity[0], base, duration);
-    double reach = 0, squares = 0, shares = 0, compliance = 0, rigid = 0, start = 0;
+    if (count == 0) { // one storey that moves with the base
+        const double omega = sqrt(plan->stiffness[0] / plan->mass[0]);
+        const double q = plan->displacement[0], speed = fabs(plan->velocity[0]) + base_integral;
+        return omega > 0 ? hypot(q, plan->velocity[0] / omega) + base_integral / omega
+                         : fabs(q) + speed * plan->duration;
+    }
+    double squares = 0, shares = 0, compliance = 0, rigid = 0, start = 0;
+    double *q = calloc(count, 2 * sizeof *q), *p = q + count;
+    if (q == NULL)
+        return INFINITY; // not known to be clear
+    modes_coordinates(modes, n, plan->mass, plan->displacement, q);
+    modes_coordinates(modes, n, plan->mass, plan->velocity, p);
     for (size_t k = 0; k < count; k++) {
         const double omega = modes->omega[k], share = modes->participation[k];
         const double shape = fabs(modes->shapes[storey * count + k]);
-        double q = 0, p = 0;
-        for (size_t j = 0; j < n; j++)
-            for (size_t i = 0; i < n && (plan->displacement[j] != 0 || plan->velocity[j] != 0);
-                 i++) {
-                const double moved = modes->shapes[i * count + k] * plan->mass[i * n + j];
-                q += moved * plan->displacement[j];
-                p += moved * plan->velocity[j];
-            }
-        reach += shape *
-                 reach_of_mode(omega, modes->damping[k * count + k], share, q, p, base, duration);
-        squares += p * p + omega * q * (omega * q);
+        squares += p[k] * p[k] + omega * q[k] * (omega * q[k]);
         shares += share * share;
         compliance += omega > 0 ? shape / omega * (shape / omega) : 0;
         rigid += omega > 0 ? 0 : shape;
-        start += omega > 0 ? 0 : shape * fabs(q);
+        start += omega > 0 ? 0 : shape * fabs(q[k]);
     }
-    const double speed = sqrt(squares) + sqrt(shares) * base->integral;
-    return modes->is_classical ? reach
-                               : sqrt(compliance) * speed + start + rigid * duration * speed;
+    free(q);
+    const double speed = sqrt(squares) + sqrt(shares) * base_integral;
+    return sqrt(compliance) * speed + start + rigid * plan->duration * speed;
 }
 
 // |z - middle| of a free mass at most; ends where a mass of a sampled base is known to be beyond
@@ -109,11 +76,8 @@ static double reach_of_mass(const Plan *plan, const PlanDamper *damper, const Ba
         const double even = speed - base->amplitude / W;
         return fmax(fabs(z), fabs(z + even * T)) + fabs(base->amplitude) / W / W;
     }
-    if (base->form != BASE_SAMPLED) {
-        const BaseBounds bounds = reach_base_bounds(base, T);
-        return fmax(fabs(z), fabs(z + speed * T)) +
-               fmin(bounds.max * T * T / 2, bounds.integral * T);
-    }
+    if (base->form != BASE_SAMPLED)
+        return fmax(fabs(z), fabs(z + speed * T)) + reach_base_integral(base, T) * T;
     double furthest = fabs(z), bend = 0;
     size_t i = 0;
     for (; i + 1 < base->count && (double)i * h < T && furthest <= most; i++) {
@@ -130,24 +94,6 @@ static double reach_of_mass(const Plan *plan, const PlanDamper *damper, const Ba
     return fmax(furthest, fabs(z + speed * rest)) + bend * h * h / 8;
 }
 
-// The largest way of a mass, as a part of the way to its stops; INFINITY: 1 or more, or unknown.
-static double reach_of_plan(const Plan *plan, const Base *base) {
-    double reach = 0;
-    for (size_t d = 0; d < plan->damper_count; d++) {
-        const PlanDamper *damper = &plan->dampers[d];
-        const double half = damper->clearance / 2;
-        const double mass = reach_of_mass(plan, damper, base, half);
-        if (!(mass < half)) // also where it is no number
-            return INFINITY;
-        const BaseBounds bounds = reach_base_bounds(base, plan->duration);
-        const double own = (mass + reach_of_storey(plan, damper->storey, &bounds)) / half;
-        if (!(own < 1))
-            return INFINITY;
-        reach = fmax(reach, own);
-    }
-    return reach;
-}
-
 static bool reach_starts_at_rest(const Plan *plan) {
     bool is_at_rest = true;
     for (size_t i = 0; i < plan->storeys; i++)
@@ -158,7 +104,15 @@ static bool reach_starts_at_rest(const Plan *plan) {
 }
 
 Regime regime_find(const Plan *plan, const Base *base) {
-    Regime regime = {.is_unforced = base->form == BASE_STILL, .reach = reach_of_plan(plan, base)};
+    Regime regime = {.is_unforced = base->form == BASE_STILL};
+    for (size_t d = 0; d < plan->damper_count && regime.reach < INFINITY; d++) {
+        const PlanDamper *damper = &plan->dampers[d];
+        const double half = damper->clearance / 2;
+        double reach = reach_of_mass(plan, damper, base, half) / half;
+        if (reach < 1)
+            reach += reach_of_storey(plan, damper->storey, base) / half;
+        regime.reach = reach < 1 ? fmax(regime.reach, reach) : INFINITY; // also if no number
+    }
     regime.is_clear = regime.reach < 1 - MARGIN;
     regime.is_at_rest = regime.is_clear && regime.is_unforced && reach_starts_at_rest(plan);
     return regime;

@@ -168,7 +168,7 @@ static Status buffer_check_way(const Buffer *buffer, const ContactLaw *law, cons
 // Whether the law can have this restitution.
 static Status buffer_check_restitution(double restitution, const ContactLaw *law,
                                        const char *pointer, Problem *problem) {
-    char is[32], least[32];
+    char is[32];
     text_real(is, restitution);
     if (law->form == CONTACT_LINEAR && restitution == 0)
         return json_pointer_fault_real(
@@ -187,38 +187,35 @@ static Status buffer_check_restitution(double restitution, const ContactLaw *law
         problem, pointer, "restitution", restitution, NULL,
         "must be at least %s for the contact model %s, is %s: its damping "
         "grows beyond all bounds",
-        text_real(least, law->restitution_min), law->kind.name, is);
+        real_text(law->restitution_min).at, law->kind.name, is);
 }
 
 static Status buffer_check_table(const Buffer *buffer, const ContactLaw *law, const char *pointer,
                                  Problem *problem) {
     const ContactRows *rows = &buffer->table;
     Status status = STATUS_OK;
-    char table[sizeof((Fault){0}.pointer)];
-    json_pointer_join(table, sizeof table, pointer, "table");
+    const JsonPointer table = json_pointer_of(pointer, "table");
     if (rows->count < 2)
-        return problem_add(problem, STATUS_INVALID, table,
+        return problem_add(problem, STATUS_INVALID, table.at,
                            "must have at least two rows, has %zu: restitution and contact_time "
                            "alone hold for every approach speed",
                            rows->count);
     for (size_t i = 0; i < rows->count; i++) {
-        char row[sizeof((Fault){0}.pointer)];
-        json_pointer_index(row, sizeof row, table, i);
-        if (buffer_check_restitution(rows->at[i].restitution, law, row, problem) != STATUS_OK)
+        const JsonPointer row = json_pointer_at(table.at, i);
+        if (buffer_check_restitution(rows->at[i].restitution, law, row.at, problem) != STATUS_OK)
             status = STATUS_INVALID;
         if (law->form != CONTACT_IMPULSIVE && !buffer_has(rows->at[i].contact_time))
             status =
-                json_pointer_fault(problem, row, "contact_time",
+                json_pointer_fault(problem, row.at, "contact_time",
                                    "is required by the contact model %s: contact time T_c of an "
                                    "isolated impact [s]",
                                    law->kind.name);
         if (i == 0 || rows->at[i].approach_speed > rows->at[i - 1].approach_speed)
             continue;
-        char is[32], than[32];
-        status = json_pointer_fault_real(problem, row, "approach_speed", rows->at[i].approach_speed,
-                                         "m/s", "must be above the row before, %s m/s, is %s",
-                                         text_real(than, rows->at[i - 1].approach_speed),
-                                         text_real(is, rows->at[i].approach_speed));
+        status = json_pointer_fault_real(
+            problem, row.at, "approach_speed", rows->at[i].approach_speed, "m/s",
+            "must be above the row before, %s m/s, is %s",
+            real_text(rows->at[i - 1].approach_speed).at, real_text(rows->at[i].approach_speed).at);
     }
     return status;
 }

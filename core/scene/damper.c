@@ -91,12 +91,10 @@ static Status damper_check_position(const Damper *damper, const char *pointer, P
     const double most = damper->clearance / 2;
     if (!(most >= 0) || !isfinite(damper->position) || fabs(damper->position) <= most)
         return STATUS_OK;
-    char limit[32], is[32];
-    text_real(limit, most);
-    text_real(is, damper->position);
+    const RealText limit = real_text(most);
     return json_pointer_fault_real(problem, pointer, "position", damper->position, "m",
-                                   "must be between the stops, within [-%s, %s] m, is %s", limit,
-                                   limit, is);
+                                   "must be between the stops, within [-%s, %s] m, is %s", limit.at,
+                                   limit.at, real_text(damper->position).at);
 }
 
 // A power law's parameters are those of an approach speed; between stops that always touch there is
@@ -238,17 +236,16 @@ static Status rig_refuse(const Damper *damper, const char *place, Problem *probl
 
 static Status rig_check(const Damper *damper, const ContactLaw *law, const char *pointer,
                         Problem *problem) {
-    char place[sizeof((Fault){0}.pointer)];
-    json_pointer_join(place, sizeof place, pointer, "rig");
+    const JsonPointer place = json_pointer_of(pointer, "rig");
     const bool is_given = rig_is_given(damper);
-    if (!damper_is_carried(damper, law) || problem_concerns(problem, place) ||
+    if (!damper_is_carried(damper, law) || problem_concerns(problem, place.at) ||
         is_given == (damper->identified_for == IDENTIFIED_FOR_RIG))
         return STATUS_OK;
     if (is_given)
-        return problem_add(problem, STATUS_INVALID, place,
+        return problem_add(problem, STATUS_INVALID, place.at,
                            "is used only with identified_for \"rig\": give that, or leave out the "
                            "rig");
-    return rig_refuse(damper, place, problem);
+    return rig_refuse(damper, place.at, problem);
 }
 
 static void rig_normalise(Damper *damper, const ContactLaw *law) {

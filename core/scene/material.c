@@ -77,45 +77,41 @@ static Status material_check_text(const char *text, const char *pointer, const c
 
 static Status material_check_order(double least, double most, const char *unit, const char *pointer,
                                    const char *name, Problem *problem) {
-    char is[32], than[32];
     if (!(most < least))
         return STATUS_OK;
     return json_pointer_fault_real(problem, pointer, name, most, unit,
                                    "must be at least %s %s, the range's other end, is %s",
-                                   text_real(than, least), unit, text_real(is, most));
+                                   real_text(least).at, unit, real_text(most).at);
 }
 
 static Status material_check_table(const Material *material, const char *pointer,
                                    Problem *problem) {
     const MaterialRows *rows = &material->table;
-    char table[sizeof((Fault){0}.pointer)];
     Status status = STATUS_OK;
-    json_pointer_join(table, sizeof table, pointer, "table");
+    const JsonPointer table = json_pointer_of(pointer, "table");
     if (rows->count == 1)
-        status = problem_add(problem, STATUS_INVALID, table,
+        status = problem_add(problem, STATUS_INVALID, table.at,
                              "must have at least two rows, has 1: restitution and contact_time "
                              "alone hold for every approach speed");
-    char first[sizeof((Fault){0}.pointer)];
-    json_pointer_index(first, sizeof first, table, 0);
-    const bool is_first_unread = json_pointer_concerns(problem, first, "contact_time");
+    const JsonPointer first = json_pointer_at(table.at, 0);
+    const bool is_first_unread = json_pointer_concerns(problem, first.at, "contact_time");
     for (size_t i = 0; i < rows->count; i++) {
         const MaterialRow *row = &rows->at[i];
-        char at[sizeof((Fault){0}.pointer)], is[32], than[32];
-        json_pointer_index(at, sizeof at, table, i);
+        const JsonPointer at = json_pointer_at(table.at, i);
         if (material_has(row->contact_time) != material_has(rows->at[0].contact_time) &&
             !is_first_unread)
-            status = json_pointer_fault(problem, at, "contact_time",
+            status = json_pointer_fault(problem, at.at, "contact_time",
                                         "must be given in every row of the table or in none");
         if (material_has(row->contact_time_deviation) && !material_has(row->contact_time) &&
-            !json_pointer_concerns(problem, at, "contact_time"))
-            status = json_pointer_fault(problem, at, "contact_time_deviation",
+            !json_pointer_concerns(problem, at.at, "contact_time"))
+            status = json_pointer_fault(problem, at.at, "contact_time_deviation",
                                         "needs a contact_time that it belongs to");
         if (i == 0 || !(row->approach_speed <= rows->at[i - 1].approach_speed))
             continue; // also where one is unknown
-        status = json_pointer_fault_real(problem, at, "approach_speed", row->approach_speed, "m/s",
-                                         "must be above the row before, %s m/s, is %s",
-                                         text_real(than, rows->at[i - 1].approach_speed),
-                                         text_real(is, row->approach_speed));
+        status = json_pointer_fault_real(problem, at.at, "approach_speed", row->approach_speed,
+                                         "m/s", "must be above the row before, %s m/s, is %s",
+                                         real_text(rows->at[i - 1].approach_speed).at,
+                                         real_text(row->approach_speed).at);
     }
     return status;
 }
@@ -127,13 +123,12 @@ static Status material_check_ways(const Material *material, const char *pointer,
                              material_has(material->contact_time) ||
                              material_has(material->restitution_deviation) ||
                              material_has(material->contact_time_deviation);
-    char table[sizeof((Fault){0}.pointer)];
-    json_pointer_join(table, sizeof table, pointer, "table");
+    const JsonPointer table = json_pointer_of(pointer, "table");
     if (has_table && has_numbers)
-        return problem_add(problem, STATUS_INVALID, table,
+        return problem_add(problem, STATUS_INVALID, table.at,
                            "stands in place of restitution, contact_time and their deviations: "
                            "leave one of the two out");
-    if (has_table || problem_concerns(problem, table))
+    if (has_table || problem_concerns(problem, table.at))
         return STATUS_OK;
     Status status = STATUS_OK;
     if (!material_has(material->restitution))
@@ -148,9 +143,8 @@ static Status material_check_ways(const Material *material, const char *pointer,
 }
 
 static Status material_check_base(const Material *material, const char *pointer, Problem *problem) {
-    char base[sizeof((Fault){0}.pointer)];
-    json_pointer_join(base, sizeof base, pointer, "base");
-    if (problem_concerns(problem, base))
+    const JsonPointer base = json_pointer_of(pointer, "base");
+    if (problem_concerns(problem, base.at))
         return STATUS_OK;
     if (material_has(material->base_mass) && material->base != MATERIAL_BASE_FREE)
         return json_pointer_fault(
@@ -164,18 +158,17 @@ static Status material_check_measurements(const Material *material, const char *
     Status status = STATUS_OK;
     for (size_t i = 0; i < material->measurements.count; i++) {
         const double number = material->measurements.at[i];
-        char list[sizeof((Fault){0}.pointer)], place[sizeof((Fault){0}.pointer)], is[32];
         bool is_again = false;
         for (size_t k = 0; k < i; k++)
             is_again = is_again || material->measurements.at[k] == number;
         if (!is_again && number == floor(number))
             continue;
-        json_pointer_join(list, sizeof list, pointer, "measurements");
-        json_pointer_index(place, sizeof place, list, i);
-        status = problem_add_real(problem, STATUS_INVALID, place, number, NULL,
+        const JsonPointer list = json_pointer_of(pointer, "measurements");
+        const JsonPointer place = json_pointer_at(list.at, i);
+        status = problem_add_real(problem, STATUS_INVALID, place.at, number, NULL,
                                   is_again ? "is listed twice, %s"
                                            : "must be the number of a measurement, is %s",
-                                  text_real(is, number));
+                                  real_text(number).at);
     }
     return status;
 }
@@ -184,14 +177,13 @@ static Status material_check_tags(const Material *material, const char *pointer,
     Status status = STATUS_OK;
     for (size_t i = 0; i < material->tags.count; i++) {
         const char *tag = material->tags.at[i];
-        char list[sizeof((Fault){0}.pointer)], place[sizeof((Fault){0}.pointer)];
         const size_t size = strlen(tag);
         if (size <= TAG_MAX && tag[strspn(tag, " \t\r\n")] != '\0')
             continue;
-        json_pointer_join(list, sizeof list, pointer, "tags");
-        json_pointer_index(place, sizeof place, list, i);
-        status = problem_add(problem, STATUS_INVALID, place, "must have 1 to %d bytes, %s", TAG_MAX,
-                             size > TAG_MAX ? "is longer" : "is empty");
+        const JsonPointer list = json_pointer_of(pointer, "tags");
+        const JsonPointer place = json_pointer_at(list.at, i);
+        status = problem_add(problem, STATUS_INVALID, place.at, "must have 1 to %d bytes, %s",
+                             TAG_MAX, size > TAG_MAX ? "is longer" : "is empty");
     }
     return status;
 }

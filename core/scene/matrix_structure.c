@@ -56,9 +56,8 @@ static Status matrix_check_square(const Checked *matrix, size_t storeys, const c
     for (size_t i = 0; i < storeys; i++) {
         if (matrix->rows->at[i].count == storeys)
             continue;
-        char row[sizeof((Fault){0}.pointer)];
-        json_pointer_index(row, sizeof row, place, i);
-        status = problem_add(problem, STATUS_INVALID, row,
+        const JsonPointer row = json_pointer_at(place, i);
+        status = problem_add(problem, STATUS_INVALID, row.at,
                              "must have %zu number%s, one per row of the matrix, has %zu", storeys,
                              storeys == 1 ? "" : "s", matrix->rows->at[i].count);
     }
@@ -74,13 +73,12 @@ static Status matrix_check_symmetry(const Checked *matrix, const char *place, Pr
                                      sqrt(fabs(rows->at[i].at[i])) * sqrt(fabs(rows->at[j].at[j])));
             if (fabs(is - mirror) <= symmetry * size)
                 continue;
-            char row[sizeof((Fault){0}.pointer)], entry[sizeof((Fault){0}.pointer)], a[32], b[32];
-            json_pointer_index(row, sizeof row, place, i);
-            json_pointer_index(entry, sizeof entry, row, j);
-            return problem_add_real(problem, STATUS_INVALID, entry, is, matrix->unit,
+            const JsonPointer row = json_pointer_at(place, i);
+            const JsonPointer entry = json_pointer_at(row.at, j);
+            return problem_add_real(problem, STATUS_INVALID, entry.at, is, matrix->unit,
                                     "must equal its mirror %s/%zu/%zu, %s: the matrix must be "
                                     "symmetric, is %s",
-                                    place, j, i, text_real(a, mirror), text_real(b, is));
+                                    place, j, i, real_text(mirror).at, real_text(is).at);
         }
     return STATUS_OK;
 }
@@ -103,10 +101,9 @@ static Status matrix_check_definite(const Checked *matrix, const char *place, Pr
         return STATUS_OK;
     if (block < 0)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a matrix");
-    char row[sizeof((Fault){0}.pointer)];
-    json_pointer_index(row, sizeof row, place, (size_t)block - 1);
+    const JsonPointer row = json_pointer_at(place, (size_t)block - 1);
     const double own = matrix->rows->at[block - 1].at[block - 1];
-    return problem_add_real(problem, STATUS_INVALID, row, own, matrix->unit,
+    return problem_add_real(problem, STATUS_INVALID, row.at, own, matrix->unit,
                             "must keep the matrix %s: with this row the leading %d by %d block is "
                             "not%s",
                             matrix->wanted, block, block,
@@ -115,14 +112,13 @@ static Status matrix_check_definite(const Checked *matrix, const char *place, Pr
 
 static Status matrix_check(const Checked *matrix, size_t storeys, const char *pointer,
                            Problem *problem) {
-    char place[sizeof((Fault){0}.pointer)];
-    json_pointer_join(place, sizeof place, pointer, matrix->name);
-    if (problem_concerns(problem, place))
+    const JsonPointer place = json_pointer_of(pointer, matrix->name);
+    if (problem_concerns(problem, place.at))
         return STATUS_OK; // reported by the rows
-    TRY(matrix_check_square(matrix, storeys, place, problem));
+    TRY(matrix_check_square(matrix, storeys, place.at, problem));
     if (matrix->is_symmetric)
-        TRY(matrix_check_symmetry(matrix, place, problem));
-    return matrix_check_definite(matrix, place, problem);
+        TRY(matrix_check_symmetry(matrix, place.at, problem));
+    return matrix_check_definite(matrix, place.at, problem);
 }
 
 static Status matrices_fill_influence(Reals *influence, size_t storeys, Problem *problem) {

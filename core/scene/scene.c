@@ -39,14 +39,13 @@ static Status scene_check_samples(const Scene *scene, size_t most, Problem *prob
     if (!scene_is_positive(scene->duration) || !scene_is_positive(scene->sample_rate) ||
         most == 0 || scene_sample_count(scene) <= most)
         return STATUS_OK;
-    char duration[32], rate[32], count[32];
-    text_real(duration, scene->duration);
-    text_real(rate, scene->sample_rate);
+    char count[32];
     const double samples = scene_last_sample(scene) + 1;
     snprintf(count, sizeof count, samples < 1e15 ? "%.0f" : "%.3g", samples);
     return problem_add_real(problem, STATUS_INVALID, "/duration", scene->duration, "s",
                             "%s s at a sample_rate of %s Hz are %s samples, must be at most %zu",
-                            duration, rate, count, most);
+                            real_text(scene->duration).at, real_text(scene->sample_rate).at, count,
+                            most);
 }
 
 // Whether numbers that are in range give parameters that doubles can hold: of a power law
@@ -118,9 +117,8 @@ static Status scene_complete_dampers(Scene *scene, size_t storeys, Problem *prob
     Status status = STATUS_OK;
     // Dampers beyond the limit were reported by the rows.
     for (size_t i = 0; i < scene->dampers.count && i < SCENE_DAMPERS; i++) {
-        char place[sizeof((Fault){0}.pointer)];
-        json_pointer_index(place, sizeof place, "/dampers", i);
-        if (damper_complete(&scene->dampers.at[i], law, storeys, place, problem) != STATUS_OK)
+        const JsonPointer place = json_pointer_at("/dampers", i);
+        if (damper_complete(&scene->dampers.at[i], law, storeys, place.at, problem) != STATUS_OK)
             status = STATUS_INVALID;
     }
     Contact *contact = (Contact *)(void *)scene->contact;

@@ -36,10 +36,9 @@ static Status frame_check_sums(const Reals *links, const char *unit, const char 
         if (!isfinite(links->at[i]) || !isfinite(links->at[i - 1]) ||
             isfinite(links->at[i] + links->at[i - 1]))
             continue;
-        char list[sizeof((Fault){0}.pointer)], place[sizeof((Fault){0}.pointer)];
-        json_pointer_join(list, sizeof list, pointer, name);
-        json_pointer_index(place, sizeof place, list, i);
-        return problem_add_real(problem, STATUS_INVALID, place, links->at[i], unit,
+        const JsonPointer list = json_pointer_of(pointer, name);
+        const JsonPointer place = json_pointer_at(list.at, i);
+        return problem_add_real(problem, STATUS_INVALID, place.at, links->at[i], unit,
                                 "and the one below must have a sum that numbers can hold");
     }
     return STATUS_OK;

@@ -71,14 +71,12 @@ Status structure_complete(Structure *structure, const char *pointer, Problem *pr
 // because it then depends on the modes.
 void structure_assemble(const Structure *structure, const StructureMatrices *matrices);
 
-// Estimated rates of a completed structure [rad/s].
+// Rates of the `modes` slowest modes of a completed structure, SIZE_MAX: of all [rad/s].
 typedef struct StructureRates {
-    double slowest; // near the first natural frequency; 0 if a motion has none
-    double fastest; // about the last one, or the fastest decay if that is faster
+    double slowest; // the first natural frequency; 0 if a motion has none
+    double fastest; // the last one or, of all modes, a bound on the decay if that is faster
 } StructureRates;
-Status structure_rates(const Structure *structure, StructureRates *rates);
-// The same for the `modes` slowest modes only.
-Status structure_rates_of(const Structure *structure, size_t modes, StructureRates *rates);
+Status structure_rates(const Structure *structure, size_t modes, StructureRates *rates);
 
 // For the kinds: sets a list to `count` zeros; adds a fault unless a list has one number per
 // storey.

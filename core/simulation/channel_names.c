@@ -167,15 +167,14 @@ Status channel_names_complete(const Scene *scene, Texts *names, bool is_spectrum
         TRY(channel_names_expand(names, &counts, is_spectrum, &expanded, problem));
     Status status = STATUS_OK;
     for (size_t i = 0; i < names->count; i++) {
-        char place[sizeof((Fault){0}.pointer)];
-        json_pointer_index(place, sizeof place, pointer, expanded_names_index(&expanded, i));
-        if (are_known && channel_names_check(names->at[i], &counts, place, problem) != STATUS_OK)
+        const JsonPointer place = json_pointer_at(pointer, expanded_names_index(&expanded, i));
+        if (are_known && channel_names_check(names->at[i], &counts, place.at, problem) != STATUS_OK)
             status = STATUS_INVALID;
         size_t first = 0;
         while (first < i && strcmp(names->at[i], names->at[first]) != 0)
             first++;
         if (first < i)
-            status = problem_add(problem, STATUS_INVALID, place,
+            status = problem_add(problem, STATUS_INVALID, place.at,
                                  "%.64s is asked for twice, first at %s/%zu", names->at[i], pointer,
                                  expanded_names_index(&expanded, first));
     }

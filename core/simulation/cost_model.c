@@ -24,12 +24,6 @@ static const double IMPACTS_A_CYCLE = 2;
 static const double REACHING = 0.3;   // share of fast flight that no bound keeps from the stops
 static const double FREE_CYCLES = 30; // after these free vibration does not reach the stops
 
-// Shares for what differences of the cost do not show: the closed form saves two thirds of flight,
-// a row of the list of impacts costs a tenth of its contact, and the search for stops at step ends
-// a tenth of a step.
-static const double FORCED_SHARE = 2.0 / 3, ROW_SHARE = 0.1, SEARCH_SHARE = 0.1;
-static const double ROWS_A_SECOND = 7; // impacts of a damper
-
 // A contact under a power law: the share that does not depend on the tolerance, and the digits of
 // full accuracy.
 static const double EASY = 0.3, DIGITS = 15;
@@ -147,7 +141,7 @@ static double cost_exact_steps(const Simulation *simulation, bool *is_fast) {
     const Structure *structure = scene_structure(scene);
     const size_t modes = simulation_modes(simulation, structure_storeys(structure));
     StructureRates rates;
-    if (structure_rates_of(structure, modes, &rates) != STATUS_OK)
+    if (structure_rates(structure, modes, &rates) != STATUS_OK)
         rates = (StructureRates){0}; // without memory: the run reports it
     const Outlook outlook = {.modes = modes,
                              .digits = -log10(exact_tolerance(simulation_settings(simulation))),
@@ -212,7 +206,7 @@ static void cost_add_bytes(const Simulation *simulation, Cost *cost) {
     const double size =
         (double)structure_storeys(scene_structure(scene)) + (double)scene->dampers.count;
     StructureRates rates;
-    if (structure_rates(scene_structure(scene), &rates) != STATUS_OK)
+    if (structure_rates(scene_structure(scene), SIZE_MAX, &rates) != STATUS_OK)
         rates = (StructureRates){0};
     cost->bytes = RUN_BYTES +
                   sizeof(double) * (samples * columns + base + refined + 60 * size * size) +
@@ -245,35 +239,4 @@ Cost cost_scene(const Simulation *simulation) {
                                               : cost_exact_steps(simulation, &cost.is_fast));
     cost.cpu_seconds = cost.steps * SOLVER_STEP;
     return cost;
-}
-
-double cost_variant_steps(const Simulation *simulation, size_t channel_count, size_t spectrum_count,
-                          size_t damper_count) {
-    Simulation view = *simulation; // borrows everything; not cleared
-    view.output.channels.count = channel_count;
-    view.output.psd.channels.count = spectrum_count;
-    view.scene.dampers.count = damper_count;
-    return cost_scene(&view).steps;
-}
-
-double cost_contact_steps(const Simulation *simulation) {
-    const Output *output = &simulation->output;
-    const double all = cost_scene(simulation).steps;
-    if (simulation_solver(simulation)->cost != NULL)
-        return SEARCH_SHARE * all; // it makes its steps in any case
-    return fmax(
-        all - cost_variant_steps(simulation, output->channels.count, output->psd.channels.count, 0),
-        0);
-}
-
-double cost_listing_steps(const Simulation *simulation) {
-    return ROW_SHARE * cost_contact_steps(simulation);
-}
-
-double cost_listed_impacts(const Simulation *simulation) {
-    return ROWS_A_SECOND * simulation->scene.duration * (double)simulation->scene.dampers.count;
-}
-
-double cost_forcing_steps(const Simulation *simulation) {
-    return FORCED_SHARE * cost_variant_steps(simulation, 0, 0, 0);
 }

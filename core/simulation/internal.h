@@ -1,5 +1,5 @@
-// Functions shared by the files of core/simulation. Calls go from dispatch.c down to
-// undamped_baseline.c, accuracy_target.c, run.c, cost_model.c and validate.c, never up.
+// Functions shared by the files of core/simulation. Calls go from simulation.c down to
+// accuracy_target.c, run.c, cost_model.c and validate.c, never up.
 #ifndef CORE_SIMULATION_INTERNAL_H
 #define CORE_SIMULATION_INTERNAL_H
 
@@ -53,15 +53,7 @@ Status scene_warnings_of_result(const Scene *scene, const DerivedList *derived, 
 Status plan_scene(const Simulation *simulation, PlanReport *report, Problem *problem);
 Cost cost_scene(const Simulation *simulation);
 double cost_step(const Simulation *simulation); // steps for one that the solver counts
-// Predicted steps of parts: spectra, contacts, the list of impacts, the motion of the base in
-// flight, and of the whole with other numbers of channels, spectra and dampers.
-double cost_spectra(const SpectrumRequest *psd, size_t samples);
-double cost_contact_steps(const Simulation *simulation);
-double cost_listing_steps(const Simulation *simulation);
-double cost_forcing_steps(const Simulation *simulation);
-double cost_variant_steps(const Simulation *simulation, size_t channel_count, size_t spectrum_count,
-                          size_t damper_count);
-double cost_listed_impacts(const Simulation *simulation); // predicted number
+double cost_spectra(const SpectrumRequest *psd, size_t samples); // predicted steps
 
 // Plan and base motion of a run.
 typedef struct RunInputs {
@@ -84,11 +76,5 @@ Cost accuracy_target_cost(const Simulation *simulation);
 Status accuracy_target_run(const Simulation *simulation, const SimulationLimits *limits,
                            const Progress *progress, Workspace *workspace, Simulation *settled,
                            Outcome **outcome, Problem *problem);
-
-// Runs the scene without its dampers, compares the outcome's summary with it and adds its work.
-Status undamped_baseline_run(const Simulation *simulation, const SimulationLimits *limits,
-                             const Progress *progress, Workspace *workspace, Outcome *outcome,
-                             Problem *problem);
-Cost undamped_baseline_cost(const Simulation *simulation);
 
 #endif

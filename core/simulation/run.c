@@ -1,6 +1,5 @@
 // From a completed simulation to its outcome: plan, base motion, solver, spectra and summary. What
-// the scene does not require is left out and reported as a decision, with the number that decided
-// and the share of the predicted cost that this saves.
+// the scene does not require is left out and reported as a decision, with the number that decided.
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,82 +9,56 @@
 #include "core/simulation/channel_names.h"
 #include "core/simulation/internal.h"
 
-static double omission_share(double left_out, double remaining) {
-    return left_out > 0 ? left_out / (left_out + fmax(remaining, 0)) : 0;
-}
+static const double IMPACT_ROWS = 7; // of a damper in a second, about
 
-// `asked`: predicted steps of the simulation.
-static Status omissions_of_output(const Simulation *simulation, const Plan *plan, double asked,
+static Status omissions_of_output(const Simulation *simulation, const Plan *plan,
                                   Decisions *decisions) {
     const Output *output = &simulation->output;
-    const size_t usual = channel_names_usual_count(&simulation->scene);
+    const size_t usual = channel_names_usual_count(&simulation->scene), samples = plan->count;
+    const size_t segment = samples < SPECTRUM_SEGMENT ? samples : SPECTRUM_SEGMENT;
     if (output->channels.count < usual)
-        TRY(decisions_omit(
-            decisions, "channels", (double)(usual - output->channels.count) * (double)plan->count,
-            "values",
-            omission_share(cost_variant_steps(simulation, usual, output->psd.channels.count,
-                                              simulation->scene.dampers.count) -
-                               asked,
-                           asked),
-            "%zu of the %zu usual channels are requested", output->channels.count, usual));
-    if (output->psd.channels.count == 0) {
-        Simulation view = *simulation;
-        SpectrumRequest *psd = &view.output.psd;
-        psd->channels.count = 1;
-        psd->segment = plan->count < SPECTRUM_SEGMENT ? plan->count : SPECTRUM_SEGMENT;
-        psd->overlap = psd->segment / 2;
-        TRY(decisions_omit(
-            decisions, "psd",
-            floor((double)(plan->count - psd->overlap) / (double)(psd->segment - psd->overlap)),
-            "segments", omission_share(cost_scene(&view).steps - asked, asked),
-            "no spectrum is requested"));
-    }
+        TRY(decisions_add(decisions, "channels", "left_out",
+                          (double)(usual - output->channels.count) * (double)samples, "values",
+                          "%zu of the %zu usual channels are requested", output->channels.count,
+                          usual));
+    if (output->psd.channels.count == 0)
+        TRY(decisions_add(decisions, "psd", "left_out",
+                          floor((double)(samples - segment / 2) / (double)(segment - segment / 2)),
+                          "segments", "no spectrum is requested"));
     if (!output->impacts && plan->damper_count > 0)
-        TRY(decisions_omit(decisions, "impacts", cost_listed_impacts(simulation), "rows",
-                           omission_share(cost_listing_steps(simulation), asked),
-                           "no list of impacts is requested: impacts are counted, not listed"));
+        TRY(decisions_add(decisions, "impacts", "left_out",
+                          IMPACT_ROWS * plan->duration * (double)plan->damper_count, "rows",
+                          "no list of impacts is requested: impacts are counted, not listed"));
     return STATUS_OK;
-}
-
-static Status omissions_of_contacts(const Simulation *simulation, const Plan *plan, double asked,
-                                    const Regime *regime, Decisions *decisions) {
-    if (plan->damper_count == 0)
-        return STATUS_OK;
-    if (regime == NULL)
-        return decisions_add(decisions, "contacts", "open", NAN, NULL,
-                             "whether a mass can reach a stop is determined when the base's motion "
-                             "is made");
-    if (!regime->is_clear)
-        return STATUS_OK;
-    const double saved = cost_contact_steps(simulation);
-    return decisions_omit(
-        decisions, "contacts", regime->reach, NULL, omission_share(saved, asked - saved),
-        "%s at most %.3g of the distance to a stop",
-        plan->damper_count == 1 ? "the mass moves" : "the masses move", regime->reach);
 }
 
 // Adds what a run leaves out to the plan's decisions. `regime` NULL: the base is not made yet, and
 // what depends on it is reported as open.
 static Status omissions_add(const Simulation *simulation, Plan *plan, const Regime *regime) {
     Decisions *decisions = &plan->report.decisions;
-    const double asked = cost_scene(simulation).steps;
-    TRY(omissions_of_output(simulation, plan, asked, decisions));
-    if (regime != NULL && regime->is_at_rest) {
-        const double moving = cost_variant_steps(
-            simulation, 0, simulation->output.psd.channels.count, plan->damper_count);
-        return decisions_omit(decisions, "motion", 0, "J", omission_share(moving, asked - moving),
-                              "nothing moves and nothing excites a motion");
-    }
-    TRY(omissions_of_contacts(simulation, plan, asked, regime, decisions));
+    const bool has_dampers = plan->damper_count > 0;
+    TRY(omissions_of_output(simulation, plan, decisions));
+    if (regime == NULL)
+        return has_dampers ? decisions_add(decisions, "contacts", "open", NAN, NULL,
+                                           "whether a mass can reach a stop is determined when "
+                                           "the base's motion is made")
+                           : STATUS_OK;
+    if (regime->is_at_rest)
+        return decisions_add(decisions, "motion", "left_out", 0, "J",
+                             "nothing moves and nothing excites a motion");
+    if (has_dampers && regime->is_clear)
+        TRY(decisions_add(decisions, "contacts", "left_out", regime->reach, NULL,
+                          "%s at most %.3g of the distance to a stop",
+                          plan->damper_count == 1 ? "the mass moves" : "the masses move",
+                          regime->reach));
     // Solvers with fixed steps make them in any case.
-    const bool has_closed_form = simulation_solver(simulation) == &solver_exact &&
-                                 (plan_is_single(plan) || (regime != NULL && regime->is_clear &&
-                                                           plan_is_single_in_flight(plan)));
-    if (regime == NULL || !regime->is_unforced || !has_closed_form)
-        return STATUS_OK;
-    const double saved = cost_forcing_steps(simulation);
-    return decisions_omit(decisions, "forcing", 0, "m/s^2", omission_share(saved, asked - saved),
-                          "the base is still: flight has a closed form");
+    const bool has_closed_form =
+        simulation_solver(simulation) == &solver_exact &&
+        (plan_is_single(plan) || (regime->is_clear && plan_is_single_in_flight(plan)));
+    return regime->is_unforced && has_closed_form
+               ? decisions_add(decisions, "forcing", "left_out", 0, "m/s^2",
+                               "the base is still: flight has a closed form")
+               : STATUS_OK;
 }
 
 static Status run_make_plan(const Simulation *simulation, Plan **plan, Problem *problem) {
@@ -114,7 +87,7 @@ static Status run_make_base(const Simulation *simulation, size_t samples_max, Ff
                        .most = samples_max,
                        .transforms = transforms};
     const Excitation *excitation = scene_excitation(scene);
-    TRY(excitation_kind(excitation)->make(excitation, &span, progress, base, problem));
+    TRY(excitation_make(excitation, &span, progress, base, problem));
     bool moves = base->form == BASE_SINE && base->amplitude != 0;
     for (size_t i = 0; i < base->count && base->form == BASE_SAMPLED && !moves; i++)
         moves = base->values[i] != 0;

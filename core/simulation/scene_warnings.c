@@ -38,27 +38,17 @@ static const TypicalLimit *warnings_find_limit(const char *name) {
     return NULL;
 }
 
-static Status warnings_of_real(const Field *field, double value, const char *pointer,
-                               Warnings *warnings) {
+// The pointer of one value among several ends with its index.
+static Status warnings_of_values(const Field *field, const double *values, size_t count,
+                                 const char *pointer, Warnings *warnings) {
     const TypicalLimit *limit = warnings_find_limit(field->name);
-    if (limit == NULL || !(fabs(value) > limit->max))
-        return STATUS_OK;
-    char is[32], most[32];
     const char *space = field->unit != NULL ? " " : "";
     const char *unit = field->unit != NULL ? field->unit : "";
-    return warnings_add(warnings, pointer, "is %s%s%s, more than %s%s%s: %s", text_real(is, value),
-                        space, unit, text_real(most, limit->max), space, unit, limit->hint);
-}
-
-static Status warnings_of_reals(const Field *field, const Reals *reals, const char *pointer,
-                                Warnings *warnings) {
-    if (reals->count == 1)
-        return warnings_of_real(field, reals->at[0], pointer, warnings);
-    for (size_t i = 0; i < reals->count && warnings_find_limit(field->name) != NULL; i++) {
-        char place[sizeof((Fault){0}.pointer)];
-        json_pointer_index(place, sizeof place, pointer, i);
-        TRY(warnings_of_real(field, reals->at[i], place, warnings));
-    }
+    for (size_t i = 0; i < count && limit != NULL; i++)
+        if (fabs(values[i]) > limit->max)
+            TRY(warnings_add(warnings, count > 1 ? json_pointer_at(pointer, i).at : pointer,
+                             "is %s%s%s, more than %s%s%s: %s", real_text(values[i]).at, space,
+                             unit, real_text(limit->max).at, space, unit, limit->hint));
     return STATUS_OK;
 }
 
@@ -75,9 +65,10 @@ static Status warnings_of_rows(const Field *fields, const void *item, const char
             continue;
         json_pointer_join(place, sizeof place, pointer, field->name);
         if (field->kind == FIELD_KIND_REALS) {
-            TRY(warnings_of_reals(field, member, place, warnings));
+            const Reals *reals = member;
+            TRY(warnings_of_values(field, reals->at, reals->count, place, warnings));
         } else if (field->kind == FIELD_KIND_REAL) {
-            TRY(warnings_of_real(field, *(const double *)member, place, warnings));
+            TRY(warnings_of_values(field, member, 1, place, warnings));
         } else if (field->kind == FIELD_KIND_ITEM) {
             TRY(warnings_of_rows(field->fields, member, place, warnings));
         } else if (field->kind == FIELD_KIND_VARIANT) {
@@ -100,19 +91,18 @@ static Status warnings_of_rows(const Field *fields, const void *item, const char
 
 static Status warnings_of_times(const Scene *scene, Warnings *warnings) {
     StructureRates rates;
-    TRY(structure_rates(scene_structure(scene), &rates));
+    TRY(structure_rates(scene_structure(scene), SIZE_MAX, &rates));
     if (!(rates.slowest > 0))
         return STATUS_OK;
     const double frequency = rates.slowest / (2 * 3.14159265358979323846);
-    char is[32];
     if (scene->duration * frequency < 1)
         TRY(warnings_add(warnings, "/duration",
                          "is %s s, less than one period of the structure, %.3g s",
-                         text_real(is, scene->duration), 1 / frequency));
+                         real_text(scene->duration).at, 1 / frequency));
     if (scene->sample_rate < 2 * frequency)
         TRY(warnings_add(warnings, "/sample_rate",
                          "is %s Hz, fewer than two samples in a period of the structure, %.3g s",
-                         text_real(is, scene->sample_rate), 1 / frequency));
+                         real_text(scene->sample_rate).at, 1 / frequency));
     return STATUS_OK;
 }
 
@@ -126,12 +116,11 @@ static Status warnings_of_masses(const Scene *scene, Warnings *warnings) {
         TRY(structure_kind(structure)->moved_mass(structure, (size_t)on->storey - 1, &moved));
         if (mass <= moved)
             continue;
-        char damper[64], place[sizeof((Fault){0}.pointer)], is[32], than[32];
-        json_pointer_index(damper, sizeof damper, "/dampers", i);
-        json_pointer_join(place, sizeof place, damper, "mass");
-        TRY(warnings_add(warnings, place, "is %s kg, more than the %s's %s kg", text_real(is, mass),
-                         structure_storeys(structure) > 1 ? "storey" : "structure",
-                         text_real(than, moved)));
+        const JsonPointer damper = json_pointer_at("/dampers", i);
+        const JsonPointer place = json_pointer_of(damper.at, "mass");
+        TRY(warnings_add(
+            warnings, place.at, "is %s kg, more than the %s's %s kg", real_text(mass).at,
+            structure_storeys(structure) > 1 ? "storey" : "structure", real_text(moved).at));
     }
     return STATUS_OK;
 }

@@ -7,7 +7,6 @@
 #include "core/plan/plan.h"
 #include "core/result/response.h"
 #include "core/result/welch.h"
-#include "core/result/work_counters.h"
 #include "core/scene/scene.h"
 #include "core/solve/solver.h"
 
@@ -72,6 +71,10 @@ bool simulation_has_target(const Simulation *simulation);
 // NULL.
 Status simulation_complete(Simulation *simulation, const SimulationLimits *limits,
                            Warnings *warnings, Problem *problem);
+
+// Replaces the contact law of a completed simulation by impulses. Buffers that are given by
+// stiffness and damping get the restitution derived from them. It has to be completed again.
+Status simulation_use_impulses(Simulation *simulation, Problem *problem);
 
 // The plan of a completed simulation, without a run. Cleared by
 // fields_clear(plan_report_fields, ...).

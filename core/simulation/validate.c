@@ -108,11 +108,10 @@ static Status validate_output(Simulation *simulation, size_t count, Warnings *wa
     const double last = count > 0 ? (double)(count - 1) / scene->sample_rate : scene->duration;
     if (scene->duration > 0 && output->statistics_from > last &&
         isfinite(output->statistics_from)) {
-        char until[32], is[32];
         status = problem_add_real(problem, STATUS_INVALID, "/output/statistics_from",
                                   output->statistics_from, "s",
                                   "must not be behind the last sample, within [0, %s] s, is %s",
-                                  text_real(until, last), text_real(is, output->statistics_from));
+                                  real_text(last).at, real_text(output->statistics_from).at);
     }
     const Status psd = validate_psd(&output->psd, count, warnings, problem);
     return psd == STATUS_NO_MEMORY || status == STATUS_OK ? psd : status;

@@ -5,7 +5,6 @@
 #include <math.h>
 
 #include "core/result/response.h"
-#include "core/result/work_counters.h"
 #include "core/scene/scene.h"
 
 // The state at one instant.

@@ -8,7 +8,6 @@
 #include "core/math/fft.h"
 #include "core/plan/plan.h"
 #include "core/result/response.h"
-#include "core/result/work_counters.h"
 
 // First member of every solver's settings, the scene's "accuracy" object.
 typedef struct Accuracy {

@@ -4,7 +4,7 @@
 
 #include <math.h>
 
-#include "core/excitation/random.h"
+#include "core/excitation/excitation.h"
 
 enum { RUNS_MAX = 10000 };
 

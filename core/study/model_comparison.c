@@ -8,7 +8,6 @@
 #include <string.h>
 
 #include "core/simulation/channel_names.h"
-#include "core/simulation/impulse_variant.h"
 
 enum { NAMES_MAX = 16, ENTRIES_MAX = 24, BUCKETS = 400 }; // buckets of a trace
 
@@ -205,7 +204,7 @@ static Status comparison_set_contact(Simulation *target, const ContactLaw *law, 
         (law->form != CONTACT_LINEAR || scene_contact(&target->scene)->separation == separation))
         return STATUS_OK;
     if (law->form == CONTACT_IMPULSIVE)
-        return impulse_variant_apply(target, problem);
+        return simulation_use_impulses(target, problem);
     Variant *contact = variant_new(&law->kind);
     TRY(status_made(contact != NULL));
     if (law->form == CONTACT_LINEAR)

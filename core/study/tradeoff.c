@@ -11,7 +11,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/simulation/impulse_variant.h"
 #include "core/solve/solver.h"
 
 // The rows of a solver's settings say what it can trade: a row "step" or "tolerance" makes
@@ -104,7 +103,7 @@ static double candidate_contact_time(const Buffer *buffer, double mass) {
 
 static Status candidate_finest_step(const Simulation *simulation, double *finest) {
     StructureRates rates;
-    TRY(structure_rates(scene_structure(&simulation->scene), &rates));
+    TRY(structure_rates(scene_structure(&simulation->scene), SIZE_MAX, &rates));
     *finest = rates.fastest > 0 ? radian_part / rates.fastest : (double)INFINITY;
     for (size_t i = 0; i < simulation->scene.dampers.count; i++) {
         const Damper *damper = &simulation->scene.dampers.at[i];
@@ -282,7 +281,7 @@ Status candidate_settings_apply(const Simulation *simulation, const TradeoffPoin
     if (status == STATUS_OK)
         status = candidate_apply_solver(point, target);
     if (status == STATUS_OK && point->contact_model != NULL)
-        status = impulse_variant_apply(target, problem);
+        status = simulation_use_impulses(target, problem);
     TRY(status);
     candidate_apply_output(point, target);
     return simulation_complete(target, limits, NULL, problem);

@@ -85,8 +85,7 @@ int main(int argc, char **argv) {
             const Excitation *excitation = scene_excitation(&simulation.scene);
             const Span span = {.duration = plan->duration, .sample_rate = plan->sample_rate};
             if (simulation_complete(&simulation, NULL, NULL, &problem) != STATUS_OK ||
-                excitation_kind(excitation)->make(excitation, &span, NULL, &base, &problem) !=
-                    STATUS_OK)
+                excitation_make(excitation, &span, NULL, &base, &problem) != STATUS_OK)
                 return printf("%s\n", problem.detail), 1;
             simulation_clear(&simulation);
         }

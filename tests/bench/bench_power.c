@@ -80,7 +80,7 @@ static double bench_measure(const Case *from, const char *model, const char *sol
     const Excitation *excitation = scene_excitation(&simulation.scene);
     const Span span = {.duration = from->duration, .sample_rate = simulation.scene.sample_rate};
     if (plan_new(&simulation.scene, solver, solver, &plan, &problem) != STATUS_OK ||
-        excitation_kind(excitation)->make(excitation, &span, NULL, &base, &problem) != STATUS_OK)
+        excitation_make(excitation, &span, NULL, &base, &problem) != STATUS_OK)
         exit(1);
     result->x = calloc(plan->count, sizeof *result->x);
     const RunColumn column = {CHANNEL_DISPLACEMENT, 0, result->x};

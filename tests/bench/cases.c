@@ -39,7 +39,7 @@ static Status make_base(BenchScene *scene, Base *base, Problem *problem) {
                        .sample_rate = of->sample_rate,
                        .transforms = &scene->workspace.transforms};
     const Excitation *excitation = scene_excitation(of);
-    return excitation_kind(excitation)->make(excitation, &span, NULL, base, problem);
+    return excitation_make(excitation, &span, NULL, base, problem);
 }
 
 bool bench_open(const BenchCase *bench, BenchScene *scene) {

@@ -4,8 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/excitation/random.h"
-#include "core/excitation/sine.h"
+#include "core/excitation/excitation.h"
 #include "tests/support/scenes.h"
 
 const PaperBuffer paper_buffers[5] = {

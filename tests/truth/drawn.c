@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "core/excitation/recorded_motion.h"
-#include "core/excitation/sine.h"
+#include "core/excitation/excitation.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
 

@@ -198,7 +198,7 @@ static bool ask_quad(const Answer *answer, const Opinion *own, double seconds, d
         return false;
     const Span span = {.duration = scene->duration, .sample_rate = scene->sample_rate};
     const Excitation *excitation = scene_excitation(scene);
-    if (excitation_kind(excitation)->make(excitation, &span, NULL, &base, NULL) == STATUS_OK &&
+    if (excitation_make(excitation, &span, NULL, &base, NULL) == STATUS_OK &&
         quad_serves(plan, &base) && (double)plan->count < QUAD_STEPS * seconds) {
         frame_truth(plan, &base, QUAD_STEPS * seconds, &truth);
         is_whole = truth.is_whole;

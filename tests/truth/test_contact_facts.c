@@ -11,7 +11,7 @@
 #include <cmocka.h>
 
 #include "core/contact/identification.h"
-#include "core/excitation/sine.h"
+#include "core/excitation/excitation.h"
 #include "core/math/fft.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"

@@ -10,10 +10,8 @@
 
 #include <cmocka.h>
 
-#include "core/excitation/chirp.h"
-#include "core/excitation/pulse.h"
+#include "core/excitation/excitation.h"
 #include "core/excitation/recorded_motion.h"
-#include "core/excitation/sine.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
 

@@ -10,9 +10,8 @@
 
 #include <cmocka.h>
 
-#include "core/excitation/random.h"
+#include "core/excitation/excitation.h"
 #include "core/excitation/recorded_motion.h"
-#include "core/excitation/sine.h"
 #include "core/math/fft.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"

@@ -14,7 +14,7 @@
 
 #include <cmocka.h>
 
-#include "core/excitation/random.h"
+#include "core/excitation/excitation.h"
 #include "core/math/fft.h"
 #include "tests/support/paper.h"
 #include "tests/truth/drawn.h"
@@ -55,7 +55,7 @@ static void paper_like(ReferenceScene *scene, size_t number) {
         fail_msg("%s", problem.detail);
     const Excitation *excitation = scene_excitation(&simulation.scene);
     const Span span = {.duration = duration, .sample_rate = RATE};
-    if (excitation_kind(excitation)->make(excitation, &span, NULL, &base, &problem) != STATUS_OK)
+    if (excitation_make(excitation, &span, NULL, &base, &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
     scene->base = REFERENCE_RECORD;
     scene->samples = base.values; // the scene's own now

@@ -2,7 +2,6 @@
 import { link } from "./address.js";
 import { h, table } from "./dom.js";
 import { column } from "./study_bits.js";
-import { share } from "./summary_view.js";
 import { quantity, title, words } from "./units.js";
 
 export const section = { title: "How it was computed", show };
@@ -13,9 +12,8 @@ const FIGURES = [["e", "restitution"], ["T_c", "contact_time", "s"], ["k_b", "st
   ["T_c reached", "reached_contact_time", "s"]];
 
 function show(host, { result: { plan: { decisions, derived, modes }, engine } }) {
-  const decision = ({ about, chose, why, value, unit, saving }) => [h("dt", null, title(about)), h("dd", null,
-    h("b", null, words(chose)), `: ${why}`, value !== null && ` (${quantity(value, unit)})`,
-    saving && `; saves ${share(saving, 2)}`)];
+  const decision = ({ about, chose, why, value, unit }) => [h("dt", null, title(about)), h("dd", null,
+    h("b", null, words(chose)), `: ${why}`, value !== null && ` (${quantity(value, unit)})`)];
   const known = FIGURES.filter(([, key]) => derived.some((row) => row[key] !== null));
   host.append(h("dl.decisions", null, decisions.map(decision)),
   derived.length === 0 ? "No damper." : table("Each stop, for its pair of masses", [

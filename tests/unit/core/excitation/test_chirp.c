@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "core/excitation/chirp.h"
+#include "core/excitation/excitation.h"
 #include "tests/support/base_at.h"
 #include "tests/support/fields.h"
 

@@ -32,8 +32,7 @@ static Status complete(Excitation *excitation) {
 static Base make(const Excitation *excitation) {
     Base base;
     memset(&base, 0x5A, sizeof base);
-    assert_int_equal(excitation_kind(excitation)->make(excitation, &span, NULL, &base, &problem),
-                     STATUS_OK);
+    assert_int_equal(excitation_make(excitation, &span, NULL, &base, &problem), STATUS_OK);
     return base;
 }
 

@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "core/excitation/pulse.h"
+#include "core/excitation/excitation.h"
 #include "tests/support/base_at.h"
 #include "tests/support/fields.h"
 
@@ -23,9 +23,7 @@ static ExcitationPulse pulse(const ExcitationKind *kind, double amplitude, doubl
 
 static Base make(const ExcitationPulse *pulse) {
     Base base;
-    assert_int_equal(
-        excitation_kind(&pulse->excitation)->make(&pulse->excitation, &span, NULL, &base, &problem),
-        STATUS_OK);
+    assert_int_equal(excitation_make(&pulse->excitation, &span, NULL, &base, &problem), STATUS_OK);
     return base;
 }
 

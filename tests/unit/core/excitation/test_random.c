@@ -1,7 +1,7 @@
 // The random base: its samples against a slow sum of their definition, its statistics against the
 // density that was asked for, and what is refused. Seeds are fixed, so nothing here is left to
 // chance.
-#include "core/excitation/random.h"
+#include "core/excitation/excitation.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -7,7 +7,7 @@
 
 #include <cmocka.h>
 
-#include "core/excitation/pulse.h"
+#include "core/excitation/excitation.h"
 #include "core/excitation/recorded_motion.h"
 #include "core/math/fft.h"
 #include "core/simulation/simulation.h"

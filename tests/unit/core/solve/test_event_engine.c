@@ -83,8 +83,7 @@ static void prepare(Simulation *simulation, Plan **plan, Base *base) {
                        .sample_rate = simulation->scene.sample_rate};
     assert_int_equal(simulation_complete(simulation, NULL, NULL, NULL), STATUS_OK);
     assert_int_equal(plan_new(&simulation->scene, "exact", "exact", plan, NULL), STATUS_OK);
-    assert_int_equal(excitation_kind(excitation)->make(excitation, &span, NULL, base, NULL),
-                     STATUS_OK);
+    assert_int_equal(excitation_make(excitation, &span, NULL, base, NULL), STATUS_OK);
 }
 
 static void the_papers_scenes_are_those_of_the_single_engine(void **state) {

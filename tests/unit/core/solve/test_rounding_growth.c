@@ -10,7 +10,7 @@
 
 #include <cmocka.h>
 
-#include "core/excitation/random.h"
+#include "core/excitation/excitation.h"
 #include "core/math/fft.h"
 #include "core/solve/rounding_growth.h"
 #include "tests/support/matrix_forms.h"

@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/excitation/random.h"
+#include "core/excitation/excitation.h"
 #include "core/math/fft.h"
 #include "core/simulation/error_metrics.h"
 #include "core/solve/exact.h"

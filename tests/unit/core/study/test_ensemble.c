@@ -10,7 +10,7 @@
 #include <string.h>
 
 #include "core/base/canonical.h"
-#include "core/excitation/random.h"
+#include "core/excitation/excitation.h"
 #include "core/math/fft.h"
 #include "core/study/ensemble.h"
 #include "core/study/study.h"
