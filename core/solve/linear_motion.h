@@ -30,8 +30,7 @@ typedef struct Motion {
 
 static inline bool motion_is_same(const Motion *a, const Motion *b) {
     return a->omega2 == b->omega2 && a->damping == b->damping && a->share == b->share &&
-           a->contact_omega2 == b->contact_omega2 && a->contact_damping == b->contact_damping &&
-           a->is_resting == b->is_resting;
+           a->contact_omega2 == b->contact_omega2 && a->contact_damping == b->contact_damping;
 }
 
 // The base over a stretch: a_g(t) = value + slope t, or, with omega > 0, value cos(omega t) + slope
