@@ -51,10 +51,9 @@ typedef struct DetectedContact {
 } DetectedContact;
 
 typedef struct ContactDetection {
-    double *force;   // without baseline, one for each sample [N]
-    double largest;  // magnitude of these [N]
-    double baseline; // in the middle of the trace [N]
-    double bend[2];  // the baseline adds these times u and u^2, u from -1 to 1 over the trace [N]
+    double *force;          // without baseline, one for each sample [N]
+    double largest;         // magnitude of these [N]
+    double baseline[TERMS]; // times 1, u and u^2, u from -1 to 1 over the trace [N]
     size_t samples;
     double noise;       // standard deviation [N]
     double noise_count; // samples outside contacts, from which it is estimated
@@ -124,28 +123,19 @@ static double detection_place(double i, size_t count) {
     return count > 1 ? 2 * i / (double)(count - 1) - 1 : 0;
 }
 
-// The baseline at a sample or between samples [N].
-static double detection_baseline(const ContactDetection *detection, double sample) {
-    const double u = detection_place(sample, detection->samples);
-    return detection->baseline + u * (detection->bend[0] + u * detection->bend[1]);
-}
-
-// A sample without the baseline c[0] + c[1] u + c[2] u^2.
-static double detection_residual(const Reals *force, size_t i, const double *c) {
-    const double u = detection_place((double)i, force->count);
-    return force->at[i] - (c[0] + u * (c[1] + u * c[2]));
+// The baseline c[0] + c[1] u + c[2] u^2 at a sample or between samples [N].
+static double detection_baseline(const double *c, double sample, size_t count) {
+    const double u = detection_place(sample, count);
+    return c[0] + u * (c[1] + u * c[2]);
 }
 
 static void detection_subtract(ContactDetection *detection, const Reals *force, const double *c) {
     detection->largest = 0;
     for (size_t i = 0; i < force->count; i++) {
-        detection->force[i] = detection_residual(force, i, c);
+        detection->force[i] = force->at[i] - detection_baseline(c, (double)i, force->count);
         detection->largest = fmax(detection->largest, fabs(detection->force[i]));
     }
-    detection->baseline = c[0];
-    detection->bend[0] = c[1];
-    detection->bend[1] = c[2];
-    detection->samples = force->count;
+    memcpy(detection->baseline, c, sizeof detection->baseline);
 }
 
 // Adds to c a polynomial of `terms` terms through the samples outside contacts, by least squares.
@@ -156,7 +146,7 @@ static double detection_fit(const Reals *force, const bool *is_inside, size_t te
         if (is_inside[i])
             continue;
         const double u = detection_place((double)i, force->count), power[TERMS] = {1, u, u * u};
-        const double left = detection_residual(force, i, c);
+        const double left = force->at[i] - detection_baseline(c, (double)i, force->count);
         for (size_t j = 0; j < terms; j++) {
             for (size_t k = 0; k < terms; k++)
                 a[j * terms + k] += power[j] * power[k];
@@ -168,7 +158,7 @@ static double detection_fit(const Reals *force, const bool *is_inside, size_t te
             c[j] += b[j];
     double sum = 0;
     for (size_t i = 0; i < force->count; i++) {
-        const double left = detection_residual(force, i, c);
+        const double left = force->at[i] - detection_baseline(c, (double)i, force->count);
         sum += is_inside[i] ? 0 : left * left;
     }
     return sum;
@@ -198,25 +188,21 @@ static double detection_fit_baseline(const Reals *force, const bool *is_inside, 
 // Returns how many are not marked.
 static size_t detection_mark(const ContactDetection *detection, size_t count, double threshold,
                              bool *is_inside) {
+    size_t outside = 0, before = 0; // end of the run before
     memset(is_inside, 0, count * sizeof *is_inside);
-    size_t outside = count, marked = 0; // all before `marked` are final
     for (size_t i = 0; i < count; i++) {
-        if (!(fabs(detection->force[i]) > threshold))
-            continue;
-        size_t end = i + 1;
+        size_t end = i;
         while (end < count && fabs(detection->force[end]) > threshold)
             end++;
-        const size_t about = (end - i) / 2 + 2;
-        size_t from = i > about ? i - about : 0;
-        from = from > marked ? from : marked;
-        marked = end + about < count ? end + about : count;
-        for (size_t k = from; k < marked; k++) {
-            outside -= !is_inside[k];
+        if (end == i)
+            continue;
+        const size_t about = (end - i) / 2 + 2, from = i > before + about ? i - about : before;
+        for (size_t k = from; k < end + about && k < count; k++)
             is_inside[k] = true;
-        }
-        i = end - 1;
-        marked = end; // samples behind the run may be marked again
+        before = i = end;
     }
+    for (size_t i = 0; i < count; i++)
+        outside += !is_inside[i];
     return outside;
 }
 
@@ -306,7 +292,7 @@ static void detection_find_runs(size_t count, ContactDetection *detection) {
 
 // `threshold` [N]; NAN: from the noise.
 static Status detection_run(const Reals *force, double threshold, ContactDetection *detection) {
-    *detection = (ContactDetection){.noise_count = 0};
+    *detection = (ContactDetection){.samples = force->count};
     detection->force = malloc((force->count + 1) * sizeof *detection->force);
     TRY(status_made(detection->force != NULL));
     TRY(detection_find_baseline(force, detection));
@@ -395,15 +381,14 @@ static void trace_count_samples(const ContactDetection *found, const DetectedCon
 }
 
 // rms of the residuals of the *count means of the window during contact [peak].
-static double trace_misfit(const FitWindow *window, const PulseFit *fit, size_t *count) {
-    PulseModel model;
-    double T, sum = 0;
-    pulse_fit_model(window, &fit->at, &model, &T);
+static double trace_misfit(const FitWindow *window, const PulseFit *fit, const PulseModel *model,
+                           double T, size_t *count) {
+    double sum = 0;
     const long m = (long)window->per_block;
     *count = 0;
     for (long k = (fit->first + m - 1) / m; (k + 1) * m - 1 <= fit->last; k++) {
         const double at = (double)(k * m) + (double)(m - 1) / 2;
-        const double force = pulse_model_force(&model, (at - fit->at.part[0]) / T);
+        const double force = pulse_model_force(model, (at - fit->at.part[0]) / T);
         const double left =
             window->mean[k] - fit->residual.amplitude * force - fit->residual.baseline;
         sum += left * left;
@@ -412,21 +397,19 @@ static double trace_misfit(const FitWindow *window, const PulseFit *fit, size_t 
     return sqrt(sum / fmax((double)*count - 4, 1));
 }
 
-// Withdraws the figure and extends the interval to the one without a fit.
-static void trace_withdraw(const TraceContact *counted, TraceContact *contact) {
-    contact->least_contact_time = fmin(contact->least_contact_time, counted->least_contact_time);
-    contact->most_contact_time = fmax(contact->most_contact_time, counted->most_contact_time);
-    contact->contact_time = contact->contact_time_uncertainty = (double)NAN;
-    contact->restitution = contact->restitution_uncertainty = (double)NAN;
-}
-
+// Withdraws a figure that is no use, and extends its interval to the one without a fit.
 static Status trace_conclude(const FitConfidence *likely, bool is_form_sure, double noise,
                              int separation, const TraceContact *counted, TraceContact *contact) {
     const double width = contact->most_contact_time - contact->least_contact_time;
     const bool is_wide = !(width < width_max * contact->contact_time);
     const bool is_endless = likely->decay.mean + 2 * likely->decay.deviation > decay_max;
-    if (is_wide || (is_form_sure && is_endless))
-        trace_withdraw(counted, contact);
+    if (is_wide || (is_form_sure && is_endless)) {
+        contact->least_contact_time =
+            fmin(contact->least_contact_time, counted->least_contact_time);
+        contact->most_contact_time = fmax(contact->most_contact_time, counted->most_contact_time);
+        contact->contact_time = contact->contact_time_uncertainty = (double)NAN;
+        contact->restitution = contact->restitution_uncertainty = (double)NAN;
+    }
     return status_made(
         !is_form_sure
             ? text_format(&contact->why,
@@ -455,8 +438,8 @@ static Status trace_draw(const PulseFit *fit, const PulseModel *model,
         const double place = origin + part[0] + share * (part[1] - part[0]);
         const double force =
             fit->residual.amplitude * pulse_model_force(model, model->length * share);
-        pulse->at[i] =
-            detection_baseline(found, place) + run->peak * (fit->residual.baseline + force);
+        pulse->at[i] = detection_baseline(found->baseline, place, found->samples) +
+                       run->peak * (fit->residual.baseline + force);
     }
     return STATUS_OK;
 }
@@ -478,7 +461,7 @@ static Status trace_fit_contact(FitWindow *window, const ContactDetection *found
     contact->seen.impulse =
         fit->residual.amplitude * T * pulse_model_impulse(&model) * run->peak * interval;
     size_t means;
-    contact->seen.misfit_share = trace_misfit(window, fit, &means);
+    contact->seen.misfit_share = trace_misfit(window, fit, &model, T, &means);
     const double noise = found->noise / fabs(run->peak) / sqrt((double)window->per_block);
     contact->seen.misfit = noise > 0 ? contact->seen.misfit_share / noise : (double)NAN;
     if (contact->seen.samples < SAMPLES_MIN)
@@ -571,7 +554,7 @@ static Status trace_read_contact(double interval, const TraceOptions *options,
                               .restitution = none,
                               .restitution_uncertainty = none};
     fields_clear(trace_detection_fields, &contact->seen);
-    contact->seen.baseline = found->baseline;
+    contact->seen.baseline = found->baseline[0];
     contact->seen.noise = found->noise;
     contact->seen.threshold = found->threshold;
     contact->seen.peak = run->peak;
