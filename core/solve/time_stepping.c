@@ -634,9 +634,13 @@ static double pair_delay_error(const Pair *pair) {
 static void pair_report(const Pair *pair, Response *response) {
     const double delay = pair_delay_error(pair);
     const double size = fmax(pair->largest, response->peaks.displacement);
-    const ImpactLog *log = &pair->run.state.impacts;
+    const ModalState *state = &pair->run.state;
+    const ImpactLog *log = &state->impacts;
     const double balance = log->largest_energy > 0 ? log->largest_balance / log->largest_energy : 0;
-    const double error = size > 0 ? fmax(pair_factor(pair) * pair->worst, delay) / size : 0;
+    double error = size > 0 ? fmax(pair_factor(pair) * pair->worst, delay) / size : 0;
+    // Rounding shifts the phases of both runs.
+    if (pair->run.tolerance > 0 && size > 0)
+        error = fmax(error, 2 * DBL_EPSILON * (1 + state->rate * state->plan->duration));
     response->has_trust = pair->is_known && pair->companion.state.sample > 0;
     response->is_stepped = true;
     response->error_estimate = fmin(fmax(error, balance / 2), 1);
