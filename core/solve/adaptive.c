@@ -243,59 +243,6 @@ static void adaptive_fit(Adaptive *adaptive, double length) {
     }
 }
 
-// The gap that an event closes, as of the end of the step, and its slope (NAN: unknown).
-static double adaptive_gap(const Adaptive *adaptive, const ContactEvent *event, double *slope) {
-    const TimeStepping *stepping = adaptive->stepping;
-    const ModalState *state = &stepping->state;
-    const size_t d = event->damper, m = state->dampers, at_r = 2 * state->mode_count;
-    const DamperState *damper = &state->damper[d];
-    const double *y = N_VGetArrayPointer(adaptive->y), *rates = adaptive->rates[1];
-    const double sign = modal_state_sign(event->side), r = y[at_r + d], w = y[at_r + m + d];
-    *slope = damper->phase == PHASE_FLIGHT ? -sign * w : (double)NAN;
-    if (damper->phase == PHASE_FLIGHT)
-        return modal_state_room(damper, event->side) - sign * r;
-    if (damper->phase == PHASE_RESTING)
-        return sign * rates[stepping->size + d];
-    const ContactForce force = step_contact_force(state, d, r, w);
-    const bool is_by_force =
-        damper->phase == PHASE_CONTACT && state->plan->separation == SEPARATION_ZERO_FORCE;
-    const double toward = event->is_inwards ? -sign : sign;
-    *slope = toward * w;
-    if (!is_by_force && !event->is_inwards)
-        return toward * r;
-    *slope = toward * (force.by_penetration * w + force.by_speed * rates[at_r + m + d]);
-    return toward * force.value;
-}
-
-// Repeats the step of `length` to end at the event near *t: by Newton's method, or by secants where
-// the slope is unknown. *is_found: whether it ends there, or as near as it came.
-static bool adaptive_step_to_event(Adaptive *adaptive, const ContactEvent *event, double length,
-                                   double *t, bool *is_found) {
-    double *y = N_VGetArrayPointer(adaptive->y);
-    double slope, other = length, value = adaptive_gap(adaptive, event, &slope);
-    *is_found = false;
-    for (int retake = 0; retake < RETAKES; retake++) {
-        if (adaptive_advance(adaptive, *t, *t, ARK_NORMAL) <= 0)
-            return false;
-        adaptive_rate(adaptive, *t, y, adaptive->rates[1]);
-        const double now = adaptive_gap(adaptive, event, &slope);
-        const double off = now / (isnan(slope) ? (now - value) / (*t - other) : slope);
-        *is_found = now == 0 || fabs(off) <= ROOT_ERROR * *t;
-        if (!isfinite(off) || (!*is_found && retake + 1 == RETAKES))
-            break;
-        if (*is_found) {
-            for (size_t k = 0; k < adaptive->size; k++)
-                y[k] -= off * adaptive->rates[1][k];
-            *t -= off;
-            break;
-        }
-        other = *t;
-        value = now;
-        *t = fmin(fmax(*t - off, *t / 64), length);
-    }
-    return true;
-}
-
 // Where in the step a contact force has its first peak above those so far; 1: at its end.
 static double adaptive_find_peak(const Adaptive *adaptive) {
     const ModalState *state = &adaptive->stepping->state;
@@ -317,30 +264,41 @@ static double adaptive_find_peak(const Adaptive *adaptive) {
 static Status adaptive_evolve(Adaptive *adaptive, double *length, ContactEvent *event,
                               bool *is_event) {
     const ModalState *state = &adaptive->stepping->state;
+    double *y = N_VGetArrayPointer(adaptive->y), part = 0;
     double reached =
         adaptive_advance(adaptive, fmin(adaptive->next_step, *length), *length, ARK_ONE_STEP);
-    double part = 1, peak = 0;
-    (void)ERKStepGetCurrentStep(adaptive->arkode, &adaptive->next_step);
-    for (int retake = 0; peak < part; retake++) {
-        if (retake > 0)
-            reached = adaptive_advance(adaptive, peak * reached, peak * reached, ARK_NORMAL);
+    *is_event = false;
+    if (ERKStepGetCurrentStep(adaptive->arkode, &adaptive->next_step) != 0)
+        return adaptive_failed(adaptive, 0);
+    for (int retake = 0; 1 - part > ROOT_ERROR && retake <= RETAKES; retake++) {
+        if (retake > 0) { // a little longer, so that the polynomials reach the event
+            reached *= part * (1 + ROOT_ERROR / 2);
+            reached = adaptive_advance(adaptive, reached, reached, ARK_NORMAL);
+        }
         if (!(reached > 0))
             return adaptive_failed(adaptive, 0);
-        adaptive_rate(adaptive, reached, N_VGetArrayPointer(adaptive->y), adaptive->rates[1]);
+        adaptive_rate(adaptive, reached, y, adaptive->rates[1]);
         adaptive_fit(adaptive, reached);
-        *is_event = contact_event_find(state, &adaptive->fit, event);
-        part = *is_event ? event->s : 1;
-        peak = retake < RETAKES ? adaptive_find_peak(adaptive) : 1;
+        ContactEvent next;
+        const bool is_next = contact_event_find(state, &adaptive->fit, &next);
+        const double peak = adaptive_find_peak(adaptive);
+        // Rounding may hide an event from a step that is too short.
+        const bool is_hidden = *is_event && !is_next && reached < modal_state_clock(state);
+        part = is_next ? next.s : 1;
+        if (is_next)
+            *event = next;
+        *is_event = is_hidden || (is_next && part <= peak);
+        if (is_hidden || part * reached < SHORTEST) {
+            *length = 0;
+            return STATUS_OK;
+        }
+        part = fmin(part, peak);
     }
-    *length = part * reached < SHORTEST ? 0 : part * reached;
-    bool is_done = true;
-    if (*is_event && *length > 0)
-        is_done = adaptive_step_to_event(adaptive, event, reached, length, is_event);
-    if (part < 1 && !*is_event && *length < modal_state_clock(state)) { // rounding hides its gap
-        *is_event = true;
-        *length = 0;
-    }
-    return is_done ? STATUS_OK : adaptive_failed(adaptive, *length);
+    *is_event = *is_event && 1 - part <= ROOT_ERROR;
+    *length = *is_event ? part * reached : reached;
+    for (size_t i = 0; i < adaptive->size && *is_event; i++)
+        y[i] -= (reached - *length) * adaptive->rates[1][i];
+    return STATUS_OK;
 }
 
 // Copies a step of `length` seconds, at whose end `hit` occurs unless NULL, to the state and the
