@@ -254,101 +254,79 @@ Status contact_event_apply(ModalState *state, const ContactEvent *event) {
     return impact_log_status(&state->impacts, state->problem);
 }
 
-void contact_event_locate(double *gap, size_t degree, ContactEvent candidate, bool *is_found,
-                          ContactEvent *first) {
-    gap[0] = fmax(gap[0], 0);
-    if (!polynomial_root_first(gap, degree, &candidate.s) || (*is_found && candidate.s >= first->s))
-        return;
-    *is_found = true;
-    *first = candidate;
+void contact_event_locate(const double *series, size_t degree, double sign, double room, int zeros,
+                          ContactEvent candidate, ContactEvent *first) {
+    double gap[POLYNOMIAL_DEGREE_MAX + 1];
+    for (size_t k = 0; k <= degree; k++)
+        gap[k] = (int)k < zeros ? 0 : sign * series[k];
+    gap[0] = zeros > 0 ? 0 : fmax(gap[0] + room, 0);
+    if (polynomial_root_first(gap, degree, &candidate.s) && candidate.s < first->s)
+        *first = candidate;
 }
 
 void contact_event_find_touch(const ModalState *state, size_t d, const double *r, size_t degree,
-                              bool *is_found, ContactEvent *first) {
+                              ContactEvent *first) {
     const DamperState *damper = &state->damper[d];
     double reach = 0;
     for (size_t k = 0; k <= degree; k++)
         reach += fabs(r[k]);
-    for (int side = 0; side < 2; side++) {
-        const double sign = modal_state_sign((Side)side),
-                     room = modal_state_room(damper, (Side)side);
-        if (reach < room)
-            continue;
-        double gap[POLYNOMIAL_DEGREE_MAX + 1];
-        for (size_t k = 0; k <= degree; k++)
-            gap[k] = -sign * r[k];
-        gap[0] += room;
-        for (int k = 0; k < damper->zero_gap_terms && damper->origin == (ContactOrigin)side; k++)
-            gap[k] = 0;
-        contact_event_locate(gap, degree, (ContactEvent){.damper = d, .side = (Side)side}, is_found,
-                             first);
+    for (Side side = SIDE_LEFT; side <= SIDE_RIGHT; side++) {
+        const double room = modal_state_room(damper, side);
+        if (reach >= room)
+            contact_event_locate(r, degree, -modal_state_sign(side), room,
+                                 damper->origin == (ContactOrigin)side ? damper->zero_gap_terms : 0,
+                                 (ContactEvent){.damper = d, .side = side}, first);
     }
-}
-
-// k p + c p' as coefficients, times `sign`.
-static void contact_event_spring_series(const DamperState *damper, const TaylorStep *arc,
-                                        const double *r, double sign, double *out) {
-    for (size_t k = 0; k < arc->degree; k++)
-        out[k] = sign * (damper->contact.stiffness * r[k] +
-                         damper->contact.damping * (double)(k + 1) * r[k + 1] / arc->length);
 }
 
 static void contact_event_find_inside(const ModalState *state, const TaylorStep *arc, size_t d,
-                                      bool *is_found, ContactEvent *first) {
+                                      ContactEvent *first) {
     const DamperState *damper = &state->damper[d];
     const double *r = taylor_step_r(arc, d), sign = modal_state_sign(damper->side);
-    double gap[POLYNOMIAL_DEGREE_MAX + 1];
-    contact_event_spring_series(damper, arc, r, -sign, gap);
-    if (damper->just_begun)
-        gap[0] = 0;
-    contact_event_locate(gap, arc->degree - 1,
+    double force[POLYNOMIAL_DEGREE_MAX + 1] = {0}; // k p + c p'
+    for (size_t k = 0; k < arc->degree; k++)
+        force[k] = damper->contact.stiffness * r[k] +
+                   damper->contact.damping * (double)(k + 1) * r[k + 1] / arc->length;
+    contact_event_locate(force, arc->degree - 1, -sign, 0, damper->just_begun,
                          (ContactEvent){.damper = d, .side = damper->side, .is_inwards = true},
-                         is_found, first);
-    for (size_t k = 0; k <= arc->degree; k++)
-        gap[k] = sign * r[k];
-    contact_event_locate(gap, arc->degree, (ContactEvent){.damper = d, .side = damper->side},
-                         is_found, first);
+                         first);
+    contact_event_locate(r, arc->degree, sign, 0, 0,
+                         (ContactEvent){.damper = d, .side = damper->side}, first);
 }
 
 static void contact_event_find_end(const ModalState *state, const TaylorStep *arc, size_t d,
-                                   bool *is_found, ContactEvent *first) {
+                                   ContactEvent *first) {
     const DamperState *damper = &state->damper[d];
     const double sign = modal_state_sign(damper->side);
-    const bool by_force =
-        damper->phase == PHASE_RESTING || state->plan->separation == SEPARATION_ZERO_FORCE;
+    const bool is_resting = damper->phase == PHASE_RESTING;
+    const bool by_force = is_resting || state->plan->separation == SEPARATION_ZERO_FORCE;
     const double *of = by_force ? taylor_step_force(arc, d) : taylor_step_r(arc, d);
     const size_t degree = by_force ? arc->degree - 1 : arc->degree;
-    double gap[POLYNOMIAL_DEGREE_MAX + 1], size = 0;
-    for (size_t k = 0; k <= degree; k++) {
-        gap[k] = sign * of[k];
+    double size = 0;
+    for (size_t k = 0; k <= degree; k++)
         size += fabs(of[k]);
-    }
     ContactEvent event = {.damper = d, .side = damper->side};
-    if (damper->phase == PHASE_RESTING && gap[0] < -64 * DBL_EPSILON * size) {
-        event.is_jump = true;
-        *is_found = true;
-        *first = event;
-        return;
-    }
+    event.is_jump = is_resting && sign * of[0] < -64 * DBL_EPSILON * size;
     // A contact that has just begun again at N = 0.
-    if (damper->phase == PHASE_CONTACT && by_force && damper->just_begun && damper->r != 0)
-        gap[0] = 0;
-    contact_event_locate(gap, degree, event, is_found, first);
+    const bool is_zero = !is_resting && by_force && damper->just_begun && damper->r != 0;
+    if (event.is_jump)
+        *first = event;
+    else
+        contact_event_locate(of, degree, sign, 0, is_zero, event, first);
 }
 
 bool contact_event_find(const ModalState *state, const TaylorStep *arc, ContactEvent *event) {
-    bool is_found = false;
+    *event = (ContactEvent){.s = INFINITY};
     if (!state->has_stops)
         return false;
     state->run->work.stop_searches++;
-    for (size_t d = 0; d < state->dampers && !(is_found && event->s == 0); d++) {
+    for (size_t d = 0; d < state->dampers && event->s > 0; d++) {
         if (state->damper[d].phase == PHASE_FLIGHT)
-            contact_event_find_touch(state, d, taylor_step_r(arc, d), arc->degree, &is_found,
-                                     event);
+            contact_event_find_touch(state, d, taylor_step_r(arc, d), arc->degree, event);
         else if (state->damper[d].phase == PHASE_INSIDE)
-            contact_event_find_inside(state, arc, d, &is_found, event);
+            contact_event_find_inside(state, arc, d, event);
         else
-            contact_event_find_end(state, arc, d, &is_found, event);
+            contact_event_find_end(state, arc, d, event);
     }
-    return is_found;
+    return event->s <= 1;
 }

@@ -74,14 +74,15 @@ typedef struct ContactEvent {
 // Finds the first event on the step; of simultaneous ones that of the first damper.
 bool contact_event_find(const ModalState *state, const TaylorStep *arc, ContactEvent *event);
 
-// Locates the first zero crossing of the polynomial `gap`, whose start is not negative; a negative
-// gap[0] is set to 0. Replaces *first by the candidate if none is found yet or its s is smaller.
-void contact_event_locate(double *gap, size_t degree, ContactEvent candidate, bool *is_found,
-                          ContactEvent *first);
+// Locates the first place where sign series + room falls to 0. It is not negative at the start,
+// where its first `zeros` terms are exactly 0. Replaces *first by the candidate if its s is smaller
+// (INFINITY: none yet).
+void contact_event_locate(const double *series, size_t degree, double sign, double room, int zeros,
+                          ContactEvent candidate, ContactEvent *first);
 
 // Likewise for a damper in flight that touches a stop; r is its relative displacement.
 void contact_event_find_touch(const ModalState *state, size_t damper, const double *r,
-                              size_t degree, bool *is_found, ContactEvent *first);
+                              size_t degree, ContactEvent *first);
 
 // Changes the state, which is that of the event's instant, and logs it. STATUS_UNSTABLE after too
 // many events at one instant, or the status of the impact log.

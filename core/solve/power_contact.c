@@ -639,45 +639,32 @@ static bool power_contact_cut_time(PowerSeries *series, double length, bool *is_
 }
 
 // The release of a contact that does not lead, and the onset of a force that is left out.
-static void power_contact_find_release(const PowerContact *contact, size_t c, bool *is_found,
-                                       ContactEvent *first) {
+static void power_contact_find_release(const PowerContact *contact, size_t c, ContactEvent *first) {
     const PowerSeries *series = &contact->series;
     const SeriesContact *at = series->contact[c];
     ContactEvent event = {.damper = at->damper, .side = contact->state->damper[at->damper].side};
-    double gap[SERIES_ROW];
-    if (c == 0) {
-        memcpy(gap, power_series_leader(series), (series->degree + 1) * sizeof *gap);
-    } else {
-        power_series_column(series, series->at_r + at->damper, gap);
-        for (size_t k = 0; k <= series->degree; k++)
-            gap[k] *= at->sign;
-        contact_event_locate(gap, series->degree, event, is_found, first);
+    double r[SERIES_ROW];
+    if (c > 0) {
+        power_series_column(series, series->at_r + at->damper, r);
+        contact_event_locate(r, series->degree, at->sign, 0, 0, event, first);
     }
-    if (at->has_force)
-        return;
-    for (size_t k = 0; k <= series->degree; k++)
-        gap[k] = -gap[k];
-    gap[0] += at->onset;
     event.is_onset = true;
-    contact_event_locate(gap, series->degree, event, is_found, first);
+    if (!at->has_force)
+        contact_event_locate(c > 0 ? r : power_series_leader(series), series->degree,
+                             c > 0 ? -at->sign : -1, at->onset, 0, event, first);
 }
 
 static void power_contact_find_kink(const PowerContact *contact, const SeriesContact *at,
-                                    bool *is_found, ContactEvent *first) {
+                                    ContactEvent *first) {
     const PowerSeries *series = &contact->series;
-    double above[SERIES_ROW];
+    double w[SERIES_ROW];
     if (!(at->terms.viscous > 0) || !at->has_force || contact->kinks > KINKS_MAX)
         return;
     const int sign = at->is_damped ? 1 : -1;
-    power_series_column(series, at->damper, above);
-    for (size_t k = 0; k <= series->degree; k++)
-        above[k] *= sign * at->sign;
-    const double size = fabs(above[0]);
-    above[0] -= sign * at->terms.turn;
-    if (fabs(above[0]) <= 4 * DBL_EPSILON * size)
-        above[0] = 0;
-    contact_event_locate(above, series->degree, (ContactEvent){.damper = at->damper, .kink = -sign},
-                         is_found, first);
+    power_series_column(series, at->damper, w);
+    const bool is_here = fabs(at->sign * w[0] - at->terms.turn) <= 4 * DBL_EPSILON * fabs(w[0]);
+    contact_event_locate(w, series->degree, sign * at->sign, -sign * at->terms.turn, is_here,
+                         (ContactEvent){.damper = at->damper, .kink = -sign}, first);
 }
 
 // A contact that is over already: the gap opens from the first instant on.
@@ -696,25 +683,26 @@ static bool power_contact_find_open(const PowerContact *contact, PowerContactSte
     return false;
 }
 
-// What ends the step first. is_released: the leading contact is at its end.
-static bool power_contact_find(const PowerContact *contact, bool is_released, ContactEvent *first) {
+// What ends the step first; s is INFINITY if nothing does. is_released: the leading contact is at
+// its end.
+static ContactEvent power_contact_find(const PowerContact *contact, bool is_released) {
     const ModalState *state = contact->state;
     const PowerSeries *series = &contact->series;
     const size_t leader = series->contact[0]->damper;
-    bool is_found = is_released;
-    *first = (ContactEvent){.damper = leader, .s = 1, .side = state->damper[leader].side};
+    ContactEvent first = {
+        .damper = leader, .s = is_released ? 1 : INFINITY, .side = state->damper[leader].side};
     for (size_t c = 0; c < series->contact_count; c++) {
-        power_contact_find_release(contact, c, &is_found, first);
-        power_contact_find_kink(contact, series->contact[c], &is_found, first);
+        power_contact_find_release(contact, c, &first);
+        power_contact_find_kink(contact, series->contact[c], &first);
     }
     for (size_t d = 0; d < state->dampers; d++) {
         double r[SERIES_ROW];
         if (state->damper[d].phase != PHASE_FLIGHT)
             continue;
         power_series_column(series, series->at_r + d, r);
-        contact_event_find_touch(state, d, r, series->degree, &is_found, first);
+        contact_event_find_touch(state, d, r, series->degree, &first);
     }
-    return is_found;
+    return first;
 }
 
 // Sets the state to that at s. is_released: the leading contact's p is exactly 0 there.
@@ -841,7 +829,6 @@ void power_contact_step(PowerContact *contact, const Slice *slice, double length
             power_contact_update(contact, d);
     if (power_contact_find_open(contact, step))
         return;
-    ContactEvent end;
     const double Y = power_contact_list(contact);
     const double span = power_contact_scale(contact, Y, length);
     power_series_cut(series, power_series_expand(series, state, slice, Y, span));
@@ -850,8 +837,9 @@ void power_contact_step(PowerContact *contact, const Slice *slice, double length
     const bool is_released = power_contact_cut_release(series);
     bool is_cut;
     const bool is_whole = power_contact_cut_time(series, length, &is_cut);
-    const bool is_found = power_contact_find(contact, is_released && !is_cut, &end);
-    if (is_found && end.s < 1)
+    const ContactEvent end = power_contact_find(contact, is_released && !is_cut);
+    const bool is_found = end.s <= 1;
+    if (end.s < 1)
         power_series_cut(series, end.s);
     if (!state->is_shadow) {
         power_contact_integrate(contact, slice, &step->work);
