@@ -261,6 +261,11 @@ Status fields_copy(const Field *fields, const void *source, void *target);
 // is absent if all its members except flags are. FIELD_HIDDEN is always absent.
 bool field_is_absent(const Field *field, const void *item);
 
+// Whether two numbers are equal; NAN, which is absent, equals NAN.
+static inline bool real_same(double a, double b) {
+    return a == b || (isnan(a) && isnan(b));
+}
+
 // Allocates `count` zeros, owned by `reals`. Without memory: false, and `reals` is empty.
 bool reals_allocate(Reals *reals, size_t count);
 

@@ -128,31 +128,15 @@ static double modal_run_base(const Base *base, double t, double step) {
     return base->values[at] + (index - (double)at) * (base->values[at + 1] - base->values[at]);
 }
 
-// The first of `count` steps: a sampled base that has more of them than that is followed around its
-// largest acceleration.
-static double modal_run_first(const ModalRun *run, double count) {
-    const Base *base = run->base;
-    const double all = run->plan->duration / run->step;
-    size_t largest = 0;
-    if (base->form != BASE_SAMPLED || count >= all)
-        return 0;
-    for (size_t i = 0; i < base->count; i++)
-        if (fabs(base->values[i]) > fabs(base->values[largest]))
-            largest = i;
-    const double middle = (double)largest * base->interval / run->step;
-    return floor(fmax(fmin(middle - count / 2, all - count), 0));
-}
-
 static void modal_run_all(ModalRun *run) {
     const Base *base = run->base;
     const double duration = run->plan->duration, interval = 1 / run->plan->sample_rate;
-    const double steps_max = STEPS_MAX / (double)run->n;
     double step = interval;
     if (base->form == BASE_SAMPLED)
         step = base->interval / ceil(base->interval / fmin(interval, base->interval) * (1 - 1e-9));
     else // no sine, corner of a pulse or release may fall between two steps of the fastest mode
-        step = fmax(fmin(step, RADIANS / fmax(base->omega, run->plan->modes.omega[run->n - 1])),
-                    duration / steps_max);
+        step = fmin(step, RADIANS / fmax(base->omega, run->plan->modes.omega[run->n - 1]));
+    step = fmax(step, duration * (double)run->n / STEPS_MAX);
     run->step = step;
     modal_run_recurrence(run);
     // The first sample counts for a whole interval, however fast a mode decays.
@@ -168,11 +152,9 @@ static void modal_run_all(ModalRun *run) {
         run->products[k] = run->count * q * run->q[0];
         run->pulls[k] = run->absolutes[k] = run->count * absolute * absolute;
     }
-    const double count = fmin(ceil(duration / step * (1 - 1e-9)), steps_max);
-    const double first = modal_run_first(run, count);
-    double a = modal_run_base(base, first * step, step);
-    for (double i = 1; i <= count; i++) {
-        const double next = modal_run_base(base, (first + i) * step, step);
+    double a = modal_run_base(base, 0, step);
+    for (double i = 1; i <= ceil(duration / step * (1 - 1e-9)); i++) {
+        const double next = modal_run_base(base, i * step, step);
         modal_run_step(run, a, (next - a) / step);
         a = next;
     }

@@ -65,29 +65,22 @@ bool buffer_has_contact_data(const Buffer *buffer) {
            buffer_has(buffer->damping);
 }
 
-static bool buffer_is_same(double a, double b) {
-    return a == b || (isnan(a) && isnan(b));
-}
-
 static bool buffer_has_same_table(const ContactRows *a, const ContactRows *b) {
     if (a->count != b->count)
         return false;
     for (size_t i = 0; i < a->count; i++)
-        if (!buffer_is_same(a->at[i].approach_speed, b->at[i].approach_speed) ||
-            !buffer_is_same(a->at[i].restitution, b->at[i].restitution) ||
-            !buffer_is_same(a->at[i].contact_time, b->at[i].contact_time))
+        if (!real_same(a->at[i].approach_speed, b->at[i].approach_speed) ||
+            !real_same(a->at[i].restitution, b->at[i].restitution) ||
+            !real_same(a->at[i].contact_time, b->at[i].contact_time))
             return false;
     return true;
 }
 
 bool buffer_equals(const Buffer *a, const Buffer *b) {
-    const bool is_same_material = a->material == NULL || b->material == NULL
-                                      ? a->material == b->material
-                                      : strcmp(a->material, b->material) == 0;
-    return is_same_material && buffer_is_same(a->restitution, b->restitution) &&
-           buffer_is_same(a->contact_time, b->contact_time) &&
-           buffer_is_same(a->stiffness, b->stiffness) && buffer_is_same(a->damping, b->damping) &&
-           buffer_is_same(a->exponent, b->exponent) && buffer_has_same_table(&a->table, &b->table);
+    return text_same(a->material, b->material) && real_same(a->restitution, b->restitution) &&
+           real_same(a->contact_time, b->contact_time) && real_same(a->stiffness, b->stiffness) &&
+           real_same(a->damping, b->damping) && real_same(a->exponent, b->exponent) &&
+           buffer_has_same_table(&a->table, &b->table);
 }
 
 void buffer_speed_range(const Buffer *buffer, double *least, double *most) {

@@ -167,13 +167,8 @@ static const Buffer *damper_find_unstated(const Damper *damper, const BufferTest
     return NULL;
 }
 
-static bool rig_is_same_mass(double a, double b) {
-    return a == b || (isnan(a) && isnan(b));
-}
-
 static bool rig_is_same(const Rig *a, const Rig *b) {
-    return rig_is_same_mass(a->impactor_mass, b->impactor_mass) &&
-           rig_is_same_mass(a->base_mass, b->base_mass);
+    return real_same(a->impactor_mass, b->impactor_mass) && real_same(a->base_mass, b->base_mass);
 }
 
 static Rig rig_of(const BufferTest *test) {

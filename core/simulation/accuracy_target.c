@@ -32,8 +32,7 @@ static const double contact_share = 0.2; // error of displacement per error of a
 static const double impacts_a_period = 2;
 static const double growth_a_period = 0.2; // natural logarithm, where a base drives the mass
 static const double growth_max = 40;
-// Safety factors on the predicted truncation error without and with dampers.
-static const double modes_margin = 0.7, dampers_margin = 0.4;
+static const double dampers_margin = 0.4; // of the error that modes left out may make with dampers
 static const double calm = 1e4; // growth of rounding up to which truncation error is bounded
 static const double modes_worth = 0.75;  // keeping a larger part of the modes saves nothing
 static const double retry_margin = 0.03; // of the tightened error that a second run aims at
@@ -163,7 +162,7 @@ static double target_choose_tolerance(const AccuracyTarget *target, double error
 }
 
 static double target_modes_share(const AccuracyTarget *target) {
-    return target->plan->damper_count > 0 ? dampers_margin : modes_margin;
+    return target->plan->damper_count > 0 ? dampers_margin : 1;
 }
 
 // The fewest modes that keep `error`; COUNT_ABSENT: all are needed.

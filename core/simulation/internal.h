@@ -1,4 +1,4 @@
-// Functions shared by the files of core/simulation. Calls go from simulation.c down to
+// Functions shared by the files of core/simulation. Calls go from dispatch.c down to
 // accuracy_target.c, run.c, cost_model.c and validate.c, never up.
 #ifndef CORE_SIMULATION_INTERNAL_H
 #define CORE_SIMULATION_INTERNAL_H

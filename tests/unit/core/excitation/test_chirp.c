@@ -26,7 +26,7 @@ static Status complete(ExcitationChirp *chirp) {
 }
 
 static Base make(const ExcitationChirp *chirp) {
-    Base base;
+    Base base = {0};
     assert_int_equal(excitation_chirp.make(&chirp->excitation, &span, NULL, &base, &problem),
                      STATUS_OK);
     return base;
@@ -141,7 +141,7 @@ static void making_a_sweep_can_be_stopped(void **state) {
     (void)state;
     const Progress progress = {.advance = stop_at_once};
     ExcitationChirp chirp = sweep(1, 2, NAN, NAN);
-    Base base;
+    Base base = {0};
     assert_int_equal(complete(&chirp), STATUS_OK);
     assert_int_equal(excitation_chirp.make(&chirp.excitation, &span, &progress, &base, &problem),
                      STATUS_CANCELLED);

@@ -72,7 +72,7 @@ static void the_base_moves_as_the_record_says(void **state) {
     NamedRecord *named = named_make("elcentro");
     ExcitationRecord *record = record_make("elcentro");
     const Span span = {.duration = 1, .sample_rate = 100};
-    Base base;
+    Base base = {0};
     assert_true(record_resolve(record, named));
     refcount_unref(&named->shared);
     record->scale = 2;

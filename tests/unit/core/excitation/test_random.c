@@ -30,7 +30,7 @@ static ExcitationRandom random_with(double f0, double f1, double rms, uint64_t s
 
 static Base base_of(const ExcitationRandom *random, double duration) {
     const Span span = {.duration = duration, .sample_rate = 1000};
-    Base base;
+    Base base = {0};
     assert_int_equal(excitation_random.make(&random->start, &span, NULL, &base, NULL), STATUS_OK);
     return base;
 }
@@ -353,7 +353,7 @@ static void the_watch_sees_every_block_and_can_stop(void **state) {
     static Problem problem;
     const ExcitationRandom random = random_with(0, 15, 1, 0, 1000);
     const Span span = {.duration = 100, .sample_rate = 1000};
-    Base base;
+    Base base = {0};
     int looks = 0;
     const Progress stopping = {&looks, stop_at_once};
     assert_int_equal(excitation_random.make(&random.start, &span, &stopping, &base, &problem),
@@ -372,7 +372,7 @@ static void a_base_without_end_is_refused_when_made(void **state) {
     (void)state;
     const ExcitationRandom random = random_with(0, 15, 1, 0, 1000);
     const Span span = {.duration = 1e9, .sample_rate = 1000};
-    Base base;
+    Base base = {0};
     assert_int_equal(excitation_random.make(&random.start, &span, NULL, &base, NULL), STATUS_LIMIT);
     assert_null(base.values);
 }

@@ -132,7 +132,7 @@ static void where_no_stop_is_reached_none_is_looked_for(void **state) {
     static const char *const scenes[] = {
         STRUCTURE ", " DAMPER("0.1") ", " RELEASE ", " TIME ", " ALL,
         STRUCTURE ", " DAMPER("100") ", " RANDOM ", " TIME ", " ALL,
-        STRUCTURE ", " DAMPER("0.5") ", " SINE ", " TIME ", " ALL,
+        STRUCTURE ", " DAMPER("1.5") ", " SINE ", " TIME ", " ALL,
         // Intervals too long for blocks.
         STRUCTURE ", " DAMPER("0.1") ", " RELEASE ", \"duration\": 30, \"sample_rate\": 20, " ALL,
         STRUCTURE ", " DAMPER("0.1") ", " RELEASE ", \"duration\": 30, \"sample_rate\": 2, " ALL,
