@@ -5,32 +5,6 @@
 
 #include "core/simulation/internal.h"
 
-static void simulation_fill_restitution(const DerivedList *derived, Dampers *dampers) {
-    for (size_t i = 0; i < derived->count; i++) {
-        Damper *damper = &dampers->at[i / 2];
-        Buffer *const own = i % 2 == SIDE_LEFT ? &damper->left_buffer : &damper->right_buffer;
-        Buffer *buffer = buffer_is_given(own) ? own : &damper->buffer;
-        if (buffer->table.count > 0 || !isnan(buffer->restitution))
-            continue;
-        buffer->restitution = derived->at[i].restitution;
-        buffer->stiffness = buffer->damping = (double)NAN;
-    }
-}
-
-Status simulation_use_impulses(Simulation *simulation, Problem *problem) {
-    Plan *plan;
-    const char *solver = simulation->accuracy->kind->name;
-    TRY(plan_new(&simulation->scene, solver, solver, &plan, problem));
-    simulation_fill_restitution(&plan->report.derived, &simulation->scene.dampers);
-    plan_free(plan);
-    Variant *contact = variant_new(&contact_impulse.kind);
-    if (contact == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a contact model");
-    variant_free(simulation->scene.contact);
-    simulation->scene.contact = contact;
-    return STATUS_OK;
-}
-
 // The scene without its dampers, run for comparison. It samples no channels, because only its
 // summary is used. An accuracy target is about the dampers, so without them the exact solver runs.
 // The view borrows its members from `simulation`.
