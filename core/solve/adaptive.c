@@ -6,9 +6,9 @@
 // The integrated vector is (q, r; p, w), then the integrals of N and N r' of each damper, the work
 // of the base, the loss in the structure and the ground velocity, all five from the step's start.
 //
-// ARKODE's dense output is far less accurate than its steps, so events are first sought on the
+// ARKODE's dense output is far less accurate than its steps, so events are sought on the
 // polynomials through the values and derivatives of r and N at both ends of a step. The step is
-// then repeated to end at the event, whose instant Newton's method corrects.
+// repeated up to the event, with new polynomials, until it ends there.
 #include <arkode/arkode_erkstep.h>
 #include <float.h>
 #include <math.h>
@@ -59,7 +59,7 @@ static void adaptive_rate(Adaptive *adaptive, double t, const double *y, double 
     time_stepping_forces(stepping, y);
     if (state->resting > 0)
         time_stepping_elastic(state, y, y + n + m, stepping->elastic);
-    for (size_t d = 0; d < m; d++)
+    for (size_t d = 0; d < m && state->resting > 0; d++)
         if (state->damper[d].phase == PHASE_RESTING)
             stepping->force[d] = modal_state_constraint(state, d, stepping->elastic, ground);
     time_stepping_rate(stepping, y, ground, out);
@@ -151,14 +151,15 @@ static bool adaptive_has_outgrown(const Adaptive *adaptive) {
 
 // Moves from the step's start at most to `length`, by one step or by several. Returns the time
 // reached, 0 after a failure.
-static double adaptive_advance(Adaptive *adaptive, double first_step, double length, int task) {
+static double adaptive_advance(Adaptive *adaptive, double length, int task) {
+    void *arkode = adaptive->arkode;
     double reached = 0;
     N_VScale(1, adaptive->from, adaptive->y);
-    return ERKStepReset(adaptive->arkode, 0, adaptive->from) == 0 &&
-                   ERKStepSetInitStep(adaptive->arkode, first_step) == 0 &&
-                   ERKStepSetStopTime(adaptive->arkode, task == ARK_NORMAL ? length : DBL_MAX) ==
-                       0 &&
-                   ERKStepEvolve(adaptive->arkode, length, adaptive->y, &reached, task) >= 0
+    // Without a stop ARKODE proposes the next step by the error alone.
+    return ERKStepReset(arkode, 0, adaptive->from) == 0 &&
+                   ERKStepSetInitStep(arkode, length) == 0 &&
+                   ERKStepSetStopTime(arkode, task == ARK_NORMAL ? length : DBL_MAX) == 0 &&
+                   ERKStepEvolve(arkode, length, adaptive->y, &reached, task) >= 0
                ? reached
                : 0;
 }
@@ -218,22 +219,28 @@ static double adaptive_find_peak(const Adaptive *adaptive) {
     return first;
 }
 
-// One step of at most *length, which becomes that of the step; 0: an event occurs at once. The step
-// ends at the first event, or at the peak of a force before it.
+// Computes a step of at most *length from the present state, which becomes the step's own; 0: an
+// event occurs at once. The step ends at the first event, or at the peak of a force before it.
 static Status adaptive_evolve(Adaptive *adaptive, double *length, ContactEvent *event,
                               bool *is_event) {
-    const ModalState *state = &adaptive->stepping->state;
-    double *y = N_VGetArrayPointer(adaptive->y), part = 0;
-    double reached =
-        adaptive_advance(adaptive, fmin(adaptive->next_step, *length), *length, ARK_ONE_STEP);
+    TimeStepping *stepping = adaptive->stepping;
+    ModalState *state = &stepping->state;
+    double *from = N_VGetArrayPointer(adaptive->from), *y = N_VGetArrayPointer(adaptive->y);
+    const double knot =
+        base_cursor_slice(&state->base, state->sample, state->offset, &adaptive->slice);
+    state->base_acceleration = adaptive->slice.value;
+    time_stepping_begin(stepping, from);
+    adaptive_rate(adaptive, 0, from, adaptive->rates[0]);
+    if (adaptive->events != state->events || adaptive_has_outgrown(adaptive))
+        TRY(adaptive_set_tolerances(adaptive));
+    const double longest = fmin(fmin(*length, knot), fmin(stepping->length, adaptive->next_step));
+    double part = 0, reached = adaptive_advance(adaptive, longest, ARK_ONE_STEP);
     *is_event = false;
     if (ERKStepGetCurrentStep(adaptive->arkode, &adaptive->next_step) != 0)
         return adaptive_failed(adaptive, 0);
     for (int retake = 0; 1 - part > ROOT_ERROR && retake <= RETAKES; retake++) {
-        if (retake > 0) { // a little longer, so that the polynomials reach the event
-            reached *= part * (1 + ROOT_ERROR / 2);
-            reached = adaptive_advance(adaptive, reached, reached, ARK_NORMAL);
-        }
+        if (retake > 0) // a little longer, so that the polynomials reach the event
+            reached = adaptive_advance(adaptive, reached * part * (1 + ROOT_ERROR / 2), ARK_NORMAL);
         if (!(reached > 0))
             return adaptive_failed(adaptive, 0);
         adaptive_rate(adaptive, reached, y, adaptive->rates[1]);
@@ -247,11 +254,12 @@ static Status adaptive_evolve(Adaptive *adaptive, double *length, ContactEvent *
         part = is_next ? next.s : 1;
         if (is_next)
             *event = next;
-        *is_event = is_hidden || (is_next && part <= peak);
         if (is_hidden || part * reached < SHORTEST) {
+            *is_event = true;
             *length = 0;
             return STATUS_OK;
         }
+        *is_event = is_next && part <= peak;
         part = fmin(part, peak);
     }
     *is_event = *is_event && 1 - part <= ROOT_ERROR;
@@ -308,29 +316,12 @@ static double adaptive_count_cost(Adaptive *adaptive) {
     return cost;
 }
 
-// Computes a step from the present state without accepting it.
-static Status adaptive_try(Adaptive *adaptive, double *length, ContactEvent *event,
-                           bool *is_event) {
-    TimeStepping *stepping = adaptive->stepping;
-    ModalState *state = &stepping->state;
-    double *from = N_VGetArrayPointer(adaptive->from);
-    const double knot =
-        base_cursor_slice(&state->base, state->sample, state->offset, &adaptive->slice);
-    state->base_acceleration = adaptive->slice.value;
-    *length = fmin(fmin(*length, knot), stepping->length);
-    time_stepping_begin(stepping, from);
-    adaptive_rate(adaptive, 0, from, adaptive->rates[0]);
-    if (adaptive->events != state->events || adaptive_has_outgrown(adaptive))
-        TRY(adaptive_set_tolerances(adaptive));
-    return adaptive_evolve(adaptive, length, event, is_event);
-}
-
 // Advances by at most `length` seconds and applies the event at the end.
 static Status adaptive_step(Adaptive *adaptive, double length) {
     ModalState *state = &adaptive->stepping->state;
     ContactEvent event;
     bool is_event = false;
-    TRY(adaptive_try(adaptive, &length, &event, &is_event));
+    TRY(adaptive_evolve(adaptive, &length, &event, &is_event));
     if (length > 0)
         adaptive_accept(adaptive, length, is_event ? &event : NULL);
     TRY(time_stepping_note(adaptive->stepping, adaptive_count_cost(adaptive)));
@@ -455,7 +446,7 @@ static Status adaptive_make(TimeStepping *stepping) {
     for (bool is_event = true; is_event;) {
         ContactEvent event;
         double length = state->interval;
-        TRY(adaptive_try(adaptive, &length, &event, &is_event));
+        TRY(adaptive_evolve(adaptive, &length, &event, &is_event));
         is_event = is_event && length == 0;
         if (is_event)
             TRY(contact_event_apply(state, &event));
