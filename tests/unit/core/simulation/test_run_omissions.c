@@ -260,13 +260,13 @@ static void where_nothing_moves_nothing_is_integrated(void **state) {
         "\"kind\": \"record\", \"interval\": 0.01, \"samples\": [1, -1, 1], \"scale\": 0",
         "\"kind\": \"half_sine\", \"amplitude\": 0, \"length\": 0.1",
     };
-    static const char *const solvers[] = {"exact", "rk4"};
-    for (size_t i = 0; i < COUNT(bases) * COUNT(solvers); i++) {
+    static const char *const names[] = {"exact", "rk4"};
+    for (size_t i = 0; i < COUNT(bases) * COUNT(names); i++) {
         char members[800];
         snprintf(members, sizeof members,
                  STRUCTURE ", " DAMPER("0.015") ", \"excitation\": {%s}, " SHORT ", " ALL
                                                 ", \"accuracy\": {\"solver\": \"%s\"}",
-                 bases[i % COUNT(bases)], solvers[i / COUNT(bases)]);
+                 bases[i % COUNT(bases)], names[i / COUNT(bases)]);
         Outcome *outcome = outcome_of(members);
         assert_left_out(outcome, "motion");
         const WorkCounters *work = &outcome->work;
