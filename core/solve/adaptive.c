@@ -3,12 +3,12 @@
 // begins or ends. Contact events follow the rules of contact_events.c, but a stop that is only
 // grazed within a step is missed.
 //
-// The integrated vector is (q, p; r, w), then the integrals of N and N r' of each damper, the work
+// The integrated vector is (q, r; p, w), then the integrals of N and N r' of each damper, the work
 // of the base, the loss in the structure and the ground velocity, all five from the step's start.
 //
-// ARKODE's dense output is far less accurate than its steps, so events are first sought on the
+// ARKODE's dense output is far less accurate than its steps, so events are sought on the
 // polynomials through the values and derivatives of r and N at both ends of a step. The step is
-// then repeated to end at the event, whose instant Newton's method corrects.
+// repeated up to the event, with new polynomials, until it ends there.
 #include <arkode/arkode_erkstep.h>
 #include <float.h>
 #include <math.h>
@@ -50,47 +50,6 @@ typedef struct Adaptive {
     size_t events;     // of the state when the tolerances were set; SIZE_MAX: not yet
 } Adaptive;
 
-// RK8(7)13M of Prince and Dormand, J. Comp. Appl. Math. 7 (1981) 67-75. The error estimate of
-// ARKODE's own table of order 8 is zero for y' = f(t), so it does not see a contact begin.
-// clang-format off
-static const double nodes[STAGES] = {
-    0, 1.0 / 18, 1.0 / 12, 1.0 / 8, 5.0 / 16, 3.0 / 8, 59.0 / 400, 93.0 / 200,
-    5490023248.0 / 9719169821.0, 13.0 / 20, 1201146811.0 / 1299019798.0, 1, 1};
-static const double stages[STAGES][STAGES] = {
-    {0},
-    {1.0 / 18},
-    {1.0 / 48, 1.0 / 16},
-    {1.0 / 32, 0, 3.0 / 32},
-    {5.0 / 16, 0, -75.0 / 64, 75.0 / 64},
-    {3.0 / 80, 0, 0, 3.0 / 16, 3.0 / 20},
-    {29443841.0 / 614563906.0, 0, 0, 77736538.0 / 692538347.0, -28693883.0 / 1125000000.0,
-     23124283.0 / 1800000000.0},
-    {16016141.0 / 946692911.0, 0, 0, 61564180.0 / 158732637.0, 22789713.0 / 633445777.0,
-     545815736.0 / 2771057229.0, -180193667.0 / 1043307555.0},
-    {39632708.0 / 573591083.0, 0, 0, -433636366.0 / 683701615.0, -421739975.0 / 2616292301.0,
-     100302831.0 / 723423059.0, 790204164.0 / 839813087.0, 800635310.0 / 3783071287.0},
-    {246121993.0 / 1340847787.0, 0, 0, -37695042795.0 / 15268766246.0,
-     -309121744.0 / 1061227803.0, -12992083.0 / 490766935.0, 6005943493.0 / 2108947869.0,
-     393006217.0 / 1396673457.0, 123872331.0 / 1001029789.0},
-    {-1028468189.0 / 846180014.0, 0, 0, 8478235783.0 / 508512852.0, 1311729495.0 / 1432422823.0,
-     -10304129995.0 / 1701304382.0, -48777925059.0 / 3047939560.0, 15336726248.0 / 1032824649.0,
-     -45442868181.0 / 3398467696.0, 3065993473.0 / 597172653.0},
-    {185892177.0 / 718116043.0, 0, 0, -3185094517.0 / 667107341.0, -477755414.0 / 1098053517.0,
-     -703635378.0 / 230739211.0, 5731566787.0 / 1027545527.0, 5232866602.0 / 850066563.0,
-     -4093664535.0 / 808688257.0, 3962137247.0 / 1805957418.0, 65686358.0 / 487910083.0},
-    {403863854.0 / 491063109.0, 0, 0, -5068492393.0 / 434740067.0, -411421997.0 / 543043805.0,
-     652783627.0 / 914296604.0, 11173962825.0 / 925320556.0, -13158990841.0 / 6184727034.0,
-     3936647629.0 / 1978049680.0, -160528059.0 / 685178525.0, 248638103.0 / 1413531060.0}};
-static const double weights[STAGES] = {
-    14005451.0 / 335480064.0, 0, 0, 0, 0, -59238493.0 / 1068277825.0, 181606767.0 / 758867731.0,
-    561292985.0 / 797845732.0, -1041891430.0 / 1371343529.0, 760417239.0 / 1151165299.0,
-    118820643.0 / 751138087.0, -528747749.0 / 2220607170.0, 1.0 / 4};
-static const double embedded[STAGES] = {
-    13451932.0 / 455176623.0, 0, 0, 0, 0, -808719846.0 / 976000145.0,
-    1757004468.0 / 5645159321.0, 656045339.0 / 265891186.0, -3867574721.0 / 1518517206.0,
-    465885868.0 / 322736535.0, 53011238.0 / 667516719.0, 2.0 / 45, 0};
-// clang-format on
-
 static void adaptive_rate(Adaptive *adaptive, double t, const double *y, double *out) {
     TimeStepping *stepping = adaptive->stepping;
     const ModalState *state = &stepping->state;
@@ -99,14 +58,14 @@ static void adaptive_rate(Adaptive *adaptive, double t, const double *y, double 
     adaptive->rate_calls++;
     time_stepping_forces(stepping, y);
     if (state->resting > 0)
-        time_stepping_elastic(state, y, y + n, stepping->elastic);
-    for (size_t d = 0; d < m; d++)
+        time_stepping_elastic(state, y, y + n + m, stepping->elastic);
+    for (size_t d = 0; d < m && state->resting > 0; d++)
         if (state->damper[d].phase == PHASE_RESTING)
             stepping->force[d] = modal_state_constraint(state, d, stepping->elastic, ground);
     time_stepping_rate(stepping, y, ground, out);
     for (size_t d = 0; d < m; d++)
         if (state->damper[d].phase == PHASE_RESTING) // zero but for rounding
-            out[2 * n + d] = out[2 * n + m + d] = 0;
+            out[n + d] = out[2 * n + m + d] = 0;
     out[adaptive->size - 1] = ground;
 }
 
@@ -134,8 +93,8 @@ static double adaptive_push(const Adaptive *adaptive) {
 static Status adaptive_set_tolerances(Adaptive *adaptive) {
     const TimeStepping *stepping = adaptive->stepping;
     const ModalState *state = &stepping->state;
-    const size_t n = state->mode_count, m = state->dampers, at_r = 2 * n;
-    double *scale = N_VGetArrayPointer(adaptive->absolute), *r = scale + at_r, *w = r + m;
+    const size_t n = state->mode_count, m = state->dampers;
+    double *scale = N_VGetArrayPointer(adaptive->absolute), *r = scale + n, *p = r + m, *w = p + n;
     double *impulse = w + m, *work = impulse + m, *totals = work + m;
     double time = state->interval, energy = 0;
     adaptive->events = state->events;
@@ -151,7 +110,7 @@ static Status adaptive_set_tolerances(Adaptive *adaptive) {
             fmax(adaptive->speed, damper->effective_mass * fabs(damper->w) * sqrt(mobility));
     }
     for (size_t i = 0; i < n; i++) {
-        scale[n + i] = adaptive->speed;
+        p[i] = adaptive->speed;
         scale[i] = adaptive->speed / fmax(sqrt(state->omega2[i]), 1 / state->plan->duration);
     }
     for (size_t d = 0; d < m; d++) {
@@ -192,14 +151,15 @@ static bool adaptive_has_outgrown(const Adaptive *adaptive) {
 
 // Moves from the step's start at most to `length`, by one step or by several. Returns the time
 // reached, 0 after a failure.
-static double adaptive_advance(Adaptive *adaptive, double first_step, double length, int task) {
+static double adaptive_advance(Adaptive *adaptive, double length, int task) {
+    void *arkode = adaptive->arkode;
     double reached = 0;
     N_VScale(1, adaptive->from, adaptive->y);
-    return ERKStepReset(adaptive->arkode, 0, adaptive->from) == 0 &&
-                   ERKStepSetInitStep(adaptive->arkode, first_step) == 0 &&
-                   ERKStepSetStopTime(adaptive->arkode, task == ARK_NORMAL ? length : DBL_MAX) ==
-                       0 &&
-                   ERKStepEvolve(adaptive->arkode, length, adaptive->y, &reached, task) >= 0
+    // Without a stop ARKODE proposes the next step by the error alone.
+    return ERKStepReset(arkode, 0, adaptive->from) == 0 &&
+                   ERKStepSetInitStep(arkode, length) == 0 &&
+                   ERKStepSetStopTime(arkode, task == ARK_NORMAL ? length : DBL_MAX) == 0 &&
+                   ERKStepEvolve(arkode, length, adaptive->y, &reached, task) >= 0
                ? reached
                : 0;
 }
@@ -207,7 +167,7 @@ static double adaptive_advance(Adaptive *adaptive, double first_step, double len
 // Fits the polynomials to a step of `length` that has ended.
 static void adaptive_fit(Adaptive *adaptive, double length) {
     const ModalState *state = &adaptive->stepping->state;
-    const size_t m = state->dampers, at_r = 2 * state->mode_count;
+    const size_t n = state->mode_count, m = state->dampers;
     TaylorStep *fit = &adaptive->fit;
     fit->length = length;
     fit->degree = 5;
@@ -215,11 +175,11 @@ static void adaptive_fit(Adaptive *adaptive, double length) {
         double *r = fit->r + d * (POLYNOMIAL_DEGREE_MAX + 1), r0[3], r1[3];
         double *N = fit->force + d * (POLYNOMIAL_DEGREE_MAX + 1), slope[2];
         for (int end = 0; end < 2; end++) {
-            const double *y = N_VGetArrayPointer(end == 0 ? adaptive->from : adaptive->y) + at_r;
-            const double *rates = adaptive->rates[end], w = y[m + d], w1 = rates[at_r + m + d];
-            const ContactForce force = step_contact_force(state, d, y[d], w);
+            const double *y = N_VGetArrayPointer(end == 0 ? adaptive->from : adaptive->y) + n + d;
+            const double *rates = adaptive->rates[end], w = y[n + m], w1 = rates[2 * n + m + d];
+            const ContactForce force = step_contact_force(state, d, *y, w);
             double *value = end == 0 ? r0 : r1;
-            value[0] = y[d];
+            value[0] = *y;
             value[1] = length * w;
             value[2] = length * length * w1;
             N[end] = rates[adaptive->stepping->size + d];
@@ -259,22 +219,28 @@ static double adaptive_find_peak(const Adaptive *adaptive) {
     return first;
 }
 
-// One step of at most *length, which becomes that of the step; 0: an event occurs at once. The step
-// ends at the first event, or at the peak of a force before it.
+// Computes a step of at most *length from the present state, which becomes the step's own; 0: an
+// event occurs at once. The step ends at the first event, or at the peak of a force before it.
 static Status adaptive_evolve(Adaptive *adaptive, double *length, ContactEvent *event,
                               bool *is_event) {
-    const ModalState *state = &adaptive->stepping->state;
-    double *y = N_VGetArrayPointer(adaptive->y), part = 0;
-    double reached =
-        adaptive_advance(adaptive, fmin(adaptive->next_step, *length), *length, ARK_ONE_STEP);
+    TimeStepping *stepping = adaptive->stepping;
+    ModalState *state = &stepping->state;
+    double *from = N_VGetArrayPointer(adaptive->from), *y = N_VGetArrayPointer(adaptive->y);
+    const double knot =
+        base_cursor_slice(&state->base, state->sample, state->offset, &adaptive->slice);
+    state->base_acceleration = adaptive->slice.value;
+    time_stepping_begin(stepping, from);
+    adaptive_rate(adaptive, 0, from, adaptive->rates[0]);
+    if (adaptive->events != state->events || adaptive_has_outgrown(adaptive))
+        TRY(adaptive_set_tolerances(adaptive));
+    const double longest = fmin(fmin(*length, knot), fmin(stepping->length, adaptive->next_step));
+    double part = 0, reached = adaptive_advance(adaptive, longest, ARK_ONE_STEP);
     *is_event = false;
     if (ERKStepGetCurrentStep(adaptive->arkode, &adaptive->next_step) != 0)
         return adaptive_failed(adaptive, 0);
     for (int retake = 0; 1 - part > ROOT_ERROR && retake <= RETAKES; retake++) {
-        if (retake > 0) { // a little longer, so that the polynomials reach the event
-            reached *= part * (1 + ROOT_ERROR / 2);
-            reached = adaptive_advance(adaptive, reached, reached, ARK_NORMAL);
-        }
+        if (retake > 0) // a little longer, so that the polynomials reach the event
+            reached = adaptive_advance(adaptive, reached * part * (1 + ROOT_ERROR / 2), ARK_NORMAL);
         if (!(reached > 0))
             return adaptive_failed(adaptive, 0);
         adaptive_rate(adaptive, reached, y, adaptive->rates[1]);
@@ -282,16 +248,18 @@ static Status adaptive_evolve(Adaptive *adaptive, double *length, ContactEvent *
         ContactEvent next;
         const bool is_next = contact_event_find(state, &adaptive->fit, &next);
         const double peak = adaptive_find_peak(adaptive);
-        // Rounding may hide an event from a step that is too short.
-        const bool is_hidden = *is_event && !is_next && reached < modal_state_clock(state);
+        // A step too short for the event that led to it: rounding hides where that occurs.
+        const bool is_hidden =
+            *is_event && reached < modal_state_clock(state) && !(is_next && next.s > 0.5);
         part = is_next ? next.s : 1;
         if (is_next)
             *event = next;
-        *is_event = is_hidden || (is_next && part <= peak);
         if (is_hidden || part * reached < SHORTEST) {
+            *is_event = true;
             *length = 0;
             return STATUS_OK;
         }
+        *is_event = is_next && part <= peak;
         part = fmin(part, peak);
     }
     *is_event = *is_event && 1 - part <= ROOT_ERROR;
@@ -348,29 +316,12 @@ static double adaptive_count_cost(Adaptive *adaptive) {
     return cost;
 }
 
-// Computes a step from the present state without accepting it.
-static Status adaptive_try(Adaptive *adaptive, double *length, ContactEvent *event,
-                           bool *is_event) {
-    TimeStepping *stepping = adaptive->stepping;
-    ModalState *state = &stepping->state;
-    double *from = N_VGetArrayPointer(adaptive->from);
-    const double knot =
-        base_cursor_slice(&state->base, state->sample, state->offset, &adaptive->slice);
-    state->base_acceleration = adaptive->slice.value;
-    *length = fmin(fmin(*length, knot), stepping->length);
-    time_stepping_begin(stepping, from);
-    adaptive_rate(adaptive, 0, from, adaptive->rates[0]);
-    if (adaptive->events != state->events || adaptive_has_outgrown(adaptive))
-        TRY(adaptive_set_tolerances(adaptive));
-    return adaptive_evolve(adaptive, length, event, is_event);
-}
-
 // Advances by at most `length` seconds and applies the event at the end.
 static Status adaptive_step(Adaptive *adaptive, double length) {
     ModalState *state = &adaptive->stepping->state;
     ContactEvent event;
     bool is_event = false;
-    TRY(adaptive_try(adaptive, &length, &event, &is_event));
+    TRY(adaptive_evolve(adaptive, &length, &event, &is_event));
     if (length > 0)
         adaptive_accept(adaptive, length, is_event ? &event : NULL);
     TRY(time_stepping_note(adaptive->stepping, adaptive_count_cost(adaptive)));
@@ -393,14 +344,49 @@ static Status adaptive_interval(TimeStepping *stepping, double length) {
     return STATUS_OK;
 }
 
+// RK8(7)13M of Prince and Dormand, J. Comp. Appl. Math. 7 (1981) 67-75. The error estimate of
+// ARKODE's own table of order 8 is zero for y' = f(t), so it does not see a contact begin.
 static bool adaptive_set_method(void *arkode) {
-    double rows[STAGES * STAGES], at[STAGES], sums[STAGES], second[STAGES];
-    memcpy(rows, stages, sizeof rows);
-    memcpy(at, nodes, sizeof at);
-    memcpy(sums, weights, sizeof sums);
-    memcpy(second, embedded, sizeof second);
-    ARKodeButcherTable table =
-        ARKodeButcherTable_Create(STAGES, ORDER, EMBEDDED_ORDER, at, rows, sums, second);
+    // clang-format off
+    double nodes[STAGES] = {
+        0, 1.0 / 18, 1.0 / 12, 1.0 / 8, 5.0 / 16, 3.0 / 8, 59.0 / 400, 93.0 / 200,
+        5490023248.0 / 9719169821.0, 13.0 / 20, 1201146811.0 / 1299019798.0, 1, 1};
+    double stages[STAGES][STAGES] = {
+        {0},
+        {1.0 / 18},
+        {1.0 / 48, 1.0 / 16},
+        {1.0 / 32, 0, 3.0 / 32},
+        {5.0 / 16, 0, -75.0 / 64, 75.0 / 64},
+        {3.0 / 80, 0, 0, 3.0 / 16, 3.0 / 20},
+        {29443841.0 / 614563906.0, 0, 0, 77736538.0 / 692538347.0, -28693883.0 / 1125000000.0,
+         23124283.0 / 1800000000.0},
+        {16016141.0 / 946692911.0, 0, 0, 61564180.0 / 158732637.0, 22789713.0 / 633445777.0,
+         545815736.0 / 2771057229.0, -180193667.0 / 1043307555.0},
+        {39632708.0 / 573591083.0, 0, 0, -433636366.0 / 683701615.0, -421739975.0 / 2616292301.0,
+         100302831.0 / 723423059.0, 790204164.0 / 839813087.0, 800635310.0 / 3783071287.0},
+        {246121993.0 / 1340847787.0, 0, 0, -37695042795.0 / 15268766246.0,
+         -309121744.0 / 1061227803.0, -12992083.0 / 490766935.0, 6005943493.0 / 2108947869.0,
+         393006217.0 / 1396673457.0, 123872331.0 / 1001029789.0},
+        {-1028468189.0 / 846180014.0, 0, 0, 8478235783.0 / 508512852.0, 1311729495.0 / 1432422823.0,
+         -10304129995.0 / 1701304382.0, -48777925059.0 / 3047939560.0, 15336726248.0 / 1032824649.0,
+         -45442868181.0 / 3398467696.0, 3065993473.0 / 597172653.0},
+        {185892177.0 / 718116043.0, 0, 0, -3185094517.0 / 667107341.0, -477755414.0 / 1098053517.0,
+         -703635378.0 / 230739211.0, 5731566787.0 / 1027545527.0, 5232866602.0 / 850066563.0,
+         -4093664535.0 / 808688257.0, 3962137247.0 / 1805957418.0, 65686358.0 / 487910083.0},
+        {403863854.0 / 491063109.0, 0, 0, -5068492393.0 / 434740067.0, -411421997.0 / 543043805.0,
+         652783627.0 / 914296604.0, 11173962825.0 / 925320556.0, -13158990841.0 / 6184727034.0,
+         3936647629.0 / 1978049680.0, -160528059.0 / 685178525.0, 248638103.0 / 1413531060.0}};
+    double weights[STAGES] = {
+        14005451.0 / 335480064.0, 0, 0, 0, 0, -59238493.0 / 1068277825.0, 181606767.0 / 758867731.0,
+        561292985.0 / 797845732.0, -1041891430.0 / 1371343529.0, 760417239.0 / 1151165299.0,
+        118820643.0 / 751138087.0, -528747749.0 / 2220607170.0, 1.0 / 4};
+    double embedded[STAGES] = {
+        13451932.0 / 455176623.0, 0, 0, 0, 0, -808719846.0 / 976000145.0,
+        1757004468.0 / 5645159321.0, 656045339.0 / 265891186.0, -3867574721.0 / 1518517206.0,
+        465885868.0 / 322736535.0, 53011238.0 / 667516719.0, 2.0 / 45, 0};
+    // clang-format on
+    ARKodeButcherTable table = ARKodeButcherTable_Create(STAGES, ORDER, EMBEDDED_ORDER, nodes,
+                                                         stages[0], weights, embedded);
     const bool is_set = table != NULL && ERKStepSetTable(arkode, table) == 0;
     ARKodeButcherTable_Free(table);
     return is_set;
@@ -460,7 +446,7 @@ static Status adaptive_make(TimeStepping *stepping) {
     for (bool is_event = true; is_event;) {
         ContactEvent event;
         double length = state->interval;
-        TRY(adaptive_try(adaptive, &length, &event, &is_event));
+        TRY(adaptive_evolve(adaptive, &length, &event, &is_event));
         is_event = is_event && length == 0;
         if (is_event)
             TRY(contact_event_apply(state, &event));

@@ -35,7 +35,9 @@ static Slice base_cursor_aligned_slice(const BaseCursor *cursor, size_t n, doubl
     const size_t j = cursor->ratio == 1 ? n : n / cursor->ratio;
     const double whole =
         cursor->ratio == 1 ? 0 : (double)(n - j * cursor->ratio) / (double)cursor->ratio;
-    return base_cursor_sampled_slice(cursor->base, j, whole + offset / cursor->base->interval);
+    const double part =
+        offset == 0 ? whole : whole + offset / cursor->base->interval; // a division less
+    return base_cursor_sampled_slice(cursor->base, j, part);
 }
 
 // The piece at `offset` after output sample n; returns how long it holds. Times count from the
@@ -64,14 +66,16 @@ static double base_cursor_piece_slice(const BaseCursor *cursor, size_t n, double
 
 double base_cursor_slice(const BaseCursor *cursor, size_t n, double offset, Slice *slice) {
     const Base *base = cursor->base;
+    if (cursor->ratio > 0) {
+        *slice = base_cursor_aligned_slice(cursor, n, offset);
+        return INFINITY;
+    }
     *slice = (Slice){0, 0, 0};
     if (base->form == BASE_PIECES)
         return base_cursor_piece_slice(cursor, n, offset, slice);
     if (base->form == BASE_SINE)
         *slice = base_cursor_sine_slice(cursor, n, offset);
-    if (cursor->ratio > 0)
-        *slice = base_cursor_aligned_slice(cursor, n, offset);
-    if (base->form != BASE_SAMPLED || cursor->ratio > 0)
+    if (base->form != BASE_SAMPLED)
         return INFINITY;
     const double time = (double)n / cursor->sample_rate + offset;
     const double place = floor(time / base->interval);
@@ -89,9 +93,10 @@ double base_cursor_slice(const BaseCursor *cursor, size_t n, double offset, Slic
 
 bool base_cursor_interval(const BaseCursor *cursor, size_t n, Slice *slice) {
     const double knot = base_cursor_slice(cursor, n, 0, slice);
-    return cursor->base->form == BASE_SAMPLED
-               ? cursor->ratio > 0
-               : knot >= (1 - 8 * DBL_EPSILON * (double)(n + 1)) / cursor->sample_rate;
+    if (cursor->base->form == BASE_SAMPLED)
+        return cursor->ratio > 0;
+    return knot == INFINITY ||
+           knot >= (1 - 8 * DBL_EPSILON * (double)(n + 1)) / cursor->sample_rate;
 }
 
 double base_cursor_at(const BaseCursor *cursor, size_t n) {

@@ -63,10 +63,10 @@ static const TradeoffPoint *find(const Tradeoff *answer, const char *name) {
 }
 
 static void solver_add(StudyRequest *inquiry, const char *name) {
-    Texts *named = &study_of(inquiry)->solvers;
-    named->at = realloc(named->at, (named->count + 1) * sizeof *named->at);
-    assert_non_null(named->at);
-    named->at[named->count++] = strdup(name);
+    Texts *names = &study_of(inquiry)->solvers;
+    names->at = realloc(names->at, (names->count + 1) * sizeof *names->at);
+    assert_non_null(names->at);
+    names->at[names->count++] = strdup(name);
 }
 
 static void every_solver_is_tried_and_the_reference_with_less(void **state) {
