@@ -268,7 +268,15 @@ typedef struct SeriesContact {
 // dt = root Y^(root - 1) dtau, where Y = p^(1/root) belongs to the leading contact, so that Y' =
 // p'. A row of `stride` values holds w of the dampers, t, q, p, then a_g and its quadrature if the
 // base is a sine, then r of the dampers if there are several.
-typedef struct PowerSeries {
+typedef struct PowerContact {
+    ModalState *state;
+    double tolerance;   // relative error of one contact
+    double last_length; // of the last series in its tau, before events cut it
+    int last_root;      // its root
+    size_t kinks;       // passed in a row in no time
+    double *row;        // scratch
+    double *block;      // NULL if no contact is under a power law
+    // The series of the last integration step:
     size_t modes, dampers;
     size_t stride;
     size_t at_t, at_q, at_p, at_a, at_r; // columns
@@ -285,35 +293,23 @@ typedef struct PowerSeries {
     size_t contact_count;
     int root;                           // of the leading contact; 1: tau is t
     SeriesFactor powers[SERIES_POWERS]; // of Y
-} PowerSeries;
+} PowerContact;
 
 // Expands the motion from the present state, with the leading contact at Y, over `length` in tau.
 // The order is the smallest that keeps the truncation error, at most order_max. Returns the s up to
 // which the error is kept.
-double power_series_expand(PowerSeries *series, const ModalState *state, const Slice *slice,
-                           double Y, double length);
+double power_series_expand(PowerContact *power, const Slice *slice, double Y, double length);
 
 // Reduces the step to 0 to s, and scales the series so that s = 1 is its end again.
-void power_series_cut(PowerSeries *series, double s);
+void power_series_cut(PowerContact *power, double s);
 
 // Evaluates the whole row at s.
-void power_series_at(const PowerSeries *series, double s, double *row);
+void power_series_at(const PowerContact *power, double s, double *row);
 
 // Coefficients of Y of the leading contact.
-static inline const double *power_series_leader(const PowerSeries *series) {
-    return series->powers[1].up;
+static inline const double *power_series_leader(const PowerContact *power) {
+    return power->powers[1].up;
 }
-
-typedef struct PowerContact {
-    ModalState *state;
-    double tolerance;      // relative error of one contact
-    PowerSeries series;    // of the last integration step
-    double *row, *elastic; // scratch
-    double last_length;    // of the last series in its tau, before events cut it
-    int last_root;         // its root
-    size_t kinks;          // passed in a row in no time
-    double *block;         // NULL if no contact is under a power law
-} PowerContact;
 
 // One integration step.
 typedef struct PowerContactStep {
@@ -329,17 +325,17 @@ typedef struct PowerContactStep {
 
 // Allocates for one run, nothing if its contact law is no power law. Freed by power_contact_clear,
 // also after a failure.
-Status power_contact_make(PowerContact *contact, ModalState *state, double tolerance,
+Status power_contact_make(PowerContact *power, ModalState *state, double tolerance,
                           Problem *problem);
-void power_contact_clear(PowerContact *contact);
+void power_contact_clear(PowerContact *power);
 
 // Whether a buffer under a power law is compressed, so that power_contact_step must be used.
-bool power_contact_is_active(const PowerContact *contact);
+bool power_contact_is_active(const PowerContact *power);
 
 // Advances the state by one integration step, at most `length` long and at most to the first event,
 // which is returned but not applied. Updates the impact rows of the dampers in contact. a_g is
 // `slice` from the present instant on.
-void power_contact_step(PowerContact *contact, const Slice *slice, double length,
+void power_contact_step(PowerContact *power, const Slice *slice, double length,
                         PowerContactStep *step);
 
 // --- recorder.c: the samples of runs by modes in the wanted columns, and peaks and sums over all

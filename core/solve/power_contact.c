@@ -105,7 +105,7 @@ static double power_series_power(const double *b, double exponent, const double 
 }
 
 // Order k of N.
-INLINE void power_series_force(PowerSeries *series, SeriesContact *contact, size_t k,
+INLINE void power_series_force(PowerContact *power, SeriesContact *contact, size_t k,
                                bool is_leader) {
     const SeriesLaw *law = &contact->law;
     if (!contact->has_force) {
@@ -113,20 +113,19 @@ INLINE void power_series_force(PowerSeries *series, SeriesContact *contact, size
         return;
     }
     SeriesFactor *elastic = &contact->elastic, *viscous = &contact->viscous;
-    contact->speeds.now = contact->sign * series->z[k * series->stride + contact->damper];
+    contact->speeds.now = contact->sign * power->z[k * power->stride + contact->damper];
     if (is_leader && law->is_integer) {
-        elastic = &series->powers[law->elastic];
-        viscous = &series->powers[law->viscous];
+        elastic = &power->powers[law->elastic];
+        viscous = &power->powers[law->viscous];
     } else {
         // Powers of Y of the leader, and of p of the others.
         double own[SERIES_ROW];
         const double root = is_leader ? law->root : 1;
-        for (size_t j = 0; j < k && is_leader; j++)
-            own[j] = series->powers[1].up[j];
-        if (is_leader)
-            own[k] = series->powers[1].now;
-        for (size_t j = 0; j <= k && !is_leader; j++)
-            own[j] = contact->sign * series->z[j * series->stride + series->at_r + contact->damper];
+        for (size_t j = 0; j <= k; j++)
+            own[j] = !is_leader ? contact->sign *
+                                      power->z[j * power->stride + power->at_r + contact->damper]
+                     : j < k ? power->powers[1].up[j]
+                             : power->powers[1].now;
         elastic->now = power_series_power(own, root * law->exponents[0], elastic->up, k);
         viscous->now = law->exponents[1] == law->exponents[0]
                            ? elastic->now
@@ -141,10 +140,10 @@ INLINE void power_series_force(PowerSeries *series, SeriesContact *contact, size
 }
 
 // D p + W^2 q.
-INLINE void power_series_elastic(PowerSeries *series, const ModalState *state, const double *row,
+INLINE void power_series_elastic(PowerContact *power, const ModalState *state, const double *row,
                                  size_t n) {
-    const double *q = row + series->at_q, *p = row + series->at_p;
-    double *restrict out = series->elastic;
+    const double *q = row + power->at_q, *p = row + power->at_p;
+    double *restrict out = power->elastic;
     if (n == 1 || state->diagonal != NULL) {
         for (size_t i = 0; i < n; i++)
             out[i] =
@@ -161,18 +160,18 @@ INLINE void power_series_elastic(PowerSeries *series, const ModalState *state, c
 }
 
 // Order k of the derivative in t.
-INLINE void power_series_rate(PowerSeries *series, const ModalState *state, const Slice *slice,
+INLINE void power_series_rate(PowerContact *power, const ModalState *state, const Slice *slice,
                               size_t k, size_t n, size_t m) {
-    const double *row = series->z + k * series->stride;
-    double *restrict rate = series->rate + k * series->stride;
-    const double *elastic = series->elastic;
-    const double base = series->is_sine ? row[series->at_a]
-                        : k == 0        ? slice->value
-                                        : slice->slope * row[series->at_t];
-    power_series_elastic(series, state, row, n);
+    const double *row = power->z + k * power->stride;
+    double *restrict rate = power->rate + k * power->stride;
+    const double *elastic = power->elastic;
+    const double base = power->is_sine ? row[power->at_a]
+                        : k == 0       ? slice->value
+                                       : slice->slope * row[power->at_t];
+    power_series_elastic(power, state, row, n);
     for (size_t i = 0; i < n; i++) {
-        rate[series->at_q + i] = row[series->at_p + i];
-        rate[series->at_p + i] = -elastic[i] - state->participation[i] * base;
+        rate[power->at_q + i] = row[power->at_p + i];
+        rate[power->at_p + i] = -elastic[i] - state->participation[i] * base;
     }
     for (size_t d = 0; d < m; d++) {
         const DamperState *damper = &state->damper[d];
@@ -181,33 +180,33 @@ INLINE void power_series_rate(PowerSeries *series, const ModalState *state, cons
             acceleration += damper->shape[i] * elastic[i];
         rate[d] = acceleration;
         if (m > 1)
-            rate[series->at_r + d] = row[d];
+            rate[power->at_r + d] = row[d];
     }
-    for (size_t c = 0; c < (m == 1 ? 1 : series->contact_count); c++) {
-        const SeriesContact *contact = series->contact[c];
+    for (size_t c = 0; c < (m == 1 ? 1 : power->contact_count); c++) {
+        const SeriesContact *contact = power->contact[c];
         const double force = contact->sign * contact->force[k];
         const double *shape = state->damper[contact->damper].shape;
         for (size_t i = 0; i < n; i++)
-            rate[series->at_p + i] += shape[i] * force;
+            rate[power->at_p + i] += shape[i] * force;
         for (size_t d = 0; d < m; d++)
             rate[d] -= state->delassus[d * m + contact->damper] * force;
     }
-    rate[series->at_t] = k == 0;
-    if (series->is_sine) {
-        rate[series->at_a] = slice->omega * row[series->at_a + 1];
-        rate[series->at_a + 1] = -slice->omega * row[series->at_a];
+    rate[power->at_t] = k == 0;
+    if (power->is_sine) {
+        rate[power->at_a] = slice->omega * row[power->at_a + 1];
+        rate[power->at_a + 1] = -slice->omega * row[power->at_a];
     }
 }
 
 // Order k + 1 of the state, which is that of the integral of rate * time_factor * root * length.
-INLINE void power_series_state(PowerSeries *series, const SeriesFactor *time_factor, size_t k,
+INLINE void power_series_state(PowerContact *power, const SeriesFactor *time_factor, size_t k,
                                size_t stride) {
-    const double scale = series->length * series->root / (double)(k + 1);
-    double *restrict next = series->z + (k + 1) * stride;
-    const double *rate = series->rate, *last = rate + k * stride;
+    const double scale = power->length * power->root / (double)(k + 1);
+    double *restrict next = power->z + (k + 1) * stride;
+    const double *rate = power->rate, *last = rate + k * stride;
     const double *down = time_factor->down + SERIES_ROW - 1 - k;
-    if (series->root == 1 || k == 0) {
-        const double times = series->root == 1 ? scale : scale * time_factor->now;
+    if (power->root == 1 || k == 0) {
+        const double times = power->root == 1 ? scale : scale * time_factor->now;
         for (size_t i = 0; i < stride; i++)
             next[i] = times * last[i];
         return;
@@ -237,12 +236,12 @@ INLINE void power_series_state(PowerSeries *series, const SeriesFactor *time_fac
 }
 
 // The largest scaled coefficient of order k.
-INLINE double power_series_largest(const PowerSeries *series, size_t k, size_t n, size_t m) {
-    const double *row = series->z + k * series->stride;
-    double largest = impact_log_larger(fabs(series->powers[1].now) * series->inverse_root,
-                                       fabs(row[series->at_t]) * series->inverse_time);
-    for (size_t c = 0; c < (m == 1 ? 1 : series->contact_count); c++) {
-        const SeriesContact *contact = series->contact[c];
+INLINE double power_series_largest(const PowerContact *power, size_t k, size_t n, size_t m) {
+    const double *row = power->z + k * power->stride;
+    double largest = impact_log_larger(fabs(power->powers[1].now) * power->inverse_root,
+                                       fabs(row[power->at_t]) * power->inverse_time);
+    for (size_t c = 0; c < (m == 1 ? 1 : power->contact_count); c++) {
+        const SeriesContact *contact = power->contact[c];
         largest = impact_log_larger(largest, fabs(row[contact->damper]) * contact->inverse_speed);
         // Powers by recurrence spread their rounding errors, which w need not show.
         if (c > 0 || !contact->law.is_integer)
@@ -250,126 +249,125 @@ INLINE double power_series_largest(const PowerSeries *series, size_t k, size_t n
                 impact_log_larger(largest, fabs(contact->force[k - 1]) * contact->inverse_force);
     }
     for (size_t i = 0; i < n; i++)
-        largest =
-            impact_log_larger(largest, fabs(row[series->at_p + i]) * series->inverse_modal[i]);
+        largest = impact_log_larger(largest, fabs(row[power->at_p + i]) * power->inverse_modal[i]);
     return largest;
 }
 
-INLINE double power_series_orders(PowerSeries *series, const ModalState *state, const Slice *slice,
+INLINE double power_series_orders(PowerContact *power, const ModalState *state, const Slice *slice,
                                   size_t n, size_t m, size_t stride) {
-    const SeriesContact *leader = series->contact[0];
+    const SeriesContact *leader = power->contact[0];
     const SeriesLaw *law = &leader->law;
-    const SeriesFactor *time_factor = &series->powers[series->root == 1 ? 0 : law->time_factor];
-    const size_t contact_count = m == 1 ? 1 : series->contact_count;
+    const SeriesFactor *time_factor = &power->powers[power->root == 1 ? 0 : law->time_factor];
+    const size_t contact_count = m == 1 ? 1 : power->contact_count;
     // From Y = 0 only one order in `gap` is not 0. As many in a row have to be small.
     const size_t gap = leader->has_force && law->is_integer
                            ? (size_t)(law->power[law->elastic] + law->root)
                            : WINDOW_MIN;
     const size_t window =
-        series->powers[1].now * series->inverse_root > NEAR || gap < WINDOW_MIN ? WINDOW_MIN : gap;
-    const size_t order = series->order_max > window ? series->order_max : window + 1;
+        power->powers[1].now * power->inverse_root > NEAR || gap < WINDOW_MIN ? WINDOW_MIN : gap;
+    const size_t order = power->order_max > window ? power->order_max : window + 1;
     size_t small = 0; // orders in a row
     double size[SERIES_ROW];
     const int powers = leader->has_force ? law->count : 2;
     for (int i = 2; i < powers; i++)
-        series_factor_start(&series->powers[i], 0);
+        series_factor_start(&power->powers[i], 0);
     for (size_t c = 0; c < contact_count; c++) {
-        series_factor_start(&series->contact[c]->speeds, 0);
+        series_factor_start(&power->contact[c]->speeds, 0);
         if (c == 0 && law->is_integer)
             continue; // its powers are those of Y
-        series_factor_start(&series->contact[c]->elastic, 0);
-        series_factor_start(&series->contact[c]->viscous, 0);
+        series_factor_start(&power->contact[c]->elastic, 0);
+        series_factor_start(&power->contact[c]->viscous, 0);
     }
     size_t k = 0;
     for (; k < order; k++) {
         for (int i = 2; i < powers; i++)
-            series->powers[i].now = series_factor_product(&series->powers[law->left[i]],
-                                                          &series->powers[law->right[i]], k);
+            power->powers[i].now = series_factor_product(&power->powers[law->left[i]],
+                                                         &power->powers[law->right[i]], k);
         for (size_t c = 0; c < contact_count; c++)
-            power_series_force(series, series->contact[c], k, c == 0);
-        power_series_rate(series, state, slice, k, n, m);
-        power_series_state(series, time_factor, k, stride);
+            power_series_force(power, power->contact[c], k, c == 0);
+        power_series_rate(power, state, slice, k, n, m);
+        power_series_state(power, time_factor, k, stride);
         for (int i = 0; i < powers; i++)
-            series_factor_store(&series->powers[i], k);
+            series_factor_store(&power->powers[i], k);
         for (size_t c = 0; c < contact_count; c++) {
-            series_factor_store(&series->contact[c]->speeds, k);
+            series_factor_store(&power->contact[c]->speeds, k);
             if (c == 0 && law->is_integer)
                 continue;
-            series_factor_store(&series->contact[c]->elastic, k);
-            series_factor_store(&series->contact[c]->viscous, k);
+            series_factor_store(&power->contact[c]->elastic, k);
+            series_factor_store(&power->contact[c]->viscous, k);
         }
-        series->powers[0].now = 0;
-        series->powers[1].now = series->length / (double)(k + 1) * leader->sign *
-                                series->z[k * stride + leader->damper];
-        size[k + 1] = power_series_largest(series, k + 1, n, m);
-        small = size[k + 1] <= series->error ? small + 1 : 0;
+        power->powers[0].now = 0;
+        power->powers[1].now =
+            power->length / (double)(k + 1) * leader->sign * power->z[k * stride + leader->damper];
+        size[k + 1] = power_series_largest(power, k + 1, n, m);
+        small = size[k + 1] <= power->error ? small + 1 : 0;
         if (small >= window) {
             k++;
             break;
         }
     }
-    series_factor_store(&series->powers[1], k);
-    series->degree = k;
+    series_factor_store(&power->powers[1], k);
+    power->degree = k;
     // Coefficients fall like R^-k. The first order left out shall be below the error.
     double log_radius = INFINITY;
     for (size_t j = k - window + 1; j <= k; j++)
         log_radius = fmin(log_radius, -log(size[j]) / (double)j);
-    return exp(fmin(log_radius + log(series->error) / (double)(k + 1), 1));
+    return exp(fmin(log_radius + log(power->error) / (double)(k + 1), 1));
 }
 
-double power_series_expand(PowerSeries *series, const ModalState *state, const Slice *slice,
-                           double Y, double length) {
-    double *row = series->z;
-    const size_t n = series->modes, m = series->dampers;
-    series->length = length;
-    memset(row, 0, series->stride * sizeof *row);
+double power_series_expand(PowerContact *power, const Slice *slice, double Y, double length) {
+    const ModalState *state = power->state;
+    double *row = power->z;
+    const size_t n = power->modes, m = power->dampers;
+    power->length = length;
+    memset(row, 0, power->stride * sizeof *row);
     for (size_t d = 0; d < m; d++) {
         row[d] = state->damper[d].w;
         if (m > 1)
-            row[series->at_r + d] = state->damper[d].r;
+            row[power->at_r + d] = state->damper[d].r;
     }
-    memcpy(row + series->at_q, state->q, n * sizeof *row);
-    memcpy(row + series->at_p, state->p, n * sizeof *row);
-    if (series->is_sine) {
-        row[series->at_a] = slice->value;
-        row[series->at_a + 1] = slice->slope;
+    memcpy(row + power->at_q, state->q, n * sizeof *row);
+    memcpy(row + power->at_p, state->p, n * sizeof *row);
+    if (power->is_sine) {
+        row[power->at_a] = slice->value;
+        row[power->at_a + 1] = slice->slope;
     }
-    series_factor_start(&series->powers[0], 1);
-    series_factor_start(&series->powers[1], Y);
+    series_factor_start(&power->powers[0], 1);
+    series_factor_start(&power->powers[1], Y);
     // Constant sizes make contacts of one mode and one damper some 5 % faster (bench_power).
-    if (n == 1 && m == 1 && series->stride == 4)
-        return power_series_orders(series, state, slice, 1, 1, 4);
-    if (n == 1 && m == 1 && series->stride == 8)
-        return power_series_orders(series, state, slice, 1, 1, 8);
-    return power_series_orders(series, state, slice, n, m, series->stride);
+    if (n == 1 && m == 1 && power->stride == 4)
+        return power_series_orders(power, state, slice, 1, 1, 4);
+    if (n == 1 && m == 1 && power->stride == 8)
+        return power_series_orders(power, state, slice, 1, 1, 8);
+    return power_series_orders(power, state, slice, n, m, power->stride);
 }
 
-void power_series_cut(PowerSeries *series, double s) {
-    double power = s;
-    series->length *= s;
-    for (size_t k = 1; k <= series->degree; k++, power *= s) {
-        double *row = series->z + k * series->stride;
-        for (size_t i = 0; i < series->stride; i++)
-            row[i] *= power;
-        series->powers[1].up[k] *= power;
-        for (size_t c = 0; c < series->contact_count && k < series->degree; c++)
-            series->contact[c]->force[k] *= power;
+void power_series_cut(PowerContact *power, double s) {
+    double share = s;
+    power->length *= s;
+    for (size_t k = 1; k <= power->degree; k++, share *= s) {
+        double *row = power->z + k * power->stride;
+        for (size_t i = 0; i < power->stride; i++)
+            row[i] *= share;
+        power->powers[1].up[k] *= share;
+        for (size_t c = 0; c < power->contact_count && k < power->degree; c++)
+            power->contact[c]->force[k] *= share;
     }
 }
 
 // Copies the coefficients of one column, degree + 1 values.
-static void power_series_column(const PowerSeries *series, size_t column, double *out) {
-    for (size_t k = 0; k <= series->degree; k++)
-        out[k] = series->z[k * series->stride + column];
+static void power_series_column(const PowerContact *power, size_t column, double *out) {
+    for (size_t k = 0; k <= power->degree; k++)
+        out[k] = power->z[k * power->stride + column];
 }
 
 // Horner's scheme. At s = 1 it adds the small terms first.
-void power_series_at(const PowerSeries *series, double s, double *row) {
-    const size_t stride = series->stride;
+void power_series_at(const PowerContact *power, double s, double *row) {
+    const size_t stride = power->stride;
     for (size_t i = 0; i < stride; i += 4) {
-        const double *at = series->z + series->degree * stride + i;
+        const double *at = power->z + power->degree * stride + i;
         Two sum[2] = {TWO(at), TWO(at + 2)};
-        for (size_t k = series->degree; k > 0; k--) {
+        for (size_t k = power->degree; k > 0; k--) {
             at -= stride;
             sum[0] = sum[0] * s + TWO(at);
             sum[1] = sum[1] * s + TWO(at + 2);
@@ -389,54 +387,52 @@ static const double ORDER_BASE = 2.5,
 static const double SPAN = 0.3;         // usual step, in (root of depth) / speed
 static const double ONSET_MARGIN = 0.9; // N is left out below this part of the onset
 
-Status power_contact_make(PowerContact *contact, ModalState *state, double tolerance,
+Status power_contact_make(PowerContact *power, ModalState *state, double tolerance,
                           Problem *problem) {
-    memset(contact, 0, sizeof *contact);
-    contact->state = state;
-    contact->tolerance = tolerance;
+    memset(power, 0, sizeof *power);
+    power->state = state;
+    power->tolerance = tolerance;
     if (state->plan->form != CONTACT_POWER || state->dampers == 0)
         return STATUS_OK;
     const size_t n = state->mode_count, m = state->dampers;
-    PowerSeries *series = &contact->series;
-    series->error = fmax(STEP_PART * tolerance, ROUNDING);
-    const double order = ORDER_BASE - ORDER_SLOPE * log(series->error);
-    series->order_max = order > ORDER_MAX ? ORDER_MAX : (size_t)order;
-    series->modes = n;
-    series->dampers = m;
-    series->is_sine = state->base.base->omega > 0;
-    series->at_t = m;
-    series->at_q = m + 1;
-    series->at_p = series->at_q + n;
-    series->at_a = series->at_p + n;
-    series->at_r = series->at_a + (series->is_sine ? 2 : 0);
-    series->stride = (series->at_r + (m > 1 ? m : 0) + 3) / 4 * 4;
-    series->all = calloc(m, sizeof *series->all);
-    series->contact = calloc(m, sizeof *series->contact);
+    power->error = fmax(STEP_PART * tolerance, ROUNDING);
+    const double order = ORDER_BASE - ORDER_SLOPE * log(power->error);
+    power->order_max = order > ORDER_MAX ? ORDER_MAX : (size_t)order;
+    power->modes = n;
+    power->dampers = m;
+    power->is_sine = state->base.base->omega > 0;
+    power->at_t = m;
+    power->at_q = m + 1;
+    power->at_p = power->at_q + n;
+    power->at_a = power->at_p + n;
+    power->at_r = power->at_a + (power->is_sine ? 2 : 0);
+    power->stride = (power->at_r + (m > 1 ? m : 0) + 3) / 4 * 4;
+    power->all = calloc(m, sizeof *power->all);
+    power->contact = calloc(m, sizeof *power->contact);
     const SimdArray arrays[] = {
-        {&series->z, SERIES_ROW * series->stride},
-        {&series->rate, SERIES_ROW * series->stride},
-        {&contact->row, series->stride},
-        {&contact->elastic, state->padded},
-        {&series->elastic, n},
-        {&series->inverse_modal, n},
+        {&power->z, SERIES_ROW * power->stride},
+        {&power->rate, SERIES_ROW * power->stride},
+        {&power->row, power->stride},
+        {&power->elastic, state->padded},
+        {&power->inverse_modal, n},
     };
-    contact->block = simd_kernels_allocate(arrays, COUNT(arrays));
-    if (series->all == NULL || series->contact == NULL || contact->block == NULL)
+    power->block = simd_kernels_allocate(arrays, COUNT(arrays));
+    if (power->all == NULL || power->contact == NULL || power->block == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for contacts of %zu dampers", m);
     for (size_t d = 0; d < m; d++)
-        series->all[d].damper = d;
+        power->all[d].damper = d;
     return STATUS_OK;
 }
 
-void power_contact_clear(PowerContact *contact) {
-    free(contact->series.all);
-    free(contact->series.contact);
-    free(contact->block);
+void power_contact_clear(PowerContact *power) {
+    free(power->all);
+    free(power->contact);
+    free(power->block);
 }
 
-bool power_contact_is_active(const PowerContact *contact) {
-    for (size_t d = 0; contact->block != NULL && d < contact->state->dampers; d++)
-        if (contact->state->damper[d].phase == PHASE_CONTACT)
+bool power_contact_is_active(const PowerContact *power) {
+    for (size_t d = 0; power->block != NULL && d < power->state->dampers; d++)
+        if (power->state->damper[d].phase == PHASE_CONTACT)
             return true;
     return false;
 }
@@ -484,10 +480,10 @@ static double power_contact_onset(const SeriesContact *at, double error, double 
 }
 
 // Updates the scales of a damper's contact to the present state.
-static void power_contact_update(PowerContact *contact, size_t d) {
-    const ModalState *state = contact->state;
+static void power_contact_update(PowerContact *power, size_t d) {
+    const ModalState *state = power->state;
     const DamperState *damper = &state->damper[d];
-    SeriesContact *at = &contact->series.all[d];
+    SeriesContact *at = &power->all[d];
     const double mass = damper->effective_mass, w = modal_state_sign(damper->side) * damper->w;
     const ContactParameters *now = &damper->contact;
     at->sign = modal_state_sign(damper->side);
@@ -499,7 +495,7 @@ static void power_contact_update(PowerContact *contact, size_t d) {
     }
     at->acceleration = modal_state_sign(damper->side) *
                        (damper->base_coupling * state->base_acceleration +
-                        modal_state_dot(damper->shape, contact->elastic, state->mode_count));
+                        modal_state_dot(damper->shape, power->elastic, state->mode_count));
     const double p = power_contact_penetration(damper);
     const double speed = fmax(fabs(w), damper->row.impact.approach_speed);
     if (!(speed <= at->speed) || !(speed >= at->speed / 4) || !(at->speed > 0)) {
@@ -513,7 +509,7 @@ static void power_contact_update(PowerContact *contact, size_t d) {
         at->speed = fmax(speed, sqrt(2 * fabs(at->acceleration) * at->depth));
     }
     at->depth = fmax(at->depth, p);
-    at->onset = power_contact_onset(at, contact->series.error, w, mass);
+    at->onset = power_contact_onset(at, power->error, w, mass);
     at->strain = power_contact_strain(at, p);
 }
 
@@ -532,16 +528,15 @@ static bool power_contact_is_damped(const SeriesContact *at, const DamperState *
 
 // Lists the contacts, the leading one first: of those with a force the one with the smallest p in
 // its scale. Returns its Y.
-static double power_contact_list(PowerContact *contact) {
-    const ModalState *state = contact->state;
-    PowerSeries *series = &contact->series;
-    SeriesContact **const list = series->contact;
+static double power_contact_list(PowerContact *power) {
+    const ModalState *state = power->state;
+    SeriesContact **const list = power->contact;
     size_t leader = 0;
     double smallest = INFINITY;
-    series->contact_count = 0;
+    power->contact_count = 0;
     for (size_t d = 0; d < state->dampers; d++) {
         const DamperState *damper = &state->damper[d];
-        SeriesContact *at = &series->all[d];
+        SeriesContact *at = &power->all[d];
         if (damper->phase != PHASE_CONTACT)
             continue;
         const double p = power_contact_penetration(damper);
@@ -550,81 +545,80 @@ static double power_contact_list(PowerContact *contact) {
         const double relative = at->has_force ? p / at->depth : 0x1p1000;
         if (relative < smallest) {
             smallest = relative;
-            leader = series->contact_count;
+            leader = power->contact_count;
         }
-        list[series->contact_count++] = at;
+        list[power->contact_count++] = at;
     }
     SeriesContact *const first = list[leader];
     list[leader] = list[0];
     list[0] = first;
     // Another contact at p = 0 has no series in the leader's time before its onset.
-    for (size_t c = 1; c < series->contact_count; c++) {
+    for (size_t c = 1; c < power->contact_count; c++) {
         if (power_contact_penetration(&state->damper[list[c]->damper]) > 0)
             continue;
         list[c]->has_force = false;
-        list[c]->onset = fmax(list[c]->onset, power_contact_impact_onset(list[c], series->error));
+        list[c]->onset = fmax(list[c]->onset, power_contact_impact_onset(list[c], power->error));
     }
-    series->root = first->has_force ? first->law.root : 1;
+    power->root = first->has_force ? first->law.root : 1;
     return power_contact_root(power_contact_penetration(&state->damper[first->damper]),
-                              series->root);
+                              power->root);
 }
 
 // Updates the scales of the series. Returns the length in tau to try.
-static double power_contact_scale(PowerContact *contact, double Y, double length) {
-    const ModalState *state = contact->state;
-    PowerSeries *series = &contact->series;
+static double power_contact_scale(PowerContact *power, double Y, double length) {
+    const ModalState *state = power->state;
     const size_t n = state->mode_count;
-    const int root = series->root;
+    const int root = power->root;
     double time = INFINITY;
     for (size_t i = 0; i < n; i++)
-        series->inverse_modal[i] = fabs(state->p[i]) + DBL_MIN;
-    for (size_t c = 0; c < series->contact_count; c++) {
-        SeriesContact *at = series->contact[c];
+        power->inverse_modal[i] = fabs(state->p[i]) + DBL_MIN;
+    for (size_t c = 0; c < power->contact_count; c++) {
+        SeriesContact *at = power->contact[c];
         const DamperState *damper = &state->damper[at->damper];
         const double speed = at->speed + DBL_MIN, own = at->depth / speed;
         for (size_t i = 0; i < n; i++)
-            series->inverse_modal[i] += fabs(damper->shape[i]) * damper->effective_mass * speed;
+            power->inverse_modal[i] += fabs(damper->shape[i]) * damper->effective_mass * speed;
         at->inverse_speed = 1 / speed;
         at->inverse_force = own / (damper->effective_mass * speed);
         time = own < time ? own : time;
     }
     for (size_t i = 0; i < n; i++)
-        series->inverse_modal[i] = 1 / series->inverse_modal[i];
-    const SeriesContact *leader = series->contact[0];
+        power->inverse_modal[i] = 1 / power->inverse_modal[i];
+    const SeriesContact *leader = power->contact[0];
     const double w = leader->sign * state->damper[leader->damper].w;
     const double Y_scale = power_contact_root(leader->depth, root) + DBL_MIN;
-    series->inverse_root = 1 / Y_scale;
-    series->inverse_time = 1 / (time + DBL_MIN);
+    power->inverse_root = 1 / Y_scale;
+    power->inverse_time = 1 / (time + DBL_MIN);
     // `length` at constant speed is (E - Y) / w in tau, E^root = Y^root + w length. Division by the
     // sum of Y^i E^(root - 1 - i) avoids the cancellation.
     double p = Y;
     for (int i = 1; i < root; i++)
         p *= Y;
     const double E = power_contact_root(impact_log_larger(p + w * length, 0), root);
-    double sum = 0, power = 1;
-    for (int i = 0; i < root; i++, power *= Y)
-        sum = sum * E + power;
+    double sum = 0, next = 1;
+    for (int i = 0; i < root; i++, next *= Y)
+        sum = sum * E + next;
     const double usual = SPAN * Y_scale * leader->inverse_speed;
     const double reach =
-        root == contact->last_root && contact->last_length > usual ? contact->last_length : usual;
+        root == power->last_root && power->last_length > usual ? power->last_length : usual;
     return fmin(reach, 1.02 * length / sum);
 }
 
 // Cuts the step where the leading contact is released: t would decrease beyond. Returns whether it
 // is.
-static bool power_contact_cut_release(PowerSeries *series) {
+static bool power_contact_cut_release(PowerContact *power) {
     double s;
-    const bool is_released = polynomial_root_first(power_series_leader(series), series->degree, &s);
+    const bool is_released = polynomial_root_first(power_series_leader(power), power->degree, &s);
     if (is_released)
-        power_series_cut(series, s);
+        power_series_cut(power, s);
     return is_released;
 }
 
 // Cuts the step where t is `length`. Returns whether it reaches `length`; *is_cut: it was longer.
-static bool power_contact_cut_time(PowerSeries *series, double length, bool *is_cut) {
+static bool power_contact_cut_time(PowerContact *power, double length, bool *is_cut) {
     double left[SERIES_ROW], s, t = 0;
-    power_series_column(series, series->at_t, left);
-    for (size_t k = series->degree; k > 0; k--) {
+    power_series_column(power, power->at_t, left);
+    for (size_t k = power->degree; k > 0; k--) {
         t += left[k];
         left[k] = -left[k];
     }
@@ -632,49 +626,47 @@ static bool power_contact_cut_time(PowerSeries *series, double length, bool *is_
     if (t <= length)
         return t >= length * (1 - 4 * DBL_EPSILON);
     left[0] = length;
-    *is_cut = polynomial_root_first(left, series->degree, &s);
+    *is_cut = polynomial_root_first(left, power->degree, &s);
     if (*is_cut)
-        power_series_cut(series, s);
+        power_series_cut(power, s);
     return true;
 }
 
 // The release of a contact that does not lead, and the onset of a force that is left out.
-static void power_contact_find_release(const PowerContact *contact, size_t c, ContactEvent *first) {
-    const PowerSeries *series = &contact->series;
-    const SeriesContact *at = series->contact[c];
-    ContactEvent event = {.damper = at->damper, .side = contact->state->damper[at->damper].side};
+static void power_contact_find_release(const PowerContact *power, size_t c, ContactEvent *first) {
+    const SeriesContact *at = power->contact[c];
+    ContactEvent event = {.damper = at->damper, .side = power->state->damper[at->damper].side};
     double r[SERIES_ROW];
     if (c > 0) {
-        power_series_column(series, series->at_r + at->damper, r);
-        contact_event_locate(r, series->degree, at->sign, 0, 0, event, first);
+        power_series_column(power, power->at_r + at->damper, r);
+        contact_event_locate(r, power->degree, at->sign, 0, 0, event, first);
     }
     event.is_onset = true;
     if (!at->has_force)
-        contact_event_locate(c > 0 ? r : power_series_leader(series), series->degree,
+        contact_event_locate(c > 0 ? r : power_series_leader(power), power->degree,
                              c > 0 ? -at->sign : -1, at->onset, 0, event, first);
 }
 
-static void power_contact_find_kink(const PowerContact *contact, const SeriesContact *at,
+static void power_contact_find_kink(const PowerContact *power, const SeriesContact *at,
                                     ContactEvent *first) {
-    const PowerSeries *series = &contact->series;
     double w[SERIES_ROW];
-    if (!(at->terms.viscous > 0) || !at->has_force || contact->kinks > KINKS_MAX)
+    if (!(at->terms.viscous > 0) || !at->has_force || power->kinks > KINKS_MAX)
         return;
     const int sign = at->is_damped ? 1 : -1;
-    power_series_column(series, at->damper, w);
+    power_series_column(power, at->damper, w);
     const bool is_here = fabs(at->sign * w[0] - at->terms.turn) <= 4 * DBL_EPSILON * fabs(w[0]);
-    contact_event_locate(w, series->degree, sign * at->sign, -sign * at->terms.turn, is_here,
+    contact_event_locate(w, power->degree, sign * at->sign, -sign * at->terms.turn, is_here,
                          (ContactEvent){.damper = at->damper, .kink = -sign}, first);
 }
 
 // A contact that is over already: the gap opens from the first instant on.
-static bool power_contact_find_open(const PowerContact *contact, PowerContactStep *step) {
-    const ModalState *state = contact->state;
+static bool power_contact_find_open(const PowerContact *power, PowerContactStep *step) {
+    const ModalState *state = power->state;
     for (size_t d = 0; d < state->dampers; d++) {
         const DamperState *damper = &state->damper[d];
         const double sign = modal_state_sign(damper->side), w = sign * damper->w;
         if (damper->phase != PHASE_CONTACT || sign * damper->r > 0 ||
-            !(w < 0 || (w == 0 && !(contact->series.all[d].acceleration > 0))))
+            !(w < 0 || (w == 0 && !(power->all[d].acceleration > 0))))
             continue;
         step->is_event = true;
         step->event = (ContactEvent){.damper = d, .s = 1, .side = damper->side};
@@ -685,47 +677,45 @@ static bool power_contact_find_open(const PowerContact *contact, PowerContactSte
 
 // What ends the step first; s is INFINITY if nothing does. is_released: the leading contact is at
 // its end.
-static ContactEvent power_contact_find(const PowerContact *contact, bool is_released) {
-    const ModalState *state = contact->state;
-    const PowerSeries *series = &contact->series;
-    const size_t leader = series->contact[0]->damper;
+static ContactEvent power_contact_find(const PowerContact *power, bool is_released) {
+    const ModalState *state = power->state;
+    const size_t leader = power->contact[0]->damper;
     ContactEvent first = {
         .damper = leader, .s = is_released ? 1 : INFINITY, .side = state->damper[leader].side};
-    for (size_t c = 0; c < series->contact_count; c++) {
-        power_contact_find_release(contact, c, &first);
-        power_contact_find_kink(contact, series->contact[c], &first);
+    for (size_t c = 0; c < power->contact_count; c++) {
+        power_contact_find_release(power, c, &first);
+        power_contact_find_kink(power, power->contact[c], &first);
     }
     for (size_t d = 0; d < state->dampers; d++) {
         double r[SERIES_ROW];
         if (state->damper[d].phase != PHASE_FLIGHT)
             continue;
-        power_series_column(series, series->at_r + d, r);
-        contact_event_find_touch(state, d, r, series->degree, &first);
+        power_series_column(power, power->at_r + d, r);
+        contact_event_find_touch(state, d, r, power->degree, &first);
     }
     return first;
 }
 
 // Sets the state to that at s. is_released: the leading contact's p is exactly 0 there.
-static void power_contact_state(PowerContact *contact, const Slice *slice, double s,
+static void power_contact_state(PowerContact *power, const Slice *slice, double s,
                                 bool is_released) {
-    ModalState *state = contact->state;
-    const PowerSeries *series = &contact->series;
-    const SeriesContact *leader = series->contact[0];
-    const double *row = contact->row;
-    power_series_at(series, s, contact->row);
-    memcpy(state->q, row + series->at_q, state->mode_count * sizeof *state->q);
-    memcpy(state->p, row + series->at_p, state->mode_count * sizeof *state->p);
+    ModalState *state = power->state;
+    const SeriesContact *leader = power->contact[0];
+    const double *row = power->row;
+    power_series_at(power, s, power->row);
+    memcpy(state->q, row + power->at_q, state->mode_count * sizeof *state->q);
+    memcpy(state->p, row + power->at_p, state->mode_count * sizeof *state->p);
     for (size_t d = 0; d < state->dampers; d++) {
         state->damper[d].w = row[d];
         if (state->dampers > 1)
-            state->damper[d].r = row[series->at_r + d];
+            state->damper[d].r = row[power->at_r + d];
     }
-    const double Y = fmax(polynomial_value(power_series_leader(series), series->degree, s), 0);
+    const double Y = fmax(polynomial_value(power_series_leader(power), power->degree, s), 0);
     double r = Y;
-    for (int i = 1; i < series->root; i++)
+    for (int i = 1; i < power->root; i++)
         r *= Y;
     state->damper[leader->damper].r = is_released ? 0 : leader->sign * r;
-    state->base_acceleration = slice_at(slice, row[series->at_t]);
+    state->base_acceleration = slice_at(slice, row[power->at_t]);
 }
 
 // Horner's scheme at all nodes of a rule.
@@ -750,24 +740,23 @@ static double power_contact_loss(const ModalState *state, const double *p) {
 
 // Integrates over the step by Gauss-Legendre quadrature: the work of the base, the losses, and
 // impulse and work of each N.
-static void power_contact_integrate(PowerContact *contact, const Slice *slice, StepWork *work) {
-    const ModalState *state = contact->state;
-    PowerSeries *series = &contact->series;
+static void power_contact_integrate(PowerContact *power, const Slice *slice, StepWork *work) {
+    const ModalState *state = power->state;
     const Quadrature *rule =
-        &linear_motion_rules[series->error > 1e-8 ? 0 : LINEAR_MOTION_RULES - 1];
-    const double *w = contact->row, *p = w + series->at_p;
+        &linear_motion_rules[power->error > 1e-8 ? 0 : LINEAR_MOTION_RULES - 1];
+    const double *w = power->row, *p = w + power->at_p;
     double Y[COUNT(rule->node)];
-    power_contact_nodes(rule, power_series_leader(series), series->degree, Y);
-    for (size_t c = 0; c < series->contact_count; c++) {
-        SeriesContact *at = series->contact[c];
+    power_contact_nodes(rule, power_series_leader(power), power->degree, Y);
+    for (size_t c = 0; c < power->contact_count; c++) {
+        SeriesContact *at = power->contact[c];
         at->impulse = at->work = 0;
-        power_contact_nodes(rule, at->force, series->degree - 1, at->node_force);
+        power_contact_nodes(rule, at->force, power->degree - 1, at->node_force);
     }
     for (size_t k = 0; k < rule->count; k++) {
-        power_series_at(series, rule->node[k], contact->row);
-        const double ground = series->is_sine ? w[series->at_a] : slice_at(slice, w[series->at_t]);
-        double weight = rule->weight[k] * series->length * series->root;
-        for (int i = 1; i < series->root; i++)
+        power_series_at(power, rule->node[k], power->row);
+        const double ground = power->is_sine ? w[power->at_a] : slice_at(slice, w[power->at_t]);
+        double weight = rule->weight[k] * power->length * power->root;
+        for (int i = 1; i < power->root; i++)
             weight *= Y[k];
         double momentum = modal_state_dot(state->momentum_weights, p, state->mode_count);
         for (size_t d = 0; d < state->dampers; d++)
@@ -775,8 +764,8 @@ static void power_contact_integrate(PowerContact *contact, const Slice *slice, S
         work->input -= weight * ground * momentum;
         work->damping += weight * power_contact_loss(state, p);
         work->ground += weight * ground;
-        for (size_t c = 0; c < series->contact_count; c++) {
-            SeriesContact *at = series->contact[c];
+        for (size_t c = 0; c < power->contact_count; c++) {
+            SeriesContact *at = power->contact[c];
             const double impulse = weight * at->sign * at->node_force[k];
             at->impulse += impulse;
             at->work += impulse * w[at->damper];
@@ -785,32 +774,31 @@ static void power_contact_integrate(PowerContact *contact, const Slice *slice, S
 }
 
 // Peak forces on the step, and peak accelerations at their instants. Changes the state.
-static void power_contact_peaks(PowerContact *contact, const Slice *slice) {
-    ModalState *state = contact->state;
-    const PowerSeries *series = &contact->series;
-    for (size_t c = 0; c < series->contact_count; c++) {
-        const SeriesContact *of = series->contact[c];
+static void power_contact_peaks(PowerContact *power, const Slice *slice) {
+    ModalState *state = power->state;
+    for (size_t c = 0; c < power->contact_count; c++) {
+        const SeriesContact *of = power->contact[c];
         DamperState *damper = &state->damper[of->damper];
         double s = -1;
         if (!of->has_force)
             continue;
         const double peak =
-            linear_motion_largest(of->force, series->degree - 1,
+            linear_motion_largest(of->force, power->degree - 1,
                                   impact_log_least_force(&state->impacts, &damper->row), &s);
         impact_log_force(&state->impacts, &damper->row, peak);
         if (!(s > 0 && s < 1))
             continue;
-        power_contact_state(contact, slice, s, false);
+        power_contact_state(power, slice, s, false);
         modal_state_forces(state);
         recorder_acceleration(state);
     }
 }
 
 // Adds the step to the impact rows; the state is that of its end.
-static void power_contact_log(PowerContact *contact, double length) {
-    ModalState *state = contact->state;
-    for (size_t c = 0; c < contact->series.contact_count; c++) {
-        const SeriesContact *at = contact->series.contact[c];
+static void power_contact_log(PowerContact *power, double length) {
+    ModalState *state = power->state;
+    for (size_t c = 0; c < power->contact_count; c++) {
+        const SeriesContact *at = power->contact[c];
         DamperState *damper = &state->damper[at->damper];
         const double strain = power_contact_strain(at, power_contact_penetration(damper));
         impact_log_stretch(&state->impacts, &damper->row, length, at->impulse,
@@ -818,53 +806,51 @@ static void power_contact_log(PowerContact *contact, double length) {
     }
 }
 
-void power_contact_step(PowerContact *contact, const Slice *slice, double length,
+void power_contact_step(PowerContact *power, const Slice *slice, double length,
                         PowerContactStep *step) {
-    ModalState *state = contact->state;
-    PowerSeries *series = &contact->series;
+    ModalState *state = power->state;
     *step = (PowerContactStep){0};
-    modal_state_elastic(state, state->q, state->p, contact->elastic);
+    modal_state_elastic(state, state->q, state->p, power->elastic);
     for (size_t d = 0; d < state->dampers; d++)
         if (state->damper[d].phase == PHASE_CONTACT)
-            power_contact_update(contact, d);
-    if (power_contact_find_open(contact, step))
+            power_contact_update(power, d);
+    if (power_contact_find_open(power, step))
         return;
-    const double Y = power_contact_list(contact);
-    const double span = power_contact_scale(contact, Y, length);
-    power_series_cut(series, power_series_expand(series, state, slice, Y, span));
-    contact->last_length = series->length;
-    contact->last_root = series->root;
-    const bool is_released = power_contact_cut_release(series);
+    const double Y = power_contact_list(power);
+    const double span = power_contact_scale(power, Y, length);
+    power_series_cut(power, power_series_expand(power, slice, Y, span));
+    power->last_length = power->length;
+    power->last_root = power->root;
+    const bool is_released = power_contact_cut_release(power);
     bool is_cut;
-    const bool is_whole = power_contact_cut_time(series, length, &is_cut);
-    const ContactEvent end = power_contact_find(contact, is_released && !is_cut);
+    const bool is_whole = power_contact_cut_time(power, length, &is_cut);
+    const ContactEvent end = power_contact_find(power, is_released && !is_cut);
     const bool is_found = end.s <= 1;
     if (end.s < 1)
-        power_series_cut(series, end.s);
+        power_series_cut(power, end.s);
     if (!state->is_shadow) {
-        power_contact_integrate(contact, slice, &step->work);
-        power_contact_peaks(contact, slice);
+        power_contact_integrate(power, slice, &step->work);
+        power_contact_peaks(power, slice);
     }
     step->is_event = is_found && !end.is_onset && end.kink == 0;
     step->event = end;
     step->event.s = 1;
-    power_contact_state(contact, slice, 1,
-                        step->is_event && end.damper == series->contact[0]->damper);
-    step->length = is_whole && !is_found ? length : contact->row[series->at_t];
+    power_contact_state(power, slice, 1, step->is_event && end.damper == power->contact[0]->damper);
+    step->length = is_whole && !is_found ? length : power->row[power->at_t];
     if (!state->is_shadow)
-        power_contact_log(contact, step->length);
-    contact->kinks = step->length > 0 ? 0 : contact->kinks + 1;
-    for (size_t c = 0; c < series->contact_count; c++)
+        power_contact_log(power, step->length);
+    power->kinks = step->length > 0 ? 0 : power->kinks + 1;
+    for (size_t c = 0; c < power->contact_count; c++)
         if (step->length > 0)
-            series->contact[c]->kink_passed = 0;
+            power->contact[c]->kink_passed = 0;
     if (end.kink != 0) {
         DamperState *damper = &state->damper[end.damper];
-        SeriesContact *at = &series->all[end.damper];
+        SeriesContact *at = &power->all[end.damper];
         damper->w = modal_state_sign(damper->side) * at->terms.turn;
         at->kink_passed = end.kink;
     }
-    const double k = (double)series->degree, n = (double)state->mode_count;
+    const double k = (double)power->degree, n = (double)state->mode_count;
     step->cost = STEP_COST +
-                 k * k / 2 * ((double)series->stride + 4 * (double)series->contact_count) +
-                 (state->diagonal == NULL ? k * n * n : 0) + 12 * k * (double)series->stride;
+                 k * k / 2 * ((double)power->stride + 4 * (double)power->contact_count) +
+                 (state->diagonal == NULL ? k * n * n : 0) + 12 * k * (double)power->stride;
 }

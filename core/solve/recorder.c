@@ -197,13 +197,6 @@ void recorder_finish(Recorder *record, const ModalState *state, Response *respon
     response->statistics_count = record->count;
 }
 
-// An upper bound of the values of all storeys.
-static double recorder_bound(const ModalState *state, const double *modal) {
-    double most;
-    state->lanes->weighted_abs(state->padded, 1, state->max_shape, modal, &most);
-    return most;
-}
-
 // Eight at a time: zeros follow `count` values up to whole vectors.
 static double recorder_largest_value(const double *values, size_t count) {
     double most[SIMD_WIDTH] = {0};
@@ -216,7 +209,8 @@ static double recorder_largest_value(const double *values, size_t count) {
 }
 
 void recorder_acceleration(ModalState *state) {
-    double most = recorder_bound(state, state->elastic), at = 0;
+    double most, at = 0; // an upper bound first
+    state->lanes->weighted_abs(state->padded, 1, state->max_shape, state->elastic, &most);
     for (size_t d = 0; d < state->dampers; d++)
         most += state->damper[d].max_mobility * fabs(state->damper[d].force);
     if (!(most > state->impacts.response->peaks.acceleration))

@@ -117,7 +117,7 @@ static void the_motion_is_smooth_at_the_touch(void **state) {
     const Slice still = {0, 0, 0};
     PowerContactStep step;
     power_contact_step(&pair.ode, &still, 1e3, &step);
-    const PowerSeries *series = &pair.ode.series;
+    const PowerContact *series = &pair.ode;
     const double *Y = power_series_leader(series);
     assert_int_equal(series->root, 2);
     // Y'' = -(2 / m_e) Y^4: orders 1, 6, 11, 16, 21 and no others.
@@ -196,7 +196,7 @@ static void the_order_is_integer_over_a_whole_contact(void **state) {
             Pair pair;
             double time = 0;
             pair_make(&pair, &contact_hertz, 1.5, 0, POWER_CONTACT_TOLERANCE);
-            PowerSeries *series = &pair.ode.series;
+            PowerContact *series = &pair.ode;
             // Equal steps in tau; the last is cut where Y is 0.
             const ContactTerms terms = {.stiffness = 1, .exponent = 1.5};
             const double length = half ? 0.1 : 0.2;
@@ -216,7 +216,7 @@ static void the_order_is_integer_over_a_whole_contact(void **state) {
             double Y = 0, s = 0;
             for (int step = 0; step < 100 && !(s > 0); step++) {
                 double row[8];
-                (void)power_series_expand(series, &pair.frame, &still, Y, length);
+                (void)power_series_expand(series, &still, Y, length);
                 if (polynomial_root_first(power_series_leader(series), series->degree, &s))
                     power_series_cut(series, s);
                 power_series_at(series, 1, row);
