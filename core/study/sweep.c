@@ -196,10 +196,9 @@ static Status sweep_grid_fill_material(const Buffer *pinned, Buffer *buffer) {
     buffer->test = pinned->test;
     if (pinned->table.count == 0)
         return STATUS_OK;
-    const size_t size = pinned->table.count * sizeof *pinned->table.at;
-    ContactRow *rows = malloc(size);
+    ContactRow *rows = calloc(pinned->table.count, sizeof *rows);
     TRY(status_made(rows != NULL));
-    memcpy(rows, pinned->table.at, size);
+    memcpy(rows, pinned->table.at, pinned->table.count * sizeof *rows);
     free(buffer->table.at);
     buffer->table = (ContactRows){rows, pinned->table.count};
     return STATUS_OK;
@@ -226,8 +225,7 @@ static Status sweep_grid_fill_record(const PinnedRecords *records, Simulation *t
     for (size_t i = 0; i < records->count; i++) {
         const PinnedRecord *pinned = &records->at[i];
         if (pinned->named != NULL && strcmp(pinned->name, record->name) == 0)
-            return record_resolve(record, (NamedRecord *)(void *)pinned->named) ? STATUS_OK
-                                                                                : STATUS_NO_MEMORY;
+            return status_made(record_resolve(record, (NamedRecord *)(void *)pinned->named));
     }
     return STATUS_OK;
 }
