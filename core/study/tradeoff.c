@@ -55,14 +55,6 @@ const Field tradeoff_point_fields[] = {
 };
 // clang-format on
 
-// The reference solver: the first of the table that can run.
-static const Kind *candidate_settings_reference(void) {
-    size_t i = 0;
-    while (solvers[i]->run == NULL)
-        i++;
-    return &solvers[i]->kind;
-}
-
 // A list under construction, all of the same simulation.
 typedef struct Candidates {
     TradeoffPoints *points;
@@ -194,6 +186,7 @@ static void candidate_add_solver(Candidates *list, const Solver *solver, double 
         candidate_add(list, kind, "%s", "");
 }
 
+// What is traded with the reference solver.
 static void candidate_add_reference(Candidates *list, const Kind *solver) {
     if (candidate_has_form(list->simulation, CONTACT_LINEAR)) {
         const char *model = contact_impulse.kind.name;
@@ -207,7 +200,6 @@ static void candidate_add_reference(Candidates *list, const Kind *solver) {
 
 Status candidate_settings_list(const Texts *names, const Simulation *simulation,
                                TradeoffPoints *points) {
-    const Kind *reference = candidate_settings_reference();
     Candidates list = {.points = points, .simulation = simulation};
     double finest = 0;
     *points = (TradeoffPoints){NULL, 0};
@@ -215,8 +207,8 @@ Status candidate_settings_list(const Texts *names, const Simulation *simulation,
     for (size_t i = 0; solvers[i] != NULL && list.is_whole; i++)
         if (solvers[i]->run != NULL && candidate_is_requested(names, solvers[i]->kind.name))
             candidate_add_solver(&list, solvers[i], finest);
-    if (list.is_whole && candidate_is_requested(names, reference->name))
-        candidate_add_reference(&list, reference);
+    if (list.is_whole && candidate_is_requested(names, solver_exact.kind.name))
+        candidate_add_reference(&list, &solver_exact.kind);
     for (size_t i = 0; i < points->count && list.is_whole; i++)
         points->at[i].estimate = candidate_settings_cost(simulation, &points->at[i]);
     free(list.spare.contact_model);
@@ -447,7 +439,7 @@ static Status tradeoff_run_reference(TradeoffRun *run, Problem *problem) {
     TradeoffPoint exact;
     Simulation simulation = {0};
     (void)fields_default(tradeoff_point_fields, &exact);
-    TRY(study_copy_text(candidate_settings_reference()->name, &reference->solver));
+    TRY(study_copy_text(solver_exact.kind.name, &reference->solver));
     exact.solver = reference->solver;
     Status status =
         candidate_settings_apply(run->simulation, &exact, run->tools->limits, &simulation, problem);
