@@ -9,11 +9,12 @@
 #include "core/base/canonical.h"
 #include "core/drop_test/pulse_model.h"
 
-enum { OUTLIERS_MAX = 5, POINTER_SIZE = sizeof((Fault){0}.pointer) };
+enum { OUTLIERS_MAX = 5, SOURCE_MAX = 1000, POINTER_SIZE = sizeof((Fault){0}.pointer) };
 
 static const double effect_min = 0.01;     // of gravity
 static const double pair_tolerance = 0.02; // of effective masses that are considered equal
 
+const char *const proposal_form_names[] = {"constant", "table", NULL};
 static const char *const restitution_by_names[] = {"heights", "speeds", "pulse", NULL};
 static const char *const contact_time_by_names[] = {"duration", "pulse", NULL};
 
@@ -656,10 +657,6 @@ Status evaluation_run(const Measurement *tests, size_t count, Separation separat
     return status == STATUS_NO_MEMORY ? problem_set(problem, status, "no memory for the evaluation")
                                       : status;
 }
-
-const char *const proposal_form_names[] = {"constant", "table", NULL};
-
-enum { SOURCE_MAX = 1000 };
 
 void material_proposal_clear(MaterialProposal *proposal) {
     fields_clear(material_fields, &proposal->material);

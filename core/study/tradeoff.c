@@ -1,3 +1,6 @@
+// The rows of a solver's settings say what it can trade: a row "step" or "tolerance" makes
+// candidates, whatever the solver is called.
+//
 // Every point is run once for its errors and then timed, in `repeats` rounds over all points, which
 // share a temporary slowdown of the machine. Short runs are timed many at once.
 //
@@ -14,8 +17,6 @@
 #include "core/simulation/impulse_variant.h"
 #include "core/solve/solvers.h"
 
-// The rows of a solver's settings say what it can trade: a row "step" or "tolerance" makes
-// candidates, whatever the solver is called.
 enum {
     DECADES_MAX = 8,  // of steps, from the sample interval down
     SEGMENT_MIN = 16, // samples of a segment
