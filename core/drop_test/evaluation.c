@@ -778,8 +778,7 @@ static Status proposal_set_constant(Proposal *proposal) {
     if (e->count == 0)
         return status_made(text_format(&proposal->result->why,
                                        "no reading that counts gives the restitution, which a "
-                                       "revision needs: add a measurement with heights or "
-                                       "speeds"));
+                                       "revision needs: add a measurement with heights or speeds"));
     material->restitution = e->mean;
     material->restitution_deviation = e->spread;
     material->contact_time = T->mean;
