@@ -91,8 +91,7 @@ static Status drop_check_speed(double height, double speed, const char *name, co
         return STATUS_OK;
     return json_pointer_fault_real(
         problem, pointer, name, speed, "m/s",
-        "must be within %.0f %% of the %.4g m/s that a height of %.4g m gives, is %.4g "
-        "m/s",
+        "must be within %.0f %% of the %.4g m/s that a height of %.4g m gives, is %.4g m/s",
         100 * height_tolerance, falls, height, speed);
 }
 
@@ -102,9 +101,8 @@ static Status drop_check_rebound(const DropTest *test, const Drop *drop, const c
     if (has_rise && !isnan(drop->drop_height) && drop->rebound_height > drop->drop_height)
         return json_pointer_fault_real(
             problem, pointer, "rebound_height", drop->rebound_height, "m",
-            "must be at most the drop_height of %.6g m, is %.6g m: a rebound cannot "
-            "exceed the drop; a drop that does not count needs \"excluded\" with the "
-            "reason",
+            "must be at most the drop_height of %.6g m, is %.6g m: a rebound cannot exceed the "
+            "drop; a drop that does not count needs \"excluded\" with the reason",
             drop->drop_height, drop->rebound_height);
     if (has_rise && !has_speed && test->base == MATERIAL_BASE_FREE &&
         isnan(drop_test_effective_mass(test)))

@@ -31,11 +31,6 @@ typedef struct Trace {
     char *excluded;       // why it does not count; NULL: it counts
     char *note;
 } Trace;
-typedef struct Traces {
-    Trace *at;
-    size_t count;
-} Traces;
-
 typedef struct DropTest {
     char *impactor;       // "steel ball, 30 mm"
     double impactor_mass; // [kg]
@@ -51,7 +46,10 @@ typedef struct DropTest {
     double speed_uncertainty;  // [m/s]
     double time_uncertainty;   // [s]
     Drops drops;
-    Traces traces;
+    struct {
+        Trace *at;
+        size_t count;
+    } traces;
 } DropTest;
 
 extern const Field drop_test_fields[];

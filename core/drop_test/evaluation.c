@@ -9,11 +9,12 @@
 #include "core/base/canonical.h"
 #include "core/drop_test/pulse_model.h"
 
-enum { OUTLIERS_MAX = 5, POINTER_SIZE = sizeof((Fault){0}.pointer) };
+enum { OUTLIERS_MAX = 5, SOURCE_MAX = 1000, POINTER_SIZE = sizeof((Fault){0}.pointer) };
 
 static const double effect_min = 0.01;     // of gravity
 static const double pair_tolerance = 0.02; // of effective masses that are considered equal
 
+const char *const proposal_form_names[] = {"constant", "table", NULL};
 static const char *const restitution_by_names[] = {"heights", "speeds", "pulse", NULL};
 static const char *const contact_time_by_names[] = {"duration", "pulse", NULL};
 
@@ -617,26 +618,28 @@ static Status evaluation_warn(const Measurement *tests, size_t count, Evaluation
     return evaluation_warn_of_outliers(evaluation);
 }
 
-static Status evaluation_add_rows(const Measurement *tests, size_t count, Separation separation,
-                                  const Progress *progress, EvaluationRows *rows,
-                                  Problem *problem) {
+static Status evaluation_make(const Measurement *tests, size_t count, const Progress *progress,
+                              Evaluation *evaluation, Problem *problem) {
+    const int separation = evaluation->separation;
+    EvaluationRows *rows = &evaluation->rows;
     for (size_t i = 0; i < count; i++) {
-        const ReadingList list = {&tests[i], i, (int)separation, progress, rows, problem};
+        const ReadingList list = {&tests[i], i, separation, progress, rows, problem};
         for (size_t k = 0; k < tests[i].test->drops.count; k++)
             TRY(reading_add_drop(&list, k));
         for (size_t k = 0; k < tests[i].test->traces.count; k++)
             TRY(reading_add_trace(&list, k));
     }
-    return readings_correct_gravity(tests, count, (int)separation, progress, rows);
-}
-
-static Status evaluation_add_statistics(Evaluation *evaluation) {
-    Reading *readings = calloc(evaluation->rows.count + 1, sizeof *readings);
+    TRY(readings_correct_gravity(tests, count, separation, progress, rows));
+    evaluation_choose_restitutions(rows);
+    for (size_t i = 0; i < rows->count; i++)
+        if (reading_counts(&rows->at[i]))
+            ranges_extend(&evaluation->ranges, &rows->at[i], tests);
+    Reading *readings = calloc(rows->count + 1, sizeof *readings);
     Status status = status_made(readings != NULL);
     for (int is_time = 0; is_time < 2 && status == STATUS_OK; is_time++)
         status = evaluation_set_statistic(is_time == 1, readings, evaluation);
     free(readings);
-    return status;
+    return status == STATUS_OK ? evaluation_warn(tests, count, evaluation) : status;
 }
 
 Status evaluation_run(const Measurement *tests, size_t count, Separation separation,
@@ -644,30 +647,16 @@ Status evaluation_run(const Measurement *tests, size_t count, Separation separat
     *evaluation = (Evaluation){.separation = (int)separation,
                                .confidence = EVALUATION_CONFIDENCE,
                                .ranges = ranges_unknown};
-    EvaluationRows *rows = &evaluation->rows;
     const size_t samples = evaluation_sample_count(tests, count);
     if (samples > EVALUATION_SAMPLES_MAX)
         return problem_set(problem, STATUS_LIMIT,
                            "more than %d samples in traces, %zu: evaluate fewer measurements at a "
                            "time",
                            EVALUATION_SAMPLES_MAX, samples);
-    Status status = evaluation_add_rows(tests, count, separation, progress, rows, problem);
-    if (status == STATUS_OK) {
-        evaluation_choose_restitutions(rows);
-        for (size_t i = 0; i < rows->count; i++)
-            if (reading_counts(&rows->at[i]))
-                ranges_extend(&evaluation->ranges, &rows->at[i], tests);
-        status = evaluation_add_statistics(evaluation);
-    }
-    if (status == STATUS_OK)
-        status = evaluation_warn(tests, count, evaluation);
+    const Status status = evaluation_make(tests, count, progress, evaluation, problem);
     return status == STATUS_NO_MEMORY ? problem_set(problem, status, "no memory for the evaluation")
                                       : status;
 }
-
-const char *const proposal_form_names[] = {"constant", "table", NULL};
-
-enum { SOURCE_MAX = 1000 };
 
 void material_proposal_clear(MaterialProposal *proposal) {
     fields_clear(material_fields, &proposal->material);
@@ -789,8 +778,7 @@ static Status proposal_set_constant(Proposal *proposal) {
     if (e->count == 0)
         return status_made(text_format(&proposal->result->why,
                                        "no reading that counts gives the restitution, which a "
-                                       "revision needs: add a measurement with heights or "
-                                       "speeds"));
+                                       "revision needs: add a measurement with heights or speeds"));
     material->restitution = e->mean;
     material->restitution_deviation = e->spread;
     material->contact_time = T->mean;

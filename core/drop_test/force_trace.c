@@ -370,16 +370,6 @@ static size_t trace_fill_window(const ContactDetection *found, size_t number, in
     return from;
 }
 
-// The interval without a fit: from the samples above the threshold.
-static void trace_count_samples(const ContactDetection *found, const DetectedContact *run,
-                                int separation, double interval, TraceContact *contact) {
-    const double seen = (double)(run->last - run->first);
-    double before;
-    const double after = trace_hidden(found->threshold / fabs(run->peak), separation, &before);
-    contact->least_contact_time = seen * interval;
-    contact->most_contact_time = (seen + 2) * (1 + after) * interval;
-}
-
 // rms of the residuals of the *count means of the window during contact [peak].
 static double trace_misfit(const FitWindow *window, const PulseFit *fit, const PulseModel *model,
                            double T, size_t *count) {
@@ -563,7 +553,13 @@ static Status trace_read_contact(double interval, const TraceOptions *options,
     contact->seen.last = (double)run->last * interval;
     contact->seen.crossing_time = (double)(run->pressed - run->first + 1) * interval;
     contact->seen.crossing_uncertainty = interval / sqrt(6);
-    trace_count_samples(found, run, options->separation, interval, contact);
+    // The interval without a fit: from the samples above the threshold.
+    const double seen = (double)(run->last - run->first);
+    double before;
+    const double after =
+        trace_hidden(found->threshold / fabs(run->peak), options->separation, &before);
+    contact->least_contact_time = seen * interval;
+    contact->most_contact_time = (seen + 2) * (1 + after) * interval;
     if (run->first == 0 || run->last == found->samples - 1) {
         contact->most_contact_time = (double)NAN;
         return status_made(text_format(&contact->why, "the trace %s during the contact",

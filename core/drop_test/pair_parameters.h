@@ -23,11 +23,6 @@ typedef struct PairContact {
     PairFigure stiffness, damping;        // k_b [N/m], c_b [N s/m]
     PairFigure damping_ratio;             // Z [-]
 } PairContact;
-typedef struct PairContacts {
-    PairContact *at;
-    size_t count;
-} PairContacts;
-
 typedef struct PairParameters {
     double damper_mass;             // [kg]
     double structure_mass;          // NAN: fixed [kg]
@@ -35,7 +30,10 @@ typedef struct PairParameters {
     double effective_mass;          // [kg]
     double test_mass;               // of the test's pair; NAN: unknown [kg]
     double least_speed, most_speed; // measured; NAN: unknown [m/s]
-    PairContacts contacts;          // by row, then by rule
+    struct {
+        PairContact *at;
+        size_t count;
+    } contacts; // by row, then by rule
     Warnings warnings;
 } PairParameters;
 

@@ -175,7 +175,8 @@ static double gravity_rebound(const GravityLoad *load, const PulseModel *model) 
 
 GravityContact gravity_apply(const GravityLoad *load, double restitution, double contact_time) {
     const double pull = load->gravity * contact_time / load->speed;
-    const PulseModel model = pulse_model_make(-log(restitution), pull, false, load->separation);
+    const PulseModel model =
+        pulse_model_make(-log(restitution), pull, false, (int)load->separation);
     return (GravityContact){gravity_rebound(load, &model), model.length * contact_time};
 }
 
@@ -185,15 +186,15 @@ static bool gravity_find(const GravityLoad *load, double read, double time, bool
                          double *restitution, double *contact_time) {
     const double pull = load->gravity * time / load->speed;
     double least = read, most = 1; // gravity only lowers e
-    PulseModel model = pulse_model_make(0, pull, is_total, load->separation);
+    PulseModel model = pulse_model_make(0, pull, is_total, (int)load->separation);
     if (!(gravity_rebound(load, &model) >= read * (1 - 1e-12)))
         return false;
     for (int i = 0; i < HALVINGS; i++) {
         const double middle = (least + most) / 2;
-        model = pulse_model_make(-log(middle), pull, is_total, load->separation);
+        model = pulse_model_make(-log(middle), pull, is_total, (int)load->separation);
         *(gravity_rebound(load, &model) < read ? &least : &most) = middle;
     }
-    model = pulse_model_make(-log(most), pull, is_total, load->separation);
+    model = pulse_model_make(-log(most), pull, is_total, (int)load->separation);
     *restitution = most;
     *contact_time = is_total ? time / model.length : time;
     return most > 0 && *contact_time > 0;
@@ -222,6 +223,6 @@ bool gravity_correct_one(const GravityLoad *load, bool is_time, double read, dou
     if (!is_time)
         return gravity_find(load, read, other, false, isolated, &ignored);
     const double pull = load->gravity * read / load->speed;
-    *isolated = read / pulse_model_make(-log(other), pull, true, load->separation).length;
+    *isolated = read / pulse_model_make(-log(other), pull, true, (int)load->separation).length;
     return *isolated > 0;
 }

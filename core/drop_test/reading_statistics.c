@@ -176,8 +176,7 @@ static bool statistic_set_interval(const Reading *readings, size_t count, Statis
                               count)
                 : text_format(&statistic->why,
                               "mean weighted by the stated uncertainties and a scatter of %.3g "
-                              "beyond them, +- %.4g standard errors, Student's t for %zu "
-                              "readings",
+                              "beyond them, +- %.4g standard errors, Student's t for %zu readings",
                               statistic->scatter, t, count);
     } else if (stated > 0) {
         statistic->standard_error = stated;
@@ -212,9 +211,8 @@ static bool trend_describe(const char *name, const char *unit, double mean, Tren
             fabs(trend->change) * percent, trend->least_speed, trend->most_speed, trend->p);
     return text_format(
         &trend->detail,
-        "%s shows no trend from %.3g to %.3g m/s (slope %.2g +- %.2g%s per m/s, p = "
-        "%.2g)%s a change of up to %.2g%s (%.3g %%) over these speeds would not have "
-        "been detected",
+        "%s shows no trend from %.3g to %.3g m/s (slope %.2g +- %.2g%s per m/s, p = %.2g)%s a "
+        "change of up to %.2g%s (%.3g %%) over these speeds would not have been detected",
         name, trend->least_speed, trend->most_speed, trend->slope, trend->standard_error, unit,
         trend->p,
         trend->verdict == TREND_CONSTANT

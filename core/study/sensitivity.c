@@ -4,6 +4,8 @@
 // In a chaotic motion a statistic of one run has no derivative that a step could find: the smaller
 // the step, the larger the quotient of differences that exist anyway. Three steps, each half of the
 // one before, detect this: only where their quotients agree there is a slope.
+//
+// Every change starts from the numbers of the original scene, so that changes are independent.
 #include "core/study/sensitivity.h"
 
 #include <math.h>
@@ -15,8 +17,6 @@
 #include "core/contact/identification.h"
 
 enum { RUNS_MAX = 2000, RUNS_DEFAULT = 200, DEVIATIONS_MAX = 1000 };
-
-// Every change starts from the numbers of the original scene, so that changes are independent.
 enum { BUFFERS = 3, DRAWS_MAX = 64, STREAM = 0x53454e53 };
 
 const char *const sensitivity_parameter_names[] = {

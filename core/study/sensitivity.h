@@ -99,11 +99,6 @@ typedef struct SensitivityStop {
     char *why;                                     // why there are no closed forms
 } SensitivityStop;
 
-typedef struct SensitivityStops {
-    SensitivityStop *at;
-    size_t count;
-} SensitivityStops;
-
 // Derivative of one metric by one parameter.
 typedef struct SensitivitySlope {
     int metric;        // StatisticsMetric
@@ -113,42 +108,39 @@ typedef struct SensitivitySlope {
     bool is_settled;   // the spread is small: the steps agree
 } SensitivitySlope;
 
-typedef struct SensitivitySlopes {
-    SensitivitySlope *at;
-    size_t count;
-} SensitivitySlopes;
-
 typedef struct SensitivityRow {
     int parameter; // SensitivityParameter
     Reals steps;   // relative
-    SensitivitySlopes slopes;
+    struct {
+        SensitivitySlope *at;
+        size_t count;
+    } slopes;
     char *why; // why there are none
 } SensitivityRow;
-
-typedef struct SensitivityRows {
-    SensitivityRow *at;
-    size_t count;
-} SensitivityRows;
-
-typedef struct SensitivityStatistics {
-    RunStatistic *at;
-    size_t count;
-} SensitivityStatistics;
 
 // The answer.
 typedef struct Sensitivity {
     Variant variant;
     Summary summary; // of the scene itself
     double steps;    // solver steps of all runs
-    SensitivityStops contact;
-    SensitivityRows response;
+    struct {
+        SensitivityStop *at;
+        size_t count;
+    } contact;
+    struct {
+        SensitivityRow *at;
+        size_t count;
+    } response;
     bool is_chaotic; // the scene continues beyond its trust horizon
     char *why;       // consequence for the slopes
     uint64_t runs, made, failed, seed;
     InputUncertainty uncertainty;
     char *distribution;
     double confidence;
-    SensitivityStatistics statistics; // over the drawn runs
+    struct {
+        RunStatistic *at;
+        size_t count;
+    } statistics; // over the drawn runs
     StudyFailures failures;
     Reals frequency; // [Hz]
     RunSpectra spectra;

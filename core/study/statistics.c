@@ -1,17 +1,11 @@
-// Means and deviations take two passes; the second corrects the rounding of the first.
-#include "core/study/statistics.h"
-
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include "core/math/student_t.h"
-
-// Of N possible runs n were made, in the order of their seeds, which is random. The mean of the n
-// differs from that of the N by a number of variance s^2 (1/n - 1/N), s the standard deviation of
-// one run; it vanishes at n = N. Student's t gives its quantile. In a skewed distribution the mean
-// and s depend on each other: to first order this adds |g| (2 q^2 + 1) / (6 sqrt(n)) to the
-// quantile q (Johnson 1978).
+// Statistics of a metric: means and deviations take two passes; the second corrects the rounding of
+// the first.
+//
+// Stopping rule: of N possible runs n were made, in the order of their seeds, which is random. The
+// mean of the n differs from that of the N by a number of variance s^2 (1/n - 1/N), s the standard
+// deviation of one run; it vanishes at n = N. Student's t gives its quantile. In a skewed
+// distribution the mean and s depend on each other: to first order this adds |g| (2 q^2 + 1) / (6
+// sqrt(n)) to the quantile q (Johnson 1978).
 //
 // To stop as soon as an estimate is small enough prefers estimates that are too small. Checks are
 // therefore few: at 8 runs and then after every quarter more. Over 1,500 to 6,000 ensembles each of
@@ -22,6 +16,22 @@
 // Spectra differ in many numbers at once: the sum of the squares of their differences is about
 // chi-square distributed with d degrees of freedom, and its quantile per degree falls with d
 // (Wilson and Hilferty).
+//
+// Spectra: means and deviations by Welford's recurrence, separately at each frequency. A density is
+// positive and its estimates are skewed, the more so the fewer segments a run has. The interval of
+// its mean m is therefore computed for its logarithm: m exp(+-t s / (m sqrt(n))). Of gamma
+// distributed densities (1, 3 and 10 independent segments in each of 3 to 64 runs) such 95 %
+// intervals contained the true density in 93.0 to 95.1 %, m +- t s / sqrt(n) in 88.6 to 95.0 %, and
+// those of a chi-square with the freedom that m and s give in 81 to 95 %. Quantiles need all
+// densities of a frequency at once, so those of every run are kept.
+#include "core/study/statistics.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/math/student_t.h"
+
 // sqrt(quantile / d) of a chi-square, relative to d = 1.
 static double stopping_rule_narrowing(double d) {
     const double z = student_t_quantile(2 * STOPPING_RULE_CONFIDENCE - 1, 0);
@@ -196,15 +206,6 @@ void statistics_trust(const RunTable *table, RunTrust *trust) {
     }
 }
 
-// Means and deviations by Welford's recurrence, separately at each frequency.
-//
-// A density is positive and its estimates are skewed, the more so the fewer segments a run has. The
-// interval of its mean m is therefore computed for its logarithm: m exp(+-t s / (m sqrt(n))). Of
-// gamma distributed densities (1, 3 and 10 independent segments in each of 3 to 64 runs) such 95 %
-// intervals contained the true density in 93.0 to 95.1 %, m +- t s / sqrt(n) in 88.6 to 95.0 %, and
-// those of a chi-square with the freedom that m and s give in 81 to 95 %.
-//
-// Quantiles need all densities of a frequency at once, so those of every run are kept.
 enum { FREQUENCIES_PER_CHECK = 64 }; // between checks of the progress
 
 static Status spectrum_accumulator_start(SpectrumAccumulator *sums, const Columns *densities,

@@ -5,9 +5,8 @@
 
 #include "core/study/study.h"
 
-// When an ensemble under a target has enough runs: how far the mean of the runs made may be from
-// the mean of all runs requested.
-// Differences among the runs made so far.
+// Differences among the runs made so far. The stopping rule of an ensemble under a target follows
+// from them: how far the mean of the runs made may be from the mean of all runs requested.
 typedef struct RunSpread {
     size_t count;    // runs
     double relative; // standard deviation of one run over the mean; INFINITY: unknown, or no mean
@@ -76,7 +75,6 @@ Status statistics_spread(const RunTable *table, int metric, RunSpread *spread);
 
 void statistics_trust(const RunTable *table, RunTrust *trust);
 
-// The spectra of many runs, added one by one: means, deviations and quantiles of their densities.
 // Densities of many runs at each frequency; a study fills some of the lists.
 typedef struct RunSpectrum {
     char *channel, *unit;
@@ -94,7 +92,7 @@ enum {
     SPECTRUM_ACCUMULATOR_MAX = 1 << 22, // limit on the densities kept of all runs
 };
 
-// All zero is empty.
+// The spectra of many runs, added one by one. All zero is empty.
 typedef struct SpectrumAccumulator {
     size_t channels, rows;
     size_t count;    // runs

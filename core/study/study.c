@@ -252,29 +252,25 @@ void study_free(StudyWork *work) {
     free(work);
 }
 
-static Status study_run_member(StudyWork *work, size_t member, const StudyTools *tools,
-                               Problem *problem) {
-    const double share = (1 - STUDY_BEGUN) / (double)work->expected;
-    ProgressRange range =
-        progress_range(tools->progress, STUDY_BEGUN + (double)member * share, share);
-    const Progress progress = progress_range_view(&range);
-    StudyTools own = *tools;
-    StudyPart *part = NULL;
-    own.progress = &progress;
-    TRY(study_advance(&progress, 0, problem));
-    Status status = study_part_make(work, member, &own, &part, problem);
-    if (status == STATUS_OK)
-        status = study_part_fold(work, member, part, problem);
-    study_part_free(work, part);
-    return status;
-}
-
 Status study_run(const Variant *study, const Simulation *simulation, const StudyTools *tools,
                  Variant **answer, Problem *problem) {
     StudyWork *work;
     Status status = study_begin(study, simulation, tools, answer, &work, problem);
-    for (size_t i = 0; status == STATUS_OK && i < work->wanted; i++)
-        status = study_run_member(work, i, tools, problem);
+    for (size_t i = 0; status == STATUS_OK && i < work->wanted; i++) {
+        const double share = (1 - STUDY_BEGUN) / (double)work->expected;
+        ProgressRange range =
+            progress_range(tools->progress, STUDY_BEGUN + (double)i * share, share);
+        const Progress progress = progress_range_view(&range);
+        StudyTools own = *tools;
+        StudyPart *part = NULL;
+        own.progress = &progress;
+        status = study_advance(&progress, 0, problem);
+        if (status == STATUS_OK)
+            status = study_part_make(work, i, &own, &part, problem);
+        if (status == STATUS_OK)
+            status = study_part_fold(work, i, part, problem);
+        study_part_free(work, part);
+    }
     if (status == STATUS_OK)
         status = study_end(work, tools, problem);
     study_free(work);

@@ -196,10 +196,9 @@ static Status sweep_grid_fill_material(const Buffer *pinned, Buffer *buffer) {
     buffer->test = pinned->test;
     if (pinned->table.count == 0)
         return STATUS_OK;
-    const size_t size = pinned->table.count * sizeof *pinned->table.at;
-    ContactRow *rows = malloc(size);
+    ContactRow *rows = calloc(pinned->table.count, sizeof *rows);
     TRY(status_made(rows != NULL));
-    memcpy(rows, pinned->table.at, size);
+    memcpy(rows, pinned->table.at, pinned->table.count * sizeof *rows);
     free(buffer->table.at);
     buffer->table = (ContactRows){rows, pinned->table.count};
     return STATUS_OK;
@@ -226,8 +225,7 @@ static Status sweep_grid_fill_record(const PinnedRecords *records, Simulation *t
     for (size_t i = 0; i < records->count; i++) {
         const PinnedRecord *pinned = &records->at[i];
         if (pinned->named != NULL && strcmp(pinned->name, record->name) == 0)
-            return record_resolve(record, (NamedRecord *)(void *)pinned->named) ? STATUS_OK
-                                                                                : STATUS_NO_MEMORY;
+            return status_made(record_resolve(record, (NamedRecord *)(void *)pinned->named));
     }
     return STATUS_OK;
 }
@@ -562,29 +560,26 @@ size_t sweep_value_index(const Sweep *sweep, size_t axis, size_t point) {
     return point / stride % sweep->axes.at[axis].values.count;
 }
 
-static Status sweep_fill_axis(const SweepValues *values, SweepAxisValues *axis) {
-    TRY(study_copy_text(values->axis->pointer, &axis->pointer));
-    TRY(study_copy_text(values->is_tag ? NULL : values->field->unit, &axis->unit));
-    for (size_t i = 0; i < values->count; i++) {
-        char digits[32];
-        TRY(texts_append(&axis->values, sweep_axis_is_range(values->axis)
-                                            ? text_real(digits, sweep_axis_value(values->axis, i))
-                                            : values->axis->values.at[i]));
-    }
-    return STATUS_OK;
-}
-
 static Status sweep_fill(const SweepGrid *grid, Sweep *sweep) {
-    const SweepStudy *study = grid->study;
+    const Texts *metrics = &grid->study->metrics;
     sweep->points = grid->points;
-    sweep->mode = study->mode;
+    sweep->mode = grid->study->mode;
     for (size_t i = 0; i < grid->axis_count; i++) {
+        const SweepValues *values = &grid->axes[i];
         SweepAxisValues *axis = study_list_add(&sweep->axes, sizeof *axis);
         TRY(status_made(axis != NULL));
-        TRY(sweep_fill_axis(&grid->axes[i], axis));
+        TRY(study_copy_text(values->axis->pointer, &axis->pointer));
+        TRY(study_copy_text(values->is_tag ? NULL : values->field->unit, &axis->unit));
+        for (size_t k = 0; k < values->count; k++) {
+            char digits[32];
+            TRY(texts_append(&axis->values,
+                             sweep_axis_is_range(values->axis)
+                                 ? text_real(digits, sweep_axis_value(values->axis, k))
+                                 : values->axis->values.at[k]));
+        }
     }
-    for (size_t i = 0; i < study->metrics.count; i++)
-        TRY(texts_append(&sweep->metrics, study->metrics.at[i]));
+    for (size_t i = 0; i < metrics->count; i++)
+        TRY(texts_append(&sweep->metrics, metrics->at[i]));
     return STATUS_OK;
 }
 

@@ -1,3 +1,6 @@
+// The rows of a solver's settings say what it can trade: a row "step" or "tolerance" makes
+// candidates, whatever the solver is called.
+//
 // Every point is run once for its errors and then timed, in `repeats` rounds over all points, which
 // share a temporary slowdown of the machine. Short runs are timed many at once.
 //
@@ -13,8 +16,6 @@
 
 #include "core/solve/solver.h"
 
-// The rows of a solver's settings say what it can trade: a row "step" or "tolerance" makes
-// candidates, whatever the solver is called.
 enum {
     DECADES_MAX = 8,  // of steps, from the sample interval down
     SEGMENT_MIN = 16, // samples of a segment
@@ -54,14 +55,6 @@ const Field tradeoff_point_fields[] = {
 };
 // clang-format on
 
-// The reference solver: the first of the table that can run.
-static const Kind *candidate_settings_reference(void) {
-    size_t i = 0;
-    while (solvers[i]->run == NULL)
-        i++;
-    return &solvers[i]->kind;
-}
-
 // A list under construction, all of the same simulation.
 typedef struct Candidates {
     TradeoffPoints *points;
@@ -70,7 +63,7 @@ typedef struct Candidates {
     TradeoffPoint spare; // takes the settings of a point for which there is no memory
 } Candidates;
 
-// Adds a point with nothing but its solver and name.
+// Adds a point with nothing but its solver and its name, the solver's and what follows.
 __attribute__((format(printf, 3, 4))) static TradeoffPoint *
 candidate_add(Candidates *list, const Kind *solver, const char *format, ...) {
     TradeoffPoint *point = study_list_add(list->points, sizeof *point);
@@ -79,14 +72,14 @@ candidate_add(Candidates *list, const Kind *solver, const char *format, ...) {
         return &list->spare;
     }
     va_list arguments;
-    char name[96];
+    char rest[64];
     va_start(arguments, format);
-    vsnprintf(name, sizeof name, format, arguments);
+    vsnprintf(rest, sizeof rest, format, arguments);
     va_end(arguments);
     (void)fields_default(tradeoff_point_fields, point); // absent and 0: nothing to allocate
-    point->name = strdup(name);
     point->solver = strdup(solver->name);
-    list->is_whole = list->is_whole && point->name != NULL && point->solver != NULL;
+    list->is_whole = text_format(&point->name, "%s%s", solver->name, rest) &&
+                     point->solver != NULL && list->is_whole;
     return point;
 }
 
@@ -118,7 +111,7 @@ static Status candidate_finest_step(const Simulation *simulation, double *finest
 static void candidate_add_steps(Candidates *list, const Kind *solver, double finest) {
     double step = 1 / list->simulation->scene.sample_rate;
     for (int i = 0; i < DECADES_MAX; i++, step /= 10) {
-        candidate_add(list, solver, "%s, step %.4g s", solver->name, step)->step = step;
+        candidate_add(list, solver, ", step %.4g s", step)->step = step;
         if (step <= finest)
             break;
     }
@@ -127,7 +120,7 @@ static void candidate_add_steps(Candidates *list, const Kind *solver, double fin
 static void candidate_add_tolerances(Candidates *list, const Kind *solver, const Range *range) {
     const double min = fmax(range->min, tolerance_min) * (1 - 1e-9);
     for (double own = fmin(tolerance_max, range->max); own >= min; own *= tolerance_factor)
-        candidate_add(list, solver, "%s, tolerance %.3g", solver->name, own)->tolerance = own;
+        candidate_add(list, solver, ", tolerance %.3g", own)->tolerance = own;
 }
 
 // Less output at full accuracy.
@@ -139,22 +132,20 @@ static void candidate_add_outputs(Candidates *list, const Kind *solver) {
         const double rate = scene->sample_rate / rate_divisors[i];
         if (rate * scene->duration < SEGMENT_MIN)
             break;
-        candidate_add(list, solver, "%s, sampled at %.6g Hz", solver->name, rate)->sample_rate =
-            rate;
+        candidate_add(list, solver, ", sampled at %.6g Hz", rate)->sample_rate = rate;
     }
     for (size_t i = 0; i < shares; i++) {
         const uint64_t segment = psd->segment / spectrum_divisors[i];
         if (segment < SEGMENT_MIN)
             break;
-        candidate_add(list, solver, "%s, segments of %llu", solver->name,
-                      (unsigned long long)segment)
-            ->segment = segment;
+        candidate_add(list, solver, ", segments of %llu", (unsigned long long)segment)->segment =
+            segment;
     }
     for (size_t i = 0; i < shares; i++) {
         const double duration = scene->duration / duration_divisors[i];
         if (duration * scene->sample_rate < (double)psd->segment)
             break;
-        candidate_add(list, solver, "%s, %.6g s long", solver->name, duration)->duration = duration;
+        candidate_add(list, solver, ", %.6g s long", duration)->duration = duration;
     }
 }
 
@@ -162,8 +153,7 @@ static void candidate_add_outputs(Candidates *list, const Kind *solver) {
 static void candidate_add_modes(Candidates *list, const Kind *solver) {
     const size_t storeys = structure_storeys(scene_structure(&list->simulation->scene));
     for (size_t modes = storeys / 2; storeys >= STOREYS_MIN && modes > 0; modes /= 2)
-        candidate_add(list, solver, "%s, %zu mode%s", solver->name, modes, modes == 1 ? "" : "s")
-            ->modes = modes;
+        candidate_add(list, solver, ", %zu mode%s", modes, modes == 1 ? "" : "s")->modes = modes;
 }
 
 static bool candidate_has_form(const Simulation *simulation, ContactForm form) {
@@ -193,14 +183,14 @@ static void candidate_add_solver(Candidates *list, const Solver *solver, double 
         candidate_add_tolerances(list, kind, &tolerance->range);
     // Without its tolerance, if that may be left out.
     if (tolerance == NULL || tolerance->presence == PRESENCE_OPTIONAL)
-        candidate_add(list, kind, "%s", kind->name);
+        candidate_add(list, kind, "%s", "");
 }
 
+// What is traded with the reference solver.
 static void candidate_add_reference(Candidates *list, const Kind *solver) {
     if (candidate_has_form(list->simulation, CONTACT_LINEAR)) {
         const char *model = contact_impulse.kind.name;
-        char **own =
-            &candidate_add(list, solver, "%s, contact %s", solver->name, model)->contact_model;
+        char **own = &candidate_add(list, solver, ", contact %s", model)->contact_model;
         *own = strdup(model);
         list->is_whole = list->is_whole && *own != NULL;
     }
@@ -210,7 +200,6 @@ static void candidate_add_reference(Candidates *list, const Kind *solver) {
 
 Status candidate_settings_list(const Texts *names, const Simulation *simulation,
                                TradeoffPoints *points) {
-    const Kind *reference = candidate_settings_reference();
     Candidates list = {.points = points, .simulation = simulation};
     double finest = 0;
     *points = (TradeoffPoints){NULL, 0};
@@ -218,8 +207,8 @@ Status candidate_settings_list(const Texts *names, const Simulation *simulation,
     for (size_t i = 0; solvers[i] != NULL && list.is_whole; i++)
         if (solvers[i]->run != NULL && candidate_is_requested(names, solvers[i]->kind.name))
             candidate_add_solver(&list, solvers[i], finest);
-    if (list.is_whole && candidate_is_requested(names, reference->name))
-        candidate_add_reference(&list, reference);
+    if (list.is_whole && candidate_is_requested(names, solver_exact.kind.name))
+        candidate_add_reference(&list, &solver_exact.kind);
     for (size_t i = 0; i < points->count && list.is_whole; i++)
         points->at[i].estimate = candidate_settings_cost(simulation, &points->at[i]);
     free(list.spare.contact_model);
@@ -383,23 +372,25 @@ static SimulationLimits tradeoff_limits(const TradeoffStudy *study,
     return own;
 }
 
-// Solver steps of a point and its timings.
-static double tradeoff_timed_steps(const TradeoffStudy *study, double steps) {
-    return steps + (double)study->repeats * (steps > batch_steps ? steps : batch_steps + steps);
+// Estimated solver steps of all points that are run, and of their timings.
+static double tradeoff_all_steps(const TradeoffStudy *study, const TradeoffPoints *points,
+                                 double max) {
+    double all = 0;
+    for (size_t i = 0; i < points->count; i++) {
+        const double steps = points->at[i].estimate;
+        if (steps <= max)
+            all += steps +
+                   (double)study->repeats * (steps > batch_steps ? steps : batch_steps + steps);
+    }
+    return all;
 }
 
 static Status tradeoff_cost(const void *request, const Simulation *simulation,
                             const SimulationLimits *limits, double *steps) {
     const TradeoffStudy *study = request;
-    const double max = tradeoff_limits(study, limits).steps;
     Tradeoff answer = {0};
     const Status status = candidate_settings_list(&study->solvers, simulation, &answer.points);
-    *steps = 0;
-    for (size_t i = 0; i < answer.points.count && status == STATUS_OK; i++) {
-        const double own = answer.points.at[i].estimate;
-        if (own <= max)
-            *steps += tradeoff_timed_steps(study, own);
-    }
+    *steps = tradeoff_all_steps(study, &answer.points, tradeoff_limits(study, limits).steps);
     fields_clear(tradeoff_answer_fields, &answer);
     return status;
 }
@@ -448,7 +439,7 @@ static Status tradeoff_run_reference(TradeoffRun *run, Problem *problem) {
     TradeoffPoint exact;
     Simulation simulation = {0};
     (void)fields_default(tradeoff_point_fields, &exact);
-    TRY(study_copy_text(candidate_settings_reference()->name, &reference->solver));
+    TRY(study_copy_text(solver_exact.kind.name, &reference->solver));
     exact.solver = reference->solver;
     Status status =
         candidate_settings_apply(run->simulation, &exact, run->tools->limits, &simulation, problem);
@@ -648,9 +639,7 @@ static Status tradeoff_run_all(TradeoffRun *run, Problem *problem) {
     const TradeoffStudy *study = run->study;
     TradeoffPoints *points = &answer->points;
     tradeoff_trim(run);
-    for (size_t i = 0; i < points->count; i++)
-        if (points->at[i].estimate <= run->limits.steps)
-            run->all += tradeoff_timed_steps(study, points->at[i].estimate);
+    run->all += tradeoff_all_steps(study, points, run->limits.steps);
     TRY(tradeoff_run_reference(run, problem));
     const Compared reference = tradeoff_compared(run->reference, run->simulation, true);
     answer->reference.yardstick = error_metrics_reference(&reference);

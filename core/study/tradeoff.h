@@ -5,8 +5,6 @@
 #include "core/simulation/error_metrics.h"
 #include "core/study/study.h"
 
-// The candidates of a tradeoff study: every solver with its steps or tolerances, and what else may
-// be traded for speed.
 typedef enum TradeoffStatus {
     TRADEOFF_MEASURED,
     TRADEOFF_REFUSED, // too expensive or invalid: not run
@@ -14,7 +12,8 @@ typedef enum TradeoffStatus {
 } TradeoffStatus;
 extern const char *const tradeoff_status_names[];
 
-// One candidate. The first part is its difference from the scene: what is absent is as there.
+// One candidate: a solver with a step or a tolerance, or something else that may be traded for
+// speed. The first part is its difference from the scene: what is absent is as there.
 typedef struct TradeoffPoint {
     char *name;   // "rk4, step 1e-05 s"
     char *solver; // of the solvers' table

@@ -69,9 +69,8 @@ typedef struct Noted {
     size_t folded, enough, parts, most;
 } Noted;
 
-static Status note(void *work, size_t member, StudyPart *part, Problem *fault) {
+static Status note(void *work, size_t member, StudyPart *part) {
     Noted *noted = work;
-    (void)fault;
     assert_int_equal(member, noted->folded);
     assert_int_equal(part->run.number, member);
     noted->folded++;
