@@ -200,6 +200,10 @@ static void adaptive_fit(Adaptive *adaptive, double length) {
         r[3] = 10 * off - 4 * off1 + off2 / 2;
         r[4] = 7 * off1 - 15 * off - off2;
         r[5] = 6 * off - 3 * off1 + off2 / 2;
+        if (r[0] == 0 && r[1] == 0 && r[2] == 0) { // which way it leaves, only the end can say
+            r[3] = r1[0];
+            r[4] = r[5] = 0;
+        }
     }
 }
 
@@ -254,7 +258,7 @@ static Status adaptive_evolve(Adaptive *adaptive, double *length, ContactEvent *
         part = is_next ? next.s : 1;
         if (is_next)
             *event = next;
-        if (is_hidden || part * reached < SHORTEST) {
+        if (is_hidden || (is_next && part * reached < SHORTEST)) {
             *is_event = true;
             *length = 0;
             return STATUS_OK;

@@ -692,6 +692,11 @@ Status time_stepping_run(const Solver *solver, Run *run, Response *response, Pro
     const Base *base = run->base;
     const StepChoice choice = time_stepping_choose(run->plan, run->accuracy,
                                                    base->form == BASE_SAMPLED ? base->interval : 0);
+    if (!(choice.share <= SHARE_MAX))
+        return problem_set(problem, STATUS_LIMIT,
+                           "the scene moves too fast for %s: %.3g steps to a sample interval, at "
+                           "most %.3g are possible",
+                           solver->kind.name, choice.share, SHARE_MAX);
     return time_stepping_run_pair(solver, run, (size_t)choice.share, (size_t)choice.kinks, 0,
                                   response, problem);
 }

