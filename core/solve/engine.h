@@ -277,7 +277,6 @@ typedef struct PowerContact {
     double *row;        // scratch
     double *block;      // NULL if no contact is under a power law
     // The series of the last integration step:
-    size_t modes, dampers;
     size_t stride;
     size_t at_t, at_q, at_p, at_a, at_r; // columns
     bool is_sine;

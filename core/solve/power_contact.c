@@ -318,7 +318,7 @@ INLINE double power_series_orders(PowerContact *power, const ModalState *state, 
 double power_series_expand(PowerContact *power, const Slice *slice, double Y, double length) {
     const ModalState *state = power->state;
     double *row = power->z;
-    const size_t n = power->modes, m = power->dampers;
+    const size_t n = state->mode_count, m = state->dampers;
     power->length = length;
     memset(row, 0, power->stride * sizeof *row);
     for (size_t d = 0; d < m; d++) {
@@ -398,8 +398,6 @@ Status power_contact_make(PowerContact *power, ModalState *state, double toleran
     power->error = fmax(STEP_PART * tolerance, ROUNDING);
     const double order = ORDER_BASE - ORDER_SLOPE * log(power->error);
     power->order_max = order > ORDER_MAX ? ORDER_MAX : (size_t)order;
-    power->modes = n;
-    power->dampers = m;
     power->is_sine = state->base.base->omega > 0;
     power->at_t = m;
     power->at_q = m + 1;
