@@ -15,6 +15,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/base/json_pointer.h"
 #include "core/excitation/recorded_motion.h"
 
 enum {
