@@ -173,12 +173,11 @@ static bool fit_derive(const FitWindow *window, const FitBox *box, PulseFit *fit
     }
     for (int p = 0; p < FIT_PARTS; p++) {
         const double step = 1e-5 * (p == FIT_DECAY ? 1 : length);
-        FitPoint point = fit->at;
-        point.part[p] += step;
-        if (!fit_pulse(window, &point, first, last, above, &from, &to))
-            return false;
-        point.part[p] -= 2 * step;
-        if (!fit_pulse(window, &point, first, last, d[p], &from, &to))
+        FitPoint high = fit->at, low = fit->at;
+        high.part[p] += step;
+        low.part[p] = high.part[p] - 2 * step;
+        if (!fit_pulse(window, &high, first, last, above, &from, &to) ||
+            !fit_pulse(window, &low, first, last, d[p], &from, &to))
             return false;
         for (size_t k = from; k <= to; k++) {
             d[p][k] = A * (above[k] - d[p][k]) / (2 * step);
@@ -428,9 +427,9 @@ static const double step_max = 0.1;
 typedef struct Piece {
     double weight; // at first its logarithm
     double mean[FIGURES], deviation[FIGURES];
-    double covariance[FIT_PARTS][FIT_PARTS];  // of start, end and L
-    double slope[FIGURES][FIT_PARTS];         // of the figures by start, end and L
-    double least[FIT_PARTS], most[FIT_PARTS]; // the gaps
+    double covariance[FIT_PARTS][FIT_PARTS]; // of start, end and L
+    double slope[FIGURES][FIT_PARTS];        // of the figures by start, end and L
+    FitBox gaps;
 } Piece;
 
 // The range of the likely gaps of the start, or of the end.
@@ -475,12 +474,12 @@ static bool fit_confidence_slopes(const FitWindow *window, const FitPoint *point
         return false;
     for (int p = 0; p < FIT_PARTS; p++) {
         const double step = 1e-4 * (p == FIT_DECAY ? 1 : *contact_time);
-        FitPoint other = *point;
+        FitPoint high = *point, low = *point;
         double above, below;
-        other.part[p] += step;
-        const bool is_above = pulse_fit_model(window, &other, &model, &above);
-        other.part[p] -= 2 * step;
-        if (!is_above || !pulse_fit_model(window, &other, &model, &below))
+        high.part[p] += step;
+        low.part[p] = high.part[p] - 2 * step;
+        if (!pulse_fit_model(window, &high, &model, &above) ||
+            !pulse_fit_model(window, &low, &model, &below))
             return false;
         slope[p] = (above - below) / (2 * step);
     }
@@ -493,7 +492,7 @@ static bool fit_confidence_weigh(const FitWindow *window, const FitBox *box, con
     double inverse[3][3], curvature[3][3], det, gain = 0, T;
     const double variance = fit_variance(window, fit->residual.sum);
     memcpy(curvature, fit->curvature, sizeof curvature);
-    *piece = (Piece){.slope = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+    *piece = (Piece){.slope = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, .gaps = *box};
     if (!fit_confidence_slopes(window, &fit->at, &T, piece->slope[CONTACT_TIME]))
         return false;
     // Limits the step to a part of the contact, over which the pulse is linear.
@@ -512,8 +511,6 @@ static bool fit_confidence_weigh(const FitWindow *window, const FitBox *box, con
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++)
             piece->covariance[i][j] = inverse[i][j] * variance;
-    memcpy(piece->least, box->least, sizeof piece->least);
-    memcpy(piece->most, box->most, sizeof piece->most);
     piece->weight = fit_log_likelihood(window, fit->residual.sum) + gain / variance / 2 -
                     log(det / pow(variance, 3)) / 2 - piece->mean[FIT_DECAY] -
                     log(fit->residual.model_square) / 2 +
@@ -526,8 +523,8 @@ static Gaps fit_confidence_gaps(const Piece *pieces, size_t count, int end) {
     for (size_t i = 0; i < count; i++) {
         if (pieces[i].weight < 0.002)
             continue;
-        least = fmin(least, pieces[i].least[end]);
-        most = fmax(most, pieces[i].most[end]);
+        least = fmin(least, pieces[i].gaps.least[end]);
+        most = fmax(most, pieces[i].gaps.most[end]);
     }
     return (Gaps){(least + most) / 2, (most - least) / 2};
 }

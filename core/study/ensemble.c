@@ -171,18 +171,14 @@ typedef struct EnsembleWork {
     size_t check;  // ended runs at the next check of the target
 } EnsembleWork;
 
-Status ensemble_scene(const Simulation *simulation, uint64_t seed, Simulation *target) {
-    TRY(study_run_copy(simulation, target));
-    ((ExcitationRandom *)(void *)target->scene.excitation)->seed = seed;
-    return STATUS_OK;
-}
-
-static Status ensemble_member_scene(const void *of, size_t member, Simulation *scene,
-                                    StudyPart *part, Problem *problem) {
+static Status ensemble_scene(const void *of, size_t member, Simulation *scene, StudyPart *part,
+                             Problem *problem) {
     const EnsembleWork *work = of;
     (void)part;
     (void)problem;
-    return ensemble_scene(work->work.simulation, work->study->first_seed + member, scene);
+    TRY(study_run_copy(work->work.simulation, scene));
+    ((ExcitationRandom *)(void *)scene->scene.excitation)->seed = work->study->first_seed + member;
+    return STATUS_OK;
 }
 
 static bool ensemble_has_target(const EnsembleWork *work) {
@@ -338,7 +334,7 @@ const StudyKind study_ensemble = {
     .work_size = sizeof(EnsembleWork),
     .part_size = sizeof(StudyPart),
     .begin = ensemble_begin,
-    .scene = ensemble_member_scene,
+    .scene = ensemble_scene,
     .fold = ensemble_fold,
     .end = ensemble_end,
     .free = ensemble_free,

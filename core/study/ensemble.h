@@ -50,8 +50,4 @@ typedef struct Ensemble {
     RunTable table; // the numbers are seeds
 } Ensemble;
 
-// The scene of one run: with this seed and without sampled channels. `simulation` must have a
-// random base; `target` is cleared by simulation_clear in any case.
-Status ensemble_scene(const Simulation *simulation, uint64_t seed, Simulation *target);
-
 #endif

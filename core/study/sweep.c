@@ -15,6 +15,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/base/json_pointer.h"
 #include "core/excitation/recorded_motion.h"
 
 enum {
@@ -362,33 +363,34 @@ static Status sweep_grid_check_size(const SweepStudy *study, const SimulationLim
     return STATUS_OK;
 }
 
-// Finds the member of each pointer; earlier axes may make it by their values.
+// Finds the member of an axis's pointer in `scene`, and sets it.
+static Status sweep_axis_find(SweepValues *values, size_t number, Simulation *scene,
+                              Problem *problem) {
+    const char *pointer = values->axis->pointer;
+    char why[JSON_POINTER_MESSAGE_MAX];
+    TRY(sweep_grid_split_buffer(pointer, scene));
+    values->field = json_pointer_find(simulation_fields, scene, pointer, &values->is_tag, why);
+    if (values->field == NULL) {
+        Fault fault = {0};
+        snprintf(fault.pointer, sizeof fault.pointer, "/study/axes/%zu/pointer", number);
+        text_fit(fault.detail, sizeof fault.detail, why);
+        text_quote(fault.value, sizeof fault.value, pointer);
+        return problem_add_fault(problem, STATUS_INVALID, &fault);
+    }
+    // Impossible values are reported point by point; a possible one is enough here.
+    Status set = STATUS_INVALID;
+    for (size_t k = 0; k < values->count && set == STATUS_INVALID; k++)
+        set = sweep_axis_set(values->axis, k, scene, why);
+    return status_made(set != STATUS_NO_MEMORY);
+}
+
+// Earlier axes may make a member by their values.
 static Status sweep_grid_find_fields(SweepGrid *grid, Problem *problem) {
     Simulation scene;
     Status status = fields_copy(simulation_fields, grid->simulation, &scene);
     for (size_t i = 0; i < grid->axis_count && status != STATUS_NO_MEMORY; i++) {
-        SweepValues *values = &grid->axes[i];
-        char why[JSON_POINTER_MESSAGE_MAX];
-        if (sweep_grid_split_buffer(values->axis->pointer, &scene) != STATUS_OK) {
-            status = STATUS_NO_MEMORY;
-            break;
-        }
-        values->field = json_pointer_find(simulation_fields, &scene, values->axis->pointer,
-                                          &values->is_tag, why);
-        if (values->field == NULL) {
-            Fault fault = {0};
-            snprintf(fault.pointer, sizeof fault.pointer, "/study/axes/%zu/pointer", i);
-            text_fit(fault.detail, sizeof fault.detail, why);
-            text_quote(fault.value, sizeof fault.value, values->axis->pointer);
-            status = problem_add_fault(problem, STATUS_INVALID, &fault);
-            continue;
-        }
-        // Impossible values are reported point by point; a possible one is enough here.
-        Status set = STATUS_INVALID;
-        for (size_t k = 0; k < values->count && set == STATUS_INVALID; k++)
-            set = sweep_axis_set(values->axis, k, &scene, why);
-        if (set == STATUS_NO_MEMORY)
-            status = set;
+        const Status own = sweep_axis_find(&grid->axes[i], i, &scene, problem);
+        status = own != STATUS_OK ? own : status;
     }
     simulation_clear(&scene);
     return status;

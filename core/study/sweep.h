@@ -3,7 +3,6 @@
 #ifndef CORE_STUDY_SWEEP_H
 #define CORE_STUDY_SWEEP_H
 
-#include "core/base/json_pointer.h"
 #include "core/study/study.h"
 
 enum {

@@ -19,6 +19,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/excitation/random.h"
 #include "core/math/fft.h"
 #include "core/math/student_t.h"
 #include "core/study/ensemble.h"
@@ -117,8 +118,8 @@ static void whole_make(const StudyRequest *inquiry, Whole *whole) {
     for (size_t i = 0; i < whole->runs; i++) {
         Simulation member;
         Outcome *outcome;
-        assert_int_equal(ensemble_scene(&inquiry->simulation, study->first_seed + i, &member),
-                         STATUS_OK);
+        assert_int_equal(study_run_copy(&inquiry->simulation, &member), STATUS_OK);
+        ((ExcitationRandom *)(void *)member.scene.excitation)->seed = study->first_seed + i;
         if (simulation_run(&member, NULL, NULL, &workspace, &outcome, &problem) != STATUS_OK)
             fail_msg("%s", problem.detail);
         const Summary *summary = &outcome->summary;
