@@ -17,6 +17,14 @@ static double symmetric_matrix_entry(const double *A, size_t size, size_t i, siz
     return A[i * size + j] / 2 + A[j * size + i] / 2;
 }
 
+// Scales A by the rows and columns.
+static void symmetric_matrix_scale(const double *A, size_t size, const double *scale,
+                                   double *scaled) {
+    for (size_t i = 0; i < size; i++)
+        for (size_t j = 0; j < size; j++)
+            scaled[i * size + j] = symmetric_matrix_entry(A, size, i, j) * scale[i] * scale[j];
+}
+
 int symmetric_matrix_find_indefinite(size_t size, const double *A, double margin) {
     double *scaled = malloc(size * size * sizeof *scaled);
     if (scaled == NULL)
@@ -48,11 +56,9 @@ Status symmetric_matrix_solve(size_t size, const double *A, const double *b, dou
     double *scale = scaled + size * size;
     for (size_t i = 0; i < size; i++)
         scale[i] = 1 / sqrt(A[i * size + i]);
-    for (size_t i = 0; i < size; i++) {
-        for (size_t j = 0; j < size; j++)
-            scaled[i * size + j] = symmetric_matrix_entry(A, size, i, j) * scale[i] * scale[j];
+    symmetric_matrix_scale(A, size, scale, scaled);
+    for (size_t i = 0; i < size; i++)
         x[i] = b[i] * scale[i];
-    }
     const lapack_int n = (lapack_int)size,
                      found = LAPACKE_dposv(LAPACK_ROW_MAJOR, 'L', n, 1, scaled, n, x, 1);
     for (size_t i = 0; i < size; i++)
@@ -72,11 +78,8 @@ Status symmetric_matrix_eigenvalues(size_t size, const double *M, const double *
     double *mass = scaled + n * n, *scale = mass + n * n;
     for (size_t i = 0; i < n; i++)
         scale[i] = 1 / sqrt(M[i * n + i]);
-    for (size_t i = 0; i < n; i++)
-        for (size_t j = 0; j < n; j++) {
-            scaled[i * n + j] = symmetric_matrix_entry(K, n, i, j) * scale[i] * scale[j];
-            mass[i * n + j] = symmetric_matrix_entry(M, n, i, j) * scale[i] * scale[j];
-        }
+    symmetric_matrix_scale(K, n, scale, scaled);
+    symmetric_matrix_scale(M, n, scale, mass);
     const lapack_int order = (lapack_int)n,
                      found = LAPACKE_dsygv(LAPACK_ROW_MAJOR, 1, 'N', 'L', order, scaled, order,
                                            mass, order, values);

@@ -6,8 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/excitation/recorded_motion.h"
 #include "core/excitation/excitation.h"
+#include "core/excitation/recorded_motion.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
 

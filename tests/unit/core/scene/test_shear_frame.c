@@ -147,7 +147,8 @@ static void rates_are_near_the_first_and_the_last_frequency(void **state) {
     assert_true(rates.fastest >= 40 * sin(9 * half) && rates.fastest < 41);
     simulation_clear(&simulation);
     document_pass(&simulation, FRAME("\"stiffnesses\": [0, 20, 30], \"damping_ratio\": 50"));
-    assert_int_equal(structure_rates(scene_structure(&simulation.scene), SIZE_MAX, &rates), STATUS_OK);
+    assert_int_equal(structure_rates(scene_structure(&simulation.scene), SIZE_MAX, &rates),
+                     STATUS_OK);
     assert_true(rates.slowest == 0 && rates.fastest > 100);
     simulation_clear(&simulation);
 }
