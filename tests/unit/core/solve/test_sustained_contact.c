@@ -99,7 +99,7 @@ static void near(double a, double b, double tolerance) {
 
 static void whole_intervals_of_contact_agree_with_arcs(void **state) {
     (void)state;
-    for (size_t c = 0; c < COUNT(choices); c++) {
+    for (size_t c = 0; c < COUNT(choices); c += IMPACTD_SANITIZED ? 2 : 1) {
         Solved whole = solve(&choices[c], false), arcs = solve(&choices[c], true);
         const Peaks *peaks = &arcs.response.peaks;
         for (size_t i = 0; i < SAMPLES; i++) {
