@@ -3,7 +3,7 @@
 // begins or ends. Contact events follow the rules of contact_events.c, but a stop that is only
 // grazed within a step is missed.
 //
-// The integrated vector is (q, r; p, w), then the integrals of N and N r' of each damper, the work
+// The integrated vector is (q, p; r, w), then the integrals of N and N r' of each damper, the work
 // of the base, the loss in the structure and the ground velocity, all five from the step's start.
 //
 // ARKODE's dense output is far less accurate than its steps, so events are sought on the
@@ -58,14 +58,14 @@ static void adaptive_rate(Adaptive *adaptive, double t, const double *y, double 
     adaptive->rate_calls++;
     time_stepping_forces(stepping, y);
     if (state->resting > 0)
-        time_stepping_elastic(state, y, y + n + m, stepping->elastic);
+        time_stepping_elastic(state, y, y + n, stepping->elastic);
     for (size_t d = 0; d < m && state->resting > 0; d++)
         if (state->damper[d].phase == PHASE_RESTING)
             stepping->force[d] = modal_state_constraint(state, d, stepping->elastic, ground);
     time_stepping_rate(stepping, y, ground, out);
     for (size_t d = 0; d < m; d++)
         if (state->damper[d].phase == PHASE_RESTING) // zero but for rounding
-            out[n + d] = out[2 * n + m + d] = 0;
+            out[2 * n + d] = out[2 * n + m + d] = 0;
     out[adaptive->size - 1] = ground;
 }
 
@@ -94,7 +94,7 @@ static Status adaptive_set_tolerances(Adaptive *adaptive) {
     const TimeStepping *stepping = adaptive->stepping;
     const ModalState *state = &stepping->state;
     const size_t n = state->mode_count, m = state->dampers;
-    double *scale = N_VGetArrayPointer(adaptive->absolute), *r = scale + n, *p = r + m, *w = p + n;
+    double *scale = N_VGetArrayPointer(adaptive->absolute), *p = scale + n, *r = p + n, *w = r + m;
     double *impulse = w + m, *work = impulse + m, *totals = work + m;
     double time = state->interval, energy = 0;
     adaptive->events = state->events;
@@ -175,8 +175,9 @@ static void adaptive_fit(Adaptive *adaptive, double length) {
         double *r = fit->r + d * (POLYNOMIAL_DEGREE_MAX + 1), r0[3], r1[3];
         double *N = fit->force + d * (POLYNOMIAL_DEGREE_MAX + 1), slope[2];
         for (int end = 0; end < 2; end++) {
-            const double *y = N_VGetArrayPointer(end == 0 ? adaptive->from : adaptive->y) + n + d;
-            const double *rates = adaptive->rates[end], w = y[n + m], w1 = rates[2 * n + m + d];
+            const double *y =
+                N_VGetArrayPointer(end == 0 ? adaptive->from : adaptive->y) + 2 * n + d;
+            const double *rates = adaptive->rates[end], w = y[m], w1 = rates[2 * n + m + d];
             const ContactForce force = step_contact_force(state, d, *y, w);
             double *value = end == 0 ? r0 : r1;
             value[0] = *y;

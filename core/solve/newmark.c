@@ -154,15 +154,17 @@ static Status newmark_step(TimeStepping *stepping, double length) {
     const double half = length / 2, quarter = length * length / 4, ground = stepping->ground[2];
     if (length != newmark->length)
         TRY(newmark_make_tables(stepping, length));
-    double *q = stepping->y, *r = q + n, *p = r + m, *w = p + n, *a = stepping->rows + n + m;
+    double *q = stepping->y, *p = q + n, *r = p + n, *w = r + m, *rates = stepping->rows;
     const double *force = stepping->force;
     memcpy(newmark->from, stepping->y, stepping->size * sizeof *newmark->from);
     time_stepping_forces(stepping, stepping->y);
-    time_stepping_rate(stepping, stepping->y, stepping->ground[0], stepping->rows);
+    time_stepping_rate(stepping, stepping->y, stepping->ground[0], rates);
     // Predict the end without its acceleration.
     for (size_t i = 0; i < n + m; i++) {
-        q[i] += length * p[i] + quarter * a[i];
-        p[i] += half * a[i];
+        double *place = i < n ? q + i : r + (i - n), *speed = i < n ? p + i : w + (i - n);
+        const double a = i < n ? rates[n + i] : rates[2 * n + m + (i - n)];
+        *place += length * *speed + quarter * a;
+        *speed += half * a;
     }
     time_stepping_elastic(state, q, p, stepping->elastic);
     for (size_t i = 0; i < n; i++)

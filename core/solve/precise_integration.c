@@ -60,6 +60,12 @@ static void precise_clear(TimeStepping *stepping) {
         precise_table_clear(&precise->tables[i]);
 }
 
+// The place of a component of y = (q, p, r, w; g, s) in the rows of transition.h.
+static size_t precise_place(const ModalState *state, size_t i) {
+    const size_t n = state->mode_count, m = state->dampers;
+    return i < n || i >= 2 * n + m ? i : i < 2 * n ? i + m : i - n;
+}
+
 // Stores the nonzero values of the state's rows of T.
 static void precise_compress(const TimeStepping *stepping, const double *T, PreciseTable *table) {
     const Precise *precise = stepping->method;
@@ -68,12 +74,13 @@ static void precise_compress(const TimeStepping *stepping, const double *T, Prec
     table->columns = table->starts + stepping->size + 1;
     memcpy(table->key, precise->key, precise->key_size * sizeof *table->key);
     for (size_t i = 0; i < stepping->size; i++) {
-        const double *row = T + i * precise->wide;
+        const double *row = T + precise_place(&stepping->state, i) * precise->wide;
         table->starts[i] = count;
         for (size_t j = 0; j < precise->wide; j++) {
-            if (row[j] != 0) {
+            const double value = row[precise_place(&stepping->state, j)];
+            if (value != 0) {
                 table->columns[count] = (uint32_t)j;
-                table->values[count++] = row[j];
+                table->values[count++] = value;
             }
         }
     }

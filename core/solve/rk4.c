@@ -52,15 +52,15 @@ static Status rk4_step(TimeStepping *stepping, double length) {
         for (size_t i = 0; i < stepping->size; i++)
             stage[i] = k == 0 ? y[i] : y[i] + part * last[i];
         for (size_t d = 0; d < m; d++)
-            stepping->force[d] = rk4_force(stepping, d, stage[n + d], stage[2 * n + m + d]);
+            stepping->force[d] = rk4_force(stepping, d, stage[2 * n + d], stage[2 * n + m + d]);
         time_stepping_rate(stepping, stage, stepping->ground[(k + 1) / 2], slopes + k * row);
     }
     const double sixth = length / 6;
     for (size_t i = stepping->size; i < row; i++)
         stepping->integrals[i - stepping->size] = rk4_gain(slopes + i, row, sixth);
     // The step's end may be the first point inside a stop: this freezes the parameters there.
-    for (size_t d = 0; d < m; d++)
-        (void)rk4_force(stepping, d, y[n + d] + rk4_gain(slopes + n + d, row, sixth), w[d]);
+    for (size_t i = 2 * n; i < 2 * n + m; i++)
+        (void)rk4_force(stepping, i - 2 * n, y[i] + rk4_gain(slopes + i, row, sixth), w[i - 2 * n]);
     for (size_t i = 0; i < stepping->size; i++)
         y[i] += rk4_gain(slopes + i, row, sixth);
     return STATUS_OK;

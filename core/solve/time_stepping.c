@@ -54,12 +54,13 @@ void time_stepping_rate(TimeStepping *stepping, const double *y, double ground,
                         double *restrict out) {
     const ModalState *state = &stepping->state;
     const size_t n = state->mode_count, m = state->dampers;
-    const double *p = y + n + m, *w = p + n;
-    double *p1 = out + n + m, *w1 = out + 2 * n + m, *sums = out + stepping->size;
+    const double *p = y + n, *w = p + n + m;
+    double *p1 = out + n, *w1 = out + 2 * n + m, *sums = out + stepping->size;
     const double *force = stepping->force;
     double momentum = modal_state_dot(state->momentum_weights, p, n), loss = 0;
     time_stepping_elastic(state, y, p, stepping->elastic);
-    memcpy(out, p, (n + m) * sizeof *y);
+    memcpy(out, p, n * sizeof *y);
+    memcpy(out + 2 * n, w, m * sizeof *y);
     for (size_t i = 0; i < n; i++)
         p1[i] = -stepping->elastic[i] - state->modes->participation[i] * ground;
     for (size_t d = 0; d < m; d++)
@@ -84,8 +85,8 @@ void time_stepping_rate(TimeStepping *stepping, const double *y, double ground,
 
 void time_stepping_forces(TimeStepping *stepping, const double *y) {
     const ModalState *state = &stepping->state;
-    const size_t n = state->mode_count, m = state->dampers;
-    const double *r = y + n, *w = r + m + n;
+    const size_t m = state->dampers;
+    const double *r = y + 2 * state->mode_count, *w = r + m;
     for (size_t d = 0; d < m; d++)
         stepping->force[d] = state->damper[d].phase == PHASE_CONTACT
                                  ? step_contact_force(state, d, r[d], w[d]).value
@@ -173,25 +174,29 @@ Status time_stepping_note(TimeStepping *stepping, double cost) {
     return stepping->unchecked_cost > CHECK_COST ? time_stepping_check(stepping) : STATUS_OK;
 }
 
-void time_stepping_begin(TimeStepping *stepping, double *y) {
-    const ModalState *state = &stepping->state;
+static void time_stepping_gather(const ModalState *state, double *y) {
     const size_t n = state->mode_count, m = state->dampers;
     memcpy(y, state->q, n * sizeof *y);
-    memcpy(y + n + m, state->p, n * sizeof *y);
+    memcpy(y + n, state->p, n * sizeof *y);
     for (size_t d = 0; d < m; d++) {
-        y[n + d] = state->damper[d].r;
+        y[2 * n + d] = state->damper[d].r;
         y[2 * n + m + d] = state->damper[d].w;
     }
-    memset(stepping->integrals, 0, (2 * m + 2) * sizeof *stepping->integrals);
+}
+
+void time_stepping_begin(TimeStepping *stepping, double *y) {
+    const ModalState *state = &stepping->state;
+    time_stepping_gather(state, y);
+    memset(stepping->integrals, 0, (2 * state->dampers + 2) * sizeof *stepping->integrals);
     step_contact_begin(state, &stepping->contact);
 }
 
 void time_stepping_scatter(ModalState *state, const double *y) {
     const size_t n = state->mode_count, m = state->dampers;
     memcpy(state->q, y, n * sizeof *y);
-    memcpy(state->p, y + n + m, n * sizeof *y);
+    memcpy(state->p, y + n, n * sizeof *y);
     for (size_t d = 0; d < m; d++) {
-        state->damper[d].r = y[n + d];
+        state->damper[d].r = y[2 * n + d];
         state->damper[d].w = y[2 * n + m + d];
     }
 }

@@ -52,7 +52,7 @@ struct TimeStepping {
 
     size_t size;      // of y
     size_t row;       // of y and its integrals
-    double *y;        // q, r, p, w of all modes and dampers
+    double *y;        // q, p, r, w of all modes and dampers
     double ground[3]; // a_g at the step's start, middle and end [m/s^2]
     // Of one step: N [N s] and N r' [J] of the dampers, work of the base and loss in the structure.
     double *integrals;
