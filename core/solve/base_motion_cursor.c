@@ -62,8 +62,29 @@ static double base_cursor_piece_slice(const BaseCursor *cursor, size_t n, double
     return INFINITY;
 }
 
+bool base_cursor_interval(const BaseCursor *cursor, size_t n, Slice *slice) {
+    switch (cursor->base->form) {
+    case BASE_STILL:
+        *slice = (Slice){0, 0, 0};
+        return true;
+    case BASE_SINE:
+        *slice = base_cursor_sine_slice(cursor, n, 0);
+        return true;
+    case BASE_PIECES:
+        return base_cursor_piece_slice(cursor, n, 0, slice) >=
+               (1 - 8 * DBL_EPSILON * (double)(n + 1)) / cursor->sample_rate;
+    case BASE_SAMPLED:
+        break;
+    }
+    if (cursor->ratio == 0)
+        return false;
+    *slice = base_cursor_aligned_slice(cursor, n, 0);
+    return true;
+}
+
 double base_cursor_slice(const BaseCursor *cursor, size_t n, double offset, Slice *slice) {
     const Base *base = cursor->base;
+    const double time = (double)n / cursor->sample_rate + offset;
     *slice = (Slice){0, 0, 0};
     if (base->form == BASE_PIECES)
         return base_cursor_piece_slice(cursor, n, offset, slice);
@@ -75,7 +96,6 @@ double base_cursor_slice(const BaseCursor *cursor, size_t n, double offset, Slic
         *slice = base_cursor_aligned_slice(cursor, n, offset);
         return INFINITY;
     }
-    const double time = (double)n / cursor->sample_rate + offset;
     const double place = floor(time / base->interval);
     if (place >= (double)base->count)
         return INFINITY;
@@ -89,15 +109,10 @@ double base_cursor_slice(const BaseCursor *cursor, size_t n, double offset, Slic
     return j + 1 >= base->count ? INFINITY : knot;
 }
 
-bool base_cursor_interval(const BaseCursor *cursor, size_t n, Slice *slice) {
-    const double lasts = base_cursor_slice(cursor, n, 0, slice);
-    return (cursor->base->form != BASE_SAMPLED || cursor->ratio > 0) &&
-           lasts >= (1 - 8 * DBL_EPSILON * (double)(n + 1)) / cursor->sample_rate;
-}
-
 double base_cursor_at(const BaseCursor *cursor, size_t n) {
     Slice slice;
-    (void)base_cursor_slice(cursor, n, 0, &slice);
+    if (!base_cursor_interval(cursor, n, &slice))
+        (void)base_cursor_slice(cursor, n, 0, &slice);
     return slice.value;
 }
 
