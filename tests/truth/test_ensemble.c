@@ -19,7 +19,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/excitation/random.h"
+#include "core/excitation/excitation.h"
 #include "core/math/fft.h"
 #include "core/math/student_t.h"
 #include "core/study/ensemble.h"
