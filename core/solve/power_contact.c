@@ -121,11 +121,12 @@ INLINE void power_series_force(PowerContact *power, SeriesContact *contact, size
         // Powers of Y of the leader, and of p of the others.
         double own[SERIES_ROW];
         const double root = is_leader ? law->root : 1;
-        for (size_t j = 0; j <= k; j++)
-            own[j] = !is_leader ? contact->sign *
-                                      power->z[j * power->stride + power->at_r + contact->damper]
-                     : j < k ? power->powers[1].up[j]
-                             : power->powers[1].now;
+        if (is_leader) {
+            memcpy(own, power->powers[1].up, k * sizeof *own);
+            own[k] = power->powers[1].now;
+        }
+        for (size_t j = 0; j <= k && !is_leader; j++)
+            own[j] = contact->sign * power->z[j * power->stride + power->at_r + contact->damper];
         elastic->now = power_series_power(own, root * law->exponents[0], elastic->up, k);
         viscous->now = law->exponents[1] == law->exponents[0]
                            ? elastic->now
