@@ -183,13 +183,13 @@ double flight_max_ground(const Slice *slice, double length);
 // interval or some halves of it, where the contact is so stiff that it takes many Taylor steps;
 // with a proof that it lasts.
 
-enum { PRESS_LEVELS = 8 };
+enum { SUSTAINED_LEVELS = 8 };
 
 // The tables of one stop, made once contacts with it have lasted long enough.
 typedef struct SustainedStop {
     double spent;     // cost of Taylor steps so far
     bool is_given_up; // no memory
-    Transition levels[PRESS_LEVELS];
+    Transition levels[SUSTAINED_LEVELS];
     double *damped, *bent;               // D shape, W^2 shape
     double wide, most_damped, most_bent; // |shape|, |D shape|, |W^2 shape|
     double coupling, bending;            // shape . D shape, shape . W^2 shape
@@ -198,20 +198,21 @@ typedef struct SustainedStop {
 typedef struct SustainedContact {
     SustainedStop *stops; // damper after damper, by Side
     size_t count;
-    double length[PRESS_LEVELS];                           // the interval, its half, ...
-    double ground[PRESS_LEVELS][2], fall[PRESS_LEVELS][2]; // as those of Flight
-    double *start, *gained, *pulled, *elastic;             // scratch
+    double length[SUSTAINED_LEVELS];                               // the interval, its half, ...
+    double ground[SUSTAINED_LEVELS][2], fall[SUSTAINED_LEVELS][2]; // as those of Flight
+    double *start, *gained, *pulled, *elastic;                     // scratch
     double *block;
 } SustainedContact;
 
 // Freed by sustained_contact_clear, also after a failure.
-Status sustained_contact_make(SustainedContact *press, const ModalState *state, Problem *problem);
-void sustained_contact_clear(SustainedContact *press);
+Status sustained_contact_make(SustainedContact *sustained, const ModalState *state,
+                              Problem *problem);
+void sustained_contact_clear(SustainedContact *sustained);
 
 // Moves the state by at most `length` if surely no contact begins or ends meanwhile, and returns
 // the length of the step [s]. Its integrals are in *work if that is not NULL, and in the damper's
 // row. 0: nothing has changed.
-double sustained_contact_step(SustainedContact *press, ModalState *state, const Slice *slice,
+double sustained_contact_step(SustainedContact *sustained, ModalState *state, const Slice *slice,
                               double length, StepWork *work);
 
 // --- power_contact.c: contact under power laws: while any buffer is compressed, all modes and
@@ -379,8 +380,8 @@ typedef struct EventEngine {
     ModalState state;
     TaylorStep arc;
     Flight flight;
-    SustainedContact pressing;
-    PowerContact ode;
+    SustainedContact sustained;
+    PowerContact power;
     Recorder record;
     double work;                   // solver steps since the last check
     size_t idle;                   // steps of contact in a row without time passing
@@ -395,7 +396,7 @@ Status event_engine_make(EventEngine *engine, Run *run, double tolerance, Respon
                          Problem *problem);
 void event_engine_clear(EventEngine *engine);
 
-// A second run of the same scene without any record. It owns `state` and `ode` and borrows the
+// A second run of the same scene without any record. It owns `state` and `power` and borrows the
 // rest.
 Status event_engine_shadow(EventEngine *engine, const EventEngine *of, Run *run, double tolerance,
                            Response *response);

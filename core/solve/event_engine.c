@@ -141,7 +141,7 @@ static double event_engine_arc_max(const ModalState *state, const Slice *slice) 
 static Status event_engine_step_power(EventEngine *engine, const Slice *slice, double length) {
     ModalState *state = &engine->state;
     PowerContactStep step;
-    power_contact_step(&engine->ode, slice, length, &step);
+    power_contact_step(&engine->power, slice, length, &step);
     event_engine_add_work(engine, &step.work);
     const double before = state->offset;
     state->offset += step.length;
@@ -164,7 +164,7 @@ static bool event_engine_step_sustained(EventEngine *engine, const Slice *slice,
     StepWork work;
     if (slice->omega > 0 && state->base_omega == 0)
         return false; // the tables have no such base
-    const double taken = sustained_contact_step(&engine->pressing, state, slice, length,
+    const double taken = sustained_contact_step(&engine->sustained, state, slice, length,
                                                 state->is_shadow ? NULL : &work);
     if (taken == 0)
         return false;
@@ -196,10 +196,10 @@ static Status event_engine_advance(EventEngine *engine, double length) {
     Slice slice;
     const double knot = base_cursor_slice(&state->base, state->sample, state->offset, &slice);
     state->base_acceleration = slice.value;
-    if (power_contact_is_active(&engine->ode))
+    if (power_contact_is_active(&engine->power))
         return event_engine_step_power(engine, &slice, fmin(length, knot));
     if (event_engine_step_sustained(engine, &slice, fmin(length, knot)))
-        return event_engine_count_steps(engine, event_engine_cost(engine, STEP_WORK_HOLD));
+        return event_engine_count_steps(engine, event_engine_cost(engine, STEP_WORK_SUSTAINED));
     const bool is_suppressed = event_engine_is_suppressed(state);
     const double max = fmin(fmin(length, knot), is_suppressed ? state->suppress_time : INFINITY);
     taylor_step_make(arc, state, &slice, fmin(max, event_engine_arc_max(state, &slice)));
@@ -351,8 +351,8 @@ Status event_engine_make(EventEngine *engine, Run *run, double tolerance, Respon
     TRY(modal_state_make(state, run, problem));
     TRY(taylor_step_allocate(&engine->arc, state, problem));
     TRY(flight_make(&engine->flight, state, problem));
-    TRY(sustained_contact_make(&engine->pressing, state, problem));
-    TRY(power_contact_make(&engine->ode, state, tolerance, problem));
+    TRY(sustained_contact_make(&engine->sustained, state, problem));
+    TRY(power_contact_make(&engine->power, state, tolerance, problem));
     TRY(recorder_start(&engine->record, state, response, problem));
     const EnergyState energy = modal_state_energy(state);
     impact_log_start(&state->impacts, response, run->impacts_max, &energy);
@@ -366,10 +366,10 @@ Status event_engine_shadow(EventEngine *engine, const EventEngine *of, Run *run,
                            Response *response) {
     ModalState *state = &engine->state;
     TRY(modal_state_make(state, run, NULL));
-    TRY(power_contact_make(&engine->ode, state, tolerance, NULL));
+    TRY(power_contact_make(&engine->power, state, tolerance, NULL));
     engine->arc = of->arc;
     engine->flight = of->flight;
-    engine->pressing = of->pressing;
+    engine->sustained = of->sustained;
     engine->record.buffer = of->record.buffer;
     state->is_shadow = true;
     const EnergyState energy = modal_state_energy(state);
@@ -380,8 +380,8 @@ Status event_engine_shadow(EventEngine *engine, const EventEngine *of, Run *run,
 void event_engine_clear(EventEngine *engine) {
     recorder_clear(&engine->record);
     flight_clear(&engine->flight);
-    sustained_contact_clear(&engine->pressing);
-    power_contact_clear(&engine->ode);
+    sustained_contact_clear(&engine->sustained);
+    power_contact_clear(&engine->power);
     taylor_step_clear(&engine->arc);
     modal_state_clear(&engine->state);
 }

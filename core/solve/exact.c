@@ -135,13 +135,13 @@ static void exact_companion_start(Companion *companion, EventEngine *engine) {
     companion->response.is_unlisted = true;
     ModalState *own = &companion->engine.state;
     companion->is_stepped =
-        state->plan->form == CONTACT_POWER && engine->ode.tolerance > POWER_CONTACT_TOLERANCE;
+        state->plan->form == CONTACT_POWER && engine->power.tolerance > POWER_CONTACT_TOLERANCE;
     const size_t tracked = companion->is_stepped ? COMPANION_SAMPLES * state->padded : 0;
     companion->tracks = calloc(2 * tracked + 1, sizeof *companion->tracks);
     companion->is_known =
         companion->tracks != NULL &&
         event_engine_shadow(&companion->engine, engine, &companion->run,
-                            fmax(engine->ode.tolerance / FINER, POWER_CONTACT_TOLERANCE),
+                            fmax(engine->power.tolerance / FINER, POWER_CONTACT_TOLERANCE),
                             &companion->response) == STATUS_OK;
     if (!companion->is_known)
         return;
@@ -175,7 +175,7 @@ static void exact_companion_report(const Companion *companion, const ModalState 
 }
 
 static void exact_companion_clear(Companion *companion) {
-    power_contact_clear(&companion->engine.ode);
+    power_contact_clear(&companion->engine.power);
     modal_state_clear(&companion->engine.state);
     response_clear(&companion->response);
     free(companion->tracks);

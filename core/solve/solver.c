@@ -15,7 +15,7 @@ double step_work_steps(StepWorkKind kind, size_t storeys, size_t dampers, bool i
     switch (kind) {
     case STEP_WORK_FLIGHT:
         return 1.2 + (0.05 + 0.0008 * n) * n * (1 + m) + (0.02 + 1.9e-6 * n * n) * pairs;
-    case STEP_WORK_HOLD:
+    case STEP_WORK_SUSTAINED:
         return 6 + 0.3 * n * (1 + m) + 0.1 * n * n;
     case STEP_WORK_ARC:
         return 20 + 5 * m + (1.2 + 0.06 * m) * n + 0.15 * pairs;

@@ -41,8 +41,8 @@ typedef struct RunColumn {
 
 // Solver steps of the event engine's parts, as measured on frames of 1 to 200 storeys.
 typedef enum StepWorkKind {
-    STEP_WORK_FLIGHT, // a sample interval of flight
-    STEP_WORK_HOLD,   // an attempt at a long step of contact
+    STEP_WORK_FLIGHT,    // a sample interval of flight
+    STEP_WORK_SUSTAINED, // an attempt at a long step of contact
     STEP_WORK_ARC,
     STEP_WORK_EVENT,
     STEP_WORK_POWER, // a contact under a power law; for predictions only

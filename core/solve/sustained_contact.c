@@ -25,38 +25,40 @@ static const double SHORT_STEP = 0.25; // shortest soft step beyond SOFT_LEVEL, 
 // Relative oscillation of N about its quasi-static value that a peak may miss.
 static const double RIPPLE_MAX = 1e-9;
 
-Status sustained_contact_make(SustainedContact *press, const ModalState *state, Problem *problem) {
+Status sustained_contact_make(SustainedContact *sustained, const ModalState *state,
+                              Problem *problem) {
     const size_t n = state->mode_count, size = simd_kernels_padded(2 * (n + 1) + 2);
-    memset(press, 0, sizeof *press);
+    memset(sustained, 0, sizeof *sustained);
     if (state->plan->form != CONTACT_LINEAR || state->dampers == 0)
         return STATUS_OK;
-    const SimdArray arrays[] = {{&press->start, size},
-                                {&press->gained, size},
-                                {&press->pulled, size},
-                                {&press->elastic, state->padded}};
-    press->stops = calloc(2 * state->dampers, sizeof *press->stops);
-    press->block = simd_kernels_allocate(arrays, COUNT(arrays));
-    if (press->stops == NULL || press->block == NULL)
+    const SimdArray arrays[] = {{&sustained->start, size},
+                                {&sustained->gained, size},
+                                {&sustained->pulled, size},
+                                {&sustained->elastic, state->padded}};
+    sustained->stops = calloc(2 * state->dampers, sizeof *sustained->stops);
+    sustained->block = simd_kernels_allocate(arrays, COUNT(arrays));
+    if (sustained->stops == NULL || sustained->block == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu modes", n);
-    press->count = 2 * state->dampers;
-    for (size_t i = 0; i < PRESS_LEVELS; i++) {
-        press->length[i] = ldexp(state->interval, -(int)i);
-        flight_ground(state->base_omega, press->length[i], press->ground[i], press->fall[i]);
+    sustained->count = 2 * state->dampers;
+    for (size_t i = 0; i < SUSTAINED_LEVELS; i++) {
+        sustained->length[i] = ldexp(state->interval, -(int)i);
+        flight_ground(state->base_omega, sustained->length[i], sustained->ground[i],
+                      sustained->fall[i]);
     }
     return STATUS_OK;
 }
 
 static void sustained_contact_clear_stop(SustainedStop *stop) {
-    for (size_t i = 0; i < PRESS_LEVELS; i++)
+    for (size_t i = 0; i < SUSTAINED_LEVELS; i++)
         transition_clear(&stop->levels[i]);
     free(stop->damped);
 }
 
-void sustained_contact_clear(SustainedContact *press) {
-    for (size_t i = 0; i < press->count; i++)
-        sustained_contact_clear_stop(&press->stops[i]);
-    free(press->stops);
-    free(press->block);
+void sustained_contact_clear(SustainedContact *sustained) {
+    for (size_t i = 0; i < sustained->count; i++)
+        sustained_contact_clear_stop(&sustained->stops[i]);
+    free(sustained->stops);
+    free(sustained->block);
 }
 
 // The only damper in contact where all others fly; NULL otherwise.
@@ -84,7 +86,7 @@ static double sustained_contact_norm(const double *values, size_t count) {
 
 // The tables of many modes are large.
 static size_t sustained_contact_levels(const ModalState *state) {
-    return state->mode_count <= FEW_MODES ? PRESS_LEVELS : 3;
+    return state->mode_count <= FEW_MODES ? SUSTAINED_LEVELS : 3;
 }
 
 // Makes the transitions of a stop once Taylor steps have cost about as much. False: there are none.
@@ -264,7 +266,7 @@ static bool sustained_contact_soft_lasts(const SustainedStop *stop, const ModalS
 }
 
 // Whether all other masses stay in flight. Sets their storey_speed and gained.
-static bool sustained_contact_others_are_clear(const SustainedContact *press, ModalState *state,
+static bool sustained_contact_others_are_clear(const SustainedContact *sustained, ModalState *state,
                                                const DamperState *alone, const SustainedBounds *at,
                                                double length, double fallen) {
     const size_t n = state->mode_count, a = (size_t)(alone - state->damper);
@@ -277,7 +279,7 @@ static bool sustained_contact_others_are_clear(const SustainedContact *press, Mo
                             fabs(state->delassus[d * state->dampers + a]) * at->force;
         damper->storey_speed = modal_state_dot(damper->shape, state->p, n);
         damper->gained = length * (damper->storey_speed + damper->w) - fallen -
-                         modal_state_dot(damper->shape, press->gained, n);
+                         modal_state_dot(damper->shape, sustained->gained, n);
         if (!flight_is_clear(damper, damper->r, damper->r + damper->gained, bend, length))
             return false;
     }
@@ -285,18 +287,20 @@ static bool sustained_contact_others_are_clear(const SustainedContact *press, Mo
 }
 
 // y' form y with y at the start.
-static double sustained_contact_form(const SustainedContact *press, const Transition *transition,
-                                     const SimdKernels *lanes, const double *form) {
-    lanes->multiply(form, transition->rows, press->start, transition->size, press->pulled);
-    return modal_state_dot(press->start, press->pulled, transition->size);
+static double sustained_contact_form(const SustainedContact *sustained,
+                                     const Transition *transition, const SimdKernels *lanes,
+                                     const double *form) {
+    lanes->multiply(form, transition->rows, sustained->start, transition->size, sustained->pulled);
+    return modal_state_dot(sustained->start, sustained->pulled, transition->size);
 }
 
-static void sustained_contact_add_work(const SustainedContact *press, const Transition *transition,
-                                       ModalState *state, DamperState *alone, const Slice *slice,
-                                       double length, StepWork *work) {
+static void sustained_contact_add_work(const SustainedContact *sustained,
+                                       const Transition *transition, ModalState *state,
+                                       DamperState *alone, const Slice *slice, double length,
+                                       StepWork *work) {
     const size_t n = state->mode_count;
-    const double *start = press->start, *gained = press->gained;
-    work->damping = sustained_contact_form(press, transition, state->lanes, transition->loss);
+    const double *start = sustained->start, *gained = sustained->gained;
+    work->damping = sustained_contact_form(sustained, transition, state->lanes, transition->loss);
     work->input = -(slice->value * modal_state_dot(transition->input[0], start, transition->size) +
                     slice->slope * modal_state_dot(transition->input[1], start, transition->size));
     for (size_t d = 0; d < state->dampers; d++) {
@@ -313,15 +317,15 @@ static void sustained_contact_add_work(const SustainedContact *press, const Tran
     impact_log_force(&state->impacts, &alone->row, fabs(force));
     impact_log_stretch(
         &state->impacts, &alone->row, length, impulse,
-        sustained_contact_form(press, transition, state->lanes, transition->contact));
+        sustained_contact_form(sustained, transition, state->lanes, transition->contact));
 }
 
 // The increments of (q, r, p, w) over a step.
-static void sustained_contact_find_gained(SustainedContact *press, const Transition *transition,
+static void sustained_contact_find_gained(SustainedContact *sustained, const Transition *transition,
                                           const ModalState *state, const DamperState *alone,
                                           const Slice *slice) {
     const size_t n = state->mode_count, freedoms = n + 1;
-    double *start = press->start;
+    double *start = sustained->start;
     memcpy(start, state->q, n * sizeof *start);
     memcpy(start + freedoms, state->p, n * sizeof *start);
     start[n] = alone->r;
@@ -329,13 +333,13 @@ static void sustained_contact_find_gained(SustainedContact *press, const Transit
     start[2 * freedoms] = slice->value;
     start[2 * freedoms + 1] = slice->slope;
     state->lanes->multiply(transition->gain, transition->rows, start, transition->size,
-                           press->gained);
+                           sustained->gained);
 }
 
-static void sustained_contact_move(const SustainedContact *press, ModalState *state,
+static void sustained_contact_move(const SustainedContact *sustained, ModalState *state,
                                    DamperState *alone, double ground) {
     const size_t n = state->mode_count;
-    const double *gained = press->gained, *speed = gained + n + 1;
+    const double *gained = sustained->gained, *speed = gained + n + 1;
     for (size_t d = 0; d < state->dampers; d++) {
         DamperState *damper = &state->damper[d];
         if (damper == alone)
@@ -353,9 +357,9 @@ static void sustained_contact_move(const SustainedContact *press, ModalState *st
     state->events_at_instant = 0;
 }
 
-double sustained_contact_step(SustainedContact *press, ModalState *state, const Slice *slice,
+double sustained_contact_step(SustainedContact *sustained, ModalState *state, const Slice *slice,
                               double length, StepWork *work) {
-    DamperState *alone = press->count > 0 ? sustained_contact_find(state) : NULL;
+    DamperState *alone = sustained->count > 0 ? sustained_contact_find(state) : NULL;
     if (alone == NULL)
         return 0;
     // Equal buffers of a damper share one.
@@ -363,21 +367,21 @@ double sustained_contact_step(SustainedContact *press, ModalState *state, const 
     const bool are_alike = stops[0].stiffness == stops[1].stiffness && //
                            stops[0].damping == stops[1].damping;
     SustainedStop *stop =
-        &press->stops[2 * (size_t)(alone - state->damper) + (are_alike ? 0 : alone->side)];
+        &sustained->stops[2 * (size_t)(alone - state->damper) + (are_alike ? 0 : alone->side)];
     if (!sustained_contact_prepare(stop, state, alone))
         return 0;
-    modal_state_elastic(state, state->q, state->p, press->elastic);
+    modal_state_elastic(state, state->q, state->p, sustained->elastic);
     const SustainedStart from = {
-        slice, press->elastic,
+        slice, sustained->elastic,
         alone->base_coupling * slice->value +
-            modal_state_dot(alone->shape, press->elastic, state->mode_count)};
+            modal_state_dot(alone->shape, sustained->elastic, state->mode_count)};
     const double rate = modal_state_rate(state);
     const double omega = sqrt(alone->contact.stiffness / alone->effective_mass);
     for (size_t i = 0; i < sustained_contact_levels(state) &&
-                       sustained_contact_is_worth(state, press->length[i] * rate);
+                       sustained_contact_is_worth(state, sustained->length[i] * rate);
          i++) {
         const Transition *transition = &stop->levels[i];
-        const double h = press->length[i];
+        const double h = sustained->length[i];
         const bool is_soft = h * omega < 1;
         SustainedBounds at;
         if (is_soft && i > SOFT_LEVEL && h * rate < SHORT_STEP)
@@ -388,21 +392,21 @@ double sustained_contact_step(SustainedContact *press, ModalState *state, const 
             continue;
         if (!is_soft && !sustained_contact_stiff_lasts(stop, state, alone, &from, h, &at))
             continue;
-        sustained_contact_find_gained(press, transition, state, alone, slice);
+        sustained_contact_find_gained(sustained, transition, state, alone, slice);
         if (is_soft && !sustained_contact_soft_lasts(
-                           stop, state, alone, &from, press->gained[state->mode_count],
-                           press->gained[2 * state->mode_count + 1], h, &at))
+                           stop, state, alone, &from, sustained->gained[state->mode_count],
+                           sustained->gained[2 * state->mode_count + 1], h, &at))
             continue;
-        const double *ground = press->ground[i], *fall = press->fall[i];
+        const double *ground = sustained->ground[i], *fall = sustained->fall[i];
         const double fallen = fall[0] * slice->value + fall[1] * slice->slope;
-        if (!sustained_contact_others_are_clear(press, state, alone, &at, h, fallen))
+        if (!sustained_contact_others_are_clear(sustained, state, alone, &at, h, fallen))
             continue;
         const double sum = ground[0] * slice->value + ground[1] * slice->slope;
         if (work != NULL) {
             work->ground = sum;
-            sustained_contact_add_work(press, transition, state, alone, slice, h, work);
+            sustained_contact_add_work(sustained, transition, state, alone, slice, h, work);
         }
-        sustained_contact_move(press, state, alone, sum);
+        sustained_contact_move(sustained, state, alone, sum);
         return h;
     }
     return 0;

@@ -22,7 +22,7 @@ typedef struct Pair {
     Run run;
     Response response;
     ModalState frame;
-    PowerContact ode;
+    PowerContact power;
 } Pair;
 
 static void pair_make(Pair *pair, const ContactLaw *law, double exponent, double factor,
@@ -38,7 +38,8 @@ static void pair_make(Pair *pair, const ContactLaw *law, double exponent, double
     assert_int_equal(modal_state_make(&pair->frame, &pair->run, &problem), STATUS_OK);
     const EnergyState still = {0};
     impact_log_start(&pair->frame.impacts, &pair->response, 0, &still);
-    assert_int_equal(power_contact_make(&pair->ode, &pair->frame, tolerance, &problem), STATUS_OK);
+    assert_int_equal(power_contact_make(&pair->power, &pair->frame, tolerance, &problem),
+                     STATUS_OK);
     DamperState *damper = &pair->frame.damper[0];
     damper->phase = PHASE_CONTACT;
     damper->side = SIDE_RIGHT;
@@ -51,7 +52,7 @@ static void pair_make(Pair *pair, const ContactLaw *law, double exponent, double
 }
 
 static void pair_clear(Pair *pair) {
-    power_contact_clear(&pair->ode);
+    power_contact_clear(&pair->power);
     modal_state_clear(&pair->frame);
     response_clear(&pair->response);
     plan_free(pair->plan);
@@ -64,7 +65,7 @@ static int pair_run(Pair *pair, double *time) {
     int count = 0;
     *time = 0;
     do {
-        power_contact_step(&pair->ode, &still, 1e3, &step);
+        power_contact_step(&pair->power, &still, 1e3, &step);
         *time += step.length;
     } while (++count < 10000 && !step.is_event);
     assert_true(step.is_event && pair->frame.damper[0].r == 0);
@@ -116,8 +117,8 @@ static void the_motion_is_smooth_at_the_touch(void **state) {
     pair_make(&pair, &contact_hertz, 1.5, 0, POWER_CONTACT_TOLERANCE);
     const Slice still = {0, 0, 0};
     PowerContactStep step;
-    power_contact_step(&pair.ode, &still, 1e3, &step);
-    const PowerContact *series = &pair.ode;
+    power_contact_step(&pair.power, &still, 1e3, &step);
+    const PowerContact *series = &pair.power;
     const double *Y = power_series_leader(series);
     assert_int_equal(series->root, 2);
     // Y'' = -(2 / m_e) Y^4: orders 1, 6, 11, 16, 21 and no others.
@@ -196,7 +197,7 @@ static void the_order_is_integer_over_a_whole_contact(void **state) {
             Pair pair;
             double time = 0;
             pair_make(&pair, &contact_hertz, 1.5, 0, POWER_CONTACT_TOLERANCE);
-            PowerContact *series = &pair.ode;
+            PowerContact *series = &pair.power;
             // Equal steps in tau; the last is cut where Y is 0.
             const ContactTerms terms = {.stiffness = 1, .exponent = 1.5};
             const double length = half ? 0.1 : 0.2;
@@ -254,7 +255,7 @@ static void a_mass_without_speed_is_pressed_in(void **state) {
         PowerContactStep step;
         double time = 0, deepest = 0;
         for (int k = 0; k < 1000 && time < 100; k++) {
-            power_contact_step(&pair.ode, &push, 100 - time, &step);
+            power_contact_step(&pair.power, &push, 100 - time, &step);
             assert_false(step.is_event && damper->r != 0);
             if (step.is_event)
                 break;
