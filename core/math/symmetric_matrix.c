@@ -50,7 +50,7 @@ int symmetric_matrix_find_indefinite(size_t size, const double *A, double margin
 }
 
 Status symmetric_matrix_solve(size_t size, const double *A, const double *b, double *x) {
-    double *scaled = malloc((size * size + size) * sizeof *scaled);
+    double *scaled = calloc(size * size + size, sizeof *scaled);
     if (scaled == NULL)
         return STATUS_NO_MEMORY;
     double *scale = scaled + size * size;
