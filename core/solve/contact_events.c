@@ -119,7 +119,7 @@ static void contact_event_begin_rest(ModalState *state, size_t d, Side side) {
         damper->approach_speed = speed;
         collision_resolve(state);
         contact_event_sort_resting(state);
-    } else { // the end of a series of bounces, too short for the clock to distinguish the masses
+    } else { // it approaches by rounding alone, after bounces that the clock does not tell apart
         damper->impulse = speed * damper->effective_mass;
         double *impulses = state->scratch;
         for (size_t e = 0; e < state->dampers; e++)

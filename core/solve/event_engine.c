@@ -14,7 +14,7 @@
 
 enum { STORM_EVENTS = 100, IDLE_STEPS = 1000 };
 
-// The speeds of a shorter step would underflow: it takes no time.
+// A shorter step changes the state by less than the smallest double: it counts as no step.
 static const double SHORTEST = 1e-250; // [s]
 
 static const double GAIN_CONTACTS = 1e3; // energy gain allowed, over the tolerance of one contact

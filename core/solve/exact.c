@@ -1,7 +1,7 @@
 // The exact solver: between events the scene is a linear system, which is propagated exactly;
-// events are located to rounding. One storey with one mass goes by single_mass.h. Everything else
-// goes by the event engine, with a companion run beside it that shows how far the run can be
-// trusted.
+// events are located to rounding. Scenes of one storey with one mass are run by single_mass.c, all
+// others by the event engine, with a companion run beside it from which error estimate and
+// predictability horizon follow.
 #include "core/solve/exact.h"
 
 #include <float.h>
@@ -14,9 +14,10 @@
 
 enum { COMPANION_SAMPLES = FLIGHT_BUFFER_MAX };
 static const double NUDGE = 4 * DBL_EPSILON;
-static const double PARTED = 0.01; // of the largest displacement: larger differences are chance
-static const double FINER = 30;    // tolerance of the run over that of the companion
-static const double CAUTION = 3;   // error of the run over the difference of two stepped runs
+static const double PARTED =
+    0.01; // of the largest displacement: beyond it the difference no longer grows
+static const double FINER = 30;  // tolerance of the run over that of the companion
+static const double CAUTION = 3; // error of the run over the difference of two stepped runs
 
 // A second run that differs by a few roundings follows the first one, COMPANION_SAMPLES behind,
 // until the two have parted.
@@ -170,7 +171,7 @@ static void exact_companion_report(const Companion *companion, const ModalState 
     response->has_trust = companion->is_known;
     response->is_stepped = companion->is_stepped;
     response->error_estimate = error < (companion->is_stepped ? 1 : PARTED) ? error : 1;
-    // A horizon in spite of a small error was found before the displacement had grown.
+    // A small error means that the horizon was found while the displacement was still small.
     response->trust_horizon = error <= RESPONSE_DIVERGENCE ? (double)NAN : companion->horizon;
 }
 

@@ -1,6 +1,7 @@
 // Free flight from sample to sample, eight at once: all of them straight from the state before the
-// first, so that no sample waits for the one before. Not contacts and not parts of an interval:
-// where a stop may be reached it ends.
+// first, so that no sample waits for the one before. A flight ends
+// before the interval in which a stop may be reached: contacts and parts of intervals are
+// single_mass.c's.
 #ifndef CORE_SOLVE_LANES_H
 #define CORE_SOLVE_LANES_H
 

@@ -30,7 +30,8 @@ typedef struct DamperState {
     ContactOrigin origin; // origin of r
     int zero_gap_terms;   // number of leading terms of the gap that are exactly 0, just after a
                           // release from rest
-    bool just_begun;      // the present phase has no duration yet
+    bool just_begun;      // the present phase has no duration yet; of a bounce at the end of a step
+                          // (step_contact.c): it ends in rest
     double r, w;          // displacement and speed relative to the storey [m], [m/s]
     double force;         // N on the structure as of the last modal_state_forces [N]
     ContactParameters contact; // frozen at the touch

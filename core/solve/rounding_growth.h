@@ -1,5 +1,6 @@
-// The predictability horizon of a run of one mass: rounding errors to first order, carried along
-// the events. The motion does not depend on it, and an accuracy of one per cent is enough.
+// Error estimate and predictability horizon of a run of one mass: rounding errors to first order,
+// carried along the events. The motion does not depend on it, and an accuracy of one per cent is
+// enough.
 #ifndef CORE_SOLVE_ROUNDING_GROWTH_H
 #define CORE_SOLVE_ROUNDING_GROWTH_H
 
@@ -19,7 +20,7 @@ enum { GROWTH_FLIGHT = SIDE_RIGHT + 1, GROWTH_REST, GROWTH_SYSTEMS };
 
 typedef struct GrowthSystem {
     Motion motion;
-    double step, frequency;            // D [s], 1 / D
+    double step, frequency;            // D of rounding_growth.c [s], 1 / D
     int levels;                        // of `power` so far; made as they are needed
     double power[GROWTH_LEVELS][4][4]; // exp(A D) to the powers 1, 2, 4 ...
 } GrowthSystem;
@@ -51,7 +52,7 @@ void rounding_growth_start(RoundingGrowth *growth, const Motion *flying, const M
 void rounding_growth_end_phase(RoundingGrowth *growth, ContactPhase phase, Side side, double time,
                                const State *state, double largest);
 
-// w becomes -restitution w; `w` is the one before, `push` is s.
+// A bounce: w becomes -restitution w. `w` is the speed before it, `push` is s of Motion.
 void rounding_growth_bounce(RoundingGrowth *growth, double restitution, double w, double push);
 // The mass rests at its stop: gap and relative speed are exactly 0.
 void rounding_growth_stick(RoundingGrowth *growth);

@@ -184,19 +184,22 @@ INLINE void single_mass_peak(SingleMass *single, const Piece *piece, double s) {
 
 // --- events
 
-// False: the mass may come to rest, which is the event engine's.
+// The impulse law at the instant of the touch, as contact_event_bounce applies it to any number of
+// masses. False, and nothing has changed: the mass may come to rest, which the event engine
+// handles.
 static bool single_mass_bounce(SingleMass *single, Side side) {
     const double sign = single_mass_sign(side), e = single->damper->stops[side].restitution;
     const double approach = fabs(single->state.w), share = single->flying.share;
     const double v = single->state.v + sign * share * (1 + e) * approach;
-    const double pull =
+    // Towards the stop after the bounce [m/s^2]: the next touch takes 2 e approach / closing, those
+    // that follow are a geometric series.
+    const double closing =
         sign * (single->flying.damping * v + single->flying.omega2 * single->state.x);
-    // The bounces that follow towards a stop that pushes are a geometric series.
-    const double left = 2 * e * approach / (pull * (1 - e));
+    const double left = 2 * e * approach / (closing * (1 - e));
     if (!(approach > 0) || single->damper->clearance == 0 ||
-        (pull > 0 ? !(left > 1e3 * DBL_EPSILON *
-                                 single_mass_larger(single_mass_time(single), single->interval))
-                  : e == 0))
+        (closing > 0 ? !(left > 1e3 * DBL_EPSILON *
+                                    single_mass_larger(single_mass_time(single), single->interval))
+                     : e == 0))
         return false;
     single_mass_note(single);
     single_mass_end_phase(single);
@@ -212,7 +215,8 @@ static bool single_mass_bounce(SingleMass *single, Side side) {
     return true;
 }
 
-// False: the event engine has to go on from here.
+// The mass has reached the stop `side`. False: the event engine has to go on from here; it finds
+// the touch again, at once.
 static bool single_mass_touch(SingleMass *single, Side side) {
     if (single->plan->form != CONTACT_LINEAR)
         return single->plan->form == CONTACT_IMPULSIVE && single_mass_bounce(single, side);
@@ -297,8 +301,8 @@ INLINE bool single_mass_step(SingleMass *single, double h) {
 
 // --- contact over many lengths of its table
 
-// States and base at the present instant and after each length, then whatever; what follows them is
-// no larger than BLOCK_ROW.
+// Rows of x, v, r, w and of the base's value and slope: at the present instant and after each
+// length. The entries after the last of these are undefined until a function clears them.
 enum { BLOCK_ROW = BLOCK + 8 };
 typedef double BlockRows[START_SIZE][BLOCK_ROW];
 
@@ -437,8 +441,10 @@ INLINE size_t single_mass_block_inside(const SingleMass *single, const MotionTab
         const Four x3 = base_slope + own * x2 + m->share * contact * (own * V + n_max);
         const Four s2 = m->damping * x3 + m->omega2 * x2;
         const Four more = (rise + h / 2 * (s2 + k2 * q)) * half_per_rest;
-        // Inside are the chord of r less the largest sag of a convex part, or r is monotone, or it
-        // leaves the stop.
+        // A length is inside the stop if one of three margins is positive: `sag`, the chord of r
+        // less the most that r can lie below it; the end with the larger |w| less the most that w
+        // can change, so that r is monotone; `leaves`, the same from r = 0 on (any r > 0 excludes
+        // it). And its end must be inside.
         const Four bend = (q + more) * h;
         largest += more;
         wide_larger(&largest, &none, &largest);
@@ -637,6 +643,8 @@ static Status single_mass_need_engine(SingleMass *single) {
     return STATUS_OK;
 }
 
+// Hands the present state to the engine. What only the engine's own steps set is as after a step
+// without an event: it finds an event at this instant again.
 static void single_mass_to_engine(SingleMass *single) {
     EventEngine *engine = single->engine;
     ModalState *state = &engine->state;
@@ -671,7 +679,7 @@ static void single_mass_to_engine(SingleMass *single) {
     modal_state_forces(state);
 }
 
-// Returns whether the kernels of this file can go on.
+// Takes over the engine's state. Returns whether the kernels of this file can go on.
 static bool single_mass_from_engine(SingleMass *single) {
     const EventEngine *engine = single->engine;
     const ModalState *state = &engine->state;
@@ -683,6 +691,7 @@ static bool single_mass_from_engine(SingleMass *single) {
     single->impacts = state->impacts;
     single->base_speed = engine->record.base_speed;
     single->last_velocity = single->state.v;
+    single->is_by_engine = false;
     if (single->plan->damper_count == 0)
         return true;
     const DamperState *damper = &state->damper[0];
@@ -692,8 +701,9 @@ static bool single_mass_from_engine(SingleMass *single) {
     single->state.r = damper->r;
     single->state.w = damper->w;
     single->row = damper->row;
-    return damper->phase == PHASE_CONTACT ||
-           (damper->phase == PHASE_FLIGHT && damper->zero_gap_terms == 0);
+    single->is_by_engine = damper->phase != PHASE_CONTACT &&
+                           !(damper->phase == PHASE_FLIGHT && damper->zero_gap_terms == 0);
+    return !single->is_by_engine;
 }
 
 static Status single_mass_check(SingleMass *single) {
@@ -715,7 +725,7 @@ static Status single_mass_check(SingleMass *single) {
 }
 
 // By the event engine from the present instant to a sample where these kernels can go on, or to the
-// last one.
+// last one, where is_by_engine tells whether they can.
 static Status single_mass_by_engine(SingleMass *single) {
     single_mass_flush(single);
     TRY(single_mass_need_engine(single));
@@ -971,12 +981,13 @@ static Status single_mass_solve(SingleMass *single) {
     single_mass_flush(single);
     // The duration may end between samples.
     const double rest = plan->duration - (double)single->sample / plan->sample_rate;
-    bool is_there = single->phase != PHASE_RESTING;
-    while (is_there && rest - single->offset > 2 * DBL_EPSILON * rest)
-        is_there = single_mass_step(single, rest);
-    if (!is_there) {
+    bool is_kept = !single->is_by_engine;
+    while (is_kept && rest - single->offset > 2 * DBL_EPSILON * rest)
+        is_kept = single_mass_step(single, rest);
+    if (!is_kept) {
         TRY(single_mass_need_engine(single));
-        single_mass_to_engine(single);
+        if (!single->is_by_engine)
+            single_mass_to_engine(single);
         TRY(event_engine_cross(single->engine, rest));
         (void)single_mass_from_engine(single);
     }

@@ -1,5 +1,5 @@
 // One storey with at most one free mass: the common scene, by kernels that propagate many samples
-// at a time. Every event is located as event_engine.c locates it; what these kernels do not handle
+// at a time. Every event is located to rounding; what these kernels do not handle
 // (rests, several events within the clock's resolution, steps that are too many) the event engine
 // does, one sample interval at a time.
 #ifndef CORE_SOLVE_SINGLE_MASS_H

@@ -39,6 +39,7 @@ struct SingleMass {
     double base_slope;   // of the base, no larger over the whole run: [m/s^3], of a sine [m/s^2]
     int pieces, events;  // of the present contact, of the present interval
     EventEngine *engine; // made when it is first needed
+    bool is_by_engine;   // its state is the present one, and these kernels cannot go on from it
     // Tables, kept for the next run of the same system.
     double table_interval;
     Lanes lanes;
@@ -78,12 +79,12 @@ static inline double single_mass_effective(const SingleMass *single) {
     return single->plan->mass[0] * single->flying.share;
 }
 
-// s [m/s^2].
+// s of Motion, the structure's elastic and damping acceleration [m/s^2].
 static inline double single_mass_push(const SingleMass *single, const State *at) {
     return single->flying.damping * at->v + single->flying.omega2 * at->x;
 }
 
-// n [m/s^2]; 0 in flight.
+// n of Motion, the contact force over the effective mass [m/s^2]; 0 in flight.
 static inline double single_mass_contact_term(const SingleMass *single, const State *at) {
     if (single->phase != PHASE_CONTACT)
         return 0;
