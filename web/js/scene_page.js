@@ -47,14 +47,13 @@ async function show(host, address, signal) {
   const picture = drawing(drawn), draw = () => picture.show(draft.scene, { plan: draft.check?.plan });
   draw();
 
-  let timer = null, turn = 0, isEdited = false, isUnkept = false, loading; // isUnkept: the URL has not what is typed
+  let timer, turn = 0, isEdited = false, isUnkept = false, loading;
   const goTo = (pointer) => focusField(steps, pointer);
 
   // Keeps the scene and asks the service; only the last question's answer counts.
   async function ask(question, answered) {
     const mine = ++turn, isLast = () => mine === turn && !signal.aborted;
     clearTimeout(timer);
-    timer = null;
     try {
       const fits = !isEdited || await keep(draft.scene, isLast);
       if (isLast()) isUnkept = false;
