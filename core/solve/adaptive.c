@@ -48,7 +48,6 @@ typedef struct Adaptive {
     N_Vector within;   // scratch: inside a step, or a derivative
     N_Vector absolute; // error tolerance of each component
     double *rates;     // y' at the last evaluation of the watched functions
-    double *strain;    // energy in the dampers' buffers at the last step [J]
     // Watched functions and their slopes (NAN: unknown): at the step's start, its end and inside.
     double *value, *slope, *end_value, *end_slope, *inner_value, *inner_slope;
     double *block;
@@ -110,17 +109,12 @@ static double *adaptive_data(N_Vector vector) {
 static void adaptive_forces(const Adaptive *adaptive, const double *y, double ground) {
     TimeStepping *stepping = adaptive->stepping;
     const ModalState *state = &stepping->state;
-    const size_t n = state->mode_count, m = state->dampers;
-    const double *r = y + 2 * state->mode_count, *w = r + m;
+    time_stepping_forces(stepping, y);
     if (state->resting > 0)
-        time_stepping_elastic(state, y, y + n, stepping->elastic);
-    for (size_t d = 0; d < m; d++) {
-        const ContactPhase phase = state->damper[d].phase;
-        stepping->force[d] = phase == PHASE_CONTACT ? step_contact_force(state, d, r[d], w[d]).value
-                             : phase == PHASE_RESTING
-                                 ? modal_state_constraint(state, d, stepping->elastic, ground)
-                                 : 0;
-    }
+        time_stepping_elastic(state, y, y + state->mode_count, stepping->elastic);
+    for (size_t d = 0; d < state->dampers; d++)
+        if (state->damper[d].phase == PHASE_RESTING)
+            stepping->force[d] = modal_state_constraint(state, d, stepping->elastic, ground);
 }
 
 static void adaptive_rate(Adaptive *adaptive, double t, const double *y, double *out) {
@@ -264,12 +258,6 @@ static Status adaptive_restart(Adaptive *adaptive) {
     double *y = adaptive_data(adaptive->y);
     memset(y, 0, adaptive->size * sizeof *y);
     time_stepping_begin(adaptive->stepping, y);
-    for (size_t d = 0; d < state->dampers; d++) {
-        const DamperState *damper = &state->damper[d];
-        adaptive->strain[d] = damper->phase == PHASE_CONTACT
-                                  ? step_contact_force(state, d, damper->r, damper->w).strain
-                                  : 0;
-    }
     adaptive->t = adaptive->t0 = 0;
     adaptive->events = state->events;
     adaptive_watch(adaptive, 0, y, adaptive->value, adaptive->slope);
@@ -429,6 +417,7 @@ static void adaptive_accept(Adaptive *adaptive, double length) {
     const double *y = adaptive_data(adaptive->y), *before = adaptive_data(adaptive->from);
     const size_t sums = adaptive->stepping->size,
                  totals = adaptive->stepping->size + 2 * state->dampers;
+    double *strain = adaptive->stepping->contact.strain_before;
     time_stepping_scatter(state, y);
     for (size_t d = 0; d < m; d++) {
         DamperState *damper = &state->damper[d];
@@ -439,8 +428,8 @@ static void adaptive_accept(Adaptive *adaptive, double length) {
         if (damper->phase == PHASE_CONTACT) {
             const ContactForce force = step_contact_force(state, d, damper->r, damper->w);
             impact_log_force(&state->impacts, &damper->row, fabs(force.value));
-            work -= force.strain - adaptive->strain[d];
-            adaptive->strain[d] = force.strain;
+            work -= force.strain - strain[d];
+            strain[d] = force.strain;
         }
         if (damper->row.is_open)
             impact_log_stretch(&state->impacts, &damper->row, length, impulse,
@@ -637,8 +626,8 @@ static void adaptive_ignore_message(int code, const char *module, const char *fu
 }
 
 static bool adaptive_allocate(Adaptive *adaptive) {
-    const size_t m = adaptive->stepping->state.dampers, watched = WATCHED * m + 1;
-    const size_t count = adaptive->size + m + 6 * watched;
+    const size_t watched = WATCHED * adaptive->stepping->state.dampers + 1;
+    const size_t count = adaptive->size + 6 * watched;
     // SUNDIALS crashes where an allocation fails, so the memory for it is reserved first and then
     // returned to the allocator.
     const size_t reserve = CLONES_MAX * (adaptive->size + CLONE_OVERHEAD) + CONTEXT_SIZE;
@@ -650,12 +639,11 @@ static bool adaptive_allocate(Adaptive *adaptive) {
     if (SUNContext_Create(NULL, &adaptive->context) != 0)
         return false;
     adaptive->rates = adaptive->block;
-    adaptive->strain = adaptive->rates + adaptive->size;
     double **const arrays[] = {&adaptive->value,       &adaptive->slope,
                                &adaptive->end_value,   &adaptive->end_slope,
                                &adaptive->inner_value, &adaptive->inner_slope};
     for (size_t i = 0; i < COUNT(arrays); i++)
-        *arrays[i] = adaptive->strain + m + i * watched;
+        *arrays[i] = adaptive->rates + adaptive->size + i * watched;
     N_Vector *const vectors[] = {&adaptive->y, &adaptive->from, &adaptive->within,
                                  &adaptive->absolute};
     for (size_t i = 0; i < COUNT(vectors); i++) {
