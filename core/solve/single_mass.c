@@ -791,12 +791,11 @@ static bool single_mass_advance_plain(SingleMass *single, size_t until) {
 
 static Status single_mass_loop(SingleMass *single) {
     const size_t last = single->plan->count - 1;
-    const bool is_wide = single->lanes.width != LANES_PLAIN;
     while (single->sample < last) {
         const size_t until =
             single->sample + single_mass_smaller(last - single->sample, PROGRESS_SAMPLES);
-        if (!(is_wide ? single_mass_advance_wide(single, until)
-                      : single_mass_advance_plain(single, until)))
+        if (!(single->is_wide ? single_mass_advance_wide(single, until)
+                              : single_mass_advance_plain(single, until)))
             TRY(single_mass_by_engine(single));
         TRY(single_mass_check(single));
     }
@@ -909,6 +908,7 @@ static Status single_mass_start(SingleMass *single, Run *run, Response *response
     single->problem = problem;
     single->interval = 1 / plan->sample_rate;
     single->has_stops = plan->damper_count > 0 && !run->is_clear;
+    single->is_wide = wide_is_at_hand();
     single->phase = PHASE_FLIGHT;
     single->origin = FROM_MIDDLE;
     single_mass_make_motions(single);
@@ -938,7 +938,7 @@ static Status single_mass_start(SingleMass *single, Run *run, Response *response
     FlightBlock *stretch = &single->stretch;
     if (base->form == BASE_SAMPLED) {
         double step;
-        if (single->lanes.width != LANES_PLAIN)
+        if (single->is_wide)
             single_mass_measure_wide(base->values, base->count, &stretch->base_max, &step);
         else
             single_mass_measure(base->values, base->count, &stretch->base_max, &step);

@@ -1,7 +1,7 @@
-// ns of CPU per sample of the exact solver for the paper's scenes, 5 channels at 1 kHz, beside a
-// memset and a memcpy of the same bytes in the same run; and the CPU time of short scenes as a
-// whole. Smallest of the repeats. Once for every vector width of this processor, or for the widths
-// that the arguments name: bench_exact [avx512] [avx2] [plain].
+// ns of CPU per sample of the exact solver for the paper's scenes, 5 channels, at 1 kHz mostly,
+// beside a memset and a memcpy of the same bytes in the same run; and the CPU time of short scenes
+// as a whole. Smallest of the repeats. Once for every vector width of this processor, or for the
+// widths that the arguments name: bench_exact [avx512] [avx2] [plain].
 #include <stdio.h>
 #include <string.h>
 
@@ -46,7 +46,7 @@ static double scene_us(bool is_random, bool has_channels, double duration) {
 
 // ns per sample of every scene; false, and a line printed, if one fails.
 static bool print_samples(void) {
-    printf("%-20s %8s %8s %8s %9s %8s %9s %9s %9s\n", "ns per sample", "memset", "memcpy", "run",
+    printf("%-23s %8s %8s %8s %9s %8s %9s %9s %9s\n", "ns per sample", "memset", "memcpy", "run",
            "x memset", "base", "whole", "impacts", "plan us");
     for (size_t i = 0; i < bench_case_count; i++) {
         BenchScene scene;
@@ -56,7 +56,7 @@ static bool print_samples(void) {
             return false;
         }
         const double set = bench_memset(&scene), copy = bench_memcpy(&scene);
-        printf("%-20s %8.2f %8.2f %8.2f %9.2f %8.2f %9.2f %9zu %9.2f\n", bench_cases[i].name, set,
+        printf("%-23s %8.2f %8.2f %8.2f %9.2f %8.2f %9.2f %9zu %9.2f\n", bench_cases[i].name, set,
                copy, times.run, times.run / set, times.base, times.whole, times.impacts,
                times.plan_us);
         bench_close(&scene);

@@ -9,15 +9,18 @@
 #include "tests/support/paper.h"
 
 const BenchCase bench_cases[] = {
-    {"no contact, free", 0.61, 0.025, false, false, 60},
-    {"no contact, random", 0.61, 0.025, true, false, 60},
-    {"free sponge", 0.61, 0.025, false, true, 60},
-    {"free aluminium", 0.46, 0.0003, false, true, 60},
-    {"random sponge", 0.61, 0.025, true, true, 60},
-    {"random aluminium", 0.46, 0.0003, true, true, 60},
+    {"no contact, free", 0.61, 0.025, false, false, 60, 1000},
+    {"no contact, random", 0.61, 0.025, true, false, 60, 1000},
+    {"free sponge", 0.61, 0.025, false, true, 60, 1000},
+    {"free aluminium", 0.46, 0.0003, false, true, 60, 1000},
+    {"random sponge", 0.61, 0.025, true, true, 60, 1000},
+    {"random aluminium", 0.46, 0.0003, true, true, 60, 1000},
     // The same impacts, hardly any flight after them.
-    {"free sponge, 10 s", 0.61, 0.025, false, true, 10},
-    {"free aluminium, 10 s", 0.46, 0.0003, false, true, 10},
+    {"free sponge, 10 s", 0.61, 0.025, false, true, 10, 1000},
+    {"free aluminium, 10 s", 0.46, 0.0003, false, true, 10, 1000},
+    // Many pieces in a sample interval.
+    {"random sponge, 50 Hz", 0.61, 0.025, true, true, 60, 50},
+    {"random aluminium, 50 Hz", 0.46, 0.0003, true, true, 60, 50},
 };
 const size_t bench_case_count = COUNT(bench_cases);
 
@@ -47,6 +50,7 @@ bool bench_open(const BenchCase *bench, BenchScene *scene) {
     problem_clear(&problem);
     memset(scene, 0, sizeof *scene);
     paper_scene(&scene->simulation, bench->restitution, bench->contact_time, bench->duration);
+    scene->simulation.scene.sample_rate = bench->sample_rate;
     if (!bench->has_contact)
         scene->simulation.scene.dampers.at[0].clearance = 100;
     if (bench->is_random)

@@ -11,7 +11,8 @@ typedef struct BenchCase {
     const char *name;
     double restitution, contact_time;
     bool is_random, has_contact;
-    double duration; // [s] at 1 kHz
+    double duration;    // [s]
+    double sample_rate; // [Hz]
 } BenchCase;
 extern const BenchCase bench_cases[];
 extern const size_t bench_case_count;
