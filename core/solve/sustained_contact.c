@@ -10,6 +10,10 @@
 // (S - drag S' / spring) / spring. The distance of r from there grows with the curvature of S,
 // which is small: of a deviation d of S the mass follows all but (d'' + drag d') / spring.
 //
+// The same system with w for r and S' for S bounds N' = k w + c r''. With S' = slope + d and w =
+// (slope + d) / spring + e,  f = r'' has f' = -drag f - spring e,  e' = f - d' / spring, so that
+// sqrt(f^2 + spring e^2) grows by |d'| / sqrt(spring) at most.
+//
 // A softer contact lasts through a step where r at both ends is further from 0 than r'' can bend
 // it. Where N is surely monotonic its peak is at an end.
 #include "core/solve/engine.h"
@@ -21,9 +25,6 @@
 // With FEW_MODES a step is cheaper than a single Taylor step.
 enum { FEW_MODES = 24, SOFT_LEVEL = 1 };
 static const double SHORT_STEP = 0.25; // shortest soft step beyond SOFT_LEVEL, times the rate
-
-// Relative oscillation of N about its quasi-static value that a peak may miss.
-static const double RIPPLE_MAX = 1e-9;
 
 Status sustained_contact_make(SustainedContact *sustained, const ModalState *state,
                               Problem *problem) {
@@ -208,10 +209,11 @@ static bool sustained_contact_stiff_lasts(const SustainedStop *stop, const Modal
     at->force = (largest + hard * (deviation + left * bow)) / (1 - share);
     const double bent = bow + more * at->force, excited = deviation + left * bent;
     at->size += lift * at->force;
-    // A force that may be the largest so far must be at an end of the step: the mass is pressed
-    // quasi-statically and S is monotonic.
+    // A force that may be the largest so far must be at an end of the step, as N' keeps its sign.
+    const double leap = from->s - (k * r + c * w) / mass; // r''
+    const double strayed = hypot(leap, omega * (w - slope / spring)) + h * bent / omega;
     if (!state->is_shadow && at->force > impact_log_least_force(&state->impacts, &damper->row) &&
-        !(hard * deviation <= RIPPLE_MAX * largest && fabs(slope) > h * bent))
+        !(k * (fabs(slope) - h * bent) / spring > hard * strayed))
         return false;
     if (state->plan->separation == SEPARATION_ZERO_FORCE)
         return fmin(sign * forces[0], sign * forces[1]) > hard * excited;
