@@ -183,7 +183,7 @@ double flight_max_ground(const Slice *slice, double length);
 // interval or some halves of it, where the contact is so stiff that it takes many Taylor steps;
 // with a proof that it lasts.
 
-enum { SUSTAINED_LEVELS = 8 };
+enum { SUSTAINED_LEVELS = 16 };
 
 // The tables of one stop, made once contacts with it have lasted long enough.
 typedef struct SustainedStop {

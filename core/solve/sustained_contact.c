@@ -23,8 +23,8 @@
 #include <string.h>
 
 // With FEW_MODES a step is cheaper than a single Taylor step.
-enum { FEW_MODES = 24, SOFT_LEVEL = 1 };
-static const double SHORT_STEP = 0.25; // shortest soft step beyond SOFT_LEVEL, times the rate
+enum { FEW_MODES = 24, LEVELS_MIN = 2, LEVELS_OF_MANY_MODES = 3 };
+static const double SHORT_STEP = 0.25; // shortest step beyond LEVELS_MIN, times the rate
 
 Status sustained_contact_make(SustainedContact *sustained, const ModalState *state,
                               Problem *problem) {
@@ -85,9 +85,14 @@ static double sustained_contact_norm(const double *values, size_t count) {
     return sqrt(modal_state_dot(values, values, count));
 }
 
-// The tables of many modes are large.
+// How many lengths are worth having. The tables of many modes are large.
 static size_t sustained_contact_levels(const ModalState *state) {
-    return state->mode_count <= FEW_MODES ? SUSTAINED_LEVELS : 3;
+    const size_t max = state->mode_count <= FEW_MODES ? SUSTAINED_LEVELS : LEVELS_OF_MANY_MODES;
+    const double reach = state->interval * modal_state_rate(state);
+    size_t levels = LEVELS_MIN;
+    while (levels < max && ldexp(reach, -(int)levels) >= SHORT_STEP)
+        levels++;
+    return levels;
 }
 
 // Makes the transitions of a stop once Taylor steps have cost about as much. False: there are none.
@@ -379,15 +384,13 @@ double sustained_contact_step(SustainedContact *sustained, ModalState *state, co
             modal_state_dot(alone->shape, sustained->elastic, state->mode_count)};
     const double rate = modal_state_rate(state);
     const double omega = sqrt(alone->contact.stiffness / alone->effective_mass);
-    for (size_t i = 0; i < sustained_contact_levels(state) &&
-                       sustained_contact_is_worth(state, sustained->length[i] * rate);
+    const size_t levels = sustained_contact_levels(state);
+    for (size_t i = 0; i < levels && sustained_contact_is_worth(state, sustained->length[i] * rate);
          i++) {
         const Transition *transition = &stop->levels[i];
         const double h = sustained->length[i];
         const bool is_soft = h * omega < 1;
         SustainedBounds at;
-        if (is_soft && i > SOFT_LEVEL && h * rate < SHORT_STEP)
-            break;
         if (h > length * (1 + 1e-15) || transition->block == NULL)
             continue;
         if (!sustained_contact_find_bounds(state, slice, h, &at))
