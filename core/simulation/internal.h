@@ -4,6 +4,7 @@
 #define CORE_SIMULATION_INTERNAL_H
 
 #include "core/simulation/simulation.h"
+#include "core/solve/exact.h"
 #include "core/solve/solver.h"
 
 enum { SPECTRUM_SEGMENT = 4096 }; // default length [samples]
@@ -71,10 +72,9 @@ void run_inputs_clear(RunInputs *inputs);
 // The same of a simulation with an accuracy target.
 Status accuracy_target_plan(const Simulation *simulation, PlanReport *report, Problem *problem);
 Cost accuracy_target_cost(const Simulation *simulation);
-// `settled`, if not NULL, receives the simulation with the settings of the last run and without a
-// target. It is cleared by simulation_clear, also after a failure.
+// `settings`, if not NULL, receives those of the last run.
 Status accuracy_target_run(const Simulation *simulation, const SimulationLimits *limits,
-                           const Progress *progress, Workspace *workspace, Simulation *settled,
+                           const Progress *progress, Workspace *workspace, AccuracyExact *settings,
                            Outcome **outcome, Problem *problem);
 
 #endif
