@@ -22,12 +22,8 @@ static inline bool progress_advance(const Progress *progress, double fraction) {
 typedef struct ProgressRange {
     const Progress *whole;
     double from, share;
-    double furthest; // largest fraction of the part so far
+    double furthest; // largest fraction of the part so far, at first 0
 } ProgressRange;
-
-static inline ProgressRange progress_range(const Progress *whole, double from, double share) {
-    return (ProgressRange){whole, from, share, 0};
-}
 
 static inline bool progress_range_advance(void *context, double fraction) {
     ProgressRange *range = context;

@@ -20,7 +20,7 @@
 // peaks left out by their sum, all else by the root of the sum of squares. Coupled damping and
 // impacts are estimated from the same numbers. SAFETY covers what they, sampling and the phases of
 // the modes change; its value and GROWTH are calibrated with tests/truth/test_modes.c.
-#include "core/plan/mode_selection.h"
+#include "core/plan/plan.h"
 
 #include <float.h>
 #include <math.h>

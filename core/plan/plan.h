@@ -6,6 +6,7 @@
 #include "core/base/report.h"
 #include "core/contact/contact_parameters.h"
 #include "core/contact/identification.h"
+#include "core/excitation/base_motion.h"
 #include "core/plan/modes.h"
 #include "core/scene/scene.h"
 
@@ -99,7 +100,7 @@ typedef struct Plan {
     double *influence;                  // r of M x'' + C x' + K x = -M r a_g + N [-]
     double *displacement, *velocity;    // of the storeys at t = 0 [m], [m/s]
     Modes modes;       // all, or those kept; empty where plan_is_single, and in a sketch
-    bool is_truncated; // moving modes are left out (plan/mode_selection.h)
+    bool is_truncated; // moving modes are left out (plan_keep)
     size_t kept;       // of a sketch: number of modes that the run keeps; 0: all
     double given_up;   // predicted error of displacement by modes left out, over its largest value
     double fastest;    // of a sketch: bound on omega and decay rate of all modes [rad/s]
@@ -138,5 +139,39 @@ bool stops_vary(const PlanDamper *damper);
 
 // Parameters of an impact that begins with this approach speed [m/s].
 ContactParameters stops_freeze(const PlanStop *stop, double approach_speed);
+
+// Selects the modes of a plan of plan_new, once; `modes` is the number asked for, 0: all. Adds its
+// decisions and the predicted error to the plan. Does nothing where plan_is_single.
+Status plan_keep(Plan *plan, const Scene *scene, size_t modes, Problem *problem);
+
+// Relative to the same run with all modes; at most 1. Exceeded in about 1 % of scenes without
+// dampers and 3 % of scenes with dampers.
+typedef struct TruncationError {
+    double displacement;      // largest difference over the largest displacement, any storey
+    double mean_acceleration; // rms of the difference over rms, of all storeys together
+    double rms_displacement;  // difference of the largest storey's rms over that rms
+} TruncationError;
+
+// Writes to errors[k] the error of a run with the k + 1 lowest modes, for all plan->modes.count of
+// them; it never rises with k and ends with 0. The plan has all modes of its structure (plan_new,
+// before plan_keep). Nothing is written where plan_is_single. Makes the base's motion.
+Status truncation_predict(const Plan *plan, const Scene *scene, TruncationError *errors);
+
+// The share of the lowest `kept` modes in the mass that the base moves, r' M r; 1 where it moves
+// none.
+double truncation_moved_mass(const Plan *plan, size_t kept);
+
+// Properties of a scene that are proved before the run from bounds (reachability.c).
+typedef struct Regime {
+    bool is_unforced; // the base does not move
+    bool is_at_rest;  // nothing moves
+    bool is_clear;    // no mass reaches a stop; true without a mass
+    // Bound on the distance of a mass from the middle of its stops over half their distance, the
+    // largest of all masses; INFINITY: 1 or more, or unknown [-]
+    double reach;
+} Regime;
+
+// `base` is the motion that the plan's run has.
+Regime regime_find(const Plan *plan, const Base *base);
 
 #endif

@@ -8,7 +8,7 @@
 // time, so that
 //
 //   |x_j| <= sqrt(sum over k of (phi_jk / omega_k)^2) (V(0) + |Gamma| integral |a_g|).
-#include "core/plan/reachability.h"
+#include "core/plan/plan.h"
 
 #include <math.h>
 #include <stdlib.h>

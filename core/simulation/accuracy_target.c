@@ -10,10 +10,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/plan/mode_selection.h"
 #include "core/result/response.h"
 #include "core/simulation/internal.h"
-#include "core/solve/exact.h"
 
 enum { ATTEMPTS = 3, NAME = 96 };
 
@@ -327,14 +325,13 @@ static Status search_run(TargetSearch *search, const Candidate *candidate, Probl
     AccuracyExact settings;
     const Simulation view = candidate_view(search->target.simulation, candidate, &settings);
     const bool is_whole = candidate_is_whole(candidate);
-    const double left = 1 - search->done;
-    ProgressRange range =
-        progress_range(search->progress, search->done, is_whole ? left : left / 2);
-    const Progress progress = progress_range_view(&range);
+    const double share = (1 - search->done) * (is_whole ? 1 : 0.5);
+    const Progress progress =
+        progress_range_view(&(ProgressRange){search->progress, search->done, share, 0});
     outcome_unref(search->outcome);
     search->outcome = NULL;
     search->estimated = 1;
-    search->done = range.from + range.share;
+    search->done += share;
     const Status status =
         run_scene(&view, search->limits, &progress, search->workspace, NULL, &search->outcome,
                   is_whole ? problem : NULL); // NULL: another candidate follows

@@ -1,14 +1,13 @@
 // With one storey and at most one damper channels have bare names. Otherwise the channel of each
 // storey and damper carries its number from 1. So one quantity has one name, and equal scenes have
 // one canonical form.
-#include "core/simulation/channel_names.h"
-
-#include "core/base/json_pointer.h"
-#include "core/base/spelling.h"
-
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include "core/base/json_pointer.h"
+#include "core/base/spelling.h"
+#include "core/simulation/internal.h"
 
 static const ChannelId usual[] = {CHANNEL_DISPLACEMENT, CHANNEL_VELOCITY, CHANNEL_ACCELERATION,
                                   CHANNEL_DAMPER_DISPLACEMENT, CHANNEL_CONTACT_FORCE};

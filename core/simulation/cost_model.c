@@ -3,7 +3,6 @@
 #include <math.h>
 
 #include "core/simulation/internal.h"
-#include "core/solve/exact.h"
 
 static const double TURN = 6.28318530717958647693;
 

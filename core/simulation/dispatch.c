@@ -156,9 +156,8 @@ Status simulation_run(const Simulation *simulation, const SimulationLimits *limi
     *outcome = NULL;
     if (!simulation->output.reduction)
         return simulation_run_damped(simulation, limits, progress, workspace, outcome, problem);
-    ProgressRange first = progress_range(progress, 0, share),
-                  second = progress_range(progress, share, 1 - share);
-    const Progress damped = progress_range_view(&first), undamped = progress_range_view(&second);
+    const Progress damped = progress_range_view(&(ProgressRange){progress, 0, share, 0});
+    const Progress undamped = progress_range_view(&(ProgressRange){progress, share, 1 - share, 0});
     TRY(simulation_run_damped(simulation, limits, &damped, workspace, outcome, problem));
     const Status status =
         undamped_baseline_run(simulation, limits, &undamped, workspace, *outcome, problem);

@@ -5,7 +5,7 @@
 #include <math.h>
 
 #include "core/result/spectrum_distance.h"
-#include "core/simulation/channel_names.h"
+#include "core/simulation/internal.h"
 
 // clang-format off
 const Field error_fields[] = {

@@ -8,15 +8,11 @@
 //
 // Force and penetration at the ends follow from the contact law and the speed, because an instant
 // at a release shows the flight after it.
-#include "core/simulation/impact_history.h"
-
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/simulation/channel_names.h"
 #include "core/simulation/internal.h"
-#include "core/solve/exact.h"
 
 enum { TIME, FORCE, PENETRATION, SPEED, COLUMNS };
 

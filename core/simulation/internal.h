@@ -5,7 +5,6 @@
 
 #include "core/simulation/simulation.h"
 #include "core/solve/exact.h"
-#include "core/solve/solver.h"
 
 enum { SPECTRUM_SEGMENT = 4096 }; // default length [samples]
 
@@ -43,6 +42,21 @@ static inline const ContactLaw *simulation_law(const Simulation *simulation) {
 // simulation_complete without a check of the cost and without warnings of implausible values.
 Status simulation_validate(Simulation *simulation, const SimulationLimits *limits,
                            Warnings *warnings, Problem *problem);
+
+enum { CHANNEL_NAME = 64 };
+
+// The one name of a channel in a completed scene; `number` is that of the storey or damper, from 1.
+void channel_names_write(const Scene *scene, ChannelId channel, size_t number,
+                         char target[CHANNEL_NAME]);
+
+// Replaces CHANNEL_USUAL by the names of the default channels, or of the default spectrum's one,
+// and validates all names; their pointers are below `pointer`. Names are not compared with the
+// numbers of storeys and dampers where a fault leaves these unknown.
+Status channel_names_complete(const Scene *scene, Texts *names, bool is_spectrum,
+                              const char *pointer, Problem *problem);
+
+// Number of channels that CHANNEL_USUAL stands for in a completed scene.
+size_t channel_names_usual_count(const Scene *scene);
 
 // Warns of implausible values of a completed simulation. STATUS_OK or STATUS_NO_MEMORY.
 Status scene_warnings_of_input(const Simulation *simulation, Warnings *warnings);

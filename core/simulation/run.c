@@ -5,9 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/plan/mode_selection.h"
-#include "core/plan/reachability.h"
-#include "core/simulation/channel_names.h"
 #include "core/simulation/internal.h"
 
 const char engine_version[] = "impactd-5";
@@ -264,8 +261,7 @@ static Status run_spectrum(RunContext *context, Problem *problem) {
         columns->at[i].values = wanted->values;
         units[i] = channel->psd_unit;
     }
-    ProgressRange range = progress_range(context->progress, 0.9, 0.1);
-    const Progress progress = progress_range_view(&range);
+    const Progress progress = progress_range_view(&(ProgressRange){context->progress, 0.9, 0.1, 0});
     const WelchSettings settings = {(size_t)request->segment, (size_t)request->overlap,
                                     request->window, request->detrend};
     Spectrum *spectrum = &context->outcome->spectrum;
@@ -332,8 +328,7 @@ static Status run_solve(RunContext *context, const Regime *regime, Workspace *wo
     Outcome *outcome = context->outcome;
     // Where nothing moves the exact solver is the fastest.
     const Solver *solver = regime->is_at_rest ? &solver_exact : simulation_solver(simulation);
-    ProgressRange range = progress_range(context->progress, 0.2, 0.7);
-    const Progress progress = progress_range_view(&range);
+    const Progress progress = progress_range_view(&(ProgressRange){context->progress, 0.2, 0.7, 0});
     Run run = {.plan = context->plan,
                .base = &context->base,
                .progress = &progress,
@@ -358,8 +353,7 @@ static Status run_all(RunContext *context, Workspace *workspace, Problem *proble
     const Output *output = &simulation->output;
     Outcome *outcome = context->outcome;
     TRY(run_make_plan(simulation, &context->plan, problem));
-    ProgressRange range = progress_range(context->progress, 0, 0.2);
-    const Progress progress = progress_range_view(&range);
+    const Progress progress = progress_range_view(&(ProgressRange){context->progress, 0, 0.2, 0});
     TRY(run_make_base(simulation, context->limits == NULL ? 0 : context->limits->samples,
                       context->transforms, &progress, &context->base, problem));
     const Regime regime = regime_find(context->plan, &context->base);

@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "core/result/response.h"
-#include "core/simulation/channel_names.h"
 #include "core/simulation/internal.h"
 
 enum { LABELS = 32, TITLE_BYTES = 200 };

@@ -7,8 +7,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "core/simulation/channel_names.h"
-
 enum { NAMES_MAX = 16, ENTRIES_MAX = 24, BUCKETS = 400 }; // buckets of a trace
 
 const char *const compare_status_names[] = {"run", "refused", "failed", NULL};
@@ -171,7 +169,7 @@ static Status comparison_add(CompareEntries *entries, const ContactLaw *law, int
             return STATUS_OK;
     if (entries->count == ENTRIES_MAX)
         return STATUS_OK;
-    CompareEntry *entry = study_list_add(entries, sizeof *entry);
+    CompareEntry *entry = list_append(entries, sizeof *entry);
     TRY(status_made(entry != NULL));
     (void)fields_default(compare_entry_fields, entry); // absent and 0: nothing to allocate
     entry->separation = separation;
@@ -216,10 +214,8 @@ static Status comparison_set_contact(Simulation *target, const ContactLaw *law, 
 
 static Status comparison_set_channel(const Scene *scene, ChannelId channel, uint64_t storey,
                                      Texts *names) {
-    char name[CHANNEL_NAME];
-    channel_names_write(scene, channel, (size_t)storey, name);
     texts_clear(names);
-    return texts_append(names, name);
+    return channel_names_add(scene, channel, (size_t)storey, names);
 }
 
 // The simulation under an entry's contact, with the compared channels as its output.

@@ -199,7 +199,7 @@ static Status uncertainty_fill_recorded(InputUncertainty *uncertainty,
         }
         if (buffer->material == NULL || (isnan(recorded[0]) && isnan(recorded[1])))
             continue;
-        InputDeviation *added = study_list_add(&uncertainty->spread, sizeof *added);
+        InputDeviation *added = list_append(&uncertainty->spread, sizeof *added);
         TRY(status_made(added != NULL));
         *added = (InputDeviation){.damper = i / BUFFERS + 1,
                                   .buffer = (int)(i % BUFFERS),
@@ -649,7 +649,7 @@ static Status sensitivity_fill_row(const SensitivityWork *work, size_t index) {
             quotients[step] = sensitivity_quotient(work->values[low][metric],
                                                    work->values[low + 1][metric], value, width);
         }
-        SensitivitySlope *slope = study_list_add(&row->slopes, sizeof *slope);
+        SensitivitySlope *slope = list_append(&row->slopes, sizeof *slope);
         TRY(status_made(slope != NULL));
         *slope = (SensitivitySlope){metric, value, (double)NAN, (double)NAN, false};
         sensitivity_fill_slope(quotients, slope);
@@ -662,7 +662,7 @@ static Status sensitivity_fill_statistics(const SensitivityWork *work) {
     static const RunTable none = {NULL, 0};
     for (int metric = 0; metric < STATISTICS_METRICS; metric++) {
         const bool is_known = metric != STATISTICS_PEAK_CONTACT_FORCE || work->has_force;
-        RunStatistic *statistic = study_list_add(&answer->statistics, sizeof *statistic);
+        RunStatistic *statistic = list_append(&answer->statistics, sizeof *statistic);
         TRY(status_made(statistic != NULL));
         (void)fields_default(sensitivity_statistic_fields, statistic); // nothing to allocate
         if (is_known)
@@ -736,7 +736,7 @@ static Status sensitivity_fill_contact(const SensitivityWork *work) {
         const Derived *from = &derived->at[i];
         const Damper *damper = &scene->dampers.at[from->damper - 1];
         const char *why = sensitivity_refuse_stop(law, damper_buffer(damper, (Side)from->side));
-        SensitivityStop *stop = study_list_add(&work->answer->contact, sizeof *stop);
+        SensitivityStop *stop = list_append(&work->answer->contact, sizeof *stop);
         TRY(status_made(stop != NULL));
         (void)fields_default(sensitivity_stop_fields, stop); // nothing to allocate
         stop->damper = from->damper;
@@ -758,7 +758,7 @@ static Status sensitivity_fill_rows(SensitivityWork *work) {
     const Texts *parameters = &work->study->parameters;
     size_t stepped = 0;
     for (size_t i = 0; i < parameters->count; i++) {
-        SensitivityRow *row = study_list_add(&work->answer->response, sizeof *row);
+        SensitivityRow *row = list_append(&work->answer->response, sizeof *row);
         TRY(status_made(row != NULL));
         row->parameter = sensitivity_parameter(parameters->at[i]);
         const char *refused = perturbation_refuse(work->simulation, row->parameter);

@@ -353,7 +353,7 @@ Status spectrum_accumulator_report(const SpectrumAccumulator *sums, const Spectr
         return STATUS_OK;
     TRY(study_copy_reals(like->frequency, densities->rows, frequency));
     for (size_t c = 0; c < densities->count; c++) {
-        RunSpectrum *spectrum = study_list_add(spectra, sizeof *spectrum);
+        RunSpectrum *spectrum = list_append(spectra, sizeof *spectrum);
         TRY(status_made(spectrum != NULL));
         TRY(study_copy_text(densities->at[c].name, &spectrum->channel));
         TRY(study_copy_text(densities->at[c].unit, &spectrum->unit));

@@ -26,29 +26,15 @@ Status study_copy_reals(const double *values, size_t count, Reals *target) {
     return STATUS_OK;
 }
 
-// There is room for as many elements as the next power of two.
-void *study_list_add(void *list, size_t size) {
-    List grown;
-    memcpy(&grown, list, sizeof grown);
-    const size_t count = grown.count;
-    if ((count & (count - 1)) == 0)
-        grown.at = realloc(grown.at, (count == 0 ? 1 : 2 * count) * size);
-    if (grown.at == NULL)
-        return NULL;
-    grown.count++;
-    memcpy(list, &grown, sizeof grown);
-    return memset((char *)grown.at + size * count, 0, size);
-}
-
 Status study_add_real(double value, Reals *reals) {
-    double *added = study_list_add(reals, sizeof *added);
+    double *added = list_append(reals, sizeof *added);
     TRY(status_made(added != NULL));
     *added = value;
     return STATUS_OK;
 }
 
 Status run_table_add(RunTable *table, RunRecord *run, uint64_t number) {
-    RunRecord *added = study_list_add(table, sizeof *added);
+    RunRecord *added = list_append(table, sizeof *added);
     TRY(status_made(added != NULL));
     *added = *run;
     added->number = number;
@@ -64,7 +50,7 @@ Status study_failures_add(StudyFailures *failures, int status, const char *reaso
             failures->at[i].count++;
             return STATUS_OK;
         }
-    StudyFailure *failure = study_list_add(failures, sizeof *failure);
+    StudyFailure *failure = list_append(failures, sizeof *failure);
     TRY(status_made(failure != NULL));
     *failure = (StudyFailure){.status = status, .count = 1, .first = number};
     TRY(study_copy_text(reason, &failure->reason));
@@ -160,9 +146,8 @@ Status study_run_fix_solver(Simulation *target) {
 Status study_begin(const Variant *study, const Simulation *simulation, const StudyTools *tools,
                    Variant **answer, StudyWork **work, Problem *problem) {
     const StudyKind *kind = study_kind(study);
-    ProgressRange range =
-        progress_range(tools->progress, 0, study_has_members(study) ? STUDY_BEGUN : 1);
-    const Progress progress = progress_range_view(&range);
+    const Progress progress = progress_range_view(
+        &(ProgressRange){tools->progress, 0, study_has_members(study) ? STUDY_BEGUN : 1, 0});
     StudyTools own = *tools;
     own.progress = &progress;
     *answer = variant_new(kind->answer);
@@ -258,9 +243,8 @@ Status study_run(const Variant *study, const Simulation *simulation, const Study
     Status status = study_begin(study, simulation, tools, answer, &work, problem);
     for (size_t i = 0; status == STATUS_OK && i < work->wanted; i++) {
         const double share = (1 - STUDY_BEGUN) / (double)work->expected;
-        ProgressRange range =
-            progress_range(tools->progress, STUDY_BEGUN + (double)i * share, share);
-        const Progress progress = progress_range_view(&range);
+        const Progress progress = progress_range_view(
+            &(ProgressRange){tools->progress, STUDY_BEGUN + (double)i * share, share, 0});
         StudyTools own = *tools;
         StudyPart *part = NULL;
         own.progress = &progress;

@@ -106,11 +106,7 @@ static inline Status study_first_failure(Status first, Status second) {
 Status study_copy_text(const char *text, char **target);
 Status study_copy_reals(const double *values, size_t count, Reals *target);
 
-// Appends an element of `size` zeros to a typed list (base/field.h) that only this function has
-// filled. NULL without memory.
-void *study_list_add(void *list, size_t size);
-
-// The same with a number.
+// Appends a number.
 Status study_add_real(double value, Reals *reals);
 
 typedef struct StudyKind StudyKind;

@@ -568,7 +568,7 @@ static Status sweep_fill(const SweepGrid *grid, Sweep *sweep) {
     sweep->mode = grid->study->mode;
     for (size_t i = 0; i < grid->axis_count; i++) {
         const SweepValues *values = &grid->axes[i];
-        SweepAxisValues *axis = study_list_add(&sweep->axes, sizeof *axis);
+        SweepAxisValues *axis = list_append(&sweep->axes, sizeof *axis);
         TRY(status_made(axis != NULL));
         TRY(study_copy_text(values->axis->pointer, &axis->pointer));
         TRY(study_copy_text(values->is_tag ? NULL : values->field->unit, &axis->unit));

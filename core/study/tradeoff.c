@@ -66,7 +66,7 @@ typedef struct Candidates {
 // Adds a point with nothing but its solver and its name, the solver's and what follows.
 __attribute__((format(printf, 3, 4))) static TradeoffPoint *
 candidate_add(Candidates *list, const Kind *solver, const char *format, ...) {
-    TradeoffPoint *point = study_list_add(list->points, sizeof *point);
+    TradeoffPoint *point = list_append(list->points, sizeof *point);
     if (point == NULL) {
         list->is_whole = false;
         return &list->spare;
@@ -428,9 +428,8 @@ static void tradeoff_trim(TradeoffRun *run) {
 static Status tradeoff_run(TradeoffRun *run, const Simulation *simulation,
                            const SimulationLimits *limits, double steps, Outcome **outcome,
                            Problem *problem) {
-    ProgressRange range =
-        progress_range(run->tools->progress, run->done / run->all, steps / run->all);
-    const Progress progress = progress_range_view(&range);
+    const Progress progress = progress_range_view(
+        &(ProgressRange){run->tools->progress, run->done / run->all, steps / run->all, 0});
     return simulation_run(simulation, limits, &progress, run->tools->workspace, outcome, problem);
 }
 

@@ -1,11 +1,11 @@
 // One impact at full detail. The result does not keep it: the scene is run again
-// (impact_history.h), at once where that is foretold to be quick, else beside the workers while the
+// (core/simulation/impact_history.c), at once where that is foretold to be quick, else beside the workers while the
 // request sleeps.
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/simulation/impact_history.h"
+#include "core/simulation/simulation.h"
 #include "server/api/results.h"
 #include "server/api/tables.h"
 #include "server/base/clock.h"

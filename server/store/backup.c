@@ -196,8 +196,8 @@ static Status count_copy(Work *work, Problem *problem) {
 
 static Status fill(Work *work, Problem *problem) {
     Database *source = NULL;
-    ProgressRange copying = progress_range(work->request->watch, 0, copy_share);
-    ProgressRange checking = progress_range(work->request->watch, copy_share, 1 - copy_share);
+    ProgressRange copying = {work->request->watch, 0, copy_share, 0};
+    ProgressRange checking = {work->request->watch, copy_share, 1 - copy_share, 0};
     const Progress watches[] = {progress_range_view(&copying), progress_range_view(&checking)};
     Status status = open_source(work, &source, problem);
     if (status == STATUS_OK)

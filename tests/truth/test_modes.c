@@ -11,7 +11,7 @@
 
 #include <cmocka.h>
 
-#include "core/plan/mode_selection.h"
+#include "core/plan/plan.h"
 #include "core/simulation/error_metrics.h"
 #include "core/solve/solver.h"
 #include "server/codec/read.h"

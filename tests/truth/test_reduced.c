@@ -11,7 +11,7 @@
 
 #include <cmocka.h>
 
-#include "core/plan/mode_selection.h"
+#include "core/plan/plan.h"
 #include "core/simulation/simulation.h"
 #include "core/solve/solver.h"
 #include "server/codec/read.h"

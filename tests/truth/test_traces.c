@@ -11,7 +11,7 @@
 
 #include "core/base/philox.h"
 #include "core/drop_test/force_trace.h"
-#include "core/simulation/impact_history.h"
+#include "core/simulation/simulation.h"
 #include "tests/support/scenes.h"
 #include "traces.h"
 

@@ -9,7 +9,7 @@
 #include <cmocka.h>
 
 #include "core/base/canonical.h"
-#include "core/plan/mode_selection.h"
+#include "core/plan/plan.h"
 #include "core/solve/solver.h"
 #include "tests/support/document.h"
 

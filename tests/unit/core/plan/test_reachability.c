@@ -10,7 +10,7 @@
 
 #include <cmocka.h>
 
-#include "core/plan/reachability.h"
+#include "core/plan/plan.h"
 #include "core/solve/exact.h"
 #include "tests/support/frames.h"
 

@@ -1,6 +1,6 @@
 // An impact from near has the ledger's peak and impulse: of every law, structure and base among the
 // examples, and of contacts that overlap.
-#include "core/simulation/impact_history.h"
+#include "core/simulation/simulation.h"
 
 #include <math.h>
 #include <setjmp.h>
