@@ -210,32 +210,6 @@ static Status warnings_of_steps(Outcome *outcome) {
         error, error > 0.1 ? "; only statistics are valid" : "");
 }
 
-// A buffer of a damper, and the stops that have it.
-typedef struct BufferStops {
-    const Buffer *buffer;
-    const char *name;  // of the member of the scene
-    const char *where; // in words
-    int first, count;  // sides
-} BufferStops;
-
-// One for both sides, or one for each.
-static size_t buffer_stops_find(const Damper *damper, BufferStops stops[2]) {
-    static const char *const names[] = {"left_buffer", "right_buffer"};
-    static const char *const wheres[] = {"left stop", "right stop"};
-    const Buffer *left = damper_buffer(damper, SIDE_LEFT);
-    if (left == damper_buffer(damper, SIDE_RIGHT)) {
-        stops[0] = (BufferStops){left, "buffer", "stops", SIDE_LEFT, 2};
-        return 1;
-    }
-    for (int side = 0; side < 2; side++) {
-        const Buffer *buffer = damper_buffer(damper, (Side)side);
-        const bool is_common = buffer == &damper->buffer;
-        stops[side] =
-            (BufferStops){buffer, is_common ? "buffer" : names[side], wheres[side], side, 1};
-    }
-    return 2;
-}
-
 // Sum over stops with the same range.
 static ApproachSpeeds approaches_sum(const ApproachSpeeds *met, int count) {
     ApproachSpeeds sum = met[0];
@@ -252,60 +226,52 @@ static ApproachSpeeds approaches_sum(const ApproachSpeeds *met, int count) {
 }
 
 // "0.15 to 1 m/s", "0.15 m/s and more", "1 m/s and less".
-static void approaches_write_range(double from, double to, char *text, size_t size) {
-    char low[32], high[32];
-    text_real(low, from);
-    text_real(high, to);
+static void approaches_write_range(double from, double to, char text[96]) {
+    const RealText low = real_text(from), high = real_text(to);
     if (isnan(to))
-        snprintf(text, size, "%s m/s and more", low);
+        snprintf(text, 96, "%s m/s and more", low.at);
     else if (isnan(from))
-        snprintf(text, size, "%s m/s and less", high);
+        snprintf(text, 96, "%s m/s and less", high.at);
     else
-        snprintf(text, size, "%s to %s m/s", low, high);
+        snprintf(text, 96, "%s to %s m/s", low.at, high.at);
 }
 
-// "slower", "faster" or both, and the extreme speeds.
-static void approaches_write_outside(const ApproachSpeeds *met, char which[48], char reach[64]) {
-    if (met->above == 0) {
-        snprintf(which, 48, "slower");
-        snprintf(reach, 64, "down to %.3g", met->min);
-    } else if (met->below == 0) {
-        snprintf(which, 48, "faster");
-        snprintf(reach, 64, "up to %.3g", met->max);
-    } else {
-        snprintf(which, 48, "slower and %llu faster", (unsigned long long)met->above);
-        snprintf(reach, 64, "at %.3g to %.3g", met->min, met->max);
-    }
+static bool warnings_is_one_buffer(const Damper *damper) {
+    return damper_buffer(damper, SIDE_LEFT) == damper_buffer(damper, SIDE_RIGHT);
 }
 
-static Status warnings_of_stops(const BufferStops *stops, size_t damper, const ApproachSpeeds *all,
-                                Warnings *warnings) {
-    const ApproachSpeeds met = approaches_sum(&all[stops->first], stops->count);
-    const bool is_named = stops->buffer->material != NULL;
-    char pointer[64], range[96], which[48], reach[64];
-    if (met.below + met.above == 0)
+// Of the impacts at one stop, or at both if they have one buffer.
+static Status warnings_of_stop(const Damper *damper, size_t index, Side side,
+                               const ApproachSpeeds *met, Warnings *warnings) {
+    const Buffer *buffer = damper_buffer(damper, side);
+    const char *own = side == SIDE_LEFT ? "left_" : "right_";
+    const char *where = side == SIDE_LEFT ? "left stop" : "right stop";
+    char pointer[64], range[96];
+    if (met->below + met->above == 0)
         return STATUS_OK;
-    snprintf(pointer, sizeof pointer, "/dampers/%zu/%s%s", damper, stops->name,
-             is_named ? "" : "/table");
-    approaches_write_range(met.from, met.to, range, sizeof range);
-    approaches_write_outside(&met, which, reach);
+    snprintf(pointer, sizeof pointer, "/dampers/%zu/%sbuffer%s", index,
+             buffer == &damper->buffer ? "" : own, buffer->material != NULL ? "" : "/table");
+    approaches_write_range(met->from, met->to, range);
     return warnings_add(
         warnings, pointer,
-        "%llu of %llu impacts at the %s of damper %zu were %s than %.80s%s (%s), %s m/s: %s",
-        (unsigned long long)(met.below > 0 ? met.below : met.above), (unsigned long long)met.count,
-        stops->where, damper + 1, which, is_named ? stops->buffer->material : "the table",
-        is_named ? " was measured" : " covers", range, reach,
-        stops->buffer->table.count > 0 ? "the nearest row is used there"
-                                       : "its numbers are used there without a measurement");
+        "%llu of %llu impacts at the %s of damper %zu were outside the speeds of %.80s, %s: all "
+        "had %.3g to %.3g m/s; %s",
+        (unsigned long long)(met->below + met->above), (unsigned long long)met->count,
+        warnings_is_one_buffer(damper) ? "stops" : where, index + 1,
+        buffer->material != NULL ? buffer->material : "the table", range, met->min, met->max,
+        buffer->table.count > 0 ? "the nearest row is used there"
+                                : "its numbers are used there without a measurement");
 }
 
 static Status warnings_of_speeds(const Scene *scene, const ApproachSpeeds *met,
                                  Warnings *warnings) {
     for (size_t i = 0; met != NULL && i < scene->dampers.count; i++) {
-        BufferStops stops[2];
-        const size_t count = buffer_stops_find(&scene->dampers.at[i], stops);
-        for (size_t k = 0; k < count; k++)
-            TRY(warnings_of_stops(&stops[k], i, &met[2 * i], warnings));
+        const Damper *damper = &scene->dampers.at[i];
+        const int stops = warnings_is_one_buffer(damper) ? 2 : 1;
+        for (int side = SIDE_LEFT; side <= SIDE_RIGHT; side += stops) {
+            const ApproachSpeeds all = approaches_sum(&met[2 * i + (size_t)side], stops);
+            TRY(warnings_of_stop(damper, i, (Side)side, &all, warnings));
+        }
     }
     return STATUS_OK;
 }
@@ -313,31 +279,24 @@ static Status warnings_of_speeds(const Scene *scene, const ApproachSpeeds *met,
 // Largest relative difference between the effective masses of test and scene.
 static const double pair_part = 0.2;
 
-static Status warnings_of_pair(const Derived *derived, const BufferStops *stops,
-                               Warnings *warnings) {
-    const double tested = buffer_test_mass(stops->buffer), own = derived->effective_mass;
-    char pointer[64];
-    if (!buffer_is_measured(stops->buffer) || !(fabs(own - tested) > pair_part * tested))
-        return STATUS_OK;
-    snprintf(pointer, sizeof pointer, "/dampers/%llu/identified_for",
-             (unsigned long long)derived->damper - 1);
-    return warnings_add(warnings, pointer,
-                        "%.80s was measured with an effective mass of %.3g kg, that of this pair "
-                        "is %.3g kg: restitution and contact time belong to a pair of masses; "
-                        "\"rig\" carries over the stiffness and damping instead",
-                        stops->buffer->material, tested, own);
-}
-
 Status scene_warnings_of_pairs(const Scene *scene, const DerivedList *derived, Warnings *warnings) {
     const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
     for (size_t i = 0; i < derived->count && law->form != CONTACT_IMPULSIVE; i++) {
-        const Derived *at = &derived->at[i];
-        const Damper *damper = &scene->dampers.at[at->damper - 1];
-        BufferStops stops[2];
-        const size_t count = buffer_stops_find(damper, stops);
-        for (size_t k = 0; k < count && damper->identified_for == IDENTIFIED_FOR_SCENE; k++)
-            if (stops[k].first == at->side)
-                TRY(warnings_of_pair(at, &stops[k], warnings));
+        const size_t index = (size_t)derived->at[i].damper - 1;
+        const Damper *damper = &scene->dampers.at[index];
+        const Buffer *buffer = damper_buffer(damper, (Side)derived->at[i].side);
+        const double tested = buffer_test_mass(buffer), own = derived->at[i].effective_mass;
+        char pointer[64];
+        if (damper->identified_for != IDENTIFIED_FOR_SCENE || !buffer_is_measured(buffer) ||
+            (derived->at[i].side == SIDE_RIGHT && warnings_is_one_buffer(damper)) ||
+            !(fabs(own - tested) > pair_part * tested))
+            continue;
+        snprintf(pointer, sizeof pointer, "/dampers/%zu/identified_for", index);
+        TRY(warnings_add(warnings, pointer,
+                         "%.80s was measured with an effective mass of %.3g kg, that of this pair "
+                         "is %.3g kg: restitution and contact time belong to a pair of masses; "
+                         "\"rig\" carries over the stiffness and damping instead",
+                         buffer->material, tested, own));
     }
     return STATUS_OK;
 }

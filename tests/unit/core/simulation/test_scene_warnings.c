@@ -176,24 +176,16 @@ static void expect(char *target, size_t size, const Outcome *outcome, size_t dam
         most = fmax(most, impact->approach_speed);
     }
     assert_true(count > 2 && below + above > 0 && below + above < count);
-    char which[48] = "faster", reach[64];
-    if (below > 0 && above > 0)
-        snprintf(which, sizeof which, "slower and %zu faster", above);
-    else if (below > 0)
-        snprintf(which, sizeof which, "slower");
-    if (below > 0 && above > 0)
-        snprintf(reach, sizeof reach, "at %.3g to %.3g", least, most);
-    else
-        snprintf(reach, sizeof reach, below > 0 ? "down to %.3g" : "up to %.3g",
-                 below > 0 ? least : most);
-    snprintf(target, size, "%zu of %zu impacts at the %s of damper %zu were %s than %s, %s m/s: %s",
-             below > 0 ? below : above, count, wheres[sides], damper, which, whose, reach, end);
+    snprintf(target, size,
+             "%zu of %zu impacts at the %s of damper %zu were outside the speeds of %s: all had "
+             "%.3g to %.3g m/s; %s",
+             below + above, count, wheres[sides], damper, whose, least, most, end);
 }
 
 static void expect_table(char *target, size_t size, const Outcome *outcome, size_t damper,
                          int sides, double from, double to) {
     char whose[96];
-    snprintf(whose, sizeof whose, "the table covers (%g to %g m/s)", from, to);
+    snprintf(whose, sizeof whose, "the table, %g to %g m/s", from, to);
     expect(target, size, outcome, damper, sides, from, to, whose, "the nearest row is used there");
 }
 
@@ -328,7 +320,7 @@ static void impacts_outside_what_a_material_was_measured_at_are_told_with_its_na
         scene_with_material(&simulation, ranges[i].least, ranges[i].most);
         Outcome *outcome = run(&simulation);
         assert_int_equal(outcome->warnings.count, 1);
-        snprintf(whose, sizeof whose, "foam@2 was measured (%s)", ranges[i].range);
+        snprintf(whose, sizeof whose, "foam@2, %s", ranges[i].range);
         expect(wanted, sizeof wanted, outcome, 1, LEFT | RIGHT, ranges[i].least, ranges[i].most,
                whose, end);
         assert_string_equal(outcome->warnings.at[0].detail, wanted);
