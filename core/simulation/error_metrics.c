@@ -43,24 +43,23 @@ static double errors_ratio(double difference, double whole) {
     return difference == 0 ? 0 : (double)NAN;
 }
 
-static double errors_end(const Compared *reference) {
-    return isnan(reference->horizon) ? (double)INFINITY : reference->horizon;
+static double errors_end(const Outcome *reference) {
+    const double horizon = reference->summary.trust_horizon;
+    return isnan(horizon) ? (double)INFINITY : horizon;
 }
 
 // Error of the reference within the samples compared. The estimate is for the whole run; at the
 // horizon the error is RESPONSE_DIVERGENCE.
-static double errors_own(const Compared *reference) {
-    const double estimate = reference->outcome->summary.error_estimate;
-    return isnan(reference->horizon) ? estimate : fmin(estimate, RESPONSE_DIVERGENCE);
+static double errors_own(const Summary *reference) {
+    return isnan(reference->trust_horizon) ? reference->error_estimate
+                                           : fmin(reference->error_estimate, RESPONSE_DIVERGENCE);
 }
 
 // Samples of the reference that can be compared.
-static size_t errors_samples(const Compared *reference) {
-    const size_t count = reference->outcome->response.count;
-    if (isnan(reference->horizon))
-        return count;
-    const double within = floor(reference->horizon * reference->outcome->response.sample_rate) + 1;
-    return within < (double)count ? (size_t)within : count;
+static size_t errors_samples(const Outcome *reference) {
+    const Response *response = &reference->response;
+    const double within = floor(errors_end(reference) * response->sample_rate) + 1;
+    return within < (double)response->count ? (size_t)within : response->count;
 }
 
 // Sample i of the reference is at index at + part of the other outcome, 0 <= part < 1.
@@ -76,10 +75,10 @@ static SamplePlace errors_place(size_t i, const Response *reference, const Respo
     return (SamplePlace){(size_t)at, part > 1e-9 ? part : 0};
 }
 
-static double errors_displacement(const Compared *reference, const Compared *point, size_t count) {
-    const Response *from = &reference->outcome->response, *to = &point->outcome->response;
+static double errors_displacement(const Response *from, const Response *to, size_t count) {
+    const size_t storeys = from->series.count / 2;
     double largest = 0, worst = 0;
-    for (size_t s = 0; s < reference->storeys; s++) {
+    for (size_t s = 0; s < storeys; s++) {
         const double *x = from->series.at[s].values, *y = to->series.at[s].values;
         for (size_t i = 0; i < from->count; i++)
             largest = fmax(largest, fabs(x[i]));
@@ -96,12 +95,12 @@ static double errors_displacement(const Compared *reference, const Compared *poi
     return errors_ratio(worst, largest);
 }
 
-static double errors_acceleration(const Compared *reference, const Compared *point, size_t count) {
-    const Response *from = &reference->outcome->response, *to = &point->outcome->response;
+static double errors_acceleration(const Response *from, const Response *to, size_t count) {
+    const size_t storeys = from->series.count / 2;
     double squares = 0, differences = 0;
-    for (size_t s = 0; s < reference->storeys; s++) {
-        const double *x = from->series.at[reference->storeys + s].values;
-        const double *y = to->series.at[reference->storeys + s].values;
+    for (size_t s = 0; s < storeys; s++) {
+        const double *x = from->series.at[storeys + s].values;
+        const double *y = to->series.at[storeys + s].values;
         for (size_t i = 0; i < count; i++) {
             const SamplePlace place = errors_place(i, from, to);
             const size_t at = place.at + (place.part > 0); // the mean before its sample
@@ -152,17 +151,17 @@ static double errors_psd(const Spectrum *reference, const Spectrum *point) {
     return worst;
 }
 
-ReferenceSummary error_metrics_reference(const Compared *reference) {
-    const Outcome *outcome = reference->outcome;
-    const HorizonImpacts within = errors_impacts(&outcome->response.impacts, errors_end(reference));
-    ReferenceSummary summary = {.error_estimate = errors_own(reference),
-                                .trust_horizon = reference->horizon,
+ReferenceSummary error_metrics_reference(const Outcome *reference) {
+    const HorizonImpacts within =
+        errors_impacts(&reference->response.impacts, errors_end(reference));
+    ReferenceSummary summary = {.error_estimate = errors_own(&reference->summary),
+                                .trust_horizon = reference->summary.trust_horizon,
                                 .impacts = within.impacts,
                                 .peak_force = within.peak,
-                                .largest = outcome->summary.peak_displacement,
+                                .largest = reference->summary.peak_displacement,
                                 .psd_from = (double)NAN,
                                 .psd_to = (double)NAN};
-    const Spectrum *spectrum = &outcome->spectrum;
+    const Spectrum *spectrum = &reference->spectrum;
     for (size_t i = 0; i < spectrum->densities.count; i++) {
         const size_t end =
             spectrum_distance_band_end(spectrum->densities.at[i].values, spectrum->densities.rows);
@@ -174,32 +173,30 @@ ReferenceSummary error_metrics_reference(const Compared *reference) {
     return summary;
 }
 
-Errors error_metrics_measure(const Compared *reference, const Compared *point) {
-    const Outcome *from = reference->outcome, *to = point->outcome;
+Errors error_metrics_measure(const Outcome *reference, const Outcome *point, bool has_motion) {
+    const Response *from = &reference->response, *to = &point->response;
     Errors errors = {.displacement = (double)NAN,
                      .mean_acceleration = (double)NAN,
                      .peak_force = (double)NAN,
                      .impacts = (double)NAN,
-                     .psd = errors_psd(&from->spectrum, &to->spectrum),
+                     .psd = errors_psd(&reference->spectrum, &point->spectrum),
                      .rms_displacement = (double)NAN};
-    if (!point->has_motion)
+    if (!has_motion)
         return errors;
     const size_t count = errors_samples(reference);
     if (count > 1) {
-        // Nothing closer than the reference itself can be summary.
+        // Nothing closer than the reference itself can be measured.
         errors.displacement =
-            fmax(errors_displacement(reference, point, count), errors_own(reference));
-        errors.mean_acceleration = errors_acceleration(reference, point, count);
+            fmax(errors_displacement(from, to, count), errors_own(&reference->summary));
+        errors.mean_acceleration = errors_acceleration(from, to, count);
     }
-    const double horizon = errors_end(reference);
-    const HorizonImpacts a = errors_impacts(&from->response.impacts, horizon);
-    const HorizonImpacts b = errors_impacts(&to->response.impacts, horizon);
+    const double horizon = errors_end(reference), rms = reference->summary.rms_displacement;
+    const HorizonImpacts a = errors_impacts(&from->impacts, horizon);
+    const HorizonImpacts b = errors_impacts(&to->impacts, horizon);
     errors.impacts = fabs((double)a.impacts - (double)b.impacts);
-    if (point->has_force && reference->has_force && !isnan(a.peak))
+    if (outcome_has_force(point) && outcome_has_force(reference) && !isnan(a.peak))
         errors.peak_force = errors_ratio(fabs(fmax(b.peak, 0) - a.peak), a.peak);
-    errors.rms_displacement =
-        errors_ratio(fabs(to->summary.rms_displacement - from->summary.rms_displacement),
-                     from->summary.rms_displacement);
+    errors.rms_displacement = errors_ratio(fabs(point->summary.rms_displacement - rms), rms);
     return errors;
 }
 

@@ -30,21 +30,15 @@ typedef struct ReferenceSummary {
 } ReferenceSummary;
 extern const Field reference_summary_fields[];
 
-// An outcome whose series holds `storeys` columns of displacement, then as many of
-// mean_acceleration.
-typedef struct Compared {
-    const Outcome *outcome;
-    size_t storeys;
-    bool has_motion; // false: only its spectra are compared
-    bool has_force;  // every impact has a contact force
-    double horizon;  // end of the comparison, of a reference [s]; NAN: end of the run
-} Compared;
-
 // Replaces the channels by those that errors are measured with; the spectra stay.
 Status error_metrics_request(Simulation *simulation, Problem *problem);
 
-ReferenceSummary error_metrics_reference(const Compared *reference);
+// Below, the series of an outcome holds the displacement of each storey, then its mean
+// acceleration.
 
-Errors error_metrics_measure(const Compared *reference, const Compared *point);
+ReferenceSummary error_metrics_reference(const Outcome *reference);
+
+// Without `has_motion` only the spectra are compared.
+Errors error_metrics_measure(const Outcome *reference, const Outcome *point, bool has_motion);
 
 #endif

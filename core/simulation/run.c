@@ -68,6 +68,12 @@ size_t outcome_bytes(const Outcome *outcome) {
            outcome->response.impacts.count * sizeof(Impact);
 }
 
+bool outcome_has_force(const Outcome *outcome) {
+    const ContactLaw *law =
+        (const ContactLaw *)(const void *)kind_find(&contact_kinds, outcome->plan.contact_model);
+    return law != NULL && law->form != CONTACT_IMPULSIVE;
+}
+
 static const double IMPACT_ROWS = 7; // of a damper in a second, about
 
 static Status omissions_of_output(const Simulation *simulation, const Plan *plan,

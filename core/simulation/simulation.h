@@ -124,7 +124,8 @@ Status simulation_run(const Simulation *simulation, const SimulationLimits *limi
 Outcome *outcome_new(void); // empty, with one reference; NULL without memory
 Outcome *outcome_ref(Outcome *outcome);
 void outcome_unref(Outcome *outcome);
-size_t outcome_bytes(const Outcome *outcome); // memory in use, for caches
+size_t outcome_bytes(const Outcome *outcome);   // memory in use, for caches
+bool outcome_has_force(const Outcome *outcome); // whether its contacts have a force
 
 // Predicted cost of a run.
 typedef struct Cost {

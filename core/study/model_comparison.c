@@ -268,12 +268,6 @@ typedef struct ComparePart {
     CompareEntry entry; // without a name
 } ComparePart;
 
-static bool comparison_has_force(const Outcome *outcome) {
-    const ContactLaw *law =
-        (const ContactLaw *)(const void *)kind_find(&contact_kinds, outcome->plan.contact_model);
-    return law != NULL && law->form != CONTACT_IMPULSIVE;
-}
-
 static CompareContacts comparison_contacts(const Outcome *outcome) {
     const Impacts *impacts = &outcome->response.impacts;
     CompareContacts contact = {.resting = outcome->response.resting_count,
@@ -306,7 +300,7 @@ static double comparison_relative(double value, double from) {
 
 static CompareDifferences comparison_differences(const Outcome *reference, const Outcome *outcome) {
     const Summary *from = &reference->summary, *to = &outcome->summary;
-    const bool have_force = comparison_has_force(reference) && comparison_has_force(outcome);
+    const bool have_force = outcome_has_force(reference) && outcome_has_force(outcome);
     return (CompareDifferences){
         comparison_relative(to->peak_displacement, from->peak_displacement),
         comparison_relative(to->rms_displacement, from->rms_displacement),

@@ -452,17 +452,6 @@ static Status tradeoff_run_reference(TradeoffRun *run, Problem *problem) {
     return status;
 }
 
-static Compared tradeoff_compared(const Outcome *outcome, const Simulation *simulation,
-                                  bool has_motion) {
-    return (Compared){
-        .outcome = outcome,
-        .storeys = structure_storeys(scene_structure(&simulation->scene)),
-        .has_motion = has_motion,
-        .has_force = study_run_has_force(simulation),
-        .horizon = outcome->summary.trust_horizon,
-    };
-}
-
 // Runs a point and measures its errors. A point that fails is a row with its reason.
 static Status tradeoff_measure(TradeoffRun *run, size_t index, Problem *problem) {
     TradeoffPoint *point = &run->answer->points.at[index];
@@ -486,11 +475,9 @@ static Status tradeoff_measure(TradeoffRun *run, size_t index, Problem *problem)
         status = tradeoff_run(run, &simulation, &run->limits, steps, &outcome, fault);
     if (status == STATUS_OK) {
         const bool has_motion = isnan(point->duration) && point->segment == COUNT_ABSENT;
-        const Compared from = tradeoff_compared(run->reference, run->simulation, true);
-        const Compared to = tradeoff_compared(outcome, &simulation, has_motion);
         point->status = TRADEOFF_MEASURED;
         point->steps = floor(outcome->steps + 0.5); // parts of one are counted too
-        point->errors = error_metrics_measure(&from, &to);
+        point->errors = error_metrics_measure(run->reference, outcome, has_motion);
     } else if (study_run_ends_study(status)) {
         (void)study_result(status, fault);
         (void)problem_set(problem, status, "%s", fault->detail);
@@ -640,8 +627,7 @@ static Status tradeoff_run_all(TradeoffRun *run, Problem *problem) {
     tradeoff_trim(run);
     run->all += tradeoff_all_steps(study, points, run->limits.steps);
     TRY(tradeoff_run_reference(run, problem));
-    const Compared reference = tradeoff_compared(run->reference, run->simulation, true);
-    answer->reference.yardstick = error_metrics_reference(&reference);
+    answer->reference.yardstick = error_metrics_reference(run->reference);
     for (size_t i = 0; i < points->count; i++)
         TRY(tradeoff_measure(run, i, problem));
     outcome_unref(run->reference);

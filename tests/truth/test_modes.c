@@ -266,12 +266,7 @@ static void judge(uint64_t number, bool has_dampers) {
         Outcome *outcome = kept > 0 ? run(&drawn, kept) : NULL;
         if (outcome == NULL)
             continue;
-        const Compared reference = {.outcome = all,
-                                    .storeys = drawn.storeys,
-                                    .has_motion = true,
-                                    .horizon = all->summary.trust_horizon};
-        const Compared point = {.outcome = outcome, .storeys = drawn.storeys, .has_motion = true};
-        const Errors found = error_metrics_measure(&reference, &point);
+        const Errors found = error_metrics_measure(all, outcome, true);
         const double errors_found[FORETOLD] = {found.displacement, found.mean_acceleration,
                                                found.rms_displacement};
         const TruncationError *one = &errors[kept - 1];

@@ -189,11 +189,10 @@ static double foretold(const char *accuracy) {
 }
 
 // Relative, also of spectra.
-static double error_of(const Outcome *reference, const Outcome *outcome, size_t storeys,
-                       int metric) {
-    const Compared from = {reference, storeys, true, true, (double)NAN},
-                   to = {outcome, storeys, true, true, (double)NAN};
-    const Errors errors = error_metrics_measure(&from, &to);
+static double error_of(const Outcome *reference, const Outcome *outcome, int metric) {
+    Outcome whole = *reference; // compared to its end
+    whole.summary.trust_horizon = (double)NAN;
+    const Errors errors = error_metrics_measure(&whole, outcome, true);
     const double error = error_metrics_by(&errors, metric);
     return metric == METRIC_PSD ? pow(10, error / 10) - 1 : error;
 }
@@ -220,7 +219,7 @@ static void ladder_try(Ladder *ladder, const Outcome *reference, const Drawn *dr
         const size_t at = ladder->count++;
         snprintf(ladder->name[at], sizeof ladder->name[at], "%s", accuracy);
         ladder->steps[at] = outcome->steps;
-        ladder->error[at] = error_of(reference, outcome, drawn->storeys, metric);
+        ladder->error[at] = error_of(reference, outcome, metric);
     }
     outcome_unref(outcome);
 }
@@ -266,7 +265,7 @@ static void judge(uint64_t number, const Drawn *drawn, const Outcome *reference,
         return;
     }
     const PlanTarget *told = &outcome->plan.target;
-    const double error = error_of(reference, outcome, drawn->storeys, metric);
+    const double error = error_of(reference, outcome, metric);
     double cheapest = reference->steps;
     const char *best = "exact";
     for (size_t i = 0; i < ladder->count; i++)
