@@ -600,24 +600,14 @@ Status tradeoff_recommend(const TradeoffPoints *points, int metric, double error
     if (!(tradeoff_point_error(best, metric) < tradeoff_point_error(cheapest, metric)))
         best = cheapest;
     const TradeoffPoint *next = tradeoff_find(points, metric, false, error, INFINITY, best);
-    const double reached = tradeoff_point_error(best, metric), cpu = best->cpu_minimum;
+    char others[256] = "; no other point keeps it";
+    if (next != NULL)
+        snprintf(others, sizeof others, "; the cheapest other is %.100s: %.2g%s in %.3g s",
+                 next->name, tradeoff_point_error(next, metric), unit, next->cpu_minimum);
     recommendation->point = (uint64_t)(best - points->at) + 1;
-    if (best != cheapest)
-        return status_made(
-            text_format(why,
-                        "%s keeps %s within %.3g%s, %.2g%s in %.3g s, and takes hardly longer than "
-                        "the cheapest, %s, %.2g%s in %.3g s",
-                        best->name, name, error, unit, reached, unit, cpu, cheapest->name,
-                        tradeoff_point_error(cheapest, metric), unit, cheapest->cpu_minimum));
-    return status_made(
-        next == NULL
-            ? text_format(why, "%s is the only point that keeps %s within %.3g%s: %.2g%s in %.3g s",
-                          best->name, name, error, unit, reached, unit, cpu)
-            : text_format(why,
-                          "%s is the cheapest that keeps %s within %.3g%s: %.2g%s in %.3g s; the "
-                          "next, %s, takes %.3g times as long",
-                          best->name, name, error, unit, reached, unit, cpu, next->name,
-                          next->cpu_minimum / cpu));
+    return status_made(text_format(why, "%s keeps %s within %.3g%s: %.2g%s in %.3g s%s", best->name,
+                                   name, error, unit, tradeoff_point_error(best, metric), unit,
+                                   best->cpu_minimum, others));
 }
 
 static Status tradeoff_run_all(TradeoffRun *run, Problem *problem) {
