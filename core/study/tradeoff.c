@@ -9,7 +9,6 @@
 #include "core/study/tradeoff.h"
 
 #include <math.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -55,32 +54,33 @@ const Field tradeoff_point_fields[] = {
 };
 // clang-format on
 
-// A list under construction, all of the same simulation.
-typedef struct Candidates {
-    TradeoffPoints *points;
-    const Simulation *simulation;
-    bool is_whole;       // false: without memory
-    TradeoffPoint spare; // takes the settings of a point for which there is no memory
-} Candidates;
+// Sets the number of this name, if the rows have one.
+static void candidate_set(const Field *fields, void *item, const char *name, double value) {
+    size_t offset = 0;
+    const Field *row = fields_find(fields, name, &offset);
+    if (row == NULL || isnan(value))
+        return;
+    void *member = (char *)item + offset + row->offset;
+    if (row->kind == FIELD_KIND_COUNT)
+        *(uint64_t *)member = (uint64_t)value;
+    else
+        *(double *)member = value;
+}
 
-// Adds a point with nothing but its solver and its name, the solver's and what follows.
-__attribute__((format(printf, 3, 4))) static TradeoffPoint *
-candidate_add(Candidates *list, const Kind *solver, const char *format, ...) {
-    TradeoffPoint *point = list_append(list->points, sizeof *point);
-    if (point == NULL) {
-        list->is_whole = false;
-        return &list->spare;
-    }
-    va_list arguments;
-    char rest[64];
-    va_start(arguments, format);
-    vsnprintf(rest, sizeof rest, format, arguments);
-    va_end(arguments);
+// Adds a point with one setting that differs from the scene's, or with none (NULL). Its name is
+// "SOLVER, BEFORE VALUE AFTER".
+static Status candidate_add(TradeoffPoints *points, const Kind *solver, const char *setting,
+                            double value, const char *before, const char *after) {
+    char rest[64] = "";
+    TradeoffPoint *point = list_append(points, sizeof *point);
+    TRY(status_made(point != NULL));
     (void)fields_default(tradeoff_point_fields, point); // absent and 0: nothing to allocate
-    point->solver = strdup(solver->name);
-    list->is_whole = text_format(&point->name, "%s%s", solver->name, rest) &&
-                     point->solver != NULL && list->is_whole;
-    return point;
+    if (setting != NULL) {
+        candidate_set(tradeoff_point_fields, point, setting, value);
+        snprintf(rest, sizeof rest, ", %s%.6g%s", before, value, after);
+    }
+    TRY(study_copy_text(solver->name, &point->solver));
+    return status_made(text_format(&point->name, "%s%s", solver->name, rest));
 }
 
 // Duration of the shortest contact of a buffer, about, for a free mass [s]; NAN: none.
@@ -108,52 +108,51 @@ static Status candidate_finest_step(const Simulation *simulation, double *finest
     return STATUS_OK;
 }
 
-static void candidate_add_steps(Candidates *list, const Kind *solver, double finest) {
-    double step = 1 / list->simulation->scene.sample_rate;
+static Status candidate_add_steps(TradeoffPoints *points, const Kind *solver,
+                                  const Simulation *simulation) {
+    double step = 1 / simulation->scene.sample_rate, finest;
+    TRY(candidate_finest_step(simulation, &finest));
     for (int i = 0; i < DECADES_MAX; i++, step /= 10) {
-        candidate_add(list, solver, ", step %.4g s", step)->step = step;
+        TRY(candidate_add(points, solver, "step", step, "step ", " s"));
         if (step <= finest)
             break;
     }
+    return STATUS_OK;
 }
 
-static void candidate_add_tolerances(Candidates *list, const Kind *solver, const Range *range) {
+static Status candidate_add_tolerances(TradeoffPoints *points, const Kind *solver,
+                                       const Range *range) {
     const double min = fmax(range->min, tolerance_min) * (1 - 1e-9);
     for (double own = fmin(tolerance_max, range->max); own >= min; own *= tolerance_factor)
-        candidate_add(list, solver, ", tolerance %.3g", own)->tolerance = own;
+        TRY(candidate_add(points, solver, "tolerance", own, "tolerance ", ""));
+    return STATUS_OK;
 }
 
 // Less output at full accuracy.
-static void candidate_add_outputs(Candidates *list, const Kind *solver) {
-    const Scene *scene = &list->simulation->scene;
-    const SpectrumRequest *psd = &list->simulation->output.psd;
+static Status candidate_add_outputs(TradeoffPoints *points, const Kind *solver,
+                                    const Simulation *simulation) {
+    const Scene *scene = &simulation->scene;
+    const SpectrumRequest *psd = &simulation->output.psd;
     const size_t shares = psd->channels.count > 0 ? SHARES : 0;
     for (size_t i = 0; i < RATES; i++) {
         const double rate = scene->sample_rate / rate_divisors[i];
         if (rate * scene->duration < SEGMENT_MIN)
             break;
-        candidate_add(list, solver, ", sampled at %.6g Hz", rate)->sample_rate = rate;
+        TRY(candidate_add(points, solver, "sample_rate", rate, "sampled at ", " Hz"));
     }
     for (size_t i = 0; i < shares; i++) {
         const uint64_t segment = psd->segment / spectrum_divisors[i];
         if (segment < SEGMENT_MIN)
             break;
-        candidate_add(list, solver, ", segments of %llu", (unsigned long long)segment)->segment =
-            segment;
+        TRY(candidate_add(points, solver, "segment", (double)segment, "segments of ", ""));
     }
     for (size_t i = 0; i < shares; i++) {
         const double duration = scene->duration / duration_divisors[i];
         if (duration * scene->sample_rate < (double)psd->segment)
             break;
-        candidate_add(list, solver, ", %.6g s long", duration)->duration = duration;
+        TRY(candidate_add(points, solver, "duration", duration, "", " s long"));
     }
-}
-
-// Half the modes, a quarter, and so on down to one.
-static void candidate_add_modes(Candidates *list, const Kind *solver) {
-    const size_t storeys = structure_storeys(scene_structure(&list->simulation->scene));
-    for (size_t modes = storeys / 2; storeys >= STOREYS_MIN && modes > 0; modes /= 2)
-        candidate_add(list, solver, ", %zu mode%s", modes, modes == 1 ? "" : "s")->modes = modes;
+    return STATUS_OK;
 }
 
 static bool candidate_has_form(const Simulation *simulation, ContactForm form) {
@@ -169,63 +168,52 @@ static bool candidate_is_requested(const Texts *names, const char *name) {
     return is_named;
 }
 
-static void candidate_add_solver(Candidates *list, const Solver *solver, double finest) {
+static Status candidate_add_solver(TradeoffPoints *points, const Solver *solver,
+                                   const Simulation *simulation) {
     const Kind *kind = &solver->kind;
     // Some solvers use their settings under power laws alone.
     const bool is_used =
-        solver->forget_unused == NULL || candidate_has_form(list->simulation, CONTACT_POWER);
+        solver->forget_unused == NULL || candidate_has_form(simulation, CONTACT_POWER);
     const Field *tolerance = is_used ? fields_find(kind->fields, "tolerance", NULL) : NULL;
-    if (fields_find(kind->fields, "step", NULL) != NULL) {
-        candidate_add_steps(list, kind, finest);
-        return;
-    }
+    if (fields_find(kind->fields, "step", NULL) != NULL)
+        return candidate_add_steps(points, kind, simulation);
     if (tolerance != NULL)
-        candidate_add_tolerances(list, kind, &tolerance->range);
+        TRY(candidate_add_tolerances(points, kind, &tolerance->range));
     // Without its tolerance, if that may be left out.
-    if (tolerance == NULL || tolerance->presence == PRESENCE_OPTIONAL)
-        candidate_add(list, kind, "%s", "");
+    return tolerance == NULL || tolerance->presence == PRESENCE_OPTIONAL
+               ? candidate_add(points, kind, NULL, NAN, "", "")
+               : STATUS_OK;
 }
 
-// What is traded with the reference solver.
-static void candidate_add_reference(Candidates *list, const Kind *solver) {
-    if (candidate_has_form(list->simulation, CONTACT_LINEAR)) {
+// What is traded with the reference solver: impulses for contacts; half the modes, a quarter, and
+// so on down to one; output.
+static Status candidate_add_reference(TradeoffPoints *points, const Kind *solver,
+                                      const Simulation *simulation) {
+    const size_t storeys = structure_storeys(scene_structure(&simulation->scene));
+    if (candidate_has_form(simulation, CONTACT_LINEAR)) {
         const char *model = contact_impulse.kind.name;
-        char **own = &candidate_add(list, solver, ", contact %s", model)->contact_model;
-        *own = strdup(model);
-        list->is_whole = list->is_whole && *own != NULL;
+        TRY(candidate_add(points, solver, NULL, NAN, "", ""));
+        TradeoffPoint *point = &points->at[points->count - 1];
+        TRY(study_copy_text(model, &point->contact_model));
+        TRY(status_made(text_format(&point->name, "%s, contact %s", solver->name, model)));
     }
-    candidate_add_modes(list, solver);
-    candidate_add_outputs(list, solver);
+    for (size_t modes = storeys / 2; storeys >= STOREYS_MIN && modes > 0; modes /= 2)
+        TRY(candidate_add(points, solver, "modes", (double)modes, "",
+                          modes == 1 ? " mode" : " modes"));
+    return candidate_add_outputs(points, solver, simulation);
 }
 
 Status candidate_settings_list(const Texts *names, const Simulation *simulation,
                                TradeoffPoints *points) {
-    Candidates list = {.points = points, .simulation = simulation};
-    double finest = 0;
     *points = (TradeoffPoints){NULL, 0};
-    list.is_whole = candidate_finest_step(simulation, &finest) == STATUS_OK;
-    for (size_t i = 0; solvers[i] != NULL && list.is_whole; i++)
+    for (size_t i = 0; solvers[i] != NULL; i++)
         if (solvers[i]->run != NULL && candidate_is_requested(names, solvers[i]->kind.name))
-            candidate_add_solver(&list, solvers[i], finest);
-    if (list.is_whole && candidate_is_requested(names, solver_exact.kind.name))
-        candidate_add_reference(&list, &solver_exact.kind);
-    for (size_t i = 0; i < points->count && list.is_whole; i++)
+            TRY(candidate_add_solver(points, solvers[i], simulation));
+    if (candidate_is_requested(names, solver_exact.kind.name))
+        TRY(candidate_add_reference(points, &solver_exact.kind, simulation));
+    for (size_t i = 0; i < points->count; i++)
         points->at[i].estimate = candidate_settings_cost(simulation, &points->at[i]);
-    free(list.spare.contact_model);
-    return list.is_whole ? STATUS_OK : STATUS_NO_MEMORY;
-}
-
-// Sets a member of a solver's settings, if it has one of this name.
-static void candidate_set(Variant *accuracy, const char *name, double real, uint64_t count) {
-    size_t offset = 0;
-    const Field *row = fields_find(accuracy->kind->fields, name, &offset);
-    if (row == NULL)
-        return;
-    void *member = (char *)accuracy + offset + row->offset;
-    if (row->kind == FIELD_KIND_COUNT && count != COUNT_ABSENT)
-        *(uint64_t *)member = count;
-    else if (row->kind == FIELD_KIND_REAL && !isnan(real))
-        *(double *)member = real;
+    return STATUS_OK;
 }
 
 static Status candidate_apply_solver(const TradeoffPoint *point, Simulation *target) {
@@ -233,9 +221,10 @@ static Status candidate_apply_solver(const TradeoffPoint *point, Simulation *tar
     TRY(status_made(accuracy != NULL));
     variant_free(target->accuracy);
     target->accuracy = accuracy;
-    candidate_set(accuracy, "step", point->step, COUNT_ABSENT);
-    candidate_set(accuracy, "tolerance", point->tolerance, COUNT_ABSENT);
-    candidate_set(accuracy, "modes", (double)NAN, point->modes);
+    candidate_set(accuracy->kind->fields, accuracy, "step", point->step);
+    candidate_set(accuracy->kind->fields, accuracy, "tolerance", point->tolerance);
+    candidate_set(accuracy->kind->fields, accuracy, "modes",
+                  point->modes == COUNT_ABSENT ? (double)NAN : (double)point->modes);
     return STATUS_OK;
 }
 
