@@ -356,22 +356,18 @@ Status plan_new(const Scene *scene, const char *asked, const char *solver, Plan 
 }
 
 Status plan_sketch(const Scene *scene, size_t modes, Plan **plan) {
-    *plan = calloc(1, sizeof **plan);
-    if (*plan == NULL)
-        return STATUS_NO_MEMORY;
     StructureRates rates;
-    Status status = plan_values(scene, *plan);
-    if (status == STATUS_OK)
-        status = structure_rates(scene_structure(scene), modes, &rates);
-    if (status == STATUS_OK) {
-        (*plan)->fastest = rates.fastest;
-        (*plan)->kept = modes;
-        (*plan)->modes.is_classical = !isnan(scene_structure(scene)->damping_ratio);
-        return STATUS_OK;
+    TRY(structure_rates(scene_structure(scene), modes, &rates));
+    *plan = calloc(1, sizeof **plan);
+    const Status status = *plan == NULL ? STATUS_NO_MEMORY : plan_values(scene, *plan);
+    if (status != STATUS_OK) {
+        plan_free(*plan);
+        return status;
     }
-    plan_free(*plan);
-    *plan = NULL;
-    return status;
+    (*plan)->fastest = rates.fastest;
+    (*plan)->kept = modes;
+    (*plan)->modes.is_classical = !isnan(scene_structure(scene)->damping_ratio);
+    return STATUS_OK;
 }
 
 void plan_free(Plan *plan) {

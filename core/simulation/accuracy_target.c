@@ -48,16 +48,20 @@ typedef struct AccuracyTarget {
     const AccuracyAuto *asked;
     Plan *plan; // with all modes
     bool has_tolerance;
-    double impacts, growth; // number of impacts, growth of an error until the end
-    double *modes_error;    // error of the metric by number of modes kept, from 1; NULL: keep all
+    double impacts, growth;    // number of impacts, growth of an error until the end
+    TruncationError *left_out; // by number of modes kept, from 1; NULL: keep all
 } AccuracyTarget;
 
-static double target_truncation_error(const TruncationError *error, int metric) {
+// Error of the metric by the modes left out.
+static double target_modes_error(const AccuracyTarget *target, uint64_t kept) {
+    const int metric = target->asked->metric;
+    if (kept == COUNT_ABSENT)
+        return 0;
+    const TruncationError *error = &target->left_out[kept - 1];
     switch ((Metric)metric) {
-    case METRIC_DISPLACEMENT:
-        return error->displacement;
-    case METRIC_RMS_DISPLACEMENT:
-        return error->rms_displacement;
+    case METRIC_RMS_DISPLACEMENT: // over a part of the run oscillating errors may not average out
+        return target->simulation->output.statistics_from > 0 ? error->displacement
+                                                              : error->rms_displacement;
     case METRIC_MEAN_ACCELERATION:
         return error->mean_acceleration;
     case METRIC_PSD: // of any channel, in each of its lines
@@ -65,27 +69,6 @@ static double target_truncation_error(const TruncationError *error, int metric) 
     default:
         return fmin(gains[metric] * error->displacement, 1);
     }
-}
-
-static Status target_predict_modes(AccuracyTarget *target, Problem *problem) {
-    const Scene *scene = &target->simulation->scene;
-    const size_t n = target->plan->storeys;
-    if (target->plan->modes.count < 2)
-        return STATUS_OK;
-    TruncationError *errors = calloc(n, sizeof *errors);
-    target->modes_error = calloc(n, sizeof *target->modes_error);
-    Status status = errors == NULL || target->modes_error == NULL
-                        ? problem_set(problem, STATUS_NO_MEMORY, "no memory for the modes")
-                        : truncation_predict(target->plan, scene, errors);
-    // Over a part of the run oscillating errors may not average out.
-    const bool is_part = target->simulation->output.statistics_from > 0;
-    const int metric = target->asked->metric == METRIC_RMS_DISPLACEMENT && is_part
-                           ? METRIC_DISPLACEMENT
-                           : target->asked->metric;
-    for (size_t k = 0; k < n && status == STATUS_OK; k++)
-        target->modes_error[k] = target_truncation_error(&errors[k], metric);
-    free(errors);
-    return status;
 }
 
 // Cleared by target_clear, also after a failure.
@@ -100,12 +83,17 @@ static Status target_make(AccuracyTarget *target, const Simulation *simulation, 
     const bool is_driven = excitation_kind(scene_excitation(scene)) != excitations[0];
     target->impacts = 1 + impacts_a_period * periods * (double)scene->dampers.count;
     target->growth = is_driven ? exp(fmin(growth_a_period * periods, growth_max)) : 1;
-    return target_predict_modes(target, problem);
+    if (target->plan->modes.count < 2)
+        return STATUS_OK;
+    target->left_out = calloc(target->plan->modes.count, sizeof *target->left_out);
+    return target->left_out == NULL
+               ? problem_set(problem, STATUS_NO_MEMORY, "no memory for the modes")
+               : truncation_predict(target->plan, scene, target->left_out);
 }
 
 static void target_clear(AccuracyTarget *target) {
     plan_free(target->plan);
-    free(target->modes_error);
+    free(target->left_out);
 }
 
 // Largest displacement of the run over that after statistics_from. An early error is compared with
@@ -167,14 +155,9 @@ static double target_modes_share(const AccuracyTarget *target) {
 static uint64_t target_choose_modes(const AccuracyTarget *target, double error) {
     const size_t n = target->plan->storeys;
     size_t kept = 1;
-    while (kept < n && target->modes_error[kept - 1] > target_modes_share(target) * error)
+    while (kept < n && target_modes_error(target, kept) > target_modes_share(target) * error)
         kept++;
     return (double)kept <= modes_worth * (double)n ? kept : COUNT_ABSENT;
-}
-
-// Error of the metric by the modes left out.
-static double target_modes_error(const AccuracyTarget *target, const Candidate *candidate) {
-    return candidate->modes == COUNT_ABSENT ? 0 : target->modes_error[candidate->modes - 1];
 }
 
 // "exact, tolerance 1e-06, 8 modes".
@@ -203,14 +186,14 @@ static Simulation candidate_view(const Simulation *simulation, const Candidate *
 // The cheapest candidate that is predicted to keep `error` of the metric.
 static Candidate target_choose(const AccuracyTarget *target, double error) {
     Candidate candidate = candidate_whole(target);
-    const double share = target->has_tolerance && target->modes_error != NULL ? error / 2 : error;
+    const double share = target->has_tolerance && target->left_out != NULL ? error / 2 : error;
     if (target->has_tolerance)
         candidate.tolerance = target_choose_tolerance(target, share);
-    if (target->modes_error != NULL)
+    if (target->left_out != NULL)
         candidate.modes = target_choose_modes(target, share);
     const double tolerance = isnan(candidate.tolerance) ? ROUNDING : candidate.tolerance;
-    candidate.predicted =
-        fmin(target_contact_error(target, tolerance) + target_modes_error(target, &candidate), 1);
+    candidate.predicted = fmin(
+        target_contact_error(target, tolerance) + target_modes_error(target, candidate.modes), 1);
     return candidate;
 }
 
@@ -224,7 +207,7 @@ static double target_estimate(const AccuracyTarget *target, const Candidate *can
     const bool is_path = metric == METRIC_DISPLACEMENT || metric == METRIC_MEAN_ACCELERATION;
     if (isnan(own) || (own >= 1 && !is_path))
         return (double)NAN;
-    double left_out = target_modes_error(target, candidate) / target_modes_share(target);
+    double left_out = target_modes_error(target, candidate->modes) / target_modes_share(target);
     // Impacts make a missing mode grow like a rounding.
     if (left_out > 0 && target->plan->damper_count > 0 && own > calm * ROUNDINGS)
         left_out = 1;

@@ -241,6 +241,8 @@ static Status ensemble_fold(void *of, size_t member, StudyPart *part) {
     answer->made++;
     if (run->why != NULL) {
         answer->failed++;
+        TRY(study_failures_add(&answer->failures, (int)run->status, status_slug(run->status), seed,
+                               run->why));
     } else {
         answer->steps += run->steps;
         if (!work->has_force)
@@ -293,7 +295,6 @@ static Status ensemble_end(void *of, const StudyTools *tools, Problem *problem) 
     for (int metric = 0; metric < STATISTICS_METRICS; metric++)
         TRY(statistics_fill(&answer->table, metric, &answer->statistics.of[metric]));
     statistics_trust(&answer->table, &answer->trust);
-    TRY(study_failures_fill(&answer->table, &answer->failures));
     return spectrum_accumulator_report(&work->sums, &work->like, false, NULL, &answer->frequency,
                                        &answer->spectra, problem);
 }

@@ -307,23 +307,14 @@ static Status uncertainty_complete(InputUncertainty *uncertainty, const Simulati
             is_exact = is_exact && isnan(spread->at[i].of[parameter]);
         if (is_exact)
             uncertainty->common[parameter] = 0;
-    }
-    return STATUS_OK;
-}
-
-// Validates the deviations that are given for all buffers at once.
-static Status uncertainty_check_common(const InputUncertainty *uncertainty,
-                                       const Simulation *simulation, Problem *problem) {
-    Status status = STATUS_OK;
-    for (int parameter = 0; parameter < 2; parameter++) {
-        const double deviation = uncertainty->common[parameter];
-        const char *why = deviation > 0 ? perturbation_refuse(simulation, parameter) : NULL;
+        const double common = uncertainty->common[parameter];
+        const char *why = common > 0 ? perturbation_refuse(simulation, parameter) : NULL;
         if (why != NULL)
             status = problem_add_real(problem, STATUS_INVALID,
                                       parameter == SENSITIVITY_RESTITUTION
                                           ? "/study/restitution_deviation"
                                           : "/study/contact_time_deviation",
-                                      deviation, NULL, "must be left out: %s", why);
+                                      common, NULL, "must be left out: %s", why);
     }
     return status;
 }
@@ -499,8 +490,7 @@ static Status sensitivity_complete(void *request, const Simulation *simulation,
     if (simulation->scene.dampers.count == 0)
         return problem_add(problem, STATUS_INVALID, "/study/kind",
                            "sensitivity needs a damper: the scene has none");
-    TRY(uncertainty_complete(&study->uncertainty, simulation, problem));
-    const Status deviations = uncertainty_check_common(&study->uncertainty, simulation, problem);
+    const Status deviations = uncertainty_complete(&study->uncertainty, simulation, problem);
     const Status runs = sensitivity_check_runs(study, simulation, problem);
     // Defaults are written out, so that equal studies have one canonical form.
     const bool has_parameters = study->parameters.count > 0;
@@ -585,10 +575,12 @@ static Status sensitivity_fold_draw(SensitivityWork *work, size_t index, StudyPa
     Sensitivity *answer = work->answer;
     TRY(run_table_add(&answer->table, &part->run, index + 1));
     answer->made++;
-    if (answer->table.at[index].why == NULL)
+    const RunRecord *run = &answer->table.at[index];
+    if (run->why == NULL)
         return spectrum_accumulator_add(&work->sums, &part->spectrum, (size_t)work->study->runs);
     answer->failed++;
-    return STATUS_OK;
+    return study_failures_add(&answer->failures, (int)run->status, status_slug(run->status),
+                              run->number, run->why);
 }
 
 static Status sensitivity_fold(void *of, size_t member, StudyPart *part) {
@@ -680,7 +672,6 @@ static Status sensitivity_end(void *of, const StudyTools *tools, Problem *proble
     if (work->study->runs == 0)
         return STATUS_OK;
     TRY(sensitivity_fill_statistics(work));
-    TRY(study_failures_fill(&answer->table, &answer->failures));
     return spectrum_accumulator_report(&work->sums, &work->own->spectrum, true, tools->progress,
                                        &answer->frequency, &answer->spectra, problem);
 }

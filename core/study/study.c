@@ -57,16 +57,6 @@ Status study_failures_add(StudyFailures *failures, int status, const char *reaso
     return study_copy_text(why, &failure->detail);
 }
 
-Status study_failures_fill(const RunTable *table, StudyFailures *failures) {
-    for (size_t i = 0; i < table->count; i++) {
-        const RunRecord *run = &table->at[i];
-        if (run->why != NULL)
-            TRY(study_failures_add(failures, (int)run->status, status_slug(run->status),
-                                   run->number, run->why));
-    }
-    return STATUS_OK;
-}
-
 double study_summary_value(const Summary *summary, const char *name) {
     size_t offset = 0;
     const Field *row = fields_find(summary_fields, name, &offset);

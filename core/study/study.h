@@ -48,9 +48,6 @@ typedef struct StudyFailures {
 Status study_failures_add(StudyFailures *failures, int status, const char *reason, uint64_t number,
                           const char *why);
 
-// Counts the failures of a table by their status, in its order.
-Status study_failures_fill(const RunTable *table, StudyFailures *failures);
-
 // The metrics of a summary that studies compare, by their names there.
 #define STUDY_METRICS                                                                              \
     "peak_displacement", "rms_displacement", "peak_acceleration", "rms_acceleration", "impacts",   \
