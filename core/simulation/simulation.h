@@ -76,6 +76,13 @@ Status simulation_complete(Simulation *simulation, const SimulationLimits *limit
 // stiffness and damping get the restitution derived from them. It has to be completed again.
 Status simulation_use_impulses(Simulation *simulation, Problem *problem);
 
+// Whether the contacts of the simulation have a force.
+bool simulation_has_force(const Simulation *simulation);
+
+// Validates that the scene can have a metric, which is the value at `pointer`.
+Status simulation_check_metric(const Simulation *simulation, const char *metric,
+                               const char *pointer, Problem *problem);
+
 // The plan of a completed simulation, without a run. Cleared by
 // fields_clear(plan_report_fields, ...).
 Status simulation_plan(const Simulation *simulation, PlanReport *report, Problem *problem);

@@ -149,28 +149,38 @@ static Status validate_modes(const Simulation *simulation, Problem *problem) {
     return STATUS_OK;
 }
 
-static Status validate_target(Simulation *simulation, Problem *problem) {
-    static const char pointer[] = "/accuracy/metric";
+bool simulation_has_force(const Simulation *simulation) {
+    return simulation->scene.dampers.count > 0 &&
+           simulation_law(simulation)->form != CONTACT_IMPULSIVE;
+}
+
+Status simulation_check_metric(const Simulation *simulation, const char *metric,
+                               const char *pointer, Problem *problem) {
+    const bool has_damper = simulation->scene.dampers.count > 0;
+    if (strcmp(metric, "psd") == 0 && simulation->output.psd.channels.count == 0)
+        return problem_add(problem, STATUS_INVALID, pointer,
+                           "psd needs spectra: ask for some in /output/psd");
+    if (strstr(metric, "force") != NULL && !simulation_has_force(simulation))
+        return problem_add(problem, STATUS_INVALID, pointer, "%s needs contacts with a force: %s",
+                           metric,
+                           has_damper ? "impulses have none, choose another contact model"
+                                      : "the scene has no damper");
+    if (strcmp(metric, "impacts") == 0 && !has_damper)
+        return problem_add(problem, STATUS_INVALID, pointer,
+                           "impacts needs a damper: the scene has none");
+    return STATUS_OK;
+}
+
+static Status validate_target(const Simulation *simulation, Problem *problem) {
     AccuracyAuto *asked = (AccuracyAuto *)(void *)simulation->accuracy;
-    const Scene *scene = &simulation->scene;
     if (asked->accuracy.modes != COUNT_ABSENT)
         return problem_add_real(
             problem, STATUS_INVALID, "/accuracy/modes", (double)asked->accuracy.modes, NULL,
             "must not be given with a target, which chooses the number of modes");
     if (asked->metric == CHOICE_ABSENT)
         asked->metric = METRIC_DISPLACEMENT;
-    if (asked->metric == METRIC_PSD && simulation->output.psd.channels.count == 0)
-        return problem_add(problem, STATUS_INVALID, pointer,
-                           "psd needs spectra: ask for some in /output/psd");
-    if ((asked->metric == METRIC_PEAK_FORCE || asked->metric == METRIC_IMPACTS) &&
-        scene->dampers.count == 0)
-        return problem_add(problem, STATUS_INVALID, pointer,
-                           "%s needs a damper: the scene has none", metric_names[asked->metric]);
-    if (asked->metric == METRIC_PEAK_FORCE && simulation_law(simulation)->form == CONTACT_IMPULSIVE)
-        return problem_add(problem, STATUS_INVALID, pointer,
-                           "peak_force needs contacts with a force: impulses have none, choose "
-                           "another contact model");
-    return STATUS_OK;
+    return simulation_check_metric(simulation, metric_names[asked->metric], "/accuracy/metric",
+                                   problem);
 }
 
 static Status validate_accuracy(Simulation *simulation, Problem *problem) {

@@ -144,7 +144,8 @@ static Status ensemble_complete(void *request, const Simulation *simulation,
     const Status metric =
         study->metric == CHOICE_ABSENT
             ? STATUS_OK
-            : study_run_check_metric(simulation, statistics_metric_names[study->metric], problem);
+            : simulation_check_metric(simulation, statistics_metric_names[study->metric],
+                                      "/study/metric", problem);
     const Status densities =
         study_run_check_densities(simulation, study_run_densities(simulation), problem);
     return study_first_failure(study_first_failure(seeds, metric), densities);
@@ -311,7 +312,7 @@ static Status ensemble_begin(void *of, const StudyTools *tools, Problem *problem
     Ensemble *answer = work->answer = work->work.answer;
     (void)tools;
     (void)problem;
-    work->has_force = study_run_has_force(work->work.simulation);
+    work->has_force = simulation_has_force(work->work.simulation);
     work->check = STOPPING_RULE_PILOT;
     work->work.members = (size_t)study->runs;
     if (ensemble_has_target(work) && study->runs > STOPPING_RULE_PILOT)

@@ -525,7 +525,8 @@ static int sensitivity_parameter(const char *name) {
 
 static Status sensitivity_copy(const Simulation *simulation, Simulation *target) {
     TRY(study_run_copy(simulation, target));
-    return study_run_fix_solver(target);
+    study_run_fix_solver(target);
+    return STATUS_OK;
 }
 
 static Status sensitivity_cost(const void *request, const Simulation *simulation,
@@ -800,7 +801,7 @@ static Status sensitivity_begin(void *of, const StudyTools *tools, Problem *prob
     Sensitivity *answer = work->answer = work->work.answer;
     const size_t runs = (size_t)study->runs;
     work->simulation = work->work.simulation;
-    work->has_force = study_run_has_force(work->simulation);
+    work->has_force = simulation_has_force(work->simulation);
     answer->runs = study->runs;
     answer->seed = study->seed;
     answer->confidence = STATISTICS_CONFIDENCE;

@@ -85,29 +85,6 @@ Status study_run_check_densities(const Simulation *simulation, double densities,
                             densities, DENSITIES_MAX);
 }
 
-bool study_run_has_force(const Simulation *simulation) {
-    const Scene *scene = &simulation->scene;
-    return scene->dampers.count > 0 &&
-           dampers_contact_law(&scene->dampers, scene_contact(scene))->form != CONTACT_IMPULSIVE;
-}
-
-Status study_run_check_metric(const Simulation *simulation, const char *metric, Problem *problem) {
-    static const char pointer[] = "/study/metric";
-    const bool has_damper = simulation->scene.dampers.count > 0;
-    if (strcmp(metric, "psd") == 0 && simulation->output.psd.channels.count == 0)
-        return problem_add(problem, STATUS_INVALID, pointer,
-                           "psd needs spectra: ask for some in /output/psd");
-    if (strstr(metric, "force") != NULL && !study_run_has_force(simulation))
-        return problem_add(problem, STATUS_INVALID, pointer, "%s needs contacts with a force: %s",
-                           metric,
-                           has_damper ? "impulses have none, choose another contact model"
-                                      : "the scene has no damper");
-    if (strcmp(metric, "impacts") == 0 && !has_damper)
-        return problem_add(problem, STATUS_INVALID, pointer,
-                           "impacts needs a damper: the scene has none");
-    return STATUS_OK;
-}
-
 Status study_run_check_names(const Texts *given, const char *const *names, const char *member,
                              Problem *problem) {
     const Field rows[] = {
@@ -122,15 +99,12 @@ Status study_run_copy(const Simulation *simulation, Simulation *target) {
     return STATUS_OK;
 }
 
-Status study_run_fix_solver(Simulation *target) {
+void study_run_fix_solver(Simulation *target) {
+    AccuracyAuto *accuracy = (AccuracyAuto *)(void *)target->accuracy;
     if (!simulation_has_target(target))
-        return STATUS_OK;
-    Variant *accuracy = variant_new(solver_kinds.at(0));
-    TRY(status_made(accuracy != NULL));
-    variant_free(target->accuracy);
-    target->accuracy = accuracy;
-    ((AccuracyAuto *)(void *)accuracy)->metric = CHOICE_ABSENT; // as in a completed scene
-    return STATUS_OK;
+        return;
+    accuracy->target = (double)NAN;
+    accuracy->metric = CHOICE_ABSENT; // as in a completed scene
 }
 
 Status study_begin(const Variant *study, const Simulation *simulation, const StudyTools *tools,

@@ -62,12 +62,6 @@ double study_run_densities(const Simulation *simulation);
 // Validates that a study holds no more than 2^18 densities at a time.
 Status study_run_check_densities(const Simulation *simulation, double densities, Problem *problem);
 
-// Whether the contacts of the simulation have a force.
-bool study_run_has_force(const Simulation *simulation);
-
-// Validates that the scene can have a metric, the value of /study/metric.
-Status study_run_check_metric(const Simulation *simulation, const char *metric, Problem *problem);
-
 // Validates a list of names, a member of the study, against a NULL-terminated list.
 Status study_run_check_names(const Texts *given, const char *const *names, const char *member,
                              Problem *problem);
@@ -78,7 +72,7 @@ Status study_run_copy(const Simulation *simulation, Simulation *target);
 
 // Replaces an accuracy target by the solver that is chosen without one: otherwise the runs of one
 // study could use different settings, and their differences would not be those of the scenes.
-Status study_run_fix_solver(Simulation *target);
+void study_run_fix_solver(Simulation *target);
 
 // Whether a failure of one run ends the whole study.
 static inline bool study_run_ends_study(Status status) {

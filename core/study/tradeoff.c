@@ -346,7 +346,8 @@ static Status tradeoff_complete(void *request, const Simulation *simulation,
         study->metric = METRIC_DISPLACEMENT;
     if (isnan(study->error))
         study->error = default_errors[study->metric];
-    const Status metric = study_run_check_metric(simulation, metric_names[study->metric], problem);
+    const Status metric =
+        simulation_check_metric(simulation, metric_names[study->metric], "/study/metric", problem);
     const Status names = tradeoff_check_solvers(study, problem);
     const Status values = tradeoff_check_values(simulation, limits, problem);
     return study_first_failure(study_first_failure(metric, names), values);

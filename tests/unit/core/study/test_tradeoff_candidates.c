@@ -270,8 +270,8 @@ static void a_buffer_of_stiffness_and_damping_has_its_restitution_under_impulse(
     Simulation target = apply(&simulation, &point);
     const Buffer *made = &target.scene.dampers.at[0].buffer;
     assert_true(fabs(made->restitution - 0.61) < 1e-9 && isnan(made->stiffness));
-    assert_false(study_run_has_force(&target));
-    assert_true(study_run_has_force(&simulation));
+    assert_false(simulation_has_force(&target));
+    assert_true(simulation_has_force(&simulation));
     simulation_clear(&target);
     simulation_clear(&simulation);
 }
