@@ -39,13 +39,6 @@ static const double PLANNING = 8000, PRIME_PLANNING = 0.5; // steps; share of a 
 static const double SEGMENT_BYTES = 48, PRIME_BYTES = 96, TEXT_BYTES = 24;
 static const double IMPACTS_KEPT = 1e5; // limit of the estimate of memory for impacts
 
-// Estimated work of the exact solver.
-typedef struct Outlook {
-    size_t modes; // of a frame
-    double samples, arcs, impacts, digits;
-    bool is_coupled;
-} Outlook;
-
 // Taylor steps of flight where the fastest motion is shorter than a sample interval. There no bound
 // shows that the stops are out of reach, and coupled modes have no closed form for a whole
 // interval.
@@ -94,22 +87,6 @@ static double cost_impacts(const Scene *scene, const StructureRates *rates) {
            (double)scene->dampers.count;
 }
 
-static double cost_frame_steps(const Scene *scene, const Outlook *outlook) {
-    const size_t n = outlook->modes, m = scene->dampers.count;
-    const bool is_coupled = outlook->is_coupled;
-    const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
-    const double arc = step_work_steps(STEP_WORK_ARC, n, m, is_coupled);
-    const double event = step_work_steps(STEP_WORK_EVENT, n, m, is_coupled);
-    const double flight = step_work_steps(STEP_WORK_FLIGHT, n, m, is_coupled);
-    const double contact = law->form == CONTACT_POWER
-                               ? step_work_steps(STEP_WORK_POWER, n, m, is_coupled) *
-                                     (EASY + (1 - EASY) * outlook->digits / DIGITS)
-                           : law->form == CONTACT_IMPULSIVE ? BLOW_ARCS * arc
-                                                            : FRAME_ARCS * arc;
-    return (m > 0 ? NEIGHBOUR : 1) * (outlook->samples * flight + outlook->arcs * arc +
-                                      outlook->impacts * (contact + 2 * event + 2 * arc));
-}
-
 // plan_is_single() without a plan.
 static bool cost_is_single(const Scene *scene) {
     const Structure *structure = scene_structure(scene);
@@ -138,21 +115,30 @@ double cost_step(const Simulation *simulation) {
 static double cost_exact_steps(const Simulation *simulation, bool *is_fast) {
     const Scene *scene = &simulation->scene;
     const Structure *structure = scene_structure(scene);
-    const size_t modes = simulation_modes(simulation, structure_storeys(structure));
+    const size_t n = simulation_modes(simulation, structure_storeys(structure)),
+                 m = scene->dampers.count;
+    const bool is_coupled = n > 1 && isnan(structure->damping_ratio);
     StructureRates rates;
-    if (structure_rates(structure, modes, &rates) != STATUS_OK)
+    if (structure_rates(structure, n, &rates) != STATUS_OK)
         rates = (StructureRates){0}; // without memory: the run reports it
-    const Outlook outlook = {.modes = modes,
-                             .digits = -log10(exact_tolerance(simulation_settings(simulation))),
-                             .samples = (double)scene_sample_count(scene),
-                             .arcs = cost_flight_arcs(scene, &rates) + cost_base_arcs(simulation),
-                             .impacts = cost_impacts(scene, &rates),
-                             .is_coupled = modes > 1 && isnan(structure->damping_ratio)};
-    *is_fast = outlook.arcs > outlook.samples;
-    if (!cost_is_single(scene))
-        return cost_frame_steps(scene, &outlook);
-    return outlook.samples * (scene->dampers.count > 0 ? SAMPLE_NEAR_STOPS : SAMPLE) +
-           ARC * outlook.arcs + IMPACT * outlook.impacts;
+    const double samples = (double)scene_sample_count(scene);
+    const double arcs = cost_flight_arcs(scene, &rates) + cost_base_arcs(simulation);
+    const double impacts = cost_impacts(scene, &rates);
+    *is_fast = arcs > samples;
+    if (cost_is_single(scene))
+        return samples * (m > 0 ? SAMPLE_NEAR_STOPS : SAMPLE) + ARC * arcs + IMPACT * impacts;
+    const ContactForm form = simulation_law(simulation)->form;
+    const double digits = -log10(exact_tolerance(simulation_settings(simulation)));
+    const double arc = step_work_steps(STEP_WORK_ARC, n, m, is_coupled);
+    const double event = step_work_steps(STEP_WORK_EVENT, n, m, is_coupled);
+    const double flight = step_work_steps(STEP_WORK_FLIGHT, n, m, is_coupled);
+    const double contact = form == CONTACT_POWER
+                               ? step_work_steps(STEP_WORK_POWER, n, m, is_coupled) *
+                                     (EASY + (1 - EASY) * digits / DIGITS)
+                           : form == CONTACT_IMPULSIVE ? BLOW_ARCS * arc
+                                                       : FRAME_ARCS * arc;
+    return (m > 0 ? NEIGHBOUR : 1) *
+           (samples * flight + arcs * arc + impacts * (contact + 2 * event + 2 * arc));
 }
 
 // Steps of a solver with its own cost function.

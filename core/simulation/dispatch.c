@@ -140,27 +140,20 @@ Cost simulation_cost(const Simulation *simulation) {
     return cost;
 }
 
-static Status simulation_run_damped(const Simulation *simulation, const SimulationLimits *limits,
-                                    const Progress *progress, Workspace *workspace,
-                                    Outcome **outcome, Problem *problem) {
-    return simulation_has_target(simulation)
-               ? accuracy_target_run(simulation, limits, progress, workspace, NULL, outcome,
-                                     problem)
-               : run_scene(simulation, limits, progress, workspace, NULL, outcome, problem);
-}
-
 Status simulation_run(const Simulation *simulation, const SimulationLimits *limits,
                       const Progress *progress, Workspace *workspace, Outcome **outcome,
                       Problem *problem) {
-    static const double share = 0.8; // of the progress, if the undamped scene follows
+    const bool has_reduction = simulation->output.reduction;
+    const double share = has_reduction ? 0.8 : 1; // of the progress, if another run follows
+    const Progress own = progress_range_view(&(ProgressRange){progress, 0, share, 0});
+    const Progress other = progress_range_view(&(ProgressRange){progress, share, 1 - share, 0});
     *outcome = NULL;
-    if (!simulation->output.reduction)
-        return simulation_run_damped(simulation, limits, progress, workspace, outcome, problem);
-    const Progress damped = progress_range_view(&(ProgressRange){progress, 0, share, 0});
-    const Progress undamped = progress_range_view(&(ProgressRange){progress, share, 1 - share, 0});
-    TRY(simulation_run_damped(simulation, limits, &damped, workspace, outcome, problem));
-    const Status status =
-        undamped_baseline_run(simulation, limits, &undamped, workspace, *outcome, problem);
+    TRY(simulation_has_target(simulation)
+            ? accuracy_target_run(simulation, limits, &own, workspace, NULL, outcome, problem)
+            : run_scene(simulation, limits, &own, workspace, NULL, outcome, problem));
+    const Status status = has_reduction ? undamped_baseline_run(simulation, limits, &other,
+                                                                workspace, *outcome, problem)
+                                        : STATUS_OK;
     if (status != STATUS_OK) {
         outcome_unref(*outcome);
         *outcome = NULL;

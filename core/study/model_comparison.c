@@ -439,7 +439,7 @@ static Status comparison_run_reference(CompareWork *work, const StudyTools *tool
         status = simulation_run(&scene, tools->limits, tools->progress, tools->workspace,
                                 &work->reference, problem);
     simulation_clear(&scene);
-    if (status != STATUS_OK && problem != NULL) {
+    if (status != STATUS_OK) {
         char detail[sizeof problem->detail];
         text_fit(detail, sizeof detail, problem->detail);
         problem_clear(problem);

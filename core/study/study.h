@@ -182,7 +182,7 @@ extern const Field study_answer_fields[];
 
 // Runs a completed study of a completed simulation on this thread. The answer is freed by
 // variant_free; NULL after a failure. Stops with STATUS_CANCELLED when the progress says so.
-// `problem` is empty.
+// `problem` is empty and not NULL.
 Status study_run(const Variant *study, const Simulation *simulation, const StudyTools *tools,
                  Variant **answer, Problem *problem);
 

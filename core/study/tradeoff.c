@@ -395,7 +395,6 @@ typedef struct TradeoffRun {
     Outcome *reference;
     double *times;    // [s], `repeats` of each point
     double done, all; // estimated steps
-    Problem *fault;   // of a point
 } TradeoffRun;
 
 // Removes the steps finer than one that is too expensive already.
@@ -445,35 +444,32 @@ static Status tradeoff_run_reference(TradeoffRun *run, Problem *problem) {
 // Runs a point and measures its errors. A point that fails is a row with its reason.
 static Status tradeoff_measure(TradeoffRun *run, size_t index, Problem *problem) {
     TradeoffPoint *point = &run->answer->points.at[index];
-    Problem *fault = run->fault;
     const double steps = point->estimate;
     Simulation simulation = {0};
     Outcome *outcome = NULL;
-    problem_clear(fault);
     Status status;
     if (steps > run->limits.steps)
-        status = problem_set(fault, STATUS_LIMIT,
+        status = problem_set(problem, STATUS_LIMIT,
                              "would take about %.2g solver steps, more than the %.2g that one "
                              "point may take",
                              steps, run->limits.steps);
     else
-        status = candidate_settings_apply(run->simulation, point, &run->limits, &simulation, fault);
+        status =
+            candidate_settings_apply(run->simulation, point, &run->limits, &simulation, problem);
     if (status == STATUS_OK)
-        status = error_metrics_request(&simulation, fault);
+        status = error_metrics_request(&simulation, problem);
     point->status = status == STATUS_OK ? TRADEOFF_FAILED : TRADEOFF_REFUSED;
     if (status == STATUS_OK)
-        status = tradeoff_run(run, &simulation, &run->limits, steps, &outcome, fault);
+        status = tradeoff_run(run, &simulation, &run->limits, steps, &outcome, problem);
     if (status == STATUS_OK) {
         const bool has_motion = isnan(point->duration) && point->segment == COUNT_ABSENT;
         point->status = TRADEOFF_MEASURED;
         point->steps = floor(outcome->steps + 0.5); // parts of one are counted too
         point->errors = error_metrics_measure(run->reference, outcome, has_motion);
-    } else if (study_run_ends_study(status)) {
-        (void)study_result(status, fault);
-        (void)problem_set(problem, status, "%s", fault->detail);
-    } else {
-        status = study_copy_text(fault->count > 0 ? fault->faults[0].detail : fault->detail,
+    } else if (!study_run_ends_study(status)) {
+        status = study_copy_text(problem->count > 0 ? problem->faults[0].detail : problem->detail,
                                  &point->why);
+        problem_clear(problem);
     }
     if (steps <= run->limits.steps)
         run->done += steps;
@@ -631,8 +627,7 @@ static Status tradeoff_begin(void *of, const StudyTools *tools, Problem *problem
     run->all = batch_steps;
     TRY(candidate_settings_list(&study->solvers, run->simulation, &answer->points));
     run->times = calloc(answer->points.count * study->repeats + 1, sizeof *run->times);
-    run->fault = calloc(1, sizeof *run->fault);
-    TRY(status_made(run->times != NULL && run->fault != NULL));
+    TRY(status_made(run->times != NULL));
     return tradeoff_run_all(run, problem);
 }
 
@@ -640,7 +635,6 @@ static void tradeoff_free(void *of) {
     TradeoffRun *run = of;
     outcome_unref(run->reference);
     free(run->times);
-    free(run->fault);
 }
 
 const StudyKind study_tradeoff = {
