@@ -118,17 +118,14 @@ static Status stops_make(const Scene *scene, Plan *plan, size_t index) {
     for (int side = 0; side < 2; side++) {
         const Buffer *buffer = damper_buffer(damper, (Side)side);
         const ContactNumbers numbers = buffer_numbers(buffer);
-        PlanStop *stop = &planned->stops[side];
-        stop->contact = contact_stop_prepare(plan->law, scene_contact(scene)->separation,
-                                             damper_identified_mass(damper, mass), mass, &numbers);
-        TRY(stops_copy_rows(&stop->contact.numbers.rows));
-        stop->restitution = stop->contact.parameters.restitution;
-        stop->stiffness = stop->contact.parameters.stiffness;
-        stop->damping = stop->contact.parameters.damping;
+        ContactStop *stop = &planned->stops[side];
+        *stop = contact_stop_prepare(plan->law, scene_contact(scene)->separation,
+                                     damper_identified_mass(damper, mass), mass, &numbers);
+        TRY(stops_copy_rows(&stop->numbers.rows));
         Derived *derived = &plan->report.derived.at[plan->report.derived.count++];
         derived->damper = index + 1;
         derived->side = side;
-        stops_report(&stop->contact, mass, derived);
+        stops_report(stop, mass, derived);
         if (buffer->material != NULL && (derived->material = strdup(buffer->material)) == NULL)
             return STATUS_NO_MEMORY;
     }
@@ -138,23 +135,19 @@ static Status stops_make(const Scene *scene, Plan *plan, size_t index) {
 static void stops_clear(Plan *plan) {
     for (size_t i = 0; i < plan->damper_count; i++)
         for (int side = 0; side < 2; side++)
-            free(plan->dampers[i].stops[side].contact.numbers.rows.at);
+            free(plan->dampers[i].stops[side].numbers.rows.at);
 }
 
-static bool stop_varies(const PlanStop *stop) {
-    return stop->contact.numbers.rows.count > 0 ||
-           (stop->contact.law != NULL && stop->contact.law->form == CONTACT_POWER);
+static bool stop_varies(const ContactStop *stop) {
+    return stop->numbers.rows.count > 0 || (stop->law != NULL && stop->law->form == CONTACT_POWER);
 }
 
 bool stops_vary(const PlanDamper *damper) {
     return stop_varies(&damper->stops[SIDE_LEFT]) || stop_varies(&damper->stops[SIDE_RIGHT]);
 }
 
-ContactParameters stops_freeze(const PlanStop *stop, double approach_speed) {
-    if (stop_varies(stop))
-        return contact_parameters_at(&stop->contact, approach_speed);
-    return (ContactParameters){
-        .restitution = stop->restitution, .stiffness = stop->stiffness, .damping = stop->damping};
+ContactParameters stops_freeze(const ContactStop *stop, double approach_speed) {
+    return stop_varies(stop) ? contact_parameters_at(stop, approach_speed) : stop->parameters;
 }
 
 static Status plan_decide_contact(const Scene *scene, Plan *plan) {

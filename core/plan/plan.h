@@ -74,15 +74,6 @@ typedef struct PlanReport {
 
 extern const Field plan_report_fields[], derived_fields[], mode_fields[], target_fields[];
 
-// Contact parameters of one stop. The first three hold for every impact; they are NAN where they
-// depend on the approach speed (stops_freeze).
-typedef struct PlanStop {
-    double restitution; // e, under CONTACT_IMPULSIVE
-    double stiffness;   // k_b [N/m], under CONTACT_LINEAR
-    double damping;     // c_b [N s/m]
-    ContactStop contact;
-} PlanStop;
-
 // One free mass.
 typedef struct PlanDamper {
     size_t storey;             // from 0
@@ -90,7 +81,9 @@ typedef struct PlanDamper {
     double effective_mass;     // m_e of the free mass and its storey, 1 / (1/m + (M^-1)_jj) [kg]
     double clearance, offset;  // d, middle of the stops [m]
     double position, velocity; // at t = 0, relative to the stops' middle and to the storey
-    PlanStop stops[2];         // by Side
+    // By Side. Their parameters hold for every impact; NAN where they depend on the approach speed
+    // (stops_freeze).
+    ContactStop stops[2];
 } PlanDamper;
 
 // Plain values, written by plan_new. Matrices are storeys x storeys, row after row.
@@ -138,7 +131,7 @@ static inline size_t plan_mode_count(const Plan *plan) {
 bool stops_vary(const PlanDamper *damper);
 
 // Parameters of an impact that begins with this approach speed [m/s].
-ContactParameters stops_freeze(const PlanStop *stop, double approach_speed);
+ContactParameters stops_freeze(const ContactStop *stop, double approach_speed);
 
 // Selects the modes of a plan of plan_new, once; `modes` is the number asked for, 0: all. Adds its
 // decisions and the predicted error to the plan. Does nothing where plan_is_single.

@@ -222,16 +222,9 @@ static Status target_add_decisions(const AccuracyTarget *target, const Candidate
                                    const char *name, Decisions *decisions) {
     static const char *const chosen[] = {"solver", "tolerance", "modes"};
     for (size_t i = 0; i < decisions->count; i++)
-        for (size_t k = 0; k < COUNT(chosen); k++) {
-            Decision *decision = &decisions->at[i];
-            if (strcmp(decision->about, chosen[k]) != 0)
-                continue;
-            char *why = strdup("chosen by accuracy.target");
-            if (why == NULL)
-                return STATUS_NO_MEMORY;
-            free(decision->why);
-            decision->why = why;
-        }
+        for (size_t k = 0; k < COUNT(chosen); k++)
+            if (strcmp(decisions->at[i].about, chosen[k]) == 0)
+                TRY(status_made(text_format(&decisions->at[i].why, "chosen by accuracy.target")));
     const char *metric = metric_names[target->asked->metric];
     const bool is_whole = candidate_is_whole(candidate);
     return decisions_add(
@@ -251,8 +244,7 @@ static Status target_report(const AccuracyTarget *target, const Candidate *candi
     report->target.error = target->asked->target;
     report->target.metric = target->asked->metric;
     report->target.predicted_error = candidate->predicted;
-    report->target.way = strdup(name);
-    if (report->target.way == NULL ||
+    if (!text_format(&report->target.way, "%s", name) ||
         target_add_decisions(target, candidate, name, &report->decisions) != STATUS_OK)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the plan");
     return STATUS_OK;

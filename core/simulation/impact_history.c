@@ -168,8 +168,7 @@ static Status impact_run_recognise(ImpactRun *run, const Impacts *impacts, Probl
             first = &at[-1];
     run->again = *again;
     run->contact = contact_parameters_at(
-        &run->inputs.plan->dampers[again->damper - 1].stops[again->side].contact,
-        first->approach_speed);
+        &run->inputs.plan->dampers[again->damper - 1].stops[again->side], first->approach_speed);
     return STATUS_OK;
 }
 

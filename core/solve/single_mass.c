@@ -188,7 +188,8 @@ INLINE void single_mass_peak(SingleMass *single, const Piece *piece, double s) {
 // masses. False, and nothing has changed: the mass may come to rest, which the event engine
 // handles.
 static bool single_mass_bounce(SingleMass *single, Side side) {
-    const double sign = single_mass_sign(side), e = single->damper->stops[side].restitution;
+    const double sign = single_mass_sign(side),
+                 e = single->damper->stops[side].parameters.restitution;
     const double approach = fabs(single->state.w), share = single->flying.share;
     const double v = single->state.v + sign * share * (1 + e) * approach;
     // Towards the stop after the bounce [m/s^2]: the next touch takes 2 e approach / closing, those
@@ -228,7 +229,8 @@ static bool single_mass_touch(SingleMass *single, Side side) {
     single->state.r = 0;
     const double speed = fabs(single->state.w);
     impact_log_open(&single->row, IMPACT_IMPACT, single_mass_time(single), 0, side, speed);
-    impact_log_force(&single->impacts, &single->row, single->damper->stops[side].damping * speed);
+    impact_log_force(&single->impacts, &single->row,
+                     single->damper->stops[side].parameters.damping * speed);
     single_mass_note_force(single);
     return true;
 }
@@ -280,7 +282,7 @@ INLINE bool single_mass_step(SingleMass *single, double h) {
                                  fabs(m->contact_damping * end.w + m->contact_omega2 * end.r));
             impact_log_stretch(&single->impacts, &single->row, s * length,
                                -single->damper->mass * ((end.v + end.w) - z + sums.a),
-                               single->damper->stops[single->side].damping * sums.ww);
+                               single->damper->stops[single->side].parameters.damping * sums.ww);
         } else {
             single_mass_work(single, sums.vv, sums.av, sums.a * (z - sums.a / 2));
         }
@@ -615,7 +617,7 @@ INLINE size_t single_mass_contact_block(SingleMass *single, size_t most) {
     single_mass_work(single, work[FORM_VV], work[FORM_AV], work[FORM_AV] + work[FORM_AW]);
     impact_log_stretch(&single->impacts, &single->row, (double)count * length,
                        -single->damper->mass * ((last[1] + last[3]) - z + gain),
-                       single->damper->stops[single->side].damping * work[FORM_WW]);
+                       single->damper->stops[single->side].parameters.damping * work[FORM_WW]);
     single->state = (State){last[0], last[1], last[2], last[3]};
     if (is_sampled) {
         single->last_velocity = last[1];
@@ -872,8 +874,8 @@ static void single_mass_make_motions(SingleMass *single) {
     for (int side = 0; side < 2 && plan->form == CONTACT_LINEAR && single->has_stops; side++) {
         Motion *touching = &single->touching[side];
         *touching = flying;
-        touching->contact_omega2 = single->damper->stops[side].stiffness / mass;
-        touching->contact_damping = single->damper->stops[side].damping / mass;
+        touching->contact_omega2 = single->damper->stops[side].parameters.stiffness / mass;
+        touching->contact_damping = single->damper->stops[side].parameters.damping / mass;
         touching->rate = fmax(own + fmax(sqrt(touching->contact_omega2), touching->contact_damping),
                               flying.rate);
     }

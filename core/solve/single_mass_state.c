@@ -5,8 +5,9 @@ EnergyState single_mass_energy(const SingleMass *single) {
     const Plan *plan = single->plan;
     const State *at = &single->state;
     const double z = at->v + at->w;
-    const double k =
-        single->phase == PHASE_CONTACT ? single->damper->stops[single->side].stiffness : 0;
+    const double k = single->phase == PHASE_CONTACT
+                         ? single->damper->stops[single->side].parameters.stiffness
+                         : 0;
     return (EnergyState){0.5 * plan->mass[0] * at->v * at->v + 0.5 * single->damper->mass * z * z,
                          0.5 * plan->stiffness[0] * at->x * at->x + 0.5 * k * at->r * at->r};
 }

@@ -101,7 +101,7 @@ static bool sustained_contact_prepare(SustainedStop *stop, const ModalState *sta
     if (stop->levels[0].block != NULL)
         return true;
     const double n = (double)state->mode_count, arcs = state->interval * modal_state_rate(state);
-    if (stop->is_given_up || !isfinite(damper->plan->stops[damper->side].stiffness) ||
+    if (stop->is_given_up || !isfinite(damper->plan->stops[damper->side].parameters.stiffness) ||
         !sustained_contact_is_worth(state, arcs) || !(arcs < 0x1p20))
         return false;
     if ((stop->spent += n) < 4 * n * n * n)
@@ -370,9 +370,9 @@ double sustained_contact_step(SustainedContact *sustained, ModalState *state, co
     if (alone == NULL)
         return 0;
     // Equal buffers of a damper share one.
-    const PlanStop *stops = alone->plan->stops;
-    const bool are_alike = stops[0].stiffness == stops[1].stiffness && //
-                           stops[0].damping == stops[1].damping;
+    const ContactStop *stops = alone->plan->stops;
+    const bool are_alike = stops[0].parameters.stiffness == stops[1].parameters.stiffness && //
+                           stops[0].parameters.damping == stops[1].parameters.damping;
     SustainedStop *stop =
         &sustained->stops[2 * (size_t)(alone - state->damper) + (are_alike ? 0 : alone->side)];
     if (!sustained_contact_prepare(stop, state, alone))

@@ -275,8 +275,8 @@ static Status time_stepping_interval(TimeStepping *stepping) {
 // The contact of stop i of all dampers, two to each, in row k of its table over the approach speed,
 // or its only one, at 1 m/s.
 static bool time_stepping_contact_at(const Plan *plan, size_t i, size_t k, ContactParameters *at) {
-    const PlanStop *stop = &plan->dampers[i / 2].stops[i % 2];
-    const ContactRows *rows = &stop->contact.numbers.rows;
+    const ContactStop *stop = &plan->dampers[i / 2].stops[i % 2];
+    const ContactRows *rows = &stop->numbers.rows;
     if (k >= (rows->count > 0 ? rows->count : 1))
         return false;
     *at = stops_freeze(stop, rows->count > 0 ? rows->at[k].approach_speed : 1);
@@ -376,15 +376,15 @@ static void time_stepping_clear(TimeStepping *stepping) {
 }
 
 // Duration of an isolated contact [s].
-static double time_stepping_duration(const PlanDamper *damper, const PlanStop *stop,
+static double time_stepping_duration(const PlanDamper *damper, const ContactStop *stop,
                                      const ContactParameters *at) {
     const double mass = damper->effective_mass;
-    if (stop->contact.law != NULL && stop->contact.law->form == CONTACT_POWER)
-        return stop->contact.duration *
+    if (stop->law != NULL && stop->law->form == CONTACT_POWER)
+        return stop->duration *
                pow(mass * at->speed * at->speed / at->stiffness, 1 / (at->exponent + 1)) /
                at->speed;
-    const Identification found = identification_from_stiffness(
-        mass, at->stiffness, at->damping, (Separation)stop->contact.separation);
+    const Identification found = identification_from_stiffness(mass, at->stiffness, at->damping,
+                                                               (Separation)stop->separation);
     // The damping sets the rate of an overdamped one.
     return isfinite(found.contact_time) ? found.contact_time : mass / at->damping;
 }

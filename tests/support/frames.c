@@ -70,8 +70,8 @@ void frames_damper(Plan *plan, size_t index, size_t storey, double mass, double 
     const Identification identified = identification_from_restitution(
         damper->effective_mass, restitution, contact_time, SEPARATION_ZERO_PENETRATION);
     for (int side = 0; side < 2; side++) {
-        damper->stops[side].restitution = restitution;
-        damper->stops[side].stiffness = identified.stiffness;
-        damper->stops[side].damping = identified.damping;
+        damper->stops[side].parameters.restitution = restitution;
+        damper->stops[side].parameters.stiffness = identified.stiffness;
+        damper->stops[side].parameters.damping = identified.damping;
     }
 }

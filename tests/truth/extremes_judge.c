@@ -179,8 +179,9 @@ static bool quad_serves(const Plan *plan, const Base *base) {
         return false;
     for (size_t d = 0; d < plan->damper_count; d++)
         for (int side = 0; side < 2; side++) {
-            const PlanStop *stop = &plan->dampers[d].stops[side];
-            if (plan->form == CONTACT_LINEAR ? isnan(stop->stiffness) : isnan(stop->restitution))
+            const ContactStop *stop = &plan->dampers[d].stops[side];
+            if (plan->form == CONTACT_LINEAR ? isnan(stop->parameters.stiffness)
+                                             : isnan(stop->parameters.restitution))
                 return false; // it depends on the speed
         }
     return true;

@@ -99,7 +99,7 @@ static void bounce(Walk *walk, size_t d) {
         }
         if (is_met[e] && mass->phase == FLYING) {
             closing[e] = walk_sign(mass->side) * mass->w;
-            mass->e = walk->plan->dampers[e].stops[mass->side].restitution;
+            mass->e = walk->plan->dampers[e].stops[mass->side].parameters.restitution;
             parting[e] = walk->plan->dampers[e].clearance > 0 ? mass->e * closing[e] : 0;
         }
     }
@@ -151,7 +151,7 @@ static void bounce(Walk *walk, size_t d) {
 
 void walk_touch(Walk *walk, size_t d, int side) {
     Mass *mass = &walk->mass[d];
-    const PlanStop *stop = &walk->plan->dampers[d].stops[side];
+    const ContactStop *stop = &walk->plan->dampers[d].stops[side];
     mass->side = mass->at = side;
     mass->u = 0;
     if (walk->plan->form != CONTACT_LINEAR) {
@@ -159,8 +159,8 @@ void walk_touch(Walk *walk, size_t d, int side) {
         return;
     }
     mass->phase = TOUCHING;
-    mass->k = stop->stiffness;
-    mass->c = stop->damping;
+    mass->k = stop->parameters.stiffness;
+    mass->c = stop->parameters.damping;
     mass->zeros = 1;
     open_row(walk, d, false, fabsq(mass->w));
     mass->peak = fabsq(mass->c * mass->w);

@@ -94,9 +94,9 @@ static DrawnFrame frame_draw(uint64_t number) {
         damper->position = chance(0.3) ? damper->clearance * uniform(-0.5, 0.5) : 0;
         damper->velocity = chance(0.3) ? reach * omega * uniform(-0.3, 0.3) : 0;
         if (chance(0.3)) {
-            damper->stops[1].restitution = uniform(0.1, 0.95);
-            damper->stops[1].stiffness *= uniform(0.5, 2);
-            damper->stops[1].damping *= uniform(0, 2);
+            damper->stops[1].parameters.restitution = uniform(0.1, 0.95);
+            damper->stops[1].parameters.stiffness *= uniform(0.5, 2);
+            damper->stops[1].parameters.damping *= uniform(0, 2);
         }
     }
     const size_t base = below(3);

@@ -150,11 +150,10 @@ static double difference(const double *a, const double *b, size_t count) {
 }
 
 static void print_scene(uint64_t number, const PowerScene *scene) {
-    const PlanStop *stop = &scene->plan->dampers[0].stops[0];
+    const ContactStop *stop = &scene->plan->dampers[0].stops[0];
     printf("scene %llu: %s n %.4g e %.3g T_c %.3g base %d rate %g: ", (unsigned long long)number,
-           scene->plan->law->kind.name, stop->contact.parameters.exponent,
-           stop->contact.numbers.restitution, stop->contact.numbers.contact_time,
-           (int)scene->base.form, scene->plan->sample_rate);
+           scene->plan->law->kind.name, stop->parameters.exponent, stop->numbers.restitution,
+           stop->numbers.contact_time, (int)scene->base.form, scene->plan->sample_rate);
 }
 
 static void judge_impacts(uint64_t number, const PowerScene *scene, const Answer *answer,

@@ -210,8 +210,7 @@ typedef struct Ladder {
     size_t count;
 } Ladder;
 
-static void ladder_try(Ladder *ladder, const Outcome *reference, const Drawn *drawn, int metric,
-                       const char *accuracy) {
+static void ladder_try(Ladder *ladder, const Outcome *reference, int metric, const char *accuracy) {
     if (foretold(accuracy) > 3 * reference->steps || ladder->count == COUNT(ladder->steps))
         return;
     Outcome *outcome = run(accuracy);
@@ -231,11 +230,11 @@ static void ladder_make(Ladder *ladder, const Outcome *reference, const Drawn *d
     ladder->count = 0;
     for (int decade = 2; decade < 13 && is_power; decade += 2) {
         snprintf(accuracy, sizeof accuracy, "\"solver\": \"exact\", \"tolerance\": 1e-%d", decade);
-        ladder_try(ladder, reference, drawn, metric, accuracy);
+        ladder_try(ladder, reference, metric, accuracy);
     }
     for (size_t modes = 1; modes < drawn->storeys && drawn->storeys > 1; modes += 1 + modes / 2) {
         snprintf(accuracy, sizeof accuracy, "\"solver\": \"exact\", \"modes\": %zu", modes);
-        ladder_try(ladder, reference, drawn, metric, accuracy);
+        ladder_try(ladder, reference, metric, accuracy);
     }
     for (size_t i = 0; i < COUNT(steppers); i++)
         for (double step = 1; step > 0.05; step /= 4) {
@@ -246,10 +245,10 @@ static void ladder_make(Ladder *ladder, const Outcome *reference, const Drawn *d
             snprintf(accuracy, sizeof accuracy, "\"solver\": \"%s\", \"step\": %.17g", steppers[i],
                      step / simulation.scene.sample_rate);
             simulation_clear(&simulation);
-            ladder_try(ladder, reference, drawn, metric, accuracy);
+            ladder_try(ladder, reference, metric, accuracy);
         }
-    ladder_try(ladder, reference, drawn, metric, "\"solver\": \"adaptive\", \"tolerance\": 1e-3");
-    ladder_try(ladder, reference, drawn, metric, "\"solver\": \"adaptive\", \"tolerance\": 1e-6");
+    ladder_try(ladder, reference, metric, "\"solver\": \"adaptive\", \"tolerance\": 1e-3");
+    ladder_try(ladder, reference, metric, "\"solver\": \"adaptive\", \"tolerance\": 1e-6");
 }
 
 static void judge(uint64_t number, const Drawn *drawn, const Outcome *reference,

@@ -205,8 +205,8 @@ static Plan *shaken_frame(size_t dampers, bool is_impulse, double split) {
         const Identification whole = identification_from_restitution(
             contact_effective_mass(10, 0.8), 0.6, 0.02, SEPARATION_ZERO_PENETRATION);
         for (int side = 0; side < 2; side++) {
-            plan->dampers[d].stops[side].stiffness = whole.stiffness / split;
-            plan->dampers[d].stops[side].damping = whole.damping / split;
+            plan->dampers[d].stops[side].parameters.stiffness = whole.stiffness / split;
+            plan->dampers[d].stops[side].parameters.damping = whole.damping / split;
         }
     }
     for (size_t j = 0; j < 4; j++)
@@ -424,7 +424,7 @@ static void masses_held_tight_wait_for_the_base_to_reach_them(void **state) {
         frames_shear(plan, mass, stiffness, damping);
         frames_damper(plan, 0, n - 1, drawn(&at, 0.1, 10), 0, drawn(&at, 0.1, 0.9),
                       pow(10, drawn(&at, -3.5, -1.5)));
-        plan->dampers[0].stops[1].stiffness *= drawn(&at, 0.5, 2);
+        plan->dampers[0].stops[1].parameters.stiffness *= drawn(&at, 0.5, 2);
         plan->separation = scene % 2 == 0 ? SEPARATION_ZERO_PENETRATION : SEPARATION_ZERO_FORCE;
         Response response = {0};
         Problem problem;

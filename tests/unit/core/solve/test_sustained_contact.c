@@ -50,10 +50,10 @@ static void vary_in_name(PlanDamper *damper, const ContactRow *row) {
                                   .rows = {malloc(sizeof *row), 1}}; // the plan's from now on
         assert_non_null(numbers.rows.at);
         *numbers.rows.at = *row;
-        damper->stops[side].contact =
+        damper->stops[side] =
             contact_stop_prepare(&contact_spring_damper, SEPARATION_ZERO_PENETRATION,
                                  damper->effective_mass, damper->effective_mass, &numbers);
-        damper->stops[side].stiffness = NAN;
+        damper->stops[side].parameters.stiffness = NAN;
     }
 }
 
