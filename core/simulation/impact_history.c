@@ -64,16 +64,14 @@ static Status impact_run_settle(ImpactRun *run, const Simulation *asked,
                            "to be shown in detail: its states would take more than %g bytes; "
                            "submit a shorter scene that holds the impact",
                            states_bytes_max);
-    Simulation view = *asked;
-    AccuracyExact settings;
     if (simulation_has_target(asked)) {
         Outcome *outcome = NULL;
-        TRY(accuracy_target_run(asked, limits, progress, workspace, &settings, &outcome, problem));
+        TRY(accuracy_target_run(asked, limits, progress, workspace, &run->simulation, &outcome,
+                                problem));
         outcome_unref(outcome);
-        view.accuracy = &settings.accuracy.variant;
-    }
-    if (fields_copy(simulation_fields, &view, &run->simulation) != STATUS_OK)
+    } else if (fields_copy(simulation_fields, asked, &run->simulation) != STATUS_OK) {
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the scene");
+    }
     run->simulation.output.impacts = true;
     if (impact_run_add_states(scene, &run->simulation.output) != STATUS_OK)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the channels");

@@ -86,9 +86,10 @@ void run_inputs_clear(RunInputs *inputs);
 // The same of a simulation with an accuracy target.
 Status accuracy_target_plan(const Simulation *simulation, PlanReport *report, Problem *problem);
 Cost accuracy_target_cost(const Simulation *simulation);
-// `settings`, if not NULL, receives those of the last run.
+// `settled`, if not NULL, receives the simulation with the settings of the last run and without a
+// target. It is cleared by simulation_clear, also after a failure.
 Status accuracy_target_run(const Simulation *simulation, const SimulationLimits *limits,
-                           const Progress *progress, Workspace *workspace, AccuracyExact *settings,
+                           const Progress *progress, Workspace *workspace, Simulation *settled,
                            Outcome **outcome, Problem *problem);
 
 #endif

@@ -85,6 +85,46 @@ static void a_power_law_is_followed_no_closer_than_asked_for(void **state) {
     outcome_unref(whole);
 }
 
+#define FRAME(contact_time)                                                                        \
+    "\"structure\": {\"kind\": \"frame\", \"masses\": [100, 100, 100], "                           \
+    "\"stiffnesses\": [1e6, 1e6, 1e6], \"damping_ratio\": 0.02}, "                                 \
+    "\"dampers\": [{\"mass\": 1, \"clearance\": 0.02, "                                            \
+    "\"buffer\": {\"restitution\": 0.5, \"contact_time\": " #contact_time "}}], "                  \
+    "\"excitation\": {\"kind\": \"free\", \"displacement\": [0.005, 0.01, 0.015]}"
+#define SEEN ", \"output\": {\"channels\": [\"displacement_3\"]}"
+#define HEARD ", \"output\": {\"channels\": [\"contact_force_1\"]}"
+
+// Blows for pushes: only where they keep the target and nobody asks for a force.
+static void contacts_are_impulses_where_that_keeps_the_target(void **state) {
+    (void)state;
+    Outcome *struck = run(FRAME(1e-8) SEEN ", \"accuracy\": {\"target\": 1e-2}");
+    Outcome *whole = run(FRAME(1e-8) SEEN);
+    assert_string_equal(struck->plan.target.way, "exact, impulses");
+    assert_int_equal(struck->plan.target.verdict, VERDICT_KEPT);
+    assert_string_equal(struck->plan.contact_model, "impulse");
+    assert_string_equal(find(&struck->plan, "contact_model")->why, "chosen by accuracy.target");
+    assert_true(struck->steps < whole->steps);
+    const double *x = struck->response.series.at[0].values,
+                 *y = whole->response.series.at[0].values;
+    for (size_t i = 0; i < whole->response.count; i++)
+        assert_true(fabs(x[i] - y[i]) <= 1e-2 * whole->summary.peak_displacement);
+    outcome_unref(struck);
+    outcome_unref(whole);
+    static const char *const others[] = {
+        FRAME(1e-8) HEARD ", \"accuracy\": {\"target\": 1e-2}",
+        FRAME(1e-8) SEEN ", \"accuracy\": {\"target\": 1e-9}",
+        FRAME(1e-2) SEEN ", \"accuracy\": {\"target\": 1e-2}",
+        FRAME(1e-8) SEEN ", \"accuracy\": {\"target\": 1e-2, \"metric\": \"peak_force\"}",
+        FRAME(1e-8) SEEN
+        ", \"contact\": {\"model\": \"spring_damper\"}, \"accuracy\": {\"target\": 1e-2}",
+    };
+    for (size_t i = 0; i < COUNT(others); i++) {
+        Outcome *outcome = run(others[i]);
+        assert_string_equal(outcome->plan.contact_model, "spring_damper");
+        outcome_unref(outcome);
+    }
+}
+
 // Of a motion that has died away what was wrong before is a larger part.
 static void late_statistics_are_beside_what_is_left_of_the_motion(void **state) {
     (void)state;
@@ -242,6 +282,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(linear_contact_is_run_exactly_and_says_so),
         cmocka_unit_test(a_power_law_is_followed_no_closer_than_asked_for),
+        cmocka_unit_test(contacts_are_impulses_where_that_keeps_the_target),
         cmocka_unit_test(late_statistics_are_beside_what_is_left_of_the_motion),
         cmocka_unit_test(what_does_not_move_has_no_error),
         cmocka_unit_test(what_no_double_can_keep_is_marked),
