@@ -15,6 +15,16 @@ static List field_list(const void *member) {
     return list;
 }
 
+// The rows of an element: those of a LIST, or one row for what an element of an array owns.
+static const Field *field_element_rows(const Field *field) {
+    static const Field number[] = {FIELD_END}, text[] = {{.kind = FIELD_KIND_TEXT}, FIELD_END};
+    static const Field numbers[] = {{.kind = FIELD_KIND_REALS, .size = sizeof(double)}, FIELD_END};
+    return field->kind == FIELD_KIND_REALS   ? number
+           : field->kind == FIELD_KIND_ROWS  ? numbers
+           : field->kind == FIELD_KIND_TEXTS ? text
+                                             : field->fields;
+}
+
 static void *field_element(const Field *field, List list, size_t index) {
     return (char *)list.at + index * field->size;
 }
@@ -61,22 +71,13 @@ static void fields_free(const Field *fields, void *item) {
             free(*(char **)member);
             break;
         case FIELD_KIND_REALS:
-            free(((Reals *)member)->at);
-            break;
-        case FIELD_KIND_ROWS: {
-            const Rows *rows = member;
-            for (size_t i = 0; i < rows->count; i++)
-                free(rows->at[i].at);
-            free(rows->at);
-            break;
-        }
+        case FIELD_KIND_ROWS:
         case FIELD_KIND_TEXTS:
-            texts_clear(member);
-            break;
         case FIELD_KIND_LIST: {
+            const Field *rows = field_element_rows(field);
             const List list = field_list(member);
-            for (size_t i = 0; i < list.count; i++)
-                fields_free(field->fields, field_element(field, list, i));
+            for (size_t i = 0; i < list.count && rows->kind != FIELD_KIND_END; i++)
+                fields_free(rows, field_element(field, list, i));
             free(list.at);
             break;
         }
@@ -101,17 +102,6 @@ void fields_clear(const Field *fields, void *item) {
         return;
     fields_free(fields, item);
     fields_set_absent(fields, item);
-}
-
-static Status field_copy_reals(const Reals *source, Reals *target) {
-    if (source->count == 0)
-        return STATUS_OK;
-    double *at = malloc(source->count * sizeof *at);
-    if (at == NULL)
-        return STATUS_NO_MEMORY;
-    memcpy(at, source->at, source->count * sizeof *at);
-    *target = (Reals){at, source->count};
-    return STATUS_OK;
 }
 
 // All members of `item` are absent.
@@ -180,36 +170,23 @@ static Status fields_copy_members(const Field *fields, const void *source, void 
             break;
         }
         case FIELD_KIND_REALS:
-            TRY(field_copy_reals(from, to));
-            break;
-        case FIELD_KIND_ROWS: {
-            const Rows *rows = from;
-            Rows *copy = to;
-            if (rows->count > 0 && (copy->at = calloc(rows->count, sizeof *copy->at)) == NULL)
-                return STATUS_NO_MEMORY;
-            for (; copy->count < rows->count; copy->count++)
-                TRY(field_copy_reals(&rows->at[copy->count], &copy->at[copy->count]));
-            break;
-        }
+        case FIELD_KIND_ROWS:
         case FIELD_KIND_TEXTS:
-            for (size_t i = 0; i < ((const Texts *)from)->count; i++)
-                TRY(texts_append(to, ((const Texts *)from)->at[i]));
-            break;
         case FIELD_KIND_LIST: {
+            const Field *rows = field_element_rows(field);
             const List list = field_list(from);
             if (list.count == 0)
                 break;
             const List copy = {calloc(list.count, field->size), list.count};
             if (copy.at == NULL)
                 return STATUS_NO_MEMORY;
-            // The list is stored before its elements are copied, so that it can be cleared after a
-            // failure.
+            // First stored, so that it can be cleared after a failure.
             memcpy(to, &copy, sizeof copy);
-            for (size_t i = 0; i < copy.count; i++)
-                fields_set_absent(field->fields, field_element(field, copy, i));
-            for (size_t i = 0; i < copy.count; i++)
-                TRY(fields_copy_members(field->fields, field_element(field, list, i),
-                                        field_element(field, copy, i)));
+            if (rows->kind == FIELD_KIND_END)
+                memcpy(copy.at, list.at, list.count * field->size);
+            for (size_t i = 0; i < copy.count && rows->kind != FIELD_KIND_END; i++)
+                TRY(fields_copy(rows, field_element(field, list, i),
+                                field_element(field, copy, i)));
             break;
         }
         case FIELD_KIND_VARIANT: {
@@ -221,8 +198,7 @@ static Status fields_copy_members(const Field *fields, const void *source, void 
                 return STATUS_NO_MEMORY;
             *(Variant **)to = copy;
             copy->kind = variant->kind;
-            fields_set_absent(copy->kind->fields, copy);
-            TRY(fields_copy_members(copy->kind->fields, variant, copy));
+            TRY(fields_copy(copy->kind->fields, variant, copy));
             break;
         }
         case FIELD_KIND_REFCOUNT:

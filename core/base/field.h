@@ -148,7 +148,7 @@ struct Field {
     const char *const
         *initial_texts;  // TEXTS under PRESENCE_DEFAULT: NULL-terminated, or NULL for none
     const Field *fields; // ITEM, LIST, BASE
-    size_t size;         // ITEM, LIST, BASE: of one
+    size_t size;         // ITEM, BASE: of the struct; REALS, ROWS, TEXTS, LIST: of an element
     // TEXT: bytes; REALS, TEXTS, LIST: elements; ROWS: rows, and numbers in each; 0: no limit
     size_t max;
     const KindTable *kinds; // VARIANT
@@ -206,16 +206,16 @@ struct Field {
      .choices = choices_, .presence = FIELD_PRESENCE(default_), .initial = (default_), .doc = doc_}
 #define FIELD_REALS(Type, member, unit_, range_, max_, presence_, doc_) \
     {.name = #member, .kind = FIELD_KIND_REALS, .offset = FIELD_AT(Type, member, Reals), .unit = unit_, \
-     .range = range_, .max = max_, .presence = presence_, .doc = doc_}
+     .size = sizeof(double), .range = range_, .max = max_, .presence = presence_, .doc = doc_}
 #define FIELD_LONE_REALS(Type, member, unit_, range_, max_, presence_, doc_) \
     {.name = #member, .kind = FIELD_KIND_REALS, .offset = FIELD_AT(Type, member, Reals), .unit = unit_, \
-     .range = range_, .max = max_, .presence = presence_, .flags = FIELD_LONE, .doc = doc_}
+     .size = sizeof(double), .range = range_, .max = max_, .presence = presence_, .flags = FIELD_LONE, .doc = doc_}
 #define FIELD_ROWS(Type, member, unit_, range_, max_, presence_, doc_) \
     {.name = #member, .kind = FIELD_KIND_ROWS, .offset = FIELD_AT(Type, member, Rows), .unit = unit_, \
-     .range = range_, .max = max_, .presence = presence_, .doc = doc_}
+     .size = sizeof(Reals), .range = range_, .max = max_, .presence = presence_, .doc = doc_}
 #define FIELD_TEXTS(Type, member, choices_, initial_, max_, presence_, flags_, doc_) \
     {.name = #member, .kind = FIELD_KIND_TEXTS, .offset = FIELD_AT(Type, member, Texts), \
-     .choices = choices_, .initial_texts = initial_, .max = max_, .presence = presence_, \
+     .size = sizeof(char *), .choices = choices_, .initial_texts = initial_, .max = max_, .presence = presence_, \
      .flags = flags_, .doc = doc_}
 #define FIELD_ITEM(Type, member, rows_, shorthand_, presence_, doc_) \
     {.name = #member, .kind = FIELD_KIND_ITEM, .offset = offsetof(Type, member), .fields = rows_, \

@@ -45,15 +45,10 @@ static Status field_check_missing(const Field *field, const char *pointer, Probl
     const bool is_many = field->kind == FIELD_KIND_REALS || field->kind == FIELD_KIND_ROWS ||
                          field->kind == FIELD_KIND_TEXTS || field->kind == FIELD_KIND_LIST;
     const char *unit = field->unit != NULL ? field->unit : "";
-    Fault fault = {0};
-    text_fit(fault.pointer, sizeof fault.pointer, pointer);
-    text_fit(fault.unit, sizeof fault.unit, unit);
-    char text[2 * sizeof fault.detail];
-    snprintf(text, sizeof text, "is required%s: %s%s%s%s", is_many ? ", with at least one" : "",
-             field->doc != NULL ? field->doc : field->name, unit[0] != '\0' ? " [" : "", unit,
-             unit[0] != '\0' ? "]" : "");
-    text_fit(fault.detail, sizeof fault.detail, text);
-    return problem_add_fault(problem, STATUS_INVALID, &fault);
+    return problem_add_real(problem, STATUS_INVALID, pointer, (double)NAN, unit,
+                            "is required%s: %s%s%s%s", is_many ? ", with at least one" : "",
+                            field->doc != NULL ? field->doc : field->name,
+                            unit[0] != '\0' ? " [" : "", unit, unit[0] != '\0' ? "]" : "");
 }
 
 size_t field_name_number(const char *name, size_t *length) {

@@ -429,23 +429,22 @@ JsonPointer json_pointer_at(const char *pointer, size_t index) {
 
 Status json_pointer_fault(Problem *problem, const char *pointer, const char *name,
                           const char *format, ...) {
-    char detail[2 * sizeof((Fault){0}.detail)];
     va_list arguments;
     va_start(arguments, format);
-    vsnprintf(detail, sizeof detail, format, arguments);
+    problem_add_arguments(problem, STATUS_INVALID, json_pointer_of(pointer, name).at, (double)NAN,
+                          NULL, format, arguments);
     va_end(arguments);
-    return problem_add(problem, STATUS_INVALID, json_pointer_of(pointer, name).at, "%s", detail);
+    return STATUS_INVALID;
 }
 
 Status json_pointer_fault_real(Problem *problem, const char *pointer, const char *name,
                                double value, const char *unit, const char *format, ...) {
-    char detail[2 * sizeof((Fault){0}.detail)];
     va_list arguments;
     va_start(arguments, format);
-    vsnprintf(detail, sizeof detail, format, arguments);
+    problem_add_arguments(problem, STATUS_INVALID, json_pointer_of(pointer, name).at, value, unit,
+                          format, arguments);
     va_end(arguments);
-    return problem_add_real(problem, STATUS_INVALID, json_pointer_of(pointer, name).at, value, unit,
-                            "%s", detail);
+    return STATUS_INVALID;
 }
 
 bool json_pointer_concerns(const Problem *problem, const char *pointer, const char *name) {

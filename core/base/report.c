@@ -1,7 +1,5 @@
 #include "core/base/report.h"
 
-#include <stdarg.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -28,10 +26,9 @@ const Field decision_fields[] = {
 static char *report_text(const char *format, va_list arguments) {
     if (strchr(format, '%') == NULL)
         return strdup(format);
-    char text[1024], cut[512];
-    vsnprintf(text, sizeof text, format, arguments);
-    text_fit(cut, sizeof cut, text);
-    return strdup(cut);
+    char text[512];
+    text_fit_format(text, sizeof text, format, arguments);
+    return strdup(text);
 }
 
 Status warnings_add(Warnings *warnings, const char *pointer, const char *format, ...) {

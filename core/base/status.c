@@ -51,6 +51,12 @@ void text_fit(char *target, size_t size, const char *text) {
     memcpy(target + kept, mark, strlen(mark) + 1);
 }
 
+void text_fit_format(char *target, size_t size, const char *format, va_list arguments) {
+    char text[1024]; // longer than any target
+    vsnprintf(text, sizeof text, format, arguments);
+    text_fit(target, size, text);
+}
+
 bool text_same(const char *a, const char *b) {
     return a == NULL || b == NULL ? a == b : strcmp(a, b) == 0;
 }
@@ -125,13 +131,11 @@ void problem_clear(Problem *problem) {
 Status problem_set(Problem *problem, Status status, const char *format, ...) {
     if (problem == NULL || problem->status != STATUS_OK || status == STATUS_OK)
         return status;
-    char text[2 * sizeof problem->detail];
     va_list arguments;
     va_start(arguments, format);
-    vsnprintf(text, sizeof text, format, arguments);
+    text_fit_format(problem->detail, sizeof problem->detail, format, arguments);
     va_end(arguments);
     problem->status = status;
-    text_fit(problem->detail, sizeof problem->detail, text);
     return status;
 }
 
@@ -156,39 +160,34 @@ Status problem_add_fault(Problem *problem, Status status, const Fault *fault) {
                        fault->pointer[0] == '\0' ? "" : ": ", fault->detail);
 }
 
-static void fault_fill(Fault *fault, const char *pointer, const char *format, va_list arguments) {
-    char text[2 * sizeof fault->detail];
-    vsnprintf(text, sizeof text, format, arguments);
-    memset(fault, 0, sizeof *fault);
-    text_fit(fault->pointer, sizeof fault->pointer, pointer);
-    text_fit(fault->detail, sizeof fault->detail, text);
+Status problem_add_arguments(Problem *problem, Status status, const char *pointer, double value,
+                             const char *unit, const char *format, va_list arguments) {
+    if (problem_count_only(problem))
+        return status;
+    Fault fault = {0};
+    text_fit(fault.pointer, sizeof fault.pointer, pointer);
+    text_fit_format(fault.detail, sizeof fault.detail, format, arguments);
+    // JSON has no representation of infinity and NaN.
+    text_fit(fault.value, sizeof fault.value, isfinite(value) ? real_text(value).at : "");
+    text_fit(fault.unit, sizeof fault.unit, unit != NULL ? unit : "");
+    return problem_add_fault(problem, status, &fault);
 }
 
 Status problem_add(Problem *problem, Status status, const char *pointer, const char *format, ...) {
-    if (problem_count_only(problem))
-        return status;
-    Fault fault;
     va_list arguments;
     va_start(arguments, format);
-    fault_fill(&fault, pointer, format, arguments);
+    problem_add_arguments(problem, status, pointer, (double)NAN, NULL, format, arguments);
     va_end(arguments);
-    return problem_add_fault(problem, status, &fault);
+    return status;
 }
 
 Status problem_add_real(Problem *problem, Status status, const char *pointer, double value,
                         const char *unit, const char *format, ...) {
-    if (problem_count_only(problem))
-        return status;
-    Fault fault;
     va_list arguments;
     va_start(arguments, format);
-    fault_fill(&fault, pointer, format, arguments);
+    problem_add_arguments(problem, status, pointer, value, unit, format, arguments);
     va_end(arguments);
-    char digits[32];
-    // JSON has no representation of infinity and NaN.
-    text_fit(fault.value, sizeof fault.value, isfinite(value) ? text_real(digits, value) : "");
-    text_fit(fault.unit, sizeof fault.unit, unit != NULL ? unit : "");
-    return problem_add_fault(problem, status, &fault);
+    return status;
 }
 
 bool problem_concerns(const Problem *problem, const char *pointer) {
@@ -204,13 +203,12 @@ bool problem_concerns(const Problem *problem, const char *pointer) {
 }
 
 bool text_format(char **target, const char *format, ...) {
-    char text[2 * TEXT_FORMAT_MAX], cut[TEXT_FORMAT_MAX];
+    char text[TEXT_FORMAT_MAX];
     va_list arguments;
     va_start(arguments, format);
-    vsnprintf(text, sizeof text, format, arguments);
+    text_fit_format(text, sizeof text, format, arguments);
     va_end(arguments);
-    text_fit(cut, sizeof cut, text);
     free(*target);
-    *target = strdup(cut);
+    *target = strdup(text);
     return *target != NULL;
 }

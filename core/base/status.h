@@ -3,6 +3,7 @@
 #ifndef CORE_BASE_STATUS_H
 #define CORE_BASE_STATUS_H
 
+#include <stdarg.h>
 #include <stdbool.h>
 #include <stddef.h>
 
@@ -85,6 +86,10 @@ Status problem_add_real(Problem *problem, Status status, const char *pointer, do
                         const char *unit, const char *format, ...)
     __attribute__((format(printf, 6, 7)));
 
+// The same with the arguments of a variadic caller; `value` NAN: none.
+Status problem_add_arguments(Problem *problem, Status status, const char *pointer, double value,
+                             const char *unit, const char *format, va_list arguments);
+
 // The same with a Fault that the caller has filled in.
 Status problem_add_fault(Problem *problem, Status status, const Fault *fault);
 
@@ -94,6 +99,8 @@ bool problem_concerns(const Problem *problem, const char *pointer);
 // Copies `text` into `target[size]`. Text that is too long is truncated at a UTF-8 character
 // boundary and ends with "...".
 void text_fit(char *target, size_t size, const char *text);
+void text_fit_format(char *target, size_t size, const char *format, va_list arguments);
+
 // Whether two texts are equal; NULL equals NULL only.
 bool text_same(const char *a, const char *b);
 
