@@ -7,8 +7,6 @@
 #include "core/base/json_pointer.h"
 #include "core/base/spelling.h"
 
-enum { POINTER_SIZE = sizeof((Fault){0}.pointer) };
-
 static bool field_range_contains(const Range *range, double value) {
     return (range->is_open_below ? value > range->min : value >= range->min) && value <= range->max;
 }
@@ -113,7 +111,6 @@ static Status field_check_member(const Field *field, const void *item, const cha
                                  Problem *problem) {
     const void *member = (const char *)item + field->offset;
     Status status = STATUS_OK;
-    char place[POINTER_SIZE];
     switch (field->kind) {
     case FIELD_KIND_REAL:
         return field_check_number(field, *(const double *)member, pointer, problem);
@@ -142,8 +139,8 @@ static Status field_check_member(const Field *field, const void *item, const cha
         if (status != STATUS_OK)
             return status;
         for (size_t i = 0; i < rows->count; i++) {
-            json_pointer_index(place, sizeof place, pointer, i);
-            if (field_check_reals(field, &rows->at[i], place, problem) != STATUS_OK)
+            const JsonPointer place = json_pointer_at(pointer, i);
+            if (field_check_reals(field, &rows->at[i], place.at, problem) != STATUS_OK)
                 status = STATUS_INVALID;
         }
         return status;
@@ -157,8 +154,8 @@ static Status field_check_member(const Field *field, const void *item, const cha
         if (status != STATUS_OK)
             return status;
         for (size_t i = 0; i < list.count; i++) {
-            json_pointer_index(place, sizeof place, pointer, i);
-            if (fields_validate(field->fields, (const char *)list.at + i * field->size, place,
+            const JsonPointer place = json_pointer_at(pointer, i);
+            if (fields_validate(field->fields, (const char *)list.at + i * field->size, place.at,
                                 problem) != STATUS_OK)
                 status = STATUS_INVALID;
         }
@@ -214,7 +211,7 @@ Status fields_validate(const Field *fields, const void *item, const char *pointe
     for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
         if (field_is_clearly_valid(field, item))
             continue;
-        char place[POINTER_SIZE];
+        char place[sizeof((Fault){0}.pointer)];
         if (field->kind == FIELD_KIND_BASE)
             text_fit(place, sizeof place, pointer);
         else

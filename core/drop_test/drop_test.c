@@ -12,7 +12,7 @@
 #include "core/drop_test/force_trace.h"
 #include "core/scene/material.h"
 
-enum { POINTER_SIZE = sizeof((Fault){0}.pointer), TEXT_MAX = 1000, NOTE_MAX = 10000 };
+enum { TEXT_MAX = 1000, NOTE_MAX = 10000 };
 
 // Relative difference between a speed and that of its height: air and friction slow a fall.
 static const double height_tolerance = 0.2;
@@ -134,29 +134,24 @@ static Status drop_check(const DropTest *test, const Drop *drop, const char *poi
         return json_pointer_fault(problem, pointer,
                                   !isnan(drop->rebound_height) ? "drop_height" : "approach_speed",
                                   "is required with a rebound");
-    Status status = STATUS_OK;
-    if (drop_check_speed(drop->drop_height, drop->approach_speed, "approach_speed", pointer,
-                         problem) != STATUS_OK)
-        status = STATUS_INVALID;
+    const Status before = drop_check_speed(drop->drop_height, drop->approach_speed,
+                                           "approach_speed", pointer, problem);
     // On a free base height and speed are of different bodies.
-    if (test->base != MATERIAL_BASE_FREE &&
-        drop_check_speed(drop->rebound_height, drop->rebound_speed, "rebound_speed", pointer,
-                         problem) != STATUS_OK)
-        status = STATUS_INVALID;
-    if (status == STATUS_OK && has_after)
-        status = drop_check_rebound(test, drop, pointer, problem);
-    return status;
+    if (test->base != MATERIAL_BASE_FREE)
+        TRY(drop_check_speed(drop->rebound_height, drop->rebound_speed, "rebound_speed", pointer,
+                             problem));
+    TRY(before);
+    return has_after ? drop_check_rebound(test, drop, pointer, problem) : STATUS_OK;
 }
 
 static Status drop_test_check_drops(const DropTest *test, const char *pointer, Problem *problem) {
     Status status = STATUS_OK;
-    char drops[POINTER_SIZE], place[POINTER_SIZE];
-    json_pointer_join(drops, sizeof drops, pointer, "drops");
+    const JsonPointer drops = json_pointer_of(pointer, "drops");
     for (size_t i = 0; i < test->drops.count; i++) {
-        json_pointer_index(place, sizeof place, drops, i);
+        const JsonPointer place = json_pointer_at(drops.at, i);
         const Drop *drop = &test->drops.at[i];
-        if (drop->excluded == NULL && !problem_concerns(problem, place) &&
-            drop_check(test, drop, place, problem) != STATUS_OK)
+        if (drop->excluded == NULL && !problem_concerns(problem, place.at) &&
+            drop_check(test, drop, place.at, problem) != STATUS_OK)
             status = STATUS_INVALID;
     }
     return status;
@@ -171,20 +166,19 @@ size_t drop_test_sample_count(const DropTest *test) {
 
 static Status drop_test_check_traces(const DropTest *test, const char *pointer, Problem *problem) {
     Status status = STATUS_OK;
-    char traces[POINTER_SIZE], trace[POINTER_SIZE], place[POINTER_SIZE];
-    json_pointer_join(traces, sizeof traces, pointer, "traces");
+    const JsonPointer traces = json_pointer_of(pointer, "traces");
     for (size_t i = 0; i < test->traces.count; i++) {
         const Trace *of = &test->traces.at[i];
-        json_pointer_index(trace, sizeof trace, traces, i);
-        json_pointer_join(place, sizeof place, trace, "force");
-        if (of->excluded == NULL && !problem_concerns(problem, trace) &&
-            trace_validate(of->interval, &of->force, place, problem) != STATUS_OK)
+        const JsonPointer trace = json_pointer_at(traces.at, i);
+        if (of->excluded == NULL && !problem_concerns(problem, trace.at) &&
+            trace_validate(of->interval, &of->force, json_pointer_of(trace.at, "force").at,
+                           problem) != STATUS_OK)
             status = STATUS_INVALID;
     }
     const size_t samples = drop_test_sample_count(test);
     if (samples <= TRACE_SAMPLES_MAX)
         return status;
-    return problem_add(problem, STATUS_INVALID, traces,
+    return problem_add(problem, STATUS_INVALID, traces.at,
                        "must have at most %d samples in all, have %zu: cut the traces to the "
                        "contacts, or send them as several measurements",
                        TRACE_SAMPLES_MAX, samples);
@@ -213,18 +207,22 @@ static Status drop_test_check_base(const DropTest *test, const char *pointer, Pr
 }
 
 Status drop_test_validate(const DropTest *test, const char *pointer, Problem *problem) {
-    bool is_valid = fields_validate(drop_test_fields, test, pointer, problem) == STATUS_OK;
+    const Status fields = fields_validate(drop_test_fields, test, pointer, problem);
     // A list that could not be read is empty too.
-    if (test->drops.count == 0 && test->traces.count == 0 &&
-        !json_pointer_concerns(problem, pointer, "drops") &&
-        !json_pointer_concerns(problem, pointer, "traces")) {
-        is_valid = false;
-        (void)json_pointer_fault(problem, pointer, "drops",
-                                 "is required unless there are traces: at least one drop");
-    }
-    is_valid = drop_test_check_date(test, pointer, problem) == STATUS_OK && is_valid;
-    is_valid = drop_test_check_base(test, pointer, problem) == STATUS_OK && is_valid;
-    is_valid = drop_test_check_traces(test, pointer, problem) == STATUS_OK && is_valid;
-    is_valid = drop_test_check_drops(test, pointer, problem) == STATUS_OK && is_valid;
-    return is_valid ? STATUS_OK : STATUS_INVALID;
+    const bool is_empty = test->drops.count == 0 && test->traces.count == 0 &&
+                          !json_pointer_concerns(problem, pointer, "drops") &&
+                          !json_pointer_concerns(problem, pointer, "traces");
+    const Status faults[] = {
+        fields,
+        is_empty ? json_pointer_fault(problem, pointer, "drops",
+                                      "is required unless there are traces: at least one drop")
+                 : STATUS_OK,
+        drop_test_check_date(test, pointer, problem),
+        drop_test_check_base(test, pointer, problem),
+        drop_test_check_traces(test, pointer, problem),
+        drop_test_check_drops(test, pointer, problem),
+    };
+    for (size_t i = 0; i < COUNT(faults); i++)
+        TRY(faults[i]);
+    return STATUS_OK;
 }

@@ -7,9 +7,10 @@
 #include <string.h>
 
 #include "core/base/canonical.h"
+#include "core/base/json_pointer.h"
 #include "core/drop_test/pulse_model.h"
 
-enum { OUTLIERS_MAX = 5, SOURCE_MAX = 1000, POINTER_SIZE = sizeof((Fault){0}.pointer) };
+enum { OUTLIERS_MAX = 5, SOURCE_MAX = 1000 };
 
 static const double effect_min = 0.01;     // of gravity
 static const double pair_tolerance = 0.02; // of effective masses that are considered equal
@@ -83,18 +84,21 @@ static void ranges_extend(Ranges *ranges, const EvaluationRow *row, const Measur
 
 // The JSON Pointer of a measurement, with `rest` behind it: "/measurements/3/gravity"; without a
 // number only the rest.
-static void measurement_pointer(uint64_t number, const char *rest, char pointer[POINTER_SIZE]) {
+static JsonPointer measurement_pointer(uint64_t number, const char *rest) {
+    JsonPointer pointer;
     if (number == COUNT_ABSENT)
-        snprintf(pointer, POINTER_SIZE, "%s", rest);
+        snprintf(pointer.at, sizeof pointer.at, "%s", rest);
     else
-        snprintf(pointer, POINTER_SIZE, "/measurements/%llu%s", (unsigned long long)number, rest);
+        snprintf(pointer.at, sizeof pointer.at, "/measurements/%llu%s", (unsigned long long)number,
+                 rest);
+    return pointer;
 }
 
 // The JSON Pointer of a row: "/drops/2", or "/measurements/3/traces/0".
-static void reading_pointer(const EvaluationRow *row, char pointer[POINTER_SIZE]) {
+static JsonPointer reading_pointer(const EvaluationRow *row) {
     char rest[40];
     snprintf(rest, sizeof rest, "/%s/%zu", row->is_of_trace ? "traces" : "drops", row->place);
-    measurement_pointer(row->measurement, rest, pointer);
+    return measurement_pointer(row->measurement, rest);
 }
 
 // Whether e or T_c of a row counts.
@@ -143,12 +147,8 @@ static Status reading_new(const ReadingList *list, size_t place, bool is_of_trac
         return problem_set(list->problem, STATUS_LIMIT,
                            "more than %d readings: evaluate fewer measurements at a time",
                            EVALUATION_ROWS_MAX);
-    if ((rows->count & (rows->count - 1)) == 0) {
-        EvaluationRow *at = realloc(rows->at, (2 * rows->count + 1) * sizeof *at);
-        TRY(status_made(at != NULL));
-        rows->at = at;
-    }
-    EvaluationRow *row = *added = &rows->at[rows->count++];
+    EvaluationRow *row = *added = list_append(rows, sizeof *row);
+    TRY(status_made(row != NULL));
     *row = (EvaluationRow){.is_of_trace = is_of_trace, .place = place, .test = list->test};
     fields_clear(evaluation_row_fields, row);
     row->measurement = list->of->number;
@@ -246,14 +246,14 @@ static Status reading_add_trace(const ReadingList *list, size_t place) {
         .approach_speed_count = trace->approach_speed.count,
         .progress = list->progress,
     };
-    char rest[48], pointer[POINTER_SIZE];
+    char rest[48];
     snprintf(rest, sizeof rest, "/traces/%zu/force", place);
-    measurement_pointer(list->of->number, rest, pointer);
+    const JsonPointer pointer = measurement_pointer(list->of->number, rest);
     TraceAnalysis analysis = {0};
     EvaluationRow *row;
     // An unreadable trace may be excluded for that reason. A trace without a contact is a row too.
-    Status status = trace_analysis_run(trace->interval, &trace->force, &options, pointer, &analysis,
-                                       trace->excluded == NULL ? list->problem : NULL);
+    Status status = trace_analysis_run(trace->interval, &trace->force, &options, pointer.at,
+                                       &analysis, trace->excluded == NULL ? list->problem : NULL);
     if (status == STATUS_INVALID && trace->excluded != NULL)
         status = reading_new(list, place, true, 0, "it cannot be read", &row);
     else if (status == STATUS_OK && analysis.contacts.count == 0)
@@ -412,12 +412,10 @@ static Status evaluation_warn_of_gravity(const Measurement *of, size_t test,
     if (row == NULL)
         return STATUS_OK;
     Warnings *warnings = &evaluation->warnings;
-    char place[POINTER_SIZE];
-    measurement_pointer(of->number, "/gravity", place);
     const double e = row->restitution_counts ? row->restitution : evaluation->restitution.mean;
     const double T = row->contact_time_counts ? row->contact_time : evaluation->contact_time.mean;
     if (isnan(T))
-        return warnings_add(warnings, place,
+        return warnings_add(warnings, measurement_pointer(of->number, "/gravity").at,
                             "gravity during contact is not corrected, and its effect is unknown "
                             "without a contact time; \"gravity\": 0 states that there is none");
     if (!(e > 0))
@@ -428,7 +426,7 @@ static Status evaluation_warn_of_gravity(const Measurement *of, size_t test,
     const GravityContact with = gravity_apply(&load, e, T);
     static const char advice[] = "set \"gravity\": 9.80665 to correct it, 0 where there is none";
     if (!(with.restitution > 0))
-        return warnings_add(warnings, place,
+        return warnings_add(warnings, measurement_pointer(of->number, "/gravity").at,
                             "gravity during contact is not corrected: in a vertical drop at the "
                             "slowest %.3g m/s a contact with this e and T_c would not end; %s",
                             row->approach_speed, advice);
@@ -436,7 +434,7 @@ static Status evaluation_warn_of_gravity(const Measurement *of, size_t test,
     if (!(fmax(longer, lower) > effect_min))
         return STATUS_OK;
     return warnings_add(
-        warnings, place,
+        warnings, measurement_pointer(of->number, "/gravity").at,
         "gravity during contact is not corrected: in a vertical drop at the slowest %.3g m/s it "
         "lengthens a contact with this e and T_c by %.2g %% and lowers e by %.2g %%; %s",
         row->approach_speed, 100 * longer, 100 * lower, advice);
@@ -458,11 +456,9 @@ static Status evaluation_warn_of_heights(const Measurement *of, size_t test,
                                             ? row->restitution_by == (int)RESTITUTION_BY_HEIGHTS
                                             : !isnan(drop->drop_height));
     }
-    char place[POINTER_SIZE];
-    measurement_pointer(of->number, "/gravity", place);
     return !is_by_height
                ? STATUS_OK
-               : warnings_add(&evaluation->warnings, place,
+               : warnings_add(&evaluation->warnings, measurement_pointer(of->number, "/gravity").at,
                               "gravity during contact is %.4g m/s^2, but speeds follow from "
                               "heights by %.6g m/s^2: where the impactor fell by another gravity, "
                               "give approach_speed and rebound_speed",
@@ -471,12 +467,10 @@ static Status evaluation_warn_of_heights(const Measurement *of, size_t test,
 
 static Status evaluation_warn_of_pairs(const Measurement *tests, size_t count, Warnings *warnings) {
     for (size_t i = 1; i < count; i++) {
-        char place[POINTER_SIZE];
-        measurement_pointer(tests[i].number, "", place);
         const double first = drop_test_effective_mass(tests[0].test);
         const double other = drop_test_effective_mass(tests[i].test);
         if (fabs(other - first) > pair_tolerance * first)
-            TRY(warnings_add(warnings, place,
+            TRY(warnings_add(warnings, measurement_pointer(tests[i].number, "").at,
                              "was made with another pair of masses: effective mass %.4g kg, that "
                              "of the first is %.4g kg; e and T_c belong to a pair",
                              other, first));
@@ -510,11 +504,10 @@ static Status evaluation_warn_of_copies(const Measurement *tests, size_t count,
             k++;
         if (k == i)
             continue;
-        char place[POINTER_SIZE], other[40] = "a test before it";
-        measurement_pointer(tests[i].number, "", place);
+        char other[40] = "a test before it";
         if (tests[k].number != COUNT_ABSENT)
             snprintf(other, sizeof other, "measurement %llu", (unsigned long long)tests[k].number);
-        status = warnings_add(&evaluation->warnings, place,
+        status = warnings_add(&evaluation->warnings, measurement_pointer(tests[i].number, "").at,
                               "is %s once more, equal in every member, and both count: if it was "
                               "sent twice the standard errors are too small; leave one out",
                               other);
@@ -548,11 +541,9 @@ static Status evaluation_warn_of_pulses(Evaluation *evaluation) {
 static Status evaluation_warn_of_interval(Evaluation *evaluation) {
     for (size_t i = 0; i < evaluation->rows.count && evaluation->contact_time.count == 0; i++) {
         const EvaluationRow *row = &evaluation->rows.at[i];
-        char place[POINTER_SIZE];
-        reading_pointer(row, place);
         if (row->excluded == NULL && !isnan(row->least_contact_time) &&
             !isnan(row->most_contact_time))
-            return warnings_add(&evaluation->warnings, place,
+            return warnings_add(&evaluation->warnings, reading_pointer(row).at,
                                 "no trace gives a value of the contact time; by %s it is between "
                                 "%.3g and %.3g s (%s)",
                                 row->from, row->least_contact_time, row->most_contact_time,
@@ -574,9 +565,7 @@ static Status evaluation_warn_of_doubt(Evaluation *evaluation) {
     }
     if (first == NULL)
         return STATUS_OK;
-    char place[POINTER_SIZE];
-    reading_pointer(first, place);
-    return warnings_add(&evaluation->warnings, place,
+    return warnings_add(&evaluation->warnings, reading_pointer(first).at,
                         "%zu contact%s of traces count%s though doubtful; %s: %s", count,
                         count == 1 ? "" : "s", count == 1 ? "s" : "", first->from, first->note);
 }
@@ -590,10 +579,8 @@ static Status evaluation_warn_of_outliers(Evaluation *evaluation) {
         if (!(is_time ? row->contact_time_is_outlier : row->restitution_is_outlier) ||
             warned[is_time]++ >= OUTLIERS_MAX)
             continue;
-        char place[POINTER_SIZE];
-        reading_pointer(row, place);
         TRY(warnings_add(
-            &evaluation->warnings, place,
+            &evaluation->warnings, reading_pointer(row).at,
             "%s %.4g of %s is %.1f robust deviations from the median; it counts: the mean is %.4g "
             "with all readings and %.4g without outliers (%llu); a reading that is known to be "
             "wrong needs \"excluded\" with the reason",
@@ -691,10 +678,6 @@ typedef struct Proposal {
     MaterialProposal *result;
 } Proposal;
 
-static bool proposal_is_same(double a, double b) {
-    return a == b || (isnan(a) && isnan(b));
-}
-
 // Impactor and base, if all tests have the same.
 static Status proposal_set_pair(const Proposal *proposal) {
     Material *material = &proposal->result->material;
@@ -702,8 +685,8 @@ static Status proposal_set_pair(const Proposal *proposal) {
     for (size_t i = 1; i < proposal->source_count; i++) {
         const DropTest *test = proposal->sources[i]->test;
         if (!text_same(test->impactor, first->impactor) || test->base != first->base ||
-            !proposal_is_same(test->impactor_mass, first->impactor_mass) ||
-            !proposal_is_same(test->base_mass, first->base_mass))
+            !real_same(test->impactor_mass, first->impactor_mass) ||
+            !real_same(test->base_mass, first->base_mass))
             return warnings_add(&proposal->evaluation->warnings, "/revision/impactor_mass",
                                 "impactor and base are left out: the measurements were made with "
                                 "different ones");
