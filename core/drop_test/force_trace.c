@@ -354,7 +354,6 @@ static size_t trace_fill_window(const ContactDetection *found, size_t number, in
         const double mean = sum / (double)m;
         window->mean[k] = mean;
         window->sum += mean;
-        window->square += mean * mean;
     }
     const double noise = found->noise / run->peak;
     window->noise_freedom = fmax(found->noise_count - (double)samples, 0);

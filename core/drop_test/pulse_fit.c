@@ -123,22 +123,10 @@ static FitResidual fit_residual_of(const FitWindow *window, const double *f, siz
     const double A = fx / ff, b = (window->sum - A * sum) / n;
     if (!(ff > 0) || !(A > 0))
         return (FitResidual){.sum = (double)INFINITY};
-    // A difference of sums loses the digits of small residuals: those are summed directly.
     double left = 0;
-    for (size_t k = from; k <= to; k++) {
-        const double r = window->mean[k] - A * f[k] - b;
-        left += r * r - (window->mean[k] - b) * (window->mean[k] - b);
-    }
-    double direct = 0;
-    const double all = window->square - 2 * b * window->sum + n * b * b;
-    if (left + all < 1e-6 * all) {
-        for (size_t k = 0; k < window->blocks; k++) {
-            const double r = window->mean[k] - b - (k >= from && k <= to ? A * f[k] : 0);
-            direct += r * r;
-        }
-        left = direct;
-    } else {
-        left += all;
+    for (size_t k = 0; k < window->blocks; k++) {
+        const double r = window->mean[k] - b - (k >= from && k <= to ? A * f[k] : 0);
+        left += r * r;
     }
     return (FitResidual){.sum = m * left, .amplitude = A, .baseline = b, .model_square = m * ff};
 }
@@ -216,30 +204,20 @@ static bool fit_invert(double a[FIT_PARTS][FIT_PARTS], double inverse[FIT_PARTS]
     return *det > 0 && inverse[0][0] > 0 && inverse[1][1] > 0 && inverse[2][2] > 0;
 }
 
-// (curvature + damping diagonal) step = -slope over the free parts, by elimination; the others do
-// not move.
+// (curvature + damping diagonal) step = -slope over the free parts; the others do not move.
 static bool fit_solve(const PulseFit *fit, const bool *is_free, double damping, double *step) {
-    double a[FIT_PARTS][FIT_PARTS + 1];
+    double a[FIT_PARTS][FIT_PARTS], inverse[FIT_PARTS][FIT_PARTS], det;
     for (int i = 0; i < FIT_PARTS; i++) {
         for (int j = 0; j < FIT_PARTS; j++)
             a[i][j] = is_free[i] && is_free[j] ? fit->curvature[i][j] : 0;
         a[i][i] = is_free[i] ? a[i][i] * (1 + damping) : 1;
-        a[i][FIT_PARTS] = is_free[i] ? -fit->slope[i] : 0;
     }
+    if (!fit_invert(a, inverse, &det))
+        return false;
     for (int i = 0; i < FIT_PARTS; i++) {
-        if (!(a[i][i] > 0))
-            return false;
-        for (int j = i + 1; j < FIT_PARTS; j++) {
-            const double factor = a[j][i] / a[i][i];
-            for (int k = i; k <= FIT_PARTS; k++)
-                a[j][k] -= factor * a[i][k];
-        }
-    }
-    for (int i = FIT_PARTS; i-- > 0;) {
-        step[i] = a[i][FIT_PARTS];
-        for (int j = i + 1; j < FIT_PARTS; j++)
-            step[i] -= a[i][j] * step[j];
-        step[i] /= a[i][i];
+        step[i] = 0;
+        for (int j = 0; j < FIT_PARTS; j++)
+            step[i] -= is_free[j] ? inverse[i][j] * fit->slope[j] : 0;
     }
     return true;
 }
@@ -538,7 +516,7 @@ typedef struct Drawn {
 // measured with a variance of `laxity` times the square of half the range.
 static Drawn fit_confidence_draw(const Piece *piece, const Gaps gaps[2], int figure,
                                  double laxity) {
-    double with[2], own = 0, part[2] = {0, 0}, extra[2];
+    double with[2], own = 0, part[2], extra[2];
     for (int i = 0; i < FIT_PARTS; i++)
         for (int j = 0; j < FIT_PARTS; j++)
             own += piece->slope[figure][i] * piece->slope[figure][j] * piece->covariance[i][j];
@@ -548,17 +526,13 @@ static Drawn fit_confidence_draw(const Piece *piece, const Gaps gaps[2], int fig
             with[i] += piece->slope[figure][j] * piece->covariance[i][j];
         // A gap wider than the form leaves it follows from the form and adds nothing.
         const bool is_known = gaps[i].half > 1.5 * sqrt(piece->covariance[i][i]);
-        extra[i] = is_known ? (double)INFINITY : laxity * gaps[i].half * gaps[i].half;
+        extra[i] = is_known ? 1e30 * piece->covariance[i][i] : laxity * gaps[i].half * gaps[i].half;
     }
     const double a = piece->covariance[0][0] + extra[0], b = piece->covariance[0][1];
     const double c = piece->covariance[1][1] + extra[1];
-    if (isinf(extra[0]) || isinf(extra[1])) {
-        part[0] = isinf(extra[0]) ? 0 : with[0] / a;
-        part[1] = isinf(extra[1]) ? 0 : with[1] / c;
-    } else {
-        part[0] = (with[0] * c - with[1] * b) / (a * c - b * b);
-        part[1] = (with[1] * a - with[0] * b) / (a * c - b * b);
-    }
+    const double det = a * c - b * b;
+    part[0] = (with[0] * c - with[1] * b) / det;
+    part[1] = (with[1] * a - with[0] * b) / det;
     Drawn drawn = {.mean = piece->mean[figure]};
     double square = own;
     for (int i = 0; i < 2; i++) {

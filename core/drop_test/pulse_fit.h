@@ -15,7 +15,7 @@ enum { FIT_START, FIT_END, FIT_DECAY }; // of FIT_PARTS
 typedef struct FitWindow {
     double mean[FIT_BLOCKS_MAX];
     size_t blocks, per_block;
-    double sum, square; // of the means, and of their squares
+    double sum; // of the means
     // Noise of the rest of the trace: sum of squares and degrees of freedom.
     double noise_square, noise_freedom;
     int separation;
