@@ -72,16 +72,6 @@ static bool json_pointer_fail_name(const Field *fields, const char *token, const
                              near != NULL ? " is meant" : "");
 }
 
-static bool json_pointer_element(const Reals *reals, const char *token, const char *of,
-                                 void **member, char message[JSON_POINTER_MESSAGE_MAX]) {
-    size_t index;
-    if (!json_pointer_read_index(token, reals->count, &index))
-        return json_pointer_fail(message, "%s has elements 0 to %zu, \"%s\" is none of them", of,
-                                 reals->count > 0 ? reals->count - 1 : 0, token);
-    *member = &reals->at[index];
-    return true;
-}
-
 static void json_pointer_note_shorthand(PointerTarget *target, const Field *field, void *member) {
     size_t offset = 0;
     const Field *name =
@@ -93,112 +83,127 @@ static void json_pointer_note_shorthand(PointerTarget *target, const Field *fiel
     target->item = field;
 }
 
-// Resolves the tokens below a member that is an item, variant, list or array.
-static bool json_pointer_descend(PointerTarget *target, const Field *field, void *member,
-                                 const char *pointer, char message[JSON_POINTER_MESSAGE_MAX]);
-
-static bool json_pointer_step(PointerTarget *target, const Field *fields, void *item,
-                              const KindTable *kinds, Variant **variant, const char *pointer,
-                              const char *of, char message[JSON_POINTER_MESSAGE_MAX]) {
-    char token[TOKEN];
-    if (*pointer != '/')
-        return json_pointer_fail(message, "must begin with a slash, as in /dampers/0/clearance");
-    if (!json_pointer_next_token(&pointer, token))
-        return json_pointer_fail(message,
-                                 "a part of it is too long, or ~ stands without 0 or 1 behind it");
-    if (kinds != NULL && strcmp(token, kinds->tag) == 0) {
-        if (*pointer != '\0')
-            return json_pointer_fail(message, "%s is a name: nothing lies below it", token);
-        target->is_tag = true;
-        target->member = variant;
-        return true;
-    }
-    size_t offset = 0;
-    const Field *field = fields_find(fields, token, &offset);
-    if (field == NULL)
-        return json_pointer_fail_name(fields, token, of, message);
-    void *member = (char *)item + offset + field->offset;
-    if (field->kind == FIELD_KIND_ITEM)
-        json_pointer_note_shorthand(target, field, member);
-    if (*pointer != '\0')
-        return json_pointer_descend(target, field, member, pointer, message);
-    target->field = field;
-    target->member = member;
-    return true;
-}
-
-static bool json_pointer_descend(PointerTarget *target, const Field *field, void *member,
+// Resolves the last one or two tokens, below an array.
+static bool json_pointer_element(PointerTarget *target, const Field *field, void *member,
                                  const char *pointer, char message[JSON_POINTER_MESSAGE_MAX]) {
     char token[TOKEN];
-    List list;
     size_t index;
-    switch (field->kind) {
-    case FIELD_KIND_ITEM:
-        return json_pointer_step(target, field->fields, member, NULL, NULL, pointer, field->name,
-                                 message);
-    case FIELD_KIND_VARIANT: {
-        Variant **variant = member;
-        if (*variant == NULL)
-            return json_pointer_fail(message, "the scene has no %s", field->name);
-        target->field = field;
-        return json_pointer_step(target, (*variant)->kind->fields, *variant, field->kinds, variant,
-                                 pointer, (*variant)->kind->name, message);
-    }
-    case FIELD_KIND_LIST:
-        memcpy(&list, member, sizeof list);
-        if (!json_pointer_next_token(&pointer, token) ||
-            !json_pointer_read_index(token, list.count, &index))
-            return json_pointer_fail(message, "the scene has %zu %s: \"%s\" is none of them",
-                                     list.count, field->name, token);
-        if (*pointer == '\0')
-            return json_pointer_fail(
-                message, "one value cannot replace an element of %s: name a member of it",
-                field->name);
-        return json_pointer_step(target, field->fields, (char *)list.at + index * field->size, NULL,
-                                 NULL, pointer, field->name, message);
-    case FIELD_KIND_ROWS: {
+    if (field->kind == FIELD_KIND_ROWS) {
         const Rows *rows = member;
         if (!json_pointer_next_token(&pointer, token) ||
             !json_pointer_read_index(token, rows->count, &index) || *pointer == '\0')
             return json_pointer_fail(message, "%s has %zu rows: name a row and a column, %s/0/0",
                                      field->name, rows->count, field->name);
         member = &rows->at[index];
-    } // fall through
-    case FIELD_KIND_REALS:
-        if (!json_pointer_next_token(&pointer, token) || *pointer != '\0')
-            return json_pointer_fail(message, "nothing lies below an element of %s", field->name);
+    }
+    const Reals *reals = member;
+    if (!json_pointer_next_token(&pointer, token) || *pointer != '\0')
+        return json_pointer_fail(message, "nothing lies below an element of %s", field->name);
+    if (!json_pointer_read_index(token, reals->count, &index))
+        return json_pointer_fail(message, "%s has elements 0 to %zu, \"%s\" is none of them",
+                                 field->name, reals->count > 0 ? reals->count - 1 : 0, token);
+    target->field = field;
+    target->is_element = true;
+    target->member = &reals->at[index];
+    return true;
+}
+
+static bool json_pointer_walk(PointerTarget *target, const Field *fields, void *item,
+                              const char *pointer, char message[JSON_POINTER_MESSAGE_MAX]) {
+    const char *of = "the scene";
+    Variant **variant = NULL; // that `item` is, of target->field
+    for (;;) {
+        char token[TOKEN];
+        size_t offset = 0, index;
+        List list;
+        if (*pointer != '/')
+            return json_pointer_fail(message,
+                                     "must begin with a slash, as in /dampers/0/clearance");
+        if (!json_pointer_next_token(&pointer, token))
+            return json_pointer_fail(
+                message, "a part of it is too long, or ~ stands without 0 or 1 behind it");
+        if (variant != NULL && strcmp(token, target->field->kinds->tag) == 0) {
+            if (*pointer != '\0')
+                return json_pointer_fail(message, "%s is a name: nothing lies below it", token);
+            target->is_tag = true;
+            target->member = variant;
+            return true;
+        }
+        const Field *field = fields_find(fields, token, &offset);
+        if (field == NULL)
+            return json_pointer_fail_name(fields, token, of, message);
+        void *member = (char *)item + offset + field->offset;
+        if (field->kind == FIELD_KIND_ITEM)
+            json_pointer_note_shorthand(target, field, member);
         target->field = field;
-        target->is_element = true;
-        return json_pointer_element(member, token, field->name, &target->member, message);
-    default:
-        return json_pointer_fail(message, "nothing lies below %s", field->name);
+        target->member = member;
+        if (*pointer == '\0')
+            return true;
+        fields = field->fields;
+        item = member;
+        of = field->name;
+        variant = NULL;
+        switch (field->kind) {
+        case FIELD_KIND_ITEM:
+            break;
+        case FIELD_KIND_VARIANT:
+            variant = member;
+            if (*variant == NULL)
+                return json_pointer_fail(message, "the scene has no %s", field->name);
+            fields = (*variant)->kind->fields;
+            item = *variant;
+            of = (*variant)->kind->name;
+            break;
+        case FIELD_KIND_LIST:
+            memcpy(&list, member, sizeof list);
+            if (!json_pointer_next_token(&pointer, token) ||
+                !json_pointer_read_index(token, list.count, &index))
+                return json_pointer_fail(message, "the scene has %zu %s: \"%s\" is none of them",
+                                         list.count, field->name, token);
+            if (*pointer == '\0')
+                return json_pointer_fail(
+                    message, "one value cannot replace an element of %s: name a member of it",
+                    field->name);
+            item = (char *)list.at + index * field->size;
+            break;
+        case FIELD_KIND_REALS:
+        case FIELD_KIND_ROWS:
+            return json_pointer_element(target, field, member, pointer, message);
+        default:
+            return json_pointer_fail(message, "nothing lies below %s", field->name);
+        }
     }
 }
 
-// Whether one scalar can replace the member.
+// The kinds of members that one scalar can replace, by which; `wanted` NULL: none can.
+static const struct {
+    JsonScalarKind scalar;
+    const char *wanted;
+} json_pointer_scalars[] = {
+    [FIELD_KIND_REAL] = {JSON_SCALAR_NUMBER, "a number"},
+    [FIELD_KIND_REALS] = {JSON_SCALAR_NUMBER, "a number"},
+    [FIELD_KIND_COUNT] = {JSON_SCALAR_NUMBER, "a whole number"},
+    [FIELD_KIND_FLAG] = {JSON_SCALAR_FLAG, "true or false"},
+    [FIELD_KIND_TEXT] = {JSON_SCALAR_TEXT, "a text"},
+    [FIELD_KIND_CHOICE] = {JSON_SCALAR_TEXT, "a name"},
+    [FIELD_KIND_REFCOUNT] = {0}, // the last kind
+};
+
 static bool json_pointer_is_settable(const PointerTarget *target) {
     if (target->is_tag || target->is_element)
         return true;
-    switch (target->field->kind) {
-    case FIELD_KIND_REAL:
-    case FIELD_KIND_COUNT:
-    case FIELD_KIND_FLAG:
-    case FIELD_KIND_TEXT:
-    case FIELD_KIND_CHOICE:
-        return (target->field->flags & FIELD_NOTE) == 0;
-    case FIELD_KIND_REALS:
-        return (target->field->flags & FIELD_LONE) != 0;
-    case FIELD_KIND_ITEM:
-        return target->field->shorthand != NULL;
-    default:
-        return false;
-    }
+    const Field *field = target->field;
+    if (field->kind == FIELD_KIND_ITEM)
+        return field->shorthand != NULL;
+    if (field->kind == FIELD_KIND_REALS)
+        return (field->flags & FIELD_LONE) != 0;
+    return json_pointer_scalars[field->kind].wanted != NULL && (field->flags & FIELD_NOTE) == 0;
 }
 
 static bool json_pointer_resolve(const Field *fields, const void *item, const char *pointer,
                                  PointerTarget *target, char message[JSON_POINTER_MESSAGE_MAX]) {
     *target = (PointerTarget){0};
-    if (!json_pointer_step(target, fields, (void *)item, NULL, NULL, pointer, "the scene", message))
+    if (!json_pointer_walk(target, fields, (void *)item, pointer, message))
         return false;
     if (json_pointer_is_settable(target))
         return true;
@@ -214,17 +219,13 @@ const Field *json_pointer_find(const Field *fields, const void *item, const char
     return is_found ? target.field : NULL;
 }
 
-static const char *json_scalar_kind_name(const JsonScalar *value) {
-    static const char *const names[] = {"a number", "a text", "true or false"};
-    return names[value->kind];
-}
-
 static Status json_pointer_fail_kind(const char *wanted, const Field *field,
                                      const JsonScalar *value,
                                      char message[JSON_POINTER_MESSAGE_MAX]) {
+    static const char *const kinds[] = {"a number", "a text", "true or false"};
     json_pointer_fail(message, "must be %s%s%s%s, is %s", wanted, field->unit != NULL ? " [" : "",
                       field->unit != NULL ? field->unit : "", field->unit != NULL ? "]" : "",
-                      json_scalar_kind_name(value));
+                      kinds[value->kind]);
     return STATUS_INVALID;
 }
 
@@ -232,9 +233,8 @@ static Status json_pointer_fail_kind(const char *wanted, const Field *field,
 static Status json_pointer_fail_choice(const char *const *names, const char *text,
                                        char message[JSON_POINTER_MESSAGE_MAX]) {
     char list[JSON_POINTER_MESSAGE_MAX / 2] = "";
-    for (size_t i = 0, length = 0; names[i] != NULL && length < sizeof list; i++)
-        length += (size_t)snprintf(list + length, sizeof list - length, "%s%s", i > 0 ? ", " : "",
-                                   names[i]);
+    for (size_t i = 0; names[i] != NULL; i++)
+        text_list(list, sizeof list, names[i]);
     json_pointer_fail(message, "must be one of %s, is \"%.40s\"", list, text);
     return STATUS_INVALID;
 }
@@ -248,25 +248,22 @@ static Status json_pointer_set_text(char **target, const char *text) {
     return STATUS_OK;
 }
 
-// Copies the members that have the same name and type in both kinds.
-static Status json_pointer_copy_common(const Variant *source, Variant *target) {
-    for (const Field *field = target->kind->fields; field->kind != FIELD_KIND_END; field++) {
-        const Field *at = field->kind == FIELD_KIND_BASE ? field->fields : field;
-        const size_t base = field->kind == FIELD_KIND_BASE ? field->offset : 0;
-        for (; at->kind != FIELD_KIND_END; at++) {
-            size_t offset = 0;
-            const Field *from = fields_find(source->kind->fields, at->name, &offset);
-            if (from != NULL && from->kind == at->kind && from->fields == at->fields &&
-                from->kinds == at->kinds && from->choices == at->choices) {
-                Field one[] = {*at, FIELD_END};
-                one[0].offset = 0;
-                char *to = (char *)target + base + at->offset;
-                fields_clear(one, to);
-                TRY(fields_copy(one, (const char *)source + offset + from->offset, to));
-            }
-            if (field->kind != FIELD_KIND_BASE)
-                break;
-        }
+// Copies the members that have the same name and type in both kinds; `fields` are those of the
+// target, or of a BASE of it.
+static Status json_pointer_copy_common(const Variant *source, const Field *fields, void *target) {
+    for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
+        void *to = (char *)target + field->offset;
+        size_t offset = 0;
+        const Field *from = fields_find(source->kind->fields, field->name, &offset);
+        if (field->kind == FIELD_KIND_BASE)
+            TRY(json_pointer_copy_common(source, field->fields, to));
+        if (from == NULL || from->kind != field->kind || from->fields != field->fields ||
+            from->kinds != field->kinds || from->choices != field->choices)
+            continue;
+        Field one[] = {*field, FIELD_END};
+        one[0].offset = 0;
+        fields_clear(one, to);
+        TRY(fields_copy(one, (const char *)source + offset + from->offset, to));
     }
     return STATUS_OK;
 }
@@ -286,7 +283,7 @@ static Status json_pointer_set_kind(const KindTable *kinds, Variant **variant,
     if (kind == (*variant)->kind)
         return STATUS_OK;
     Variant *made = variant_new(kind);
-    if (made == NULL || json_pointer_copy_common(*variant, made) != STATUS_OK) {
+    if (made == NULL || json_pointer_copy_common(*variant, kind->fields, made) != STATUS_OK) {
         variant_free(made);
         return STATUS_NO_MEMORY;
     }
@@ -309,16 +306,15 @@ static Status json_pointer_set_name(const PointerTarget *target, const JsonScala
 
 static Status json_pointer_set_member(const Field *field, void *member, const JsonScalar *value,
                                       char message[JSON_POINTER_MESSAGE_MAX]) {
+    if (value->kind != json_pointer_scalars[field->kind].scalar)
+        return json_pointer_fail_kind(json_pointer_scalars[field->kind].wanted, field, value,
+                                      message);
     switch (field->kind) {
     case FIELD_KIND_REAL:
-        if (value->kind != JSON_SCALAR_NUMBER)
-            return json_pointer_fail_kind("a number", field, value, message);
         *(double *)member = value->number;
         return STATUS_OK;
     case FIELD_KIND_COUNT:
-        if (value->kind != JSON_SCALAR_NUMBER || value->whole == COUNT_ABSENT) {
-            if (value->kind != JSON_SCALAR_NUMBER)
-                return json_pointer_fail_kind("a whole number", field, value, message);
+        if (value->whole == COUNT_ABSENT) {
             json_pointer_fail(message, "must be a whole number of at least 0, is %s",
                               real_text(value->number).at);
             return STATUS_INVALID;
@@ -326,37 +322,25 @@ static Status json_pointer_set_member(const Field *field, void *member, const Js
         *(uint64_t *)member = value->whole;
         return STATUS_OK;
     case FIELD_KIND_FLAG:
-        if (value->kind != JSON_SCALAR_FLAG)
-            return json_pointer_fail_kind("true or false", field, value, message);
         *(bool *)member = value->flag;
         return STATUS_OK;
     case FIELD_KIND_TEXT:
-        return value->kind != JSON_SCALAR_TEXT
-                   ? json_pointer_fail_kind("a text", field, value, message)
-                   : json_pointer_set_text(member, value->text);
+        return json_pointer_set_text(member, value->text);
     case FIELD_KIND_CHOICE:
-        if (value->kind != JSON_SCALAR_TEXT)
-            return json_pointer_fail_kind("a name", field, value, message);
         for (int i = 0; field->choices[i] != NULL; i++)
             if (strcmp(field->choices[i], value->text) == 0) {
                 *(int *)member = i;
                 return STATUS_OK;
             }
         return json_pointer_fail_choice(field->choices, value->text, message);
-    case FIELD_KIND_REALS: {
+    default: { // FIELD_KIND_REALS
         Reals *reals = member;
-        if (value->kind != JSON_SCALAR_NUMBER)
-            return json_pointer_fail_kind("a number", field, value, message);
-        double *at = malloc(sizeof *at);
-        if (at == NULL)
-            return STATUS_NO_MEMORY;
-        *at = value->number;
         free(reals->at);
-        *reals = (Reals){at, 1};
+        if (!reals_allocate(reals, 1))
+            return STATUS_NO_MEMORY;
+        reals->at[0] = value->number;
         return STATUS_OK;
     }
-    default:
-        return STATUS_INTERNAL;
     }
 }
 

@@ -146,27 +146,16 @@ static void random_make_block(const ExcitationRandom *random, const RandomBlocks
     sparse_spectrum_run(synthesis);
 }
 
-// The faded first half of a block, added to `count` samples; then the second half, which starts the
-// next hop. Only the samples needed are computed.
-static void random_fade_in(const SparseSpectrum *synthesis, const double *fade, size_t count,
-                           double *x) {
+// Adds `count` faded samples of a block, from its beginning or from its middle on. Only the samples
+// needed are computed.
+static void random_fade(const SparseSpectrum *synthesis, const double *fade, size_t hop,
+                        bool is_second_half, size_t count, double *x) {
     double y[PART];
     for (size_t from = 0; from < count; from += PART) {
         const size_t many = count - from < PART ? count - from : PART;
-        sparse_spectrum_samples(synthesis, from, PART, y);
+        sparse_spectrum_samples(synthesis, is_second_half ? hop + from : from, PART, y);
         for (size_t i = 0; i < many; i++)
-            x[from + i] += fade[from + i] * y[i];
-    }
-}
-
-static void random_fade_out(const SparseSpectrum *synthesis, const double *fade, size_t hop,
-                            size_t count, double *x) {
-    double y[PART];
-    for (size_t from = 0; from < count; from += PART) {
-        const size_t many = count - from < PART ? count - from : PART;
-        sparse_spectrum_samples(synthesis, hop + from, PART, y);
-        for (size_t i = 0; i < many; i++)
-            x[from + i] = fade[hop - 1 - from - i] * y[i];
+            x[from + i] += fade[is_second_half ? hop - 1 - from - i : from + i] * y[i];
     }
 }
 
@@ -180,12 +169,9 @@ static Status random_make_samples(const ExcitationRandom *random, const RandomBl
             return problem_set(problem, STATUS_CANCELLED,
                                "stopped while the base's motion was made");
         random_make_block(random, blocks, m, synthesis);
-        if (m > 0)
-            random_fade_in(synthesis, fade, m == hops ? base->count - (m - 1) * hop : hop,
-                           base->values + (m - 1) * hop);
-        if (m < hops)
-            random_fade_out(synthesis, fade, hop, m == hops - 1 ? base->count - m * hop : hop,
-                            base->values + m * hop);
+        for (size_t h = m > 0 ? m - 1 : 0; h < hops && h <= m; h++)
+            random_fade(synthesis, fade, hop, h == m, h == hops - 1 ? base->count - h * hop : hop,
+                        base->values + h * hop);
     }
     return STATUS_OK;
 }
@@ -205,7 +191,7 @@ static Status random_make(const Excitation *excitation, const Span *span, const 
         sparse_spectrum_new(blocks.length, blocks.first_bin + blocks.bins, span->transforms);
     double *fade = malloc(hop * sizeof *fade);
     base->count = (size_t)wanted;
-    base->values = malloc(base->count * sizeof *base->values);
+    base->values = calloc(base->count, sizeof *base->values);
     Status status;
     if (synthesis == NULL || fade == NULL || base->values == NULL) {
         status = problem_set(problem, STATUS_NO_MEMORY,
