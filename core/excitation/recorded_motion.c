@@ -170,7 +170,9 @@ RecordLook record_look(const Reals *samples, double interval, double scale) {
     return look;
 }
 
-bool record_drifts(const RecordLook *look) {
+// Whether the acceleration has both signs and yet leaves the base with a velocity: its baseline is
+// not corrected.
+static bool record_drifts(const RecordLook *look) {
     const double lesser = fmin(look->highest, -look->lowest);
     return lesser > 0.1 * fmax(look->highest, -look->lowest) &&
            fabs(look->end_velocity) > 0.3 * look->peak_velocity;

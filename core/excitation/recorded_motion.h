@@ -60,8 +60,4 @@ RecordLook record_look(const Reals *samples, double interval, double scale);
 void record_look_doubt(const RecordLook *look, const char *before, const char *place,
                        Problem *doubts);
 
-// Whether the acceleration has both signs and yet leaves the base with a velocity: its baseline is
-// not corrected.
-bool record_drifts(const RecordLook *look);
-
 #endif
