@@ -130,6 +130,13 @@ bool text_format(char **target, const char *format, ...) __attribute__((format(p
             return try_status;                                                                     \
     } while (0)
 
+// The first of `count` statuses that is not STATUS_OK; STATUS_OK if all are.
+static inline Status status_first(const Status *all, size_t count) {
+    for (size_t i = 0; i < count; i++)
+        TRY(all[i]);
+    return STATUS_OK;
+}
+
 // Whether something could be allocated, as a status.
 static inline Status status_made(bool is_made) {
     return is_made ? STATUS_OK : STATUS_NO_MEMORY;

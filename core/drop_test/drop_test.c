@@ -222,7 +222,5 @@ Status drop_test_validate(const DropTest *test, const char *pointer, Problem *pr
         drop_test_check_traces(test, pointer, problem),
         drop_test_check_drops(test, pointer, problem),
     };
-    for (size_t i = 0; i < COUNT(faults); i++)
-        TRY(faults[i]);
-    return STATUS_OK;
+    return status_first(faults, COUNT(faults));
 }

@@ -393,22 +393,15 @@ static Status evaluation_set_statistic(bool is_time, Reading *readings, Evaluati
     return STATUS_OK;
 }
 
-// The slowest row of a test that counts.
-static const EvaluationRow *evaluation_slowest(const EvaluationRows *rows, size_t test) {
-    const EvaluationRow *found = NULL;
-    for (size_t i = 0; i < rows->count; i++) {
-        const EvaluationRow *row = &rows->at[i];
-        if (row->test == test && reading_counts(row) && !isnan(row->approach_speed) &&
-            (found == NULL || row->approach_speed < found->approach_speed))
-            found = row;
-    }
-    return found;
-}
-
 static Status evaluation_warn_of_gravity(const Measurement *of, size_t test,
                                          Evaluation *evaluation) {
-    const EvaluationRow *row =
-        isnan(of->test->gravity) ? evaluation_slowest(&evaluation->rows, test) : NULL;
+    const EvaluationRow *row = NULL; // the slowest one that counts
+    for (size_t i = 0; i < evaluation->rows.count && isnan(of->test->gravity); i++) {
+        const EvaluationRow *at = &evaluation->rows.at[i];
+        if (at->test == test && reading_counts(at) && !isnan(at->approach_speed) &&
+            (row == NULL || at->approach_speed < row->approach_speed))
+            row = at;
+    }
     if (row == NULL)
         return STATUS_OK;
     Warnings *warnings = &evaluation->warnings;

@@ -147,53 +147,46 @@ static bool rig_is_given(const Damper *damper) {
     return !isnan(damper->rig.impactor_mass) || !isnan(damper->rig.base_mass);
 }
 
-// The first measured buffer without the masses of its test. NULL: all have them; *test is the first
-// test, and *is_alike whether the others had the same masses.
-static const Buffer *damper_find_unstated(const Damper *damper, const BufferTest **test,
-                                          bool *is_alike) {
-    *test = NULL;
-    *is_alike = true;
-    for (int side = 0; side < 2; side++) {
-        const Buffer *buffer = damper_buffer(damper, (Side)side);
-        if (!buffer_is_measured(buffer))
-            continue;
-        if (isnan(buffer_test_mass(buffer)))
-            return buffer;
-        if (*test == NULL)
-            *test = &buffer->test;
-        *is_alike = *is_alike && buffer->test.impactor_mass == (*test)->impactor_mass &&
-                    buffer->test.base_mass == (*test)->base_mass;
-    }
-    return NULL;
-}
-
 static bool rig_is_same(const Rig *a, const Rig *b) {
     return real_same(a->impactor_mass, b->impactor_mass) && real_same(a->base_mass, b->base_mass);
 }
 
-static Rig rig_of(const BufferTest *test) {
-    return (Rig){test->impactor_mass, isinf(test->base_mass) ? (double)NAN : test->base_mass};
+// The masses of the tests that measured the buffers. False: there is no such test, they had
+// different masses, or one does not state them: then *unstated is its buffer, else NULL.
+static bool damper_tested_rig(const Damper *damper, Rig *rig, const Buffer **unstated) {
+    bool is_found = false;
+    *unstated = NULL;
+    for (int side = 0; side < 2; side++) {
+        const Buffer *buffer = damper_buffer(damper, (Side)side);
+        if (!buffer_is_measured(buffer))
+            continue;
+        const BufferTest *test = &buffer->test;
+        const Rig own = {test->impactor_mass,
+                         isinf(test->base_mass) ? (double)NAN : test->base_mass};
+        if (isnan(buffer_test_mass(buffer)))
+            *unstated = buffer;
+        if (*unstated != NULL || (is_found && !rig_is_same(rig, &own)))
+            return false;
+        *rig = own;
+        is_found = true;
+    }
+    return is_found;
 }
 
 // A rig that is not given is that of the materials' tests.
 static void rig_fill(Damper *damper, const ContactLaw *law) {
-    const BufferTest *test;
-    bool is_alike;
-    if (damper->identified_for != IDENTIFIED_FOR_RIG || rig_is_given(damper) ||
-        !damper_is_carried(damper, law) || damper_find_unstated(damper, &test, &is_alike) != NULL ||
-        !is_alike)
-        return;
-    damper->rig = rig_of(test);
+    const Buffer *unstated;
+    Rig tested;
+    if (damper->identified_for == IDENTIFIED_FOR_RIG && !rig_is_given(damper) &&
+        damper_is_carried(damper, law) && damper_tested_rig(damper, &tested, &unstated))
+        damper->rig = tested;
 }
 
 void damper_reset_rig(const Damper *base, Damper *damper) {
-    const BufferTest *test;
-    bool is_alike;
+    const Buffer *unstated;
+    Rig tested;
     if (base->identified_for != IDENTIFIED_FOR_RIG || !rig_is_same(&base->rig, &damper->rig) ||
-        damper_find_unstated(base, &test, &is_alike) != NULL || test == NULL || !is_alike)
-        return;
-    const Rig tested = rig_of(test);
-    if (!rig_is_same(&base->rig, &tested))
+        !damper_tested_rig(base, &tested, &unstated) || !rig_is_same(&base->rig, &tested))
         return;
     for (int side = 0; side < 2; side++) {
         const Buffer *buffer = damper_buffer(damper, (Side)side);
@@ -205,9 +198,9 @@ void damper_reset_rig(const Damper *base, Damper *damper) {
 
 // Why the materials could not stand for it.
 static Status rig_refuse(const Damper *damper, const char *place, Problem *problem) {
-    const BufferTest *test;
-    bool is_alike;
-    const Buffer *unstated = damper_find_unstated(damper, &test, &is_alike);
+    const Buffer *unstated;
+    Rig tested;
+    (void)damper_tested_rig(damper, &tested, &unstated);
     if (unstated == NULL)
         return problem_add(problem, STATUS_INVALID, place,
                            "is required by identified_for \"rig\": %.64s and %.64s were measured "
@@ -282,8 +275,7 @@ Status damper_complete(Damper *damper, const ContactLaw *law, size_t storeys, co
         damper_check_buffers(damper, law, pointer, problem),
         rig_check(damper, law, pointer, problem),
     };
-    for (size_t i = 0; i < COUNT(faults); i++)
-        TRY(faults[i]);
+    TRY(status_first(faults, COUNT(faults)));
     damper_normalise_buffers(damper, law);
     rig_normalise(damper, law);
     return STATUS_OK;

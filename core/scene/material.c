@@ -204,9 +204,7 @@ Status material_validate(const Material *material, const char *pointer, Problem 
         material_check_base(material, pointer, problem),
         material_check_measurements(material, pointer, problem),
     };
-    for (size_t i = 0; i < COUNT(faults); i++)
-        TRY(faults[i]);
-    return STATUS_OK;
+    return status_first(faults, COUNT(faults));
 }
 
 void material_speed_range(const Material *material, double *least, double *most) {

@@ -194,8 +194,7 @@ Status scene_complete(Scene *scene, size_t most_samples, Problem *problem) {
         faults[3] = scene_complete_excitation(scene, most_samples, problem);
         faults[4] = scene_complete_starts(scene, storeys, problem);
     }
-    for (size_t i = 0; i < COUNT(faults); i++)
-        TRY(faults[i]);
+    TRY(status_first(faults, COUNT(faults)));
     if (problem_concerns(problem, "/structure") || problem_concerns(problem, "/dampers") ||
         scene->structure == NULL || scene->contact == NULL)
         return STATUS_OK;

@@ -60,9 +60,7 @@ static Status frame_complete(Structure *structure, const char *pointer, Problem 
         frame_check_sums(&frame->stiffnesses, "N/m", pointer, "stiffnesses", problem),
         frame_check_sums(&frame->dampings, "N s/m", pointer, "dampings", problem),
     };
-    for (size_t i = 0; i < COUNT(faults); i++)
-        TRY(faults[i]);
-    return STATUS_OK;
+    return status_first(faults, COUNT(faults));
 }
 
 static void frame_fill_links(const Reals *links, size_t n, double *matrix) {
