@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { NAME_MAX = 48 }; // longer names get no suggestion
+enum { NAME_MAX = 48, FIELDS_MAX = 256 }; // longer names, and fields beyond, get no suggestion
 
 static int spelling_lower(char c) {
     return c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : (unsigned char)c;
@@ -39,51 +39,36 @@ static size_t spelling_distance(const char *a, size_t a_length, const char *b, s
     return last[b_length];
 }
 
-typedef struct SpellingSearch {
-    const char *text; // the misspelt name
-    size_t length;
-    const char *name; // the nearest so far; NULL: none is near enough
-    size_t distance;
-} SpellingSearch;
-
-static bool spelling_start(SpellingSearch *search, const char *text) {
-    *search = (SpellingSearch){text, strlen(text), NULL, SIZE_MAX};
-    return search->length > 0 && search->length <= NAME_MAX;
-}
-
-static void spelling_try(SpellingSearch *search, const char *name) {
+const char *spelling_nearest(const char *const *texts, const char *name) {
     const size_t length = strlen(name);
-    if (length > NAME_MAX)
-        return;
-    const size_t d = spelling_distance(search->text, search->length, name, length);
-    const size_t longer = length > search->length ? length : search->length;
-    if (d <= longer / 3 && d < search->distance) {
-        search->name = name;
-        search->distance = d;
+    const char *nearest = NULL;
+    size_t least = SIZE_MAX;
+    for (; *texts != NULL && length > 0 && length <= NAME_MAX; texts++) {
+        const size_t other = strlen(*texts), longer = other > length ? other : length;
+        if (other > NAME_MAX)
+            continue;
+        const size_t d = spelling_distance(name, length, *texts, other);
+        if (d <= longer / 3 && d < least) {
+            nearest = *texts;
+            least = d;
+        }
     }
+    return nearest;
 }
 
-static void spelling_try_fields(SpellingSearch *search, const Field *fields) {
+static size_t spelling_collect(const Field *fields, const char **names, size_t count) {
     for (const Field *field = fields; field->kind != FIELD_KIND_END; field++)
         if (field->kind == FIELD_KIND_BASE)
-            spelling_try_fields(search, field->fields);
-        else if ((field->flags & FIELD_HIDDEN) == 0)
-            spelling_try(search, field->name);
+            count = spelling_collect(field->fields, names, count);
+        else if ((field->flags & FIELD_HIDDEN) == 0 && count < FIELDS_MAX)
+            names[count++] = field->name;
+    return count;
 }
 
 const char *spelling_nearest_field(const Field *fields, const char *name) {
-    SpellingSearch search;
-    if (spelling_start(&search, name))
-        spelling_try_fields(&search, fields);
-    return search.name;
-}
-
-const char *spelling_nearest(const char *const *texts, const char *name) {
-    SpellingSearch search;
-    if (spelling_start(&search, name))
-        for (; *texts != NULL; texts++)
-            spelling_try(&search, *texts);
-    return search.name;
+    const char *names[FIELDS_MAX + 1];
+    names[spelling_collect(fields, names, 0)] = NULL;
+    return spelling_nearest(names, name);
 }
 
 Status spelling_reject_numbered(const char *const *texts, const char *text, size_t length,
