@@ -36,7 +36,7 @@ double identification_zero_force_phase(double damping_ratio) {
 }
 
 // Z of L = Z h(Z).
-static long double identification_ratio(long double L) {
+static long double identification_zero_force_ratio(long double L) {
     // 2 <= h <= pi below Z = 1; above it L / 2 - 1 <= arccosh(Z).
     long double Z = L <= 2 ? L / (long double)pi : coshl(L / 2 - 1);
     for (int step = 0; step < 60; step++) {
@@ -45,20 +45,17 @@ static long double identification_ratio(long double L) {
             fabsl(off) < 1e-3L ? 4.0L / 3 + 0.8L * off : (h - 2 * Z) / (off * (1 + Z));
         const long double rise = (L - Z * h) / slope;
         Z += rise;
-        if (!(rise > 2 * LDBL_EPSILON * fabsl(Z)))
+        if (!(rise > 2 * LDBL_EPSILON * Z))
             break;
     }
     return Z;
 }
 
-double identification_zero_force_ratio(double decay) {
-    return (double)identification_ratio(decay);
-}
-
 static Identification identification_zero_force_measured(double m_e, double restitution,
                                                          double contact_time) {
     const long double L = fabsl(logl(restitution));
-    const long double Z = identification_ratio(L), w = identification_phase(Z) / contact_time;
+    const long double Z = identification_zero_force_ratio(L),
+                      w = identification_phase(Z) / contact_time;
     return (Identification){
         .effective_mass = m_e,
         .restitution = restitution,

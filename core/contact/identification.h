@@ -30,10 +30,6 @@ Identification identification_from_stiffness(double effective_mass, double stiff
 // w T_c of a contact with damping ratio Z >= 0 that ends at zero force; -ln(e) = Z w T_c.
 double identification_zero_force_phase(double damping_ratio);
 
-// The damping ratio of such a contact from L = -ln(e), which may be negative (-3 at least): such a
-// contact gains energy.
-double identification_zero_force_ratio(double decay);
-
 // Relative change of k_b and c_b over the relative error of e and T_c: d ln(k_b) / d ln(e) etc.
 // Both are proportional to m_e.
 typedef struct IdentificationSensitivity {

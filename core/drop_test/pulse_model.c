@@ -3,8 +3,8 @@
 //
 //   y = e^(-L s) S + (pull / w^2) (1 - e^(-L s) (C + L S)),  F = w^2 y + 2 L y'
 //
-// T_c is the time unit: S(1) = 0 under zero penetration, hence turn = pi^2. Under zero force turn
-// is (1 - Z^2) (w T_c)^2 with the Z and w T_c of the same decay.
+// T_c is the time unit: S(1) = 0 under zero penetration, hence turn = pi^2. Under zero force and
+// without gravity F(1) = 0: with x = sqrt(turn) / 2 that is x cot(x) = L / 2.
 //
 // With the duration of the contact under gravity as the time unit of the pull, e of the isolated
 // pair is the one unknown of its inverse.
@@ -12,18 +12,37 @@
 
 #include <math.h>
 
-#include "core/contact/identification.h"
-
 static const double pi = 3.14159265358979323846;
 
 enum { HALVINGS = 52 };
 
+// x cot(x) of x^2 = u, which may be negative, and its derivative.
+static double pulse_cotangent(double u, double *slope) {
+    if (fabs(u) < 1e-3) {
+        *slope = -1.0 / 3 - u * (2.0 / 45 + u * (2.0 / 315));
+        return 1 - u * (1.0 / 3 + u * (1.0 / 45 + u * (2.0 / 945)));
+    }
+    const double x = sqrt(fabs(u));
+    const double value = u > 0 ? x / tan(x) : x / tanh(x);
+    const double root = u > 0 ? x / sin(x) : x / sinh(x);
+    *slope = (value - root * root) / (2 * u);
+    return value;
+}
+
+// x cot(x) falls from infinity to -infinity at u = pi^2 and is concave: Newton's method from the
+// right does not pass the root.
 static double pulse_turn(double decay, int separation) {
     if (separation != SEPARATION_ZERO_FORCE)
         return pi * pi;
-    const double Z = identification_zero_force_ratio(decay);
-    const double h = identification_zero_force_phase(Z);
-    return h * (1 - Z) * (h * (1 + Z));
+    double u = fmin(pi * pi / 4 * (1 - decay / 2), 9);
+    for (int step = 0; step < 30; step++) {
+        double slope;
+        const double change = (pulse_cotangent(u, &slope) - decay / 2) / slope;
+        u = fmin(u - change, 9.8);
+        if (fabs(change) < 1e-14 * (1 + fabs(u)))
+            break;
+    }
+    return 4 * u;
 }
 
 // S and C.
