@@ -136,6 +136,19 @@ static int adaptive_arkode_rate(realtype t, N_Vector y, N_Vector out, void *user
     return 0;
 }
 
+// dN/dt of a damper at rest at (t, y), whose y' is `rates`. N is linear in p, q and a_g.
+static double adaptive_rest_slope(const Adaptive *adaptive, size_t d, double t) {
+    const TimeStepping *stepping = adaptive->stepping;
+    const ModalState *state = &stepping->state;
+    const Slice *slice = &adaptive->slice;
+    const double omega = slice->omega;
+    const Slice rate = omega > 0 ? (Slice){omega * slice->slope, -omega * slice->value, omega}
+                                 : (Slice){.value = slice->slope};
+    time_stepping_elastic(state, adaptive->rates, adaptive->rates + state->mode_count,
+                          stepping->elastic);
+    return modal_state_constraint(state, d, stepping->elastic, slice_at(&rate, t - adaptive->t0));
+}
+
 // The watched functions of a damper and their slopes.
 static void adaptive_watch(Adaptive *adaptive, double t, const double *y, double *value,
                            double *slope) {
@@ -157,7 +170,7 @@ static void adaptive_watch(Adaptive *adaptive, double t, const double *y, double
             }
         } else if (damper->phase == PHASE_RESTING) {
             f[WATCH_FIRST] = sign * adaptive->stepping->force[d];
-            f1[WATCH_FIRST] = (double)NAN;
+            f1[WATCH_FIRST] = sign * adaptive_rest_slope(adaptive, d, t);
         } else {
             const ContactForce force = step_contact_force(state, d, r[d], w[d]);
             const double N1 = sign * (force.by_penetration * w[d] +
@@ -335,10 +348,10 @@ static bool adaptive_step_to_root(Adaptive *adaptive, size_t i, double t1, doubl
                        ERKStepEvolve(adaptive->arkode, t, adaptive->y, &reached, ARK_NORMAL) < 0))
             return false;
         adaptive->t = t;
-        adaptive_watch(adaptive, t, adaptive_data(adaptive->y), adaptive->value, adaptive->slope);
-        const double slope = isnan(adaptive->slope[i]) ? (adaptive->value[i] - value) / (t - other)
-                                                       : adaptive->slope[i];
-        const double off = adaptive->value[i] / slope;
+        adaptive_watch(adaptive, t, adaptive_data(adaptive->y), adaptive->inner_value,
+                       adaptive->inner_slope);
+        const double now = adaptive->inner_value[i], known = adaptive->inner_slope[i];
+        const double off = now / (isnan(known) ? (now - value) / (t - other) : known);
         if (!isfinite(off))
             break;
         if (fabs(off) <= 1e-9 * (t1 - t0)) { // the error of an Euler step is below rounding
@@ -346,7 +359,7 @@ static bool adaptive_step_to_root(Adaptive *adaptive, size_t i, double t1, doubl
             break;
         }
         other = t;
-        value = adaptive->value[i];
+        value = now;
         t = fmin(fmax(t - off, t0), t1);
     }
     return true;
@@ -356,6 +369,7 @@ static bool adaptive_step_to_root(Adaptive *adaptive, size_t i, double t1, doubl
 // *root, or without one: NO_ROOT.
 static Status adaptive_evolve(Adaptive *adaptive, double until, int *root) {
     const ModalState *state = &adaptive->stepping->state;
+    const size_t watched = state->has_stops ? WATCHED * state->dampers : 0;
     double t1, first = 0;
     *root = NO_ROOT;
     adaptive->t0 = adaptive->t;
@@ -364,6 +378,8 @@ static Status adaptive_evolve(Adaptive *adaptive, double until, int *root) {
         16 * DBL_EPSILON * fabs(adaptive->t0)) { // below ARKODE's resolution
         adaptive_move(adaptive, adaptive->t0, until - adaptive->t0);
         adaptive->t = until;
+        memcpy(adaptive->end_value, adaptive->value, watched * sizeof *adaptive->value);
+        memcpy(adaptive->end_slope, adaptive->slope, watched * sizeof *adaptive->slope);
         return adaptive_reset(adaptive, until, adaptive->y, adaptive->next_step)
                    ? STATUS_OK
                    : adaptive_failed(adaptive, adaptive->t0);
@@ -374,7 +390,6 @@ static Status adaptive_evolve(Adaptive *adaptive, double until, int *root) {
         return adaptive_failed(adaptive, adaptive->t0);
     adaptive_watch(adaptive, t1, adaptive_data(adaptive->y), adaptive->end_value,
                    adaptive->end_slope);
-    const size_t watched = state->has_stops ? WATCHED * state->dampers : 0;
     for (size_t i = 0; i < watched; i++) {
         double at;
         if (adaptive_has_root(adaptive, i, t1, &at) && (*root == NO_ROOT || at < first)) {
@@ -385,16 +400,14 @@ static Status adaptive_evolve(Adaptive *adaptive, double until, int *root) {
     adaptive->next_step = t1 - adaptive->t0;
     if (*root == NO_ROOT) {
         adaptive->t = t1;
-        memcpy(adaptive->value, adaptive->end_value, watched * sizeof *adaptive->value);
-        memcpy(adaptive->slope, adaptive->end_slope, watched * sizeof *adaptive->slope);
         return STATUS_OK;
     }
     if (!adaptive_step_to_root(adaptive, (size_t)*root, t1, first))
         return adaptive_failed(adaptive, first);
-    adaptive_watch(adaptive, adaptive->t, adaptive_data(adaptive->y), adaptive->value,
-                   adaptive->slope);
+    adaptive_watch(adaptive, adaptive->t, adaptive_data(adaptive->y), adaptive->end_value,
+                   adaptive->end_slope);
     // It has fallen, whatever the sign of the rounding error.
-    adaptive->value[*root] = fmin(adaptive->value[*root], 0);
+    adaptive->end_value[*root] = fmin(adaptive->end_value[*root], 0);
     return adaptive_reset(adaptive, adaptive->t, adaptive->y, adaptive->next_step)
                ? STATUS_OK
                : adaptive_failed(adaptive, first);
@@ -410,34 +423,42 @@ static void adaptive_release(ModalState *state, DamperState *damper) {
     state->events++; // this restarts the integration
 }
 
+// Largest |N| in a step of a damper at rest, by the cubic through N and dN/dt at its ends.
+static double adaptive_rest_peak(const Adaptive *adaptive, size_t d, double length) {
+    const size_t i = WATCHED * d + WATCH_FIRST;
+    const double from = adaptive->value[i], by = adaptive->end_value[i] - from,
+                 slope = length * adaptive->slope[i], end_slope = length * adaptive->end_slope[i];
+    const double cubic[] = {from, slope, 3 * by - 2 * slope - end_slope,
+                            slope + end_slope - 2 * by};
+    double at;
+    return linear_motion_largest(cubic, COUNT(cubic) - 1, 0, &at);
+}
+
 // Copies a step of `length` seconds from y to the state and the logs.
 static void adaptive_accept(Adaptive *adaptive, double length) {
-    ModalState *state = &adaptive->stepping->state;
+    TimeStepping *stepping = adaptive->stepping;
+    ModalState *state = &stepping->state;
     const size_t m = state->dampers;
-    const double *y = adaptive_data(adaptive->y), *before = adaptive_data(adaptive->from);
-    const size_t sums = adaptive->stepping->size,
-                 totals = adaptive->stepping->size + 2 * state->dampers;
-    double *strain = adaptive->stepping->contact.strain_before;
-    time_stepping_scatter(state, y);
+    const double *sums = adaptive_data(adaptive->y) + stepping->size,
+                 *before = adaptive_data(adaptive->from) + stepping->size;
+    step_contact_begin(state, &stepping->contact);
+    time_stepping_scatter(state, adaptive_data(adaptive->y));
+    for (size_t i = 0; i < 2 * m + 2; i++)
+        stepping->integrals[i] = sums[i] - before[i];
     for (size_t d = 0; d < m; d++) {
         DamperState *damper = &state->damper[d];
-        const double impulse = y[sums + d] - before[sums + d];
-        double work = y[sums + m + d] - before[sums + m + d];
         if (damper->zero_gap_terms > 0)
             adaptive_release(state, damper);
-        if (damper->phase == PHASE_CONTACT) {
-            const ContactForce force = step_contact_force(state, d, damper->r, damper->w);
-            impact_log_force(&state->impacts, &damper->row, fabs(force.value));
-            work -= force.strain - strain[d];
-            strain[d] = force.strain;
-        }
         if (damper->row.is_open)
-            impact_log_stretch(&state->impacts, &damper->row, length, impulse,
-                               damper->phase == PHASE_CONTACT ? work : 0);
+            step_contact_log(state, &stepping->contact, d, length);
+        if (damper->phase == PHASE_RESTING)
+            impact_log_force(&state->impacts, &damper->row,
+                             adaptive_rest_peak(adaptive, d, length));
     }
-    impact_log_work(&state->impacts, y[totals] - before[totals],
-                    y[totals + 1] - before[totals + 1]);
-    adaptive->stepping->recorder.base_speed += y[totals + 2] - before[totals + 2];
+    memcpy(adaptive->value, adaptive->end_value, WATCHED * m * sizeof *adaptive->value);
+    memcpy(adaptive->slope, adaptive->end_slope, WATCHED * m * sizeof *adaptive->slope);
+    impact_log_work(&state->impacts, stepping->integrals[2 * m], stepping->integrals[2 * m + 1]);
+    stepping->recorder.base_speed += sums[2 * m + 2] - before[2 * m + 2];
 }
 
 static ContactEvent adaptive_event(const ModalState *state, size_t d, int watch) {

@@ -164,6 +164,9 @@ Status time_stepping_note(TimeStepping *stepping, double cost) {
         ENERGY_GROWTH_MAX * (stepping->largest_input + state->impacts.energy.initial);
     if (!(held <= max) || !isfinite(held))
         return time_stepping_unstable(stepping);
+    for (size_t d = 0; d < state->dampers; d++)
+        if (state->damper[d].row.is_open)
+            impact_log_force(&state->impacts, &state->damper[d].row, fabs(state->damper[d].force));
     if (!state->is_shadow) {
         recorder_peaks(state);
         impact_log_balance(&state->impacts, &energy);
@@ -497,7 +500,6 @@ typedef struct Pair {
     double step_ratio;             // the companion's step over the run's
     bool is_kinked;                // the base has kinks within steps
     bool is_known;                 // the companion has not failed
-    bool is_finished;              // the companion is no longer needed
     double largest, worst;         // displacement, and difference of displacements [m]
     double horizon;                // [s]; NAN: not reached
     double first_contact;          // no contact has begun before [s]; NAN: none has
@@ -523,35 +525,31 @@ static double pair_factor(const Pair *pair) {
                            : 1 / fabs(pow(pair->step_ratio, pair->run.solver->stepper->order) - 1);
 }
 
-static void pair_compare(Pair *pair) {
-    const ModalState *state = &pair->run.state;
-    const double before = pair->worst;
-    pair->largest = fmax(pair->largest, state->impacts.response->peaks.displacement);
-    pair->worst = modal_state_difference(state, state->q, pair->companion.state.q, before);
-    if (pair->worst <= before)
-        return;
-    const double error = pair_factor(pair) * pair->worst;
-    if (isnan(pair->horizon) && !(error <= RESPONSE_DIVERGENCE * pair->largest))
-        pair->horizon = (double)(state->sample - pair->stride) / state->plan->sample_rate;
-    pair->is_finished = error > pair->largest;
-}
-
-// Advances the companion to the run's sample.
+// Advances the companion to the run's sample, and compares the two. While they are further apart
+// than the largest displacement so far, the companion waits: the motion may just have begun.
 static Status pair_follow(Pair *pair) {
-    Run *run = pair->run.state.run;
-    if (pair->is_finished || pair->run.state.sample % pair->stride != 0)
+    const ModalState *state = &pair->run.state;
+    Run *run = state->run;
+    pair->largest = fmax(pair->largest, state->impacts.response->peaks.displacement);
+    if (!pair->is_known || state->sample % pair->stride != 0 ||
+        pair_factor(pair) * pair->worst > pair->largest)
         return STATUS_OK;
+    Status status = STATUS_OK;
     pair->companion_run.steps = run->steps;
-    const Status status = time_stepping_interval(&pair->companion);
-    run->steps = pair->companion_run.steps;
-    run->work.neighbour_samples += pair->stride;
-    if (status == STATUS_OK) {
-        pair_compare(pair);
-        return STATUS_OK;
+    while (pair->companion.state.sample * pair->stride < state->sample && status == STATUS_OK) {
+        status = time_stepping_interval(&pair->companion);
+        run->work.neighbour_samples += pair->stride;
     }
-    pair->is_finished = true;
-    pair->is_known = false;
-    return time_stepping_check(&pair->run); // the cause may be the run's own limit
+    run->steps = pair->companion_run.steps;
+    pair->is_known = status == STATUS_OK;
+    if (!pair->is_known)
+        return time_stepping_check(&pair->run); // the cause may be the run's own limit
+    pair->worst = modal_state_difference(state, state->q, pair->companion.state.q, pair->worst);
+    if (pair_factor(pair) * pair->worst <= RESPONSE_DIVERGENCE * pair->largest)
+        pair->horizon = (double)NAN;
+    else if (isnan(pair->horizon))
+        pair->horizon = (double)(state->sample - pair->stride) / state->plan->sample_rate;
+    return STATUS_OK;
 }
 
 // Starts a companion with `share` steps in `stride` samples of the run.
@@ -596,7 +594,6 @@ static void pair_start_companion(Pair *pair, size_t kinks) {
         status = pair_make_companion(pair, 1, 2 * pair->run.share);
     }
     pair->is_known = status == STATUS_OK;
-    pair->is_finished = !pair->is_known;
 }
 
 // Displacement of a storey by one contact that begins a step late [m]: both runs may be equally
