@@ -515,7 +515,7 @@ static bool adaptive_find_overdue_of(ModalState *state, size_t d, bool has_moved
         if (!(speed > 0 || is_back || is_held))
             continue;
         damper->w = is_back ? -damper->w : damper->w;
-        *event = adaptive_event(state, d, side);
+        *event = adaptive_event(state, d, is_held && damper->w > 0 ? SIDE_RIGHT : side);
         return true;
     }
     return false;
