@@ -33,11 +33,12 @@ enum { HALVINGS = 60, RETAKES = 8, ERROR_TEST_FAILURES = 60 };
 // vector and of the context.
 enum { CLONES_MAX = 40, CLONE_OVERHEAD = 128, CONTEXT_SIZE = 1 << 13 };
 static const double TOLERANCE_DEFAULT = 1e-9;
-static const double OUTGROWN = 100;     // motion over that of the last error weights
-static const double POISED = 1e-4;      // of a step
-static const double JUMP = 1e-9;        // relative, of a_g between two steps
-static const double ADVANCE_COST = 10;  // solver steps of a step without its derivatives
-static const double SCALE_MIN = 1e-290; // an error weight must not be zero
+static const double OUTGROWN = 100;      // motion over that of the last error weights
+static const double POISED = 1e-4;       // of a step
+static const double JUMP = 1e-9;         // relative, of a_g between two steps
+static const double SIMULTANEOUS = 1e-9; // dN/dt at a peak over that at the start of its step
+static const double ADVANCE_COST = 10;   // solver steps of a step without its derivatives
+static const double SCALE_MIN = 1e-290;  // an error weight must not be zero
 
 typedef struct Adaptive {
     TimeStepping *stepping;
@@ -57,6 +58,8 @@ typedef struct Adaptive {
     double push;       // largest |a_g| over an interval so far [m/s^2]
     double rate_calls; // since the cost was last counted
     Slice slice;       // of the base, from t0 on
+    bool is_at_knot;   // of the base
+    double part;       // longest step until the next one [s]
     size_t events;     // of the state at the last restart; SIZE_MAX: restart
 } Adaptive;
 
@@ -408,6 +411,10 @@ static Status adaptive_evolve(Adaptive *adaptive, double until, int *root) {
                    adaptive->end_slope);
     // It has fallen, whatever the sign of the rounding error.
     adaptive->end_value[*root] = fmin(adaptive->end_value[*root], 0);
+    // So have the peaks of other dampers at the same instant.
+    for (size_t i = WATCH_PEAK; i < watched; i += WATCHED)
+        if (adaptive->end_value[i] <= SIMULTANEOUS * adaptive->value[i])
+            adaptive->end_value[i] = fmin(adaptive->end_value[i], 0);
     return adaptive_reset(adaptive, adaptive->t, adaptive->y, adaptive->next_step)
                ? STATUS_OK
                : adaptive_failed(adaptive, first);
@@ -476,11 +483,12 @@ static bool adaptive_find_overdue_of(ModalState *state, size_t d, bool has_moved
                                      ContactEvent *event) {
     DamperState *damper = &state->damper[d];
     const double sign = modal_state_sign(damper->side);
-    if (damper->phase == PHASE_CONTACT && sign * damper->r < 0 && sign * damper->w < 0) {
+    if (damper->phase == PHASE_CONTACT && sign * damper->r <= 0 && sign * damper->w < 0) {
         *event = adaptive_event(state, d, WATCH_FIRST);
         return true;
     }
-    if (damper->phase == PHASE_INSIDE && sign * damper->r < 0) {
+    if (damper->phase == PHASE_INSIDE &&
+        (sign * damper->r < 0 || (damper->r == 0 && sign * damper->w < 0))) {
         *event = adaptive_event(state, d, WATCH_SECOND);
         return true;
     }
@@ -589,7 +597,10 @@ static Status adaptive_step(Adaptive *adaptive, double length) {
         }
         TRY(adaptive_restart(adaptive));
     }
-    length = fmin(fmin(length, knot), stepping->length);
+    // The companion's steps are shorter than the run's where kinks of the base limit both.
+    if (adaptive->is_at_knot)
+        adaptive->part = knot / (double)stepping->share;
+    length = fmin(fmin(length, knot), fmin(adaptive->part, stepping->length));
     state->run->work.stop_searches += state->has_stops;
     if (adaptive_is_poised(adaptive))
         length *= POISED;
@@ -598,6 +609,7 @@ static Status adaptive_step(Adaptive *adaptive, double length) {
     const double done =
         root == NO_ROOT && adaptive->t >= until ? length : adaptive->t - adaptive->t0;
     adaptive_accept(adaptive, done);
+    adaptive->is_at_knot = done >= knot;
     state->offset += done;
     state->base_acceleration = slice_at(&adaptive->slice, done);
     if (done > modal_state_clock(state))
@@ -691,6 +703,7 @@ static Status adaptive_make(TimeStepping *stepping) {
         adaptive->stepping = stepping;
         adaptive->size = stepping->size + 2 * state->dampers + TOTALS;
         adaptive->events = SIZE_MAX;
+        adaptive->is_at_knot = true;
     }
     if (adaptive == NULL || !adaptive_allocate(adaptive))
         return problem_set(state->problem, STATUS_NO_MEMORY, "no memory for a run");
