@@ -323,6 +323,9 @@ static void a_pushed_mass_bounces_and_rests(void **state) {
         assert_true(isnan(last->end));
         assert_true(fabs(last->start - true_last->start) < 1e-3);
         assert_true(fabs(last->impulse - true_last->impulse) < 2e-3 * true_last->impulse);
+        const double force = exact.response.peaks.contact_force;
+        assert_true(fabs(other.response.peaks.contact_force - force) < 2e-3 * force);
+        assert_true(fabs(last->peak_force - true_last->peak_force) < 2e-3 * true_last->peak_force);
         assert_true(other.response.energy.residual < 1e-5);
         answer_clear(&exact);
         answer_clear(&other);
@@ -367,6 +370,53 @@ static void buffers_without_room_between_them_serve_too(void **state) {
             assert_true(miss(fixed[k], 1e-5, plan, &sine, NULL) < 1e-3);
         plan_free(plan);
     }
+}
+
+static void check_adaptive_estimates(const Plan *plan, const Base *base) {
+    for (double tolerance = 1e-3; tolerance > 1e-9; tolerance /= 10) {
+        double estimate;
+        const double error = miss(&solver_adaptive, tolerance, plan, base, &estimate);
+        if (!(error < 2 * estimate))
+            fail_msg("adaptive at %g misses by %g and says %g", tolerance, error, estimate);
+    }
+}
+
+// Nothing has moved before, so that the first difference of the two runs is larger than the motion.
+static void a_first_touch_at_a_sample_leaves_the_estimate_honest(void **state) {
+    (void)state;
+    Plan *plan = frames_new(1, 1, 1, 1000);
+    frames_shear(plan, (double[]){1.35}, (double[]){865}, (double[]){1.092});
+    frames_damper(plan, 0, 0, 0.1107, 0.01, 0.9, 0.003);
+    plan->dampers[0].velocity = 0.5; // at the stop after 10 samples
+    check_adaptive_estimates(plan, &still);
+    plan_free(plan);
+}
+
+// Kinks limit the steps of both runs more than tolerance and sample interval do.
+static void kinks_of_the_base_leave_the_estimate_honest(void **state) {
+    (void)state;
+    double values[4000];
+    for (size_t i = 0; i < COUNT(values); i++)
+        values[i] = 0.3 * sin(2e-6 * (double)(i * i));
+    const Base sampled = {
+        .form = BASE_SAMPLED, .values = values, .count = COUNT(values), .interval = 0.0003};
+    Plan *plan = frames_new(1, 1, 1, 1000);
+    frames_shear(plan, (double[]){1.35}, (double[]){810}, (double[]){0});
+    frames_damper(plan, 0, 0, 0.1107, 0.015, 1, 0.006);
+    plan->dampers[0].velocity = 0.5;
+    check_adaptive_estimates(plan, &sampled);
+    plan_free(plan);
+}
+
+static void simultaneous_contacts_of_equal_dampers_end_together(void **state) {
+    (void)state;
+    const Base sine = {.form = BASE_SINE, .amplitude = 2, .omega = 17};
+    Plan *plan = frames_new(3, 4, 1, 100);
+    frames_uniform(plan, 10, 10 * 40 * 40, 0.02);
+    for (size_t d = 0; d < 4; d++)
+        frames_damper(plan, d, 2, 0.5, 0.006, 1, 0.006);
+    check_adaptive_estimates(plan, &sine);
+    plan_free(plan);
 }
 
 // Runs with steps of twice the length may be late by the same time: that must not be taken for
@@ -584,6 +634,9 @@ int main(void) {
         cmocka_unit_test(a_pushed_mass_bounces_and_rests),
         cmocka_unit_test(stops_without_clearance_hold_the_mass),
         cmocka_unit_test(buffers_without_room_between_them_serve_too),
+        cmocka_unit_test(a_first_touch_at_a_sample_leaves_the_estimate_honest),
+        cmocka_unit_test(kinks_of_the_base_leave_the_estimate_honest),
+        cmocka_unit_test(simultaneous_contacts_of_equal_dampers_end_together),
         cmocka_unit_test(few_impacts_are_not_taken_for_exact),
         cmocka_unit_test(a_step_that_cannot_be_stable_is_told),
         cmocka_unit_test(precise_at_a_millisecond_is_wrong_and_says_so),
