@@ -420,16 +420,6 @@ static Status adaptive_evolve(Adaptive *adaptive, double until, int *root) {
                : adaptive_failed(adaptive, first);
 }
 
-// Keeps a mass released from rest on its stop until the gap opens beyond rounding.
-static void adaptive_release(ModalState *state, DamperState *damper) {
-    if (modal_state_sign((Side)damper->origin) * damper->r < 0) {
-        damper->zero_gap_terms = 0;
-        return;
-    }
-    damper->r = damper->w = 0;
-    state->events++; // this restarts the integration
-}
-
 // Largest |N| in a step of a damper at rest, by the cubic through N and dN/dt at its ends.
 static double adaptive_rest_peak(const Adaptive *adaptive, size_t d, double length) {
     const size_t i = WATCHED * d + WATCH_FIRST;
@@ -454,8 +444,10 @@ static void adaptive_accept(Adaptive *adaptive, double length) {
         stepping->integrals[i] = sums[i] - before[i];
     for (size_t d = 0; d < m; d++) {
         DamperState *damper = &state->damper[d];
-        if (damper->zero_gap_terms > 0)
-            adaptive_release(state, damper);
+        if (damper->zero_gap_terms > 0) {
+            contact_event_leave(damper, false);
+            state->events += damper->zero_gap_terms > 0; // this restarts the integration
+        }
         if (damper->row.is_open)
             step_contact_log(state, &stepping->contact, d, length);
         if (damper->phase == PHASE_RESTING)

@@ -223,6 +223,14 @@ static void contact_event_release(ModalState *state, size_t d, bool is_jump) {
         contact_event_begin_rest(state, d, damper->side == SIDE_RIGHT ? SIDE_LEFT : SIDE_RIGHT);
 }
 
+void contact_event_leave(DamperState *damper, bool is_hit) {
+    const double sign = modal_state_sign((Side)damper->origin);
+    if (sign * damper->r < 0)
+        damper->zero_gap_terms = 0;
+    else if (!is_hit || sign * damper->w < 0)
+        damper->r = damper->w = 0;
+}
+
 Status contact_event_apply(ModalState *state, const ContactEvent *event) {
     DamperState *damper = &state->damper[event->damper];
     const size_t max = EVENTS_AT_INSTANT_MAX * state->dampers;

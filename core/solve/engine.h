@@ -84,6 +84,10 @@ void contact_event_locate(const double *series, size_t degree, double sign, doub
 void contact_event_find_touch(const ModalState *state, size_t damper, const double *r,
                               size_t degree, ContactEvent *first);
 
+// After a step: keeps a mass released from rest on its stop until the gap has opened beyond
+// rounding. If the step ends by closing it, the speed remains.
+void contact_event_leave(DamperState *damper, bool is_hit);
+
 // Changes the state, which is that of the event's instant, and logs it. STATUS_UNSTABLE after too
 // many events at one instant, or the status of the impact log.
 Status contact_event_apply(ModalState *state, const ContactEvent *event);
@@ -413,7 +417,7 @@ Status event_engine_finish_interval(EventEngine *engine);
 // Moves from the present sample over `length` [s].
 Status event_engine_cross(EventEngine *engine, double length);
 
-// STATUS_UNSTABLE where the motion is not finite, else as modal_state_check.
+// As modal_state_check.
 Status event_engine_check(EventEngine *engine);
 
 #endif

@@ -23,19 +23,8 @@ static const double CHECK_STEPS = 3e4; // solver steps between checks of limits 
 static const double STEP_COST = 60;    // multiplications in a solver step
 
 Status event_engine_check(EventEngine *engine) {
-    const ModalState *state = &engine->state;
     engine->work = 0;
-    const EnergyState energy = modal_state_energy(state);
-    double sum = energy.kinetic + energy.strain;
-    for (size_t i = 0; i < state->mode_count; i++)
-        sum += fabs(state->q[i]);
-    for (size_t d = 0; d < state->dampers; d++)
-        sum += fabs(state->damper[d].r);
-    if (!isfinite(sum))
-        return problem_set(state->problem, STATUS_UNSTABLE,
-                           "the motion left what double precision can hold at t = %.6g s",
-                           modal_state_time(state));
-    return modal_state_check(state, 0);
+    return modal_state_check(&engine->state, 0);
 }
 
 static double event_engine_cost(const EventEngine *engine, StepWorkKind kind) {
@@ -73,16 +62,6 @@ static void event_engine_log_contact(EventEngine *engine, size_t d) {
     impact_log_stretch(&state->impacts, &damper->row, arc->length, impulse, lost);
 }
 
-// After a step: whether the gap of a mass released from rest has opened beyond rounding. If the
-// step ends by closing it, the speed remains.
-static void event_engine_leave(DamperState *damper, bool is_hit) {
-    const double sign = modal_state_sign((Side)damper->origin);
-    if (sign * damper->r < 0)
-        damper->zero_gap_terms = 0;
-    else if (!is_hit || sign * damper->w < 0)
-        damper->r = damper->w = 0;
-}
-
 // Logs the step and moves to its end, where event `hit`, or none, occurs.
 static void event_engine_accept(EventEngine *engine, const ContactEvent *hit) {
     ModalState *state = &engine->state;
@@ -106,7 +85,7 @@ static void event_engine_accept(EventEngine *engine, const ContactEvent *hit) {
         DamperState *damper = &state->damper[d];
         damper->just_begun = false;
         if (damper->zero_gap_terms > 0)
-            event_engine_leave(damper, hit != NULL && hit->damper == d);
+            contact_event_leave(damper, hit != NULL && hit->damper == d);
     }
 }
 

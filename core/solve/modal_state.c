@@ -16,18 +16,13 @@ double modal_state_clock(const ModalState *state) {
 }
 
 Status modal_state_check(const ModalState *state, double step) {
-    const Run *run = state->run;
-    const double now = modal_state_time(state);
-    if (run->steps_max > 0 && run->steps > run->steps_max)
-        return step > 0 ? problem_set(state->problem, STATUS_LIMIT,
-                                      SOLVER_STOPPED "t = %.6g s of %.6g s, by steps of %.4g s",
-                                      run->steps_max, run->steps_max * SOLVER_STEP, now,
-                                      state->plan->duration, step)
-                        : problem_set(state->problem, STATUS_LIMIT,
-                                      SOLVER_STOPPED "t = %.6g s of %.6g s", run->steps_max,
-                                      run->steps_max * SOLVER_STEP, now, state->plan->duration);
-    if (!progress_advance(run->progress, now / state->plan->duration))
-        return problem_set(state->problem, STATUS_CANCELLED, "cancelled at t = %.6g s", now);
+    const EnergyState energy = modal_state_energy(state);
+    double sum = energy.kinetic + energy.strain;
+    for (size_t i = 0; i < state->mode_count; i++)
+        sum += fabs(state->q[i]);
+    for (size_t d = 0; d < state->dampers; d++)
+        sum += fabs(state->damper[d].r);
+    TRY(run_check(state->run, modal_state_time(state), step, isfinite(sum), state->problem));
     return impact_log_status(&state->impacts, state->problem);
 }
 

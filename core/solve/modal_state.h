@@ -154,8 +154,7 @@ double modal_state_room(const DamperState *damper, Side side);
 // out = D p + W^2 q; arrays of `padded` values.
 void modal_state_elastic(const ModalState *state, const double *q, const double *p,
                          double *restrict out);
-// STATUS_LIMIT, STATUS_CANCELLED or the status of the impact log; `step` is that of a fixed step
-// [s], or 0.
+// As run_check, or the status of the impact log.
 Status modal_state_check(const ModalState *state, double step);
 
 // N that keeps a damper at rest on its stop [N].

@@ -710,20 +710,10 @@ static bool single_mass_from_engine(SingleMass *single) {
 
 static Status single_mass_check(SingleMass *single) {
     const State *state = &single->state;
-    const Run *run = single->run;
+    const bool is_finite =
+        isfinite(state->x) && isfinite(state->v) && isfinite(state->r) && isfinite(state->w);
     TRY(impact_log_status(&single->impacts, single->problem));
-    if (!isfinite(state->x) || !isfinite(state->v) || !isfinite(state->r) || !isfinite(state->w))
-        return problem_set(single->problem, STATUS_UNSTABLE,
-                           "the motion left what double precision can hold at t = %.6g s",
-                           single_mass_time(single));
-    if (run->steps_max > 0 && run->steps > run->steps_max)
-        return problem_set(single->problem, STATUS_LIMIT, SOLVER_STOPPED "t = %.6g s of %.6g s",
-                           run->steps_max, run->steps_max * SOLVER_STEP, single_mass_time(single),
-                           single->plan->duration);
-    if (!progress_advance(run->progress, single_mass_time(single) / single->plan->duration))
-        return problem_set(single->problem, STATUS_CANCELLED, "cancelled at t = %.6g s",
-                           single_mass_time(single));
-    return STATUS_OK;
+    return run_check(single->run, single_mass_time(single), 0, is_finite, single->problem);
 }
 
 // By the event engine from the present instant to a sample where these kernels can go on, or to the

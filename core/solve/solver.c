@@ -27,6 +27,22 @@ double step_work_steps(StepWorkKind kind, size_t storeys, size_t dampers, bool i
     return 0;
 }
 
+Status run_check(const Run *run, double time, double step, bool is_finite, Problem *problem) {
+    const double duration = run->plan->duration, max = run->steps_max;
+    if (!is_finite)
+        return problem_set(problem, STATUS_UNSTABLE,
+                           "the motion left what double precision can hold at t = %.6g s", time);
+    if (max > 0 && run->steps > max)
+        return step > 0 ? problem_set(problem, STATUS_LIMIT,
+                                      SOLVER_STOPPED "t = %.6g s of %.6g s, by steps of %.4g s",
+                                      max, max * SOLVER_STEP, time, duration, step)
+                        : problem_set(problem, STATUS_LIMIT, SOLVER_STOPPED "t = %.6g s of %.6g s",
+                                      max, max * SOLVER_STEP, time, duration);
+    if (!progress_advance(run->progress, time / duration))
+        return problem_set(problem, STATUS_CANCELLED, "cancelled at t = %.6g s", time);
+    return STATUS_OK;
+}
+
 void workspace_clear(Workspace *workspace) {
     fft_cache_clear(&workspace->transforms);
     free(workspace->single);

@@ -78,6 +78,10 @@ typedef struct Run {
     WorkCounters work;      // out: work of the solver by kind
 } Run;
 
+// Between steps at `time`: STATUS_UNSTABLE where the motion is not finite, STATUS_LIMIT or
+// STATUS_CANCELLED. `step` is that of a fixed step [s], or 0.
+Status run_check(const Run *run, double time, double step, bool is_finite, Problem *problem);
+
 // One solver. Its functions are called with the solver itself.
 typedef struct Solver {
     Kind kind;

@@ -38,6 +38,10 @@ static double step_contact_strain(const ModalState *state, size_t d) {
     return damper->phase == PHASE_CONTACT ? step_contact_force(state, d, damper->r, 0).strain : 0;
 }
 
+static double step_contact_magnitude(const ModalState *state, size_t d) {
+    return fabs(step_contact_force(state, d, state->damper[d].r, state->damper[d].w).value);
+}
+
 void step_contact_begin(const ModalState *state, StepContact *contact) {
     for (size_t d = 0; d < state->dampers && state->has_stops; d++)
         contact->strain_before[d] = step_contact_strain(state, d);
@@ -103,8 +107,7 @@ void step_contact_log(ModalState *state, const StepContact *contact, size_t d, d
                        contact->work[d] -
                            (step_contact_strain(state, d) - contact->strain_before[d]));
     if (damper->phase == PHASE_CONTACT)
-        impact_log_force(&state->impacts, &damper->row,
-                         fabs(step_contact_force(state, d, damper->r, damper->w).value));
+        impact_log_force(&state->impacts, &damper->row, step_contact_magnitude(state, d));
 }
 
 // Of a method whose stages follow the penetration, the integrals of a step in which a contact
@@ -123,6 +126,7 @@ static void step_contact_switch(ModalState *state, const StepContact *contact, s
         step_contact_enter(state, d, side, contact->is_by_place);
         if (contact->is_by_place || is_resumed)
             step_contact_log(state, contact, d, 0);
+        impact_log_force(&state->impacts, &damper->row, step_contact_magnitude(state, d));
     } else if (contact->impulse[d] != 0) { // it began and ended within the step
         damper->side = contact->impulse[d] > 0 ? SIDE_RIGHT : SIDE_LEFT;
         step_contact_open_row(state, d, length);

@@ -165,9 +165,6 @@ Status time_stepping_note(TimeStepping *stepping, double cost) {
         ENERGY_GROWTH_MAX * (stepping->largest_input + state->impacts.energy.initial);
     if (!(held <= max) || !isfinite(held))
         return time_stepping_unstable(stepping);
-    for (size_t d = 0; d < state->dampers; d++)
-        if (state->damper[d].row.is_open)
-            impact_log_force(&state->impacts, &state->damper[d].row, fabs(state->damper[d].force));
     if (!state->is_shadow) {
         recorder_peaks(state);
         impact_log_balance(&state->impacts, &energy);
@@ -542,9 +539,11 @@ static Status pair_follow(Pair *pair) {
         run->work.neighbour_samples += pair->stride;
     }
     run->steps = pair->companion_run.steps;
-    pair->is_known = status == STATUS_OK;
-    if (!pair->is_known)
+    if (status != STATUS_OK) {
+        pair->is_known = !isnan(pair->horizon); // two motions that have parted stay so
+        pair->worst = INFINITY;
         return time_stepping_check(&pair->run); // the cause may be the run's own limit
+    }
     pair->worst = modal_state_difference(state, state->q, pair->companion.state.q, pair->worst);
     if (pair_factor(pair) * pair->worst <= RESPONSE_DIVERGENCE * pair->largest)
         pair->horizon = (double)NAN;
