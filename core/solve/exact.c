@@ -273,7 +273,7 @@ Status exact_run_window(Run *run, const OutputWindow *window, Response *response
 
 static Status exact_run(const Solver *solver, Run *run, Response *response, Problem *problem) {
     (void)solver;
-    if (!single_mass_serves(run->plan, run->is_clear))
+    if (!single_mass_serves(run->plan, run->base, run->is_clear))
         return exact_run_engine(run, response, problem);
     // With values at all output samples single_mass.h moves over many of them at once.
     const size_t fine =

@@ -187,24 +187,27 @@ static void lanes_make_forms(Lanes *lanes, const Motion *flying) {
     }
 }
 
+bool lanes_are_for(const Motion *flying, double base_omega, double interval) {
+    const double own = lanes_greater(sqrt(flying->omega2), flying->damping);
+    return LANES * interval * lanes_greater(own, base_omega) <= 1;
+}
+
 void lanes_make(Lanes *lanes, const MotionTable *one, bool is_sampled, LanesWidth width) {
     const Motion *flying = &one->motion;
-    const double omega = sqrt(flying->omega2), interval = one->length;
+    const double interval = one->length;
     if (lanes->run == lanes_run_of(width) && lanes->is_sampled == is_sampled &&
         lanes->interval == interval && lanes->base_omega == one->base_omega &&
         motion_is_same(&lanes->motion, flying))
         return;
     memset(lanes, 0, sizeof *lanes);
-    if (!(LANES * interval *
-              lanes_greater(lanes_greater(omega, flying->damping), one->base_omega) <=
-          1))
+    if (!lanes_are_for(flying, one->base_omega, interval))
         return;
     lanes->motion = *flying;
     lanes->is_sampled = is_sampled;
     lanes->base_omega = one->base_omega;
     lanes->interval = interval;
     lanes->per_interval = 1 / interval;
-    lanes->omega = omega;
+    lanes->omega = sqrt(flying->omega2);
     const long double step[2][2] = {{one->gain[0][0], one->gain[1][0]},
                                     {one->gain[0][1], one->gain[1][1]}};
     lanes_make_map(&lanes->sample, step, interval);

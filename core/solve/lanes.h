@@ -72,6 +72,8 @@ struct Lanes {
 };
 
 LanesWidth lanes_widest(void); // on this processor
+// Whether the interval is short enough for the structure and a base of this frequency (or 0).
+bool lanes_are_for(const Motion *flying, double base_omega, double interval);
 // `one` is the table of flight over one sample interval; `is_sampled`: the base may be linear. All
 // zero is no table; one that was made for the same motion is kept.
 void lanes_make(Lanes *lanes, const MotionTable *one, bool is_sampled, LanesWidth width);

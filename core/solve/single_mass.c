@@ -16,13 +16,15 @@
 
 enum {
     PENDING_MAX = 1024,      // samples between two balances of energy
-    PROGRESS_SAMPLES = 8192, // between two looks at the progress
+    PROGRESS_SAMPLES = 8192, // between two looks at limits and progress, at most
     CLEAR_SAMPLES = 1 << 16, // prepared between two looks at the progress
     BLOCK = 32,              // samples of contact at a time, a multiple of 8
     PIECES_MAX = 24,         // of one contact in an interval; longer ones are the event engine's
     EVENTS_MAX = 4096,       // in an interval; with more the event engine goes on
 };
 
+// Solver steps between two looks at limits and progress.
+static const double PROGRESS_STEPS = 3e4;
 // Solver steps of a sample in a block.
 static const double SAMPLE_STEPS = 0.1;
 // The longest piece, times the system's rate.
@@ -740,12 +742,13 @@ INLINE bool single_mass_block_is_worthwhile(const SingleMass *single) {
     return r * single->touching[single->side].rate + w > 0;
 }
 
-// Whole intervals by blocks and all else by pieces, up to sample `until`; false: the event engine
-// has to go on.
+// Whole intervals by blocks and all else by pieces, up to sample `until` or for PROGRESS_STEPS;
+// false: the event engine has to go on.
 INLINE bool single_mass_advance(SingleMass *single, size_t until) {
     const double h = single->interval, clock = 2 * DBL_EPSILON * h;
+    const double steps_max = single->run->steps + PROGRESS_STEPS;
     single->pieces = single->events = 0;
-    while (single->sample < until) {
+    while (single->sample < until && single->run->steps < steps_max) {
         const bool is_flight = single->phase == PHASE_FLIGHT;
         const size_t ahead = single->offset == 0 ? single_mass_blocks_ahead(single) : 0;
         size_t most = single_mass_smaller(until - single->sample, ahead);
@@ -851,23 +854,28 @@ static Status single_mass_clear_columns(const SingleMass *single) {
     return STATUS_OK;
 }
 
-static void single_mass_make_motions(SingleMass *single) {
-    const Plan *plan = single->plan;
-    const double total = plan->mass[0] + single->damper->mass;
-    const double share = single->damper->mass / total, mass = plan->mass[0] * share;
+// Of the storey and its free mass.
+static Motion single_mass_flying(const Plan *plan) {
+    const double free_mass = plan->dampers->mass;
     Motion flying = {.omega2 = plan->stiffness[0] / plan->mass[0],
                      .damping = plan->damping[0] / plan->mass[0],
-                     .share = share};
-    const double own = fmax(sqrt(flying.omega2), flying.damping);
-    flying.rate = fmax(own, 1e-300);
+                     .share = free_mass / (plan->mass[0] + free_mass)};
+    flying.rate = fmax(fmax(sqrt(flying.omega2), flying.damping), 1e-300);
+    return flying;
+}
+
+static void single_mass_make_motions(SingleMass *single) {
+    const Plan *plan = single->plan;
+    const Motion flying = single_mass_flying(plan);
+    const double mass = plan->mass[0] * flying.share;
     single->flying = flying;
     for (int side = 0; side < 2 && plan->form == CONTACT_LINEAR && single->has_stops; side++) {
         Motion *touching = &single->touching[side];
         *touching = flying;
         touching->contact_omega2 = single->damper->stops[side].parameters.stiffness / mass;
         touching->contact_damping = single->damper->stops[side].parameters.damping / mass;
-        touching->rate = fmax(own + fmax(sqrt(touching->contact_omega2), touching->contact_damping),
-                              flying.rate);
+        touching->rate =
+            flying.rate + fmax(sqrt(touching->contact_omega2), touching->contact_damping);
     }
 }
 
@@ -974,8 +982,11 @@ static Status single_mass_solve(SingleMass *single) {
     // The duration may end between samples.
     const double rest = plan->duration - (double)single->sample / plan->sample_rate;
     bool is_kept = !single->is_by_engine;
-    while (is_kept && rest - single->offset > 2 * DBL_EPSILON * rest)
+    for (size_t i = 1; is_kept && rest - single->offset > 2 * DBL_EPSILON * rest; i++) {
         is_kept = single_mass_step(single, rest);
+        if (i % PROGRESS_SAMPLES == 0)
+            TRY(single_mass_check(single));
+    }
     if (!is_kept) {
         TRY(single_mass_need_engine(single));
         if (!single->is_by_engine)
@@ -1009,8 +1020,14 @@ static Status single_mass_run_with(SingleMass *single, Run *run, Response *respo
     return status;
 }
 
-bool single_mass_serves(const Plan *plan, bool is_clear) {
-    return plan_is_single(plan) || (is_clear && plan_is_single_in_flight(plan));
+bool single_mass_serves(const Plan *plan, const Base *base, bool is_clear) {
+    const bool has_stops = plan->damper_count > 0 && !is_clear;
+    if (!plan_is_single_in_flight(plan) || (has_stops && !plan_is_single(plan)))
+        return false;
+    // The event engine has no limit to an interval, and one step for it.
+    const Motion flying = single_mass_flying(plan);
+    const double omega = base->form == BASE_SINE ? base->omega : 0;
+    return has_stops || lanes_are_for(&flying, omega, 1 / plan->sample_rate);
 }
 
 // Without a workspace: all on the stack.

@@ -7,8 +7,8 @@
 
 #include "core/solve/solver.h"
 
-// Whether the plan is one for single_mass_run; `is_clear`: no mass reaches a stop.
-bool single_mass_serves(const Plan *plan, bool is_clear);
+// Whether the scene is one for single_mass_run; `is_clear`: no mass reaches a stop.
+bool single_mass_serves(const Plan *plan, const Base *base, bool is_clear);
 
 // As Solver.run. The workspace, if there is one, keeps the tables for the next run.
 Status single_mass_run(Run *run, Response *response, Problem *problem);
