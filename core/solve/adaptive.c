@@ -468,6 +468,13 @@ static ContactEvent adaptive_event(const ModalState *state, size_t d, int watch)
                           .is_inwards = damper->phase == PHASE_INSIDE && watch == WATCH_FIRST};
 }
 
+// Acceleration of a damper that may be rounding noise [m/s^2].
+static double adaptive_noise(const ModalState *state, const DamperState *damper) {
+    return 64 * DBL_EPSILON *
+           (damper->elastic_bound * modal_state_size(state) +
+            fabs(damper->base_coupling * state->base_acceleration));
+}
+
 // An event of a damper that is past its end without a root in a step: a buffer released without
 // having been compressed, a stop behind the mass by rounding or a miss, a rest without a push.
 // Before the motion `has_moved`, a force may be rounding noise.
@@ -493,10 +500,7 @@ static bool adaptive_find_overdue_of(ModalState *state, size_t d, bool has_moved
             return true;
         }
     }
-    // Acceleration that may be rounding noise.
-    const double noise = 64 * DBL_EPSILON *
-                         (damper->elastic_bound * modal_state_size(state) +
-                          fabs(damper->base_coupling * state->base_acceleration));
+    const double noise = adaptive_noise(state, damper);
     if (damper->phase == PHASE_RESTING && sign * damper->force < -noise * damper->effective_mass) {
         *event = adaptive_event(state, d, WATCH_FIRST);
         event->is_jump = true;
@@ -568,6 +572,22 @@ static bool adaptive_has_outgrown(const Adaptive *adaptive) {
 }
 
 // One step of at most `length` seconds, and the event at its end.
+// After a restart: a rest whose force is 0 and falls ends now. Rests on one storey end together,
+// and the root of one of them is that of all.
+static bool adaptive_find_end_of_rest(const Adaptive *adaptive, ContactEvent *event) {
+    const ModalState *state = &adaptive->stepping->state;
+    for (size_t d = 0; d < state->dampers && state->has_stops; d++) {
+        const DamperState *damper = &state->damper[d];
+        const size_t i = WATCHED * d + WATCH_FIRST;
+        if (damper->phase == PHASE_RESTING && adaptive->slope[i] < 0 &&
+            adaptive->value[i] <= adaptive_noise(state, damper) * damper->effective_mass) {
+            *event = adaptive_event(state, d, WATCH_FIRST);
+            return true;
+        }
+    }
+    return false;
+}
+
 static Status adaptive_step(Adaptive *adaptive, double length) {
     TimeStepping *stepping = adaptive->stepping;
     ModalState *state = &stepping->state;
@@ -588,6 +608,8 @@ static Status adaptive_step(Adaptive *adaptive, double length) {
             return contact_event_apply(state, &event);
         }
         TRY(adaptive_restart(adaptive));
+        if (adaptive_find_end_of_rest(adaptive, &event))
+            return contact_event_apply(state, &event);
     }
     // The companion's steps are shorter than the run's where kinks of the base limit both.
     if (adaptive->is_at_knot)
