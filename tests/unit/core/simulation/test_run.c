@@ -1,3 +1,4 @@
+#include <limits.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -139,12 +140,39 @@ static void a_run_at_rest_can_be_stopped(void **state) {
     (void)stopped_at(0, "damper_displacement", 3);
 }
 
+// Intervals of a hundred periods of the structure: where no stop is in reach they are one step
+// each, else the run looks whether to go on within them, too.
+static void long_intervals_take_one_step_or_many_looks(void **state) {
+    (void)state;
+    for (int has_stops = 0; has_stops < 2; has_stops++) {
+        Simulation simulation;
+        Problem problem;
+        Outcome *outcome;
+        Looks looks = {.most = INT_MAX};
+        const Progress progress = {&looks, look};
+        problem_clear(&problem);
+        paper_scene(&simulation, 0.61, 0.025, 5000);
+        simulation.scene.sample_rate = 0.04;
+        if (has_stops == 0)
+            simulation.scene.dampers.at[0].clearance = 1e6;
+        paper_sine(&simulation, 1, 3);
+        paper_no_psd(&simulation);
+        assert_int_equal(simulation_complete(&simulation, NULL, NULL, &problem), STATUS_OK);
+        assert_int_equal(simulation_run(&simulation, NULL, &progress, NULL, &outcome, &problem),
+                         STATUS_OK);
+        assert_true(has_stops == 0 ? outcome->work.arcs < 100 : looks.count > 20);
+        outcome_unref(outcome);
+        simulation_clear(&simulation);
+    }
+}
+
 int main(void) {
     fft_start();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_workspace_leaves_no_trace_in_a_run),
         cmocka_unit_test(a_run_looks_many_times_while_its_columns_are_made_ready),
         cmocka_unit_test(a_run_at_rest_can_be_stopped),
+        cmocka_unit_test(long_intervals_take_one_step_or_many_looks),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

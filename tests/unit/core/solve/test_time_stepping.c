@@ -419,6 +419,20 @@ static void simultaneous_contacts_of_equal_dampers_end_together(void **state) {
     plan_free(plan);
 }
 
+static void rests_on_one_storey_end_together(void **state) {
+    (void)state;
+    const Base sine = {.form = BASE_SINE, .amplitude = 5, .omega = 14.5};
+    Plan *plan = frames_new(1, 2, 0.6, 500);
+    frames_uniform(plan, 2, 800, 0.0125);
+    plan->form = CONTACT_IMPULSIVE;
+    for (size_t d = 0; d < 2; d++) {
+        frames_damper(plan, d, 0, d == 0 ? 0.05 : 0.033, 0.05, 0.3, NAN);
+        plan->dampers[d].position = -0.025;
+    }
+    check_adaptive_estimates(plan, &sine);
+    plan_free(plan);
+}
+
 // Runs with steps of twice the length may be late by the same time: that must not be taken for
 // none.
 static void few_impacts_are_not_taken_for_exact(void **state) {
@@ -637,6 +651,7 @@ int main(void) {
         cmocka_unit_test(a_first_touch_at_a_sample_leaves_the_estimate_honest),
         cmocka_unit_test(kinks_of_the_base_leave_the_estimate_honest),
         cmocka_unit_test(simultaneous_contacts_of_equal_dampers_end_together),
+        cmocka_unit_test(rests_on_one_storey_end_together),
         cmocka_unit_test(few_impacts_are_not_taken_for_exact),
         cmocka_unit_test(a_step_that_cannot_be_stable_is_told),
         cmocka_unit_test(precise_at_a_millisecond_is_wrong_and_says_so),
