@@ -86,7 +86,10 @@ static void contact_event_sort_resting(ModalState *state) {
         if (damper->phase != PHASE_RESTING)
             continue;
         const double sign = modal_state_sign(damper->side);
-        if (damper->impulse == 0 && sign * damper->w < 0) {
+        // A bounce of another mass may be as small as rounding: one that would be back within the
+        // clock's resolution stays.
+        const double pull = fabs(damper->force) / damper->effective_mass;
+        if (damper->impulse == 0 && -2 * sign * damper->w > pull * modal_state_clock(state)) {
             damper->phase = PHASE_FLIGHT;
             impact_log_close(&state->impacts, &damper->row, modal_state_time(state), NAN);
         } else {
