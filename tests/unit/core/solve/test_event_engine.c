@@ -407,6 +407,25 @@ static double drawn(uint64_t *state, double a, double b) {
 }
 
 // Far from the base nothing moves at first but by rounding.
+// A bounce at the size of rounding parts a resting mass for less than the clock resolves.
+static void small_bounces_do_not_lift_resting_masses(void **state) {
+    (void)state;
+    const Base sine = {.form = BASE_SINE, .amplitude = 1, .omega = 10};
+    const double mass[] = {3, 2}, stiffness[] = {900, 700}, damping[] = {6, 4};
+    Plan *plan = frames_new(2, 2, 6, 200);
+    frames_shear(plan, mass, stiffness, damping);
+    frames_damper(plan, 0, 1, 0.3, 0.004, 0.27, NAN);
+    frames_damper(plan, 1, 1, 0.5, 0.02, 0.64, NAN);
+    plan->form = CONTACT_IMPULSIVE;
+    Answer answer = run(exact_run_engine, plan, &sine);
+    size_t rests = 0;
+    for (size_t i = 0; i < answer.response.impacts.count; i++)
+        rests += answer.response.impacts.at[i].kind == IMPACT_RESTING;
+    assert_in_range(rests, 1, 1000);
+    answer_clear(&answer);
+    plan_free(plan);
+}
+
 static void masses_held_tight_wait_for_the_base_to_reach_them(void **state) {
     (void)state;
     uint64_t at = 1;
@@ -512,6 +531,7 @@ int main(void) {
         cmocka_unit_test(many_held_masses_change_stops_together),
         cmocka_unit_test(limits_and_cancelling_end_a_run_with_their_reason),
         cmocka_unit_test(the_work_of_the_neighbour_is_counted),
+        cmocka_unit_test(small_bounces_do_not_lift_resting_masses),
         cmocka_unit_test(masses_held_tight_wait_for_the_base_to_reach_them),
         cmocka_unit_test(making_the_tables_of_many_coupled_storeys_is_cancelled_on_the_way),
     };
