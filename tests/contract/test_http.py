@@ -230,7 +230,7 @@ def test_a_run_says_how_far_it_can_be_trusted():
             assert 2 < summary["trust_horizon"] < 30 and 1e-6 < summary["error_estimate"] <= 1, summary
             assert f"{summary['trust_horizon']:.6g} s" in warnings[1]["detail"], warnings
             assert "only statistics are valid" in warnings[1]["detail"], warnings
-            assert "slower than sponge@1 was measured" in warnings[2]["detail"], warnings
+            assert "were outside the speeds of sponge@1, 0.15 to 1 m/s" in warnings[2]["detail"], warnings
         assert calm["summary"]["trust_horizon"] is None, calm
         assert [warning["pointer"] for warning in calm["warnings"]] == ["/dampers/0/buffer"], calm
         assert 0 < calm["summary"]["error_estimate"] < 1e-6, calm

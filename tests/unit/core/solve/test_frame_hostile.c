@@ -107,7 +107,7 @@ static void so_they_do_by_every_solver_that_steps(void **state) {
         if ((*solver)->run == NULL || *solver == &solver_exact)
             continue;
         size_t answered, refused;
-        run_all(*solver, 600000, &answered, &refused);
+        run_all(*solver, 900000, &answered, &refused);
         assert_true(answered > RUNS / 6);
         assert_true(refused > RUNS / 70);
     }
