@@ -1,7 +1,7 @@
 // The exact solver: between events the scene is a linear system, which is propagated exactly;
-// events are located to rounding. Scenes of one storey with one mass are run by single_mass.c, all
-// others by the event engine, with a companion run beside it from which error estimate and
-// predictability horizon follow.
+// events are located to rounding. Most scenes of one storey with one mass are run by single_mass.c
+// (single_mass_serves), all others by the event engine, with a companion run beside it from which
+// error estimate and predictability horizon follow.
 #include "core/solve/exact.h"
 
 #include <float.h>

@@ -786,11 +786,12 @@ static bool single_mass_advance_plain(SingleMass *single, size_t until) {
 
 static Status single_mass_loop(SingleMass *single) {
     const size_t last = single->plan->count - 1;
+    const bool is_wide = wide_is_at_hand();
     while (single->sample < last) {
         const size_t until =
             single->sample + single_mass_smaller(last - single->sample, PROGRESS_SAMPLES);
-        if (!(single->is_wide ? single_mass_advance_wide(single, until)
-                              : single_mass_advance_plain(single, until)))
+        if (!(is_wide ? single_mass_advance_wide(single, until)
+                      : single_mass_advance_plain(single, until)))
             TRY(single_mass_by_engine(single));
         TRY(single_mass_check(single));
     }
@@ -908,7 +909,6 @@ static Status single_mass_start(SingleMass *single, Run *run, Response *response
     single->problem = problem;
     single->interval = 1 / plan->sample_rate;
     single->has_stops = plan->damper_count > 0 && !run->is_clear;
-    single->is_wide = wide_is_at_hand();
     single->phase = PHASE_FLIGHT;
     single->origin = FROM_MIDDLE;
     single_mass_make_motions(single);
@@ -938,7 +938,7 @@ static Status single_mass_start(SingleMass *single, Run *run, Response *response
     FlightBlock *stretch = &single->stretch;
     if (base->form == BASE_SAMPLED) {
         double step;
-        if (single->is_wide)
+        if (wide_is_at_hand())
             single_mass_measure_wide(base->values, base->count, &stretch->base_max, &step);
         else
             single_mass_measure(base->values, base->count, &stretch->base_max, &step);
@@ -1024,7 +1024,8 @@ bool single_mass_serves(const Plan *plan, const Base *base, bool is_clear) {
     const bool has_stops = plan->damper_count > 0 && !is_clear;
     if (!plan_is_single_in_flight(plan) || (has_stops && !plan_is_single(plan)))
         return false;
-    // The event engine has no limit to an interval, and one step for it.
+    // Intervals that are too long for blocks would take many pieces here, and the event engine
+    // takes one step for each.
     const Motion flying = single_mass_flying(plan);
     const double omega = base->form == BASE_SINE ? base->omega : 0;
     return has_stops || lanes_are_for(&flying, omega, 1 / plan->sample_rate);

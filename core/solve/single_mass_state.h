@@ -20,7 +20,6 @@ struct SingleMass {
     FlightBlock stretch;
     bool has_stops;     // that the mass may reach
     bool has_blocks;    // of flight
-    bool is_wide;       // the processor has vectors of four numbers
     size_t pending;     // samples whose sums wait in `stretch`
     double free_work;   // integral of a_g times the free mass's velocity over them [m^2/s^2]
     ContactPhase phase; // PHASE_FLIGHT or PHASE_CONTACT

@@ -77,7 +77,8 @@ static Status candidate_add(TradeoffPoints *points, const Kind *solver, const ch
     (void)fields_default(tradeoff_point_fields, point); // absent and 0: nothing to allocate
     if (setting != NULL) {
         candidate_set(tradeoff_point_fields, point, setting, value);
-        snprintf(rest, sizeof rest, ", %s%.6g%s", before, value, after);
+        const bool is_whole = value == floor(value) && value < 1e15;
+        snprintf(rest, sizeof rest, is_whole ? ", %s%.0f%s" : ", %s%.6g%s", before, value, after);
     }
     TRY(study_copy_text(solver->name, &point->solver));
     return status_made(text_format(&point->name, "%s%s", solver->name, rest));

@@ -1,5 +1,5 @@
 // One impact at full detail. The result does not keep it: the scene is run again
-// (core/simulation/impact_history.c), at once where that is foretold to be quick, else beside the
+// (core/simulation/impact_history.c), at once where that is predicted to be quick, else beside the
 // workers while the request sleeps.
 #include <stdio.h>
 #include <stdlib.h>
