@@ -298,15 +298,26 @@ void reals_sort(double *values, size_t count) {
         qsort(values, count, sizeof *values, reals_compare);
 }
 
-void *list_append(void *list, size_t element_size) {
+// With room for `room` elements; 0: there is room.
+static void *list_append_within(void *list, size_t element_size, size_t room) {
     List grown = field_list(list);
-    char *at = realloc(grown.at, (grown.count + 1) * element_size);
+    char *at = room == 0 ? grown.at : realloc(grown.at, room * element_size);
     if (at == NULL)
         return NULL;
     void *const element = memset(at + grown.count * element_size, 0, element_size);
     grown = (List){at, grown.count + 1};
     memcpy(list, &grown, sizeof grown);
     return element;
+}
+
+void *list_append(void *list, size_t element_size) {
+    return list_append_within(list, element_size, field_list(list).count + 1);
+}
+
+void *list_grow(void *list, size_t element_size) {
+    const size_t count = field_list(list).count;
+    const bool is_full = (count & (count - 1)) == 0;
+    return list_append_within(list, element_size, !is_full ? 0 : count == 0 ? 1 : 2 * count);
 }
 
 Status texts_append(Texts *texts, const char *text) {

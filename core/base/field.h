@@ -273,6 +273,9 @@ bool reals_allocate(Reals *reals, size_t count);
 void reals_sort(double *values, size_t count);
 // Appends an element of zeros to a typed list. Returns it, or NULL without memory.
 void *list_append(void *list, size_t element_size);
+// The same for a long list that only this function has filled: there is room for as many elements
+// as the next power of two.
+void *list_grow(void *list, size_t element_size);
 // Appends a copy of the text. STATUS_OK or STATUS_NO_MEMORY, which leaves the list unchanged.
 Status texts_append(Texts *texts, const char *text);
 void texts_clear(Texts *texts);

@@ -147,12 +147,8 @@ static Status reading_new(const ReadingList *list, size_t place, bool is_of_trac
         return problem_set(list->problem, STATUS_LIMIT,
                            "more than %d readings: evaluate fewer measurements at a time",
                            EVALUATION_ROWS_MAX);
-    if ((rows->count & (rows->count - 1)) == 0) {
-        EvaluationRow *at = realloc(rows->at, (2 * rows->count + 1) * sizeof *at);
-        TRY(status_made(at != NULL));
-        rows->at = at;
-    }
-    EvaluationRow *row = *added = &rows->at[rows->count++];
+    EvaluationRow *row = *added = list_grow(rows, sizeof *row);
+    TRY(status_made(row != NULL));
     *row = (EvaluationRow){.is_of_trace = is_of_trace, .place = place, .test = list->test};
     fields_clear(evaluation_row_fields, row);
     row->measurement = list->of->number;

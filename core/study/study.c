@@ -27,14 +27,14 @@ Status study_copy_reals(const double *values, size_t count, Reals *target) {
 }
 
 Status study_add_real(double value, Reals *reals) {
-    double *added = list_append(reals, sizeof *added);
+    double *added = list_grow(reals, sizeof *added);
     TRY(status_made(added != NULL));
     *added = value;
     return STATUS_OK;
 }
 
 Status run_table_add(RunTable *table, RunRecord *run, uint64_t number) {
-    RunRecord *added = list_append(table, sizeof *added);
+    RunRecord *added = list_grow(table, sizeof *added);
     TRY(status_made(added != NULL));
     *added = *run;
     added->number = number;
