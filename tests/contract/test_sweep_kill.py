@@ -14,7 +14,7 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."
 import program  # noqa: E402
 
 POINTS, KILLS = 6000, 6
-DURATION = 12  # of a scene [s]: the sweep is some seconds of CPU, in a dozen chunks or more
+DURATION = 30  # of a scene [s]: the sweep is some seconds of CPU, in a dozen chunks or more
 
 
 def scene(duration):
@@ -50,6 +50,7 @@ def test_a_sweep_survives_being_killed_again_and_again():
     asked = scene(DURATION)
     with program.daemon("--workers", "2") as daemon:
         whole = daemon.finished(daemon.submit(asked, headers={"Prefer": "respond-async"}).json()["id"], 300)
+        longest = min(0.6, whole["timing"]["run"] / (2 * KILLS))  # so that the kills fall into the sweep
         undisturbed = tables(daemon, whole)
         assert daemon.get(f"/v1/results/{whole['result']}/table.json").json()["done"] == POINTS
     folder, kept = tempfile.mkdtemp(prefix="impactd-"), []
@@ -66,7 +67,7 @@ def test_a_sweep_survives_being_killed_again_and_again():
                     if done > before or done == POINTS:
                         break
                     time.sleep(0.01)
-                time.sleep(chance.uniform(0, 0.6))
+                time.sleep(chance.uniform(0, longest))
                 daemon.kill()
             wanted, there, twice = stored(folder)
             assert twice == 0 and (not kept or there >= kept[-1]), (kept, there, twice)
@@ -117,6 +118,7 @@ def test_a_full_disk_pauses_a_sweep_until_there_is_room():
     asked = scene(DURATION / 3)
     with program.daemon("--workers", "2") as daemon:
         whole = daemon.finished(daemon.submit(asked, headers={"Prefer": "respond-async"}).json()["id"], 300)
+        longest = min(0.6, whole["timing"]["run"] / (2 * KILLS))  # so that the kills fall into the sweep
         undisturbed = tables(daemon, whole)
     with small_disk() as folder, program.Daemon(program.build, "--workers", "2", data=folder) as daemon:
         job = daemon.submit(asked, headers={"Prefer": "respond-async"}).json()["id"]
