@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# What a commit has to pass: builds with gcc, also with address, undefined-behaviour and thread sanitizers, unit and
-# contract tests in each (under the last what knows threads alone), truth tests and the tests of the program in the
-# release build. clang checks the sources. --quick: the release build only. tests/nightly.sh runs everything else.
+# What a commit has to pass: builds with gcc, also with address and undefined-behaviour sanitizers, unit and contract
+# tests in each, truth tests and the tests of the program in the release build. --quick: the release build only.
+# tests/nightly.sh runs everything else.
 # On a bare Debian 12 it first installs what is missing (as root or with sudo). The last line counts.
 #
 # The release build comes first and is tested while the others are made, one by one, of what the tests leave of the
@@ -10,7 +10,7 @@ set -uo pipefail
 here=$(cd "$(dirname "$0")/.." && pwd)
 cd "$here" || exit 1
 
-presets=(release debug tsan)
+presets=(release debug)
 case "${1-}" in
 '') ;;
 --quick) presets=(release) ;;
@@ -22,7 +22,7 @@ esac
 
 server/packages.sh server/packages.txt tests/packages.txt || exit 1
 
-export ASAN_OPTIONS=detect_leaks=1 UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1 TSAN_OPTIONS=halt_on_error=1
+export ASAN_OPTIONS=detect_leaks=1 UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1
 # Debian's python3, which has the packages, whatever else is in PATH.
 python=/usr/bin/python3
 passed=0
@@ -39,14 +39,11 @@ finish() {
 trap finish EXIT
 trap 'exit 130' INT TERM
 
-# gcc's thread sanitizer cannot live with as much address randomisation as some kernels use.
-still=()
-if setarch "$(uname -m)" -R true 2>/dev/null; then still=(setarch "$(uname -m)" -R); fi
-
 # What is asked, in this order, each "PRESET TEST" where the test is ctest or a file. What faces hostile input is asked
-# of the instrumented program as well, what concerns threads of the one that watches them.
+# of the instrumented program as well.
 judge=tests/contract/test_traffic.py
-files() { grep -l "$@" tests/contract/test_*.py; }
+mapfile -t commits < <(grep -L '^NIGHTLY = True' tests/contract/test_*.py)
+files() { grep -l "$@" "${commits[@]}"; }
 queue=()
 mapfile -t -O 0 queue < <(
     echo release tests/browser/test_browser.py
@@ -54,7 +51,6 @@ mapfile -t -O 0 queue < <(
     files '^WAITS = True' | sed 's/^/release /'
     files -L '^WAITS = True' | grep -vxF "$judge" | sed 's/^/release /'
     printf 'release %s\n' "$judge" tests/truth/test_*.py
-    files '^THREADED = True' | sed 's/^/tsan /'
     files '^SANITIZED = True' | sed 's/^/debug /'
 )
 for at in "${!queue[@]}"; do [[ " ${presets[*]} " == *" ${queue[at]% *} "* ]] || unset "queue[at]"; done
@@ -99,15 +95,17 @@ places() {
 
 # PRESET TEST, in place of this process.
 run() {
-    local runner=() folder=build
+    local folder=build
     [ "$1" = release ] || folder=build-$1
-    [ "$1" != tsan ] || runner=("${still[@]}")
     if [ "$2" = ctest ]; then
+        local left_out=()
+        # The instrumented build runs the unit tests of the server.
+        [ "$1" != release ] || [[ " ${presets[*]} " != *" debug "* ]] || left_out=(-E '^unit/server/')
         # Half of the processors, all of them when it is the last.
-        exec "${runner[@]}" ctest --preset "$1" -j "$(((${#queue[@]} > 0 ? $(nproc) + 1 : 2 * $(nproc)) / 2))"
+        exec ctest --preset "$1" "${left_out[@]}" -j "$(((${#queue[@]} > 0 ? $(nproc) + 1 : 2 * $(nproc)) / 2))"
     fi
     if is_recorded "$*" || [ "$2" = "$judge" ]; then export IMPACTD_RECORD=$work/said; fi
-    exec "${runner[@]}" "$python" "$2" --build "$folder"
+    exec "$python" "$2" --build "$folder"
 }
 
 used=0

@@ -18,7 +18,7 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."
 import program  # noqa: E402
 from disk import fill, small_disk  # noqa: E402
 
-SANITIZED = True
+SANITIZED = "nightly"
 ASYNC = {"Prefer": "respond-async"}
 
 

@@ -11,6 +11,8 @@ import sys
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
 
+NIGHTLY = True
+
 # What only gcc compiles: references in quad precision and what asks them.
 GCC_ONLY = ("tests/truth/", "tests/bench/")
 

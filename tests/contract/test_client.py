@@ -21,7 +21,7 @@ import program  # noqa: E402
 from asking import endless  # noqa: E402
 from client import Fake, client, endless_body, endless_headers, fake, raw, say  # noqa: E402
 
-SANITIZED = True
+SANITIZED = "nightly"
 WAITS = True
 SPONGE = os.path.join(program.EXAMPLES, "paper_free_sponge.json")
 

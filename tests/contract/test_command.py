@@ -18,7 +18,7 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."
 import program  # noqa: E402
 from asking import endless  # noqa: E402
 
-SANITIZED = True
+SANITIZED = "nightly"
 SPONGE = os.path.join(program.EXAMPLES, "paper_free_sponge.json")
 
 

@@ -16,7 +16,7 @@ import scipy.signal
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
 
-SANITIZED = True
+SANITIZED = "nightly"
 SVG = "{http://www.w3.org/2000/svg}"
 
 

@@ -14,6 +14,8 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."
 import program  # noqa: E402
 from materials import bring, export, laboratory  # noqa: E402
 
+NIGHTLY = True
+
 ROUNDS = 30
 
 

@@ -15,6 +15,8 @@ import time
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
 
+NIGHTLY = True
+
 JOBS, ROUNDS = 200, 10
 RUN = 0.01  # [s] of CPU a job
 

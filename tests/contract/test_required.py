@@ -12,7 +12,7 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."
 import daemon as daemons  # noqa: E402
 import program  # noqa: E402
 
-SANITIZED = True
+SANITIZED = "nightly"
 STORED_MOST = 4096
 SUMMARY = {"channels": [], "psd": None}
 

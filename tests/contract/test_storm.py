@@ -11,7 +11,8 @@ import cancel_storm  # noqa: E402
 import mixed  # noqa: E402
 import program  # noqa: E402
 
-SANITIZED = True
+NIGHTLY = True
+SANITIZED = "nightly"
 THREADED = True
 REQUESTS = 30000
 CANCELS = 300
