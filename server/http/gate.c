@@ -93,6 +93,7 @@ void gate_header(Gate *gate, const char *name, size_t name_size, const char *val
     }
     if (is_name(name, name_size, "Host")) {
         gate->hosts++;
+        gate->own_host = value;
         const GateHosts *names = gate->names != NULL ? gate->names : &gate_loopback;
         if (!gate_host_is_ours(names, value_size > 0 ? value : "", value_size)) {
             gate->is_foreign_host = true;
@@ -105,6 +106,10 @@ void gate_header(Gate *gate, const char *name, size_t name_size, const char *val
             gate->has_bad_length = true;
         else
             gate->length = strtoull(value, NULL, 10);
+    } else if (is_name(name, name_size, "Origin")) {
+        gate->origin = value != NULL ? value : "";
+    } else if (is_name(name, name_size, "Sec-Fetch-Site")) {
+        gate->fetch_site = value;
     } else if (is_name(name, name_size, "Authorization")) {
         gate->authorizations++;
     } else if (is_name(name, name_size, "Transfer-Encoding")) {
@@ -159,6 +164,31 @@ static int refuse_host(const Gate *gate, Problem *problem) {
     return 421;
 }
 
+// Whether an Origin header names this server: the authority of the Host header, or a name given by
+// --host or --base-url, for a proxy that changes the Host.
+static bool gate_origin_is_ours(const Gate *gate) {
+    const char *const mark = strstr(gate->origin, "://");
+    if (mark == NULL)
+        return false;
+    const char *const authority = mark + 3;
+    if (gate->own_host != NULL && strcasecmp(authority, gate->own_host) == 0)
+        return true;
+    const GateHosts *hosts = gate->names != NULL ? gate->names : &gate_loopback;
+    const GateHosts named = {hosts->names, false};
+    const size_t size = strlen(authority);
+    return gate_host_is_ours(&named, authority, size) &&
+           !gate_host_is_ours(&gate_loopback, authority, size);
+}
+
+// Another site's page may send requests with the rights of this machine (CSRF); browsers mark them.
+static bool gate_is_from_other_site(const Gate *gate, const char *method) {
+    if (strcmp(method, "GET") == 0 || strcmp(method, "HEAD") == 0 || strcmp(method, "OPTIONS") == 0)
+        return false;
+    return (gate->fetch_site != NULL && (strcasecmp(gate->fetch_site, "cross-site") == 0 ||
+                                         strcasecmp(gate->fetch_site, "same-site") == 0)) ||
+           (gate->origin != NULL && !gate_origin_is_ours(gate));
+}
+
 int gate_judge(const Gate *gate, const char *method, const char *target, const char *version,
                Problem *problem) {
     if (strcmp(version, "HTTP/1.1") != 0 && strcmp(version, "HTTP/1.0") != 0)
@@ -204,5 +234,9 @@ int gate_judge(const Gate *gate, const char *method, const char *target, const c
         return refuse(problem, 501, "the only Transfer-Encoding understood is \"chunked\"");
     if (gate->encodings > 0 && strcmp(version, "HTTP/1.0") == 0)
         return refuse(problem, 400, "HTTP/1.0 has no Transfer-Encoding");
+    if (gate_is_from_other_site(gate, method))
+        return refuse(problem, 403,
+                      "a page of another site may not send this: Origin must be this server's, and "
+                      "Sec-Fetch-Site same-origin or none");
     return 0;
 }

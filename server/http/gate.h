@@ -24,14 +24,16 @@ typedef struct Gate {
     unsigned long long length; // of the body, as told
     bool is_chunked, is_foreign_host, has_bad_length, has_control;
     char fault_name[40]; // the header that has_control is about
+    // Values of headers as given, of the caller; NULL where there is none.
+    const char *own_host, *origin, *fetch_site;
     char host[64];
 } Gate;
 
 void gate_header(Gate *gate, const char *name, size_t name_size, const char *value,
                  size_t value_size);
 
-// 0 if the request may go on, else the HTTP status (400, 414, 421, 501, 505), with the reason in
-// `problem`.
+// 0 if the request may go on, else the HTTP status (400, 403, 414, 421, 501, 505), with the reason
+// in `problem`. 403: another site's page sends a request that is not GET, HEAD or OPTIONS.
 int gate_judge(const Gate *gate, const char *method, const char *target, const char *version,
                Problem *problem);
 

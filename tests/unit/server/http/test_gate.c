@@ -50,6 +50,11 @@ static void ordinary_requests_pass(void **state) {
          "HTTP/1.1",
          {{"Host", "localhost"}, {"X-A", "a\tb \xc3\xa9"}},
          0},
+        {"POST", "/", "HTTP/1.1", {{"Host", "localhost:80"}, {"Origin", "http://LOCALHOST:80"}}, 0},
+        {"POST", "/", "HTTP/1.1", {{"Host", "localhost"}, {"Sec-Fetch-Site", "same-origin"}}, 0},
+        {"POST", "/", "HTTP/1.1", {{"Host", "localhost"}, {"Sec-Fetch-Site", "none"}}, 0},
+        {"GET", "/", "HTTP/1.1", {{"Host", "localhost"}, {"Sec-Fetch-Site", "cross-site"}}, 0},
+        {"GET", "/", "HTTP/1.1", {{"Host", "localhost"}, {"Origin", "http://evil.org"}}, 0},
     };
     for (size_t i = 0; i < COUNT(heads); i++)
         assert_int_equal(judge(&heads[i]), 0);
@@ -113,6 +118,16 @@ static void ambiguous_or_foreign_heads_are_refused(void **state) {
         {"GET", "/", "HTTP/1.1", {{"Host", "localhost"}, {"X-A", "a\rX-B: b"}}, 400},
         {"GET", "/", "HTTP/1.1", {{"Host", "localhost"}, {"X-A", "a\x7f"}}, 400},
         {"GET", "/", "HTTP/1.1", {{"Host", "localhost"}, {"X A", "a"}}, 400},
+        {"POST", "/", "HTTP/1.1", {{"Host", "localhost"}, {"Sec-Fetch-Site", "cross-site"}}, 403},
+        {"DELETE", "/", "HTTP/1.1", {{"Host", "localhost"}, {"Sec-Fetch-Site", "same-site"}}, 403},
+        {"POST", "/", "HTTP/1.1", {{"Host", "localhost:80"}, {"Origin", "null"}}, 403},
+        {"POST", "/", "HTTP/1.1", {{"Host", "localhost:80"}, {"Origin", ""}}, 403},
+        {"POST", "/", "HTTP/1.1", {{"Host", "localhost:80"}, {"Origin", "http://evil.org"}}, 403},
+        {"PATCH",
+         "/",
+         "HTTP/1.1",
+         {{"Host", "localhost:80"}, {"Origin", "http://localhost:81"}},
+         403},
     };
     for (size_t i = 0; i < COUNT(heads); i++)
         if (judge(&heads[i]) != heads[i].code)
@@ -166,6 +181,28 @@ static void a_foreign_host_is_told_the_names_that_are_right(void **state) {
     assert_non_null(strstr(problem.detail, "\"evil\""));
 }
 
+static void a_name_given_for_a_proxy_is_no_foreign_origin(void **state) {
+    (void)state;
+    static const char *const names[] = {"localhost", "sim.example.org", NULL};
+    const GateHosts named = {names, false};
+    static const struct {
+        const char *origin;
+        int code;
+    } cases[] = {{"https://sim.example.org", 0},
+                 {"https://sim.example.org:8443", 0},
+                 {"https://sim.example.org.evil.org", 403},
+                 {"https://example.org", 403},
+                 {"http://localhost:3000", 403}};
+    for (size_t i = 0; i < COUNT(cases); i++) {
+        Gate gate = {.names = &named};
+        Problem problem;
+        problem_clear(&problem);
+        gate_header(&gate, "Host", 4, "localhost:8080", 14);
+        gate_header(&gate, "Origin", 6, cases[i].origin, strlen(cases[i].origin));
+        assert_int_equal(gate_judge(&gate, "POST", "/", "HTTP/1.1", &problem), cases[i].code);
+    }
+}
+
 static void a_nul_inside_a_value_is_seen_by_its_size(void **state) {
     (void)state;
     Gate gate = {0};
@@ -195,6 +232,7 @@ int main(void) {
         cmocka_unit_test(ambiguous_or_foreign_heads_are_refused),
         cmocka_unit_test(hosts_are_those_that_were_named),
         cmocka_unit_test(a_foreign_host_is_told_the_names_that_are_right),
+        cmocka_unit_test(a_name_given_for_a_proxy_is_no_foreign_origin),
         cmocka_unit_test(a_nul_inside_a_value_is_seen_by_its_size),
         cmocka_unit_test(a_target_of_4097_bytes_is_too_long),
     };
