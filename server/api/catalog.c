@@ -142,6 +142,9 @@ Status health_ready(App *app, const Request *request, Reply *reply, Problem *pro
     IntakeTally tally = {0};
     if (atomic_load(&app->is_stopping))
         return problem_set(problem, STATUS_BUSY, "the daemon is stopping");
+    if (!store_is_writable(app->store))
+        return problem_set(problem, STATUS_BUSY,
+                           "the last write to the database failed: is the disk full or read-only?");
     intake_tally(app->intake, &tally);
     if (tally.queued + tally.running >= tally.queue_most)
         return problem_set(problem, STATUS_BUSY,

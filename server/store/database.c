@@ -232,6 +232,15 @@ static Status read_number(Database *database, const char *sql, int64_t *number, 
     return status;
 }
 
+Status database_touch(Database *database, Problem *problem) {
+    int64_t version = 0;
+    char sql[64];
+    TRY(read_number(database, "SELECT user_version AS number FROM pragma_user_version", &version,
+                    problem));
+    sqlite3_snprintf(sizeof sql, sql, "PRAGMA user_version = %lld", (long long)version);
+    return database_execute(database, sql, problem);
+}
+
 static Status check_owner(Database *database, Problem *problem) {
     int64_t application = 0, tables = 0;
     TRY(read_number(database, "SELECT application_id AS number FROM pragma_application_id",
@@ -312,6 +321,13 @@ static Status read_version(Database *database, const EmbeddedFile *files, int64_
         ++*last;
     TRY(read_number(database, "SELECT user_version AS number FROM pragma_user_version", version,
                     problem));
+    if (*version < 0)
+        return problem_set(
+            problem, STATUS_CONFLICT,
+            "%s is damaged: its schema's version is %lld, must be 0 to %lld; restore "
+            "a backup or use another folder",
+            sqlite3_db_filename(database->connection, "main"), (long long)*version,
+            (long long)*last);
     if (*version <= *last)
         return STATUS_OK;
     return problem_set(

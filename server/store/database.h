@@ -38,6 +38,8 @@ Status database_is_current(Database *database, const EmbeddedFile *files, bool *
 
 // Runs SQL that has neither parameters nor rows; any number of statements.
 Status database_execute(Database *database, const char *sql, Problem *problem);
+// Writes the first page as it is, to see whether writing works. Within a transaction.
+Status database_touch(Database *database, Problem *problem);
 // Whether a transaction is open. A failed write may have ended it.
 bool database_is_in_transaction(Database *database);
 

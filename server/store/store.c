@@ -34,6 +34,7 @@ struct Store {
     atomic_uint_fast64_t generation; // of the catalogue
     atomic_uint_fast64_t measured;   // materials
     atomic_uint_fast64_t evictions;  // of series
+    atomic_bool is_probing;          // by store_is_writable
     pthread_mutex_t lock;
     pthread_cond_t some;
     Database *readers[READERS]; // of which the first `free_count` are not taken
@@ -133,6 +134,28 @@ void store_close(Store *store) {
 
 const StoreTotals *store_totals(const Store *store) {
     return writer_totals(store->writer);
+}
+
+// Writes the database's first page as it is.
+static Status store_apply_probe(Database *database, const void *work, Problem *problem) {
+    (void)work;
+    return database_touch(database, problem);
+}
+
+static void store_probe_ended(void *context, Status status, const char *detail) {
+    (void)status;
+    (void)detail;
+    atomic_store(&((Store *)context)->is_probing, false);
+}
+
+bool store_is_writable(Store *store) {
+    if (!atomic_load(&store_totals(store)->is_failing))
+        return true;
+    const StoreDone done = {store_probe_ended, store};
+    if (!atomic_exchange(&store->is_probing, true) &&
+        store_post(store, store_apply_probe, NULL, 0, STORE_NOW, &done, NULL) != STATUS_OK)
+        atomic_store(&store->is_probing, false);
+    return false;
 }
 
 Status store_write(Store *store, StoreApply *apply, const void *work, Problem *problem) {

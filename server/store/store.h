@@ -61,9 +61,13 @@ void store_material_measured(Store *store);
 // What was written since the start; counted on.
 typedef struct StoreTotals {
     Counter writes, rows, errors;
-    Histogram commits; // transactions, from their beginning until they are durable
+    Histogram commits;      // transactions, from their beginning until they are durable
+    atomic_bool is_failing; // the last transaction could not be made durable
 } StoreTotals;
 const StoreTotals *store_totals(const Store *store);
+// Whether the last transaction was made durable; if not, another one is tried meanwhile, so that a
+// later call knows whether the cause has gone. Does not wait.
+bool store_is_writable(Store *store);
 
 typedef struct JobRow {
     char id[40];

@@ -106,6 +106,7 @@ static bool commit(Writer *writer, Database *database, StoreTicket *first, const
     if (status != STATUS_OK && database_is_in_transaction(database))
         (void)database_change(database, undo, NULL, NULL, NULL, NULL);
     if (status == STATUS_OK) {
+        atomic_store(&writer->totals.is_failing, false);
         histogram_add(&writer->totals.commits, clock_monotonic_ns() - began_ns);
         counter_add(&writer->totals.writes, writes);
         counter_add(&writer->totals.rows, database_rows_changed(database) - rows);
@@ -120,6 +121,7 @@ static void commit_alone(Writer *writer, Database *database, StoreTicket *write)
     if (commit(writer, database, write, write->next, true) || write->status != STATUS_OK)
         return;
     const Status status = writer->problem.status;
+    atomic_store(&writer->totals.is_failing, true);
     settle(write, status != STATUS_OK ? status : STATUS_IO, &writer->problem);
 }
 

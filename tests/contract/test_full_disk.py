@@ -54,6 +54,9 @@ def test_a_full_disk_stops_writes_alone():
             problem = refused.json()
             assert problem["type"] == "/problems/no-room", problem
             assert folder in problem["detail"] and "bytes are free" in problem["detail"], problem
+            assert daemon.get("/health/live").status == 200
+            ready = daemon.get("/health/ready")
+            assert ready.status == 503 and "database" in ready.json()["detail"], ready
             for path in (f"/v1/results/{before['result']}", f"/v1/jobs/{endless['id']}", "/v1/records/shake"):
                 assert daemon.request("DELETE", path).status == 507, path
             assert daemon.request("POST", "/v1/records", json={**shake, "name": "more"}).status == 507
@@ -71,6 +74,7 @@ def test_a_full_disk_stops_writes_alone():
                          "/health/live", "/v1/records/shake", "/v1/records/shake/samples.csv"):
                 assert daemon.get(path).status == 200, path
             os.remove(ballast)
+            assert until(lambda: daemon.get("/health/ready").status == 200), "not ready again"
             assert until(lambda: daemon.submit(scene(1000)).status == 200), "no recovery"
             assert daemon.get(f"/v1/jobs/{before['id']}").json()["status"] == "successful"
 

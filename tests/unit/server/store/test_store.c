@@ -375,7 +375,7 @@ static void a_database_is_migrated_from_each_step(void **state) {
     database_close(database);
 }
 
-static void a_newer_database_is_refused(void **state) {
+static void a_newer_database_and_an_impossible_version_are_refused(void **state) {
     (void)state;
     static Problem problem;
     problem_clear(&problem);
@@ -384,6 +384,10 @@ static void a_newer_database_is_refused(void **state) {
     assert_int_equal(database_migrate(database, one_step, &problem), STATUS_CONFLICT);
     assert_non_null(strstr(problem.detail, "newer"));
     assert_non_null(strstr(problem.detail, folder));
+    assert_int_equal(database_execute(database, "PRAGMA user_version = -1", NULL), STATUS_OK);
+    problem_clear(&problem);
+    assert_int_equal(database_migrate(database, two_steps, &problem), STATUS_CONFLICT);
+    assert_non_null(strstr(problem.detail, "damaged"));
     database_close(database);
 }
 
@@ -605,7 +609,7 @@ int main(void) {
         IN_FOLDER(what_was_acknowledged_survives_kill_9),
         IN_FOLDER(a_full_disk_is_told_and_what_was_there_stays),
         IN_FOLDER(a_database_is_migrated_from_each_step),
-        IN_FOLDER(a_newer_database_is_refused),
+        IN_FOLDER(a_newer_database_and_an_impossible_version_are_refused),
         IN_FOLDER(a_database_of_another_program_is_refused_and_left_alone),
         IN_FOLDER(revisions_of_materials_never_change),
         IN_FOLDER(late_rows_are_found_at_once_and_written_soon),
