@@ -152,9 +152,10 @@ static Status loop_start(Loop *loop, Desk *desk, size_t most, Problem *problem) 
     const bool is_tls = settings->certificate != NULL;
     const unsigned flags = MHD_USE_EPOLL | MHD_USE_NO_LISTEN_SOCKET | MHD_ALLOW_SUSPEND_RESUME |
                            MHD_USE_TURBO | (is_tls ? (unsigned)MHD_USE_TLS : 0);
+    // -RSA: no key exchange without forward secrecy.
     const struct MHD_OptionItem tls[] = {
         {MHD_OPTION_HTTPS_PRIORITIES, 0,
-         (void *)(uintptr_t) "SECURE128:-VERS-ALL:+VERS-TLS1.2:+VERS-TLS1.3"},
+         (void *)(uintptr_t) "SECURE128:-VERS-ALL:+VERS-TLS1.2:+VERS-TLS1.3:-RSA"},
         {MHD_OPTION_END, 0, NULL}};
     const struct MHD_OptionItem none[] = {{MHD_OPTION_END, 0, NULL}};
     loop->daemon = MHD_start_daemon(
@@ -171,13 +172,14 @@ static Status loop_start(Loop *loop, Desk *desk, size_t most, Problem *problem) 
                            is_tls ? " with this certificate and key" : "");
     const bool has_bell = bell_open(&loop->bell);
     pthread_mutex_init(&loop->lock, NULL);
-    if (has_bell && pthread_create(&loop->thread, NULL, run_loop, loop) == 0)
+    const int code = has_bell ? pthread_create(&loop->thread, NULL, run_loop, loop) : errno;
+    if (code == 0)
         return STATUS_OK;
     MHD_stop_daemon(loop->daemon);
     pthread_mutex_destroy(&loop->lock);
     bell_close(&loop->bell);
     return problem_set(problem, STATUS_INTERNAL, "an event loop cannot be started: %s",
-                       strerror(errno));
+                       strerror(code));
 }
 
 // No callback runs any more.
@@ -229,11 +231,13 @@ static Status start(Listener *listener, Problem *problem) {
     for (; listener->loop_count < most; listener->loop_count++)
         TRY(loop_start(&listener->loops[listener->loop_count], desk, listener->connections_most,
                        problem));
-    listener->is_accepting = bell_open(&listener->bell) &&
-                             pthread_create(&listener->acceptor, NULL, accept_all, listener) == 0;
+    const int code = bell_open(&listener->bell)
+                         ? pthread_create(&listener->acceptor, NULL, accept_all, listener)
+                         : errno;
+    listener->is_accepting = code == 0;
     if (!listener->is_accepting)
         return problem_set(problem, STATUS_INTERNAL, "the accepting thread cannot be started: %s",
-                           strerror(errno));
+                           strerror(code));
     return STATUS_OK;
 }
 

@@ -212,6 +212,17 @@ def test_tls_serves_and_refuses_bad_files():
             with urllib.request.urlopen(url + "/", context=ssl.create_default_context(cafile=cert), timeout=20) as reply:
                 assert reply.headers["Strict-Transport-Security"].startswith("max-age="), reply.headers
                 assert f"{url}/v1/jobs" in reply.read().decode()
+            port = int(url.rsplit(":", 1)[1])
+            for ciphers, is_taken in (("ECDHE+AESGCM", True), ("AES128-GCM-SHA256", False)):
+                context = ssl.create_default_context(cafile=cert)
+                context.maximum_version = ssl.TLSVersion.TLSv1_2
+                context.set_ciphers(ciphers)
+                try:
+                    with socket.create_connection(("127.0.0.1", port), timeout=20) as plain, \
+                            context.wrap_socket(plain, server_hostname="localhost"):
+                        assert is_taken, "a key exchange without forward secrecy was accepted"
+                except ssl.SSLError:
+                    assert not is_taken, ciphers
         finally:
             process.terminate()
             process.wait(20)
