@@ -107,6 +107,7 @@ static Status pause_until_kept(const Request *request, Reply *reply, Job *job, b
 
 static Status dry_run(App *app, const Request *request, Reply *reply, Problem *problem) {
     DryRun run = {0};
+    TRY(intake_charge(app->intake, request->client, problem));
     const Status status =
         intake_dry_run(app->intake, request->body, request->body_size, &run, problem);
     if (status != STATUS_OK) {

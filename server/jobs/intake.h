@@ -30,6 +30,15 @@ typedef struct IntakeSettings {
 Status intake_prepare(Store *store, const char *text, size_t size, const SimulationLimits *limits,
                       StudyRequest *inquiry, Warnings *warnings, Problem *problem);
 
+// The same for a request, of which only so many may plan large structures at once: STATUS_BUSY
+// beyond. *has_place is for intake_leave_place, once the request plans no more; also on failure.
+Status intake_prepare_request(Intake *intake, const char *text, size_t size,
+                              const SimulationLimits *limits, bool *has_place,
+                              StudyRequest *inquiry, Warnings *warnings, Problem *problem);
+void intake_leave_place(Intake *intake, bool has_place);
+// Counts one submission of `client` (NULL: nobody in particular) against its jobs a minute.
+Status intake_charge(Intake *intake, const char *client, Problem *problem);
+
 // "r-" and 64 hexadecimal digits: SHA-256 of the canonical form and the engine's version.
 void intake_result_id(const StudyRequest *inquiry, char target[72]);
 

@@ -120,6 +120,7 @@ struct Intake {
     LayerTally rows, stored;            // results and series found in the database
     size_t keeping_bytes;               // of series on the way there
     atomic_uint_fast64_t deletions;     // of results
+    atomic_int large_plans;             // requests that plan large structures
     Failure failures[OUTCOME_FAILURES]; // of computations for readers, told once
     size_t next_failure;
     Totals totals;

@@ -14,15 +14,47 @@
 #include "server/jobs/prepare_record.h"
 #include "server/jobs/prepare_sweep.h"
 
-Status intake_prepare(Store *store, const char *text, size_t size, const SimulationLimits *limits,
-                      StudyRequest *inquiry, Warnings *warnings, Problem *problem) {
+// Planning takes storeys^3 operations and more, and nothing stops it: from LARGE_STOREYS on (some
+// milliseconds) a request needs a place, so that others are answered meanwhile.
+enum { LARGE_STOREYS = 40, LARGE_PLACES = 4 };
+
+static Status prepare_place(Intake *intake, const StudyRequest *inquiry, bool *has_place,
+                            Problem *problem) {
+    const Scene *scene = &inquiry->simulation.scene;
+    if (scene->structure == NULL || structure_storeys(scene_structure(scene)) < LARGE_STOREYS)
+        return STATUS_OK;
+    *has_place = atomic_fetch_add(&intake->large_plans, 1) < LARGE_PLACES;
+    if (*has_place)
+        return STATUS_OK;
+    atomic_fetch_sub(&intake->large_plans, 1);
+    return problem_set(problem, STATUS_BUSY,
+                       "%d scenes of %d storeys or more are being planned, which is the limit; "
+                       "retry later",
+                       LARGE_PLACES, LARGE_STOREYS);
+}
+
+void intake_leave_place(Intake *intake, bool has_place) {
+    if (has_place)
+        atomic_fetch_sub(&intake->large_plans, 1);
+}
+
+// `has_place` NULL: not for a request.
+static Status prepare(Store *store, Intake *intake, const char *text, size_t size,
+                      const SimulationLimits *limits, bool *has_place, StudyRequest *inquiry,
+                      Warnings *warnings, Problem *problem) {
     // All three add to one problem: what could not be read is judged no further, the rest is.
     Problem *own = NULL;
     if (problem == NULL && (problem = own = calloc(1, sizeof *own)) == NULL)
         return STATUS_NO_MEMORY;
     Status status = read_json(text, size, study_request_fields, inquiry, problem);
     const bool is_object = problem->count == 0 || problem->faults[0].pointer[0] != '\0';
-    if (is_object && (status == STATUS_OK || status == STATUS_INVALID)) {
+    const bool is_read = is_object && (status == STATUS_OK || status == STATUS_INVALID);
+    const Status place = is_read && has_place != NULL
+                             ? prepare_place(intake, inquiry, has_place, problem)
+                             : STATUS_OK;
+    if (place != STATUS_OK) {
+        status = place;
+    } else if (is_read) {
         Status resolved = prepare_materials(store, &inquiry->simulation, warnings, problem);
         const Status record = prepare_record(store, &inquiry->simulation, problem);
         if (resolved == STATUS_OK || (record != STATUS_OK && record != STATUS_INVALID))
@@ -38,6 +70,19 @@ Status intake_prepare(Store *store, const char *text, size_t size, const Simulat
     }
     free(own);
     return status;
+}
+
+Status intake_prepare(Store *store, const char *text, size_t size, const SimulationLimits *limits,
+                      StudyRequest *inquiry, Warnings *warnings, Problem *problem) {
+    return prepare(store, NULL, text, size, limits, NULL, inquiry, warnings, problem);
+}
+
+Status intake_prepare_request(Intake *intake, const char *text, size_t size,
+                              const SimulationLimits *limits, bool *has_place,
+                              StudyRequest *inquiry, Warnings *warnings, Problem *problem) {
+    *has_place = false;
+    return prepare(intake->store, intake, text, size, limits, has_place, inquiry, warnings,
+                   problem);
 }
 
 void intake_result_id(const StudyRequest *inquiry, char target[72]) {
@@ -58,11 +103,10 @@ void dry_run_clear(DryRun *dry_run) {
     fields_clear(plan_report_fields, &dry_run->plan);
 }
 
-Status intake_dry_run(Intake *intake, const char *text, size_t size, DryRun *dry_run,
-                      Problem *problem) {
-    memset(dry_run, 0, sizeof *dry_run);
-    TRY(intake_prepare(intake->store, text, size, &intake->settings.limits, &dry_run->inquiry,
-                       &dry_run->warnings, problem));
+static Status prepare_dry_run(Intake *intake, const char *text, size_t size, bool *has_place,
+                              DryRun *dry_run, Problem *problem) {
+    TRY(intake_prepare_request(intake, text, size, &intake->settings.limits, has_place,
+                               &dry_run->inquiry, &dry_run->warnings, problem));
     intake_result_id(&dry_run->inquiry, dry_run->result);
     TRY(simulation_plan(&dry_run->inquiry.simulation, &dry_run->plan, problem));
     if (scene_warnings_of_pairs(&dry_run->inquiry.simulation.scene, &dry_run->plan.derived,
@@ -71,4 +115,13 @@ Status intake_dry_run(Intake *intake, const char *text, size_t size, DryRun *dry
     TRY(study_request_cost(&dry_run->inquiry, &intake->settings.limits, &dry_run->cost, problem));
     dry_run->is_cached = store_result_exists(intake->store, dry_run->result);
     return STATUS_OK;
+}
+
+Status intake_dry_run(Intake *intake, const char *text, size_t size, DryRun *dry_run,
+                      Problem *problem) {
+    memset(dry_run, 0, sizeof *dry_run);
+    bool has_place;
+    const Status status = prepare_dry_run(intake, text, size, &has_place, dry_run, problem);
+    intake_leave_place(intake, has_place);
+    return status;
 }

@@ -284,6 +284,12 @@ static Status enter_client(Intake *intake, const Submission *submission, Client 
     return status;
 }
 
+Status intake_charge(Intake *intake, const char *client, Problem *problem) {
+    Client *charged;
+    const Submission submission = {.client = client};
+    return enter_client(intake, &submission, &charged, problem);
+}
+
 // A record that it names may have been deleted since it was looked up under `generation`. From here
 // on none is before the store knows of the job.
 static Status submit_named(Intake *intake, Job *job, StudyRequest *inquiry, uint64_t generation,
@@ -310,8 +316,10 @@ static Status submit_new(Intake *intake, const Submission *submission, const Key
     StudyRequest inquiry = {0};
     Warnings warnings = {NULL, 0};
     const uint64_t generation = store_generation(intake->store);
-    Status status = intake_prepare(intake->store, submission->text, submission->size,
-                                   &intake->settings.limits, &inquiry, &warnings, problem);
+    bool has_place;
+    Status status =
+        intake_prepare_request(intake, submission->text, submission->size, &intake->settings.limits,
+                               &has_place, &inquiry, &warnings, problem);
     if (status == STATUS_OK)
         status = fill_job(job, &inquiry, &warnings, problem);
     if (status == STATUS_OK)
@@ -320,6 +328,7 @@ static Status submit_new(Intake *intake, const Submission *submission, const Key
         status = submit(intake, job, &inquiry, submission->retry_of != NULL, problem);
     else if (status == STATUS_OK)
         status = submit_named(intake, job, &inquiry, generation, submission, problem);
+    intake_leave_place(intake, has_place);
     study_request_clear(&inquiry);
     warnings_clear(&warnings);
     if (status != STATUS_OK) {

@@ -34,6 +34,23 @@ def test_a_full_queue_is_503():
         assert daemon.get("/health/ready").status == 200
 
 
+def test_dry_runs_of_large_scenes_leave_room_for_others():
+    """Of many dry runs of 200 storeys some get 503 with Retry-After; reads are answered meanwhile, and later ones are taken."""
+    large = sponge(structure={"kind": "frame", "masses": [1] * 200, "stiffnesses": [900] * 200, "damping_ratio": 0.02},
+                   excitation={"kind": "random", "band": [1, 50], "rms": 1, "seed": 1})
+    with program.daemon("--workers", "1") as daemon, concurrent.futures.ThreadPoolExecutor(48) as pool:
+        asked = [pool.submit(daemon.request, "POST", "/v1/jobs?dry_run=1", json=large) for _ in range(48)]
+        while not all(one.done() for one in asked):
+            assert daemon.get("/v1/jobs").status == 200
+        replies = [one.result() for one in asked]
+        refused = [reply for reply in replies if reply.status != 200]
+        assert 0 < len(refused) < len(replies), [reply.status for reply in replies]
+        for reply in refused:
+            problem(reply, 503)
+            assert int(reply.headers["retry-after"]) >= 1, reply.headers
+        assert daemon.request("POST", "/v1/jobs?dry_run=1", json=large).status == 200
+
+
 def test_many_at_once():
     """200 clients who wait while others ask: every answer comes, none is mixed up, none stalls."""
     with program.daemon("--workers", "2") as daemon:
