@@ -31,7 +31,7 @@ typedef struct ServeSettings {
     uint64_t workers, queue, queue_bytes, max_body, max_samples, max_impacts, max_run_bytes,
         max_points, cache_bytes, store_bytes;
     uint64_t quota, keep_jobs, keep_bytes;
-    double max_cpu_seconds, rate, keep_days;
+    double max_cpu_seconds, max_study_seconds, rate, keep_days;
     int journal;
     bool require_tokens, print_config;
 } ServeSettings;
@@ -54,6 +54,7 @@ static const Field serve_fields[] = {
     FIELD_COUNT(ServeSettings, max_samples, NULL, WITHIN(2, 1073741824.0), 33554432, "samples per channel a scene may ask for"),
     FIELD_COUNT(ServeSettings, max_impacts, NULL, WITHIN(1, 1e9), 5e5, "impacts a run may have before it is stopped"),
     FIELD_REAL(ServeSettings, max_cpu_seconds, "s", WITHIN(1e-6, 1e9), SIMULATION_CPU_SECONDS, "CPU time a scene may be foretold to take; it is refused beyond, and stopped at about three times as much"),
+    FIELD_REAL(ServeSettings, max_study_seconds, "s", WITHIN(0, 1e9), 3600, "CPU time that a study may be predicted to take; others are refused; 0: any"),
     FIELD_COUNT(ServeSettings, max_run_bytes, "B", WITHIN(1 << 20, 1099511627776.0), SIMULATION_BYTES, "memory a scene may be foretold to take; it is refused beyond"),
     FIELD_COUNT(ServeSettings, max_points, NULL, WITHIN(1, 1e7), SWEEP_POINTS, "points a sweep may have"),
     FIELD_COUNT(ServeSettings, cache_bytes, "B", WITHIN(0, 1099511627776.0), 256 * MIB, "memory for what is kept ready: whole answers a quarter, results the rest"),
@@ -216,6 +217,7 @@ static Status serve(const ServeSettings *settings, const sigset_t *signals, Prob
                                  .store_bytes = settings->store_bytes,
                                  .quota = settings->quota,
                                  .rate = settings->rate,
+                                 .study_seconds = settings->max_study_seconds,
                                  .deleted = {dispatcher.hot, forget_answers},
                                  .limits = {.samples = settings->max_samples,
                                             .impacts = settings->max_impacts,

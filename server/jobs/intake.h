@@ -21,6 +21,7 @@ typedef struct IntakeSettings {
     double rate;        // jobs a minute of one client by name; 0: any number
     Waker deleted;      // called after results were deleted; `wake` may be NULL
     size_t store_bytes; // of series in the database, those that are dearer to compute than to read
+    double study_seconds; // of CPU that a study may be predicted to take; 0: any
     SimulationLimits limits;
 } IntakeSettings;
 
@@ -30,7 +31,7 @@ typedef struct IntakeSettings {
 Status intake_prepare(Store *store, const char *text, size_t size, const SimulationLimits *limits,
                       StudyRequest *inquiry, Warnings *warnings, Problem *problem);
 
-// The same for a request, of which only so many may plan large structures at once: STATUS_BUSY
+// The same for a request, whose study must be within study_seconds and of which only so many may plan large structures at once: STATUS_BUSY
 // beyond. *has_place is for intake_leave_place, once the request plans no more; also on failure.
 Status intake_prepare_request(Intake *intake, const char *text, size_t size,
                               const SimulationLimits *limits, bool *has_place,

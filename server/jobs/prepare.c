@@ -77,12 +77,27 @@ Status intake_prepare(Store *store, const char *text, size_t size, const Simulat
     return prepare(store, NULL, text, size, limits, NULL, inquiry, warnings, problem);
 }
 
+static Status prepare_limit_study(const Intake *intake, const StudyRequest *inquiry,
+                                  Problem *problem) {
+    const double most = intake->settings.study_seconds;
+    Cost cost;
+    if (inquiry->study == NULL || most == 0)
+        return STATUS_OK;
+    TRY(study_request_cost(inquiry, &intake->settings.limits, &cost, problem));
+    if (cost.cpu_seconds <= most)
+        return STATUS_OK;
+    return problem_add(problem, STATUS_INVALID, "/study",
+                       "would take about %.3g s of CPU, at most %g s are allowed: take fewer runs "
+                       "or a shorter duration, or raise --max-study-seconds of the daemon",
+                       cost.cpu_seconds, most);
+}
+
 Status intake_prepare_request(Intake *intake, const char *text, size_t size,
                               const SimulationLimits *limits, bool *has_place,
                               StudyRequest *inquiry, Warnings *warnings, Problem *problem) {
     *has_place = false;
-    return prepare(intake->store, intake, text, size, limits, has_place, inquiry, warnings,
-                   problem);
+    TRY(prepare(intake->store, intake, text, size, limits, has_place, inquiry, warnings, problem));
+    return limits != NULL ? prepare_limit_study(intake, inquiry, problem) : STATUS_OK;
 }
 
 void intake_result_id(const StudyRequest *inquiry, char target[72]) {

@@ -297,6 +297,21 @@ def test_equal_scenes_in_flight_are_computed_once():
         assert len({job["timing"]["run"] for job in fresh}) == 1, "it was computed more than once"
 
 
+def test_a_study_beyond_its_limit_is_refused():
+    """--max-study-seconds: a study predicted to take more CPU time is a fault at /study with both numbers, by a dry run too."""
+    study = {"kind": "sweep", "axes": [{"pointer": "/dampers/0/clearance", "from": 0.005, "to": 0.02, "count": 100000}]}
+    asked = {**program.scene("paper_random_sponge"), "duration": 1000, "study": study}
+    with program.daemon("--max-study-seconds", "1") as daemon:
+        for path in ("/v1/jobs", "/v1/jobs?dry_run=1"):
+            reply = daemon.request("POST", path, json=asked)
+            fault = reply.json()["errors"][0]
+            assert reply.status == 422 and fault["pointer"] == "/study" and "at most 1 s" in fault["detail"], reply
+        small = {**asked, "duration": 1, "study": {**study, "axes": [{**study["axes"][0], "count": 3}]}}
+        assert daemon.submit(small).json()["status"] == "successful"
+    with program.daemon("--max-study-seconds", "0") as daemon:
+        assert daemon.request("POST", "/v1/jobs?dry_run=1", json=asked).status == 200
+
+
 def test_a_full_queue_says_when_to_come_back():
     """503 with Retry-After within [1, 3600] that grows with the work ahead; a dismissed job gives its place back."""
     found = []
