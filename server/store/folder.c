@@ -1,5 +1,5 @@
-// The lock is flock's: it ends with the process however that ends, and the file may stay behind.
-// Its text, the holder's number, is for people only.
+// The lock is flock's on the folder itself: it ends with the process however that ends. The file
+// impactd.lock has the holder's number, for the message alone, and may stay behind or be removed.
 #include "server/store/folder.h"
 
 #include <errno.h>
@@ -32,11 +32,13 @@ Status folder_make(const char *directory, Problem *problem) {
     return STATUS_OK;
 }
 
-static void say_who(const char *directory, int lock, Problem *problem) {
+static void folder_report_holder(const char *directory, const char *path, Problem *problem) {
     char holder[32] = "";
-    const ssize_t size = read(lock, holder, sizeof holder - 1);
-    if (size > 0)
+    const int file = open(path, O_RDONLY | O_CLOEXEC);
+    if (file >= 0 && read(file, holder, sizeof holder - 1) > 0)
         holder[strspn(holder, "0123456789")] = '\0';
+    if (file >= 0)
+        close(file);
     problem_set(problem, STATUS_CONFLICT,
                 "another impactd%s%s%s uses the folder %s; stop it or choose another folder",
                 holder[0] != '\0' ? " (process " : "", holder, holder[0] != '\0' ? ")" : "",
@@ -48,22 +50,30 @@ Status folder_lock(const char *directory, int *lock, Problem *problem) {
     *lock = -1;
     TRY(folder_make(directory, problem));
     snprintf(path, sizeof path, "%s/impactd.lock", directory);
-    const int file = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
-    if (file < 0)
-        return problem_set(problem, STATUS_IO, "cannot make %s: %s", path, strerror(errno));
-    if (flock(file, LOCK_EX | LOCK_NB) != 0) {
+    const int folder = open(directory, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (folder < 0)
+        return problem_set(problem, STATUS_IO, "cannot open the folder %s: %s", directory,
+                           strerror(errno));
+    if (flock(folder, LOCK_EX | LOCK_NB) != 0) {
         const int code = errno;
         if (code == EWOULDBLOCK)
-            say_who(directory, file, problem);
-        close(file);
+            folder_report_holder(directory, path, problem);
+        close(folder);
         return code == EWOULDBLOCK
                    ? STATUS_CONFLICT
-                   : problem_set(problem, STATUS_IO, "cannot lock %s: %s", path, strerror(code));
+                   : problem_set(problem, STATUS_IO, "cannot lock the folder %s: %s", directory,
+                                 strerror(code));
     }
-    // A full disk is no reason not to start.
-    if (ftruncate(file, 0) == 0)
+    const int file = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+    const int code = errno;
+    if (file >= 0) { // a full disk is no reason not to start
         (void)dprintf(file, "%ld\n", (long)getpid());
-    *lock = file;
+        close(file);
+    } else if (code != ENOSPC && code != EDQUOT) {
+        close(folder);
+        return problem_set(problem, STATUS_IO, "cannot make %s: %s", path, strerror(code));
+    }
+    *lock = folder;
     return STATUS_OK;
 }
 

@@ -40,6 +40,21 @@ def walk_links(value, found):
     return found
 
 
+def test_one_daemon_has_a_folder():
+    """A second daemon on one folder is refused and names the first, also after impactd.lock was removed; when it has ended it starts."""
+    with program.daemon() as daemon:
+        for _ in range(2):
+            done = impactd("serve", "--listen", "127.0.0.1:0", "--data", daemon.data)
+            assert done.returncode != 0 and "uses the folder" in done.stderr and daemon.data in done.stderr, done
+            lock = os.path.join(daemon.data, "impactd.lock")
+            if os.path.exists(lock):
+                assert str(daemon.process.pid) in done.stderr, done
+                os.remove(lock)
+        daemon.stop()
+        daemon.start()
+        assert daemon.get("/version").status == 200
+
+
 def test_behind_a_base_url_every_link_begins_with_it():
     """Links, Location, Link, landing page and openapi's server carry the base; paths come in with and without it."""
     base = "https://sim.example.org/impactd"
