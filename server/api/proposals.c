@@ -9,8 +9,8 @@
 #include "server/api/query.h"
 #include "server/base/link.h"
 #include "server/codec/write.h"
-#include "server/encode/chart_evaluation.h"
-#include "server/encode/svg.h"
+#include "server/encode/chart.h"
+#include "server/encode/charts.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
 #include "server/http/shield.h"
@@ -100,7 +100,7 @@ static Status take_asked(const Request *request, const MaterialState *state, Tak
 
 // Which of the extensions.
 static Status choose_format(const Request *request, Reply *reply, int *format, Problem *problem) {
-    static const char *const types[] = {"application/json", svg_type, NULL};
+    static const char *const types[] = {"application/json", chart_type, NULL};
     const char *extension = request->parameters[1];
     reply->varies_by_accept = extension == NULL;
     *format = extension == NULL ? header_accept(request->accept, types) : -1;
@@ -172,8 +172,8 @@ static Status tell(App *app, const Request *request, const Taken *taken,
 static Status tell_chart(App *app, const Request *request, const Evaluation *evaluation,
                          Reply *reply, Problem *problem) {
     Bytes bytes = {.most = app->reply_most};
-    chart_evaluation(evaluation, request->parameters[0], &bytes);
-    return reply_bytes(reply, 200, svg_type, &bytes, problem);
+    charts_evaluation(evaluation, request->parameters[0], &bytes);
+    return reply_bytes(reply, 200, chart_type, &bytes, problem);
 }
 
 static Status propose(App *app, const Request *request, const Material *before, Taken *taken,

@@ -9,7 +9,7 @@
 #include "server/api/app.h"
 #include "server/codec/read.h"
 #include "server/encode/answer.h"
-#include "server/encode/svg.h"
+#include "server/encode/chart.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
 #include "server/http/shield.h"
@@ -70,7 +70,7 @@ static Status choose_format(const Request *request, const AnswerFormat *formats,
 Status study_format(const Request *request, const AnswerFormat *formats, Reply *reply,
                     const AnswerFormat **format, Problem *problem) {
     TRY(choose_format(request, formats, reply, format, problem));
-    if ((*format)->content_type == svg_type)
+    if ((*format)->content_type == chart_type)
         reply->policy = shield_drawing_policy;
     return STATUS_OK;
 }

@@ -9,7 +9,7 @@
 #include "server/base/link.h"
 #include "server/codec/write.h"
 #include "server/encode/answer.h"
-#include "server/encode/chart_sweep.h"
+#include "server/encode/charts.h"
 #include "server/encode/encoding.h"
 #include "server/encode/sweep_columns.h"
 #include "server/encode/sweep_table.h"
@@ -153,7 +153,7 @@ static Status send_chart(App *app, Reply *reply, const char *content_type, Sendi
                          Problem *problem) {
     const SweepSource source = {sending->show.rows, sweep_show_read, &sending->show};
     Bytes bytes = {.most = app->reply_most};
-    Status status = chart_sweep(sending->show.sweep, &source, &bytes)
+    Status status = charts_sweep(sending->show.sweep, &source, &bytes)
                         ? reply_bytes(reply, 200, content_type, &bytes, problem)
                         : refuse_changed(problem);
     bytes_clear(&bytes);

@@ -4,16 +4,12 @@
 #include <string.h>
 
 #include "server/encode/chart.h"
-#include "server/encode/chart_compare.h"
-#include "server/encode/chart_ensemble.h"
-#include "server/encode/chart_sensitivity.h"
-#include "server/encode/chart_sweep.h"
+#include "server/encode/charts.h"
 #include "server/encode/compare_csv.h"
 #include "server/encode/ensemble_csv.h"
 #include "server/encode/mat.h"
 #include "server/encode/npy.h"
 #include "server/encode/sensitivity_csv.h"
-#include "server/encode/svg.h"
 #include "server/encode/sweep_columns.h"
 #include "server/encode/sweep_npz.h"
 #include "server/encode/sweep_table.h"
@@ -25,11 +21,11 @@ static void json_write(const Variant *answer, Bytes *bytes) {
 }
 
 static void tradeoff_chart(const Variant *answer, Bytes *bytes) {
-    chart_tradeoff((const Tradeoff *)(const void *)answer, bytes);
+    charts_tradeoff((const Tradeoff *)(const void *)answer, bytes);
 }
 
 static void ensemble_chart(const Variant *answer, Bytes *bytes) {
-    chart_ensemble((const Ensemble *)(const void *)answer, bytes);
+    charts_ensemble((const Ensemble *)(const void *)answer, bytes);
 }
 
 static void ensemble_table(const Variant *answer, Bytes *bytes) {
@@ -55,7 +51,7 @@ static void sweep_variables(const Variant *answer, Bytes *bytes) {
 static void sweep_chart(const Variant *answer, Bytes *bytes) {
     const Sweep *sweep = (const Sweep *)(const void *)answer;
     const SweepSource source = sweep_source(sweep);
-    (void)chart_sweep(sweep, &source, bytes);
+    (void)charts_sweep(sweep, &source, bytes);
 }
 
 static void sweep_table(const Variant *answer, Bytes *bytes) {
@@ -63,7 +59,7 @@ static void sweep_table(const Variant *answer, Bytes *bytes) {
 }
 
 static void compare_chart(const Variant *answer, Bytes *bytes) {
-    chart_compare((const Comparison *)(const void *)answer, bytes);
+    charts_compare((const Comparison *)(const void *)answer, bytes);
 }
 
 static void compare_table(const Variant *answer, Bytes *bytes) {
@@ -71,7 +67,7 @@ static void compare_table(const Variant *answer, Bytes *bytes) {
 }
 
 static void sensitivity_chart(const Variant *answer, Bytes *bytes) {
-    chart_sensitivity((const Sensitivity *)(const void *)answer, bytes);
+    charts_sensitivity((const Sensitivity *)(const void *)answer, bytes);
 }
 
 static void sensitivity_table(const Variant *answer, Bytes *bytes) {
@@ -86,12 +82,12 @@ static const struct {
 } all[] = {
     {&study_tradeoff,
      {{"json", "application/json", false, json_write},
-      {"svg", svg_type, false, tradeoff_chart},
+      {"svg", chart_type, false, tradeoff_chart},
       {NULL, NULL, false, NULL}}},
     {&study_ensemble,
      {{"json", "application/json", false, json_write},
       {"csv", csv_type, false, ensemble_table},
-      {"svg", svg_type, false, ensemble_chart},
+      {"svg", chart_type, false, ensemble_chart},
       {NULL, NULL, false, NULL}}},
     {&study_sweep,
      {{"json", "application/json", false, sweep_whole},
@@ -99,17 +95,17 @@ static const struct {
       {"npy", "application/x-npy", true, sweep_array},
       {"npz", "application/x-npz", true, sweep_archive},
       {"mat", "application/x-matlab-data", true, sweep_variables},
-      {"svg", svg_type, false, sweep_chart},
+      {"svg", chart_type, false, sweep_chart},
       {NULL, NULL, false, NULL}}},
     {&study_compare,
      {{"json", "application/json", false, json_write},
       {"csv", csv_type, false, compare_table},
-      {"svg", svg_type, false, compare_chart},
+      {"svg", chart_type, false, compare_chart},
       {NULL, NULL, false, NULL}}},
     {&study_sensitivity,
      {{"json", "application/json", false, json_write},
       {"csv", csv_type, false, sensitivity_table},
-      {"svg", svg_type, false, sensitivity_chart},
+      {"svg", chart_type, false, sensitivity_chart},
       {NULL, NULL, false, NULL}}},
 };
 

@@ -1,4 +1,4 @@
-// A sweep's table as text: JSON and CSV. Not its chart (chart_sweep.h) and not where the rows come
+// A sweep's table as text: JSON and CSV. Not its chart (charts.h) and not where the rows come
 // from. Used by answer.c and api/sweeps.c.
 #ifndef SERVER_ENCODE_SWEEP_TABLE_H
 #define SERVER_ENCODE_SWEEP_TABLE_H

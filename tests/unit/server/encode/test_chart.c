@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/encode/chart.h"
+#include "server/encode/charts.h"
 
 static TradeoffPoint point_make(char *name, char *solver, double cpu, double error) {
     TradeoffPoint point;
@@ -27,7 +27,7 @@ static char *draw(TradeoffPoint *points, size_t count, double error, uint64_t ch
                                .points = {points, count},
                                .recommendation = {choice, "because a < b & c"}};
     Bytes bytes = {0};
-    chart_tradeoff(&tradeoff, &bytes);
+    charts_tradeoff(&tradeoff, &bytes);
     char *text = bytes_take(&bytes, NULL);
     assert_non_null(text);
     assert_null(strstr(text, "nan"));

@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "server/encode/chart_evaluation.h"
+#include "server/encode/charts.h"
 #include "tests/support/drops.h"
 
 static Problem problem;
@@ -24,7 +24,7 @@ static char *draw(const char *text) {
         evaluation_run(&one, 1, SEPARATION_ZERO_PENETRATION, NULL, &evaluation, &problem),
         STATUS_OK);
     Bytes bytes = {.most = 1 << 20};
-    chart_evaluation(&evaluation, "felt", &bytes);
+    charts_evaluation(&evaluation, "felt", &bytes);
     evaluation_clear(&evaluation);
     fields_clear(drop_test_fields, &test);
     char *svg = bytes_take(&bytes, NULL);

@@ -7,7 +7,7 @@
 
 #include <string.h>
 
-#include "server/encode/chart_sweep.h"
+#include "server/encode/charts.h"
 #include "server/encode/sweep_table.h"
 
 static char clearance[] = "/dampers/0/clearance", metre[] = "m", buffer[] = "/dampers/0/buffer";
@@ -56,7 +56,7 @@ static void rows_that_are_there_are_in_the_table_with_their_status(void **state)
 
 static void draw(const Sweep *sweep, Bytes *bytes) {
     const SweepSource source = sweep_source(sweep);
-    assert_true(chart_sweep(sweep, &source, bytes));
+    assert_true(charts_sweep(sweep, &source, bytes));
 }
 
 static size_t count_of(const char *text, const char *what) {
