@@ -144,7 +144,7 @@ static bool has_to_send(const Request *request, Reply *reply, const Look *look,
 
 Status results_force(App *app, const Request *request, Reply *reply, Problem *problem) {
     const Encoder *encoder = NULL;
-    TRY(tables_encoder(request, 2, reply, &encoder, problem));
+    TRY(tables_encoder(request, 2, false, reply, &encoder, problem));
     if (request->kept != NULL) {
         Aside *aside = request->kept;
         if (aside_is_done(aside))

@@ -141,7 +141,7 @@ static Status choose_impacts(App *app, const Request *request, bool is_json, con
 static Status results_part(App *app, const Request *request, Reply *reply, Document document,
                            Problem *problem) {
     const Encoder *encoder = NULL;
-    TRY(tables_encoder(request, 1, reply, &encoder, problem));
+    TRY(tables_encoder(request, 1, document == DOCUMENT_PSD, reply, &encoder, problem));
     ResultRow row = {.count = 0};
     const char *text = NULL;
     Bytes window = {.most = 0};

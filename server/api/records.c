@@ -176,7 +176,7 @@ Status records_samples(App *app, const Request *request, Reply *reply, Problem *
     NamedRecord *named;
     Sheet sheet = {.encoding = NULL};
     char tag[96];
-    TRY(tables_encoder(request, 1, reply, &encoder, problem));
+    TRY(tables_encoder(request, 1, false, reply, &encoder, problem));
     TRY(store_record_named(app->store, request->parameters[0], &named, problem));
     snprintf(tag, sizeof tag, "%.64s-%.8s", named->digest, encoder->extension);
     const Status status = fill(request, named, &sheet, problem);

@@ -64,7 +64,7 @@ static Status choose(const Request *request, Sheet *sheet, Problem *problem) {
 Status results_series(App *app, const Request *request, Reply *reply, Problem *problem) {
     const Encoder *encoder = NULL;
     Sheet sheet = {.encoding = NULL};
-    TRY(tables_encoder(request, 1, reply, &encoder, problem));
+    TRY(tables_encoder(request, 1, true, reply, &encoder, problem));
     TRY(tables_outcome(app, request, reply, "series", encoder->extension, &sheet.outcome, problem));
     if (sheet.outcome == NULL)
         return STATUS_OK;

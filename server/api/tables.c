@@ -9,8 +9,10 @@
 #include "server/base/clock.h"
 #include "server/base/shortest.h"
 #include "server/encode/buckets.h"
+#include "server/encode/svg.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
+#include "server/http/shield.h"
 
 // Up to so many bytes an answer is made at once: then it can be kept, and compressed.
 enum { WHOLE_MAX = 4 << 20 };
@@ -95,30 +97,37 @@ Status tables_buckets(const Request *request, Sheet *sheet, Problem *problem) {
     return STATUS_OK;
 }
 
-Status tables_encoder(const Request *request, size_t parameter, Reply *reply,
+Status tables_encoder(const Request *request, size_t parameter, bool has_chart, Reply *reply,
                       const Encoder **encoder, Problem *problem) {
     const char *extension = request->parameters[parameter];
     char known[96] = "";
     const char *types[16] = {NULL};
-    for (size_t i = 0; encoders[i] != NULL && i + 1 < COUNT(types); i++) {
+    const Encoder *offered[16];
+    size_t count = 0;
+    int choice = -1;
+    for (size_t i = 0; encoders[i] != NULL && count + 1 < COUNT(types); i++) {
+        if (encoders[i] == &encoder_svg && !has_chart)
+            continue;
         text_list(known, sizeof known, encoders[i]->extension);
-        types[i] = encoders[i]->content_type;
-        types[i + 1] = NULL;
+        if (extension != NULL && strcmp(extension, encoders[i]->extension) == 0)
+            choice = (int)count;
+        offered[count] = encoders[i];
+        types[count++] = encoders[i]->content_type;
     }
-    if (extension != NULL) {
-        *encoder = encoder_find(extension);
-        if (*encoder != NULL)
-            return STATUS_OK;
-        return problem_set(problem, STATUS_NOT_FOUND, "there is no format \"%.20s\"; there are %s",
-                           extension, known);
+    if (extension == NULL) {
+        reply->varies_by_accept = true;
+        choice = header_accept(request->accept, types);
     }
-    reply->varies_by_accept = true;
-    const int choice = header_accept(request->accept, types);
     if (choice < 0)
-        return problem_set(problem, STATUS_NOT_ACCEPTABLE,
-                           "none of the formats fits Accept; there are %s, by extension too",
-                           known);
-    *encoder = encoders[choice];
+        return extension != NULL
+                   ? problem_set(problem, STATUS_NOT_FOUND,
+                                 "there is no format \"%.20s\"; there are %s", extension, known)
+                   : problem_set(problem, STATUS_NOT_ACCEPTABLE,
+                                 "none of the formats fits Accept; there are %s, by extension too",
+                                 known);
+    *encoder = offered[choice];
+    if (*encoder == &encoder_svg)
+        reply->policy = shield_drawing_policy;
     return STATUS_OK;
 }
 

@@ -35,8 +35,9 @@ Status tables_buckets(const Request *request, Sheet *sheet, Problem *problem);
 // The table of spectra as they were saved. (ledgers.c)
 Status sheet_psd(Sheet *sheet, const char *text, Problem *problem);
 
-// The encoder asked for by extension (a parameter of the path), else by Accept.
-Status tables_encoder(const Request *request, size_t parameter, Reply *reply,
+// The encoder asked for by extension (a parameter of the path), else by Accept. `has_chart`: SVG is
+// one of the formats.
+Status tables_encoder(const Request *request, size_t parameter, bool has_chart, Reply *reply,
                       const Encoder **encoder, Problem *problem);
 
 // The outcome of a part of a result. *outcome is a hold, or NULL when the reply is made already:

@@ -55,7 +55,7 @@ static const char overview[] =
     "\n"
     "  impactd serve                        start the daemon on http://127.0.0.1:8080\n"
     "  impactd run scene.json               run one scene here and print the finished job\n"
-    "  impactd run scene.json -o out.csv    write its time series (npy, npz, mat)\n"
+    "  impactd run scene.json -o out.csv    write its time series (npy, npz, mat, svg)\n"
     "  impactd check scene.json             say what is wrong with a scene, or show its plan\n"
     "  impactd tradeoff scene.json          try solvers and steps on it: error against CPU time\n"
     "  impactd ensemble scene.json          many seeds of a random base: means and confidence\n"

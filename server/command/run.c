@@ -226,6 +226,7 @@ const Command command_run = {
         "  impactd run scene.json -o out.csv      write the time series, as a table\n"
         "  impactd run scene.json -o out.npy      the same for numpy.load; .npz by names\n"
         "  impactd run scene.json -o out.mat      the same for MATLAB and Octave\n"
+        "  impactd run scene.json -o out.svg      the same as a chart\n"
         "  impactd run scene.json -o out.json     job, series, impacts and psd in one document\n"
         "  impactd run - < scene.json             from standard input\n"
         "\n"

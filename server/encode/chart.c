@@ -507,7 +507,10 @@ static void panel_put_series(const ChartPanel *panel, const ChartSeries *series,
 
 // Beside the frame the samples are on the left of the texts, in it on the right.
 static void panel_put_legend(const ChartPanel *panel, Bytes *bytes) {
-    double y = panel->top + (panel->has_side_legend ? 10 : 18);
+    double y = panel->top + (panel->has_side_legend ? 10 : 18), count = 0;
+    for (size_t i = 0; i < panel->count; i++)
+        count += panel->series[i].legend[0] != '\0';
+    const double step = fmin(LEGEND_LINE, (panel->bottom - panel->top) / count);
     for (size_t i = 0; i < panel->count; i++) {
         const ChartSeries *series = &panel->series[i];
         if (series->legend[0] == '\0')
@@ -523,7 +526,7 @@ static void panel_put_legend(const ChartPanel *panel, Bytes *bytes) {
         }
         chart_put_text(bytes, panel->has_side_legend ? x + 24 : x - 8, y + 4,
                        panel->has_side_legend ? "start" : "end", NULL, series->legend);
-        y += LEGEND_LINE;
+        y += step;
     }
 }
 

@@ -6,9 +6,10 @@
 #include "server/encode/mat.h"
 #include "server/encode/npy.h"
 #include "server/encode/npz.h"
+#include "server/encode/svg.h"
 
 const Encoder *const encoders[] = {
-    &encoder_json, &encoder_csv, &encoder_npy, &encoder_npz, &encoder_mat, NULL,
+    &encoder_json, &encoder_csv, &encoder_npy, &encoder_npz, &encoder_mat, &encoder_svg, NULL,
 };
 
 const Encoder *encoder_find(const char *extension) {

@@ -6,12 +6,14 @@ import io
 import json
 import os
 import random
+import re
 import shutil
 import socket
 import subprocess
 import sys
 import tempfile
 import time
+import xml.etree.ElementTree
 import zipfile
 
 import numpy as np
@@ -22,6 +24,7 @@ import program  # noqa: E402
 
 FORMATS = ("json", "csv", "npy", "npz", "mat")
 BINARY = ("npy", "npz", "mat")
+SVG = "{http://www.w3.org/2000/svg}"
 AXES = {"series": "time", "psd": "frequency", "force": "time"}
 
 
@@ -229,7 +232,8 @@ def test_conditions_and_ranges_hold_for_every_format():
         long.update(duration=150)
         paths = [f"{base}/{part}.{form}" for part in ("series", "psd", "impacts", "energy", "impacts/2/force")
                  for form in FORMATS]
-        paths += [f"{finished(daemon, long)}/series.{form}" for form in FORMATS]
+        paths += [f"{finished(daemon, long)}/series.{form}" for form in (*FORMATS, "svg")]
+        paths += [f"{base}/psd.svg"]
         paths += [f"{base}/bundle.zip"]
         dice = random.Random(6)
         tags = set()
@@ -398,11 +402,57 @@ def test_what_the_dampers_save_is_told_when_asked_for():
         assert dry[0] > dry[1], dry
 
 
+def chart_of(reply):
+    """The frames of a chart, top to bottom as (top, height), and the coordinates of each line by its name."""
+    assert reply.headers["content-type"] == "image/svg+xml" and len(reply.body) < 400000
+    assert reply.headers["content-security-policy"].startswith("default-src 'none'; style-src 'unsafe-inline'; ")
+    text = reply.body.decode()
+    assert "nan" not in text and "inf" not in text and "<script" not in text and "prefers-color-scheme: dark" in text
+    root = xml.etree.ElementTree.fromstring(text)
+    frames = [(float(one.get("y")), float(one.get("height"))) for one in root.iter(SVG + "rect") if one.get("class") == "frame"]
+    lines = {one.find(SVG + "title").text: np.array(re.findall(r"[ML](\S+?) ([^ML]+)", one.get("d")), dtype=float)
+             for one in root.iter(SVG + "path") if one.find(SVG + "title") is not None}
+    return root, frames, lines
+
+
+def test_series_and_spectra_are_drawn():
+    """A panel for each unit and a line for each channel, whose extremes are those of the samples; a window of them alone;
+    spectra; what has no chart has none."""
+    with program.daemon() as daemon:
+        scene = program.scene("paper_random_sponge")
+        scene["duration"] = 60
+        base = finished(daemon, scene)
+        for query in ("", "?from=20.5&to=31", "?points=5000"):
+            rows = csv_columns(get(daemon, f"{base}/series.csv{query.partition('?points')[0]}").body)
+            _, frames, lines = chart_of(get(daemon, f"{base}/series.svg{query}"))
+            assert set(lines) == set(rows) - {"time"}, (set(lines), set(rows))
+            assert len(frames) == 4 and all(100 < len(line) <= 1600 for line in lines.values())
+            alone = [("velocity", 1), ("acceleration", 2), ("contact_force", 3)]
+            for name, panel in alone:  # 5 % of the range are free above and below
+                top, height = frames[panel]
+                span = height / 1.1
+                ends = (top + height / 2 - span / 2, top + height / 2 + span / 2)
+                assert np.allclose((lines[name][:, 1].min(), lines[name][:, 1].max()), ends, atol=0.11), (query, name)
+        _, frames, lines = chart_of(get(daemon, f"{base}/series.svg?channels=contact_force"))
+        assert len(frames) == 1 and list(lines) == ["contact_force"]
+        root, frames, lines = chart_of(get(daemon, f"{base}/psd.svg"))
+        assert len(frames) == 1 and list(lines) == ["mean_acceleration"]
+        texts = [one.text for one in root.iter(SVG + "text")]
+        assert "mean_acceleration [(m/s^2)^2/Hz]" in texts and "frequency [Hz]" in texts, texts
+        for part in ("series", "psd"):
+            asked = get(daemon, f"{base}/{part}", headers={"Accept": "image/svg+xml"})
+            assert asked.body == get(daemon, f"{base}/{part}.svg").body and "Accept" in asked.headers["vary"]
+            refused = daemon.get(f"{base}/{part}.xml")
+            assert refused.status == 404 and "json, csv, npy, npz, mat, svg" in refused.json()["detail"]
+        for part in ("impacts", "energy", "impacts/1/force"):
+            assert daemon.get(f"{base}/{part}.svg").status == 404
+
+
 def test_the_command_writes_every_format():
-    """impactd run -o OUT.{csv,npy,npz,mat} writes what the daemon answers."""
+    """impactd run -o OUT.{csv,npy,npz,mat,svg} writes what the daemon answers."""
     with program.daemon() as daemon, tempfile.TemporaryDirectory() as folder:
         base = finished(daemon, program.scene("paper_free_sponge"))
-        for form in FORMATS[1:]:
+        for form in (*FORMATS[1:], "svg"):
             path = os.path.join(folder, "out." + form)
             code, _, errors = program.run("run", os.path.join(program.EXAMPLES, "paper_free_sponge.json"), "-o", path)
             assert code == 0, errors
