@@ -54,6 +54,14 @@ ChartPanel *chart_panel(Chart *chart, double left, double right, double top, dou
     return panel;
 }
 
+ChartPanel *chart_spectra(Chart *chart, double left, double right, double top, double bottom) {
+    ChartPanel *panel = chart_panel(chart, left, right, top, bottom);
+    panel->x.is_logarithmic = panel->y.is_logarithmic = true;
+    panel->y.max_decades = CHART_DECADES;
+    text_fit(panel->x.title, CHART_TEXT, "frequency [Hz]");
+    return panel;
+}
+
 ChartSeries *chart_series(ChartPanel *panel, ChartKind kind, const double *x, const double *y,
                           const double *high, size_t count) {
     ChartSeries *series = &panel->series[panel->count < CHART_SERIES ? panel->count++ : 0];
@@ -133,6 +141,20 @@ static void chart_put_style(Bytes *bytes) {
                ".ring, .cross { stroke-width: 1.5; } .cross, .all { stroke: #888888; }\n"
                ".half { fill: #888888; fill-opacity: 0.35; } .mean { stroke-width: 2; }\n"
                ".bad { fill: #9a9a9a; }\n</style>\n");
+}
+
+void chart_quantity(char *target, const char *name, const char *unit) {
+    const bool has_unit = unit != NULL && *unit != '\0';
+    chart_format(target, CHART_TEXT, "%.120s%s%.24s%s", name != NULL ? name : "",
+                 has_unit ? " [" : "", has_unit ? unit : "", has_unit ? "]" : "");
+}
+
+void chart_note(Chart *chart, const char *before, const char *text) {
+    if (text == NULL)
+        return;
+    bytes_text(&chart->description, before);
+    chart_text(&chart->description, text);
+    bytes_text(&chart->description, ".");
 }
 
 // --- axes ---
@@ -372,18 +394,6 @@ static void series_put_extents(const ChartPanel *panel, const ChartSeries *serie
     }
 }
 
-static void series_put_steps(const ChartPanel *panel, const ChartSeries *series, Bytes *bytes) {
-    bool is_open = false;
-    for (size_t i = 0; i < series->count; i++)
-        if (series_has_x(panel, series, i)) {
-            bytes_format(bytes, is_open ? "H%.1fV%.1f" : "M%.1f %.1f", panel_x(panel, series->x[i]),
-                         panel_y(panel, series->y[i]));
-            is_open = true;
-        }
-    if (is_open)
-        bytes_format(bytes, "H%.0f", panel->right);
-}
-
 static void series_put_line(const ChartPanel *panel, const ChartSeries *series, Bytes *bytes) {
     if (series->count == 0)
         return;
@@ -394,8 +404,6 @@ static void series_put_line(const ChartPanel *panel, const ChartSeries *series, 
         series_put_means(panel, series, series->high, false, bytes);
         series_put_means(panel, series, series->y, true, bytes);
         bytes_text(bytes, "z");
-    } else if (series->kind == CHART_STEPS) {
-        series_put_steps(panel, series, bytes);
     } else if (series->high != NULL || series->is_joined) {
         series_put_extents(panel, series, bytes);
     } else {

@@ -15,6 +15,7 @@ enum {
     CHART_ROWS = 8,
     CHART_CELLS = 8,
     CHART_BLOCKS = 24,
+    CHART_DECADES = 8,
     CHART_TEXT = 160,
     CHART_LABEL = 48,
 };
@@ -41,7 +42,6 @@ typedef struct ChartAxis {
 
 typedef enum ChartKind {
     CHART_LINE,    // joins the points
-    CHART_STEPS,   // from each point to the right, then to the next one's height
     CHART_BAND,    // between `y` and `high`
     CHART_MARKERS, // each point's shape
     CHART_MAP,     // a cell for each value, row by row from the bottom
@@ -127,6 +127,13 @@ ChartSeries *chart_series(ChartPanel *panel, ChartKind kind, const double *x, co
 // Formats a text of a chart; one that is too long ends with "...".
 void chart_format(char *target, size_t size, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
+
+// Adds a panel for spectra over frequency, both logarithmic; not more than CHART_DECADES are shown.
+ChartPanel *chart_spectra(Chart *chart, double left, double right, double top, double bottom);
+// "NAME [UNIT]" in target[CHART_TEXT].
+void chart_quantity(char *target, const char *name, const char *unit);
+// Appends "BEFORE TEXT." to the description, TEXT escaped; nothing where `text` is NULL.
+void chart_note(Chart *chart, const char *before, const char *text);
 
 // Sets the ranges of both axes. False: there is no value to be drawn.
 bool chart_fit(ChartPanel *panel);

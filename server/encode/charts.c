@@ -6,7 +6,7 @@
 
 #include "server/encode/chart.h"
 
-enum { SPECTRA_DRAWN = 4, VARIANTS_DRAWN = 8, READINGS_DRAWN = 5000, PSD_DECADES = 8 };
+enum { SPECTRA_DRAWN = 4, VARIANTS_DRAWN = 8, READINGS_DRAWN = 5000 };
 
 static const double charts_edges[] = {-(double)INFINITY, (double)INFINITY};
 
@@ -18,28 +18,12 @@ static void charts_words(char *target, size_t size, const char *name) {
             *c = ' ';
 }
 
-// "NAME [UNIT]"
-static void charts_quantity(char *target, size_t size, const char *name, const char *unit) {
-    const bool has_unit = unit != NULL && *unit != '\0';
-    chart_format(target, size, "%.120s%s%.24s%s", name != NULL ? name : "", has_unit ? " [" : "",
-                 has_unit ? unit : "", has_unit ? "]" : "");
-}
-
-// Appends "BEFORE TEXT." to the description.
-static void charts_add_note(Chart *chart, const char *before, const char *text) {
-    if (text == NULL)
-        return;
-    bytes_text(&chart->description, before);
-    chart_text(&chart->description, text);
-    bytes_text(&chart->description, ".");
-}
-
 // Appends "Not drawn: NAME", and why.
 static void charts_add_undrawn(Chart *chart, const char *name, const char *before,
                                const char *why) {
     bytes_text(&chart->description, " Not drawn: ");
     chart_text(&chart->description, name);
-    charts_add_note(chart, before, why);
+    chart_note(chart, before, why);
 }
 
 // Two values that are kept with the chart.
@@ -59,23 +43,15 @@ static ChartSeries *charts_add_level(Chart *chart, ChartPanel *panel, double val
                         isnan(high) ? NULL : charts_pair(chart, high, high), 2);
 }
 
-// A panel of spectra over frequency, both logarithmic.
-static ChartPanel *charts_add_spectra(Chart *chart, double left, double right, double top,
-                                      double bottom) {
-    ChartPanel *panel = chart_panel(chart, left, right, top, bottom);
-    panel->x.is_logarithmic = panel->y.is_logarithmic = true;
-    panel->y.max_decades = PSD_DECADES;
-    text_fit(panel->x.title, sizeof panel->x.title, "frequency [Hz]");
-    return panel;
-}
-
 static size_t charts_shorter(const Reals *a, const Reals *b) {
     return a->count < b->count ? a->count : b->count;
 }
 
 // The spectra of many runs, each with a band.
-static void charts_add_bands(ChartPanel *panel, const Reals *frequency, const RunSpectra *spectra,
-                             bool has_mean) {
+static void charts_add_bands(Chart *chart, ChartPanel *panel, const Reals *frequency,
+                             const RunSpectra *spectra, bool has_mean) {
+    for (size_t i = SPECTRA_DRAWN; i < spectra->count; i++)
+        chart_note(chart, " Not drawn: ", spectra->at[i].channel);
     for (size_t i = 0; i < spectra->count && i < SPECTRA_DRAWN; i++) {
         const RunSpectrum *spectrum = &spectra->at[i];
         const Reals *value = has_mean ? &spectrum->mean : &spectrum->value;
@@ -84,17 +60,12 @@ static void charts_add_bands(ChartPanel *panel, const Reals *frequency, const Ru
         ChartSeries *line = chart_series(panel, CHART_LINE, frequency->at, value->at, NULL,
                                          charts_shorter(frequency, value));
         line->colour = i;
-        text_fit(line->name, sizeof line->name, spectrum->channel != NULL ? spectrum->channel : "");
-        charts_quantity(line->legend, sizeof line->legend, spectrum->channel, spectrum->unit);
+        text_fit(line->name, CHART_TEXT, spectrum->channel != NULL ? spectrum->channel : "");
+        chart_quantity(line->legend, spectrum->channel, spectrum->unit);
         const size_t count = charts_shorter(low, high);
         if (count > 0 && count <= frequency->count)
             chart_series(panel, CHART_BAND, frequency->at, low->at, high->at, count)->colour = i;
     }
-}
-
-static void charts_note_undrawn(Chart *chart, const RunSpectra *spectra) {
-    for (size_t i = SPECTRA_DRAWN; i < spectra->count; i++)
-        charts_add_note(chart, " Not drawn: ", spectra->at[i].channel);
 }
 
 // --- tradeoff ---
@@ -132,8 +103,8 @@ static int tradeoff_compare(const void *a, const void *b) {
 }
 
 // The points that are drawn, by CPU time; the others are named in the description.
-static size_t tradeoff_list(Chart *chart, const Tradeoff *tradeoff, TradeoffMark *marks) {
-    const char *groups[CHART_COLOURS];
+static size_t tradeoff_list(Chart *chart, const Tradeoff *tradeoff, TradeoffMark *marks,
+                            const char *groups[CHART_COLOURS]) {
     size_t count = 0, group_count = 0;
     for (size_t i = 0; i < tradeoff->points.count; i++) {
         const TradeoffPoint *point = &tradeoff->points.at[i];
@@ -156,70 +127,86 @@ static size_t tradeoff_list(Chart *chart, const Tradeoff *tradeoff, TradeoffMark
     return count;
 }
 
+// From each point that none is cheaper and closer than along its error to the next one.
+static void tradeoff_add_best(Chart *chart, ChartPanel *panel, const TradeoffMark *marks,
+                              size_t count) {
+    double *x = chart_allocate(chart, 2 * count + 1, sizeof *x);
+    double *y = chart_allocate(chart, 2 * count + 1, sizeof *y);
+    size_t steps = 0;
+    for (size_t i = 0; i < count && !chart->is_failed; i++)
+        if (marks[i].point->is_best) {
+            x[steps] = x[steps + 1] = marks[i].point->cpu_minimum;
+            y[steps] = steps > 0 ? y[steps - 1] : marks[i].error;
+            y[steps + 1] = marks[i].error;
+            steps += 2;
+        }
+    if (steps > 0) {
+        x[steps] = charts_edges[1];
+        y[steps] = y[steps - 1];
+        steps++;
+    }
+    ChartSeries *best = chart_series(panel, CHART_LINE, x, y, y, steps);
+    best->colour = CHART_STRONG;
+    best->look = "best";
+    text_fit(best->legend, CHART_TEXT, "best of all");
+}
+
 // The errors are those of all points; each series has the CPU times of its own.
 static void tradeoff_fill(Chart *chart, ChartPanel *panel, const Tradeoff *tradeoff) {
-    enum { BEST = CHART_COLOURS, CHOICE, LISTS };
+    enum { CHOICE = CHART_COLOURS, LISTS };
     TradeoffMark *marks = chart_allocate(chart, tradeoff->points.count, sizeof *marks);
     double *x = chart_allocate(chart, LISTS * tradeoff->points.count, sizeof *x);
     double *y = chart_allocate(chart, tradeoff->points.count, sizeof *y);
+    const char *groups[CHART_COLOURS] = {NULL};
     if (chart->is_failed)
         return;
-    const size_t count = tradeoff_list(chart, tradeoff, marks);
-    size_t sizes[LISTS] = {0};
+    const size_t count = tradeoff_list(chart, tradeoff, marks, groups);
     for (size_t i = 0; i < count; i++) {
         const TradeoffPoint *point = marks[i].point;
         const uint64_t number = (uint64_t)(point - tradeoff->points.at) + 1;
         y[i] = marks[i].error;
-        for (size_t list = 0; list < LISTS; list++) {
-            const bool is_in = list == BEST     ? point->is_best
-                               : list == CHOICE ? number == tradeoff->recommendation.point
-                                                : list == marks[i].group;
-            x[list * count + i] = is_in ? point->cpu_minimum : (double)NAN;
-            sizes[list] += is_in;
-        }
+        for (size_t list = 0; list < LISTS; list++)
+            x[list * count + i] =
+                (list == CHOICE ? number == tradeoff->recommendation.point : list == marks[i].group)
+                    ? point->cpu_minimum
+                    : (double)NAN;
     }
-    for (size_t i = count, group = 0; group < CHART_COLOURS && sizes[group] > 0; group++) {
+    for (size_t group = 0; group < CHART_COLOURS && groups[group] != NULL; group++) {
         ChartSeries *series = chart_series(panel, CHART_MARKERS, x + group * count, y, NULL, count);
         series->colour = group;
         series->is_joined = true;
         series->describe = tradeoff_describe;
         series->context = marks;
-        for (i = 0; marks[i].group != group;)
-            i++;
-        text_fit(series->legend, sizeof series->legend, tradeoff_group(marks[i].point));
+        text_fit(series->legend, CHART_TEXT, groups[group]);
     }
-    ChartSeries *best = chart_series(panel, CHART_STEPS, x + BEST * count, y, NULL, count);
-    best->colour = CHART_STRONG;
-    best->look = "best";
-    text_fit(best->legend, sizeof best->legend, "best of all");
+    tradeoff_add_best(chart, panel, marks, count);
     if (tradeoff->error > 0) {
         ChartSeries *wanted = charts_add_level(chart, panel, tradeoff->error, (double)NAN);
         wanted->colour = CHART_STRONG;
         wanted->look = "wanted";
-        chart_format(wanted->legend, sizeof wanted->legend, "wanted: %.3g%s", tradeoff->error,
+        chart_format(wanted->legend, CHART_TEXT, "wanted: %.3g%s", tradeoff->error,
                      metric_units[tradeoff->metric]);
     }
     ChartSeries *choice = chart_series(panel, CHART_MARKERS, x + CHOICE * count, y, NULL, count);
     choice->colour = CHART_STRONG;
     choice->shape = CHART_RING;
     choice->look = "ring";
-    text_fit(choice->legend, sizeof choice->legend, "to take");
+    text_fit(choice->legend, CHART_TEXT, "to take");
 }
 
 void charts_tradeoff(const Tradeoff *tradeoff, Bytes *bytes) {
-    Chart chart = {.width = 640, .left = 62};
+    Chart chart = {.width = 640, .height = 430, .left = 62};
     char metric[CHART_LABEL];
     charts_words(metric, sizeof metric, metric_names[tradeoff->metric]);
-    chart.height = 430;
-    chart_format(chart.title, sizeof chart.title, "Error of %s against CPU time", metric);
-    chart_format(chart.heading, sizeof chart.heading, "Error of %s%s", metric,
+    chart_format(chart.title, CHART_TEXT, "Error of %s against CPU time", metric);
+    chart_format(chart.heading, CHART_TEXT, "Error of %s%s", metric,
                  tradeoff->metric == METRIC_PSD ? " [dB]" : "");
-    charts_add_note(&chart, "", tradeoff->recommendation.why);
+    chart_note(&chart, "", tradeoff->recommendation.why);
     ChartPanel *panel = chart_panel(&chart, 62, 486, 44, 376);
     panel->has_side_legend = true;
     panel->x.is_logarithmic = panel->y.is_logarithmic = panel->x.is_whole = true;
     panel->y.has_zero = true;
-    text_fit(panel->x.title, sizeof panel->x.title, "CPU time of a run [s]");
+    text_fit(panel->x.title, CHART_TEXT, "CPU time of a run [s]");
     tradeoff_fill(&chart, panel, tradeoff);
     chart_write(&chart, bytes);
 }
@@ -250,20 +237,19 @@ void charts_ensemble(const Ensemble *ensemble, Bytes *bytes) {
     Chart chart = {.width = 640, .left = 62};
     const unsigned long long runs = ensemble->made - ensemble->failed;
     ChartTable *table = &chart.table;
-    chart_format(chart.title, sizeof chart.title, "Mean of %llu runs", runs);
-    chart_format(chart.heading, sizeof chart.heading, "Mean of %llu runs, with its %g %% interval",
-                 runs, 100 * ensemble->confidence);
+    chart_format(chart.title, CHART_TEXT, "Mean of %llu runs", runs);
+    chart_format(chart.heading, CHART_TEXT, "Mean of %llu runs, with its %g %% interval", runs,
+                 100 * ensemble->confidence);
     bytes_format(&chart.description, "%llu runs of %llu, seeds from %llu; %llu failed.",
                  (unsigned long long)ensemble->made, (unsigned long long)ensemble->runs,
                  (unsigned long long)ensemble->first_seed, (unsigned long long)ensemble->failed);
-    charts_add_note(&chart, " Target: ", ensemble->target.why);
+    chart_note(&chart, " Target: ", ensemble->target.why);
     bytes_format(&chart.description,
                  " Bands and whiskers: %g %% intervals of the mean over all seeds; boxes: half of "
                  "the runs; grey lines: all of them.",
                  100 * ensemble->confidence);
-    charts_note_undrawn(&chart, &ensemble->spectra);
-    ChartPanel *panel = charts_add_spectra(&chart, 62, 626, 44, 300);
-    charts_add_bands(panel, &ensemble->frequency, &ensemble->spectra, true);
+    ChartPanel *panel = chart_spectra(&chart, 62, 626, 44, 300);
+    charts_add_bands(&chart, panel, &ensemble->frequency, &ensemble->spectra, true);
     table->top = chart_fit(panel) ? 362 : 56;
     table->label_right = 190;
     table->interval_width = 280;
@@ -287,21 +273,18 @@ static void compare_add_trace(Chart *chart, ChartPanel *panel, const Comparison 
     ChartSeries *series = chart_series(panel, CHART_LINE, time, entry->trace.minimum.at,
                                        entry->trace.maximum.at, time != NULL ? count : 0);
     series->colour = colour;
-    text_fit(series->name, sizeof series->name, entry->name);
+    text_fit(series->name, CHART_TEXT, entry->name);
 }
 
 void charts_compare(const Comparison *comparison, Bytes *bytes) {
-    Chart chart = {.width = 960, .left = 70};
-    chart.height = 690;
-    text_fit(chart.title, sizeof chart.title, "Contact models compared");
+    Chart chart = {.width = 960, .height = 690, .left = 70, .title = "Contact models compared"};
     bytes_text(&chart.description, "The first is the reference, the scene as it is.");
-    ChartPanel *spectra = charts_add_spectra(&chart, 70, 630, 44, 330);
+    ChartPanel *spectra = chart_spectra(&chart, 70, 630, 44, 330);
     ChartPanel *traces = chart_panel(&chart, 70, 630, 404, 644);
     spectra->has_side_legend = true;
-    charts_quantity(spectra->heading, sizeof spectra->heading, comparison->channel,
-                    comparison->unit);
-    text_fit(traces->heading, sizeof traces->heading, "displacement [m]");
-    text_fit(traces->x.title, sizeof traces->x.title, "time [s]");
+    chart_quantity(spectra->heading, comparison->channel, comparison->unit);
+    text_fit(traces->heading, CHART_TEXT, "displacement [m]");
+    text_fit(traces->x.title, CHART_TEXT, "time [s]");
     size_t drawn = 0;
     for (size_t i = 0; i < comparison->entries.count; i++) {
         const CompareEntry *entry = &comparison->entries.at[i];
@@ -314,11 +297,11 @@ void charts_compare(const Comparison *comparison, Bytes *bytes) {
             chart_series(spectra, CHART_LINE, comparison->frequency.at, entry->density.at, NULL,
                          charts_shorter(&comparison->frequency, &entry->density));
         line->colour = drawn;
-        text_fit(line->name, sizeof line->name, entry->name);
+        text_fit(line->name, CHART_TEXT, entry->name);
         if (drawn == 0 || isnan(entry->psd.level))
-            text_fit(line->legend, sizeof line->legend, entry->name);
+            text_fit(line->legend, CHART_TEXT, entry->name);
         else
-            chart_format(line->legend, sizeof line->legend, "%s: %.2g dB off", entry->name,
+            chart_format(line->legend, CHART_TEXT, "%s: %.2g dB off", entry->name,
                          entry->psd.level);
         compare_add_trace(&chart, traces, comparison, entry, drawn++);
     }
@@ -361,21 +344,18 @@ static void sensitivity_fill_table(ChartTable *table, const Sensitivity *sensiti
 }
 
 void charts_sensitivity(const Sensitivity *sensitivity, Bytes *bytes) {
-    Chart chart = {.width = 760, .left = 70};
-    text_fit(chart.title, sizeof chart.title, "Sensitivity");
+    Chart chart = {.width = 760, .left = 70, .title = "Sensitivity"};
     bytes_format(&chart.description,
                  "Relative change of each statistic over the relative change of each parameter; "
                  "grey ones do not settle, their spread is in brackets. Bands: 5 to 95 %% of %llu "
                  "drawn runs.",
                  (unsigned long long)(sensitivity->made - sensitivity->failed));
-    charts_add_note(&chart, " ", sensitivity->why);
-    charts_note_undrawn(&chart, &sensitivity->spectra);
-    ChartPanel *panel = charts_add_spectra(&chart, 70, 746, 44, 330);
-    charts_add_bands(panel, &sensitivity->frequency, &sensitivity->spectra, false);
+    chart_note(&chart, " ", sensitivity->why);
+    ChartPanel *panel = chart_spectra(&chart, 70, 746, 44, 330);
+    charts_add_bands(&chart, panel, &sensitivity->frequency, &sensitivity->spectra, false);
     const bool has_spectra = chart_fit(panel);
     if (has_spectra)
-        text_fit(panel->heading, sizeof panel->heading,
-                 "Spectra, with 5 to 95 % of the drawn runs");
+        text_fit(panel->heading, CHART_TEXT, "Spectra, with 5 to 95 % of the drawn runs");
     sensitivity_fill_table(&chart.table, sensitivity);
     chart.table.top = has_spectra ? 416 : 50;
     chart.height = chart.table.top + 22 * (STATISTICS_METRICS + 2) + 14;
@@ -484,13 +464,13 @@ static bool sweep_places(const SweepCells *cells, double *x, ChartAxis *axis) {
     for (size_t i = 0; i < cells->columns; i++)
         x[i] = is_numeric ? strtod(values->at[i * cells->group], NULL) : (double)(i * cells->group);
     axis->is_logarithmic = is_numeric && least > 0 && most > 30 * least;
-    axis->padding = 0.015;
+    axis->padding = is_numeric ? 0.015 : 0.08; // room for half a word
     const size_t ticks = values->count < CHART_TICKS ? values->count : CHART_TICKS;
     for (size_t i = 0; i < ticks && !is_numeric; i++) {
         const size_t index = sweep_cells_index(i, ticks, values->count);
         sweep_add_tick(axis, (double)index, values->at[index]);
     }
-    charts_quantity(axis->title, sizeof axis->title, cells->x->pointer, cells->x->unit);
+    chart_quantity(axis->title, cells->x->pointer, cells->x->unit);
     return is_numeric;
 }
 
@@ -502,15 +482,15 @@ static void sweep_add_notes(Chart *chart, const Sweep *sweep, const SweepSource 
                  "%zu of %llu points, %llu failed. Gaps and grey cells: not there.", source->rows,
                  points, failed);
     for (size_t i = 0; is_map && i + 2 < sweep->axes.count; i++)
-        charts_add_note(chart, " Drawn at the first value of ", sweep->axes.at[i].pointer);
+        chart_note(chart, " Drawn at the first value of ", sweep->axes.at[i].pointer);
     for (size_t i = metrics; i < sweep->metrics.count; i++)
-        charts_add_note(chart, " Not drawn: ", sweep->metrics.at[i]);
+        chart_note(chart, " Not drawn: ", sweep->metrics.at[i]);
     if (source->rows < sweep->points)
         chart_format(done, sizeof done, "%zu of ", source->rows);
     if (failed > 0)
         chart_format(failures, sizeof failures, ", %llu failed", failed);
-    chart_format(chart->title, sizeof chart->title, "A sweep of %llu points", points);
-    chart_format(chart->heading, sizeof chart->heading, "%s%llu points%s", done, points, failures);
+    chart_format(chart->title, CHART_TEXT, "A sweep of %llu points", points);
+    chart_format(chart->heading, CHART_TEXT, "%s%llu points%s", done, points, failures);
 }
 
 // Panels of all metrics: one below the other, or maps in two columns.
@@ -527,8 +507,7 @@ static void sweep_add_panels(Chart *chart, const Sweep *sweep, const SweepCells 
             chart_panel(chart, left, is_map ? left + 208 : 622, top, top + (is_map ? 168 : 110));
         char name[CHART_LABEL];
         charts_words(name, sizeof name, sweep->metrics.at[i]);
-        charts_quantity(panel->heading, sizeof panel->heading, name,
-                        sweep_metric_unit(sweep->metrics.at[i]));
+        chart_quantity(panel->heading, name, sweep_metric_unit(sweep->metrics.at[i]));
         panel->is_small = true;
         if (is_map) {
             chart_series(panel, CHART_MAP, NULL, low, NULL, count)->columns = cells->columns;
@@ -551,10 +530,10 @@ static void sweep_add_panels(Chart *chart, const Sweep *sweep, const SweepCells 
     }
     if (!is_map)
         return;
-    char name[CHART_TEXT - 16];
-    charts_quantity(name, sizeof name, cells->x->pointer, cells->x->unit);
+    char name[CHART_TEXT];
+    chart_quantity(name, cells->x->pointer, cells->x->unit);
     chart_format(chart->notes[0], CHART_TEXT, "across: %s", name);
-    charts_quantity(name, sizeof name, cells->y->pointer, cells->y->unit);
+    chart_quantity(name, cells->y->pointer, cells->y->unit);
     chart_format(chart->notes[1], CHART_TEXT, "upwards: %s", name);
 }
 
@@ -660,12 +639,12 @@ static void evaluation_add_mean(Chart *chart, ChartPanel *panel, const Statistic
             chart_series(panel, CHART_LINE, charts_pair(chart, from, to), y, NULL, 2);
         line->colour = 1;
         line->look = "trend";
-        chart_format(line->name, sizeof line->name, "%.3g per m/s", trend->slope);
+        chart_format(line->name, CHART_TEXT, "%.3g per m/s", trend->slope);
     }
     if (isnan(statistic->mean))
         return;
     ChartSeries *mean = charts_add_level(chart, panel, statistic->mean, (double)NAN);
-    chart_format(mean->name, sizeof mean->name, "mean %.4g", statistic->mean);
+    chart_format(mean->name, CHART_TEXT, "mean %.4g", statistic->mean);
     if (!isnan(statistic->low))
         charts_add_level(chart, panel, statistic->low, statistic->high);
 }
@@ -677,7 +656,7 @@ static void evaluation_add_panel(Chart *chart, const Evaluation *evaluation, boo
     ChartPanel *panel = chart_panel(chart, 78, 664, top, top + 230);
     Quantity *quantity = chart_allocate(chart, 1, sizeof *quantity);
     char interval[CHART_LABEL + 16] = "";
-    text_fit(panel->x.title, sizeof panel->x.title, "approach speed [m/s]");
+    text_fit(panel->x.title, CHART_TEXT, "approach speed [m/s]");
     panel->x.padding = 0.06;
     if (!isnan(statistic->low))
         chart_format(interval, sizeof interval, ", 95 %% within %.4g to %.4g", statistic->low,
@@ -696,14 +675,13 @@ static void evaluation_add_panel(Chart *chart, const Evaluation *evaluation, boo
 }
 
 void charts_evaluation(const Evaluation *evaluation, const char *slug, Bytes *bytes) {
-    Chart chart = {.width = 680, .left = 78};
-    chart.height = 640;
-    chart_format(chart.title, sizeof chart.title, "Drop tests of %.63s", slug);
+    Chart chart = {.width = 680, .height = 640, .left = 78};
+    chart_format(chart.title, CHART_TEXT, "Drop tests of %.63s", slug);
     bytes_text(&chart.description,
                "Dots: readings that count; rings: outliers, which count; crosses: readings that do "
                "not. Band: 95 % interval of the mean.");
-    charts_add_note(&chart, " ", evaluation->restitution.trend.detail);
-    charts_add_note(&chart, " ", evaluation->contact_time.trend.detail);
+    chart_note(&chart, " ", evaluation->restitution.trend.detail);
+    chart_note(&chart, " ", evaluation->contact_time.trend.detail);
     evaluation_add_panel(&chart, evaluation, false);
     evaluation_add_panel(&chart, evaluation, true);
     chart_write(&chart, bytes);

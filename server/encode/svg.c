@@ -6,7 +6,7 @@
 #include "server/encode/buckets.h"
 #include "server/encode/chart.h"
 
-enum { SVG_POINTS = 800, SVG_DECADES = 8 }; // of a line over time; of spectra
+enum { SVG_POINTS = 800 }; // of a line over time
 
 // The columns of one line: the same one twice, or the least and the largest values of buckets.
 static const Column *svg_column(const Table *table, size_t line, bool is_high) {
@@ -90,9 +90,7 @@ static void svg_add_series(Chart *chart, const Table *table) {
         char name[CHART_LABEL];
         svg_set_name(table, column, name);
         if (panel == NULL) {
-            bytes_text(&chart->description, " Not drawn: ");
-            chart_text(&chart->description, name);
-            bytes_text(&chart->description, ".");
+            chart_note(chart, " Not drawn: ", name);
             continue;
         }
         svg_thin(table, i, part, next, next + points);
@@ -105,25 +103,20 @@ static void svg_add_series(Chart *chart, const Table *table) {
 }
 
 static void svg_add_spectra(Chart *chart, const Table *table) {
-    ChartPanel *panel = chart_panel(chart, 70, 946, 44, 424);
+    ChartPanel *panel = chart_spectra(chart, 70, 946, 44, 424);
     chart->height = 476;
     panel->empty = "not known";
-    panel->x.is_logarithmic = panel->y.is_logarithmic = true;
-    panel->y.max_decades = SVG_DECADES;
-    chart_format(panel->x.title, CHART_TEXT, "%s [%s]", table->axis_name, table->axis_unit);
     for (size_t i = 0; i < table->column_count; i++) {
         const Column *column = table->columns[i];
         if (i >= CHART_COLOURS) {
-            bytes_text(&chart->description, " Not drawn: ");
-            chart_text(&chart->description, column->name);
-            bytes_text(&chart->description, ".");
+            chart_note(chart, " Not drawn: ", column->name);
             continue;
         }
         ChartSeries *series = chart_series(panel, CHART_LINE, table_values(table, table->axis),
                                            table_values(table, column->values), NULL, table->count);
         series->colour = i;
         text_fit(series->name, CHART_TEXT, column->name);
-        chart_format(series->legend, CHART_TEXT, "%s [%s]", column->name, column->unit);
+        chart_quantity(series->legend, column->name, column->unit);
     }
 }
 

@@ -5,10 +5,12 @@
 
 #include <cmocka.h>
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "server/encode/chart.h"
 #include "server/encode/charts.h"
 
 static TradeoffPoint point_make(char *name, char *solver, double cpu, double error) {
@@ -103,12 +105,71 @@ static void more_groups_than_colours_share_the_last_one(void **state) {
     free(text);
 }
 
+// A panel of 100 by 100 pixels with one line over 0, 1, 2 and so on.
+static char *draw_line(const double *y, const double *high, size_t count, bool is_logarithmic) {
+    Chart chart = {.width = 120, .height = 120, .title = "a < b"};
+    ChartPanel *panel = chart_panel(&chart, 10, 110, 10, 110);
+    double *x = chart_allocate(&chart, count, sizeof *x);
+    assert_non_null(x);
+    for (size_t i = 0; i < count; i++)
+        x[i] = (double)i;
+    panel->y.is_logarithmic = is_logarithmic;
+    (void)chart_series(panel, CHART_LINE, x, y, high, count);
+    Bytes bytes = {0};
+    chart_write(&chart, &bytes);
+    char *text = bytes_take(&bytes, NULL);
+    assert_non_null(text);
+    assert_non_null(strstr(text, "<title>a &lt; b</title>"));
+    return text;
+}
+
+static void a_line_is_interrupted_where_a_value_is_missing(void **state) {
+    (void)state;
+    const double y[] = {0, 1, (double)NAN, 1, 0};
+    char *text = draw_line(y, NULL, COUNT(y), false);
+    assert_non_null(
+        strstr(text, "class=\"line s0\" d=\"M10.0 105.5L35.0 14.5M85.0 14.5L110.0 105.5\""));
+    free(text);
+    text = draw_line(y, y, COUNT(y), false);
+    assert_non_null(
+        strstr(text, "class=\"line s0\" d=\"M10.0 105.5L35.0 14.5M85.0 14.5L110.0 105.5\""));
+    free(text);
+    text = draw_line(y + 2, NULL, 1, false);
+    assert_null(strstr(text, "class=\"frame\"")); // no value at all
+    free(text);
+}
+
+static void many_points_take_limited_room_and_peaks_remain(void **state) {
+    (void)state;
+    enum { POINTS = 100000 };
+    double *low = calloc(POINTS, sizeof *low), *high = calloc(POINTS, sizeof *high);
+    assert_true(low != NULL && high != NULL);
+    for (size_t i = 0; i < POINTS; i++)
+        low[i] = 1 + (double)(i % 7);
+    char *text = draw_line(low, NULL, POINTS, true), *again = draw_line(low, NULL, POINTS, true);
+    assert_string_equal(text, again); // equal bytes
+    assert_true(count_of(text, "L") < 700);
+    assert_non_null(strstr(text, ">10</text>"));
+    free(text);
+    free(again);
+    for (size_t i = 0; i < 5; i++)
+        high[i] = low[i] = i == 2 ? 2 : 0;
+    low[2] = -2;
+    text = draw_line(low, high, 5, false);
+    assert_non_null(strstr(text, "L60.0 105.5L72.5 14.5")); // to both ends
+    free(text);
+    free(low);
+    free(high);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_measured_point_has_a_mark_and_the_others_are_told),
         cmocka_unit_test(an_error_of_0_stands_on_the_floor),
         cmocka_unit_test(there_may_be_nothing_to_draw),
         cmocka_unit_test(more_groups_than_colours_share_the_last_one),
+        cmocka_unit_test(a_line_is_interrupted_where_a_value_is_missing),
+        cmocka_unit_test(many_points_take_limited_room_and_peaks_remain),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
