@@ -72,11 +72,7 @@ static Status choose(const GetSettings *settings, const Options *options, char w
     const char *typed = options->operand_count > 1      ? options->operands[1]
                         : !is_table                     ? "result"
                         : strcmp(extension, "zip") == 0 ? "bundle"
-                        : strcmp(extension, "svg") == 0 ? NULL
                                                         : "series";
-    if (typed == NULL)
-        return problem_set(problem, STATUS_USAGE,
-                           "which chart? e.g. impactd get RESULT tradeoff -o chart.svg");
     if (!is_what(typed))
         return problem_set(problem, STATUS_USAGE,
                            "%.100s is nothing a result has; it has series, psd, impacts, energy, "
@@ -200,6 +196,7 @@ const Command command_get = {
     .help =
         "  impactd get r-91c0                              summary, plan and units\n"
         "  impactd get r-91c0 series -o motion.npy         the time series, for numpy.load\n"
+        "  impactd get r-91c0 psd -o psd.svg               the spectra as a chart\n"
         "  impactd get r-91c0 series -o motion.csv --channels displacement --from 1 --to 2\n"
         "  impactd get r-91c0 series --points 500          buckets of least and largest values\n"
         "  impactd get r-91c0 psd -o psd.csv               spectra\n"
