@@ -1,5 +1,5 @@
 // impactd study SCENE.json: what its member "study" asks, as the daemon makes it, as JSON.
-#include "server/command/any_study.h"
+#include "server/command/command.h"
 
 #include <stdio.h>
 

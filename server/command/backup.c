@@ -1,6 +1,6 @@
 // A first Ctrl-C asks the copying to stop, which then removes what it has written; a second one, on
 // a disk that answers no more, ends the program there and then.
-#include "server/command/backup.h"
+#include "server/command/command.h"
 
 #include <inttypes.h>
 #include <signal.h>

@@ -1,4 +1,4 @@
-#include "server/command/cancel.h"
+#include "server/command/command.h"
 
 #include "server/command/daemon.h"
 

@@ -1,6 +1,6 @@
 // impactd check SCENE.json: the dry run of the daemon, for people or (--json) as the daemon answers
 // it.
-#include "server/command/check.h"
+#include "server/command/command.h"
 
 #include <stdio.h>
 #include <stdlib.h>

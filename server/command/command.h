@@ -1,5 +1,5 @@
-// What ONE subcommand of impactd is; commands.c lists all. A command reads its arguments, asks one
-// room, answers. Used by main.c and command/.
+// A subcommand of impactd, and the list of all. A command reads its arguments, calls one module and
+// prints the result.
 #ifndef SERVER_COMMAND_COMMAND_H
 #define SERVER_COMMAND_COMMAND_H
 
@@ -29,6 +29,11 @@ typedef struct Command {
     // argv[0] is the first argument behind the command's name. Returns the exit code.
     int (*run)(int argc, char *const *argv);
 } Command;
+
+// Each is in the file of its name, those of studies in study.c.
+extern const Command command_serve, command_run, command_check, command_tradeoff, command_ensemble,
+    command_study, command_sweep, command_import, command_materials, command_records, command_token,
+    command_backup, command_submit, command_watch, command_get, command_cancel, command_compare;
 
 extern const Command *const commands[];        // NULL-terminated
 const Command *command_find(const char *name); // NULL if there is none

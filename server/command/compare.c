@@ -1,4 +1,4 @@
-#include "server/command/compare.h"
+#include "server/command/command.h"
 
 #include <string.h>
 

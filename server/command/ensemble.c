@@ -1,5 +1,5 @@
 // impactd ensemble SCENE.json: the study of the same name, as the daemon makes it, as a table.
-#include "server/command/ensemble.h"
+#include "server/command/command.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -1,6 +1,6 @@
 // impactd get RESULT-or-JOB [WHAT]: WHAT is the path below the result, its format the output's
 // extension; bytes go to the file as they come.
-#include "server/command/get.h"
+#include "server/command/command.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -1,6 +1,6 @@
 // impactd import FILE: the excitation as JSON on stdout or in a file, what a person should know of
 // it on stderr.
-#include "server/command/import.h"
+#include "server/command/command.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,5 +1,5 @@
 // One table of actions; what each takes is counted here, what it means is the action's.
-#include "server/command/materials.h"
+#include "server/command/command.h"
 
 #include <stdio.h>
 #include <string.h>

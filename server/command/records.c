@@ -1,5 +1,5 @@
 // The daemon reads the file and judges it; here it is sent as it is.
-#include "server/command/records.h"
+#include "server/command/command.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -1,6 +1,6 @@
 // impactd run SCENE.json: what the daemon does with a job, without the daemon. The scene is judged
 // and completed as there, so that equal scenes have equal results by number and by id.
-#include "server/command/run.h"
+#include "server/command/command.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,6 +1,6 @@
 // impactd submit SCENE.json: the job's id on standard output, so that a shell can go on with it;
 // all else on stderr.
-#include "server/command/submit.h"
+#include "server/command/command.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,5 +1,5 @@
 // impactd sweep SCENE.json: the study of the same name, as the daemon makes it, point by point.
-#include "server/command/sweep.h"
+#include "server/command/command.h"
 
 #include <stdio.h>
 

@@ -1,5 +1,5 @@
 // The token itself goes to standard output and nothing else does, so that a script can take it.
-#include "server/command/token.h"
+#include "server/command/command.h"
 
 #include <stdio.h>
 #include <stdlib.h>
