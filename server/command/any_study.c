@@ -28,17 +28,12 @@ static void document_print(const Variant *answer) {
     bytes_clear(&bytes);
 }
 
-static const StudyCommand study = {.name = "study", .print = document_print};
+static const StudyCommand study = {.print = document_print};
 
-static int any_study(void *of, const Options *options, Problem *problem) {
+static int any_study(const Command *self, void *of, const Options *options, Problem *problem) {
     AnySettings *settings = of;
-    return study_command_run(&study, &settings->output, settings->max_cpu_seconds, settings,
+    return study_command_run(self, &study, &settings->output, settings->max_cpu_seconds, settings,
                              options, problem);
-}
-
-static int any_study_run(int argc, char *const *argv) {
-    AnySettings settings;
-    return command_with_options("study", any_fields, &settings, argc, argv, any_study);
 }
 
 const Command command_study = {
@@ -56,5 +51,6 @@ const Command command_study = {
         "study,\n"
         "1 if its run failed.\n",
     .options = any_fields,
-    .run = any_study_run,
+    .size = sizeof(AnySettings),
+    .run = any_study,
 };

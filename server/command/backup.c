@@ -45,7 +45,7 @@ static bool advance(void *bar, double fraction) {
     return is_interrupted == 0;
 }
 
-static int backup(void *of, const Options *options, Problem *problem) {
+static int backup(const Command *self, void *of, const Options *options, Problem *problem) {
     BackupSettings *settings = of;
     if (options->operand_count != 1)
         (void)problem_set(problem, STATUS_USAGE, "takes one file to write, is given %zu",
@@ -54,7 +54,7 @@ static int backup(void *of, const Options *options, Problem *problem) {
         (void)problem_set(problem, STATUS_USAGE,
                           "writes a file, not standard output: it appears whole or not at all");
     if (problem->status != STATUS_OK)
-        return command_refuse("backup", problem);
+        return command_refuse(self->name, problem);
     const char *path = options->operands[0];
     Backup made = {0};
     Bar bar;
@@ -79,11 +79,6 @@ static int backup(void *of, const Options *options, Problem *problem) {
     return command_exit(status);
 }
 
-static int run(int argc, char *const *argv) {
-    BackupSettings settings;
-    return command_with_options("backup", backup_fields, &settings, argc, argv, backup);
-}
-
 const Command command_backup = {
     .name = "backup",
     .operands = "FILE",
@@ -106,5 +101,6 @@ const Command command_backup = {
         "Jobs that\n"
         "were unfinished in the copy are taken up again.\n",
     .options = backup_fields,
-    .run = run,
+    .size = sizeof(BackupSettings),
+    .run = backup,
 };

@@ -11,12 +11,12 @@ static const Field cancel_fields[] = {
     FIELD_END,
 };
 
-static int cancel(void *of, const Options *options, Problem *problem) {
+static int cancel(const Command *self, void *of, const Options *options, Problem *problem) {
     const CancelSettings *settings = of;
     const char *id = options->operands[0];
     if (options->operand_count != 1 || !daemon_is_id(id)) {
         (void)problem_set(problem, STATUS_USAGE, "takes one job's id, like j-7f3a");
-        return command_refuse("cancel", problem);
+        return command_refuse(self->name, problem);
     }
     Daemon daemon;
     HttpAnswer answer = {0};
@@ -34,16 +34,11 @@ static int cancel(void *of, const Options *options, Problem *problem) {
     if (status == STATUS_OK)
         printf("%s %s\n", job.id, job.status);
     else
-        code = daemon_refuse("cancel", id, status, problem);
+        code = daemon_refuse(self->name, id, status, problem);
     job_told_clear(&job);
     http_answer_clear(&answer);
     daemon_close(&daemon);
     return code;
-}
-
-static int cancel_run(int argc, char *const *argv) {
-    CancelSettings settings;
-    return command_with_options("cancel", cancel_fields, &settings, argc, argv, cancel);
 }
 
 const Command command_cancel = {
@@ -54,5 +49,6 @@ const Command command_cancel = {
             "\n"
             "Exit code 1 if the job was finished before, 4 if there is no such job.\n",
     .options = cancel_fields,
-    .run = cancel_run,
+    .size = sizeof(CancelSettings),
+    .run = cancel,
 };

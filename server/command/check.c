@@ -130,34 +130,21 @@ static Status plan_show(const char *path, const Bytes *text, const CheckSettings
     return status;
 }
 
-static int check(int argc, char *const *argv, Problem *problem) {
-    CheckSettings settings;
-    Options options;
-    (void)fields_default(check_fields, &settings);
-    Status status = options_read(check_fields, &settings, argc, argv, NULL, &options, problem);
-    if (status == STATUS_OK && options.operand_count != 1)
-        status = problem_set(problem, STATUS_USAGE, "takes one scene, is given %zu",
-                             options.operand_count);
-    if (status != STATUS_OK)
-        return command_refuse("check", problem);
-    const char *path = options.operands[0];
+static int check(const Command *self, void *settings, const Options *options, Problem *problem) {
+    if (options->operand_count != 1) {
+        (void)problem_set(problem, STATUS_USAGE, "takes one scene, is given %zu",
+                          options->operand_count);
+        return command_refuse(self->name, problem);
+    }
+    const char *path = options->operands[0];
     Bytes text;
-    status = scene_file_read(path, &text, problem);
+    Status status = scene_file_read(path, &text, problem);
     if (status == STATUS_OK)
-        status = plan_show(path, &text, &settings, problem);
+        status = plan_show(path, &text, settings, problem);
     bytes_clear(&text);
     if (status != STATUS_OK)
         scene_file_refuse(path, problem);
     return command_exit(status);
-}
-
-static int check_run(int argc, char *const *argv) {
-    Problem *problem = calloc(1, sizeof *problem);
-    if (problem == NULL)
-        return command_exit(STATUS_NO_MEMORY);
-    const int code = check(argc, argv, problem);
-    free(problem);
-    return code;
 }
 
 const Command command_check = {
@@ -171,5 +158,6 @@ const Command command_check = {
         "\n"
         "Runs nothing. Exit code 3 if the scene has faults.\n",
     .options = check_fields,
-    .run = check_run,
+    .size = sizeof(CheckSettings),
+    .run = check,
 };

@@ -19,16 +19,19 @@ typedef enum CommandExit {
     COMMAND_INTERRUPTED = 130,
 } CommandExit;
 
-typedef struct Command {
+typedef struct Command Command;
+struct Command {
     const char *name;
     const char *operands;      // as help shows them: "SCENE.json"; NULL: takes none
     const char *summary;       // one line
     const char *help;          // examples and what else one should know; whole lines
     const Field *options;      // rows for help; NULL: none
     const OptionGroup *groups; // headings over them; NULL: none
-    // argv[0] is the first argument behind the command's name. Returns the exit code.
-    int (*run)(int argc, char *const *argv);
-} Command;
+    size_t size;               // of the struct that the options describe
+    const char *environment;   // prefix of variables that are read as options; NULL: none
+    // `settings` has what was given; it is cleared by the caller. Returns the exit code.
+    int (*run)(const Command *self, void *settings, const Options *options, Problem *problem);
+};
 
 // Each is in the file of its name, those of studies in study.c.
 extern const Command command_serve, command_run, command_check, command_tradeoff, command_ensemble,
@@ -44,12 +47,6 @@ int command_main(int argc, char *const *argv);
 // Usage faults on stderr, "impactd run: --outpt is no option (did you mean --output?)"; returns
 // COMMAND_USAGE.
 int command_refuse(const char *name, const Problem *problem);
-
-// Reads the options of command `name` into `settings`, a struct of `fields`, goes on with them and
-// clears them. Returns the exit code.
-int command_with_options(const char *name, const Field *fields, void *settings, int argc,
-                         char *const *argv,
-                         int (*go_on)(void *settings, const Options *options, Problem *problem));
 
 // What a Status means to a shell.
 int command_exit(Status status);

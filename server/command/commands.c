@@ -9,8 +9,9 @@
 #include "server/command/command.h"
 #include "server/options.h"
 
-static int help_run(int argc, char *const *argv);
-static int version_run(int argc, char *const *argv);
+static int help_run(const Command *self, void *settings, const Options *options, Problem *problem);
+static int version_run(const Command *self, void *settings, const Options *options,
+                       Problem *problem);
 
 static const Command command_help = {
     .name = "help",
@@ -104,22 +105,26 @@ static int unknown_refuse(const char *name) {
     return COMMAND_USAGE;
 }
 
-static int help_run(int argc, char *const *argv) {
-    if (argc == 0) {
+static int help_run(const Command *self, void *settings, const Options *options, Problem *problem) {
+    (void)self, (void)settings, (void)problem;
+    if (options->operand_count == 0) {
         overview_print(stdout);
         return COMMAND_OK;
     }
-    const Command *command = command_find(argv[0]);
+    const Command *command = command_find(options->operands[0]);
     if (command == NULL)
-        return unknown_refuse(argv[0]);
+        return unknown_refuse(options->operands[0]);
     command_print(command);
     return COMMAND_OK;
 }
 
-static int version_run(int argc, char *const *argv) {
-    if (argc > 0) {
-        fprintf(stderr, "impactd version: takes no arguments, is given %s\n", argv[0]);
-        return COMMAND_USAGE;
+static int version_run(const Command *self, void *settings, const Options *options,
+                       Problem *problem) {
+    (void)settings;
+    if (options->operand_count > 0) {
+        (void)problem_set(problem, STATUS_USAGE, "takes no arguments, is given %s",
+                          options->operands[0]);
+        return command_refuse(self->name, problem);
     }
     printf("impactd %s (engine %s)\n", program_version, engine_version);
     return COMMAND_OK;
@@ -137,24 +142,6 @@ int command_refuse(const char *name, const Problem *problem) {
         fprintf(stderr, "impactd %s: %s\n", name, problem->detail);
     fprintf(stderr, "impactd help %s shows what it takes\n", name);
     return COMMAND_USAGE;
-}
-
-int command_with_options(const char *name, const Field *fields, void *settings, int argc,
-                         char *const *argv,
-                         int (*go_on)(void *settings, const Options *options, Problem *problem)) {
-    Options options;
-    Problem *problem = calloc(1, sizeof *problem);
-    if (problem == NULL || fields_default(fields, settings) != STATUS_OK) {
-        free(problem);
-        return command_exit(STATUS_NO_MEMORY);
-    }
-    const int code =
-        options_read(fields, settings, argc, argv, NULL, &options, problem) == STATUS_OK
-            ? go_on(settings, &options, problem)
-            : command_refuse(name, problem);
-    fields_clear(fields, settings);
-    free(problem);
-    return code;
 }
 
 int command_exit(Status status) {
@@ -183,24 +170,44 @@ int command_exit(Status status) {
     }
 }
 
+// Reads the arguments behind the command's name and runs it.
+static int command_run_with(const Command *command, int argc, char *const *argv) {
+    static const Field no_options[] = {FIELD_END};
+    const Field *fields = command->options != NULL ? command->options : no_options;
+    Options options = {0};
+    Problem *problem = calloc(1, sizeof *problem);
+    void *settings = calloc(1, command->size + 1);
+    int code = command_exit(STATUS_NO_MEMORY);
+    if (problem != NULL && settings != NULL && fields_default(fields, settings) == STATUS_OK) {
+        code = options_read(fields, settings, argc, argv, command->environment, &options,
+                            problem) == STATUS_OK
+                   ? command->run(command, settings, &options, problem)
+                   : command_refuse(command->name, problem);
+        fields_clear(fields, settings);
+    }
+    free(settings);
+    free(problem);
+    return code;
+}
+
 int command_main(int argc, char *const *argv) {
     if (argc < 2) {
         overview_print(stderr);
         return COMMAND_USAGE;
     }
-    if (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0)
-        return help_run(0, NULL);
-    if (strcmp(argv[1], "--version") == 0)
-        return version_run(0, NULL);
-    const Command *command = command_find(argv[1]);
+    const char *name = strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0 ? "help"
+                       : strcmp(argv[1], "--version") == 0                          ? "version"
+                                                                                    : argv[1];
+    const Command *command = command_find(name);
     if (command == NULL)
-        return unknown_refuse(argv[1]);
-    for (int i = 2; i < argc && strcmp(argv[i], "--") != 0; i++)
+        return unknown_refuse(name);
+    const bool is_flag = name != argv[1]; // the rest is passed over
+    for (int i = 2; i < argc && !is_flag && strcmp(argv[i], "--") != 0; i++)
         if (strcmp(argv[i], "--help") == 0 || strcmp(argv[i], "-h") == 0) {
             command_print(command);
             return COMMAND_OK;
         }
-    const int code = command->run(argc - 2, argv + 2);
+    const int code = command_run_with(command, is_flag ? 0 : argc - 2, argv + 2);
     // What was printed must have arrived: a full disk or a closed pipe is a failure.
     if (fflush(stdout) != 0 && code == COMMAND_OK) {
         fputs("impactd: standard output cannot be written\n", stderr);

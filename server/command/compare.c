@@ -134,13 +134,13 @@ static Status ask_compare(const CompareSettings *settings, Daemon *daemon, const
     return status;
 }
 
-static int compare(void *of, const Options *options, Problem *problem) {
+static int compare(const Command *self, void *of, const Options *options, Problem *problem) {
     const CompareSettings *settings = of;
     if (options->operand_count != 2 || !daemon_is_id(options->operands[0]) ||
         !daemon_is_id(options->operands[1])) {
         (void)problem_set(problem, STATUS_USAGE,
                           "takes the ids of two results or jobs, like r-91c0");
-        return command_refuse("compare", problem);
+        return command_refuse(self->name, problem);
     }
     const char *ids[2] = {options->operands[0], options->operands[1]};
     char results[2][96];
@@ -155,12 +155,7 @@ static int compare(void *of, const Options *options, Problem *problem) {
     if (status == STATUS_OK)
         status = ask_compare(settings, &daemon, results[0], results[1], problem);
     daemon_close(&daemon);
-    return status == STATUS_OK ? COMMAND_OK : daemon_refuse("compare", about, status, problem);
-}
-
-static int compare_run(int argc, char *const *argv) {
-    CompareSettings settings;
-    return command_with_options("compare", compare_fields, &settings, argc, argv, compare);
+    return status == STATUS_OK ? COMMAND_OK : daemon_refuse(self->name, about, status, problem);
 }
 
 const Command command_compare = {
@@ -173,5 +168,6 @@ const Command command_compare = {
         "\n"
         "Exit code 4 if one of them is not there.\n",
     .options = compare_fields,
-    .run = compare_run,
+    .size = sizeof(CompareSettings),
+    .run = compare,
 };

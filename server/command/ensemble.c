@@ -115,17 +115,12 @@ static void ensemble_print(const Variant *answer) {
     printf("Target %s: %s.\n", target->is_kept ? "kept" : "not kept", target->why);
 }
 
-static const StudyCommand study = {"ensemble", &study_ensemble, study_choose, ensemble_print};
+static const StudyCommand study = {&study_ensemble, study_choose, ensemble_print};
 
-static int ensemble(void *of, const Options *options, Problem *problem) {
+static int ensemble(const Command *self, void *of, const Options *options, Problem *problem) {
     EnsembleSettings *settings = of;
-    return study_command_run(&study, &settings->output, settings->max_cpu_seconds, settings,
+    return study_command_run(self, &study, &settings->output, settings->max_cpu_seconds, settings,
                              options, problem);
-}
-
-static int ensemble_run(int argc, char *const *argv) {
-    EnsembleSettings settings;
-    return command_with_options("ensemble", ensemble_fields, &settings, argc, argv, ensemble);
 }
 
 const Command command_ensemble = {
@@ -146,5 +141,6 @@ const Command command_ensemble = {
         "on; any of them can be run again alone. One that fails is told and left out. The same\n"
         "study gives the same bytes. Ctrl-C stops at once. Exit code 3 if the scene has faults.\n",
     .options = ensemble_fields,
-    .run = ensemble_run,
+    .size = sizeof(EnsembleSettings),
+    .run = ensemble,
 };

@@ -157,7 +157,7 @@ static Status fetch(Daemon *daemon, const GetSettings *settings, const char *id,
     return status;
 }
 
-static int get(void *of, const Options *options, Problem *problem) {
+static int get(const Command *self, void *of, const Options *options, Problem *problem) {
     const GetSettings *settings = of;
     char what[WHAT_MAX + 8] = "";
     Status status = STATUS_OK;
@@ -173,7 +173,7 @@ static int get(void *of, const Options *options, Problem *problem) {
         status = problem_set(problem, STATUS_USAGE,
                              "would print binary data on the terminal; use -o FILE.%s", extension);
     if (status != STATUS_OK)
-        return command_refuse("get", problem);
+        return command_refuse(self->name, problem);
     const char *id = options->operands[0];
     Daemon daemon;
     status = daemon_open(settings->server, settings->token_file, settings->ca_file, settings->wait,
@@ -181,12 +181,7 @@ static int get(void *of, const Options *options, Problem *problem) {
     if (status == STATUS_OK)
         status = fetch(&daemon, settings, id, what, problem);
     daemon_close(&daemon);
-    return status == STATUS_OK ? COMMAND_OK : daemon_refuse("get", id, status, problem);
-}
-
-static int get_run(int argc, char *const *argv) {
-    GetSettings settings;
-    return command_with_options("get", get_fields, &settings, argc, argv, get);
+    return status == STATUS_OK ? COMMAND_OK : daemon_refuse(self->name, id, status, problem);
 }
 
 const Command command_get = {
@@ -211,5 +206,6 @@ const Command command_get = {
         "the daemon has them. A file appears whole or not at all. Exit code 4 if there is no such\n"
         "thing, 8 if the job goes on after --wait.\n",
     .options = get_fields,
-    .run = get_run,
+    .size = sizeof(GetSettings),
+    .run = get,
 };

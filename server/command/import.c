@@ -119,12 +119,12 @@ static Status import_show(const char *path, const Bytes *text, const ImportSetti
     return status;
 }
 
-static int import(void *of, const Options *options, Problem *problem) {
+static int import(const Command *self, void *of, const Options *options, Problem *problem) {
     const ImportSettings *settings = of;
     if (options->operand_count != 1) {
         (void)problem_set(problem, STATUS_USAGE, "takes one file, is given %zu",
                           options->operand_count);
-        return command_refuse("import", problem);
+        return command_refuse(self->name, problem);
     }
     const char *path = options->operands[0];
     Bytes text;
@@ -136,11 +136,6 @@ static int import(void *of, const Options *options, Problem *problem) {
     if (status != STATUS_OK)
         scene_file_refuse(path, problem);
     return command_exit(status);
-}
-
-static int import_run(int argc, char *const *argv) {
-    ImportSettings settings;
-    return command_with_options("import", import_fields, &settings, argc, argv, import);
 }
 
 const Command command_import = {
@@ -159,5 +154,6 @@ const Command command_import = {
         "beside accelerations, and bare columns. What it found stands on stderr.\n"
         "Exit code 3 if the file has faults.\n",
     .options = import_fields,
-    .run = import_run,
+    .size = sizeof(ImportSettings),
+    .run = import,
 };

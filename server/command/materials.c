@@ -95,11 +95,11 @@ static const struct Action *action_find(const Options *options, Problem *problem
     return NULL;
 }
 
-static int materials(void *of, const Options *options, Problem *problem) {
+static int materials(const Command *self, void *of, const Options *options, Problem *problem) {
     const MaterialsSettings *settings = of;
     const struct Action *action = action_find(options, problem);
     if (action == NULL)
-        return command_refuse("materials", problem);
+        return command_refuse(self->name, problem);
     const size_t count = options->operand_count - 1;
     Daemon daemon;
     MaterialsCall call = {settings, &daemon, options->operands + 1, count,
@@ -109,21 +109,16 @@ static int materials(void *of, const Options *options, Problem *problem) {
         status = problem_set(problem, STATUS_USAGE, "%s takes %s, is given %zu operands",
                              action->name, action->takes, count);
     if (status != STATUS_OK)
-        return command_refuse("materials", problem);
+        return command_refuse(self->name, problem);
     status = daemon_open(settings->server, settings->token_file, settings->ca_file, settings->wait,
                          &daemon, problem);
     if (status == STATUS_OK)
         status = action->act(&call, problem);
     daemon_close(&daemon);
     if (status == STATUS_USAGE && problem->count == 0)
-        return command_refuse("materials", problem);
+        return command_refuse(self->name, problem);
     return status == STATUS_OK ? COMMAND_OK
-                               : daemon_refuse("materials", call.about, status, problem);
-}
-
-static int run(int argc, char *const *argv) {
-    MaterialsSettings settings;
-    return command_with_options("materials", materials_fields, &settings, argc, argv, materials);
+                               : daemon_refuse(self->name, call.about, status, problem);
 }
 
 const Command command_materials = {
@@ -162,5 +157,6 @@ const Command command_materials = {
         "4 if there is no such material, 5 if you may not, 1 if somebody was faster.\n",
     .options = materials_fields,
     .groups = groups,
-    .run = run,
+    .size = sizeof(MaterialsSettings),
+    .run = materials,
 };

@@ -225,11 +225,11 @@ static const struct Action *choose(const Options *options, Problem *problem) {
     return NULL;
 }
 
-static int records(void *of, const Options *options, Problem *problem) {
+static int records(const Command *self, void *of, const Options *options, Problem *problem) {
     const RecordsSettings *settings = of;
     const struct Action *action = choose(options, problem);
     if (action == NULL)
-        return command_refuse("records", problem);
+        return command_refuse(self->name, problem);
     const char *operand = action->operand != NULL ? options->operands[1] : NULL;
     Daemon daemon;
     Status status = daemon_open(settings->server, settings->token_file, settings->ca_file,
@@ -239,12 +239,7 @@ static int records(void *of, const Options *options, Problem *problem) {
     daemon_close(&daemon);
     return status == STATUS_OK
                ? COMMAND_OK
-               : daemon_refuse("records", operand != NULL ? operand : "records", status, problem);
-}
-
-static int records_run(int argc, char *const *argv) {
-    RecordsSettings settings;
-    return command_with_options("records", records_fields, &settings, argc, argv, records);
+               : daemon_refuse(self->name, operand != NULL ? operand : "records", status, problem);
 }
 
 const Command command_records = {
@@ -266,5 +261,6 @@ const Command command_records = {
         "if the file has faults, 4 if there is no such record, 1 if it is used or its name is "
         "taken.\n",
     .options = records_fields,
-    .run = records_run,
+    .size = sizeof(RecordsSettings),
+    .run = records,
 };

@@ -191,7 +191,7 @@ static Status encoder_choose(const char *output, const Encoder **encoder, Proble
                        output);
 }
 
-static int run(void *of, const Options *options, Problem *problem) {
+static int run(const Command *self, void *of, const Options *options, Problem *problem) {
     const RunSettings *settings = of;
     const Encoder *encoder = NULL;
     Status status = encoder_choose(settings->output, &encoder, problem);
@@ -199,7 +199,7 @@ static int run(void *of, const Options *options, Problem *problem) {
         status = problem_set(problem, STATUS_USAGE, "takes one scene, is given %zu",
                              options->operand_count);
     if (status != STATUS_OK)
-        return command_refuse("run", problem);
+        return command_refuse(self->name, problem);
     const char *path = options->operands[0];
     Bytes text;
     output_guard();
@@ -210,11 +210,6 @@ static int run(void *of, const Options *options, Problem *problem) {
     if (status != STATUS_OK)
         scene_file_refuse(path, problem);
     return command_exit(status);
-}
-
-static int run_run(int argc, char *const *argv) {
-    RunSettings settings;
-    return command_with_options("run", run_fields, &settings, argc, argv, run);
 }
 
 const Command command_run = {
@@ -233,5 +228,6 @@ const Command command_run = {
         "The output appears whole or not at all. Ctrl-C stops at once (exit code 130).\n"
         "Exit code 3 if the scene has faults, 1 if the run failed.\n",
     .options = run_fields,
-    .run = run_run,
+    .size = sizeof(RunSettings),
+    .run = run,
 };

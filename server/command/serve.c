@@ -293,42 +293,28 @@ static void hold_signals(sigset_t *signals) {
     signal(SIGXFSZ, SIG_IGN); // a limit on a file's size is an error of writing like any other
 }
 
-static int run(int argc, char *const *argv) {
-    ServeSettings settings;
-    Options options = {0};
-    Problem *problem = malloc(sizeof *problem);
-    if (problem == NULL)
-        return command_exit(STATUS_NO_MEMORY);
-    problem_clear(problem);
-
-    int code;
-    Status status = fields_default(serve_fields, &settings);
-    if (status == STATUS_OK)
-        status = options_read(serve_fields, &settings, argc, argv, "IMPACTD_", &options, problem);
-    if (status == STATUS_OK && options.operand_count > 0)
+static int run(const Command *self, void *of, const Options *options, Problem *problem) {
+    ServeSettings *settings = of;
+    Status status = STATUS_OK;
+    if (options->operand_count > 0)
         status = problem_set(problem, STATUS_USAGE, "takes no operands, \"%.60s\" is one",
-                             options.operands[0]);
+                             options->operands[0]);
     if (status == STATUS_OK)
-        status = complete(&settings, problem);
-    if (status == STATUS_OK && settings.print_config) {
-        options_print(serve_fields, &settings, &options, stdout);
+        status = complete(settings, problem);
+    if (status == STATUS_OK && settings->print_config) {
+        options_print(serve_fields, settings, options, stdout);
     } else if (status == STATUS_OK) {
         sigset_t signals;
         hold_signals(&signals);
-        status = serve(&settings, &signals, problem);
+        status = serve(settings, &signals, problem);
     }
-    if (status == STATUS_OK) {
-        code = COMMAND_OK;
-    } else if (problem->status == STATUS_USAGE) {
-        code = command_refuse("serve", problem);
-    } else {
-        fprintf(stderr, "impactd serve: %s\n",
-                problem->detail[0] != '\0' ? problem->detail : status_title(status));
-        code = command_exit(status);
-    }
-    fields_clear(serve_fields, &settings);
-    free(problem);
-    return code;
+    if (status == STATUS_OK)
+        return COMMAND_OK;
+    if (problem->status == STATUS_USAGE)
+        return command_refuse(self->name, problem);
+    fprintf(stderr, "impactd serve: %s\n",
+            problem->detail[0] != '\0' ? problem->detail : status_title(status));
+    return command_exit(status);
 }
 
 const Command command_serve = {
@@ -348,5 +334,7 @@ const Command command_serve = {
         "ones stay. GET / of the URL shows what it can do.\n",
     .options = serve_fields,
     .groups = serve_groups,
+    .size = sizeof(ServeSettings),
+    .environment = "IMPACTD_",
     .run = run,
 };

@@ -147,14 +147,15 @@ static Status scene_study(const StudyCommand *command, const char *path, const B
     return status;
 }
 
-int study_command_run(const StudyCommand *command, const Texts *outputs, double cpu_seconds,
-                      void *settings, const Options *options, Problem *problem) {
+int study_command_run(const Command *self, const StudyCommand *command, const Texts *outputs,
+                      double cpu_seconds, void *settings, const Options *options,
+                      Problem *problem) {
     Status status = command->kind != NULL ? check_outputs(command, outputs, problem) : STATUS_OK;
     if (status == STATUS_OK && options->operand_count != 1)
         status = problem_set(problem, STATUS_USAGE, "takes one scene, is given %zu",
                              options->operand_count);
     if (status != STATUS_OK)
-        return command_refuse(command->name, problem);
+        return command_refuse(self->name, problem);
     const char *path = options->operands[0];
     Bytes text;
     output_guard();

@@ -4,12 +4,11 @@
 #define SERVER_COMMAND_STUDY_H
 
 #include "core/study/study.h"
-#include "server/options.h"
+#include "server/command/command.h"
 
 enum { STUDY_OUTPUTS = 8 }; // files of one command
 
 typedef struct StudyCommand {
-    const char *name;      // of the command
     const StudyKind *kind; // NULL: the document's own study, whatever it is; it must have one
     // Puts what the flags say into the document's own study of this kind, or into a new one; may
     // take what `settings` own. NULL: the document alone counts, and nothing is printed where files
@@ -20,8 +19,8 @@ typedef struct StudyCommand {
 
 // Does the whole for the one scene among the operands, with a file for each of `outputs`, within
 // the CPU seconds that a scene may take. Returns the exit code.
-int study_command_run(const StudyCommand *command, const Texts *outputs, double cpu_seconds,
-                      void *settings, const Options *options, Problem *problem);
+int study_command_run(const Command *self, const StudyCommand *command, const Texts *outputs,
+                      double cpu_seconds, void *settings, const Options *options, Problem *problem);
 
 // A number for a table's cell, "-" where it is not known.
 const char *study_number(char text[24], const char *format, double value);

@@ -102,7 +102,7 @@ static bool is_printable(const char *text) {
     return true;
 }
 
-static int submit(void *of, const Options *options, Problem *problem) {
+static int submit(const Command *self, void *of, const Options *options, Problem *problem) {
     const SubmitSettings *settings = of;
     Status status = STATUS_OK;
     if (options->operand_count != 1)
@@ -112,21 +112,16 @@ static int submit(void *of, const Options *options, Problem *problem) {
         status = problem_add(problem, STATUS_USAGE, "--idempotency-key",
                              "must be of printable ASCII characters");
     if (status != STATUS_OK)
-        return command_refuse("submit", problem);
+        return command_refuse(self->name, problem);
     const char *path = options->operands[0];
     Bytes text;
     status = scene_file_read(path, &text, problem);
     if (status == STATUS_OK)
         status = retitle(&text, settings->title, &settings->label, problem);
     const int code = status == STATUS_OK ? scene_submit(settings, path, &text, problem)
-                                         : daemon_refuse("submit", path, status, problem);
+                                         : daemon_refuse(self->name, path, status, problem);
     bytes_clear(&text);
     return code;
-}
-
-static int submit_run(int argc, char *const *argv) {
-    SubmitSettings settings;
-    return command_with_options("submit", submit_fields, &settings, argc, argv, submit);
 }
 
 const Command command_submit = {
@@ -151,5 +146,6 @@ const Command command_submit = {
         "on\n"
         "after --wait.\n",
     .options = submit_fields,
-    .run = submit_run,
+    .size = sizeof(SubmitSettings),
+    .run = submit,
 };

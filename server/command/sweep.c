@@ -71,17 +71,12 @@ static void sweep_print(const Variant *answer) {
                (unsigned long long)table->failures.at[i].first, table->failures.at[i].detail);
 }
 
-static const StudyCommand study = {"sweep", &study_sweep, study_choose, sweep_print};
+static const StudyCommand study = {&study_sweep, study_choose, sweep_print};
 
-static int sweep(void *of, const Options *options, Problem *problem) {
+static int sweep(const Command *self, void *of, const Options *options, Problem *problem) {
     SweepSettings *settings = of;
-    return study_command_run(&study, &settings->output, settings->max_cpu_seconds, settings,
+    return study_command_run(self, &study, &settings->output, settings->max_cpu_seconds, settings,
                              options, problem);
-}
-
-static int sweep_run(int argc, char *const *argv) {
-    SweepSettings settings;
-    return command_with_options("sweep", sweep_fields, &settings, argc, argv, sweep);
 }
 
 const Command command_sweep = {
@@ -104,5 +99,6 @@ const Command command_sweep = {
         "Every point is judged before the first runs. The same sweep gives the same bytes, here\n"
         "and by the daemon, which uses all its workers. Exit code 3 if the scene has faults.\n",
     .options = sweep_fields,
-    .run = sweep_run,
+    .size = sizeof(SweepSettings),
+    .run = sweep,
 };

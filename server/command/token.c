@@ -150,20 +150,15 @@ static Status act(TokenSettings *settings, const Options *options, Problem *prob
     return status;
 }
 
-static int go_on(void *settings, const Options *options, Problem *problem) {
+static int go_on(const Command *self, void *settings, const Options *options, Problem *problem) {
     const Status status = act(settings, options, problem);
     if (status == STATUS_OK)
         return COMMAND_OK;
     if (status == STATUS_USAGE)
-        return command_refuse("token", problem);
+        return command_refuse(self->name, problem);
     fprintf(stderr, "impactd token: %s\n",
             problem->detail[0] != '\0' ? problem->detail : status_title(status));
     return command_exit(status);
-}
-
-static int run(int argc, char *const *argv) {
-    TokenSettings settings;
-    return command_with_options("token", token_fields, &settings, argc, argv, go_on);
 }
 
 const Command command_token = {
@@ -181,5 +176,6 @@ const Command command_token = {
             "strikes a revoked\n"
             "one from the list) loopback is open again.\n",
     .options = token_fields,
-    .run = run,
+    .size = sizeof(TokenSettings),
+    .run = go_on,
 };

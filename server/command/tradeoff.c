@@ -108,17 +108,12 @@ static void study_choose(void *asked, void *of) {
     }
 }
 
-static const StudyCommand study = {"tradeoff", &study_tradeoff, study_choose, table_print};
+static const StudyCommand study = {&study_tradeoff, study_choose, table_print};
 
-static int tradeoff(void *of, const Options *options, Problem *problem) {
+static int tradeoff(const Command *self, void *of, const Options *options, Problem *problem) {
     TradeoffSettings *settings = of;
-    return study_command_run(&study, &settings->output, settings->max_cpu_seconds, settings,
+    return study_command_run(self, &study, &settings->output, settings->max_cpu_seconds, settings,
                              options, problem);
-}
-
-static int tradeoff_run(int argc, char *const *argv) {
-    TradeoffSettings settings;
-    return command_with_options("tradeoff", tradeoff_fields, &settings, argc, argv, tradeoff);
 }
 
 const Command command_tradeoff = {
@@ -139,5 +134,6 @@ const Command command_tradeoff = {
         "same each time; CPU times are measured and differ a little. Ctrl-C stops at once.\n"
         "Exit code 3 if the scene has faults, 1 if its exact run failed.\n",
     .options = tradeoff_fields,
-    .run = tradeoff_run,
+    .size = sizeof(TradeoffSettings),
+    .run = tradeoff,
 };

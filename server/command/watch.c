@@ -17,12 +17,12 @@ static const Field watch_fields[] = {
 };
 // clang-format on
 
-static int watch(void *of, const Options *options, Problem *problem) {
+static int watch(const Command *self, void *of, const Options *options, Problem *problem) {
     const WatchSettings *settings = of;
     const char *id = options->operands[0];
     if (options->operand_count != 1 || !daemon_is_id(id)) {
         (void)problem_set(problem, STATUS_USAGE, "takes one job's id, like j-7f3a");
-        return command_refuse("watch", problem);
+        return command_refuse(self->name, problem);
     }
     Daemon daemon;
     HttpAnswer answer = {0};
@@ -37,16 +37,11 @@ static int watch(void *of, const Options *options, Problem *problem) {
     if (status == STATUS_OK)
         code = daemon_verdict(&job, problem);
     else
-        code = daemon_refuse("watch", id, status, problem);
+        code = daemon_refuse(self->name, id, status, problem);
     job_told_clear(&job);
     http_answer_clear(&answer);
     daemon_close(&daemon);
     return code;
-}
-
-static int watch_run(int argc, char *const *argv) {
-    WatchSettings settings;
-    return command_with_options("watch", watch_fields, &settings, argc, argv, watch);
 }
 
 const Command command_watch = {
@@ -62,5 +57,6 @@ const Command command_watch = {
         "such job, 8 if it goes on after --wait. Ctrl-C ends the watching alone (130). A daemon\n"
         "that is started anew meanwhile is found again.\n",
     .options = watch_fields,
-    .run = watch_run,
+    .size = sizeof(WatchSettings),
+    .run = watch,
 };
