@@ -9,7 +9,7 @@
 #include "core/drop_test/pair_parameters.h"
 #include "core/scene/buffer.h"
 #include "core/scene/material.h"
-#include "server/codec/amend.h"
+#include "server/codec/json_edit.h"
 #include "server/codec/read.h"
 #include "server/command/scene_file.h"
 #include "server/command/sheet.h"
@@ -150,13 +150,9 @@ Status materials_print_revision(const MaterialsCall *call, const HttpAnswer *ans
 }
 
 Status materials_body(MaterialsCall *call, const char *path, Bytes *body, Problem *problem) {
-    Bytes comment = {0};
     call->about = path;
     Status status = scene_file_read(path, body, problem);
-    if (status == STATUS_OK && call->settings->comment != NULL) {
-        bytes_json_string(&comment, call->settings->comment);
-        status = amend_set(body, "comment", &comment, problem);
-    }
-    bytes_clear(&comment);
+    if (status == STATUS_OK && call->settings->comment != NULL)
+        status = json_edit_set(body, "comment", call->settings->comment, problem);
     return status;
 }

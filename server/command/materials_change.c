@@ -5,7 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/codec/amend.h"
 #include "server/command/materials_ask.h"
 
 Status materials_add_act(MaterialsCall *call, Problem *problem) {

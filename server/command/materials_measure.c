@@ -7,7 +7,7 @@
 
 #include "core/drop_test/evaluation.h"
 #include "core/formats/force_trace_text.h"
-#include "server/codec/amend.h"
+#include "server/codec/json_edit.h"
 #include "server/codec/write.h"
 #include "server/command/materials_ask.h"
 #include "server/command/scene_file.h"
@@ -45,7 +45,7 @@ static Status trace_add(MaterialsCall *call, const char *path, Bytes *body, Prob
     if (status == STATUS_OK)
         status = trace_write(&trace, path, &json, problem);
     if (status == STATUS_OK)
-        status = amend_append(body, "traces", &json, problem);
+        status = json_edit_append(body, "traces", &json, problem);
     free(trace.force.at);
     bytes_clear(&text);
     bytes_clear(&json);
@@ -91,13 +91,11 @@ Status materials_measurements_act(MaterialsCall *call, Problem *problem) {
 // was shown of: whatever was done since is not overwritten.
 static Status confirm(MaterialsCall *call, const HttpAnswer *shown, Problem *problem) {
     const char *slug = call->operands[0];
-    Bytes body = {0}, comment = {0};
+    Bytes body = {0};
     HttpAnswer answer = {0};
-    Status status = amend_take(&shown->body, "revision", &body, problem);
-    if (call->settings->comment != NULL)
-        bytes_json_string(&comment, call->settings->comment);
+    Status status = json_edit_extract(&shown->body, "revision", &body, problem);
     if (status == STATUS_OK && call->settings->comment != NULL)
-        status = amend_set(&body, "comment", &comment, problem);
+        status = json_edit_set(&body, "comment", call->settings->comment, problem);
     if (status == STATUS_OK)
         status = materials_write_seen(call, slug, slug, "/revisions", &body, shown->etag, &answer,
                                       problem);
@@ -106,7 +104,6 @@ static Status confirm(MaterialsCall *call, const HttpAnswer *shown, Problem *pro
     if (status == STATUS_OK)
         status = materials_print_revision(call, &answer, problem);
     http_answer_clear(&answer);
-    bytes_clear(&comment);
     bytes_clear(&body);
     return status;
 }

@@ -5,7 +5,7 @@
 
 #include "core/scene/damper.h"
 #include "core/scene/material.h"
-#include "server/codec/amend.h"
+#include "server/codec/json_edit.h"
 #include "server/codec/read.h"
 #include "server/codec/write.h"
 #include "server/command/materials_ask.h"
@@ -53,7 +53,7 @@ Status materials_list_act(MaterialsCall *call, Problem *problem) {
 static Status said_print(HttpAnswer *answer, Problem *problem) {
     Material material = {0};
     const char *between = "{\n  ";
-    TRY(amend_known(&answer->body, problem));
+    TRY(json_edit_remove_nulls(&answer->body, problem));
     // What is beside it (who, when, links) is no fault here.
     (void)read_json(answer->body.at, answer->body.count, material_fields, &material, NULL);
     Bytes text = {0};

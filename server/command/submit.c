@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/codec/retitle.h"
+#include "server/codec/json_edit.h"
 #include "server/command/daemon.h"
 #include "server/command/scene_file.h"
 
@@ -116,8 +116,10 @@ static int submit(const Command *self, void *of, const Options *options, Problem
     const char *path = options->operands[0];
     Bytes text;
     status = scene_file_read(path, &text, problem);
-    if (status == STATUS_OK)
-        status = retitle(&text, settings->title, &settings->label, problem);
+    if (status == STATUS_OK && settings->title != NULL)
+        status = json_edit_set(&text, "title", settings->title, problem);
+    for (size_t i = 0; i < settings->label.count && status == STATUS_OK; i++)
+        status = json_edit_label(&text, settings->label.at[i], problem);
     const int code = status == STATUS_OK ? scene_submit(settings, path, &text, problem)
                                          : daemon_refuse(self->name, path, status, problem);
     bytes_clear(&text);
