@@ -4,6 +4,7 @@
 #include "server/client/http.h"
 
 #include <curl/curl.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -392,4 +393,18 @@ void http_encode(Bytes *bytes, const char *text) {
             bytes_put(bytes, c, 1);
         else
             bytes_format(bytes, "%%%02X", (unsigned)(unsigned char)*c);
+}
+
+void http_query(Bytes *path, const char *name, const char *value) {
+    if (value == NULL)
+        return;
+    bytes_format(path, "%s%s=", path->at == NULL || strchr(path->at, '?') == NULL ? "?" : "&",
+                 name);
+    http_encode(path, value);
+}
+
+void http_query_real(Bytes *path, const char *name, double value) {
+    char text[32];
+    if (!isnan(value))
+        http_query(path, name, text_real(text, value));
 }

@@ -63,5 +63,9 @@ void http_answer_clear(HttpAnswer *answer);
 
 // Appends `text` percent-encoded.
 void http_encode(Bytes *bytes, const char *text);
+// Appends "?name=value" to a path, or "&name=value" where it has a query; nothing where `value` is
+// NULL or NAN.
+void http_query(Bytes *path, const char *name, const char *value);
+void http_query_real(Bytes *path, const char *name, double value);
 
 #endif

@@ -118,7 +118,7 @@ static Status ask_compare(const CompareSettings *settings, Daemon *daemon, const
     const HttpAsk ask = {.method = "GET", .path = path};
     Status status = daemon_ask(daemon, &ask, &answer, problem);
     if (status == STATUS_OK && settings->json) {
-        (void)fwrite(answer.body.at, 1, answer.body.count, stdout);
+        daemon_print(&answer);
     } else if (status == STATUS_OK) {
         status = pairs_read(answer.body.at, answer.body.count, &pairs, NULL) == STATUS_OK
                      ? STATUS_OK

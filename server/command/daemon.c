@@ -67,6 +67,21 @@ Status daemon_ask(Daemon *daemon, const HttpAsk *ask, HttpAnswer *answer, Proble
     }
 }
 
+Status daemon_request(Daemon *daemon, HttpAsk ask, Bytes *path, HttpAnswer *answer,
+                      Problem *problem) {
+    ask.path = path->at;
+    *answer = (HttpAnswer){.retry_after = -1};
+    const Status status = path->is_failed
+                              ? problem_set(problem, STATUS_USAGE, "asks for too much at once")
+                              : daemon_ask(daemon, &ask, answer, problem);
+    bytes_clear(path);
+    return status;
+}
+
+void daemon_print(const HttpAnswer *answer) {
+    (void)fwrite(answer->body.at, 1, answer->body.count, stdout);
+}
+
 bool daemon_is_id(const char *text) {
     const size_t length = strlen(text);
     return length > 0 && length <= 80 &&

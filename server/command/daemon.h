@@ -34,6 +34,11 @@ double daemon_left(const Daemon *daemon); // [s], at least 0
 // any case.
 Status daemon_ask(Daemon *daemon, const HttpAsk *ask, HttpAnswer *answer, Problem *problem);
 
+// The same at `path`, which is cleared in any case.
+Status daemon_request(Daemon *daemon, HttpAsk ask, Bytes *path, HttpAnswer *answer,
+                      Problem *problem);
+void daemon_print(const HttpAnswer *answer); // the document as it came
+
 // An id as the API writes them; anything else is no path's part.
 bool daemon_is_id(const char *text);
 

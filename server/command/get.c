@@ -90,29 +90,6 @@ static Status choose(const GetSettings *settings, const Options *options, char w
     return STATUS_OK;
 }
 
-static void queries_put(Bytes *path, const GetSettings *settings) {
-    const char *between = "?";
-    const struct {
-        const char *name;
-        double value;
-    } numbers[] = {
-        {"from", settings->from},
-        {"to", settings->to},
-        {"points", settings->points == COUNT_ABSENT ? (double)NAN : (double)settings->points}};
-    if (settings->channels != NULL) {
-        bytes_text(path, "?channels=");
-        http_encode(path, settings->channels);
-        between = "&";
-    }
-    for (size_t i = 0; i < COUNT(numbers); i++) {
-        if (isnan(numbers[i].value))
-            continue;
-        bytes_format(path, "%s%s=", between, numbers[i].name);
-        bytes_real(path, numbers[i].value);
-        between = "&";
-    }
-}
-
 static Status file_take(void *context, const void *bytes, size_t size, Problem *problem) {
     (void)context;
     return output_write(bytes, size, problem);
@@ -137,18 +114,18 @@ static Status fetch(Daemon *daemon, const GetSettings *settings, const char *id,
     bytes_format(&path, "/v1/%s/%s", is_job ? "jobs" : "results", result);
     if (!is_job && strcmp(what, "result") != 0)
         bytes_format(&path, "/%s", what);
-    queries_put(&path, settings);
+    http_query(&path, "channels", settings->channels);
+    http_query_real(&path, "from", settings->from);
+    http_query_real(&path, "to", settings->to);
+    if (settings->points != COUNT_ABSENT)
+        http_query_real(&path, "points", (double)settings->points);
     HttpAnswer answer = {0};
-    Status status = path.is_failed ? problem_set(problem, STATUS_USAGE, "asks for too much at once")
-                                   : STATUS_OK;
-    if (status == STATUS_OK && settings->output != NULL)
-        status = output_open(settings->output, problem);
+    Status status = settings->output != NULL ? output_open(settings->output, problem) : STATUS_OK;
     const HttpAsk ask = {.method = "GET",
-                         .path = path.at,
                          .take = settings->output != NULL ? file_take : screen_take,
                          .most = settings->max_bytes};
     if (status == STATUS_OK)
-        status = daemon_ask(daemon, &ask, &answer, problem);
+        status = daemon_request(daemon, ask, &path, &answer, problem);
     if (status == STATUS_OK && settings->output != NULL)
         status = output_close(problem);
     output_drop();

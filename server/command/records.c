@@ -38,17 +38,6 @@ static const Field records_fields[] = {
 };
 // clang-format on
 
-static void answer_print(const HttpAnswer *answer) {
-    (void)fwrite(answer->body.at, 1, answer->body.count, stdout);
-}
-
-static void query_put(Bytes *path, const char *name, const char *value) {
-    if (value == NULL)
-        return;
-    bytes_format(path, "%s%s=", strchr(path->at, '?') == NULL ? "?" : "&", name);
-    http_encode(path, value);
-}
-
 static void line_print(const RecordTold *record) {
     const double count = record->count == COUNT_ABSENT ? (double)NAN : (double)record->count;
     printf("%-32s  %8.0f  %-10.6g  %-10.6g  %-10.6g  %s\n", record->name, count, record->interval,
@@ -67,8 +56,8 @@ static Status list(Daemon *daemon, const RecordsSettings *settings, const char *
         HttpAnswer answer = {0};
         RecordsTold told = {{NULL, 0}};
         bytes_format(&path, "/v1/records?limit=%d", PAGE);
-        query_put(&path, "q", settings->q);
-        query_put(&path, "after", after[0] != '\0' ? after : NULL);
+        http_query(&path, "q", settings->q);
+        http_query(&path, "after", after[0] != '\0' ? after : NULL);
         const HttpAsk ask = {.method = "GET", .path = path.at};
         Status status = daemon_ask(daemon, &ask, &answer, problem);
         if (status == STATUS_OK)
@@ -76,7 +65,7 @@ static Status list(Daemon *daemon, const RecordsSettings *settings, const char *
         const RecordTold *at = told.records.at;
         count = status == STATUS_OK ? told.records.count : 0;
         if (status == STATUS_OK && settings->json)
-            answer_print(&answer);
+            daemon_print(&answer);
         for (size_t i = 0; i < count && !settings->json; i++)
             line_print(&at[i]);
         // A server that goes in circles is followed no further.
@@ -124,18 +113,15 @@ static Status send(Daemon *daemon, const RecordsSettings *settings, const char *
     RecordTold record = {0};
     name_of(path, name);
     bytes_text(&target, "/v1/records");
-    query_put(&target, "name", settings->name != NULL ? settings->name : name);
-    query_put(&target, "unit",
-              settings->unit == CHOICE_ABSENT ? NULL : acceleration_unit_names[settings->unit]);
-    query_put(&target, "source", settings->source);
-    query_put(&target, "processing", settings->processing);
-    query_put(&target, "earthquake", settings->earthquake);
-    query_put(&target, "station", settings->station);
-    query_put(&target, "notes", settings->notes);
-    if (!isnan(settings->interval)) {
-        bytes_text(&target, "&interval=");
-        bytes_real(&target, settings->interval);
-    }
+    http_query(&target, "name", settings->name != NULL ? settings->name : name);
+    http_query(&target, "unit",
+               settings->unit == CHOICE_ABSENT ? NULL : acceleration_unit_names[settings->unit]);
+    http_query(&target, "source", settings->source);
+    http_query(&target, "processing", settings->processing);
+    http_query(&target, "earthquake", settings->earthquake);
+    http_query(&target, "station", settings->station);
+    http_query(&target, "notes", settings->notes);
+    http_query_real(&target, "interval", settings->interval);
     const HttpAsk ask = {
         .method = "POST", .path = target.at, .body = text, .content_type = "text/plain"};
     Status status = target.is_failed ? problem_set(problem, STATUS_USAGE, "tells too much of it")
@@ -143,7 +129,7 @@ static Status send(Daemon *daemon, const RecordsSettings *settings, const char *
     if (status == STATUS_OK)
         status = record_told_read(&answer, &record, problem);
     if (status == STATUS_OK && settings->json) {
-        answer_print(&answer);
+        daemon_print(&answer);
     } else if (status == STATUS_OK) {
         kept_tell(scene_file_name(path), &record, answer.code == 201);
         printf("%s\n", record.name);
@@ -174,7 +160,7 @@ static Status ask_for(Daemon *daemon, const char *method, const char *name, Prob
                               ? problem_set(problem, STATUS_USAGE, "is too long for a name")
                               : daemon_ask(daemon, &ask, &answer, problem);
     if (status == STATUS_OK && answer.body.count > 0)
-        answer_print(&answer);
+        daemon_print(&answer);
     http_answer_clear(&answer);
     bytes_clear(&path);
     return status;

@@ -32,10 +32,6 @@ static const Field submit_fields[] = {
 };
 // clang-format on
 
-static void answer_print(const HttpAnswer *answer) {
-    (void)fwrite(answer->body.at, 1, answer->body.count, stdout);
-}
-
 // The job is there: its id, and with patience its end. Takes nothing.
 static int job_follow(const SubmitSettings *settings, Daemon *daemon, HttpAnswer *answer,
                       JobTold *job, Problem *problem) {
@@ -56,7 +52,7 @@ static int job_follow(const SubmitSettings *settings, Daemon *daemon, HttpAnswer
             return code;
     }
     if (settings->json)
-        answer_print(answer);
+        daemon_print(answer);
     // Without patience the job's end is nobody's question, but if it is there it is told.
     return code == COMMAND_OK && job_told_is_final(job) ? daemon_verdict(job, problem) : code;
 }
@@ -79,7 +75,7 @@ static int scene_submit(const SubmitSettings *settings, const char *path, const 
     if (status == STATUS_OK)
         status = daemon_ask(&daemon, &ask, &answer, problem);
     if (status == STATUS_OK && settings->dry_run) {
-        answer_print(&answer);
+        daemon_print(&answer);
     } else if (status == STATUS_OK) {
         status = job_told_read(&answer, &job, problem);
         if (status == STATUS_OK && !daemon_is_id(job.id))

@@ -33,7 +33,7 @@ static int watch(const Command *self, void *of, const Options *options, Problem 
         status = daemon_follow(&daemon, id, settings->json ? NULL : stdout, &answer, &job, problem);
     int code = COMMAND_OK;
     if (status == STATUS_OK && settings->json)
-        (void)fwrite(answer.body.at, 1, answer.body.count, stdout);
+        daemon_print(&answer);
     if (status == STATUS_OK)
         code = daemon_verdict(&job, problem);
     else
