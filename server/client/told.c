@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "server/codec/listing.h"
 #include "server/codec/read.h"
 
 typedef struct FaultTold {
@@ -42,29 +43,15 @@ static const Field job_fields[] = {
 };
 // clang-format on
 
-void told_tame(char *text) {
-    for (unsigned char *c = (unsigned char *)text; *c != '\0'; c++)
-        if (*c < ' ' || *c == 0x7f || (c[0] == 0xC2 && c[1] >= 0x80 && c[1] < 0xA0)) {
-            if (*c == 0xC2)
-                *c++ = '?'; // both bytes of a C1 control
-            *c = '?';
-        }
-}
-
-static void tame(char *text) {
-    if (text != NULL)
-        told_tame(text);
-}
-
 Status job_told_read(const HttpAnswer *answer, JobTold *job, Problem *problem) {
     // Members that are not known here are no faults, so nobody listens to the reader.
     (void)read_json(answer->body.at, answer->body.count, job_fields, job, NULL);
     if (job->id == NULL || job->status == NULL || strlen(job->id) > 80 || strlen(job->status) > 40)
         return problem_set(problem, STATUS_UNREACHABLE,
                            "the answer is no job: what answers there is no impactd");
-    tame(job->id);
-    tame(job->status);
-    tame(job->result);
+    text_make_printable(job->id);
+    text_make_printable(job->status);
+    text_make_printable(job->result);
     return STATUS_OK;
 }
 
@@ -74,7 +61,7 @@ bool job_told_event(const char *text, size_t size, const char *id, JobTold *job)
     job->id = strdup(id);
     if (job->id == NULL || job->status == NULL || strlen(job->status) > 40)
         return false;
-    tame(job->status);
+    text_make_printable(job->status);
     return true;
 }
 
@@ -88,7 +75,7 @@ bool job_told_is_final(const JobTold *job) {
 
 static void text_put(char *target, size_t size, const char *text) {
     text_fit(target, size, text != NULL ? text : "");
-    told_tame(target);
+    text_make_printable(target);
 }
 
 // A cell of a table is what people look for, not its place in a document.

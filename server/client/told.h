@@ -34,7 +34,4 @@ Status problem_told_read(const HttpAnswer *answer, Problem *problem);
 // The same for the cause of a failed job.
 void problem_told_put(const ProblemTold *told, Status status, Problem *problem);
 
-// Replaces in place what a terminal would obey: control characters.
-void told_tame(char *text);
-
 #endif

@@ -15,14 +15,13 @@
 #include "core/scene/damper.h"
 #include "core/scene/material.h"
 #include "server/codec/json_edit.h"
-#include "server/codec/outline.h"
+#include "server/codec/listing.h"
 #include "server/codec/read.h"
 #include "server/codec/write.h"
 #include "server/command/command.h"
 #include "server/command/daemon.h"
 #include "server/command/output.h"
 #include "server/command/scene_file.h"
-#include "server/command/sheet.h"
 
 typedef struct MaterialsSettings {
     char *server, *token_file, *ca_file;
@@ -98,7 +97,7 @@ static const OptionGroup groups[] = {
 
 enum { NUMBER_MAX = 9 }; // digits of a revision
 
-static const OutlineTable tables[] = {
+static const ListingColumns columns[] = {
     {"rows",
      {"measurement", "from", "approach_speed", "restitution", "restitution_uncertainty",
       "contact_time", "contact_time_uncertainty", "restitution_is_outlier",
@@ -162,30 +161,23 @@ static Status materials_ask(MaterialsCall *call, const char *method, Bytes *path
 
 // The answer for people, or with --json as it came.
 static Status materials_print(const MaterialsCall *call, const HttpAnswer *answer,
-                       Problem *problem) {
-    static const char *const besides[] = {"links", "test", NULL};
-    const Field *const fields[] = {material_fields, pair_parameters_fields, evaluation_fields,
-                                   buffer_fields, NULL};
-    const OutlineWay way = {besides, tables, fields};
-    Outline outline;
+                              Problem *problem) {
+    static const char *const skipped[] = {"links", "test", NULL};
+    static const Field *const fields[] = {material_fields, pair_parameters_fields,
+                                          evaluation_fields, buffer_fields, NULL};
+    static const ListingView view = {skipped, columns, fields};
+    size_t longest;
     if (call->settings->json) {
         daemon_print(answer);
         return STATUS_OK;
     }
-    Status status = outline_read(answer->body.at, answer->body.count, &way, &outline, NULL);
-    for (size_t i = 0; i < outline.count; i++)
-        if (outline.at[i].has_heads && outline.at[i].rows == MATERIALS_MAX + 1)
-            fprintf(stderr, "impactd materials: the first %d; narrow it down to see others\n",
-                    MATERIALS_MAX);
-    if (status == STATUS_OK && outline.count == 0)
+    TRY(listing_print_json(answer->body.at, answer->body.count, &view, stdout, &longest, problem));
+    if (longest == 0)
         fputs("impactd materials: nothing fits\n", stderr);
-    else if (status == STATUS_OK)
-        sheet_print(&outline);
-    else if (status == STATUS_UNREADABLE)
-        status = problem_set(problem, STATUS_UNREACHABLE,
-                             "the answer is no document: what answers there is no impactd");
-    outline_clear(&outline);
-    return status;
+    if (longest == MATERIALS_MAX)
+        fprintf(stderr, "impactd materials: the first %d; narrow it down to see others\n",
+                MATERIALS_MAX);
+    return STATUS_OK;
 }
 
 typedef struct ReviewTold {
@@ -225,8 +217,8 @@ static Status materials_print_revision(const MaterialsCall *call, const HttpAnsw
         status = problem_set(problem, STATUS_UNREACHABLE,
                              "the answer is no revision: what answers there is no impactd");
     } else {
-        told_tame(told.slug);
-        told_tame(told.status);
+        text_make_printable(told.slug);
+        text_make_printable(told.status);
         printf("%s@%llu %s%s\n", told.slug, (unsigned long long)told.revision, told.status,
                told.review.self_approved ? ", by its own author" : "");
     }

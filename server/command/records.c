@@ -6,11 +6,12 @@
 
 #include "core/excitation/recorded_motion.h"
 #include "core/formats/ground_motion_text.h"
-#include "server/client/told_record.h"
+#include "server/codec/listing.h"
+#include "server/codec/read.h"
 #include "server/command/daemon.h"
 #include "server/command/scene_file.h"
 
-enum { PAGE = 200 };
+enum { PAGE = 500 }; // records a request, the most that the API allows
 
 typedef struct RecordsSettings {
     char *server, *token_file, *ca_file;
@@ -38,46 +39,90 @@ static const Field records_fields[] = {
 };
 // clang-format on
 
-static void line_print(const RecordTold *record) {
-    const double count = record->count == COUNT_ABSENT ? (double)NAN : (double)record->count;
-    printf("%-32s  %8.0f  %-10.6g  %-10.6g  %-10.6g  %s\n", record->name, count, record->interval,
-           record->duration, record->peak, record->source != NULL ? record->source : "-");
+// What is read of a record that the daemon shows; what is not there is NULL, NAN or COUNT_ABSENT.
+typedef struct RecordWarning {
+    char *pointer, *detail;
+} RecordWarning;
+typedef struct RecordReply {
+    char *name, *layout;
+    double interval, duration, peak, peak_time; // [s], [m/s^2]
+    uint64_t count;
+    List warnings; // RecordWarning
+} RecordReply;
+typedef struct RecordsReply {
+    List records; // RecordReply
+} RecordsReply;
+
+// clang-format off
+static const Field doubt_fields[] = {
+    FIELD_TEXT(RecordWarning, pointer, 0, PRESENCE_OPTIONAL, 0, "place"),
+    FIELD_TEXT(RecordWarning, detail, 0, PRESENCE_OPTIONAL, 0, "what is doubtful"),
+    FIELD_END,
+};
+static const Field reply_fields[] = {
+    FIELD_TEXT(RecordReply, name, 0, PRESENCE_OPTIONAL, 0, "name"),
+    FIELD_TEXT(RecordReply, layout, 0, PRESENCE_OPTIONAL, 0, "of its file"),
+    FIELD_REAL(RecordReply, interval, "s", ANY, OPTIONAL, "between samples"),
+    FIELD_REAL(RecordReply, duration, "s", ANY, OPTIONAL, "from the first sample to the last"),
+    FIELD_REAL(RecordReply, peak, "m/s^2", ANY, OPTIONAL, "largest magnitude"),
+    FIELD_REAL(RecordReply, peak_time, "s", ANY, OPTIONAL, "when"),
+    FIELD_COUNT(RecordReply, count, NULL, ANY, OPTIONAL, "samples"),
+    {.name = "warnings", .kind = FIELD_KIND_LIST, .offset = offsetof(RecordReply, warnings),
+     .fields = doubt_fields, .size = sizeof(RecordWarning), .presence = PRESENCE_OPTIONAL, .doc = "doubts"},
+    FIELD_END,
+};
+static const Field replies_fields[] = {
+    {.name = "records", .kind = FIELD_KIND_LIST, .offset = offsetof(RecordsReply, records),
+     .fields = reply_fields, .size = sizeof(RecordReply), .presence = PRESENCE_OPTIONAL, .doc = "records"},
+    FIELD_END,
+};
+// clang-format on
+
+// A page of the list for people; the name of its last record is what the next page comes after, ""
+// behind the last page.
+static Status page_print(const HttpAnswer *answer, bool is_json, char after[RECORD_NAME_SIZE],
+                         Problem *problem) {
+    static const char *const skipped[] = {"links", NULL};
+    static const ListingColumns columns[] = {
+        {"records", {"name", "count", "interval", "duration", "peak", "source"}}, {NULL, {NULL}}};
+    static const Field *const fields[] = {reply_fields, NULL};
+    static const ListingView view = {skipped, columns, fields};
+    size_t longest;
+    RecordsReply reply = {{NULL, 0}};
+    Status status = STATUS_OK;
+    (void)read_json(answer->body.at, answer->body.count, replies_fields, &reply, NULL);
+    const RecordReply *last =
+        reply.records.count > 0 ? (RecordReply *)reply.records.at + reply.records.count - 1 : NULL;
+    const char *name = last != NULL && last->name != NULL ? last->name : "";
+    // A server that goes in circles is followed no further.
+    if (reply.records.count >= PAGE && strcmp(name, after) <= 0)
+        status = problem_set(problem, STATUS_UNREACHABLE, "the list of records has no end");
+    text_fit(after, RECORD_NAME_SIZE, reply.records.count >= PAGE ? name : "");
+    if (status == STATUS_OK && is_json)
+        daemon_print(answer);
+    else if (status == STATUS_OK)
+        status = listing_print_json(answer->body.at, answer->body.count, &view, stdout, &longest,
+                                    problem);
+    fields_clear(replies_fields, &reply);
+    return status;
 }
 
 static Status list(Daemon *daemon, const RecordsSettings *settings, const char *operand,
                    Problem *problem) {
     char after[RECORD_NAME_SIZE] = "";
     (void)operand;
-    if (!settings->json)
-        printf("%-32s  %8s  %-10s  %-10s  %-10s  %s\n", "NAME", "SAMPLES", "INTERVAL s", "LENGTH s",
-               "PEAK m/s^2", "SOURCE");
-    for (size_t count = PAGE; count == PAGE;) {
+    do {
         Bytes path = {.most = 4000};
-        HttpAnswer answer = {0};
-        RecordsTold told = {{NULL, 0}};
+        HttpAnswer answer;
         bytes_format(&path, "/v1/records?limit=%d", PAGE);
         http_query(&path, "q", settings->q);
         http_query(&path, "after", after[0] != '\0' ? after : NULL);
-        const HttpAsk ask = {.method = "GET", .path = path.at};
-        Status status = daemon_ask(daemon, &ask, &answer, problem);
+        Status status = daemon_request(daemon, (HttpAsk){.method = "GET"}, &path, &answer, problem);
         if (status == STATUS_OK)
-            status = records_told_read(&answer, &told, problem);
-        const RecordTold *at = told.records.at;
-        count = status == STATUS_OK ? told.records.count : 0;
-        if (status == STATUS_OK && settings->json)
-            daemon_print(&answer);
-        for (size_t i = 0; i < count && !settings->json; i++)
-            line_print(&at[i]);
-        // A server that goes in circles is followed no further.
-        if (count == PAGE && strcmp(at[count - 1].name, after) <= 0)
-            status = problem_set(problem, STATUS_UNREACHABLE, "the list of records has no end");
-        else if (count > 0)
-            text_fit(after, sizeof after, at[count - 1].name);
-        records_told_clear(&told);
+            status = page_print(&answer, settings->json, after, problem);
         http_answer_clear(&answer);
-        bytes_clear(&path);
         TRY(status);
-    }
+    } while (after[0] != '\0');
     return STATUS_OK;
 }
 
@@ -94,15 +139,21 @@ static void name_of(const char *path, char name[RECORD_NAME_SIZE]) {
             *c = '-';
 }
 
-static void kept_tell(const char *path, const RecordTold *record, bool is_new) {
+// What the daemon read from the file, and its doubts, on stderr.
+static void record_report(const char *path, RecordReply *record, bool is_new) {
     const RecordWarning *warnings = record->warnings.at;
+    text_make_printable(record->layout);
     fprintf(stderr, "%s: %s%s, %.0f samples, one every %.6g s; peak %.6g m/s^2 at %.6g s\n", path,
             is_new ? "" : "was there already; ", record->layout != NULL ? record->layout : "-",
             record->count == COUNT_ABSENT ? (double)NAN : (double)record->count, record->interval,
             record->peak, record->peak_time);
-    for (size_t i = 0; i < record->warnings.count; i++)
-        if (warnings[i].pointer != NULL && warnings[i].detail != NULL)
-            fprintf(stderr, "%s: warning: %s %s\n", path, warnings[i].pointer, warnings[i].detail);
+    for (size_t i = 0; i < record->warnings.count; i++) {
+        text_make_printable(warnings[i].pointer);
+        text_make_printable(warnings[i].detail);
+        fprintf(stderr, "%s: warning: %s %s\n", path,
+                warnings[i].pointer != NULL ? warnings[i].pointer : "",
+                warnings[i].detail != NULL ? warnings[i].detail : "");
+    }
 }
 
 static Status send(Daemon *daemon, const RecordsSettings *settings, const char *path,
@@ -110,7 +161,7 @@ static Status send(Daemon *daemon, const RecordsSettings *settings, const char *
     char name[RECORD_NAME_SIZE];
     Bytes target = {.most = 60000};
     HttpAnswer answer = {0};
-    RecordTold record = {0};
+    RecordReply record = {0};
     name_of(path, name);
     bytes_text(&target, "/v1/records");
     http_query(&target, "name", settings->name != NULL ? settings->name : name);
@@ -122,21 +173,22 @@ static Status send(Daemon *daemon, const RecordsSettings *settings, const char *
     http_query(&target, "station", settings->station);
     http_query(&target, "notes", settings->notes);
     http_query_real(&target, "interval", settings->interval);
-    const HttpAsk ask = {
-        .method = "POST", .path = target.at, .body = text, .content_type = "text/plain"};
-    Status status = target.is_failed ? problem_set(problem, STATUS_USAGE, "tells too much of it")
-                                     : daemon_ask(daemon, &ask, &answer, problem);
+    const HttpAsk ask = {.method = "POST", .body = text, .content_type = "text/plain"};
+    Status status = daemon_request(daemon, ask, &target, &answer, problem);
     if (status == STATUS_OK)
-        status = record_told_read(&answer, &record, problem);
+        (void)read_json(answer.body.at, answer.body.count, reply_fields, &record, NULL);
+    if (status == STATUS_OK && record.name == NULL)
+        status = problem_set(problem, STATUS_UNREACHABLE,
+                             "the answer is no record: what answers there is no impactd");
     if (status == STATUS_OK && settings->json) {
         daemon_print(&answer);
     } else if (status == STATUS_OK) {
-        kept_tell(scene_file_name(path), &record, answer.code == 201);
+        record_report(scene_file_name(path), &record, answer.code == 201);
+        text_make_printable(record.name);
         printf("%s\n", record.name);
     }
-    record_told_clear(&record);
+    fields_clear(reply_fields, &record);
     http_answer_clear(&answer);
-    bytes_clear(&target);
     return status;
 }
 
@@ -155,14 +207,11 @@ static Status ask_for(Daemon *daemon, const char *method, const char *name, Prob
     HttpAnswer answer = {0};
     bytes_text(&path, "/v1/records/");
     http_encode(&path, name);
-    const HttpAsk ask = {.method = method, .path = path.at};
-    const Status status = path.is_failed
-                              ? problem_set(problem, STATUS_USAGE, "is too long for a name")
-                              : daemon_ask(daemon, &ask, &answer, problem);
+    const Status status =
+        daemon_request(daemon, (HttpAsk){.method = method}, &path, &answer, problem);
     if (status == STATUS_OK && answer.body.count > 0)
         daemon_print(&answer);
     http_answer_clear(&answer);
-    bytes_clear(&path);
     return status;
 }
 

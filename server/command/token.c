@@ -7,6 +7,7 @@
 
 #include "server/auth/tokens.h"
 #include "server/base/clock.h"
+#include "server/codec/listing.h"
 #include "server/command/data_folder.h"
 
 typedef struct TokenSettings {
@@ -47,30 +48,38 @@ static Status create(Store *store, const TokenSettings *settings, TokenRow *row,
     return STATUS_OK;
 }
 
-static void put_time(int64_t unix_ms, const char *never) {
+static void time_add(Listing *listing, int64_t unix_ms, const char *never) {
     char text[32];
     if (unix_ms > 0)
         clock_rfc3339(unix_ms, text);
-    printf("  %-24s", unix_ms > 0 ? text : never);
+    listing_add(listing, "%s", unix_ms > 0 ? text : never);
 }
 
 static Status list(Store *store, const TokenSettings *settings, TokenRow *row, Problem *problem) {
+    static const char *const heads[] = {"NAME",      "SCOPES",  "CREATED",
+                                        "LAST USED", "EXPIRES", "STATE"};
     (void)settings;
     (void)row;
     TokenRows rows = {0};
     TRY(store_tokens(store, &rows, problem));
     const int64_t now = clock_unix_ms();
-    printf("%-20s  %-24s  %-24s  %-24s  %-24s  %s\n", "NAME", "SCOPES", "CREATED", "LAST USED",
-           "EXPIRES", "STATE");
+    Listing listing = {.columns = COUNT(heads), .has_heads = true};
+    for (size_t i = 0; i < COUNT(heads); i++)
+        listing_add(&listing, "%s", heads[i]);
     for (size_t i = 0; i < rows.count; i++) {
         const TokenRow *one = &rows.at[i];
         const bool has_ended = one->expires_unix_ms > 0 && one->expires_unix_ms <= now;
-        printf("%-20s  %-24s", one->name, one->scopes);
-        put_time(one->created_unix_ms, "-");
-        put_time(one->used_unix_ms, "never");
-        put_time(one->expires_unix_ms, "never");
-        printf("  %s\n", one->revoked_unix_ms > 0 ? "revoked" : has_ended ? "expired" : "good");
+        listing_add(&listing, "%s", one->name);
+        listing_add(&listing, "%s", one->scopes);
+        time_add(&listing, one->created_unix_ms, "-");
+        time_add(&listing, one->used_unix_ms, "never");
+        time_add(&listing, one->expires_unix_ms, "never");
+        listing_add(&listing, "%s",
+                    one->revoked_unix_ms > 0 ? "revoked"
+                    : has_ended              ? "expired"
+                                             : "good");
     }
+    listing_print(&listing, stdout);
     free(rows.at);
     return STATUS_OK;
 }

@@ -389,9 +389,9 @@ def test_compare_prints_what_differs():
     with fake(say(body=json.dumps(answer).encode())) as (url, seen):
         code, out, errors = client(url, "compare", "r-1", "r-2")
         assert code == 0 and errors == "" and seen[0][1] == "/v1/compare?a=r-1&b=r-2", (code, errors, seen)
-        assert "peak_displacement" in out and "0.0151" in out and "difference 0.0001" in out, out
-        assert "/dampers/0/clearance" in out and "psd/distance: 1.25" in out and "\x1b" not in out, out
-        assert re.search(r"^channel +unit +rms A .*\nvelocity\S +m/s +0.06174 +- +- +- +-$", out, re.M), out
+        assert "peak_displacement" in out and "0.0151" in out and re.search("difference +0.0001", out), out
+        assert "/dampers/0/clearance" in out and re.search("distance +1.25", out) and "\x1b" not in out, out
+        assert re.search(r"^channel +unit +rms$\nvelocity\S +m/s +0.0617442$", out, re.M), out
         assert json.loads(client(url, "compare", "r-1", "r-2", "--json")[1]) == answer
     for body in (b"", b"[1]", b"{", b"[" * 100000):
         with fake(say(body=body)) as (url, _):

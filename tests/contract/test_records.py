@@ -520,7 +520,7 @@ def test_the_command_line_adds_lists_shows_and_deletes():
         code, _, errors = client(daemon.url, "records", "add", "-", "--name", "bad", "--interval", "1", text="1\nx\n")
         assert code == 3 and "standard input" in errors and "line 2" in errors, (code, errors)
         code, out, _ = client(daemon.url, "records", "list")
-        assert code == 0 and [line.split()[0] for line in out.splitlines()] == ["NAME", "I-ELC-180", "column"], out
+        assert code == 0 and [line.split()[0] for line in out.splitlines()] == ["name", "I-ELC-180", "column"], out
         code, out, _ = client(daemon.url, "records", "list", "--q", "peer", "--json")
         assert [record["name"] for record in json.loads(out)["records"]] == ["I-ELC-180"], out
         code, out, _ = client(daemon.url, "records", "show", "column")

@@ -83,20 +83,12 @@ static void every_code_has_a_status(void **state) {
     }
 }
 
-static void controls_of_terminals_are_tamed(void **state) {
-    (void)state;
-    char text[] = "a\x1b[2J\x7f\xc2\x9bz \xc3\xa4";
-    told_tame(text);
-    assert_string_equal(text, "a?[2J???z \xc3\xa4");
-}
-
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_job_is_read_and_what_is_not_known_skipped),
         cmocka_unit_test(what_is_no_job_is_refused),
         cmocka_unit_test(a_problem_document_becomes_a_problem),
         cmocka_unit_test(every_code_has_a_status),
-        cmocka_unit_test(controls_of_terminals_are_tamed),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
