@@ -6,7 +6,7 @@ target_link_libraries(print_pages PRIVATE impactd_server)
 set_target_properties(print_pages PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/install)
 set(PAGES ${CMAKE_BINARY_DIR}/install)
 add_custom_command(
-    OUTPUT ${PAGES}/impactd.1 ${PAGES}/impactd-scene.5 ${PAGES}/impactd.bash ${PAGES}/_impactd ${PAGES}/impactd.fish
+    OUTPUT ${PAGES}/impactd.1 ${PAGES}/impactd-scene.5 ${PAGES}/impactd.bash
     COMMAND print_pages ${PAGES} DEPENDS print_pages VERBATIM)
 add_custom_target(pages ALL DEPENDS ${PAGES}/impactd.1)
 
@@ -15,8 +15,6 @@ install(FILES ${PAGES}/impactd.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)
 install(FILES ${PAGES}/impactd-scene.5 DESTINATION ${CMAKE_INSTALL_MANDIR}/man5)
 install(FILES server/install/impactd.service.8 DESTINATION ${CMAKE_INSTALL_MANDIR}/man8)
 install(FILES ${PAGES}/impactd.bash DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions RENAME impactd)
-install(FILES ${PAGES}/_impactd DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/site-functions)
-install(FILES ${PAGES}/impactd.fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d)
 file(GLOB INSTALLED_SCHEMAS CONFIGURE_DEPENDS schema/*.json)
 file(GLOB INSTALLED_EXAMPLES CONFIGURE_DEPENDS schema/examples/*.json)
 install(FILES ${INSTALLED_SCHEMAS} DESTINATION ${CMAKE_INSTALL_DATADIR}/impactd/schema)

@@ -8,9 +8,9 @@ static const struct {
     const char *name;
     void (*print)(FILE *file);
 } pages[] = {
-    {"impactd.1", manual_program},     {"impactd-scene.5", manual_scene},
-    {"impactd.bash", completion_bash}, {"_impactd", completion_zsh},
-    {"impactd.fish", completion_fish},
+    {"impactd.1", manual_program},
+    {"impactd-scene.5", manual_scene},
+    {"impactd.bash", completion_bash},
 };
 
 int main(int argc, char **argv) {
