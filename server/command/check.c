@@ -101,8 +101,8 @@ static void plan_print(const char *path, const DryRun *run) {
         printf("  %s: %s\n", run->warnings.at[i].pointer, run->warnings.at[i].detail);
 }
 
-static Status plan_show(const char *path, const Bytes *text, const CheckSettings *asked,
-                        Problem *problem) {
+static Status plan_show(const char *path, const Bytes *text, void *of, Problem *problem) {
+    const CheckSettings *asked = of;
     const IntakeSettings settings = {
         .workers = 1, .queue_most = 1, .limits = scene_file_limits(asked->max_cpu_seconds)};
     Store *store = NULL;
@@ -131,20 +131,7 @@ static Status plan_show(const char *path, const Bytes *text, const CheckSettings
 }
 
 static int check(const Command *self, void *settings, const Options *options, Problem *problem) {
-    if (options->operand_count != 1) {
-        (void)problem_set(problem, STATUS_USAGE, "takes one scene, is given %zu",
-                          options->operand_count);
-        return command_refuse(self->name, problem);
-    }
-    const char *path = options->operands[0];
-    Bytes text;
-    Status status = scene_file_read(path, &text, problem);
-    if (status == STATUS_OK)
-        status = plan_show(path, &text, settings, problem);
-    bytes_clear(&text);
-    if (status != STATUS_OK)
-        scene_file_refuse(path, problem);
-    return command_exit(status);
+    return scene_file_command(self, "scene", options, settings, plan_show, problem);
 }
 
 const Command command_check = {

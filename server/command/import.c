@@ -87,8 +87,8 @@ static Status excitation_write(const ExcitationRecord *record, const char *outpu
     return status;
 }
 
-static Status import_show(const char *path, const Bytes *text, const ImportSettings *settings,
-                          Problem *problem) {
+static Status import_show(const char *path, const Bytes *text, void *of, Problem *problem) {
+    const ImportSettings *settings = of;
     const GroundMotionOptions request = {.interval = settings->interval, .unit = settings->unit};
     GroundMotionText import;
     TRY(ground_motion_text_read(text->at != NULL ? text->at : "", text->count, RECORD_SAMPLES,
@@ -119,23 +119,8 @@ static Status import_show(const char *path, const Bytes *text, const ImportSetti
     return status;
 }
 
-static int import(const Command *self, void *of, const Options *options, Problem *problem) {
-    const ImportSettings *settings = of;
-    if (options->operand_count != 1) {
-        (void)problem_set(problem, STATUS_USAGE, "takes one file, is given %zu",
-                          options->operand_count);
-        return command_refuse(self->name, problem);
-    }
-    const char *path = options->operands[0];
-    Bytes text;
-    output_guard();
-    Status status = scene_file_read(path, &text, problem);
-    if (status == STATUS_OK)
-        status = import_show(path, &text, settings, problem);
-    bytes_clear(&text);
-    if (status != STATUS_OK)
-        scene_file_refuse(path, problem);
-    return command_exit(status);
+static int import(const Command *self, void *settings, const Options *options, Problem *problem) {
+    return scene_file_command(self, "file", options, settings, import_show, problem);
 }
 
 const Command command_import = {

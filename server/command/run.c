@@ -20,6 +20,7 @@
 typedef struct RunSettings {
     char *output;
     double max_cpu_seconds;
+    const Encoder *encoder; // of the output's extension; NULL without output
 } RunSettings;
 
 static const Field run_fields[] = {
@@ -100,9 +101,9 @@ static Status job_write(const StudyRequest *inquiry, const Warnings *warnings,
     return is_failed || bytes->is_failed ? STATUS_NO_MEMORY : STATUS_OK;
 }
 
-// Runs and prints or writes. `encoder` is that of the output's extension, NULL without output.
+// Runs and prints or writes.
 static Status scene_run(const char *path, const StudyRequest *inquiry, const Warnings *warnings,
-                        const RunSettings *settings, const Encoder *encoder, Problem *problem) {
+                        const RunSettings *settings, Problem *problem) {
     const SimulationLimits limits = scene_file_limits(settings->max_cpu_seconds);
     const char *output = settings->output;
     Outcome *outcome = NULL;
@@ -122,9 +123,9 @@ static Status scene_run(const char *path, const StudyRequest *inquiry, const War
         bytes_text(&job, "\n");
         (void)fwrite(job.at, 1, job.count, stdout);
     } else if (status == STATUS_OK) {
-        status = strcmp(encoder->extension, "json") == 0
+        status = strcmp(settings->encoder->extension, "json") == 0
                      ? whole_write(outcome, &job, &bytes, problem)
-                     : series_write(&outcome->response, encoder, &bytes, problem);
+                     : series_write(&outcome->response, settings->encoder, &bytes, problem);
         if (status == STATUS_OK && bytes.is_failed)
             status = STATUS_NO_MEMORY;
         if (status == STATUS_OK)
@@ -140,9 +141,9 @@ static Status scene_run(const char *path, const StudyRequest *inquiry, const War
     return status;
 }
 
-static Status scene_prepare_and_run(const char *path, const Bytes *text,
-                                    const RunSettings *settings, const Encoder *encoder,
+static Status scene_prepare_and_run(const char *path, const Bytes *text, void *of,
                                     Problem *problem) {
+    const RunSettings *settings = of;
     const SimulationLimits limits = scene_file_limits(settings->max_cpu_seconds);
     Store *store = NULL;
     StudyRequest inquiry = {0};
@@ -162,7 +163,7 @@ static Status scene_prepare_and_run(const char *path, const Bytes *text,
         if (settings->output != NULL)
             status = output_open(settings->output, problem);
         if (status == STATUS_OK)
-            status = scene_run(path, &inquiry, &warnings, settings, encoder, problem);
+            status = scene_run(path, &inquiry, &warnings, settings, problem);
         output_drop();
     }
     study_request_clear(&inquiry);
@@ -192,24 +193,11 @@ static Status encoder_choose(const char *output, const Encoder **encoder, Proble
 }
 
 static int run(const Command *self, void *of, const Options *options, Problem *problem) {
-    const RunSettings *settings = of;
-    const Encoder *encoder = NULL;
-    Status status = encoder_choose(settings->output, &encoder, problem);
-    if (status == STATUS_OK && options->operand_count != 1)
-        status = problem_set(problem, STATUS_USAGE, "takes one scene, is given %zu",
-                             options->operand_count);
-    if (status != STATUS_OK)
-        return command_refuse(self->name, problem);
-    const char *path = options->operands[0];
-    Bytes text;
-    output_guard();
-    status = scene_file_read(path, &text, problem);
-    if (status == STATUS_OK)
-        status = scene_prepare_and_run(path, &text, settings, encoder, problem);
-    bytes_clear(&text);
-    if (status != STATUS_OK)
-        scene_file_refuse(path, problem);
-    return command_exit(status);
+    RunSettings *settings = of;
+    return encoder_choose(settings->output, &settings->encoder, problem) == STATUS_OK
+               ? scene_file_command(self, "scene", options, settings, scene_prepare_and_run,
+                                    problem)
+               : command_refuse(self->name, problem);
 }
 
 const Command command_run = {

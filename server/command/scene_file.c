@@ -4,6 +4,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "server/command/output.h"
+
 SimulationLimits scene_file_limits(double cpu_seconds) {
     return (SimulationLimits){.samples = SCENE_FILE_SAMPLES,
                               .impacts = SCENE_FILE_IMPACTS,
@@ -37,6 +39,28 @@ Status scene_file_read(const char *path, Bytes *text, Problem *problem) {
     if (text->is_failed)
         return problem_set(problem, STATUS_TOO_LARGE, "is larger than %d bytes", SCENE_FILE_BYTES);
     return STATUS_OK;
+}
+
+int scene_file_command(const Command *self, const char *what, const Options *options,
+                       void *settings,
+                       Status (*run)(const char *path, const Bytes *text, void *settings,
+                                     Problem *problem),
+                       Problem *problem) {
+    if (options->operand_count != 1) {
+        (void)problem_set(problem, STATUS_USAGE, "takes one %s, is given %zu", what,
+                          options->operand_count);
+        return command_refuse(self->name, problem);
+    }
+    const char *path = options->operands[0];
+    Bytes text;
+    output_guard();
+    Status status = scene_file_read(path, &text, problem);
+    if (status == STATUS_OK)
+        status = run(path, &text, settings, problem);
+    bytes_clear(&text);
+    if (status != STATUS_OK)
+        scene_file_refuse(path, problem);
+    return command_exit(status);
 }
 
 void scene_file_refuse(const char *path, const Problem *problem) {

@@ -5,6 +5,7 @@
 
 #include "core/simulation/simulation.h"
 #include "server/base/bytes.h"
+#include "server/command/command.h"
 
 enum {
     SCENE_FILE_BYTES = 16 << 20,
@@ -22,6 +23,15 @@ SimulationLimits scene_file_limits(double cpu_seconds);
 
 // What people call the source of the text: the path, or standard input for "-".
 const char *scene_file_name(const char *path);
+
+// Runs a command on its one operand, a file or standard input, which is `what` in a message.
+// Reports faults under the file's name; returns the exit code. Ctrl-C ends the program from here
+// on.
+int scene_file_command(const Command *self, const char *what, const Options *options,
+                       void *settings,
+                       Status (*run)(const char *path, const Bytes *text, void *settings,
+                                     Problem *problem),
+                       Problem *problem);
 
 // Reads the file, or standard input for "-". Cleared by bytes_clear in any case.
 Status scene_file_read(const char *path, Bytes *text, Problem *problem);

@@ -19,8 +19,11 @@
 
 enum { OUTPUTS_MAX = 8, SOLVERS_MAX = 32 };
 
+typedef struct StudyCommand StudyCommand;
+
 // Of all four commands; each has rows for its own members.
 typedef struct StudySettings {
+    const StudyCommand *command;
     Texts output;
     bool json;
     double max_cpu_seconds;
@@ -32,13 +35,13 @@ typedef struct StudySettings {
     double target;
 } StudySettings;
 
-typedef struct StudyCommand {
+struct StudyCommand {
     const StudyKind *kind; // NULL: the document's own study, whatever it is; it must have one
     // Puts what the flags say into the document's own study of this kind, or into a new one; may
     // take what `settings` own. NULL: the document alone counts.
     void (*choose)(void *study, StudySettings *settings);
     void (*print)(const Variant *answer); // a table for people; NULL: JSON
-} StudyCommand;
+};
 
 #define OUTPUT_ROW(formats)                                                                        \
     FIELD_TEXTS(StudySettings, output, NULL, NULL, OUTPUTS_MAX, PRESENCE_OPTIONAL, 0,              \
@@ -153,8 +156,9 @@ static Status study_choose(const StudyCommand *command, StudyRequest *inquiry,
     return STATUS_OK;
 }
 
-static Status study_scene(const StudyCommand *command, const char *path, const Bytes *text,
-                          StudySettings *settings, Problem *problem) {
+static Status study_scene(const char *path, const Bytes *text, void *of, Problem *problem) {
+    StudySettings *settings = of;
+    const StudyCommand *command = settings->command;
     const SimulationLimits limits = scene_file_limits(settings->max_cpu_seconds);
     const Texts *outputs = &settings->output;
     Store *store = NULL;
@@ -189,23 +193,11 @@ static Status study_scene(const StudyCommand *command, const char *path, const B
 
 static int study_command(const Command *self, const StudyCommand *command, StudySettings *settings,
                          const Options *options, Problem *problem) {
-    Status status = command->kind != NULL ? study_check_outputs(command, &settings->output, problem)
-                                          : STATUS_OK;
-    if (status == STATUS_OK && options->operand_count != 1)
-        status = problem_set(problem, STATUS_USAGE, "takes one scene, is given %zu",
-                             options->operand_count);
-    if (status != STATUS_OK)
-        return command_refuse(self->name, problem);
-    const char *path = options->operands[0];
-    Bytes text;
-    output_guard();
-    status = scene_file_read(path, &text, problem);
-    if (status == STATUS_OK)
-        status = study_scene(command, path, &text, settings, problem);
-    bytes_clear(&text);
-    if (status != STATUS_OK)
-        scene_file_refuse(path, problem);
-    return command_exit(status);
+    settings->command = command;
+    return command->kind == NULL ||
+                   study_check_outputs(command, &settings->output, problem) == STATUS_OK
+               ? scene_file_command(self, "scene", options, settings, study_scene, problem)
+               : command_refuse(self->name, problem);
 }
 
 static void study_heads_add(Listing *listing, const char *const *heads) {
