@@ -8,7 +8,6 @@
 #include <string.h>
 
 #include "server/command/bar.h"
-#include "server/command/data_folder.h"
 #include "server/store/backup.h"
 
 typedef struct BackupSettings {
@@ -61,7 +60,7 @@ static int backup(const Command *self, void *of, const Options *options, Problem
     const Progress watch = {&bar, advance};
     interrupts_catch();
     bar_start(&bar);
-    Status status = data_folder_find(&settings->data, problem);
+    Status status = command_data_folder(&settings->data, problem);
     if (status == STATUS_OK) {
         const BackupRequest request = {settings->data, path, settings->force, &watch};
         status = backup_write(&request, &made, problem);

@@ -48,6 +48,11 @@ int command_main(int argc, char *const *argv);
 // COMMAND_USAGE.
 int command_refuse(const char *name, const Problem *problem);
 
+// Sets *folder, where it is NULL, to $IMPACTD_DATA, else to impactd under $XDG_STATE_HOME, else
+// under
+// ~/.local/state; the caller frees it. STATUS_USAGE where none is known.
+Status command_data_folder(char **folder, Problem *problem);
+
 // What a Status means to a shell.
 int command_exit(Status status);
 

@@ -170,6 +170,28 @@ int command_exit(Status status) {
     }
 }
 
+Status command_data_folder(char **folder, Problem *problem) {
+    char text[4096];
+    const char *given = getenv("IMPACTD_DATA");
+    const char *state = getenv("XDG_STATE_HOME"), *home = getenv("HOME");
+    int size = -1;
+    if (*folder != NULL)
+        return STATUS_OK;
+    if (given != NULL)
+        size = snprintf(text, sizeof text, "%s", given);
+    // The specification of XDG has relative paths ignored.
+    else if (state != NULL && state[0] == '/')
+        size = snprintf(text, sizeof text, "%s/impactd", state);
+    else if (home != NULL && home[0] == '/')
+        size = snprintf(text, sizeof text, "%s/.local/state/impactd", home);
+    if (size < 0 || (size_t)size >= sizeof text)
+        return problem_set(
+            problem, STATUS_USAGE,
+            "no place for the data: neither XDG_STATE_HOME nor HOME is set; use --data DIR");
+    *folder = strdup(text);
+    return *folder != NULL ? STATUS_OK : problem_set(problem, STATUS_NO_MEMORY, "no memory");
+}
+
 // Reads the arguments behind the command's name and runs it.
 static int command_run_with(const Command *command, int argc, char *const *argv) {
     static const Field no_options[] = {FIELD_END};

@@ -18,7 +18,6 @@
 #include "server/base/notify.h"
 #include "server/base/process.h"
 #include "server/command/command.h"
-#include "server/command/data_folder.h"
 #include "server/command/reach.h"
 #include "server/http/dispatch.h"
 #include "server/http/listener.h"
@@ -86,7 +85,7 @@ static const OptionGroup serve_groups[] = {
 
 // The defaults that depend on where we run.
 static Status complete(ServeSettings *settings, Problem *problem) {
-    TRY(data_folder_default(&settings->data, problem));
+    TRY(command_data_folder(&settings->data, problem));
     if (settings->listen == NULL && (settings->listen = strdup("127.0.0.1:8080")) == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory");
     if (settings->workers == 0) {

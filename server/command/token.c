@@ -8,7 +8,6 @@
 #include "server/auth/tokens.h"
 #include "server/base/clock.h"
 #include "server/codec/listing.h"
-#include "server/command/data_folder.h"
 
 typedef struct TokenSettings {
     char *data, *name, *scopes;
@@ -151,7 +150,7 @@ static Status act(TokenSettings *settings, const Options *options, Problem *prob
         return problem_set(problem, STATUS_USAGE, "\"%.60s\" is one operand too many",
                            options->operands[2]);
     TRY(read_name(settings, options, action->needs_name, &row, problem));
-    TRY(data_folder_find(&settings->data, problem));
+    TRY(command_data_folder(&settings->data, problem));
     Store *store = NULL;
     TRY(store_open_beside(settings->data, &store, problem));
     const Status status = action->act(store, settings, &row, problem);
