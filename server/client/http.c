@@ -28,8 +28,6 @@ typedef struct Transfer {
     size_t headers; // [B] so far
     uint64_t taken; // [B] handed to ask->take
     uint64_t continue_from;
-    char location[256];
-    bool has_ranges, is_right_range;
 } Transfer;
 
 static char *copy(const char *text) {
@@ -125,60 +123,47 @@ bool http_exposes_token(const Http *http) {
     return http->token != NULL && !http->is_tls && !http->is_loopback;
 }
 
-// The value of the header `line[size]` if it is called `name`, trimmed; false if it is another.
-static bool header_is(const char *line, size_t size, const char *name, char *value, size_t room) {
-    const size_t length = strlen(name);
-    if (size <= length || strncasecmp(line, name, length) != 0 || line[length] != ':')
-        return false;
-    const char *from = line + length + 1, *to = line + size;
-    while (from < to && (*from == ' ' || *from == '\t'))
-        from++;
-    while (to > from && (unsigned char)to[-1] <= ' ')
-        to--;
-    snprintf(value, room, "%.*s", (int)(to - from), from);
-    return true;
+// The value of a header of the answer, "" where it has none.
+static void header_get(const Http *http, const char *name, char *value, size_t room) {
+    struct curl_header *header;
+    const bool is_there =
+        curl_easy_header(http->curl, name, 0, CURLH_HEADER, -1, &header) == CURLHE_OK;
+    text_fit(value, room, is_there ? header->value : "");
+}
+
+// What is kept of the headers, once they are all there.
+static void headers_read(Transfer *transfer) {
+    HttpAnswer *answer = transfer->answer;
+    curl_off_t seconds = 0;
+    char etag[sizeof answer->etag];
+    header_get(transfer->http, "Content-Type", answer->content_type, sizeof answer->content_type);
+    answer->content_type[strcspn(answer->content_type, "; \t")] = '\0';
+    header_get(transfer->http, "ETag", etag, sizeof etag);
+    if (transfer->continue_from == 0)
+        text_fit(answer->etag, sizeof answer->etag, etag[0] == '"' ? etag : "");
+    (void)curl_easy_getinfo(transfer->http->curl, CURLINFO_RETRY_AFTER, &seconds);
+    answer->retry_after = seconds > 86400 ? 86400 : (int)seconds;
+}
+
+// Whether the rest of a body begins where the first part ended.
+static bool is_right_range(const Transfer *transfer) {
+    char expected[64], value[64];
+    snprintf(expected, sizeof expected, "bytes %llu-", (unsigned long long)transfer->continue_from);
+    header_get(transfer->http, "Content-Range", value, sizeof value);
+    return strncasecmp(value, expected, strlen(expected)) == 0;
 }
 
 static size_t header_take(char *line, size_t one, size_t count, void *of) {
     Transfer *transfer = of;
-    HttpAnswer *answer = transfer->answer;
-    const size_t size = one * count;
-    char value[256];
-    transfer->headers += size;
-    if (transfer->headers > HTTP_HEADERS_MAX) {
-        transfer->status = problem_set(transfer->problem, STATUS_UNREACHABLE,
-                                       "%s answers with more than %d bytes of headers: this is "
-                                       "no impactd",
-                                       transfer->http->url, HTTP_HEADERS_MAX);
-        return 0;
-    }
-    if (size > 5 && strncmp(line, "HTTP/", 5) == 0) { // a new answer begins, behind a 1xx
-        answer->content_type[0] = transfer->location[0] = '\0';
-        answer->retry_after = -1;
-        transfer->has_ranges = transfer->is_right_range = false;
-    } else if (header_is(line, size, "content-type", value, sizeof value)) {
-        snprintf(answer->content_type, sizeof answer->content_type, "%.*s",
-                 (int)strcspn(value, "; \t"), value);
-    } else if (header_is(line, size, "retry-after", value, sizeof value)) {
-        char *end;
-        const long seconds = strtol(value, &end, 10);
-        answer->retry_after = end == value || seconds < 0 ? -1
-                              : seconds > 86400           ? 86400
-                                                          : (int)seconds;
-    } else if (header_is(line, size, "etag", value, sizeof value)) {
-        if (transfer->continue_from == 0)
-            text_fit(answer->etag, sizeof answer->etag, value[0] == '"' ? value : "");
-    } else if (header_is(line, size, "accept-ranges", value, sizeof value)) {
-        transfer->has_ranges = strcasecmp(value, "bytes") == 0;
-    } else if (header_is(line, size, "location", value, sizeof value)) {
-        snprintf(transfer->location, sizeof transfer->location, "%s", value);
-    } else if (header_is(line, size, "content-range", value, sizeof value)) {
-        char expected[64];
-        snprintf(expected, sizeof expected, "bytes %llu-",
-                 (unsigned long long)transfer->continue_from);
-        transfer->is_right_range = strncasecmp(value, expected, strlen(expected)) == 0;
-    }
-    return size;
+    (void)line;
+    transfer->headers += one * count;
+    if (transfer->headers <= HTTP_HEADERS_MAX)
+        return one * count;
+    transfer->status = problem_set(transfer->problem, STATUS_UNREACHABLE,
+                                   "%s answers with more than %d bytes of headers: this is "
+                                   "no impactd",
+                                   transfer->http->url, HTTP_HEADERS_MAX);
+    return 0;
 }
 
 static size_t body_take(char *piece, size_t one, size_t count, void *of) {
@@ -186,7 +171,9 @@ static size_t body_take(char *piece, size_t one, size_t count, void *of) {
     const size_t size = one * count;
     long code = 0;
     (void)curl_easy_getinfo(transfer->http->curl, CURLINFO_RESPONSE_CODE, &code);
-    if (transfer->continue_from > 0 && (code != 206 || !transfer->is_right_range)) {
+    if (transfer->taken == transfer->continue_from)
+        headers_read(transfer);
+    if (transfer->continue_from > 0 && (code != 206 || !is_right_range(transfer))) {
         transfer->status = problem_set(transfer->problem, STATUS_UNREACHABLE,
                                        "the answer was cut off after %llu bytes and cannot be "
                                        "gone on with",
@@ -332,8 +319,10 @@ static CURLcode exchange(Transfer *transfer, const char *url, struct curl_slist 
 
 // Whether the rest of a body that was cut off may be asked for.
 static bool can_go_on(const Transfer *transfer, CURLcode code) {
+    char ranges[16];
+    header_get(transfer->http, "Accept-Ranges", ranges, sizeof ranges);
     return transfer->status == STATUS_OK && transfer->taken > 0 &&
-           transfer->answer->etag[0] != '\0' && transfer->has_ranges &&
+           transfer->answer->etag[0] != '\0' && strcasecmp(ranges, "bytes") == 0 &&
            (code == CURLE_PARTIAL_FILE || code == CURLE_RECV_ERROR || code == CURLE_GOT_NOTHING);
 }
 
@@ -349,20 +338,22 @@ static Status attempt(Transfer *transfer, const char *url, bool *is_cut, Problem
     if (code != CURLE_OK)
         return *is_cut ? STATUS_UNREACHABLE : failure_tell(transfer, code, problem);
     long status = 0;
+    const char *location = NULL;
+    headers_read(transfer);
     (void)curl_easy_getinfo(transfer->http->curl, CURLINFO_RESPONSE_CODE, &status);
+    (void)curl_easy_getinfo(transfer->http->curl, CURLINFO_REDIRECT_URL, &location);
     // The rest of a body that was cut off makes it whole.
     transfer->answer->code = transfer->continue_from > 0 && status == 206 ? 200 : (int)status;
     if (status >= 300 && status < 400)
         return problem_set(problem, STATUS_UNREACHABLE,
                            "%s answers %ld and points to %.200s; redirects are not followed: give "
                            "the address itself by --server",
-                           transfer->http->url, status,
-                           transfer->location[0] != '\0' ? transfer->location : "nothing");
+                           transfer->http->url, status, location != NULL ? location : "nothing");
     return STATUS_OK;
 }
 
 Status http_ask(Http *http, const HttpAsk *ask, HttpAnswer *answer, Problem *problem) {
-    *answer = (HttpAnswer){.retry_after = -1, .body.most = HTTP_DOCUMENT_MAX};
+    *answer = (HttpAnswer){.body.most = HTTP_DOCUMENT_MAX};
     Transfer transfer = {.http = http, .ask = ask, .answer = answer, .problem = problem};
     Bytes url = {.most = 16384};
     bytes_text(&url, http->url);
@@ -382,7 +373,7 @@ Status http_ask(Http *http, const HttpAsk *ask, HttpAnswer *answer, Problem *pro
 
 void http_answer_clear(HttpAnswer *answer) {
     bytes_clear(&answer->body);
-    *answer = (HttpAnswer){.retry_after = -1};
+    *answer = (HttpAnswer){0};
 }
 
 void http_encode(Bytes *bytes, const char *text) {

@@ -51,7 +51,7 @@ typedef struct HttpAnswer {
     int code;
     char content_type[64]; // without parameters
     char etag[256];        // a strong one with its quotes; "" for none
-    int retry_after;       // [s]; -1: not told
+    int retry_after;       // [s]; 0: not told
     Bytes body;
 } HttpAnswer;
 

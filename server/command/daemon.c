@@ -122,7 +122,7 @@ Status daemon_ask(Daemon *daemon, const HttpAsk *ask, HttpAnswer *answer, Proble
 Status daemon_request(Daemon *daemon, HttpAsk ask, Bytes *path, HttpAnswer *answer,
                       Problem *problem) {
     ask.path = path->at;
-    *answer = (HttpAnswer){.retry_after = -1};
+    *answer = (HttpAnswer){0};
     const Status status = path->is_failed
                               ? problem_set(problem, STATUS_USAGE, "asks for too much at once")
                               : daemon_ask(daemon, &ask, answer, problem);
