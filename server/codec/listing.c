@@ -53,6 +53,13 @@ void listing_number(Listing *table, const char *format, double value) {
     listing_take(table, strdup(isnan(value) ? "-" : text));
 }
 
+void listing_clear(Listing *table) {
+    for (size_t i = 0; i < table->count; i++)
+        free(table->cells[i]);
+    free(table->cells);
+    *table = (Listing){.columns = table->columns};
+}
+
 // Characters of UTF-8, as a terminal counts most of them.
 static int text_width(const char *text) {
     int width = 0;
@@ -99,12 +106,9 @@ void listing_print(Listing *table, FILE *file) {
         fprintf(file, "%*s%s%*s%s", is_numeric[k] ? pad : 0, "", cell,
                 is_numeric[k] || is_last ? 0 : pad, "", is_last ? "\n" : "  ");
     }
-    for (size_t i = 0; i < table->count; i++)
-        free(table->cells[i]);
-    free(table->cells);
     if (table->is_failed)
         fputs("... no memory for the rest\n", file);
-    *table = (Listing){.columns = columns};
+    listing_clear(table);
 }
 
 typedef struct Printer {

@@ -20,6 +20,7 @@ typedef struct Listing {
 void listing_add(Listing *table, const char *format, ...) __attribute__((format(printf, 2, 3)));
 // The same of a number, "-" where it is NAN.
 void listing_number(Listing *table, const char *format, double value);
+void listing_clear(Listing *table);
 // Prints and clears the table; an empty cell below a head is "-".
 void listing_print(Listing *table, FILE *file);
 

@@ -48,6 +48,11 @@ int command_main(int argc, char *const *argv);
 // COMMAND_USAGE.
 int command_refuse(const char *name, const Problem *problem);
 
+// Which of `count` actions the first operand names: the index of its name. `names` points to the
+// first name, the others follow at `stride` bytes. STATUS_USAGE lists them.
+Status command_action(const Options *options, const char *const *names, size_t count, size_t stride,
+                      size_t *index, Problem *problem);
+
 // Sets *folder, where it is NULL, to $IMPACTD_DATA, else to impactd under $XDG_STATE_HOME, else
 // under
 // ~/.local/state; the caller frees it. STATUS_USAGE where none is known.

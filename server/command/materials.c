@@ -7,7 +7,6 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "core/base/spelling.h"
 #include "core/drop_test/evaluation.h"
 #include "core/drop_test/pair_parameters.h"
 #include "core/formats/force_trace_text.h"
@@ -687,30 +686,13 @@ static const struct Action {
 };
 // clang-format on
 
-static const struct Action *action_find(const Options *options, Problem *problem) {
-    const char *names[COUNT(actions) + 1] = {NULL};
-    const char *given = options->operand_count > 0 ? options->operands[0] : "";
-    for (size_t i = 0; i < COUNT(actions); i++) {
-        names[i] = actions[i].name;
-        if (strcmp(given, actions[i].name) == 0)
-            return &actions[i];
-    }
-    char all[200] = "";
-    for (size_t i = 0; i < COUNT(actions); i++)
-        text_list(all, sizeof all, actions[i].name);
-    const char *near = spelling_nearest(names, given);
-    (void)problem_set(problem, STATUS_USAGE,
-                      "the first operand must be one of %s, is \"%.60s\"%s%s%s", all, given,
-                      near != NULL ? " (did you mean " : "", near != NULL ? near : "",
-                      near != NULL ? "?)" : "");
-    return NULL;
-}
-
 static int materials(const Command *self, void *of, const Options *options, Problem *problem) {
     const MaterialsSettings *settings = of;
-    const struct Action *action = action_find(options, problem);
-    if (action == NULL)
+    size_t index;
+    if (command_action(options, &actions->name, COUNT(actions), sizeof *actions, &index, problem) !=
+        STATUS_OK)
         return command_refuse(self->name, problem);
+    const struct Action *action = &actions[index];
     const size_t count = options->operand_count - 1;
     Daemon daemon;
     MaterialsCall call = {settings, &daemon, options->operands + 1, count,

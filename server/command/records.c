@@ -241,22 +241,18 @@ static const struct Action {
 };
 
 static const struct Action *choose(const Options *options, Problem *problem) {
-    const char *name = options->operand_count > 0 ? options->operands[0] : "";
-    for (size_t i = 0; i < COUNT(actions); i++) {
-        if (strcmp(actions[i].name, name) != 0)
-            continue;
-        const size_t takes = actions[i].operand != NULL ? 2 : 1;
-        if (options->operand_count == takes &&
-            (takes == 1 ||
-             (options->operands[1][0] != '\0' && strcmp(options->operands[1], "..") != 0)))
-            return &actions[i];
-        (void)problem_set(problem, STATUS_USAGE, "%s takes %s", name,
-                          actions[i].operand != NULL ? actions[i].operand : "nothing more");
+    size_t index;
+    if (command_action(options, &actions->name, COUNT(actions), sizeof *actions, &index, problem) !=
+        STATUS_OK)
         return NULL;
-    }
-    (void)problem_set(problem, STATUS_USAGE,
-                      "the first operand must be list, add, show or delete%s%.60s%s",
-                      name[0] != '\0' ? ", is \"" : "", name, name[0] != '\0' ? "\"" : "");
+    const struct Action *action = &actions[index];
+    const size_t takes = action->operand != NULL ? 2 : 1;
+    if (options->operand_count == takes &&
+        (takes == 1 ||
+         (options->operands[1][0] != '\0' && strcmp(options->operands[1], "..") != 0)))
+        return action;
+    (void)problem_set(problem, STATUS_USAGE, "%s takes %s", action->name,
+                      takes == 2 ? action->operand : "nothing more");
     return NULL;
 }
 

@@ -12,6 +12,7 @@
 typedef struct TokenSettings {
     char *data, *name, *scopes;
     double expires;
+    bool json;
 } TokenSettings;
 
 // clang-format off
@@ -19,6 +20,7 @@ static const Field token_fields[] = {
     FIELD_TEXT(TokenSettings, name, 64, PRESENCE_OPTIONAL, 0, "whose it is: letters, digits, dot, underscore and dash; its jobs are counted under this name"),
     FIELD_TEXT(TokenSettings, scopes, 60, PRESENCE_OPTIONAL, 0, "what it may: read, submit, materials, admin (which is all), with commas between (read,submit)"),
     FIELD_REAL(TokenSettings, expires, "days", ABOVE(0), OPTIONAL, "when it ends; never if absent"),
+    FIELD_FLAG(TokenSettings, json, false, "list: print it as JSON"),
     FIELD_TEXT(TokenSettings, data, 4000, PRESENCE_OPTIONAL, 0, "the daemon's folder ($IMPACTD_DATA, else as impactd serve has it)"),
     FIELD_END,
 };
@@ -27,7 +29,7 @@ static const Field token_fields[] = {
 static Status create(Store *store, const TokenSettings *settings, TokenRow *row, Problem *problem) {
     static const double day_ms = 24 * 3600 * 1000.0;
     static const double days_most = 36500;
-    char token[TOKEN_SIZE];
+    char made[TOKEN_SIZE];
     int64_t expires_unix_ms = 0;
     // Who reviewed what the program came with.
     if (strcmp(row->name, "impactd") == 0)
@@ -37,48 +39,63 @@ static Status create(Store *store, const TokenSettings *settings, TokenRow *row,
         expires_unix_ms = clock_unix_ms() + (int64_t)(days * day_ms);
     }
     TRY(token_make(settings->scopes != NULL ? settings->scopes : "read,submit", expires_unix_ms,
-                   row, token, problem));
+                   row, made, problem));
     TRY(store_token_add(store, row, problem));
     fprintf(stderr,
             "The token \"%s\" (%s). It is shown this once; only its digest is kept. Use it as\n"
             "  curl -H \"Authorization: Bearer $TOKEN\" ...\n",
             row->name, row->scopes);
-    printf("%s\n", token);
+    printf("%s\n", made);
     return STATUS_OK;
 }
 
-static void time_add(Listing *listing, int64_t unix_ms, const char *never) {
-    char text[32];
+static const char *time_text(int64_t unix_ms, char text[32]) {
     if (unix_ms > 0)
         clock_rfc3339(unix_ms, text);
-    listing_add(listing, "%s", unix_ms > 0 ? text : never);
+    return unix_ms > 0 ? text : NULL;
 }
 
 static Status list(Store *store, const TokenSettings *settings, TokenRow *row, Problem *problem) {
-    static const char *const heads[] = {"NAME",      "SCOPES",  "CREATED",
-                                        "LAST USED", "EXPIRES", "STATE"};
-    (void)settings;
-    (void)row;
+    static const char *const heads[] = {"name", "scopes", "created", "used", "expires", "state"};
     TokenRows rows = {0};
+    (void)row;
     TRY(store_tokens(store, &rows, problem));
     const int64_t now = clock_unix_ms();
     Listing listing = {.columns = COUNT(heads), .has_heads = true};
+    Bytes json = {0};
     for (size_t i = 0; i < COUNT(heads); i++)
         listing_add(&listing, "%s", heads[i]);
+    bytes_text(&json, "{\"tokens\": [");
     for (size_t i = 0; i < rows.count; i++) {
         const TokenRow *one = &rows.at[i];
         const bool has_ended = one->expires_unix_ms > 0 && one->expires_unix_ms <= now;
-        listing_add(&listing, "%s", one->name);
-        listing_add(&listing, "%s", one->scopes);
-        time_add(&listing, one->created_unix_ms, "-");
-        time_add(&listing, one->used_unix_ms, "never");
-        time_add(&listing, one->expires_unix_ms, "never");
-        listing_add(&listing, "%s",
-                    one->revoked_unix_ms > 0 ? "revoked"
-                    : has_ended              ? "expired"
-                                             : "good");
+        char created[32], used[32], expires[32];
+        const char *const cells[COUNT(heads)] = {one->name,
+                                                 one->scopes,
+                                                 time_text(one->created_unix_ms, created),
+                                                 time_text(one->used_unix_ms, used),
+                                                 time_text(one->expires_unix_ms, expires),
+                                                 one->revoked_unix_ms > 0 ? "revoked"
+                                                 : has_ended              ? "expired"
+                                                                          : "good"};
+        for (size_t k = 0; k < COUNT(cells); k++) {
+            listing_add(&listing, "%s", cells[k] != NULL ? cells[k] : "never");
+            bytes_format(&json, "%s\"%s\": ", k > 0 ? ", " : i > 0 ? ", {" : "{", heads[k]);
+            if (cells[k] != NULL)
+                bytes_json_string(&json, cells[k]);
+            else
+                bytes_text(&json, "null");
+        }
+        bytes_text(&json, "}");
     }
-    listing_print(&listing, stdout);
+    bytes_text(&json, "]}\n");
+    if (settings->json && !json.is_failed)
+        fputs(json.at, stdout);
+    if (settings->json)
+        listing_clear(&listing);
+    else
+        listing_print(&listing, stdout);
+    bytes_clear(&json);
     free(rows.at);
     return STATUS_OK;
 }
@@ -135,17 +152,10 @@ static Status read_name(const TokenSettings *settings, const Options *options, b
 }
 
 static Status act(TokenSettings *settings, const Options *options, Problem *problem) {
-    const struct Action *action = NULL;
+    size_t index;
     TokenRow row = {0};
-    for (size_t i = 0; options->operand_count > 0 && i < COUNT(actions); i++)
-        if (strcmp(actions[i].name, options->operands[0]) == 0)
-            action = &actions[i];
-    if (action == NULL)
-        return problem_set(problem, STATUS_USAGE,
-                           "the first operand must be create, list, revoke or forget%s%.60s%s",
-                           options->operand_count > 0 ? ", is \"" : "",
-                           options->operand_count > 0 ? options->operands[0] : "",
-                           options->operand_count > 0 ? "\"" : "");
+    TRY(command_action(options, &actions->name, COUNT(actions), sizeof *actions, &index, problem));
+    const struct Action *action = &actions[index];
     if (options->operand_count > 2)
         return problem_set(problem, STATUS_USAGE, "\"%.60s\" is one operand too many",
                            options->operands[2]);
@@ -158,7 +168,7 @@ static Status act(TokenSettings *settings, const Options *options, Problem *prob
     return status;
 }
 
-static int go_on(const Command *self, void *settings, const Options *options, Problem *problem) {
+static int token(const Command *self, void *settings, const Options *options, Problem *problem) {
     const Status status = act(settings, options, problem);
     if (status == STATUS_OK)
         return COMMAND_OK;
@@ -185,5 +195,5 @@ const Command command_token = {
             "one from the list) loopback is open again.\n",
     .options = token_fields,
     .size = sizeof(TokenSettings),
-    .run = go_on,
+    .run = token,
 };
