@@ -1,5 +1,5 @@
 // One HTTP exchange after another with a server that is not trusted: bounded, no redirects, TLS
-// verified. Not a reader of what comes back (told.h). Used by command/daemon.c.
+// verified. Bodies are read by reply.h.
 #ifndef SERVER_CLIENT_HTTP_H
 #define SERVER_CLIENT_HTTP_H
 
@@ -51,7 +51,7 @@ typedef struct HttpAnswer {
     int code;
     char content_type[64]; // without parameters
     char etag[256];        // a strong one with its quotes; "" for none
-    int retry_after;       // [s]; 0: not told
+    int retry_after;       // [s]; 0: none
     Bytes body;
 } HttpAnswer;
 

@@ -1,5 +1,5 @@
 // A progress bar on a terminal: appears when the work takes long, goes when it ends.
-// Draws nothing where stderr is a file. Used by run.c, daemon.c and backup.c.
+// Draws nothing where stderr is a file.
 #ifndef SERVER_COMMAND_BAR_H
 #define SERVER_COMMAND_BAR_H
 

@@ -20,7 +20,7 @@ static int cancel(const Command *self, void *of, const Options *options, Problem
     }
     Daemon daemon;
     HttpAnswer answer = {0};
-    JobTold job = {0};
+    JobReply job = {0};
     char path[128];
     snprintf(path, sizeof path, "/v1/jobs/%s", id);
     const HttpAsk ask = {.method = "DELETE", .path = path};
@@ -29,13 +29,13 @@ static int cancel(const Command *self, void *of, const Options *options, Problem
     if (status == STATUS_OK)
         status = daemon_ask(&daemon, &ask, &answer, problem);
     if (status == STATUS_OK)
-        status = job_told_read(&answer, &job, problem);
+        status = job_reply_read(&answer, &job, problem);
     int code = COMMAND_OK;
     if (status == STATUS_OK)
         printf("%s %s\n", job.id, job.status);
     else
         code = daemon_refuse(self->name, id, status, problem);
-    job_told_clear(&job);
+    job_reply_clear(&job);
     http_answer_clear(&answer);
     daemon_close(&daemon);
     return code;

@@ -113,7 +113,7 @@ Status daemon_ask(Daemon *daemon, const HttpAsk *ask, HttpAnswer *answer, Proble
         const double pause = answer->retry_after > 0 ? answer->retry_after : 1;
         const bool is_busy = answer->code == 503 || answer->code == 429;
         if (!is_busy || pause > daemon_left(daemon))
-            return problem_told_read(answer, problem);
+            return problem_reply_read(answer, problem);
         http_answer_clear(answer);
         pause_for(pause);
     }
@@ -141,13 +141,13 @@ bool daemon_is_id(const char *text) {
                length;
 }
 
-Status daemon_job(Daemon *daemon, const char *id, double wait, HttpAnswer *answer, JobTold *job,
+Status daemon_job(Daemon *daemon, const char *id, double wait, HttpAnswer *answer, JobReply *job,
                   Problem *problem) {
     char path[160];
     snprintf(path, sizeof path, "/v1/jobs/%s?wait=%.3f", id, wait);
     const HttpAsk ask = {.method = "GET", .path = path};
     TRY(daemon_ask(daemon, &ask, answer, problem));
-    return job_told_read(answer, job, problem);
+    return job_reply_read(answer, job, problem);
 }
 
 Status daemon_result(Daemon *daemon, const char *id, char result[96], Problem *problem) {
@@ -155,27 +155,27 @@ Status daemon_result(Daemon *daemon, const char *id, char result[96], Problem *p
     if (strncmp(id, "j-", 2) != 0)
         return STATUS_OK;
     HttpAnswer answer = {0};
-    JobTold job = {0};
+    JobReply job = {0};
     const double left = daemon_left(daemon);
     Status status = daemon_job(daemon, id, left < 20 ? left : 20, &answer, &job, problem);
-    while (status == STATUS_OK && !job_told_is_final(&job) && daemon_left(daemon) > 0) {
-        job_told_clear(&job);
+    while (status == STATUS_OK && !job_reply_is_final(&job) && daemon_left(daemon) > 0) {
+        job_reply_clear(&job);
         http_answer_clear(&answer);
         const double rest = daemon_left(daemon);
         status = daemon_job(daemon, id, rest < 20 ? rest : 20, &answer, &job, problem);
     }
-    if (status == STATUS_OK && !job_told_is_final(&job))
+    if (status == STATUS_OK && !job_reply_is_final(&job))
         status = problem_set(problem, STATUS_TIMEOUT,
                              "is still %s; \"impactd watch %s\" follows it, --wait S waits",
                              job.status, id);
     else if (status == STATUS_OK && strcmp(job.status, "failed") == 0) {
-        problem_told_put(&job.problem, STATUS_INTERNAL, problem);
+        problem_reply_put(&job.problem, STATUS_INTERNAL, problem);
         status = STATUS_INTERNAL;
     } else if (status == STATUS_OK && (job.result == NULL || !daemon_is_id(job.result)))
         status = problem_set(problem, STATUS_INTERNAL, "was %s and has no result", job.status);
     if (status == STATUS_OK)
         snprintf(result, 96, "%s", job.result);
-    job_told_clear(&job);
+    job_reply_clear(&job);
     http_answer_clear(&answer);
     return status;
 }
@@ -188,7 +188,7 @@ typedef struct Show {
     double progress;
 } Show;
 
-static void show_job(Show *show, const JobTold *job) {
+static void show_job(Show *show, const JobReply *job) {
     const double progress = job->progress >= 0 && job->progress <= 100 ? job->progress : 0;
     if (show->bar.is_terminal) {
         const Progress watch = bar_watch(&show->bar);
@@ -206,14 +206,14 @@ static void show_job(Show *show, const JobTold *job) {
 
 // One look. Where nothing answers any more, again each second until a new daemon had its time.
 static Status look(Daemon *daemon, const char *id, double wait, bool was_there, HttpAnswer *answer,
-                   JobTold *job, Problem *problem) {
+                   JobReply *job, Problem *problem) {
     const int64_t until_ns = clock_monotonic_ns() + restart_ns;
     for (;;) {
         const Status status = daemon_job(daemon, id, wait, answer, job, problem);
         if (status != STATUS_UNREACHABLE || !was_there || clock_monotonic_ns() > until_ns ||
             daemon_left(daemon) < 1)
             return status;
-        job_told_clear(job);
+        job_reply_clear(job);
         http_answer_clear(answer);
         problem_clear(problem);
         pause_for(1);
@@ -232,7 +232,7 @@ typedef struct Events {
 
 static void line_take(Events *events) {
     static const char name[] = "event: ", data[] = "data: ";
-    JobTold job = {0};
+    JobReply job = {0};
     const size_t size = events->length;
     events->length = 0;
     if (size >= sizeof events->line)
@@ -242,9 +242,9 @@ static void line_take(Events *events) {
         events->is_progress = strcmp(events->line + sizeof name - 1, "progress") == 0;
     if (!events->is_progress || strncmp(events->line, data, sizeof data - 1) != 0)
         return;
-    if (job_told_event(events->line + sizeof data - 1, size - (sizeof data - 1), events->id, &job))
+    if (job_reply_event(events->line + sizeof data - 1, size - (sizeof data - 1), events->id, &job))
         show_job(events->show, &job);
-    job_told_clear(&job);
+    job_reply_clear(&job);
 }
 
 static bool are_events(const HttpAnswer *answer) {
@@ -289,7 +289,7 @@ static bool events_follow(Daemon *daemon, const char *id, Show *show) {
     return is_there;
 }
 
-Status daemon_follow(Daemon *daemon, const char *id, FILE *lines, HttpAnswer *answer, JobTold *job,
+Status daemon_follow(Daemon *daemon, const char *id, FILE *lines, HttpAnswer *answer, JobReply *job,
                      Problem *problem) {
     char farewell[256];
     Show show = {.lines = lines};
@@ -307,14 +307,14 @@ Status daemon_follow(Daemon *daemon, const char *id, FILE *lines, HttpAnswer *an
         if (status != STATUS_OK)
             break;
         show_job(&show, job);
-        if (job_told_is_final(job))
+        if (job_reply_is_final(job))
             break;
         if (daemon_left(daemon) <= 0) {
             status = problem_set(problem, STATUS_TIMEOUT, "is still %s after the time given; %.*s",
                                  job->status, (int)strlen(farewell) - 1, farewell);
             break;
         }
-        job_told_clear(job);
+        job_reply_clear(job);
         http_answer_clear(answer);
         has_events = has_events && events_follow(daemon, id, &show);
     }
@@ -325,11 +325,11 @@ Status daemon_follow(Daemon *daemon, const char *id, FILE *lines, HttpAnswer *an
     return status;
 }
 
-int daemon_verdict(const JobTold *job, Problem *problem) {
+int daemon_verdict(const JobReply *job, Problem *problem) {
     if (strcmp(job->status, "successful") == 0)
         return COMMAND_OK;
     if (strcmp(job->status, "failed") == 0) {
-        problem_told_put(&job->problem, STATUS_INTERNAL, problem);
+        problem_reply_put(&job->problem, STATUS_INTERNAL, problem);
         scene_file_refuse(job->id, problem);
     } else {
         fprintf(stderr, "%s: was %s\n", job->id, job->status);

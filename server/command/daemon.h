@@ -1,10 +1,10 @@
 // What commands that ask a daemon share: where it is, patience while it is busy, watching a job.
-// Not a command. Used by submit.c, watch.c, get.c, cancel.c, compare.c and materials*.c.
+// Not a command.
 #ifndef SERVER_COMMAND_DAEMON_H
 #define SERVER_COMMAND_DAEMON_H
 
 #include "server/client/http.h"
-#include "server/client/told.h"
+#include "server/client/reply.h"
 #include "server/options.h"
 
 // First rows of every such command's options; its struct has these members. IMPACTD_SERVER,
@@ -43,7 +43,7 @@ void daemon_print(const HttpAnswer *answer); // the document as it came
 bool daemon_is_id(const char *text);
 
 // Asks for a job, at most `wait` seconds for its end.
-Status daemon_job(Daemon *daemon, const char *id, double wait, HttpAnswer *answer, JobTold *job,
+Status daemon_job(Daemon *daemon, const char *id, double wait, HttpAnswer *answer, JobReply *job,
                   Problem *problem);
 
 // The result that `id` means: itself, or of a job that is finished, or is so before patience ends.
@@ -54,11 +54,11 @@ Status daemon_result(Daemon *daemon, const char *id, char result[96], Problem *p
 // again: a bar on a terminal, else lines on `lines` (NULL: none). A daemon that is started anew
 // meanwhile is found again. STATUS_TIMEOUT when patience ends: the job goes on. The last answer and
 // what it tells stay with the caller, who clears both.
-Status daemon_follow(Daemon *daemon, const char *id, FILE *lines, HttpAnswer *answer, JobTold *job,
+Status daemon_follow(Daemon *daemon, const char *id, FILE *lines, HttpAnswer *answer, JobReply *job,
                      Problem *problem);
 
 // The exit code of a finished job; tells on stderr why it failed.
-int daemon_verdict(const JobTold *job, Problem *problem);
+int daemon_verdict(const JobReply *job, Problem *problem);
 
 // Everything a fault says, on stderr, under `name`; returns the exit code.
 int daemon_refuse(const char *command, const char *name, Status status, const Problem *problem);

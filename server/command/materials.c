@@ -179,25 +179,25 @@ static Status materials_print(const MaterialsCall *call, const HttpAnswer *answe
     return STATUS_OK;
 }
 
-typedef struct ReviewTold {
+typedef struct ReviewReply {
     bool self_approved;
-} ReviewTold;
-typedef struct RevisionTold {
+} ReviewReply;
+typedef struct RevisionReply {
     char *slug, *status;
     uint64_t revision;
-    ReviewTold review;
-} RevisionTold;
+    ReviewReply review;
+} RevisionReply;
 
 // clang-format off
-static const Field review_told_fields[] = {
-    FIELD_FLAG(ReviewTold, self_approved, false, "by whoever wrote the revision"),
+static const Field review_reply_fields[] = {
+    FIELD_FLAG(ReviewReply, self_approved, false, "by whoever wrote the revision"),
     FIELD_END,
 };
-static const Field revision_told_fields[] = {
-    FIELD_TEXT(RevisionTold, slug, 0, PRESENCE_OPTIONAL, 0, "slug"),
-    FIELD_TEXT(RevisionTold, status, 0, PRESENCE_OPTIONAL, 0, "status"),
-    FIELD_COUNT(RevisionTold, revision, NULL, ANY, OPTIONAL, "revision"),
-    FIELD_ITEM_OR_NULL(RevisionTold, review, review_told_fields, PRESENCE_OPTIONAL, "last review"),
+static const Field revision_reply_fields[] = {
+    FIELD_TEXT(RevisionReply, slug, 0, PRESENCE_OPTIONAL, 0, "slug"),
+    FIELD_TEXT(RevisionReply, status, 0, PRESENCE_OPTIONAL, 0, "status"),
+    FIELD_COUNT(RevisionReply, revision, NULL, ANY, OPTIONAL, "revision"),
+    FIELD_ITEM_OR_NULL(RevisionReply, review, review_reply_fields, PRESENCE_OPTIONAL, "last review"),
     FIELD_END,
 };
 // clang-format on
@@ -205,13 +205,13 @@ static const Field revision_told_fields[] = {
 // "sponge@2 draft" of an answer that is a revision.
 static Status materials_print_revision(const MaterialsCall *call, const HttpAnswer *answer,
                                        Problem *problem) {
-    RevisionTold told = {0};
+    RevisionReply told = {0};
     Status status = STATUS_OK;
     if (call->settings->json) {
         daemon_print(answer);
         return STATUS_OK;
     }
-    (void)read_json(answer->body.at, answer->body.count, revision_told_fields, &told, NULL);
+    (void)read_json(answer->body.at, answer->body.count, revision_reply_fields, &told, NULL);
     if (told.slug == NULL || told.status == NULL || told.revision == COUNT_ABSENT) {
         status = problem_set(problem, STATUS_UNREACHABLE,
                              "the answer is no revision: what answers there is no impactd");
@@ -221,7 +221,7 @@ static Status materials_print_revision(const MaterialsCall *call, const HttpAnsw
         printf("%s@%llu %s%s\n", told.slug, (unsigned long long)told.revision, told.status,
                told.review.self_approved ? ", by its own author" : "");
     }
-    fields_clear(revision_told_fields, &told);
+    fields_clear(revision_reply_fields, &told);
     return status;
 }
 

@@ -1,6 +1,5 @@
 // A file that appears whole or not at all: written beside its name, renamed at the end, removed
-// when the program is interrupted. Not a stream to a terminal. Used by the commands that
-// write files.
+// when the program is interrupted. Not a stream to a terminal.
 #ifndef SERVER_COMMAND_OUTPUT_H
 #define SERVER_COMMAND_OUTPUT_H
 

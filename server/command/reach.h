@@ -1,5 +1,5 @@
 // Who can reach the daemon and under which names: Host names, base URL, TLS files, and whether
-// tokens are a must. Settings into what the listener takes. Used by serve.c.
+// tokens are a must. Settings into what the listener takes.
 #ifndef SERVER_COMMAND_REACH_H
 #define SERVER_COMMAND_REACH_H
 

@@ -1,5 +1,5 @@
 // A scene given on the command line: its text, and what a person is told about its faults.
-// Judges nothing itself. Used by run.c, check.c and import.c.
+// Judges nothing itself.
 #ifndef SERVER_COMMAND_SCENE_FILE_H
 #define SERVER_COMMAND_SCENE_FILE_H
 

@@ -34,16 +34,16 @@ static const Field submit_fields[] = {
 
 // The job is there: its id, and with patience its end. Takes nothing.
 static int job_follow(const SubmitSettings *settings, Daemon *daemon, HttpAnswer *answer,
-                      JobTold *job, Problem *problem) {
+                      JobReply *job, Problem *problem) {
     int code = COMMAND_OK;
     if (!settings->json) {
         printf("%s\n", job->id);
         fflush(stdout);
     }
-    if (settings->wait > 0 && !job_told_is_final(job)) {
+    if (settings->wait > 0 && !job_reply_is_final(job)) {
         char id[96];
         snprintf(id, sizeof id, "%s", job->id);
-        job_told_clear(job);
+        job_reply_clear(job);
         http_answer_clear(answer);
         const Status status = daemon_follow(daemon, id, stderr, answer, job, problem);
         if (status != STATUS_OK)
@@ -54,14 +54,14 @@ static int job_follow(const SubmitSettings *settings, Daemon *daemon, HttpAnswer
     if (settings->json)
         daemon_print(answer);
     // Without patience the job's end is nobody's question, but if it is there it is told.
-    return code == COMMAND_OK && job_told_is_final(job) ? daemon_verdict(job, problem) : code;
+    return code == COMMAND_OK && job_reply_is_final(job) ? daemon_verdict(job, problem) : code;
 }
 
 static int scene_submit(const SubmitSettings *settings, const char *path, const Bytes *text,
                         Problem *problem) {
     Daemon daemon;
     HttpAnswer answer = {0};
-    JobTold job = {0};
+    JobReply job = {0};
     char prefer[48];
     snprintf(prefer, sizeof prefer, "wait=%.0f", ceil(fmin(settings->wait, 2)));
     const HttpAsk ask = {.method = "POST",
@@ -77,7 +77,7 @@ static int scene_submit(const SubmitSettings *settings, const char *path, const 
     if (status == STATUS_OK && settings->dry_run) {
         daemon_print(&answer);
     } else if (status == STATUS_OK) {
-        status = job_told_read(&answer, &job, problem);
+        status = job_reply_read(&answer, &job, problem);
         if (status == STATUS_OK && !daemon_is_id(job.id))
             status = problem_set(problem, STATUS_UNREACHABLE, "the answer holds no job's id");
         if (status == STATUS_OK)
@@ -85,7 +85,7 @@ static int scene_submit(const SubmitSettings *settings, const char *path, const 
     }
     if (status != STATUS_OK)
         code = daemon_refuse("submit", path, status, problem);
-    job_told_clear(&job);
+    job_reply_clear(&job);
     http_answer_clear(&answer);
     daemon_close(&daemon);
     return code;

@@ -26,7 +26,7 @@ static int watch(const Command *self, void *of, const Options *options, Problem 
     }
     Daemon daemon;
     HttpAnswer answer = {0};
-    JobTold job = {0};
+    JobReply job = {0};
     Status status = daemon_open(settings->server, settings->token_file, settings->ca_file,
                                 settings->wait, &daemon, problem);
     if (status == STATUS_OK)
@@ -38,7 +38,7 @@ static int watch(const Command *self, void *of, const Options *options, Problem 
         code = daemon_verdict(&job, problem);
     else
         code = daemon_refuse(self->name, id, status, problem);
-    job_told_clear(&job);
+    job_reply_clear(&job);
     http_answer_clear(&answer);
     daemon_close(&daemon);
     return code;

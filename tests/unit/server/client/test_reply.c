@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "server/client/told.h"
+#include "server/client/reply.h"
 
 static HttpAnswer answer_of(int code, const char *text) {
     HttpAnswer answer = {.code = code};
@@ -21,14 +21,14 @@ static void a_job_is_read_and_what_is_not_known_skipped(void **state) {
     HttpAnswer answer = answer_of(
         200, "{\"id\": \"j-1\", \"status\": \"failed\", \"result\": null, \"progress\": 40.5, "
              "\"news\": {\"deep\": [1]}, \"problem\": {\"detail\": \"why\", \"more\": 2}}");
-    JobTold job = {0};
-    assert_int_equal(job_told_read(&answer, &job, NULL), STATUS_OK);
+    JobReply job = {0};
+    assert_int_equal(job_reply_read(&answer, &job, NULL), STATUS_OK);
     assert_string_equal(job.id, "j-1");
     assert_null(job.result);
     assert_true(job.progress == 40.5);
-    assert_true(job_told_is_final(&job));
+    assert_true(job_reply_is_final(&job));
     assert_string_equal(job.problem.detail, "why");
-    job_told_clear(&job);
+    job_reply_clear(&job);
     http_answer_clear(&answer);
 }
 
@@ -42,9 +42,9 @@ static void what_is_no_job_is_refused(void **state) {
                                         "{\"id\": \"j-1\", \"id\": \"j-2\", \"status\": \"x\"}"};
     for (size_t i = 0; i < COUNT(texts); i++) {
         HttpAnswer answer = answer_of(200, texts[i]);
-        JobTold job = {0};
-        assert_int_equal(job_told_read(&answer, &job, NULL), STATUS_UNREACHABLE);
-        job_told_clear(&job);
+        JobReply job = {0};
+        assert_int_equal(job_reply_read(&answer, &job, NULL), STATUS_UNREACHABLE);
+        job_reply_clear(&job);
         http_answer_clear(&answer);
     }
 }
@@ -57,7 +57,7 @@ static void a_problem_document_becomes_a_problem(void **state) {
         "{\"type\": \"/problems/invalid-scene\", \"detail\": \"two\", \"errors\": ["
         "{\"pointer\": \"/a\", \"detail\": \"bad \\u001b[31m\", \"value\": {\"x\": 1}, "
         "\"did_you_mean\": \"b\"}, {\"pointer\": \"/c\", \"detail\": \"worse\"}], \"more\": 7}");
-    assert_int_equal(problem_told_read(&answer, problem), STATUS_INVALID);
+    assert_int_equal(problem_reply_read(&answer, problem), STATUS_INVALID);
     assert_int_equal(problem->count, 9);
     assert_string_equal(problem->faults[0].pointer, "/a");
     assert_string_equal(problem->faults[0].detail, "bad ?[31m");
@@ -78,7 +78,7 @@ static void every_code_has_a_status(void **state) {
                 {299, STATUS_INTERNAL}};
     for (size_t i = 0; i < COUNT(rows); i++) {
         HttpAnswer answer = answer_of(rows[i].code, "<html>");
-        assert_int_equal(problem_told_read(&answer, NULL), rows[i].status);
+        assert_int_equal(problem_reply_read(&answer, NULL), rows[i].status);
         http_answer_clear(&answer);
     }
 }
