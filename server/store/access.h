@@ -27,7 +27,6 @@ atomic_uint_fast64_t *store_evictions(Store *store); // of series
 struct Late *store_late(Store *store);               // NULL: its database is in memory
 struct MaterialMemory *store_material_memory(Store *store);
 struct RecordMemory *store_record_memory(Store *store);
-struct ResultFilter *store_result_filter(Store *store);
 
 // A connection for reading, to be put back soon: there are few. Waits for one.
 Database *store_take(Store *store);

@@ -3,7 +3,6 @@
 #include <string.h>
 
 #include "server/store/job_rows.h"
-#include "server/store/result_filter.h"
 #include "server/store/store.h"
 
 // clang-format off
@@ -60,16 +59,12 @@ static Status finish(Database *database, const void *work, Problem *problem) {
 
 Status store_result_save(Store *store, const ResultRow *result, const JobRow *const *jobs,
                          size_t job_count, Problem *problem) {
-    if (result != NULL)
-        result_filter_add(store_result_filter(store), result->id);
     return store_write(store, finish, &(Finish){result, jobs, job_count}, problem);
 }
 
 Status store_result_post(Store *store, const ResultRow *result, const JobRow *const *jobs,
                          size_t job_count, StoreTurn turn, const StoreDone *done) {
     const Finish work = {result, jobs, job_count};
-    if (result != NULL)
-        result_filter_add(store_result_filter(store), result->id);
     return store_post(store, finish, &work, sizeof work, turn, done, NULL);
 }
 
@@ -81,10 +76,9 @@ static const RowColumn key_columns[] = {ROW_COLUMN(Key, id, COLUMN_TEXT), ROW_EN
 static Status load(Store *store, const char *sql, const char *id, ResultRow *row,
                    Problem *problem) {
     const Key key = {(char *)id};
-    bool is_found = false;
+    bool is_found;
     memset(row, 0, sizeof *row);
-    if (result_filter_may_have(store_result_filter(store), id))
-        TRY(store_first(store, sql, key_columns, &key, result_columns, row, &is_found, problem));
+    TRY(store_first(store, sql, key_columns, &key, result_columns, row, &is_found, problem));
     return is_found ? STATUS_OK
                     : problem_set(problem, STATUS_NOT_FOUND, "there is no result \"%.72s\"", id);
 }

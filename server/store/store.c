@@ -18,7 +18,6 @@
 #include "server/store/late.h"
 #include "server/store/material_memory.h"
 #include "server/store/record_memory.h"
-#include "server/store/result_filter.h"
 #include "server/store/writer.h"
 
 enum { READERS = 4 };
@@ -30,7 +29,6 @@ struct Store {
     Late *late;
     MaterialMemory *materials;
     RecordMemory *records;
-    ResultFilter *results;
     atomic_uint_fast64_t generation; // of the catalogue
     atomic_uint_fast64_t measured;   // materials
     atomic_uint_fast64_t evictions;  // of series
@@ -81,15 +79,10 @@ static Status open_store(const char *directory, bool is_beside, Store **store, P
     pthread_cond_init(&made->some, NULL);
     made->materials = material_memory_new();
     made->records = record_memory_new();
-    made->results = result_filter_new();
-    Status status = made->materials == NULL || made->records == NULL || made->results == NULL
+    Status status = made->materials == NULL || made->records == NULL
                         ? problem_set(problem, STATUS_NO_MEMORY, "no memory for the store")
                     : directory != NULL ? open_files(made, directory, is_beside, problem)
                                         : open_memory(made, problem);
-    // Beside a daemon there are others who write.
-    if (status == STATUS_OK && !is_beside)
-        status = result_filter_fill(made->results, made->own != NULL ? made->own : made->readers[0],
-                                    problem);
     if (status == STATUS_OK)
         status = writer_start(made->own, made->own == NULL ? made : NULL, &made->writer, problem);
     if (status == STATUS_OK && directory != NULL && !is_beside) {
@@ -126,7 +119,6 @@ void store_close(Store *store) {
     folder_unlock(store->lock_file);
     material_memory_free(store->materials);
     record_memory_free(store->records);
-    result_filter_free(store->results);
     pthread_cond_destroy(&store->some);
     pthread_mutex_destroy(&store->lock);
     free(store);
@@ -199,10 +191,6 @@ RecordMemory *store_record_memory(Store *store) {
 
 bool store_is_private(const Store *store) {
     return store->own == NULL;
-}
-
-ResultFilter *store_result_filter(Store *store) {
-    return store->results;
 }
 
 uint64_t store_generation(Store *store) {
