@@ -27,8 +27,6 @@ Status cache_show(App *app, const Request *request, Reply *reply, Problem *probl
     Bytes bytes = {.most = app->reply_most};
     intake_tally(app->intake, &tally);
     bytes_text(&bytes, "{");
-    put_layer(&bytes, "bodies", &tally.known, true);
-    bytes_text(&bytes, ", ");
     put_layer(&bytes, "documents", &tally.heads, true);
     bytes_text(&bytes, ", ");
     put_layer(&bytes, "series", &tally.series, true);

@@ -22,10 +22,8 @@ static void write_raw(Bytes *bytes, const char *name, const char *json) {
 }
 
 static void write_links(Bytes *bytes, const char *id, const char *result, bool has_result,
-                        bool has_table, JobSlots *slots) {
-    bytes_format(bytes, ", \"links\": {\"self\": \"%s/v1/jobs/", link_base());
-    slots->self = bytes->count;
-    bytes_format(bytes, "%s\"", id);
+                        bool has_table) {
+    bytes_format(bytes, ", \"links\": {\"self\": \"%s/v1/jobs/%s\"", link_base(), id);
     if (has_table)
         bytes_format(bytes, ", \"table\": \"%s/v1/jobs/%s/table.json\"", link_base(), id);
     if (has_result)
@@ -36,16 +34,9 @@ static void write_links(Bytes *bytes, const char *id, const char *result, bool h
     bytes_text(bytes, "}");
 }
 
-// Behind the quote of the time that write_time is about to write.
-static size_t time_slot(const Bytes *bytes, const char *name) {
-    return bytes->count + strlen(", \"\": \"") + strlen(name);
-}
-
-// With `is_known`, the time it took is written as wide as its slot.
-static void put(Bytes *bytes, const JobShow *show, int parts, JobSlots *slots, bool is_known) {
+void job_put(Bytes *bytes, const JobShow *show, int parts) {
     const bool has_result = show->state == JOB_SUCCESSFUL && show->result[0] != '\0';
     bytes_text(bytes, "{\"id\": ");
-    slots->id = bytes->count + 1;
     bytes_json_string(bytes, show->id);
     if (show->title != NULL) {
         bytes_text(bytes, ", \"title\": ");
@@ -69,11 +60,8 @@ static void put(Bytes *bytes, const JobShow *show, int parts, JobSlots *slots, b
     bytes_json_string(bytes, has_result ? show->result : NULL);
     if (has_result && show->is_result_deleted)
         bytes_text(bytes, ", \"result_deleted\": true");
-    slots->created = time_slot(bytes, "created");
     write_time(bytes, "created", show->created_unix_ms);
-    slots->started = time_slot(bytes, "started");
     write_time(bytes, "started", show->started_unix_ms);
-    slots->finished = time_slot(bytes, "finished");
     write_time(bytes, "finished", show->finished_unix_ms);
     write_raw(bytes, "problem", show->problem);
     if (parts & JOB_PUT_WHOLE) {
@@ -88,27 +76,14 @@ static void put(Bytes *bytes, const JobShow *show, int parts, JobSlots *slots, b
     bytes_text(bytes, ", \"run\": ");
     bytes_real(bytes, show->run);
     bytes_text(bytes, ", \"total\": ");
-    slots->total = bytes->count;
-    if (is_known)
-        bytes_text(bytes, "0.000000");
-    else
-        bytes_real(bytes, show->total);
+    bytes_real(bytes, show->total);
     bytes_text(bytes, "}");
     if (parts & JOB_PUT_LINKS)
         write_links(bytes, show->id, show->result, has_result && !show->is_result_deleted,
-                    show->points > 0, slots);
+                    show->points > 0);
     else
         bytes_text(bytes, ", \"links\": {}");
     bytes_text(bytes, "}");
-}
-
-void job_put(Bytes *bytes, const JobShow *show, int parts) {
-    put(bytes, show, parts, &(JobSlots){0}, false);
-}
-
-void job_put_known(Bytes *bytes, const JobShow *show, JobSlots *slots) {
-    put(bytes, show, JOB_PUT_WHOLE | JOB_PUT_LINKS, slots, true);
-    bytes_text(bytes, "\n");
 }
 
 void job_put_dry_run(Bytes *bytes, const DryRun *run) {

@@ -14,8 +14,6 @@ enum {
 };
 
 void job_put(Bytes *bytes, const JobShow *show, int parts);
-// As one job is shown, and where what differs from job to job stands in it; `bytes` is empty.
-void job_put_known(Bytes *bytes, const JobShow *show, JobSlots *slots);
 void job_put_dry_run(Bytes *bytes, const DryRun *run);
 
 #endif

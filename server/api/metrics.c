@@ -17,8 +17,7 @@ static void write_layers(Bytes *bytes, const IntakeTally *tally, Store *store) {
     const struct {
         const char *label;
         const LayerTally *layer;
-    } layers[] = {{"layer=\"bodies\"", &tally->known},
-                  {"layer=\"documents\"", &tally->heads},
+    } layers[] = {{"layer=\"documents\"", &tally->heads},
                   {"layer=\"series\"", &tally->series},
                   {"layer=\"results\"", &tally->rows},
                   {"layer=\"stored_series\"", &stored}};

@@ -12,8 +12,6 @@
 // Of scenes that wait, where the settings say nothing.
 static const size_t queue_bytes_usual = (size_t)256 << 20;
 
-enum { KNOWN_SHARE = 8 }; // of the cache's bytes: answers to known bodies
-
 Computation *computation_new(const char *result) {
     Computation *computation = calloc(1, sizeof *computation);
     if (computation == NULL)
@@ -189,13 +187,11 @@ Status intake_open(Store *store, const IntakeSettings *settings, Intake **opened
     pthread_cond_init(&intake->settled, NULL);
     intake->jobs = index_new();
     intake->in_flight = index_new();
-    const size_t known_bytes = settings->cache_bytes / KNOWN_SHARE;
-    intake->cache = cache_new(settings->cache_bytes - known_bytes);
-    intake->known = known_new(known_bytes);
+    intake->cache = cache_new(settings->cache_bytes);
     intake->workers = calloc(settings->workers + 1, sizeof *intake->workers);
     Status status = STATUS_OK;
     if (intake->jobs == NULL || intake->in_flight == NULL || intake->cache == NULL ||
-        intake->known == NULL || intake->queue == NULL || intake->workers == NULL)
+        intake->queue == NULL || intake->workers == NULL)
         status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the job queue");
     if (status == STATUS_OK)
         status = store_sweep_tidy(store, problem);
@@ -281,7 +277,6 @@ void intake_close(Intake *intake) {
         intake_retire(job);
     cache_free(intake->cache);
     queue_free(intake->queue);
-    known_free(intake->known);
     index_free(intake->jobs);
     index_free(intake->in_flight);
     free(intake->workers);
@@ -319,37 +314,7 @@ Status intake_find(Intake *intake, const char *id, Job **found, Problem *problem
     return STATUS_OK;
 }
 
-bool intake_known(Intake *intake, const Submission *submission, KnownAnswer *answer) {
-    // Whoever's jobs are counted has them counted at the door.
-    if (submission->client != NULL && intake->settings.rate > 0)
-        return false;
-    if (!known_answer(intake->known, intake->store, submission, intake_mark(intake), answer))
-        return false;
-    totals_ended(&intake->totals, JOB_SUCCESSFUL, true);
-    return true;
-}
-
-// Both only rise: their sum is the same only while both are.
-uint64_t intake_mark(Intake *intake) {
-    return store_generation(intake->store) + atomic_load(&intake->deletions);
-}
-
-void intake_learn(Intake *intake, const Submission *submission, uint64_t mark, Job *job,
-                  const char *text, size_t size, const JobSlots *slots) {
-    pthread_mutex_lock(&intake->lock);
-    JobRow row = job->row;
-    row.scene = NULL;                                      // its result has it
-    row.client = row.idempotency_key = row.request = NULL; // are another request's
-    row.has_result = true;
-    // What it was made under may be no more: it would be dropped when it is found.
-    if (mark == intake_mark(intake))
-        known_put(intake->known, submission, mark, &row, text, size, slots);
-    pthread_mutex_unlock(&intake->lock);
-}
-
 void intake_forget(Intake *intake, const char *result) {
-    atomic_fetch_add(&intake->deletions, 1);
-    known_forget(intake->known, result);
     pthread_mutex_lock(&intake->lock);
     cache_forget(intake->cache, result);
     pthread_mutex_unlock(&intake->lock);
@@ -393,7 +358,6 @@ void intake_tally(Intake *intake, IntakeTally *tally) {
     cache_tally(intake->cache, &tally->series, &tally->heads);
     tally->cached_outcomes = tally->series.count;
     tally->cached_bytes = tally->series.bytes + tally->heads.bytes;
-    known_tally(intake->known, &tally->known);
     for (size_t i = 0; i < intake->worker_count; i++)
         tally->running += intake->workers[i].running != NULL || intake->workers[i].study != NULL;
     pthread_mutex_unlock(&intake->lock);

@@ -16,7 +16,7 @@ typedef struct IntakeSettings {
     size_t workers;     // threads, at least 1
     size_t queue_most;  // unfinished jobs at most
     size_t queue_bytes; // of their scenes at most; 0: 256 MiB
-    size_t cache_bytes; // in memory, of finished outcomes and of answers to bodies that came before
+    size_t cache_bytes; // in memory, of finished outcomes
     size_t quota;       // unfinished jobs of one client by name; 0: as many as the queue takes
     double rate;        // jobs a minute of one client by name; 0: any number
     Waker deleted;      // called after results were deleted; `wake` may be NULL
@@ -72,33 +72,6 @@ Status intake_submit(Intake *intake, const Submission *submission, Job **job, Pr
 // another try, as far as can be told.
 int intake_retry_after(Intake *intake, const char *client, Status status);
 
-// What differs from job to job in the text of a known answer: offsets, each the place of so many
-// bytes. The job's id stands at `id` and `self` (JOB_ID_LENGTH).
-enum { JOB_SLOT_TIME = 24, JOB_SLOT_TOTAL = 8 };
-typedef struct JobSlots {
-    size_t id, self;
-    size_t created, started, finished; // JOB_SLOT_TIME, RFC 3339
-    size_t total;                      // JOB_SLOT_TOTAL, "0.000001" [s]
-} JobSlots;
-
-typedef struct KnownAnswer {
-    char *body; // the whole document, to be freed
-    size_t size;
-    char job[40];
-} KnownAnswer;
-
-// Answers a body that was answered before to the byte, under the catalogue as it is: a job of its
-// own that is finished at once, as jobs_create would. Without reading JSON, files or the database
-// and without waiting, some microseconds in all: fit for an event loop. False: submit it. Not for
-// requests with a query or an Idempotency-Key.
-bool intake_known(Intake *intake, const Submission *submission, KnownAnswer *answer);
-// Under what an answer holds: to be read before the submission that is learnt.
-uint64_t intake_mark(Intake *intake);
-// Keeps the answer to a submission whose job was finished at once, for intake_known: `text` is the
-// document as it shall stand there, with anything in its slots.
-void intake_learn(Intake *intake, const Submission *submission, uint64_t mark, Job *job,
-                  const char *text, size_t size, const JobSlots *slots);
-
 // The same without running: everything a dry run answers.
 typedef struct DryRun {
     StudyRequest inquiry;
@@ -153,7 +126,6 @@ void intake_layers(Intake *intake, const char *result, IntakeLayers *layers);
 typedef struct IntakeTally {
     size_t queued, running, workers, queue_most, cached_outcomes, cached_bytes;
     size_t saving;     // computations that have run and are not yet in the store
-    LayerTally known;  // whole answers, by body
     LayerTally heads;  // in memory, by result: plan, summary, work and notes
     LayerTally series; // in memory, by result; its bytes are those of both
     LayerTally rows;   // results in the database: those found there and not

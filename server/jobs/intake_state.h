@@ -10,7 +10,6 @@
 #include "server/jobs/head.h"
 #include "server/jobs/index.h"
 #include "server/jobs/intake.h"
-#include "server/jobs/known.h"
 #include "server/jobs/naming.h"
 #include "server/jobs/queue.h"
 #include "server/jobs/totals.h"
@@ -116,10 +115,8 @@ struct Intake {
     struct Saving *delayed;          // of these, what waits for room in the store
     Job *undismissed;                // held: dismissed, but the store could not be told
     Cache *cache;
-    Known *known;
     LayerTally rows, stored;            // results and series found in the database
     size_t keeping_bytes;               // of series on the way there
-    atomic_uint_fast64_t deletions;     // of results
     atomic_int large_plans;             // requests that plan large structures
     Failure failures[OUTCOME_FAILURES]; // of computations for readers, told once
     size_t next_failure;

@@ -12,14 +12,14 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."
 import program  # noqa: E402
 
 
-def test_a_body_that_came_before_is_answered_without_being_read():
+def test_a_scene_that_came_before_is_answered_from_the_cache():
     """The third time the same body comes, the answer is the first one's but for id, times and "cached"; each is a job."""
     scene = {**program.scene("paper_free_sponge"), "title": "a \"title\": 0.000000", "labels": ["x"]}
     with program.daemon() as daemon:
         replies = [daemon.submit(scene) for _ in range(6)]
         jobs = [reply.json() for reply in replies]
         layers = daemon.get("/v1/cache").json()
-        assert layers["bodies"]["hits"] == 4 and layers["bodies"]["count"] == 1, layers
+        assert layers["documents"]["hits"] == 5 and layers["documents"]["count"] == 1, layers
         assert [job["cached"] for job in jobs] == [False] + 5 * [True]
         assert len({job["id"] for job in jobs}) == 6 and sorted(job["id"] for job in jobs) == [job["id"] for job in jobs]
         differing = {"id", "created", "started", "finished", "timing", "links", "cached"}

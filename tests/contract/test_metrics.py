@@ -149,7 +149,7 @@ def test_jobs_work_and_writes_are_counted():
         assert value(now, "impactd_sqlite_errors_total") == 0
         assert value(now, "impactd_sqlite_transaction_seconds_count") == value(now, "impactd_sqlite_transactions_total")
         assert value(now, "impactd_cache_bytes") > 0
-        assert value(now, "impactd_cache_misses_total", layer="bodies") > 0
+        assert value(now, "impactd_cache_misses_total", layer="documents") > 0
         assert value(now, "process_resident_memory_bytes") > 1e6 and value(now, "process_open_fds") > 5
         assert 0 < time.time() - value(now, "process_start_time_seconds") < 3600
         assert value(now, "process_cpu_seconds_total") > 0
