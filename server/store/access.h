@@ -24,7 +24,6 @@ Status store_post(Store *store, StoreApply *apply, const void *work, size_t size
                   const StoreDone *done, StoreTicket **ticket);
 
 atomic_uint_fast64_t *store_evictions(Store *store); // of series
-struct Late *store_late(Store *store);               // NULL: its database is in memory
 struct MaterialMemory *store_material_memory(Store *store);
 struct RecordMemory *store_record_memory(Store *store);
 

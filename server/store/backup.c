@@ -1,12 +1,9 @@
-// Rows that follow their answer (late.h) are read first: each is in their file until the database
-// has it, so what is not found there is in the database as it is copied afterwards.
+// The database as it is at one moment, beside whatever a daemon writes meanwhile.
 //
-//     impactd.late --> memory --------------------.
-//     impactd.db   --> FILE.xxxxxx, one moment --> + --> check --> sync --> FILE
+//     impactd.db --> FILE.xxxxxx --> check --> sync --> FILE
 #include "server/store/backup.h"
 
 #include <errno.h>
-#include <fcntl.h>
 #include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -18,11 +15,10 @@
 #include "server/base/embedded.h"
 #include "server/store/database.h"
 #include "server/store/folder.h"
-#include "server/store/job_rows.h"
-#include "server/store/late.h"
 #include "server/store/row.h"
 
-// The daemon's own; a copy under one of these names would be taken for a part of its database.
+// The daemon's own, and the log of an earlier one; a copy under one of these names would be taken
+// for a part of its database.
 static const char *const own_names[] = {"impactd.db",
                                         "impactd.db-wal",
                                         "impactd.db-shm",
@@ -39,8 +35,6 @@ typedef struct Work {
     char part[PATH_MAX];   // its name until it is whole
     int file;              // that file
     Database *copy;
-    char *late; // as read
-    size_t late_size;
     Backup backup;
 } Work;
 
@@ -82,28 +76,6 @@ static Status check_place(Work *work, Problem *problem) {
     return is_there && !work->request->replaces ? refuse_place(path, problem) : STATUS_OK;
 }
 
-static Status read_late(Work *work, Problem *problem) {
-    char path[PATH_MAX];
-    struct stat what;
-    snprintf(path, sizeof path, "%.4000s/impactd.late", work->request->directory);
-    const int file = open(path, O_RDONLY | O_CLOEXEC);
-    if (file < 0 && errno == ENOENT)
-        return STATUS_OK;
-    bool is_read = file >= 0 && fstat(file, &what) == 0 && what.st_size <= LATE_BYTES;
-    work->late = is_read ? malloc((size_t)what.st_size + 1) : NULL;
-    while (is_read && work->late != NULL && work->late_size < (size_t)what.st_size) {
-        const ssize_t some =
-            read(file, work->late + work->late_size, (size_t)what.st_size - work->late_size);
-        is_read = some > 0;
-        work->late_size += some > 0 ? (size_t)some : 0;
-    }
-    if (file >= 0)
-        close(file);
-    return is_read && work->late != NULL
-               ? STATUS_OK
-               : problem_set(problem, STATUS_IO, "%s cannot be read: %s", path, strerror(errno));
-}
-
 static Status open_source(Work *work, Database **source, Problem *problem) {
     static const char sql[] =
         "SELECT count(*) AS jobs FROM sqlite_schema WHERE name IN ('jobs', 'results', 'materials')";
@@ -141,15 +113,6 @@ static Status open_part(Work *work, Problem *problem) {
     work->part[0] = '\0';
     return problem_set(problem, errno == EACCES || errno == EPERM ? STATUS_FORBIDDEN : STATUS_IO,
                        "%s cannot be written: %s", path, strerror(errno));
-}
-
-static Status add_late(Work *work, Problem *problem) {
-    if (work->late == NULL)
-        return STATUS_OK;
-    TRY(database_execute(work->copy, "BEGIN", problem));
-    TRY(late_replay(work->late, work->late_size, work->copy, job_columns, sizeof(JobRow),
-                    job_rows_put, problem));
-    return database_execute(work->copy, "COMMIT", problem);
 }
 
 typedef struct Verdict {
@@ -206,7 +169,6 @@ static Status fill(Work *work, Problem *problem) {
         status = database_copy(source, work->copy, &watches[0], problem);
     database_close(source);
     TRY(status);
-    TRY(add_late(work, problem));
     database_watch(work->copy, &watches[1]);
     TRY(check_copy(work, problem));
     TRY(count_copy(work, problem));
@@ -271,8 +233,6 @@ Status backup_write(const BackupRequest *request, Backup *backup, Problem *probl
     work->file = -1;
     Status status = check_place(work, problem);
     if (status == STATUS_OK)
-        status = read_late(work, problem);
-    if (status == STATUS_OK)
         status = fill(work, problem);
     database_close(work->copy);
     if (status == STATUS_OK)
@@ -282,7 +242,6 @@ Status backup_write(const BackupRequest *request, Backup *backup, Problem *probl
         status = tell_full(work, problem);
     if (status == STATUS_OK)
         *backup = work->backup;
-    free(work->late);
     free(work);
     return status;
 }

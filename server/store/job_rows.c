@@ -4,8 +4,6 @@
 #include <string.h>
 
 #include "server/store/job_rows.h"
-#include "server/store/late.h"
-#include "server/store/pack.h"
 #include "server/store/store.h"
 
 // clang-format off
@@ -103,37 +101,6 @@ Status store_job_update_post(Store *store, const JobRow *row, const StoreDone *d
     return store_post(store, save, row, 0, STORE_NOW, done, NULL);
 }
 
-typedef struct Batch {
-    const void *const *at;
-    size_t count;
-} Batch;
-
-static Status add_rows(Database *database, const void *work, Problem *problem) {
-    static const char sql[] = JOB_INSERT " ON CONFLICT DO NOTHING";
-    const Batch *rows = work;
-    for (size_t i = 0; i < rows->count; i++)
-        TRY(database_change(database, sql, job_columns, rows->at[i], NULL, problem));
-    return STATUS_OK;
-}
-
-Status job_rows_add(void *store, const void *const *rows, size_t count, Problem *problem) {
-    return store_write(store, add_rows, &(Batch){rows, count}, problem);
-}
-
-Status job_rows_put(void *database, const void *const *rows, size_t count, Problem *problem) {
-    return add_rows(database, &(Batch){rows, count}, problem);
-}
-
-bool store_job_late(Store *store, const JobRow *row) {
-    return store_late(store) != NULL && late_add(store_late(store), row);
-}
-
-bool job_row_copy(const JobRow *row, JobRow *copy) {
-    *copy = *row;
-    copy->uses = NULL;
-    return pack_own(job_columns, copy);
-}
-
 typedef struct Key {
     char *id;
     uint64_t most;
@@ -145,10 +112,6 @@ Status store_job_load(Store *store, const char *id, JobRow *row, Problem *proble
     static const char sql[] = "SELECT " JOB_SHOWN " FROM jobs WHERE id = :id";
     const Key key = {(char *)id, 0};
     bool is_found;
-    memset(row, 0, sizeof *row);
-    // It is there until the database has it, so this is the order to look in.
-    if (store_late(store) != NULL && late_find(store_late(store), id, row))
-        return STATUS_OK;
     memset(row, 0, sizeof *row);
     TRY(store_first(store, sql, key_columns, &key, job_columns, row, &is_found, problem));
     return is_found ? STATUS_OK : not_found(id, problem);

@@ -1,6 +1,5 @@
 // What a transaction over several tables needs of the jobs'. Everything else of them is in store.h.
-// Not for the rest of the server. Used by result_rows.c, job_search.c, store.c and
-// backup.c.
+// Not for the rest of the server. Used by result_rows.c and job_search.c.
 #ifndef SERVER_STORE_JOB_ROWS_H
 #define SERVER_STORE_JOB_ROWS_H
 
@@ -14,11 +13,6 @@ extern const RowColumn job_columns[];
     "run, total, title, problem, warnings, labels, study, client"
 // Of a row that is read.
 #define JOB_SHOWN JOB_SHORT ", EXISTS (SELECT 1 FROM results WHERE id = jobs.result) AS has_result"
-// Jobs whole, passing over those that are there already: to a Store, and to a Database of the
-// caller's own.
-Status job_rows_add(void *store, const void *const *rows, size_t count, Problem *problem);
-Status job_rows_put(void *database, const void *const *rows, size_t count, Problem *problem);
-
 // Within a transaction: all that changes of a job, or the whole where it is_unsaved.
 // STATUS_NOT_FOUND.
 Status job_row_save(Database *database, const JobRow *row, Problem *problem);

@@ -14,8 +14,6 @@
 #include "server/store/access.h"
 #include "server/store/database.h"
 #include "server/store/folder.h"
-#include "server/store/job_rows.h"
-#include "server/store/late.h"
 #include "server/store/material_memory.h"
 #include "server/store/record_memory.h"
 #include "server/store/writer.h"
@@ -26,7 +24,6 @@ struct Store {
     int lock_file;
     Database *own; // the writer's; NULL where it shares the pool's
     Writer *writer;
-    Late *late;
     MaterialMemory *materials;
     RecordMemory *records;
     atomic_uint_fast64_t generation; // of the catalogue
@@ -85,12 +82,6 @@ static Status open_store(const char *directory, bool is_beside, Store **store, P
                                         : open_memory(made, problem);
     if (status == STATUS_OK)
         status = writer_start(made->own, made->own == NULL ? made : NULL, &made->writer, problem);
-    if (status == STATUS_OK && directory != NULL && !is_beside) {
-        char path[PATH_MAX];
-        snprintf(path, sizeof path, "%s/impactd.late", directory);
-        status =
-            late_open(path, made, job_columns, sizeof(JobRow), job_rows_add, &made->late, problem);
-    }
     if (status != STATUS_OK) {
         store_close(made);
         return status;
@@ -110,7 +101,6 @@ Status store_open_beside(const char *directory, Store **store, Problem *problem)
 void store_close(Store *store) {
     if (store == NULL)
         return;
-    late_close(store->late); // which writes
     writer_stop(store->writer);
     for (size_t i = 0; i < store->free_count; i++)
         database_close(store->readers[i]);
@@ -172,13 +162,7 @@ void store_hurry(Store *store, StoreTicket *ticket) {
 }
 
 void store_settle(Store *store) {
-    if (store->late != NULL)
-        late_flush(store->late);
     writer_settle(store->writer);
-}
-
-Late *store_late(Store *store) {
-    return store->late;
 }
 
 MaterialMemory *store_material_memory(Store *store) {

@@ -90,17 +90,11 @@ typedef struct JobRow {
     bool is_unsaved; // no column: the store may not have it yet, so that saving it adds it
 } JobRow;
 void job_row_clear(JobRow *row);
-// With texts of its own; false without memory, and then it has none.
-bool job_row_copy(const JobRow *row, JobRow *copy);
 // `scene` and `warnings` are required. STATUS_CONFLICT where the id exists.
 Status store_job_add(Store *store, const JobRow *row, Problem *problem);
 // The same, posted; `row` is borrowed until then.
 Status store_job_post(Store *store, const JobRow *row, StoreTurn turn, const StoreDone *done,
                       StoreTicket **ticket);
-// The same behind the answer, for a finished job that computed nothing: found by its id at once, in
-// the database some 20 ms later. A killed process loses none, a power failure may lose the last
-// ones. False where there is no room for it now: it is to be added the usual way.
-bool store_job_late(Store *store, const JobRow *row);
 // State, is_cached, times, problem, result. STATUS_NOT_FOUND, unless it is_unsaved.
 Status store_job_update(Store *store, const JobRow *row, Problem *problem);
 Status store_job_update_post(Store *store, const JobRow *row, const StoreDone *done);

@@ -283,34 +283,6 @@ static void measure_rows(bool is_grouped, bool is_rising) {
         stop("the folder");
 }
 
-// What the index costs once it is large: rows by the thousand, without the disk.
-static void measure_index(bool is_rising, size_t most) {
-    char directory[4100], command[4200];
-    snprintf(directory, sizeof directory, "%s/rows", folder);
-    Store *store;
-    if (store_open(directory, &store, &problem) != STATUS_OK)
-        stop("the store");
-    const double cpu_began = cpu(), began = now();
-    for (size_t i = 0; i < most;) {
-        JobRow row = {.scene = "", .warnings = "[]"};
-        name_row(&row, is_rising, i);
-        if (store_job_late(store, &row))
-            i++;
-        else
-            store_settle(store);
-    }
-    store_settle(store);
-    char name[64];
-    snprintf(name, sizeof name, "%zu rows in batches, %s ids", most,
-             is_rising ? "rising" : "random");
-    printf("%-44s %10.0f /s %8.2f us of CPU\n", name, (double)most / (now() - began),
-           1e6 * (cpu() - cpu_began) / (double)most);
-    store_close(store);
-    snprintf(command, sizeof command, "rm -rf '%s'", directory);
-    if (system(command) != 0)
-        stop("the folder");
-}
-
 int main(int argc, char **argv) {
     snprintf(folder, sizeof folder, "%s", argc > 1 ? argv[1] : "/tmp");
     if (argc > 2)
@@ -334,8 +306,7 @@ int main(int argc, char **argv) {
         measure_disk();
         measure_rows(false, true);
         measure_rows(true, true);
-        measure_index(false, 300000);
-        measure_index(true, 300000);
+        measure_rows(true, false);
     }
     snprintf(command, sizeof command, "rm -rf '%s'", folder);
     return system(command) == 0 ? 0 : 1;

@@ -284,7 +284,7 @@ def test_no_file_takes_a_closed_streams_place():
                                     program.impactd(), folder])
         try:
             lock, end = os.path.join(folder, "impactd.lock"), time.monotonic() + 20
-            while not os.path.exists(os.path.join(folder, "impactd.late")) and time.monotonic() < end:
+            while not os.path.exists(os.path.join(folder, "impactd.db-wal")) and time.monotonic() < end:
                 time.sleep(0.05)
             files = [os.readlink(f"/proc/{process.pid}/fd/{number}") for number in range(3)]
             assert files == 3 * ["/dev/null"], files

@@ -186,7 +186,7 @@ static void tokens_made_and_revoked_elsewhere_are_followed(void **state) {
     store_close(daemon);
     char command[64];
     static const char *const files[] = {"impactd.db", "impactd.lock", "impactd.db-wal",
-                                        "impactd.db-shm", "impactd.late"};
+                                        "impactd.db-shm"};
     for (size_t i = 0; i < COUNT(files); i++) {
         snprintf(command, sizeof command, "%s/%s", folder, files[i]);
         (void)unlink(command);

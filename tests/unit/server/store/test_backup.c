@@ -1,5 +1,5 @@
-// A copy of the database from inside: under a writer in the same process, stopped at every moment,
-// and with what a file of late rows may hold.
+// A copy of the database from inside: under a writer in the same process, and stopped at every
+// moment.
 #include <dirent.h>
 #include <poll.h>
 #include <pthread.h>
@@ -11,13 +11,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include <cmocka.h>
 
 #include "server/store/backup.h"
-#include "server/store/job_rows.h"
-#include "server/store/late.h"
 #include "server/store/store.h"
 #include "tests/support/scratch.h"
 
@@ -78,18 +75,14 @@ static void *stream(void *of) {
     Stream *rows = of;
     for (unsigned long number = 0; !atomic_load(&rows->is_over); number++) {
         const JobRow row = job_row(number);
-        // Where there is no room now it is added the usual way, as the daemon does.
-        if (!store_job_late(rows->store, &row) &&
-            store_job_add(rows->store, &row, NULL) != STATUS_OK)
+        if (store_job_add(rows->store, &row, NULL) != STATUS_OK)
             break;
         atomic_store(&rows->added, number + 1);
-        if (number % 64 == 0)
-            (void)poll(NULL, 0, 1);
     }
     return NULL;
 }
 
-static void every_late_row_that_was_taken_before_is_in_the_copy(void **state) {
+static void every_row_that_was_added_before_is_in_the_copy(void **state) {
     (void)state;
     Stream rows = {.store = open_store(data)};
     pthread_t thread;
@@ -111,9 +104,6 @@ static void every_late_row_that_was_taken_before_is_in_the_copy(void **state) {
             job_row_clear(&loaded);
         }
         store_close(store);
-        char late[SCRATCH_SIZE + 16];
-        snprintf(late, sizeof late, "%s/impactd.late", target);
-        assert_int_equal(unlink(late), 0);
     }
     atomic_store(&rows.is_over, true);
     pthread_join(thread, NULL);
@@ -155,70 +145,12 @@ static void stopped_at_any_moment_it_leaves_nothing(void **state) {
     store_close(store);
 }
 
-static size_t taken;
-
-static Status refuse(void *context, const void *const *rows, size_t count, Problem *told) {
-    (void)context, (void)rows, (void)count;
-    return problem_set(told, STATUS_IO, "not now");
-}
-
-static Status take(void *context, const void *const *rows, size_t count, Problem *told) {
-    (void)context, (void)told;
-    for (size_t i = 0; i < count; i++)
-        assert_true(strncmp(((const JobRow *)rows[i])->id, "j-", 2) == 0);
-    taken += count;
-    return STATUS_OK;
-}
-
-static Status replay(const char *bytes, size_t size) {
-    char *own = malloc(size + 1);
-    memcpy(own, bytes, size);
-    taken = 0;
-    const Status status = late_replay(own, size, NULL, job_columns, sizeof(JobRow), take, NULL);
-    free(own);
-    return status;
-}
-
-enum { STRIDE = IMPACTD_SANITIZED ? 101 : 3 };
-
-static void late_rows_end_where_their_bytes_are_no_rows(void **state) {
-    (void)state;
-    enum { ROWS = 40 };
-    char path[SCRATCH_SIZE + 16], *bytes = calloc(1, LATE_BYTES);
-    snprintf(path, sizeof path, "%s/impactd.late", data);
-    Late *late;
-    // Without a database that takes them they stay in the file.
-    assert_int_equal(late_open(path, NULL, job_columns, sizeof(JobRow), refuse, &late, NULL),
-                     STATUS_OK);
-    for (unsigned long number = 0; number < ROWS; number++) {
-        const JobRow row = job_row(number);
-        assert_true(late_add(late, &row));
-    }
-    FILE *file = fopen(path, "rb");
-    assert_int_equal(fread(bytes, 1, LATE_BYTES, file), LATE_BYTES);
-    fclose(file);
-    late_close(late);
-    assert_int_equal(replay(bytes, LATE_BYTES), STATUS_OK);
-    assert_int_equal(taken, ROWS);
-    assert_int_equal(replay(bytes, LATE_BYTES - 1), STATUS_OK);
-    assert_int_equal(taken, 0);
-    assert_int_equal(replay(bytes, 0), STATUS_OK);
-    for (size_t at = 0; at < 4000; at += STRIDE) {
-        bytes[at] = (char)(bytes[at] ^ 0x55);
-        assert_int_equal(replay(bytes, LATE_BYTES), STATUS_OK);
-        assert_true(taken <= ROWS);
-        bytes[at] = (char)(bytes[at] ^ 0x55);
-    }
-    free(bytes);
-}
-
 #define IN_FOLDERS(test) cmocka_unit_test_setup_teardown(test, folders_make, folders_remove)
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        IN_FOLDERS(every_late_row_that_was_taken_before_is_in_the_copy),
+        IN_FOLDERS(every_row_that_was_added_before_is_in_the_copy),
         IN_FOLDERS(stopped_at_any_moment_it_leaves_nothing),
-        IN_FOLDERS(late_rows_end_where_their_bytes_are_no_rows),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -447,114 +447,6 @@ static void revisions_of_materials_never_change(void **state) {
 
 #define IN_FOLDER(test) cmocka_unit_test_setup_teardown(test, make_folder, remove_folder)
 
-static void late_rows_are_found_at_once_and_written_soon(void **state) {
-    (void)state;
-    Store *store = open_store(folder);
-    char id[40];
-    JobRow row, loaded;
-    for (int i = 0; i < 3000; i++) {
-        snprintf(id, sizeof id, "j-%05d", i);
-        row = job_row(id, 2);
-        row.total = 0.5 * i;
-        if (i % 2 == 0)
-            row.title = NULL;
-        assert_true(store_job_late(store, &row));
-        assert_int_equal(store_job_load(store, id, &loaded, NULL), STATUS_OK);
-        assert_true(loaded.total == 0.5 * i);
-        assert_true((loaded.title == NULL) == (i % 2 == 0));
-        job_row_clear(&loaded);
-    }
-    assert_int_equal(store_job_load(store, "j-99999", &loaded, NULL), STATUS_NOT_FOUND);
-    store_settle(store);
-    JobRows rows;
-    const JobSearch all = job_search_all(10000);
-    assert_int_equal(store_job_search(store, &all, &rows, NULL), STATUS_OK);
-    assert_int_equal(rows.count, 3000);
-    assert_string_equal(rows.at[0].id, "j-02999");
-    assert_string_equal(rows.at[1].warnings, "[]");
-    job_rows_clear(&rows);
-    assert_int_equal(store_job_load(store, "j-00007", &loaded, NULL), STATUS_OK);
-    assert_true(loaded.total == 3.5);
-    job_row_clear(&loaded);
-    store_close(store);
-}
-
-static void late_rows_of_a_killed_process_are_written_at_the_next_start(void **state) {
-    (void)state;
-    char id[40];
-    for (int life = 0; life < 3; life++) {
-        const pid_t child = fork();
-        assert_true(child >= 0);
-        if (child == 0) {
-            Store *store;
-            if (store_open(folder, &store, NULL) != STATUS_OK)
-                _exit(1);
-            for (int i = 0; i < 500; i++) {
-                snprintf(id, sizeof id, "j-%d-%d", life, i);
-                JobRow row = job_row(id, 2);
-                if (!store_job_late(store, &row))
-                    _exit(2);
-            }
-            kill(getpid(), SIGKILL);
-        }
-        int status;
-        assert_int_equal(waitpid(child, &status, 0), child);
-        assert_true(WIFSIGNALED(status));
-    }
-    Store *store = open_store(folder);
-    JobRows rows;
-    const JobSearch all = job_search_all(10000);
-    assert_int_equal(store_job_search(store, &all, &rows, NULL), STATUS_OK);
-    assert_int_equal(rows.count, 1500);
-    job_rows_clear(&rows);
-    store_close(store);
-    // What is torn is left out, and nothing else of the file is believed.
-    char path[128];
-    snprintf(path, sizeof path, "%s/impactd.late", folder);
-    FILE *file = fopen(path, "r+b");
-    assert_non_null(file);
-    for (int i = 0; i < 4000; i++)
-        assert_int_equal(fputc(i * 7 % 251, file) == EOF, 0);
-    fclose(file);
-    store = open_store(folder);
-    assert_int_equal(store_job_search(store, &all, &rows, NULL), STATUS_OK);
-    assert_int_equal(rows.count, 1500);
-    job_rows_clear(&rows);
-    store_close(store);
-}
-
-static void late_rows_wait_while_the_database_is_held_and_then_have_no_more_room(void **state) {
-    (void)state;
-    Store *store = open_store(folder);
-    char path[128], id[40];
-    Database *other;
-    JobRow row, loaded;
-    snprintf(path, sizeof path, "%s/impactd.db", folder);
-    assert_int_equal(database_open(path, DATABASE_WRITER, &other, NULL), STATUS_OK);
-    assert_int_equal(database_execute(other, "BEGIN IMMEDIATE", NULL), STATUS_OK);
-    int count = 0;
-    for (; count < 100000; count++) {
-        snprintf(id, sizeof id, "j-%d", count);
-        row = job_row(id, 2);
-        if (!store_job_late(store, &row))
-            break;
-    }
-    assert_true(count > 1000 && count < 100000);
-    assert_int_equal(store_job_load(store, "j-77", &loaded, NULL), STATUS_OK);
-    job_row_clear(&loaded);
-    assert_int_equal(store_job_load(store, id, &loaded, NULL), STATUS_NOT_FOUND);
-    assert_int_equal(database_execute(other, "ROLLBACK", NULL), STATUS_OK);
-    database_close(other);
-    store_close(store);
-    store = open_store(folder);
-    JobRows rows;
-    const JobSearch all = job_search_all(100000);
-    assert_int_equal(store_job_search(store, &all, &rows, NULL), STATUS_OK);
-    assert_int_equal(rows.count, count);
-    job_rows_clear(&rows);
-    store_close(store);
-}
-
 static void note_done(void *context, Status status, const char *detail) {
     (void)detail;
     *(Status *)context = status;
@@ -612,9 +504,6 @@ int main(void) {
         IN_FOLDER(a_newer_database_and_an_impossible_version_are_refused),
         IN_FOLDER(a_database_of_another_program_is_refused_and_left_alone),
         IN_FOLDER(revisions_of_materials_never_change),
-        IN_FOLDER(late_rows_are_found_at_once_and_written_soon),
-        IN_FOLDER(late_rows_of_a_killed_process_are_written_at_the_next_start),
-        IN_FOLDER(late_rows_wait_while_the_database_is_held_and_then_have_no_more_room),
         IN_FOLDER(series_are_kept_under_a_budget_and_the_longest_unused_goes),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
