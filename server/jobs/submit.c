@@ -92,7 +92,6 @@ static Status finish_known(Intake *intake, Job *job, Problem *problem) {
     row->is_cached = true;
     row->started_unix_ms = row->finished_unix_ms = clock_unix_ms();
     row->total = 1e-9 * (double)(clock_monotonic_ns() - job->submitted_ns);
-    row->has_result = true;
     pthread_mutex_lock(&intake->lock);
     const Status status = post(intake, job, STORE_NOW, problem);
     pthread_mutex_unlock(&intake->lock);
