@@ -57,8 +57,9 @@ def test_a_token_beyond_its_rate_or_quota_waits():
             replies = [submit(greedy, i) for i in range(3)]
             refused = next(reply for reply in replies if reply.status != 202)
             assert refused.status == 429 and int(refused.headers["retry-after"]) >= 1, (option, refused)
-            dry = daemon.request("POST", "/v1/jobs?dry_run=1", json=slow, headers=bearer(greedy))
-            assert dry.status == (429 if option == "--rate" else 200), (option, dry)
+            for path in ("/v1/jobs?dry_run=1", "/v1/cache/explain"):
+                reply = daemon.request("POST", path, json=slow, headers=bearer(greedy))
+                assert reply.status == (429 if option == "--rate" else 200), (option, path, reply)
             assert submit(other, 9).status == 202, option
             job = replies[0].json()["links"]["self"]
             assert daemon.request("DELETE", job, headers=bearer(greedy)).status == 200

@@ -35,16 +35,18 @@ def test_a_full_queue_is_503():
 
 
 def test_dry_runs_of_large_scenes_leave_room_for_others():
-    """Of many dry runs of 200 storeys some get 503 with Retry-After; reads are answered meanwhile, and later ones are taken."""
+    """Of many dry runs and explanations of 200 storeys some get 503 with Retry-After; reads are answered meanwhile, and later ones are taken."""
     large = sponge(structure={"kind": "frame", "masses": [1] * 200, "stiffnesses": [900] * 200, "damping_ratio": 0.02},
                    excitation={"kind": "random", "band": [1, 50], "rms": 1, "seed": 1})
     with program.daemon("--workers", "1") as daemon, concurrent.futures.ThreadPoolExecutor(48) as pool:
-        asked = [pool.submit(daemon.request, "POST", "/v1/jobs?dry_run=1", json=large) for _ in range(48)]
+        paths = 12 * ["/v1/jobs?dry_run=1"] + 36 * ["/v1/cache/explain"]
+        asked = [pool.submit(daemon.request, "POST", path, json=large) for path in paths]
         while not all(one.done() for one in asked):
             assert daemon.get("/v1/jobs").status == 200
         replies = [one.result() for one in asked]
         refused = [reply for reply in replies if reply.status != 200]
         assert 0 < len(refused) < len(replies), [reply.status for reply in replies]
+        assert 503 in [reply.status for reply in replies[12:]], [reply.status for reply in replies]
         for reply in refused:
             problem(reply, 503)
             assert int(reply.headers["retry-after"]) >= 1, reply.headers
