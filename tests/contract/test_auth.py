@@ -17,6 +17,9 @@ from daemon import Daemon  # noqa: E402
 SCENE = program.scene("paper_free_sponge")
 
 # What needs no token: what the API is, whether there is a daemon, the page that asks for a token and what it is made of.
+# Some 50 s of CPU.
+SLOW = dict(program.scene("paper_sine_aluminium"), duration=2400, sample_rate=10, output={"channels": [], "psd": None},
+            accuracy={"solver": "rk4", "step": 1e-5})
 OPEN = ["/schemas", "/schemas/{name}", "/openapi.json", "/health/live", "/health/ready", "/version", "/web/vendor/{library}/{file}", "/web/{folder}/{file}", "/web/{file}",
         "/favicon.ico", "/"]
 
@@ -46,19 +49,18 @@ def test_loopback_is_open_until_there_is_a_token_and_shut_from_then_on():
 
 def test_a_token_beyond_its_rate_or_quota_waits():
     """--rate and --quota: 429 with Retry-After for that token alone; a job that ends gives its place back."""
-    slow = dict(program.scene("paper_sine_aluminium"), duration=2e6, sample_rate=10, output={"channels": [], "psd": None})
     for option, value in (("--rate", "1"), ("--quota", "1")):
         with program.daemon(option, value) as daemon:
             greedy, other = token(daemon.data, "greedy"), token(daemon.data, "other")
             assert until(lambda: daemon.get("/v1/jobs").status == 401)
 
             def submit(who, more):
-                return daemon.submit({**slow, "duration": 2e6 + more}, headers={**bearer(who), "Prefer": "respond-async"})
+                return daemon.submit({**SLOW, "duration": 2400 + more}, headers={**bearer(who), "Prefer": "respond-async"})
             replies = [submit(greedy, i) for i in range(3)]
             refused = next(reply for reply in replies if reply.status != 202)
             assert refused.status == 429 and int(refused.headers["retry-after"]) >= 1, (option, refused)
             for path in ("/v1/jobs?dry_run=1", "/v1/cache/explain"):
-                reply = daemon.request("POST", path, json=slow, headers=bearer(greedy))
+                reply = daemon.request("POST", path, json=SLOW, headers=bearer(greedy))
                 assert reply.status == (429 if option == "--rate" else 200), (option, path, reply)
             assert submit(other, 9).status == 202, option
             job = replies[0].json()["links"]["self"]
@@ -66,19 +68,16 @@ def test_a_token_beyond_its_rate_or_quota_waits():
             assert option == "--rate" or submit(greedy, 5).status == 202
 
 
-SLOW = dict(program.scene("paper_sine_aluminium"), duration=2e6, sample_rate=10, output={"channels": [], "psd": None})
-
-
 def test_a_job_is_cancelled_by_its_owner_or_an_admin_alone():
     """Another's DELETE and retry: 403 with the owner's name, and the job goes on; its sender stands in the job and the list."""
     with program.daemon() as daemon:
-        nobodys = daemon.submit({**SLOW, "duration": 1.9e6}, headers={"Prefer": "respond-async"}).json()
+        nobodys = daemon.submit({**SLOW, "duration": 2300}, headers={"Prefer": "respond-async"}).json()
         names = {name: bearer(token(daemon.data, name, scopes)) for name, scopes in
                  (("ann", "read,submit"), ("bob", "read,submit"), ("chief", "read,admin"))}
         assert until(lambda: daemon.get("/v1/jobs").status == 401)
 
         def submit(who, more):
-            reply = daemon.submit({**SLOW, "duration": 2e6 + more}, headers={**names[who], "Prefer": "respond-async"})
+            reply = daemon.submit({**SLOW, "duration": 2400 + more}, headers={**names[who], "Prefer": "respond-async"})
             assert reply.status == 202 and "client" not in reply.json(), reply
             return reply.json()["links"]["self"]
         for i, (who, other) in enumerate((("ann", "bob"), ("bob", "ann"))):
