@@ -155,7 +155,7 @@ def test_unfinished_jobs_are_taken_up_by_the_copy():
     """A job that waited when the copy was made is finished by the daemon on the copy."""
     with tempfile.TemporaryDirectory() as folder, program.daemon("--workers", "1") as daemon:
         endless = program.scene("paper_sine_aluminium")
-        endless.update(duration=2e6, sample_rate=10, output={"channels": [], "psd": None})
+        endless.update(duration=2400, sample_rate=10, output={"channels": [], "psd": None}, accuracy={"solver": "rk4", "step": 1e-5})
         first = daemon.submit(endless, headers=ASYNC).json()["id"]
         second = daemon.submit(scene(1), headers=ASYNC).json()["id"]
         path = os.path.join(folder, "copy.db")

@@ -252,7 +252,7 @@ def test_faults_of_a_comparison_are_told():
                               (f"?a=j-0&b={job['id']}", 404), (f"?a={job['id']}&b={job['id']}&c=1", 400)):
             assert daemon.get("/v1/compare" + query).status == status, query
         slow = program.scene("paper_sine_aluminium")
-        slow.update(duration=2e6, sample_rate=10, output={"channels": [], "psd": None})
+        slow.update(duration=2400, sample_rate=10, output={"channels": [], "psd": None}, accuracy={"solver": "rk4", "step": 1e-5})
         running = daemon.submit(slow, headers={"Prefer": "respond-async"}).json()["id"]
         reply = daemon.get(f"/v1/compare?a={running}&b={job['id']}")
         assert reply.status == 409 and "has no result" in reply.json()["detail"], reply

@@ -270,7 +270,7 @@ def test_real_answers_have_the_promised_shapes():
         call("POST", "/v1/compare", "/v1/compare", body="{}")
         scene = program.scene("paper_random_sponge")
         slow = program.scene("paper_sine_aluminium")
-        slow.update(duration=2e6, sample_rate=10, output={"channels": [], "psd": None})
+        slow.update(duration=2400, sample_rate=10, output={"channels": [], "psd": None}, accuracy={"solver": "rk4", "step": 1e-5})
         call("POST", "/v1/jobs", "/v1/jobs", json=scene)
         call("POST", "/v1/jobs", "/v1/jobs?dry_run=1", json=scene)
         call("POST", "/v1/jobs", "/v1/jobs", json={})

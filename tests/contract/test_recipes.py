@@ -108,7 +108,7 @@ def test_lines():
         with open(os.path.join(folder, "force.csv"), "w", encoding="utf-8") as file:
             file.write("time [s],force [N]\n" + "".join(f"{0.001 * i:.3f},{max(0, numpy.sin(0.3 * i - 3)) if i < 20 else 0:.4f}\n" for i in range(60)))
         endless = program.scene("paper_sine_aluminium")
-        endless.update(duration=2e6, sample_rate=10, output={"channels": [], "psd": None})
+        endless.update(duration=2400, sample_rate=10, output={"channels": [], "psd": None}, accuracy={"solver": "rk4", "step": 1e-5})
         one, two = (program.finished(daemon, program.scene(name)) for name in ("paper_free_sponge", "paper_free_aluminium"))
         swept = program.finished(daemon, program.scene("sweep_clearance_buffer"))
         for line in kept:
