@@ -29,6 +29,9 @@ struct App {
 extern const char program_version[]; // "0.1.0"
 extern const char program_build[];   // the compiler
 
+// Sets Retry-After where a scene was refused with STATUS_BUSY or STATUS_QUOTA; returns `status`.
+Status jobs_refused(App *app, const Request *request, Reply *reply, Status status);
+
 // The handlers, by file; routes.c lists them with their patterns.
 Handler jobs_create, jobs_create_quick, jobs_list, jobs_show, jobs_dismiss, jobs_retry, jobs_scene,
     jobs_events;

@@ -127,10 +127,11 @@ Status cache_explain(App *app, const Request *request, Reply *reply, Problem *pr
     Warnings warnings = {NULL, 0};
     Bytes bytes = {.most = app->reply_most};
     TRY(body_require_json(request, problem));
-    TRY(intake_charge(app->intake, request->client, problem));
-    bool has_place;
-    Status status = intake_prepare_request(app->intake, request->body, request->body_size, NULL,
-                                           &has_place, &inquiry, &warnings, problem);
+    bool has_place = false;
+    Status status = intake_charge(app->intake, request->client, problem);
+    if (status == STATUS_OK)
+        status = intake_prepare_request(app->intake, request->body, request->body_size, NULL,
+                                        &has_place, &inquiry, &warnings, problem);
     intake_leave_place(app->intake, has_place);
     if (status == STATUS_OK)
         status = explain(app, &inquiry, &bytes, problem);
@@ -140,5 +141,5 @@ Status cache_explain(App *app, const Request *request, Reply *reply, Problem *pr
         bytes_clear(&bytes);
     study_request_clear(&inquiry);
     warnings_clear(&warnings);
-    return status;
+    return jobs_refused(app, request, reply, status);
 }

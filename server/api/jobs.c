@@ -105,14 +105,20 @@ static Status pause_until_kept(const Request *request, Reply *reply, Job *job, b
     return status;
 }
 
+Status jobs_refused(App *app, const Request *request, Reply *reply, Status status) {
+    if (status == STATUS_BUSY || status == STATUS_QUOTA)
+        reply->retry_after = intake_retry_after(app->intake, request->client, status);
+    return status;
+}
+
 static Status dry_run(App *app, const Request *request, Reply *reply, Problem *problem) {
     DryRun run = {0};
-    TRY(intake_charge(app->intake, request->client, problem));
-    const Status status =
-        intake_dry_run(app->intake, request->body, request->body_size, &run, problem);
+    Status status = intake_charge(app->intake, request->client, problem);
+    if (status == STATUS_OK)
+        status = intake_dry_run(app->intake, request->body, request->body_size, &run, problem);
     if (status != STATUS_OK) {
         dry_run_clear(&run);
-        return status;
+        return jobs_refused(app, request, reply, status);
     }
     Bytes bytes = {.most = app->reply_most};
     job_put_dry_run(&bytes, &run);
@@ -147,10 +153,7 @@ static Status refuse_stopping(App *app, Problem *problem) {
 
 static Status submit(App *app, const Request *request, const Submission *submission, Reply *reply,
                      Job **job, Problem *problem) {
-    const Status status = intake_submit(app->intake, submission, job, problem);
-    if (status == STATUS_BUSY || status == STATUS_QUOTA)
-        reply->retry_after = intake_retry_after(app->intake, request->client, status);
-    return status;
+    return jobs_refused(app, request, reply, intake_submit(app->intake, submission, job, problem));
 }
 
 // Waits as long as the client likes, and at least until nobody can lose the job. Drops the hold.

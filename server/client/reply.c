@@ -44,7 +44,7 @@ static const Field job_fields[] = {
 // clang-format on
 
 Status job_reply_read(const HttpAnswer *answer, JobReply *job, Problem *problem) {
-    // Members that are not known here are no faults, so nobody listens to the reader.
+    // Unknown members are no faults: the reader's problem is not used.
     (void)read_json(answer->body.at, answer->body.count, job_fields, job, NULL);
     if (job->id == NULL || job->status == NULL || strlen(job->id) > 80 || strlen(job->status) > 40)
         return problem_set(problem, STATUS_UNREACHABLE,

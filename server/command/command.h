@@ -54,8 +54,7 @@ Status command_action(const Options *options, const char *const *names, size_t c
                       size_t *index, Problem *problem);
 
 // Sets *folder, where it is NULL, to $IMPACTD_DATA, else to impactd under $XDG_STATE_HOME, else
-// under
-// ~/.local/state; the caller frees it. STATUS_USAGE where none is known.
+// under ~/.local/state; the caller frees it. STATUS_USAGE where none is known.
 Status command_data_folder(char **folder, Problem *problem);
 
 // What a Status means to a shell.

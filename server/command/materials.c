@@ -1,6 +1,6 @@
-// impactd materials: the materials database of a daemon, from a shell. Whoever revises says which
-// state that is about; where nothing was shown before, the state is asked for just before, and of
-// two who do so at once one is refused.
+// impactd materials: the materials database of a daemon, from a shell. A change names the state of
+// the material that it is based on (--from); without it the state is read just before. Of two
+// clients that change one state at once one is refused.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -46,7 +46,7 @@ typedef struct MaterialsCall {
     Daemon *daemon;
     const char *const *operands; // behind the action's name
     size_t operand_count;
-    const char *about; // what faults are told of; the action may name a file
+    const char *about; // what messages of faults name; the action may set a file
 } MaterialsCall;
 
 enum { MATERIALS_MAX = 1000 }; // of a list that is asked for
@@ -190,7 +190,7 @@ typedef struct RevisionReply {
 
 // clang-format off
 static const Field review_reply_fields[] = {
-    FIELD_FLAG(ReviewReply, self_approved, false, "by whoever wrote the revision"),
+    FIELD_FLAG(ReviewReply, self_approved, false, "by the author of the revision"),
     FIELD_END,
 };
 static const Field revision_reply_fields[] = {
@@ -548,7 +548,7 @@ static Status materials_measurements_act(MaterialsCall *call, Problem *problem) 
     Bytes path;
     TRY(materials_name(call->operands[0], false, problem));
     materials_path(&path, call->operands[0], "/measurements");
-    http_query(&path, "limit", "100"); // the document tells how many there are
+    http_query(&path, "limit", "100"); // the document has their number
     return materials_get(call, &path, problem);
 }
 

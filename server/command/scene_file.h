@@ -16,7 +16,7 @@ enum {
 // Of every command that judges or runs a scene, as a row of its options.
 #define SCENE_FILE_CPU_ROW(struct_type)                                                            \
     FIELD_REAL(struct_type, max_cpu_seconds, "s", WITHIN(1e-6, 1e9), SIMULATION_CPU_SECONDS,       \
-               "CPU time a scene may be foretold to take; it is refused beyond")
+               "CPU time a scene may be predicted to take; it is refused beyond")
 
 // What a scene may take that a person runs.
 SimulationLimits scene_file_limits(double cpu_seconds);

@@ -257,7 +257,7 @@ static const Field tradeoff_fields[] = {
     FIELD_TEXTS(StudySettings, solver, NULL, NULL, SOLVERS_MAX, PRESENCE_OPTIONAL, 0,
                 "try this solver only; may be given again"),
     FIELD_REAL(StudySettings, point_steps, NULL, ANY, OPTIONAL,
-               "solver steps a point may be foretold to take (5e7)"),
+               "solver steps a point may be predicted to take (5e7)"),
     SCENE_FILE_CPU_ROW(StudySettings),
     FIELD_END,
 };
@@ -477,7 +477,7 @@ const Command command_ensemble = {
         "\n"
         "The scene's excitation must be random. A run is the scene with one seed, from "
         "--first-seed\n"
-        "on; any of them can be run again alone. One that fails is told and left out. The same\n"
+        "on; any of them can be run again alone. One that fails is reported and left out. The same\n"
         "study gives the same bytes. Ctrl-C stops at once. Exit code 3 if the scene has faults.\n",
     .options = ensemble_fields,
     .size = sizeof(StudySettings),

@@ -25,7 +25,7 @@ static const Field submit_fields[] = {
     FIELD_REAL(SubmitSettings, wait, "s", AT_MIN(0), 0, "wait so long for the job's end, and for a daemon that is busy (0)"),
     FIELD_TEXT(SubmitSettings, title, 0, PRESENCE_OPTIONAL, 0, "the job's title, in place of the scene's"),
     FIELD_TEXTS(SubmitSettings, label, NULL, NULL, LABELS, PRESENCE_OPTIONAL, 0, "KEY=VALUE, a label on top of the scene's; may be given again"),
-    FIELD_FLAG(SubmitSettings, dry_run, false, "print the plan and the cost that is foretold, as JSON; run nothing"),
+    FIELD_FLAG(SubmitSettings, dry_run, false, "print the plan and the predicted cost, as JSON; run nothing"),
     FIELD_TEXT(SubmitSettings, idempotency_key, 255, PRESENCE_OPTIONAL, 0, "the same key with the same scene is the same job, however often it is sent"),
     FIELD_FLAG(SubmitSettings, json, false, "print the job as JSON in place of its id"),
     FIELD_END,

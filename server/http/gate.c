@@ -46,6 +46,10 @@ static bool is_address(const char *name, size_t size) {
     return inet_pton(has_brackets ? AF_INET6 : AF_INET, text, ignored) == 1;
 }
 
+static const GateHosts *gate_names(const Gate *gate) {
+    return gate->names != NULL ? gate->names : &gate_loopback;
+}
+
 bool gate_host_is_ours(const GateHosts *hosts, const char *host, size_t size) {
     const size_t name_size = name_size_of(host, size);
     if (name_size == 0)
@@ -94,8 +98,7 @@ void gate_header(Gate *gate, const char *name, size_t name_size, const char *val
     if (is_name(name, name_size, "Host")) {
         gate->hosts++;
         gate->own_host = value;
-        const GateHosts *names = gate->names != NULL ? gate->names : &gate_loopback;
-        if (!gate_host_is_ours(names, value_size > 0 ? value : "", value_size)) {
+        if (!gate_host_is_ours(gate_names(gate), value_size > 0 ? value : "", value_size)) {
             gate->is_foreign_host = true;
             if (value_size > 0 && !has_control(value, value_size))
                 text_fit(gate->host, sizeof gate->host, value);
@@ -147,7 +150,7 @@ static const char *path_fault(const char *target) {
 }
 
 static int refuse_host(const Gate *gate, Problem *problem) {
-    const GateHosts *hosts = gate->names != NULL ? gate->names : &gate_loopback;
+    const GateHosts *hosts = gate_names(gate);
     char list[256] = "";
     for (size_t i = 0; hosts->names[i] != NULL; i++) {
         const size_t used = strlen(list);
@@ -173,8 +176,7 @@ static bool gate_origin_is_ours(const Gate *gate) {
     const char *const authority = mark + 3;
     if (gate->own_host != NULL && strcasecmp(authority, gate->own_host) == 0)
         return true;
-    const GateHosts *hosts = gate->names != NULL ? gate->names : &gate_loopback;
-    const GateHosts named = {hosts->names, false};
+    const GateHosts named = {gate_names(gate)->names, false};
     const size_t size = strlen(authority);
     return gate_host_is_ours(&named, authority, size) &&
            !gate_host_is_ours(&gate_loopback, authority, size);

@@ -31,13 +31,15 @@ typedef struct IntakeSettings {
 Status intake_prepare(Store *store, const char *text, size_t size, const SimulationLimits *limits,
                       StudyRequest *inquiry, Warnings *warnings, Problem *problem);
 
-// The same for a request, whose study must be within study_seconds and of which only so many may plan large structures at once: STATUS_BUSY
-// beyond. *has_place is for intake_leave_place, once the request plans no more; also on failure.
+// The same for a request. Its study must be within study_seconds where there are limits, and only
+// so many requests may plan large structures at once: STATUS_BUSY beyond. *has_place is for
+// intake_leave_place, once the request plans no more; also on failure.
 Status intake_prepare_request(Intake *intake, const char *text, size_t size,
                               const SimulationLimits *limits, bool *has_place,
                               StudyRequest *inquiry, Warnings *warnings, Problem *problem);
 void intake_leave_place(Intake *intake, bool has_place);
-// Counts one submission of `client` (NULL: nobody in particular) against its jobs a minute.
+// Counts one submission of `client` (NULL: a client without a token) against its jobs a minute:
+// STATUS_QUOTA.
 Status intake_charge(Intake *intake, const char *client, Problem *problem);
 
 // "r-" and 64 hexadecimal digits: SHA-256 of the canonical form and the engine's version.

@@ -263,11 +263,10 @@ static Status submit(Intake *intake, Job *job, StudyRequest *inquiry, bool is_re
 }
 
 // Who asks, if it may.
-static Status enter_client(Intake *intake, const Submission *submission, Client **client,
-                           Problem *problem) {
+static Status enter_client(Intake *intake, const char *name, Client **client, Problem *problem) {
     Status status = STATUS_OK;
     pthread_mutex_lock(&intake->lock);
-    *client = queue_client(intake->queue, submission->client != NULL ? submission->client : "");
+    *client = queue_client(intake->queue, name != NULL ? name : "");
     if (*client == NULL)
         status = problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
     else
@@ -278,8 +277,7 @@ static Status enter_client(Intake *intake, const Submission *submission, Client 
 
 Status intake_charge(Intake *intake, const char *client, Problem *problem) {
     Client *charged;
-    const Submission submission = {.client = client};
-    return enter_client(intake, &submission, &charged, problem);
+    return enter_client(intake, client, &charged, problem);
 }
 
 // A record that it names may have been deleted since it was looked up under `generation`. From here
@@ -299,7 +297,7 @@ static Status submit_named(Intake *intake, Job *job, StudyRequest *inquiry, uint
 static Status submit_new(Intake *intake, const Submission *submission, const KeyHold *hold,
                          Job **accepted, Problem *problem) {
     Client *client;
-    TRY(enter_client(intake, submission, &client, problem));
+    TRY(enter_client(intake, submission->client, &client, problem));
     Job *job = job_new(intake);
     if (job == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");

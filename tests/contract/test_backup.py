@@ -16,6 +16,7 @@ import time
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
+from asking import endless  # noqa: E402
 from disk import fill, small_disk  # noqa: E402
 
 SANITIZED = "nightly"
@@ -154,9 +155,7 @@ def test_cached_answers_are_in_it():
 def test_unfinished_jobs_are_taken_up_by_the_copy():
     """A job that waited when the copy was made is finished by the daemon on the copy."""
     with tempfile.TemporaryDirectory() as folder, program.daemon("--workers", "1") as daemon:
-        endless = program.scene("paper_sine_aluminium")
-        endless.update(duration=2400, sample_rate=10, output={"channels": [], "psd": None}, accuracy={"solver": "rk4", "step": 1e-5})
-        first = daemon.submit(endless, headers=ASYNC).json()["id"]
+        first = daemon.submit(endless(), headers=ASYNC).json()["id"]
         second = daemon.submit(scene(1), headers=ASYNC).json()["id"]
         path = os.path.join(folder, "copy.db")
         assert backup(path, daemon.data)[0] == 0

@@ -15,6 +15,7 @@ import scipy.signal
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
+from asking import endless  # noqa: E402
 
 SANITIZED = "nightly"
 SVG = "{http://www.w3.org/2000/svg}"
@@ -251,8 +252,7 @@ def test_faults_of_a_comparison_are_told():
         for query, status in (("", 400), (f"?a={job['id']}", 400), ("?a=&b=", 400), (f"?a={job['id']}&b=r-0", 404),
                               (f"?a=j-0&b={job['id']}", 404), (f"?a={job['id']}&b={job['id']}&c=1", 400)):
             assert daemon.get("/v1/compare" + query).status == status, query
-        slow = program.scene("paper_sine_aluminium")
-        slow.update(duration=2400, sample_rate=10, output={"channels": [], "psd": None}, accuracy={"solver": "rk4", "step": 1e-5})
+        slow = endless()
         running = daemon.submit(slow, headers={"Prefer": "respond-async"}).json()["id"]
         reply = daemon.get(f"/v1/compare?a={running}&b={job['id']}")
         assert reply.status == 409 and "has no result" in reply.json()["detail"], reply

@@ -13,6 +13,7 @@ import numpy
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
+from asking import endless  # noqa: E402
 
 USUAL = "http://127.0.0.1:8080"
 
@@ -107,8 +108,6 @@ def test_lines():
                 json.dump(document, file)
         with open(os.path.join(folder, "force.csv"), "w", encoding="utf-8") as file:
             file.write("time [s],force [N]\n" + "".join(f"{0.001 * i:.3f},{max(0, numpy.sin(0.3 * i - 3)) if i < 20 else 0:.4f}\n" for i in range(60)))
-        endless = program.scene("paper_sine_aluminium")
-        endless.update(duration=2400, sample_rate=10, output={"channels": [], "psd": None}, accuracy={"solver": "rk4", "step": 1e-5})
         one, two = (program.finished(daemon, program.scene(name)) for name in ("paper_free_sponge", "paper_free_aluminium"))
         swept = program.finished(daemon, program.scene("sweep_clearance_buffer"))
         for line in kept:
@@ -117,7 +116,7 @@ def test_lines():
             with open(os.path.join(folder, "scene.json"), "w", encoding="utf-8") as file:
                 json.dump({**scene, "duration": min(2, scene["duration"])}, file)
             is_end = re.search(r"cancel|jobs/\$JOB$", line)
-            job = daemon.submit(endless, headers={"Prefer": "respond-async"}).json()["id"] if is_end else one["id"]
+            job = daemon.submit(endless(), headers={"Prefer": "respond-async"}).json()["id"] if is_end else one["id"]
             said = re.sub(r"\[\.\.\.\]", str([0.1 * i for i in range(40)]), line).replace("r-…", one["result"])
             said = said.replace(USUAL, daemon.url).replace("localhost:8080", f"localhost:{daemon.port}")
             said = re.sub(r"\bcurl ", "curl -fsS ", said)

@@ -23,6 +23,7 @@ import urllib.request
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
 from access import bearer, impactd, token, until  # noqa: E402
+from asking import endless  # noqa: E402
 from daemon import Daemon  # noqa: E402
 
 SCENE = program.scene("paper_free_sponge")
@@ -341,8 +342,7 @@ def test_systemd_is_told_of_the_beginning_and_the_end():
 
 def test_the_end_answers_those_who_wait_and_takes_no_new_jobs():
     """SIGTERM with clients waiting on a long job: each is answered, the job goes on at the next start, within 5 s."""
-    slow = dict(program.scene("paper_sine_aluminium"), duration=2400, sample_rate=10, output={"channels": [], "psd": None},
-                accuracy={"solver": "rk4", "step": 1e-5})
+    slow = endless()
     with Daemon(program.build, "--workers", "1") as daemon:
         job = daemon.request("POST", "/v1/jobs", json=slow, headers={"Prefer": "respond-async"}).json()
         answers = []
