@@ -1,6 +1,6 @@
 # Files as C arrays inside the binary, so that it runs from anywhere.
 #
-#   impactd_embed(TARGET NAME FILE...)   adds to TARGET the table `embedded_NAME` of server/base/embedded.h: one row
+#   impactd_embed(TARGET NAME FILE...)   adds to TARGET the table `embedded_NAME` of server/util/embedded.h: one row
 #                                        per file, by its path from the project's folder, in the order given.
 #
 # The same file is the script that writes one such table while building (cmake -P).
@@ -44,4 +44,4 @@ foreach(path ${files})
     math(EXPR index "${index} + 1")
 endforeach()
 file(WRITE ${SOURCE}
-    "#include \"server/base/embedded.h\"\n\n${arrays}\nconst EmbeddedFile embedded_${NAME}[] = {\n${rows}    {0},\n};\n")
+    "#include \"server/util/embedded.h\"\n\n${arrays}\nconst EmbeddedFile embedded_${NAME}[] = {\n${rows}    {0},\n};\n")

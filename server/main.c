@@ -3,7 +3,7 @@
 #include <unistd.h>
 
 #include "core/math/fft.h"
-#include "server/command/command.h"
+#include "server/cli/command.h"
 
 // The first file opened takes the number of a closed standard stream, and would be given what is
 // printed there. What holds its place refuses that.

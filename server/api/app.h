@@ -1,15 +1,15 @@
 // What handlers work with: the rooms of the running daemon, and the few facts replies tell about
-// it. Not the rooms' settings. Filled by command/serve.c, used by every handler in api/.
+// it. Not the rooms' settings. Filled by cli/serve.c, used by every handler in api/.
 #ifndef SERVER_API_APP_H
 #define SERVER_API_APP_H
 
 #include <stdatomic.h>
 #include <stdint.h>
 
+#include "server/db/db.h"
 #include "server/http/route.h"
-#include "server/jobs/aside.h"
-#include "server/jobs/intake.h"
-#include "server/store/store.h"
+#include "server/jobs/background.h"
+#include "server/jobs/jobs.h"
 
 struct App {
     Store *store;

@@ -5,9 +5,9 @@
 #include <string.h>
 
 #include "server/api/app.h"
-#include "server/base/embedded.h"
 #include "server/http/reply.h"
-#include "server/http/shield.h"
+#include "server/http/security_headers.h"
+#include "server/util/embedded.h"
 
 static const struct {
     const char *extension, *content_type;

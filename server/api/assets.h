@@ -3,8 +3,8 @@
 #ifndef SERVER_API_ASSETS_H
 #define SERVER_API_ASSETS_H
 
-#include "server/base/embedded.h"
 #include "server/http/request.h"
+#include "server/util/embedded.h"
 
 // The file, or that the client has it already: its tag is what it holds.
 Status assets_reply(const Request *request, Reply *reply, const EmbeddedFile *file,

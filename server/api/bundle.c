@@ -2,12 +2,12 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "server/api/columns.h"
 #include "server/api/results.h"
-#include "server/api/tables.h"
-#include "server/encode/csv.h"
-#include "server/encode/impacts_csv.h"
-#include "server/encode/npz.h"
-#include "server/encode/zip.h"
+#include "server/formats/csv.h"
+#include "server/formats/impacts_csv.h"
+#include "server/formats/npz.h"
+#include "server/formats/zip.h"
 #include "server/http/reply.h"
 
 static const char about[] =

@@ -3,10 +3,10 @@
 #include <string.h>
 
 #include "server/api/app.h"
-#include "server/codec/differ.h"
 #include "server/http/body.h"
 #include "server/http/reply.h"
 #include "server/jobs/documents.h"
+#include "server/json/diff.h"
 
 // The scenes that are compared, and how long they may be.
 enum { RECENT_MAX = 256, SCENE_MAX = 16384 };

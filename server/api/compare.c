@@ -9,10 +9,10 @@
 #include "server/api/app.h"
 #include "server/api/compare_parts.h"
 #include "server/api/compare_side.h"
-#include "server/base/link.h"
-#include "server/codec/differ.h"
-#include "server/codec/report.h"
 #include "server/http/reply.h"
+#include "server/json/diff.h"
+#include "server/json/stored_report.h"
+#include "server/util/base_path.h"
 
 static void put_side(Bytes *bytes, const char *name, const ResultRow *row) {
     bytes_format(bytes, "\"%s\": {\"id\": \"%s\", \"engine\": ", name, row->id);

@@ -9,10 +9,10 @@
 #include "server/api/app.h"
 #include "server/api/compare_parts.h"
 #include "server/api/compare_side.h"
-#include "server/api/measured.h"
-#include "server/base/link.h"
-#include "server/codec/write.h"
+#include "server/api/compare_upload.h"
 #include "server/http/reply.h"
+#include "server/json/encode.h"
+#include "server/util/base_path.h"
 
 enum { SEGMENT = 4096 };
 

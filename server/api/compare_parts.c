@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "server/codec/write.h"
+#include "server/json/encode.h"
 
 enum { CHANNELS = 64, SAMPLES = 1 << 26 }; // compared, of each kind and in all
 

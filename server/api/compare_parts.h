@@ -6,7 +6,7 @@
 #include "core/result/signal_comparison.h"
 #include "core/result/spectrum_distance.h"
 #include "core/simulation/simulation.h"
-#include "server/base/bytes.h"
+#include "server/util/bytes.h"
 
 #define COMPARE_PART 0.01 // of the largest displacement, by which motions have parted
 

@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/base/clock.h"
 #include "server/http/reply.h"
+#include "server/util/clock.h"
 
 static const double wait_most = 60; // [s]
 

@@ -8,11 +8,11 @@
 #include "core/base/rfc3339.h"
 #include "core/study/study.h"
 #include "server/api/app.h"
-#include "server/api/job_document.h"
+#include "server/api/job_json.h"
 #include "server/api/query.h"
+#include "server/db/job_search.h"
 #include "server/http/reply.h"
 #include "server/jobs/job_id.h"
-#include "server/store/job_search.h"
 
 enum { LIST_INITIAL = 20, LIST_MAX = 100 };
 

@@ -6,12 +6,12 @@
 #include <string.h>
 
 #include "server/api/app.h"
-#include "server/api/job_document.h"
-#include "server/base/clock.h"
+#include "server/api/job_json.h"
+#include "server/http/access.h"
 #include "server/http/body.h"
-#include "server/http/doorman.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
+#include "server/util/clock.h"
 
 static const double wait_initial = 2, wait_most = 30; // [s]
 

@@ -7,7 +7,7 @@
 #include "server/api/assets.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
-#include "server/http/shield.h"
+#include "server/http/security_headers.h"
 
 #define SCENE                                                                                      \
     "{\"structure\": {\"mass\": 1.35, \"stiffness\": 865, \"damping\": 1.092}, "                   \

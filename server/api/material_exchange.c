@@ -4,9 +4,9 @@
 #include <string.h>
 
 #include "server/api/app.h"
-#include "server/encode/csv.h"
-#include "server/encode/encoder.h"
-#include "server/encode/exchange_text.h"
+#include "server/formats/csv.h"
+#include "server/formats/format.h"
+#include "server/formats/material_export.h"
 #include "server/http/body.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"

@@ -6,10 +6,10 @@
 
 #include "server/api/materials.h"
 #include "server/api/query.h"
-#include "server/base/link.h"
-#include "server/codec/write.h"
 #include "server/http/reply.h"
-#include "server/materials/catalogue.h"
+#include "server/json/encode.h"
+#include "server/materials/material.h"
+#include "server/util/base_path.h"
 
 // Revisions may be long, with their tables; what was done is short.
 enum { REVISIONS_MAX = 100, DEEDS_INITIAL = 100, DEEDS_MAX = 1000 };

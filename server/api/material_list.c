@@ -4,9 +4,9 @@
 
 #include "server/api/app.h"
 #include "server/api/query.h"
-#include "server/base/fold.h"
 #include "server/http/reply.h"
-#include "server/materials/catalogue.h"
+#include "server/materials/material.h"
+#include "server/util/utf8_fold.h"
 
 enum { LIST_INITIAL = 100, LIST_MAX = 1000, LOOKED_AT = 100 };
 static const char *const statuses[] = {"draft", "approved", "deprecated", NULL};

@@ -5,9 +5,9 @@
 
 #include "server/api/materials.h"
 #include "server/api/query.h"
-#include "server/base/link.h"
 #include "server/http/reply.h"
-#include "server/materials/catalogue.h"
+#include "server/materials/material.h"
+#include "server/util/base_path.h"
 
 enum { LIST_INITIAL = 20, LIST_MAX = 1000 };
 

@@ -6,13 +6,13 @@
 #include <string.h>
 
 #include "server/api/materials.h"
-#include "server/base/clock.h"
-#include "server/codec/material_bodies.h"
-#include "server/codec/read.h"
 #include "server/http/body.h"
 #include "server/http/reply.h"
-#include "server/materials/catalogue.h"
+#include "server/json/material_bodies.h"
+#include "server/json/parse.h"
+#include "server/materials/material.h"
 #include "server/materials/slug.h"
+#include "server/util/clock.h"
 
 // Whether a body was an object at all, so that more may be said of it than that.
 static bool is_object(Status status, const Problem *problem) {

@@ -7,7 +7,7 @@
 
 #include "server/http/header.h"
 #include "server/http/reply.h"
-#include "server/materials/catalogue.h"
+#include "server/materials/material.h"
 
 void material_tag(const char *slug, uint64_t revision, uint64_t version, char tag[MATERIAL_TAG]) {
     snprintf(tag, MATERIAL_TAG, "%.63s@%llu-%llu", slug, (unsigned long long)revision,

@@ -5,9 +5,9 @@
 
 #include "core/drop_test/evaluation.h"
 #include "server/api/app.h"
-#include "server/api/patience.h"
-#include "server/base/bytes.h"
-#include "server/store/material_rows.h"
+#include "server/api/cpu_budget.h"
+#include "server/db/materials.h"
+#include "server/util/bytes.h"
 
 enum { MATERIAL_TAG = 110 };
 

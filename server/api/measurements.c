@@ -6,15 +6,15 @@
 
 #include "server/api/materials.h"
 #include "server/api/query.h"
-#include "server/base/clock.h"
-#include "server/base/link.h"
-#include "server/codec/material_bodies.h"
-#include "server/codec/read.h"
-#include "server/codec/write.h"
 #include "server/http/body.h"
 #include "server/http/reply.h"
-#include "server/materials/catalogue.h"
+#include "server/json/encode.h"
+#include "server/json/material_bodies.h"
+#include "server/json/parse.h"
+#include "server/materials/material.h"
 #include "server/materials/measurement.h"
+#include "server/util/base_path.h"
+#include "server/util/clock.h"
 
 enum { LIST_INITIAL = 20, LIST_MAX = 100 };
 

@@ -1,11 +1,11 @@
 // GET /metrics: counters and gauges of all rooms in the Prometheus text format, version 0.0.4.
 #include "server/api/app.h"
-#include "server/base/process.h"
-#include "server/http/hot.h"
-#include "server/http/listener.h"
-#include "server/http/meter.h"
 #include "server/http/reply.h"
-#include "server/jobs/totals.h"
+#include "server/http/request_metrics.h"
+#include "server/http/response_cache.h"
+#include "server/http/server.h"
+#include "server/jobs/job_metrics.h"
+#include "server/util/process.h"
 
 // What is known already, by layer in the order in which they are asked.
 static void write_layers(Bytes *bytes, const IntakeTally *tally, Store *store) {

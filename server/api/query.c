@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/base/bytes.h"
+#include "server/util/bytes.h"
 
 Status query_text(const Request *request, const char *name, const char **text, Problem *problem) {
     *text = request_query(request, name);

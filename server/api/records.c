@@ -3,15 +3,15 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "server/api/columns.h"
 #include "server/api/query.h"
 #include "server/api/records_upload.h"
-#include "server/api/tables.h"
-#include "server/base/clock.h"
-#include "server/base/link.h"
-#include "server/codec/write.h"
-#include "server/http/doorman.h"
+#include "server/http/access.h"
 #include "server/http/reply.h"
 #include "server/jobs/documents.h"
+#include "server/json/encode.h"
+#include "server/util/base_path.h"
+#include "server/util/clock.h"
 
 enum { LIST_INITIAL = 50, LIST_MAX = 500 };
 

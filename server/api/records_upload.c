@@ -8,11 +8,11 @@
 #include "core/base/json_pointer.h"
 #include "core/base/spelling.h"
 #include "core/formats/ground_motion_text.h"
-#include "server/base/clock.h"
-#include "server/codec/read.h"
 #include "server/http/body.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
+#include "server/json/parse.h"
+#include "server/util/clock.h"
 
 typedef struct Asked {
     char *name, *source, *processing, *earthquake, *station, *notes;

@@ -4,8 +4,8 @@
 #define SERVER_API_RECORDS_UPLOAD_H
 
 #include "core/base/report.h"
+#include "server/db/records.h"
 #include "server/http/request.h"
-#include "server/store/record_rows.h"
 
 typedef struct RecordUpload {
     RecordRow row;

@@ -4,7 +4,7 @@
 #define SERVER_API_RESULTS_H
 
 #include "server/api/app.h"
-#include "server/base/bytes.h"
+#include "server/util/bytes.h"
 
 typedef enum Document { DOCUMENT_PSD, DOCUMENT_IMPACTS, DOCUMENT_ENERGY } Document;
 

@@ -4,7 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "server/api/tables.h"
+#include "server/api/columns.h"
 
 static void list_names(const Columns *columns, char *target, size_t size) {
     target[0] = '\0';

@@ -7,12 +7,12 @@
 #include <string.h>
 
 #include "server/api/app.h"
-#include "server/codec/read.h"
-#include "server/encode/answer.h"
-#include "server/encode/chart.h"
+#include "server/formats/chart.h"
+#include "server/formats/study_formats.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
-#include "server/http/shield.h"
+#include "server/http/security_headers.h"
+#include "server/json/parse.h"
 
 Status study_read(const ResultRow *row, StudyAnswer *answer, Problem *problem) {
     Problem *fault = calloc(1, sizeof *fault);

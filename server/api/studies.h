@@ -4,9 +4,9 @@
 #define SERVER_API_STUDIES_H
 
 #include "core/study/study.h"
-#include "server/encode/answer.h"
+#include "server/db/db.h"
+#include "server/formats/study_formats.h"
 #include "server/http/request.h"
-#include "server/store/store.h"
 
 // Of a row that has one. Cleared by fields_clear(study_answer_fields, ...) in any case.
 Status study_read(const ResultRow *row, StudyAnswer *answer, Problem *problem);

@@ -4,18 +4,18 @@
 #include <string.h>
 
 #include "server/api/app.h"
-#include "server/api/job_document.h"
+#include "server/api/job_json.h"
 #include "server/api/studies.h"
-#include "server/base/link.h"
-#include "server/codec/write.h"
-#include "server/encode/answer.h"
-#include "server/encode/charts.h"
-#include "server/encode/encoding.h"
-#include "server/encode/sweep_columns.h"
-#include "server/encode/sweep_table.h"
+#include "server/formats/charts.h"
+#include "server/formats/encoding.h"
+#include "server/formats/study_formats.h"
+#include "server/formats/sweep_columns.h"
+#include "server/formats/sweep_table.h"
 #include "server/http/reply.h"
 #include "server/jobs/documents.h"
 #include "server/jobs/sweep_rows.h"
+#include "server/json/encode.h"
+#include "server/util/base_path.h"
 
 // Up to so many bytes a text is made at once.
 enum { WHOLE_MAX = 4 << 20 };

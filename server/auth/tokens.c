@@ -14,8 +14,8 @@
 #include <sys/random.h>
 #include <time.h>
 
-#include "server/base/clock.h"
-#include "server/base/digest.h"
+#include "server/util/clock.h"
+#include "server/util/sha256.h"
 
 enum {
     FOLLOW_MS = 500,

@@ -4,7 +4,7 @@
 #ifndef SERVER_AUTH_TOKENS_H
 #define SERVER_AUTH_TOKENS_H
 
-#include "server/store/token_rows.h"
+#include "server/db/tokens.h"
 
 typedef struct Tokens Tokens;
 

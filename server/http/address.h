@@ -1,5 +1,5 @@
 // Where the daemon listens: reading "HOST:PORT", opening the socket, writing the URL.
-// Not whether that is wise (command/serve.c). Used by listener.c and command/serve.c.
+// Not whether that is wise (cli/serve.c). Used by listener.c and cli/serve.c.
 #ifndef SERVER_HTTP_ADDRESS_H
 #define SERVER_HTTP_ADDRESS_H
 

@@ -1,10 +1,10 @@
 // The address that clients reach us by, behind a proxy: "https://sim.example.org/impactd".
-// Not where we listen (address.h). Used by command/serve.c.
+// Not where we listen (address.h). Used by cli/serve.c.
 #ifndef SERVER_HTTP_BASE_URL_H
 #define SERVER_HTTP_BASE_URL_H
 
 #include "core/base/status.h"
-#include "server/base/link.h"
+#include "server/util/base_path.h"
 
 typedef struct BaseUrl {
     char text[256];            // without a slash at its end

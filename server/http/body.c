@@ -3,9 +3,9 @@
 #include <stdlib.h>
 #include <strings.h>
 
-#include "server/codec/write.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
+#include "server/json/encode.h"
 
 static const char type_problem[] = "application/problem+json";
 static const char no_memory[] =

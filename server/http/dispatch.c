@@ -5,10 +5,10 @@
 
 #include "core/base/field.h"
 #include "core/base/spelling.h"
-#include "server/base/link.h"
 #include "server/http/body.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
+#include "server/util/base_path.h"
 
 static Status check_queries(const Route *route, const Request *request, Problem *problem) {
     static const char *const none[] = {NULL};

@@ -1,11 +1,11 @@
 // From a Request to a Reply: find the route, check what all routes have in common, call the
 // handler, turn its fault into a problem document. Not the gate (gate.h), not sockets (listener.h).
-// Used by command/serve.c, as the listener's answerer, and by tests without sockets.
+// Used by cli/serve.c, as the listener's answerer, and by tests without sockets.
 #ifndef SERVER_HTTP_DISPATCH_H
 #define SERVER_HTTP_DISPATCH_H
 
-#include "server/http/doorman.h"
-#include "server/http/hot.h"
+#include "server/http/access.h"
+#include "server/http/response_cache.h"
 #include "server/http/route.h"
 
 typedef struct Dispatcher {

@@ -14,11 +14,11 @@
 #include <string.h>
 #include <strings.h>
 
-#include "server/base/clock.h"
-#include "server/codec/write.h"
 #include "server/http/body.h"
 #include "server/http/reply.h"
-#include "server/http/sending.h"
+#include "server/http/response.h"
+#include "server/json/encode.h"
+#include "server/util/clock.h"
 
 enum {
     IDLE_MS = 60000, // from the last reply to the next request line

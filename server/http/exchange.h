@@ -8,13 +8,13 @@
 #include <pthread.h>
 #include <stdatomic.h>
 
-#include "server/base/bytes.h"
-#include "server/http/bell.h"
-#include "server/http/gate.h"
-#include "server/http/listener.h"
-#include "server/http/pool.h"
-#include "server/http/seat.h"
-#include "server/http/sending.h"
+#include "server/http/eventfd.h"
+#include "server/http/response.h"
+#include "server/http/server.h"
+#include "server/http/timer.h"
+#include "server/http/validate.h"
+#include "server/util/bytes.h"
+#include "server/util/thread_pool.h"
 
 // What all exchanges of a listener share.
 typedef struct Desk {

@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/base/deflate.h"
 #include "server/http/header.h"
+#include "server/util/gzip.h"
 
 #define PACKED "-gz" // behind the tag of what is packed: other bytes, another tag
 

@@ -3,8 +3,8 @@
 #ifndef SERVER_HTTP_REPLY_H
 #define SERVER_HTTP_REPLY_H
 
-#include "server/base/bytes.h"
 #include "server/http/request.h"
+#include "server/util/bytes.h"
 
 extern const char type_json[]; // "application/json"
 

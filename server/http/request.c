@@ -8,7 +8,7 @@
 #include <string.h>
 #include <strings.h>
 
-#include "server/base/link.h"
+#include "server/util/base_path.h"
 
 static int hex_digit(char c) {
     if (c >= '0' && c <= '9')

@@ -3,7 +3,7 @@
 #include <stdbool.h>
 #include <string.h>
 
-#include "server/command/command.h"
+#include "server/cli/command.h"
 #include "server/install/pages.h"
 #include "server/options.h"
 

@@ -6,7 +6,7 @@
 #include "core/base/field.h"
 #include "core/study/study.h"
 #include "server/api/app.h"
-#include "server/command/command.h"
+#include "server/cli/command.h"
 #include "server/install/pages.h"
 #include "server/options.h"
 

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "core/base/status.h"
-#include "server/jobs/index.h"
+#include "server/util/hashmap.h"
 
 typedef struct Entry {
     IndexEntry indexed; // by id

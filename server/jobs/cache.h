@@ -4,8 +4,8 @@
 #ifndef SERVER_JOBS_CACHE_H
 #define SERVER_JOBS_CACHE_H
 
-#include "server/jobs/head.h"
-#include "server/jobs/intake.h"
+#include "server/jobs/jobs.h"
+#include "server/jobs/result_summary.h"
 
 typedef struct Cache Cache;
 

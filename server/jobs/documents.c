@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#include "server/codec/write.h"
+#include "server/json/encode.h"
 
 void document_plan(Bytes *bytes, const PlanReport *plan) {
     write_item(bytes, plan_report_fields, plan, WRITE_REPORT);

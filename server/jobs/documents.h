@@ -6,7 +6,7 @@
 
 #include "core/base/progress.h"
 #include "core/study/study.h"
-#include "server/base/bytes.h"
+#include "server/util/bytes.h"
 
 void document_plan(Bytes *bytes, const PlanReport *plan);
 void document_summary(Bytes *bytes, const Outcome *outcome); // with what was asked for besides

@@ -5,7 +5,7 @@
 #ifndef SERVER_JOBS_EXECUTOR_H
 #define SERVER_JOBS_EXECUTOR_H
 
-#include "server/jobs/intake.h"
+#include "server/jobs/jobs.h"
 
 typedef struct StudyRun StudyRun;
 

@@ -1,7 +1,7 @@
 // A record is deleted while no scene that names one is being accepted: those that were are in the
 // store by then, and count.
-#include "server/jobs/intake_state.h"
-#include "server/store/record_rows.h"
+#include "server/db/records.h"
+#include "server/jobs/jobs_private.h"
 
 Status intake_record_delete(Intake *intake, const char *name, Problem *problem) {
     RecordUses uses;

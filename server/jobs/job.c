@@ -3,8 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/base/clock.h"
-#include "server/jobs/gather.h"
+#include "server/jobs/study_sink.h"
+#include "server/util/clock.h"
 
 const char *const job_state_names[] = {"accepted", "running",   "successful",
                                        "failed",   "dismissed", NULL};

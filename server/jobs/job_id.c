@@ -7,7 +7,7 @@
 #include <string.h>
 #include <sys/random.h>
 
-#include "server/base/clock.h"
+#include "server/util/clock.h"
 
 static int64_t next_us(void) {
     static atomic_int_fast64_t last;

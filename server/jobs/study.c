@@ -13,9 +13,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "server/base/clock.h"
-#include "server/base/journal.h"
-#include "server/jobs/gather.h"
+#include "server/jobs/study_sink.h"
+#include "server/util/clock.h"
+#include "server/util/log.h"
 
 // Each that is under way holds its scene's outcome and what it folds.
 enum { STUDIES_BYTES = 512 << 20, STUDIES_PER_WORKER = 2 };

@@ -5,9 +5,9 @@
 #ifndef SERVER_JOBS_STUDY_H
 #define SERVER_JOBS_STUDY_H
 
-#include "server/base/bytes.h"
 #include "server/jobs/executor.h"
 #include "server/jobs/worker.h"
+#include "server/util/bytes.h"
 
 // A chunk that a thread makes, or will.
 typedef struct Shift {

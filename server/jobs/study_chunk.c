@@ -1,7 +1,7 @@
 // The members of one chunk: made one after the other, with a look now and then whether others wait.
 // What was made stays gathered when the chunk is put back.
-#include "server/base/clock.h"
-#include "server/jobs/gather.h"
+#include "server/jobs/study_sink.h"
+#include "server/util/clock.h"
 
 static const double before = STUDY_OWN + (1 - STUDY_OWN) * STUDY_BEGUN; // of the whole progress
 static const int64_t look_ns = 1000000; // how often a chunk looks whether others wait

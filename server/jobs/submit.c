@@ -5,17 +5,17 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/base/bytes.h"
-#include "server/base/clock.h"
-#include "server/codec/write.h"
+#include "server/db/job_search.h"
 #include "server/jobs/documents.h"
-#include "server/jobs/intake_state.h"
+#include "server/jobs/idempotency.h"
 #include "server/jobs/job_id.h"
-#include "server/jobs/keyed.h"
-#include "server/jobs/prepare_record.h"
-#include "server/jobs/quota.h"
-#include "server/jobs/retry.h"
-#include "server/store/job_search.h"
+#include "server/jobs/jobs_private.h"
+#include "server/jobs/limits.h"
+#include "server/jobs/resolve_record.h"
+#include "server/jobs/sweep_retry.h"
+#include "server/json/encode.h"
+#include "server/util/bytes.h"
+#include "server/util/clock.h"
 
 // With the lock held: one of this scene that is under way, to be shared. One for readers alone
 // saves nothing.

@@ -4,7 +4,7 @@
 #define SERVER_JOBS_SWEEP_H
 
 #include "core/study/sweep.h"
-#include "server/store/store.h"
+#include "server/db/db.h"
 
 size_t sweep_rows_of(const SweepRow *row, size_t chunk);
 size_t sweep_row_size(const SweepRow *row);

@@ -3,10 +3,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/codec/read.h"
 #include "server/jobs/job.h"
-#include "server/jobs/prepare_record.h"
+#include "server/jobs/resolve_record.h"
 #include "server/jobs/sweep.h"
+#include "server/json/parse.h"
 
 // Bytes of rows that are read at once, more only where one of each chunk is.
 enum { WINDOW = 4 << 20 };

@@ -5,7 +5,7 @@
 
 #include "core/study/study.h"
 #include "core/study/sweep.h"
-#include "server/store/store.h"
+#include "server/db/db.h"
 
 // A sweep read back. All zero is empty.
 typedef struct SweepShow {

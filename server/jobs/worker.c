@@ -6,14 +6,14 @@
 #include <string.h>
 #include <time.h>
 
-#include "server/base/bytes.h"
-#include "server/base/clock.h"
-#include "server/codec/write.h"
 #include "server/jobs/documents.h"
-#include "server/jobs/gather.h"
-#include "server/jobs/prepare_record.h"
+#include "server/jobs/references.h"
+#include "server/jobs/resolve_record.h"
 #include "server/jobs/study.h"
-#include "server/jobs/uses.h"
+#include "server/jobs/study_sink.h"
+#include "server/json/encode.h"
+#include "server/util/bytes.h"
+#include "server/util/clock.h"
 
 // A computation's run, or the study after it, as a part of the whole.
 typedef struct Part {

@@ -4,7 +4,7 @@
 #ifndef SERVER_JOBS_WORKER_H
 #define SERVER_JOBS_WORKER_H
 
-#include "server/jobs/intake_state.h"
+#include "server/jobs/jobs_private.h"
 
 #define STUDY_OWN 0.05 // of the progress, the scene's own run where a study follows
 

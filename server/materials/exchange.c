@@ -8,9 +8,9 @@
 
 #include "core/base/json_pointer.h"
 #include "core/base/rfc3339.h"
-#include "server/codec/material_bodies.h"
-#include "server/codec/write.h"
-#include "server/materials/catalogue.h"
+#include "server/json/encode.h"
+#include "server/json/material_bodies.h"
+#include "server/materials/material.h"
 #include "server/materials/slug.h"
 
 enum { NAME_MAX = 64, WORDS_MAX = 10000, POINTER_SIZE = sizeof((Fault){0}.pointer) };

@@ -1,13 +1,13 @@
 // All materials as a document, to be carried to another database and back: its rows, and how what
 // was read becomes an import. Not the texts (exchange_json.h, exchange_csv.h;
-// encode/exchange_text.h writes them) and not the database's judgement (store/material_import.h).
+// formats/material_export.h writes them) and not the database's judgement (db/material_import.h).
 // Used by those and by api/.
 #ifndef SERVER_MATERIALS_EXCHANGE_H
 #define SERVER_MATERIALS_EXCHANGE_H
 
 #include "core/drop_test/drop_test.h"
 #include "core/scene/material.h"
-#include "server/store/material_import.h"
+#include "server/db/material_import.h"
 
 enum { EXCHANGE_VERSION = 1, EXCHANGE_ROWS_MAX = 100000 };
 extern const char exchange_format[]; // "impactd-materials"

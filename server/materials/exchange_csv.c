@@ -10,9 +10,9 @@
 
 #include "core/base/json_pointer.h"
 #include "core/base/spelling.h"
-#include "server/codec/csv_scan.h"
-#include "server/codec/read.h"
-#include "server/codec/scan.h"
+#include "server/json/parse.h"
+#include "server/json/scan.h"
+#include "server/util/csv_reader.h"
 
 enum { POINTER_SIZE = sizeof((Fault){0}.pointer), COLUMNS_MAX = 64 };
 

@@ -1,5 +1,5 @@
 // The table that all materials are carried in, read: a header of names, perhaps with units, in any
-// order, and a row for each revision and measurement. Not its writing (encode/exchange_text.h).
+// order, and a row for each revision and measurement. Not its writing (formats/material_export.h).
 // Used by api/.
 #ifndef SERVER_MATERIALS_EXCHANGE_CSV_H
 #define SERVER_MATERIALS_EXCHANGE_CSV_H

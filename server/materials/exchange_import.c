@@ -4,9 +4,9 @@
 #include <string.h>
 
 #include "core/base/json_pointer.h"
-#include "server/base/clock.h"
 #include "server/materials/exchange.h"
 #include "server/materials/exchange_same.h"
+#include "server/util/clock.h"
 
 // By slug, by number, what has none last, then as in the file.
 static int order(const char *slug_a, uint64_t number_a, const ImportMark *a, const char *slug_b,

@@ -5,9 +5,9 @@
 #include <string.h>
 
 #include "core/base/json_pointer.h"
-#include "server/base/bytes.h"
-#include "server/codec/read.h"
-#include "server/codec/scan.h"
+#include "server/json/parse.h"
+#include "server/json/scan.h"
+#include "server/util/bytes.h"
 
 typedef struct Envelope {
     char *format;

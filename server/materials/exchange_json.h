@@ -1,5 +1,5 @@
-// The document that all materials are carried in, read. Not its writing (encode/exchange_text.h).
-// Used by api/.
+// The document that all materials are carried in, read. Not its writing
+// (formats/material_export.h). Used by api/.
 #ifndef SERVER_MATERIALS_EXCHANGE_JSON_H
 #define SERVER_MATERIALS_EXCHANGE_JSON_H
 

@@ -5,8 +5,8 @@
 #include <string.h>
 
 #include "core/base/json_pointer.h"
-#include "server/codec/read.h"
-#include "server/codec/write.h"
+#include "server/json/encode.h"
+#include "server/json/parse.h"
 
 enum { POINTER_SIZE = sizeof((Fault){0}.pointer) };
 

@@ -1,9 +1,9 @@
 // Whether two revisions say the same of a material. Not whose they are and when they were written
-// (store/material_import.c). Used by exchange_import.c.
+// (db/material_import.c). Used by exchange_import.c.
 #ifndef SERVER_MATERIALS_EXCHANGE_SAME_H
 #define SERVER_MATERIALS_EXCHANGE_SAME_H
 
-#include "server/store/material_rows.h"
+#include "server/db/materials.h"
 
 // What `ours` says otherwise than `there` is told below `place`, member by member; `problem` NULL:
 // nothing is told. Lists are compared as they are stored.

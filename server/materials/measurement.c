@@ -3,10 +3,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/base/link.h"
-#include "server/codec/read.h"
-#include "server/codec/write.h"
-#include "server/materials/catalogue.h"
+#include "server/json/encode.h"
+#include "server/json/parse.h"
+#include "server/materials/material.h"
+#include "server/util/base_path.h"
 
 void stored_test_clear(StoredTest *stored) {
     material_measurement_clear(&stored->row);

@@ -5,8 +5,8 @@
 #define SERVER_MATERIALS_MEASUREMENT_H
 
 #include "core/drop_test/evaluation.h"
-#include "server/base/bytes.h"
-#include "server/store/material_rows.h"
+#include "server/db/materials.h"
+#include "server/util/bytes.h"
 
 typedef struct StoredTest {
     MaterialMeasurement row; // without its document

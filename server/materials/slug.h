@@ -1,4 +1,4 @@
-// Whether a new material may be called so. Not whether there is one (store/material_rows.h). Used
+// Whether a new material may be called so. Not whether there is one (db/materials.h). Used
 // by whoever adds materials.
 #ifndef SERVER_MATERIALS_SLUG_H
 #define SERVER_MATERIALS_SLUG_H

@@ -11,9 +11,9 @@
 #include "core/excitation/excitation.h"
 #include "core/math/fft.h"
 #include "core/solve/solver.h"
-#include "server/base/clock.h"
-#include "server/base/process.h"
-#include "server/jobs/intake.h"
+#include "server/jobs/jobs.h"
+#include "server/util/clock.h"
+#include "server/util/process.h"
 
 typedef struct Lane {
     pthread_t thread;

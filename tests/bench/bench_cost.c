@@ -13,9 +13,9 @@
 
 #include "core/math/fft.h"
 #include "core/simulation/simulation.h"
-#include "server/base/clock.h"
-#include "server/base/process.h"
-#include "server/codec/read.h"
+#include "server/json/parse.h"
+#include "server/util/clock.h"
+#include "server/util/process.h"
 #include "tests/truth/drawn.h"
 
 enum { SCENES = 500, SCENES_MAX = 100000, STOREYS_MAX = 40 };

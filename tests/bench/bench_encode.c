@@ -8,9 +8,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/base/clock.h"
-#include "server/encode/buckets.h"
-#include "server/encode/encoding.h"
+#include "server/formats/downsample.h"
+#include "server/formats/encoding.h"
+#include "server/util/clock.h"
 
 enum { ROWS = 60001, CHANNELS = 5, REPEATS = 41, SAMPLES = 1000000 };
 enum { MEMCPY, JANSSON, NPY, NPZ, MAT, JSON, CSV, WAYS };

@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "core/math/fft.h"
-#include "server/base/clock.h"
+#include "server/util/clock.h"
 #include "tests/bench/cases.h"
 #include "tests/support/paper.h"
 #include "tests/support/vectors.h"

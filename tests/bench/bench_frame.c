@@ -9,7 +9,7 @@
 
 #include "core/math/fft.h"
 #include "core/solve/exact.h"
-#include "server/base/clock.h"
+#include "server/util/clock.h"
 #include "tests/support/frames.h"
 #include "tests/support/paper.h"
 

@@ -16,8 +16,8 @@
 #include <unistd.h>
 
 #include "core/math/fft.h"
-#include "server/base/clock.h"
-#include "server/jobs/intake.h"
+#include "server/jobs/jobs.h"
+#include "server/util/clock.h"
 
 enum { CLIENTS = 64 };
 

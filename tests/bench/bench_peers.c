@@ -8,7 +8,7 @@
 #include <string.h>
 
 #include "core/math/fft.h"
-#include "server/base/clock.h"
+#include "server/util/clock.h"
 #include "tests/bench/cases.h"
 #include "tests/bench/peers.h"
 

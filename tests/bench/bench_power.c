@@ -11,7 +11,7 @@
 #include "core/solve/exact.h"
 #include "core/solve/solver.h"
 #include "core/solve/time_stepping.h"
-#include "server/base/clock.h"
+#include "server/util/clock.h"
 #include "tests/support/paper.h"
 
 typedef struct Case {

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 
 #include "core/math/fft.h"
-#include "server/base/clock.h"
+#include "server/util/clock.h"
 #include "tests/bench/cases.h"
 #include "tests/support/paper.h"
 

@@ -12,9 +12,9 @@
 
 #include "core/math/fft.h"
 #include "core/study/sweep.h"
-#include "server/base/clock.h"
-#include "server/jobs/intake.h"
+#include "server/jobs/jobs.h"
 #include "server/jobs/sweep.h"
+#include "server/util/clock.h"
 
 enum { ROUNDS_MAX = 64 };
 

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "core/solve/solver.h"
-#include "server/base/clock.h"
+#include "server/util/clock.h"
 #include "tests/support/paper.h"
 
 const BenchCase bench_cases[] = {

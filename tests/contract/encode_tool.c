@@ -1,10 +1,10 @@
 // encode_tool FORMAT COLUMNS RATE FIRST COUNT [AXIS]: rows of the columns at standard input, one
-// column after the other, in a format of server/encode. With AXIS, the first column is the axis.
+// column after the other, in a format of server/formats. With AXIS, the first column is the axis.
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/encode/encoding.h"
+#include "server/formats/encoding.h"
 #include "tests/support/doubles.h"
 
 enum { COLUMNS_MAX = 16 };

@@ -2,7 +2,7 @@
 // `schema`.
 #include <stdio.h>
 
-#include "server/codec/describe.h"
+#include "server/json/schema.h"
 
 static int write_file(const char *path, const Bytes *bytes) {
     FILE *file = fopen(path, "wb");

@@ -15,8 +15,8 @@ import program  # noqa: E402
 FLOORS = {
     "core": [["base", "math"], ["contact", "excitation", "result"], ["scene"], ["plan", "drop_test", "formats"], ["solve"],
              ["simulation"], ["study"]],
-    "server": [["base", "store"], ["codec", "materials", "auth", "jobs"], ["encode", "http"], ["api"],
-               ["options", "options_show", "client", "command", "main", "install"]],
+    "server": [["util", "db"], ["json", "materials", "auth", "jobs"], ["formats", "http"], ["api"],
+               ["options", "options_show", "cli", "main", "install"]],
 }
 
 # The C library as the two halves may use it, and the processor's vectors. Not here: files, clocks, threads and
@@ -28,22 +28,22 @@ SYSTEM = PURE | set("dirent fcntl grp libgen locale netdb poll pthread pwd sched
                     "sys/file sys/ioctl sys/mman sys/random sys/resource sys/select sys/socket sys/stat "
                     "sys/statvfs sys/time sys/types sys/un sys/wait wctype".split())
 
-MHD_FILES = [f"server/http/{name}" for name in ("listener.c", "exchange.c", "exchange.h", "sending.c", "sending.h")]
+MHD_FILES = [f"server/http/{name}" for name in ("server.c", "exchange.c", "exchange.h", "response.c", "response.h")]
 
 # One room per foreign library: header -> the only files or folders that may include it.
 FOREIGN = {
     "microhttpd.h": MHD_FILES,
-    "malloc.h": ["server/base/process.c"],
-    "sqlite3.h": ["server/store/database.c", "server/store/row.c"],
-    "jansson.h": ["server/codec/"],
+    "malloc.h": ["server/util/process.c"],
+    "sqlite3.h": ["server/db/sqlite.c", "server/db/row.c"],
+    "jansson.h": ["server/json/"],
     "fftw3.h": ["core/math/fft.c"],
     "lapacke.h": ["core/math/symmetric_matrix.c"],
     "arkode/": ["core/solve/adaptive.c"],
     "nvector/": ["core/solve/adaptive.c"],
-    "gnutls/": ["server/base/digest.c", "server/base/certificate.c"],
-    "libdeflate.h": ["server/base/deflate.c"],
-    "curl/": ["server/client/http.c"],
-    "dragonbox/": ["server/base/shortest.cpp"],
+    "gnutls/": ["server/util/sha256.c", "server/http/tls.c"],
+    "libdeflate.h": ["server/util/gzip.c"],
+    "curl/": ["server/cli/http.c"],
+    "dragonbox/": ["server/util/dtoa.cpp"],
 }
 
 # Calls -> (why, where they are allowed all the same).
@@ -53,16 +53,16 @@ BANNED = {
     r"strtok|rand|srand|random|srandom|drand48|localtime|gmtime|asctime|ctime|setlocale":
         ("has hidden state", []),
     r"system|popen|alloca|mktemp|tmpnam|tempnam|setjmp|longjmp": ("is not for a daemon", []),
-    r"exit|_exit|_Exit|abort|quick_exit": ("errors are returned", ["server/main.c", "server/command/output.c"]),
-    r"clock_gettime|gettimeofday|time|clock": ("the clock is one room", ["server/base/clock.c"]),
-    r"json_object_\w+|json_array_\w+|json_loadb|json_loads|json_dumps": ("JSON is codec's", ["server/codec/"]),
-    r"sqlite3_\w+": ("SQL is the store's", ["server/store/database.c", "server/store/row.c"]),
+    r"exit|_exit|_Exit|abort|quick_exit": ("errors are returned", ["server/main.c", "server/cli/output.c"]),
+    r"clock_gettime|gettimeofday|time|clock": ("the clock is one room", ["server/util/clock.c"]),
+    r"json_object_\w+|json_array_\w+|json_loadb|json_loads|json_dumps": ("JSON is codec's", ["server/json/"]),
+    r"sqlite3_\w+": ("SQL is the store's", ["server/db/sqlite.c", "server/db/row.c"]),
     r"MHD_\w+": ("libmicrohttpd is the listener's", MHD_FILES),
     r"fftw_\w+": ("FFTW is fft.c's", ["core/math/fft.c"]),
     r"LAPACKE_\w+": ("LAPACK is symmetric_matrix.c's", ["core/math/symmetric_matrix.c"]),
-    r"gnutls_\w+": ("GnuTLS is digest.c's and certificate.c's", ["server/base/digest.c", "server/base/certificate.c"]),
-    r"libdeflate_\w+": ("libdeflate is deflate.c's", ["server/base/deflate.c"]),
-    r"curl_\w+": ("libcurl is client/http.c's", ["server/client/http.c"]),
+    r"gnutls_\w+": ("GnuTLS is digest.c's and certificate.c's", ["server/util/sha256.c", "server/http/tls.c"]),
+    r"libdeflate_\w+": ("libdeflate is deflate.c's", ["server/util/gzip.c"]),
+    r"curl_\w+": ("libcurl is cli/http.c's", ["server/cli/http.c"]),
 }
 CORE_BANNED = {
     r"fopen|fclose|fread|fwrite|fprintf|printf|puts|putchar|fputs|fputc|perror|getenv|remove|rename":
@@ -208,14 +208,14 @@ def test_headers_have_no_circles():
 PLANTED = [
     ("core/base/x.c", '#include "core/plan/plan.h"\n', "above"),
     ("core/scene/x.c", '#include "core/simulation/simulation.h"\n', "above"),
-    ("core/plan/x.c", '#include "server/base/bytes.h"\n', "must not know server/"),
+    ("core/plan/x.c", '#include "server/util/bytes.h"\n', "must not know server/"),
     ("core/plan/x.c", '#include "plan.h"\n', "no such file"),
     ("core/plan/x.c", "#include <pthread.h>\n", "pure part"),
     ("core/plan/x.c", "  #  include  <time.h>\n", "pure part"),
     ("core/plan/x.c", "#include <fftw3.h>\n", "alone"),
     ("core/plan/x.c", 'void f(void) { printf("x"); }\n', "no files"),
     ("core/rooms/x.c", "\n", "without a floor"),
-    ("server/store/x.c", '#include "server/jobs/job.h"\n', "above"),
+    ("server/db/x.c", '#include "server/jobs/job.h"\n', "above"),
     ("server/jobs/x.c", '#include "server/http/request.h"\n', "above"),
     ("server/api/x.c", "#include <microhttpd.h>\n", "alone"),
     ("server/jobs/x.c", "#include <sqlite3.h>\n", "alone"),
@@ -245,7 +245,7 @@ INNOCENT = [
 
 def test_planted_violations_are_found():
     """The checker finds each planted violation, once, and nothing in innocent look-alikes."""
-    known = {"core/plan/plan.h", "core/simulation/simulation.h", "server/base/bytes.h",
+    known = {"core/plan/plan.h", "core/simulation/simulation.h", "server/util/bytes.h",
              "server/jobs/job.h", "server/http/request.h"}
     for path, text, expected in PLANTED:
         found = faults(path, text, known.__contains__)

@@ -12,7 +12,7 @@
 #include <dirent.h>
 #include <jansson.h>
 
-#include "server/codec/describe.h"
+#include "server/json/schema.h"
 
 static const char *const folder = IMPACTD_SOURCE_DIR "/schema";
 

@@ -49,7 +49,7 @@ UNSEEN = {
     (None, r"/v1/materials/\{slug\}/(measurements.*|proposal.*)", "503"): "more long force traces at once than are evaluated",
     ("POST", r"/v1/results/\{id\}/again", "202|422|429|503|507"): "it submits as POST /v1/jobs does, where they are seen",
     ("POST", r"/v1/jobs/\{id\}/retry", "410|429|503|507"): "the same; 410: a sweep with failed points of another engine",
-    (None, r"/v1/results/\{id\}/(series.*|bundle.zip)", "422"): "files of 2 or 4 GiB; unit/server/encode/test_encoders.c",
+    (None, r"/v1/results/\{id\}/(series.*|bundle.zip)", "422"): "files of 2 or 4 GiB; unit/server/formats/test_encoders.c",
     (None, r"/v1/results/\{id\}/impacts/\{number\}/force.*", "422"): "states of more than 1 GB, or an impact of 1e-9 s",
 }
 

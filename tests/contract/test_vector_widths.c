@@ -12,7 +12,7 @@
 
 #include "core/base/canonical.h"
 #include "core/math/fft.h"
-#include "server/jobs/intake.h"
+#include "server/jobs/jobs.h"
 #include "tests/support/vectors.h"
 
 enum { EXAMPLES_MAX = 200 };

@@ -12,8 +12,8 @@
 #include <cmocka.h>
 
 #include "core/math/fft.h"
-#include "server/base/clock.h"
-#include "server/jobs/intake.h"
+#include "server/jobs/jobs.h"
+#include "server/util/clock.h"
 
 // Instrumented code takes many times the CPU: its times say little, so it runs for a shorter time.
 enum {

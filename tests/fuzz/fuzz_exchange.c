@@ -8,7 +8,7 @@
 #include <string.h>
 #include <time.h>
 
-#include "server/encode/exchange_text.h"
+#include "server/formats/material_export.h"
 #include "server/materials/exchange_csv.h"
 #include "server/materials/exchange_json.h"
 

@@ -9,7 +9,7 @@
 
 #include <cmocka.h>
 
-#include "server/codec/read.h"
+#include "server/json/parse.h"
 
 static Problem told;
 

@@ -12,7 +12,7 @@
 #include <cmocka.h>
 
 #include "core/base/philox.h"
-#include "server/codec/read.h"
+#include "server/json/parse.h"
 #include "tests/support/document.h"
 
 DropMade drops_simulate(double restitution, double contact_time, Separation separation,

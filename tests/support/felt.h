@@ -2,7 +2,7 @@
 #ifndef TESTS_SUPPORT_FELT_H
 #define TESTS_SUPPORT_FELT_H
 
-#include "server/store/material_rows.h"
+#include "server/db/materials.h"
 
 // A store in `directory` (NULL: in memory); fails the test if it cannot be opened.
 Store *felt_store(const char *directory);

@@ -2,7 +2,7 @@
 #ifndef TESTS_SUPPORT_ROOM_H
 #define TESTS_SUPPORT_ROOM_H
 
-#include "server/jobs/intake.h"
+#include "server/jobs/jobs.h"
 #include "tests/support/scratch.h"
 
 typedef struct Room {

@@ -9,8 +9,8 @@
 #include "core/simulation/simulation.h"
 #include "core/solve/solver.h"
 #include "core/solve/time_stepping.h"
-#include "server/base/clock.h"
-#include "server/codec/read.h"
+#include "server/json/parse.h"
+#include "server/util/clock.h"
 #include "tests/support/doubles.h"
 #include "tests/truth/frame_reference.h"
 

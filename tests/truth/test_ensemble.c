@@ -25,7 +25,7 @@
 #include "core/study/ensemble.h"
 #include "core/study/statistics.h"
 #include "core/study/study.h"
-#include "server/codec/read.h"
+#include "server/json/parse.h"
 #include "tests/truth/drawn.h"
 
 static unsigned long scenes = 4;

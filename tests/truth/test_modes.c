@@ -14,7 +14,7 @@
 #include "core/plan/plan.h"
 #include "core/simulation/error_metrics.h"
 #include "core/solve/solver.h"
-#include "server/codec/read.h"
+#include "server/json/parse.h"
 #include "tests/truth/drawn.h"
 
 static size_t scenes = 24;

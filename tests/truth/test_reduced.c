@@ -14,7 +14,7 @@
 #include "core/plan/plan.h"
 #include "core/simulation/simulation.h"
 #include "core/solve/solver.h"
-#include "server/codec/read.h"
+#include "server/json/parse.h"
 
 enum { N = 5, SAMPLES = 101, DAMPED = 4 }; // storeys; samples; storey of the damper, from 0
 static const double RATE = 50, RATIO = 0.03, TURN = 6.283185307179586;

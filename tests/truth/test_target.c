@@ -16,7 +16,7 @@
 
 #include "core/result/response.h"
 #include "core/simulation/error_metrics.h"
-#include "server/codec/read.h"
+#include "server/json/parse.h"
 #include "tests/truth/drawn.h"
 
 static size_t scenes = 24;

@@ -10,7 +10,7 @@
 #include <cmocka.h>
 
 #include "core/contact/identification.h"
-#include "server/base/bytes.h"
+#include "server/util/bytes.h"
 #include "tests/support/drops.h"
 #include "tests/support/fields.h"
 

@@ -11,7 +11,7 @@
 
 #include "core/drop_test/evaluation.h"
 #include "core/drop_test/pulse_model.h"
-#include "server/base/bytes.h"
+#include "server/util/bytes.h"
 #include "tests/support/drops.h"
 
 static Problem problem;

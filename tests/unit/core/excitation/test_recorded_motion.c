@@ -11,8 +11,8 @@
 
 #include "core/base/canonical.h"
 #include "core/base/json_pointer.h"
-#include "server/codec/read.h"
-#include "server/codec/write.h"
+#include "server/json/encode.h"
+#include "server/json/parse.h"
 
 static Problem problem;
 static const char digest[] = "0123456789abcdef0123456789abcdef0123456789abcdef0123456789abcdef";

@@ -11,8 +11,8 @@
 
 #include <cmocka.h>
 
-#include "server/command/scene_file.h"
-#include "server/jobs/intake.h"
+#include "server/cli/scene_file.h"
+#include "server/jobs/jobs.h"
 
 static void read_scene(const char *text, size_t size, StudyRequest *inquiry) {
     Store *store = NULL;

@@ -13,7 +13,7 @@
 
 #include "core/simulation/simulation.h"
 #include "core/solve/solver.h"
-#include "server/codec/read.h"
+#include "server/json/parse.h"
 
 static Problem told;
 

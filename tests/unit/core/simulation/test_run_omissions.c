@@ -14,7 +14,7 @@
 #include "core/math/fft.h"
 #include "core/simulation/simulation.h"
 #include "core/solve/solver.h"
-#include "server/codec/read.h"
+#include "server/json/parse.h"
 
 #define STRUCTURE "\"structure\": {\"mass\": 1.35, \"stiffness\": 865, \"damping\": 1.092}"
 #define BUFFER "{\"restitution\": 0.61, \"contact_time\": 0.025}"

@@ -14,7 +14,7 @@
 #include <cmocka.h>
 
 #include "server/auth/tokens.h"
-#include "server/base/clock.h"
+#include "server/util/clock.h"
 
 static Status add(Store *store, const char *name, const char *scopes, int64_t expires_unix_ms,
                   char header[128]) {

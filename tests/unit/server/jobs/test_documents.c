@@ -7,8 +7,8 @@
 
 #include <cmocka.h>
 
-#include "server/codec/write.h"
 #include "server/jobs/documents.h"
+#include "server/json/encode.h"
 
 enum { MANY = 1 << 17 };
 

@@ -8,8 +8,8 @@
 
 #include <cmocka.h>
 
-#include "server/jobs/intake_state.h"
-#include "server/store/record_rows.h"
+#include "server/db/records.h"
+#include "server/jobs/jobs_private.h"
 #include "tests/support/scratch.h"
 
 static Problem problem;

@@ -11,9 +11,9 @@
 
 #include <cmocka.h>
 
-#include "server/jobs/intake.h"
-#include "server/store/job_search.h"
-#include "server/store/retention.h"
+#include "server/db/job_search.h"
+#include "server/db/retention.h"
+#include "server/jobs/jobs.h"
 #include "tests/support/scratch.h"
 
 typedef struct Room {

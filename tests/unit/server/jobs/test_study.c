@@ -11,9 +11,9 @@
 #include <cmocka.h>
 
 #include "core/math/fft.h"
-#include "server/base/clock.h"
-#include "server/jobs/gather.h"
-#include "server/jobs/order.h"
+#include "server/jobs/reorder.h"
+#include "server/jobs/study_sink.h"
+#include "server/util/clock.h"
 #include "tests/support/room.h"
 
 // Instrumented code takes many times the CPU.

@@ -10,7 +10,7 @@
 
 #include <cmocka.h>
 
-#include "server/encode/exchange_text.h"
+#include "server/formats/material_export.h"
 #include "server/materials/exchange_csv.h"
 #include "server/materials/exchange_json.h"
 

@@ -1,0 +1,250 @@
+#include "server/api/columns.h"
+#include "server/api/results.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "server/formats/downsample.h"
+#include "server/formats/svg.h"
+#include "server/http/header.h"
+#include "server/http/reply.h"
+#include "server/http/security_headers.h"
+#include "server/util/clock.h"
+#include "server/util/dtoa.h"
+
+// Up to so many bytes an answer is made at once: then it can be kept, and compressed.
+enum { WHOLE_MAX = 4 << 20 };
+
+static const double outcome_wait_most = 60; // [s]
+
+void sheet_clear(Sheet *sheet) {
+    encoding_close(sheet->encoding);
+    free(sheet->chosen);
+    columns_clear(&sheet->own);
+    outcome_unref(sheet->outcome);
+    *sheet = (Sheet){.encoding = NULL};
+}
+
+Status sheet_make(Sheet *sheet, size_t count, Problem *problem) {
+    sheet->chosen = calloc(count + 1, sizeof *sheet->chosen);
+    sheet->table.columns = sheet->chosen;
+    return sheet->chosen != NULL ? STATUS_OK
+                                 : problem_set(problem, STATUS_NO_MEMORY, "no memory for columns");
+}
+
+Status sheet_own(Sheet *sheet, Problem *problem) {
+    free(sheet->chosen);
+    TRY(sheet_make(sheet, sheet->own.count, problem));
+    sheet->table.column_count = sheet->own.count;
+    sheet->table.count = sheet->own.rows;
+    for (size_t i = 0; i < sheet->own.count; i++)
+        sheet->chosen[i] = &sheet->own.at[i];
+    return STATUS_OK;
+}
+
+Status sheet_own_axis(Sheet *sheet, Problem *problem) {
+    TRY(sheet_own(sheet, problem));
+    Table *table = &sheet->table;
+    const Column *axis = &sheet->own.at[0];
+    table->axis_name = axis->name;
+    table->axis_unit = axis->unit;
+    table->axis = axis->values;
+    table->columns = sheet->chosen + 1;
+    table->column_count--;
+    return STATUS_OK;
+}
+
+Status tables_window(const Request *request, size_t count, Table *table, Problem *problem) {
+    // The half of a rounding on either side keeps a sample that stands at the very time asked for.
+    const double rate = table->axis_rate, end = (double)(count - 1) / rate;
+    double from, to;
+    TRY(request_number(request, "from", 0, 1e12, 0, &from, problem));
+    TRY(request_number(request, "to", 0, 1e12, end, &to, problem));
+    const double first = ceil(from * rate * (1 - 1e-12)), last = floor(to * rate * (1 + 1e-12));
+    char text[32], text_to[32];
+    if (first > (double)(count - 1))
+        return problem_set(problem, STATUS_USAGE,
+                           "\"from\" is %s s, behind the last sample at %s s",
+                           text_real(text, from), text_real(text_to, end));
+    if (last < first)
+        return problem_set(problem, STATUS_USAGE, "there is no sample from %s s to %s s",
+                           text_real(text, from), text_real(text_to, to));
+    table->first = (size_t)first;
+    table->count = (last < (double)count ? (size_t)last : count - 1) - table->first + 1;
+    return STATUS_OK;
+}
+
+Status tables_buckets(const Request *request, Sheet *sheet, Problem *problem) {
+    Table *table = &sheet->table;
+    Columns buckets;
+    size_t most;
+    if (request_query(request, "points") == NULL)
+        return STATUS_OK;
+    TRY(request_count(request, "points", 1, 1000000000, 1, &most, problem));
+    const size_t samples = table->count;
+    const size_t bucket = (samples + most - 1) / most;
+    TRY(buckets_make(table->columns, table->column_count, table->first, samples, bucket, &buckets,
+                     problem));
+    columns_clear(&sheet->own);
+    sheet->own = buckets;
+    TRY(sheet_own(sheet, problem));
+    // Without channels too there is a time for each.
+    table->count = (samples + bucket - 1) / bucket;
+    table->bucket = bucket;
+    table->samples = samples;
+    return STATUS_OK;
+}
+
+Status tables_encoder(const Request *request, size_t parameter, bool has_chart, Reply *reply,
+                      const Encoder **encoder, Problem *problem) {
+    const char *extension = request->parameters[parameter];
+    char known[96] = "";
+    const char *types[16] = {NULL};
+    const Encoder *offered[16];
+    size_t count = 0;
+    int choice = -1;
+    for (size_t i = 0; encoders[i] != NULL && count + 1 < COUNT(types); i++) {
+        if (encoders[i] == &encoder_svg && !has_chart)
+            continue;
+        text_list(known, sizeof known, encoders[i]->extension);
+        if (extension != NULL && strcmp(extension, encoders[i]->extension) == 0)
+            choice = (int)count;
+        offered[count] = encoders[i];
+        types[count++] = encoders[i]->content_type;
+    }
+    if (extension == NULL) {
+        reply->varies_by_accept = true;
+        choice = header_accept(request->accept, types);
+    }
+    if (choice < 0)
+        return extension != NULL
+                   ? problem_set(problem, STATUS_NOT_FOUND,
+                                 "there is no format \"%.20s\"; there are %s", extension, known)
+                   : problem_set(problem, STATUS_NOT_ACCEPTABLE,
+                                 "none of the formats fits Accept; there are %s, by extension too",
+                                 known);
+    *encoder = offered[choice];
+    if (*encoder == &encoder_svg)
+        reply->policy = shield_drawing_policy;
+    return STATUS_OK;
+}
+
+Status tables_find(App *app, const Request *request, Reply *reply, Outcome **outcome,
+                   Problem *problem) {
+    const char *id = request->parameters[0];
+    const Status status = intake_outcome(app->intake, id, request->waker, outcome, problem);
+    if (status == STATUS_GONE)
+        results_link_gone(id, reply);
+    if (status == STATUS_BUSY)
+        reply->retry_after = 2;
+    if (status != STATUS_OK || *outcome != NULL)
+        return status;
+    const double left =
+        outcome_wait_most - 1e-9 * (double)(clock_monotonic_ns() - request->started_ns);
+    if (left <= 0 || request->is_expired) {
+        reply->retry_after = 5;
+        return problem_set(problem, STATUS_BUSY,
+                           "the series is still being computed anew; ask again a little later");
+    }
+    reply_wait(reply, (int)(1000 * left) + 1, NULL, NULL);
+    return STATUS_OK;
+}
+
+Status tables_outcome(App *app, const Request *request, Reply *reply, const char *what,
+                      const char *extension, Outcome **outcome, Problem *problem) {
+    const char *id = request->parameters[0];
+    char tag[104];
+    snprintf(tag, sizeof tag, "%.72s-%s.%s", id, what, extension);
+    // Nothing is computed anew for a client who has it.
+    if (request->if_none_match != NULL && !store_result_exists(app->store, id))
+        return problem_set(problem, STATUS_NOT_FOUND, "there is no result %.80s", id);
+    return reply_immutable(reply, request, tag)
+               ? STATUS_OK
+               : tables_find(app, request, reply, outcome, problem);
+}
+
+static ptrdiff_t stream_next(void *context, char *target, size_t size) {
+    const size_t count = encoding_next(((Sheet *)context)->encoding, target, size);
+    return count > 0 ? (ptrdiff_t)count : STREAM_END;
+}
+
+static void stream_cut(void *context, uint64_t first, uint64_t size) {
+    encoding_cut(((Sheet *)context)->encoding, first, size);
+}
+
+static void stream_release(void *context) {
+    sheet_clear(context);
+    free(context);
+}
+
+// Takes what `sheet` holds, which has its encoding.
+static Status reply_stream(Reply *reply, const char *content_type, Sheet *sheet, Problem *problem) {
+    Sheet *kept = malloc(sizeof *kept);
+    if (kept == NULL) {
+        sheet_clear(sheet);
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the answer");
+    }
+    *kept = *sheet;
+    *sheet = (Sheet){.encoding = NULL};
+    reply_borrow(reply, 200, content_type, NULL, 0);
+    reply->stream =
+        (Stream){.next = stream_next, .size = encoding_size(kept->encoding), .cut = stream_cut};
+    reply->release = stream_release;
+    reply->context = kept;
+    return STATUS_OK;
+}
+
+// Whether a text can be no longer than WHOLE_MAX.
+static bool is_short(const Table *table) {
+    const size_t most = WHOLE_MAX / (SHORTEST_SIZE + 1);
+    return table->count <= most / (table->column_count + 1);
+}
+
+static Status reply_whole(App *app, Reply *reply, const char *content_type, Sheet *sheet,
+                          Problem *problem) {
+    Bytes bytes = {.most = app->reply_most};
+    const size_t size = (size_t)encoding_size(sheet->encoding);
+    if (bytes_reserve(&bytes, size)) {
+        bytes.count = encoding_next(sheet->encoding, bytes.at, size);
+        bytes.at[bytes.count] = '\0';
+    }
+    sheet_clear(sheet);
+    return reply_bytes(reply, 200, content_type, &bytes, problem);
+}
+
+Status tables_reply(App *app, Reply *reply, const Encoder *encoder, Sheet *sheet,
+                    Problem *problem) {
+    reply->accepts_ranges = encoder->is_binary;
+    if (!encoder->is_binary && is_short(&sheet->table)) {
+        Bytes bytes = {.most = app->reply_most};
+        const Status status = encoding_write(encoder, &sheet->table, &bytes, problem);
+        sheet_clear(sheet);
+        if (status == STATUS_OK)
+            return reply_bytes(reply, 200, encoder->content_type, &bytes, problem);
+        bytes_clear(&bytes);
+        return status;
+    }
+    const Status status = encoding_open(encoder, &sheet->table, &sheet->encoding, problem);
+    if (status != STATUS_OK) {
+        sheet_clear(sheet);
+        return status;
+    }
+    if (encoding_size(sheet->encoding) <= WHOLE_MAX)
+        return reply_whole(app, reply, encoder->content_type, sheet, problem);
+    return reply_stream(reply, encoder->content_type, sheet, problem);
+}
+
+Status tables_reply_layout(App *app, Reply *reply, const char *content_type, Layout *layout,
+                           Sheet *sheet, Problem *problem) {
+    reply->accepts_ranges = true;
+    const Status status = encoding_open_layout(layout, &sheet->encoding, problem);
+    if (status != STATUS_OK) {
+        sheet_clear(sheet);
+        return status;
+    }
+    if (encoding_size(sheet->encoding) <= WHOLE_MAX)
+        return reply_whole(app, reply, content_type, sheet, problem);
+    return reply_stream(reply, content_type, sheet, problem);
+}

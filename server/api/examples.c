@@ -1,0 +1,175 @@
+// What does not change while the daemon runs: examples, schemas, the API's description, health and
+// version. The files are embedded in the program under their path in the source tree.
+#include <stdio.h>
+#include <string.h>
+
+#include "core/study/study.h"
+#include "server/api/app.h"
+#include "server/api/assets.h"
+#include "server/http/reply.h"
+#include "server/json/parse.h"
+#include "server/json/schema.h"
+#include "server/util/base_path.h"
+#include "server/util/clock.h"
+#include "server/util/embedded.h"
+
+const char program_version[] = "0.1.0"; // as in CMakeLists.txt; a test compares
+#ifdef __clang__
+const char program_build[] = "clang " __clang_version__;
+#else
+const char program_build[] = "gcc " __VERSION__;
+#endif
+
+static const char examples_folder[] = "schema/examples/";
+
+// The file's name without folder and ".json"; false if it is not directly in the folder.
+static bool name_in_folder(const char *path, const char *folder, char name[64]) {
+    const size_t size = strlen(folder);
+    if (strncmp(path, folder, size) != 0 || strchr(path + size, '/') != NULL)
+        return false;
+    const char *from = path + size, *end = strstr(from, ".json");
+    if (end == NULL || end - from >= 64)
+        return false;
+    snprintf(name, 64, "%.*s", (int)(end - from), from);
+    return true;
+}
+
+static void write_example(Bytes *bytes, const EmbeddedFile *file, const char *name) {
+    StudyRequest inquiry;
+    const bool is_read =
+        read_json(file->bytes, file->size, study_request_fields, &inquiry, NULL) == STATUS_OK;
+    bytes_text(bytes, "{\"name\": ");
+    bytes_json_string(bytes, name);
+    bytes_text(bytes, ", \"title\": ");
+    bytes_json_string(bytes, is_read ? inquiry.simulation.title : NULL);
+    bytes_format(bytes, ", \"links\": {\"self\": \"%s/v1/examples/%s\"}, \"scene\": ", link_base(),
+                 name);
+    bytes_put(bytes, file->bytes, file->size);
+    bytes_text(bytes, "}");
+    study_request_clear(&inquiry);
+}
+
+Status examples_list(App *app, const Request *request, Reply *reply, Problem *problem) {
+    (void)request;
+    Bytes bytes = {.most = app->reply_most};
+    char name[64];
+    bytes_text(&bytes, "{\"examples\": [");
+    bool is_first = true;
+    for (const EmbeddedFile *file = embedded_examples; file->path != NULL; file++) {
+        if (!name_in_folder(file->path, examples_folder, name))
+            continue;
+        bytes_text(&bytes, is_first ? "\n" : ",\n");
+        write_example(&bytes, file, name);
+        is_first = false;
+    }
+    bytes_text(&bytes, "]}\n");
+    return reply_bytes(reply, 200, type_json, &bytes, problem);
+}
+
+Status examples_show(App *app, const Request *request, Reply *reply, Problem *problem) {
+    (void)app;
+    char name[64];
+    for (const EmbeddedFile *file = embedded_examples; file->path != NULL; file++)
+        if (name_in_folder(file->path, examples_folder, name) &&
+            strcmp(name, request->parameters[0]) == 0)
+            return assets_reply(request, reply, file, type_json);
+    return problem_set(problem, STATUS_NOT_FOUND,
+                       "there is no example \"%.60s\"; GET /v1/examples lists them",
+                       request->parameters[0]);
+}
+
+Status schemas_list(App *app, const Request *request, Reply *reply, Problem *problem) {
+    (void)request;
+    Bytes bytes = {.most = app->reply_most};
+    bytes_text(&bytes, "{\"schemas\": [");
+    for (const SchemaDocument *document = schema_documents; document->name != NULL; document++) {
+        bytes_format(&bytes,
+                     "%s{\"name\": \"%s\", \"title\": ", document == schema_documents ? "" : ", ",
+                     document->name);
+        bytes_json_string(&bytes, document->title);
+        bytes_format(&bytes, ", \"links\": {\"self\": \"%s/schemas/%s\"}}", link_base(),
+                     document->name);
+    }
+    bytes_text(&bytes, "]}\n");
+    return reply_bytes(reply, 200, type_json, &bytes, problem);
+}
+
+// "scene", also under its file name "scene.schema.json".
+Status schemas_show(App *app, const Request *request, Reply *reply, Problem *problem) {
+    const char *name = request->parameters[0];
+    const size_t size = strcspn(name, ".");
+    const bool is_named = name[size] == '\0' || strcmp(name + size, ".schema.json") == 0;
+    for (const SchemaDocument *document = schema_documents; document->name != NULL; document++) {
+        if (!is_named || strlen(document->name) != size || strncmp(document->name, name, size) != 0)
+            continue;
+        Bytes bytes = {.most = app->reply_most};
+        describe_document(&bytes, document);
+        return reply_bytes(reply, 200, "application/schema+json", &bytes, problem);
+    }
+    return problem_set(problem, STATUS_NOT_FOUND,
+                       "there is no schema \"%.60s\"; GET /schemas lists them", name);
+}
+
+// The description names the server that it stands for in the file; here that is the base URL.
+Status openapi_show(App *app, const Request *request, Reply *reply, Problem *problem) {
+    static const char before[] = "\"servers\": [{\"url\": \"";
+    const EmbeddedFile *file = embedded_find(embedded_schemas, "schema/openapi.json");
+    const char *servers = file != NULL ? strstr(file->bytes, before) : NULL;
+    if (servers == NULL)
+        return problem_set(problem, STATUS_INTERNAL,
+                           "this program was built without its API description");
+    if (app->base_url[0] == '\0')
+        return assets_reply(request, reply, file, type_json);
+    const char *url = servers + sizeof before - 1, *rest = strchr(url, '"');
+    Bytes bytes = {.most = app->reply_most};
+    bytes_put(&bytes, file->bytes, (size_t)(url - file->bytes));
+    bytes_text(&bytes, app->base_url);
+    bytes_text(&bytes, rest);
+    return reply_bytes(reply, 200, type_json, &bytes, problem);
+}
+
+Status health_live(App *app, const Request *request, Reply *reply, Problem *problem) {
+    (void)app;
+    (void)request;
+    (void)problem;
+    static const char body[] = "{\"status\": \"live\"}\n";
+    reply_borrow(reply, 200, type_json, body, sizeof body - 1);
+    return STATUS_OK;
+}
+
+Status health_ready(App *app, const Request *request, Reply *reply, Problem *problem) {
+    (void)request;
+    IntakeTally tally = {0};
+    if (atomic_load(&app->is_stopping))
+        return problem_set(problem, STATUS_BUSY, "the daemon is stopping");
+    if (!store_is_writable(app->store))
+        return problem_set(problem, STATUS_BUSY,
+                           "the last write to the database failed: is the disk full or read-only?");
+    intake_tally(app->intake, &tally);
+    if (tally.queued + tally.running >= tally.queue_most)
+        return problem_set(problem, STATUS_BUSY,
+                           "the queue is full: of unfinished jobs it has %zu, and may have %zu",
+                           tally.queued + tally.running, tally.queue_most);
+    Bytes bytes = {.most = app->reply_most};
+    bytes_format(&bytes,
+                 "{\"status\": \"ready\", \"queued\": %zu, \"running\": %zu, \"workers\": %zu, "
+                 "\"queue_most\": "
+                 "%zu, \"cached_outcomes\": %zu, \"cached_bytes\": %zu}\n",
+                 tally.queued, tally.running, tally.workers, tally.queue_most,
+                 tally.cached_outcomes, tally.cached_bytes);
+    return reply_bytes(reply, 200, type_json, &bytes, problem);
+}
+
+Status version_show(App *app, const Request *request, Reply *reply, Problem *problem) {
+    (void)request;
+    char started[32];
+    clock_rfc3339(app->started_unix_ms, started);
+    Bytes bytes = {.most = app->reply_most};
+    bytes_format(&bytes,
+                 "{\"program\": \"impactd\", \"version\": \"%s\", \"engine\": ", program_version);
+    bytes_json_string(&bytes, engine_version);
+    bytes_text(&bytes, ", \"build\": ");
+    bytes_json_string(&bytes, program_build);
+    bytes_format(&bytes, ", \"started\": \"%s\"}\n", started);
+    return reply_bytes(reply, 200, type_json, &bytes, problem);
+}

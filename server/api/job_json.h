@@ -1,0 +1,19 @@
+// The documents that tell of a job: as it stands, and as a dry run foresees it.
+// Knows no HTTP. Used by jobs.c and by the commands, which print the same.
+#ifndef SERVER_API_JOB_JSON_H
+#define SERVER_API_JOB_JSON_H
+
+#include "server/jobs/jobs.h"
+#include "server/util/bytes.h"
+
+enum {
+    JOB_PUT_WHOLE =
+        1, // with plan, summary, work and warnings, as one job is shown; without, as in a list
+    JOB_PUT_LINKS = 2,  // where a server has it; without, "links" is empty
+    JOB_PUT_SENDER = 4, // who sent it, if anybody in particular; whoever sends it knows
+};
+
+void job_put(Bytes *bytes, const JobShow *show, int parts);
+void job_put_dry_run(Bytes *bytes, const DryRun *run);
+
+#endif

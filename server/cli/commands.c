@@ -1,0 +1,261 @@
+// The list of subcommands, --help and version.
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/base/spelling.h"
+#include "core/simulation/simulation.h"
+#include "server/api/app.h"
+#include "server/cli/command.h"
+#include "server/options.h"
+
+static int help_run(const Command *self, void *settings, const Options *options, Problem *problem);
+static int version_run(const Command *self, void *settings, const Options *options,
+                       Problem *problem);
+
+static const Command command_help = {
+    .name = "help",
+    .operands = "[COMMAND]",
+    .summary = "tell more about a command",
+    .help = "  impactd help run\n",
+    .run = help_run,
+};
+static const Command command_version = {
+    .name = "version",
+    .summary = "print the versions of program and engine",
+    .help = "  impactd version\n",
+    .run = version_run,
+};
+
+const Command *const commands[] = {
+    &command_serve,  &command_run,     &command_check,  &command_tradeoff,  &command_ensemble,
+    &command_study,  &command_sweep,   &command_import, &command_materials, &command_records,
+    &command_token,  &command_backup,  &command_submit, &command_watch,     &command_get,
+    &command_cancel, &command_compare, &command_help,   &command_version,   NULL,
+};
+
+static const char overview[] =
+    "impactd simulates structures with impact dampers.\n"
+    "\n"
+    "  impactd serve                        start the daemon on http://127.0.0.1:8080\n"
+    "  impactd run scene.json               run one scene here and print the finished job\n"
+    "  impactd run scene.json -o out.csv    write its time series (npy, npz, mat, svg)\n"
+    "  impactd check scene.json             say what is wrong with a scene, or show its plan\n"
+    "  impactd tradeoff scene.json          try solvers and steps on it: error against CPU time\n"
+    "  impactd ensemble scene.json          many seeds of a random base: means and confidence\n"
+    "  impactd study scene.json             the study that it asks for: compare, sensitivity\n"
+    "  impactd sweep scene.json             the scene at many points: a grid or a list of values\n"
+    "  impactd token create --name lab      let a client in who has this token\n"
+    "  impactd materials list               what the lab has measured, and what became of it\n"
+    "  impactd backup lab.db                copy the database while the daemon runs\n"
+    "  impactd import motion.AT2            make an excitation of a ground motion's file\n"
+    "  impactd submit scene.json --wait 60  send it to a daemon, here or elsewhere\n"
+    "  impactd get JOB series -o out.npy    what became of it\n"
+    "\n"
+    "A scene: release a structure from 15 mm, a ball between two sponges inside it.\n"
+    "\n"
+    "  {\"structure\": {\"mass\": 1.35, \"stiffness\": 865, \"damping\": 1.092},\n"
+    "   \"dampers\": [{\"mass\": 0.1107, \"clearance\": 0.015, \"buffer\": \"sponge\"}],\n"
+    "   \"excitation\": {\"kind\": \"free\", \"displacement\": 0.015},\n"
+    "   \"duration\": 10, \"sample_rate\": 1000}\n"
+    "\n";
+
+static const char exits[] =
+    "\n"
+    "impactd help COMMAND tells more. Exit codes: 0 ok, 1 the job failed, 2 usage, 3 bad scene,\n"
+    "4 not found, 5 not allowed, 7 server unreachable, 8 timed out while the job goes on, 130 "
+    "interrupted.\n";
+
+const Command *command_find(const char *name) {
+    for (size_t i = 0; commands[i] != NULL; i++)
+        if (strcmp(commands[i]->name, name) == 0)
+            return commands[i];
+    return NULL;
+}
+
+static void overview_print(FILE *file) {
+    fputs(overview, file);
+    for (size_t i = 0; commands[i] != NULL; i++)
+        fprintf(file, "  %-9s %s\n", commands[i]->name, commands[i]->summary);
+    fputs(exits, file);
+}
+
+static void command_print(const Command *command) {
+    printf("impactd %s%s%s: %s\n\n", command->name, command->operands != NULL ? " " : "",
+           command->operands != NULL ? command->operands : "", command->summary);
+    fputs(command->help, stdout);
+    if (command->options != NULL) {
+        putchar('\n');
+        if (command->groups != NULL)
+            options_help_grouped(command->options, command->groups, stdout);
+        else
+            options_help(command->options, stdout);
+    }
+}
+
+static int unknown_refuse(const char *name) {
+    const char *names[COUNT(commands)];
+    for (size_t i = 0; i < COUNT(commands); i++)
+        names[i] = commands[i] == NULL ? NULL : commands[i]->name;
+    const char *near = spelling_nearest(names, name);
+    fprintf(stderr, "impactd: %s is no command", name);
+    if (near != NULL)
+        fprintf(stderr, " (did you mean %s?)", near);
+    fputs("; impactd --help lists them\n", stderr);
+    return COMMAND_USAGE;
+}
+
+static int help_run(const Command *self, void *settings, const Options *options, Problem *problem) {
+    (void)self, (void)settings, (void)problem;
+    if (options->operand_count == 0) {
+        overview_print(stdout);
+        return COMMAND_OK;
+    }
+    const Command *command = command_find(options->operands[0]);
+    if (command == NULL)
+        return unknown_refuse(options->operands[0]);
+    command_print(command);
+    return COMMAND_OK;
+}
+
+static int version_run(const Command *self, void *settings, const Options *options,
+                       Problem *problem) {
+    (void)settings;
+    if (options->operand_count > 0) {
+        (void)problem_set(problem, STATUS_USAGE, "takes no arguments, is given %s",
+                          options->operands[0]);
+        return command_refuse(self->name, problem);
+    }
+    printf("impactd %s (engine %s)\n", program_version, engine_version);
+    return COMMAND_OK;
+}
+
+int command_refuse(const char *name, const Problem *problem) {
+    for (size_t i = 0; i < problem->count && i < PROBLEM_FAULTS; i++) {
+        const Fault *fault = &problem->faults[i];
+        fprintf(stderr, "impactd %s: %s %s", name, fault->pointer, fault->detail);
+        if (fault->did_you_mean[0] != '\0')
+            fprintf(stderr, " (did you mean %s?)", fault->did_you_mean);
+        fputc('\n', stderr);
+    }
+    if (problem->count == 0)
+        fprintf(stderr, "impactd %s: %s\n", name, problem->detail);
+    fprintf(stderr, "impactd help %s shows what it takes\n", name);
+    return COMMAND_USAGE;
+}
+
+int command_exit(Status status) {
+    switch (status) {
+    case STATUS_OK:
+        return COMMAND_OK;
+    case STATUS_UNREADABLE:
+    case STATUS_INVALID:
+    case STATUS_TOO_LARGE:
+        return COMMAND_BAD_SCENE;
+    case STATUS_USAGE:
+        return COMMAND_USAGE;
+    case STATUS_NOT_FOUND:
+        return COMMAND_NOT_FOUND;
+    case STATUS_UNAUTHORIZED:
+    case STATUS_FORBIDDEN:
+        return COMMAND_NOT_ALLOWED;
+    case STATUS_UNREACHABLE:
+        return COMMAND_UNREACHABLE;
+    case STATUS_TIMEOUT:
+        return COMMAND_TIMED_OUT;
+    case STATUS_CANCELLED:
+        return COMMAND_INTERRUPTED;
+    default:
+        return COMMAND_FAILED;
+    }
+}
+
+Status command_action(const Options *options, const char *const *names, size_t count, size_t stride,
+                      size_t *index, Problem *problem) {
+    enum { ACTIONS_MAX = 32 };
+    const char *known[ACTIONS_MAX + 1] = {NULL};
+    const char *given = options->operand_count > 0 ? options->operands[0] : "";
+    char all[200] = "", last[40] = "";
+    for (size_t i = 0; i < count && i < ACTIONS_MAX; i++) {
+        known[i] = *(const char *const *)(const void *)((const char *)names + i * stride);
+        *index = i;
+        if (strcmp(given, known[i]) == 0)
+            return STATUS_OK;
+        if (i + 1 < count)
+            text_list(all, sizeof all, known[i]);
+        else
+            snprintf(last, sizeof last, " or %s", known[i]);
+    }
+    const char *near = spelling_nearest(known, given);
+    return problem_set(problem, STATUS_USAGE, "the first operand must be %s%s, is \"%.60s\"%s%s%s",
+                       all, last, given, near != NULL ? " (did you mean " : "",
+                       near != NULL ? near : "", near != NULL ? "?)" : "");
+}
+
+Status command_data_folder(char **folder, Problem *problem) {
+    char text[4096];
+    const char *given = getenv("IMPACTD_DATA");
+    const char *state = getenv("XDG_STATE_HOME"), *home = getenv("HOME");
+    int size = -1;
+    if (*folder != NULL)
+        return STATUS_OK;
+    if (given != NULL)
+        size = snprintf(text, sizeof text, "%s", given);
+    // The specification of XDG has relative paths ignored.
+    else if (state != NULL && state[0] == '/')
+        size = snprintf(text, sizeof text, "%s/impactd", state);
+    else if (home != NULL && home[0] == '/')
+        size = snprintf(text, sizeof text, "%s/.local/state/impactd", home);
+    if (size < 0 || (size_t)size >= sizeof text)
+        return problem_set(
+            problem, STATUS_USAGE,
+            "no place for the data: neither XDG_STATE_HOME nor HOME is set; use --data DIR");
+    *folder = strdup(text);
+    return *folder != NULL ? STATUS_OK : problem_set(problem, STATUS_NO_MEMORY, "no memory");
+}
+
+// Reads the arguments behind the command's name and runs it.
+static int command_run_with(const Command *command, int argc, char *const *argv) {
+    static const Field no_options[] = {FIELD_END};
+    const Field *fields = command->options != NULL ? command->options : no_options;
+    Options options = {0};
+    Problem *problem = calloc(1, sizeof *problem);
+    void *settings = calloc(1, command->size + 1);
+    int code = command_exit(STATUS_NO_MEMORY);
+    if (problem != NULL && settings != NULL && fields_default(fields, settings) == STATUS_OK) {
+        code = options_read(fields, settings, argc, argv, command->environment, &options,
+                            problem) == STATUS_OK
+                   ? command->run(command, settings, &options, problem)
+                   : command_refuse(command->name, problem);
+        fields_clear(fields, settings);
+    }
+    free(settings);
+    free(problem);
+    return code;
+}
+
+int command_main(int argc, char *const *argv) {
+    if (argc < 2) {
+        overview_print(stderr);
+        return COMMAND_USAGE;
+    }
+    const char *name = strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0 ? "help"
+                       : strcmp(argv[1], "--version") == 0                          ? "version"
+                                                                                    : argv[1];
+    const Command *command = command_find(name);
+    if (command == NULL)
+        return unknown_refuse(name);
+    const bool is_flag = name != argv[1]; // the rest is passed over
+    for (int i = 2; i < argc && !is_flag && strcmp(argv[i], "--") != 0; i++)
+        if (strcmp(argv[i], "--help") == 0 || strcmp(argv[i], "-h") == 0) {
+            command_print(command);
+            return COMMAND_OK;
+        }
+    const int code = command_run_with(command, is_flag ? 0 : argc - 2, argv + 2);
+    // What was printed must have arrived: a full disk or a closed pipe is a failure.
+    if (fflush(stdout) != 0 && code == COMMAND_OK) {
+        fputs("impactd: standard output cannot be written\n", stderr);
+        return COMMAND_FAILED;
+    }
+    return code;
+}

@@ -1,0 +1,37 @@
+// Who can reach the daemon and under which names: Host names, base URL, TLS files, and whether
+// tokens are a must. Settings into what the listener takes.
+#ifndef SERVER_CLI_NETWORK_H
+#define SERVER_CLI_NETWORK_H
+
+#include "core/base/field.h"
+#include "server/http/address.h"
+#include "server/http/base_url.h"
+#include "server/http/validate.h"
+
+typedef struct ReachSettings {
+    Texts host;
+    const char *base_url, *tls_cert, *tls_key; // NULL: none; the last two are files
+    bool require_tokens;
+} ReachSettings;
+
+typedef struct Reach {
+    BaseUrl url; // empty: none
+    GateHosts hosts;
+    char **names; // of hosts
+    size_t name_count;
+    bool needs_tokens;
+} Reach;
+
+// Adds all faults (STATUS_USAGE); the certificate is in use then. `reach` is cleared by reach_clear
+// in any case.
+Status reach_read(const ReachSettings *settings, const Address *address, Reach *reach,
+                  Problem *problem);
+// The files of the certificate once more, if there are any: where they are wrong (STATUS_USAGE),
+// the one in use stays.
+Status reach_read_tls(const ReachSettings *settings, Problem *problem);
+void reach_clear(Reach *reach);
+
+// STATUS_FORBIDDEN where tokens are a must and none can be used; says how to make one.
+Status reach_check(const Reach *reach, const Address *address, size_t tokens, Problem *problem);
+
+#endif

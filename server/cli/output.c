@@ -1,0 +1,125 @@
+// Ctrl-C must stop at once, also in the middle of a transform or of writing, and leave nothing half
+// done. All this program holds outside its memory is the one temporary file, so the signal's
+// handler can end it there and then.
+#include "server/cli/output.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "server/cli/command.h"
+
+enum { PATH_SIZE = 4096 };
+
+static char final_path[PATH_SIZE], part_path[PATH_SIZE];
+static volatile sig_atomic_t has_part;
+static int part = -1;
+static char farewell[512];
+static volatile sig_atomic_t farewell_size;
+
+static void interrupted(int number) {
+    (void)number;
+    if (has_part)
+        (void)unlink(part_path);
+    if (isatty(STDERR_FILENO))
+        (void)!write(STDERR_FILENO, "\n", 1);
+    (void)!write(STDERR_FILENO, farewell, (size_t)farewell_size);
+    _exit(COMMAND_INTERRUPTED);
+}
+
+void output_guard(void) {
+    struct sigaction action = {.sa_handler = interrupted};
+    sigemptyset(&action.sa_mask);
+    (void)sigaction(SIGINT, &action, NULL);
+    (void)sigaction(SIGTERM, &action, NULL);
+}
+
+// Holds both signals back while the file and has_part do not agree.
+static void signals_hold(sigset_t *before) {
+    sigset_t held;
+    sigemptyset(&held);
+    sigaddset(&held, SIGINT);
+    sigaddset(&held, SIGTERM);
+    (void)sigprocmask(SIG_BLOCK, &held, before);
+}
+
+void output_farewell(const char *text) {
+    sigset_t before;
+    signals_hold(&before);
+    snprintf(farewell, sizeof farewell, "%s", text != NULL ? text : "");
+    farewell_size = (sig_atomic_t)strlen(farewell);
+    (void)sigprocmask(SIG_SETMASK, &before, NULL);
+}
+
+Status output_open(const char *path, Problem *problem) {
+    if (strlen(path) + sizeof ".XXXXXX" > PATH_SIZE)
+        return problem_set(problem, STATUS_IO, "%.200s...: the name is too long", path);
+    struct stat what;
+    // A rename would put a file in the place of a device or a pipe.
+    if (stat(path, &what) == 0 && !S_ISREG(what.st_mode))
+        return problem_set(problem, STATUS_IO, "%s is not a regular file", path);
+    snprintf(final_path, sizeof final_path, "%s", path);
+    snprintf(part_path, sizeof part_path, "%.*s.XXXXXX", PATH_SIZE - 8, path);
+    sigset_t before;
+    signals_hold(&before);
+    part = mkstemp(part_path);
+    has_part = part >= 0;
+    const int error = errno;
+    (void)sigprocmask(SIG_SETMASK, &before, NULL);
+    if (part < 0)
+        return problem_set(problem, STATUS_IO, "%s cannot be written: %s", path, strerror(error));
+    return STATUS_OK;
+}
+
+Status output_write(const void *bytes, size_t size, Problem *problem) {
+    const char *at = bytes;
+    while (size > 0) {
+        const ssize_t done = write(part, at, size);
+        if (done < 0 && errno == EINTR)
+            continue;
+        if (done < 0)
+            return problem_set(problem, STATUS_IO, "%s cannot be written: %s", final_path,
+                               strerror(errno));
+        at += done;
+        size -= (size_t)done;
+    }
+    return STATUS_OK;
+}
+
+Status output_close(Problem *problem) {
+    // mkstemp gives 0600; the file gets what any new file would get.
+    const mode_t mask = umask(0);
+    (void)umask(mask);
+    const bool is_whole = fchmod(part, 0666 & ~mask) == 0 && fsync(part) == 0;
+    int error = errno;
+    sigset_t before;
+    signals_hold(&before);
+    const bool is_named = is_whole && rename(part_path, final_path) == 0;
+    if (is_whole && !is_named)
+        error = errno;
+    if (is_named)
+        has_part = 0;
+    (void)sigprocmask(SIG_SETMASK, &before, NULL);
+    output_drop();
+    if (!is_named)
+        return problem_set(problem, STATUS_IO, "%s cannot be written: %s", final_path,
+                           strerror(error));
+    return STATUS_OK;
+}
+
+void output_drop(void) {
+    sigset_t before;
+    signals_hold(&before);
+    if (has_part)
+        (void)unlink(part_path);
+    has_part = 0;
+    if (part >= 0)
+        (void)close(part);
+    part = -1;
+    (void)sigprocmask(SIG_SETMASK, &before, NULL);
+}

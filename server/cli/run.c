@@ -1,0 +1,221 @@
+// impactd run SCENE.json: what the daemon does with a job, without the daemon. The scene is judged
+// and completed as there, so that equal scenes have equal results by number and by id.
+#include "server/cli/command.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/simulation/simulation.h"
+#include "server/api/job_json.h"
+#include "server/cli/output.h"
+#include "server/cli/progress_bar.h"
+#include "server/cli/scene_file.h"
+#include "server/formats/encoding.h"
+#include "server/jobs/documents.h"
+#include "server/jobs/jobs.h"
+#include "server/options.h"
+#include "server/util/clock.h"
+
+typedef struct RunSettings {
+    char *output;
+    double max_cpu_seconds;
+    const Encoder *encoder; // of the output's extension; NULL without output
+} RunSettings;
+
+static const Field run_fields[] = {
+    FIELD_TEXT(RunSettings, output, 4000, PRESENCE_OPTIONAL, 0,
+               "write to this file; its extension says what"),
+    SCENE_FILE_CPU_ROW(RunSettings),
+    FIELD_END,
+};
+
+// The series as the encoders take it. The caller frees *chosen.
+static Status series_write(const Response *response, const Encoder *encoder, Bytes *bytes,
+                           Problem *problem) {
+    const Column **chosen = calloc(response->series.count + 1, sizeof *chosen);
+    if (chosen == NULL)
+        return STATUS_NO_MEMORY;
+    for (size_t i = 0; i < response->series.count; i++)
+        chosen[i] = &response->series.at[i];
+    const Table table = {.axis_name = "time",
+                         .axis_unit = "s",
+                         .axis_rate = response->sample_rate,
+                         .count = response->count,
+                         .columns = chosen,
+                         .column_count = response->series.count};
+    const Status status = encoding_write(encoder, &table, bytes, problem);
+    free(chosen);
+    return status;
+}
+
+// {job, series, impacts, psd}, each as the daemon answers it.
+static Status whole_write(const Outcome *outcome, const Bytes *job, Bytes *bytes,
+                          Problem *problem) {
+    bytes_text(bytes, "{\"job\": ");
+    bytes_put(bytes, job->at, job->count);
+    bytes_text(bytes, ",\n\"series\": ");
+    TRY(series_write(&outcome->response, encoder_find("json"), bytes, problem));
+    bytes_text(bytes, ",\n\"impacts\": ");
+    (void)document_impacts(bytes, &outcome->response, NULL);
+    bytes_text(bytes, ",\n\"psd\": ");
+    (void)document_psd(bytes, &outcome->spectrum, NULL);
+    bytes_text(bytes, "}\n");
+    return STATUS_OK;
+}
+
+// A job of nobody's queue, finished.
+static Status job_write(const StudyRequest *inquiry, const Warnings *warnings,
+                        const Outcome *outcome, const int64_t began_unix_ms, double took,
+                        Bytes *bytes) {
+    Bytes plan = {0}, summary = {0}, work = {0}, told = {0}, notes = {0};
+    document_plan(&plan, &outcome->plan);
+    document_summary(&summary, outcome);
+    document_work(&work, &outcome->work);
+    document_warnings(&told, warnings);
+    document_warnings(&notes, &outcome->warnings);
+    JobShow show = {.id = "j-local",
+                    .state = JOB_SUCCESSFUL,
+                    .progress = 100,
+                    .created_unix_ms = began_unix_ms,
+                    .started_unix_ms = began_unix_ms,
+                    .finished_unix_ms = clock_unix_ms(),
+                    .run = took,
+                    .total = took,
+                    .plan = plan.at,
+                    .summary = summary.at,
+                    .work = work.at,
+                    .warnings = told.at,
+                    .notes = notes.at,
+                    .title = inquiry->simulation.title};
+    intake_result_id(inquiry, show.result);
+    const bool is_failed =
+        plan.is_failed || summary.is_failed || work.is_failed || told.is_failed || notes.is_failed;
+    if (!is_failed)
+        job_put(bytes, &show, JOB_PUT_WHOLE);
+    bytes_clear(&plan);
+    bytes_clear(&summary);
+    bytes_clear(&work);
+    bytes_clear(&told);
+    bytes_clear(&notes);
+    return is_failed || bytes->is_failed ? STATUS_NO_MEMORY : STATUS_OK;
+}
+
+// Runs and prints or writes.
+static Status scene_run(const char *path, const StudyRequest *inquiry, const Warnings *warnings,
+                        const RunSettings *settings, Problem *problem) {
+    const SimulationLimits limits = scene_file_limits(settings->max_cpu_seconds);
+    const char *output = settings->output;
+    Outcome *outcome = NULL;
+    Bytes job = {0}, bytes = {0};
+    Bar bar;
+    const int64_t began_unix_ms = clock_unix_ms(), began_ns = clock_monotonic_ns();
+    bar_start(&bar);
+    const Progress watch = bar_watch(&bar);
+    Status status = simulation_run(&inquiry->simulation, &limits, &watch, NULL, &outcome, problem);
+    bar_stop(&bar);
+    const double took = (double)(clock_monotonic_ns() - began_ns) * 1e-9;
+    if (status == STATUS_OK)
+        scene_file_warn(path, &outcome->warnings);
+    if (status == STATUS_OK)
+        status = job_write(inquiry, warnings, outcome, began_unix_ms, took, &job);
+    if (status == STATUS_OK && output == NULL) {
+        bytes_text(&job, "\n");
+        (void)fwrite(job.at, 1, job.count, stdout);
+    } else if (status == STATUS_OK) {
+        status = strcmp(settings->encoder->extension, "json") == 0
+                     ? whole_write(outcome, &job, &bytes, problem)
+                     : series_write(&outcome->response, settings->encoder, &bytes, problem);
+        if (status == STATUS_OK && bytes.is_failed)
+            status = STATUS_NO_MEMORY;
+        if (status == STATUS_OK)
+            status = output_write(bytes.at, bytes.count, problem);
+        if (status == STATUS_OK)
+            status = output_close(problem);
+    }
+    if (status == STATUS_NO_MEMORY)
+        (void)problem_set(problem, status, "no memory for the answer");
+    bytes_clear(&job);
+    bytes_clear(&bytes);
+    outcome_unref(outcome);
+    return status;
+}
+
+static Status scene_prepare_and_run(const char *path, const Bytes *text, void *of,
+                                    Problem *problem) {
+    const RunSettings *settings = of;
+    const SimulationLimits limits = scene_file_limits(settings->max_cpu_seconds);
+    Store *store = NULL;
+    StudyRequest inquiry = {0};
+    Warnings warnings = {0};
+    TRY(store_open(NULL, &store, problem));
+    Status status =
+        intake_prepare(store, text->at, text->count, &limits, &inquiry, &warnings, problem);
+    store_close(store);
+    if (status == STATUS_OK && inquiry.study != NULL)
+        status =
+            problem_add(problem, STATUS_INVALID, "/study",
+                        "is not for `run`, which runs the scene alone: `impactd study` makes it, "
+                        "or the daemon; `impactd tradeoff` and `impactd ensemble` print theirs");
+    if (status == STATUS_OK) {
+        scene_file_warn(path, &warnings);
+        // Before the run, so that a wrong folder is told now and not after it.
+        if (settings->output != NULL)
+            status = output_open(settings->output, problem);
+        if (status == STATUS_OK)
+            status = scene_run(path, &inquiry, &warnings, settings, problem);
+        output_drop();
+    }
+    study_request_clear(&inquiry);
+    warnings_clear(&warnings);
+    return status;
+}
+
+// The encoder by the output's extension, NULL where there is no output.
+static Status encoder_choose(const char *output, const Encoder **encoder, Problem *problem) {
+    *encoder = NULL;
+    if (output == NULL)
+        return STATUS_OK;
+    const char *file = strrchr(output, '/') != NULL ? strrchr(output, '/') + 1 : output;
+    const char *dot = strrchr(file, '.');
+    if (dot != NULL)
+        *encoder = encoder_find(dot + 1);
+    if (*encoder != NULL)
+        return STATUS_OK;
+    char known[128] = "";
+    for (size_t i = 0; encoders[i] != NULL; i++) {
+        char ending[16];
+        snprintf(ending, sizeof ending, ".%s", encoders[i]->extension);
+        text_list(known, sizeof known, ending);
+    }
+    return problem_add(problem, STATUS_USAGE, "--output", "must end in one of %s, is %.200s", known,
+                       output);
+}
+
+static int run(const Command *self, void *of, const Options *options, Problem *problem) {
+    RunSettings *settings = of;
+    return encoder_choose(settings->output, &settings->encoder, problem) == STATUS_OK
+               ? scene_file_command(self, "scene", options, settings, scene_prepare_and_run,
+                                    problem)
+               : command_refuse(self->name, problem);
+}
+
+const Command command_run = {
+    .name = "run",
+    .operands = "SCENE.json",
+    .summary = "run one scene here, without a daemon",
+    .help =
+        "  impactd run scene.json                 print the finished job\n"
+        "  impactd run scene.json -o out.csv      write the time series, as a table\n"
+        "  impactd run scene.json -o out.npy      the same for numpy.load; .npz by names\n"
+        "  impactd run scene.json -o out.mat      the same for MATLAB and Octave\n"
+        "  impactd run scene.json -o out.svg      the same as a chart\n"
+        "  impactd run scene.json -o out.json     job, series, impacts and psd in one document\n"
+        "  impactd run - < scene.json             from standard input\n"
+        "\n"
+        "The output appears whole or not at all. Ctrl-C stops at once (exit code 130).\n"
+        "Exit code 3 if the scene has faults, 1 if the run failed.\n",
+    .options = run_fields,
+    .size = sizeof(RunSettings),
+    .run = run,
+};

@@ -1,0 +1,339 @@
+// impactd serve: the daemon. Opens store, intake and listener in this order, waits for SIGTERM or
+// SIGINT, and closes them so that nobody meets a room that is gone: first no more requests, then no
+// more work, then what sleepers used.
+#include <errno.h>
+#include <pthread.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "core/math/fft.h"
+#include "core/study/sweep.h"
+#include "server/api/app.h"
+#include "server/cli/command.h"
+#include "server/cli/network.h"
+#include "server/http/dispatch.h"
+#include "server/http/server.h"
+#include "server/jobs/maintenance.h"
+#include "server/options.h"
+#include "server/util/clock.h"
+#include "server/util/log.h"
+#include "server/util/process.h"
+#include "server/util/systemd.h"
+
+typedef struct ServeSettings {
+    char *listen, *data, *config, *base_url, *tls_cert, *tls_key;
+    Texts host;
+    uint64_t workers, queue, queue_bytes, max_body, max_samples, max_impacts, max_run_bytes,
+        max_points, cache_bytes, store_bytes;
+    uint64_t quota, keep_jobs, keep_bytes;
+    double max_cpu_seconds, max_study_seconds, rate, keep_days;
+    int journal;
+    bool require_tokens, print_config;
+} ServeSettings;
+
+// ASIDES: runs for readers at once. HOT_SHARE: whole answers take such a part of the cache's bytes.
+enum { GRACE_MS = 1500, ASIDES = 2, HOT_SHARE = 4 };
+
+#define MIB ((double)(1 << 20))
+
+// clang-format off
+static const Field serve_fields[] = {
+    FIELD_TEXT(ServeSettings, listen, 255, PRESENCE_OPTIONAL, 0, "HOST:PORT, in digits or localhost; port 0 takes any free one; beyond loopback a token must exist (127.0.0.1:8080)"),
+    FIELD_TEXT(ServeSettings, data, 4000, PRESENCE_OPTIONAL, 0, "folder of the database ($XDG_STATE_HOME/impactd, else ~/.local/state/impactd)"),
+    FIELD_COUNT(ServeSettings, workers, NULL, WITHIN(0, 256), 0, "simulations at once; 0 takes the number of processors"),
+    FIELD_COUNT(ServeSettings, queue, NULL, WITHIN(1, 1e6), 10000, "unfinished jobs at most; more are answered 503"),
+    FIELD_COUNT(ServeSettings, queue_bytes, "B", WITHIN(1024, 1099511627776.0), 256 * MIB, "of unfinished jobs' scenes at most; more are answered 503"),
+    FIELD_COUNT(ServeSettings, quota, NULL, WITHIN(0, 1e6), 0, "unfinished jobs of one token at most, more are answered 429; 0: as many as the queue takes"),
+    FIELD_REAL(ServeSettings, rate, "1/min", WITHIN(0, 1e9), 0, "jobs one token may send, more are answered 429; 0: any number"),
+    FIELD_COUNT(ServeSettings, max_body, "B", WITHIN(1024, 1024 * MIB), 16 * MIB, "a larger request body is answered 413"),
+    FIELD_COUNT(ServeSettings, max_samples, NULL, WITHIN(2, 1073741824.0), 33554432, "samples per channel a scene may ask for"),
+    FIELD_COUNT(ServeSettings, max_impacts, NULL, WITHIN(1, 1e9), 5e5, "impacts a run may have before it is stopped"),
+    FIELD_REAL(ServeSettings, max_cpu_seconds, "s", WITHIN(1e-6, 1e9), SIMULATION_CPU_SECONDS, "CPU time a scene may be predicted to take; it is refused beyond, and stopped at about three times as much"),
+    FIELD_REAL(ServeSettings, max_study_seconds, "s", WITHIN(0, 1e9), 3600, "CPU time that a study may be predicted to take; others are refused; 0: any"),
+    FIELD_COUNT(ServeSettings, max_run_bytes, "B", WITHIN(1 << 20, 1099511627776.0), SIMULATION_BYTES, "memory a scene may be predicted to take; it is refused beyond"),
+    FIELD_COUNT(ServeSettings, max_points, NULL, WITHIN(1, 1e7), SWEEP_POINTS, "points a sweep may have"),
+    FIELD_COUNT(ServeSettings, cache_bytes, "B", WITHIN(0, 1099511627776.0), 256 * MIB, "memory for what is kept ready: whole answers a quarter, results the rest"),
+    FIELD_COUNT(ServeSettings, store_bytes, "B", WITHIN(0, 1099511627776.0), 1024 * MIB, "disk for series that are dearer to compute than to read"),
+    FIELD_REAL(ServeSettings, keep_days, "d", WITHIN(0, 36500), 0, "finished jobs are kept so long, with the results that no later job names; 0: for ever"),
+    FIELD_COUNT(ServeSettings, keep_jobs, NULL, WITHIN(0, 1e12), 0, "finished jobs kept, the oldest go first; 0: all"),
+    FIELD_COUNT(ServeSettings, keep_bytes, "B", WITHIN(0, 1e18), 0, "size of the database beyond which the oldest finished jobs go; 0: any"),
+    FIELD_TEXTS(ServeSettings, host, NULL, NULL, 64, PRESENCE_OPTIONAL, 0, "another name that requests may call this machine by; may be repeated, or a list with commas"),
+    FIELD_TEXT(ServeSettings, base_url, 255, PRESENCE_OPTIONAL, 0, "how clients reach it behind a proxy, as https://sim.example.org/impactd; every link begins with it"),
+    FIELD_FLAG(ServeSettings, require_tokens, false, "ask for a token on loopback too, even while there is none"),
+    FIELD_TEXT(ServeSettings, tls_cert, 4000, PRESENCE_OPTIONAL, 0, "PEM file of the certificate, for HTTPS"),
+    FIELD_TEXT(ServeSettings, tls_key, 4000, PRESENCE_OPTIONAL, 0, "PEM file of its key"),
+    FIELD_CHOICE(ServeSettings, journal, journal_mode_names, JOURNAL_ERRORS, "which requests get a line on standard error: off, errors or all"),
+    FIELD_TEXT(ServeSettings, config, 4000, PRESENCE_OPTIONAL, 0, "a file of settings, one \"name = value\" a line"),
+    FIELD_FLAG(ServeSettings, print_config, false, "print each setting and where it came from, and stop"),
+    FIELD_END,
+};
+// clang-format on
+
+static const OptionGroup serve_groups[] = {
+    {"listen", "Where it listens and keeps its data"},
+    {"workers", "Work"},
+    {"max_body", "Limits"},
+    {"cache_bytes", "Memory"},
+    {"host", "Who can reach it, and how"},
+    {"journal", "Journal and settings"},
+    {NULL, NULL},
+};
+
+// The defaults that depend on where we run.
+static Status complete(ServeSettings *settings, Problem *problem) {
+    TRY(command_data_folder(&settings->data, problem));
+    if (settings->listen == NULL && (settings->listen = strdup("127.0.0.1:8080")) == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory");
+    if (settings->workers == 0) {
+        const long processors = sysconf(_SC_NPROCESSORS_ONLN);
+        settings->workers = processors > 0 ? (uint64_t)processors : 1;
+    }
+    return STATUS_OK;
+}
+
+static Status refuse(Problem *problem, const char *small, uint64_t value, const char *large,
+                     uint64_t other, const char *why) {
+    return problem_add(problem, STATUS_USAGE, small, "must be at least %s, %llu, is %llu: %s",
+                       large, (unsigned long long)other, (unsigned long long)value, why);
+}
+
+// Settings that are right by themselves and wrong together.
+static Status check(const ServeSettings *settings, Problem *problem) {
+    Status status = STATUS_OK;
+    if (settings->queue_bytes < settings->max_body)
+        status = refuse(problem, "--queue-bytes", settings->queue_bytes, "--max-body",
+                        settings->max_body, "a scene that is taken must find room in the queue");
+    if (settings->queue < settings->workers)
+        status = refuse(problem, "--queue", settings->queue, "--workers", settings->workers,
+                        "a worker without a job is of no use");
+    if (settings->quota > settings->queue)
+        status =
+            problem_add(problem, STATUS_USAGE, "--quota",
+                        "is %llu, more than the %llu jobs of --queue: no token could ever have "
+                        "so many; lower --quota or raise --queue",
+                        (unsigned long long)settings->quota, (unsigned long long)settings->queue);
+    if (settings->keep_bytes > 0 && settings->keep_bytes < 1 << 20)
+        status =
+            problem_add(problem, STATUS_USAGE, "--keep-bytes",
+                        "is %llu B, less than an empty database takes: use at least %.0f, or 0 "
+                        "for no limit",
+                        (unsigned long long)settings->keep_bytes, MIB);
+    return status;
+}
+
+static void greet(const Listener *listener, const ServeSettings *settings, const App *app) {
+    const char *url = app->base_url[0] != '\0' ? app->base_url : listener_url(listener);
+    printf("impactd %s listens on %s\n", program_version, listener_url(listener));
+    printf("data in %s, %llu workers; Ctrl-C stops\n\n", settings->data,
+           (unsigned long long)settings->workers);
+    printf("curl -s %s/v1/examples/paper_free_sponge | curl -s --json @- %s/v1/jobs\n", url, url);
+    fflush(stdout);
+}
+
+static void forget_answers(void *hot) {
+    if (hot != NULL)
+        hot_clear(hot);
+}
+
+// SIGHUP: a certificate that was renewed is used from now on.
+static void read_anew(const ReachSettings *asked, Problem *problem) {
+    problem_clear(problem);
+    if (asked->tls_cert == NULL)
+        fprintf(stderr, "impactd: SIGHUP: without TLS there is nothing to read anew\n");
+    else if (reach_read_tls(asked, problem) == STATUS_OK)
+        fprintf(stderr, "impactd: SIGHUP: the certificate in %s is used from now on\n",
+                asked->tls_cert);
+    else
+        fprintf(stderr, "impactd: SIGHUP: the certificate stays as it was: %s\n", problem->detail);
+}
+
+// Waits for a signal to end, and tells systemd meanwhile that we live. A terminal that is gone ends
+// what was started in it, as it always does.
+static int wait_for_end(const sigset_t *signals, const ReachSettings *asked, Problem *problem) {
+    const bool has_terminal = isatty(STDIN_FILENO) != 0;
+    const int64_t period_ms = notify_watchdog_ms();
+    const struct timespec period = {.tv_sec = (time_t)(period_ms / 1000),
+                                    .tv_nsec = (long)(period_ms % 1000) * 1000000};
+    for (;;) {
+        const int signal =
+            period_ms > 0 ? sigtimedwait(signals, NULL, &period) : sigwaitinfo(signals, NULL);
+        if (signal == SIGHUP && (!has_terminal || isatty(STDIN_FILENO) != 0))
+            read_anew(asked, problem);
+        else if (signal > 0)
+            return signal;
+        else if (errno == EAGAIN)
+            notify_send("WATCHDOG=1");
+    }
+}
+
+// From here on a second signal ends us at once; what is acknowledged is in the database.
+static void let_signals_kill(const sigset_t *signals) {
+    signal(SIGHUP, SIG_IGN);
+    signal(SIGTERM, SIG_DFL);
+    signal(SIGINT, SIG_DFL);
+    pthread_sigmask(SIG_UNBLOCK, signals, NULL);
+}
+
+static void run_until_stopped(App *app, Listener *listener, const ServeSettings *settings,
+                              const ReachSettings *asked, const sigset_t *signals,
+                              Problem *problem) {
+    atomic_store(&app->listener, listener);
+    greet(listener, settings, app);
+    notify_send("READY=1");
+    const int signal = wait_for_end(signals, asked, problem);
+    notify_send("STOPPING=1");
+    atomic_store(&app->is_stopping, true);
+    let_signals_kill(signals);
+    Bytes line = {0};
+    bytes_format(&line, "%s, stopping",
+                 signal == SIGINT   ? "interrupted"
+                 : signal == SIGHUP ? "its terminal is gone"
+                                    : "asked to end");
+    journal_write(&line);
+    bytes_clear(&line);
+}
+
+static Status serve(const ServeSettings *settings, const sigset_t *signals, Problem *problem) {
+    App app = {.reply_most = (size_t)1 << 30, .started_unix_ms = clock_unix_ms()};
+    Doorman doorman = {.journal = (JournalMode)settings->journal};
+    const size_t hot_bytes = settings->cache_bytes / HOT_SHARE;
+    Dispatcher dispatcher = {&app, routes, quick_handlers, hot_new(hot_bytes), &doorman};
+    ListenerSettings door = {.body_most = settings->max_body,
+                             .answer_at_once = dispatch_at_once,
+                             .answer = dispatch,
+                             .admits = dispatch_admits,
+                             .still_admits = dispatch_still_admits,
+                             .note = dispatch_note,
+                             .context = &dispatcher};
+    const IntakeSettings work = {.workers = settings->workers,
+                                 .queue_most = settings->queue,
+                                 .queue_bytes = settings->queue_bytes,
+                                 .cache_bytes = settings->cache_bytes - hot_bytes,
+                                 .store_bytes = settings->store_bytes,
+                                 .quota = settings->quota,
+                                 .rate = settings->rate,
+                                 .study_seconds = settings->max_study_seconds,
+                                 .deleted = {dispatcher.hot, forget_answers},
+                                 .limits = {.samples = settings->max_samples,
+                                            .impacts = settings->max_impacts,
+                                            .steps = settings->max_cpu_seconds / SOLVER_STEP,
+                                            .bytes = (double)settings->max_run_bytes,
+                                            .document_bytes = DOCUMENT_BYTES,
+                                            .points = settings->max_points}};
+    const KeepRules keep = {settings->keep_days, settings->keep_jobs, settings->keep_bytes};
+    const ReachSettings asked = {settings->host, settings->base_url, settings->tls_cert,
+                                 settings->tls_key, settings->require_tokens};
+    Reach ready = {0};
+    Meter *meter = NULL;
+    Listener *listener = NULL;
+    Keeper *keeper = NULL;
+    process_return_memory();
+    fft_start();
+    Status status = address_read(settings->listen, &door.address, problem);
+    if (status == STATUS_OK) {
+        const Status together = check(settings, problem);
+        status = reach_read(&asked, &door.address, &ready, problem);
+        status = together != STATUS_OK ? together : status;
+    }
+    if (status == STATUS_OK && (meter = meter_new(routes)) == NULL)
+        status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the counters");
+    if (status == STATUS_OK)
+        status = store_open(settings->data, &app.store, problem);
+    if (status == STATUS_OK)
+        status = tokens_open(app.store, ready.needs_tokens, &doorman.tokens, problem);
+    if (status == STATUS_OK)
+        status = reach_check(&ready, &door.address, tokens_usable(doorman.tokens), problem);
+    if (status == STATUS_OK)
+        status = intake_open(app.store, &work, &app.intake, problem);
+    if (status == STATUS_OK)
+        status = keeper_start(app.store, app.intake, &keep, &keeper, problem);
+    if (status == STATUS_OK)
+        status = asides_open(ASIDES, &app.asides, problem);
+    if (status == STATUS_OK) {
+        link_base_set(ready.url.path);
+        text_fit(app.base_url, sizeof app.base_url, ready.url.text);
+        app.has_tls = certificate_source() != NULL;
+        app.meter = doorman.meter = meter;
+        app.hot = dispatcher.hot;
+        door.hosts = &ready.hosts;
+        door.certificate = certificate_source();
+        status = listener_open(&door, &listener, problem);
+    }
+    if (status == STATUS_OK)
+        run_until_stopped(&app, listener, settings, &asked, signals, problem);
+    listener_stop(listener, GRACE_MS);
+    keeper_stop(keeper);
+    asides_close(app.asides);
+    if (app.intake != NULL)
+        intake_close(app.intake);
+    listener_free(listener);
+    hot_free(dispatcher.hot);
+    tokens_close(doorman.tokens);
+    store_close(app.store);
+    meter_free(meter);
+    reach_clear(&ready);
+    certificate_forget();
+    return status;
+}
+
+// Before any thread starts, so that only sigwait sees them, and when the settings have been read:
+// until then they end us as they end anything.
+static void hold_signals(sigset_t *signals) {
+    sigemptyset(signals);
+    sigaddset(signals, SIGTERM);
+    sigaddset(signals, SIGINT);
+    sigaddset(signals, SIGHUP);
+    pthread_sigmask(SIG_BLOCK, signals, NULL);
+    signal(SIGPIPE, SIG_IGN);
+    signal(SIGXFSZ, SIG_IGN); // a limit on a file's size is an error of writing like any other
+}
+
+static int run(const Command *self, void *of, const Options *options, Problem *problem) {
+    ServeSettings *settings = of;
+    Status status = STATUS_OK;
+    if (options->operand_count > 0)
+        status = problem_set(problem, STATUS_USAGE, "takes no operands, \"%.60s\" is one",
+                             options->operands[0]);
+    if (status == STATUS_OK)
+        status = complete(settings, problem);
+    if (status == STATUS_OK && settings->print_config) {
+        options_print(serve_fields, settings, options, stdout);
+    } else if (status == STATUS_OK) {
+        sigset_t signals;
+        hold_signals(&signals);
+        status = serve(settings, &signals, problem);
+    }
+    if (status == STATUS_OK)
+        return COMMAND_OK;
+    if (problem->status == STATUS_USAGE)
+        return command_refuse(self->name, problem);
+    fprintf(stderr, "impactd serve: %s\n",
+            problem->detail[0] != '\0' ? problem->detail : status_title(status));
+    return command_exit(status);
+}
+
+const Command command_serve = {
+    .name = "serve",
+    .summary = "the daemon: takes scenes over HTTP, keeps jobs and results",
+    .help =
+        "  impactd serve\n"
+        "  impactd serve --listen 127.0.0.1:0 --data /tmp/trial\n"
+        "  impactd serve --print-config\n"
+        "  impactd token create --name lab; impactd serve --listen 0.0.0.0:8443 --tls-cert c.pem "
+        "--tls-key k.pem\n"
+        "\n"
+        "Prints its URL and a curl line. SIGTERM or Ctrl-C ends it within 5 seconds; "
+        "unfinished jobs go on at\n"
+        "the next start. SIGHUP reads the certificate and its key anew; where they are faulty the "
+        "old "
+        "ones stay. GET / of the URL shows what it can do.\n",
+    .options = serve_fields,
+    .groups = serve_groups,
+    .size = sizeof(ServeSettings),
+    .environment = "IMPACTD_",
+    .run = run,
+};

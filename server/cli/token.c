@@ -1,0 +1,199 @@
+// The token itself goes to standard output and nothing else does, so that a script can take it.
+#include "server/cli/command.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "server/auth/tokens.h"
+#include "server/json/table.h"
+#include "server/util/clock.h"
+
+typedef struct TokenSettings {
+    char *data, *name, *scopes;
+    double expires;
+    bool json;
+} TokenSettings;
+
+// clang-format off
+static const Field token_fields[] = {
+    FIELD_TEXT(TokenSettings, name, 64, PRESENCE_OPTIONAL, 0, "whose it is: letters, digits, dot, underscore and dash; its jobs are counted under this name"),
+    FIELD_TEXT(TokenSettings, scopes, 60, PRESENCE_OPTIONAL, 0, "what it may: read, submit, materials, admin (which is all), with commas between (read,submit)"),
+    FIELD_REAL(TokenSettings, expires, "days", ABOVE(0), OPTIONAL, "when it ends; never if absent"),
+    FIELD_FLAG(TokenSettings, json, false, "list: print it as JSON"),
+    FIELD_TEXT(TokenSettings, data, 4000, PRESENCE_OPTIONAL, 0, "the daemon's folder ($IMPACTD_DATA, else as impactd serve has it)"),
+    FIELD_END,
+};
+// clang-format on
+
+static Status create(Store *store, const TokenSettings *settings, TokenRow *row, Problem *problem) {
+    static const double day_ms = 24 * 3600 * 1000.0;
+    static const double days_most = 36500;
+    char made[TOKEN_SIZE];
+    int64_t expires_unix_ms = 0;
+    // Who reviewed what the program came with.
+    if (strcmp(row->name, "impactd") == 0)
+        return problem_set(problem, STATUS_USAGE, "impactd is the program's own name");
+    if (isfinite(settings->expires)) {
+        const double days = settings->expires < days_most ? settings->expires : days_most;
+        expires_unix_ms = clock_unix_ms() + (int64_t)(days * day_ms);
+    }
+    TRY(token_make(settings->scopes != NULL ? settings->scopes : "read,submit", expires_unix_ms,
+                   row, made, problem));
+    TRY(store_token_add(store, row, problem));
+    fprintf(stderr,
+            "The token \"%s\" (%s). It is shown this once; only its digest is kept. Use it as\n"
+            "  curl -H \"Authorization: Bearer $TOKEN\" ...\n",
+            row->name, row->scopes);
+    printf("%s\n", made);
+    return STATUS_OK;
+}
+
+static const char *time_text(int64_t unix_ms, char text[32]) {
+    if (unix_ms > 0)
+        clock_rfc3339(unix_ms, text);
+    return unix_ms > 0 ? text : NULL;
+}
+
+static Status list(Store *store, const TokenSettings *settings, TokenRow *row, Problem *problem) {
+    static const char *const heads[] = {"name", "scopes", "created", "used", "expires", "state"};
+    TokenRows rows = {0};
+    (void)row;
+    TRY(store_tokens(store, &rows, problem));
+    const int64_t now = clock_unix_ms();
+    Listing listing = {.columns = COUNT(heads), .has_heads = true};
+    Bytes json = {0};
+    for (size_t i = 0; i < COUNT(heads); i++)
+        listing_add(&listing, "%s", heads[i]);
+    bytes_text(&json, "{\"tokens\": [");
+    for (size_t i = 0; i < rows.count; i++) {
+        const TokenRow *one = &rows.at[i];
+        const bool has_ended = one->expires_unix_ms > 0 && one->expires_unix_ms <= now;
+        char created[32], used[32], expires[32];
+        const char *const cells[COUNT(heads)] = {one->name,
+                                                 one->scopes,
+                                                 time_text(one->created_unix_ms, created),
+                                                 time_text(one->used_unix_ms, used),
+                                                 time_text(one->expires_unix_ms, expires),
+                                                 one->revoked_unix_ms > 0 ? "revoked"
+                                                 : has_ended              ? "expired"
+                                                                          : "good"};
+        for (size_t k = 0; k < COUNT(cells); k++) {
+            listing_add(&listing, "%s", cells[k] != NULL ? cells[k] : "never");
+            bytes_format(&json, "%s\"%s\": ", k > 0 ? ", " : i > 0 ? ", {" : "{", heads[k]);
+            if (cells[k] != NULL)
+                bytes_json_string(&json, cells[k]);
+            else
+                bytes_text(&json, "null");
+        }
+        bytes_text(&json, "}");
+    }
+    bytes_text(&json, "]}\n");
+    if (settings->json && !json.is_failed)
+        fputs(json.at, stdout);
+    if (settings->json)
+        listing_clear(&listing);
+    else
+        listing_print(&listing, stdout);
+    bytes_clear(&json);
+    free(rows.at);
+    return STATUS_OK;
+}
+
+static Status revoke(Store *store, const TokenSettings *settings, TokenRow *row, Problem *problem) {
+    (void)settings;
+    row->revoked_unix_ms = clock_unix_ms();
+    TRY(store_token_revoke(store, row, problem));
+    fprintf(stderr, "The token \"%s\" is revoked; a running daemon knows within a second.\n",
+            row->name);
+    return STATUS_OK;
+}
+
+static Status forget(Store *store, const TokenSettings *settings, TokenRow *row, Problem *problem) {
+    (void)settings;
+    TRY(store_token_forget(store, row, problem));
+    fprintf(stderr, "The token \"%s\" is forgotten.\n", row->name);
+    return STATUS_OK;
+}
+
+static const struct Action {
+    const char *name;
+    bool needs_name;
+    Status (*act)(Store *store, const TokenSettings *settings, TokenRow *row, Problem *problem);
+} actions[] = {
+    {"create", true, create},
+    {"list", false, list},
+    {"revoke", true, revoke},
+    {"forget", true, forget},
+};
+
+static Status read_name(const TokenSettings *settings, const Options *options, bool is_needed,
+                        TokenRow *row, Problem *problem) {
+    static const char allowed[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
+                                  "0123456789._-";
+    const char *name = settings->name;
+    if (options->operand_count > 1 && name == NULL && is_needed)
+        name = options->operands[1];
+    else if (options->operand_count > 1)
+        return problem_set(problem, STATUS_USAGE, "\"%.60s\" is one operand too many",
+                           options->operands[1]);
+    if (name == NULL && !is_needed)
+        return STATUS_OK;
+    if (name == NULL)
+        return problem_set(problem, STATUS_USAGE, "which token? Say --name NAME");
+    const size_t size = strlen(name);
+    if (size == 0 || size >= sizeof row->name || strspn(name, allowed) != size)
+        return problem_set(problem, STATUS_USAGE,
+                           "a token's name must be 1 to 64 letters, digits, dots, underscores and "
+                           "dashes, is \"%.80s\"",
+                           name);
+    snprintf(row->name, sizeof row->name, "%s", name);
+    return STATUS_OK;
+}
+
+static Status act(TokenSettings *settings, const Options *options, Problem *problem) {
+    size_t index;
+    TokenRow row = {0};
+    TRY(command_action(options, &actions->name, COUNT(actions), sizeof *actions, &index, problem));
+    const struct Action *action = &actions[index];
+    if (options->operand_count > 2)
+        return problem_set(problem, STATUS_USAGE, "\"%.60s\" is one operand too many",
+                           options->operands[2]);
+    TRY(read_name(settings, options, action->needs_name, &row, problem));
+    TRY(command_data_folder(&settings->data, problem));
+    Store *store = NULL;
+    TRY(store_open_beside(settings->data, &store, problem));
+    const Status status = action->act(store, settings, &row, problem);
+    store_close(store);
+    return status;
+}
+
+static int token(const Command *self, void *settings, const Options *options, Problem *problem) {
+    const Status status = act(settings, options, problem);
+    if (status == STATUS_OK)
+        return COMMAND_OK;
+    if (status == STATUS_USAGE)
+        return command_refuse(self->name, problem);
+    fprintf(stderr, "impactd token: %s\n",
+            problem->detail[0] != '\0' ? problem->detail : status_title(status));
+    return command_exit(status);
+}
+
+const Command command_token = {
+    .name = "token",
+    .operands = "create|list|revoke|forget [NAME]",
+    .summary = "access tokens: who may use the daemon, and for what",
+    .help = "  TOKEN=$(impactd token create --name lab --scopes read,submit --expires 90)\n"
+            "  curl -H \"Authorization: Bearer $TOKEN\" http://127.0.0.1:8080/v1/jobs\n"
+            "  impactd token list\n"
+            "  impactd token revoke lab\n"
+            "\n"
+            "Works beside a running daemon, which follows within a second, and without one. From "
+            "the first token\n"
+            "on, also if it is revoked, every request needs one; once all are forgotten (forget "
+            "strikes a revoked\n"
+            "one from the list) loopback is open again.\n",
+    .options = token_fields,
+    .size = sizeof(TokenSettings),
+    .run = token,
+};

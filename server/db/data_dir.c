@@ -1,0 +1,96 @@
+// The lock is flock's on the folder itself: it ends with the process however that ends. The file
+// impactd.lock has the holder's number, for the message alone, and may stay behind or be removed.
+#include "server/db/data_dir.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+Status folder_make(const char *directory, Problem *problem) {
+    char path[PATH_MAX];
+    const size_t length = strlen(directory);
+    if (length == 0 || length >= sizeof path - 32)
+        return problem_set(problem, STATUS_IO,
+                           "the data folder's name has %zu bytes; must be 1 to %zu", length,
+                           sizeof path - 33);
+    memcpy(path, directory, length + 1);
+    for (size_t i = 1; i <= length; i++) {
+        if (path[i] != '/' && path[i] != '\0')
+            continue;
+        const char end = path[i];
+        path[i] = '\0';
+        if (mkdir(path, 0700) != 0 && errno != EEXIST)
+            return problem_set(problem, STATUS_IO, "cannot make the folder %s: %s", path,
+                               strerror(errno));
+        path[i] = end;
+    }
+    return STATUS_OK;
+}
+
+static void folder_report_holder(const char *directory, const char *path, Problem *problem) {
+    char holder[32] = "";
+    const int file = open(path, O_RDONLY | O_CLOEXEC);
+    if (file >= 0 && read(file, holder, sizeof holder - 1) > 0)
+        holder[strspn(holder, "0123456789")] = '\0';
+    if (file >= 0)
+        close(file);
+    problem_set(problem, STATUS_CONFLICT,
+                "another impactd%s%s%s uses the folder %s; stop it or choose another folder",
+                holder[0] != '\0' ? " (process " : "", holder, holder[0] != '\0' ? ")" : "",
+                directory);
+}
+
+Status folder_lock(const char *directory, int *lock, Problem *problem) {
+    char path[PATH_MAX];
+    *lock = -1;
+    TRY(folder_make(directory, problem));
+    snprintf(path, sizeof path, "%s/impactd.lock", directory);
+    const int folder = open(directory, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (folder < 0)
+        return problem_set(problem, STATUS_IO, "cannot open the folder %s: %s", directory,
+                           strerror(errno));
+    if (flock(folder, LOCK_EX | LOCK_NB) != 0) {
+        const int code = errno;
+        if (code == EWOULDBLOCK)
+            folder_report_holder(directory, path, problem);
+        close(folder);
+        return code == EWOULDBLOCK
+                   ? STATUS_CONFLICT
+                   : problem_set(problem, STATUS_IO, "cannot lock the folder %s: %s", directory,
+                                 strerror(code));
+    }
+    const int file = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+    const int code = errno;
+    if (file >= 0) { // a full disk is no reason not to start
+        (void)dprintf(file, "%ld\n", (long)getpid());
+        close(file);
+    } else if (code != ENOSPC && code != EDQUOT) {
+        close(folder);
+        return problem_set(problem, STATUS_IO, "cannot make %s: %s", path, strerror(code));
+    }
+    *lock = folder;
+    return STATUS_OK;
+}
+
+void folder_unlock(int lock) {
+    if (lock >= 0)
+        close(lock);
+}
+
+Status folder_sync(const char *directory, Problem *problem) {
+    const int folder = open(directory, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    const bool is_synced = folder >= 0 && fsync(folder) == 0;
+    // Some file systems cannot sync a folder and need not.
+    const int code = errno;
+    if (folder >= 0)
+        close(folder);
+    if (is_synced || (folder >= 0 && code == EINVAL))
+        return STATUS_OK;
+    return problem_set(problem, STATUS_IO, "cannot sync the folder %s: %s", directory,
+                       strerror(code));
+}

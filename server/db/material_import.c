@@ -1,0 +1,276 @@
+// Material by material, in the order of slugs: its measurements, for revisions name them, then its
+// revisions with their reviews. A number that is there must say what is there; one that is not must
+// be the next. What is written before a fault is met goes with the transaction.
+#include "server/db/material_import.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/base/json_pointer.h"
+#include "server/db/db_private.h"
+#include "server/db/material_import_context.h"
+
+enum { POINTER_SIZE = sizeof((Fault){0}.pointer) };
+
+static Status load_revision(Database *database, const char *slug, uint64_t number,
+                            MaterialRevision *revision, Problem *problem) {
+    static const char sql[] =
+        "SELECT m.slug, r.* FROM materials m JOIN material_revisions r ON r.material = m.number "
+        "WHERE m.slug = :slug AND r.revision = :number";
+    return import_load(database, sql, slug, number, material_revision_columns, revision, problem);
+}
+
+static void compare_revision(const Walk *walk, const ImportRevision *ours,
+                             const MaterialRevision *there, Group *group) {
+    const ImportMark *mark = &ours->mark;
+    const size_t faults = walk->faults->count;
+    if (!walk->import->is_partial)
+        (void)walk->import->says_same(&ours->said, there, mark->place, walk->faults);
+    const ImportOrigin is = {ours->said.author, ours->said.comment, ours->said.created_unix_ms},
+                       was = {there->author, there->comment, there->created_unix_ms};
+    import_compare_origin(walk, mark, "revision", &is, &was);
+    if (ours->said.reverts != there->reverts && !(ours->said.reverts == 0 && mark->is_faulty))
+        (void)import_fault(walk, mark->place, "reverts",
+                           "is not that of the revision that is there, and those never change");
+    group->revisions_done.same += walk->faults->count == faults;
+}
+
+// A revision that says again what another one says.
+static Status judge_reverts(const Walk *walk, Database *database, const ImportRevision *ours,
+                            uint64_t number, const Group *group, Problem *problem) {
+    const uint64_t again = ours->said.reverts;
+    MaterialRevision there = {0};
+    if (again == 0)
+        return STATUS_OK;
+    if (again >= number) {
+        (void)import_fault(walk, ours->mark.place, "reverts",
+                           "must be a revision before %llu, is %llu", (unsigned long long)number,
+                           (unsigned long long)again);
+        return STATUS_OK;
+    }
+    if (again <= group->key.latest)
+        TRY(load_revision(database, group->slug, again, &there, problem));
+    const MaterialRevision *said = there.revision > 0 ? &there : NULL;
+    for (size_t i = 0; said == NULL && i < group->revision_count; i++)
+        if (group->revisions[i].said.revision == again && !group->revisions[i].mark.is_faulty)
+            said = &group->revisions[i].said;
+    if (said != NULL && !ours->mark.is_faulty &&
+        !walk->import->says_same(&ours->said, said, "", NULL))
+        (void)import_fault(
+            walk, ours->mark.place, "reverts",
+            "revision %llu says something else; a revision that reverts says the same",
+            (unsigned long long)again);
+    material_revision_clear(&there);
+    return STATUS_OK;
+}
+
+static void judge_measurements(const Walk *walk, const ImportRevision *ours, const Group *group) {
+    const Reals *named = &ours->said.material.measurements;
+    char list[POINTER_SIZE], place[POINTER_SIZE];
+    json_pointer_join(list, sizeof list, ours->mark.place, "measurements");
+    for (size_t i = 0; i < named->count && !group->measurements_drift; i++) {
+        if (named->at[i] <= (double)group->last_measurement)
+            continue;
+        json_pointer_index(place, sizeof place, list, i);
+        (void)import_fault(walk, place, "",
+                           "there is no measurement %.0f of \"%.64s\"; it has %llu", named->at[i],
+                           group->slug, (unsigned long long)group->last_measurement);
+    }
+}
+
+static Status add_revision(Walk *walk, Database *database, const ImportRevision *ours,
+                           uint64_t number, Group *group, Problem *problem) {
+    const ImportMark *mark = &ours->mark;
+    import_judge_origin(walk, mark, ours->said.author, ours->said.created_unix_ms);
+    judge_measurements(walk, ours, group);
+    TRY(judge_reverts(walk, database, ours, number, group, problem));
+    group->revisions_done.added++;
+    MaterialRevision said = ours->said;
+    said.revision = number;
+    said.author = (char *)import_author(walk, mark, said.author);
+    said.comment = mark->has_comment ? said.comment : (char *)"imported";
+    said.created_unix_ms = mark->has_created ? said.created_unix_ms : walk->import->now_unix_ms;
+    if (walk->writes && walk->faults->count == 0)
+        TRY(material_revision_add(database, &said, problem));
+    return import_reviews(walk, database, ours, &said, group, problem);
+}
+
+// One without a number is the next, unless the newest says the same already.
+static Status import_next(Walk *walk, Database *database, const ImportRevision *ours, Group *group,
+                          Problem *problem) {
+    MaterialRevision newest = {0};
+    Status status = STATUS_OK;
+    if (group->key.latest > 0)
+        status = load_revision(database, group->slug, group->key.latest, &newest, problem);
+    if (status == STATUS_OK && newest.revision > 0 &&
+        walk->import->says_same(&ours->said, &newest, "", NULL)) {
+        group->revisions_done.same++;
+        status = import_reviews(walk, database, ours, &newest, group, problem);
+    } else if (status == STATUS_OK) {
+        status = add_revision(walk, database, ours, group->key.latest + 1, group, problem);
+    }
+    material_revision_clear(&newest);
+    return status;
+}
+
+static Status import_known(Walk *walk, Database *database, const ImportRevision *ours, Group *group,
+                           Problem *problem) {
+    MaterialRevision there = {0};
+    TRY(load_revision(database, group->slug, ours->said.revision, &there, problem));
+    compare_revision(walk, ours, &there, group);
+    const Status status = import_reviews(walk, database, ours, &there, group, problem);
+    material_revision_clear(&there);
+    return status;
+}
+
+static Status import_revisions(Walk *walk, Database *database, Group *group, Problem *problem) {
+    const char *name = walk->import->revision_name;
+    uint64_t before = 0, last = group->key.latest;
+    for (size_t i = 0; i < group->revision_count; i++)
+        group->revisions_drift = group->revisions_drift || group->revisions[i].mark.is_adrift;
+    for (size_t i = 0; i < group->revision_count; i++) {
+        const ImportRevision *ours = &group->revisions[i];
+        const uint64_t number = ours->said.revision;
+        if (ours->mark.is_adrift)
+            continue;
+        if (number == 0) {
+            TRY(import_next(walk, database, ours, group, problem));
+            continue;
+        }
+        if (import_judge_number(walk, &ours->mark, name, number, before, group->revisions_drift,
+                                &last) != STATUS_OK)
+            continue;
+        before = number;
+        if (number <= group->key.latest)
+            TRY(import_known(walk, database, ours, group, problem));
+        else
+            TRY(add_revision(walk, database, ours, number, group, problem));
+    }
+    return STATUS_OK;
+}
+
+static Status note(const Walk *walk, Database *database, const Group *group, Problem *problem) {
+    char why[160];
+    if (group->revisions_done.added + group->measurements_done.added + group->reviews_done.added ==
+        0)
+        return STATUS_OK;
+    snprintf(why, sizeof why, "imported revisions: %zu, measurements: %zu, reviews: %zu",
+             group->revisions_done.added, group->measurements_done.added,
+             group->reviews_done.added);
+    const MaterialDeed deed = {.action = (char *)"import",
+                               .who = (char *)walk->import->who,
+                               .why = why,
+                               .created_unix_ms = walk->import->now_unix_ms};
+    return material_deed_add(database, group->slug, &deed, problem);
+}
+
+static void count(ImportCount *all, const ImportCount *some) {
+    all->added += some->added;
+    all->same += some->same;
+}
+
+static Status import_group(Walk *walk, Database *database, Group *group, Problem *problem) {
+    TRY(material_key_find(database, group->slug, 0, &group->key, problem));
+    if (group->key.number == 0 && group->revision_count == 0) {
+        (void)import_fault(walk, group->measurements[0].mark.place, "slug",
+                           "there is no material \"%.64s\" to measure; bring a revision of it",
+                           group->slug);
+        return STATUS_OK;
+    }
+    if (group->key.number == 0 && walk->writes && walk->faults->count == 0)
+        TRY(material_row_add(database, group->slug, problem));
+    TRY(import_measurements(walk, database, group, problem));
+    TRY(import_revisions(walk, database, group, problem));
+    if (walk->writes && walk->faults->count == 0)
+        TRY(note(walk, database, group, problem));
+    count(&walk->tally->revisions, &group->revisions_done);
+    count(&walk->tally->measurements, &group->measurements_done);
+    count(&walk->tally->reviews, &group->reviews_done);
+    return STATUS_OK;
+}
+
+static Status import_all(Walk *walk, Database *database, Problem *problem) {
+    const MaterialImport *import = walk->import;
+    size_t r = 0, m = 0;
+    while (r < import->revision_count || m < import->measurement_count) {
+        const char *a = r < import->revision_count ? import->revisions[r].said.slug : NULL;
+        const char *b = m < import->measurement_count ? import->measurements[m].made.slug : NULL;
+        Group group = {.slug = a == NULL || (b != NULL && strcmp(b, a) < 0) ? b : a,
+                       .revisions = &import->revisions[r],
+                       .measurements = &import->measurements[m]};
+        for (; r < import->revision_count && text_same(import->revisions[r].said.slug, group.slug);
+             r++)
+            group.revision_count++;
+        for (; m < import->measurement_count &&
+               text_same(import->measurements[m].made.slug, group.slug);
+             m++)
+            group.measurement_count++;
+        walk->tally->materials++;
+        TRY(import_group(walk, database, &group, problem));
+    }
+    return STATUS_OK;
+}
+
+static Status refuse(const Walk *walk) {
+    if (walk->faults->count > 0)
+        return STATUS_INVALID;
+    if (walk->denied == 0)
+        return STATUS_OK;
+    return problem_add(walk->faults, STATUS_FORBIDDEN, walk->denied_place,
+                       "%s (%zu more rows are like it): what is by others, times, and reviews "
+                       "may be brought by who has the scope admin; nobody approves their own by "
+                       "way of a file",
+                       walk->denied_why, walk->denied - 1);
+}
+
+// May be done again from its beginning.
+static Status write_all(Database *database, const void *work, Problem *problem) {
+    Walk walk = *(const Walk *)work;
+    problem_clear(walk.faults);
+    *walk.tally = (ImportTally){0};
+    TRY(import_all(&walk, database, problem));
+    return refuse(&walk);
+}
+
+// Within one transaction of a reader, so that all of it is of one moment.
+static Status judge_all(Store *store, Walk *walk, Problem *problem) {
+    static const char begin[] = "BEGIN", end[] = "COMMIT";
+    Database *database = store_take(store);
+    Status status = database_change(database, begin, NULL, NULL, NULL, problem);
+    if (status == STATUS_OK) {
+        status = import_all(walk, database, problem);
+        (void)database_change(database, end, NULL, NULL, NULL, NULL);
+    }
+    store_put(store, database);
+    return status == STATUS_OK ? refuse(walk) : status;
+}
+
+Status store_material_import(Store *store, const MaterialImport *import, bool is_dry,
+                             ImportTally *tally, Problem *problem) {
+    *tally = (ImportTally){0};
+    Walk walk = {.import = import, .tally = tally, .faults = problem};
+    if (is_dry || problem->count > 0)
+        return judge_all(store, &walk, problem);
+    walk.writes = true;
+    TRY(store_write(store, write_all, &walk, problem));
+    if (tally->revisions.added + tally->reviews.added > 0)
+        store_catalogue_changed(store);
+    else if (tally->measurements.added > 0)
+        store_material_measured(store);
+    return STATUS_OK;
+}
+
+void import_revision_clear(ImportRevision *revision) {
+    for (size_t i = 0; i < revision->review_count; i++)
+        row_clear(material_review_columns, &revision->reviews[i].review,
+                  sizeof revision->reviews[i].review);
+    free(revision->reviews);
+    material_revision_clear(&revision->said);
+    *revision = (ImportRevision){.reviews = NULL};
+}
+
+void import_measurement_clear(ImportMeasurement *measurement) {
+    material_measurement_clear(&measurement->made);
+    *measurement = (ImportMeasurement){.made = {0}};
+}

@@ -1,0 +1,73 @@
+// Ground-motion records as they are stored: what is known of each, and its samples. They never
+// change; one goes only when nothing was made with it. Not a reader of their files (api/
+// records_upload.c). Used by api/ and by jobs/resolve_record.c.
+#ifndef SERVER_DB_RECORDS_H
+#define SERVER_DB_RECORDS_H
+
+#include "core/excitation/recorded_motion.h"
+#include "server/db/db.h"
+
+enum { RECORDS_MAX = 20000, RECORD_TWINS = 4 };
+#define RECORDS_SAMPLES (UINT64_C(1) << 31) // of all records: 16 GiB
+
+// Texts are NULL where nothing was said.
+typedef struct RecordRow {
+    int64_t number; // the store's
+    char *name;     // record_name_is_sound
+    char *source, *processing, *earthquake, *station, *notes;
+    char *layout, *header;    // as `impactd import` tells them; "json" without a header
+    char *unit, *stated_unit; // of the file: what was taken, what it tells
+    double interval;          // [s]
+    uint64_t count;           // samples
+    double peak, peak_time;   // the largest magnitude [m/s^2], when [s]
+    double peak_velocity;     // of the base, from rest [m/s]
+    double end_velocity;      // likewise
+    char *digest;             // record_digest
+    char *author;             // the token's name; NULL: nobody in particular
+    int64_t created_unix_ms;
+} RecordRow;
+typedef struct RecordRows {
+    RecordRow *at;
+    size_t count;
+} RecordRows;
+void record_row_clear(RecordRow *row);
+void record_rows_clear(RecordRows *rows);
+
+// 1 to 64 of letters, digits, dot, underscore and dash, the first a letter or a digit.
+bool record_name_is_sound(const char *name);
+// SHA-256 of the interval and the samples as little-endian doubles, in hexadecimal digits; "" if it
+// cannot be had.
+void record_digest(double interval, const Reals *samples, char digest[RECORD_DIGEST_SIZE]);
+
+// Writes both down in one transaction. One of the same name, samples and words is there already:
+// *is_there, and nothing is written; with others STATUS_CONFLICT. STATUS_LIMIT where there are
+// RECORDS_MAX, or where they would have more than RECORDS_SAMPLES.
+Status store_record_add(Store *store, const RecordRow *row, const Reals *samples, bool *is_there,
+                        Problem *problem);
+
+// STATUS_NOT_FOUND. `row` may be uninitialised; cleared in any case.
+Status store_record(Store *store, const char *name, RecordRow *row, Problem *problem);
+// By name, those behind `after` ("": from the first) in which `words` (NULL: any) occur, at most
+// `most`.
+Status store_records(Store *store, const char *words, const char *after, size_t most,
+                     RecordRows *rows, Problem *problem);
+// Up to RECORD_TWINS others with the same interval and samples.
+Status store_record_twins(Store *store, const RecordRow *row, RecordRows *rows, Problem *problem);
+
+// Interval and samples, shared by all who ask as long as one of them has them. A hold of the
+// caller's. STATUS_NOT_FOUND.
+Status store_record_named(Store *store, const char *name, NamedRecord **named, Problem *problem);
+
+// Results made with it, and unfinished jobs that will be.
+typedef struct RecordUses {
+    uint64_t results, jobs;
+} RecordUses;
+Status store_record_uses(Store *store, const char *name, RecordUses *uses, Problem *problem);
+// "record:elcentro", as result_uses has it.
+void record_use_name(const char *name, char target[RECORD_NAME_SIZE + 8]);
+
+// Deletes it; STATUS_CONFLICT, with *uses, where it is used, STATUS_NOT_FOUND. Jobs that are on
+// their way to the store are not seen: that is the caller's to prevent.
+Status store_record_delete(Store *store, const char *name, RecordUses *uses, Problem *problem);
+
+#endif

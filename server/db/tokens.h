@@ -1,0 +1,33 @@
+// Access tokens as they are stored: names, digests, scopes, times. Not the tokens themselves, which
+// nobody keeps, and not who may do what (auth/tokens.h). Used by auth/ and the command `token`.
+#ifndef SERVER_DB_TOKENS_H
+#define SERVER_DB_TOKENS_H
+
+#include "server/db/db.h"
+
+enum { TOKEN_NAME_SIZE = 65, TOKENS_MAX = 1000 };
+
+// Times in milliseconds since 1970; 0: never.
+typedef struct TokenRow {
+    char name[TOKEN_NAME_SIZE]; // [A-Za-z0-9._-]{1,64}
+    char digest[65];            // SHA-256, in hexadecimal digits
+    char scopes[64];            // "read,submit"
+    int64_t created_unix_ms, used_unix_ms, expires_unix_ms, revoked_unix_ms;
+} TokenRow;
+typedef struct TokenRows {
+    TokenRow *at; // freed by free
+    size_t count;
+} TokenRows;
+
+// STATUS_CONFLICT where the name is taken, STATUS_LIMIT where there are TOKENS_MAX.
+Status store_token_add(Store *store, const TokenRow *row, Problem *problem);
+// All, by name.
+Status store_tokens(Store *store, TokenRows *rows, Problem *problem);
+// Revokes at row->revoked_unix_ms; STATUS_NOT_FOUND, STATUS_CONFLICT if it is revoked already.
+Status store_token_revoke(Store *store, const TokenRow *row, Problem *problem);
+// Strikes it from the list; STATUS_NOT_FOUND, STATUS_CONFLICT unless it is revoked.
+Status store_token_forget(Store *store, const TokenRow *row, Problem *problem);
+// Notes row->used_unix_ms.
+Status store_token_used(Store *store, const TokenRow *row, Problem *problem);
+
+#endif

@@ -1,0 +1,94 @@
+// A header of 128 bytes, then for each variable an element
+//
+//     miMATRIX size | miUINT32 8: class, 0 | miINT32 8: rows, 1 | miINT8 n: name, blanks | miDOUBLE
+//     n: numbers
+//
+// whose parts each fill a multiple of 8 bytes.
+#include "server/formats/mat.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "server/formats/npy.h"
+
+enum {
+    MI_INT8 = 1,
+    MI_INT32 = 5,
+    MI_UINT32 = 6,
+    MI_DOUBLE = 9,
+    MI_MATRIX = 14,
+    MX_DOUBLE = 6,
+    TEXT = 116, // bytes for people
+    VERSION = 0x0100,
+};
+
+// Of one variable: readers take sizes as signed numbers of 32 bits.
+static const uint64_t variable_max = 0x7fffffff;
+
+static bool is_letter(char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
+}
+
+void mat_name(const char *name, char target[MAT_NAME_SIZE]) {
+    size_t length = 0;
+    if (!is_letter(*name))
+        target[length++] = 'x';
+    for (; *name != '\0' && length + 1 < MAT_NAME_SIZE; name++)
+        target[length++] = (char)(is_letter(*name) || (*name >= '0' && *name <= '9') ? *name : '_');
+    target[length] = '\0';
+}
+
+// All that stands before a variable's numbers. STATUS_LIMIT where they are too many.
+static Status open_variable(Layout *layout, const char *name, size_t rows, Problem *problem) {
+    char known[MAT_NAME_SIZE];
+    mat_name(name, known);
+    const size_t length = strlen(known), padding = (8 - length % 8) % 8;
+    const uint64_t size = 16 + 16 + 8 + length + padding + 8 + 8 * (uint64_t)rows;
+    if (size > variable_max)
+        return problem_set(problem, STATUS_LIMIT,
+                           "%s has %zu values, more than a variable of such a file can hold: ask "
+                           "for a shorter time, or for .npy",
+                           name, rows);
+    layout_number(layout, MI_MATRIX, 4);
+    layout_number(layout, size, 4);
+    layout_number(layout, MI_UINT32, 4);
+    layout_number(layout, 8, 4);
+    layout_number(layout, MX_DOUBLE, 8);
+    layout_number(layout, MI_INT32, 4);
+    layout_number(layout, 8, 4);
+    layout_number(layout, rows, 4);
+    layout_number(layout, 1, 4);
+    layout_number(layout, MI_INT8, 4);
+    layout_number(layout, length, 4);
+    layout_put(layout, known, length);
+    layout_fill(layout, '\0', padding);
+    layout_number(layout, MI_DOUBLE, 4);
+    layout_number(layout, 8 * (uint64_t)rows, 4);
+    return STATUS_OK;
+}
+
+static Status mat_lay(const Table *table, Layout *layout, Problem *problem) {
+    char text[TEXT + 1];
+    // No time of day: the same result is the same bytes.
+    snprintf(text, sizeof text, "%-*s", TEXT, "MATLAB 5.0 MAT-file, written by impactd");
+    layout_put(layout, text, TEXT);
+    layout_fill(layout, '\0', 8);
+    layout_number(layout, VERSION, 2);
+    layout_put(layout, "IM", 2); // little-endian
+    if (table->axis_name != NULL) {
+        TRY(open_variable(layout, table->axis_name, table->count, problem));
+        npy_put_axis(layout, table);
+    }
+    for (size_t c = 0; c < table->column_count; c++) {
+        TRY(open_variable(layout, table->columns[c]->name, table->count, problem));
+        table_lay_column(table, c, layout);
+    }
+    return STATUS_OK;
+}
+
+const Encoder encoder_mat = {
+    .extension = "mat",
+    .content_type = "application/x-matlab-data",
+    .is_binary = true,
+    .lay = mat_lay,
+};

@@ -1,0 +1,33 @@
+// All materials as one document or table, made piece by piece: what materials/exchange_json.h and
+// exchange_csv.h read, to the byte the same from the same rows. Used by api/material_exchange.c.
+#ifndef SERVER_FORMATS_MATERIAL_EXPORT_H
+#define SERVER_FORMATS_MATERIAL_EXPORT_H
+
+#include "server/db/material_export.h"
+#include "server/util/bytes.h"
+
+typedef enum ExchangeStage {
+    EXCHANGE_BETWEEN, // materials
+    EXCHANGE_REVISIONS,
+    EXCHANGE_MEASUREMENTS
+} ExchangeStage;
+
+// How far it is.
+typedef struct ExchangeText {
+    Store *store;
+    MaterialMoment moment;
+    bool is_table;
+    bool has_begun;
+    ExchangeStage stage;
+    size_t measurements;              // of this material so far
+    char slug[MATERIAL_SLUG_MAX + 1]; // the material's; "" before the first
+    uint64_t number;                  // of its last revision, or measurement
+} ExchangeText;
+
+Status exchange_text_open(Store *store, bool is_table, ExchangeText *text, Problem *problem);
+
+// Appends the next piece, at most one revision with its reviews or one measurement; *is_last behind
+// it all.
+Status exchange_text_next(ExchangeText *text, Bytes *bytes, bool *is_last, Problem *problem);
+
+#endif

@@ -1,0 +1,53 @@
+// A document whose every byte has a place before the first one is written: headers, and numbers as
+// they lie in memory or as they are counted up. Any part of it can be read alone. Not a format:
+// npy.c, npz.c, mat.c and zip.c lay out what they are. Used by those and by encoding.c.
+#ifndef SERVER_FORMATS_SEGMENTS_H
+#define SERVER_FORMATS_SEGMENTS_H
+
+#include <stdint.h>
+
+#include "server/util/bytes.h"
+
+// Bytes that are somewhere else: `read` copies `size` of them from `offset` of column `column` on,
+// and keeps for itself where it cannot.
+typedef struct LayoutSource {
+    void (*read)(void *context, size_t column, uint64_t offset, void *target, size_t size);
+    void *context;
+} LayoutSource;
+
+typedef struct Segment {
+    uint64_t start, size;       // in the document
+    const double *values;       // borrowed; NULL: text, or counted
+    size_t text;                // where it begins in the layout's text
+    double first, step, rate;   // counted: number i is (first + i step) / rate; else rate 0
+    const LayoutSource *source; // borrowed; NULL: not from there
+    size_t column;              // of the source
+} Segment;
+
+// All zero is empty. Once it failed (memory) it stays so, like Bytes.
+typedef struct Layout {
+    Segment *at;
+    size_t count, room;
+    uint64_t size;
+    Bytes text;
+    bool is_failed;
+} Layout;
+
+void layout_clear(Layout *layout);
+void layout_put(Layout *layout, const void *data, size_t size); // copied
+void layout_number(Layout *layout, uint64_t value,
+                   size_t size); // its `size` lowest bytes, lowest first
+void layout_fill(Layout *layout, char with, size_t count);
+void layout_values(Layout *layout, const double *values, size_t count); // borrowed
+// (first + i step) / rate for i = 0 ... count - 1.
+void layout_counted(Layout *layout, size_t first, size_t step, double rate, size_t count);
+// All `size` bytes of a column of `source`, which is borrowed.
+void layout_source(Layout *layout, const LayoutSource *source, size_t column, uint64_t size);
+void layout_join(Layout *layout, const Layout *other); // behind; borrows what `other` borrows
+
+// Copies `size` bytes from `start` on; both within the document.
+void layout_read(const Layout *layout, uint64_t start, void *target, size_t size);
+void layout_write(const Layout *layout, Bytes *bytes); // appends the whole
+uint32_t layout_crc32(const Layout *layout);           // of the whole
+
+#endif

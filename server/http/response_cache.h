@@ -1,0 +1,37 @@
+// Whole answers that never change, by their target, up to a budget of bytes; the longest unused one
+// goes first. Not the outcomes they were made of (jobs/cache.h). Used by dispatch.c, from all
+// threads.
+#ifndef SERVER_HTTP_RESPONSE_CACHE_H
+#define SERVER_HTTP_RESPONSE_CACHE_H
+
+#include "server/http/request.h"
+
+typedef struct Hot Hot;
+
+Hot *hot_new(size_t most_bytes); // NULL without memory
+void hot_free(Hot *hot);         // NULL is fine; answers still held live on
+
+// Grows with each hot_clear.
+uint64_t hot_age(Hot *hot);
+
+// Keeps a finished 200 of a body that is whole in memory: what `reply` owns moves into the cache,
+// and `reply` becomes a borrower of it. One that is too large for the budget stays as it is.
+// `target` is as sent, `is_packed` says that the body is gzip, `route` whose it is.
+// Nothing is kept that was begun at another `age`: it may have been deleted since.
+void hot_put(Hot *hot, uint64_t age, const char *target, bool is_packed, const struct Route *route,
+             Reply *reply);
+
+// Fills `reply`, a borrower, and *route. False if it is not there.
+bool hot_find(Hot *hot, const char *target, bool is_packed, Reply *reply,
+              const struct Route **route);
+
+// Forgets all: something that never changes was deleted.
+void hot_clear(Hot *hot);
+
+typedef struct HotTally {
+    size_t count, bytes;
+    uint64_t hits, misses, evictions;
+} HotTally;
+HotTally hot_tally(Hot *hot);
+
+#endif

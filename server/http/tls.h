@@ -1,0 +1,22 @@
+// The TLS certificate and its key: looked at before they are used, so that what is wrong with them
+// is said in words, and changed for others while connections come and go. Not TLS itself
+// (http/server.c). Used by cli/network.c and cli/serve.c.
+#ifndef SERVER_HTTP_TLS_H
+#define SERVER_HTTP_TLS_H
+
+#include "core/base/status.h"
+
+// Answers handshakes with this one from now on; both as PEM text. STATUS_USAGE for what cannot be
+// read, for a key that is not the certificate's, and for a certificate whose time is over:
+// `cert_path` and `key_path` are named in the fault, and what was used before stays.
+Status certificate_use(const char *cert, const char *cert_path, const char *key,
+                       const char *key_path, Problem *problem);
+
+// A gnutls_certificate_retrieve_function2 that hands out the one in use; NULL while there is none.
+typedef void CertificateSource(void);
+CertificateSource *certificate_source(void);
+
+// When no connection is left.
+void certificate_forget(void);
+
+#endif

@@ -1,0 +1,43 @@
+// What is turned away before anything else looks at a request: heads that two parsers could read
+// differently, and hosts that are not ours. Plain values, no sockets. A refused request's
+// connection is closed. Not who may do what (scopes) and not which routes exist. Used by
+// listener.c.
+#ifndef SERVER_HTTP_VALIDATE_H
+#define SERVER_HTTP_VALIDATE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "core/base/status.h"
+
+// The names that requests may call us by.
+typedef struct GateHosts {
+    const char *const *names; // without port, "[::1]", NULL-terminated
+    bool takes_addresses;     // any numeric address as well: no other site's name leads to it
+} GateHosts;
+extern const GateHosts gate_loopback; // localhost, 127.0.0.1 and [::1]
+
+// Facts gathered header by header; all zero to begin with, but for `names`.
+typedef struct Gate {
+    const GateHosts *names; // NULL: gate_loopback
+    size_t hosts, lengths, encodings, authorizations;
+    unsigned long long length; // of the body, as told
+    bool is_chunked, is_foreign_host, has_bad_length, has_control;
+    char fault_name[40]; // the header that has_control is about
+    // Values of headers as given, of the caller; NULL where there is none.
+    const char *own_host, *origin, *fetch_site;
+    char host[64];
+} Gate;
+
+void gate_header(Gate *gate, const char *name, size_t name_size, const char *value,
+                 size_t value_size);
+
+// 0 if the request may go on, else the HTTP status (400, 403, 414, 421, 501, 505), with the reason
+// in `problem`. 403: another site's page sends a request that is not GET, HEAD or OPTIONS.
+int gate_judge(const Gate *gate, const char *method, const char *target, const char *version,
+               Problem *problem);
+
+// Whether a Host header's value is one of the names, with any port or none.
+bool gate_host_is_ours(const GateHosts *hosts, const char *host, size_t size);
+
+#endif

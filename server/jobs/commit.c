@@ -1,0 +1,382 @@
+// What has run goes to the store without anyone waiting: result and jobs in one transaction,
+// posted.
+//
+//     worker ---- intake_save ----> store ---- saved ----> finished, for all who asked
+//                     ^                          |
+//                     +---- who joined since ----+
+//
+// Only when the store has them are the jobs finished, and the result known. Until then others may
+// join the computation; they get a turn of their own. What is on the way is bounded: workers wait.
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "server/jobs/study.h"
+#include "server/json/encode.h"
+#include "server/util/bytes.h"
+#include "server/util/clock.h"
+#include "server/util/log.h"
+
+// Computations on the way to the store, and the bytes of what they came to.
+enum { SAVING_MAX = 4096, SAVING_BYTES = 256 << 20 };
+
+typedef struct Saving {
+    Intake *intake;
+    Computation *computation;
+    Findings findings;
+    Head *head; // of a successful one
+    size_t bytes;
+    bool is_saved;       // the result is in the store
+    bool is_told;        // that it could not be saved
+    struct Saving *next; // of those that wait for room
+    Job **jobs;          // held: those whose rows are on the way
+    const JobRow **rows;
+    size_t count, room;
+} Saving;
+
+static void saved(void *context, Status status, const char *detail);
+
+bool intake_is_behind(const Intake *intake) {
+    return intake->saving >= SAVING_MAX || intake->saving_bytes >= SAVING_BYTES;
+}
+
+static char *problem_text(Status status, const char *detail) {
+    Problem *problem = malloc(sizeof *problem);
+    if (problem == NULL)
+        return NULL;
+    Bytes bytes = {.most = 1 << 20};
+    problem_clear(problem);
+    problem_set(problem, status, "%s", detail);
+    write_problem(&bytes, problem, write_problem_code(status), NULL);
+    free(problem);
+    return bytes_take(&bytes, NULL);
+}
+
+static bool make_room(Saving *saving, size_t count) {
+    if (count <= saving->room)
+        return true;
+    Job **jobs = realloc(saving->jobs, count * sizeof *jobs);
+    if (jobs == NULL)
+        return false;
+    saving->jobs = jobs;
+    const JobRow **rows = realloc(saving->rows, count * sizeof *rows);
+    if (rows == NULL)
+        return false;
+    saving->rows = rows;
+    saving->room = count;
+    return true;
+}
+
+// With the lock held: the rows as they go to the store, of at most so many jobs that have none on
+// the way.
+static void close_jobs(Saving *saving, size_t most) {
+    const Findings *findings = &saving->findings;
+    const int64_t now_ms = clock_unix_ms(), now_ns = clock_monotonic_ns();
+    size_t count = 0;
+    for (Job *job = saving->computation->jobs; job != NULL; job = job->next_shared)
+        count += !job->is_closing && count < most;
+    saving->count = 0;
+    if (!make_room(saving, count))
+        count = saving->room; // the others get the next turn
+    for (Job *job = saving->computation->jobs; job != NULL && saving->count < count;
+         job = job->next_shared) {
+        if (job->is_closing)
+            continue;
+        intake_withdraw(job);
+        job->is_closing = true;
+        job->closing = job->row;
+        JobRow *row = &job->closing;
+        row->is_unsaved = !job->is_kept;
+        row->state = findings->status == STATUS_OK ? JOB_SUCCESSFUL : JOB_FAILED;
+        row->finished_unix_ms = now_ms;
+        row->run = 1e-9 * (double)(findings->ended_ns - findings->began_ns);
+        row->total = 1e-9 * (double)(now_ns - job->submitted_ns);
+        row->problem = findings->problem == NULL ? NULL : strdup(findings->problem);
+        saving->jobs[saving->count] = job_hold(job);
+        saving->rows[saving->count++] = row;
+    }
+}
+
+// With the lock held.
+static void tell_askers(const Saving *saving) {
+    Intake *intake = saving->intake;
+    Computation *computation = saving->computation;
+    if (computation->askers.count > 0 && saving->findings.status != STATUS_OK) {
+        Failure *failure = &intake->failures[intake->next_failure++ % OUTCOME_FAILURES];
+        text_fit(failure->result, sizeof failure->result, computation->result);
+        text_fit(failure->detail, sizeof failure->detail, saving->findings.detail);
+        failure->status = saving->findings.status;
+    }
+    wakers_call(&computation->askers);
+}
+
+// With the lock held: nobody waits for it any more. saving_free is to follow without the lock.
+static void end(Saving *saving) {
+    Intake *intake = saving->intake;
+    Computation *computation = saving->computation;
+    index_remove(intake->in_flight, &computation->indexed);
+    tell_askers(saving);
+    while (computation->jobs != NULL) {
+        Job *job = computation->jobs;
+        computation->jobs = job->next_shared;
+        job->computation = NULL;
+        job->next_shared = NULL;
+        job_drop(job); // the computation's hold
+    }
+    const bool was_behind = intake_is_behind(intake);
+    intake->saving--;
+    intake->saving_bytes -= saving->bytes;
+    if (was_behind) {
+        pthread_cond_broadcast(&intake->work);
+        pthread_cond_broadcast(&intake->spare_work);
+    }
+}
+
+static void saving_free(Saving *saving) {
+    computation_free(saving->computation);
+    findings_clear(&saving->findings);
+    head_drop(saving->head);
+    free(saving->jobs);
+    free(saving->rows);
+    free(saving);
+}
+
+bool status_is_passing(Status status) {
+    return status == STATUS_IO || status == STATUS_FULL || status == STATUS_BUSY ||
+           status == STATUS_NO_MEMORY;
+}
+
+// With the lock held: the jobs are what the store says they are. If it could not be told of their
+// end, they go on running where `may_wait`; otherwise they are failed here and unfinished there:
+// the next start computes them again. If it never had them, they never were.
+static void publish(Saving *saving, Status status, const char *detail, bool may_wait) {
+    for (size_t i = 0; i < saving->count; i++) {
+        Job *job = saving->jobs[i];
+        if (status != STATUS_OK && !job->is_kept) {
+            free(job->closing.problem);
+            job->closing.problem = NULL;
+            intake_refuse(job, status, detail);
+        } else if (status != STATUS_OK && may_wait) {
+            free(job->closing.problem);
+            job->closing.problem = NULL;
+            job->is_closing = false;
+        } else {
+            job->row = job->closing;
+            job->row.is_unsaved = false;
+            if (status != STATUS_OK) {
+                free(job->row.problem);
+                job->row.problem = problem_text(status, detail);
+                job->row.state = JOB_FAILED;
+                intake_release(job);
+            } else {
+                if (job->row.state == JOB_SUCCESSFUL)
+                    job->head = head_hold(saving->head);
+                job->is_kept = true;
+                intake_retire(job);
+            }
+            totals_ended(&saving->intake->totals, job->row.state, false);
+            wakers_call(&job->wakers);
+            wakers_call(&job->keepers);
+        }
+        job_drop(job); // close_jobs's hold
+    }
+    saving->count = 0;
+}
+
+// A result that can never be saved, because it is too large, makes its jobs failed ones.
+static void give_up(Saving *saving, Status status, const char *detail) {
+    Findings *findings = &saving->findings;
+    free(findings->problem);
+    findings->problem = problem_text(status, detail);
+    findings->status = status;
+    text_fit(findings->detail, sizeof findings->detail, detail);
+    for (size_t i = 0; i < saving->count; i++) {
+        JobRow *row = &saving->jobs[i]->closing;
+        free(row->problem);
+        row->problem = findings->problem == NULL ? NULL : strdup(findings->problem);
+        row->state = JOB_FAILED;
+    }
+}
+
+// With the lock held: whether others will have run in a moment, to be saved together with this.
+static bool is_followed(const Intake *intake) {
+    static const double moment = 5e-3; // [s]
+    return queue_seconds(intake->queue) < moment * (double)queue_count(intake->queue);
+}
+
+// With the lock held.
+static Status post(Saving *saving) {
+    const bool has_result = saving->findings.status == STATUS_OK && !saving->is_saved;
+    const StoreDone done = {saved, saving};
+    const Status status = store_result_post(
+        saving->intake->store, has_result ? &saving->findings.result : NULL, saving->rows,
+        saving->count, is_followed(saving->intake) ? STORE_SOON : STORE_NOW, &done);
+    if (status == STATUS_OK)
+        saving->intake->posted++;
+    return status;
+}
+
+// With the lock held: what waits is on the way to the store, or else this is at its end (false).
+static bool go_on(Saving *saving) {
+    for (;;) {
+        close_jobs(saving, SIZE_MAX);
+        if (saving->count == 0)
+            return false;
+        const Status status = post(saving);
+        if (status == STATUS_OK)
+            return true;
+        publish(saving, status, "no memory to save the job", false);
+    }
+}
+
+// With the lock held: whether it is tried again when there may be room.
+static bool wait_for_room(Saving *saving) {
+    Intake *intake = saving->intake;
+    if (saving->computation->jobs == NULL || intake->is_closing)
+        return false;
+    saving->next = intake->delayed;
+    intake->delayed = saving;
+    return true;
+}
+
+// The store has answered; its writer's thread.
+static void saved(void *context, Status status, const char *detail) {
+    Saving *saving = context;
+    Intake *intake = saving->intake;
+    if (status != STATUS_OK && !saving->is_told) {
+        Bytes line = {.most = 1024};
+        bytes_format(&line, "the result %s could not be saved: %s", saving->computation->result,
+                     detail);
+        journal_write(&line);
+        bytes_clear(&line);
+    }
+    saving->is_told = status != STATUS_OK;
+    pthread_mutex_lock(&intake->lock);
+    bool goes_on;
+    if (status != STATUS_OK && !status_is_passing(status) && saving->findings.status == STATUS_OK) {
+        give_up(saving, status, detail);
+        goes_on = post(saving) == STATUS_OK;
+        if (!goes_on) {
+            publish(saving, STATUS_NO_MEMORY, "no memory to save the job", false);
+            goes_on = go_on(saving);
+        }
+    } else if (status_is_passing(status)) {
+        publish(saving, status, detail, !intake->is_closing);
+        goes_on = wait_for_room(saving) || go_on(saving);
+    } else {
+        // What is in the cache is known, so it must be in the store.
+        if (status == STATUS_OK && saving->findings.status == STATUS_OK) {
+            saving->is_saved = true;
+            cache_put(intake->cache, saving->computation->result, saving->findings.outcome,
+                      saving->head);
+        }
+        publish(saving, status, detail, false);
+        goes_on = go_on(saving);
+    }
+    if (!goes_on)
+        end(saving);
+    intake_settle(intake);
+    pthread_mutex_unlock(&intake->lock);
+    if (!goes_on)
+        saving_free(saving);
+}
+
+void intake_retry(Intake *intake) {
+    Saving *ended = NULL, *next;
+    pthread_mutex_lock(&intake->lock);
+    Saving *saving = intake->delayed;
+    intake->delayed = NULL;
+    for (; saving != NULL; saving = next) {
+        next = saving->next;
+        if (go_on(saving))
+            continue;
+        end(saving);
+        saving->next = ended;
+        ended = saving;
+    }
+    intake_retry_dismissed(intake);
+    studies_resume(intake);
+    pthread_mutex_unlock(&intake->lock);
+    for (; ended != NULL; ended = next) {
+        next = ended->next;
+        saving_free(ended);
+    }
+}
+
+void intake_abandon_delayed(Intake *intake) {
+    while (intake->delayed != NULL) {
+        Saving *saving = intake->delayed;
+        intake->delayed = saving->next;
+        for (Job *job = saving->computation->jobs; job != NULL; job = job->next_shared) {
+            intake_retire(job);
+            wakers_call(&job->wakers);
+        }
+        end(saving);
+        saving_free(saving);
+    }
+}
+
+static size_t text_bytes(const char *text) {
+    return text != NULL ? strlen(text) : 0;
+}
+
+static size_t findings_bytes(const Findings *findings) {
+    const ResultRow *row = &findings->result;
+    return sizeof(Saving) + (findings->outcome != NULL ? outcome_bytes(findings->outcome) : 0) +
+           text_bytes(row->scene) + text_bytes(row->plan) + text_bytes(row->summary) +
+           text_bytes(row->energy) + text_bytes(row->impacts) + text_bytes(row->psd) +
+           text_bytes(row->study);
+}
+
+// With the lock held: without memory for a Saving its jobs are failed here, and computed again at
+// the next start.
+static void lose(Intake *intake, Computation *computation, Findings *findings) {
+    Job *jobs[1];
+    const JobRow *rows[1];
+    Saving saving = {.intake = intake,
+                     .computation = computation,
+                     .findings = *findings,
+                     .jobs = jobs,
+                     .rows = rows,
+                     .room = 1};
+    intake->saving++;
+    for (;;) {
+        close_jobs(&saving, COUNT(jobs));
+        if (saving.count == 0)
+            break;
+        publish(&saving, STATUS_NO_MEMORY, "no memory to save the job", false);
+    }
+    end(&saving);
+}
+
+void intake_save(Intake *intake, Computation *computation, Findings *findings) {
+    Saving *saving = calloc(1, sizeof *saving);
+    if (saving == NULL) {
+        pthread_mutex_lock(&intake->lock);
+        lose(intake, computation, findings);
+        pthread_mutex_unlock(&intake->lock);
+        computation_free(computation);
+        return;
+    }
+    *saving = (Saving){.intake = intake,
+                       .computation = computation,
+                       .findings = *findings,
+                       .bytes = findings_bytes(findings)};
+    *findings = (Findings){0};
+    if (saving->findings.status == STATUS_OK && !computation->is_again)
+        saving->head = head_new(&saving->findings.result);
+    pthread_mutex_lock(&intake->lock);
+    intake->saving++;
+    intake->saving_bytes += saving->bytes;
+    // Only the series was wanted: the result is saved already. But it may have been deleted
+    // meanwhile, and what is in the cache counts as known.
+    if (saving->findings.outcome != NULL && computation->is_again &&
+        store_result_exists(intake->store, computation->result))
+        cache_put(intake->cache, computation->result, saving->findings.outcome, NULL);
+    const bool goes_on = go_on(saving);
+    if (!goes_on)
+        end(saving);
+    pthread_mutex_unlock(&intake->lock);
+    if (!goes_on)
+        saving_free(saving);
+}

@@ -1,0 +1,135 @@
+// draft-ietf-httpapi-idempotency-key-header: the key is a quoted string, "8e03...", but many send
+// it bare. It stands in the job's row, unique for its client, so it lasts as long as the job does.
+// Two requests of one key at once go one behind the other: the second finds the first one's job.
+#include "server/jobs/idempotency.h"
+
+#include <string.h>
+
+#include "server/util/sha256.h"
+
+static Status read_key(const char *text, char key[KEY_MAX + 1], Problem *problem) {
+    size_t size = strlen(text);
+    if (size >= 2 && text[0] == '"' && text[size - 1] == '"') {
+        text++;
+        size -= 2;
+    }
+    bool is_sound = size >= 1 && size <= KEY_MAX;
+    for (size_t i = 0; i < size && is_sound; i++)
+        is_sound = text[i] >= ' ' && text[i] <= '~' && text[i] != '"' && text[i] != '\\';
+    if (!is_sound)
+        return problem_set(problem, STATUS_USAGE,
+                           "Idempotency-Key must be 1 to %d printable ASCII characters without "
+                           "\" and \\, best a UUID in quotes; it has %zu",
+                           KEY_MAX, size);
+    memcpy(key, text, size);
+    key[size] = '\0';
+    return STATUS_OK;
+}
+
+static bool is_taken(const Intake *intake, const KeyHold *hold) {
+    for (const KeyHold *other = intake->keys; other != NULL; other = other->next)
+        if (strcmp(other->key, hold->key) == 0 && strcmp(other->client, hold->client) == 0)
+            return true;
+    return false;
+}
+
+static Status check_same(const KeyHold *hold, const JobRow *row, Problem *problem) {
+    if (row->request != NULL && strcmp(row->request, hold->request) == 0)
+        return STATUS_OK;
+    return problem_set(problem, STATUS_REUSED,
+                       "the Idempotency-Key \"%.80s\" was used with another body, for the job "
+                       "%.40s; take a new key for a new request",
+                       hold->key, row->id);
+}
+
+// With the lock held: *found is the job of that key which the store may not have yet, held, or
+// NULL. Those that it has, or never will have, are let go.
+static Status find_new(Intake *intake, const KeyHold *hold, Job **found, Problem *problem) {
+    Job *same = NULL;
+    for (Job **at = &intake->keyed; *at != NULL;) {
+        Job *job = *at;
+        if (job->is_kept || job->refusal != STATUS_OK) {
+            *at = job->next_keyed;
+            job_drop(job);
+            continue;
+        }
+        const char *client = job->row.client != NULL ? job->row.client : "";
+        if (strcmp(job->row.idempotency_key, hold->key) == 0 && strcmp(client, hold->client) == 0)
+            same = job;
+        at = &job->next_keyed;
+    }
+    *found = NULL;
+    if (same != NULL) {
+        TRY(check_same(hold, &same->row, problem));
+        *found = job_hold(same);
+    }
+    return STATUS_OK;
+}
+
+Status keyed_begin(Intake *intake, const Submission *submission, KeyHold *hold, Job **job,
+                   Problem *problem) {
+    *job = NULL;
+    hold->is_held = false;
+    hold->key[0] = '\0';
+    if (submission->idempotency_key == NULL)
+        return STATUS_OK;
+    hold->client = submission->client != NULL ? submission->client : "";
+    TRY(read_key(submission->idempotency_key, hold->key, problem));
+    Digest *digest = digest_new();
+    if (digest == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
+    if (submission->retry_of != NULL) {
+        digest_take(digest, "retry ", 6);
+        digest_take(digest, submission->retry_of, strlen(submission->retry_of));
+    } else {
+        digest_take(digest, submission->text, submission->size);
+    }
+    digest_end(digest, hold->request);
+
+    pthread_mutex_lock(&intake->lock);
+    while (is_taken(intake, hold))
+        pthread_cond_wait(&intake->keys_free, &intake->lock);
+    hold->next = intake->keys;
+    intake->keys = hold;
+    hold->is_held = true;
+    const Status status = find_new(intake, hold, job, problem);
+    pthread_mutex_unlock(&intake->lock);
+    if (status != STATUS_OK || *job != NULL)
+        return status;
+
+    JobRow row;
+    const Status known =
+        store_job_keyed(intake->store, submission->client, hold->key, &row, problem);
+    if (known == STATUS_NOT_FOUND) {
+        problem_clear(problem);
+        return STATUS_OK;
+    }
+    TRY(known);
+    const Status same = check_same(hold, &row, problem);
+    char id[40];
+    text_fit(id, sizeof id, row.id);
+    job_row_clear(&row);
+    return same == STATUS_OK ? intake_find(intake, id, job, problem) : same;
+}
+
+void keyed_remember(Intake *intake, const KeyHold *hold, Job *job) {
+    if (!hold->is_held)
+        return;
+    pthread_mutex_lock(&intake->lock);
+    job->next_keyed = intake->keyed;
+    intake->keyed = job_hold(job);
+    pthread_mutex_unlock(&intake->lock);
+}
+
+void keyed_end(Intake *intake, KeyHold *hold) {
+    if (!hold->is_held)
+        return;
+    pthread_mutex_lock(&intake->lock);
+    for (KeyHold **at = &intake->keys; *at != NULL; at = &(*at)->next)
+        if (*at == hold) {
+            *at = hold->next;
+            break;
+        }
+    pthread_cond_broadcast(&intake->keys_free);
+    pthread_mutex_unlock(&intake->lock);
+}

@@ -1,0 +1,86 @@
+// Jobs a minute by a bucket that fills steadily and holds a minute's worth. Whoever has no name
+// shares theirs with everybody, so only the queue's own bounds hold for them.
+//
+// When to come back: a place is free when the first of the running computations ends, which is told
+// by its progress, and by what was foretold and how far that is off of late.
+#include "server/jobs/limits.h"
+
+#include <math.h>
+
+#include "server/jobs/study.h"
+#include "server/util/clock.h"
+
+static double allowance(const Intake *intake, const Client *client) {
+    const double most = intake->settings.rate;
+    if (client->allowed_ns == 0)
+        return most;
+    const double passed = 1e-9 * (double)(clock_monotonic_ns() - client->allowed_ns);
+    return fmin(most, client->allowance + passed * most / 60);
+}
+
+Status quota_send(Intake *intake, Client *client, Problem *problem) {
+    if (!(intake->settings.rate > 0) || client->name[0] == '\0')
+        return STATUS_OK;
+    const double left = allowance(intake, client);
+    if (left < 1)
+        return problem_set(problem, STATUS_QUOTA,
+                           "the token \"%.60s\" may send %.6g jobs a minute and has sent them",
+                           client->name, intake->settings.rate);
+    client->allowance = left - 1;
+    client->allowed_ns = clock_monotonic_ns();
+    return STATUS_OK;
+}
+
+Status quota_admit(const Intake *intake, const Client *client, Problem *problem) {
+    const size_t most = intake->settings.quota;
+    if (most == 0 || client->name[0] == '\0' || client->live < most)
+        return STATUS_OK;
+    return problem_set(problem, STATUS_QUOTA,
+                       "the token \"%.60s\" has %zu unfinished jobs, %zu are allowed; wait for "
+                       "them or dismiss some",
+                       client->name, client->live, most);
+}
+
+static bool is_of(const Computation *computation, const Client *client) {
+    for (const Job *job = computation->jobs; job != NULL; job = job->next_shared)
+        if (job->client == client)
+            return true;
+    return false;
+}
+
+// Until `computation`, which runs, will have ended.
+static double left_of(const Intake *intake, Computation *computation) {
+    const double passed = 1e-9 * (double)(clock_monotonic_ns() - computation->began_ns);
+    const double done = atomic_load(&computation->progress) / 10000.0;
+    // The first part of a run may go faster than the rest.
+    const double foretold = computation->queued.seconds * intake->pace - passed;
+    const double seen = done > 0.02 ? passed * (1 - done) / done : 0;
+    return fmax(fmax(foretold, seen), 0);
+}
+
+int intake_retry_after(Intake *intake, const char *name, Status status) {
+    double seconds = 0;
+    pthread_mutex_lock(&intake->lock);
+    const Client *client = queue_client(intake->queue, name != NULL ? name : "");
+    const bool is_own = status == STATUS_QUOTA && client != NULL;
+    const bool is_many = is_own && quota_admit(intake, client, NULL) != STATUS_OK;
+    if (is_own && !is_many && intake->settings.rate > 0) {
+        seconds = (1 - allowance(intake, client)) * 60 / intake->settings.rate;
+    } else {
+        double soonest = INFINITY;
+        for (size_t i = 0; i < intake->worker_count; i++) {
+            Computation *running = intake->workers[i].running;
+            if (running != NULL && (!is_own || is_of(running, client)))
+                soonest = fmin(soonest, left_of(intake, running));
+        }
+        for (const StudyRun *run = intake->studies; run != NULL; run = run->next)
+            if (!is_own || is_of(run->computation, client))
+                soonest = fmin(soonest, left_of(intake, run->computation));
+        // None of its jobs runs: their turn comes within what waits.
+        seconds = isfinite(soonest) ? soonest
+                                    : queue_seconds(intake->queue) * intake->pace /
+                                          (double)intake->settings.workers;
+    }
+    pthread_mutex_unlock(&intake->lock);
+    return seconds < 1 ? 1 : seconds > 3600 ? 3600 : (int)ceil(seconds);
+}

@@ -1,0 +1,21 @@
+// What of the catalogue an inquiry names: the lines that are kept beside its result. Not where they
+// are kept (store/). Used by worker.c when a result is described, and by whoever lists them.
+#ifndef SERVER_JOBS_REFERENCES_H
+#define SERVER_JOBS_REFERENCES_H
+
+#include "core/study/study.h"
+#include "server/util/bytes.h"
+
+// Adds a line for each revision of a material, "sponge@1\n", and each record,
+// "record:elcentro\n", that the prepared scene or its sweep names.
+void uses_write(Bytes *bytes, const StudyRequest *inquiry);
+
+// One of those lines.
+typedef struct Use {
+    char slug[128];
+    unsigned long long revision; // 0: it is of no material
+} Use;
+// Takes the next line off `*lines`; false at their end.
+bool uses_next(const char **lines, Use *use);
+
+#endif

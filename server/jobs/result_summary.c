@@ -1,0 +1,42 @@
+#include "server/jobs/result_summary.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+// The texts stand behind the struct, in one block.
+Head *head_new(const ResultRow *row) {
+    const char *const texts[] = {row->plan, row->summary, row->work, row->notes};
+    size_t bytes = sizeof(Head);
+    for (size_t i = 0; i < COUNT(texts); i++)
+        bytes += texts[i] != NULL ? strlen(texts[i]) + 1 : 0;
+    Head *head = malloc(bytes);
+    if (head == NULL)
+        return NULL;
+    char *at = (char *)(head + 1);
+    const char *copies[COUNT(texts)] = {NULL};
+    for (size_t i = 0; i < COUNT(texts); i++) {
+        if (texts[i] == NULL)
+            continue;
+        const size_t size = strlen(texts[i]) + 1;
+        copies[i] = memcpy(at, texts[i], size);
+        at += size;
+    }
+    head->plan = copies[0];
+    head->summary = copies[1];
+    head->work = copies[2];
+    head->notes = copies[3];
+    head->bytes = bytes;
+    atomic_init(&head->holds, 1);
+    return head;
+}
+
+Head *head_hold(Head *head) {
+    if (head != NULL)
+        atomic_fetch_add(&head->holds, 1);
+    return head;
+}
+
+void head_drop(Head *head) {
+    if (head != NULL && atomic_fetch_sub(&head->holds, 1) == 1)
+        free(head);
+}

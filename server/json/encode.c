@@ -1,0 +1,247 @@
+// One pass over the rows; nothing is built in between. ", " parts members, "," elements of arrays
+// of numbers.
+#include "server/json/encode.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
+
+static void put_members(Bytes *bytes, const Field *fields, const void *item, WriteStyle style,
+                        size_t *count);
+
+static void put_name(Bytes *bytes, const char *name, size_t *count) {
+    if ((*count)++ > 0)
+        bytes_text(bytes, ", ");
+    bytes_json_string(bytes, name);
+    bytes_text(bytes, ": ");
+}
+
+static void put_reals(Bytes *bytes, const Reals *reals) {
+    bytes_text(bytes, "[");
+    for (size_t i = 0; i < reals->count; i++) {
+        if (i > 0)
+            bytes_put(bytes, ",", 1);
+        bytes_real(bytes, reals->at[i]);
+    }
+    bytes_text(bytes, "]");
+}
+
+static void put_rows(Bytes *bytes, const Rows *rows) {
+    bytes_text(bytes, "[");
+    for (size_t i = 0; i < rows->count; i++) {
+        if (i > 0)
+            bytes_text(bytes, ", ");
+        put_reals(bytes, &rows->at[i]);
+    }
+    bytes_text(bytes, "]");
+}
+
+static void put_texts(Bytes *bytes, const Texts *texts, bool is_json) {
+    bytes_text(bytes, "[");
+    for (size_t i = 0; i < texts->count; i++) {
+        if (i > 0)
+            bytes_text(bytes, ", ");
+        if (is_json)
+            bytes_text(bytes, texts->at[i]);
+        else
+            bytes_json_string(bytes, texts->at[i]);
+    }
+    bytes_text(bytes, "]");
+}
+
+static void put_variant(Bytes *bytes, const KindTable *kinds, const Variant *variant,
+                        WriteStyle style) {
+    size_t count = 0;
+    bytes_text(bytes, "{");
+    put_name(bytes, kinds->tag, &count);
+    bytes_json_string(bytes, variant->kind->name);
+    put_members(bytes, variant->kind->fields, variant, style, &count);
+    bytes_text(bytes, "}");
+}
+
+static void put_value(Bytes *bytes, const Field *field, const void *member, WriteStyle style) {
+    switch (field->kind) {
+    case FIELD_KIND_REAL:
+        bytes_real(bytes, *(const double *)member);
+        break;
+    case FIELD_KIND_COUNT:
+        bytes_format(bytes, "%" PRIu64, *(const uint64_t *)member);
+        break;
+    case FIELD_KIND_FLAG:
+        bytes_text(bytes, *(const bool *)member ? "true" : "false");
+        break;
+    case FIELD_KIND_TEXT:
+        bytes_json_string(bytes, *(char *const *)member);
+        break;
+    case FIELD_KIND_CHOICE:
+        bytes_json_string(bytes, field->choices[*(const int *)member]);
+        break;
+    case FIELD_KIND_REALS: {
+        const Reals *reals = member;
+        if ((field->flags & FIELD_LONE) != 0 && reals->count == 1)
+            bytes_real(bytes, reals->at[0]);
+        else
+            put_reals(bytes, reals);
+        break;
+    }
+    case FIELD_KIND_ROWS:
+        put_rows(bytes, member);
+        break;
+    case FIELD_KIND_TEXTS:
+        put_texts(bytes, member, (field->flags & FIELD_SCALARS) != 0);
+        break;
+    case FIELD_KIND_ITEM:
+        write_item(bytes, field->fields, member, style);
+        break;
+    case FIELD_KIND_LIST: {
+        List list;
+        memcpy(&list, member, sizeof list);
+        write_list(bytes, field->fields, list.at, list.count, field->size, style);
+        break;
+    }
+    case FIELD_KIND_VARIANT:
+        put_variant(bytes, field->kinds, *(Variant *const *)member, style);
+        break;
+    case FIELD_KIND_BASE:
+    case FIELD_KIND_REFCOUNT:
+    case FIELD_KIND_END:
+        break;
+    }
+}
+
+// What null empties, and what is empty: left out it would come back with its defaults, or as if
+// nothing were said.
+static bool is_emptied(const Field *field, const void *item) {
+    if (field->kind == FIELD_KIND_TEXT && (field->flags & FIELD_NULL_IS_EMPTY) != 0) {
+        const char *text = *(char *const *)(const void *)((const char *)item + field->offset);
+        return text != NULL && text[0] == '\0';
+    }
+    Field optional = *field;
+    optional.presence = PRESENCE_OPTIONAL;
+    return field->kind == FIELD_KIND_ITEM && (field->flags & FIELD_NULL_IS_EMPTY) != 0 &&
+           field->presence == PRESENCE_DEFAULT && field_is_absent(&optional, item);
+}
+
+static bool is_array(const Field *field) {
+    return field->kind == FIELD_KIND_REALS || field->kind == FIELD_KIND_ROWS ||
+           field->kind == FIELD_KIND_TEXTS || field->kind == FIELD_KIND_LIST;
+}
+
+static void put_members(Bytes *bytes, const Field *fields, const void *item, WriteStyle style,
+                        size_t *count) {
+    for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
+        const void *member = (const char *)item + field->offset;
+        if (field->kind == FIELD_KIND_BASE) {
+            put_members(bytes, field->fields, member, style, count);
+            continue;
+        }
+        const bool is_absent = field_is_absent(field, item);
+        if (is_absent && (style == WRITE_SCENE || (field->flags & FIELD_HIDDEN) != 0))
+            continue;
+        put_name(bytes, field->name, count);
+        if ((is_absent && !is_array(field)) || is_emptied(field, item))
+            bytes_text(bytes, "null");
+        else
+            put_value(bytes, field, member, style);
+    }
+}
+
+size_t write_members(Bytes *bytes, const Field *fields, const void *item, WriteStyle style) {
+    size_t count = 0;
+    put_members(bytes, fields, item, style, &count);
+    return count;
+}
+
+void write_item(Bytes *bytes, const Field *fields, const void *item, WriteStyle style) {
+    bytes_text(bytes, "{");
+    write_members(bytes, fields, item, style);
+    bytes_text(bytes, "}");
+}
+
+void write_list(Bytes *bytes, const Field *fields, const void *at, size_t count, size_t size,
+                WriteStyle style) {
+    bytes_text(bytes, "[");
+    for (size_t i = 0; i < count; i++) {
+        if (i > 0)
+            bytes_text(bytes, ", ");
+        write_item(bytes, fields, (const char *)at + i * size, style);
+    }
+    bytes_text(bytes, "]");
+}
+
+static void put_text_member(Bytes *bytes, const char *name, const char *text, size_t *count) {
+    put_name(bytes, name, count);
+    bytes_json_string(bytes, text);
+}
+
+static void put_fault(Bytes *bytes, const Fault *fault) {
+    size_t count = 0;
+    bytes_text(bytes, "{");
+    put_text_member(bytes, "pointer", fault->pointer, &count);
+    put_name(bytes, "value", &count);
+    bytes_text(bytes, fault->value[0] != '\0' ? fault->value : "null");
+    put_text_member(bytes, "detail", fault->detail, &count);
+    if (fault->unit[0] != '\0')
+        put_text_member(bytes, "unit", fault->unit, &count);
+    if (fault->did_you_mean[0] != '\0')
+        put_text_member(bytes, "did_you_mean", fault->did_you_mean, &count);
+    if (fault->row > 0) {
+        put_name(bytes, "row", &count);
+        bytes_format(bytes, "%zu", fault->row);
+        put_text_member(bytes, "column", fault->column, &count);
+    }
+    bytes_text(bytes, "}");
+}
+
+int write_problem_code(Status status) {
+    // clang-format off
+    static const int codes[STATUS_COUNT] = {
+        [STATUS_OK] = 200,             [STATUS_UNREADABLE] = 400,     [STATUS_INVALID] = 422,
+        [STATUS_USAGE] = 400,          [STATUS_TOO_LARGE] = 413,      [STATUS_UNSUPPORTED_TYPE] = 415,
+        [STATUS_NOT_ACCEPTABLE] = 406, [STATUS_UNAUTHORIZED] = 401,   [STATUS_FORBIDDEN] = 403,
+        [STATUS_NOT_FOUND] = 404,      [STATUS_METHOD] = 405,         [STATUS_CONFLICT] = 409,
+        [STATUS_UNCONDITIONAL] = 428, [STATUS_STALE] = 412, [STATUS_GONE] = 410,           [STATUS_TIMEOUT] = 504,        [STATUS_BUSY] = 503,
+        [STATUS_CANCELLED] = 409,      [STATUS_LIMIT] = 422,          [STATUS_UNSTABLE] = 422,
+        [STATUS_QUOTA] = 429,          [STATUS_REUSED] = 422,         [STATUS_FULL] = 507,
+        [STATUS_NO_MEMORY] = 500,      [STATUS_IO] = 500,             [STATUS_INTERNAL] = 500,
+        [STATUS_UNREACHABLE] = 502,
+    };
+    // clang-format on
+    return (size_t)status < COUNT(codes) && codes[status] != 0 ? codes[status] : 500;
+}
+
+void write_problem(Bytes *bytes, const Problem *problem, int status_code, const char *instance) {
+    size_t count = 0;
+    bytes_text(bytes, "{");
+    put_name(bytes, "type", &count);
+    bytes_format(bytes, "\"/problems/%s\"", status_slug(problem->status));
+    put_name(bytes, "title", &count);
+    if (problem->status == STATUS_INVALID && problem->count > 0)
+        bytes_format(bytes, "\"The %s has %zu fault%s\"",
+                     problem->whose != NULL ? problem->whose : "scene", problem->count,
+                     problem->count == 1 ? "" : "s");
+    else
+        bytes_json_string(bytes, status_title(problem->status));
+    put_name(bytes, "status", &count);
+    bytes_format(bytes, "%d", status_code);
+    const char *detail = problem->detail;
+    if (detail[0] == '\0')
+        detail = problem->count > 0 ? problem->faults[0].detail : status_title(problem->status);
+    put_text_member(bytes, "detail", detail, &count);
+    if (instance != NULL)
+        put_text_member(bytes, "instance", instance, &count);
+    if (problem->count > 0) {
+        put_name(bytes, "errors", &count);
+        bytes_text(bytes, "[");
+        for (size_t i = 0; i < problem->count && i < PROBLEM_FAULTS; i++) {
+            bytes_text(bytes, i > 0 ? ", " : "");
+            put_fault(bytes, &problem->faults[i]);
+        }
+        bytes_text(bytes, "]");
+    }
+    if (problem->count > PROBLEM_FAULTS) {
+        put_name(bytes, "more", &count);
+        bytes_format(bytes, "%zu", problem->count - PROBLEM_FAULTS);
+    }
+    bytes_text(bytes, "}");
+}

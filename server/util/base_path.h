@@ -1,0 +1,22 @@
+// Addresses of our own as answers tell them: "/v1/jobs/..." behind the path that a proxy may put
+// before it. The one place that knows that path; set once, before there are threads. Not routes.
+// Used by everything that writes links.
+#ifndef SERVER_UTIL_BASE_PATH_H
+#define SERVER_UTIL_BASE_PATH_H
+
+#include <stddef.h>
+
+enum { LINK_BASE_SIZE = 64 };
+
+// "/sim", or "" for none; at most LINK_BASE_SIZE - 1 bytes of it. A link is written as "%s/v1/...".
+void link_base_set(const char *path);
+const char *link_base(void);
+
+// Puts the base before `text` if it is a path, and before each "</path>" in it: headers Location
+// and Link. Left as it is where it would not fit.
+void link_apply(char *text, size_t size);
+
+// `path` without the base, if it begins with it.
+const char *link_inside(const char *path);
+
+#endif

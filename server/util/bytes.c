@@ -1,0 +1,204 @@
+// One block, doubled when it is full. A NUL stands behind the bytes at all times, and is not
+// counted.
+#include "server/util/bytes.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "server/util/dtoa.h"
+
+enum { FIRST_ROOM = 256, CHUNK = 4096 }; // bytes; numbers that room is made for at once
+
+static bool fail(Bytes *bytes) {
+    free(bytes->at);
+    *bytes = (Bytes){.most = bytes->most, .is_failed = true};
+    return false;
+}
+
+void bytes_clear(Bytes *bytes) {
+    free(bytes->at);
+    *bytes = (Bytes){.most = bytes->most};
+}
+
+bool bytes_reserve(Bytes *bytes, size_t more) {
+    if (bytes->is_failed)
+        return false;
+    const size_t most = bytes->most != 0 ? bytes->most : SIZE_MAX / 2;
+    if (bytes->count > most || more > most - bytes->count)
+        return fail(bytes);
+    const size_t wanted = bytes->count + more + 1;
+    if (wanted <= bytes->room)
+        return true;
+    size_t room = bytes->room > 0 ? bytes->room : FIRST_ROOM;
+    while (room < wanted)
+        room = room <= SIZE_MAX / 2 ? 2 * room : wanted;
+    // The last doubling stops at the limit.
+    if (room > most)
+        room = most + 1;
+    char *at = realloc(bytes->at, room);
+    if (at == NULL)
+        return fail(bytes);
+    at[bytes->count] = '\0';
+    bytes->at = at;
+    bytes->room = room;
+    return true;
+}
+
+void bytes_put(Bytes *bytes, const void *data, size_t size) {
+    if (!bytes_reserve(bytes, size) || size == 0)
+        return;
+    memcpy(bytes->at + bytes->count, data, size);
+    bytes->count += size;
+    bytes->at[bytes->count] = '\0';
+}
+
+void bytes_text(Bytes *bytes, const char *text) {
+    bytes_put(bytes, text, strlen(text));
+}
+
+void bytes_format(Bytes *bytes, const char *format, ...) {
+    if (bytes->is_failed)
+        return;
+    char text[512];
+    va_list arguments, again;
+    va_start(arguments, format);
+    va_copy(again, arguments);
+    const int length = vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    if (length < 0) {
+        fail(bytes);
+    } else if ((size_t)length < sizeof text) {
+        bytes_put(bytes, text, (size_t)length);
+    } else if (bytes_reserve(bytes, (size_t)length)) {
+        vsnprintf(bytes->at + bytes->count, (size_t)length + 1, format, again);
+        bytes->count += (size_t)length;
+    }
+    va_end(again);
+}
+
+void bytes_real(Bytes *bytes, double value) {
+    char digits[SHORTEST_SIZE];
+    if (isfinite(value))
+        bytes_put(bytes, digits, shortest_write(digits, value));
+    else
+        bytes_put(bytes, "null", 4);
+}
+
+void bytes_reals(Bytes *bytes, const double *values, size_t count) {
+    for (size_t i = 0; i < count; i += CHUNK) {
+        const size_t some = count - i < CHUNK ? count - i : CHUNK;
+        if (!bytes_reserve(bytes, some * (SHORTEST_SIZE + 1) + 1))
+            return;
+        char *at = bytes->at + bytes->count;
+        if (i > 0)
+            *at++ = ',';
+        at += shortest_list(at, values + i, some);
+        *at = '\0';
+        bytes->count = (size_t)(at - bytes->at);
+    }
+}
+
+// The length of the UTF-8 character at `text`, 0 where there is none: cut short, overlong, a
+// surrogate, too large.
+static size_t character_length(const unsigned char *text) {
+    static const struct {
+        unsigned char first, last, second_min, second_max, length;
+    } forms[] = {{0xC2, 0xDF, 0x80, 0xBF, 2}, {0xE0, 0xE0, 0xA0, 0xBF, 3},
+                 {0xE1, 0xEC, 0x80, 0xBF, 3}, {0xED, 0xED, 0x80, 0x9F, 3},
+                 {0xEE, 0xEF, 0x80, 0xBF, 3}, {0xF0, 0xF0, 0x90, 0xBF, 4},
+                 {0xF1, 0xF3, 0x80, 0xBF, 4}, {0xF4, 0xF4, 0x80, 0x8F, 4}};
+    if (text[0] < 0x80)
+        return 1;
+    for (size_t i = 0; i < sizeof forms / sizeof forms[0]; i++) {
+        if (text[0] < forms[i].first || text[0] > forms[i].last)
+            continue;
+        if (text[1] < forms[i].second_min || text[1] > forms[i].second_max)
+            return 0;
+        for (size_t k = 2; k < forms[i].length; k++)
+            if ((text[k] & 0xC0) != 0x80)
+                return 0;
+        return forms[i].length;
+    }
+    return 0;
+}
+
+bool text_is_utf8(const char *text) {
+    const unsigned char *at = (const unsigned char *)text;
+    for (size_t length; *at != '\0'; at += length)
+        if ((length = character_length(at)) == 0)
+            return false;
+    return true;
+}
+
+static bool is_plain(unsigned char c) {
+    return c >= 0x20 && c < 0x7F && c != '"' && c != '\\';
+}
+
+static void put_escape(Bytes *bytes, unsigned char c) {
+    static const char from[] = "\"\\\b\f\n\r\t", to[] = "\"\\bfnrt";
+    const char *short_form = strchr(from, c);
+    if (short_form != NULL)
+        bytes_put(bytes, (const char[]){'\\', to[short_form - from]}, 2);
+    else
+        bytes_format(bytes, "\\u%04x", (unsigned)c);
+}
+
+void bytes_json_string(Bytes *bytes, const char *text) {
+    if (text == NULL) {
+        bytes_text(bytes, "null");
+        return;
+    }
+    bytes_put(bytes, "\"", 1);
+    const unsigned char *at = (const unsigned char *)text;
+    while (*at != '\0') {
+        const unsigned char *start = at;
+        while (is_plain(*at))
+            at++;
+        bytes_put(bytes, start, (size_t)(at - start));
+        if (*at == '\0')
+            break;
+        const size_t length = character_length(at);
+        if (length == 0)
+            bytes_put(bytes, "\xEF\xBF\xBD",
+                      3); // U+FFFD: what we write is JSON whatever we were given
+        else if (length == 1)
+            put_escape(bytes, *at);
+        else
+            bytes_put(bytes, at, length);
+        at += length > 0 ? length : 1;
+    }
+    bytes_put(bytes, "\"", 1);
+}
+
+void bytes_percent(Bytes *bytes, const char *text) {
+    for (; *text != '\0'; text++) {
+        const unsigned char c = (unsigned char)*text;
+        if ((c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') ||
+            strchr("-._~", c) != NULL)
+            bytes_put(bytes, text, 1);
+        else
+            bytes_format(bytes, "%%%02X", (unsigned)c);
+    }
+}
+
+size_t bytes_hand(const Bytes *bytes, size_t *taken, char *target, size_t size) {
+    const size_t left = bytes->count - *taken, count = left < size ? left : size;
+    if (count > 0)
+        memcpy(target, bytes->at + *taken, count);
+    *taken += count;
+    return count;
+}
+
+char *bytes_take(Bytes *bytes, size_t *size) {
+    const bool is_whole = bytes_reserve(bytes, 0);
+    char *at = is_whole ? bytes->at : NULL;
+    if (size != NULL)
+        *size = is_whole ? bytes->count : 0;
+    if (is_whole)
+        *bytes = (Bytes){.most = bytes->most};
+    return at;
+}

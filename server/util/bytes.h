@@ -1,0 +1,40 @@
+// A growing buffer of bytes with a limit it is born with; text is built in it. Once it failed
+// (limit or memory) it stays failed and empty, so that writers need not check each call. Used by
+// everything in server/ that writes.
+#ifndef SERVER_UTIL_BYTES_H
+#define SERVER_UTIL_BYTES_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+typedef struct Bytes {
+    char *at;     // NUL-terminated when not NULL
+    size_t count; // without the NUL
+    size_t room;
+    size_t most; // of count; 0: no limit
+    bool is_failed;
+} Bytes;
+
+void bytes_clear(Bytes *bytes); // empty and sound again, under the same limit
+void bytes_put(Bytes *bytes, const void *data, size_t size);
+void bytes_text(Bytes *bytes, const char *text);
+void bytes_format(Bytes *bytes, const char *format, ...) __attribute__((format(printf, 2, 3)));
+bool bytes_reserve(Bytes *bytes, size_t more); // room for `more` beyond count; false once failed
+// The shortest digits that read back to the same double; "null" where it is not finite.
+void bytes_real(Bytes *bytes, double value);
+// Many of them, with commas between; room is made for thousands at once.
+void bytes_reals(Bytes *bytes, const double *values, size_t count);
+// Quoted and escaped; NULL is null, bad UTF-8 becomes U+FFFD.
+void bytes_json_string(Bytes *bytes, const char *text);
+// Whether all of a text is UTF-8.
+bool text_is_utf8(const char *text);
+// As part of a URL's query: what is not a letter, a digit or one of -._~ as %XX.
+void bytes_percent(Bytes *bytes, const char *text);
+// What is left behind the first *taken bytes, as much as fits, to target[size]; *taken moves on.
+// Returns how many.
+size_t bytes_hand(const Bytes *bytes, size_t *taken, char *target, size_t size);
+// Takes the text out ("" if there is none), leaving the buffer empty; the caller frees it with
+// free(). NULL if failed.
+char *bytes_take(Bytes *bytes, size_t *size);
+
+#endif

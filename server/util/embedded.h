@@ -1,0 +1,25 @@
+// Files that stand inside the binary, written by server/embed.cmake: SQL, schemas, examples, the
+// dashboard. Not a file system: the rows are constant and nothing is read from disk. Used by store/
+// (sql) and by whoever serves the others.
+#ifndef SERVER_UTIL_EMBEDDED_H
+#define SERVER_UTIL_EMBEDDED_H
+
+#include <stddef.h>
+
+typedef struct EmbeddedFile {
+    const char *path;   // from the project's folder: "schema/sql/001_start.sql"
+    const char *bytes;  // a NUL follows the last one
+    size_t size;        // without that NUL
+    const char *digest; // half of its SHA-256, in hexadecimal
+} EmbeddedFile;
+
+// Each table is sorted by path and ends with path == NULL.
+extern const EmbeddedFile embedded_sql[];      // schema/sql/*.sql
+extern const EmbeddedFile embedded_schemas[];  // schema/*.json
+extern const EmbeddedFile embedded_examples[]; // schema/examples/*.json
+extern const EmbeddedFile embedded_web[];      // web/, all that a browser loads
+
+// The row of that path, NULL if there is none.
+const EmbeddedFile *embedded_find(const EmbeddedFile *table, const char *path);
+
+#endif

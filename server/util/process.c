@@ -1,0 +1,67 @@
+#include "server/util/process.h"
+
+#include <dirent.h>
+#include <malloc.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+static uint64_t resident(void) {
+    char text[128] = "";
+    FILE *file = fopen("/proc/self/statm", "r");
+    if (file == NULL)
+        return 0;
+    const char *line = fgets(text, sizeof text, file);
+    fclose(file);
+    // Size and resident pages.
+    const char *second = line != NULL ? strchr(line, ' ') : NULL;
+    return second == NULL ? 0 : strtoull(second, NULL, 10) * (uint64_t)sysconf(_SC_PAGESIZE);
+}
+
+static uint64_t open_files(void) {
+    DIR *folder = opendir("/proc/self/fd");
+    if (folder == NULL)
+        return 0;
+    uint64_t count = 0;
+    for (const struct dirent *entry; (entry = readdir(folder)) != NULL;)
+        count += entry->d_name[0] != '.';
+    closedir(folder);
+    return count - 1; // the folder's own
+}
+
+static double seconds(struct timeval time) {
+    return (double)time.tv_sec + 1e-6 * (double)time.tv_usec;
+}
+
+void process_facts(ProcessFacts *facts) {
+    struct rusage usage = {0};
+    struct rlimit limit = {0};
+    *facts = (ProcessFacts){.resident_bytes = resident(), .open_files = open_files()};
+    if (getrusage(RUSAGE_SELF, &usage) == 0)
+        facts->cpu_seconds = seconds(usage.ru_utime) + seconds(usage.ru_stime);
+    if (getrlimit(RLIMIT_NOFILE, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY)
+        facts->open_files_most = limit.rlim_cur;
+}
+
+// By default the C library has up to 8 arenas a processor and keeps, for each, twice the largest
+// block that was ever freed. More arenas than processors only spread the holes: with 2 for 28
+// threads 95 MB stayed resident where 190 MB did.
+void process_return_memory(void) {
+    enum { KEPT = 8 << 20 };
+    const long processors = sysconf(_SC_NPROCESSORS_ONLN);
+    mallopt(M_ARENA_MAX, processors > 2 && processors < 1024 ? (int)processors : 2);
+    mallopt(M_MMAP_THRESHOLD, KEPT);
+    mallopt(M_TRIM_THRESHOLD, KEPT);
+}
+
+// Small blocks in use keep the free ones between them from going back by themselves.
+void process_trim_memory(uint64_t *taken) {
+    enum { PAGES = 4096 }; // 16 MB, in some milliseconds
+    struct rusage usage = {0};
+    if (getrusage(RUSAGE_SELF, &usage) != 0 || (uint64_t)usage.ru_minflt - *taken < PAGES)
+        return;
+    malloc_trim(0);
+    *taken = (uint64_t)usage.ru_minflt;
+}

@@ -1,0 +1,156 @@
+// A copy of the database from inside: under a writer in the same process, and stopped at every
+// moment.
+#include <dirent.h>
+#include <poll.h>
+#include <pthread.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdatomic.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "server/db/backup.h"
+#include "server/db/db.h"
+#include "tests/support/scratch.h"
+
+static char data[SCRATCH_SIZE], target[SCRATCH_SIZE];
+static Problem problem;
+
+static int folders_make(void **state) {
+    (void)state;
+    scratch_make(data);
+    scratch_make(target);
+    return 0;
+}
+
+static int folders_remove(void **state) {
+    (void)state;
+    scratch_remove(data);
+    scratch_remove(target);
+    return 0;
+}
+
+static Store *open_store(const char *folder) {
+    Store *store;
+    problem_clear(&problem);
+    if (store_open(folder, &store, &problem) != STATUS_OK)
+        fail_msg("%s", problem.detail);
+    return store;
+}
+
+static JobRow job_row(unsigned long number) {
+    JobRow row = {.state = 2, .created_unix_ms = 1000, .scene = "{}", .warnings = "[]"};
+    snprintf(row.id, sizeof row.id, "j-%08lu", number);
+    return row;
+}
+
+static Status copy(const Progress *watch, Backup *backup) {
+    char path[SCRATCH_SIZE + 16];
+    snprintf(path, sizeof path, "%s/impactd.db", target);
+    problem_clear(&problem);
+    return backup_write(&(BackupRequest){data, path, true, watch}, backup, &problem);
+}
+
+static size_t files_in(const char *folder) {
+    DIR *opened = opendir(folder);
+    size_t count = 0;
+    for (const struct dirent *one; (one = readdir(opened)) != NULL;)
+        count += one->d_name[0] != '.';
+    closedir(opened);
+    return count;
+}
+
+typedef struct Stream {
+    Store *store;
+    atomic_ulong added; // rows that are acknowledged
+    atomic_bool is_over;
+} Stream;
+
+static void *stream(void *of) {
+    Stream *rows = of;
+    for (unsigned long number = 0; !atomic_load(&rows->is_over); number++) {
+        const JobRow row = job_row(number);
+        if (store_job_add(rows->store, &row, NULL) != STATUS_OK)
+            break;
+        atomic_store(&rows->added, number + 1);
+    }
+    return NULL;
+}
+
+static void every_row_that_was_added_before_is_in_the_copy(void **state) {
+    (void)state;
+    Stream rows = {.store = open_store(data)};
+    pthread_t thread;
+    assert_int_equal(pthread_create(&thread, NULL, stream, &rows), 0);
+    unsigned long last = 0;
+    for (int round = 0; round < 6; round++) {
+        Backup backup;
+        while (atomic_load(&rows.added) < last + 200)
+            (void)poll(NULL, 0, 1);
+        last = atomic_load(&rows.added);
+        if (copy(NULL, &backup) != STATUS_OK)
+            fail_msg("%s", problem.detail);
+        assert_true(backup.jobs >= last);
+        Store *store = open_store(target);
+        for (unsigned long number = last > 300 ? last - 300 : 0; number < last; number++) {
+            const JobRow row = job_row(number);
+            JobRow loaded;
+            assert_int_equal(store_job_load(store, row.id, &loaded, NULL), STATUS_OK);
+            job_row_clear(&loaded);
+        }
+        store_close(store);
+    }
+    atomic_store(&rows.is_over, true);
+    pthread_join(thread, NULL);
+    store_close(rows.store);
+}
+
+static bool stop_at(void *context, double fraction) {
+    int *left = context;
+    assert_true(fraction >= 0 && fraction <= 1);
+    return (*left)-- > 0;
+}
+
+static void stopped_at_any_moment_it_leaves_nothing(void **state) {
+    (void)state;
+    enum { TITLE = 60000, JOBS = 40 }; // some steps of copying
+    Store *store = open_store(data);
+    char *title = calloc(1, TITLE);
+    memset(title, 'x', TITLE - 1);
+    for (unsigned long number = 0; number < JOBS; number++) {
+        JobRow row = job_row(number);
+        row.title = title;
+        assert_int_equal(store_job_add(store, &row, NULL), STATUS_OK);
+    }
+    free(title);
+    Status status = STATUS_CANCELLED;
+    int moment = 0;
+    for (; status == STATUS_CANCELLED && moment < 10000; moment++) {
+        int left = moment;
+        Backup backup;
+        status = copy(&(Progress){&left, stop_at}, &backup);
+        if (status == STATUS_CANCELLED) {
+            assert_int_equal(files_in(target), 0);
+            assert_int_equal(backup.jobs, 0);
+        }
+    }
+    assert_int_equal(status, STATUS_OK);
+    assert_true(moment > 5);
+    assert_int_equal(files_in(target), 1);
+    store_close(store);
+}
+
+#define IN_FOLDERS(test) cmocka_unit_test_setup_teardown(test, folders_make, folders_remove)
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        IN_FOLDERS(every_row_that_was_added_before_is_in_the_copy),
+        IN_FOLDERS(stopped_at_any_moment_it_leaves_nothing),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,292 @@
+// Materials in the database: what is added comes back, nobody changes what was said, and databases
+// of before go on.
+#include "server/db/materials.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "core/contact/contact.h"
+#include "server/db/row.h"
+#include "server/db/sqlite.h"
+#include "server/util/embedded.h"
+#include "tests/support/felt.h"
+#include "tests/support/scratch.h"
+
+static char folder[SCRATCH_SIZE];
+
+static int make_folder(void **state) {
+    (void)state;
+    scratch_make(folder);
+    return 0;
+}
+
+static int remove_folder(void **state) {
+    (void)state;
+    scratch_remove(folder);
+    return 0;
+}
+
+static void a_revision_comes_back_as_it_went(void **state) {
+    (void)state;
+    Store *store = felt_store(folder);
+    MaterialRevision whole = felt_saying(0.5), found;
+    Material *said = &whole.material;
+    said->kind = "foam";
+    said->hardness = "Shore A 40";
+    said->supplier = "Acme";
+    said->notes = "a\nb\t\"c\"";
+    said->impactor = "steel ball";
+    said->thickness = 0.004;
+    said->restitution_deviation = 0.01;
+    said->contact_time = 0.02;
+    said->contact_time_deviation = 0.001;
+    said->separation = SEPARATION_ZERO_FORCE;
+    said->least_speed = 0.1;
+    said->most_speed = 1.0 / 3;
+    said->least_temperature = -5;
+    said->most_temperature = 20;
+    said->impactor_mass = 0.11;
+    said->base = MATERIAL_BASE_FREE;
+    said->base_mass = 7;
+    whole.author = "ann";
+    assert_int_equal(store_material_add(store, &whole, NULL), STATUS_OK);
+    assert_int_equal(store_material_add(store, &whole, NULL), STATUS_CONFLICT);
+    MaterialRevision bare = felt_saying(0.4);
+    bare.lists = NULL;
+    assert_int_equal(store_material_revise(store, &bare, 1, NULL), STATUS_OK);
+    assert_int_equal(bare.revision, 2);
+    store_close(store);
+
+    store = felt_store(folder);
+    assert_int_equal(store_material(store, "felt", 1, &found, NULL), STATUS_OK);
+    assert_string_equal(found.material.notes, said->notes);
+    assert_string_equal(found.material.hardness, said->hardness);
+    assert_string_equal(found.material.impactor, said->impactor);
+    assert_true(found.material.most_speed == 1.0 / 3 && found.material.least_temperature == -5);
+    assert_true(found.material.thickness == 0.004 && found.material.base_mass == 7);
+    assert_int_equal(found.material.separation, SEPARATION_ZERO_FORCE);
+    assert_int_equal(found.material.base, MATERIAL_BASE_FREE);
+    assert_string_equal(found.lists, whole.lists);
+    assert_string_equal(found.author, "ann");
+    assert_string_equal(found.status, "draft");
+    assert_null(found.reason);
+    assert_int_equal(found.created_unix_ms, 5000);
+    assert_int_equal(found.latest, 2);
+    assert_int_equal(found.version, 2);
+    material_revision_clear(&found);
+    assert_int_equal(store_material(store, "felt", 2, &found, NULL), STATUS_OK);
+    assert_null(found.lists);
+    assert_null(found.author);
+    assert_null(found.material.kind);
+    assert_true(isnan(found.material.contact_time) && isnan(found.material.base_mass));
+    assert_int_equal(found.material.base, CHOICE_ABSENT);
+    material_revision_clear(&found);
+    store_close(store);
+}
+
+static Database *open_database(void) {
+    char path[128];
+    Database *database;
+    snprintf(path, sizeof path, "%s/impactd.db", folder);
+    assert_int_equal(database_open(path, DATABASE_WRITER, &database, NULL), STATUS_OK);
+    return database;
+}
+
+// All that the materials' tables hold, as one text.
+static char *dump(Database *database) {
+    static const char sql[] =
+        "SELECT (SELECT group_concat(json_array(number, slug)) FROM materials) || "
+        "(SELECT group_concat(json_array(number, material, revision, name, kind, thickness, "
+        "hardness, supplier, notes, restitution, restitution_deviation, contact_time, "
+        "contact_time_deviation, separation, least_speed, most_speed, least_temperature, "
+        "most_temperature, impactor, impactor_mass, base, base_mass, source, lists, reverts, "
+        "author, comment, created_unix_ms)) FROM material_revisions) || "
+        "(SELECT group_concat(json_array(number, material, revision, status, reason, reviewer, "
+        "created_unix_ms)) FROM material_reviews) || "
+        "(SELECT group_concat(json_array(number, material, measurement, author, comment, "
+        "created_unix_ms, document)) FROM material_measurements) || "
+        "(SELECT group_concat(json_array(number, material, version, action, revision, measurement, "
+        "who, why, created_unix_ms)) FROM material_trail) AS text";
+    static const RowColumn columns[] = {{.name = "text", .kind = COLUMN_TEXT}, ROW_END};
+    Statement *statement;
+    bool has_row = false;
+    char *text = NULL;
+    assert_int_equal(statement_begin(database, sql, NULL, NULL, &statement, NULL), STATUS_OK);
+    assert_int_equal(statement_step(statement, &has_row, NULL), STATUS_OK);
+    assert_true(has_row);
+    assert_int_equal(row_read(statement, columns, &text, NULL), STATUS_OK);
+    statement_end(statement);
+    assert_non_null(text);
+    return text;
+}
+
+static void no_sql_changes_what_was_said(void **state) {
+    (void)state;
+    static const char *const tables[] = {"materials", "material_revisions", "material_reviews",
+                                         "material_measurements", "material_trail"};
+    static const char *const harm[] = {
+        "UPDATE %s SET number = number",
+        "UPDATE OR REPLACE %s SET number = 1",
+        "UPDATE OR IGNORE %s SET number = number + 1000",
+        "DELETE FROM %s",
+        "DELETE FROM %s WHERE number = 1",
+        "INSERT OR REPLACE INTO %s SELECT * FROM %s",
+        "REPLACE INTO %s SELECT * FROM %s LIMIT 1",
+        "INSERT INTO %s SELECT * FROM %s",
+        "INSERT OR REPLACE INTO %s SELECT * FROM %s ORDER BY number DESC",
+        "INSERT INTO %s SELECT * FROM %s WHERE true ON CONFLICT DO UPDATE SET number = "
+        "excluded.number + 1000",
+        "PRAGMA foreign_keys = OFF; DELETE FROM %s",
+        "PRAGMA recursive_triggers = OFF; PRAGMA ignore_check_constraints = ON; REPLACE INTO %s "
+        "SELECT * FROM %s",
+        "PRAGMA writable_schema = ON; DELETE FROM sqlite_schema WHERE type = 'trigger' AND "
+        "tbl_name "
+        "= '%s'",
+        "PRAGMA writable_schema = ON; UPDATE sqlite_schema SET sql = '' WHERE tbl_name = '%s'",
+        "UPDATE sqlite_schema SET rootpage = 1 WHERE name = '%s'"};
+    static const char *const named[] = {
+        "UPDATE material_revisions SET restitution = 0.9 WHERE revision = 1",
+        "UPDATE material_revisions SET comment = comment || '!'",
+        "UPDATE materials SET slug = 'other' WHERE slug = 'felt'",
+        "UPDATE material_measurements SET document = '{}'",
+        "UPDATE material_trail SET who = 'me'",
+        "UPDATE material_reviews SET status = 'deprecated'",
+        "INSERT OR REPLACE INTO material_revisions (material, revision, name, restitution, source, "
+        "comment, created_unix_ms) SELECT material, revision, name, 0.9, source, comment, 0 FROM "
+        "material_revisions",
+        "INSERT OR REPLACE INTO material_measurements (material, measurement, comment, "
+        "created_unix_ms, document) SELECT material, measurement, 'x', 0, '[]' FROM "
+        "material_measurements",
+        "INSERT OR REPLACE INTO materials (slug) VALUES ('felt')",
+        ("INSERT OR REPLACE INTO material_trail (material, version, action, why, created_unix_ms) "
+         "SELECT material, version, 'revise', 'x', 0 FROM material_trail"),
+        "UPDATE material_states SET restitution = 0.9",
+        "DELETE FROM material_states",
+        "INSERT INTO material_states (slug) VALUES ('felt')"};
+    Store *store = felt_store(folder);
+    MaterialRevision one = felt_saying(0.5);
+    MaterialMeasurement drop = {.slug = "felt", .comment = "c", .document = "{\"a\": 1}"};
+    assert_int_equal(store_material_add(store, &one, NULL), STATUS_OK);
+    assert_int_equal(store_material_measure(store, &drop, ANY_VERSION, NULL), STATUS_OK);
+    assert_int_equal(felt_review(store, 1, "approved", NULL, ANY_VERSION), STATUS_OK);
+    store_close(store);
+
+    Database *database = open_database();
+    char *before = dump(database);
+    for (size_t i = 0; i < COUNT(harm); i++)
+        for (size_t k = 0; k < COUNT(tables); k++) {
+            char sql[400];
+            snprintf(sql, sizeof sql, harm[i], tables[k], tables[k]);
+            if (database_execute(database, sql, NULL) == STATUS_OK)
+                fail_msg("taken: %s", sql);
+        }
+    for (size_t i = 0; i < COUNT(named); i++)
+        if (database_execute(database, named[i], NULL) == STATUS_OK)
+            fail_msg("taken: %s", named[i]);
+    char *after = dump(database);
+    assert_string_equal(before, after);
+    free(before);
+    free(after);
+    database_close(database);
+}
+
+// A result on "sponge@1" and a revision of somebody's, as each step has them.
+static const char data_of_before[] =
+    "INSERT INTO material_revisions (material, revision, name, restitution, contact_time, source, "
+    "created_unix_ms) VALUES (1, 2, 'Sponge, new', 0.55, NULL, 'us', 77);"
+    "INSERT INTO material_reviews (material, revision, status, reason, created_unix_ms) VALUES "
+    "(1, 2, 'approved', 'better', 78), (1, 1, 'deprecated', 'old', 79);"
+    "INSERT INTO results (id, engine, sample_rate, count, created_unix_ms, summary, plan, "
+    "warnings, energy, scene, impacts) VALUES ('r-1', 'e', 10, 11, 80, '{}', '{}', '[]', '{}', "
+    "'{\"dampers\": [{\"left_buffer\": {\"material\": \"sponge@1\"}, \"right_buffer\": "
+    "{\"material\": \"sponge@1\"}}], \"title\": \"a@b\"}', '{}')";
+
+static void check_migrated(Store *store) {
+    MaterialRevision found;
+    assert_int_equal(store_material(store, "sponge", 0, &found, NULL), STATUS_OK);
+    assert_int_equal(found.revision, 2);
+    assert_string_equal(found.material.name, "Sponge, new");
+    assert_string_equal(found.reason, "better");
+    assert_true(found.material.restitution == 0.55 && isnan(found.material.contact_time));
+    assert_int_equal(found.version, 5);
+    material_revision_clear(&found);
+    assert_int_equal(store_material(store, "sponge", 1, &found, NULL), STATUS_OK);
+    assert_string_equal(found.status, "deprecated");
+    assert_true(found.material.restitution == 0.61 && found.material.impactor_mass == 0.11);
+    material_revision_clear(&found);
+    MaterialDeeds deeds;
+    assert_int_equal(store_material_trail(store, "sponge", 100, 100, &deeds, NULL), STATUS_OK);
+    static const char *const actions[] = {"deprecate", "approve", "approve", "revise", "create"};
+    assert_int_equal(deeds.count, COUNT(actions));
+    for (size_t i = 0; i < COUNT(actions); i++)
+        assert_string_equal(deeds.at[i].action, actions[i]);
+    material_deeds_clear(&deeds);
+    MaterialUses uses;
+    assert_int_equal(store_material_uses(store, "sponge", &uses, NULL), STATUS_OK);
+    assert_int_equal(uses.count, 2);
+    assert_int_equal(uses.at[0].revision, 2);
+    assert_int_equal(uses.at[0].results, 0);
+    assert_string_equal(uses.at[0].status, "approved");
+    assert_int_equal(uses.at[1].revision, 1);
+    assert_int_equal(uses.at[1].results, 1);
+    free(uses.at);
+    ResultUses results;
+    uint64_t total;
+    assert_int_equal(store_result_uses(store, "sponge@1", 10, 0, &results, &total, NULL),
+                     STATUS_OK);
+    assert_int_equal(total, 1);
+    assert_string_equal(results.at[0].id, "r-1");
+    free(results.at);
+    MaterialRevision next = felt_saying(0.5);
+    next.slug = "sponge";
+    assert_int_equal(store_material_revise(store, &next, 5, NULL), STATUS_OK);
+    assert_int_equal(next.revision, 3);
+    MaterialRevisions heads;
+    assert_int_equal(store_material_heads(store, "", 100, &heads, NULL), STATUS_OK);
+    assert_int_equal(heads.count, 5);
+    for (size_t i = 0; i < heads.count; i++)
+        assert_string_equal(heads.at[i].status, "approved");
+    material_revisions_clear(&heads);
+    Texts slugs;
+    assert_int_equal(store_material_slugs(store, &slugs, NULL), STATUS_OK);
+    assert_int_equal(slugs.count, 5);
+    assert_string_equal(slugs.at[4], "sponge");
+    material_slugs_clear(&slugs);
+}
+
+static void a_database_of_each_step_before_goes_on(void **state) {
+    (void)state;
+    enum { STEPS = 8 }; // the last one before materials had their trail
+    for (size_t steps = 1; steps <= STEPS; steps++) {
+        EmbeddedFile files[STEPS + 1] = {{0}};
+        for (size_t i = 0; i < steps; i++)
+            files[i] = embedded_sql[i];
+        scratch_make(folder);
+        Database *database = open_database();
+        assert_int_equal(database_migrate(database, files, NULL), STATUS_OK);
+        assert_int_equal(database_execute(database, data_of_before, NULL), STATUS_OK);
+        database_close(database);
+        Store *store = felt_store(folder);
+        check_migrated(store);
+        store_close(store);
+        store_close(felt_store(folder));
+        scratch_remove(folder);
+    }
+}
+
+#define IN_FOLDER(test) cmocka_unit_test_setup_teardown(test, make_folder, remove_folder)
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        IN_FOLDER(a_revision_comes_back_as_it_went),
+        IN_FOLDER(no_sql_changes_what_was_said),
+        cmocka_unit_test(a_database_of_each_step_before_goes_on),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,389 @@
+// Records as they are stored: whole, unchanged, shared in memory, and kept as long as they are
+// used.
+#include "server/db/records.h"
+
+#include <pthread.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "server/db/record_memory.h"
+#include "server/db/sqlite.h"
+#include "tests/support/scratch.h"
+
+static Problem problem;
+static char folder[SCRATCH_SIZE];
+
+static Store *store_make(void) {
+    Store *store;
+    scratch_make(folder);
+    problem_clear(&problem);
+    if (store_open(folder, &store, &problem) != STATUS_OK)
+        fail_msg("%s", problem.detail);
+    return store;
+}
+
+static void store_end(Store *store) {
+    store_close(store);
+    scratch_remove(folder);
+}
+
+// A record whose first sample is `first`.
+static Status add(Store *store, const char *name, double first, const char *source,
+                  bool *is_there) {
+    double values[] = {first, -2, 0.5};
+    const Reals samples = {values, 3};
+    char digest[RECORD_DIGEST_SIZE];
+    record_digest(0.02, &samples, digest);
+    const RecordRow row = {.name = (char *)name,
+                           .source = (char *)source,
+                           .layout = "json",
+                           .unit = "m/s^2",
+                           .interval = 0.02,
+                           .count = 3,
+                           .peak = 2,
+                           .digest = digest,
+                           .created_unix_ms = 1000};
+    problem_clear(&problem);
+    return store_record_add(store, &row, &samples, is_there, &problem);
+}
+
+static void add_new(Store *store, const char *name, double first) {
+    bool is_there = true;
+    if (add(store, name, first, NULL, &is_there) != STATUS_OK)
+        fail_msg("%s", problem.detail);
+    assert_false(is_there);
+}
+
+static void a_record_comes_back_to_the_bit(void **state) {
+    (void)state;
+    Store *store = store_make();
+    const uint64_t generation = store_generation(store);
+    NamedRecord *named, *again;
+    RecordRow row;
+    add_new(store, "elcentro", 0.1);
+    assert_true(store_generation(store) > generation);
+    assert_int_equal(store_record(store, "elcentro", &row, &problem), STATUS_OK);
+    assert_true(row.count == 3 && row.interval == 0.02 && row.peak == 2);
+    assert_null(row.author);
+    record_row_clear(&row);
+    assert_int_equal(store_record_named(store, "elcentro", &named, &problem), STATUS_OK);
+    assert_true(named->samples.count == 3 && named->interval == 0.02);
+    assert_true(named->samples.at[0] == 0.1 && named->samples.at[2] == 0.5);
+    // Others share them, also when something else came in between.
+    add_new(store, "other", 0.2);
+    assert_int_equal(store_record_named(store, "elcentro", &again, &problem), STATUS_OK);
+    assert_ptr_equal(named, again);
+    refcount_unref(&named->shared);
+    refcount_unref(&again->shared);
+    assert_int_equal(store_record_named(store, "elcentr", &named, &problem), STATUS_NOT_FOUND);
+    assert_null(named);
+    store_end(store);
+}
+
+static void what_is_there_already_is_told_from_what_would_change_it(void **state) {
+    (void)state;
+    Store *store = store_make();
+    bool is_there = false;
+    add_new(store, "elcentro", 0.1);
+    assert_int_equal(add(store, "elcentro", 0.1, NULL, &is_there), STATUS_OK);
+    assert_true(is_there);
+    assert_int_equal(add(store, "elcentro", 0.2, NULL, &is_there), STATUS_CONFLICT);
+    assert_non_null(strstr(problem.detail, "samples"));
+    assert_int_equal(add(store, "elcentro", 0.1, "PEER", &is_there), STATUS_CONFLICT);
+    assert_non_null(strstr(problem.detail, "another source"));
+    RecordRow row;
+    assert_int_equal(store_record(store, "elcentro", &row, &problem), STATUS_OK);
+    assert_null(row.source);
+    RecordRows twins;
+    assert_int_equal(store_record_twins(store, &row, &twins, &problem), STATUS_OK);
+    assert_int_equal(twins.count, 0);
+    add_new(store, "same", 0.1);
+    assert_int_equal(store_record_twins(store, &row, &twins, &problem), STATUS_OK);
+    assert_int_equal(twins.count, 1);
+    assert_string_equal(twins.at[0].name, "same");
+    record_rows_clear(&twins);
+    record_row_clear(&row);
+    store_end(store);
+}
+
+static void a_list_goes_on_behind_a_name_and_searches_words(void **state) {
+    (void)state;
+    static const char *const names[] = {"b", "a", "C", "d"};
+    Store *store = store_make();
+    RecordRows rows;
+    bool is_there;
+    for (size_t i = 0; i < COUNT(names); i++)
+        assert_int_equal(
+            add(store, names[i], (double)i, i == 3 ? "The Imperial Valley" : NULL, &is_there),
+            STATUS_OK);
+    assert_int_equal(store_records(store, NULL, "", 2, &rows, &problem), STATUS_OK);
+    assert_int_equal(rows.count, 2);
+    assert_string_equal(rows.at[0].name, "C");
+    assert_string_equal(rows.at[1].name, "a");
+    record_rows_clear(&rows);
+    assert_int_equal(store_records(store, NULL, "a", 9, &rows, &problem), STATUS_OK);
+    assert_int_equal(rows.count, 2);
+    record_rows_clear(&rows);
+    assert_int_equal(store_records(store, "imperial", "", 9, &rows, &problem), STATUS_OK);
+    assert_int_equal(rows.count, 1);
+    assert_string_equal(rows.at[0].name, "d");
+    record_rows_clear(&rows);
+    assert_int_equal(store_records(store, "%", "", 9, &rows, &problem), STATUS_OK);
+    assert_int_equal(rows.count, 0);
+    record_rows_clear(&rows);
+    store_end(store);
+}
+
+static JobRow job_add(Store *store, const char *id, int state, const char *uses) {
+    JobRow row = {.state = state, .scene = "{}", .warnings = "[]", .uses = (char *)uses};
+    snprintf(row.id, sizeof row.id, "%s", id);
+    assert_int_equal(store_job_add(store, &row, &problem), STATUS_OK);
+    return row;
+}
+
+static void a_record_in_use_is_not_deleted(void **state) {
+    (void)state;
+    Store *store = store_make();
+    RecordUses uses;
+    NamedRecord *named;
+    add_new(store, "elcentro", 0.1);
+    add_new(store, "kobe", 0.3);
+    JobRow job = job_add(store, "j-1", 0, "record:elcentro\nrecord:kobe\nrecord:elcentro\n");
+    job_add(store, "j-2", 2, "record:elcentro\n");
+    ResultRow result = {.id = "r-1",
+                        .engine = "e",
+                        .scene = "{}",
+                        .plan = "{}",
+                        .summary = "{}",
+                        .warnings = "[]",
+                        .energy = "{}",
+                        .impacts = "{}",
+                        .uses = "sponge@1\nrecord:elcentro\n"};
+    assert_int_equal(store_result_save(store, &result, NULL, 0, &problem), STATUS_OK);
+    assert_int_equal(store_record_uses(store, "elcentro", &uses, &problem), STATUS_OK);
+    assert_true(uses.results == 1 && uses.jobs == 1);
+    assert_int_equal(store_record_delete(store, "kobe", &uses, NULL), STATUS_CONFLICT);
+    assert_true(uses.results == 0 && uses.jobs == 1);
+    problem_clear(&problem);
+    assert_int_equal(store_record_delete(store, "elcentro", &uses, &problem), STATUS_CONFLICT);
+    assert_true(uses.results == 1 && uses.jobs == 1);
+    assert_non_null(strstr(problem.detail, "1 result and 1 unfinished job:"));
+    // A job that has ended uses nothing any more.
+    job.state = 3;
+    assert_int_equal(store_job_update(store, &job, &problem), STATUS_OK);
+    assert_int_equal(store_record_uses(store, "elcentro", &uses, &problem), STATUS_OK);
+    assert_true(uses.results == 1 && uses.jobs == 0);
+    assert_int_equal(store_record_delete(store, "kobe", &uses, &problem), STATUS_OK);
+    assert_int_equal(store_record_named(store, "kobe", &named, NULL), STATUS_NOT_FOUND);
+    assert_int_equal(store_record_delete(store, "kobe", &uses, NULL), STATUS_NOT_FOUND);
+    // The name is free, and means the new samples at once.
+    add_new(store, "kobe", 0.7);
+    assert_int_equal(store_record_named(store, "kobe", &named, &problem), STATUS_OK);
+    assert_true(named->samples.at[0] == 0.7);
+    refcount_unref(&named->shared);
+    store_end(store);
+}
+
+static void nothing_written_beside_the_daemon_changes_a_record(void **state) {
+    (void)state;
+    static const char *const attempts[] = {
+        "UPDATE records SET peak = 0",
+        "UPDATE records SET name = 'x'",
+        "UPDATE record_samples SET samples = x'00'",
+        "DELETE FROM record_samples",
+        "REPLACE INTO record_samples (number, samples) SELECT number, x'00' FROM records",
+        "REPLACE INTO records SELECT * FROM records",
+        "INSERT OR REPLACE INTO records (name, layout, unit, interval, count, peak, peak_time, "
+        "peak_velocity, end_velocity, digest, created_unix_ms) SELECT name, layout, unit, 1, "
+        "count, 0, 0, 0, 0, digest, 0 FROM records",
+        "INSERT INTO records (number, name, layout, unit, interval, count, peak, peak_time, "
+        "peak_velocity, end_velocity, digest, created_unix_ms) SELECT number, name, layout, unit, "
+        "1, count, 0, 0, 0, 0, digest, 0 FROM records WHERE true ON CONFLICT DO UPDATE SET peak = "
+        "0",
+        "DELETE FROM records",
+    };
+    Store *store = store_make();
+    char path[SCRATCH_SIZE + 16];
+    Database *database;
+    NamedRecord *named;
+    add_new(store, "elcentro", 0.1);
+    ResultRow result = {.id = "r-1",
+                        .engine = "e",
+                        .scene = "{}",
+                        .plan = "{}",
+                        .summary = "{}",
+                        .warnings = "[]",
+                        .energy = "{}",
+                        .impacts = "{}",
+                        .uses = "record:elcentro\n"};
+    assert_int_equal(store_result_save(store, &result, NULL, 0, &problem), STATUS_OK);
+    store_close(store);
+    snprintf(path, sizeof path, "%s/impactd.db", folder);
+    assert_int_equal(database_open(path, DATABASE_WRITER, &database, &problem), STATUS_OK);
+    for (size_t i = 0; i < COUNT(attempts); i++) {
+        problem_clear(&problem);
+        if (database_execute(database, attempts[i], &problem) == STATUS_OK)
+            fail_msg("%s", attempts[i]);
+        if (strstr(problem.detail, "record") == NULL)
+            fail_msg("%s: %s", attempts[i], problem.detail);
+    }
+    database_close(database);
+    problem_clear(&problem);
+    assert_int_equal(store_open(folder, &store, &problem), STATUS_OK);
+    assert_int_equal(store_record_named(store, "elcentro", &named, &problem), STATUS_OK);
+    assert_true(named->interval == 0.02 && named->samples.at[0] == 0.1);
+    refcount_unref(&named->shared);
+    store_end(store);
+}
+
+static void there_are_only_so_many(void **state) {
+    (void)state;
+    static const char many[] =
+        "WITH RECURSIVE n (i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < 20000) INSERT "
+        "INTO records (name, layout, unit, interval, count, peak, peak_time, peak_velocity, "
+        "end_velocity, digest, created_unix_ms) SELECT 'n' || i, 'json', 'g', 1, 1, 0, 0, 0, 0, "
+        "printf('%064d', i), 0 FROM n";
+    static const char huge[] =
+        "INSERT INTO records (name, layout, unit, interval, count, peak, peak_time, "
+        "peak_velocity, end_velocity, digest, created_unix_ms) SELECT 'huge', 'json', 'g', 1, "
+        "2147483645 - sum(count), 0, 0, 0, 0, printf('%064d', 0), 0 FROM records";
+    char path[SCRATCH_SIZE + 16];
+    Store *store = store_make();
+    Database *database;
+    RecordUses uses;
+    bool is_there;
+    snprintf(path, sizeof path, "%s/impactd.db", folder);
+    assert_int_equal(database_open(path, DATABASE_WRITER, &database, &problem), STATUS_OK);
+    assert_int_equal(database_execute(database, many, &problem), STATUS_OK);
+    assert_int_equal(add(store, "one_more", 1, NULL, &is_there), STATUS_LIMIT);
+    assert_non_null(strstr(problem.detail, "20000 records"));
+    for (int i = 1; i <= 3; i++) {
+        char name[16];
+        snprintf(name, sizeof name, "n%d", i);
+        assert_int_equal(store_record_delete(store, name, &uses, &problem), STATUS_OK);
+    }
+    // Now there is room for two, and for three samples.
+    assert_int_equal(database_execute(database, huge, &problem), STATUS_OK);
+    add_new(store, "three", 1);
+    assert_int_equal(store_record_delete(store, "n4", &uses, &problem), STATUS_OK);
+    assert_int_equal(add(store, "three_more", 2, NULL, &is_there), STATUS_LIMIT);
+    assert_non_null(strstr(problem.detail, "2147483648"));
+    database_close(database);
+    store_end(store);
+}
+
+typedef struct Racer {
+    Store *store;
+    pthread_t thread;
+    Status status;
+    bool is_there;
+} Racer;
+
+static void *race(void *of) {
+    Racer *racer = of;
+    double values[] = {0.1, -2, 0.5};
+    const Reals samples = {values, 3};
+    char digest[RECORD_DIGEST_SIZE];
+    record_digest(0.02, &samples, digest);
+    const RecordRow row = {.name = "same",
+                           .layout = "json",
+                           .unit = "m/s^2",
+                           .interval = 0.02,
+                           .count = 3,
+                           .digest = digest};
+    racer->status = store_record_add(racer->store, &row, &samples, &racer->is_there, NULL);
+    return NULL;
+}
+
+static void of_two_same_uploads_at_once_one_is_kept(void **state) {
+    (void)state;
+    Store *store = store_make();
+    Racer racers[8];
+    size_t kept = 0;
+    for (size_t i = 0; i < COUNT(racers); i++) {
+        racers[i] = (Racer){.store = store};
+        assert_int_equal(pthread_create(&racers[i].thread, NULL, race, &racers[i]), 0);
+    }
+    for (size_t i = 0; i < COUNT(racers); i++) {
+        pthread_join(racers[i].thread, NULL);
+        assert_int_equal(racers[i].status, STATUS_OK);
+        kept += !racers[i].is_there;
+    }
+    assert_int_equal(kept, 1);
+    store_end(store);
+}
+
+static void names_are_fit_for_paths_and_files(void **state) {
+    (void)state;
+    static const char *const sound[] = {"a", "7", "elcentro_NS-2.AT2", "A..b"};
+    static const char *const unsound[] = {"",    ".",   "..",  ".a",       "-a", "_a",
+                                          "a/b", "a b", "a\n", "\xC3\xA9", "a%"};
+    char longest[66];
+    for (size_t i = 0; i < COUNT(sound); i++)
+        assert_true(record_name_is_sound(sound[i]));
+    for (size_t i = 0; i < COUNT(unsound); i++)
+        assert_false(record_name_is_sound(unsound[i]));
+    memset(longest, 'x', sizeof longest);
+    longest[65] = '\0';
+    assert_false(record_name_is_sound(longest));
+    longest[64] = '\0';
+    assert_true(record_name_is_sound(longest));
+}
+
+static NamedRecord *large(const char *name) {
+    Reals samples;
+    assert_true(reals_allocate(&samples, 3 << 20)); // 24 MiB, never touched
+    return named_record_new(name, name, 1, &samples);
+}
+
+static void the_memory_forgets_what_nobody_holds_beyond_its_budget(void **state) {
+    (void)state;
+    RecordMemory *memory = record_memory_new();
+    NamedRecord *held = record_memory_put(memory, 1, large("held")), *found;
+    static const char *const others[] = {"a", "b", "c", "d"};
+    for (size_t i = 0; i < COUNT(others); i++) {
+        found = record_memory_put(memory, 1, large(others[i]));
+        refcount_unref(&found->shared);
+    }
+    found = record_memory_find(memory, 1, "held", NULL);
+    assert_ptr_equal(found, held);
+    refcount_unref(&found->shared);
+    assert_null(record_memory_find(memory, 1, "a", NULL));
+    found = record_memory_find(memory, 1, "d", NULL);
+    assert_non_null(found);
+    refcount_unref(&found->shared);
+    // Under another catalogue the digest tells whether it is the same.
+    assert_null(record_memory_find(memory, 2, "held", NULL));
+    assert_null(record_memory_find(memory, 2, "held", "other"));
+    found = record_memory_find(memory, 2, "held", "held");
+    assert_ptr_equal(found, held);
+    refcount_unref(&found->shared);
+    // Who was slower gets what is there.
+    found = record_memory_put(memory, 2, large("held"));
+    assert_ptr_equal(found, held);
+    refcount_unref(&found->shared);
+    refcount_unref(&held->shared);
+    record_memory_free(memory);
+    record_memory_free(NULL);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_record_comes_back_to_the_bit),
+        cmocka_unit_test(what_is_there_already_is_told_from_what_would_change_it),
+        cmocka_unit_test(a_list_goes_on_behind_a_name_and_searches_words),
+        cmocka_unit_test(a_record_in_use_is_not_deleted),
+        cmocka_unit_test(nothing_written_beside_the_daemon_changes_a_record),
+        cmocka_unit_test(there_are_only_so_many),
+        cmocka_unit_test(of_two_same_uploads_at_once_one_is_kept),
+        cmocka_unit_test(names_are_fit_for_paths_and_files),
+        cmocka_unit_test(the_memory_forgets_what_nobody_holds_beyond_its_budget),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

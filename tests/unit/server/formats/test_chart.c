@@ -1,0 +1,175 @@
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "server/formats/chart.h"
+#include "server/formats/charts.h"
+
+static TradeoffPoint point_make(char *name, char *solver, double cpu, double error) {
+    TradeoffPoint point;
+    assert_int_equal(fields_default(tradeoff_point_fields, &point), STATUS_OK);
+    point.name = name;
+    point.solver = solver;
+    point.cpu_minimum = cpu;
+    point.errors.displacement = error;
+    return point;
+}
+
+static char *draw(TradeoffPoint *points, size_t count, double error, uint64_t choice) {
+    const Tradeoff tradeoff = {.metric = METRIC_DISPLACEMENT,
+                               .error = error,
+                               .points = {points, count},
+                               .recommendation = {choice, "because a < b & c"}};
+    Bytes bytes = {0};
+    charts_tradeoff(&tradeoff, &bytes);
+    char *text = bytes_take(&bytes, NULL);
+    assert_non_null(text);
+    assert_null(strstr(text, "nan"));
+    assert_null(strstr(text, "inf"));
+    return text;
+}
+
+static size_t count_of(const char *text, const char *part) {
+    size_t count = 0;
+    for (const char *at = text; (at = strstr(at, part)) != NULL; at++)
+        count++;
+    return count;
+}
+
+static void every_measured_point_has_a_mark_and_the_others_are_told(void **state) {
+    (void)state;
+    TradeoffPoint points[] = {
+        point_make("exact", "exact", 1e-5, 1e-13),
+        point_make("rk4, step 0.001 s", "rk4", 1e-3, 1e-2),
+        point_make("rk4, step 0.0001 s", "rk4", 1e-2, 1e-6),
+        point_make("rk4, step 1e-05 s", "rk4", (double)NAN, (double)NAN),
+        point_make("exact, shorter", "exact", 1e-6, (double)NAN),
+    };
+    points[0].is_best = true;
+    points[3].status = TRADEOFF_REFUSED;
+    points[3].why = "1e9 steps > 1e7";
+    char *text = draw(points, COUNT(points), 1e-3, 1);
+    assert_int_equal(count_of(text, "<title>"), 1 + 3);
+    assert_int_equal(count_of(text, "<title>rk4, step 0.001 s: 0.01 in 0.001 s"), 1);
+    assert_int_equal(count_of(text, "class=\"line s1\""), 1);
+    assert_int_equal(count_of(text, "Not drawn: "), 2);
+    assert_non_null(strstr(text, "Not drawn: rk4, step 1e-05 s, because: 1e9 steps &gt; 1e7."));
+    assert_non_null(strstr(text, "because a &lt; b &amp; c"));
+    assert_int_equal(count_of(text, "class=\"strong ring\""), 2); // its own and the legend's
+    assert_non_null(strstr(text, ">wanted: 0.001"));
+    assert_non_null(strstr(text, "prefers-color-scheme: dark"));
+    free(text);
+}
+
+static void an_error_of_0_stands_on_the_floor(void **state) {
+    (void)state;
+    TradeoffPoint points[] = {point_make("exact", "exact", 1e-5, 0),
+                              point_make("rk4", "rk4", 1e-3, 3)};
+    char *text = draw(points, COUNT(points), 0, COUNT_ABSENT);
+    assert_non_null(strstr(text, ">0</text>"));
+    assert_null(strstr(text, ">wanted"));
+    assert_int_equal(count_of(text, "class=\"mark s0\""), 2);
+    assert_non_null(strstr(text, " 376.0)")); // at the bottom of the plot
+    free(text);
+}
+
+static void there_may_be_nothing_to_draw(void **state) {
+    (void)state;
+    char *text = draw(NULL, 0, 1e-3, COUNT_ABSENT);
+    assert_int_equal(count_of(text, "class=\"mark"), 0);
+    free(text);
+    TradeoffPoint one = point_make("exact", "exact", 1e-5, 1e-3);
+    text = draw(&one, 1, 1e-3, 7); // no such number
+    assert_int_equal(count_of(text, "class=\"mark"), 2);
+    free(text);
+}
+
+static void more_groups_than_colours_share_the_last_one(void **state) {
+    (void)state;
+    TradeoffPoint points[20];
+    char names[20][8];
+    for (size_t i = 0; i < COUNT(points); i++) {
+        snprintf(names[i], sizeof names[i], "s%zu", i);
+        points[i] = point_make(names[i], names[i], 1e-5 * (double)(i + 1), 1e-3);
+    }
+    char *text = draw(points, COUNT(points), 1e-3, 20);
+    assert_int_equal(count_of(text, "<title>s"), 20);
+    free(text);
+}
+
+// A panel of 100 by 100 pixels with one line over 0, 1, 2 and so on.
+static char *draw_line(const double *y, const double *high, size_t count, bool is_logarithmic) {
+    Chart chart = {.width = 120, .height = 120, .title = "a < b"};
+    ChartPanel *panel = chart_panel(&chart, 10, 110, 10, 110);
+    double *x = chart_allocate(&chart, count, sizeof *x);
+    assert_non_null(x);
+    for (size_t i = 0; i < count; i++)
+        x[i] = (double)i;
+    panel->y.is_logarithmic = is_logarithmic;
+    (void)chart_series(panel, CHART_LINE, x, y, high, count);
+    Bytes bytes = {0};
+    chart_write(&chart, &bytes);
+    char *text = bytes_take(&bytes, NULL);
+    assert_non_null(text);
+    assert_non_null(strstr(text, "<title>a &lt; b</title>"));
+    return text;
+}
+
+static void a_line_is_interrupted_where_a_value_is_missing(void **state) {
+    (void)state;
+    const double y[] = {0, 1, (double)NAN, 1, 0};
+    char *text = draw_line(y, NULL, COUNT(y), false);
+    assert_non_null(
+        strstr(text, "class=\"line s0\" d=\"M10.0 105.5L35.0 14.5M85.0 14.5L110.0 105.5\""));
+    free(text);
+    text = draw_line(y, y, COUNT(y), false);
+    assert_non_null(
+        strstr(text, "class=\"line s0\" d=\"M10.0 105.5L35.0 14.5M85.0 14.5L110.0 105.5\""));
+    free(text);
+    text = draw_line(y + 2, NULL, 1, false);
+    assert_null(strstr(text, "class=\"frame\"")); // no value at all
+    free(text);
+}
+
+static void many_points_take_limited_room_and_peaks_remain(void **state) {
+    (void)state;
+    enum { POINTS = 100000 };
+    double *low = calloc(POINTS, sizeof *low), *high = calloc(POINTS, sizeof *high);
+    assert_true(low != NULL && high != NULL);
+    for (size_t i = 0; i < POINTS; i++)
+        low[i] = 1 + (double)(i % 7);
+    char *text = draw_line(low, NULL, POINTS, true), *again = draw_line(low, NULL, POINTS, true);
+    assert_string_equal(text, again); // equal bytes
+    assert_true(count_of(text, "L") < 700);
+    assert_non_null(strstr(text, ">10</text>"));
+    free(text);
+    free(again);
+    for (size_t i = 0; i < 5; i++)
+        high[i] = low[i] = i == 2 ? 2 : 0;
+    low[2] = -2;
+    text = draw_line(low, high, 5, false);
+    assert_non_null(strstr(text, "L60.0 105.5L72.5 14.5")); // to both ends
+    free(text);
+    free(low);
+    free(high);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_measured_point_has_a_mark_and_the_others_are_told),
+        cmocka_unit_test(an_error_of_0_stands_on_the_floor),
+        cmocka_unit_test(there_may_be_nothing_to_draw),
+        cmocka_unit_test(more_groups_than_colours_share_the_last_one),
+        cmocka_unit_test(a_line_is_interrupted_where_a_value_is_missing),
+        cmocka_unit_test(many_points_take_limited_room_and_peaks_remain),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

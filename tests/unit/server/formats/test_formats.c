@@ -1,0 +1,319 @@
+// The formats to the letter, on tables small enough to read; tests/contract/test_encoders.py reads
+// large ones back with numpy.
+#include "server/formats/encoding.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "core/base/status.h"
+#include "server/formats/downsample.h"
+#include "server/formats/mat.h"
+
+enum { ROWS = 5000 };
+
+static double displacement[ROWS], force[ROWS], frequency[ROWS];
+static Column column[2] = {{"displacement", "m", displacement}, {"contact_force", "N", force}};
+static const Column *const both[] = {&column[0], &column[1]};
+
+static int fill(void **state) {
+    (void)state;
+    for (size_t i = 0; i < ROWS; i++) {
+        displacement[i] = (double)i / 8;
+        force[i] = -(double)i;
+        frequency[i] = (double)i * 0.5;
+    }
+    force[51] = NAN;
+    return 0;
+}
+
+static Table series(size_t first, size_t count) {
+    return (Table){.axis_name = "time",
+                   .axis_unit = "s",
+                   .axis_rate = 1000,
+                   .first = first,
+                   .count = count,
+                   .columns = both,
+                   .column_count = 2};
+}
+
+static Table over_frequency(size_t first, size_t count) {
+    Table table = series(first, count);
+    table.axis_name = "frequency";
+    table.axis_unit = "Hz";
+    table.axis = frequency;
+    return table;
+}
+
+static void assert_text(const char *extension, Table table, const char *expected) {
+    Bytes bytes = {0};
+    assert_int_equal(encoding_write(encoder_find(extension), &table, &bytes, NULL), STATUS_OK);
+    assert_false(bytes.is_failed);
+    assert_string_equal(bytes.at, expected);
+    assert_int_equal(bytes.count, strlen(expected));
+    bytes_clear(&bytes);
+}
+
+static void json_has_rate_start_count_and_channels(void **state) {
+    (void)state;
+    assert_text("json", series(50, 3),
+                "{\"sample_rate\": 1000, \"start\": 0.05, \"count\": 3, \"channels\": {"
+                "\"displacement\": {\"unit\": \"m\", \"values\": [6.25,6.375,6.5]}, "
+                "\"contact_force\": {\"unit\": \"N\", \"values\": [-50,null,-52]}}}\n");
+    Table none = series(0, 0);
+    none.column_count = 0;
+    assert_text("json", none,
+                "{\"sample_rate\": 1000, \"start\": 0, \"count\": 0, \"channels\": {}}\n");
+}
+
+static void json_over_an_axis_carries_the_axis(void **state) {
+    (void)state;
+    Table table = over_frequency(2, 2);
+    table.column_count = 1;
+    assert_text("json", table,
+                "{\"count\": 2, \"frequency\": {\"unit\": \"Hz\", \"values\": [1,1.5]}, "
+                "\"channels\": {\"displacement\": {\"unit\": \"m\", \"values\": [0.25,0.375]}}}\n");
+}
+
+static void csv_has_a_header_with_units_and_short_times(void **state) {
+    (void)state;
+    assert_text("csv", series(49, 3),
+                "time [s],displacement [m],contact_force [N]\n"
+                "0.049,6.125,-49\n"
+                "0.05,6.25,-50\n"
+                "0.051,6.375,nan\n");
+    assert_text("csv", over_frequency(1, 2),
+                "frequency [Hz],displacement [m],contact_force [N]\n0.5,0.125,-1\n1,0.25,-2\n");
+    assert_text("csv", series(0, 0), "time [s],displacement [m],contact_force [N]\n");
+}
+
+static void npy_has_its_header_and_columns_as_they_lie_in_memory(void **state) {
+    (void)state;
+    const Table table = series(50, 4500);
+    Bytes bytes = {0};
+    assert_int_equal(encoding_write(encoder_find("npy"), &table, &bytes, NULL), STATUS_OK);
+    const size_t header = 128;
+    assert_int_equal(bytes.count, header + 4500 * 3 * 8);
+    assert_memory_equal(bytes.at, "\x93NUMPY\x01\x00\x76\x00", 10);
+    const char *text = "{'descr': '<f8', 'fortran_order': True, 'shape': (4500, 3), }";
+    assert_memory_equal(bytes.at + 10, text, strlen(text));
+    for (size_t i = 10 + strlen(text); i + 1 < header; i++)
+        assert_int_equal(bytes.at[i], ' ');
+    assert_int_equal(bytes.at[header - 1], '\n');
+    double time;
+    memcpy(&time, bytes.at + header, sizeof time);
+    assert_true(time == 0.05);
+    memcpy(&time, bytes.at + header + 4499 * 8, sizeof time);
+    assert_true(time == 4549 / 1000.0);
+    assert_memory_equal(bytes.at + header + 4500 * 8, displacement + 50, 4500 * 8);
+    assert_memory_equal(bytes.at + header + 9000 * 8, force + 50, 4500 * 8);
+    bytes_clear(&bytes);
+}
+
+static void every_part_of_a_binary_format_can_be_read_alone(void **state) {
+    (void)state;
+    static const char *const names[] = {"npy", "npz", "mat"};
+    for (size_t n = 0; n < 3; n++) {
+        const Table table = series(50, 4500);
+        const Encoder *encoder = encoder_find(names[n]);
+        Bytes whole = {0};
+        assert_int_equal(encoding_write(encoder, &table, &whole, NULL), STATUS_OK);
+        unsigned seed = 1;
+        for (size_t i = 0; i < 500; i++) {
+            seed = seed * 1664525 + 1013904223;
+            const size_t first = seed % whole.count;
+            seed = seed * 1664525 + 1013904223;
+            const size_t size = 1 + (i % 2 == 0 ? seed % 64 : seed % (whole.count - first));
+            const size_t most = whole.count - first, taken = size < most ? size : most;
+            Encoding *encoding;
+            char piece[777];
+            assert_int_equal(encoding_open(encoder, &table, &encoding, NULL), STATUS_OK);
+            assert_int_equal(encoding_size(encoding), whole.count);
+            encoding_cut(encoding, first, taken);
+            size_t at = 0, count;
+            while ((count = encoding_next(encoding, piece, sizeof piece)) > 0) {
+                assert_memory_equal(piece, whole.at + first + at, count);
+                at += count;
+            }
+            assert_int_equal(at, taken);
+            encoding_close(encoding);
+        }
+        bytes_clear(&whole);
+    }
+}
+
+static void piece_by_piece_is_the_same_as_whole(void **state) {
+    (void)state;
+    for (size_t e = 0; encoders[e] != NULL; e++)
+        for (size_t size = 1; size < 100000; size = size * 7 + 3) {
+            const Table table = e % 2 == 0 ? series(7, 4990) : over_frequency(0, ROWS);
+            Bytes whole = {0}, pieces = {0};
+            Encoding *encoding;
+            char *piece = malloc(size);
+            assert_int_equal(encoding_write(encoders[e], &table, &whole, NULL), STATUS_OK);
+            assert_int_equal(encoding_open(encoders[e], &table, &encoding, NULL), STATUS_OK);
+            size_t count;
+            while ((count = encoding_next(encoding, piece, size)) > 0)
+                bytes_put(&pieces, piece, count);
+            assert_int_equal(pieces.count, whole.count);
+            assert_memory_equal(pieces.at, whole.at, whole.count);
+            encoding_close(encoding);
+            bytes_clear(&whole);
+            bytes_clear(&pieces);
+            free(piece);
+        }
+}
+
+static void archives_are_the_same_each_time_and_stored(void **state) {
+    (void)state;
+    const Table table = series(0, 100);
+    Bytes first = {0}, second = {0};
+    assert_int_equal(encoding_write(encoder_find("npz"), &table, &first, NULL), STATUS_OK);
+    assert_int_equal(encoding_write(encoder_find("npz"), &table, &second, NULL), STATUS_OK);
+    assert_int_equal(first.count, second.count);
+    assert_memory_equal(first.at, second.at, first.count);
+    assert_memory_equal(first.at, "PK\3\4\x14\0\0\0\0\0\0\0\x21\0", 14);
+    assert_memory_equal(first.at + 30, "time.npy\x93NUMPY", 14);
+    assert_memory_equal(first.at + first.count - 22, "PK\5\6\0\0\0\0\3\0\3\0", 12);
+    bytes_clear(&first);
+    bytes_clear(&second);
+}
+
+static void what_is_too_large_for_a_format_is_refused(void **state) {
+    (void)state;
+    // Its length alone is looked at: nothing of it is read.
+    static const struct {
+        const char *extension;
+        size_t rows;
+        const char *words;
+    } cases[] = {{"npz", (size_t)1 << 29, "4 GiB"}, {"mat", (size_t)1 << 28, ".npy"}};
+    for (size_t i = 0; i < 2; i++) {
+        Table table = series(0, cases[i].rows);
+        table.axis_name = NULL;
+        Encoding *encoding;
+        Problem problem;
+        problem_clear(&problem);
+        assert_int_equal(
+            encoding_open(encoder_find(cases[i].extension), &table, &encoding, &problem),
+            STATUS_LIMIT);
+        assert_null(encoding);
+        assert_non_null(strstr(problem.detail, cases[i].words));
+    }
+}
+
+static void names_become_variables(void **state) {
+    (void)state;
+    char name[MAT_NAME_SIZE];
+    mat_name("contact_force_2", name);
+    assert_string_equal(name, "contact_force_2");
+    mat_name("2nd force", name);
+    assert_string_equal(name, "x2nd_force");
+    mat_name("", name);
+    assert_string_equal(name, "x");
+    mat_name("a123456789b123456789c123456789d123456789e123456789f123456789g123456789", name);
+    assert_int_equal(strlen(name), 63);
+}
+
+static void buckets_are_labelled(void **state) {
+    (void)state;
+    Columns buckets;
+    assert_int_equal(buckets_make(both, 1, 49, 5, 2, &buckets, NULL), STATUS_OK);
+    const Column *const pair[] = {&buckets.at[0], &buckets.at[1]};
+    Table table = series(49, 3);
+    table.bucket = 2;
+    table.samples = 5;
+    table.columns = pair;
+    assert_text("json", table,
+                "{\"sample_rate\": 1000, \"start\": 0.049, \"count\": 3, \"bucket\": 2, "
+                "\"samples\": 5, \"channels\": {\"displacement\": {\"unit\": \"m\", \"min\": "
+                "[6.125,6.375,6.625], \"max\": [6.25,6.5,6.625]}}}\n");
+    assert_text("csv", table,
+                "time [s],displacement_min [m],displacement_max [m]\n"
+                "0.049,6.125,6.25\n0.051,6.375,6.5\n0.053,6.625,6.625\n");
+    columns_clear(&buckets);
+}
+
+static void buckets_keep_the_extremes_of_ten_thousand_windows(void **state) {
+    (void)state;
+    enum { VALUES = 20000 };
+    double *values = malloc(VALUES * sizeof *values);
+    uint64_t seed = 3;
+    for (size_t i = 0; i < VALUES; i++) {
+        seed = seed * 6364136223846793005u + 1442695040888963407u;
+        values[i] = (double)(int64_t)seed / 9e18 * (i % 1000 == 0 ? 50 : 1);
+    }
+    const Column one = {"x", "m", values};
+    const Column *const columns[] = {&one};
+    for (size_t w = 0; w < 10000; w++) {
+        seed = seed * 6364136223846793005u + 1442695040888963407u;
+        const size_t first = (size_t)(seed >> 33) % VALUES;
+        seed = seed * 6364136223846793005u + 1442695040888963407u;
+        const size_t count =
+            1 + (size_t)(seed >> 33) % (w % 2 == 0 ? 50 : VALUES - first) % (VALUES - first);
+        seed = seed * 6364136223846793005u + 1442695040888963407u;
+        const size_t bucket = 1 + (size_t)(seed >> 33) % (w % 3 == 0 ? 5 : count);
+        Columns buckets;
+        assert_int_equal(buckets_make(columns, 1, first, count, bucket, &buckets, NULL), STATUS_OK);
+        assert_int_equal(buckets.rows, (count + bucket - 1) / bucket);
+        for (size_t i = 0; i < buckets.rows; i++) {
+            double least = INFINITY, most = -INFINITY;
+            for (size_t k = i * bucket; k < count && k < (i + 1) * bucket; k++) {
+                least = fmin(least, values[first + k]);
+                most = fmax(most, values[first + k]);
+            }
+            assert_true(buckets.at[0].values[i] == least && buckets.at[1].values[i] == most);
+        }
+        columns_clear(&buckets);
+    }
+    free(values);
+}
+
+static void a_full_buffer_fails_and_stays_empty(void **state) {
+    (void)state;
+    for (size_t e = 0; encoders[e] != NULL; e++)
+        for (size_t most = 1; most < 40000; most = most * 3 + 1) {
+            const Table table = series(0, ROWS);
+            Bytes bytes = {.most = most};
+            assert_int_equal(encoding_write(encoders[e], &table, &bytes, NULL), STATUS_OK);
+            assert_true(bytes.is_failed);
+            assert_int_equal(bytes.count, 0);
+            bytes_clear(&bytes);
+        }
+}
+
+static void formats_are_found_by_extension_and_json_is_first(void **state) {
+    (void)state;
+    assert_string_equal(encoders[0]->extension, "json");
+    for (size_t i = 0; encoders[i] != NULL; i++) {
+        assert_ptr_equal(encoder_find(encoders[i]->extension), encoders[i]);
+        assert_non_null(strchr(encoders[i]->content_type, '/'));
+    }
+    assert_true(encoder_find("npy")->is_binary);
+    assert_false(encoder_find("csv")->is_binary);
+    assert_null(encoder_find("xml"));
+    assert_null(encoder_find(""));
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(json_has_rate_start_count_and_channels),
+        cmocka_unit_test(json_over_an_axis_carries_the_axis),
+        cmocka_unit_test(csv_has_a_header_with_units_and_short_times),
+        cmocka_unit_test(npy_has_its_header_and_columns_as_they_lie_in_memory),
+        cmocka_unit_test(every_part_of_a_binary_format_can_be_read_alone),
+        cmocka_unit_test(piece_by_piece_is_the_same_as_whole),
+        cmocka_unit_test(archives_are_the_same_each_time_and_stored),
+        cmocka_unit_test(what_is_too_large_for_a_format_is_refused),
+        cmocka_unit_test(names_become_variables),
+        cmocka_unit_test(buckets_are_labelled),
+        cmocka_unit_test(buckets_keep_the_extremes_of_ten_thousand_windows),
+        cmocka_unit_test(a_full_buffer_fails_and_stays_empty),
+        cmocka_unit_test(formats_are_found_by_extension_and_json_is_first),
+    };
+    return cmocka_run_group_tests(tests, fill, NULL);
+}

@@ -1,0 +1,82 @@
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include <string.h>
+
+#include "core/study/ensemble.h"
+#include "server/formats/study_formats.h"
+
+static char unstable[] = "the \"numbers\" grew";
+
+static const AnswerFormat *format(const StudyKind *kind, const char *extension) {
+    const AnswerFormat *found = answer_format_find(answer_formats(kind->answer), extension);
+    assert_non_null(found);
+    return found;
+}
+
+static void every_study_has_its_formats_json_first(void **state) {
+    (void)state;
+    for (size_t i = 0; studies[i] != NULL; i++) {
+        const AnswerFormat *formats = answer_formats(studies[i]->answer);
+        assert_string_equal(formats->extension, "json");
+        size_t count = 0;
+        while (formats[count].extension != NULL)
+            count++;
+        assert_true(count < ANSWER_FORMATS);
+    }
+    char names[64];
+    answer_formats_name(answer_formats(study_ensemble.answer), ".", names, sizeof names);
+    assert_string_equal(names, ".json, .csv, .svg");
+    assert_null(answer_format_find(answer_formats(study_tradeoff.answer), "csv"));
+    answer_formats_name(answer_formats(study_ensemble.answer), "", names, 8);
+    assert_string_equal(names, "json, c"); // cut, not overrun
+}
+
+static void a_run_that_failed_is_quoted_in_the_table(void **state) {
+    (void)state;
+    RunRecord runs[2] = {{.number = 7, .steps = 100, .summary = {.impacts = 3}},
+                         {.number = 8, .steps = (double)NAN, .why = unstable}};
+    runs[0].summary.trust_horizon = (double)NAN;
+    runs[0].summary.rms_displacement = 0.1;
+    assert_int_equal(fields_default(summary_fields, &runs[1].summary), STATUS_OK);
+    const Ensemble ensemble = {.table = {runs, 2}};
+    Bytes bytes = {0};
+    format(&study_ensemble, "csv")->write(&ensemble.variant, &bytes);
+    assert_string_equal(
+        bytes.at,
+        "seed,steps,peak_displacement [m],rms_displacement [m],peak_acceleration [m/s^2],"
+        "rms_acceleration [m/s^2],impacts,peak_contact_force [N],energy_residual,error_estimate,"
+        "trust_horizon [s],why\n"
+        "7,100,0,0.1,0,0,3,0,0,0,nan,\n"
+        "8,nan,nan,nan,nan,nan,nan,nan,nan,nan,nan,\"the \"\"numbers\"\" grew\"\n");
+    bytes_clear(&bytes);
+}
+
+static void a_chart_of_nothing_known_is_whole(void **state) {
+    (void)state;
+    Variant *answer = variant_new(study_ensemble.answer);
+    assert_non_null(answer);
+    ((Ensemble *)(void *)answer)->confidence = 0.95;
+    Bytes bytes = {0};
+    format(&study_ensemble, "svg")->write(answer, &bytes);
+    assert_false(bytes.is_failed);
+    assert_null(strstr(bytes.at, "nan"));
+    assert_null(strstr(bytes.at, "inf"));
+    assert_non_null(strstr(bytes.at, "not known"));
+    assert_string_equal(bytes.at + bytes.count - 7, "</svg>\n");
+    bytes_clear(&bytes);
+    variant_free(answer);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_study_has_its_formats_json_first),
+        cmocka_unit_test(a_run_that_failed_is_quoted_in_the_table),
+        cmocka_unit_test(a_chart_of_nothing_known_is_whole),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

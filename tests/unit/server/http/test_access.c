@@ -1,0 +1,154 @@
+// The doorman over a database in memory: whom he lets in, as whom, and what he counts; and that the
+// dispatcher asks him before a body is taken.
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "server/http/dispatch.h"
+#include "server/http/reply.h"
+#include "server/util/base_path.h"
+
+static Status tell(App *app, const Request *request, Reply *reply, Problem *problem) {
+    (void)app;
+    (void)problem;
+    reply_borrow(reply, 200, "text/plain", request->client != NULL ? request->client : "nobody", 3);
+    snprintf(reply->location, sizeof reply->location, "/v1/a");
+    snprintf(reply->link, sizeof reply->link, "</v1/a>; rel=\"next\"");
+    return STATUS_OK;
+}
+
+static const Route table[] = {
+    {"GET", "/open", "open", NULL, "", tell},
+    {"GET", "/v1/a", "read", NULL, "", tell},
+    {"POST", "/v1/a", "submit", NULL, "", tell},
+    {NULL, NULL, NULL, NULL, NULL, NULL},
+};
+
+typedef struct House {
+    Store *store;
+    Doorman doorman;
+    Dispatcher dispatcher;
+    char lab[128]; // the Authorization header of a token that may read
+} House;
+
+static int open_house(void **state) {
+    static House house;
+    TokenRow row = {.name = "lab"};
+    char token[TOKEN_SIZE];
+    if (store_open(NULL, &house.store, NULL) != STATUS_OK ||
+        token_make("read", 0, &row, token, NULL) != STATUS_OK ||
+        store_token_add(house.store, &row, NULL) != STATUS_OK)
+        return -1;
+    snprintf(house.lab, sizeof house.lab, "Bearer %s", token);
+    house.doorman.meter = meter_new(table);
+    house.dispatcher = (Dispatcher){NULL, table, NULL, NULL, &house.doorman};
+    *state = &house;
+    return tokens_open(house.store, false, &house.doorman.tokens, NULL) == STATUS_OK ? 0 : -1;
+}
+
+static int close_house(void **state) {
+    House *house = *state;
+    tokens_close(house->doorman.tokens);
+    meter_free(house->doorman.meter);
+    store_close(house->store);
+    return 0;
+}
+
+static int ask(House *house, const char *method, const char *target, const char *authorization,
+               Reply *reply) {
+    Request request = {
+        .method = method, .authorization = authorization, .id = "q-1", .received = 5};
+    reply_default(reply);
+    assert_int_equal(request_open(&request, target, NULL), STATUS_OK);
+    dispatch(&house->dispatcher, &request, reply);
+    request_close(&request);
+    return reply->code;
+}
+
+static void scopes_of_routes_are_asked_for(void **state) {
+    House *house = *state;
+    Reply reply;
+    assert_int_equal(ask(house, "GET", "/open", NULL, &reply), 200);
+    assert_memory_equal(reply.body, "nobody", 3);
+    assert_int_equal(ask(house, "GET", "/v1/a", house->lab, &reply), 200);
+    assert_memory_equal(reply.body, "lab", 3);
+    assert_int_equal(ask(house, "GET", "/v1/a", NULL, &reply), 401);
+    assert_non_null(strstr(reply.authenticate, "Bearer"));
+    assert_non_null(strstr(reply.body, "\"request_id\": \"q-1\""));
+    reply_clear(&reply);
+    assert_int_equal(ask(house, "POST", "/v1/a", house->lab, &reply), 403);
+    assert_null(reply.authenticate);
+    reply_clear(&reply);
+    // Which paths there are is no secret.
+    assert_int_equal(ask(house, "GET", "/v1/b", NULL, &reply), 404);
+    reply_clear(&reply);
+}
+
+static void a_body_is_not_taken_for_whom_may_not_send_it(void **state) {
+    House *house = *state;
+    Request request = {.method = "POST", .authorization = house->lab};
+    Reply reply;
+    reply_default(&reply);
+    assert_int_equal(request_open(&request, "/v1/a", NULL), STATUS_OK);
+    assert_false(dispatch_admits(&house->dispatcher, &request, &reply));
+    assert_int_equal(reply.code, 403);
+    reply_clear(&reply);
+    request.method = "GET";
+    assert_true(dispatch_admits(&house->dispatcher, &request, &reply));
+    assert_int_equal(reply.code, 0);
+    assert_string_equal(request.client, "lab");
+    request_close(&request);
+}
+
+static void answers_are_counted_where_they_belong(void **state) {
+    House *house = *state;
+    Reply reply;
+    Bytes before = {0}, after = {0};
+    meter_write(house->doorman.meter, &before);
+    for (int i = 0; i < 3; i++)
+        ask(house, "GET", "/open", NULL, &reply);
+    ask(house, "PUT", "/open", NULL, &reply);
+    reply_clear(&reply);
+    meter_write(house->doorman.meter, &after);
+    assert_non_null(strstr(before.at, "{route=\"/open\",method=\"GET\",code=\"2xx\"} 1\n"));
+    assert_non_null(strstr(after.at, "{route=\"/open\",method=\"GET\",code=\"2xx\"} 4\n"));
+    assert_non_null(strstr(after.at, "{route=\"none\",method=\"any\",code=\"4xx\"} 2\n"));
+    assert_non_null(strstr(after.at, "_count{route=\"/open\",method=\"GET\"} 4\n"));
+    bytes_clear(&before);
+    bytes_clear(&after);
+}
+
+static void links_in_headers_begin_with_the_base(void **state) {
+    House *house = *state;
+    Reply reply;
+    link_base_set("/sim");
+    assert_int_equal(ask(house, "GET", "/sim/v1/a", house->lab, &reply), 200);
+    assert_string_equal(reply.location, "/sim/v1/a");
+    assert_string_equal(reply.link, "</sim/v1/a>; rel=\"next\"");
+    assert_int_equal(ask(house, "GET", "/v1/a", house->lab, &reply), 200);
+    assert_string_equal(reply.location, "/sim/v1/a");
+    link_base_set("");
+}
+
+static void without_a_doorman_everyone_comes_in(void **state) {
+    (void)state;
+    House house = {.dispatcher = {NULL, table, NULL, NULL, NULL}};
+    Reply reply;
+    assert_int_equal(ask(&house, "POST", "/v1/a", NULL, &reply), 200);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(scopes_of_routes_are_asked_for),
+        cmocka_unit_test(a_body_is_not_taken_for_whom_may_not_send_it),
+        cmocka_unit_test(answers_are_counted_where_they_belong),
+        cmocka_unit_test(links_in_headers_begin_with_the_base),
+        cmocka_unit_test(without_a_doorman_everyone_comes_in),
+    };
+    return cmocka_run_group_tests(tests, open_house, close_house);
+}

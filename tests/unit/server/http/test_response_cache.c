@@ -1,0 +1,139 @@
+// Whole answers kept: found by target and packing, evicted by age, alive as long as they are held.
+#include <pthread.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdatomic.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "server/http/reply.h"
+#include "server/http/response_cache.h"
+#include "server/http/route.h"
+
+static const Route route = {.scope = "read"};
+
+static atomic_int released;
+
+static void release(void *body) {
+    atomic_fetch_add(&released, 1);
+    free(body);
+}
+
+static Reply fresh(const char *text, size_t size) {
+    Reply reply;
+    reply_default(&reply);
+    char *body = calloc(1, size);
+    snprintf(body, size, "%s", text);
+    reply_borrow(&reply, 200, "text/plain", body, size);
+    reply.release = release;
+    reply.context = body;
+    return reply;
+}
+
+static void put(Hot *hot, const char *target, bool is_packed, const char *text, size_t size) {
+    Reply reply = fresh(text, size);
+    hot_put(hot, hot_age(hot), target, is_packed, &route, &reply);
+    assert_string_equal(reply.body, text);
+    reply_clear(&reply);
+}
+
+static bool finds(Hot *hot, const char *target, bool is_packed, const char *text) {
+    Reply reply;
+    const Route *found;
+    if (!hot_find(hot, target, is_packed, &reply, &found))
+        return false;
+    assert_string_equal(reply.body, text);
+    assert_ptr_equal(found, &route);
+    assert_non_null(reply.shared);
+    reply_clear(&reply);
+    return true;
+}
+
+static void an_answer_is_found_by_target_and_packing(void **state) {
+    (void)state;
+    Hot *hot = hot_new(1 << 20);
+    put(hot, "/a", false, "plain", 100);
+    put(hot, "/a", true, "packed", 100);
+    assert_true(finds(hot, "/a", false, "plain"));
+    assert_true(finds(hot, "/a", true, "packed"));
+    assert_false(finds(hot, "/a?x=1", false, ""));
+    put(hot, "/a", false, "newer", 100);
+    assert_true(finds(hot, "/a", false, "newer"));
+    assert_int_equal(hot_tally(hot).count, 2);
+    assert_int_equal(hot_tally(hot).hits, 3);
+    assert_int_equal(hot_tally(hot).misses, 1);
+    hot_free(hot);
+}
+
+static void the_longest_unused_goes_first_and_the_budget_holds(void **state) {
+    (void)state;
+    Hot *hot = hot_new(100000);
+    put(hot, "/1", false, "1", 20000);
+    put(hot, "/2", false, "2", 20000);
+    put(hot, "/3", false, "3", 20000);
+    put(hot, "/4", false, "4", 20000);
+    assert_true(finds(hot, "/1", false, "1"));
+    put(hot, "/5", false, "5", 20000);
+    assert_false(finds(hot, "/2", false, ""));
+    assert_true(finds(hot, "/1", false, "1"));
+    assert_true(hot_tally(hot).bytes <= 100000);
+    assert_int_equal(hot_tally(hot).evictions, 1);
+    put(hot, "/large", false, "large", 26000); // above its share: stays its owner's
+    assert_false(finds(hot, "/large", false, ""));
+    hot_free(hot);
+}
+
+static void what_is_held_outlives_the_cache(void **state) {
+    (void)state;
+    atomic_store(&released, 0);
+    Hot *hot = hot_new(1 << 20);
+    Reply reply = fresh("held", 100);
+    hot_put(hot, hot_age(hot), "/held", false, &route, &reply);
+    hot_clear(hot);
+    assert_false(finds(hot, "/held", false, ""));
+    hot_free(hot);
+    assert_int_equal(released, 0);
+    assert_string_equal(reply.body, "held");
+    reply_clear(&reply);
+    assert_int_equal(released, 1);
+}
+
+static void *ask_and_put(void *context) {
+    Hot *hot = context;
+    for (int i = 0; i < 20000; i++) {
+        char target[16];
+        snprintf(target, sizeof target, "/%d", i * 7 % 50);
+        if (!finds(hot, target, false, target))
+            put(hot, target, false, target, 1000);
+        if (i % 5000 == 4999)
+            hot_clear(hot);
+    }
+    return NULL;
+}
+
+static void many_threads_share_it(void **state) {
+    (void)state;
+    Hot *hot = hot_new(20000);
+    pthread_t threads[4];
+    for (size_t i = 0; i < COUNT(threads); i++)
+        assert_int_equal(pthread_create(&threads[i], NULL, ask_and_put, hot), 0);
+    for (size_t i = 0; i < COUNT(threads); i++)
+        pthread_join(threads[i], NULL);
+    assert_true(hot_tally(hot).bytes <= 20000);
+    hot_free(hot);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(an_answer_is_found_by_target_and_packing),
+        cmocka_unit_test(the_longest_unused_goes_first_and_the_budget_holds),
+        cmocka_unit_test(what_is_held_outlives_the_cache),
+        cmocka_unit_test(many_threads_share_it),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,240 @@
+// The gate: every head it must refuse, and those it must let through.
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "server/http/validate.h"
+
+// One request head: up to four headers.
+typedef struct Head {
+    const char *method, *target, *version;
+    const char *headers[4][2];
+    int code;
+} Head;
+
+static int judge(const Head *head) {
+    Gate gate = {0};
+    Problem problem;
+    problem_clear(&problem);
+    for (size_t i = 0; i < 4 && head->headers[i][0] != NULL; i++) {
+        const char *name = head->headers[i][0], *value = head->headers[i][1];
+        gate_header(&gate, name, strlen(name), value, strlen(value));
+    }
+    const int code = gate_judge(&gate, head->method, head->target, head->version, &problem);
+    assert_int_equal(code != 0, problem.status != STATUS_OK);
+    return code;
+}
+
+static void ordinary_requests_pass(void **state) {
+    (void)state;
+    static const Head heads[] = {
+        {"GET", "/", "HTTP/1.1", {{"Host", "localhost"}}, 0},
+        {"GET", "/", "HTTP/1.0", {{NULL, NULL}}, 0},
+        {"POST",
+         "/v1/jobs?dry_run=1",
+         "HTTP/1.1",
+         {{"host", "127.0.0.1:8080"}, {"content-length", "12"}},
+         0},
+        {"POST",
+         "/v1/jobs",
+         "HTTP/1.1",
+         {{"Host", "[::1]:1"}, {"Transfer-Encoding", "Chunked"}},
+         0},
+        {"GET", "/v1/materials/a.b..c", "HTTP/1.1", {{"Host", "LOCALHOST:65535"}}, 0},
+        {"GET",
+         "/v1/jobs?next=..",
+         "HTTP/1.1",
+         {{"Host", "localhost"}, {"X-A", "a\tb \xc3\xa9"}},
+         0},
+        {"POST", "/", "HTTP/1.1", {{"Host", "localhost:80"}, {"Origin", "http://LOCALHOST:80"}}, 0},
+        {"POST", "/", "HTTP/1.1", {{"Host", "localhost"}, {"Sec-Fetch-Site", "same-origin"}}, 0},
+        {"POST", "/", "HTTP/1.1", {{"Host", "localhost"}, {"Sec-Fetch-Site", "none"}}, 0},
+        {"GET", "/", "HTTP/1.1", {{"Host", "localhost"}, {"Sec-Fetch-Site", "cross-site"}}, 0},
+        {"GET", "/", "HTTP/1.1", {{"Host", "localhost"}, {"Origin", "http://evil.org"}}, 0},
+    };
+    for (size_t i = 0; i < COUNT(heads); i++)
+        assert_int_equal(judge(&heads[i]), 0);
+}
+
+static void ambiguous_or_foreign_heads_are_refused(void **state) {
+    (void)state;
+    static const Head heads[] = {
+        {"GET", "/", "HTTP/1.2", {{"Host", "localhost"}}, 505},
+        {"GET", "/", "HTTP/2.0", {{"Host", "localhost"}}, 505},
+        {"BREW", "/", "HTTP/1.1", {{"Host", "localhost"}}, 501},
+        {"get", "/", "HTTP/1.1", {{"Host", "localhost"}}, 501},
+        {"GET", "http://localhost/", "HTTP/1.1", {{"Host", "localhost"}}, 400},
+        {"OPTIONS", "*", "HTTP/1.1", {{"Host", "localhost"}}, 400},
+        {"GET", "/a\x01", "HTTP/1.1", {{"Host", "localhost"}}, 400},
+        {"GET", "/a%00b", "HTTP/1.1", {{"Host", "localhost"}}, 400},
+        {"GET", "/a?b=%00", "HTTP/1.1", {{"Host", "localhost"}}, 400},
+        {"GET", "/v1/%2e%2E/x", "HTTP/1.1", {{"Host", "localhost"}}, 400},
+        {"GET", "/v1/.%2e", "HTTP/1.1", {{"Host", "localhost"}}, 400},
+        {"GET", "/v1/%2e/x", "HTTP/1.1", {{"Host", "localhost"}}, 400},
+        {"GET", "/v1/../x", "HTTP/1.1", {{"Host", "localhost"}}, 400},
+        {"GET", "/", "HTTP/1.1", {{NULL, NULL}}, 400},
+        {"GET", "/", "HTTP/1.1", {{"Host", "localhost"}, {"Host", "localhost"}}, 400},
+        {"GET", "/", "HTTP/1.1", {{"Host", "example.org"}}, 421},
+        {"GET", "/", "HTTP/1.1", {{"Host", "localhost.example.org"}}, 421},
+        {"GET", "/", "HTTP/1.1", {{"Host", "localhost:80a"}}, 421},
+        {"GET", "/", "HTTP/1.1", {{"Host", "127.0.0.1:123456"}}, 421},
+        {"GET", "/", "HTTP/1.1", {{"Host", ""}}, 421},
+        {"GET", "/", "HTTP/1.1", {{"Host ", "localhost"}}, 400},
+        {"POST",
+         "/",
+         "HTTP/1.1",
+         {{"Host", "localhost"}, {"Content-Length", "1"}, {"Content-Length", "1"}},
+         400},
+        {"GET",
+         "/",
+         "HTTP/1.1",
+         {{"Host", "localhost"}, {"Authorization", "Bearer a"}, {"authorization", "Bearer b"}},
+         400},
+        {"POST", "/", "HTTP/1.1", {{"Host", "localhost"}, {"Content-Length", "+1"}}, 400},
+        {"POST", "/", "HTTP/1.1", {{"Host", "localhost"}, {"Content-Length", "1, 1"}}, 400},
+        {"POST", "/", "HTTP/1.1", {{"Host", "localhost"}, {"Content-Length", ""}}, 400},
+        {"POST",
+         "/",
+         "HTTP/1.1",
+         {{"Host", "localhost"}, {"Content-Length", "1"}, {"Transfer-Encoding", "chunked"}},
+         400},
+        {"POST",
+         "/",
+         "HTTP/1.1",
+         {{"Host", "localhost"}, {"Transfer-Encoding", "gzip, chunked"}},
+         501},
+        {"POST",
+         "/",
+         "HTTP/1.1",
+         {{"Host", "localhost"},
+          {"Transfer-Encoding", "chunked"},
+          {"Transfer-Encoding", "chunked"}},
+         501},
+        {"POST", "/", "HTTP/1.0", {{"Transfer-Encoding", "chunked"}}, 400},
+        {"GET", "/", "HTTP/1.1", {{"Host", "localhost"}, {"X-A", "a\rX-B: b"}}, 400},
+        {"GET", "/", "HTTP/1.1", {{"Host", "localhost"}, {"X-A", "a\x7f"}}, 400},
+        {"GET", "/", "HTTP/1.1", {{"Host", "localhost"}, {"X A", "a"}}, 400},
+        {"POST", "/", "HTTP/1.1", {{"Host", "localhost"}, {"Sec-Fetch-Site", "cross-site"}}, 403},
+        {"DELETE", "/", "HTTP/1.1", {{"Host", "localhost"}, {"Sec-Fetch-Site", "same-site"}}, 403},
+        {"POST", "/", "HTTP/1.1", {{"Host", "localhost:80"}, {"Origin", "null"}}, 403},
+        {"POST", "/", "HTTP/1.1", {{"Host", "localhost:80"}, {"Origin", ""}}, 403},
+        {"POST", "/", "HTTP/1.1", {{"Host", "localhost:80"}, {"Origin", "http://evil.org"}}, 403},
+        {"PATCH",
+         "/",
+         "HTTP/1.1",
+         {{"Host", "localhost:80"}, {"Origin", "http://localhost:81"}},
+         403},
+    };
+    for (size_t i = 0; i < COUNT(heads); i++)
+        if (judge(&heads[i]) != heads[i].code)
+            fail_msg("row %zu: %s %s is judged %d, not %d", i, heads[i].method, heads[i].target,
+                     judge(&heads[i]), heads[i].code);
+}
+
+static void hosts_are_those_that_were_named(void **state) {
+    (void)state;
+    static const char *const names[] = {"sim.example.org", "192.168.1.5", NULL};
+    const GateHosts named = {names, false}, any = {names, true};
+    static const struct {
+        const char *host;
+        bool is_named, is_any;
+    } hosts[] = {
+        {"sim.example.org", true, true},
+        {"SIM.example.org:8080", true, true},
+        {"192.168.1.5:1", true, true},
+        {"sim.example.org.", false, false},
+        {"xsim.example.org", false, false},
+        {"localhost", false, false},
+        {"10.0.0.1:80", false, true},
+        {"[fe80::1]:80", false, true},
+        {"[fe80::1", false, false},
+        {"fe80::1", false, false},
+        {"10.0.0.1.example.org", false, false},
+        {"10.0.0.1:80:80", false, false},
+        {"[sim.example.org]", false, false},
+        {"10.0.0", false, false},
+        {":80", false, false},
+        {"", false, false},
+    };
+    for (size_t i = 0; i < COUNT(hosts); i++) {
+        const size_t size = strlen(hosts[i].host);
+        if (gate_host_is_ours(&named, hosts[i].host, size) != hosts[i].is_named ||
+            gate_host_is_ours(&any, hosts[i].host, size) != hosts[i].is_any)
+            fail_msg("\"%s\" is judged otherwise", hosts[i].host);
+    }
+}
+
+static void a_foreign_host_is_told_the_names_that_are_right(void **state) {
+    (void)state;
+    static const char *const names[] = {"sim.example.org", "localhost", NULL};
+    const GateHosts named = {names, true};
+    Gate gate = {.names = &named};
+    Problem problem;
+    problem_clear(&problem);
+    gate_header(&gate, "Host", 4, "evil", 4);
+    assert_int_equal(gate_judge(&gate, "GET", "/", "HTTP/1.1", &problem), 421);
+    assert_non_null(strstr(problem.detail, "sim.example.org or localhost, or an address"));
+    assert_non_null(strstr(problem.detail, "\"evil\""));
+}
+
+static void a_name_given_for_a_proxy_is_no_foreign_origin(void **state) {
+    (void)state;
+    static const char *const names[] = {"localhost", "sim.example.org", NULL};
+    const GateHosts named = {names, false};
+    static const struct {
+        const char *origin;
+        int code;
+    } cases[] = {{"https://sim.example.org", 0},
+                 {"https://sim.example.org:8443", 0},
+                 {"https://sim.example.org.evil.org", 403},
+                 {"https://example.org", 403},
+                 {"http://localhost:3000", 403}};
+    for (size_t i = 0; i < COUNT(cases); i++) {
+        Gate gate = {.names = &named};
+        Problem problem;
+        problem_clear(&problem);
+        gate_header(&gate, "Host", 4, "localhost:8080", 14);
+        gate_header(&gate, "Origin", 6, cases[i].origin, strlen(cases[i].origin));
+        assert_int_equal(gate_judge(&gate, "POST", "/", "HTTP/1.1", &problem), cases[i].code);
+    }
+}
+
+static void a_nul_inside_a_value_is_seen_by_its_size(void **state) {
+    (void)state;
+    Gate gate = {0};
+    Problem problem;
+    problem_clear(&problem);
+    gate_header(&gate, "Host", 4, "localhost", 9);
+    gate_header(&gate, "X-A", 3, "a\0b", 3);
+    assert_int_equal(gate_judge(&gate, "GET", "/", "HTTP/1.1", &problem), 400);
+    assert_non_null(strstr(problem.detail, "X-A"));
+}
+
+static void a_target_of_4097_bytes_is_too_long(void **state) {
+    (void)state;
+    char target[4098];
+    memset(target, 'a', sizeof target - 1);
+    target[0] = '/';
+    target[4097] = '\0';
+    Head head = {"GET", target, "HTTP/1.1", {{"Host", "localhost"}}, 414};
+    assert_int_equal(judge(&head), 414);
+    target[4096] = '\0';
+    assert_int_equal(judge(&head), 0);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(ordinary_requests_pass),
+        cmocka_unit_test(ambiguous_or_foreign_heads_are_refused),
+        cmocka_unit_test(hosts_are_those_that_were_named),
+        cmocka_unit_test(a_foreign_host_is_told_the_names_that_are_right),
+        cmocka_unit_test(a_name_given_for_a_proxy_is_no_foreign_origin),
+        cmocka_unit_test(a_nul_inside_a_value_is_seen_by_its_size),
+        cmocka_unit_test(a_target_of_4097_bytes_is_too_long),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,125 @@
+// Work for readers: so much at once, woken when done, stopped when the reader goes.
+#include "server/jobs/background.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+#include <time.h>
+
+#include <cmocka.h>
+
+static atomic_int woken, released;
+
+static void wake(void *context) {
+    (void)context;
+    atomic_fetch_add(&woken, 1);
+}
+
+static const Waker waker = {NULL, wake};
+
+typedef struct Task {
+    atomic_bool may_end;
+    bool was_stopped;
+} Task;
+
+static void rest(void) {
+    const struct timespec pause = {.tv_nsec = 1000000};
+    nanosleep(&pause, NULL);
+}
+
+static void task_run(void *context, const Progress *watch) {
+    Task *task = context;
+    while (!atomic_load(&task->may_end) && !task->was_stopped) {
+        task->was_stopped = !watch->advance(watch->context, 0);
+        rest();
+    }
+}
+
+static void task_free(void *context) {
+    atomic_fetch_add(&released, 1);
+    free(context);
+}
+
+static Status begin(Asides *asides, bool may_end, Aside **aside) {
+    Task *task = calloc(1, sizeof *task);
+    atomic_init(&task->may_end, may_end);
+    const AsideWork work = {task, task_run, task_free};
+    return aside_start(asides, &work, &waker, aside, NULL);
+}
+
+static void a_reader_is_woken_when_it_is_done(void **state) {
+    (void)state;
+    Asides *asides;
+    Aside *aside;
+    atomic_store(&woken, 0);
+    atomic_store(&released, 0);
+    assert_int_equal(asides_open(1, &asides, NULL), STATUS_OK);
+    assert_int_equal(begin(asides, true, &aside), STATUS_OK);
+    while (atomic_load(&woken) == 0)
+        rest();
+    assert_true(aside_is_done(aside));
+    assert_false(((Task *)aside_context(aside))->was_stopped);
+    assert_int_equal(atomic_load(&released), 0);
+    aside_drop(aside);
+    assert_int_equal(atomic_load(&released), 1);
+    asides_close(asides);
+}
+
+static void beyond_its_room_it_refuses(void **state) {
+    (void)state;
+    Asides *asides;
+    Aside *aside, *other;
+    atomic_store(&released, 0);
+    assert_int_equal(asides_open(1, &asides, NULL), STATUS_OK);
+    assert_int_equal(begin(asides, false, &aside), STATUS_OK);
+    assert_int_equal(begin(asides, false, &other), STATUS_BUSY);
+    assert_null(other);
+    assert_int_equal(atomic_load(&released), 1);
+    assert_false(aside_is_done(aside));
+    aside_drop(aside); // stops it
+    while (begin(asides, true, &other) != STATUS_OK)
+        rest();
+    aside_drop(other);
+    asides_close(asides);
+}
+
+static void the_end_stops_what_runs_and_waits(void **state) {
+    (void)state;
+    Asides *asides;
+    Aside *aside;
+    atomic_store(&released, 0);
+    assert_int_equal(asides_open(3, &asides, NULL), STATUS_OK);
+    for (size_t i = 0; i < 3; i++) {
+        assert_int_equal(begin(asides, false, &aside), STATUS_OK);
+        if (i < 2)
+            aside_drop(aside);
+    }
+    aside_drop(aside);
+    asides_close(asides);
+    assert_int_equal(atomic_load(&released), 3);
+}
+
+static void many_come_and_go(void **state) {
+    (void)state;
+    Asides *asides;
+    assert_int_equal(asides_open(4, &asides, NULL), STATUS_OK);
+    atomic_store(&released, 0);
+    for (int i = 0; i < 500; i++) {
+        Aside *aside;
+        if (begin(asides, i % 2 == 0, &aside) == STATUS_OK)
+            aside_drop(aside);
+    }
+    asides_close(asides);
+    assert_int_equal(atomic_load(&released), 500);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_reader_is_woken_when_it_is_done),
+        cmocka_unit_test(beyond_its_room_it_refuses),
+        cmocka_unit_test(the_end_stops_what_runs_and_waits),
+        cmocka_unit_test(many_come_and_go),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

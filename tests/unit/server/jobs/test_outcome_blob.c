@@ -1,0 +1,101 @@
+// Kept numbers come back bit for bit, and what was cut or changed does not come back at all.
+#include "server/jobs/outcome_blob.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static Outcome *sample(void) {
+    Outcome *outcome = outcome_new();
+    assert_non_null(outcome);
+    Response *response = &outcome->response;
+    response->sample_rate = 1000;
+    response->count = 5;
+    response->impact_count = 2;
+    response->energy.residual = 1e-14;
+    response->impacts.at = calloc(2, sizeof *response->impacts.at);
+    assert_non_null(response->impacts.at);
+    response->impacts.count = 2;
+    response->impacts.at[1] =
+        (Impact){.start = 0.1, .end = (double)NAN, .damper = 3, .side = 1, .is_resumed = true};
+    assert_int_equal(columns_allocate(&response->series, 2, 5, 0, NULL), STATUS_OK);
+    columns_name(&response->series, 0, "displacement", "m");
+    columns_name(&response->series, 1, "contact_force", "N");
+    for (size_t i = 0; i < 10; i++)
+        response->series.block[i] = 1.0 / (double)(i + 1);
+    Spectrum *spectrum = &outcome->spectrum;
+    spectrum->settings.segment = 4;
+    spectrum->frequency = calloc(3, sizeof(double));
+    assert_non_null(spectrum->frequency);
+    spectrum->frequency[2] = 500;
+    assert_int_equal(columns_allocate(&spectrum->densities, 1, 3, 0, NULL), STATUS_OK);
+    columns_name(&spectrum->densities, 0, "mean_acceleration", "(m/s^2)^2/Hz");
+    for (size_t i = 0; i < 3; i++)
+        spectrum->densities.block[i] = (double)i;
+    return outcome;
+}
+
+static void an_outcomes_numbers_come_back(void **state) {
+    (void)state;
+    Outcome *outcome = sample();
+    Bytes bytes = {.most = 1 << 20}, again = {.most = 1 << 20};
+    numbers_write(&bytes, outcome);
+    Outcome *read = numbers_read(bytes.at, bytes.count);
+    assert_non_null(read);
+    assert_int_equal(read->response.count, 5);
+    assert_string_equal(read->response.series.at[1].name, "contact_force");
+    assert_string_equal(read->response.series.at[1].unit, "N");
+    assert_memory_equal(read->response.series.block, outcome->response.series.block,
+                        10 * sizeof(double));
+    assert_int_equal(read->response.impacts.at[1].damper, 3);
+    assert_true(isnan(read->response.impacts.at[1].end));
+    assert_true(read->response.impacts.at[1].is_resumed);
+    assert_true(read->spectrum.frequency[2] == 500);
+    numbers_write(&again, read);
+    assert_int_equal(bytes.count, again.count);
+    assert_memory_equal(bytes.at, again.at, bytes.count);
+    bytes_clear(&bytes);
+    bytes_clear(&again);
+    outcome_unref(outcome);
+    outcome_unref(read);
+}
+
+static void what_is_cut_or_has_wild_counts_is_not_read(void **state) {
+    (void)state;
+    Outcome *outcome = sample();
+    Bytes bytes = {.most = 1 << 20};
+    numbers_write(&bytes, outcome);
+    for (size_t size = 0; size < bytes.count; size++)
+        assert_null(numbers_read(bytes.at, size));
+    const double wild[] = {-1, 1e300, 4e9, (double)NAN, 1e15};
+    for (size_t i = 0; i < 24; i++)
+        for (size_t k = 0; k < COUNT(wild); k++) {
+            double before;
+            char *at = bytes.at + 8 + i * sizeof before;
+            memcpy(&before, at, sizeof before);
+            // Plain numbers may be anything; counts of what follows may not.
+            if (i == 2 || i == 3 || i == 4 || i == 15 || i == 16) {
+                memcpy(at, &wild[k], sizeof before);
+                assert_null(numbers_read(bytes.at, bytes.count));
+                memcpy(at, &before, sizeof before);
+            }
+        }
+    bytes.at[0] = 'x';
+    assert_null(numbers_read(bytes.at, bytes.count));
+    bytes_clear(&bytes);
+    outcome_unref(outcome);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(an_outcomes_numbers_come_back),
+        cmocka_unit_test(what_is_cut_or_has_wild_counts_is_not_read),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,526 @@
+// What the names of materials in a scene become: numbers or tables, rigs, spreads; and that it
+// never becomes anything else afterwards.
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "core/study/sensitivity.h"
+#include "core/study/sweep.h"
+#include "server/jobs/documents.h"
+#include "server/jobs/jobs.h"
+#include "server/jobs/references.h"
+#include "server/json/parse.h"
+#include "server/materials/material.h"
+
+static Store *store;
+static Problem problem;
+static StudyRequest inquiry;
+static Warnings warnings;
+
+static int set_up(void **state) {
+    (void)state;
+    problem_clear(&problem);
+    return store_open(NULL, &store, &problem) == STATUS_OK ? 0 : -1;
+}
+
+static void clear(void) {
+    study_request_clear(&inquiry);
+    warnings_clear(&warnings);
+    problem_clear(&problem);
+}
+
+static int tear_down(void **state) {
+    (void)state;
+    clear();
+    store_close(store);
+    return 0;
+}
+
+// A revision of what `said` says; the first of its slug makes the material.
+static void say(const char *slug, const char *said) {
+    MaterialRevision revision = {.slug = (char *)slug, .comment = (char *)"measured again"};
+    assert_int_equal(read_json(said, strlen(said), material_fields, &revision.material, &problem),
+                     STATUS_OK);
+    assert_int_equal(material_validate(&revision.material, "", &problem), STATUS_OK);
+    assert_int_equal(catalogue_write_lists(&revision, &problem), STATUS_OK);
+    revision.created_unix_ms = 1;
+    if (store_material_add(store, &revision, &problem) != STATUS_OK) {
+        problem_clear(&problem);
+        assert_int_equal(store_material_revise(store, &revision, ANY_VERSION, &problem), STATUS_OK);
+    }
+    free(revision.lists);
+    fields_clear(material_fields, &revision.material);
+}
+
+static void review(const char *slug, uint64_t revision, const char *status) {
+    const MaterialReview given = {.slug = (char *)slug,
+                                  .revision = revision,
+                                  .status = (char *)status,
+                                  .reason = (char *)"the base was loose",
+                                  .created_unix_ms = 1};
+    assert_int_equal(store_material_review(store, &given, ANY_VERSION, &problem), STATUS_OK);
+}
+
+#define SAID(members) "{\"name\": \"Foam\", \"source\": \"our bench\", " members "}"
+#define TABLE_MEMBERS                                                                              \
+    "\"table\": [{\"approach_speed\": 0.1, \"restitution\": 0.7, \"contact_time\": 0.02, "         \
+    "\"restitution_deviation\": 0.07}, {\"approach_speed\": 0.8, \"restitution\": 0.5, "           \
+    "\"contact_time\": 0.03, \"restitution_deviation\": 0.1, \"contact_time_deviation\": 0.003}]"
+
+static Status prepare_text(const char *text) {
+    clear();
+    return intake_prepare(store, text, strlen(text), NULL, &inquiry, &warnings, &problem);
+}
+
+// The paper's scene with these members of its damper, and what else the document has.
+static Status prepare(const char *damper, const char *rest) {
+    char text[4096];
+    snprintf(text, sizeof text,
+             "{\"structure\": {\"mass\": 1.35, \"stiffness\": 865, \"damping\": 1.092}, "
+             "\"dampers\": [{\"mass\": 0.1107, \"clearance\": 0.015, %s}], \"excitation\": "
+             "{\"kind\": \"free\", "
+             "\"displacement\": 0.015}, \"duration\": 1, \"sample_rate\": 1000%s}",
+             damper, rest);
+    return prepare_text(text);
+}
+
+static void prepare_well(const char *damper, const char *rest) {
+    const Status status = prepare(damper, rest);
+    if (status != STATUS_OK)
+        fail_msg("%s %s: %s: %s", damper, rest, problem.faults[0].pointer,
+                 problem.faults[0].detail);
+}
+
+static const char *detail_at(const char *pointer) {
+    for (size_t i = 0; i < problem.count && i < PROBLEM_FAULTS; i++)
+        if (strcmp(problem.faults[i].pointer, pointer) == 0)
+            return problem.faults[i].detail;
+    return "(no fault there)";
+}
+
+static void expect_fault(const char *pointer, const char *detail) {
+    const char *told = detail_at(pointer);
+    if (strstr(told, detail) == NULL)
+        fail_msg("at %s: \"%s\" instead of \"%s\"", pointer, told, detail);
+}
+
+static const Damper *damper(void) {
+    return &inquiry.simulation.scene.dampers.at[0];
+}
+
+// To be freed.
+static char *canonical(void) {
+    Bytes bytes = {0};
+    document_scene(&bytes, &inquiry);
+    return bytes_take(&bytes, NULL);
+}
+
+static void expect_member(const char *wanted) {
+    char *text = canonical();
+    if (strstr(text, wanted) == NULL)
+        fail_msg("no %s in %s", wanted, text);
+    free(text);
+}
+
+// The canonical form read again is itself, under the same id.
+static void expect_stable(void) {
+    char id[72], again[72];
+    char *text = canonical();
+    intake_result_id(&inquiry, id);
+    if (prepare_text(text) != STATUS_OK)
+        fail_msg("%s: %s: %s", text, problem.faults[0].pointer, problem.faults[0].detail);
+    char *second = canonical();
+    intake_result_id(&inquiry, again);
+    assert_string_equal(text, second);
+    assert_string_equal(id, again);
+    free(text);
+    free(second);
+}
+
+static void a_table_stands_where_its_material_was_named(void **state) {
+    (void)state;
+    say("foam", SAID(TABLE_MEMBERS));
+    prepare_well("\"buffer\": \"foam\"", "");
+    expect_member("{\"material\": \"foam@1\", \"table\": [{\"approach_speed\": 0.1, "
+                  "\"restitution\": 0.7, \"contact_time\": 0.02}, {\"approach_speed\": 0.8, "
+                  "\"restitution\": 0.5, \"contact_time\": 0.03}]}");
+    expect_stable();
+    // What the model does not use is left out, and comes back for another.
+    prepare_well("\"buffer\": \"foam@1\"", ", \"contact\": {\"model\": \"impulse\"}");
+    expect_member("\"table\": [{\"approach_speed\": 0.1, \"restitution\": 0.7}, "
+                  "{\"approach_speed\": 0.8, \"restitution\": 0.5}]");
+    expect_stable();
+    assert_true(isnan(damper()->buffer.table.at[0].contact_time));
+}
+
+static void what_stands_beside_a_name_is_what_the_revision_says(void **state) {
+    (void)state;
+    static const char row[] =
+        "{\"approach_speed\": %g, \"restitution\": %g, \"contact_time\": 0.03}";
+    static const struct {
+        const char *beside, *pointer, *detail;
+    } cases[] = {
+        {"\"material\": \"foam@1\", \"restitution\": 0.7", "/dampers/0/buffer/restitution",
+         "is 0.7, but foam@1 has none"},
+        {"\"material\": \"foam@1\", \"contact_time\": 0.02", "/dampers/0/buffer/contact_time",
+         "is 0.02, but foam@1 has none"},
+        {"\"material\": \"sponge@1\", \"restitution\": 0.62", "/dampers/0/buffer/restitution",
+         "is 0.62, but sponge@1 has 0.61"},
+    };
+    say("foam", SAID(TABLE_MEMBERS));
+    for (size_t i = 0; i < COUNT(cases); i++) {
+        char buffer[256];
+        snprintf(buffer, sizeof buffer, "\"buffer\": {%s}", cases[i].beside);
+        assert_int_equal(prepare(buffer, ""), STATUS_INVALID);
+        expect_fault(cases[i].pointer, cases[i].detail);
+    }
+    char rows[2][128], buffer[512];
+    snprintf(rows[0], sizeof rows[0], row, 0.1, 0.7);
+    snprintf(rows[1], sizeof rows[1], row, 0.8, 0.55);
+    snprintf(buffer, sizeof buffer, "\"buffer\": {\"material\": \"foam\", \"table\": [%s, %s]}",
+             rows[0], rows[1]);
+    assert_int_equal(prepare(buffer, ""), STATUS_INVALID);
+    expect_fault("/dampers/0/buffer/table/0/contact_time", "is 0.03, but foam@1 has 0.02");
+    expect_fault("/dampers/0/buffer/table/1/restitution", "is 0.55, but foam@1 has 0.5");
+    snprintf(buffer, sizeof buffer, "\"buffer\": {\"material\": \"foam\", \"table\": [%s]}",
+             rows[0]);
+    assert_int_equal(prepare(buffer, ""), STATUS_INVALID);
+    expect_fault("/dampers/0/buffer/table", "is not that of foam@1");
+    snprintf(buffer, sizeof buffer, "\"buffer\": {\"material\": \"sponge\", \"table\": [%s, %s]}",
+             rows[0], rows[1]);
+    assert_int_equal(prepare(buffer, ""), STATUS_INVALID);
+    expect_fault("/dampers/0/buffer/table", "must be left out: sponge@1 has no table");
+}
+
+static void a_name_alone_is_the_approved_head_and_never_a_deprecated_one(void **state) {
+    (void)state;
+    say("foam", SAID("\"restitution\": 0.5"));
+    prepare_well("\"buffer\": \"foam\"", "");
+    assert_string_equal(damper()->buffer.material, "foam@1");
+    assert_int_equal(warnings.count, 1);
+    assert_string_equal(warnings.at[0].detail, "foam@1 is a draft that nobody has approved");
+    review("foam", 1, "approved");
+    say("foam", SAID("\"restitution\": 0.6"));
+    prepare_well("\"buffer\": \"foam\"", "");
+    assert_string_equal(damper()->buffer.material, "foam@1");
+    assert_int_equal(warnings.count, 0);
+    prepare_well("\"buffer\": \"foam@2\"", "");
+    assert_true(damper()->buffer.restitution == 0.6);
+    assert_int_equal(warnings.count, 1);
+    review("foam", 1, "deprecated");
+    prepare_well("\"buffer\": \"foam@1\"", "");
+    assert_string_equal(warnings.at[0].detail, "foam@1 is deprecated: the base was loose");
+    assert_string_equal(warnings.at[0].pointer, "/dampers/0/buffer");
+    prepare_well("\"buffer\": \"foam\"", "");
+    assert_string_equal(damper()->buffer.material, "foam@2");
+    review("foam", 2, "deprecated");
+    assert_int_equal(prepare("\"buffer\": \"foam\"", ""), STATUS_INVALID);
+    expect_fault("/dampers/0/buffer", "every revision of the material foam is deprecated");
+    assert_string_equal(problem.faults[0].did_you_mean, "foam@2");
+    assert_int_equal(prepare("\"buffer\": \"foam@3\"", ""), STATUS_INVALID);
+    expect_fault("/dampers/0/buffer", "has no such revision; its newest revision is foam@2");
+}
+
+static void what_is_known_of_a_test_goes_with_the_buffer(void **state) {
+    (void)state;
+    say("foam", SAID("\"restitution\": 0.5, \"restitution_deviation\": 0.05, \"contact_time\": "
+                     "0.02, \"contact_time_deviation\": 0.001, \"least_speed\": 0.2, "
+                     "\"impactor_mass\": 0.3, \"base\": \"free\", \"base_mass\": 0.6"));
+    prepare_well("\"buffer\": \"foam\"", "");
+    const BufferTest *test = &damper()->buffer.test;
+    assert_true(test->least_speed == 0.2 && isnan(test->most_speed));
+    assert_true(fabs(buffer_test_mass(&damper()->buffer) - 0.2) < 1e-15);
+    assert_true(fabs(test->restitution_deviation - 0.1) < 1e-15);
+    assert_true(fabs(test->contact_time_deviation - 0.05) < 1e-15);
+    // A table has its own ends, and its deviations together.
+    say("rubber", SAID(TABLE_MEMBERS));
+    prepare_well("\"buffer\": \"rubber\"", "");
+    test = &damper()->buffer.test;
+    assert_true(test->least_speed == 0.1 && test->most_speed == 0.8);
+    assert_true(fabs(test->restitution_deviation - sqrt((0.01 + 0.04) / 2)) < 1e-15);
+    assert_true(fabs(test->contact_time_deviation - 0.1) < 1e-15);
+    assert_true(isnan(buffer_test_mass(&damper()->buffer)));
+}
+
+static void a_rig_that_is_not_given_is_that_of_the_revision(void **state) {
+    (void)state;
+#define MEASURED "\"restitution\": 0.5, \"contact_time\": 0.02"
+    static const char rig[] = "\"identified_for\": \"rig\", ";
+    static const struct {
+        const char *slug, *said, *rig, *fault;
+    } cases[] = {
+        {"fixed", SAID(MEASURED ", \"impactor_mass\": 0.3, \"base\": \"fixed\""),
+         "\"rig\": {\"impactor_mass\": 0.3}", NULL},
+        {"free", SAID(MEASURED ", \"impactor_mass\": 0.3, \"base\": \"free\", \"base_mass\": 2"),
+         "\"rig\": {\"impactor_mass\": 0.3, \"base_mass\": 2}", NULL},
+        {"table", SAID(TABLE_MEMBERS ", \"impactor_mass\": 0.3, \"base\": \"fixed\""),
+         "\"rig\": {\"impactor_mass\": 0.3}", NULL},
+        {"no_base", SAID(MEASURED ", \"impactor_mass\": 0.3"), NULL,
+         "no_base@1 does not state the base that it lay on"},
+        {"no_mass", SAID(MEASURED ", \"base\": \"fixed\""), NULL,
+         "no_mass@1 does not state the mass of the impactor"},
+        {"nothing", SAID(MEASURED), NULL,
+         "nothing@1 does not state the masses that it was tested with"},
+    };
+    char text[512];
+    for (size_t i = 0; i < COUNT(cases); i++) {
+        say(cases[i].slug, cases[i].said);
+        snprintf(text, sizeof text, "%s\"buffer\": \"%s\"", rig, cases[i].slug);
+        assert_int_equal(prepare(text, ""), cases[i].fault == NULL ? STATUS_OK : STATUS_INVALID);
+        if (cases[i].fault != NULL) {
+            expect_fault("/dampers/0/rig", cases[i].fault);
+            assert_int_equal(problem.count, 1);
+            continue;
+        }
+        expect_member(cases[i].rig);
+        expect_stable();
+        // Impulses have no use for it.
+        prepare_well(text, ", \"contact\": {\"model\": \"impulse\"}");
+        assert_true(isnan(damper()->rig.impactor_mass));
+    }
+    // One that is given wins.
+    snprintf(text, sizeof text, "%s\"buffer\": \"fixed\", \"rig\": {\"impactor_mass\": 7}", rig);
+    prepare_well(text, "");
+    expect_member("\"rig\": {\"impactor_mass\": 7}");
+    // A damper has one: both sides' tests must be alike, and numbers alone tell none.
+    snprintf(text, sizeof text, "%s\"left_buffer\": \"fixed\", \"right_buffer\": \"table\"", rig);
+    prepare_well(text, "");
+    snprintf(text, sizeof text, "%s\"left_buffer\": \"fixed\", \"right_buffer\": \"free\"", rig);
+    assert_int_equal(prepare(text, ""), STATUS_INVALID);
+    expect_fault("/dampers/0/rig", "fixed@1 and free@1 were measured with other masses");
+    snprintf(text, sizeof text, "%s\"left_buffer\": \"fixed\", \"right_buffer\": {%s}", rig,
+             MEASURED);
+    assert_int_equal(prepare(text, ""), STATUS_INVALID);
+    expect_fault("/dampers/0/rig", "the impactor_mass [kg] and, unless it was fixed");
+}
+
+// As they were before any material had more than one revision.
+static void canonical_forms_of_named_revisions_never_change(void **state) {
+    (void)state;
+    static const struct {
+        const char *damper, *rest, *form;
+    } cases[] = {
+        {"\"buffer\": \"sponge\"", "",
+         "\"buffer\": {\"material\": \"sponge@1\", \"restitution\": 0.61, \"contact_time\": "
+         "0.025}, "
+         "\"identified_for\": \"scene\"}], \"contact\": {\"model\": \"auto\""},
+        {"\"buffer\": \"sponge\"", ", \"contact\": {\"model\": \"impulse\"}",
+         "\"buffer\": {\"material\": \"sponge@1\", \"restitution\": 0.61}, "
+         "\"identified_for\": \"scene\"}], \"contact\": {\"model\": \"impulse\""},
+        {"\"left_buffer\": \"aluminium@1\", \"right_buffer\": \"hard_acrylic\", "
+         "\"identified_for\": \"rig\", \"rig\": {\"impactor_mass\": 0.11}",
+         "",
+         "\"left_buffer\": {\"material\": \"aluminium@1\", \"restitution\": 0.46, "
+         "\"contact_time\": 0.0003}, \"right_buffer\": {\"material\": \"hard_acrylic@1\", "
+         "\"restitution\": 0.49, \"contact_time\": 0.003}, \"identified_for\": \"rig\", \"rig\": "
+         "{\"impactor_mass\": 0.11}}]"},
+        {"\"buffer\": \"soft_rubber\"", ", \"contact\": {\"model\": \"flores\"}",
+         "\"buffer\": {\"material\": \"soft_rubber@1\", \"restitution\": 0.44, \"contact_time\": "
+         "0.019, \"exponent\": 1.5}"},
+        {"\"buffer\": \"sponge\"", ", \"study\": {\"kind\": \"sensitivity\"}",
+         "\"study\": {\"kind\": \"sensitivity\", \"parameters\": [\"restitution\", "
+         "\"contact_time\", \"mass\", \"clearance\"], \"step\": 0.01, \"restitution_deviation\": "
+         "0, \"contact_time_deviation\": 0, \"runs\": 0, \"seed\": 1}"},
+    };
+    char *forms[COUNT(cases)], ids[COUNT(cases)][72];
+    for (size_t i = 0; i < COUNT(cases); i++) {
+        prepare_well(cases[i].damper, cases[i].rest);
+        expect_member(cases[i].form);
+        forms[i] = canonical();
+        intake_result_id(&inquiry, ids[i]);
+    }
+    for (int i = 0; i < 100; i++) {
+        say("sponge", SAID("\"restitution\": 0.3, \"restitution_deviation\": 0.1, "
+                           "\"contact_time\": 0.1, \"impactor_mass\": 1, \"base\": \"fixed\""));
+        if (i % 10 == 0)
+            review("sponge", (uint64_t)i + 2, "approved");
+    }
+    review("sponge", 1, "deprecated");
+    for (size_t i = 0; i < COUNT(cases); i++) {
+        char id[72];
+        assert_int_equal(prepare_text(forms[i]), STATUS_OK);
+        char *again = canonical();
+        intake_result_id(&inquiry, id);
+        assert_string_equal(again, forms[i]);
+        assert_string_equal(id, ids[i]);
+        free(again);
+        free(forms[i]);
+    }
+    prepare_well("\"buffer\": \"sponge\"", "");
+    assert_string_equal(damper()->buffer.material, "sponge@92");
+}
+
+static const SensitivityStudy *study(void) {
+    return (const SensitivityStudy *)(const void *)inquiry.study;
+}
+
+#define SPREAD_SAID                                                                                \
+    SAID("\"restitution\": 0.5, \"restitution_deviation\": 0.05, \"contact_time\": 0.02, "         \
+         "\"contact_time_deviation\": 0.001")
+#define SENSITIVITY(members) ", \"study\": {\"kind\": \"sensitivity\"" members "}"
+
+static void a_sensitivity_study_takes_the_recorded_spread(void **state) {
+    (void)state;
+    say("foam", SPREAD_SAID);
+    prepare_well("\"buffer\": \"foam\"", SENSITIVITY(""));
+    assert_int_equal(study()->runs, 200);
+    assert_int_equal(study()->uncertainty.spread.count, 1);
+    assert_string_equal(study()->uncertainty.spread.at[0].source, "foam@1");
+    expect_member("\"spread\": [{\"damper\": 1, \"buffer\": \"buffer\", \"source\": \"foam@1\", "
+                  "\"restitution\": 0.1, \"contact_time\": 0.05}], \"runs\": 200");
+    char id[72], again[72];
+    intake_result_id(&inquiry, id);
+    char *text = canonical();
+    // It stays what it was, whatever is said later.
+    say("foam", SAID("\"restitution\": 0.5, \"restitution_deviation\": 0.2"));
+    review("foam", 2, "approved");
+    assert_int_equal(prepare_text(text), STATUS_OK);
+    intake_result_id(&inquiry, again);
+    assert_string_equal(id, again);
+    free(text);
+    // Left and right for themselves; where nothing was recorded it is sure.
+    prepare_well("\"left_buffer\": \"foam@1\", \"right_buffer\": \"sponge\"", SENSITIVITY(""));
+    expect_member(
+        "\"spread\": [{\"damper\": 1, \"buffer\": \"left_buffer\", \"source\": \"foam@1\"");
+    expect_stable();
+    // What a model does not use is not drawn.
+    prepare_well("\"buffer\": \"foam@1\"",
+                 ", \"contact\": {\"model\": \"impulse\"}" SENSITIVITY(""));
+    expect_member("\"contact_time_deviation\": 0, \"spread\": [{\"damper\": 1, \"buffer\": "
+                  "\"buffer\", \"source\": \"foam@1\", \"restitution\": 0.1}]");
+    expect_stable();
+}
+
+static void what_a_study_says_itself_wins_over_what_was_recorded(void **state) {
+    (void)state;
+    say("foam", SPREAD_SAID);
+    prepare_well("\"buffer\": \"foam\"", SENSITIVITY(", \"restitution_deviation\": 0.3"));
+    expect_member("\"restitution_deviation\": 0.3, \"spread\": [{\"damper\": 1, \"buffer\": "
+                  "\"buffer\", \"source\": \"foam@1\", \"contact_time\": 0.05}]");
+    expect_stable();
+    prepare_well("\"buffer\": \"foam\"", SENSITIVITY(", \"restitution_deviation\": 0, "
+                                                     "\"contact_time_deviation\": 0"));
+    assert_int_equal(study()->uncertainty.spread.count, 0);
+    assert_int_equal(study()->runs, 0);
+    prepare_well("\"buffer\": \"foam\"",
+                 SENSITIVITY(", \"spread\": [{\"damper\": 1, \"restitution\": 0.02}]"));
+    expect_member("\"contact_time_deviation\": 0, \"spread\": [{\"damper\": 1, \"buffer\": "
+                  "\"buffer\", \"restitution\": 0.02}]");
+    expect_stable();
+    static const struct {
+        const char *members, *pointer, *detail;
+    } cases[] = {
+        {", \"spread\": [{\"damper\": 2, \"restitution\": 0.02}]", "/study/spread/0/damper",
+         "must be the number of a damper"},
+        {", \"spread\": [{\"damper\": 1, \"buffer\": \"left_buffer\"}]", "/study/spread/0/buffer",
+         "is not given: if both"},
+        {", \"spread\": [{\"damper\": 1}, {\"damper\": 1}]", "/study/spread/1", "give one each"},
+        {", \"spread\": [{\"damper\": 1, \"source\": \"sponge@1\", \"restitution\": 0.1}]",
+         "/study/spread/0/source", "is not the material of that buffer"},
+        {", \"spread\": [{\"damper\": 1, \"source\": \"foam@1\", \"restitution\": 0.2}]",
+         "/study/spread/0/restitution", "is 0.2, but foam@1 records 0.1"},
+        {", \"restitution_deviation\": 0.1, \"spread\": [{\"damper\": 1, \"restitution\": 0.1}]",
+         "/study/spread/0/restitution", "must be left out: restitution_deviation gives it"},
+        {", \"spread\": [{\"damper\": 1, \"restitution\": 1.5}]", "/study/spread/0/restitution",
+         "must be within [0, 1]"},
+    };
+    for (size_t i = 0; i < COUNT(cases); i++) {
+        char rest[256];
+        snprintf(rest, sizeof rest, SENSITIVITY("%s"), cases[i].members);
+        assert_int_equal(prepare("\"buffer\": \"foam\"", rest), STATUS_INVALID);
+        expect_fault(cases[i].pointer, cases[i].detail);
+    }
+    say("wild", SAID("\"restitution\": 0.1, \"restitution_deviation\": 0.2"));
+    assert_int_equal(prepare("\"buffer\": \"wild\"", SENSITIVITY("")), STATUS_INVALID);
+    expect_fault("/study/spread/0/restitution", "is 2 of its value, as wild@1 records");
+    prepare_well("\"buffer\": \"wild\"", SENSITIVITY(", \"restitution_deviation\": 0.4"));
+}
+
+static void points_of_a_sweep_have_the_tables_and_rigs_of_their_materials(void **state) {
+    (void)state;
+    say("foam", SAID(TABLE_MEMBERS ", \"impactor_mass\": 0.3, \"base\": \"fixed\""));
+    say("rubber", SAID("\"restitution\": 0.5, \"contact_time\": 0.01, \"impactor_mass\": 0.4, "
+                       "\"base\": \"fixed\""));
+    prepare_well("\"buffer\": \"rubber\", \"identified_for\": \"rig\"",
+                 ", \"study\": {\"kind\": \"sweep\", \"axes\": [{\"pointer\": "
+                 "\"/dampers/0/buffer\", \"values\": [\"rubber\", \"foam\"]}]}");
+    const SweepStudy *sweep = (const SweepStudy *)(const void *)inquiry.study;
+    SweepGrid *plan;
+    assert_int_equal(sweep_grid_new(sweep, &inquiry.simulation, NULL, &plan, &problem), STATUS_OK);
+    Simulation points[2];
+    for (size_t i = 0; i < 2; i++)
+        assert_int_equal(sweep_grid_scene(plan, i, true, NULL, &points[i], &problem), STATUS_OK);
+    assert_true(points[0].scene.dampers.at[0].buffer.contact_time == 0.01);
+    assert_true(points[0].scene.dampers.at[0].rig.impactor_mass == 0.4);
+    assert_int_equal(points[1].scene.dampers.at[0].buffer.table.count, 2);
+    assert_true(points[1].scene.dampers.at[0].buffer.table.at[1].contact_time == 0.03);
+    assert_true(points[1].scene.dampers.at[0].rig.impactor_mass == 0.3);
+    for (size_t i = 0; i < 2; i++)
+        simulation_clear(&points[i]);
+    sweep_grid_free(plan);
+    Bytes uses = {0};
+    uses_write(&uses, &inquiry);
+    assert_string_equal(uses.at, "rubber@1\nfoam@1\n");
+    bytes_clear(&uses);
+    expect_stable();
+    // A rig that somebody gave stays for all.
+    prepare_well("\"buffer\": \"rubber\", \"identified_for\": \"rig\", \"rig\": "
+                 "{\"impactor_mass\": 7}",
+                 ", \"study\": {\"kind\": \"sweep\", \"axes\": [{\"pointer\": "
+                 "\"/dampers/0/buffer\", \"values\": [\"rubber\", \"foam\"]}]}");
+    sweep = (const SweepStudy *)(const void *)inquiry.study;
+    assert_int_equal(sweep_grid_new(sweep, &inquiry.simulation, NULL, &plan, &problem), STATUS_OK);
+    assert_int_equal(sweep_grid_scene(plan, 1, true, NULL, &points[1], &problem), STATUS_OK);
+    assert_true(points[1].scene.dampers.at[0].rig.impactor_mass == 7);
+    simulation_clear(&points[1]);
+    sweep_grid_free(plan);
+}
+
+static void uses_are_lines_each_once(void **state) {
+    (void)state;
+    Bytes uses = {0};
+    prepare_well("\"buffer\": {\"restitution\": 0.5}", "");
+    uses_write(&uses, &inquiry);
+    assert_int_equal(uses.count, 0);
+    prepare_well("\"left_buffer\": \"sponge\", \"right_buffer\": \"aluminium\"", "");
+    uses_write(&uses, &inquiry);
+    uses_write(&uses, &inquiry);
+    assert_string_equal(uses.at, "sponge@1\naluminium@1\n");
+    const char *rest = uses.at;
+    Use use;
+    assert_true(uses_next(&rest, &use));
+    assert_string_equal(use.slug, "sponge");
+    assert_int_equal(use.revision, 1);
+    assert_true(uses_next(&rest, &use));
+    assert_string_equal(use.slug, "aluminium");
+    assert_false(uses_next(&rest, &use));
+    bytes_clear(&uses);
+    rest = "record:elcentro\nsponge@12\n";
+    assert_true(uses_next(&rest, &use));
+    assert_int_equal(use.revision, 0);
+    assert_true(uses_next(&rest, &use));
+    assert_int_equal(use.revision, 12);
+}
+
+#define TEST(name) cmocka_unit_test_setup_teardown(name, set_up, tear_down)
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        TEST(a_table_stands_where_its_material_was_named),
+        TEST(what_stands_beside_a_name_is_what_the_revision_says),
+        TEST(a_name_alone_is_the_approved_head_and_never_a_deprecated_one),
+        TEST(what_is_known_of_a_test_goes_with_the_buffer),
+        TEST(a_rig_that_is_not_given_is_that_of_the_revision),
+        TEST(canonical_forms_of_named_revisions_never_change),
+        TEST(a_sensitivity_study_takes_the_recorded_spread),
+        TEST(what_a_study_says_itself_wins_over_what_was_recorded),
+        TEST(points_of_a_sweep_have_the_tables_and_rigs_of_their_materials),
+        TEST(uses_are_lines_each_once),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,283 @@
+// Records that scenes and sweeps name: found, pinned, guarded by their digests, and counted as
+// used.
+#include "server/jobs/resolve_record.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "core/study/sweep.h"
+#include "server/db/db_private.h"
+#include "server/db/record_memory.h"
+#include "server/db/records.h"
+#include "server/jobs/documents.h"
+#include "server/jobs/jobs.h"
+#include "server/json/encode.h"
+#include "tests/support/scratch.h"
+
+static Problem problem;
+static char folder[SCRATCH_SIZE];
+static Store *store;
+
+static int store_make(void **state) {
+    (void)state;
+    scratch_make(folder);
+    return store_open(folder, &store, &problem) == STATUS_OK ? 0 : 1;
+}
+
+static int store_end(void **state) {
+    (void)state;
+    store_close(store);
+    scratch_remove(folder);
+    return 0;
+}
+
+static void add(const char *name, double first) {
+    double values[] = {first, -2, 2};
+    const Reals samples = {values, 3};
+    char digest[RECORD_DIGEST_SIZE];
+    bool is_there;
+    record_digest(0.02, &samples, digest);
+    const RecordRow row = {.name = (char *)name,
+                           .layout = "json",
+                           .unit = "m/s^2",
+                           .interval = 0.02,
+                           .count = 3,
+                           .digest = digest};
+    assert_int_equal(store_record_add(store, &row, &samples, &is_there, &problem), STATUS_OK);
+}
+
+static Status prepare(const char *excitation, const char *study, StudyRequest *inquiry) {
+    char text[2048];
+    Warnings warnings = {NULL, 0};
+    snprintf(text, sizeof text,
+             "{\"structure\": {\"mass\": 1.35, \"stiffness\": 865}, \"duration\": 1, "
+             "\"sample_rate\": 100, \"excitation\": {\"kind\": \"record\", %s}%s%s}",
+             excitation, study[0] != '\0' ? ", \"study\": " : "", study);
+    problem_clear(&problem);
+    const Status status =
+        intake_prepare(store, text, strlen(text), NULL, inquiry, &warnings, &problem);
+    warnings_clear(&warnings);
+    return status;
+}
+
+static const ExcitationRecord *record_in(const StudyRequest *inquiry) {
+    return (const ExcitationRecord *)(const void *)inquiry->simulation.scene.excitation;
+}
+
+static void scenes_share_the_samples_of_the_record_they_name(void **state) {
+    (void)state;
+    StudyRequest one, two;
+    char ids[2][72];
+    assert_int_equal(prepare("\"name\": \"a\"", "", &one), STATUS_OK);
+    assert_int_equal(prepare("\"name\": \"a\", \"scale\": 2", "", &two), STATUS_OK);
+    assert_ptr_equal(record_in(&one)->named, record_in(&two)->named);
+    study_request_clear(&two);
+    // What it has been prepared as is prepared to the same.
+    Bytes scene = {0}, again = {0};
+    Warnings warnings = {NULL, 0};
+    document_scene(&scene, &one);
+    intake_result_id(&one, ids[0]);
+    study_request_clear(&one);
+    assert_int_equal(intake_prepare(store, scene.at, scene.count, NULL, &two, &warnings, &problem),
+                     STATUS_OK);
+    document_scene(&again, &two);
+    intake_result_id(&two, ids[1]);
+    assert_string_equal(scene.at, again.at);
+    assert_string_equal(ids[0], ids[1]);
+    assert_null(strstr(scene.at, "samples"));
+    bytes_clear(&scene);
+    bytes_clear(&again);
+    warnings_clear(&warnings);
+    study_request_clear(&two);
+}
+
+static void a_sweep_pins_the_records_of_its_axes_once_each(void **state) {
+    (void)state;
+    StudyRequest inquiry;
+    Bytes uses = {0};
+    assert_int_equal(
+        prepare("\"name\": \"a\"",
+                "{\"kind\": \"sweep\", \"axes\": [{\"pointer\": \"/excitation/name\", \"values\": "
+                "[\"b\", \"a\", \"b\"]}]}",
+                &inquiry),
+        STATUS_OK);
+    const SweepStudy *study = (const SweepStudy *)(const void *)inquiry.study;
+    assert_int_equal(study->records.count, 2);
+    assert_string_equal(study->records.at[0].name, "b");
+    assert_string_equal(study->records.at[1].digest, record_in(&inquiry)->digest);
+    prepare_record_uses(&inquiry, &uses);
+    assert_string_equal(uses.at, "record:a\nrecord:b\nrecord:a\n");
+    bytes_clear(&uses);
+    study_request_clear(&inquiry);
+}
+
+static void samples_are_let_go_of_and_had_again(void **state) {
+    (void)state;
+    StudyRequest inquiry;
+    RecordUses uses;
+    add("gone", 5);
+    assert_int_equal(
+        prepare("\"name\": \"a\"",
+                "{\"kind\": \"sweep\", \"axes\": [{\"pointer\": \"/excitation/name\", \"values\": "
+                "[\"b\", \"gone\"]}]}",
+                &inquiry),
+        STATUS_OK);
+    const PinnedRecords *pinned = &((const SweepStudy *)(const void *)inquiry.study)->records;
+    const Refcount *samples = record_in(&inquiry)->named;
+    prepare_records_drop(&inquiry);
+    assert_true(record_in(&inquiry)->named == NULL && pinned->at[1].named == NULL);
+    prepare_records_drop(&inquiry); // does nothing
+    assert_int_equal(prepare_records_again(store, &inquiry, &problem), STATUS_OK);
+    assert_ptr_equal(record_in(&inquiry)->named, samples);
+    assert_non_null(pinned->at[1].named);
+    // What was found stays, but it must be there still, with the same samples.
+    assert_int_equal(prepare_records_again(store, &inquiry, &problem), STATUS_OK);
+    assert_int_equal(store_record_delete(store, "gone", &uses, &problem), STATUS_OK);
+    assert_int_equal(prepare_records_again(store, &inquiry, &problem), STATUS_INVALID);
+    assert_string_equal(problem.faults[0].pointer, "/study/records/1/name");
+    add("gone", 6);
+    problem_clear(&problem);
+    assert_int_equal(prepare_records_again(store, &inquiry, &problem), STATUS_INVALID);
+    assert_string_equal(problem.faults[0].pointer, "/study/records/1/digest");
+    assert_int_equal(store_record_delete(store, "gone", &uses, &problem), STATUS_OK);
+    study_request_clear(&inquiry);
+}
+
+static void a_sweep_holds_only_so_many_samples(void **state) {
+    (void)state;
+    NamedRecord *large[5];
+    StudyRequest inquiry;
+    for (size_t i = 0; i < COUNT(large); i++) {
+        Reals samples;
+        char name[8];
+        snprintf(name, sizeof name, "large%zu", i);
+        assert_true(reals_allocate(&samples, RECORD_SAMPLES)); // never written
+        large[i] = record_memory_put(store_record_memory(store), store_generation(store),
+                                     named_record_new(name, name, 1, &samples));
+    }
+    assert_int_equal(prepare("\"name\": \"a\"",
+                             "{\"kind\": \"sweep\", \"axes\": [{\"pointer\": "
+                             "\"/excitation/name\", \"values\": [\"large0\", \"large1\", "
+                             "\"large2\", \"large3\", \"large4\", \"b\"]}]}",
+                             &inquiry),
+                     STATUS_INVALID);
+    assert_int_equal(problem.count, 1);
+    assert_string_equal(problem.faults[0].pointer, "/study/axes/0/values/4");
+    assert_non_null(strstr(problem.faults[0].detail, "16777216 samples"));
+    study_request_clear(&inquiry);
+    for (size_t i = 0; i < COUNT(large); i++)
+        refcount_unref(&large[i]->shared);
+}
+
+static void unknown_names_are_suggested_for_a_few_and_looked_up_for_a_hundred(void **state) {
+    (void)state;
+    enum { NAMES = 300 };
+    static const char *const axes[][2] = {{"/excitation/name", "record-"},
+                                          {"/dampers/0/buffer", "spong"}};
+    for (size_t k = 0; k < COUNT(axes); k++) {
+        char text[NAMES * 24 + 512];
+        StudyRequest inquiry;
+        Warnings warnings = {NULL, 0};
+        int size =
+            snprintf(text, sizeof text,
+                     "{\"structure\": {\"mass\": 1.35, \"stiffness\": 865}, \"duration\": 1, "
+                     "\"sample_rate\": 100, \"excitation\": {\"kind\": \"record\", "
+                     "\"name\": \"a\"}, \"study\": {\"kind\": \"sweep\", \"axes\": "
+                     "[{\"pointer\": \"%s\", \"values\": [",
+                     axes[k][0]);
+        for (int i = 0; i < NAMES; i++)
+            size += snprintf(text + size, sizeof text - (size_t)size, "\"%s%d\", ", axes[k][1],
+                             100 + i);
+        snprintf(text + size - 2, sizeof text - (size_t)size, "]}]}}");
+        problem_clear(&problem);
+        assert_int_equal(
+            intake_prepare(store, text, strlen(text), NULL, &inquiry, &warnings, &problem),
+            STATUS_INVALID);
+        // Nothing was looked up that could not be told.
+        assert_int_equal(problem.count, PROBLEM_FAULTS);
+        assert_non_null(strstr(problem.faults[0].detail, "there are"));
+        assert_non_null(strstr(problem.faults[99].detail, "is called"));
+        assert_null(strstr(problem.faults[99].detail, "there are"));
+        assert_string_equal(problem.faults[99].pointer, "/study/axes/0/values/99");
+        study_request_clear(&inquiry);
+        warnings_clear(&warnings);
+    }
+}
+
+static void faults_stand_where_the_name_or_the_digest_does(void **state) {
+    (void)state;
+    static const char axis[] =
+        "{\"kind\": \"sweep\", \"axes\": [{\"pointer\": \"/excitation/name\", \"values\": %s}]%s}";
+    static const struct {
+        const char *excitation, *values, *pinned, *pointer, *did_you_mean;
+    } cases[] = {
+        {"\"name\": \"aa\"", NULL, "", "/excitation/name", ""},
+        {"\"name\": \"record-11\"", NULL, "", "/excitation/name", "record-1"},
+        {"\"name\": \"a\", \"digest\": \"0\"", NULL, "", "/excitation/digest", ""},
+        {"\"name\": \"a\"", "[\"a\", \"record-2\"]", "", "/study/axes/0/values/1", "record-1"},
+        {"\"name\": \"a\"", "[\"a\"]", ", \"records\": [{\"name\": \"a\", \"digest\": \"0\"}]",
+         "/study/records/0/digest", ""},
+        {"\"name\": \"a\"", "[\"a\"]", ", \"records\": [{\"name\": \"x\"}]",
+         "/study/records/0/name", ""},
+    };
+    for (size_t i = 0; i < COUNT(cases); i++) {
+        char study[512] = "";
+        StudyRequest inquiry;
+        if (cases[i].values != NULL)
+            snprintf(study, sizeof study, axis, cases[i].values, cases[i].pinned);
+        assert_int_equal(prepare(cases[i].excitation, study, &inquiry), STATUS_INVALID);
+        const Fault *fault = NULL;
+        for (size_t k = 0; k < problem.count; k++)
+            if (strcmp(problem.faults[k].pointer, cases[i].pointer) == 0)
+                fault = &problem.faults[k];
+        if (fault == NULL)
+            fail_msg("%s: %s %s", cases[i].pointer, problem.faults[0].pointer,
+                     problem.faults[0].detail);
+        else
+            assert_string_equal(fault->did_you_mean, cases[i].did_you_mean);
+        study_request_clear(&inquiry);
+    }
+}
+
+static void without_a_daemon_there_are_no_records(void **state) {
+    (void)state;
+    Store *own, *kept = store;
+    StudyRequest inquiry;
+    assert_int_equal(store_open(NULL, &own, &problem), STATUS_OK);
+    store = own;
+    const Status status = prepare("\"name\": \"a\"", "", &inquiry);
+    store = kept;
+    assert_int_equal(status, STATUS_INVALID);
+    assert_int_equal(problem.count, 1);
+    assert_string_equal(problem.faults[0].pointer, "/excitation/name");
+    assert_non_null(strstr(problem.faults[0].detail, "impactd import"));
+    study_request_clear(&inquiry);
+    store_close(own);
+}
+
+static int fill(void **state) {
+    if (store_make(state) != 0)
+        return 1;
+    add("a", 1);
+    add("b", 2);
+    add("record-1", 3);
+    return 0;
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(scenes_share_the_samples_of_the_record_they_name),
+        cmocka_unit_test(a_sweep_pins_the_records_of_its_axes_once_each),
+        cmocka_unit_test(samples_are_let_go_of_and_had_again),
+        cmocka_unit_test(a_sweep_holds_only_so_many_samples),
+        cmocka_unit_test(unknown_names_are_suggested_for_a_few_and_looked_up_for_a_hundred),
+        cmocka_unit_test(faults_stand_where_the_name_or_the_digest_does),
+        cmocka_unit_test(without_a_daemon_there_are_no_records),
+    };
+    return cmocka_run_group_tests(tests, fill, store_end);
+}

@@ -1,0 +1,107 @@
+// Arrays of numbers, rows of them and texts: read, written back and described.
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "server/json/encode.h"
+#include "server/json/parse.h"
+#include "server/json/schema.h"
+#include "tests/support/fields.h"
+
+typedef struct Item {
+    Rows matrix;
+    Reals start;
+    Texts names;
+} Item;
+
+static const char *const stems[] = {"velocity", NULL};
+
+static const Field fields[] = {
+    FIELD_ROWS(Item, matrix, "kg", ANY, 3, PRESENCE_OPTIONAL, "a matrix"),
+    FIELD_LONE_REALS(Item, start, "m", ANY, 3, PRESENCE_OPTIONAL, "a start"),
+    FIELD_TEXTS(Item, names, stems, NULL, 3, PRESENCE_OPTIONAL, FIELD_NUMBERED, "names"),
+    FIELD_END};
+
+static Problem problem;
+
+static Status read(Item *item, const char *text) {
+    problem_clear(&problem);
+    return read_json(text, strlen(text), fields, item, &problem);
+}
+
+static void assert_written(const char *text, const char *expected) {
+    Item item;
+    Bytes bytes = {0};
+    assert_int_equal(read(&item, text), STATUS_OK);
+    write_item(&bytes, fields, &item, WRITE_SCENE);
+    bytes_put(&bytes, "", 1);
+    assert_string_equal(bytes.at, expected);
+    bytes_clear(&bytes);
+    fields_clear(fields, &item);
+}
+
+static void matrices_come_back_as_they_went(void **state) {
+    (void)state;
+    assert_written("{\"matrix\": [[1, -2.5], [ 1e3 ], []]}",
+                   "{\"matrix\": [[1,-2.5], [1000], []]}");
+    assert_written("{\"matrix\": []}", "{}");
+}
+
+static void a_lone_number_is_a_list_of_one(void **state) {
+    (void)state;
+    assert_written("{\"start\": 0.5}", "{\"start\": 0.5}");
+    assert_written("{\"start\": [0.5]}", "{\"start\": 0.5}");
+    assert_written("{\"start\": [1, 2]}", "{\"start\": [1,2]}");
+}
+
+static void what_is_no_matrix_is_told_where_it_is_none(void **state) {
+    (void)state;
+    Item item;
+    assert_int_equal(read(&item, "{\"matrix\": [[1, \"2\"], 3, [4, null]], \"start\": \"0\"}"),
+                     STATUS_INVALID);
+    assert_int_equal(problem.count, 4);
+    assert_string_equal(detail_at(&problem, "/matrix/0/1"), "must be a number [kg], is a string");
+    assert_string_equal(detail_at(&problem, "/matrix/1"),
+                        "must be an array of numbers [kg], is a number");
+    assert_string_equal(detail_at(&problem, "/matrix/2/1"), "must be a number [kg], is null");
+    assert_string_equal(detail_at(&problem, "/start"),
+                        "must be a number or an array of numbers [m], is a string");
+    fields_clear(fields, &item);
+    assert_int_equal(read(&item, "{\"matrix\": {}}"), STATUS_INVALID);
+    assert_string_equal(detail_at(&problem, "/matrix"),
+                        "must be an array of rows of numbers [kg], is an object");
+    fields_clear(fields, &item);
+    assert_int_equal(read(&item, "{\"matrix\": [[], [], [], []]}"), STATUS_INVALID);
+    assert_string_equal(detail_at(&problem, "/matrix"), "must have at most 3 rows, has 4");
+    fields_clear(fields, &item);
+    assert_int_equal(read(&item, "{\"matrix\": [[], [1, 2, 3, 4]]}"), STATUS_INVALID);
+    assert_string_equal(detail_at(&problem, "/matrix/1"), "must have at most 3 numbers, has 4");
+    fields_clear(fields, &item);
+}
+
+static void the_schema_says_all_forms(void **state) {
+    (void)state;
+    Bytes bytes = {0};
+    describe_schema(&bytes, "/x", "x", fields);
+    bytes_put(&bytes, "", 1);
+    assert_non_null(strstr(bytes.at, "\"pattern\": \"^(velocity)(_[1-9][0-9]*)?$\""));
+    assert_non_null(strstr(bytes.at, "\"anyOf\": [\n        {\n          \"type\": \"number\""));
+    const char *rows = strstr(bytes.at, "\"items\"");
+    assert_non_null(rows);
+    assert_non_null(strstr(rows + 1, "\"items\"")); // of the rows' numbers
+    bytes_clear(&bytes);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(matrices_come_back_as_they_went),
+        cmocka_unit_test(a_lone_number_is_a_list_of_one),
+        cmocka_unit_test(what_is_no_matrix_is_told_where_it_is_none),
+        cmocka_unit_test(the_schema_says_all_forms),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

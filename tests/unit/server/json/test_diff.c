@@ -1,0 +1,106 @@
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "core/simulation/simulation.h"
+#include "server/json/diff.h"
+#include "server/json/stored_report.h"
+
+static void assert_differs(const char *a, const char *b, const char *besides, const char *wanted) {
+    Differences differences;
+    Bytes bytes = {0};
+    assert_int_equal(differ_json(a, b, besides, &differences, NULL), STATUS_OK);
+    differences_write(&bytes, &differences);
+    assert_string_equal(bytes.at, wanted);
+    bytes_clear(&bytes);
+    differences_clear(&differences);
+}
+
+static void only_what_differs_is_told_with_its_place(void **state) {
+    (void)state;
+    assert_differs("{\"a\": 1, \"b\": {\"c\": [1, {\"d\": 0.1}]}}",
+                   "{\"b\": {\"c\": [1, {\"d\": 0.2}]}, \"a\": 1.0}", NULL,
+                   "[{\"pointer\": \"/b/c/1/d\", \"a\": 0.1, \"b\": 0.2, \"detail\": null}]");
+    assert_differs("{\"x\": 1}", "{\"x\": 1}", NULL, "[]");
+}
+
+static void what_is_not_there_is_null(void **state) {
+    (void)state;
+    assert_differs("{\"a\": \"t\", \"l\": [1, 2]}", "{\"b/~\": {\"q\": true}, \"l\": [1]}", NULL,
+                   "[{\"pointer\": \"/a\", \"a\": \"t\", \"b\": null, \"detail\": null}, "
+                   "{\"pointer\": \"/l/1\", \"a\": 2, \"b\": null, \"detail\": null}, "
+                   "{\"pointer\": \"/b~1~0\", \"a\": null, \"b\": {\"q\": true}, "
+                   "\"detail\": null}]");
+}
+
+static void a_member_may_be_left_out(void **state) {
+    (void)state;
+    assert_differs("{\"study\": 1, \"x\": 2}", "{\"x\": 2}", "study", "[]");
+}
+
+static void long_numbers_are_one_difference(void **state) {
+    (void)state;
+    char a[2048] = "{\"s\": [", b[2048] = "{\"s\": [";
+    for (int i = 0; i < 300; i++) {
+        snprintf(a + strlen(a), sizeof a - strlen(a), "%s%d", i > 0 ? "," : "", i);
+        snprintf(b + strlen(b), sizeof b - strlen(b), "%s%d", i > 0 ? "," : "", i == 250 ? 0 : i);
+    }
+    strcat(a, "]}");
+    strcat(b, ", 7]}");
+    assert_differs(a, b, NULL,
+                   "[{\"pointer\": \"/s\", \"a\": null, \"b\": null, \"detail\": \"300 and 301 "
+                   "items, the first that differs is number 251\"}]");
+}
+
+static void more_than_are_shown_are_counted(void **state) {
+    (void)state;
+    Bytes texts[2] = {{0}, {0}};
+    for (int t = 0; t < 2; t++) {
+        bytes_text(&texts[t], "{");
+        for (int i = 0; i < DIFFER_MAX + 5; i++)
+            bytes_format(&texts[t], "%s\"m%d\": %d", i > 0 ? ", " : "", i, t);
+        bytes_text(&texts[t], "}");
+    }
+    Differences differences;
+    assert_int_equal(differ_json(texts[0].at, texts[1].at, NULL, &differences, NULL), STATUS_OK);
+    assert_true(differences.count == DIFFER_MAX && differences.more == 5);
+    differences_clear(&differences);
+    bytes_clear(&texts[0]);
+    bytes_clear(&texts[1]);
+    assert_int_equal(differ_json("{", "{}", NULL, &differences, NULL), STATUS_INTERNAL);
+    differences_clear(&differences);
+}
+
+static void a_report_reads_back_with_what_is_unknown(void **state) {
+    (void)state;
+    Summary summary;
+    static const char report[] = "{\"peak_displacement\": 0.5, \"impacts\": 3, "
+                                 "\"trust_horizon\": null, \"of_another_version\": 1} and more";
+    assert_int_equal(
+        report_read(report, strlen(report) - strlen(" and more"), summary_fields, &summary, NULL),
+        STATUS_OK);
+    assert_true(summary.peak_displacement == 0.5 && summary.impacts == 3);
+    assert_true(isnan(summary.trust_horizon) && isnan(summary.rms_displacement));
+    assert_int_equal(report_read("{\"impacts\": \"3\"}", 16, summary_fields, &summary, NULL),
+                     STATUS_INTERNAL);
+    assert_int_equal(report_read("[", 1, summary_fields, &summary, NULL), STATUS_INTERNAL);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(only_what_differs_is_told_with_its_place),
+        cmocka_unit_test(what_is_not_there_is_null),
+        cmocka_unit_test(a_member_may_be_left_out),
+        cmocka_unit_test(long_numbers_are_one_difference),
+        cmocka_unit_test(more_than_are_shown_are_counted),
+        cmocka_unit_test(a_report_reads_back_with_what_is_unknown),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

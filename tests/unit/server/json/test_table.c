@@ -1,0 +1,118 @@
+// Tables of text, built by hand and made of documents.
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "server/json/table.h"
+
+typedef struct Thing {
+    double speed;
+} Thing;
+static const Field thing_fields[] = {
+    FIELD_REAL(Thing, speed, "m/s", ANY, 0, "of it"),
+    FIELD_END,
+};
+
+static void control_characters_are_replaced(void **state) {
+    (void)state;
+    char text[] = "a\x1b[2J\x7f\xc2\x9bz \xc3\xa4";
+    text_make_printable(text);
+    assert_string_equal(text, "a?[2J???z \xc3\xa4");
+    text_make_printable(NULL);
+}
+
+static void numbers_stand_to_the_right_and_unknown_cells_are_marked(void **state) {
+    (void)state;
+    char *text = NULL;
+    size_t size;
+    FILE *file = open_memstream(&text, &size);
+    Listing listing = {.columns = 3, .has_heads = true};
+    static const char *const cells[] = {"name", "n", "note", "\xc3\xa4", "", "x", "bb", "12.5", ""};
+    for (size_t i = 0; i < COUNT(cells); i++)
+        listing_add(&listing, "%s", cells[i]);
+    listing_print(&listing, file);
+    listing_number(&listing, "%.1f", 1);
+    listing_number(&listing, "%.1f", (double)NAN);
+    listing_print(&listing, file);
+    fclose(file);
+    assert_string_equal(text, "name     n  note\n"
+                              "\xc3\xa4        -  x\n"
+                              "bb    12.5  -\n"
+                              "1.0  -\n");
+    free(text);
+}
+
+// What is printed of a document.
+static Status printed(const char *json, char **text, size_t *longest) {
+    static const char *const skipped[] = {"links", NULL};
+    static const ListingColumns lists[] = {{"rows", {"b", "a", "c"}}, {NULL, {NULL}}};
+    static const Field *const fields[] = {thing_fields, NULL};
+    static const ListingView view = {skipped, lists, fields};
+    size_t size;
+    *text = NULL;
+    FILE *file = open_memstream(text, &size);
+    const Status status = listing_print_json(json, strlen(json), &view, file, longest, NULL);
+    fclose(file);
+    return status;
+}
+
+static void expect(const char *json, const char *expected) {
+    char *text;
+    size_t longest;
+    assert_int_equal(printed(json, &text, &longest), STATUS_OK);
+    assert_string_equal(text, expected);
+    free(text);
+}
+
+static void documents_are_shown_member_by_member(void **state) {
+    (void)state;
+    expect("{\"speed\": 0.5, \"none\": null, \"links\": {\"a\": 1}, \"tags\": [\"x\", 2], \"is\": "
+           "true}",
+           "speed  0.5 m/s\ntags   x, 2\nis     yes\n");
+    expect("{\"rows\": [{\"a\": 1, \"b\": \"x\", \"d\": 3}, {\"a\": 12}]}",
+           "b   a\nx   1\n-  12\n");
+    expect("{\"n\": 1, \"of\": [{\"speed\": 2}, {\"speed\": 3, \"no\": false}]}",
+           "n  1\n\nof\nspeed [m/s]\n          2\n          3\n");
+    expect("{\"p\": {\"u\": 1, \"v\": null}, \"q\": {\"u\": 2, \"v\": null}, \"r\": {\"x\": "
+           "{\"y\": 4}}}",
+           "   p  q\nu  1  2\n\nr x\ny  4\n");
+    expect("{\"each\": [{\"n\": 1, \"in\": {\"k\": 5}}, {\"n\": 2, \"in\": {\"k\": 6}}]}",
+           "n  1\n\neach 1 in\nk  5\n\neach 2\nn  2\n\neach 2 in\nk  6\n");
+    expect("{}", "");
+}
+
+static void what_is_no_object_is_refused_and_what_is_large_is_cut(void **state) {
+    (void)state;
+    static const char *const texts[] = {"", "[1]", "{", "{\"a\": 1, \"a\": 2}"};
+    char *text;
+    size_t longest;
+    for (size_t i = 0; i < COUNT(texts); i++) {
+        assert_int_equal(printed(texts[i], &text, &longest), STATUS_UNREACHABLE);
+        assert_string_equal(text, "");
+        free(text);
+    }
+    static char large[100000];
+    size_t used = (size_t)snprintf(large, sizeof large, "{\"rows\": [{\"a\": 0}");
+    for (int i = 1; i < 2100; i++)
+        used += (size_t)snprintf(large + used, sizeof large - used, ", {\"a\": %d}", i);
+    snprintf(large + used, sizeof large - used, "]}");
+    assert_int_equal(printed(large, &text, &longest), STATUS_OK);
+    assert_int_equal(longest, 2000);
+    assert_non_null(strstr(text, "... and 100 more"));
+    free(text);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(control_characters_are_replaced),
+        cmocka_unit_test(numbers_stand_to_the_right_and_unknown_cells_are_marked),
+        cmocka_unit_test(documents_are_shown_member_by_member),
+        cmocka_unit_test(what_is_no_object_is_refused_and_what_is_large_is_cut),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,148 @@
+// The growing buffer: its limit, its failed state, and the JSON pieces built in it.
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include <math.h>
+
+#include "core/base/status.h"
+#include "server/util/bytes.h"
+
+static void what_is_put_stands_there_with_a_nul(void **state) {
+    (void)state;
+    Bytes bytes = {0};
+    char expected[40001] = "";
+    for (int i = 0; i < 10000; i++) {
+        bytes_format(&bytes, "%04d", i);
+        snprintf(expected + 4 * i, sizeof expected - 4 * (size_t)i, "%04d", i);
+    }
+    assert_int_equal(bytes.count, 40000);
+    assert_string_equal(bytes.at, expected);
+    bytes_clear(&bytes);
+    assert_null(bytes.at);
+    bytes_put(&bytes, "", 0);
+    assert_string_equal(bytes.at, "");
+    bytes_clear(&bytes);
+}
+
+static void long_formats_are_whole(void **state) {
+    (void)state;
+    char text[3000];
+    memset(text, 'x', sizeof text - 1);
+    text[sizeof text - 1] = '\0';
+    Bytes bytes = {0};
+    bytes_format(&bytes, "<%s>", text);
+    assert_int_equal(bytes.count, sizeof text + 1);
+    assert_int_equal(bytes.at[bytes.count - 1], '>');
+    bytes_clear(&bytes);
+}
+
+static void the_limit_is_exact_and_failure_stays(void **state) {
+    (void)state;
+    Bytes bytes = {.most = 1000};
+    for (int i = 0; i < 1000; i++)
+        bytes_text(&bytes, "x");
+    assert_false(bytes.is_failed);
+    assert_int_equal(bytes.count, 1000);
+    assert_true(bytes.room <= 1001);
+    bytes_text(&bytes, "x");
+    assert_true(bytes.is_failed);
+    assert_null(bytes.at);
+    assert_int_equal(bytes.count, 0);
+    bytes_text(&bytes, "x");
+    bytes_format(&bytes, "%d", 1);
+    bytes_real(&bytes, 1);
+    bytes_json_string(&bytes, "x");
+    assert_false(bytes_reserve(&bytes, 0));
+    assert_null(bytes.at);
+    size_t size = 7;
+    assert_null(bytes_take(&bytes, &size));
+    assert_int_equal(size, 0);
+    bytes_clear(&bytes);
+    bytes_text(&bytes, "again");
+    assert_string_equal(bytes.at, "again");
+    assert_int_equal(bytes.most, 1000);
+    bytes_clear(&bytes);
+}
+
+static void sizes_that_overflow_fail(void **state) {
+    (void)state;
+    Bytes bytes = {0};
+    bytes_text(&bytes, "x");
+    assert_false(bytes_reserve(&bytes, SIZE_MAX));
+    assert_true(bytes.is_failed);
+    bytes_clear(&bytes);
+}
+
+static void taking_leaves_an_empty_buffer(void **state) {
+    (void)state;
+    Bytes bytes = {.most = 50};
+    size_t size = 7;
+    char *text = bytes_take(&bytes, &size);
+    assert_string_equal(text, "");
+    assert_int_equal(size, 0);
+    free(text);
+    bytes_text(&bytes, "abc");
+    text = bytes_take(&bytes, &size);
+    assert_string_equal(text, "abc");
+    assert_int_equal(size, 3);
+    assert_null(bytes.at);
+    assert_int_equal(bytes.most, 50);
+    free(text);
+}
+
+static void numbers_that_are_none_are_null(void **state) {
+    (void)state;
+    Bytes bytes = {0};
+    const double values[] = {0.5, NAN, INFINITY, -INFINITY, -0.0};
+    for (size_t i = 0; i < COUNT(values); i++) {
+        bytes_real(&bytes, values[i]);
+        bytes_text(&bytes, " ");
+    }
+    assert_string_equal(bytes.at, "0.5 null null null -0.0 ");
+    bytes_clear(&bytes);
+}
+
+static void strings_are_escaped_and_always_utf8(void **state) {
+    (void)state;
+    static const struct {
+        const char *text, *json;
+    } cases[] = {
+        {NULL, "null"},
+        {"", "\"\""},
+        {"a\"b\\c/d", "\"a\\\"b\\\\c/d\""},
+        {"\b\f\n\r\t\x01\x1f\x7f", "\"\\b\\f\\n\\r\\t\\u0001\\u001f\\u007f\""},
+        {"\xC3\xBC \xE2\x82\xAC \xF0\x9D\x84\x9E", "\"\xC3\xBC \xE2\x82\xAC \xF0\x9D\x84\x9E\""},
+        {"\xFF", "\"\xEF\xBF\xBD\""},
+        {"\xC3", "\"\xEF\xBF\xBD\""},
+        {"\xC0\xAF", "\"\xEF\xBF\xBD\xEF\xBF\xBD\""},
+        {"\xED\xA0\x80", "\"\xEF\xBF\xBD\xEF\xBF\xBD\xEF\xBF\xBD\""},
+        {"\xF4\x90\x80\x80", "\"\xEF\xBF\xBD\xEF\xBF\xBD\xEF\xBF\xBD\xEF\xBF\xBD\""},
+        {"\xE2\x82", "\"\xEF\xBF\xBD\xEF\xBF\xBD\""},
+    };
+    for (size_t i = 0; i < COUNT(cases); i++) {
+        Bytes bytes = {0};
+        bytes_json_string(&bytes, cases[i].text);
+        assert_string_equal(bytes.at, cases[i].json);
+        bytes_clear(&bytes);
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(what_is_put_stands_there_with_a_nul),
+        cmocka_unit_test(long_formats_are_whole),
+        cmocka_unit_test(the_limit_is_exact_and_failure_stays),
+        cmocka_unit_test(sizes_that_overflow_fail),
+        cmocka_unit_test(taking_leaves_an_empty_buffer),
+        cmocka_unit_test(numbers_that_are_none_are_null),
+        cmocka_unit_test(strings_are_escaped_and_always_utf8),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
