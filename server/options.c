@@ -13,12 +13,12 @@
 enum { NAME_SIZE = OPTION_NAME, LINE_SIZE = 4096 };
 
 // Where the rows' values go to; one of these per options_read.
-typedef struct Reader {
+typedef struct Decoder {
     const Field *fields;
     void *item;
     Options *options;
     Problem *problem;
-} Reader;
+} Decoder;
 
 // "queue_most" as it is typed: "queue-most" after "--", "QUEUE_MOST" after the prefix.
 static void name_spell(char target[NAME_SIZE], const char *prefix, const char *name, bool is_flag) {
@@ -37,11 +37,11 @@ static const Field *row_find(const Field *fields, const char *name, size_t lengt
     return NULL;
 }
 
-static void *member(const Reader *reader, const Field *row) {
+static void *member(const Decoder *reader, const Field *row) {
     return (char *)reader->item + row->offset;
 }
 
-static Status refuse(const Reader *reader, const char *typed, const char *value, const Field *row,
+static Status refuse(const Decoder *reader, const char *typed, const char *value, const Field *row,
                      const char *detail) {
     Fault fault = {0};
     text_fit(fault.pointer, sizeof fault.pointer, typed);
@@ -56,7 +56,7 @@ static Status refuse(const Reader *reader, const char *typed, const char *value,
     return problem_add_fault(reader->problem, STATUS_USAGE, &fault);
 }
 
-static Status refuse_choice(const Reader *reader, const char *typed, const char *value,
+static Status refuse_choice(const Decoder *reader, const char *typed, const char *value,
                             const Field *row) {
     static const char before[] = "one of ";
     char all[160];
@@ -95,7 +95,7 @@ static Status texts_add(Texts *texts, const char *value, bool is_first) {
 }
 
 // The row's range judges the new value, but its fault is told under the name that was typed.
-static Status range_check(const Reader *reader, const char *typed, const Field *row) {
+static Status range_check(const Decoder *reader, const char *typed, const Field *row) {
     const Field rows[] = {*row, FIELD_END};
     Problem *found = calloc(1, sizeof *found);
     if (found == NULL)
@@ -110,7 +110,7 @@ static Status range_check(const Reader *reader, const char *typed, const Field *
     return status == STATUS_OK ? STATUS_OK : STATUS_USAGE;
 }
 
-static Status option_set(const Reader *reader, const Field *row, const char *typed,
+static Status option_set(const Decoder *reader, const Field *row, const char *typed,
                          const char *value, OptionOrigin origin) {
     char *end = NULL;
     errno = 0;
@@ -158,7 +158,8 @@ static Status option_set(const Reader *reader, const Field *row, const char *typ
     return range_check(reader, typed, row);
 }
 
-static Status unknown_put(const Reader *reader, const char *typed, const char *name, bool is_flag) {
+static Status unknown_put(const Decoder *reader, const char *typed, const char *name,
+                          bool is_flag) {
     Fault fault = {0};
     text_fit(fault.pointer, sizeof fault.pointer, typed);
     text_fit(fault.detail, sizeof fault.detail, is_flag ? "is no option" : "is no setting");
@@ -181,7 +182,7 @@ static char *trimmed(char *text) {
 }
 
 // "name = value" lines; "#" begins a comment at a line's start or after a space.
-static Status file_read(const Reader *reader, const char *path) {
+static Status file_read(const Decoder *reader, const char *path) {
     FILE *file = fopen(path, "r");
     if (file == NULL)
         return problem_add(reader->problem, STATUS_USAGE, path, "cannot be read: %s",
@@ -227,7 +228,7 @@ static Status file_read(const Reader *reader, const char *path) {
     return STATUS_OK;
 }
 
-static void environment_read(const Reader *reader, const char *prefix) {
+static void environment_read(const Decoder *reader, const char *prefix) {
     char typed[NAME_SIZE];
     for (const Field *row = reader->fields; row->kind != FIELD_KIND_END; row++) {
         name_spell(typed, prefix, row->name, false);
@@ -239,7 +240,7 @@ static void environment_read(const Reader *reader, const char *prefix) {
 
 // The row that a flag names, and in *value what stands behind its "=". -o is the first row with
 // that letter.
-static const Field *flag_row(const Reader *reader, const char *flag, char name[NAME_SIZE],
+static const Field *flag_row(const Decoder *reader, const char *flag, char name[NAME_SIZE],
                              const char **value) {
     *value = NULL;
     if (flag[1] != '-') {
@@ -262,7 +263,7 @@ static const Field *flag_row(const Reader *reader, const char *flag, char name[N
     return row_find(reader->fields, name, length);
 }
 
-static void flags_read(const Reader *reader, int argc, char *const *argv) {
+static void flags_read(const Decoder *reader, int argc, char *const *argv) {
     Options *options = reader->options;
     bool is_ended = false;
     for (int i = 0; i < argc; i++) {
@@ -296,7 +297,7 @@ static void flags_read(const Reader *reader, int argc, char *const *argv) {
 }
 
 // The file is the weakest source but is named by a stronger one, so its name is looked up first.
-static const char *config_path(const Reader *reader, int argc, char *const *argv,
+static const char *config_path(const Decoder *reader, int argc, char *const *argv,
                                const char *prefix) {
     const Field *row = row_find(reader->fields, "config", strlen("config"));
     if (row == NULL)
@@ -329,7 +330,7 @@ Status options_read(const Field *fields, void *item, int argc, char *const *argv
                            OPTIONS_ROWS);
     // Faults are counted in a Problem of its own where the caller has none.
     Problem *own = problem == NULL ? calloc(1, sizeof *own) : NULL;
-    const Reader reader = {fields, item, options, problem != NULL ? problem : own};
+    const Decoder reader = {fields, item, options, problem != NULL ? problem : own};
     if (reader.problem == NULL)
         return STATUS_NO_MEMORY;
     const size_t before = reader.problem->count;

@@ -42,14 +42,14 @@ static const char about[] =
     "The numbers: impactd, engine %s, result %s.\n";
 
 static Status put_text(Zip *zip, const char *name, Bytes *bytes, Problem *problem) {
-    Layout content = {.size = 0};
+    Segments content = {.size = 0};
     if (bytes->is_failed)
         content.is_failed = true;
     else
-        layout_put(&content, bytes->at, bytes->count);
+        segments_put(&content, bytes->at, bytes->count);
     zip->layout->is_failed = zip->layout->is_failed || content.is_failed;
     const Status status = zip_put(zip, name, &content, problem);
-    layout_clear(&content);
+    segments_clear(&content);
     bytes_clear(bytes);
     return status;
 }
@@ -61,9 +61,9 @@ static Status put_document(Zip *zip, const char *name, const char *text, Problem
     return put_text(zip, name, &bytes, problem);
 }
 
-static Status put_series(Zip *zip, const Response *response, Sheet *sheet, Problem *problem) {
-    Layout content = {.size = 0};
-    TRY(sheet_make(sheet, response->series.count, problem));
+static Status put_series(Zip *zip, const Response *response, ColumnReply *sheet, Problem *problem) {
+    Segments content = {.size = 0};
+    TRY(column_reply_make(sheet, response->series.count, problem));
     for (size_t i = 0; i < response->series.count; i++)
         sheet->chosen[i] = &response->series.at[i];
     sheet->table = (Table){.axis_name = "time",
@@ -75,27 +75,27 @@ static Status put_series(Zip *zip, const Response *response, Sheet *sheet, Probl
     Status status = encoder_npz.lay(&sheet->table, &content, problem);
     if (status == STATUS_OK)
         status = zip_put(zip, "series.npz", &content, problem);
-    layout_clear(&content);
+    segments_clear(&content);
     return status;
 }
 
 static Status put_spectra(Zip *zip, const char *document, Problem *problem) {
     Bytes bytes = {.most = 0};
-    Sheet sheet = {.encoding = NULL};
+    ColumnReply sheet = {.encoding = NULL};
     Status status = put_document(zip, "psd.json", document, problem);
     if (status == STATUS_OK)
-        status = sheet_psd(&sheet, document, problem);
+        status = column_reply_psd(&sheet, document, problem);
     if (status == STATUS_OK)
         status = encoding_write(&encoder_csv, &sheet.table, &bytes, problem);
     if (status == STATUS_OK)
         status = put_text(zip, "psd.csv", &bytes, problem);
     bytes_clear(&bytes);
-    sheet_clear(&sheet);
+    column_reply_clear(&sheet);
     return status;
 }
 
 // The sheet keeps the outcome whose series the layout borrows.
-static Status fill(Zip *zip, const ResultRow *row, Bytes *manifest, Sheet *sheet,
+static Status fill(Zip *zip, const ResultRow *row, Bytes *manifest, ColumnReply *sheet,
                    Problem *problem) {
     const Response *response = &sheet->outcome->response;
     Bytes readme = {.most = 0}, result = {.most = 0}, impacts = {.most = 0};
@@ -119,30 +119,30 @@ static Status fill(Zip *zip, const ResultRow *row, Bytes *manifest, Sheet *sheet
     return put_text(zip, "impacts.csv", &impacts, problem);
 }
 
-static Status pack(App *app, Reply *reply, const ResultRow *row, Bytes *manifest, Sheet *sheet,
-                   Problem *problem) {
-    Layout layout = {.size = 0};
+static Status pack(App *app, Reply *reply, const ResultRow *row, Bytes *manifest,
+                   ColumnReply *sheet, Problem *problem) {
+    Segments layout = {.size = 0};
     Zip zip = {.layout = &layout};
     Status status = fill(&zip, row, manifest, sheet, problem);
     const Status ended = zip_end(&zip, status == STATUS_OK ? problem : NULL);
     status = status != STATUS_OK ? status : ended;
     if (status == STATUS_OK)
-        return tables_reply_layout(app, reply, "application/zip", &layout, sheet, problem);
-    layout_clear(&layout);
-    sheet_clear(sheet);
+        return columns_reply_segments(app, reply, "application/zip", &layout, sheet, problem);
+    segments_clear(&layout);
+    column_reply_clear(sheet);
     return status;
 }
 
 Status results_bundle(App *app, const Request *request, Reply *reply, Problem *problem) {
     ResultRow row = {.count = 0};
     Bytes manifest = {.most = app->reply_most};
-    Sheet sheet = {.encoding = NULL};
-    Status status = store_result_load(app->store, request->parameters[0], &row, problem);
+    ColumnReply sheet = {.encoding = NULL};
+    Status status = db_result_load(app->store, request->parameters[0], &row, problem);
     if (status == STATUS_OK)
         status = manifest_put(app, &row, &manifest, problem);
     // The manifest tells all that may change: a material's status and the base of the links.
     if (status == STATUS_OK && !results_tagged(request, reply, &row, "bundle", &manifest)) {
-        status = tables_find(app, request, reply, &sheet.outcome, problem);
+        status = columns_choose(app, request, reply, &sheet.outcome, problem);
         if (status == STATUS_OK && sheet.outcome != NULL)
             status = pack(app, reply, &row, &manifest, &sheet, problem);
     }

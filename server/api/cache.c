@@ -11,7 +11,7 @@
 // The scenes that are compared, and how long they may be.
 enum { RECENT_MAX = 256, SCENE_MAX = 16384 };
 
-static void put_layer(Bytes *bytes, const char *name, const LayerTally *layer, bool has_budget) {
+static void put_layer(Bytes *bytes, const char *name, const CacheStats *layer, bool has_budget) {
     bytes_format(bytes, "\"%s\": {\"hits\": %llu, \"misses\": %llu", name,
                  (unsigned long long)layer->hits, (unsigned long long)layer->misses);
     if (has_budget)
@@ -23,9 +23,9 @@ static void put_layer(Bytes *bytes, const char *name, const LayerTally *layer, b
 
 Status cache_show(App *app, const Request *request, Reply *reply, Problem *problem) {
     (void)request;
-    IntakeTally tally;
+    JobStats tally;
     Bytes bytes = {.most = app->reply_most};
-    intake_tally(app->intake, &tally);
+    jobs_tally(app->intake, &tally);
     bytes_text(&bytes, "{");
     put_layer(&bytes, "documents", &tally.heads, true);
     bytes_text(&bytes, ", ");
@@ -33,7 +33,7 @@ Status cache_show(App *app, const Request *request, Reply *reply, Problem *probl
     bytes_text(&bytes, ", ");
     put_layer(&bytes, "results", &tally.rows, false);
     uint64_t count, size;
-    store_series_tally(app->store, &count, &size, &tally.stored.evictions);
+    db_series_tally(app->store, &count, &size, &tally.stored.evictions);
     tally.stored.count = count;
     tally.stored.bytes = size;
     bytes_text(&bytes, ", ");
@@ -73,10 +73,10 @@ static Status find_nearest(App *app, const char *scene, Bytes *bytes, Problem *p
     ResultRows rows = {NULL, 0};
     Differences least = {0};
     const ResultRow *nearest = NULL;
-    TRY(store_result_recent(app->store, RECENT_MAX, SCENE_MAX, &rows, problem));
+    TRY(db_result_recent(app->store, RECENT_MAX, SCENE_MAX, &rows, problem));
     for (size_t i = 0; i < rows.count; i++) {
         Differences other;
-        const Status status = differ_json(scene, rows.at[i].scene, NULL, &other, NULL);
+        const Status status = json_diff(scene, rows.at[i].scene, NULL, &other, NULL);
         if (status == STATUS_OK &&
             (nearest == NULL || other.count + other.more < least.count + least.more)) {
             differences_clear(&least);
@@ -97,10 +97,10 @@ static Status find_nearest(App *app, const char *scene, Bytes *bytes, Problem *p
 
 static Status explain(App *app, const StudyRequest *inquiry, Bytes *bytes, Problem *problem) {
     char result[72];
-    IntakeLayers layers;
+    CacheLayers layers;
     Bytes scene = {.most = app->reply_most};
-    intake_result_id(inquiry, result);
-    intake_layers(app->intake, result, &layers);
+    jobs_result_id(inquiry, result);
+    jobs_layers(app->intake, result, &layers);
     const bool is_known = layers.in_memory || layers.in_database;
     bytes_format(bytes, "{\"result\": \"%s\", \"engine\": ", result);
     bytes_json_string(bytes, engine_version);
@@ -128,11 +128,11 @@ Status cache_explain(App *app, const Request *request, Reply *reply, Problem *pr
     Bytes bytes = {.most = app->reply_most};
     TRY(body_require_json(request, problem));
     bool has_place = false;
-    Status status = intake_charge(app->intake, request->client, problem);
+    Status status = jobs_charge(app->intake, request->client, problem);
     if (status == STATUS_OK)
-        status = intake_prepare_request(app->intake, request->body, request->body_size, NULL,
-                                        &has_place, &inquiry, &warnings, problem);
-    intake_leave_place(app->intake, has_place);
+        status = jobs_prepare_request(app->intake, request->body, request->body_size, NULL,
+                                      &has_place, &inquiry, &warnings, problem);
+    jobs_leave_place(app->intake, has_place);
     if (status == STATUS_OK)
         status = explain(app, &inquiry, &bytes, problem);
     if (status == STATUS_OK)

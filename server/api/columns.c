@@ -19,24 +19,24 @@ enum { WHOLE_MAX = 4 << 20 };
 
 static const double outcome_wait_most = 60; // [s]
 
-void sheet_clear(Sheet *sheet) {
+void column_reply_clear(ColumnReply *sheet) {
     encoding_close(sheet->encoding);
     free(sheet->chosen);
     columns_clear(&sheet->own);
     outcome_unref(sheet->outcome);
-    *sheet = (Sheet){.encoding = NULL};
+    *sheet = (ColumnReply){.encoding = NULL};
 }
 
-Status sheet_make(Sheet *sheet, size_t count, Problem *problem) {
+Status column_reply_make(ColumnReply *sheet, size_t count, Problem *problem) {
     sheet->chosen = calloc(count + 1, sizeof *sheet->chosen);
     sheet->table.columns = sheet->chosen;
     return sheet->chosen != NULL ? STATUS_OK
                                  : problem_set(problem, STATUS_NO_MEMORY, "no memory for columns");
 }
 
-Status sheet_own(Sheet *sheet, Problem *problem) {
+Status column_reply_own(ColumnReply *sheet, Problem *problem) {
     free(sheet->chosen);
-    TRY(sheet_make(sheet, sheet->own.count, problem));
+    TRY(column_reply_make(sheet, sheet->own.count, problem));
     sheet->table.column_count = sheet->own.count;
     sheet->table.count = sheet->own.rows;
     for (size_t i = 0; i < sheet->own.count; i++)
@@ -44,8 +44,8 @@ Status sheet_own(Sheet *sheet, Problem *problem) {
     return STATUS_OK;
 }
 
-Status sheet_own_axis(Sheet *sheet, Problem *problem) {
-    TRY(sheet_own(sheet, problem));
+Status column_reply_own_axis(ColumnReply *sheet, Problem *problem) {
+    TRY(column_reply_own(sheet, problem));
     Table *table = &sheet->table;
     const Column *axis = &sheet->own.at[0];
     table->axis_name = axis->name;
@@ -56,7 +56,7 @@ Status sheet_own_axis(Sheet *sheet, Problem *problem) {
     return STATUS_OK;
 }
 
-Status tables_window(const Request *request, size_t count, Table *table, Problem *problem) {
+Status columns_window(const Request *request, size_t count, Table *table, Problem *problem) {
     // The half of a rounding on either side keeps a sample that stands at the very time asked for.
     const double rate = table->axis_rate, end = (double)(count - 1) / rate;
     double from, to;
@@ -76,7 +76,7 @@ Status tables_window(const Request *request, size_t count, Table *table, Problem
     return STATUS_OK;
 }
 
-Status tables_buckets(const Request *request, Sheet *sheet, Problem *problem) {
+Status columns_downsample(const Request *request, ColumnReply *sheet, Problem *problem) {
     Table *table = &sheet->table;
     Columns buckets;
     size_t most;
@@ -85,11 +85,11 @@ Status tables_buckets(const Request *request, Sheet *sheet, Problem *problem) {
     TRY(request_count(request, "points", 1, 1000000000, 1, &most, problem));
     const size_t samples = table->count;
     const size_t bucket = (samples + most - 1) / most;
-    TRY(buckets_make(table->columns, table->column_count, table->first, samples, bucket, &buckets,
-                     problem));
+    TRY(downsample(table->columns, table->column_count, table->first, samples, bucket, &buckets,
+                   problem));
     columns_clear(&sheet->own);
     sheet->own = buckets;
-    TRY(sheet_own(sheet, problem));
+    TRY(column_reply_own(sheet, problem));
     // Without channels too there is a time for each.
     table->count = (samples + bucket - 1) / bucket;
     table->bucket = bucket;
@@ -97,12 +97,12 @@ Status tables_buckets(const Request *request, Sheet *sheet, Problem *problem) {
     return STATUS_OK;
 }
 
-Status tables_encoder(const Request *request, size_t parameter, bool has_chart, Reply *reply,
-                      const Encoder **encoder, Problem *problem) {
+Status columns_format(const Request *request, size_t parameter, bool has_chart, Reply *reply,
+                      const TableFormat **encoder, Problem *problem) {
     const char *extension = request->parameters[parameter];
     char known[96] = "";
     const char *types[16] = {NULL};
-    const Encoder *offered[16];
+    const TableFormat *offered[16];
     size_t count = 0;
     int choice = -1;
     for (size_t i = 0; encoders[i] != NULL && count + 1 < COUNT(types); i++) {
@@ -131,10 +131,10 @@ Status tables_encoder(const Request *request, size_t parameter, bool has_chart, 
     return STATUS_OK;
 }
 
-Status tables_find(App *app, const Request *request, Reply *reply, Outcome **outcome,
-                   Problem *problem) {
+Status columns_choose(App *app, const Request *request, Reply *reply, Outcome **outcome,
+                      Problem *problem) {
     const char *id = request->parameters[0];
-    const Status status = intake_outcome(app->intake, id, request->waker, outcome, problem);
+    const Status status = jobs_outcome(app->intake, id, request->waker, outcome, problem);
     if (status == STATUS_GONE)
         results_link_gone(id, reply);
     if (status == STATUS_BUSY)
@@ -152,42 +152,43 @@ Status tables_find(App *app, const Request *request, Reply *reply, Outcome **out
     return STATUS_OK;
 }
 
-Status tables_outcome(App *app, const Request *request, Reply *reply, const char *what,
-                      const char *extension, Outcome **outcome, Problem *problem) {
+Status columns_outcome(App *app, const Request *request, Reply *reply, const char *what,
+                       const char *extension, Outcome **outcome, Problem *problem) {
     const char *id = request->parameters[0];
     char tag[104];
     snprintf(tag, sizeof tag, "%.72s-%s.%s", id, what, extension);
     // Nothing is computed anew for a client who has it.
-    if (request->if_none_match != NULL && !store_result_exists(app->store, id))
+    if (request->if_none_match != NULL && !db_result_exists(app->store, id))
         return problem_set(problem, STATUS_NOT_FOUND, "there is no result %.80s", id);
     return reply_immutable(reply, request, tag)
                ? STATUS_OK
-               : tables_find(app, request, reply, outcome, problem);
+               : columns_choose(app, request, reply, outcome, problem);
 }
 
 static ptrdiff_t stream_next(void *context, char *target, size_t size) {
-    const size_t count = encoding_next(((Sheet *)context)->encoding, target, size);
+    const size_t count = encoding_next(((ColumnReply *)context)->encoding, target, size);
     return count > 0 ? (ptrdiff_t)count : STREAM_END;
 }
 
 static void stream_cut(void *context, uint64_t first, uint64_t size) {
-    encoding_cut(((Sheet *)context)->encoding, first, size);
+    encoding_cut(((ColumnReply *)context)->encoding, first, size);
 }
 
 static void stream_release(void *context) {
-    sheet_clear(context);
+    column_reply_clear(context);
     free(context);
 }
 
 // Takes what `sheet` holds, which has its encoding.
-static Status reply_stream(Reply *reply, const char *content_type, Sheet *sheet, Problem *problem) {
-    Sheet *kept = malloc(sizeof *kept);
+static Status reply_stream(Reply *reply, const char *content_type, ColumnReply *sheet,
+                           Problem *problem) {
+    ColumnReply *kept = malloc(sizeof *kept);
     if (kept == NULL) {
-        sheet_clear(sheet);
+        column_reply_clear(sheet);
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the answer");
     }
     *kept = *sheet;
-    *sheet = (Sheet){.encoding = NULL};
+    *sheet = (ColumnReply){.encoding = NULL};
     reply_borrow(reply, 200, content_type, NULL, 0);
     reply->stream =
         (Stream){.next = stream_next, .size = encoding_size(kept->encoding), .cut = stream_cut};
@@ -202,7 +203,7 @@ static bool is_short(const Table *table) {
     return table->count <= most / (table->column_count + 1);
 }
 
-static Status reply_whole(App *app, Reply *reply, const char *content_type, Sheet *sheet,
+static Status reply_whole(App *app, Reply *reply, const char *content_type, ColumnReply *sheet,
                           Problem *problem) {
     Bytes bytes = {.most = app->reply_most};
     const size_t size = (size_t)encoding_size(sheet->encoding);
@@ -210,17 +211,17 @@ static Status reply_whole(App *app, Reply *reply, const char *content_type, Shee
         bytes.count = encoding_next(sheet->encoding, bytes.at, size);
         bytes.at[bytes.count] = '\0';
     }
-    sheet_clear(sheet);
+    column_reply_clear(sheet);
     return reply_bytes(reply, 200, content_type, &bytes, problem);
 }
 
-Status tables_reply(App *app, Reply *reply, const Encoder *encoder, Sheet *sheet,
-                    Problem *problem) {
+Status columns_reply(App *app, Reply *reply, const TableFormat *encoder, ColumnReply *sheet,
+                     Problem *problem) {
     reply->accepts_ranges = encoder->is_binary;
     if (!encoder->is_binary && is_short(&sheet->table)) {
         Bytes bytes = {.most = app->reply_most};
         const Status status = encoding_write(encoder, &sheet->table, &bytes, problem);
-        sheet_clear(sheet);
+        column_reply_clear(sheet);
         if (status == STATUS_OK)
             return reply_bytes(reply, 200, encoder->content_type, &bytes, problem);
         bytes_clear(&bytes);
@@ -228,7 +229,7 @@ Status tables_reply(App *app, Reply *reply, const Encoder *encoder, Sheet *sheet
     }
     const Status status = encoding_open(encoder, &sheet->table, &sheet->encoding, problem);
     if (status != STATUS_OK) {
-        sheet_clear(sheet);
+        column_reply_clear(sheet);
         return status;
     }
     if (encoding_size(sheet->encoding) <= WHOLE_MAX)
@@ -236,12 +237,12 @@ Status tables_reply(App *app, Reply *reply, const Encoder *encoder, Sheet *sheet
     return reply_stream(reply, encoder->content_type, sheet, problem);
 }
 
-Status tables_reply_layout(App *app, Reply *reply, const char *content_type, Layout *layout,
-                           Sheet *sheet, Problem *problem) {
+Status columns_reply_segments(App *app, Reply *reply, const char *content_type, Segments *layout,
+                              ColumnReply *sheet, Problem *problem) {
     reply->accepts_ranges = true;
     const Status status = encoding_open_layout(layout, &sheet->encoding, problem);
     if (status != STATUS_OK) {
-        sheet_clear(sheet);
+        column_reply_clear(sheet);
         return status;
     }
     if (encoding_size(sheet->encoding) <= WHOLE_MAX)

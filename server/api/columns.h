@@ -8,51 +8,52 @@
 #include "server/formats/encoding.h"
 
 // A table with all that must live until it is sent. All zero is empty.
-typedef struct Sheet {
+typedef struct ColumnReply {
     Table table;           // its list of columns is `chosen`
     const Column **chosen; // owned
     Columns own;           // what was made for it, or nothing
     Outcome *outcome;      // a hold, or NULL
-    Encoding *encoding;    // made by tables_reply
-} Sheet;
+    Encoding *encoding;    // made by columns_reply
+} ColumnReply;
 
-void sheet_clear(Sheet *sheet);
+void column_reply_clear(ColumnReply *sheet);
 // Room for `count` columns in sheet->chosen.
-Status sheet_make(Sheet *sheet, size_t count, Problem *problem);
+Status column_reply_make(ColumnReply *sheet, size_t count, Problem *problem);
 // Chooses all columns that are the sheet's own.
-Status sheet_own(Sheet *sheet, Problem *problem);
+Status column_reply_own(ColumnReply *sheet, Problem *problem);
 
 // The same with the first of them as the axis.
-Status sheet_own_axis(Sheet *sheet, Problem *problem);
+Status column_reply_own_axis(ColumnReply *sheet, Problem *problem);
 
 // "?from=&to=" [s]: which of `count` samples, at least one and at the table's rate, its rows are.
 // STATUS_USAGE: not numbers, or no sample is there.
-Status tables_window(const Request *request, size_t count, Table *table, Problem *problem);
+Status columns_window(const Request *request, size_t count, Table *table, Problem *problem);
 // "?points=n": least and largest value of the rows in at most n buckets, all of one size but the
 // last, are the sheet's own then. STATUS_USAGE: not a count.
-Status tables_buckets(const Request *request, Sheet *sheet, Problem *problem);
+Status columns_downsample(const Request *request, ColumnReply *sheet, Problem *problem);
 
 // The table of spectra as they were saved. (ledgers.c)
-Status sheet_psd(Sheet *sheet, const char *text, Problem *problem);
+Status column_reply_psd(ColumnReply *sheet, const char *text, Problem *problem);
 
 // The encoder asked for by extension (a parameter of the path), else by Accept. `has_chart`: SVG is
 // one of the formats.
-Status tables_encoder(const Request *request, size_t parameter, bool has_chart, Reply *reply,
-                      const Encoder **encoder, Problem *problem);
+Status columns_format(const Request *request, size_t parameter, bool has_chart, Reply *reply,
+                      const TableFormat **encoder, Problem *problem);
 
 // The outcome of a part of a result. *outcome is a hold, or NULL when the reply is made already:
 // the client has the part, or the request has been put to sleep.
-Status tables_outcome(App *app, const Request *request, Reply *reply, const char *what,
-                      const char *extension, Outcome **outcome, Problem *problem);
+Status columns_outcome(App *app, const Request *request, Reply *reply, const char *what,
+                       const char *extension, Outcome **outcome, Problem *problem);
 
 // The same without an entity tag.
-Status tables_find(App *app, const Request *request, Reply *reply, Outcome **outcome,
-                   Problem *problem);
+Status columns_choose(App *app, const Request *request, Reply *reply, Outcome **outcome,
+                      Problem *problem);
 
 // Takes what `sheet` holds, also when it fails.
-Status tables_reply(App *app, Reply *reply, const Encoder *encoder, Sheet *sheet, Problem *problem);
+Status columns_reply(App *app, Reply *reply, const TableFormat *encoder, ColumnReply *sheet,
+                     Problem *problem);
 // The same of a document whose every byte has its place; the sheet holds what that borrows.
-Status tables_reply_layout(App *app, Reply *reply, const char *content_type, Layout *layout,
-                           Sheet *sheet, Problem *problem);
+Status columns_reply_segments(App *app, Reply *reply, const char *content_type, Segments *layout,
+                              ColumnReply *sheet, Problem *problem);
 
 #endif

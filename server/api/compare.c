@@ -17,7 +17,7 @@
 static void put_side(Bytes *bytes, const char *name, const ResultRow *row) {
     bytes_format(bytes, "\"%s\": {\"id\": \"%s\", \"engine\": ", name, row->id);
     bytes_json_string(bytes, row->engine);
-    bytes_format(bytes, ", \"links\": {\"self\": \"%s/v1/results/%s\"}}", link_base(), row->id);
+    bytes_format(bytes, ", \"links\": {\"self\": \"%s/v1/results/%s\"}}", base_path(), row->id);
 }
 
 // Without outcomes (NULL), what is of series and spectra is null, and `gone` says why.
@@ -48,10 +48,10 @@ static Status write_comparison(App *app, const ResultRow rows[2], Outcome *const
     Differences differences = {0};
     Bytes bytes = {.most = app->reply_most};
     for (int i = 0; i < 2; i++)
-        TRY(report_read(rows[i].summary, strlen(rows[i].summary), summary_fields, &summaries[i],
-                        problem));
+        TRY(stored_report_read(rows[i].summary, strlen(rows[i].summary), summary_fields,
+                               &summaries[i], problem));
     // A study asks more of a scene; what is compared is the scene's own run.
-    Status status = differ_json(rows[0].scene, rows[1].scene, "study", &differences, problem);
+    Status status = json_diff(rows[0].scene, rows[1].scene, "study", &differences, problem);
     if (status == STATUS_OK) {
         bytes_text(&bytes, "{");
         put_side(&bytes, "a", &rows[0]);
@@ -75,7 +75,7 @@ static Status show(App *app, char results[2][72], Outcome *const outcomes[SIDES]
     ResultRow rows[2] = {{.id = ""}, {.id = ""}};
     Status status = STATUS_OK;
     for (int i = 0; i < 2 && status == STATUS_OK; i++)
-        status = store_result_load(app->store, results[i], &rows[i], problem);
+        status = db_result_load(app->store, results[i], &rows[i], problem);
     if (status == STATUS_OK && (rows[0].scene == NULL || rows[1].scene == NULL ||
                                 rows[0].summary == NULL || rows[1].summary == NULL))
         status = problem_set(problem, STATUS_INTERNAL, "a stored result is not whole");

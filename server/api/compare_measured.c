@@ -76,16 +76,16 @@ static void write_answer(Bytes *bytes, const char *result, const Column *column,
     bytes_format(bytes,
                  "{\"a\": {\"id\": \"%s\", \"links\": {\"self\": \"%s/v1/results/%s\"}}, "
                  "\"channel\": ",
-                 result, link_base(), result);
+                 result, base_path(), result);
     bytes_json_string(bytes, column->name);
     bytes_text(bytes, ", \"unit\": ");
     bytes_json_string(bytes, column->unit);
     bytes_format(bytes, ", \"align\": \"%s\", \"shift\": ", align_names[asked->align]);
     bytes_real(bytes, shift);
     bytes_text(bytes, ", \"motion\": ");
-    write_item(bytes, signal_comparison_fields, &likeness, WRITE_REPORT);
+    encode_item(bytes, signal_comparison_fields, &likeness, WRITE_REPORT);
     bytes_format(bytes, ", \"psd\": {\"segment\": %zu, ", spectrum->settings.segment);
-    write_members(bytes, spectrum_distance_fields, &distance, WRITE_REPORT);
+    encode_members(bytes, spectrum_distance_fields, &distance, WRITE_REPORT);
     bytes_text(bytes, "}, \"warnings\": [");
     if (b->rate > a->rate * (1 + 1e-9))
         compare_put_warning(bytes,
@@ -98,7 +98,7 @@ static void write_answer(Bytes *bytes, const char *result, const Column *column,
 static Status compare(App *app, const char *result, const MeasuredRequest *asked,
                       const Outcome *outcome, Reply *reply, Problem *problem) {
     const Response *response = &outcome->response;
-    const Measured *measured = &asked->measured;
+    const MeasuredUpload *measured = &asked->measured;
     const Column *column;
     TRY(choose_channel(asked, response, &column, problem));
     const Signal a = {column->values, response->count, response->sample_rate, 0};
@@ -125,9 +125,9 @@ Status compare_measured(App *app, const Request *request, Reply *reply, Problem 
     MeasuredRequest *asked = sides.asked;
     problem->whose = "comparison";
     if (asked == NULL)
-        status = measured_read(request, &asked, problem);
+        status = measured_upload_read(request, &asked, problem);
     sides.asked = asked;
-    sides.release = measured_free;
+    sides.release = measured_upload_free;
     if (status == STATUS_OK)
         status = side_resolve(app, "a", asked->a, results[0], problem);
     if (status == STATUS_OK)

@@ -45,7 +45,7 @@ static void put_named(Bytes *bytes, const char *name, const char *unit, const Fi
     bytes_text(bytes, ", \"unit\": ");
     bytes_json_string(bytes, unit);
     bytes_text(bytes, ", ");
-    write_members(bytes, fields, item, WRITE_REPORT);
+    encode_members(bytes, fields, item, WRITE_REPORT);
     bytes_text(bytes, "}");
 }
 

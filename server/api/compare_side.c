@@ -11,17 +11,17 @@ static const double wait_most = 60; // [s]
 
 Status side_resolve(App *app, const char *name, const char *id, char result[72], Problem *problem) {
     Job *job = NULL;
-    JobShow show = {0};
+    JobView show = {0};
     if (strncmp(id, "j-", 2) != 0) {
         snprintf(result, 72, "%s", id);
-        return store_result_exists(app->store, result)
+        return db_result_exists(app->store, result)
                    ? STATUS_OK
                    : problem_set(problem, STATUS_NOT_FOUND, "there is no result %.80s (\"%s\")", id,
                                  name);
     }
-    TRY(intake_find(app->intake, id, &job, problem));
-    Status status = job_show(job, &show);
-    job_drop(job);
+    TRY(jobs_find(app->intake, id, &job, problem));
+    Status status = job_view(job, &show);
+    job_unref(job);
     if (status != STATUS_OK)
         status = problem_set(problem, status, "the job cannot be shown");
     else if (show.state != JOB_SUCCESSFUL)
@@ -30,7 +30,7 @@ Status side_resolve(App *app, const char *name, const char *id, char result[72],
                         show.id, name, job_state_names[show.state]);
     else
         snprintf(result, 72, "%s", show.result);
-    job_show_clear(&show);
+    job_view_clear(&show);
     return status;
 }
 
@@ -77,8 +77,8 @@ Status sides_outcomes(App *app, const Request *request, Reply *reply, size_t cou
     *is_waiting = false;
     for (size_t i = 0; i < count; i++) {
         if (sides->outcomes[i] == NULL)
-            TRY(intake_outcome(app->intake, results[i], request->waker, &sides->outcomes[i],
-                               problem));
+            TRY(jobs_outcome(app->intake, results[i], request->waker, &sides->outcomes[i],
+                             problem));
         *is_waiting = *is_waiting || sides->outcomes[i] == NULL;
     }
     return *is_waiting ? sleep_on(request, reply, sides, problem) : STATUS_OK;

@@ -24,7 +24,7 @@ Sides sides_begin(const Request *request);
 void sides_end(Sides *sides);
 
 // Gets the outcomes of `count` results. With *is_waiting the reply is made: the request sleeps, and
-// `sides` is empty. STATUS_GONE as intake_outcome.
+// `sides` is empty. STATUS_GONE as jobs_outcome.
 Status sides_outcomes(App *app, const Request *request, Reply *reply, size_t count,
                       char results[][72], Sides *sides, bool *is_waiting, Problem *problem);
 

@@ -17,10 +17,10 @@ const char *const align_names[] = {"given", "auto", NULL};
 
 // clang-format off
 static const Field measured_fields[] = {
-    FIELD_REALS(Measured, samples, NULL, ANY, RECORD_SAMPLES, PRESENCE_REQUIRED, "what was measured, in SI units"),
-    FIELD_REAL(Measured, interval, "s", WITHIN(1e-9, 1e6), REQUIRED, "from one sample to the next"),
-    FIELD_REAL(Measured, start, "s", WITHIN(-1e9, 1e9), 0, "time of the first sample; the result's first is at 0"),
-    FIELD_CHOICE(Measured, quantity, statistic_names, QUANTITY_ACCELERATION, "what was measured"),
+    FIELD_REALS(MeasuredUpload, samples, NULL, ANY, RECORD_SAMPLES, PRESENCE_REQUIRED, "what was measured, in SI units"),
+    FIELD_REAL(MeasuredUpload, interval, "s", WITHIN(1e-9, 1e6), REQUIRED, "from one sample to the next"),
+    FIELD_REAL(MeasuredUpload, start, "s", WITHIN(-1e9, 1e9), 0, "time of the first sample; the result's first is at 0"),
+    FIELD_CHOICE(MeasuredUpload, quantity, statistic_names, QUANTITY_ACCELERATION, "what was measured"),
     FIELD_END
 };
 
@@ -35,7 +35,7 @@ static const Field request_fields[] = {
 };
 // clang-format on
 
-void measured_free(void *asked) {
+void measured_upload_free(void *asked) {
     if (asked != NULL)
         fields_clear(request_fields, asked);
     free(asked);
@@ -46,7 +46,7 @@ static Status read_document(const Request *request, MeasuredRequest *asked, Prob
         return problem_set(problem, STATUS_USAGE,
                            "beside JSON there is no query: \"%.40s\" is a member of the document",
                            request->queries[0].name);
-    return read_json(request->body, request->body_size, request_fields, asked, problem);
+    return json_parse(request->body, request->body_size, request_fields, asked, problem);
 }
 
 static Status read_name(const Request *request, const char *name, char **target, Problem *problem) {
@@ -128,7 +128,7 @@ static Status require_type(const Request *request, bool *is_text, Problem *probl
     return *is_text ? body_require(request, problem) : body_require_json(request, problem);
 }
 
-Status measured_read(const Request *request, MeasuredRequest **made, Problem *problem) {
+Status measured_upload_read(const Request *request, MeasuredRequest **made, Problem *problem) {
     bool is_text;
     TRY(require_type(request, &is_text, problem));
     MeasuredRequest *asked = *made = calloc(1, sizeof *asked);

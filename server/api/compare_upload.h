@@ -18,23 +18,23 @@ extern const char *const statistic_names[];
 typedef enum Align { ALIGN_GIVEN, ALIGN_AUTO } Align;
 extern const char *const align_names[];
 
-typedef struct Measured {
+typedef struct MeasuredUpload {
     Reals samples;
     double interval, start; // [s]
     int quantity;           // Statistic
-} Measured;
+} MeasuredUpload;
 
 typedef struct MeasuredRequest {
     char *a;
     char *channel;
-    Measured measured;
+    MeasuredUpload measured;
     int align;         // Align
     double shift;      // [s]
     double most_shift; // [s]
 } MeasuredRequest;
 
-// Made also where it fails, but for STATUS_NO_MEMORY; freed by measured_free.
-Status measured_read(const Request *request, MeasuredRequest **asked, Problem *problem);
-void measured_free(void *asked);
+// Made also where it fails, but for STATUS_NO_MEMORY; freed by measured_upload_free.
+Status measured_upload_read(const Request *request, MeasuredRequest **asked, Problem *problem);
+void measured_upload_free(void *asked);
 
 #endif

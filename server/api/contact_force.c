@@ -40,7 +40,7 @@ static void look_run(void *context, const Progress *watch) {
 static Status read_scene(App *app, const char *id, Reply *reply, Look *look, Problem *problem) {
     ResultRow row = {.count = 0};
     Warnings warnings = {NULL, 0};
-    Status status = store_result_scene(app->store, id, &row, problem);
+    Status status = db_result_scene(app->store, id, &row, problem);
     if (status == STATUS_OK && strcmp(row.engine, engine_version) != 0) {
         status = problem_set(problem, STATUS_GONE,
                              "the result was made by %s, this is %s: POST to /again below the "
@@ -49,8 +49,8 @@ static Status read_scene(App *app, const char *id, Reply *reply, Look *look, Pro
         results_link_gone(id, reply);
     }
     if (status == STATUS_OK)
-        status = intake_prepare(app->store, row.scene, strlen(row.scene), NULL, &look->inquiry,
-                                &warnings, problem);
+        status = jobs_prepare(app->store, row.scene, strlen(row.scene), NULL, &look->inquiry,
+                              &warnings, problem);
     if (status == STATUS_OK && !look->inquiry.simulation.output.impacts)
         status = problem_set(problem, STATUS_NOT_FOUND, "%s", no_impacts);
     warnings_clear(&warnings);
@@ -74,29 +74,30 @@ static Status read_what(const Request *request, Look *look, Problem *problem) {
 }
 
 // Of a look that has been taken; its columns become the sheet's.
-static Status reply_look(App *app, Reply *reply, const Encoder *encoder, Look *look,
+static Status reply_look(App *app, Reply *reply, const TableFormat *encoder, Look *look,
                          Problem *problem) {
     if (look->status != STATUS_OK)
         return problem_set(problem, look->status, "%s", look->problem.detail);
-    Sheet sheet = {.own = look->closeup.columns};
+    ColumnReply sheet = {.own = look->closeup.columns};
     look->closeup.columns = (Columns){.count = 0};
-    const Status status = sheet_own_axis(&sheet, problem);
+    const Status status = column_reply_own_axis(&sheet, problem);
     if (status != STATUS_OK) {
-        sheet_clear(&sheet);
+        column_reply_clear(&sheet);
         return status;
     }
-    return tables_reply(app, reply, encoder, &sheet, problem);
+    return columns_reply(app, reply, encoder, &sheet, problem);
 }
 
 static void forget(void *kept) {
-    aside_drop(kept);
+    background_unref(kept);
 }
 
 // Takes the aside.
-static Status wait_on(const Request *request, Reply *reply, Aside *aside, Problem *problem) {
+static Status wait_on(const Request *request, Reply *reply, BackgroundTask *aside,
+                      Problem *problem) {
     const double left = wait_most - 1e-9 * (double)(clock_monotonic_ns() - request->started_ns);
     if (left <= 0 || request->is_expired) {
-        aside_drop(aside);
+        background_unref(aside);
         reply->retry_after = 30;
         return problem_set(problem, STATUS_BUSY,
                            "to run the scene again takes longer than %g s: submit a shorter scene "
@@ -108,16 +109,16 @@ static Status wait_on(const Request *request, Reply *reply, Aside *aside, Proble
 }
 
 // Takes the aside of a request that slept.
-static Status go_on(App *app, const Request *request, Reply *reply, const Encoder *encoder,
-                    Aside *aside, Problem *problem) {
-    if (!aside_is_done(aside))
+static Status go_on(App *app, const Request *request, Reply *reply, const TableFormat *encoder,
+                    BackgroundTask *aside, Problem *problem) {
+    if (!background_is_done(aside))
         return wait_on(request, reply, aside, problem);
-    const Status status = reply_look(app, reply, encoder, aside_context(aside), problem);
-    aside_drop(aside);
+    const Status status = reply_look(app, reply, encoder, background_context(aside), problem);
+    background_unref(aside);
     return status;
 }
 
-static Status look_begin(App *app, const Request *request, Reply *reply, const Encoder *encoder,
+static Status look_begin(App *app, const Request *request, Reply *reply, const TableFormat *encoder,
                          Look *look, Problem *problem) {
     if (impact_history_steps(&look->inquiry.simulation) * SOLVER_STEP <= quick) {
         look_run(look, NULL);
@@ -125,9 +126,9 @@ static Status look_begin(App *app, const Request *request, Reply *reply, const E
         look_free(look);
         return status;
     }
-    Aside *aside = NULL;
-    const AsideWork work = {look, look_run, look_free};
-    const Status status = aside_start(app->asides, &work, request->waker, &aside, problem);
+    BackgroundTask *aside = NULL;
+    const BackgroundWork work = {look, look_run, look_free};
+    const Status status = background_start(app->asides, &work, request->waker, &aside, problem);
     if (status == STATUS_BUSY)
         reply->retry_after = 2;
     return status == STATUS_OK ? wait_on(request, reply, aside, problem) : status;
@@ -135,7 +136,7 @@ static Status look_begin(App *app, const Request *request, Reply *reply, const E
 
 // False: the client has it.
 static bool has_to_send(const Request *request, Reply *reply, const Look *look,
-                        const Encoder *encoder) {
+                        const TableFormat *encoder) {
     char tag[104];
     snprintf(tag, sizeof tag, "%.72s-%zu-force.%s", request->parameters[0], look->number,
              encoder->extension);
@@ -143,12 +144,12 @@ static bool has_to_send(const Request *request, Reply *reply, const Look *look,
 }
 
 Status results_force(App *app, const Request *request, Reply *reply, Problem *problem) {
-    const Encoder *encoder = NULL;
-    TRY(tables_encoder(request, 2, false, reply, &encoder, problem));
+    const TableFormat *encoder = NULL;
+    TRY(columns_format(request, 2, false, reply, &encoder, problem));
     if (request->kept != NULL) {
-        Aside *aside = request->kept;
-        if (aside_is_done(aside))
-            (void)has_to_send(request, reply, aside_context(aside), encoder);
+        BackgroundTask *aside = request->kept;
+        if (background_is_done(aside))
+            (void)has_to_send(request, reply, background_context(aside), encoder);
         return go_on(app, request, reply, encoder, aside, problem);
     }
     Look *look = calloc(1, sizeof *look);

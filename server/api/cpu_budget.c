@@ -5,12 +5,12 @@
 enum { LONG_MAX = 4 };
 static const double quick = 0.5, most = 30; // [s]
 
-void patience_begin(App *app, Patience *patience) {
-    *patience = (Patience){.app = app, .from_ns = clock_thread_cpu_ns()};
+void cpu_budget_begin(App *app, CpuBudget *patience) {
+    *patience = (CpuBudget){.app = app, .from_ns = clock_thread_cpu_ns()};
 }
 
-bool patience_lasts(void *context, double fraction) {
-    Patience *patience = context;
+bool cpu_budget_lasts(void *context, double fraction) {
+    CpuBudget *patience = context;
     App *app = patience->app;
     const double spent = 1e-9 * (double)(clock_thread_cpu_ns() - patience->from_ns);
     (void)fraction;
@@ -23,7 +23,7 @@ bool patience_lasts(void *context, double fraction) {
     return !patience->is_crowded && spent < most && !atomic_load(&app->is_stopping);
 }
 
-Status patience_tell(const Patience *patience, Problem *problem) {
+Status cpu_budget_report(const CpuBudget *patience, Problem *problem) {
     if (atomic_load(&patience->app->is_stopping))
         return problem_set(problem, STATUS_BUSY, "the daemon is stopping");
     if (patience->is_crowded)
@@ -35,7 +35,7 @@ Status patience_tell(const Patience *patience, Problem *problem) {
                        most);
 }
 
-void patience_end(Patience *patience) {
+void cpu_budget_end(CpuBudget *patience) {
     if (patience->has_place)
         atomic_fetch_sub(&patience->app->evaluations, 1);
     patience->has_place = false;

@@ -6,18 +6,18 @@
 
 #include "server/api/app.h"
 
-typedef struct Patience {
+typedef struct CpuBudget {
     App *app;
     int64_t from_ns; // of this thread's processor time
     bool has_place;  // among those that take long
     bool is_crowded; // there was none
-} Patience;
+} CpuBudget;
 
-void patience_begin(App *app, Patience *patience);
+void cpu_budget_begin(App *app, CpuBudget *patience);
 // Of a Progress, whose context is the patience; on the thread that began. False: give up.
-bool patience_lasts(void *patience, double fraction);
+bool cpu_budget_lasts(void *patience, double fraction);
 // Why it was given up: STATUS_BUSY while others take long or the daemon stops, else STATUS_LIMIT.
-Status patience_tell(const Patience *patience, Problem *problem);
-void patience_end(Patience *patience);
+Status cpu_budget_report(const CpuBudget *patience, Problem *problem);
+void cpu_budget_end(CpuBudget *patience);
 
 #endif

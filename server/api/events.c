@@ -27,7 +27,7 @@ enum {
 typedef struct Events {
     App *app;
     Job *job;
-    const Waker *waker;
+    const Callback *waker;
     Bytes text; // not sent yet, from `sent`
     size_t sent;
     int last_id;
@@ -39,8 +39,8 @@ static const char no_memory[] = ": no memory\n\n";
 
 static void events_release(void *context) {
     Events *events = context;
-    job_unwatch(events->job, events->waker);
-    job_drop(events->job);
+    job_unsubscribe(events->job, events->waker);
+    job_unref(events->job);
     bytes_clear(&events->text);
     free(events);
 }
@@ -60,11 +60,11 @@ static void put_data(Bytes *text, const char *document) {
 }
 
 static void tell_finished(Events *events) {
-    JobShow show = {0};
+    JobView show = {0};
     Bytes document = {.most = events->app->reply_most};
-    if (job_show(events->job, &show) == STATUS_OK)
-        job_put(&document, &show, JOB_PUT_WHOLE | JOB_PUT_LINKS | JOB_PUT_SENDER);
-    job_show_clear(&show);
+    if (job_view(events->job, &show) == STATUS_OK)
+        job_json_put(&document, &show, JOB_PUT_WHOLE | JOB_PUT_LINKS | JOB_PUT_SENDER);
+    job_view_clear(&show);
     char *told = bytes_take(&document, NULL);
     bytes_format(&events->text, "event: finished\nid: %d\n", FINISHED_ID);
     put_data(&events->text, told != NULL ? told : "{}");
@@ -77,8 +77,8 @@ static void tell_progress(Events *events, JobState state, double progress) {
     const int id = 1 + (state == JOB_RUNNING) + (int)(100 * progress);
     if (id <= events->last_id)
         return;
-    JobShow show = {0};
-    if (job_show(events->job, &show) == STATUS_OK) {
+    JobView show = {0};
+    if (job_view(events->job, &show) == STATUS_OK) {
         bytes_format(&events->text, "event: progress\nid: %d\ndata: {\"status\": \"%s\", ", id,
                      job_state_names[state]);
         bytes_text(&events->text, "\"progress\": ");
@@ -91,7 +91,7 @@ static void tell_progress(Events *events, JobState state, double progress) {
         bytes_real(&events->text, show.total);
         bytes_text(&events->text, "}}\n\n");
     }
-    job_show_clear(&show);
+    job_view_clear(&show);
     events->last_id = id;
 }
 
@@ -100,8 +100,8 @@ static void look(Events *events) {
     double progress;
     // Watched before it is looked at: what happens after the look wakes this. It is forgotten with
     // each call, so it is asked again.
-    (void)job_watch(events->job, events->waker);
-    const JobState state = job_glance(events->job, &progress);
+    (void)job_subscribe(events->job, events->waker);
+    const JobState state = job_peek(events->job, &progress);
     if (job_state_is_final((int)state)) {
         tell_finished(events);
     } else if (atomic_load(&events->app->is_stopping)) {
@@ -150,15 +150,15 @@ static int last_id(const Request *request) {
 
 Status jobs_events(App *app, const Request *request, Reply *reply, Problem *problem) {
     Job *job = NULL;
-    TRY(intake_find(app->intake, request->parameters[0], &job, problem));
+    TRY(jobs_find(app->intake, request->parameters[0], &job, problem));
     if (last_id(request) >= FINISHED_ID) {
-        job_drop(job);
+        job_unref(job);
         reply_borrow(reply, 204, NULL, NULL, 0);
         return STATUS_OK;
     }
     Events *events = calloc(1, sizeof *events);
     if (events == NULL) {
-        job_drop(job);
+        job_unref(job);
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the events");
     }
     *events = (Events){.app = app,

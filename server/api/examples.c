@@ -37,12 +37,12 @@ static bool name_in_folder(const char *path, const char *folder, char name[64]) 
 static void write_example(Bytes *bytes, const EmbeddedFile *file, const char *name) {
     StudyRequest inquiry;
     const bool is_read =
-        read_json(file->bytes, file->size, study_request_fields, &inquiry, NULL) == STATUS_OK;
+        json_parse(file->bytes, file->size, study_request_fields, &inquiry, NULL) == STATUS_OK;
     bytes_text(bytes, "{\"name\": ");
     bytes_json_string(bytes, name);
     bytes_text(bytes, ", \"title\": ");
     bytes_json_string(bytes, is_read ? inquiry.simulation.title : NULL);
-    bytes_format(bytes, ", \"links\": {\"self\": \"%s/v1/examples/%s\"}, \"scene\": ", link_base(),
+    bytes_format(bytes, ", \"links\": {\"self\": \"%s/v1/examples/%s\"}, \"scene\": ", base_path(),
                  name);
     bytes_put(bytes, file->bytes, file->size);
     bytes_text(bytes, "}");
@@ -87,7 +87,7 @@ Status schemas_list(App *app, const Request *request, Reply *reply, Problem *pro
                      "%s{\"name\": \"%s\", \"title\": ", document == schema_documents ? "" : ", ",
                      document->name);
         bytes_json_string(&bytes, document->title);
-        bytes_format(&bytes, ", \"links\": {\"self\": \"%s/schemas/%s\"}}", link_base(),
+        bytes_format(&bytes, ", \"links\": {\"self\": \"%s/schemas/%s\"}}", base_path(),
                      document->name);
     }
     bytes_text(&bytes, "]}\n");
@@ -103,7 +103,7 @@ Status schemas_show(App *app, const Request *request, Reply *reply, Problem *pro
         if (!is_named || strlen(document->name) != size || strncmp(document->name, name, size) != 0)
             continue;
         Bytes bytes = {.most = app->reply_most};
-        describe_document(&bytes, document);
+        schema_write_document(&bytes, document);
         return reply_bytes(reply, 200, "application/schema+json", &bytes, problem);
     }
     return problem_set(problem, STATUS_NOT_FOUND,
@@ -139,13 +139,13 @@ Status health_live(App *app, const Request *request, Reply *reply, Problem *prob
 
 Status health_ready(App *app, const Request *request, Reply *reply, Problem *problem) {
     (void)request;
-    IntakeTally tally = {0};
+    JobStats tally = {0};
     if (atomic_load(&app->is_stopping))
         return problem_set(problem, STATUS_BUSY, "the daemon is stopping");
-    if (!store_is_writable(app->store))
+    if (!db_is_writable(app->store))
         return problem_set(problem, STATUS_BUSY,
                            "the last write to the database failed: is the disk full or read-only?");
-    intake_tally(app->intake, &tally);
+    jobs_tally(app->intake, &tally);
     if (tally.queued + tally.running >= tally.queue_most)
         return problem_set(problem, STATUS_BUSY,
                            "the queue is full: of unfinished jobs it has %zu, and may have %zu",

@@ -14,18 +14,18 @@
 #include "server/json/parse.h"
 #include "server/json/stored_columns.h"
 
-Status sheet_psd(Sheet *sheet, const char *text, Problem *problem) {
-    TRY(kept_spectra(text, &sheet->own, problem));
-    return sheet_own_axis(sheet, problem);
+Status column_reply_psd(ColumnReply *sheet, const char *text, Problem *problem) {
+    TRY(stored_spectra(text, &sheet->own, problem));
+    return column_reply_own_axis(sheet, problem);
 }
 
-static Status sheet_impacts(Sheet *sheet, const char *text, Problem *problem) {
+static Status column_reply_impacts(ColumnReply *sheet, const char *text, Problem *problem) {
     Impacts impacts;
-    TRY(kept_impacts(text, &impacts, problem));
-    const Status status = records_columns(impact_fields, impacts.at, impacts.count,
-                                          sizeof *impacts.at, &sheet->own, problem);
+    TRY(stored_impacts(text, &impacts, problem));
+    const Status status = struct_columns(impact_fields, impacts.at, impacts.count,
+                                         sizeof *impacts.at, &sheet->own, problem);
     free(impacts.at);
-    return status == STATUS_OK ? sheet_own(sheet, problem) : status;
+    return status == STATUS_OK ? column_reply_own(sheet, problem) : status;
 }
 
 // energy.json as it was saved.
@@ -40,19 +40,19 @@ static const Field energy_document_fields[] = {
     FIELD_END,
 };
 
-static Status sheet_energy(Sheet *sheet, const char *text, Problem *problem) {
+static Status column_reply_energy(ColumnReply *sheet, const char *text, Problem *problem) {
     EnergyDocument document = {.unit = NULL};
     Problem fault;
     problem_clear(&fault);
-    Status status = read_json(text, strlen(text), energy_document_fields, &document, &fault);
+    Status status = json_parse(text, strlen(text), energy_document_fields, &document, &fault);
     if (status != STATUS_OK) // ours, not the client's
         status = problem_set(problem, STATUS_INTERNAL, "the stored energies cannot be read: %s",
                              fault.detail);
     if (status == STATUS_OK)
-        status = records_columns(energy_fields, &document.energy, 1, sizeof document.energy,
-                                 &sheet->own, problem);
+        status = struct_columns(energy_fields, &document.energy, 1, sizeof document.energy,
+                                &sheet->own, problem);
     fields_clear(energy_document_fields, &document);
-    return status == STATUS_OK ? sheet_own(sheet, problem) : status;
+    return status == STATUS_OK ? column_reply_own(sheet, problem) : status;
 }
 
 static const char *const document_names[] = {
@@ -74,18 +74,18 @@ static Status result_document(const ResultRow *row, Document document, const cha
 }
 
 // What a saved document is as columns.
-typedef Status Maker(Sheet *sheet, const char *text, Problem *problem);
+typedef Status Maker(ColumnReply *sheet, const char *text, Problem *problem);
 static Maker *const makers[] = {
-    [DOCUMENT_PSD] = sheet_psd,
-    [DOCUMENT_IMPACTS] = sheet_impacts,
-    [DOCUMENT_ENERGY] = sheet_energy,
+    [DOCUMENT_PSD] = column_reply_psd,
+    [DOCUMENT_IMPACTS] = column_reply_impacts,
+    [DOCUMENT_ENERGY] = column_reply_energy,
 };
 
 // Kinds and sides as words, which no column of numbers has.
 static Status reply_impacts_csv(App *app, Reply *reply, const char *text, Problem *problem) {
     Bytes bytes = {.most = app->reply_most};
     Impacts impacts;
-    TRY(kept_impacts(text, &impacts, problem));
+    TRY(stored_impacts(text, &impacts, problem));
     impacts_csv(&impacts, &bytes);
     free(impacts.at);
     return reply_bytes(reply, 200, encoder_csv.content_type, &bytes, problem);
@@ -98,15 +98,15 @@ static Status reply_document(App *app, Reply *reply, const char *text, Problem *
     return reply_bytes(reply, 200, type_json, &bytes, problem);
 }
 
-static Status reply_columns(App *app, Reply *reply, const Encoder *encoder, Document document,
+static Status reply_columns(App *app, Reply *reply, const TableFormat *encoder, Document document,
                             const char *text, Problem *problem) {
     if (document == DOCUMENT_IMPACTS && encoder == &encoder_csv)
         return reply_impacts_csv(app, reply, text, problem);
-    Sheet sheet = {.encoding = NULL};
+    ColumnReply sheet = {.encoding = NULL};
     const Status status = makers[document](&sheet, text, problem);
     if (status == STATUS_OK)
-        return tables_reply(app, reply, encoder, &sheet, problem);
-    sheet_clear(&sheet);
+        return columns_reply(app, reply, encoder, &sheet, problem);
+    column_reply_clear(&sheet);
     return status;
 }
 
@@ -131,7 +131,7 @@ static Status choose_impacts(App *app, const Request *request, bool is_json, con
         return STATUS_OK;
     TRY(impact_window(request, &window, problem));
     bytes->most = app->reply_most;
-    TRY(kept_impacts_window(*text, &window, is_json, bytes, problem));
+    TRY(stored_impacts_window(*text, &window, is_json, bytes, problem));
     if (bytes->is_failed)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the impacts");
     *text = bytes->at;
@@ -140,13 +140,13 @@ static Status choose_impacts(App *app, const Request *request, bool is_json, con
 
 static Status results_part(App *app, const Request *request, Reply *reply, Document document,
                            Problem *problem) {
-    const Encoder *encoder = NULL;
-    TRY(tables_encoder(request, 1, document == DOCUMENT_PSD, reply, &encoder, problem));
+    const TableFormat *encoder = NULL;
+    TRY(columns_format(request, 1, document == DOCUMENT_PSD, reply, &encoder, problem));
     ResultRow row = {.count = 0};
     const char *text = NULL;
     Bytes window = {.most = 0};
     char tag[104];
-    Status status = store_result_load(app->store, request->parameters[0], &row, problem);
+    Status status = db_result_load(app->store, request->parameters[0], &row, problem);
     if (status == STATUS_OK)
         status = result_document(&row, document, &text, problem);
     if (status == STATUS_OK && document == DOCUMENT_IMPACTS)

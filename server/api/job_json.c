@@ -23,18 +23,18 @@ static void write_raw(Bytes *bytes, const char *name, const char *json) {
 
 static void write_links(Bytes *bytes, const char *id, const char *result, bool has_result,
                         bool has_table) {
-    bytes_format(bytes, ", \"links\": {\"self\": \"%s/v1/jobs/%s\"", link_base(), id);
+    bytes_format(bytes, ", \"links\": {\"self\": \"%s/v1/jobs/%s\"", base_path(), id);
     if (has_table)
-        bytes_format(bytes, ", \"table\": \"%s/v1/jobs/%s/table.json\"", link_base(), id);
+        bytes_format(bytes, ", \"table\": \"%s/v1/jobs/%s/table.json\"", base_path(), id);
     if (has_result)
         bytes_format(
             bytes,
             ", \"result\": \"%s/v1/results/%s\", \"series\": \"%s/v1/results/%s/series.json\"",
-            link_base(), result, link_base(), result);
+            base_path(), result, base_path(), result);
     bytes_text(bytes, "}");
 }
 
-void job_put(Bytes *bytes, const JobShow *show, int parts) {
+void job_json_put(Bytes *bytes, const JobView *show, int parts) {
     const bool has_result = show->state == JOB_SUCCESSFUL && show->result[0] != '\0';
     bytes_text(bytes, "{\"id\": ");
     bytes_json_string(bytes, show->id);
@@ -86,19 +86,19 @@ void job_put(Bytes *bytes, const JobShow *show, int parts) {
     bytes_text(bytes, "}");
 }
 
-void job_put_dry_run(Bytes *bytes, const DryRun *run) {
+void job_json_put_dry_run(Bytes *bytes, const DryRun *run) {
     bytes_text(bytes, "{\"dry_run\": true, \"scene\": ");
-    write_item(bytes, study_request_fields, &run->inquiry, WRITE_SCENE);
+    encode_item(bytes, study_request_fields, &run->inquiry, WRITE_SCENE);
     bytes_format(bytes, ", \"result\": \"%s\", \"cached\": %s, \"plan\": ", run->result,
                  run->is_cached ? "true" : "false");
-    write_item(bytes, plan_report_fields, &run->plan, WRITE_REPORT);
+    encode_item(bytes, plan_report_fields, &run->plan, WRITE_REPORT);
     bytes_format(bytes, ", \"samples\": %zu, \"cost\": {\"cpu_seconds\": ",
                  scene_sample_count(&run->inquiry.simulation.scene));
     bytes_real(bytes, run->cost.cpu_seconds);
     bytes_text(bytes, ", \"bytes\": ");
     bytes_real(bytes, run->cost.bytes);
     bytes_text(bytes, "}, \"warnings\": ");
-    write_list(bytes, warning_fields, run->warnings.at, run->warnings.count,
-               sizeof *run->warnings.at, WRITE_REPORT);
+    encode_list(bytes, warning_fields, run->warnings.at, run->warnings.count,
+                sizeof *run->warnings.at, WRITE_REPORT);
     bytes_text(bytes, "}");
 }

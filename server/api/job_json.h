@@ -13,7 +13,7 @@ enum {
     JOB_PUT_SENDER = 4, // who sent it, if anybody in particular; whoever sends it knows
 };
 
-void job_put(Bytes *bytes, const JobShow *show, int parts);
-void job_put_dry_run(Bytes *bytes, const DryRun *run);
+void job_json_put(Bytes *bytes, const JobView *show, int parts);
+void job_json_put_dry_run(Bytes *bytes, const DryRun *run);
 
 #endif

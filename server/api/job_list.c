@@ -22,24 +22,24 @@ enum { LOOKED_AT = 256 };
 // A row knows no progress: of an unfinished job the queue is asked. False where the job is not in
 // the state that was asked for (-1: any).
 static bool list_row(App *app, Bytes *bytes, const JobRow *row, int state, const char *separator) {
-    JobShow show = {0};
+    JobView show = {0};
     Job *job = NULL;
     const bool is_unfinished = !job_state_is_final(row->state);
-    if (is_unfinished && intake_find(app->intake, row->id, &job, NULL) == STATUS_OK) {
-        const Status status = job_show(job, &show);
+    if (is_unfinished && jobs_find(app->intake, row->id, &job, NULL) == STATUS_OK) {
+        const Status status = job_view(job, &show);
         const bool is_meant = state < 0 || (int)show.state == state;
-        job_drop(job);
+        job_unref(job);
         if (status == STATUS_OK && is_meant) {
             bytes_text(bytes, separator);
-            job_put(bytes, &show, JOB_PUT_LINKS | JOB_PUT_SENDER);
+            job_json_put(bytes, &show, JOB_PUT_LINKS | JOB_PUT_SENDER);
         }
-        job_show_clear(&show);
+        job_view_clear(&show);
         if (status == STATUS_OK)
             return is_meant;
     }
     if (state >= 0 && row->state != state)
         return false;
-    show = (JobShow){.state = (JobState)row->state,
+    show = (JobView){.state = (JobState)row->state,
                      .progress = row->state == JOB_SUCCESSFUL ? 100 : 0,
                      .is_cached = row->is_cached,
                      .created_unix_ms = row->created_unix_ms,
@@ -57,7 +57,7 @@ static bool list_row(App *app, Bytes *bytes, const JobRow *row, int state, const
     text_fit(show.id, sizeof show.id, row->id);
     text_fit(show.result, sizeof show.result, row->result);
     bytes_text(bytes, separator);
-    job_put(bytes, &show, JOB_PUT_LINKS | JOB_PUT_SENDER); // borrows the row's texts
+    job_json_put(bytes, &show, JOB_PUT_LINKS | JOB_PUT_SENDER); // borrows the row's texts
     return true;
 }
 
@@ -118,7 +118,7 @@ static Status list(App *app, JobSearch search, int state, Bytes *bytes, char las
     search.most = is_live ? LOOKED_AT : most + 1;
     for (;;) {
         JobRows rows = {0};
-        TRY(store_job_search(app->store, &search, &rows, problem));
+        TRY(db_job_search(app->store, &search, &rows, problem));
         bool is_full = false;
         for (size_t i = 0; i < rows.count && !is_full; i++) {
             is_full = count == most;
@@ -147,7 +147,7 @@ Status jobs_list(App *app, const Request *request, Reply *reply, Problem *proble
     TRY(read_search(request, &search, &state, problem));
     Bytes bytes = {.most = app->reply_most};
     char last[40];
-    store_settle(app->store); // whoever was answered finds the job here
+    db_flush(app->store); // whoever was answered finds the job here
     bytes_text(&bytes, "{\"jobs\": [");
     const Status status = list(app, search, state, &bytes, last, problem);
     if (status != STATUS_OK) {

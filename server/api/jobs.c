@@ -20,11 +20,11 @@ enum { KEEP_WAIT_MS = 10000 }; // then it is looked at again
 // Drops the hold on `job`. `code` 0: to its sender, 200 if it is finished, else 202 and where to
 // look.
 static Status reply_job(App *app, Reply *reply, Job *job, int code, Problem *problem) {
-    JobShow show = {0};
-    const Status status = job_show(job, &show);
-    job_drop(job);
+    JobView show = {0};
+    const Status status = job_view(job, &show);
+    job_unref(job);
     if (status != STATUS_OK) {
-        job_show_clear(&show);
+        job_view_clear(&show);
         return problem_set(problem, status, "the job cannot be shown");
     }
     const bool is_finished = job_state_is_final((int)show.state);
@@ -36,16 +36,16 @@ static Status reply_job(App *app, Reply *reply, Job *job, int code, Problem *pro
     if (!is_finished)
         reply->retry_after = 1;
     Bytes bytes = {.most = app->reply_most};
-    job_put(&bytes, &show, parts);
+    job_json_put(&bytes, &show, parts);
     bytes_text(&bytes, "\n");
-    job_show_clear(&show);
+    job_view_clear(&show);
     return reply_bytes(reply, code, type_json, &bytes, problem);
 }
 
 // What a sleeping request holds on to.
 typedef struct Pause {
     Job *job;
-    const Waker *waker;
+    const Callback *waker;
     bool is_replayed; // what the reply had said so far
 } Pause;
 
@@ -54,19 +54,19 @@ static Job *pause_end(Pause *pause, Reply *reply) {
     Job *job = pause->job;
     if (reply != NULL)
         reply->is_replayed = pause->is_replayed;
-    job_unwatch(job, pause->waker);
+    job_unsubscribe(job, pause->waker);
     free(pause);
     return job;
 }
 
 static void pause_forget(void *kept) {
-    job_drop(pause_end(kept, NULL));
+    job_unref(pause_end(kept, NULL));
 }
 
 // Puts the request to sleep until the waker that `watch` leaves with the job is called. False where
 // there is no memory; the hold stays with the caller then.
 static bool sleep_until(const Request *request, Reply *reply, Job *job,
-                        bool (*watch)(Job *job, const Waker *waker), int wait_ms) {
+                        bool (*watch)(Job *job, const Callback *waker), int wait_ms) {
     Pause *pause = malloc(sizeof *pause);
     if (pause == NULL)
         return false;
@@ -85,7 +85,7 @@ static bool pause_begin(const Request *request, Reply *reply, Job *job, double w
     const double left = wait - 1e-9 * (double)(clock_monotonic_ns() - request->started_ns);
     if (request->is_expired || left <= 0 || job_is_finished(job))
         return false;
-    return sleep_until(request, reply, job, job_watch, (int)(1000 * left) + 1);
+    return sleep_until(request, reply, job, job_subscribe, (int)(1000 * left) + 1);
 }
 
 // The same until the store has the job: nobody is told of it before. Where that fails, the hold is
@@ -94,34 +94,34 @@ static Status pause_until_kept(const Request *request, Reply *reply, Job *job, b
                                Problem *problem) {
     bool is_kept;
     *is_paused = false;
-    Status status = job_kept(job, &is_kept, problem);
+    Status status = job_is_durable(job, &is_kept, problem);
     if (status == STATUS_OK && !is_kept) {
-        *is_paused = sleep_until(request, reply, job, job_watch_kept, KEEP_WAIT_MS);
+        *is_paused = sleep_until(request, reply, job, job_subscribe_durable, KEEP_WAIT_MS);
         if (!*is_paused)
             status = problem_set(problem, STATUS_NO_MEMORY, "no memory to wait for the job");
     }
     if (status != STATUS_OK)
-        job_drop(job);
+        job_unref(job);
     return status;
 }
 
 Status jobs_refused(App *app, const Request *request, Reply *reply, Status status) {
     if (status == STATUS_BUSY || status == STATUS_QUOTA)
-        reply->retry_after = intake_retry_after(app->intake, request->client, status);
+        reply->retry_after = jobs_retry_after(app->intake, request->client, status);
     return status;
 }
 
 static Status dry_run(App *app, const Request *request, Reply *reply, Problem *problem) {
     DryRun run = {0};
-    Status status = intake_charge(app->intake, request->client, problem);
+    Status status = jobs_charge(app->intake, request->client, problem);
     if (status == STATUS_OK)
-        status = intake_dry_run(app->intake, request->body, request->body_size, &run, problem);
+        status = jobs_dry_run(app->intake, request->body, request->body_size, &run, problem);
     if (status != STATUS_OK) {
         dry_run_clear(&run);
         return jobs_refused(app, request, reply, status);
     }
     Bytes bytes = {.most = app->reply_most};
-    job_put_dry_run(&bytes, &run);
+    job_json_put_dry_run(&bytes, &run);
     bytes_text(&bytes, "\n");
     dry_run_clear(&run);
     return reply_bytes(reply, 200, type_json, &bytes, problem);
@@ -153,7 +153,7 @@ static Status refuse_stopping(App *app, Problem *problem) {
 
 static Status submit(App *app, const Request *request, const Submission *submission, Reply *reply,
                      Job **job, Problem *problem) {
-    return jobs_refused(app, request, reply, intake_submit(app->intake, submission, job, problem));
+    return jobs_refused(app, request, reply, jobs_submit(app->intake, submission, job, problem));
 }
 
 // Waits as long as the client likes, and at least until nobody can lose the job. Drops the hold.
@@ -194,7 +194,7 @@ Status results_again(App *app, const Request *request, Reply *reply, Problem *pr
     if (request->kept != NULL)
         return answer_job(app, request, reply, pause_end(request->kept, reply), problem);
     TRY(refuse_stopping(app, problem));
-    Status status = store_result_scene(app->store, request->parameters[0], &row, problem);
+    Status status = db_result_scene(app->store, request->parameters[0], &row, problem);
     if (status == STATUS_OK) {
         const Submission submission = {.text = row.scene,
                                        .size = strlen(row.scene),
@@ -238,7 +238,7 @@ Status jobs_show(App *app, const Request *request, Reply *reply, Problem *proble
     if (request->kept != NULL)
         job = pause_end(request->kept, reply);
     else
-        TRY(intake_find(app->intake, request->parameters[0], &job, problem));
+        TRY(jobs_find(app->intake, request->parameters[0], &job, problem));
     if (pause_begin(request, reply, job, wait))
         return STATUS_OK;
     return reply_job(app, reply, job, 200, problem);
@@ -246,7 +246,7 @@ Status jobs_show(App *app, const Request *request, Reply *reply, Problem *proble
 
 Status jobs_scene(App *app, const Request *request, Reply *reply, Problem *problem) {
     char *scene;
-    TRY(store_job_scene(app->store, request->parameters[0], &scene, problem));
+    TRY(db_job_scene(app->store, request->parameters[0], &scene, problem));
     Bytes bytes = {.most = app->reply_most};
     bytes_text(&bytes, scene);
     bytes_text(&bytes, "\n");
@@ -258,10 +258,10 @@ Status jobs_scene(App *app, const Request *request, Reply *reply, Problem *probl
 static Status require_own(App *app, const Request *request, const char *id, Problem *problem) {
     Job *job = NULL;
     char what[64];
-    TRY(intake_find(app->intake, id, &job, problem));
+    TRY(jobs_find(app->intake, id, &job, problem));
     snprintf(what, sizeof what, "the job %.40s", id);
-    const Status status = doorman_owns(request, job_client(job), what, problem);
-    job_drop(job);
+    const Status status = access_owns(request, job_client(job), what, problem);
+    job_unref(job);
     return status;
 }
 
@@ -272,7 +272,7 @@ Status jobs_dismiss(App *app, const Request *request, Reply *reply, Problem *pro
         job = pause_end(request->kept, reply);
     } else {
         TRY(require_own(app, request, request->parameters[0], problem));
-        TRY(intake_dismiss(app->intake, request->parameters[0], &job, problem));
+        TRY(jobs_cancel(app->intake, request->parameters[0], &job, problem));
     }
     TRY(pause_until_kept(request, reply, job, &is_paused, problem));
     if (is_paused)

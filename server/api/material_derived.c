@@ -34,14 +34,14 @@ static Status read_query(const Request *request, Asked *asked, Problem *problem)
 
 static void write_answer(Bytes *bytes, const MaterialRevision *material,
                          const PairParameters *pair) {
-    const char *base = link_base();
+    const char *base = base_path();
     const unsigned long long revision = material->revision;
     bytes_format(bytes, "{\"material\": \"%s@%llu\", \"status\": \"%s\", ", material->slug,
                  revision, material->status);
-    (void)write_members(bytes, pair_parameters_fields, pair, WRITE_REPORT);
+    (void)encode_members(bytes, pair_parameters_fields, pair, WRITE_REPORT);
     bytes_text(bytes, ", \"warnings\": ");
-    write_list(bytes, warning_fields, pair->warnings.at, pair->warnings.count,
-               sizeof *pair->warnings.at, WRITE_REPORT);
+    encode_list(bytes, warning_fields, pair->warnings.at, pair->warnings.count,
+                sizeof *pair->warnings.at, WRITE_REPORT);
     bytes_format(bytes,
                  ", \"links\": {\"material\": \"%s/v1/materials/%s\", \"revision\": "
                  "\"%s/v1/materials/%s@%llu\"}}\n",
@@ -54,8 +54,7 @@ static Status show(App *app, const Request *request, uint64_t revision, Reply *r
     TRY(read_query(request, &asked, problem));
     MaterialRevision material = {.slug = NULL};
     PairParameters pair = {.contacts = {NULL, 0}};
-    Status status =
-        catalogue_find(app->store, request->parameters[0], revision, &material, problem);
+    Status status = material_find(app->store, request->parameters[0], revision, &material, problem);
     problem->whose = "query";
     if (status == STATUS_OK)
         status = pair_parameters_run(&material.material, asked.damper_mass, asked.structure_mass,

@@ -16,7 +16,7 @@
 enum { WHOLE_MAX = 4 << 20 }; // what is longer is sent while it is made
 
 typedef struct Sending {
-    ExchangeText text;
+    MaterialExport text;
     Bytes made;
     size_t taken; // of it
     bool is_last;
@@ -37,7 +37,7 @@ static ptrdiff_t send_next(void *context, char *target, size_t size) {
             if (sending->is_last)
                 break;
             made->count = sending->taken = 0;
-            if (exchange_text_next(&sending->text, made, &sending->is_last, NULL) != STATUS_OK)
+            if (material_export_next(&sending->text, made, &sending->is_last, NULL) != STATUS_OK)
                 return STREAM_BROKEN;
             continue;
         }
@@ -47,10 +47,10 @@ static ptrdiff_t send_next(void *context, char *target, size_t size) {
 }
 
 // The beginning at once: where that is all it is kept, and compressed.
-static Status begin(Sending *sending, Store *store, bool is_table, Problem *problem) {
-    TRY(exchange_text_open(store, is_table, &sending->text, problem));
+static Status begin(Sending *sending, Db *store, bool is_table, Problem *problem) {
+    TRY(material_export_open(store, is_table, &sending->text, problem));
     while (!sending->is_last && sending->made.count < WHOLE_MAX)
-        TRY(exchange_text_next(&sending->text, &sending->made, &sending->is_last, problem));
+        TRY(material_export_next(&sending->text, &sending->made, &sending->is_last, problem));
     return STATUS_OK;
 }
 

@@ -43,9 +43,9 @@ static bool is_known(const Request *request, Reply *reply, uint64_t latest, uint
 
 static Status put_revisions(Bytes *bytes, MaterialRevisions *revisions, Problem *problem) {
     for (size_t i = 0; i < revisions->count; i++) {
-        TRY(catalogue_read_lists(&revisions->at[i], problem));
+        TRY(material_read_lists(&revisions->at[i], problem));
         bytes_text(bytes, i > 0 ? ",\n " : "");
-        catalogue_write(bytes, &revisions->at[i]);
+        material_write(bytes, &revisions->at[i]);
     }
     return STATUS_OK;
 }
@@ -77,10 +77,10 @@ Status materials_revisions(App *app, const Request *request, Reply *reply, Probl
     MaterialState state;
     Page page;
     TRY(read_page(request, REVISIONS_MAX, REVISIONS_MAX, &page, problem));
-    TRY(store_material_state(app->store, slug, &state, problem));
+    TRY(db_material_state(app->store, slug, &state, problem));
     if (page.before > state.latest + 1)
         page.before = state.latest + 1;
-    TRY(store_material_page(app->store, slug, page.before, page.limit, &revisions, problem));
+    TRY(db_material_page(app->store, slug, page.before, page.limit, &revisions, problem));
     const Status status = list_revisions(app, request, &state, &revisions, reply, problem);
     material_revisions_clear(&revisions);
     return status;
@@ -93,7 +93,7 @@ static void put_number(Bytes *bytes, const char *name, uint64_t number) {
         bytes_format(bytes, ", \"%s\": null", name);
 }
 
-static void put_deed(Bytes *bytes, const MaterialDeed *deed) {
+static void put_deed(Bytes *bytes, const AuditEntry *deed) {
     bytes_format(bytes, "{\"version\": %llu, \"action\": \"%s\"", (unsigned long long)deed->version,
                  deed->action);
     put_number(bytes, "revision", deed->revision);
@@ -106,16 +106,16 @@ static void put_deed(Bytes *bytes, const MaterialDeed *deed) {
 
 Status materials_history(App *app, const Request *request, Reply *reply, Problem *problem) {
     const char *slug = request->parameters[0];
-    MaterialDeeds deeds = {0};
+    AuditEntries deeds = {0};
     MaterialState state;
     Page page;
     TRY(read_page(request, DEEDS_INITIAL, DEEDS_MAX, &page, problem));
-    TRY(store_material_state(app->store, slug, &state, problem));
+    TRY(db_material_state(app->store, slug, &state, problem));
     if (page.before > state.version + 1)
         page.before = state.version + 1;
     if (is_known(request, reply, state.latest, state.version))
         return STATUS_OK;
-    TRY(store_material_trail(app->store, slug, page.before, page.limit, &deeds, problem));
+    TRY(db_audit_entries(app->store, slug, page.before, page.limit, &deeds, problem));
     Bytes bytes = {.most = app->reply_most};
     bytes_format(&bytes, "{\"slug\": \"%s\", \"version\": %llu, \"history\": [", slug,
                  (unsigned long long)state.version);
@@ -126,7 +126,7 @@ Status materials_history(App *app, const Request *request, Reply *reply, Problem
     bytes_text(&bytes, "]}\n");
     if (deeds.count > 0)
         link_page(request, reply, deeds.at[deeds.count - 1].version);
-    material_deeds_clear(&deeds);
+    audit_entries_clear(&deeds);
     return reply_bytes(reply, 200, type_json, &bytes, problem);
 }
 
@@ -136,7 +136,7 @@ static void put_side(Bytes *bytes, const char *name, const MaterialRevision *rev
     material_put_text(bytes, "author", revision->author);
     material_put_text(bytes, "comment", revision->comment);
     material_put_time(bytes, "created", revision->created_unix_ms);
-    bytes_format(bytes, ", \"links\": {\"self\": \"%s/v1/materials/%s@%llu\"}}", link_base(),
+    bytes_format(bytes, ", \"links\": {\"self\": \"%s/v1/materials/%s@%llu\"}}", base_path(),
                  revision->slug, (unsigned long long)revision->revision);
 }
 
@@ -152,8 +152,8 @@ static size_t put_differences(Bytes *bytes, const Material *from, const Material
     for (const Field *row = material_fields; row->kind != FIELD_KIND_END; row++) {
         const Field alone[] = {*row, FIELD_END};
         Bytes a = {0}, b = {0};
-        (void)write_members(&a, alone, from, WRITE_REPORT);
-        (void)write_members(&b, alone, to, WRITE_REPORT);
+        (void)encode_members(&a, alone, from, WRITE_REPORT);
+        (void)encode_members(&b, alone, to, WRITE_REPORT);
         if (strcmp(value_of(&a), value_of(&b)) != 0) {
             bytes_format(bytes, "%s{\"pointer\": \"/%s\", \"from\": ", count++ > 0 ? ",\n " : "",
                          row->name);
@@ -177,7 +177,7 @@ static Status read_sides(App *app, const Request *request, const MaterialState *
     MaterialRevision head;
     TRY(request_count(request, "to", 1, latest, latest, to, problem));
     size_t before = *to > 1 ? *to - 1 : 1;
-    const Status status = store_material(app->store, slug, 0, &head, NULL);
+    const Status status = db_material(app->store, slug, 0, &head, NULL);
     if (status == STATUS_OK && strcmp(head.status, "approved") == 0 && head.revision < *to)
         before = (size_t)head.revision;
     material_revision_clear(&head);
@@ -202,13 +202,13 @@ Status materials_diff(App *app, const Request *request, Reply *reply, Problem *p
     MaterialState state;
     size_t from, to;
     // Before all else, so that its tag is not newer than what it stands for.
-    TRY(store_material_state(app->store, slug, &state, problem));
+    TRY(db_material_state(app->store, slug, &state, problem));
     TRY(read_sides(app, request, &state, &from, &to, problem));
     if (is_known(request, reply, state.latest, state.version))
         return STATUS_OK;
-    Status status = catalogue_find(app->store, slug, from, &a, problem);
+    Status status = material_find(app->store, slug, from, &a, problem);
     if (status == STATUS_OK)
-        status = catalogue_find(app->store, slug, to, &b, problem);
+        status = material_find(app->store, slug, to, &b, problem);
     if (status == STATUS_OK)
         status = diff(app, &a, &b, reply, problem);
     material_revision_clear(&a);

@@ -24,7 +24,7 @@ static Status read_folded(const Request *request, const char *name, Bytes *folde
     const char *text;
     TRY(query_text(request, name, &text, problem));
     if (text != NULL)
-        fold_put(folded, text);
+        utf8_fold(folded, text);
     return STATUS_OK;
 }
 
@@ -41,7 +41,7 @@ static Status read_search(const Request *request, Search *search, Problem *probl
 // A line for each text: words that are searched for hold no line's end.
 static void put_line(Bytes *bytes, const char *text) {
     if (text != NULL)
-        fold_put(bytes, text);
+        utf8_fold(bytes, text);
     bytes_text(bytes, "\n");
 }
 
@@ -62,7 +62,7 @@ static bool has_words(const MaterialRevision *revision, const char *words) {
 static bool is_of_kind(const Material *said, const char *kind) {
     Bytes own = {0};
     if (said->kind != NULL)
-        fold_put(&own, said->kind);
+        utf8_fold(&own, said->kind);
     const bool is_same = own.at != NULL && strcmp(own.at, kind) == 0;
     bytes_clear(&own);
     return is_same;
@@ -98,21 +98,21 @@ static Status put_some(MaterialRevisions *materials, const Search *search, Liste
                        Bytes *bytes, Problem *problem) {
     for (size_t i = 0; i < materials->count && !list->is_more; i++) {
         MaterialRevision *material = &materials->at[i];
-        TRY(catalogue_read_lists(material, problem));
+        TRY(material_read_lists(material, problem));
         if (!is_meant(material, search))
             continue;
         list->is_more = list->count == search->limit;
         if (list->is_more)
             break;
         bytes_text(bytes, list->count++ > 0 ? ",\n " : "");
-        catalogue_write(bytes, material);
+        material_write(bytes, material);
         text_fit(list->last, sizeof list->last, material->slug);
     }
     return STATUS_OK;
 }
 
 // At most search->limit of them.
-static Status put_list(Store *store, const Search *search, Listed *list, Bytes *bytes,
+static Status put_list(Db *store, const Search *search, Listed *list, Bytes *bytes,
                        Problem *problem) {
     char after[QUERY_TEXT_MAX + 1] = "";
     bool is_end = false;
@@ -120,7 +120,7 @@ static Status put_list(Store *store, const Search *search, Listed *list, Bytes *
         text_fit(after, sizeof after, search->after);
     while (!is_end && !list->is_more) {
         MaterialRevisions materials = {0};
-        Status status = store_material_heads(store, after, LOOKED_AT, &materials, problem);
+        Status status = db_material_heads(store, after, LOOKED_AT, &materials, problem);
         if (status == STATUS_OK)
             status = put_some(&materials, search, list, bytes, problem);
         is_end = materials.count < LOOKED_AT;

@@ -54,11 +54,11 @@ static Status take(const char *slug, const MaterialState *state, uint64_t number
     return STATUS_OK;
 }
 
-static Status load(Patience *patience, const char *slug, Taken *taken, Reply *reply,
+static Status load(CpuBudget *patience, const char *slug, Taken *taken, Reply *reply,
                    Problem *problem) {
     for (size_t i = 0; i < taken->count; i++) {
-        if (!patience_lasts(patience, 0)) {
-            const Status status = patience_tell(patience, problem);
+        if (!cpu_budget_lasts(patience, 0)) {
+            const Status status = cpu_budget_report(patience, problem);
             reply->retry_after = status == STATUS_BUSY ? 10 : reply->retry_after;
             return status;
         }
@@ -120,7 +120,7 @@ static Status choose_format(const Request *request, Reply *reply, int *format, P
 // As it may be sent back.
 static void write_revision(Bytes *bytes, const Taken *taken, const Material *material) {
     bytes_text(bytes, "{");
-    (void)write_members(bytes, material_fields, material, WRITE_SCENE);
+    (void)encode_members(bytes, material_fields, material, WRITE_SCENE);
     bytes_format(bytes, ", \"comment\": \"from measurement%s", taken->count > 1 ? "s" : "");
     for (size_t i = 0; i < taken->count; i++)
         bytes_format(bytes, "%s%llu", i > 0 ? ", " : " ",
@@ -129,7 +129,7 @@ static void write_revision(Bytes *bytes, const Taken *taken, const Material *mat
 }
 
 static void write_links(Bytes *bytes, const Request *request) {
-    const char *base = link_base(), *slug = request->parameters[0];
+    const char *base = base_path(), *slug = request->parameters[0];
     const char *query = strchr(request->target, '?');
     bytes_text(bytes, ", \"links\": {\"self\": ");
     Bytes self = {.most = 8192};
@@ -182,13 +182,13 @@ static Status propose(App *app, const Request *request, const Material *before, 
     TRY(query_choice(request, "as", proposal_form_names, PROPOSAL_CONSTANT, &form, problem));
     Evaluation evaluation = {.separation = separation};
     MaterialProposal proposal = {.why = NULL};
-    Patience patience;
-    patience_begin(app, &patience);
+    CpuBudget patience;
+    cpu_budget_begin(app, &patience);
     Status status = load(&patience, request->parameters[0], taken, reply, problem);
     if (status == STATUS_OK)
         status = material_evaluate(&patience, taken->tests, taken->count, separation, &evaluation,
                                    reply, problem);
-    patience_end(&patience);
+    cpu_budget_end(&patience);
     if (status == STATUS_OK)
         status = material_proposal_run(&evaluation, taken->tests, taken->count, before,
                                        (ProposalForm)form, &proposal, problem);
@@ -208,7 +208,7 @@ Status proposals_show(App *app, const Request *request, Reply *reply, Problem *p
     TRY(choose_format(request, reply, &format, problem));
     if (format != 0)
         reply->policy = shield_drawing_policy;
-    TRY(store_material_state(app->store, slug, &state, problem));
+    TRY(db_material_state(app->store, slug, &state, problem));
     TRY(material_separation(app, request, &separation, problem));
     material_tag(slug, state.latest, state.version, tag);
     MaterialRevision before = {.slug = NULL};

@@ -14,7 +14,7 @@ enum { LIST_INITIAL = 20, LIST_MAX = 1000 };
 // An empty list is of a revision that is there.
 static Status require_revision(App *app, const char *slug, uint64_t revision, Problem *problem) {
     MaterialState state;
-    TRY(store_material_state(app->store, slug, &state, problem));
+    TRY(db_material_state(app->store, slug, &state, problem));
     if (revision <= state.latest)
         return STATUS_OK;
     return problem_set(problem, STATUS_NOT_FOUND,
@@ -24,7 +24,7 @@ static Status require_revision(App *app, const char *slug, uint64_t revision, Pr
 
 static Status list_uses(App *app, const Request *request, uint64_t revision, Reply *reply,
                         Problem *problem) {
-    const char *slug = request->parameters[0], *base = link_base();
+    const char *slug = request->parameters[0], *base = base_path();
     const unsigned long long number = revision;
     size_t limit, before;
     uint64_t total;
@@ -35,7 +35,7 @@ static Status list_uses(App *app, const Request *request, uint64_t revision, Rep
     TRY(require_revision(app, slug, revision, problem));
     snprintf(name, sizeof name, "%.63s@%llu", slug, number);
     // One more than asked for tells whether there is a next page.
-    TRY(store_result_uses(app->store, name, limit + 1, (int64_t)before, &uses, &total, problem));
+    TRY(db_result_uses(app->store, name, limit + 1, (int64_t)before, &uses, &total, problem));
     const size_t count = uses.count > limit ? limit : uses.count;
     Bytes bytes = {.most = app->reply_most};
     bytes_format(&bytes, "{\"slug\": \"%s\", \"revision\": %llu, \"total\": %llu, \"results\": [",
@@ -58,12 +58,12 @@ static Status list_uses(App *app, const Request *request, uint64_t revision, Rep
     return reply_bytes(reply, 200, type_json, &bytes, problem);
 }
 
-static void put_counts(Bytes *bytes, const char *slug, const MaterialUses *uses) {
-    const char *base = link_base();
+static void put_counts(Bytes *bytes, const char *slug, const MaterialReferences *uses) {
+    const char *base = base_path();
     uint64_t total = 0;
     bytes_format(bytes, "{\"slug\": \"%s\", \"revisions\": [", slug);
     for (size_t i = 0; i < uses->count; i++) {
-        const MaterialUse *use = &uses->at[i];
+        const MaterialReference *use = &uses->at[i];
         const unsigned long long number = use->revision;
         total += use->results;
         bytes_format(bytes,
@@ -78,10 +78,10 @@ static void put_counts(Bytes *bytes, const char *slug, const MaterialUses *uses)
 
 static Status count_uses(App *app, const char *slug, Reply *reply, Problem *problem) {
     MaterialState state;
-    MaterialUses uses = {0};
+    MaterialReferences uses = {0};
     Bytes bytes = {.most = app->reply_most};
-    TRY(store_material_state(app->store, slug, &state, problem));
-    TRY(store_material_uses(app->store, slug, &uses, problem));
+    TRY(db_material_state(app->store, slug, &state, problem));
+    TRY(db_material_uses(app->store, slug, &uses, problem));
     put_counts(&bytes, slug, &uses);
     free(uses.at);
     return reply_bytes(reply, 200, type_json, &bytes, problem);

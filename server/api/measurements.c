@@ -33,11 +33,11 @@ Status material_separation(App *app, const Request *request, int *separation, Pr
 
 Status material_latest(App *app, const char *slug, MaterialRevision *revision, Problem *problem) {
     MaterialState state;
-    TRY(store_material_state(app->store, slug, &state, problem));
-    Status status = catalogue_find(app->store, slug, 0, revision, NULL);
+    TRY(db_material_state(app->store, slug, &state, problem));
+    Status status = material_find(app->store, slug, 0, revision, NULL);
     if (status == STATUS_NOT_FOUND) { // all are deprecated
         material_revision_clear(revision);
-        status = catalogue_find(app->store, slug, state.latest, revision, NULL);
+        status = material_find(app->store, slug, state.latest, revision, NULL);
     }
     if (status == STATUS_OK)
         return STATUS_OK;
@@ -45,13 +45,13 @@ Status material_latest(App *app, const char *slug, MaterialRevision *revision, P
     return problem_set(problem, status, "the material \"%.63s\" cannot be read", slug);
 }
 
-Status material_evaluate(Patience *patience, const Measurement *tests, size_t count, int separation,
-                         Evaluation *evaluation, Reply *reply, Problem *problem) {
-    const Progress watch = {patience, patience_lasts};
+Status material_evaluate(CpuBudget *patience, const Measurement *tests, size_t count,
+                         int separation, Evaluation *evaluation, Reply *reply, Problem *problem) {
+    const Progress watch = {patience, cpu_budget_lasts};
     Status status =
         evaluation_run(tests, count, (Separation)separation, &watch, evaluation, problem);
     if (status == STATUS_CANCELLED)
-        status = patience_tell(patience, problem);
+        status = cpu_budget_report(patience, problem);
     if (status == STATUS_BUSY)
         reply->retry_after = 10;
     return status;
@@ -59,7 +59,7 @@ Status material_evaluate(Patience *patience, const Measurement *tests, size_t co
 
 // Of a test that is kept whatever it comes to. Given up, the evaluation is clear and its warnings
 // say why.
-static Status evaluate_kept(Patience *patience, const Measurement *test, int separation,
+static Status evaluate_kept(CpuBudget *patience, const Measurement *test, int separation,
                             Evaluation *evaluation, bool *is_there, Reply *reply,
                             Problem *problem) {
     Problem *why = calloc(1, sizeof *why);
@@ -88,7 +88,7 @@ static Status read_body(const Request *request, MeasurementBody *body, Problem *
     TRY(body_require_json(request, problem));
     problem->whose = "measurement";
     const Status status =
-        read_json(request->body, request->body_size, measurement_body_fields, body, problem);
+        json_parse(request->body, request->body_size, measurement_body_fields, body, problem);
     if (status != STATUS_OK && status != STATUS_INVALID)
         return status;
     const Status all[] = {status, fields_validate(measurement_body_fields, body, "", problem),
@@ -101,7 +101,7 @@ static Status read_body(const Request *request, MeasurementBody *body, Problem *
 static void write_test(Bytes *bytes, const DropTest *test, const Evaluation *evaluation,
                        bool is_there) {
     bytes_text(bytes, ", \"test\": ");
-    write_item(bytes, drop_test_fields, test, WRITE_SCENE);
+    encode_item(bytes, drop_test_fields, test, WRITE_SCENE);
     bytes_text(bytes, ", ");
     if (is_there)
         evaluation_write(bytes, evaluation);
@@ -118,7 +118,7 @@ static Status tell_dry(App *app, const char *slug, const DropTest *test,
     bytes_format(&bytes,
                  "\"links\": {\"material\": \"%s/v1/materials/%s\", \"measurements\": "
                  "\"%s/v1/materials/%s/measurements\"}}\n",
-                 link_base(), slug, link_base(), slug);
+                 base_path(), slug, base_path(), slug);
     return reply_bytes(reply, 200, type_json, &bytes, problem);
 }
 
@@ -143,7 +143,7 @@ static Status keep(App *app, const Request *request, const MeasurementBody *body
                    const MaterialState *state, uint64_t seen, const Evaluation *evaluation,
                    bool is_there, Reply *reply, Problem *problem) {
     Bytes document = {0};
-    write_item(&document, drop_test_fields, &body->test, WRITE_SCENE);
+    encode_item(&document, drop_test_fields, &body->test, WRITE_SCENE);
     char *text = bytes_take(&document, NULL);
     if (text == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the measurement");
@@ -153,7 +153,7 @@ static Status keep(App *app, const Request *request, const MeasurementBody *body
                                .comment = body->comment != NULL ? body->comment : silent,
                                .created_unix_ms = clock_unix_ms(),
                                .document = text};
-    Status status = store_material_measure(app->store, &row, seen, problem);
+    Status status = db_material_measure(app->store, &row, seen, problem);
     free(text);
     if (status != STATUS_OK)
         return status;
@@ -171,13 +171,13 @@ static Status create(App *app, const Request *request, const MeasurementBody *bo
     TRY(material_separation(app, request, &separation, problem));
     const Measurement test = {COUNT_ABSENT, &body->test};
     Evaluation evaluation;
-    Patience patience;
-    patience_begin(app, &patience);
+    CpuBudget patience;
+    cpu_budget_begin(app, &patience);
     Status status =
         is_dry
             ? material_evaluate(&patience, &test, 1, separation, &evaluation, reply, problem)
             : evaluate_kept(&patience, &test, separation, &evaluation, &is_there, reply, problem);
-    patience_end(&patience);
+    cpu_budget_end(&patience);
     if (status == STATUS_OK && is_dry)
         status = tell_dry(app, request->parameters[0], &body->test, &evaluation, reply, problem);
     else if (status == STATUS_OK)
@@ -203,7 +203,7 @@ Status measurements_list(App *app, const Request *request, Reply *reply, Problem
     const char *slug = request->parameters[0];
     MaterialState state;
     size_t limit, before;
-    TRY(store_material_state(app->store, slug, &state, problem));
+    TRY(db_material_state(app->store, slug, &state, problem));
     const size_t count = (size_t)state.measurements;
     TRY(request_count(request, "limit", 1, LIST_MAX, LIST_INITIAL, &limit, problem));
     TRY(request_count(request, "before", 1, (size_t)1 << 53, count + 1, &before, problem));
@@ -211,8 +211,8 @@ Status measurements_list(App *app, const Request *request, Reply *reply, Problem
     material_tag(slug, state.latest, state.version, tag);
     if (reply_tagged(reply, request, tag))
         return STATUS_OK;
-    MaterialBriefs page;
-    Status status = store_material_briefs(app->store, slug, before, limit, &page, problem);
+    MeasurementSummaries page;
+    Status status = db_measurement_summaries(app->store, slug, before, limit, &page, problem);
     Bytes bytes = {.most = app->reply_most};
     bytes_format(&bytes, "{\"slug\": \"%s\", \"count\": %zu, \"measurements\": [", slug, count);
     for (size_t i = 0; i < page.count && status == STATUS_OK; i++) {
@@ -220,7 +220,7 @@ Status measurements_list(App *app, const Request *request, Reply *reply, Problem
         status = measurement_write_brief(&bytes, &page.at[i], problem);
     }
     const uint64_t next = page.count > 0 ? page.at[page.count - 1].row.measurement : 0;
-    material_briefs_clear(&page);
+    measurement_summaries_clear(&page);
     bytes_text(&bytes, "]}\n");
     if (status != STATUS_OK) {
         bytes_clear(&bytes);
@@ -251,7 +251,7 @@ Status measurements_show(App *app, const Request *request, Reply *reply, Problem
     int separation;
     TRY(measurement_number(request->parameters[1], &number, problem));
     TRY(material_separation(app, request, &separation, problem));
-    TRY(store_material_state(app->store, slug, &state, problem));
+    TRY(db_material_state(app->store, slug, &state, problem));
     // What was measured never changes, and what it comes to only with the program.
     char tag[MATERIAL_TAG];
     snprintf(tag, sizeof tag, "%.63s#%llu-%s-%s", slug, (unsigned long long)number,
@@ -259,8 +259,8 @@ Status measurements_show(App *app, const Request *request, Reply *reply, Problem
     if (number <= state.measurements && reply_tagged(reply, request, tag))
         return STATUS_OK;
     StoredTest stored = {.row = {.slug = NULL}};
-    Patience patience;
-    patience_begin(app, &patience);
+    CpuBudget patience;
+    cpu_budget_begin(app, &patience);
     Status status = stored_test_load(app->store, slug, number, &stored, problem);
     if (status == STATUS_OK) {
         const Measurement test = {COUNT_ABSENT, &stored.test};
@@ -275,7 +275,7 @@ Status measurements_show(App *app, const Request *request, Reply *reply, Problem
                 tell(app, &stored.row, &stored.test, &evaluation, is_there, 200, reply, problem);
         evaluation_clear(&evaluation);
     }
-    patience_end(&patience);
+    cpu_budget_end(&patience);
     stored_test_clear(&stored);
     return status;
 }

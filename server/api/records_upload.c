@@ -56,7 +56,7 @@ static Status read_document(const Request *request, Asked *asked, RecordRow *row
         return problem_set(problem, STATUS_USAGE,
                            "beside JSON there is no query: \"%.40s\" is a member of the document",
                            request->queries[0].name);
-    TRY(read_json(request->body, request->body_size, asked_fields, asked, problem));
+    TRY(json_parse(request->body, request->body_size, asked_fields, asked, problem));
     row->layout = strdup("json");
     if (asked->unit == CHOICE_ABSENT)
         asked->unit = ACCELERATION_METRES;

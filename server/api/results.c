@@ -51,7 +51,7 @@ static Status read_scene(const ResultRow *row, StudyRequest *inquiry, Problem *p
     }
     problem_clear(fault);
     const Status status =
-        read_json(row->scene, strlen(row->scene), study_request_fields, inquiry, fault);
+        json_parse(row->scene, strlen(row->scene), study_request_fields, inquiry, fault);
     // A fault here is ours, not the client's.
     if (status != STATUS_OK)
         problem_set(problem, STATUS_INTERNAL, "the stored scene cannot be read: %s", fault->detail);
@@ -87,10 +87,10 @@ static void write_units(Bytes *bytes, const Simulation *simulation) {
 
 // "series" is the JSON one; the other formats are named in full.
 static void write_ways(Bytes *bytes, const char *id, const char *part, const char *formats) {
-    bytes_format(bytes, ", \"%s\": \"%s/v1/results/%s/%s.json\"", part, link_base(), id, part);
+    bytes_format(bytes, ", \"%s\": \"%s/v1/results/%s/%s.json\"", part, base_path(), id, part);
     for (size_t size; (size = strcspn(formats, " ")) > 0; formats += size + (formats[size] != '\0'))
         bytes_format(bytes, ", \"%s.%.*s\": \"%s/v1/results/%s/%s.%.*s\"", part, (int)size, formats,
-                     link_base(), id, part, (int)size, formats);
+                     base_path(), id, part, (int)size, formats);
 }
 
 // Under impulses an impact takes no time, and where there is none there is nothing to look at.
@@ -103,12 +103,12 @@ static bool has_force(const ResultRow *row) {
         results_document(row, DOCUMENT_IMPACTS) == NULL)
         return false;
     const bool is_read =
-        report_read(row->plan, strlen(row->plan), model_fields, &plan, NULL) == STATUS_OK;
+        stored_report_read(row->plan, strlen(row->plan), model_fields, &plan, NULL) == STATUS_OK;
     const bool is_impulse =
         is_read && plan.contact_model != NULL && strcmp(plan.contact_model, "impulse") == 0;
     fields_clear(model_fields, &plan);
     return is_read && !is_impulse &&
-           report_read(row->summary, strlen(row->summary), summary_fields, &summary, NULL) ==
+           stored_report_read(row->summary, strlen(row->summary), summary_fields, &summary, NULL) ==
                STATUS_OK &&
            summary.impacts > 0;
 }
@@ -117,7 +117,7 @@ static void write_links(Bytes *bytes, const ResultRow *row, const StudyAnswer *a
     const char *id = row->id;
     bytes_format(bytes,
                  "{\"self\": \"%s/v1/results/%s\", \"manifest\": \"%s/v1/results/%s/manifest\"",
-                 link_base(), id, link_base(), id);
+                 base_path(), id, base_path(), id);
     write_ways(bytes, id, "series", "csv npy npz mat");
     if (results_document(row, DOCUMENT_PSD) != NULL)
         write_ways(bytes, id, "psd", "csv npy npz mat");
@@ -126,18 +126,18 @@ static void write_links(Bytes *bytes, const ResultRow *row, const StudyAnswer *a
     // A template (RFC 6570): the impact's place in the ledger, from 1.
     if (has_force(row))
         bytes_format(bytes, ", \"force\": \"%s/v1/results/%s/impacts/{number}/force.json\"",
-                     link_base(), id);
+                     base_path(), id);
     write_ways(bytes, id, "energy", "csv npy npz mat");
-    bytes_format(bytes, ", \"bundle.zip\": \"%s/v1/results/%s/bundle.zip\"", link_base(), id);
+    bytes_format(bytes, ", \"bundle.zip\": \"%s/v1/results/%s/bundle.zip\"", base_path(), id);
     if (answer->study != NULL) {
         // A sweep's rows are a table of their own.
         const bool is_table = answer->study->kind == study_sweep.answer;
         const char *name = is_table ? "table" : answer->study->kind->name;
-        const AnswerFormat *format = answer_formats(answer->study->kind);
-        bytes_format(bytes, ", \"%s\": \"%s/v1/results/%s/%s.json\"", name, link_base(), id, name);
+        const StudyFormat *format = study_formats(answer->study->kind);
+        bytes_format(bytes, ", \"%s\": \"%s/v1/results/%s/%s.json\"", name, base_path(), id, name);
         while ((++format)->extension != NULL)
             bytes_format(bytes, ", \"%s.%s\": \"%s/v1/results/%s/%s.%s\"", name, format->extension,
-                         link_base(), id, name, format->extension);
+                         base_path(), id, name, format->extension);
     }
     bytes_text(bytes, "}");
 }
@@ -146,10 +146,10 @@ static const char *json_or(const char *json, const char *otherwise) {
     return json != NULL ? json : otherwise;
 }
 
-static void write_said(App *app, Bytes *bytes, const Use *use) {
+static void write_said(App *app, Bytes *bytes, const ReferenceRow *use) {
     MaterialRevision material = {0};
-    if (catalogue_find(app->store, use->slug, use->revision, &material, NULL) == STATUS_OK) {
-        catalogue_write_said(bytes, &material);
+    if (material_find(app->store, use->slug, use->revision, &material, NULL) == STATUS_OK) {
+        material_write_stated(bytes, &material);
     } else { // no longer here: its numbers stand in the scene
         bytes_text(bytes, "{\"slug\": ");
         bytes_json_string(bytes, use->slug);
@@ -158,26 +158,26 @@ static void write_said(App *app, Bytes *bytes, const Use *use) {
     material_revision_clear(&material);
 }
 
-static void write_link(App *app, Bytes *bytes, const Use *use) {
+static void write_link(App *app, Bytes *bytes, const ReferenceRow *use) {
     (void)app;
     bytes_format(bytes,
                  "{\"slug\": \"%s\", \"revision\": %llu, \"links\": {\"revision\": "
                  "\"%s/v1/materials/%s@%llu\", \"used_by\": "
                  "\"%s/v1/materials/%s@%llu/used-by\"}}",
-                 use->slug, use->revision, link_base(), use->slug, use->revision, link_base(),
+                 use->slug, use->revision, base_path(), use->slug, use->revision, base_path(),
                  use->slug, use->revision);
 }
 
 // What the scene and its study were made with, each in the words of `write`.
 static void write_materials(App *app, Bytes *bytes, const StudyRequest *inquiry,
-                            void (*write)(App *app, Bytes *bytes, const Use *use)) {
+                            void (*write)(App *app, Bytes *bytes, const ReferenceRow *use)) {
     Bytes lines = {0};
-    Use use;
+    ReferenceRow use;
     const char *separator = "";
-    uses_write(&lines, inquiry);
+    references_write(&lines, inquiry);
     const char *rest = lines.at;
     bytes_text(bytes, "[");
-    while (uses_next(&rest, &use)) {
+    while (references_next(&rest, &use)) {
         if (use.revision == 0)
             continue;
         bytes_text(bytes, separator);
@@ -241,7 +241,7 @@ Status results_put(const ResultRow *row, Bytes *bytes, Problem *problem) {
 Status results_show(App *app, const Request *request, Reply *reply, Problem *problem) {
     ResultRow row = {0};
     Bytes bytes = {.most = app->reply_most};
-    Status status = store_result_load(app->store, request->parameters[0], &row, problem);
+    Status status = db_result_load(app->store, request->parameters[0], &row, problem);
     if (status == STATUS_OK && !reply_immutable(reply, request, row.id)) {
         status = results_put(&row, &bytes, problem);
         if (status == STATUS_OK)
@@ -276,7 +276,7 @@ Status manifest_put(App *app, const ResultRow *row, Bytes *bytes, Problem *probl
             "\"application/json\", \"body\": \"the member scene of this document\", "
             "\"why\": \"the same "
             "scene and engine give the same id and the same bytes",
-            link_base());
+            base_path());
         // It is measured once and then kept; elsewhere it comes out a little differently.
         if (inquiry.study != NULL && study_kind(inquiry.study)->is_measured)
             bytes_text(bytes, ", but for the CPU time that a study measures and what follows of "
@@ -290,10 +290,10 @@ Status manifest_put(App *app, const ResultRow *row, Bytes *bytes, Problem *probl
 bool results_tagged(const Request *request, Reply *reply, const ResultRow *row, const char *what,
                     const Bytes *content) {
     char digits[65] = "", tag[104];
-    Digest *digest = digest_new();
+    Sha256 *digest = sha256_new();
     if (digest != NULL) {
-        digest_take(digest, content->at, content->count);
-        digest_end(digest, digits);
+        sha256_add(digest, content->at, content->count);
+        sha256_end(digest, digits);
     }
     snprintf(tag, sizeof tag, "%.72s-%.8s-%.16s", row->id, what, digits);
     return reply_tagged(reply, request, tag);
@@ -302,7 +302,7 @@ bool results_tagged(const Request *request, Reply *reply, const ResultRow *row, 
 Status results_manifest(App *app, const Request *request, Reply *reply, Problem *problem) {
     ResultRow row = {0};
     Bytes bytes = {.most = app->reply_most};
-    Status status = store_result_load(app->store, request->parameters[0], &row, problem);
+    Status status = db_result_load(app->store, request->parameters[0], &row, problem);
     if (status == STATUS_OK)
         status = manifest_put(app, &row, &bytes, problem);
     if (status == STATUS_OK && !results_tagged(request, reply, &row, "manifest", &bytes))
@@ -318,15 +318,15 @@ static Status require_own(App *app, const Request *request, Problem *problem) {
     char owner[72], what[128];
     if (request->client == NULL || request->holder.is_admin)
         return STATUS_OK;
-    store_settle(app->store);
-    TRY(store_result_sharer(app->store, request->parameters[0], request->client, owner, problem));
+    db_flush(app->store);
+    TRY(db_result_sharer(app->store, request->parameters[0], request->client, owner, problem));
     snprintf(what, sizeof what, "a job with the result %.80s", request->parameters[0]);
-    return doorman_owns(request, owner[0] != '\0' ? owner : NULL, what, problem);
+    return access_owns(request, owner[0] != '\0' ? owner : NULL, what, problem);
 }
 
 Status results_delete(App *app, const Request *request, Reply *reply, Problem *problem) {
     TRY(require_own(app, request, problem));
-    TRY(intake_delete(app->intake, request->parameters[0], problem));
+    TRY(jobs_delete(app->intake, request->parameters[0], problem));
     reply_borrow(reply, 204, NULL, NULL, 0);
     return STATUS_OK;
 }

@@ -48,29 +48,30 @@ static Status choose_columns(const Request *request, const Columns *columns, con
     return STATUS_OK;
 }
 
-static Status choose(const Request *request, Sheet *sheet, Problem *problem) {
+static Status choose(const Request *request, ColumnReply *sheet, Problem *problem) {
     const Response *response = &sheet->outcome->response;
     sheet->table =
         (Table){.axis_name = "time", .axis_unit = "s", .axis_rate = response->sample_rate};
     if (response->count == 0)
         return problem_set(problem, STATUS_NOT_FOUND, "the result has no samples");
-    TRY(sheet_make(sheet, response->series.count, problem));
+    TRY(column_reply_make(sheet, response->series.count, problem));
     TRY(choose_columns(request, &response->series, sheet->chosen, &sheet->table.column_count,
                        problem));
-    TRY(tables_window(request, response->count, &sheet->table, problem));
-    return tables_buckets(request, sheet, problem);
+    TRY(columns_window(request, response->count, &sheet->table, problem));
+    return columns_downsample(request, sheet, problem);
 }
 
 Status results_series(App *app, const Request *request, Reply *reply, Problem *problem) {
-    const Encoder *encoder = NULL;
-    Sheet sheet = {.encoding = NULL};
-    TRY(tables_encoder(request, 1, true, reply, &encoder, problem));
-    TRY(tables_outcome(app, request, reply, "series", encoder->extension, &sheet.outcome, problem));
+    const TableFormat *encoder = NULL;
+    ColumnReply sheet = {.encoding = NULL};
+    TRY(columns_format(request, 1, true, reply, &encoder, problem));
+    TRY(columns_outcome(app, request, reply, "series", encoder->extension, &sheet.outcome,
+                        problem));
     if (sheet.outcome == NULL)
         return STATUS_OK;
     const Status status = choose(request, &sheet, problem);
     if (status == STATUS_OK)
-        return tables_reply(app, reply, encoder, &sheet, problem);
-    sheet_clear(&sheet);
+        return columns_reply(app, reply, encoder, &sheet, problem);
+    column_reply_clear(&sheet);
     return status;
 }

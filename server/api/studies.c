@@ -20,7 +20,7 @@ Status study_read(const ResultRow *row, StudyAnswer *answer, Problem *problem) {
     if (fault == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the study");
     const Status status =
-        read_json(row->study, strlen(row->study), study_answer_fields, answer, fault);
+        json_parse(row->study, strlen(row->study), study_answer_fields, answer, fault);
     // A fault here is ours, not the client's.
     if (status != STATUS_OK)
         problem_set(problem, STATUS_INTERNAL, "the stored study cannot be read: %s", fault->detail);
@@ -43,14 +43,14 @@ static Status answer_read(const ResultRow *row, const StudyKind *kind, StudyAnsw
     return answer->study->kind == kind->answer ? STATUS_OK : refuse_other(kind, problem);
 }
 
-static Status choose_format(const Request *request, const AnswerFormat *formats, Reply *reply,
-                            const AnswerFormat **format, Problem *problem) {
-    const char *extension = request->parameters[1], *types[ANSWER_FORMATS] = {NULL};
+static Status choose_format(const Request *request, const StudyFormat *formats, Reply *reply,
+                            const StudyFormat **format, Problem *problem) {
+    const char *extension = request->parameters[1], *types[STUDY_FORMATS_MAX] = {NULL};
     char names[64];
-    answer_formats_name(formats, "", names, sizeof names);
+    study_formats_names(formats, "", names, sizeof names);
     reply->varies_by_accept = extension == NULL;
     if (extension != NULL) {
-        *format = answer_format_find(formats, extension);
+        *format = study_format_find(formats, extension);
         return *format != NULL
                    ? STATUS_OK
                    : problem_set(problem, STATUS_NOT_FOUND,
@@ -67,8 +67,8 @@ static Status choose_format(const Request *request, const AnswerFormat *formats,
     return STATUS_OK;
 }
 
-Status study_format(const Request *request, const AnswerFormat *formats, Reply *reply,
-                    const AnswerFormat **format, Problem *problem) {
+Status study_format(const Request *request, const StudyFormat *formats, Reply *reply,
+                    const StudyFormat **format, Problem *problem) {
     TRY(choose_format(request, formats, reply, format, problem));
     if ((*format)->content_type == chart_type)
         reply->policy = shield_drawing_policy;
@@ -77,13 +77,13 @@ Status study_format(const Request *request, const AnswerFormat *formats, Reply *
 
 static Status show(App *app, const Request *request, const StudyKind *kind, Reply *reply,
                    Problem *problem) {
-    const AnswerFormat *format;
-    TRY(study_format(request, answer_formats(kind->answer), reply, &format, problem));
+    const StudyFormat *format;
+    TRY(study_format(request, study_formats(kind->answer), reply, &format, problem));
     ResultRow row = {0};
     StudyAnswer answer = {NULL};
     Bytes bytes = {.most = app->reply_most};
     char tag[128];
-    Status status = store_result_load(app->store, request->parameters[0], &row, problem);
+    Status status = db_result_load(app->store, request->parameters[0], &row, problem);
     if (status == STATUS_OK)
         status = answer_read(&row, kind, &answer, problem);
     if (status == STATUS_OK) {

@@ -13,7 +13,7 @@ Status study_read(const ResultRow *row, StudyAnswer *answer, Problem *problem);
 
 // The format by the extension in the request's second parameter, else by Accept. STATUS_NOT_FOUND,
 // STATUS_NOT_ACCEPTABLE.
-Status study_format(const Request *request, const AnswerFormat *formats, Reply *reply,
-                    const AnswerFormat **format, Problem *problem);
+Status study_format(const Request *request, const StudyFormat *formats, Reply *reply,
+                    const StudyFormat **format, Problem *problem);
 
 #endif

@@ -23,11 +23,11 @@ enum { WHOLE_MAX = 4 << 20 };
 // A path begins with a result, or with the job that makes it.
 static bool is_of_job(const Request *request) {
     static const char jobs[] = "/v1/jobs/";
-    return strncmp(link_inside(request->path), jobs, sizeof jobs - 1) == 0;
+    return strncmp(base_path_strip(request->path), jobs, sizeof jobs - 1) == 0;
 }
 
 // Rows come, and failed ones may be made again: only a table without either never changes.
-static bool is_known(const Request *request, Reply *reply, const SweepShow *show,
+static bool is_known(const Request *request, Reply *reply, const SweepView *show,
                      const char *extension) {
     char tag[112];
     snprintf(tag, sizeof tag, "%.72s-t%zu-%llu.%.5s", show->row.result, show->chunks.count,
@@ -42,14 +42,14 @@ static bool is_known(const Request *request, Reply *reply, const SweepShow *show
 
 // A table on its way: a text as far as it is made, or an archive whose every byte has its place.
 typedef struct Sending {
-    SweepShow show;
+    SweepView show;
     SweepSource source;
     bool (*next)(SweepText *text, Bytes *bytes); // NULL: an archive
     SweepText text;
     Bytes made;
     size_t taken; // of that
     bool is_last;
-    const Encoder *encoder; // of an archive; NULL: NPZ
+    const TableFormat *encoder; // of an archive; NULL: NPZ
     SweepArchive archive;
     Encoding *encoding;
 } Sending;
@@ -58,7 +58,7 @@ static void sending_free(void *context) {
     Sending *sending = context;
     encoding_close(sending->encoding);
     bytes_clear(&sending->made);
-    sweep_show_clear(&sending->show);
+    sweep_view_clear(&sending->show);
     free(sending);
 }
 
@@ -107,13 +107,13 @@ static Status begin_text(Sending *sending, Problem *problem) {
 }
 
 static Status begin_archive(Sending *sending, Problem *problem) {
-    Layout layout = {0};
+    Segments layout = {0};
     const Status status =
         sending->encoder != NULL
             ? sweep_columns_lay(&sending->archive, sending->encoder, &layout, problem)
             : sweep_npz_lay(&sending->archive, &layout, problem);
     if (status != STATUS_OK) {
-        layout_clear(&layout);
+        segments_clear(&layout);
         return status == STATUS_CONFLICT ? refuse_changed(problem) : status;
     }
     return encoding_open_layout(&layout, &sending->encoding, problem);
@@ -122,7 +122,7 @@ static Status begin_archive(Sending *sending, Problem *problem) {
 // Takes `sending`, also when it fails.
 static Status send(Reply *reply, const char *content_type, Sending *sending, Problem *problem) {
     Status status;
-    sending->source = (SweepSource){sending->show.rows, sweep_show_read, &sending->show};
+    sending->source = (SweepSource){sending->show.rows, sweep_view_read, &sending->show};
     sending->text = (SweepText){.sweep = sending->show.sweep,
                                 .source = &sending->source,
                                 .result = sending->show.row.result};
@@ -151,7 +151,7 @@ static Status send(Reply *reply, const char *content_type, Sending *sending, Pro
 
 static Status send_chart(App *app, Reply *reply, const char *content_type, Sending *sending,
                          Problem *problem) {
-    const SweepSource source = {sending->show.rows, sweep_show_read, &sending->show};
+    const SweepSource source = {sending->show.rows, sweep_view_read, &sending->show};
     Bytes bytes = {.most = app->reply_most};
     Status status = charts_sweep(sending->show.sweep, &source, &bytes)
                         ? reply_bytes(reply, 200, content_type, &bytes, problem)
@@ -162,12 +162,12 @@ static Status send_chart(App *app, Reply *reply, const char *content_type, Sendi
 }
 
 Status sweeps_table(App *app, const Request *request, Reply *reply, Problem *problem) {
-    const AnswerFormat *format;
-    TRY(study_format(request, answer_formats(study_sweep.answer), reply, &format, problem));
+    const StudyFormat *format;
+    TRY(study_format(request, study_formats(study_sweep.answer), reply, &format, problem));
     Sending *sending = calloc(1, sizeof *sending);
     if (sending == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the table");
-    const Status status = sweep_show_load(app->store, request->parameters[0], is_of_job(request),
+    const Status status = sweep_view_load(app->store, request->parameters[0], is_of_job(request),
                                           true, &sending->show, problem);
     if (status != STATUS_OK || is_known(request, reply, &sending->show, format->extension)) {
         sending_free(sending);
@@ -179,7 +179,7 @@ Status sweeps_table(App *app, const Request *request, Reply *reply, Problem *pro
                     : strcmp(format->extension, "csv") == 0 ? sweep_csv_next
                                                             : NULL;
     if (strcmp(format->extension, "npz") != 0)
-        sending->encoder = encoder_find(format->extension);
+        sending->encoder = format_find(format->extension);
     return send(reply, format->content_type, sending, problem);
 }
 
@@ -193,8 +193,8 @@ static Status read_index(const Request *request, uint64_t *index, Problem *probl
     return STATUS_OK;
 }
 
-static void put_point(Bytes *bytes, const SweepShow *show, uint64_t index,
-                      const SweepPointShow *point) {
+static void put_point(Bytes *bytes, const SweepView *show, uint64_t index,
+                      const SweepPointView *point) {
     const Sweep *sweep = show->sweep;
     bytes_format(bytes, "{\"index\": %llu, \"result\": \"%s\", \"status\": \"%s\", \"why\": ",
                  (unsigned long long)index, show->row.result, sweep_status_names[point->status]);
@@ -213,7 +213,7 @@ static void put_point(Bytes *bytes, const SweepShow *show, uint64_t index,
     }
     bytes_text(bytes, "}, \"scene\": ");
     document_scene(bytes, &point->scene);
-    const char *base = link_base(), *id = show->row.result;
+    const char *base = base_path(), *id = show->row.result;
     bytes_format(bytes, ", \"links\": {\"self\": \"%s/v1/results/%s/points/%llu\"", base, id,
                  (unsigned long long)index);
     bytes_format(bytes, ", \"scene\": \"%s/v1/results/%s/points/%llu/scene\"", base, id,
@@ -224,11 +224,11 @@ static void put_point(Bytes *bytes, const SweepShow *show, uint64_t index,
 static Status show_point(App *app, const Request *request, Reply *reply, bool is_scene,
                          Problem *problem) {
     uint64_t index = 0;
-    SweepShow show = {.sweep = NULL};
-    SweepPointShow point = {.values = NULL};
+    SweepView show = {.sweep = NULL};
+    SweepPointView point = {.values = NULL};
     TRY(read_index(request, &index, problem));
     Status status =
-        sweep_show_load(app->store, request->parameters[0], false, false, &show, problem);
+        sweep_view_load(app->store, request->parameters[0], false, false, &show, problem);
     if (status == STATUS_OK)
         status = sweep_point_load(app->store, &show, index, &point, problem);
     if (status == STATUS_OK) {
@@ -243,7 +243,7 @@ static Status show_point(App *app, const Request *request, Reply *reply, bool is
     }
     free(point.values);
     study_request_clear(&point.scene);
-    sweep_show_clear(&show);
+    sweep_view_clear(&show);
     return status;
 }
 

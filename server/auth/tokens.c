@@ -35,7 +35,7 @@ typedef struct Entry {
 } Entry;
 
 struct Tokens {
-    Store *store;
+    Db *store;
     bool are_required;
     pthread_mutex_t lock; // of entries and count, held for a look-up
     Entry *entries;
@@ -139,7 +139,7 @@ static void entry_fill(const Tokens *tokens, Entry *entry, const TokenRow *row) 
 // With `looking` held. What is there stays where the database cannot be read.
 static Status look(Tokens *tokens, Problem *problem) {
     TokenRows rows = {0};
-    TRY(store_tokens(tokens->store, &rows, problem));
+    TRY(db_tokens(tokens->store, &rows, problem));
     Entry *entries = calloc(rows.count + 1, sizeof *entries);
     if (entries == NULL) {
         free(rows.at);
@@ -179,7 +179,7 @@ static bool next_used(Tokens *tokens, int64_t apart_ms, TokenRow *row) {
 static void note_used(Tokens *tokens, int64_t apart_ms) {
     TokenRow row = {0};
     while (next_used(tokens, apart_ms, &row))
-        (void)store_token_used(tokens->store, &row, NULL);
+        (void)db_token_used(tokens->store, &row, NULL);
 }
 
 static void *follow(void *context) {
@@ -204,7 +204,7 @@ static void *follow(void *context) {
     return NULL;
 }
 
-Status tokens_open(Store *store, bool are_required, Tokens **tokens, Problem *problem) {
+Status tokens_open(Db *store, bool are_required, Tokens **tokens, Problem *problem) {
     *tokens = NULL;
     Tokens *made = calloc(1, sizeof *made);
     if (made == NULL)
@@ -331,7 +331,7 @@ Status tokens_check(Tokens *tokens, const char *authorization, const char *scope
     const char *token = authorization != NULL ? bearer(authorization, &size) : NULL;
     *holder = (Holder){.name = ""};
     if (token != NULL)
-        digest_sum(token, size, digest);
+        sha256_sum(token, size, digest);
     Judgement found = judge(tokens, token != NULL ? digest : NULL, holder);
     if (token != NULL && found.is_asked && !found.is_known && look_again(tokens))
         found = judge(tokens, digest, holder);
@@ -360,10 +360,10 @@ Status token_make(const char *scopes, int64_t expires_unix_ms, TokenRow *row,
     if (getrandom(secret, sizeof secret, 0) != (ssize_t)sizeof secret)
         return problem_set(problem, STATUS_INTERNAL, "no random numbers for a token");
     char digits[65];
-    digest_spell(secret, digits);
+    sha256_hex(secret, digits);
     snprintf(token, TOKEN_SIZE, "impactd_%s", digits);
-    digest_sum(token, strlen(token), digest);
-    digest_spell(digest, row->digest);
+    sha256_sum(token, strlen(token), digest);
+    sha256_hex(digest, row->digest);
     scopes_write(asked, row->scopes, sizeof row->scopes);
     row->created_unix_ms = clock_unix_ms();
     row->expires_unix_ms = expires_unix_ms;

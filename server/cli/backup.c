@@ -39,7 +39,7 @@ static void interrupts_catch(void) {
 }
 
 static bool advance(void *bar, double fraction) {
-    const Progress drawn = bar_watch(bar);
+    const Progress drawn = progress_bar_watch(bar);
     (void)progress_advance(&drawn, fraction);
     return is_interrupted == 0;
 }
@@ -53,19 +53,19 @@ static int backup(const Command *self, void *of, const Options *options, Problem
         (void)problem_set(problem, STATUS_USAGE,
                           "writes a file, not standard output: it appears whole or not at all");
     if (problem->status != STATUS_OK)
-        return command_refuse(self->name, problem);
+        return command_error(self->name, problem);
     const char *path = options->operands[0];
     Backup made = {0};
-    Bar bar;
+    ProgressBar bar;
     const Progress watch = {&bar, advance};
     interrupts_catch();
-    bar_start(&bar);
+    progress_bar_start(&bar);
     Status status = command_data_folder(&settings->data, problem);
     if (status == STATUS_OK) {
         const BackupRequest request = {settings->data, path, settings->force, &watch};
         status = backup_write(&request, &made, problem);
     }
-    bar_stop(&bar);
+    progress_bar_stop(&bar);
     if (status == STATUS_OK)
         printf("%s: %" PRIu64 " bytes, checked; %" PRIu64 " jobs, %" PRIu64 " results, %" PRIu64
                " materials\n",

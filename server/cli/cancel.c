@@ -14,30 +14,30 @@ static const Field cancel_fields[] = {
 static int cancel(const Command *self, void *of, const Options *options, Problem *problem) {
     const CancelSettings *settings = of;
     const char *id = options->operands[0];
-    if (options->operand_count != 1 || !daemon_is_id(id)) {
+    if (options->operand_count != 1 || !api_client_is_id(id)) {
         (void)problem_set(problem, STATUS_USAGE, "takes one job's id, like j-7f3a");
-        return command_refuse(self->name, problem);
+        return command_error(self->name, problem);
     }
-    Daemon daemon;
+    ApiClient daemon;
     HttpAnswer answer = {0};
     JobReply job = {0};
     char path[128];
     snprintf(path, sizeof path, "/v1/jobs/%s", id);
     const HttpAsk ask = {.method = "DELETE", .path = path};
-    Status status =
-        daemon_open(settings->server, settings->token_file, settings->ca_file, 0, &daemon, problem);
+    Status status = api_client_open(settings->server, settings->token_file, settings->ca_file, 0,
+                                    &daemon, problem);
     if (status == STATUS_OK)
-        status = daemon_ask(&daemon, &ask, &answer, problem);
+        status = api_client_ask(&daemon, &ask, &answer, problem);
     if (status == STATUS_OK)
         status = job_reply_read(&answer, &job, problem);
     int code = COMMAND_OK;
     if (status == STATUS_OK)
         printf("%s %s\n", job.id, job.status);
     else
-        code = daemon_refuse(self->name, id, status, problem);
+        code = api_client_refuse(self->name, id, status, problem);
     job_reply_clear(&job);
     http_answer_clear(&answer);
-    daemon_close(&daemon);
+    api_client_close(&daemon);
     return code;
 }
 

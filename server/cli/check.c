@@ -103,18 +103,18 @@ static void plan_print(const char *path, const DryRun *run) {
 
 static Status plan_show(const char *path, const Bytes *text, void *of, Problem *problem) {
     const CheckSettings *asked = of;
-    const IntakeSettings settings = {
+    const JobManagerSettings settings = {
         .workers = 1, .queue_most = 1, .limits = scene_file_limits(asked->max_cpu_seconds)};
-    Store *store = NULL;
-    Intake *intake = NULL;
+    Db *store = NULL;
+    JobManager *intake = NULL;
     DryRun run = {0};
-    TRY(store_open(NULL, &store, problem));
-    Status status = intake_open(store, &settings, &intake, problem);
+    TRY(db_open(NULL, &store, problem));
+    Status status = jobs_open(store, &settings, &intake, problem);
     if (status == STATUS_OK)
-        status = intake_dry_run(intake, text->at, text->count, &run, problem);
+        status = jobs_dry_run(intake, text->at, text->count, &run, problem);
     if (status == STATUS_OK && asked->json) {
         Bytes bytes = {0};
-        job_put_dry_run(&bytes, &run);
+        job_json_put_dry_run(&bytes, &run);
         bytes_text(&bytes, "\n");
         if (bytes.is_failed)
             status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the plan");
@@ -125,8 +125,8 @@ static Status plan_show(const char *path, const Bytes *text, void *of, Problem *
         plan_print(path, &run);
     }
     dry_run_clear(&run);
-    intake_close(intake);
-    store_close(store);
+    jobs_close(intake);
+    db_close(store);
     return status;
 }
 

@@ -74,12 +74,12 @@ static Status token_read(const char *path, char token[TOKEN_MAX + 1], Problem *p
     return STATUS_OK;
 }
 
-Status daemon_open(const char *server, const char *token_file, const char *ca_file, double wait,
-                   Daemon *daemon, Problem *problem) {
+Status api_client_open(const char *server, const char *token_file, const char *ca_file, double wait,
+                       ApiClient *daemon, Problem *problem) {
     char token[TOKEN_MAX + 1];
     output_guard();
-    *daemon = (Daemon){.until_ns = clock_monotonic_ns() +
-                                   (int64_t)(1e9 * (wait < forever ? wait : forever))};
+    *daemon = (ApiClient){.until_ns = clock_monotonic_ns() +
+                                      (int64_t)(1e9 * (wait < forever ? wait : forever))};
     TRY(token_read(setting(token_file, "IMPACTD_TOKEN_FILE", NULL), token, problem));
     const HttpServer at = {.url = setting(server, "IMPACTD_SERVER", usual_server),
                            .token = token[0] != '\0' ? token : NULL,
@@ -90,12 +90,12 @@ Status daemon_open(const char *server, const char *token_file, const char *ca_fi
     return STATUS_OK;
 }
 
-void daemon_close(Daemon *daemon) {
+void api_client_close(ApiClient *daemon) {
     http_close(daemon->http);
     daemon->http = NULL;
 }
 
-double daemon_left(const Daemon *daemon) {
+double api_client_left(const ApiClient *daemon) {
     const double left = 1e-9 * (double)(daemon->until_ns - clock_monotonic_ns());
     return left > 0 ? left : 0;
 }
@@ -104,7 +104,7 @@ static void pause_for(double seconds) {
     (void)poll(NULL, 0, (int)(1000 * seconds));
 }
 
-Status daemon_ask(Daemon *daemon, const HttpAsk *ask, HttpAnswer *answer, Problem *problem) {
+Status api_client_ask(ApiClient *daemon, const HttpAsk *ask, HttpAnswer *answer, Problem *problem) {
     for (;;) {
         TRY(http_ask(daemon->http, ask, answer, problem));
         if (answer->code == 200 || answer->code == 201 || answer->code == 202 ||
@@ -112,57 +112,57 @@ Status daemon_ask(Daemon *daemon, const HttpAsk *ask, HttpAnswer *answer, Proble
             return STATUS_OK;
         const double pause = answer->retry_after > 0 ? answer->retry_after : 1;
         const bool is_busy = answer->code == 503 || answer->code == 429;
-        if (!is_busy || pause > daemon_left(daemon))
+        if (!is_busy || pause > api_client_left(daemon))
             return problem_reply_read(answer, problem);
         http_answer_clear(answer);
         pause_for(pause);
     }
 }
 
-Status daemon_request(Daemon *daemon, HttpAsk ask, Bytes *path, HttpAnswer *answer,
-                      Problem *problem) {
+Status api_client_request(ApiClient *daemon, HttpAsk ask, Bytes *path, HttpAnswer *answer,
+                          Problem *problem) {
     ask.path = path->at;
     *answer = (HttpAnswer){0};
     const Status status = path->is_failed
                               ? problem_set(problem, STATUS_USAGE, "asks for too much at once")
-                              : daemon_ask(daemon, &ask, answer, problem);
+                              : api_client_ask(daemon, &ask, answer, problem);
     bytes_clear(path);
     return status;
 }
 
-void daemon_print(const HttpAnswer *answer) {
+void api_client_print(const HttpAnswer *answer) {
     (void)fwrite(answer->body.at, 1, answer->body.count, stdout);
 }
 
-bool daemon_is_id(const char *text) {
+bool api_client_is_id(const char *text) {
     const size_t length = strlen(text);
     return length > 0 && length <= 80 &&
            strspn(text, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-") ==
                length;
 }
 
-Status daemon_job(Daemon *daemon, const char *id, double wait, HttpAnswer *answer, JobReply *job,
-                  Problem *problem) {
+Status api_client_job(ApiClient *daemon, const char *id, double wait, HttpAnswer *answer,
+                      JobReply *job, Problem *problem) {
     char path[160];
     snprintf(path, sizeof path, "/v1/jobs/%s?wait=%.3f", id, wait);
     const HttpAsk ask = {.method = "GET", .path = path};
-    TRY(daemon_ask(daemon, &ask, answer, problem));
+    TRY(api_client_ask(daemon, &ask, answer, problem));
     return job_reply_read(answer, job, problem);
 }
 
-Status daemon_result(Daemon *daemon, const char *id, char result[96], Problem *problem) {
+Status api_client_result(ApiClient *daemon, const char *id, char result[96], Problem *problem) {
     snprintf(result, 96, "%s", id);
     if (strncmp(id, "j-", 2) != 0)
         return STATUS_OK;
     HttpAnswer answer = {0};
     JobReply job = {0};
-    const double left = daemon_left(daemon);
-    Status status = daemon_job(daemon, id, left < 20 ? left : 20, &answer, &job, problem);
-    while (status == STATUS_OK && !job_reply_is_final(&job) && daemon_left(daemon) > 0) {
+    const double left = api_client_left(daemon);
+    Status status = api_client_job(daemon, id, left < 20 ? left : 20, &answer, &job, problem);
+    while (status == STATUS_OK && !job_reply_is_final(&job) && api_client_left(daemon) > 0) {
         job_reply_clear(&job);
         http_answer_clear(&answer);
-        const double rest = daemon_left(daemon);
-        status = daemon_job(daemon, id, rest < 20 ? rest : 20, &answer, &job, problem);
+        const double rest = api_client_left(daemon);
+        status = api_client_job(daemon, id, rest < 20 ? rest : 20, &answer, &job, problem);
     }
     if (status == STATUS_OK && !job_reply_is_final(&job))
         status = problem_set(problem, STATUS_TIMEOUT,
@@ -171,7 +171,7 @@ Status daemon_result(Daemon *daemon, const char *id, char result[96], Problem *p
     else if (status == STATUS_OK && strcmp(job.status, "failed") == 0) {
         problem_reply_put(&job.problem, STATUS_INTERNAL, problem);
         status = STATUS_INTERNAL;
-    } else if (status == STATUS_OK && (job.result == NULL || !daemon_is_id(job.result)))
+    } else if (status == STATUS_OK && (job.result == NULL || !api_client_is_id(job.result)))
         status = problem_set(problem, STATUS_INTERNAL, "was %s and has no result", job.status);
     if (status == STATUS_OK)
         snprintf(result, 96, "%s", job.result);
@@ -182,7 +182,7 @@ Status daemon_result(Daemon *daemon, const char *id, char result[96], Problem *p
 
 // A bar, or a line whenever the state changes or ten more percent are done.
 typedef struct Show {
-    Bar bar;
+    ProgressBar bar;
     FILE *lines;
     char status[48];
     double progress;
@@ -191,7 +191,7 @@ typedef struct Show {
 static void show_job(Show *show, const JobReply *job) {
     const double progress = job->progress >= 0 && job->progress <= 100 ? job->progress : 0;
     if (show->bar.is_terminal) {
-        const Progress watch = bar_watch(&show->bar);
+        const Progress watch = progress_bar_watch(&show->bar);
         (void)progress_advance(&watch, progress / 100);
         return;
     }
@@ -205,13 +205,13 @@ static void show_job(Show *show, const JobReply *job) {
 }
 
 // One look. Where nothing answers any more, again each second until a new daemon had its time.
-static Status look(Daemon *daemon, const char *id, double wait, bool was_there, HttpAnswer *answer,
-                   JobReply *job, Problem *problem) {
+static Status look(ApiClient *daemon, const char *id, double wait, bool was_there,
+                   HttpAnswer *answer, JobReply *job, Problem *problem) {
     const int64_t until_ns = clock_monotonic_ns() + restart_ns;
     for (;;) {
-        const Status status = daemon_job(daemon, id, wait, answer, job, problem);
+        const Status status = api_client_job(daemon, id, wait, answer, job, problem);
         if (status != STATUS_UNREACHABLE || !was_there || clock_monotonic_ns() > until_ns ||
-            daemon_left(daemon) < 1)
+            api_client_left(daemon) < 1)
             return status;
         job_reply_clear(job);
         http_answer_clear(answer);
@@ -270,7 +270,7 @@ static Status events_take(void *context, const void *bytes, size_t size, Problem
 
 // Shows what the server tells of the job for as long as it does. False where it has no such stream:
 // it is not asked for it again.
-static bool events_follow(Daemon *daemon, const char *id, Show *show) {
+static bool events_follow(ApiClient *daemon, const char *id, Show *show) {
     enum { EVENTS_MAX = 256 << 20 }; // [B]
     char path[160];
     HttpAnswer answer;
@@ -282,34 +282,34 @@ static bool events_follow(Daemon *daemon, const char *id, Show *show) {
                          .take = events_take,
                          .context = &events,
                          .most = EVENTS_MAX,
-                         .within = daemon_left(daemon)};
+                         .within = api_client_left(daemon)};
     (void)http_ask(daemon->http, &ask, &answer, ignored);
     const bool is_there = are_events(&answer);
     http_answer_clear(&answer);
     return is_there;
 }
 
-Status daemon_follow(Daemon *daemon, const char *id, FILE *lines, HttpAnswer *answer, JobReply *job,
-                     Problem *problem) {
+Status api_client_follow(ApiClient *daemon, const char *id, FILE *lines, HttpAnswer *answer,
+                         JobReply *job, Problem *problem) {
     char farewell[256];
     Show show = {.lines = lines};
     snprintf(farewell, sizeof farewell,
              "%s goes on; \"impactd cancel %s\" stops it, \"impactd watch %s\" follows it\n", id,
              id, id);
     output_farewell(farewell);
-    bar_start(&show.bar);
+    progress_bar_start(&show.bar);
     Status status = STATUS_OK;
     bool has_events = true;
     for (bool was_there = false;; was_there = true) {
         const double poll = show.bar.is_terminal ? bar_poll : lines_poll;
-        const double left = daemon_left(daemon);
+        const double left = api_client_left(daemon);
         status = look(daemon, id, left < poll ? left : poll, was_there, answer, job, problem);
         if (status != STATUS_OK)
             break;
         show_job(&show, job);
         if (job_reply_is_final(job))
             break;
-        if (daemon_left(daemon) <= 0) {
+        if (api_client_left(daemon) <= 0) {
             status = problem_set(problem, STATUS_TIMEOUT, "is still %s after the time given; %.*s",
                                  job->status, (int)strlen(farewell) - 1, farewell);
             break;
@@ -318,14 +318,14 @@ Status daemon_follow(Daemon *daemon, const char *id, FILE *lines, HttpAnswer *an
         http_answer_clear(answer);
         has_events = has_events && events_follow(daemon, id, &show);
     }
-    bar_stop(&show.bar);
+    progress_bar_stop(&show.bar);
     output_farewell(NULL);
     if (status == STATUS_OK && show.bar.is_terminal && lines != NULL)
         fprintf(lines, "%s %s\n", job->id, job->status);
     return status;
 }
 
-int daemon_verdict(const JobReply *job, Problem *problem) {
+int api_client_verdict(const JobReply *job, Problem *problem) {
     if (strcmp(job->status, "successful") == 0)
         return COMMAND_OK;
     if (strcmp(job->status, "failed") == 0) {
@@ -337,12 +337,13 @@ int daemon_verdict(const JobReply *job, Problem *problem) {
     return COMMAND_FAILED;
 }
 
-int daemon_refuse(const char *command, const char *name, Status status, const Problem *problem) {
+int api_client_refuse(const char *command, const char *name, Status status,
+                      const Problem *problem) {
     // Faults of flags have them as their place.
     if (status == STATUS_USAGE && problem->count > 0 &&
         strchr("-I", problem->faults[0].pointer[0]) != NULL &&
         problem->faults[0].pointer[0] != '\0')
-        return command_refuse(command, problem);
+        return command_error(command, problem);
     scene_file_refuse(name, problem);
     return command_exit(status);
 }

@@ -46,7 +46,7 @@ int command_main(int argc, char *const *argv);
 
 // Usage faults on stderr, "impactd run: --outpt is no option (did you mean --output?)"; returns
 // COMMAND_USAGE.
-int command_refuse(const char *name, const Problem *problem);
+int command_error(const char *name, const Problem *problem);
 
 // Which of `count` actions the first operand names: the index of its name. `names` points to the
 // first name, the others follow at `stride` bytes. STATUS_USAGE lists them.

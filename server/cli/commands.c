@@ -124,13 +124,13 @@ static int version_run(const Command *self, void *settings, const Options *optio
     if (options->operand_count > 0) {
         (void)problem_set(problem, STATUS_USAGE, "takes no arguments, is given %s",
                           options->operands[0]);
-        return command_refuse(self->name, problem);
+        return command_error(self->name, problem);
     }
     printf("impactd %s (engine %s)\n", program_version, engine_version);
     return COMMAND_OK;
 }
 
-int command_refuse(const char *name, const Problem *problem) {
+int command_error(const char *name, const Problem *problem) {
     for (size_t i = 0; i < problem->count && i < PROBLEM_FAULTS; i++) {
         const Fault *fault = &problem->faults[i];
         fprintf(stderr, "impactd %s: %s %s", name, fault->pointer, fault->detail);
@@ -226,7 +226,7 @@ static int command_run_with(const Command *command, int argc, char *const *argv)
         code = options_read(fields, settings, argc, argv, command->environment, &options,
                             problem) == STATUS_OK
                    ? command->run(command, settings, &options, problem)
-                   : command_refuse(command->name, problem);
+                   : command_error(command->name, problem);
         fields_clear(fields, settings);
     }
     free(settings);

@@ -18,7 +18,7 @@ static const Field compare_fields[] = {
 };
 // clang-format on
 
-static const ListingColumns columns[] = {
+static const PrintTableColumns columns[] = {
     {"inputs", {"pointer", "a", "b", "detail"}},
     {"metrics", {"name", "unit", "a", "b", "difference", "relative"}},
     {"channels",
@@ -27,48 +27,48 @@ static const ListingColumns columns[] = {
     {NULL, {NULL}},
 };
 
-static Status compare_ask(const CompareSettings *settings, Daemon *daemon, const char *a,
+static Status compare_ask(const CompareSettings *settings, ApiClient *daemon, const char *a,
                           const char *b, Problem *problem) {
     static const char *const skipped[] = {"links", NULL};
-    static const ListingView view = {skipped, columns, NULL};
+    static const PrintTableView view = {skipped, columns, NULL};
     HttpAnswer answer;
     Bytes path = {.most = 1000};
     size_t longest;
     bytes_text(&path, "/v1/compare");
     http_query(&path, "a", a);
     http_query(&path, "b", b);
-    Status status = daemon_request(daemon, (HttpAsk){.method = "GET"}, &path, &answer, problem);
+    Status status = api_client_request(daemon, (HttpAsk){.method = "GET"}, &path, &answer, problem);
     if (status == STATUS_OK && settings->json)
-        daemon_print(&answer);
+        api_client_print(&answer);
     else if (status == STATUS_OK)
-        status =
-            listing_print_json(answer.body.at, answer.body.count, &view, stdout, &longest, problem);
+        status = print_table_print_json(answer.body.at, answer.body.count, &view, stdout, &longest,
+                                        problem);
     http_answer_clear(&answer);
     return status;
 }
 
 static int compare(const Command *self, void *of, const Options *options, Problem *problem) {
     const CompareSettings *settings = of;
-    if (options->operand_count != 2 || !daemon_is_id(options->operands[0]) ||
-        !daemon_is_id(options->operands[1])) {
+    if (options->operand_count != 2 || !api_client_is_id(options->operands[0]) ||
+        !api_client_is_id(options->operands[1])) {
         (void)problem_set(problem, STATUS_USAGE,
                           "takes the ids of two results or jobs, like r-91c0");
-        return command_refuse(self->name, problem);
+        return command_error(self->name, problem);
     }
     const char *ids[2] = {options->operands[0], options->operands[1]};
     char results[2][96];
     const char *about = ids[0];
-    Daemon daemon;
-    Status status = daemon_open(settings->server, settings->token_file, settings->ca_file,
-                                settings->wait, &daemon, problem);
+    ApiClient daemon;
+    Status status = api_client_open(settings->server, settings->token_file, settings->ca_file,
+                                    settings->wait, &daemon, problem);
     for (int i = 0; i < 2 && status == STATUS_OK; i++) {
         about = ids[i];
-        status = daemon_result(&daemon, ids[i], results[i], problem);
+        status = api_client_result(&daemon, ids[i], results[i], problem);
     }
     if (status == STATUS_OK)
         status = compare_ask(settings, &daemon, results[0], results[1], problem);
-    daemon_close(&daemon);
-    return status == STATUS_OK ? COMMAND_OK : daemon_refuse(self->name, about, status, problem);
+    api_client_close(&daemon);
+    return status == STATUS_OK ? COMMAND_OK : api_client_refuse(self->name, about, status, problem);
 }
 
 const Command command_compare = {

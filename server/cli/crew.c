@@ -13,7 +13,7 @@ enum { THREADS = 256 };
 typedef struct Crew {
     const SimulationLimits *limits;
     const Progress *watch;
-    Order order;
+    ReorderBuffer order;
     pthread_mutex_t lock; // of what follows
     pthread_cond_t changed;
     uint64_t changes; // members that were handed in
@@ -38,7 +38,7 @@ static void fail(Crew *crew, Status status, const char *detail) {
 static bool advance(void *context, double fraction) {
     Hand *hand = context;
     Crew *crew = hand->crew;
-    const double expected = (double)order_expected(&crew->order);
+    const double expected = (double)reorder_expected(&crew->order);
     pthread_mutex_lock(&crew->lock);
     if (fraction > hand->told) {
         crew->done += fraction - hand->told;
@@ -65,7 +65,7 @@ static Status make_member(Hand *hand, Workspace *workspace, size_t member) {
         return status;
     }
     (void)advance(hand, 1);
-    return order_put(&crew->order, member, part, &hand->problem);
+    return reorder_put(&crew->order, member, part, &hand->problem);
 }
 
 // How many were handed in so far; false where the crew is to stop.
@@ -91,7 +91,7 @@ static void *work(void *context) {
     uint64_t seen;
     size_t from, to;
     // Looked at before members are asked for: what is handed in after that is no reason to wait.
-    while (look(crew, &seen) && order_begin(&crew->order, 1, &from, &to)) {
+    while (look(crew, &seen) && reorder_begin(&crew->order, 1, &from, &to)) {
         if (from == to) {
             wait_for_change(crew, seen);
             continue;
@@ -136,10 +136,10 @@ static Status make_members(StudyWork *of, const StudyTools *tools, Problem *prob
     pthread_mutex_init(&crew.lock, NULL);
     pthread_cond_init(&crew.changed, NULL);
     const size_t threads = slots();
-    Status status = order_make(of, threads, &crew.order, problem);
+    Status status = reorder_make(of, threads, &crew.order, problem);
     if (status == STATUS_OK)
         status = make_all(&crew, threads, problem);
-    order_clear(&crew.order);
+    reorder_clear(&crew.order);
     pthread_cond_destroy(&crew.changed);
     pthread_mutex_destroy(&crew.lock);
     return status;

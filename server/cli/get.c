@@ -102,14 +102,14 @@ static Status screen_take(void *context, const void *bytes, size_t size, Problem
                : problem_set(problem, STATUS_IO, "standard output cannot be written");
 }
 
-static Status fetch(Daemon *daemon, const GetSettings *settings, const char *id, const char *what,
-                    Problem *problem) {
+static Status fetch(ApiClient *daemon, const GetSettings *settings, const char *id,
+                    const char *what, Problem *problem) {
     char result[96];
     const bool is_job = strcmp(what, "job") == 0;
     if (is_job)
         snprintf(result, sizeof result, "%s", id);
     else
-        TRY(daemon_result(daemon, id, result, problem));
+        TRY(api_client_result(daemon, id, result, problem));
     Bytes path = {.most = 16000};
     bytes_format(&path, "/v1/%s/%s", is_job ? "jobs" : "results", result);
     if (!is_job && strcmp(what, "result") != 0)
@@ -125,7 +125,7 @@ static Status fetch(Daemon *daemon, const GetSettings *settings, const char *id,
                          .take = settings->output != NULL ? file_take : screen_take,
                          .most = settings->max_bytes};
     if (status == STATUS_OK)
-        status = daemon_request(daemon, ask, &path, &answer, problem);
+        status = api_client_request(daemon, ask, &path, &answer, problem);
     if (status == STATUS_OK && settings->output != NULL)
         status = output_close(problem);
     output_drop();
@@ -139,7 +139,7 @@ static int get(const Command *self, void *of, const Options *options, Problem *p
     char what[WHAT_MAX + 8] = "";
     Status status = STATUS_OK;
     if (options->operand_count < 1 || options->operand_count > 2 ||
-        !daemon_is_id(options->operands[0]))
+        !api_client_is_id(options->operands[0]))
         status = problem_set(problem, STATUS_USAGE,
                              "takes the id of a result or a job, like r-91c0, and what to get");
     if (status == STATUS_OK)
@@ -150,15 +150,15 @@ static int get(const Command *self, void *of, const Options *options, Problem *p
         status = problem_set(problem, STATUS_USAGE,
                              "would print binary data on the terminal; use -o FILE.%s", extension);
     if (status != STATUS_OK)
-        return command_refuse(self->name, problem);
+        return command_error(self->name, problem);
     const char *id = options->operands[0];
-    Daemon daemon;
-    status = daemon_open(settings->server, settings->token_file, settings->ca_file, settings->wait,
-                         &daemon, problem);
+    ApiClient daemon;
+    status = api_client_open(settings->server, settings->token_file, settings->ca_file,
+                             settings->wait, &daemon, problem);
     if (status == STATUS_OK)
         status = fetch(&daemon, settings, id, what, problem);
-    daemon_close(&daemon);
-    return status == STATUS_OK ? COMMAND_OK : daemon_refuse(self->name, id, status, problem);
+    api_client_close(&daemon);
+    return status == STATUS_OK ? COMMAND_OK : api_client_refuse(self->name, id, status, problem);
 }
 
 const Command command_get = {

@@ -69,7 +69,7 @@ static Status excitation_write(const ExcitationRecord *record, const char *outpu
                                Problem *problem) {
     Bytes bytes = {0};
     bytes_text(&bytes, "{\"kind\": \"record\", ");
-    (void)write_members(&bytes, excitation_record.kind.fields, record, WRITE_SCENE);
+    (void)encode_members(&bytes, excitation_record.kind.fields, record, WRITE_SCENE);
     bytes_text(&bytes, "}\n");
     Status status =
         bytes.is_failed ? problem_set(problem, STATUS_NO_MEMORY, "no memory for it") : STATUS_OK;

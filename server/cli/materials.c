@@ -43,7 +43,7 @@ typedef struct MaterialsSettings {
 // One action at work.
 typedef struct MaterialsCall {
     const MaterialsSettings *settings;
-    Daemon *daemon;
+    ApiClient *daemon;
     const char *const *operands; // behind the action's name
     size_t operand_count;
     const char *about; // what messages of faults name; the action may set a file
@@ -96,7 +96,7 @@ static const OptionGroup groups[] = {
 
 enum { NUMBER_MAX = 9 }; // digits of a revision
 
-static const ListingColumns columns[] = {
+static const PrintTableColumns columns[] = {
     {"rows",
      {"measurement", "from", "approach_speed", "restitution", "restitution_uncertainty",
       "contact_time", "contact_time_uncertainty", "restitution_is_outlier",
@@ -155,7 +155,7 @@ static void materials_path(Bytes *path, const char *name, const char *rest) {
 static Status materials_ask(MaterialsCall *call, const char *method, Bytes *path, const Bytes *body,
                             const char *tag, HttpAnswer *answer, Problem *problem) {
     const HttpAsk ask = {.method = method, .body = body, .if_match = tag};
-    return daemon_request(call->daemon, ask, path, answer, problem);
+    return api_client_request(call->daemon, ask, path, answer, problem);
 }
 
 // The answer for people, or with --json as it came.
@@ -164,13 +164,13 @@ static Status materials_print(const MaterialsCall *call, const HttpAnswer *answe
     static const char *const skipped[] = {"links", "test", NULL};
     static const Field *const fields[] = {material_fields, pair_parameters_fields,
                                           evaluation_fields, buffer_fields, NULL};
-    static const ListingView view = {skipped, columns, fields};
+    static const PrintTableView view = {skipped, columns, fields};
     size_t longest;
     if (call->settings->json) {
-        daemon_print(answer);
+        api_client_print(answer);
         return STATUS_OK;
     }
-    TRY(listing_print_json(answer->body.at, answer->body.count, &view, stdout, &longest, problem));
+    TRY(print_table_print_json(answer->body.at, answer->body.count, &view, stdout, &longest, problem));
     if (longest == 0)
         fputs("impactd materials: nothing fits\n", stderr);
     if (longest == MATERIALS_MAX)
@@ -208,10 +208,10 @@ static Status materials_print_revision(const MaterialsCall *call, const HttpAnsw
     RevisionReply told = {0};
     Status status = STATUS_OK;
     if (call->settings->json) {
-        daemon_print(answer);
+        api_client_print(answer);
         return STATUS_OK;
     }
-    (void)read_json(answer->body.at, answer->body.count, revision_reply_fields, &told, NULL);
+    (void)json_parse(answer->body.at, answer->body.count, revision_reply_fields, &told, NULL);
     if (told.slug == NULL || told.status == NULL || told.revision == COUNT_ABSENT) {
         status = problem_set(problem, STATUS_UNREACHABLE,
                              "the answer is no revision: what answers there is no impactd");
@@ -269,12 +269,12 @@ static Status materials_print_editable(HttpAnswer *answer, Problem *problem) {
     const char *between = "{\n  ";
     TRY(json_edit_remove_nulls(&answer->body, problem));
     // What is beside it (who, when, links) is no fault here.
-    (void)read_json(answer->body.at, answer->body.count, material_fields, &material, NULL);
+    (void)json_parse(answer->body.at, answer->body.count, material_fields, &material, NULL);
     Bytes text = {0};
     for (const Field *row = material_fields; row->kind != FIELD_KIND_END; row++) {
         const Field alone[] = {*row, FIELD_END};
         Bytes member = {0};
-        if (write_members(&member, alone, &material, WRITE_SCENE) > 0) {
+        if (encode_members(&member, alone, &material, WRITE_SCENE) > 0) {
             bytes_text(&text, between);
             bytes_put(&text, member.at, member.count);
             between = ",\n  ";
@@ -631,7 +631,7 @@ static Status materials_export_act(MaterialsCall *call, Problem *problem) {
         .method = "GET", .path = format->path, .take = exchange_take, .most = UINT64_MAX};
     Status status = output_open(file, problem);
     if (status == STATUS_OK)
-        status = daemon_ask(call->daemon, &ask, &answer, problem);
+        status = api_client_ask(call->daemon, &ask, &answer, problem);
     if (status == STATUS_OK)
         status = output_close(problem);
     output_drop();
@@ -654,7 +654,7 @@ static Status materials_import_act(MaterialsCall *call, Problem *problem) {
                          .body = &body,
                          .content_type = format->type};
     if (status == STATUS_OK)
-        status = daemon_ask(call->daemon, &ask, &answer, problem);
+        status = api_client_ask(call->daemon, &ask, &answer, problem);
     if (status == STATUS_OK)
         status = materials_print(call, &answer, problem);
     http_answer_clear(&answer);
@@ -691,10 +691,10 @@ static int materials(const Command *self, void *of, const Options *options, Prob
     size_t index;
     if (command_action(options, &actions->name, COUNT(actions), sizeof *actions, &index, problem) !=
         STATUS_OK)
-        return command_refuse(self->name, problem);
+        return command_error(self->name, problem);
     const struct Action *action = &actions[index];
     const size_t count = options->operand_count - 1;
-    Daemon daemon;
+    ApiClient daemon;
     MaterialsCall call = {settings, &daemon, options->operands + 1, count,
                           count > 0 ? options->operands[1] : "materials"};
     Status status = STATUS_OK;
@@ -702,16 +702,16 @@ static int materials(const Command *self, void *of, const Options *options, Prob
         status = problem_set(problem, STATUS_USAGE, "%s takes %s, is given %zu operands",
                              action->name, action->takes, count);
     if (status != STATUS_OK)
-        return command_refuse(self->name, problem);
-    status = daemon_open(settings->server, settings->token_file, settings->ca_file, settings->wait,
-                         &daemon, problem);
+        return command_error(self->name, problem);
+    status = api_client_open(settings->server, settings->token_file, settings->ca_file,
+                             settings->wait, &daemon, problem);
     if (status == STATUS_OK)
         status = action->act(&call, problem);
-    daemon_close(&daemon);
+    api_client_close(&daemon);
     if (status == STATUS_USAGE && problem->count == 0)
-        return command_refuse(self->name, problem);
+        return command_error(self->name, problem);
     return status == STATUS_OK ? COMMAND_OK
-                               : daemon_refuse(self->name, call.about, status, problem);
+                               : api_client_refuse(self->name, call.about, status, problem);
 }
 
 const Command command_materials = {

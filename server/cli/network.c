@@ -9,7 +9,7 @@
 #include "server/http/tls.h"
 #include "server/util/bytes.h"
 
-static Status add_name(Reach *reach, const char *name, size_t size, Problem *problem) {
+static Status add_name(Network *reach, const char *name, size_t size, Problem *problem) {
     char **grown = realloc(reach->names, (reach->name_count + 2) * sizeof *grown);
     if (grown != NULL)
         reach->names = grown;
@@ -29,7 +29,7 @@ static bool is_host(const char *name, size_t size) {
 }
 
 // "a.example.org,b.example.org"
-static Status add_list(Reach *reach, const char *list, Problem *problem) {
+static Status add_list(Network *reach, const char *list, Problem *problem) {
     Status status = STATUS_OK;
     for (const char *at = list; *at != '\0';) {
         const size_t size = strcspn(at, ",");
@@ -46,7 +46,7 @@ static Status add_list(Reach *reach, const char *list, Problem *problem) {
     return status;
 }
 
-static Status add_names(const ReachSettings *settings, const Address *address, Reach *reach,
+static Status add_names(const NetworkSettings *settings, const Address *address, Network *reach,
                         Problem *problem) {
     Status status = STATUS_OK;
     const bool is_any = address_is_any(address);
@@ -70,7 +70,7 @@ static Status add_names(const ReachSettings *settings, const Address *address, R
     }
     if (reach->url.host[0] != '\0')
         TRY(add_name(reach, reach->url.host, strlen(reach->url.host), problem));
-    reach->hosts = (GateHosts){(const char *const *)reach->names, is_any};
+    reach->hosts = (AcceptedHosts){(const char *const *)reach->names, is_any};
     return status;
 }
 
@@ -101,7 +101,7 @@ static Status read_file(const char *name, const char *path, bool is_secret, char
     return status;
 }
 
-Status reach_read_tls(const ReachSettings *settings, Problem *problem) {
+Status network_read_tls(const NetworkSettings *settings, Problem *problem) {
     const char *cert = settings->tls_cert, *key = settings->tls_key;
     char *cert_text = NULL, *key_text = NULL;
     if (cert == NULL && key == NULL)
@@ -113,30 +113,31 @@ Status reach_read_tls(const ReachSettings *settings, Problem *problem) {
     const Status second = read_file("--tls-key", key, true, &key_text, problem);
     Status status = first != STATUS_OK ? first : second;
     if (status == STATUS_OK)
-        status = certificate_use(cert_text, cert, key_text, key, problem);
+        status = tls_use(cert_text, cert, key_text, key, problem);
     free(cert_text);
     free(key_text);
     return status;
 }
 
-Status reach_read(const ReachSettings *settings, const Address *address, Reach *reach,
-                  Problem *problem) {
-    *reach = (Reach){.needs_tokens = settings->require_tokens || !address_is_loopback(address)};
+Status network_read(const NetworkSettings *settings, const Address *address, Network *reach,
+                    Problem *problem) {
+    *reach = (Network){.needs_tokens = settings->require_tokens || !address_is_loopback(address)};
     if (settings->base_url != NULL)
         TRY(base_url_read(settings->base_url, &reach->url, problem));
     const Status names = add_names(settings, address, reach, problem);
-    const Status tls = reach_read_tls(settings, problem);
+    const Status tls = network_read_tls(settings, problem);
     return names != STATUS_OK ? names : tls;
 }
 
-void reach_clear(Reach *reach) {
+void network_clear(Network *reach) {
     for (size_t i = 0; i < reach->name_count; i++)
         free(reach->names[i]);
     free(reach->names);
-    *reach = (Reach){0};
+    *reach = (Network){0};
 }
 
-Status reach_check(const Reach *reach, const Address *address, size_t tokens, Problem *problem) {
+Status network_check(const Network *reach, const Address *address, size_t tokens,
+                     Problem *problem) {
     if (!reach->needs_tokens || tokens > 0)
         return STATUS_OK;
     const bool is_loopback = address_is_loopback(address);

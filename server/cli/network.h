@@ -8,30 +8,30 @@
 #include "server/http/base_url.h"
 #include "server/http/validate.h"
 
-typedef struct ReachSettings {
+typedef struct NetworkSettings {
     Texts host;
     const char *base_url, *tls_cert, *tls_key; // NULL: none; the last two are files
     bool require_tokens;
-} ReachSettings;
+} NetworkSettings;
 
-typedef struct Reach {
+typedef struct Network {
     BaseUrl url; // empty: none
-    GateHosts hosts;
+    AcceptedHosts hosts;
     char **names; // of hosts
     size_t name_count;
     bool needs_tokens;
-} Reach;
+} Network;
 
-// Adds all faults (STATUS_USAGE); the certificate is in use then. `reach` is cleared by reach_clear
-// in any case.
-Status reach_read(const ReachSettings *settings, const Address *address, Reach *reach,
-                  Problem *problem);
+// Adds all faults (STATUS_USAGE); the certificate is in use then. `reach` is cleared by
+// network_clear in any case.
+Status network_read(const NetworkSettings *settings, const Address *address, Network *reach,
+                    Problem *problem);
 // The files of the certificate once more, if there are any: where they are wrong (STATUS_USAGE),
 // the one in use stays.
-Status reach_read_tls(const ReachSettings *settings, Problem *problem);
-void reach_clear(Reach *reach);
+Status network_read_tls(const NetworkSettings *settings, Problem *problem);
+void network_clear(Network *reach);
 
 // STATUS_FORBIDDEN where tokens are a must and none can be used; says how to make one.
-Status reach_check(const Reach *reach, const Address *address, size_t tokens, Problem *problem);
+Status network_check(const Network *reach, const Address *address, size_t tokens, Problem *problem);
 
 #endif

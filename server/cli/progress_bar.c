@@ -9,12 +9,13 @@
 enum { BAR_WIDTH = 40 };
 static const int64_t appears_after_ns = 300000000, redraws_after_ns = 100000000;
 
-void bar_start(Bar *bar) {
-    *bar = (Bar){.is_terminal = isatty(STDERR_FILENO) != 0, .began_ns = clock_monotonic_ns()};
+void progress_bar_start(ProgressBar *bar) {
+    *bar =
+        (ProgressBar){.is_terminal = isatty(STDERR_FILENO) != 0, .began_ns = clock_monotonic_ns()};
 }
 
 static bool bar_advance(void *context, double fraction) {
-    Bar *bar = context;
+    ProgressBar *bar = context;
     if (!bar->is_terminal)
         return true;
     const int64_t now = clock_monotonic_ns(), took = now - bar->began_ns;
@@ -37,11 +38,11 @@ static bool bar_advance(void *context, double fraction) {
     return true;
 }
 
-Progress bar_watch(Bar *bar) {
+Progress progress_bar_watch(ProgressBar *bar) {
     return (Progress){bar, bar_advance};
 }
 
-void bar_stop(Bar *bar) {
+void progress_bar_stop(ProgressBar *bar) {
     if (bar->is_drawn)
         fputs("\r\033[K", stderr);
     bar->is_drawn = false;

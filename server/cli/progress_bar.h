@@ -8,14 +8,14 @@
 
 #include "core/base/progress.h"
 
-typedef struct Bar {
+typedef struct ProgressBar {
     bool is_terminal, is_drawn;
     int64_t began_ns, drawn_ns;
-} Bar;
+} ProgressBar;
 
-void bar_start(Bar *bar);
+void progress_bar_start(ProgressBar *bar);
 // A Progress that draws; it never asks to stop. Borrows `bar`.
-Progress bar_watch(Bar *bar);
-void bar_stop(Bar *bar);
+Progress progress_bar_watch(ProgressBar *bar);
+void progress_bar_stop(ProgressBar *bar);
 
 #endif

@@ -83,14 +83,14 @@ static const Field replies_fields[] = {
 static Status page_print(const HttpAnswer *answer, bool is_json, char after[RECORD_NAME_SIZE],
                          Problem *problem) {
     static const char *const skipped[] = {"links", NULL};
-    static const ListingColumns columns[] = {
+    static const PrintTableColumns columns[] = {
         {"records", {"name", "count", "interval", "duration", "peak", "source"}}, {NULL, {NULL}}};
     static const Field *const fields[] = {reply_fields, NULL};
-    static const ListingView view = {skipped, columns, fields};
+    static const PrintTableView view = {skipped, columns, fields};
     size_t longest;
     RecordsReply reply = {{NULL, 0}};
     Status status = STATUS_OK;
-    (void)read_json(answer->body.at, answer->body.count, replies_fields, &reply, NULL);
+    (void)json_parse(answer->body.at, answer->body.count, replies_fields, &reply, NULL);
     const RecordReply *last =
         reply.records.count > 0 ? (RecordReply *)reply.records.at + reply.records.count - 1 : NULL;
     const char *name = last != NULL && last->name != NULL ? last->name : "";
@@ -99,15 +99,15 @@ static Status page_print(const HttpAnswer *answer, bool is_json, char after[RECO
         status = problem_set(problem, STATUS_UNREACHABLE, "the list of records has no end");
     text_fit(after, RECORD_NAME_SIZE, reply.records.count >= PAGE ? name : "");
     if (status == STATUS_OK && is_json)
-        daemon_print(answer);
+        api_client_print(answer);
     else if (status == STATUS_OK)
-        status = listing_print_json(answer->body.at, answer->body.count, &view, stdout, &longest,
-                                    problem);
+        status = print_table_print_json(answer->body.at, answer->body.count, &view, stdout,
+                                        &longest, problem);
     fields_clear(replies_fields, &reply);
     return status;
 }
 
-static Status list(Daemon *daemon, const RecordsSettings *settings, const char *operand,
+static Status list(ApiClient *daemon, const RecordsSettings *settings, const char *operand,
                    Problem *problem) {
     char after[RECORD_NAME_SIZE] = "";
     (void)operand;
@@ -117,7 +117,8 @@ static Status list(Daemon *daemon, const RecordsSettings *settings, const char *
         bytes_format(&path, "/v1/records?limit=%d", PAGE);
         http_query(&path, "q", settings->q);
         http_query(&path, "after", after[0] != '\0' ? after : NULL);
-        Status status = daemon_request(daemon, (HttpAsk){.method = "GET"}, &path, &answer, problem);
+        Status status =
+            api_client_request(daemon, (HttpAsk){.method = "GET"}, &path, &answer, problem);
         if (status == STATUS_OK)
             status = page_print(&answer, settings->json, after, problem);
         http_answer_clear(&answer);
@@ -156,7 +157,7 @@ static void record_report(const char *path, RecordReply *record, bool is_new) {
     }
 }
 
-static Status send(Daemon *daemon, const RecordsSettings *settings, const char *path,
+static Status send(ApiClient *daemon, const RecordsSettings *settings, const char *path,
                    const Bytes *text, Problem *problem) {
     char name[RECORD_NAME_SIZE];
     Bytes target = {.most = 60000};
@@ -174,14 +175,14 @@ static Status send(Daemon *daemon, const RecordsSettings *settings, const char *
     http_query(&target, "notes", settings->notes);
     http_query_real(&target, "interval", settings->interval);
     const HttpAsk ask = {.method = "POST", .body = text, .content_type = "text/plain"};
-    Status status = daemon_request(daemon, ask, &target, &answer, problem);
+    Status status = api_client_request(daemon, ask, &target, &answer, problem);
     if (status == STATUS_OK)
-        (void)read_json(answer.body.at, answer.body.count, reply_fields, &record, NULL);
+        (void)json_parse(answer.body.at, answer.body.count, reply_fields, &record, NULL);
     if (status == STATUS_OK && record.name == NULL)
         status = problem_set(problem, STATUS_UNREACHABLE,
                              "the answer is no record: what answers there is no impactd");
     if (status == STATUS_OK && settings->json) {
-        daemon_print(&answer);
+        api_client_print(&answer);
     } else if (status == STATUS_OK) {
         record_report(scene_file_name(path), &record, answer.code == 201);
         text_make_printable(record.name);
@@ -192,7 +193,7 @@ static Status send(Daemon *daemon, const RecordsSettings *settings, const char *
     return status;
 }
 
-static Status add(Daemon *daemon, const RecordsSettings *settings, const char *operand,
+static Status add(ApiClient *daemon, const RecordsSettings *settings, const char *operand,
                   Problem *problem) {
     Bytes text;
     Status status = scene_file_read(operand, &text, problem);
@@ -202,26 +203,26 @@ static Status add(Daemon *daemon, const RecordsSettings *settings, const char *o
     return status;
 }
 
-static Status ask_for(Daemon *daemon, const char *method, const char *name, Problem *problem) {
+static Status ask_for(ApiClient *daemon, const char *method, const char *name, Problem *problem) {
     Bytes path = {.most = 4000};
     HttpAnswer answer = {0};
     bytes_text(&path, "/v1/records/");
     http_encode(&path, name);
     const Status status =
-        daemon_request(daemon, (HttpAsk){.method = method}, &path, &answer, problem);
+        api_client_request(daemon, (HttpAsk){.method = method}, &path, &answer, problem);
     if (status == STATUS_OK && answer.body.count > 0)
-        daemon_print(&answer);
+        api_client_print(&answer);
     http_answer_clear(&answer);
     return status;
 }
 
-static Status show(Daemon *daemon, const RecordsSettings *settings, const char *operand,
+static Status show(ApiClient *daemon, const RecordsSettings *settings, const char *operand,
                    Problem *problem) {
     (void)settings;
     return ask_for(daemon, "GET", operand, problem);
 }
 
-static Status forget(Daemon *daemon, const RecordsSettings *settings, const char *operand,
+static Status forget(ApiClient *daemon, const RecordsSettings *settings, const char *operand,
                      Problem *problem) {
     (void)settings;
     TRY(ask_for(daemon, "DELETE", operand, problem));
@@ -231,7 +232,7 @@ static Status forget(Daemon *daemon, const RecordsSettings *settings, const char
 
 static const struct Action {
     const char *name, *operand; // NULL: takes none
-    Status (*act)(Daemon *daemon, const RecordsSettings *settings, const char *operand,
+    Status (*act)(ApiClient *daemon, const RecordsSettings *settings, const char *operand,
                   Problem *problem);
 } actions[] = {
     {"list", NULL, list},
@@ -260,17 +261,18 @@ static int records(const Command *self, void *of, const Options *options, Proble
     const RecordsSettings *settings = of;
     const struct Action *action = choose(options, problem);
     if (action == NULL)
-        return command_refuse(self->name, problem);
+        return command_error(self->name, problem);
     const char *operand = action->operand != NULL ? options->operands[1] : NULL;
-    Daemon daemon;
-    Status status = daemon_open(settings->server, settings->token_file, settings->ca_file,
-                                settings->wait, &daemon, problem);
+    ApiClient daemon;
+    Status status = api_client_open(settings->server, settings->token_file, settings->ca_file,
+                                    settings->wait, &daemon, problem);
     if (status == STATUS_OK)
         status = action->act(&daemon, settings, operand, problem);
-    daemon_close(&daemon);
+    api_client_close(&daemon);
     return status == STATUS_OK
                ? COMMAND_OK
-               : daemon_refuse(self->name, operand != NULL ? operand : "records", status, problem);
+               : api_client_refuse(self->name, operand != NULL ? operand : "records", status,
+                                   problem);
 }
 
 const Command command_records = {

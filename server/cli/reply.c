@@ -45,7 +45,7 @@ static const Field job_fields[] = {
 
 Status job_reply_read(const HttpAnswer *answer, JobReply *job, Problem *problem) {
     // Unknown members are no faults: the reader's problem is not used.
-    (void)read_json(answer->body.at, answer->body.count, job_fields, job, NULL);
+    (void)json_parse(answer->body.at, answer->body.count, job_fields, job, NULL);
     if (job->id == NULL || job->status == NULL || strlen(job->id) > 80 || strlen(job->status) > 40)
         return problem_set(problem, STATUS_UNREACHABLE,
                            "the answer is no job: what answers there is no impactd");
@@ -56,7 +56,7 @@ Status job_reply_read(const HttpAnswer *answer, JobReply *job, Problem *problem)
 }
 
 bool job_reply_event(const char *text, size_t size, const char *id, JobReply *job) {
-    (void)read_json(text, size, job_fields, job, NULL);
+    (void)json_parse(text, size, job_fields, job, NULL);
     free(job->id);
     job->id = strdup(id);
     if (job->id == NULL || job->status == NULL || strlen(job->status) > 40)
@@ -140,7 +140,7 @@ static Status status_of(int code, const char *type) {
 
 Status problem_reply_read(const HttpAnswer *answer, Problem *problem) {
     ProblemReply reply = {0};
-    (void)read_json(answer->body.at, answer->body.count, problem_fields, &reply, NULL);
+    (void)json_parse(answer->body.at, answer->body.count, problem_fields, &reply, NULL);
     const Status status = status_of(answer->code, reply.type);
     if (reply.detail != NULL || reply.title != NULL || reply.errors.count > 0)
         problem_reply_put(&reply, status, problem);

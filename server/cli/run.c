@@ -20,7 +20,7 @@
 typedef struct RunSettings {
     char *output;
     double max_cpu_seconds;
-    const Encoder *encoder; // of the output's extension; NULL without output
+    const TableFormat *encoder; // of the output's extension; NULL without output
 } RunSettings;
 
 static const Field run_fields[] = {
@@ -31,7 +31,7 @@ static const Field run_fields[] = {
 };
 
 // The series as the encoders take it. The caller frees *chosen.
-static Status series_write(const Response *response, const Encoder *encoder, Bytes *bytes,
+static Status series_write(const Response *response, const TableFormat *encoder, Bytes *bytes,
                            Problem *problem) {
     const Column **chosen = calloc(response->series.count + 1, sizeof *chosen);
     if (chosen == NULL)
@@ -55,7 +55,7 @@ static Status whole_write(const Outcome *outcome, const Bytes *job, Bytes *bytes
     bytes_text(bytes, "{\"job\": ");
     bytes_put(bytes, job->at, job->count);
     bytes_text(bytes, ",\n\"series\": ");
-    TRY(series_write(&outcome->response, encoder_find("json"), bytes, problem));
+    TRY(series_write(&outcome->response, format_find("json"), bytes, problem));
     bytes_text(bytes, ",\n\"impacts\": ");
     (void)document_impacts(bytes, &outcome->response, NULL);
     bytes_text(bytes, ",\n\"psd\": ");
@@ -74,7 +74,7 @@ static Status job_write(const StudyRequest *inquiry, const Warnings *warnings,
     document_work(&work, &outcome->work);
     document_warnings(&told, warnings);
     document_warnings(&notes, &outcome->warnings);
-    JobShow show = {.id = "j-local",
+    JobView show = {.id = "j-local",
                     .state = JOB_SUCCESSFUL,
                     .progress = 100,
                     .created_unix_ms = began_unix_ms,
@@ -88,11 +88,11 @@ static Status job_write(const StudyRequest *inquiry, const Warnings *warnings,
                     .warnings = told.at,
                     .notes = notes.at,
                     .title = inquiry->simulation.title};
-    intake_result_id(inquiry, show.result);
+    jobs_result_id(inquiry, show.result);
     const bool is_failed =
         plan.is_failed || summary.is_failed || work.is_failed || told.is_failed || notes.is_failed;
     if (!is_failed)
-        job_put(bytes, &show, JOB_PUT_WHOLE);
+        job_json_put(bytes, &show, JOB_PUT_WHOLE);
     bytes_clear(&plan);
     bytes_clear(&summary);
     bytes_clear(&work);
@@ -108,12 +108,12 @@ static Status scene_run(const char *path, const StudyRequest *inquiry, const War
     const char *output = settings->output;
     Outcome *outcome = NULL;
     Bytes job = {0}, bytes = {0};
-    Bar bar;
+    ProgressBar bar;
     const int64_t began_unix_ms = clock_unix_ms(), began_ns = clock_monotonic_ns();
-    bar_start(&bar);
-    const Progress watch = bar_watch(&bar);
+    progress_bar_start(&bar);
+    const Progress watch = progress_bar_watch(&bar);
     Status status = simulation_run(&inquiry->simulation, &limits, &watch, NULL, &outcome, problem);
-    bar_stop(&bar);
+    progress_bar_stop(&bar);
     const double took = (double)(clock_monotonic_ns() - began_ns) * 1e-9;
     if (status == STATUS_OK)
         scene_file_warn(path, &outcome->warnings);
@@ -145,13 +145,13 @@ static Status scene_prepare_and_run(const char *path, const Bytes *text, void *o
                                     Problem *problem) {
     const RunSettings *settings = of;
     const SimulationLimits limits = scene_file_limits(settings->max_cpu_seconds);
-    Store *store = NULL;
+    Db *store = NULL;
     StudyRequest inquiry = {0};
     Warnings warnings = {0};
-    TRY(store_open(NULL, &store, problem));
+    TRY(db_open(NULL, &store, problem));
     Status status =
-        intake_prepare(store, text->at, text->count, &limits, &inquiry, &warnings, problem);
-    store_close(store);
+        jobs_prepare(store, text->at, text->count, &limits, &inquiry, &warnings, problem);
+    db_close(store);
     if (status == STATUS_OK && inquiry.study != NULL)
         status =
             problem_add(problem, STATUS_INVALID, "/study",
@@ -172,14 +172,14 @@ static Status scene_prepare_and_run(const char *path, const Bytes *text, void *o
 }
 
 // The encoder by the output's extension, NULL where there is no output.
-static Status encoder_choose(const char *output, const Encoder **encoder, Problem *problem) {
+static Status encoder_choose(const char *output, const TableFormat **encoder, Problem *problem) {
     *encoder = NULL;
     if (output == NULL)
         return STATUS_OK;
     const char *file = strrchr(output, '/') != NULL ? strrchr(output, '/') + 1 : output;
     const char *dot = strrchr(file, '.');
     if (dot != NULL)
-        *encoder = encoder_find(dot + 1);
+        *encoder = format_find(dot + 1);
     if (*encoder != NULL)
         return STATUS_OK;
     char known[128] = "";
@@ -197,7 +197,7 @@ static int run(const Command *self, void *of, const Options *options, Problem *p
     return encoder_choose(settings->output, &settings->encoder, problem) == STATUS_OK
                ? scene_file_command(self, "scene", options, settings, scene_prepare_and_run,
                                     problem)
-               : command_refuse(self->name, problem);
+               : command_error(self->name, problem);
 }
 
 const Command command_run = {

@@ -49,7 +49,7 @@ int scene_file_command(const Command *self, const char *what, const Options *opt
     if (options->operand_count != 1) {
         (void)problem_set(problem, STATUS_USAGE, "takes one %s, is given %zu", what,
                           options->operand_count);
-        return command_refuse(self->name, problem);
+        return command_error(self->name, problem);
     }
     const char *path = options->operands[0];
     Bytes text;

@@ -28,7 +28,7 @@ typedef struct ServeSettings {
     char *listen, *data, *config, *base_url, *tls_cert, *tls_key;
     Texts host;
     uint64_t workers, queue, queue_bytes, max_body, max_samples, max_impacts, max_run_bytes,
-        max_points, cache_bytes, store_bytes;
+        max_points, cache_bytes, db_bytes;
     uint64_t quota, keep_jobs, keep_bytes;
     double max_cpu_seconds, max_study_seconds, rate, keep_days;
     int journal;
@@ -57,7 +57,7 @@ static const Field serve_fields[] = {
     FIELD_COUNT(ServeSettings, max_run_bytes, "B", WITHIN(1 << 20, 1099511627776.0), SIMULATION_BYTES, "memory a scene may be predicted to take; it is refused beyond"),
     FIELD_COUNT(ServeSettings, max_points, NULL, WITHIN(1, 1e7), SWEEP_POINTS, "points a sweep may have"),
     FIELD_COUNT(ServeSettings, cache_bytes, "B", WITHIN(0, 1099511627776.0), 256 * MIB, "memory for what is kept ready: whole answers a quarter, results the rest"),
-    FIELD_COUNT(ServeSettings, store_bytes, "B", WITHIN(0, 1099511627776.0), 1024 * MIB, "disk for series that are dearer to compute than to read"),
+    FIELD_COUNT(ServeSettings, db_bytes, "B", WITHIN(0, 1099511627776.0), 1024 * MIB, "disk for series that are dearer to compute than to read"),
     FIELD_REAL(ServeSettings, keep_days, "d", WITHIN(0, 36500), 0, "finished jobs are kept so long, with the results that no later job names; 0: for ever"),
     FIELD_COUNT(ServeSettings, keep_jobs, NULL, WITHIN(0, 1e12), 0, "finished jobs kept, the oldest go first; 0: all"),
     FIELD_COUNT(ServeSettings, keep_bytes, "B", WITHIN(0, 1e18), 0, "size of the database beyond which the oldest finished jobs go; 0: any"),
@@ -66,7 +66,7 @@ static const Field serve_fields[] = {
     FIELD_FLAG(ServeSettings, require_tokens, false, "ask for a token on loopback too, even while there is none"),
     FIELD_TEXT(ServeSettings, tls_cert, 4000, PRESENCE_OPTIONAL, 0, "PEM file of the certificate, for HTTPS"),
     FIELD_TEXT(ServeSettings, tls_key, 4000, PRESENCE_OPTIONAL, 0, "PEM file of its key"),
-    FIELD_CHOICE(ServeSettings, journal, journal_mode_names, JOURNAL_ERRORS, "which requests get a line on standard error: off, errors or all"),
+    FIELD_CHOICE(ServeSettings, journal, log_mode_names, JOURNAL_ERRORS, "which requests get a line on standard error: off, errors or all"),
     FIELD_TEXT(ServeSettings, config, 4000, PRESENCE_OPTIONAL, 0, "a file of settings, one \"name = value\" a line"),
     FIELD_FLAG(ServeSettings, print_config, false, "print each setting and where it came from, and stop"),
     FIELD_END,
@@ -125,9 +125,9 @@ static Status check(const ServeSettings *settings, Problem *problem) {
     return status;
 }
 
-static void greet(const Listener *listener, const ServeSettings *settings, const App *app) {
-    const char *url = app->base_url[0] != '\0' ? app->base_url : listener_url(listener);
-    printf("impactd %s listens on %s\n", program_version, listener_url(listener));
+static void greet(const Server *listener, const ServeSettings *settings, const App *app) {
+    const char *url = app->base_url[0] != '\0' ? app->base_url : server_url(listener);
+    printf("impactd %s listens on %s\n", program_version, server_url(listener));
     printf("data in %s, %llu workers; Ctrl-C stops\n\n", settings->data,
            (unsigned long long)settings->workers);
     printf("curl -s %s/v1/examples/paper_free_sponge | curl -s --json @- %s/v1/jobs\n", url, url);
@@ -136,15 +136,15 @@ static void greet(const Listener *listener, const ServeSettings *settings, const
 
 static void forget_answers(void *hot) {
     if (hot != NULL)
-        hot_clear(hot);
+        response_cache_clear(hot);
 }
 
 // SIGHUP: a certificate that was renewed is used from now on.
-static void read_anew(const ReachSettings *asked, Problem *problem) {
+static void read_anew(const NetworkSettings *asked, Problem *problem) {
     problem_clear(problem);
     if (asked->tls_cert == NULL)
         fprintf(stderr, "impactd: SIGHUP: without TLS there is nothing to read anew\n");
-    else if (reach_read_tls(asked, problem) == STATUS_OK)
+    else if (network_read_tls(asked, problem) == STATUS_OK)
         fprintf(stderr, "impactd: SIGHUP: the certificate in %s is used from now on\n",
                 asked->tls_cert);
     else
@@ -153,9 +153,9 @@ static void read_anew(const ReachSettings *asked, Problem *problem) {
 
 // Waits for a signal to end, and tells systemd meanwhile that we live. A terminal that is gone ends
 // what was started in it, as it always does.
-static int wait_for_end(const sigset_t *signals, const ReachSettings *asked, Problem *problem) {
+static int wait_for_end(const sigset_t *signals, const NetworkSettings *asked, Problem *problem) {
     const bool has_terminal = isatty(STDIN_FILENO) != 0;
-    const int64_t period_ms = notify_watchdog_ms();
+    const int64_t period_ms = systemd_watchdog_ms();
     const struct timespec period = {.tv_sec = (time_t)(period_ms / 1000),
                                     .tv_nsec = (long)(period_ms % 1000) * 1000000};
     for (;;) {
@@ -166,7 +166,7 @@ static int wait_for_end(const sigset_t *signals, const ReachSettings *asked, Pro
         else if (signal > 0)
             return signal;
         else if (errno == EAGAIN)
-            notify_send("WATCHDOG=1");
+            systemd_notify("WATCHDOG=1");
     }
 }
 
@@ -178,14 +178,14 @@ static void let_signals_kill(const sigset_t *signals) {
     pthread_sigmask(SIG_UNBLOCK, signals, NULL);
 }
 
-static void run_until_stopped(App *app, Listener *listener, const ServeSettings *settings,
-                              const ReachSettings *asked, const sigset_t *signals,
+static void run_until_stopped(App *app, Server *listener, const ServeSettings *settings,
+                              const NetworkSettings *asked, const sigset_t *signals,
                               Problem *problem) {
     atomic_store(&app->listener, listener);
     greet(listener, settings, app);
-    notify_send("READY=1");
+    systemd_notify("READY=1");
     const int signal = wait_for_end(signals, asked, problem);
-    notify_send("STOPPING=1");
+    systemd_notify("STOPPING=1");
     atomic_store(&app->is_stopping, true);
     let_signals_kill(signals);
     Bytes line = {0};
@@ -193,90 +193,91 @@ static void run_until_stopped(App *app, Listener *listener, const ServeSettings 
                  signal == SIGINT   ? "interrupted"
                  : signal == SIGHUP ? "its terminal is gone"
                                     : "asked to end");
-    journal_write(&line);
+    log_write(&line);
     bytes_clear(&line);
 }
 
 static Status serve(const ServeSettings *settings, const sigset_t *signals, Problem *problem) {
     App app = {.reply_most = (size_t)1 << 30, .started_unix_ms = clock_unix_ms()};
-    Doorman doorman = {.journal = (JournalMode)settings->journal};
-    const size_t hot_bytes = settings->cache_bytes / HOT_SHARE;
-    Dispatcher dispatcher = {&app, routes, quick_handlers, hot_new(hot_bytes), &doorman};
-    ListenerSettings door = {.body_most = settings->max_body,
-                             .answer_at_once = dispatch_at_once,
-                             .answer = dispatch,
-                             .admits = dispatch_admits,
-                             .still_admits = dispatch_still_admits,
-                             .note = dispatch_note,
-                             .context = &dispatcher};
-    const IntakeSettings work = {.workers = settings->workers,
-                                 .queue_most = settings->queue,
-                                 .queue_bytes = settings->queue_bytes,
-                                 .cache_bytes = settings->cache_bytes - hot_bytes,
-                                 .store_bytes = settings->store_bytes,
-                                 .quota = settings->quota,
-                                 .rate = settings->rate,
-                                 .study_seconds = settings->max_study_seconds,
-                                 .deleted = {dispatcher.hot, forget_answers},
-                                 .limits = {.samples = settings->max_samples,
-                                            .impacts = settings->max_impacts,
-                                            .steps = settings->max_cpu_seconds / SOLVER_STEP,
-                                            .bytes = (double)settings->max_run_bytes,
-                                            .document_bytes = DOCUMENT_BYTES,
-                                            .points = settings->max_points}};
+    AccessControl doorman = {.journal = (LogMode)settings->journal};
+    const size_t response_cache_bytes = settings->cache_bytes / HOT_SHARE;
+    Dispatcher dispatcher = {&app, routes, quick_handlers, response_cache_new(response_cache_bytes),
+                             &doorman};
+    ServerSettings door = {.body_most = settings->max_body,
+                           .answer_at_once = dispatch_quick,
+                           .answer = dispatch,
+                           .admits = dispatch_admits,
+                           .still_admits = dispatch_still_admits,
+                           .note = dispatch_note,
+                           .context = &dispatcher};
+    const JobManagerSettings work = {.workers = settings->workers,
+                                     .queue_most = settings->queue,
+                                     .queue_bytes = settings->queue_bytes,
+                                     .cache_bytes = settings->cache_bytes - response_cache_bytes,
+                                     .db_bytes = settings->db_bytes,
+                                     .quota = settings->quota,
+                                     .rate = settings->rate,
+                                     .study_seconds = settings->max_study_seconds,
+                                     .deleted = {dispatcher.hot, forget_answers},
+                                     .limits = {.samples = settings->max_samples,
+                                                .impacts = settings->max_impacts,
+                                                .steps = settings->max_cpu_seconds / SOLVER_STEP,
+                                                .bytes = (double)settings->max_run_bytes,
+                                                .document_bytes = DOCUMENT_BYTES,
+                                                .points = settings->max_points}};
     const KeepRules keep = {settings->keep_days, settings->keep_jobs, settings->keep_bytes};
-    const ReachSettings asked = {settings->host, settings->base_url, settings->tls_cert,
-                                 settings->tls_key, settings->require_tokens};
-    Reach ready = {0};
-    Meter *meter = NULL;
-    Listener *listener = NULL;
-    Keeper *keeper = NULL;
+    const NetworkSettings asked = {settings->host, settings->base_url, settings->tls_cert,
+                                   settings->tls_key, settings->require_tokens};
+    Network ready = {0};
+    RequestMetrics *meter = NULL;
+    Server *listener = NULL;
+    Maintenance *keeper = NULL;
     process_return_memory();
     fft_start();
     Status status = address_read(settings->listen, &door.address, problem);
     if (status == STATUS_OK) {
         const Status together = check(settings, problem);
-        status = reach_read(&asked, &door.address, &ready, problem);
+        status = network_read(&asked, &door.address, &ready, problem);
         status = together != STATUS_OK ? together : status;
     }
-    if (status == STATUS_OK && (meter = meter_new(routes)) == NULL)
+    if (status == STATUS_OK && (meter = request_metrics_new(routes)) == NULL)
         status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the counters");
     if (status == STATUS_OK)
-        status = store_open(settings->data, &app.store, problem);
+        status = db_open(settings->data, &app.store, problem);
     if (status == STATUS_OK)
         status = tokens_open(app.store, ready.needs_tokens, &doorman.tokens, problem);
     if (status == STATUS_OK)
-        status = reach_check(&ready, &door.address, tokens_usable(doorman.tokens), problem);
+        status = network_check(&ready, &door.address, tokens_usable(doorman.tokens), problem);
     if (status == STATUS_OK)
-        status = intake_open(app.store, &work, &app.intake, problem);
+        status = jobs_open(app.store, &work, &app.intake, problem);
     if (status == STATUS_OK)
-        status = keeper_start(app.store, app.intake, &keep, &keeper, problem);
+        status = maintenance_start(app.store, app.intake, &keep, &keeper, problem);
     if (status == STATUS_OK)
-        status = asides_open(ASIDES, &app.asides, problem);
+        status = background_open(ASIDES, &app.asides, problem);
     if (status == STATUS_OK) {
-        link_base_set(ready.url.path);
+        base_path_set(ready.url.path);
         text_fit(app.base_url, sizeof app.base_url, ready.url.text);
-        app.has_tls = certificate_source() != NULL;
+        app.has_tls = tls_source() != NULL;
         app.meter = doorman.meter = meter;
         app.hot = dispatcher.hot;
         door.hosts = &ready.hosts;
-        door.certificate = certificate_source();
-        status = listener_open(&door, &listener, problem);
+        door.certificate = tls_source();
+        status = server_open(&door, &listener, problem);
     }
     if (status == STATUS_OK)
         run_until_stopped(&app, listener, settings, &asked, signals, problem);
-    listener_stop(listener, GRACE_MS);
-    keeper_stop(keeper);
-    asides_close(app.asides);
+    server_stop(listener, GRACE_MS);
+    maintenance_stop(keeper);
+    background_close(app.asides);
     if (app.intake != NULL)
-        intake_close(app.intake);
-    listener_free(listener);
-    hot_free(dispatcher.hot);
+        jobs_close(app.intake);
+    server_free(listener);
+    response_cache_free(dispatcher.hot);
     tokens_close(doorman.tokens);
-    store_close(app.store);
-    meter_free(meter);
-    reach_clear(&ready);
-    certificate_forget();
+    db_close(app.store);
+    request_metrics_free(meter);
+    network_clear(&ready);
+    tls_forget();
     return status;
 }
 
@@ -310,7 +311,7 @@ static int run(const Command *self, void *of, const Options *options, Problem *p
     if (status == STATUS_OK)
         return COMMAND_OK;
     if (problem->status == STATUS_USAGE)
-        return command_refuse(self->name, problem);
+        return command_error(self->name, problem);
     fprintf(stderr, "impactd serve: %s\n",
             problem->detail[0] != '\0' ? problem->detail : status_title(status));
     return command_exit(status);

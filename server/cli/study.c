@@ -49,18 +49,18 @@ struct StudyCommand {
 #define JSON_ROW FIELD_FLAG(StudySettings, json, false, "print the document, as the daemon has it")
 
 // The format that a path ends in, NULL if there is none.
-static const AnswerFormat *study_format(const StudyCommand *command, const char *path) {
+static const StudyFormat *study_format(const StudyCommand *command, const char *path) {
     const char *extension = strrchr(path, '.');
     if (extension == NULL || extension == path || extension[-1] == '/')
         return NULL;
-    return answer_format_find(answer_formats(command->kind->answer), extension + 1);
+    return study_format_find(study_formats(command->kind->answer), extension + 1);
 }
 
 static Status study_check_outputs(const StudyCommand *command, const Texts *outputs,
                                   Problem *problem) {
     Status status = STATUS_OK;
     char names[64];
-    answer_formats_name(answer_formats(command->kind->answer), ".", names, sizeof names);
+    study_formats_names(study_formats(command->kind->answer), ".", names, sizeof names);
     for (size_t i = 0; i < outputs->count; i++)
         if (study_format(command, outputs->at[i]) == NULL)
             status = problem_add(problem, STATUS_USAGE, "--output",
@@ -103,7 +103,7 @@ static Status study_measure(const StudyRequest *inquiry, const SimulationLimits 
 // As JSON, the first format of every study.
 static void study_print_json(const Variant *answer) {
     Bytes bytes = {0};
-    answer_formats(answer->kind)->write(answer, &bytes);
+    study_formats(answer->kind)->write(answer, &bytes);
     if (bytes.at != NULL)
         (void)fwrite(bytes.at, 1, bytes.count, stdout);
     bytes_clear(&bytes);
@@ -113,15 +113,15 @@ static Status study_make(const StudyCommand *command, const StudyRequest *inquir
                          const StudySettings *settings, const SimulationLimits *limits,
                          Problem *problem) {
     const Texts *outputs = &settings->output;
-    Bar bar;
+    ProgressBar bar;
     Variant *answer = NULL;
-    bar_start(&bar);
-    const Progress watch = bar_watch(&bar);
+    progress_bar_start(&bar);
+    const Progress watch = progress_bar_watch(&bar);
     Status status =
         study_has_members(inquiry->study)
             ? crew_run(inquiry->study, &inquiry->simulation, limits, &watch, &answer, problem)
             : study_measure(inquiry, limits, &watch, &answer, problem);
-    bar_stop(&bar);
+    progress_bar_stop(&bar);
     // The document's own study prints nothing where it is written to files.
     const bool is_quiet = command->print == NULL && outputs->count > 0 && !settings->json;
     if (status == STATUS_OK && (command->print == NULL || settings->json) && !is_quiet)
@@ -161,13 +161,13 @@ static Status study_scene(const char *path, const Bytes *text, void *of, Problem
     const StudyCommand *command = settings->command;
     const SimulationLimits limits = scene_file_limits(settings->max_cpu_seconds);
     const Texts *outputs = &settings->output;
-    Store *store = NULL;
+    Db *store = NULL;
     StudyRequest inquiry = {0};
     Warnings warnings = {0};
-    TRY(store_open(NULL, &store, problem));
+    TRY(db_open(NULL, &store, problem));
     Status status =
-        intake_prepare(store, text->at, text->count, &limits, &inquiry, &warnings, problem);
-    store_close(store);
+        jobs_prepare(store, text->at, text->count, &limits, &inquiry, &warnings, problem);
+    db_close(store);
     if (status == STATUS_OK)
         scene_file_warn(path, &warnings);
     if (status == STATUS_OK)
@@ -197,20 +197,20 @@ static int study_command(const Command *self, const StudyCommand *command, Study
     return command->kind == NULL ||
                    study_check_outputs(command, &settings->output, problem) == STATUS_OK
                ? scene_file_command(self, "scene", options, settings, study_scene, problem)
-               : command_refuse(self->name, problem);
+               : command_error(self->name, problem);
 }
 
-static void study_heads_add(Listing *listing, const char *const *heads) {
+static void study_heads_add(PrintTable *listing, const char *const *heads) {
     listing->has_heads = true;
     for (size_t i = 0; i < listing->columns; i++)
-        listing_add(listing, "%s", heads[i]);
+        print_table_add(listing, "%s", heads[i]);
 }
 
 // "rms_displacement [m]"
-static void study_metric_add(Listing *listing, const char *name, const char *unit) {
+static void study_metric_add(PrintTable *listing, const char *name, const char *unit) {
     const bool has_unit = unit != NULL && strcmp(unit, "1") != 0;
-    listing_add(listing, "%.40s%s%s%s", name, has_unit ? " [" : "", has_unit ? unit : "",
-                has_unit ? "]" : "");
+    print_table_add(listing, "%.40s%s%s%s", name, has_unit ? " [" : "", has_unit ? unit : "",
+                    has_unit ? "]" : "");
 }
 
 static const Field study_fields[] = {
@@ -265,28 +265,28 @@ static const Field tradeoff_fields[] = {
 static void tradeoff_points_print(const Tradeoff *tradeoff) {
     static const char *const heads[] = {"  ",       "CPU [s]", "median",  "steps", "displ.",
                                         "mean acc", "force",   "impacts", "PSD dB"};
-    Listing listing = {.columns = COUNT(heads)};
+    PrintTable listing = {.columns = COUNT(heads)};
     study_heads_add(&listing, heads);
     for (size_t i = 0; i < tradeoff->points.count; i++) {
         const TradeoffPoint *point = &tradeoff->points.at[i];
         const Errors *errors = &point->errors;
         if (point->status != TRADEOFF_MEASURED)
             continue;
-        listing_add(&listing, "%c %s",
-                    tradeoff->recommendation.point == i + 1 ? '>'
-                    : point->is_best                        ? '*'
-                                                            : ' ',
-                    point->name);
-        listing_number(&listing, "%.2e", point->cpu_minimum);
-        listing_number(&listing, "%.2e", point->cpu_median);
-        listing_number(&listing, "%.2e", point->steps);
-        listing_number(&listing, "%.1e", errors->displacement);
-        listing_number(&listing, "%.1e", errors->mean_acceleration);
-        listing_number(&listing, "%.1e", errors->peak_force);
-        listing_number(&listing, "%.0f", errors->impacts);
-        listing_number(&listing, "%.2g", errors->psd);
+        print_table_add(&listing, "%c %s",
+                        tradeoff->recommendation.point == i + 1 ? '>'
+                        : point->is_best                        ? '*'
+                                                                : ' ',
+                        point->name);
+        print_table_number(&listing, "%.2e", point->cpu_minimum);
+        print_table_number(&listing, "%.2e", point->cpu_median);
+        print_table_number(&listing, "%.2e", point->steps);
+        print_table_number(&listing, "%.1e", errors->displacement);
+        print_table_number(&listing, "%.1e", errors->mean_acceleration);
+        print_table_number(&listing, "%.1e", errors->peak_force);
+        print_table_number(&listing, "%.0f", errors->impacts);
+        print_table_number(&listing, "%.2g", errors->psd);
     }
-    listing_print(&listing, stdout);
+    print_table_print(&listing, stdout);
     for (size_t i = 0; i < tradeoff->points.count; i++) {
         const TradeoffPoint *point = &tradeoff->points.at[i];
         if (point->status != TRADEOFF_MEASURED)
@@ -394,19 +394,19 @@ static void ensemble_choose(void *asked, StudySettings *settings) {
 
 static void ensemble_statistics_print(const Ensemble *ensemble) {
     static const char *const heads[] = {"", "mean", "+-", "s.d.", "smallest", "median", "largest"};
-    Listing listing = {.columns = COUNT(heads)};
+    PrintTable listing = {.columns = COUNT(heads)};
     study_heads_add(&listing, heads);
     for (int metric = 0; metric < STATISTICS_METRICS; metric++) {
         const RunStatistic *statistic = &ensemble->statistics.of[metric];
         study_metric_add(&listing, statistics_metric_names[metric], statistic->unit);
-        listing_number(&listing, "%.5g", statistic->mean);
-        listing_number(&listing, "%.2g", statistic->high - statistic->mean);
-        listing_number(&listing, "%.2g", statistic->standard_deviation);
-        listing_number(&listing, "%.4g", statistic->minimum);
-        listing_number(&listing, "%.4g", statistic->median);
-        listing_number(&listing, "%.4g", statistic->maximum);
+        print_table_number(&listing, "%.5g", statistic->mean);
+        print_table_number(&listing, "%.2g", statistic->high - statistic->mean);
+        print_table_number(&listing, "%.2g", statistic->standard_deviation);
+        print_table_number(&listing, "%.4g", statistic->minimum);
+        print_table_number(&listing, "%.4g", statistic->median);
+        print_table_number(&listing, "%.4g", statistic->maximum);
     }
-    listing_print(&listing, stdout);
+    print_table_print(&listing, stdout);
 }
 
 static void ensemble_spectrum_print(const Ensemble *ensemble, const RunSpectrum *spectrum) {
@@ -493,7 +493,7 @@ static const Field sweep_fields[] = {
 };
 
 // The extremes of a metric, and where they are.
-static void sweep_extremes_add(Listing *listing, const Sweep *sweep, size_t metric) {
+static void sweep_extremes_add(PrintTable *listing, const Sweep *sweep, size_t metric) {
     const SweepTable *table = &sweep->table;
     const size_t metrics = sweep->metrics.count, none = table->points.count;
     size_t ends[2] = {none, none}; // the smallest and the largest
@@ -510,9 +510,9 @@ static void sweep_extremes_add(Listing *listing, const Sweep *sweep, size_t metr
                      sweep_metric_unit(sweep->metrics.at[metric]));
     for (size_t k = 0; k < COUNT(ends); k++) {
         const bool is_known = ends[k] != none;
-        listing_number(listing, "%.6g",
-                       is_known ? table->values.at[ends[k] * metrics + metric] : (double)NAN);
-        listing_number(listing, "%.0f", is_known ? (double)ends[k] : (double)NAN);
+        print_table_number(listing, "%.6g",
+                           is_known ? table->values.at[ends[k] * metrics + metric] : (double)NAN);
+        print_table_number(listing, "%.0f", is_known ? (double)ends[k] : (double)NAN);
     }
 }
 
@@ -520,7 +520,7 @@ static void sweep_print(const Variant *answer) {
     const Sweep *sweep = (const Sweep *)(const void *)answer;
     static const char *const heads[] = {"", "smallest", "at point", "largest", "at point"};
     const SweepTable *table = &sweep->table;
-    Listing listing = {.columns = COUNT(heads)};
+    PrintTable listing = {.columns = COUNT(heads)};
     printf("%llu points", (unsigned long long)sweep->points);
     for (size_t i = 0; i < sweep->axes.count; i++)
         printf("%s %s (%zu)", i > 0 ? "," : ":", sweep->axes.at[i].pointer,
@@ -529,7 +529,7 @@ static void sweep_print(const Variant *answer) {
     study_heads_add(&listing, heads);
     for (size_t i = 0; i < sweep->metrics.count; i++)
         sweep_extremes_add(&listing, sweep, i);
-    listing_print(&listing, stdout);
+    print_table_print(&listing, stdout);
     for (size_t i = 0; i < table->failures.count; i++)
         printf("\n%llu failed, %s; point %llu: %s\n",
                (unsigned long long)table->failures.at[i].count,

@@ -33,7 +33,7 @@ static const Field submit_fields[] = {
 // clang-format on
 
 // The job is there: its id, and with patience its end. Takes nothing.
-static int job_follow(const SubmitSettings *settings, Daemon *daemon, HttpAnswer *answer,
+static int job_follow(const SubmitSettings *settings, ApiClient *daemon, HttpAnswer *answer,
                       JobReply *job, Problem *problem) {
     int code = COMMAND_OK;
     if (!settings->json) {
@@ -45,21 +45,21 @@ static int job_follow(const SubmitSettings *settings, Daemon *daemon, HttpAnswer
         snprintf(id, sizeof id, "%s", job->id);
         job_reply_clear(job);
         http_answer_clear(answer);
-        const Status status = daemon_follow(daemon, id, stderr, answer, job, problem);
+        const Status status = api_client_follow(daemon, id, stderr, answer, job, problem);
         if (status != STATUS_OK)
-            code = daemon_refuse("submit", id, status, problem);
+            code = api_client_refuse("submit", id, status, problem);
         if (status != STATUS_OK && status != STATUS_TIMEOUT)
             return code;
     }
     if (settings->json)
-        daemon_print(answer);
+        api_client_print(answer);
     // Without patience the job's end is nobody's question, but if it is there it is told.
-    return code == COMMAND_OK && job_reply_is_final(job) ? daemon_verdict(job, problem) : code;
+    return code == COMMAND_OK && job_reply_is_final(job) ? api_client_verdict(job, problem) : code;
 }
 
 static int scene_submit(const SubmitSettings *settings, const char *path, const Bytes *text,
                         Problem *problem) {
-    Daemon daemon;
+    ApiClient daemon;
     HttpAnswer answer = {0};
     JobReply job = {0};
     char prefer[48];
@@ -69,25 +69,25 @@ static int scene_submit(const SubmitSettings *settings, const char *path, const 
                          .body = text,
                          .prefer = settings->wait > 0 ? prefer : "respond-async",
                          .idempotency_key = settings->idempotency_key};
-    Status status = daemon_open(settings->server, settings->token_file, settings->ca_file,
-                                settings->wait, &daemon, problem);
+    Status status = api_client_open(settings->server, settings->token_file, settings->ca_file,
+                                    settings->wait, &daemon, problem);
     int code = COMMAND_OK;
     if (status == STATUS_OK)
-        status = daemon_ask(&daemon, &ask, &answer, problem);
+        status = api_client_ask(&daemon, &ask, &answer, problem);
     if (status == STATUS_OK && settings->dry_run) {
-        daemon_print(&answer);
+        api_client_print(&answer);
     } else if (status == STATUS_OK) {
         status = job_reply_read(&answer, &job, problem);
-        if (status == STATUS_OK && !daemon_is_id(job.id))
+        if (status == STATUS_OK && !api_client_is_id(job.id))
             status = problem_set(problem, STATUS_UNREACHABLE, "the answer holds no job's id");
         if (status == STATUS_OK)
             code = job_follow(settings, &daemon, &answer, &job, problem);
     }
     if (status != STATUS_OK)
-        code = daemon_refuse("submit", path, status, problem);
+        code = api_client_refuse("submit", path, status, problem);
     job_reply_clear(&job);
     http_answer_clear(&answer);
-    daemon_close(&daemon);
+    api_client_close(&daemon);
     return code;
 }
 
@@ -108,7 +108,7 @@ static int submit(const Command *self, void *of, const Options *options, Problem
         status = problem_add(problem, STATUS_USAGE, "--idempotency-key",
                              "must be of printable ASCII characters");
     if (status != STATUS_OK)
-        return command_refuse(self->name, problem);
+        return command_error(self->name, problem);
     const char *path = options->operands[0];
     Bytes text;
     status = scene_file_read(path, &text, problem);
@@ -117,7 +117,7 @@ static int submit(const Command *self, void *of, const Options *options, Problem
     for (size_t i = 0; i < settings->label.count && status == STATUS_OK; i++)
         status = json_edit_label(&text, settings->label.at[i], problem);
     const int code = status == STATUS_OK ? scene_submit(settings, path, &text, problem)
-                                         : daemon_refuse(self->name, path, status, problem);
+                                         : api_client_refuse(self->name, path, status, problem);
     bytes_clear(&text);
     return code;
 }

@@ -26,7 +26,7 @@ static const Field token_fields[] = {
 };
 // clang-format on
 
-static Status create(Store *store, const TokenSettings *settings, TokenRow *row, Problem *problem) {
+static Status create(Db *store, const TokenSettings *settings, TokenRow *row, Problem *problem) {
     static const double day_ms = 24 * 3600 * 1000.0;
     static const double days_most = 36500;
     char made[TOKEN_SIZE];
@@ -40,7 +40,7 @@ static Status create(Store *store, const TokenSettings *settings, TokenRow *row,
     }
     TRY(token_make(settings->scopes != NULL ? settings->scopes : "read,submit", expires_unix_ms,
                    row, made, problem));
-    TRY(store_token_add(store, row, problem));
+    TRY(db_token_add(store, row, problem));
     fprintf(stderr,
             "The token \"%s\" (%s). It is shown this once; only its digest is kept. Use it as\n"
             "  curl -H \"Authorization: Bearer $TOKEN\" ...\n",
@@ -55,16 +55,16 @@ static const char *time_text(int64_t unix_ms, char text[32]) {
     return unix_ms > 0 ? text : NULL;
 }
 
-static Status list(Store *store, const TokenSettings *settings, TokenRow *row, Problem *problem) {
+static Status list(Db *store, const TokenSettings *settings, TokenRow *row, Problem *problem) {
     static const char *const heads[] = {"name", "scopes", "created", "used", "expires", "state"};
     TokenRows rows = {0};
     (void)row;
-    TRY(store_tokens(store, &rows, problem));
+    TRY(db_tokens(store, &rows, problem));
     const int64_t now = clock_unix_ms();
-    Listing listing = {.columns = COUNT(heads), .has_heads = true};
+    PrintTable listing = {.columns = COUNT(heads), .has_heads = true};
     Bytes json = {0};
     for (size_t i = 0; i < COUNT(heads); i++)
-        listing_add(&listing, "%s", heads[i]);
+        print_table_add(&listing, "%s", heads[i]);
     bytes_text(&json, "{\"tokens\": [");
     for (size_t i = 0; i < rows.count; i++) {
         const TokenRow *one = &rows.at[i];
@@ -79,7 +79,7 @@ static Status list(Store *store, const TokenSettings *settings, TokenRow *row, P
                                                  : has_ended              ? "expired"
                                                                           : "good"};
         for (size_t k = 0; k < COUNT(cells); k++) {
-            listing_add(&listing, "%s", cells[k] != NULL ? cells[k] : "never");
+            print_table_add(&listing, "%s", cells[k] != NULL ? cells[k] : "never");
             bytes_format(&json, "%s\"%s\": ", k > 0 ? ", " : i > 0 ? ", {" : "{", heads[k]);
             if (cells[k] != NULL)
                 bytes_json_string(&json, cells[k]);
@@ -92,26 +92,26 @@ static Status list(Store *store, const TokenSettings *settings, TokenRow *row, P
     if (settings->json && !json.is_failed)
         fputs(json.at, stdout);
     if (settings->json)
-        listing_clear(&listing);
+        print_table_clear(&listing);
     else
-        listing_print(&listing, stdout);
+        print_table_print(&listing, stdout);
     bytes_clear(&json);
     free(rows.at);
     return STATUS_OK;
 }
 
-static Status revoke(Store *store, const TokenSettings *settings, TokenRow *row, Problem *problem) {
+static Status revoke(Db *store, const TokenSettings *settings, TokenRow *row, Problem *problem) {
     (void)settings;
     row->revoked_unix_ms = clock_unix_ms();
-    TRY(store_token_revoke(store, row, problem));
+    TRY(db_token_revoke(store, row, problem));
     fprintf(stderr, "The token \"%s\" is revoked; a running daemon knows within a second.\n",
             row->name);
     return STATUS_OK;
 }
 
-static Status forget(Store *store, const TokenSettings *settings, TokenRow *row, Problem *problem) {
+static Status forget(Db *store, const TokenSettings *settings, TokenRow *row, Problem *problem) {
     (void)settings;
-    TRY(store_token_forget(store, row, problem));
+    TRY(db_token_forget(store, row, problem));
     fprintf(stderr, "The token \"%s\" is forgotten.\n", row->name);
     return STATUS_OK;
 }
@@ -119,7 +119,7 @@ static Status forget(Store *store, const TokenSettings *settings, TokenRow *row,
 static const struct Action {
     const char *name;
     bool needs_name;
-    Status (*act)(Store *store, const TokenSettings *settings, TokenRow *row, Problem *problem);
+    Status (*act)(Db *store, const TokenSettings *settings, TokenRow *row, Problem *problem);
 } actions[] = {
     {"create", true, create},
     {"list", false, list},
@@ -161,10 +161,10 @@ static Status act(TokenSettings *settings, const Options *options, Problem *prob
                            options->operands[2]);
     TRY(read_name(settings, options, action->needs_name, &row, problem));
     TRY(command_data_folder(&settings->data, problem));
-    Store *store = NULL;
-    TRY(store_open_beside(settings->data, &store, problem));
+    Db *store = NULL;
+    TRY(db_open_beside(settings->data, &store, problem));
     const Status status = action->act(store, settings, &row, problem);
-    store_close(store);
+    db_close(store);
     return status;
 }
 
@@ -173,7 +173,7 @@ static int token(const Command *self, void *settings, const Options *options, Pr
     if (status == STATUS_OK)
         return COMMAND_OK;
     if (status == STATUS_USAGE)
-        return command_refuse(self->name, problem);
+        return command_error(self->name, problem);
     fprintf(stderr, "impactd token: %s\n",
             problem->detail[0] != '\0' ? problem->detail : status_title(status));
     return command_exit(status);

@@ -20,27 +20,28 @@ static const Field watch_fields[] = {
 static int watch(const Command *self, void *of, const Options *options, Problem *problem) {
     const WatchSettings *settings = of;
     const char *id = options->operands[0];
-    if (options->operand_count != 1 || !daemon_is_id(id)) {
+    if (options->operand_count != 1 || !api_client_is_id(id)) {
         (void)problem_set(problem, STATUS_USAGE, "takes one job's id, like j-7f3a");
-        return command_refuse(self->name, problem);
+        return command_error(self->name, problem);
     }
-    Daemon daemon;
+    ApiClient daemon;
     HttpAnswer answer = {0};
     JobReply job = {0};
-    Status status = daemon_open(settings->server, settings->token_file, settings->ca_file,
-                                settings->wait, &daemon, problem);
+    Status status = api_client_open(settings->server, settings->token_file, settings->ca_file,
+                                    settings->wait, &daemon, problem);
     if (status == STATUS_OK)
-        status = daemon_follow(&daemon, id, settings->json ? NULL : stdout, &answer, &job, problem);
+        status =
+            api_client_follow(&daemon, id, settings->json ? NULL : stdout, &answer, &job, problem);
     int code = COMMAND_OK;
     if (status == STATUS_OK && settings->json)
-        daemon_print(&answer);
+        api_client_print(&answer);
     if (status == STATUS_OK)
-        code = daemon_verdict(&job, problem);
+        code = api_client_verdict(&job, problem);
     else
-        code = daemon_refuse(self->name, id, status, problem);
+        code = api_client_refuse(self->name, id, status, problem);
     job_reply_clear(&job);
     http_answer_clear(&answer);
-    daemon_close(&daemon);
+    api_client_close(&daemon);
     return code;
 }
 

@@ -34,7 +34,7 @@ typedef struct Work {
     char folder[PATH_MAX]; // that the copy is to be in
     char part[PATH_MAX];   // its name until it is whole
     int file;              // that file
-    Database *copy;
+    Sqlite *copy;
     Backup backup;
 } Work;
 
@@ -76,7 +76,7 @@ static Status check_place(Work *work, Problem *problem) {
     return is_there && !work->request->replaces ? refuse_place(path, problem) : STATUS_OK;
 }
 
-static Status open_source(Work *work, Database **source, Problem *problem) {
+static Status open_source(Work *work, Sqlite **source, Problem *problem) {
     static const char sql[] =
         "SELECT count(*) AS jobs FROM sqlite_schema WHERE name IN ('jobs', 'results', 'materials')";
     static const RowColumn columns[] = {ROW_COLUMN(Backup, jobs, COLUMN_COUNT), ROW_END};
@@ -89,8 +89,8 @@ static Status open_source(Work *work, Database **source, Problem *problem) {
         return problem_set(problem, STATUS_NOT_FOUND,
                            "there is no database in %s; --data DIR names the daemon's folder",
                            directory);
-    TRY(database_open(path, DATABASE_READER, source, problem));
-    TRY(database_is_current(*source, embedded_sql, NULL, problem));
+    TRY(sqlite_open(path, DATABASE_READER, source, problem));
+    TRY(sqlite_is_current(*source, embedded_sql, NULL, problem));
     TRY(statement_begin(*source, sql, NULL, NULL, &statement, problem));
     Status status = statement_step(statement, &has_row, problem);
     if (status == STATUS_OK && has_row)
@@ -109,7 +109,7 @@ static Status open_part(Work *work, Problem *problem) {
         return problem_set(problem, STATUS_IO, "%.200s...: the name is too long", path);
     work->file = mkstemp(work->part); // for this user alone: tokens' digests are in it
     if (work->file >= 0)
-        return database_open(work->part, DATABASE_COPY, &work->copy, problem);
+        return sqlite_open(work->part, DATABASE_COPY, &work->copy, problem);
     work->part[0] = '\0';
     return problem_set(problem, errno == EACCES || errno == EPERM ? STATUS_FORBIDDEN : STATUS_IO,
                        "%s cannot be written: %s", path, strerror(errno));
@@ -158,7 +158,7 @@ static Status count_copy(Work *work, Problem *problem) {
 }
 
 static Status fill(Work *work, Problem *problem) {
-    Database *source = NULL;
+    Sqlite *source = NULL;
     ProgressRange copying = {work->request->watch, 0, copy_share, 0};
     ProgressRange checking = {work->request->watch, copy_share, 1 - copy_share, 0};
     const Progress watches[] = {progress_range_view(&copying), progress_range_view(&checking)};
@@ -166,10 +166,10 @@ static Status fill(Work *work, Problem *problem) {
     if (status == STATUS_OK)
         status = open_part(work, problem);
     if (status == STATUS_OK)
-        status = database_copy(source, work->copy, &watches[0], problem);
-    database_close(source);
+        status = sqlite_copy(source, work->copy, &watches[0], problem);
+    sqlite_close(source);
     TRY(status);
-    database_watch(work->copy, &watches[1]);
+    sqlite_watch(work->copy, &watches[1]);
     TRY(check_copy(work, problem));
     TRY(count_copy(work, problem));
     return STATUS_OK;
@@ -195,7 +195,7 @@ static Status give_name(Work *work, Problem *problem) {
     if (is_linked)
         (void)unlink(work->part);
     work->part[0] = '\0';
-    return folder_sync(work->folder, problem);
+    return data_dir_sync(work->folder, problem);
 }
 
 // The database's own words are about itself.
@@ -234,7 +234,7 @@ Status backup_write(const BackupRequest *request, Backup *backup, Problem *probl
     Status status = check_place(work, problem);
     if (status == STATUS_OK)
         status = fill(work, problem);
-    database_close(work->copy);
+    sqlite_close(work->copy);
     if (status == STATUS_OK)
         status = give_name(work, problem);
     remove_part(work);

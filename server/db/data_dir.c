@@ -11,7 +11,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-Status folder_make(const char *directory, Problem *problem) {
+Status data_dir_make(const char *directory, Problem *problem) {
     char path[PATH_MAX];
     const size_t length = strlen(directory);
     if (length == 0 || length >= sizeof path - 32)
@@ -45,10 +45,10 @@ static void folder_report_holder(const char *directory, const char *path, Proble
                 directory);
 }
 
-Status folder_lock(const char *directory, int *lock, Problem *problem) {
+Status data_dir_lock(const char *directory, int *lock, Problem *problem) {
     char path[PATH_MAX];
     *lock = -1;
-    TRY(folder_make(directory, problem));
+    TRY(data_dir_make(directory, problem));
     snprintf(path, sizeof path, "%s/impactd.lock", directory);
     const int folder = open(directory, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     if (folder < 0)
@@ -77,12 +77,12 @@ Status folder_lock(const char *directory, int *lock, Problem *problem) {
     return STATUS_OK;
 }
 
-void folder_unlock(int lock) {
+void data_dir_unlock(int lock) {
     if (lock >= 0)
         close(lock);
 }
 
-Status folder_sync(const char *directory, Problem *problem) {
+Status data_dir_sync(const char *directory, Problem *problem) {
     const int folder = open(directory, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     const bool is_synced = folder >= 0 && fsync(folder) == 0;
     // Some file systems cannot sync a folder and need not.

@@ -6,14 +6,14 @@
 #include "core/base/status.h"
 
 // Makes `directory` and what is missing above it, for this user alone.
-Status folder_make(const char *directory, Problem *problem);
+Status data_dir_make(const char *directory, Problem *problem);
 // Makes `directory` and what is missing above it, for this user alone, and locks
-// DIRECTORY/impactd.lock. *lock is to be given to folder_unlock. STATUS_CONFLICT if another process
-// has it.
-Status folder_lock(const char *directory, int *lock, Problem *problem);
-void folder_unlock(int lock); // below 0: nothing
+// DIRECTORY/impactd.lock. *lock is to be given to data_dir_unlock. STATUS_CONFLICT if another
+// process has it.
+Status data_dir_lock(const char *directory, int *lock, Problem *problem);
+void data_dir_unlock(int lock); // below 0: nothing
 
 // Makes new names in `directory` durable.
-Status folder_sync(const char *directory, Problem *problem);
+Status data_dir_sync(const char *directory, Problem *problem);
 
 #endif

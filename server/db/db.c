@@ -20,55 +20,55 @@
 
 enum { READERS = 4 };
 
-struct Store {
+struct Db {
     int lock_file;
-    Database *own; // the writer's; NULL where it shares the pool's
+    Sqlite *own; // the writer's; NULL where it shares the pool's
     Writer *writer;
     MaterialMemory *materials;
     RecordMemory *records;
     atomic_uint_fast64_t generation; // of the catalogue
     atomic_uint_fast64_t measured;   // materials
     atomic_uint_fast64_t evictions;  // of series
-    atomic_bool is_probing;          // by store_is_writable
+    atomic_bool is_probing;          // by db_is_writable
     pthread_mutex_t lock;
     pthread_cond_t some;
-    Database *readers[READERS]; // of which the first `free_count` are not taken
+    Sqlite *readers[READERS]; // of which the first `free_count` are not taken
     size_t free_count;
 };
 
-static Status open_files(Store *store, const char *directory, bool is_beside, Problem *problem) {
+static Status open_files(Db *store, const char *directory, bool is_beside, Problem *problem) {
     char path[PATH_MAX];
     bool is_current = false;
     if (!is_beside)
-        TRY(folder_lock(directory, &store->lock_file, problem));
+        TRY(data_dir_lock(directory, &store->lock_file, problem));
     else
-        TRY(folder_make(directory, problem));
+        TRY(data_dir_make(directory, problem));
     snprintf(path, sizeof path, "%s/impactd.db", directory);
-    TRY(database_open(path, DATABASE_WRITER, &store->own, problem));
+    TRY(sqlite_open(path, DATABASE_WRITER, &store->own, problem));
     if (is_beside)
-        TRY(database_is_current(store->own, embedded_sql, &is_current, problem));
+        TRY(sqlite_is_current(store->own, embedded_sql, &is_current, problem));
     if (is_beside && !is_current)
-        TRY(folder_lock(directory, &store->lock_file, problem));
+        TRY(data_dir_lock(directory, &store->lock_file, problem));
     if (!is_current) {
-        TRY(database_migrate(store->own, embedded_sql, problem));
-        TRY(folder_sync(directory, problem));
+        TRY(sqlite_migrate(store->own, embedded_sql, problem));
+        TRY(data_dir_sync(directory, problem));
     }
     while (store->free_count < READERS) {
-        TRY(database_open(path, DATABASE_READER, &store->readers[store->free_count], problem));
+        TRY(sqlite_open(path, DATABASE_READER, &store->readers[store->free_count], problem));
         store->free_count++;
     }
     return STATUS_OK;
 }
 
-static Status open_memory(Store *store, Problem *problem) {
-    TRY(database_open(NULL, DATABASE_WRITER, &store->readers[0], problem));
+static Status open_memory(Db *store, Problem *problem) {
+    TRY(sqlite_open(NULL, DATABASE_WRITER, &store->readers[0], problem));
     store->free_count = 1;
-    return database_migrate(store->readers[0], embedded_sql, problem);
+    return sqlite_migrate(store->readers[0], embedded_sql, problem);
 }
 
-static Status open_store(const char *directory, bool is_beside, Store **store, Problem *problem) {
+static Status open_store(const char *directory, bool is_beside, Db **store, Problem *problem) {
     *store = NULL;
-    Store *made = calloc(1, sizeof *made);
+    Db *made = calloc(1, sizeof *made);
     if (made == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the store");
     made->lock_file = -1;
@@ -83,30 +83,30 @@ static Status open_store(const char *directory, bool is_beside, Store **store, P
     if (status == STATUS_OK)
         status = writer_start(made->own, made->own == NULL ? made : NULL, &made->writer, problem);
     if (status != STATUS_OK) {
-        store_close(made);
+        db_close(made);
         return status;
     }
     *store = made;
     return STATUS_OK;
 }
 
-Status store_open(const char *directory, Store **store, Problem *problem) {
+Status db_open(const char *directory, Db **store, Problem *problem) {
     return open_store(directory, false, store, problem);
 }
 
-Status store_open_beside(const char *directory, Store **store, Problem *problem) {
+Status db_open_beside(const char *directory, Db **store, Problem *problem) {
     return open_store(directory, true, store, problem);
 }
 
-void store_close(Store *store) {
+void db_close(Db *store) {
     if (store == NULL)
         return;
     writer_stop(store->writer);
     for (size_t i = 0; i < store->free_count; i++)
-        database_close(store->readers[i]);
+        sqlite_close(store->readers[i]);
     // The last one to close moves the journal into the database.
-    database_close(store->own);
-    folder_unlock(store->lock_file);
+    sqlite_close(store->own);
+    data_dir_unlock(store->lock_file);
     material_memory_free(store->materials);
     record_memory_free(store->records);
     pthread_cond_destroy(&store->some);
@@ -114,106 +114,106 @@ void store_close(Store *store) {
     free(store);
 }
 
-const StoreTotals *store_totals(const Store *store) {
+const DbStats *db_totals(const Db *store) {
     return writer_totals(store->writer);
 }
 
 // Writes the database's first page as it is.
-static Status store_apply_probe(Database *database, const void *work, Problem *problem) {
+static Status db_apply_probe(Sqlite *database, const void *work, Problem *problem) {
     (void)work;
-    return database_touch(database, problem);
+    return sqlite_touch(database, problem);
 }
 
-static void store_probe_ended(void *context, Status status, const char *detail) {
+static void db_probe_ended(void *context, Status status, const char *detail) {
     (void)status;
     (void)detail;
-    atomic_store(&((Store *)context)->is_probing, false);
+    atomic_store(&((Db *)context)->is_probing, false);
 }
 
-bool store_is_writable(Store *store) {
-    if (!atomic_load(&store_totals(store)->is_failing))
+bool db_is_writable(Db *store) {
+    if (!atomic_load(&db_totals(store)->is_failing))
         return true;
-    const StoreDone done = {store_probe_ended, store};
+    const WriteDone done = {db_probe_ended, store};
     if (!atomic_exchange(&store->is_probing, true) &&
-        store_post(store, store_apply_probe, NULL, 0, STORE_NOW, &done, NULL) != STATUS_OK)
+        db_enqueue(store, db_apply_probe, NULL, 0, STORE_NOW, &done, NULL) != STATUS_OK)
         atomic_store(&store->is_probing, false);
     return false;
 }
 
-Status store_write(Store *store, StoreApply *apply, const void *work, Problem *problem) {
+Status db_write(Db *store, StoreApply *apply, const void *work, Problem *problem) {
     return writer_do(store->writer, apply, work, problem);
 }
 
-Status store_post(Store *store, StoreApply *apply, const void *work, size_t size, StoreTurn turn,
-                  const StoreDone *done, StoreTicket **ticket) {
-    return writer_post(store->writer, apply, work, size, turn, done, ticket);
+Status db_enqueue(Db *store, StoreApply *apply, const void *work, size_t size, WritePriority turn,
+                  const WriteDone *done, PendingWrite **ticket) {
+    return writer_enqueue(store->writer, apply, work, size, turn, done, ticket);
 }
 
-atomic_uint_fast64_t *store_evictions(Store *store) {
+atomic_uint_fast64_t *db_evictions(Db *store) {
     return &store->evictions;
 }
 
-bool store_withdraw(Store *store, StoreTicket *ticket) {
-    return writer_withdraw(store->writer, ticket);
+bool db_cancel_write(Db *store, PendingWrite *ticket) {
+    return writer_cancel(store->writer, ticket);
 }
 
-void store_hurry(Store *store, StoreTicket *ticket) {
-    writer_hurry(store->writer, ticket);
+void db_expedite(Db *store, PendingWrite *ticket) {
+    writer_expedite(store->writer, ticket);
 }
 
-void store_settle(Store *store) {
-    writer_settle(store->writer);
+void db_flush(Db *store) {
+    writer_flush(store->writer);
 }
 
-MaterialMemory *store_material_memory(Store *store) {
+MaterialMemory *db_material_memory(Db *store) {
     return store->materials;
 }
 
-RecordMemory *store_record_memory(Store *store) {
+RecordMemory *db_record_memory(Db *store) {
     return store->records;
 }
 
-bool store_is_private(const Store *store) {
+bool db_is_private(const Db *store) {
     return store->own == NULL;
 }
 
-uint64_t store_generation(Store *store) {
+uint64_t db_catalog_version(Db *store) {
     return atomic_load(&store->generation);
 }
 
-void store_catalogue_changed(Store *store) {
+void db_catalog_changed(Db *store) {
     atomic_fetch_add(&store->generation, 1);
 }
 
 // Both only rise: their sum is the same only while both are.
-uint64_t store_deeds(Store *store) {
+uint64_t db_audit_version(Db *store) {
     return atomic_load(&store->generation) + atomic_load(&store->measured);
 }
 
-void store_material_measured(Store *store) {
+void db_material_measured(Db *store) {
     atomic_fetch_add(&store->measured, 1);
 }
 
-Database *store_take(Store *store) {
+Sqlite *db_take(Db *store) {
     pthread_mutex_lock(&store->lock);
     while (store->free_count == 0)
         pthread_cond_wait(&store->some, &store->lock);
-    Database *database = store->readers[--store->free_count];
+    Sqlite *database = store->readers[--store->free_count];
     pthread_mutex_unlock(&store->lock);
     return database;
 }
 
-void store_put(Store *store, Database *database) {
+void db_put(Db *store, Sqlite *database) {
     pthread_mutex_lock(&store->lock);
     store->readers[store->free_count++] = database;
     pthread_cond_signal(&store->some);
     pthread_mutex_unlock(&store->lock);
 }
 
-Status store_first(Store *store, const char *sql, const RowColumn *key_columns, const void *key,
-                   const RowColumn *columns, void *target, bool *is_found, Problem *problem) {
+Status db_first(Db *store, const char *sql, const RowColumn *key_columns, const void *key,
+                const RowColumn *columns, void *target, bool *is_found, Problem *problem) {
     *is_found = false;
-    Database *database = store_take(store);
+    Sqlite *database = db_take(store);
     Statement *statement;
     Status status = statement_begin(database, sql, key_columns, key, &statement, problem);
     if (status == STATUS_OK)
@@ -221,7 +221,7 @@ Status store_first(Store *store, const char *sql, const RowColumn *key_columns, 
     if (status == STATUS_OK && *is_found)
         status = row_read(statement, columns, target, problem);
     statement_end(statement);
-    store_put(store, database);
+    db_put(store, database);
     return status;
 }
 
@@ -248,17 +248,16 @@ static Status read_all(Statement *statement, const RowColumn *columns, size_t si
     }
 }
 
-Status store_all(Store *store, const char *sql, const RowColumn *key_columns, const void *key,
-                 const RowColumn *columns, size_t size, void **at, size_t *count,
-                 Problem *problem) {
+Status db_all(Db *store, const char *sql, const RowColumn *key_columns, const void *key,
+              const RowColumn *columns, size_t size, void **at, size_t *count, Problem *problem) {
     *at = NULL;
     *count = 0;
-    Database *database = store_take(store);
+    Sqlite *database = db_take(store);
     Statement *statement;
     Status status = statement_begin(database, sql, key_columns, key, &statement, problem);
     if (status == STATUS_OK)
         status = read_all(statement, columns, size, at, count, problem);
     statement_end(statement);
-    store_put(store, database);
+    db_put(store, database);
     return status;
 }

@@ -12,62 +12,62 @@
 #include "core/base/status.h"
 #include "server/util/metrics.h"
 
-typedef struct Store Store;
+typedef struct Db Db;
 
 // Opens (and makes or migrates) DIR/impactd.db, DIR too if it is missing; `directory` NULL is a
 // private database in memory, for `impactd run`. STATUS_CONFLICT if another daemon has the folder,
 // or the database is a newer program's.
-Status store_open(const char *directory, Store **store, Problem *problem);
+Status db_open(const char *directory, Db **store, Problem *problem);
 // The same folder while a daemon has it, or none: for commands that read or write a few rows. Locks
 // the folder only where the database has to be made or migrated.
-Status store_open_beside(const char *directory, Store **store, Problem *problem);
-void store_close(Store *store);
-bool store_is_private(const Store *store); // in memory, gone with the program
+Status db_open_beside(const char *directory, Db **store, Problem *problem);
+void db_close(Db *store);
+bool db_is_private(const Db *store); // in memory, gone with the program
 
 // Writes are called "posted" where nobody waits for them. They are done in the order in which they
 // were posted, some at a time, as far as they are of the same turn. `call` comes once, from the
 // writer's thread, when the write is durable or has failed (then with the reason), and must be
 // quick; it may post.
-typedef struct StoreDone {
+typedef struct WriteDone {
     void (*call)(void *context, Status status, const char *detail);
     void *context;
-} StoreDone;
-typedef enum StoreTurn {
+} WriteDone;
+typedef enum WritePriority {
     STORE_NOW,
     STORE_SOON,  // a few milliseconds later, or with what else is written until then
     STORE_LATER, // a quarter of a second later; until then it may be withdrawn, or hurried
     STORE_LOW,   // when nothing else is queued, by itself
     STORE_TURNS
-} StoreTurn;
-typedef struct StoreTicket StoreTicket; // lives until `call` returns
+} WritePriority;
+typedef struct PendingWrite PendingWrite; // lives until `call` returns
 // True: it was not begun, will never be, and `call` will not come. Otherwise it is under way.
-bool store_withdraw(Store *store, StoreTicket *ticket);
+bool db_cancel_write(Db *store, PendingWrite *ticket);
 // What was to come later comes now.
-void store_hurry(Store *store, StoreTicket *ticket);
+void db_expedite(Db *store, PendingWrite *ticket);
 // Returns when all jobs that there are, accepted, finished or answered by what is known, are in the
 // database, or could not be written: before they are listed.
-void store_settle(Store *store);
+void db_flush(Db *store);
 
 // Rises whenever a name in a scene may come to mean something else, or be warned of otherwise: a
-// material's head, a review, a record. Whoever writes those calls store_catalogue_changed once it
+// material's head, a review, a record. Whoever writes those calls db_catalog_changed once it
 // is durable.
-uint64_t store_generation(Store *store);
-void store_catalogue_changed(Store *store);
+uint64_t db_catalog_version(Db *store);
+void db_catalog_changed(Db *store);
 // Rises with that, and when a material was measured: its version is another one then, what its name
 // means is not.
-uint64_t store_deeds(Store *store);
-void store_material_measured(Store *store);
+uint64_t db_audit_version(Db *store);
+void db_material_measured(Db *store);
 
 // What was written since the start; counted on.
-typedef struct StoreTotals {
+typedef struct DbStats {
     Counter writes, rows, errors;
     Histogram commits;      // transactions, from their beginning until they are durable
     atomic_bool is_failing; // the last transaction could not be made durable
-} StoreTotals;
-const StoreTotals *store_totals(const Store *store);
+} DbStats;
+const DbStats *db_totals(const Db *store);
 // Whether the last transaction was made durable; if not, another one is tried meanwhile, so that a
 // later call knows whether the cause has gone. Does not wait.
-bool store_is_writable(Store *store);
+bool db_is_writable(Db *store);
 
 typedef struct JobRow {
     char id[40];
@@ -91,27 +91,26 @@ typedef struct JobRow {
 } JobRow;
 void job_row_clear(JobRow *row);
 // `scene` and `warnings` are required. STATUS_CONFLICT where the id exists.
-Status store_job_add(Store *store, const JobRow *row, Problem *problem);
+Status db_job_add(Db *store, const JobRow *row, Problem *problem);
 // The same, posted; `row` is borrowed until then.
-Status store_job_post(Store *store, const JobRow *row, StoreTurn turn, const StoreDone *done,
-                      StoreTicket **ticket);
+Status db_job_post(Db *store, const JobRow *row, WritePriority turn, const WriteDone *done,
+                   PendingWrite **ticket);
 // State, is_cached, times, problem, result. STATUS_NOT_FOUND, unless it is_unsaved.
-Status store_job_update(Store *store, const JobRow *row, Problem *problem);
-Status store_job_update_post(Store *store, const JobRow *row, const StoreDone *done);
+Status db_job_update(Db *store, const JobRow *row, Problem *problem);
+Status db_job_update_post(Db *store, const JobRow *row, const WriteDone *done);
 // All but the scene, here and in the list; the unfinished ones come with theirs. `row` may be
 // uninitialised.
-Status store_job_load(Store *store, const char *id, JobRow *row, Problem *problem);
+Status db_job_load(Db *store, const char *id, JobRow *row, Problem *problem);
 // The scene that it asked for, to be freed: canonical JSON. STATUS_NOT_FOUND; STATUS_GONE where it
 // went with a deleted result.
-Status store_job_scene(Store *store, const char *id, char **scene, Problem *problem);
+Status db_job_scene(Db *store, const char *id, char **scene, Problem *problem);
 // The job that `client` (NULL: nobody in particular) sent under that key. STATUS_NOT_FOUND.
-Status store_job_keyed(Store *store, const char *client, const char *key, JobRow *row,
-                       Problem *problem);
+Status db_job_keyed(Db *store, const char *client, const char *key, JobRow *row, Problem *problem);
 typedef struct JobRows {
     JobRow *at;
     size_t count;
 } JobRows;
-Status store_job_unfinished(Store *store, JobRows *rows, Problem *problem); // oldest first
+Status db_job_unfinished(Db *store, JobRows *rows, Problem *problem); // oldest first
 void job_rows_clear(JobRows *rows);
 
 // Everything of a result but its series, which is computed anew when asked for.
@@ -132,39 +131,38 @@ typedef struct ResultRow {
 void result_row_clear(ResultRow *row);
 // Saves the result (NULL: none) and the finished jobs in one transaction; a result already there
 // stays as it is.
-Status store_result_save(Store *store, const ResultRow *result, const JobRow *const *jobs,
-                         size_t job_count, Problem *problem);
+Status db_result_save(Db *store, const ResultRow *result, const JobRow *const *jobs,
+                      size_t job_count, Problem *problem);
 // The same, posted; all of it is borrowed until then.
-Status store_result_post(Store *store, const ResultRow *result, const JobRow *const *jobs,
-                         size_t job_count, StoreTurn turn, const StoreDone *done);
-Status store_result_load(Store *store, const char *id, ResultRow *row, Problem *problem);
+Status db_result_post(Db *store, const ResultRow *result, const JobRow *const *jobs,
+                      size_t job_count, WritePriority turn, const WriteDone *done);
+Status db_result_load(Db *store, const char *id, ResultRow *row, Problem *problem);
 // The same without scene, energy, impacts, psd and study, which may be long.
-Status store_result_head(Store *store, const char *id, ResultRow *row, Problem *problem);
+Status db_result_head(Db *store, const char *id, ResultRow *row, Problem *problem);
 // Id, engine and scene alone: what computing it anew takes.
-Status store_result_scene(Store *store, const char *id, ResultRow *row, Problem *problem);
-bool store_result_exists(Store *store, const char *id);
+Status db_result_scene(Db *store, const char *id, ResultRow *row, Problem *problem);
+bool db_result_exists(Db *store, const char *id);
 // A client other than `client` of whose finished jobs it is the result; "" if there is none.
-Status store_result_sharer(Store *store, const char *id, const char *client, char sharer[72],
-                           Problem *problem);
-Status store_result_delete(Store *store, const char *id, Problem *problem); // STATUS_NOT_FOUND
+Status db_result_sharer(Db *store, const char *id, const char *client, char sharer[72],
+                        Problem *problem);
+Status db_result_delete(Db *store, const char *id, Problem *problem); // STATUS_NOT_FOUND
 // Id, engine and scene of the newest ones, newest first, without scenes longer than that.
 typedef struct ResultRows {
     ResultRow *at;
     size_t count;
 } ResultRows;
-Status store_result_recent(Store *store, size_t most, size_t scene_max, ResultRows *rows,
-                           Problem *problem);
+Status db_result_recent(Db *store, size_t most, size_t scene_max, ResultRows *rows,
+                        Problem *problem);
 void result_rows_clear(ResultRows *rows);
 
 // Series of results as bytes, at most `most` of them in all: the longest unused make room. Posted
 // behind all else that is to be written. Takes `body`, which is to be freed, also when it fails.
-Status store_series_post(Store *store, const char *result, char *body, size_t size, uint64_t most,
-                         const StoreDone *done);
+Status db_series_post(Db *store, const char *result, char *body, size_t size, uint64_t most,
+                      const WriteDone *done);
 // *body is to be freed. STATUS_NOT_FOUND.
-Status store_series_load(Store *store, const char *result, char **body, size_t *size,
-                         Problem *problem);
-bool store_series_exists(Store *store, const char *result);
-void store_series_tally(Store *store, uint64_t *count, uint64_t *bytes, uint64_t *evictions);
+Status db_series_load(Db *store, const char *result, char **body, size_t *size, Problem *problem);
+bool db_series_exists(Db *store, const char *result);
+void db_series_tally(Db *store, uint64_t *count, uint64_t *bytes, uint64_t *evictions);
 
 typedef struct StoredBytes {
     void *at;
@@ -198,28 +196,28 @@ typedef struct SweepChunkRows {
 void sweep_chunk_rows_clear(SweepChunkRows *rows);
 
 // Writes the sweep down; one that is there already stays as it is, and `row` becomes that one.
-Status store_sweep_begin(Store *store, SweepRow *row, Problem *problem);
+Status db_sweep_begin(Db *store, SweepRow *row, Problem *problem);
 // STATUS_NOT_FOUND. `row` may be uninitialised.
-Status store_sweep_load(Store *store, const char *result, SweepRow *row, Problem *problem);
+Status db_sweep_load(Db *store, const char *result, SweepRow *row, Problem *problem);
 // What a job asked for, of which nothing may be written down yet: result and scene alone.
 // STATUS_NOT_FOUND.
-Status store_sweep_asked(Store *store, const char *job, SweepRow *row, Problem *problem);
+Status db_sweep_asked(Db *store, const char *job, SweepRow *row, Problem *problem);
 // Adds a chunk, in one transaction. One that is there already and not open stays as it is.
-Status store_sweep_take(Store *store, const SweepChunkRow *chunk, Problem *problem);
+Status db_sweep_take(Db *store, const SweepChunkRow *chunk, Problem *problem);
 // All that are there, by chunk, without reasons and rows.
-Status store_sweep_chunks(Store *store, int64_t sweep, SweepChunkRows *chunks, Problem *problem);
+Status db_sweep_chunks(Db *store, int64_t sweep, SweepChunkRows *chunks, Problem *problem);
 // One of them. STATUS_NOT_FOUND.
-Status store_sweep_chunk(Store *store, int64_t sweep, uint64_t number, SweepChunkRow *chunk,
-                         Problem *problem);
+Status db_sweep_chunk(Db *store, int64_t sweep, uint64_t number, SweepChunkRow *chunk,
+                      Problem *problem);
 void sweep_chunk_row_clear(SweepChunkRow *row);
 // Bytes `offset` ... of the rows of each of these chunks, `size` or as many as there are: those of
 // chunk i at target + i size. STATUS_CONFLICT where sweep or chunk is not what it was when it was
 // loaded.
-Status store_sweep_read(Store *store, const SweepRow *sweep, const SweepChunkRows *chunks,
-                        size_t offset, size_t size, unsigned char *target, Problem *problem);
+Status db_sweep_read(Db *store, const SweepRow *sweep, const SweepChunkRows *chunks, size_t offset,
+                     size_t size, unsigned char *target, Problem *problem);
 // Opens every chunk that has failures. STATUS_CONFLICT where none has.
-Status store_sweep_reopen(Store *store, const char *result, Problem *problem);
+Status db_sweep_reopen(Db *store, const char *result, Problem *problem);
 // Forgets all sweeps that have neither a result nor an unfinished job.
-Status store_sweep_tidy(Store *store, Problem *problem);
+Status db_sweep_tidy(Db *store, Problem *problem);
 
 #endif

@@ -84,11 +84,11 @@ JobSearch job_search_all(size_t most) {
 
 void job_words(Bytes *bytes, const char *title, const char *const *labels, size_t label_count) {
     if (title != NULL)
-        fold_put(bytes, title);
+        utf8_fold(bytes, title);
     if (title != NULL || label_count > 0)
         bytes_text(bytes, "\n");
     for (size_t i = 0; i < label_count; i++) {
-        fold_put(bytes, labels[i]);
+        utf8_fold(bytes, labels[i]);
         bytes_text(bytes, "\n");
     }
 }
@@ -100,21 +100,21 @@ static Status fold(const char *text, const char *before, const char *after, char
     if (text == NULL)
         return STATUS_OK;
     bytes_text(&bytes, before);
-    fold_put(&bytes, text);
+    utf8_fold(&bytes, text);
     bytes_text(&bytes, after);
     *folded = bytes_take(&bytes, NULL);
     return *folded != NULL ? STATUS_OK : STATUS_NO_MEMORY;
 }
 
-static Status find_place(Store *store, const JobSearch *search, Asked *asked, Problem *problem) {
+static Status find_place(Db *store, const JobSearch *search, Asked *asked, Problem *problem) {
     static const char sql[] = "SELECT created_unix_ms AS before_ms, number AS before_number "
                               "FROM jobs WHERE id = :id";
     const char *before = search->before;
     bool is_found = true;
     asked->before_ms = asked->before_number = INT64_MAX;
     if (before != NULL)
-        TRY(store_first(store, sql, asked_columns, &(Asked){.id = (char *)before}, asked_columns,
-                        asked, &is_found, problem));
+        TRY(db_first(store, sql, asked_columns, &(Asked){.id = (char *)before}, asked_columns,
+                     asked, &is_found, problem));
     if (is_found)
         return STATUS_OK;
     if (search->before_unix_ms < 0)
@@ -125,7 +125,7 @@ static Status find_place(Store *store, const JobSearch *search, Asked *asked, Pr
     return STATUS_OK;
 }
 
-Status store_job_search(Store *store, const JobSearch *search, JobRows *rows, Problem *problem) {
+Status db_job_search(Db *store, const JobSearch *search, JobRows *rows, Problem *problem) {
     Asked asked = {.result = (char *)search->result,
                    .study = (char *)search->study,
                    .since = search->since_unix_ms,
@@ -142,8 +142,8 @@ Status store_job_search(Store *store, const JobSearch *search, JobRows *rows, Pr
         status = fold(search->label, "\n", "=", &asked.key);
     void *at = NULL;
     if (status == STATUS_OK)
-        status = store_all(store, choose(search), asked_columns, &asked, job_columns,
-                           sizeof *rows->at, &at, &rows->count, problem);
+        status = db_all(store, choose(search), asked_columns, &asked, job_columns, sizeof *rows->at,
+                        &at, &rows->count, problem);
     else
         (void)problem_set(problem, status, "no memory for a search");
     rows->at = at;

@@ -62,43 +62,43 @@ static Status not_found(const char *id, Problem *problem) {
     "queued = :queued, run = :run, total = :total, problem = :problem, "                           \
     "scene = CASE :state WHEN 2 THEN '' ELSE scene END"
 
-static Status add(Database *database, const void *work, Problem *problem) {
+static Status add(Sqlite *database, const void *work, Problem *problem) {
     static const char sql[] = JOB_INSERT;
     static const char uses_sql[] = "INSERT INTO job_uses (job, name) VALUES "
                                    "(last_insert_rowid(), :name) ON CONFLICT DO NOTHING";
     const JobRow *row = work;
-    TRY(database_change(database, sql, job_columns, row, NULL, problem));
+    TRY(sqlite_change(database, sql, job_columns, row, NULL, problem));
     return row->state < 2 ? use_lines_add(database, uses_sql, row->uses, problem) : STATUS_OK;
 }
 
-Status store_job_add(Store *store, const JobRow *row, Problem *problem) {
-    return store_write(store, add, row, problem);
+Status db_job_add(Db *store, const JobRow *row, Problem *problem) {
+    return db_write(store, add, row, problem);
 }
 
-Status store_job_post(Store *store, const JobRow *row, StoreTurn turn, const StoreDone *done,
-                      StoreTicket **ticket) {
-    return store_post(store, add, row, 0, turn, done, ticket);
+Status db_job_post(Db *store, const JobRow *row, WritePriority turn, const WriteDone *done,
+                   PendingWrite **ticket) {
+    return db_enqueue(store, add, row, 0, turn, done, ticket);
 }
 
-Status job_row_save(Database *database, const JobRow *row, Problem *problem) {
+Status job_row_save(Sqlite *database, const JobRow *row, Problem *problem) {
     static const char change_sql[] = "UPDATE jobs " JOB_CHANGE " WHERE id = :id";
     static const char put_sql[] = JOB_INSERT " ON CONFLICT (id) DO UPDATE " JOB_CHANGE;
     int changes;
-    TRY(database_change(database, row->is_unsaved ? put_sql : change_sql, job_columns, row,
-                        &changes, problem));
+    TRY(sqlite_change(database, row->is_unsaved ? put_sql : change_sql, job_columns, row, &changes,
+                      problem));
     return changes > 0 ? STATUS_OK : not_found(row->id, problem);
 }
 
-static Status save(Database *database, const void *work, Problem *problem) {
+static Status save(Sqlite *database, const void *work, Problem *problem) {
     return job_row_save(database, work, problem);
 }
 
-Status store_job_update(Store *store, const JobRow *row, Problem *problem) {
-    return store_write(store, save, row, problem);
+Status db_job_update(Db *store, const JobRow *row, Problem *problem) {
+    return db_write(store, save, row, problem);
 }
 
-Status store_job_update_post(Store *store, const JobRow *row, const StoreDone *done) {
-    return store_post(store, save, row, 0, STORE_NOW, done, NULL);
+Status db_job_update_post(Db *store, const JobRow *row, const WriteDone *done) {
+    return db_enqueue(store, save, row, 0, STORE_NOW, done, NULL);
 }
 
 typedef struct Key {
@@ -108,12 +108,12 @@ typedef struct Key {
 static const RowColumn key_columns[] = {ROW_COLUMN(Key, id, COLUMN_TEXT),
                                         ROW_COLUMN(Key, most, COLUMN_COUNT), ROW_END};
 
-Status store_job_load(Store *store, const char *id, JobRow *row, Problem *problem) {
+Status db_job_load(Db *store, const char *id, JobRow *row, Problem *problem) {
     static const char sql[] = "SELECT " JOB_SHOWN " FROM jobs WHERE id = :id";
     const Key key = {(char *)id, 0};
     bool is_found;
     memset(row, 0, sizeof *row);
-    TRY(store_first(store, sql, key_columns, &key, job_columns, row, &is_found, problem));
+    TRY(db_first(store, sql, key_columns, &key, job_columns, row, &is_found, problem));
     return is_found ? STATUS_OK : not_found(id, problem);
 }
 
@@ -125,7 +125,7 @@ static const RowColumn asked_columns[] = {ROW_COLUMN(Asked, id, COLUMN_NAME),
                                           ROW_COLUMN(Asked, result, COLUMN_NAME),
                                           ROW_COLUMN(Asked, scene, COLUMN_TEXT), ROW_END};
 
-Status store_job_scene(Store *store, const char *id, char **scene, Problem *problem) {
+Status db_job_scene(Db *store, const char *id, char **scene, Problem *problem) {
     static const char sql[] =
         "SELECT coalesce((SELECT scene FROM jobs WHERE id = :id AND scene <> ''), "
         "(SELECT scene FROM results WHERE id = :result)) AS scene";
@@ -134,11 +134,11 @@ Status store_job_scene(Store *store, const char *id, char **scene, Problem *prob
     bool is_found;
     *scene = NULL;
     // A job may be in memory alone as yet, its result not.
-    TRY(store_job_load(store, id, &row, problem));
+    TRY(db_job_load(store, id, &row, problem));
     memcpy(asked.id, row.id, sizeof asked.id);
     memcpy(asked.result, row.result, sizeof asked.result);
     job_row_clear(&row);
-    TRY(store_first(store, sql, asked_columns, &asked, asked_columns, &asked, &is_found, problem));
+    TRY(db_first(store, sql, asked_columns, &asked, asked_columns, &asked, &is_found, problem));
     *scene = asked.scene;
     return *scene != NULL ? STATUS_OK
                           : problem_set(problem, STATUS_GONE,
@@ -150,32 +150,31 @@ Status store_job_scene(Store *store, const char *id, char **scene, Problem *prob
 typedef struct Keyed {
     char *client, *key;
 } Keyed;
-static const RowColumn keyed_columns[] = {ROW_COLUMN(Keyed, client, COLUMN_TEXT),
-                                          ROW_COLUMN(Keyed, key, COLUMN_TEXT), ROW_END};
+static const RowColumn idempotency_columns[] = {ROW_COLUMN(Keyed, client, COLUMN_TEXT),
+                                                ROW_COLUMN(Keyed, key, COLUMN_TEXT), ROW_END};
 
-Status store_job_keyed(Store *store, const char *client, const char *key, JobRow *row,
-                       Problem *problem) {
+Status db_job_keyed(Db *store, const char *client, const char *key, JobRow *row, Problem *problem) {
     static const char sql[] = "SELECT " JOB_SHOWN ", request FROM jobs "
                               "WHERE idempotency_key = :key AND coalesce(client, '') = :client";
     const Keyed keyed = {(char *)(client != NULL ? client : ""), (char *)key};
     bool is_found;
     memset(row, 0, sizeof *row);
-    TRY(store_first(store, sql, keyed_columns, &keyed, job_columns, row, &is_found, problem));
+    TRY(db_first(store, sql, idempotency_columns, &keyed, job_columns, row, &is_found, problem));
     return is_found ? STATUS_OK
                     : problem_set(problem, STATUS_NOT_FOUND, "there is no job of that key");
 }
 
-static Status load(Store *store, const char *sql, const Key *key, JobRows *rows, Problem *problem) {
+static Status load(Db *store, const char *sql, const Key *key, JobRows *rows, Problem *problem) {
     void *at;
-    const Status status = store_all(store, sql, key_columns, key, job_columns, sizeof *rows->at,
-                                    &at, &rows->count, problem);
+    const Status status = db_all(store, sql, key_columns, key, job_columns, sizeof *rows->at, &at,
+                                 &rows->count, problem);
     rows->at = at;
     if (status != STATUS_OK)
         job_rows_clear(rows);
     return status;
 }
 
-Status store_job_unfinished(Store *store, JobRows *rows, Problem *problem) {
+Status db_job_unfinished(Db *store, JobRows *rows, Problem *problem) {
     static const char sql[] =
         "SELECT " JOB_SHORT ", scene FROM jobs WHERE state < 2 ORDER BY number";
     return load(store, sql, &(Key){0}, rows, problem);

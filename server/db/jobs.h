@@ -15,6 +15,6 @@ extern const RowColumn job_columns[];
 #define JOB_SHOWN JOB_SHORT ", EXISTS (SELECT 1 FROM results WHERE id = jobs.result) AS has_result"
 // Within a transaction: all that changes of a job, or the whole where it is_unsaved.
 // STATUS_NOT_FOUND.
-Status job_row_save(Database *database, const JobRow *row, Problem *problem);
+Status job_row_save(Sqlite *database, const JobRow *row, Problem *problem);
 
 #endif

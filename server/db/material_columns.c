@@ -59,27 +59,27 @@ const RowColumn material_measurement_columns[] = {
     ROW_END
 };
 
-#define OF_ROW(member, kind_) ROW_COLUMN_AS(MaterialBrief, row.member, #member, kind_)
+#define OF_ROW(member, kind_) ROW_COLUMN_AS(MeasurementSummary, row.member, #member, kind_)
 const RowColumn material_brief_columns[] = {
     OF_ROW(slug, COLUMN_TEXT),
     OF_ROW(measurement, COLUMN_COUNT),
     OF_ROW(author, COLUMN_TEXT),
     OF_ROW(comment, COLUMN_TEXT),
     OF_ROW(created_unix_ms, COLUMN_INTEGER),
-    ROW_COLUMN_AS(MaterialBrief, row.document, "head", COLUMN_TEXT),
-    ROW_COLUMN(MaterialBrief, drops, COLUMN_COUNT),
-    ROW_COLUMN(MaterialBrief, traces, COLUMN_COUNT),
+    ROW_COLUMN_AS(MeasurementSummary, row.document, "head", COLUMN_TEXT),
+    ROW_COLUMN(MeasurementSummary, drops, COLUMN_COUNT),
+    ROW_COLUMN(MeasurementSummary, traces, COLUMN_COUNT),
     ROW_END
 };
 
 const RowColumn material_deed_columns[] = {
-    ROW_COLUMN(MaterialDeed, version, COLUMN_COUNT),
-    ROW_COLUMN(MaterialDeed, action, COLUMN_TEXT),
-    ROW_COLUMN(MaterialDeed, revision, COLUMN_COUNT),
-    ROW_COLUMN(MaterialDeed, measurement, COLUMN_COUNT),
-    ROW_COLUMN(MaterialDeed, who, COLUMN_TEXT),
-    ROW_COLUMN(MaterialDeed, why, COLUMN_TEXT),
-    ROW_COLUMN(MaterialDeed, created_unix_ms, COLUMN_INTEGER),
+    ROW_COLUMN(AuditEntry, version, COLUMN_COUNT),
+    ROW_COLUMN(AuditEntry, action, COLUMN_TEXT),
+    ROW_COLUMN(AuditEntry, revision, COLUMN_COUNT),
+    ROW_COLUMN(AuditEntry, measurement, COLUMN_COUNT),
+    ROW_COLUMN(AuditEntry, who, COLUMN_TEXT),
+    ROW_COLUMN(AuditEntry, why, COLUMN_TEXT),
+    ROW_COLUMN(AuditEntry, created_unix_ms, COLUMN_INTEGER),
     ROW_END
 };
 

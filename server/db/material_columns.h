@@ -18,18 +18,17 @@ typedef struct MaterialKey {
     char status[16], author[72]; // of that revision, "" where there is none or nobody is known
 } MaterialKey;
 extern const RowColumn material_key_columns[];
-Status material_key_find(Database *database, const char *slug, uint64_t revision, MaterialKey *key,
+Status material_key_find(Sqlite *database, const char *slug, uint64_t revision, MaterialKey *key,
                          Problem *problem);
 
 // Adds a row each, without judging and without the trail; the material exists, but for the first.
-Status material_row_add(Database *database, const char *slug, Problem *problem);
-Status material_revision_add(Database *database, const MaterialRevision *revision,
-                             Problem *problem);
-Status material_review_add(Database *database, const MaterialReview *review, Problem *problem);
-Status material_measurement_add(Database *database, const MaterialMeasurement *measurement,
+Status material_row_add(Sqlite *database, const char *slug, Problem *problem);
+Status material_revision_add(Sqlite *database, const MaterialRevision *revision, Problem *problem);
+Status material_review_add(Sqlite *database, const MaterialReview *review, Problem *problem);
+Status material_measurement_add(Sqlite *database, const MaterialMeasurement *measurement,
                                 Problem *problem);
 // Notes what was done to `slug`.
-Status material_deed_add(Database *database, const char *slug, const MaterialDeed *deed,
-                         Problem *problem);
+Status audit_entry_add(Sqlite *database, const char *slug, const AuditEntry *deed,
+                       Problem *problem);
 
 #endif

@@ -26,27 +26,27 @@ static const RowColumn moment_columns[] = {
 };
 // clang-format on
 
-Status store_material_moment(Store *store, MaterialMoment *moment, Problem *problem) {
+Status db_material_moment(Db *store, MaterialMoment *moment, Problem *problem) {
     static const char sql[] =
         "SELECT (SELECT coalesce(max(number), 0) FROM material_revisions) AS revisions, "
         "(SELECT coalesce(max(number), 0) FROM material_reviews) AS reviews, "
         "(SELECT coalesce(max(number), 0) FROM material_measurements) AS measurements";
     bool is_found;
     *moment = (MaterialMoment){0, 0, 0};
-    return store_first(store, sql, NULL, NULL, moment_columns, moment, &is_found, problem);
+    return db_first(store, sql, NULL, NULL, moment_columns, moment, &is_found, problem);
 }
 
-static Status first_revision(Store *store, const char *sql, const Key *key,
-                             MaterialRevision *revision, bool *is_found, Problem *problem) {
+static Status first_revision(Db *store, const char *sql, const Key *key, MaterialRevision *revision,
+                             bool *is_found, Problem *problem) {
     memset(revision, 0, sizeof *revision);
-    return store_first(store, sql, key_columns, key, material_revision_columns, revision, is_found,
-                       problem);
+    return db_first(store, sql, key_columns, key, material_revision_columns, revision, is_found,
+                    problem);
 }
 
 // CROSS and + keep the database to slugs in order: all revisions up to a number would be sorted
 // for each material.
-Status store_material_behind(Store *store, const MaterialMoment *moment, const char *slug,
-                             MaterialRevision *revision, bool *is_found, Problem *problem) {
+Status db_material_behind(Db *store, const MaterialMoment *moment, const char *slug,
+                          MaterialRevision *revision, bool *is_found, Problem *problem) {
     static const char sql[] =
         "SELECT m.slug, r.* FROM materials m CROSS JOIN material_revisions r ON r.material = "
         "m.number "
@@ -55,9 +55,9 @@ Status store_material_behind(Store *store, const MaterialMoment *moment, const c
     return first_revision(store, sql, &key, revision, is_found, problem);
 }
 
-Status store_revision_behind(Store *store, const MaterialMoment *moment, const char *slug,
-                             uint64_t number, MaterialRevision *revision, bool *is_found,
-                             Problem *problem) {
+Status db_revision_behind(Db *store, const MaterialMoment *moment, const char *slug,
+                          uint64_t number, MaterialRevision *revision, bool *is_found,
+                          Problem *problem) {
     static const char sql[] =
         "SELECT m.slug, r.* FROM materials m JOIN material_revisions r ON r.material = m.number "
         "WHERE m.slug = :slug AND r.revision > :number AND r.number <= :revisions "
@@ -66,28 +66,28 @@ Status store_revision_behind(Store *store, const MaterialMoment *moment, const c
     return first_revision(store, sql, &key, revision, is_found, problem);
 }
 
-Status store_reviews_of(Store *store, const MaterialMoment *moment, const char *slug,
-                        uint64_t revision, MaterialReviews *reviews, Problem *problem) {
+Status db_reviews_of(Db *store, const MaterialMoment *moment, const char *slug, uint64_t revision,
+                     MaterialReviews *reviews, Problem *problem) {
     static const char sql[] =
         "SELECT m.slug, v.* FROM materials m JOIN material_reviews v ON v.material = m.number "
         "WHERE m.slug = :slug AND v.revision = :number AND v.number <= :reviews ORDER BY v.number";
     const Key key = {(char *)slug, revision, *moment};
     void *at;
-    const Status status = store_all(store, sql, key_columns, &key, material_review_columns,
-                                    sizeof *reviews->at, &at, &reviews->count, problem);
+    const Status status = db_all(store, sql, key_columns, &key, material_review_columns,
+                                 sizeof *reviews->at, &at, &reviews->count, problem);
     reviews->at = at;
     return status;
 }
 
-Status store_measurement_behind(Store *store, const MaterialMoment *moment, const char *slug,
-                                uint64_t number, MaterialMeasurement *measurement, bool *is_found,
-                                Problem *problem) {
+Status db_measurement_behind(Db *store, const MaterialMoment *moment, const char *slug,
+                             uint64_t number, MaterialMeasurement *measurement, bool *is_found,
+                             Problem *problem) {
     static const char sql[] =
         "SELECT m.slug, t.* FROM materials m JOIN material_measurements t ON t.material = m.number "
         "WHERE m.slug = :slug AND t.measurement > :number AND t.number <= :measurements "
         "ORDER BY t.measurement LIMIT 1";
     const Key key = {(char *)slug, number, *moment};
     memset(measurement, 0, sizeof *measurement);
-    return store_first(store, sql, key_columns, &key, material_measurement_columns, measurement,
-                       is_found, problem);
+    return db_first(store, sql, key_columns, &key, material_measurement_columns, measurement,
+                    is_found, problem);
 }

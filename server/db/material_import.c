@@ -13,7 +13,7 @@
 
 enum { POINTER_SIZE = sizeof((Fault){0}.pointer) };
 
-static Status load_revision(Database *database, const char *slug, uint64_t number,
+static Status load_revision(Sqlite *database, const char *slug, uint64_t number,
                             MaterialRevision *revision, Problem *problem) {
     static const char sql[] =
         "SELECT m.slug, r.* FROM materials m JOIN material_revisions r ON r.material = m.number "
@@ -21,9 +21,9 @@ static Status load_revision(Database *database, const char *slug, uint64_t numbe
     return import_load(database, sql, slug, number, material_revision_columns, revision, problem);
 }
 
-static void compare_revision(const Walk *walk, const ImportRevision *ours,
-                             const MaterialRevision *there, Group *group) {
-    const ImportMark *mark = &ours->mark;
+static void compare_revision(const ImportContext *walk, const ImportRevision *ours,
+                             const MaterialRevision *there, MaterialGroup *group) {
+    const RowInfo *mark = &ours->mark;
     const size_t faults = walk->faults->count;
     if (!walk->import->is_partial)
         (void)walk->import->says_same(&ours->said, there, mark->place, walk->faults);
@@ -37,8 +37,8 @@ static void compare_revision(const Walk *walk, const ImportRevision *ours,
 }
 
 // A revision that says again what another one says.
-static Status judge_reverts(const Walk *walk, Database *database, const ImportRevision *ours,
-                            uint64_t number, const Group *group, Problem *problem) {
+static Status judge_reverts(const ImportContext *walk, Sqlite *database, const ImportRevision *ours,
+                            uint64_t number, const MaterialGroup *group, Problem *problem) {
     const uint64_t again = ours->said.reverts;
     MaterialRevision there = {0};
     if (again == 0)
@@ -65,7 +65,8 @@ static Status judge_reverts(const Walk *walk, Database *database, const ImportRe
     return STATUS_OK;
 }
 
-static void judge_measurements(const Walk *walk, const ImportRevision *ours, const Group *group) {
+static void judge_measurements(const ImportContext *walk, const ImportRevision *ours,
+                               const MaterialGroup *group) {
     const Reals *named = &ours->said.material.measurements;
     char list[POINTER_SIZE], place[POINTER_SIZE];
     json_pointer_join(list, sizeof list, ours->mark.place, "measurements");
@@ -79,10 +80,10 @@ static void judge_measurements(const Walk *walk, const ImportRevision *ours, con
     }
 }
 
-static Status add_revision(Walk *walk, Database *database, const ImportRevision *ours,
-                           uint64_t number, Group *group, Problem *problem) {
-    const ImportMark *mark = &ours->mark;
-    import_judge_origin(walk, mark, ours->said.author, ours->said.created_unix_ms);
+static Status add_revision(ImportContext *walk, Sqlite *database, const ImportRevision *ours,
+                           uint64_t number, MaterialGroup *group, Problem *problem) {
+    const RowInfo *mark = &ours->mark;
+    import_validate_origin(walk, mark, ours->said.author, ours->said.created_unix_ms);
     judge_measurements(walk, ours, group);
     TRY(judge_reverts(walk, database, ours, number, group, problem));
     group->revisions_done.added++;
@@ -97,8 +98,8 @@ static Status add_revision(Walk *walk, Database *database, const ImportRevision 
 }
 
 // One without a number is the next, unless the newest says the same already.
-static Status import_next(Walk *walk, Database *database, const ImportRevision *ours, Group *group,
-                          Problem *problem) {
+static Status import_next(ImportContext *walk, Sqlite *database, const ImportRevision *ours,
+                          MaterialGroup *group, Problem *problem) {
     MaterialRevision newest = {0};
     Status status = STATUS_OK;
     if (group->key.latest > 0)
@@ -114,8 +115,8 @@ static Status import_next(Walk *walk, Database *database, const ImportRevision *
     return status;
 }
 
-static Status import_known(Walk *walk, Database *database, const ImportRevision *ours, Group *group,
-                           Problem *problem) {
+static Status import_known(ImportContext *walk, Sqlite *database, const ImportRevision *ours,
+                           MaterialGroup *group, Problem *problem) {
     MaterialRevision there = {0};
     TRY(load_revision(database, group->slug, ours->said.revision, &there, problem));
     compare_revision(walk, ours, &there, group);
@@ -124,7 +125,8 @@ static Status import_known(Walk *walk, Database *database, const ImportRevision 
     return status;
 }
 
-static Status import_revisions(Walk *walk, Database *database, Group *group, Problem *problem) {
+static Status import_revisions(ImportContext *walk, Sqlite *database, MaterialGroup *group,
+                               Problem *problem) {
     const char *name = walk->import->revision_name;
     uint64_t before = 0, last = group->key.latest;
     for (size_t i = 0; i < group->revision_count; i++)
@@ -138,8 +140,8 @@ static Status import_revisions(Walk *walk, Database *database, Group *group, Pro
             TRY(import_next(walk, database, ours, group, problem));
             continue;
         }
-        if (import_judge_number(walk, &ours->mark, name, number, before, group->revisions_drift,
-                                &last) != STATUS_OK)
+        if (import_validate_number(walk, &ours->mark, name, number, before, group->revisions_drift,
+                                   &last) != STATUS_OK)
             continue;
         before = number;
         if (number <= group->key.latest)
@@ -150,7 +152,8 @@ static Status import_revisions(Walk *walk, Database *database, Group *group, Pro
     return STATUS_OK;
 }
 
-static Status note(const Walk *walk, Database *database, const Group *group, Problem *problem) {
+static Status note(const ImportContext *walk, Sqlite *database, const MaterialGroup *group,
+                   Problem *problem) {
     char why[160];
     if (group->revisions_done.added + group->measurements_done.added + group->reviews_done.added ==
         0)
@@ -158,11 +161,11 @@ static Status note(const Walk *walk, Database *database, const Group *group, Pro
     snprintf(why, sizeof why, "imported revisions: %zu, measurements: %zu, reviews: %zu",
              group->revisions_done.added, group->measurements_done.added,
              group->reviews_done.added);
-    const MaterialDeed deed = {.action = (char *)"import",
-                               .who = (char *)walk->import->who,
-                               .why = why,
-                               .created_unix_ms = walk->import->now_unix_ms};
-    return material_deed_add(database, group->slug, &deed, problem);
+    const AuditEntry deed = {.action = (char *)"import",
+                             .who = (char *)walk->import->who,
+                             .why = why,
+                             .created_unix_ms = walk->import->now_unix_ms};
+    return audit_entry_add(database, group->slug, &deed, problem);
 }
 
 static void count(ImportCount *all, const ImportCount *some) {
@@ -170,7 +173,8 @@ static void count(ImportCount *all, const ImportCount *some) {
     all->same += some->same;
 }
 
-static Status import_group(Walk *walk, Database *database, Group *group, Problem *problem) {
+static Status import_group(ImportContext *walk, Sqlite *database, MaterialGroup *group,
+                           Problem *problem) {
     TRY(material_key_find(database, group->slug, 0, &group->key, problem));
     if (group->key.number == 0 && group->revision_count == 0) {
         (void)import_fault(walk, group->measurements[0].mark.place, "slug",
@@ -190,15 +194,15 @@ static Status import_group(Walk *walk, Database *database, Group *group, Problem
     return STATUS_OK;
 }
 
-static Status import_all(Walk *walk, Database *database, Problem *problem) {
+static Status import_all(ImportContext *walk, Sqlite *database, Problem *problem) {
     const MaterialImport *import = walk->import;
     size_t r = 0, m = 0;
     while (r < import->revision_count || m < import->measurement_count) {
         const char *a = r < import->revision_count ? import->revisions[r].said.slug : NULL;
         const char *b = m < import->measurement_count ? import->measurements[m].made.slug : NULL;
-        Group group = {.slug = a == NULL || (b != NULL && strcmp(b, a) < 0) ? b : a,
-                       .revisions = &import->revisions[r],
-                       .measurements = &import->measurements[m]};
+        MaterialGroup group = {.slug = a == NULL || (b != NULL && strcmp(b, a) < 0) ? b : a,
+                               .revisions = &import->revisions[r],
+                               .measurements = &import->measurements[m]};
         for (; r < import->revision_count && text_same(import->revisions[r].said.slug, group.slug);
              r++)
             group.revision_count++;
@@ -212,7 +216,7 @@ static Status import_all(Walk *walk, Database *database, Problem *problem) {
     return STATUS_OK;
 }
 
-static Status refuse(const Walk *walk) {
+static Status refuse(const ImportContext *walk) {
     if (walk->faults->count > 0)
         return STATUS_INVALID;
     if (walk->denied == 0)
@@ -225,8 +229,8 @@ static Status refuse(const Walk *walk) {
 }
 
 // May be done again from its beginning.
-static Status write_all(Database *database, const void *work, Problem *problem) {
-    Walk walk = *(const Walk *)work;
+static Status write_all(Sqlite *database, const void *work, Problem *problem) {
+    ImportContext walk = *(const ImportContext *)work;
     problem_clear(walk.faults);
     *walk.tally = (ImportTally){0};
     TRY(import_all(&walk, database, problem));
@@ -234,30 +238,30 @@ static Status write_all(Database *database, const void *work, Problem *problem) 
 }
 
 // Within one transaction of a reader, so that all of it is of one moment.
-static Status judge_all(Store *store, Walk *walk, Problem *problem) {
+static Status judge_all(Db *store, ImportContext *walk, Problem *problem) {
     static const char begin[] = "BEGIN", end[] = "COMMIT";
-    Database *database = store_take(store);
-    Status status = database_change(database, begin, NULL, NULL, NULL, problem);
+    Sqlite *database = db_take(store);
+    Status status = sqlite_change(database, begin, NULL, NULL, NULL, problem);
     if (status == STATUS_OK) {
         status = import_all(walk, database, problem);
-        (void)database_change(database, end, NULL, NULL, NULL, NULL);
+        (void)sqlite_change(database, end, NULL, NULL, NULL, NULL);
     }
-    store_put(store, database);
+    db_put(store, database);
     return status == STATUS_OK ? refuse(walk) : status;
 }
 
-Status store_material_import(Store *store, const MaterialImport *import, bool is_dry,
-                             ImportTally *tally, Problem *problem) {
+Status db_material_import(Db *store, const MaterialImport *import, bool is_dry, ImportTally *tally,
+                          Problem *problem) {
     *tally = (ImportTally){0};
-    Walk walk = {.import = import, .tally = tally, .faults = problem};
+    ImportContext walk = {.import = import, .tally = tally, .faults = problem};
     if (is_dry || problem->count > 0)
         return judge_all(store, &walk, problem);
     walk.writes = true;
-    TRY(store_write(store, write_all, &walk, problem));
+    TRY(db_write(store, write_all, &walk, problem));
     if (tally->revisions.added + tally->reviews.added > 0)
-        store_catalogue_changed(store);
+        db_catalog_changed(store);
     else if (tally->measurements.added > 0)
-        store_material_measured(store);
+        db_material_measured(store);
     return STATUS_OK;
 }
 

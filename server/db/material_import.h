@@ -8,13 +8,13 @@
 enum { IMPORT_PLACE_SIZE = 64 };
 
 // What a file says of a row besides its contents.
-typedef struct ImportMark {
+typedef struct RowInfo {
     char place[IMPORT_PLACE_SIZE]; // JSON Pointer
     size_t order;                  // in the file
     bool is_faulty; // told already: its number counts, and what could be read is compared
     bool is_adrift; // it has a number that could not be read
     bool has_author, has_comment, has_created; // else the importer's, a word for it, and now
-} ImportMark;
+} RowInfo;
 
 typedef struct ImportReview {
     MaterialReview review; // but for slug and revision
@@ -22,14 +22,14 @@ typedef struct ImportReview {
 } ImportReview;
 
 typedef struct ImportRevision {
-    ImportMark mark;
+    RowInfo mark;
     MaterialRevision said; // revision 0: the next, unless the newest says the same
     ImportReview *reviews; // in their order
     size_t review_count;
 } ImportRevision;
 
 typedef struct ImportMeasurement {
-    ImportMark mark;
+    RowInfo mark;
     MaterialMeasurement made; // measurement 0: the next, unless its test is there
 } ImportMeasurement;
 
@@ -60,8 +60,8 @@ typedef struct ImportTally {
 
 // Judges all of it; adds it unless `is_dry`, or `problem` has faults already or comes to have some:
 // then nothing is written. STATUS_INVALID: the faults. Tells the catalogue's readers.
-Status store_material_import(Store *store, const MaterialImport *import, bool is_dry,
-                             ImportTally *tally, Problem *problem);
+Status db_material_import(Db *store, const MaterialImport *import, bool is_dry, ImportTally *tally,
+                          Problem *problem);
 
 void import_revision_clear(ImportRevision *revision);
 void import_measurement_clear(ImportMeasurement *measurement);

@@ -15,8 +15,8 @@ static const int64_t time_slack_ms = 24 * 3600 * (int64_t)1000;
 const RowColumn import_key_columns[] = {ROW_COLUMN(ImportKey, slug, COLUMN_TEXT),
                                         ROW_COLUMN(ImportKey, number, COLUMN_COUNT), ROW_END};
 
-Status import_fault(const Walk *walk, const char *place, const char *name, const char *format,
-                    ...) {
+Status import_fault(const ImportContext *walk, const char *place, const char *name,
+                    const char *format, ...) {
     char pointer[POINTER_SIZE], text[sizeof((Fault){0}.detail)];
     va_list arguments;
     va_start(arguments, format);
@@ -29,14 +29,14 @@ Status import_fault(const Walk *walk, const char *place, const char *name, const
     return problem_add(walk->faults, STATUS_INVALID, pointer, "%s", text);
 }
 
-void import_deny(Walk *walk, const char *place, const char *name, const char *why) {
+void import_deny(ImportContext *walk, const char *place, const char *name, const char *why) {
     if (walk->denied++ > 0)
         return;
     json_pointer_join(walk->denied_place, sizeof walk->denied_place, place, name);
     walk->denied_why = why;
 }
 
-Status import_load(Database *database, const char *sql, const char *slug, uint64_t number,
+Status import_load(Sqlite *database, const char *sql, const char *slug, uint64_t number,
                    const RowColumn *columns, void *item, Problem *problem) {
     const ImportKey key = {(char *)slug, number};
     Statement *statement;
@@ -49,7 +49,7 @@ Status import_load(Database *database, const char *sql, const char *slug, uint64
     return status;
 }
 
-void import_compare_origin(const Walk *walk, const ImportMark *mark, const char *what,
+void import_compare_origin(const ImportContext *walk, const RowInfo *mark, const char *what,
                            const ImportOrigin *ours, const ImportOrigin *there) {
     static const char never[] = "is not that of the %s that is there, and those never change";
     if (mark->has_author && !text_same(ours->author, there->author))
@@ -60,8 +60,8 @@ void import_compare_origin(const Walk *walk, const ImportMark *mark, const char 
         (void)import_fault(walk, mark->place, "created", never, what);
 }
 
-Status import_judge_number(const Walk *walk, const ImportMark *mark, const char *name,
-                           uint64_t number, uint64_t before, bool drifts, uint64_t *last) {
+Status import_validate_number(const ImportContext *walk, const RowInfo *mark, const char *name,
+                              uint64_t number, uint64_t before, bool drifts, uint64_t *last) {
     if (number == before)
         return import_fault(walk, mark->place, name, "stands in the file twice, %llu",
                             (unsigned long long)number);
@@ -76,12 +76,12 @@ Status import_judge_number(const Walk *walk, const ImportMark *mark, const char 
                         (unsigned long long)next, (unsigned long long)number);
 }
 
-const char *import_author(const Walk *walk, const ImportMark *mark, const char *author) {
+const char *import_author(const ImportContext *walk, const RowInfo *mark, const char *author) {
     return mark->has_author && walk->import->may_all ? author : walk->import->who;
 }
 
-void import_judge_time(const Walk *walk, const char *place, int64_t unix_ms,
-                       int64_t revised_unix_ms) {
+void import_validate_time(const ImportContext *walk, const char *place, int64_t unix_ms,
+                          int64_t revised_unix_ms) {
     if (unix_ms > walk->import->now_unix_ms + time_slack_ms)
         (void)import_fault(walk, place, "created", "lies in the future");
     else if (unix_ms < revised_unix_ms - time_slack_ms)
@@ -89,13 +89,13 @@ void import_judge_time(const Walk *walk, const char *place, int64_t unix_ms,
                            "lies before the revision was written; give that its \"created\", too");
 }
 
-void import_judge_origin(Walk *walk, const ImportMark *mark, const char *author,
-                         int64_t created_unix_ms) {
+void import_validate_origin(ImportContext *walk, const RowInfo *mark, const char *author,
+                            int64_t created_unix_ms) {
     const bool may_all = walk->import->may_all;
     if (!may_all && mark->has_author && author != NULL && !text_same(author, walk->import->who))
         import_deny(walk, mark->place, "author", "is somebody else");
     if (!may_all && mark->has_created)
         import_deny(walk, mark->place, "created", "is a time of the file's own");
     if (mark->has_created)
-        import_judge_time(walk, mark->place, created_unix_ms, 0);
+        import_validate_time(walk, mark->place, created_unix_ms, 0);
 }

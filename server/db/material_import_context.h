@@ -6,7 +6,7 @@
 #include "server/db/material_columns.h"
 #include "server/db/material_import.h"
 
-typedef struct Walk {
+typedef struct ImportContext {
     const MaterialImport *import;
     bool writes;
     ImportTally *tally;
@@ -14,10 +14,10 @@ typedef struct Walk {
     size_t denied;                                 // rows that the importer may not bring
     char denied_place[sizeof((Fault){0}.pointer)]; // the first of them
     const char *denied_why;
-} Walk;
+} ImportContext;
 
 // One material of the file, and how far it is.
-typedef struct Group {
+typedef struct MaterialGroup {
     const char *slug;
     MaterialKey key;
     const ImportRevision *revisions;
@@ -27,33 +27,33 @@ typedef struct Group {
     uint64_t last_measurement;                // there, or in the file before
     bool revisions_drift, measurements_drift; // one has a number that could not be read
     ImportCount revisions_done, measurements_done, reviews_done;
-} Group;
+} MaterialGroup;
 
 // Adds a fault at `name` below `place`; "": at `place` itself. STATUS_INVALID.
-Status import_fault(const Walk *walk, const char *place, const char *name, const char *format, ...)
-    __attribute__((format(printf, 4, 5)));
+Status import_fault(const ImportContext *walk, const char *place, const char *name,
+                    const char *format, ...) __attribute__((format(printf, 4, 5)));
 // Counts what the importer may not bring.
-void import_deny(Walk *walk, const char *place, const char *name, const char *why);
+void import_deny(ImportContext *walk, const char *place, const char *name, const char *why);
 
-const char *import_author(const Walk *walk, const ImportMark *mark, const char *author);
+const char *import_author(const ImportContext *walk, const RowInfo *mark, const char *author);
 // Of a row that is not there yet: who wrote it, and when.
-void import_judge_origin(Walk *walk, const ImportMark *mark, const char *author,
-                         int64_t created_unix_ms);
+void import_validate_origin(ImportContext *walk, const RowInfo *mark, const char *author,
+                            int64_t created_unix_ms);
 // A time is told at "created" below `place` where it lies ahead, or before that of the revision
 // reviewed; 0: of none.
-void import_judge_time(const Walk *walk, const char *place, int64_t unix_ms,
-                       int64_t revised_unix_ms);
+void import_validate_time(const ImportContext *walk, const char *place, int64_t unix_ms,
+                          int64_t revised_unix_ms);
 // Who, when and why, as far as the file tells it.
 typedef struct ImportOrigin {
     const char *author, *comment;
     int64_t created_unix_ms;
 } ImportOrigin;
-void import_compare_origin(const Walk *walk, const ImportMark *mark, const char *what,
+void import_compare_origin(const ImportContext *walk, const RowInfo *mark, const char *what,
                            const ImportOrigin *ours, const ImportOrigin *there);
 // A number that is not there must be the one behind `last`, which it becomes; where numbers drift
 // it may be any.
-Status import_judge_number(const Walk *walk, const ImportMark *mark, const char *name,
-                           uint64_t number, uint64_t before, bool drifts, uint64_t *last);
+Status import_validate_number(const ImportContext *walk, const RowInfo *mark, const char *name,
+                              uint64_t number, uint64_t before, bool drifts, uint64_t *last);
 
 typedef struct ImportKey {
     char *slug;
@@ -61,12 +61,13 @@ typedef struct ImportKey {
 } ImportKey;
 extern const RowColumn import_key_columns[];
 // The row of that number into `item`, which is all zero before and where there is none.
-Status import_load(Database *database, const char *sql, const char *slug, uint64_t number,
+Status import_load(Sqlite *database, const char *sql, const char *slug, uint64_t number,
                    const RowColumn *columns, void *item, Problem *problem);
 
-Status import_measurements(Walk *walk, Database *database, Group *group, Problem *problem);
+Status import_measurements(ImportContext *walk, Sqlite *database, MaterialGroup *group,
+                           Problem *problem);
 // Those of one revision, `said`, which is there already or has been added.
-Status import_reviews(Walk *walk, Database *database, const ImportRevision *ours,
-                      const MaterialRevision *said, Group *group, Problem *problem);
+Status import_reviews(ImportContext *walk, Sqlite *database, const ImportRevision *ours,
+                      const MaterialRevision *said, MaterialGroup *group, Problem *problem);
 
 #endif

@@ -12,12 +12,13 @@ typedef struct Unnumbered {
     size_t count;
 } Unnumbered;
 
-static Status compare_measurement(const Walk *walk, Database *database,
-                                  const ImportMeasurement *ours, Group *group, Problem *problem) {
+static Status compare_measurement(const ImportContext *walk, Sqlite *database,
+                                  const ImportMeasurement *ours, MaterialGroup *group,
+                                  Problem *problem) {
     static const char sql[] =
         "SELECT t.* FROM materials m JOIN material_measurements t ON t.material = m.number "
         "WHERE m.slug = :slug AND t.measurement = :number";
-    const ImportMark *mark = &ours->mark;
+    const RowInfo *mark = &ours->mark;
     MaterialMeasurement there = {0};
     TRY(import_load(database, sql, group->slug, ours->made.measurement,
                     material_measurement_columns, &there, problem));
@@ -34,10 +35,10 @@ static Status compare_measurement(const Walk *walk, Database *database,
     return STATUS_OK;
 }
 
-static Status add_measurement(Walk *walk, Database *database, const ImportMeasurement *ours,
-                              Group *group, Problem *problem) {
-    const ImportMark *mark = &ours->mark;
-    import_judge_origin(walk, mark, ours->made.author, ours->made.created_unix_ms);
+static Status add_measurement(ImportContext *walk, Sqlite *database, const ImportMeasurement *ours,
+                              MaterialGroup *group, Problem *problem) {
+    const RowInfo *mark = &ours->mark;
+    import_validate_origin(walk, mark, ours->made.author, ours->made.created_unix_ms);
     group->measurements_done.added++;
     if (!walk->writes || walk->faults->count > 0)
         return STATUS_OK;
@@ -62,7 +63,7 @@ static bool *find_unnumbered(const Unnumbered *unnumbered, const char *document)
 }
 
 // Reads the material's measurements once, however many the file has.
-static Status match_unnumbered(Database *database, const Group *group, Unnumbered *unnumbered,
+static Status match_unnumbered(Sqlite *database, const MaterialGroup *group, Unnumbered *unnumbered,
                                Problem *problem) {
     static const char sql[] =
         "SELECT t.* FROM materials m JOIN material_measurements t ON t.material = m.number "
@@ -86,7 +87,7 @@ static Status match_unnumbered(Database *database, const Group *group, Unnumbere
 }
 
 // What is faulty has no document and counts as new.
-static Status load_unnumbered(Database *database, const Group *group, Unnumbered *unnumbered,
+static Status load_unnumbered(Sqlite *database, const MaterialGroup *group, Unnumbered *unnumbered,
                               Problem *problem) {
     const size_t most = group->measurement_count + 1;
     unnumbered->documents = calloc(most, sizeof *unnumbered->documents);
@@ -109,8 +110,8 @@ static void unnumbered_clear(Unnumbered *unnumbered) {
     free(unnumbered->are_there);
 }
 
-static Status import_all(Walk *walk, Database *database, const Unnumbered *unnumbered, Group *group,
-                         Problem *problem) {
+static Status import_all(ImportContext *walk, Sqlite *database, const Unnumbered *unnumbered,
+                         MaterialGroup *group, Problem *problem) {
     const char *name = walk->import->measurement_name;
     uint64_t before = 0;
     group->last_measurement = group->key.measurements;
@@ -130,9 +131,9 @@ static Status import_all(Walk *walk, Database *database, const Unnumbered *unnum
         }
         if (number == 0)
             group->last_measurement++;
-        else if (import_judge_number(walk, &ours->mark, name, number, before,
-                                     group->measurements_drift,
-                                     &group->last_measurement) != STATUS_OK)
+        else if (import_validate_number(walk, &ours->mark, name, number, before,
+                                        group->measurements_drift,
+                                        &group->last_measurement) != STATUS_OK)
             continue;
         before = number;
         if (number > 0 && number <= group->key.measurements)
@@ -143,7 +144,8 @@ static Status import_all(Walk *walk, Database *database, const Unnumbered *unnum
     return STATUS_OK;
 }
 
-Status import_measurements(Walk *walk, Database *database, Group *group, Problem *problem) {
+Status import_measurements(ImportContext *walk, Sqlite *database, MaterialGroup *group,
+                           Problem *problem) {
     Unnumbered unnumbered = {.count = 0};
     Status status = load_unnumbered(database, group, &unnumbered, problem);
     if (status == STATUS_OK)

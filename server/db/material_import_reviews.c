@@ -20,8 +20,8 @@ static void reviews_clear(Reviews *reviews) {
     *reviews = (Reviews){0};
 }
 
-static Status load_reviews(Database *database, const char *slug, uint64_t revision,
-                           Reviews *reviews, Problem *problem) {
+static Status load_reviews(Sqlite *database, const char *slug, uint64_t revision, Reviews *reviews,
+                           Problem *problem) {
     static const char sql[] =
         "SELECT v.* FROM materials m JOIN material_reviews v ON v.material = m.number "
         "WHERE m.slug = :slug AND v.revision = :number ORDER BY v.number";
@@ -60,7 +60,7 @@ static bool is_review(const ImportReview *ours, const MaterialReview *there) {
 
 // What a review that is not there yet must not be. One whose reviewer nobody knows may be the
 // importer's own.
-static Status judge_review(const Walk *walk, const char *place, const ImportReview *ours,
+static Status judge_review(const ImportContext *walk, const char *place, const ImportReview *ours,
                            const char *before, const MaterialRevision *said) {
     const MaterialReview *review = &ours->review;
     const bool is_known = ours->has_reviewer && review->reviewer != NULL;
@@ -73,12 +73,12 @@ static Status judge_review(const Walk *walk, const char *place, const ImportRevi
                             "%s the revision's author, %.64s, and nobody approves their own",
                             is_known ? "is" : "must be told, else it is", said->author);
     if (ours->has_created)
-        import_judge_time(walk, place, review->created_unix_ms, said->created_unix_ms);
+        import_validate_time(walk, place, review->created_unix_ms, said->created_unix_ms);
     return STATUS_OK;
 }
 
-static Status add_review(const Walk *walk, Database *database, const char *slug, uint64_t revision,
-                         const ImportReview *ours, Problem *problem) {
+static Status add_review(const ImportContext *walk, Sqlite *database, const char *slug,
+                         uint64_t revision, const ImportReview *ours, Problem *problem) {
     MaterialReview review = ours->review;
     review.slug = (char *)slug;
     review.revision = revision;
@@ -89,9 +89,9 @@ static Status add_review(const Walk *walk, Database *database, const char *slug,
     return material_review_add(database, &review, problem);
 }
 
-static Status match_reviews(Walk *walk, Database *database, const ImportRevision *ours,
-                            const MaterialRevision *said, const Reviews *there, Group *group,
-                            Problem *problem) {
+static Status match_reviews(ImportContext *walk, Sqlite *database, const ImportRevision *ours,
+                            const MaterialRevision *said, const Reviews *there,
+                            MaterialGroup *group, Problem *problem) {
     char list[POINTER_SIZE], place[POINTER_SIZE];
     const char *before = there->count > 0 ? there->at[there->count - 1].status : "draft";
     // Of a faulty row the time may be what could not be read.
@@ -127,8 +127,8 @@ static Status match_reviews(Walk *walk, Database *database, const ImportRevision
     return STATUS_OK;
 }
 
-Status import_reviews(Walk *walk, Database *database, const ImportRevision *ours,
-                      const MaterialRevision *said, Group *group, Problem *problem) {
+Status import_reviews(ImportContext *walk, Sqlite *database, const ImportRevision *ours,
+                      const MaterialRevision *said, MaterialGroup *group, Problem *problem) {
     Reviews there = {0};
     if (ours->review_count == 0)
         return STATUS_OK;

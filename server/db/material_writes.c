@@ -4,7 +4,7 @@
 
 #include "server/db/material_columns.h"
 
-Status material_key_find(Database *database, const char *slug, uint64_t revision, MaterialKey *key,
+Status material_key_find(Sqlite *database, const char *slug, uint64_t revision, MaterialKey *key,
                          Problem *problem) {
     // Not by the view, of which a join would make all rows.
     static const char sql[] =
@@ -35,7 +35,7 @@ Status material_key_find(Database *database, const char *slug, uint64_t revision
 }
 
 // A material that is there, at the version that its writer saw.
-static Status require(Database *database, const char *slug, uint64_t revision, uint64_t version,
+static Status require(Sqlite *database, const char *slug, uint64_t revision, uint64_t version,
                       MaterialKey *key, Problem *problem) {
     TRY(material_key_find(database, slug, revision, key, problem));
     if (key->number == 0)
@@ -59,13 +59,13 @@ static int64_t length(const char *text) {
 }
 
 // Room for a row with that many bytes of texts, within the transaction that adds it.
-static Status take_room(Database *database, int64_t bytes, Problem *problem) {
+static Status take_room(Sqlite *database, int64_t bytes, Problem *problem) {
     enum { ROW = 200 };
     static const char sql[] =
         "UPDATE material_room SET bytes = bytes + :bytes WHERE bytes + :bytes <= :most";
     const Room room = {ROW + bytes, CATALOGUE_BYTES};
     int changes = 0;
-    TRY(database_change(database, sql, room_columns, &room, &changes, problem));
+    TRY(sqlite_change(database, sql, room_columns, &room, &changes, problem));
     if (changes > 0)
         return STATUS_OK;
     return problem_set(problem, STATUS_LIMIT,
@@ -83,22 +83,21 @@ static Status require_number(uint64_t number, uint64_t most, const char *slug, c
                              slug, (unsigned long long)most, what);
 }
 
-Status material_row_add(Database *database, const char *slug, Problem *problem) {
+Status material_row_add(Sqlite *database, const char *slug, Problem *problem) {
     // None is ever deleted: the highest number is how many there are.
     static const char sql[] = "INSERT INTO materials (slug) SELECT :slug WHERE (SELECT "
                               "coalesce(max(number), 0) FROM materials) < :revision";
     const MaterialKey key = {.slug = (char *)slug, .revision = CATALOGUE_MATERIALS};
     int changes = 0;
     TRY(take_room(database, length(slug), problem));
-    TRY(database_change(database, sql, material_key_columns, &key, &changes, problem));
+    TRY(sqlite_change(database, sql, material_key_columns, &key, &changes, problem));
     return changes > 0 ? STATUS_OK
                        : problem_set(problem, STATUS_LIMIT,
                                      "%d materials are kept, no more: revise one that is there",
                                      CATALOGUE_MATERIALS);
 }
 
-Status material_revision_add(Database *database, const MaterialRevision *revision,
-                             Problem *problem) {
+Status material_revision_add(Sqlite *database, const MaterialRevision *revision, Problem *problem) {
     static const char sql[] =
         "INSERT INTO material_revisions (material, revision, name, kind, thickness, hardness, "
         "supplier, notes, restitution, restitution_deviation, contact_time, "
@@ -118,19 +117,19 @@ Status material_revision_add(Database *database, const MaterialRevision *revisio
                       length(said->supplier) + length(said->notes) + length(said->impactor) +
                       length(said->source) + length(revision->lists) + length(revision->comment),
                   problem));
-    return database_change(database, sql, material_revision_columns, revision, NULL, problem);
+    return sqlite_change(database, sql, material_revision_columns, revision, NULL, problem);
 }
 
-Status material_review_add(Database *database, const MaterialReview *review, Problem *problem) {
+Status material_review_add(Sqlite *database, const MaterialReview *review, Problem *problem) {
     static const char sql[] =
         "INSERT INTO material_reviews (material, revision, status, reason, reviewer, "
         "created_unix_ms) SELECT number, :revision, :status, :reason, :reviewer, :created_unix_ms "
         "FROM materials WHERE slug = :slug";
     TRY(take_room(database, length(review->reason), problem));
-    return database_change(database, sql, material_review_columns, review, NULL, problem);
+    return sqlite_change(database, sql, material_review_columns, review, NULL, problem);
 }
 
-Status material_measurement_add(Database *database, const MaterialMeasurement *measurement,
+Status material_measurement_add(Sqlite *database, const MaterialMeasurement *measurement,
                                 Problem *problem) {
     static const char sql[] =
         "INSERT INTO material_measurements (material, measurement, author, comment, "
@@ -141,12 +140,12 @@ Status material_measurement_add(Database *database, const MaterialMeasurement *m
     TRY(require_number(measurement->measurement, CATALOGUE_MEASUREMENTS, measurement->slug,
                        "measurements", problem));
     TRY(take_room(database, length(measurement->comment) + length(measurement->document), problem));
-    return database_change(database, sql, material_measurement_columns, measurement, NULL, problem);
+    return sqlite_change(database, sql, material_measurement_columns, measurement, NULL, problem);
 }
 
 typedef struct SlugDeed {
     char *slug;
-    MaterialDeed deed;
+    AuditEntry deed;
 } SlugDeed;
 // clang-format off
 static const RowColumn slug_deed_columns[] = {
@@ -161,8 +160,8 @@ static const RowColumn slug_deed_columns[] = {
 };
 // clang-format on
 
-Status material_deed_add(Database *database, const char *slug, const MaterialDeed *deed,
-                         Problem *problem) {
+Status audit_entry_add(Sqlite *database, const char *slug, const AuditEntry *deed,
+                       Problem *problem) {
     static const char sql[] =
         "INSERT INTO material_trail (material, version, action, revision, measurement, who, why, "
         "created_unix_ms) SELECT number, 1 + (SELECT coalesce(max(version), 0) FROM "
@@ -170,22 +169,22 @@ Status material_deed_add(Database *database, const char *slug, const MaterialDee
         "nullif(:measurement, 0), :who, :why, :created_unix_ms FROM materials m WHERE slug = :slug";
     const SlugDeed both = {(char *)slug, *deed};
     TRY(take_room(database, length(deed->why), problem));
-    return database_change(database, sql, slug_deed_columns, &both, NULL, problem);
+    return sqlite_change(database, sql, slug_deed_columns, &both, NULL, problem);
 }
 
 // A revision and its entry in the trail.
-static Status put_revision(Database *database, const MaterialRevision *revision, char *action,
+static Status put_revision(Sqlite *database, const MaterialRevision *revision, char *action,
                            Problem *problem) {
-    const MaterialDeed deed = {.action = action,
-                               .revision = revision->revision,
-                               .who = revision->author,
-                               .why = revision->comment,
-                               .created_unix_ms = revision->created_unix_ms};
+    const AuditEntry deed = {.action = action,
+                             .revision = revision->revision,
+                             .who = revision->author,
+                             .why = revision->comment,
+                             .created_unix_ms = revision->created_unix_ms};
     TRY(material_revision_add(database, revision, problem));
-    return material_deed_add(database, revision->slug, &deed, problem);
+    return audit_entry_add(database, revision->slug, &deed, problem);
 }
 
-static Status add(Database *database, const void *work, Problem *problem) {
+static Status add(Sqlite *database, const void *work, Problem *problem) {
     MaterialRevision first = *(const MaterialRevision *)work;
     MaterialKey key;
     TRY(material_key_find(database, first.slug, 0, &key, problem));
@@ -200,14 +199,14 @@ static Status add(Database *database, const void *work, Problem *problem) {
 }
 
 // Readers of the catalogue are told of what was written.
-static Status write(Store *store, StoreApply *apply, const void *work, Problem *problem) {
-    const Status status = store_write(store, apply, work, problem);
+static Status write(Db *store, StoreApply *apply, const void *work, Problem *problem) {
+    const Status status = db_write(store, apply, work, problem);
     if (status == STATUS_OK)
-        store_catalogue_changed(store);
+        db_catalog_changed(store);
     return status;
 }
 
-Status store_material_add(Store *store, const MaterialRevision *first, Problem *problem) {
+Status db_material_add(Db *store, const MaterialRevision *first, Problem *problem) {
     return write(store, add, first, problem);
 }
 
@@ -216,7 +215,7 @@ typedef struct Revise {
     uint64_t version;
 } Revise;
 
-static Status revise(Database *database, const void *work, Problem *problem) {
+static Status revise(Sqlite *database, const void *work, Problem *problem) {
     const Revise *asked = work;
     MaterialKey key;
     TRY(require(database, asked->revision->slug, 0, asked->version, &key, problem));
@@ -225,8 +224,8 @@ static Status revise(Database *database, const void *work, Problem *problem) {
                         asked->revision->reverts > 0 ? "revert" : "revise", problem);
 }
 
-Status store_material_revise(Store *store, MaterialRevision *revision, uint64_t version,
-                             Problem *problem) {
+Status db_material_revise(Db *store, MaterialRevision *revision, uint64_t version,
+                          Problem *problem) {
     return write(store, revise, &(Revise){revision, version}, problem);
 }
 
@@ -235,7 +234,7 @@ typedef struct Review {
     uint64_t version;
 } Review;
 
-static Status judge(Database *database, const void *work, Problem *problem) {
+static Status judge(Sqlite *database, const void *work, Problem *problem) {
     const Review *asked = work;
     const MaterialReview *review = asked->review;
     const bool approves = strcmp(review->status, "approved") == 0;
@@ -253,17 +252,17 @@ static Status judge(Database *database, const void *work, Problem *problem) {
                            "nobody approves their own revision: %.64s@%llu is by %.64s, somebody "
                            "else has to look at it",
                            review->slug, (unsigned long long)review->revision, key.author);
-    const MaterialDeed deed = {.action = approves ? "approve" : "deprecate",
-                               .revision = review->revision,
-                               .who = review->reviewer,
-                               .why = review->reason,
-                               .created_unix_ms = review->created_unix_ms};
+    const AuditEntry deed = {.action = approves ? "approve" : "deprecate",
+                             .revision = review->revision,
+                             .who = review->reviewer,
+                             .why = review->reason,
+                             .created_unix_ms = review->created_unix_ms};
     TRY(material_review_add(database, review, problem));
-    return material_deed_add(database, review->slug, &deed, problem);
+    return audit_entry_add(database, review->slug, &deed, problem);
 }
 
-Status store_material_review(Store *store, const MaterialReview *review, uint64_t version,
-                             Problem *problem) {
+Status db_material_review(Db *store, const MaterialReview *review, uint64_t version,
+                          Problem *problem) {
     return write(store, judge, &(Review){review, version}, problem);
 }
 
@@ -272,24 +271,24 @@ typedef struct Measure {
     uint64_t version;
 } Measure;
 
-static Status measure(Database *database, const void *work, Problem *problem) {
+static Status measure(Sqlite *database, const void *work, Problem *problem) {
     const Measure *asked = work;
     MaterialMeasurement *measurement = asked->measurement;
     MaterialKey key;
     TRY(require(database, measurement->slug, 0, asked->version, &key, problem));
     measurement->measurement = key.measurements + 1;
-    const MaterialDeed deed = {.action = "measure",
-                               .measurement = measurement->measurement,
-                               .who = measurement->author,
-                               .why = measurement->comment,
-                               .created_unix_ms = measurement->created_unix_ms};
+    const AuditEntry deed = {.action = "measure",
+                             .measurement = measurement->measurement,
+                             .who = measurement->author,
+                             .why = measurement->comment,
+                             .created_unix_ms = measurement->created_unix_ms};
     TRY(material_measurement_add(database, measurement, problem));
-    return material_deed_add(database, measurement->slug, &deed, problem);
+    return audit_entry_add(database, measurement->slug, &deed, problem);
 }
 
-Status store_material_measure(Store *store, MaterialMeasurement *measurement, uint64_t version,
-                              Problem *problem) {
-    TRY(store_write(store, measure, &(Measure){measurement, version}, problem));
-    store_material_measured(store);
+Status db_material_measure(Db *store, MaterialMeasurement *measurement, uint64_t version,
+                           Problem *problem) {
+    TRY(db_write(store, measure, &(Measure){measurement, version}, problem));
+    db_material_measured(store);
     return STATUS_OK;
 }

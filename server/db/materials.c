@@ -50,13 +50,12 @@ static Status refuse_slug(const char *slug, Problem *problem) {
     return problem_set(problem, STATUS_NOT_FOUND, "there is no material \"%.64s\"", slug);
 }
 
-Status store_material_state(Store *store, const char *slug, MaterialState *state,
-                            Problem *problem) {
+Status db_material_state(Db *store, const char *slug, MaterialState *state, Problem *problem) {
     MaterialKey key;
     *state = (MaterialState){0};
-    Database *database = store_take(store);
+    Sqlite *database = db_take(store);
     const Status status = material_key_find(database, slug, 0, &key, problem);
-    store_put(store, database);
+    db_put(store, database);
     TRY(status);
     if (key.number == 0)
         return refuse_slug(slug, problem);
@@ -64,23 +63,23 @@ Status store_material_state(Store *store, const char *slug, MaterialState *state
     return STATUS_OK;
 }
 
-Status store_material(Store *store, const char *slug, uint64_t revision, MaterialRevision *material,
-                      Problem *problem) {
+Status db_material(Db *store, const char *slug, uint64_t revision, MaterialRevision *material,
+                   Problem *problem) {
     const Key key = key_of(slug, revision);
-    MaterialMemory *memory = store_material_memory(store);
-    const uint64_t generation = store_deeds(store);
+    MaterialMemory *memory = db_material_memory(store);
+    const uint64_t generation = db_audit_version(store);
     bool is_found;
     memset(material, 0, sizeof *material);
     if (material_memory_find(memory, generation, slug, revision, material))
         return STATUS_OK;
-    TRY(store_first(store, revision == 0 ? head_sql : revision_sql, key_columns, &key,
-                    material_revision_columns, material, &is_found, problem));
+    TRY(db_first(store, revision == 0 ? head_sql : revision_sql, key_columns, &key,
+                 material_revision_columns, material, &is_found, problem));
     if (is_found) {
         material_memory_put(memory, generation, revision, material);
         return STATUS_OK;
     }
     MaterialState state;
-    TRY(store_material_state(store, slug, &state, problem));
+    TRY(db_material_state(store, slug, &state, problem));
     if (revision == 0)
         return problem_set(problem, STATUS_NOT_FOUND,
                            "every revision of the material \"%.64s\" is deprecated; name one, as "
@@ -92,12 +91,12 @@ Status store_material(Store *store, const char *slug, uint64_t revision, Materia
 }
 
 // All rows of a query into a typed list; on failure it is cleared.
-static Status all(Store *store, const char *sql, const Key *key, const RowColumn *columns,
-                  size_t size, void *list, Problem *problem) {
+static Status all(Db *store, const char *sql, const Key *key, const RowColumn *columns, size_t size,
+                  void *list, Problem *problem) {
     List *rows = list;
     *rows = (List){NULL, 0};
-    const Status status = store_all(store, sql, key == NULL ? NULL : key_columns, key, columns,
-                                    size, &rows->at, &rows->count, problem);
+    const Status status = db_all(store, sql, key == NULL ? NULL : key_columns, key, columns, size,
+                                 &rows->at, &rows->count, problem);
     if (status == STATUS_OK)
         return status;
     for (size_t i = 0; i < rows->count; i++)
@@ -107,7 +106,7 @@ static Status all(Store *store, const char *sql, const Key *key, const RowColumn
     return status;
 }
 
-Status store_material_slugs(Store *store, Texts *slugs, Problem *problem) {
+Status db_material_slugs(Db *store, Texts *slugs, Problem *problem) {
     static const char sql[] = "SELECT slug FROM materials ORDER BY slug";
     // A row of one text is that text.
     static const RowColumn columns[] = {{.name = "slug", .kind = COLUMN_TEXT}, ROW_END};
@@ -121,15 +120,15 @@ void material_slugs_clear(Texts *slugs) {
     *slugs = (Texts){NULL, 0};
 }
 
-Status store_material_heads(Store *store, const char *after, size_t most,
-                            MaterialRevisions *materials, Problem *problem) {
+Status db_material_heads(Db *store, const char *after, size_t most, MaterialRevisions *materials,
+                         Problem *problem) {
     const Key key = key_of_page(after, 0, most);
     return all(store, heads_sql, &key, material_revision_columns, sizeof *materials->at, materials,
                problem);
 }
 
-Status store_material_page(Store *store, const char *slug, uint64_t before, size_t most,
-                           MaterialRevisions *revisions, Problem *problem) {
+Status db_material_page(Db *store, const char *slug, uint64_t before, size_t most,
+                        MaterialRevisions *revisions, Problem *problem) {
     static const char sql[] = "SELECT * FROM material_states WHERE slug = :slug AND revision < "
                               ":number ORDER BY revision DESC LIMIT :most";
     const Key key = key_of_page(slug, before, most);
@@ -160,13 +159,13 @@ static const char measurement_sql[] =
     "SELECT m.slug, t.* FROM material_measurements t JOIN materials m ON m.number = t.material "
     "WHERE m.slug = :slug AND t.measurement = :number";
 
-Status store_material_measurement(Store *store, const char *slug, uint64_t number,
-                                  MaterialMeasurement *measurement, Problem *problem) {
+Status db_material_measurement(Db *store, const char *slug, uint64_t number,
+                               MaterialMeasurement *measurement, Problem *problem) {
     const Key key = key_of(slug, number);
     bool is_found;
     memset(measurement, 0, sizeof *measurement);
-    TRY(store_first(store, measurement_sql, key_columns, &key, material_measurement_columns,
-                    measurement, &is_found, problem));
+    TRY(db_first(store, measurement_sql, key_columns, &key, material_measurement_columns,
+                 measurement, &is_found, problem));
     if (is_found)
         return STATUS_OK;
     return problem_set(problem, STATUS_NOT_FOUND,
@@ -174,8 +173,8 @@ Status store_material_measurement(Store *store, const char *slug, uint64_t numbe
                        (unsigned long long)number, slug);
 }
 
-Status store_material_briefs(Store *store, const char *slug, uint64_t before, size_t most,
-                             MaterialBriefs *briefs, Problem *problem) {
+Status db_measurement_summaries(Db *store, const char *slug, uint64_t before, size_t most,
+                                MeasurementSummaries *briefs, Problem *problem) {
     static const char sql[] =
         "SELECT m.slug, t.measurement, t.author, t.comment, t.created_unix_ms, t.head, t.drops, "
         "t.traces FROM material_measurements t JOIN materials m ON m.number = t.material WHERE "
@@ -184,7 +183,7 @@ Status store_material_briefs(Store *store, const char *slug, uint64_t before, si
     return all(store, sql, &key, material_brief_columns, sizeof *briefs->at, briefs, problem);
 }
 
-void material_briefs_clear(MaterialBriefs *briefs) {
+void measurement_summaries_clear(MeasurementSummaries *briefs) {
     clear_all(material_brief_columns, sizeof *briefs->at, briefs);
 }
 
@@ -192,8 +191,8 @@ void material_measurement_clear(MaterialMeasurement *measurement) {
     row_clear(material_measurement_columns, measurement, sizeof *measurement);
 }
 
-Status store_material_trail(Store *store, const char *slug, uint64_t before, size_t most,
-                            MaterialDeeds *deeds, Problem *problem) {
+Status db_audit_entries(Db *store, const char *slug, uint64_t before, size_t most,
+                        AuditEntries *deeds, Problem *problem) {
     static const char sql[] =
         "SELECT t.* FROM material_trail t JOIN materials m ON m.number = t.material WHERE m.slug = "
         ":slug AND t.version < :number ORDER BY t.version DESC LIMIT :most";
@@ -201,6 +200,6 @@ Status store_material_trail(Store *store, const char *slug, uint64_t before, siz
     return all(store, sql, &key, material_deed_columns, sizeof *deeds->at, deeds, problem);
 }
 
-void material_deeds_clear(MaterialDeeds *deeds) {
+void audit_entries_clear(AuditEntries *deeds) {
     clear_all(material_deed_columns, sizeof *deeds->at, deeds);
 }

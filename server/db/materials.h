@@ -35,22 +35,22 @@ typedef struct MaterialState {
     uint64_t latest, version, measurements; // the newest of each; measurements 0: none
 } MaterialState;
 // As it is in the database now. STATUS_NOT_FOUND.
-Status store_material_state(Store *store, const char *slug, MaterialState *state, Problem *problem);
+Status db_material_state(Db *store, const char *slug, MaterialState *state, Problem *problem);
 
 // revision 0: the head, which is the newest approved one, else the newest draft. STATUS_NOT_FOUND,
 // also where all are deprecated.
-Status store_material(Store *store, const char *slug, uint64_t revision, MaterialRevision *material,
-                      Problem *problem);
+Status db_material(Db *store, const char *slug, uint64_t revision, MaterialRevision *material,
+                   Problem *problem);
 // The slugs of all materials, by name.
-Status store_material_slugs(Store *store, Texts *slugs, Problem *problem);
+Status db_material_slugs(Db *store, Texts *slugs, Problem *problem);
 void material_slugs_clear(Texts *slugs);
 // The heads of materials, by slug; of those that are all deprecated the newest revision. At most
 // `most` of them, those behind the slug `after` ("": from the first).
-Status store_material_heads(Store *store, const char *after, size_t most,
-                            MaterialRevisions *materials, Problem *problem);
+Status db_material_heads(Db *store, const char *after, size_t most, MaterialRevisions *materials,
+                         Problem *problem);
 // Newest first, at most `most` of one material's, those before `before`.
-Status store_material_page(Store *store, const char *slug, uint64_t before, size_t most,
-                           MaterialRevisions *revisions, Problem *problem);
+Status db_material_page(Db *store, const char *slug, uint64_t before, size_t most,
+                        MaterialRevisions *revisions, Problem *problem);
 void material_revisions_clear(MaterialRevisions *materials);
 
 typedef struct MaterialReview {
@@ -74,50 +74,50 @@ typedef struct MaterialMeasurement {
     char *document; // the drop test, JSON
 } MaterialMeasurement;
 // STATUS_NOT_FOUND. `measurement` may be uninitialised.
-Status store_material_measurement(Store *store, const char *slug, uint64_t number,
-                                  MaterialMeasurement *measurement, Problem *problem);
+Status db_material_measurement(Db *store, const char *slug, uint64_t number,
+                               MaterialMeasurement *measurement, Problem *problem);
 void material_measurement_clear(MaterialMeasurement *measurement);
 
 // A measurement without its readings, which are counted. `document` is the drop test but for them.
-typedef struct MaterialBrief {
+typedef struct MeasurementSummary {
     MaterialMeasurement row;
     uint64_t drops, traces;
-} MaterialBrief;
-typedef struct MaterialBriefs {
-    MaterialBrief *at;
+} MeasurementSummary;
+typedef struct MeasurementSummaries {
+    MeasurementSummary *at;
     size_t count;
-} MaterialBriefs;
+} MeasurementSummaries;
 // Newest first, at most `most` of one material's, those before `before`.
-Status store_material_briefs(Store *store, const char *slug, uint64_t before, size_t most,
-                             MaterialBriefs *briefs, Problem *problem);
-void material_briefs_clear(MaterialBriefs *briefs);
+Status db_measurement_summaries(Db *store, const char *slug, uint64_t before, size_t most,
+                                MeasurementSummaries *briefs, Problem *problem);
+void measurement_summaries_clear(MeasurementSummaries *briefs);
 
-typedef struct MaterialDeed {
+typedef struct AuditEntry {
     uint64_t version;               // of the material after it; what is added gets the next
     char *action;                   // "create", "revise" ...: schema/sql/009_materials.sql
     uint64_t revision, measurement; // 0: not about one
     char *who, *why;
     int64_t created_unix_ms;
-} MaterialDeed;
-typedef struct MaterialDeeds {
-    MaterialDeed *at;
+} AuditEntry;
+typedef struct AuditEntries {
+    AuditEntry *at;
     size_t count;
-} MaterialDeeds;
+} AuditEntries;
 // The trail of one material, newest first, at most `most` entries, those before `before`.
-Status store_material_trail(Store *store, const char *slug, uint64_t before, size_t most,
-                            MaterialDeeds *deeds, Problem *problem);
-void material_deeds_clear(MaterialDeeds *deeds);
+Status db_audit_entries(Db *store, const char *slug, uint64_t before, size_t most,
+                        AuditEntries *deeds, Problem *problem);
+void audit_entries_clear(AuditEntries *deeds);
 
 // Each revision with how many results were made with it, newest first.
-typedef struct MaterialUse {
+typedef struct MaterialReference {
     uint64_t revision, results;
     char status[16];
-} MaterialUse;
-typedef struct MaterialUses {
-    MaterialUse *at; // freed by free
+} MaterialReference;
+typedef struct MaterialReferences {
+    MaterialReference *at; // freed by free
     size_t count;
-} MaterialUses;
-Status store_material_uses(Store *store, const char *slug, MaterialUses *uses, Problem *problem);
+} MaterialReferences;
+Status db_material_uses(Db *store, const char *slug, MaterialReferences *uses, Problem *problem);
 
 // Results made with `name` ("sponge@1", "record:elcentro"), newest first, at most `most` of them,
 // those before the one numbered `before` (0: from the newest); *total counts all.
@@ -130,8 +130,8 @@ typedef struct ResultUses {
     ResultUse *at; // freed by free
     size_t count;
 } ResultUses;
-Status store_result_uses(Store *store, const char *name, size_t most, int64_t before,
-                         ResultUses *uses, uint64_t *total, Problem *problem);
+Status db_result_uses(Db *store, const char *name, size_t most, int64_t before, ResultUses *uses,
+                      uint64_t *total, Problem *problem);
 
 // What is kept is kept for good, so there is an end to it: STATUS_LIMIT from each that writes.
 enum {
@@ -148,17 +148,17 @@ enum {
 
 // The first revision of a new material. STATUS_CONFLICT where the slug is taken. Slug, material,
 // lists, author, comment and created_unix_ms are read.
-Status store_material_add(Store *store, const MaterialRevision *first, Problem *problem);
+Status db_material_add(Db *store, const MaterialRevision *first, Problem *problem);
 // Adds a revision and sets revision->revision; `reverts` is kept (0: none), the rest as above. That
 // the measurements that it names are there is for the caller to see to.
-Status store_material_revise(Store *store, MaterialRevision *revision, uint64_t version,
-                             Problem *problem);
+Status db_material_revise(Db *store, MaterialRevision *revision, uint64_t version,
+                          Problem *problem);
 // STATUS_CONFLICT where the revision has that status already; STATUS_FORBIDDEN where its author,
 // known by name, approves it.
-Status store_material_review(Store *store, const MaterialReview *review, uint64_t version,
-                             Problem *problem);
+Status db_material_review(Db *store, const MaterialReview *review, uint64_t version,
+                          Problem *problem);
 // Adds a measurement and sets its number.
-Status store_material_measure(Store *store, MaterialMeasurement *measurement, uint64_t version,
-                              Problem *problem);
+Status db_material_measure(Db *store, MaterialMeasurement *measurement, uint64_t version,
+                           Problem *problem);
 
 #endif

@@ -80,13 +80,13 @@ bool record_name_is_sound(const char *name) {
 }
 
 void record_digest(double interval, const Reals *samples, char digest[RECORD_DIGEST_SIZE]) {
-    Digest *taking = digest_new();
+    Sha256 *taking = sha256_new();
     digest[0] = '\0';
     if (taking == NULL)
         return;
-    digest_take(taking, &interval, sizeof interval);
-    digest_take(taking, samples->at, samples->count * sizeof *samples->at);
-    digest_end(taking, digest);
+    sha256_add(taking, &interval, sizeof interval);
+    sha256_add(taking, samples->at, samples->count * sizeof *samples->at);
+    sha256_end(taking, digest);
 }
 
 static Status not_found(const char *name, Problem *problem) {
@@ -94,7 +94,7 @@ static Status not_found(const char *name, Problem *problem) {
 }
 
 // Within the writer's transaction.
-static Status first(Database *database, const char *sql, const Key *key, const RowColumn *columns,
+static Status first(Sqlite *database, const char *sql, const Key *key, const RowColumn *columns,
                     void *target, bool *is_found, Problem *problem) {
     Statement *statement;
     *is_found = false;
@@ -135,7 +135,7 @@ typedef struct Adding {
     bool *is_there;
 } Adding;
 
-static Status add(Database *database, const void *work, Problem *problem) {
+static Status add(Sqlite *database, const void *work, Problem *problem) {
     static const char count_sql[] =
         "SELECT count(*) AS count, coalesce(sum(count), 0) AS most FROM records";
     static const char head_sql[] =
@@ -171,40 +171,39 @@ static Status add(Database *database, const void *work, Problem *problem) {
                            "the records have %llu samples, with this one more than the %llu that "
                            "are kept; delete some that nothing uses",
                            (unsigned long long)counted.most, (unsigned long long)RECORDS_SAMPLES);
-    TRY(database_change(database, head_sql, record_columns, row, NULL, problem));
+    TRY(sqlite_change(database, head_sql, record_columns, row, NULL, problem));
     key.samples = (StoredBytes){adding->samples->at, adding->samples->count * sizeof(double)};
-    return database_change(database, body_sql, key_columns, &key, NULL, problem);
+    return sqlite_change(database, body_sql, key_columns, &key, NULL, problem);
 }
 
-Status store_record_add(Store *store, const RecordRow *row, const Reals *samples, bool *is_there,
-                        Problem *problem) {
-    TRY(store_write(store, add, &(Adding){row, samples, is_there}, problem));
+Status db_record_add(Db *store, const RecordRow *row, const Reals *samples, bool *is_there,
+                     Problem *problem) {
+    TRY(db_write(store, add, &(Adding){row, samples, is_there}, problem));
     if (!*is_there)
-        store_catalogue_changed(store);
+        db_catalog_changed(store);
     return STATUS_OK;
 }
 
-Status store_record(Store *store, const char *name, RecordRow *row, Problem *problem) {
+Status db_record(Db *store, const char *name, RecordRow *row, Problem *problem) {
     const Key key = {.name = (char *)name};
     bool is_found;
     memset(row, 0, sizeof *row);
-    TRY(store_first(store, one_sql, key_columns, &key, record_columns, row, &is_found, problem));
+    TRY(db_first(store, one_sql, key_columns, &key, record_columns, row, &is_found, problem));
     return is_found ? STATUS_OK : not_found(name, problem);
 }
 
-static Status list(Store *store, const char *sql, const Key *key, RecordRows *rows,
-                   Problem *problem) {
+static Status list(Db *store, const char *sql, const Key *key, RecordRows *rows, Problem *problem) {
     void *at;
-    const Status status = store_all(store, sql, key_columns, key, record_columns, sizeof *rows->at,
-                                    &at, &rows->count, problem);
+    const Status status = db_all(store, sql, key_columns, key, record_columns, sizeof *rows->at,
+                                 &at, &rows->count, problem);
     rows->at = at;
     if (status != STATUS_OK)
         record_rows_clear(rows);
     return status;
 }
 
-Status store_records(Store *store, const char *words, const char *after, size_t most,
-                     RecordRows *rows, Problem *problem) {
+Status db_records(Db *store, const char *words, const char *after, size_t most, RecordRows *rows,
+                  Problem *problem) {
     static const char sql[] =
         "SELECT * FROM records WHERE name > :name AND (:words IS NULL OR instr(lower(name || "
         "char(10) || coalesce(earthquake, '') || char(10) || coalesce(station, '') || char(10) || "
@@ -214,7 +213,7 @@ Status store_records(Store *store, const char *words, const char *after, size_t 
     return list(store, sql, &key, rows, problem);
 }
 
-Status store_record_twins(Store *store, const RecordRow *row, RecordRows *rows, Problem *problem) {
+Status db_record_twins(Db *store, const RecordRow *row, RecordRows *rows, Problem *problem) {
     static const char sql[] = "SELECT * FROM records WHERE digest = :digest AND name <> :name "
                               "ORDER BY number LIMIT :most";
     const Key key = {.name = row->name, .digest = row->digest, .most = RECORD_TWINS};
@@ -222,13 +221,13 @@ Status store_record_twins(Store *store, const RecordRow *row, RecordRows *rows, 
 }
 
 // A copy of its own, of whole numbers.
-static Status read_samples(Store *store, const RecordRow *row, Reals *samples, Problem *problem) {
+static Status read_samples(Db *store, const RecordRow *row, Reals *samples, Problem *problem) {
     static const char sql[] = "SELECT s.samples FROM record_samples s JOIN records r USING "
                               "(number) WHERE r.name = :name AND r.digest = :digest";
     const Key key = {.name = row->name, .digest = row->digest};
     Key found = {.name = NULL};
     bool is_found;
-    TRY(store_first(store, sql, key_columns, &key, key_columns, &found, &is_found, problem));
+    TRY(db_first(store, sql, key_columns, &key, key_columns, &found, &is_found, problem));
     if (!is_found)
         return not_found(row->name, problem);
     if (found.samples.size != row->count * sizeof(double)) {
@@ -240,15 +239,15 @@ static Status read_samples(Store *store, const RecordRow *row, Reals *samples, P
     return STATUS_OK;
 }
 
-Status store_record_named(Store *store, const char *name, NamedRecord **named, Problem *problem) {
-    RecordMemory *memory = store_record_memory(store);
-    const uint64_t generation = store_generation(store);
+Status db_record_named(Db *store, const char *name, NamedRecord **named, Problem *problem) {
+    RecordMemory *memory = db_record_memory(store);
+    const uint64_t generation = db_catalog_version(store);
     RecordRow row;
     Reals samples;
     *named = record_memory_find(memory, generation, name, NULL);
     if (*named != NULL)
         return STATUS_OK;
-    Status status = store_record(store, name, &row, problem);
+    Status status = db_record(store, name, &row, problem);
     if (status == STATUS_OK)
         *named = record_memory_find(memory, generation, name, row.digest);
     if (status == STATUS_OK && *named == NULL) {
@@ -272,13 +271,13 @@ static const char uses_sql[] =
     "SELECT (SELECT count(*) FROM result_uses WHERE name = :use) AS results, "
     "(SELECT count(*) FROM job_uses WHERE name = :use) AS jobs";
 
-Status store_record_uses(Store *store, const char *name, RecordUses *uses, Problem *problem) {
+Status db_record_uses(Db *store, const char *name, RecordUses *uses, Problem *problem) {
     char use[RECORD_NAME_SIZE + 8];
     record_use_name(name, use);
     const Key key = {.use = use};
     Key found = {.results = 0};
     bool is_found;
-    TRY(store_first(store, uses_sql, key_columns, &key, key_columns, &found, &is_found, problem));
+    TRY(db_first(store, uses_sql, key_columns, &key, key_columns, &found, &is_found, problem));
     *uses = (RecordUses){found.results, found.jobs};
     return STATUS_OK;
 }
@@ -288,7 +287,7 @@ typedef struct Deleting {
     RecordUses *uses;
 } Deleting;
 
-static Status delete (Database *database, const void *work, Problem *problem) {
+static Status delete (Sqlite *database, const void *work, Problem *problem) {
     static const char sql[] = "DELETE FROM records WHERE name = :name";
     const Deleting *deleting = work;
     Key found = {.results = 0};
@@ -303,16 +302,16 @@ static Status delete (Database *database, const void *work, Problem *problem) {
                            deleting->key.name, (unsigned long long)found.results,
                            found.results == 1 ? "" : "s", (unsigned long long)found.jobs,
                            found.jobs == 1 ? "" : "s");
-    TRY(database_change(database, sql, key_columns, &deleting->key, &changes, problem));
+    TRY(sqlite_change(database, sql, key_columns, &deleting->key, &changes, problem));
     return changes > 0 ? STATUS_OK : not_found(deleting->key.name, problem);
 }
 
-Status store_record_delete(Store *store, const char *name, RecordUses *uses, Problem *problem) {
+Status db_record_delete(Db *store, const char *name, RecordUses *uses, Problem *problem) {
     char use[RECORD_NAME_SIZE + 8];
     record_use_name(name, use);
     const Deleting deleting = {{.name = (char *)name, .use = use}, uses};
     *uses = (RecordUses){0, 0};
-    TRY(store_write(store, delete, &deleting, problem));
-    store_catalogue_changed(store);
+    TRY(db_write(store, delete, &deleting, problem));
+    db_catalog_changed(store);
     return STATUS_OK;
 }

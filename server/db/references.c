@@ -10,13 +10,13 @@ typedef struct UseLine {
 } UseLine;
 static const RowColumn line_columns[] = {ROW_COLUMN(UseLine, name, COLUMN_NAME), ROW_END};
 
-Status use_lines_add(Database *database, const char *sql, const char *lines, Problem *problem) {
+Status use_lines_add(Sqlite *database, const char *sql, const char *lines, Problem *problem) {
     while (lines != NULL && *lines != '\0') {
         const size_t size = strcspn(lines, "\n");
         UseLine line = {""};
         if (size > 0 && size < sizeof line.name) {
             memcpy(line.name, lines, size);
-            TRY(database_change(database, sql, line_columns, &line, NULL, problem));
+            TRY(sqlite_change(database, sql, line_columns, &line, NULL, problem));
         }
         lines += size + (lines[size] == '\n');
     }
@@ -35,8 +35,8 @@ static const RowColumn use_columns[] = {
     ROW_COLUMN(ResultUse, number, COLUMN_INTEGER), ROW_COLUMN(ResultUse, id, COLUMN_NAME),
     ROW_COLUMN(ResultUse, created_unix_ms, COLUMN_INTEGER), ROW_END};
 
-Status store_result_uses(Store *store, const char *name, size_t most, int64_t before,
-                         ResultUses *uses, uint64_t *total, Problem *problem) {
+Status db_result_uses(Db *store, const char *name, size_t most, int64_t before, ResultUses *uses,
+                      uint64_t *total, Problem *problem) {
     static const char count_sql[] = "SELECT count(*) AS total FROM result_uses WHERE name = :name";
     static const char sql[] =
         "SELECT r.number, r.id, r.created_unix_ms FROM result_uses u JOIN results r ON r.number = "
@@ -46,12 +46,11 @@ Status store_result_uses(Store *store, const char *name, size_t most, int64_t be
     bool is_found;
     void *at;
     *uses = (ResultUses){NULL, 0};
-    store_settle(store); // results whose rows wait count
-    TRY(store_first(store, count_sql, key_columns, &key, key_columns, &counted, &is_found,
-                    problem));
+    db_flush(store); // results whose rows wait count
+    TRY(db_first(store, count_sql, key_columns, &key, key_columns, &counted, &is_found, problem));
     *total = counted.total;
-    const Status status = store_all(store, sql, key_columns, &key, use_columns, sizeof *uses->at,
-                                    &at, &uses->count, problem);
+    const Status status = db_all(store, sql, key_columns, &key, use_columns, sizeof *uses->at, &at,
+                                 &uses->count, problem);
     uses->at = at;
     if (status != STATUS_OK) {
         free(at);
@@ -61,22 +60,23 @@ Status store_result_uses(Store *store, const char *name, size_t most, int64_t be
 }
 
 static const RowColumn material_use_columns[] = {
-    ROW_COLUMN(MaterialUse, revision, COLUMN_COUNT), ROW_COLUMN(MaterialUse, results, COLUMN_COUNT),
-    ROW_COLUMN(MaterialUse, status, COLUMN_NAME), ROW_END};
+    ROW_COLUMN(MaterialReference, revision, COLUMN_COUNT),
+    ROW_COLUMN(MaterialReference, results, COLUMN_COUNT),
+    ROW_COLUMN(MaterialReference, status, COLUMN_NAME), ROW_END};
 
-Status store_material_uses(Store *store, const char *slug, MaterialUses *uses, Problem *problem) {
+Status db_material_uses(Db *store, const char *slug, MaterialReferences *uses, Problem *problem) {
     static const char sql[] =
         "SELECT revision, status, (SELECT count(*) FROM result_uses u WHERE u.name = slug || '@' "
         "|| revision) AS results FROM material_states WHERE slug = :name ORDER BY revision DESC";
     const UseKey key = {.name = (char *)slug};
     void *at;
-    store_settle(store);
-    const Status status = store_all(store, sql, key_columns, &key, material_use_columns,
-                                    sizeof *uses->at, &at, &uses->count, problem);
+    db_flush(store);
+    const Status status = db_all(store, sql, key_columns, &key, material_use_columns,
+                                 sizeof *uses->at, &at, &uses->count, problem);
     uses->at = at;
     if (status != STATUS_OK) {
         free(at);
-        *uses = (MaterialUses){NULL, 0};
+        *uses = (MaterialReferences){NULL, 0};
     }
     return status;
 }

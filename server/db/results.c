@@ -37,7 +37,7 @@ typedef struct Finish {
     size_t job_count;
 } Finish;
 
-static Status finish(Database *database, const void *work, Problem *problem) {
+static Status finish(Sqlite *database, const void *work, Problem *problem) {
     static const char sql[] =
         "INSERT INTO results (id, engine, sample_rate, count, "
         "created_unix_ms, summary, plan, warnings, work, notes, energy, "
@@ -49,7 +49,7 @@ static Status finish(Database *database, const void *work, Problem *problem) {
     const Finish *both = work;
     int added = 0;
     if (both->result != NULL)
-        TRY(database_change(database, sql, result_columns, both->result, &added, problem));
+        TRY(sqlite_change(database, sql, result_columns, both->result, &added, problem));
     if (added > 0)
         TRY(use_lines_add(database, uses_sql, both->result->uses, problem));
     for (size_t i = 0; i < both->job_count; i++)
@@ -57,15 +57,15 @@ static Status finish(Database *database, const void *work, Problem *problem) {
     return STATUS_OK;
 }
 
-Status store_result_save(Store *store, const ResultRow *result, const JobRow *const *jobs,
-                         size_t job_count, Problem *problem) {
-    return store_write(store, finish, &(Finish){result, jobs, job_count}, problem);
+Status db_result_save(Db *store, const ResultRow *result, const JobRow *const *jobs,
+                      size_t job_count, Problem *problem) {
+    return db_write(store, finish, &(Finish){result, jobs, job_count}, problem);
 }
 
-Status store_result_post(Store *store, const ResultRow *result, const JobRow *const *jobs,
-                         size_t job_count, StoreTurn turn, const StoreDone *done) {
+Status db_result_post(Db *store, const ResultRow *result, const JobRow *const *jobs,
+                      size_t job_count, WritePriority turn, const WriteDone *done) {
     const Finish work = {result, jobs, job_count};
-    return store_post(store, finish, &work, sizeof work, turn, done, NULL);
+    return db_enqueue(store, finish, &work, sizeof work, turn, done, NULL);
 }
 
 typedef struct Key {
@@ -73,36 +73,35 @@ typedef struct Key {
 } Key;
 static const RowColumn key_columns[] = {ROW_COLUMN(Key, id, COLUMN_TEXT), ROW_END};
 
-static Status load(Store *store, const char *sql, const char *id, ResultRow *row,
-                   Problem *problem) {
+static Status load(Db *store, const char *sql, const char *id, ResultRow *row, Problem *problem) {
     const Key key = {(char *)id};
     bool is_found;
     memset(row, 0, sizeof *row);
-    TRY(store_first(store, sql, key_columns, &key, result_columns, row, &is_found, problem));
+    TRY(db_first(store, sql, key_columns, &key, result_columns, row, &is_found, problem));
     return is_found ? STATUS_OK
                     : problem_set(problem, STATUS_NOT_FOUND, "there is no result \"%.72s\"", id);
 }
 
-Status store_result_load(Store *store, const char *id, ResultRow *row, Problem *problem) {
+Status db_result_load(Db *store, const char *id, ResultRow *row, Problem *problem) {
     static const char sql[] =
         "SELECT id, engine, sample_rate, count, created_unix_ms, summary, plan, warnings, work, "
         "notes, energy, scene, impacts, psd, study FROM results WHERE id = :id";
     return load(store, sql, id, row, problem);
 }
 
-Status store_result_head(Store *store, const char *id, ResultRow *row, Problem *problem) {
+Status db_result_head(Db *store, const char *id, ResultRow *row, Problem *problem) {
     static const char sql[] =
         "SELECT id, engine, sample_rate, count, created_unix_ms, summary, plan, warnings, work, "
         "notes FROM results WHERE id = :id";
     return load(store, sql, id, row, problem);
 }
 
-Status store_result_scene(Store *store, const char *id, ResultRow *row, Problem *problem) {
+Status db_result_scene(Db *store, const char *id, ResultRow *row, Problem *problem) {
     static const char sql[] = "SELECT id, engine, scene FROM results WHERE id = :id";
     return load(store, sql, id, row, problem);
 }
 
-bool store_result_exists(Store *store, const char *id) {
+bool db_result_exists(Db *store, const char *id) {
     static const char sql[] = "SELECT id FROM results WHERE id = :id";
     ResultRow row;
     return load(store, sql, id, &row, NULL) == STATUS_OK;
@@ -116,31 +115,31 @@ static const RowColumn sharer_columns[] = {ROW_COLUMN(Sharer, id, COLUMN_TEXT),
                                            ROW_COLUMN(Sharer, client, COLUMN_TEXT),
                                            ROW_COLUMN(Sharer, sharer, COLUMN_NAME), ROW_END};
 
-Status store_result_sharer(Store *store, const char *id, const char *client, char sharer[72],
-                           Problem *problem) {
+Status db_result_sharer(Db *store, const char *id, const char *client, char sharer[72],
+                        Problem *problem) {
     static const char sql[] =
         "SELECT client AS sharer FROM jobs WHERE substr(result, 3, 12) = substr(:id, 3, 12) "
         "AND result = :id AND state = 2 AND client <> :client LIMIT 1";
     const Sharer key = {(char *)id, (char *)client, ""};
     Sharer found = {0};
     bool is_found;
-    TRY(store_first(store, sql, sharer_columns, &key, sharer_columns, &found, &is_found, problem));
+    TRY(db_first(store, sql, sharer_columns, &key, sharer_columns, &found, &is_found, problem));
     text_fit(sharer, sizeof found.sharer, is_found ? found.sharer : "");
     return STATUS_OK;
 }
 
-static Status delete (Database *database, const void *work, Problem *problem) {
+static Status delete (Sqlite *database, const void *work, Problem *problem) {
     static const char sql[] = "DELETE FROM results WHERE id = :id";
     const Key *key = work;
     int changes;
-    TRY(database_change(database, sql, key_columns, key, &changes, problem));
+    TRY(sqlite_change(database, sql, key_columns, key, &changes, problem));
     return changes > 0
                ? STATUS_OK
                : problem_set(problem, STATUS_NOT_FOUND, "there is no result \"%.72s\"", key->id);
 }
 
-Status store_result_delete(Store *store, const char *id, Problem *problem) {
-    return store_write(store, delete, &(Key){(char *)id}, problem);
+Status db_result_delete(Db *store, const char *id, Problem *problem) {
+    return db_write(store, delete, &(Key){(char *)id}, problem);
 }
 
 typedef struct Recent {
@@ -149,14 +148,14 @@ typedef struct Recent {
 static const RowColumn recent_columns[] = {ROW_COLUMN(Recent, most, COLUMN_COUNT),
                                            ROW_COLUMN(Recent, scene_max, COLUMN_COUNT), ROW_END};
 
-Status store_result_recent(Store *store, size_t most, size_t scene_max, ResultRows *rows,
-                           Problem *problem) {
+Status db_result_recent(Db *store, size_t most, size_t scene_max, ResultRows *rows,
+                        Problem *problem) {
     static const char sql[] =
         "SELECT id, engine, scene FROM (SELECT * FROM results ORDER BY number DESC LIMIT :most) "
         "WHERE length(scene) <= :scene_max";
     void *at;
-    const Status status = store_all(store, sql, recent_columns, &(Recent){most, scene_max},
-                                    result_columns, sizeof *rows->at, &at, &rows->count, problem);
+    const Status status = db_all(store, sql, recent_columns, &(Recent){most, scene_max},
+                                 result_columns, sizeof *rows->at, &at, &rows->count, problem);
     rows->at = at;
     if (status != STATUS_OK)
         result_rows_clear(rows);

@@ -45,7 +45,7 @@ static const RowColumn bounds_columns[] = {
 
 enum { VACUUM_MIN = 256 }; // pages that are free before any are given back
 
-static Status measure(Store *store, bool counts_jobs, Extent *extent, Problem *problem) {
+static Status measure(Db *store, bool counts_jobs, Extent *extent, Problem *problem) {
     static const char sizes[] =
         "SELECT page_count AS pages, freelist_count AS free_pages, page_size "
         "FROM pragma_page_count, pragma_freelist_count, pragma_page_size";
@@ -54,18 +54,18 @@ static Status measure(Store *store, bool counts_jobs, Extent *extent, Problem *p
                                  "FROM jobs";
     bool is_found;
     *extent = (Extent){0};
-    TRY(store_first(store, sizes, NULL, NULL, extent_columns, extent, &is_found, problem));
+    TRY(db_first(store, sizes, NULL, NULL, extent_columns, extent, &is_found, problem));
     if (counts_jobs)
-        TRY(store_first(store, counts, NULL, NULL, extent_columns, extent, &is_found, problem));
+        TRY(db_first(store, counts, NULL, NULL, extent_columns, extent, &is_found, problem));
     return STATUS_OK;
 }
 
-static Status has_older(Store *store, int64_t before, bool *has, Problem *problem) {
+static Status has_older(Db *store, int64_t before, bool *has, Problem *problem) {
     static const char sql[] = "SELECT number, result FROM jobs INDEXED BY jobs_created "
                               "WHERE created_unix_ms < :before AND state > 1 LIMIT 1";
     Victim victim = {0};
-    return store_first(store, sql, bounds_columns, &(Bounds){before, 1}, victim_columns, &victim,
-                       has, problem);
+    return db_first(store, sql, bounds_columns, &(Bounds){before, 1}, victim_columns, &victim, has,
+                    problem);
 }
 
 typedef struct Removal {
@@ -74,7 +74,7 @@ typedef struct Removal {
     Removed *removed;
 } Removal;
 
-static Status list_victims(Database *database, const Bounds *bounds, Victim *victims, size_t *count,
+static Status list_victims(Sqlite *database, const Bounds *bounds, Victim *victims, size_t *count,
                            Problem *problem) {
     static const char sql[] =
         "SELECT number, result FROM jobs INDEXED BY jobs_created "
@@ -95,7 +95,7 @@ static Status list_victims(Database *database, const Bounds *bounds, Victim *vic
     return status;
 }
 
-static Status apply(Database *database, const void *work, Problem *problem) {
+static Status apply(Sqlite *database, const void *work, Problem *problem) {
     static const char job_sql[] = "DELETE FROM jobs WHERE number = :number";
     static const char result_sql[] =
         "DELETE FROM results WHERE id = :result AND NOT EXISTS (SELECT 1 FROM jobs "
@@ -107,13 +107,13 @@ static Status apply(Database *database, const void *work, Problem *problem) {
     size_t count;
     *removed = (Removed){0};
     if (removal->gives_back)
-        return database_execute(database, "PRAGMA incremental_vacuum(64)", problem);
+        return sqlite_execute(database, "PRAGMA incremental_vacuum(64)", problem);
     memset(victims, 0, sizeof victims);
     TRY(list_victims(database, &removal->bounds, victims, &count, problem));
     for (size_t i = 0; i < count; i++) {
         int changes;
-        TRY(database_change(database, job_sql, victim_columns, &victims[i], NULL, problem));
-        TRY(database_change(database, result_sql, victim_columns, &victims[i], &changes, problem));
+        TRY(sqlite_change(database, job_sql, victim_columns, &victims[i], NULL, problem));
+        TRY(sqlite_change(database, result_sql, victim_columns, &victims[i], &changes, problem));
         removed->jobs++;
         if (changes > 0)
             memcpy(removed->result[removed->results++], victims[i].result,
@@ -122,7 +122,7 @@ static Status apply(Database *database, const void *work, Problem *problem) {
     return STATUS_OK;
 }
 
-Status store_remove(Store *store, const KeepRules *rules, Removed *removed, Problem *problem) {
+Status db_remove(Db *store, const KeepRules *rules, Removed *removed, Problem *problem) {
     static const double day_ms = 86400000;
     const int64_t before = clock_unix_ms() - (int64_t)(rules->days * day_ms);
     Extent extent;
@@ -146,7 +146,7 @@ Status store_remove(Store *store, const KeepRules *rules, Removed *removed, Prob
         return STATUS_OK;
     if (removal.bounds.most > RETENTION_BATCH)
         removal.bounds.most = RETENTION_BATCH;
-    TRY(store_write(store, apply, &removal, problem));
+    TRY(db_write(store, apply, &removal, problem));
     removed->is_more = removal.gives_back || removed->jobs > 0;
     return STATUS_OK;
 }

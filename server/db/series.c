@@ -11,7 +11,7 @@ typedef struct Blob {
     StoredBytes body;
     uint64_t bytes, most;
     atomic_uint_fast64_t *evictions;
-    StoreDone done;
+    WriteDone done;
 } Blob;
 
 // clang-format off
@@ -23,7 +23,7 @@ static const RowColumn columns[] = {
 };
 // clang-format on
 
-static Status total(Database *database, uint64_t *bytes, Problem *problem) {
+static Status total(Sqlite *database, uint64_t *bytes, Problem *problem) {
     static const char sql[] = "SELECT coalesce(sum(bytes), 0) AS bytes FROM series";
     Statement *statement;
     bool has_row = false;
@@ -37,7 +37,7 @@ static Status total(Database *database, uint64_t *bytes, Problem *problem) {
     return status;
 }
 
-static Status put(Database *database, const void *work, Problem *problem) {
+static Status put(Sqlite *database, const void *work, Problem *problem) {
     static const char drop_sql[] = "DELETE FROM series WHERE number = "
                                    "(SELECT number FROM series ORDER BY used LIMIT 1)";
     static const char again_sql[] = "DELETE FROM series WHERE result = :result";
@@ -48,15 +48,15 @@ static Status put(Database *database, const void *work, Problem *problem) {
     const Blob *blob = work;
     uint64_t there;
     int changes = 1;
-    TRY(database_change(database, again_sql, columns, blob, NULL, problem));
+    TRY(sqlite_change(database, again_sql, columns, blob, NULL, problem));
     TRY(total(database, &there, problem));
     while (there + blob->bytes > blob->most && changes > 0) {
-        TRY(database_change(database, drop_sql, NULL, NULL, &changes, problem));
+        TRY(sqlite_change(database, drop_sql, NULL, NULL, &changes, problem));
         TRY(total(database, &there, problem));
         atomic_fetch_add(blob->evictions, changes > 0);
     }
-    TRY(database_change(database, head_sql, columns, blob, NULL, problem));
-    return database_change(database, body_sql, columns, blob, NULL, problem);
+    TRY(sqlite_change(database, head_sql, columns, blob, NULL, problem));
+    return sqlite_change(database, body_sql, columns, blob, NULL, problem);
 }
 
 static void was_put(void *context, Status status, const char *detail) {
@@ -66,8 +66,8 @@ static void was_put(void *context, Status status, const char *detail) {
     free(blob);
 }
 
-Status store_series_post(Store *store, const char *result, char *body, size_t size, uint64_t most,
-                         const StoreDone *done) {
+Status db_series_post(Db *store, const char *result, char *body, size_t size, uint64_t most,
+                      const WriteDone *done) {
     Blob *blob = size <= most ? calloc(1, sizeof *blob) : NULL;
     if (blob == NULL) {
         free(body);
@@ -77,10 +77,10 @@ Status store_series_post(Store *store, const char *result, char *body, size_t si
     blob->body = (StoredBytes){body, size};
     blob->bytes = size;
     blob->most = most;
-    blob->evictions = store_evictions(store);
+    blob->evictions = db_evictions(store);
     blob->done = *done;
-    const StoreDone own = {was_put, blob};
-    const Status status = store_post(store, put, blob, 0, STORE_LOW, &own, NULL);
+    const WriteDone own = {was_put, blob};
+    const Status status = db_enqueue(store, put, blob, 0, STORE_LOW, &own, NULL);
     if (status != STATUS_OK) {
         free(blob->body.at);
         free(blob);
@@ -88,10 +88,10 @@ Status store_series_post(Store *store, const char *result, char *body, size_t si
     return status;
 }
 
-static Status touch(Database *database, const void *work, Problem *problem) {
+static Status touch(Sqlite *database, const void *work, Problem *problem) {
     static const char sql[] = "UPDATE series SET used = (SELECT max(used) + 1 FROM series) "
                               "WHERE result = :result AND used < (SELECT max(used) FROM series)";
-    return database_change(database, sql, columns, work, NULL, problem);
+    return sqlite_change(database, sql, columns, work, NULL, problem);
 }
 
 static void was_touched(void *context, Status status, const char *detail) {
@@ -100,21 +100,20 @@ static void was_touched(void *context, Status status, const char *detail) {
     free(context);
 }
 
-Status store_series_load(Store *store, const char *result, char **body, size_t *size,
-                         Problem *problem) {
+Status db_series_load(Db *store, const char *result, char **body, size_t *size, Problem *problem) {
     static const char sql[] = "SELECT body FROM series JOIN series_bodies USING (number) "
                               "WHERE result = :result";
     Blob blob = {.bytes = 0}, *used = calloc(1, sizeof *used);
     bool is_found = false;
     text_fit(blob.result, sizeof blob.result, result);
-    Status status = store_first(store, sql, columns, &blob, columns, &blob, &is_found, problem);
+    Status status = db_first(store, sql, columns, &blob, columns, &blob, &is_found, problem);
     *body = blob.body.at;
     *size = blob.body.size;
     if (status == STATUS_OK && is_found && used != NULL) {
-        const StoreDone done = {was_touched, used};
+        const WriteDone done = {was_touched, used};
         *used = (Blob){.bytes = 0};
         text_fit(used->result, sizeof used->result, result);
-        if (store_post(store, touch, used, 0, STORE_LOW, &done, NULL) == STATUS_OK)
+        if (db_enqueue(store, touch, used, 0, STORE_LOW, &done, NULL) == STATUS_OK)
             used = NULL;
     }
     free(used);
@@ -123,16 +122,16 @@ Status store_series_load(Store *store, const char *result, char **body, size_t *
     return status;
 }
 
-bool store_series_exists(Store *store, const char *result) {
+bool db_series_exists(Db *store, const char *result) {
     static const char sql[] = "SELECT bytes FROM series WHERE result = :result";
     Blob blob = {.bytes = 0};
     bool is_found = false;
     text_fit(blob.result, sizeof blob.result, result);
-    return store_first(store, sql, columns, &blob, columns, &blob, &is_found, NULL) == STATUS_OK &&
+    return db_first(store, sql, columns, &blob, columns, &blob, &is_found, NULL) == STATUS_OK &&
            is_found;
 }
 
-void store_series_tally(Store *store, uint64_t *count, uint64_t *bytes, uint64_t *evictions) {
+void db_series_tally(Db *store, uint64_t *count, uint64_t *bytes, uint64_t *evictions) {
     static const char sql[] =
         "SELECT count(*) AS count, coalesce(sum(bytes), 0) AS bytes FROM series";
     typedef struct Sum {
@@ -142,8 +141,8 @@ void store_series_tally(Store *store, uint64_t *count, uint64_t *bytes, uint64_t
                                      ROW_COLUMN(Sum, bytes, COLUMN_COUNT), ROW_END};
     Sum sum = {0, 0};
     bool is_found;
-    (void)store_first(store, sql, NULL, NULL, sums, &sum, &is_found, NULL);
+    (void)db_first(store, sql, NULL, NULL, sums, &sum, &is_found, NULL);
     *count = sum.count;
     *bytes = sum.bytes;
-    *evictions = atomic_load(store_evictions(store));
+    *evictions = atomic_load(db_evictions(store));
 }

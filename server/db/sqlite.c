@@ -23,7 +23,7 @@ typedef struct Kept {
     RowMap map;
 } Kept;
 
-struct Database {
+struct Sqlite {
     sqlite3 *connection;
     Kept kept[STATEMENTS];
     size_t kept_count;
@@ -92,17 +92,17 @@ static Status report(sqlite3 *connection, const char *doing, Problem *problem) {
                        has_path ? ", in " : "", has_path ? path : "");
 }
 
-Status database_execute(Database *database, const char *sql, Problem *problem) {
+Status sqlite_execute(Sqlite *database, const char *sql, Problem *problem) {
     if (sqlite3_exec(database->connection, sql, NULL, NULL, NULL) == SQLITE_OK)
         return STATUS_OK;
     return report(database->connection, "writing to the database", problem);
 }
 
-bool database_is_in_transaction(Database *database) {
+bool sqlite_is_in_transaction(Sqlite *database) {
     return sqlite3_get_autocommit(database->connection) == 0;
 }
 
-Status database_check_place(Database *database, Problem *problem) {
+Status sqlite_check_place(Sqlite *database, Problem *problem) {
     int has_moved = 0;
     (void)sqlite3_file_control(database->connection, "main", SQLITE_FCNTL_HAS_MOVED, &has_moved);
     if (has_moved == 0)
@@ -113,11 +113,11 @@ Status database_check_place(Database *database, Problem *problem) {
                        sqlite3_db_filename(database->connection, "main"));
 }
 
-uint64_t database_rows_changed(Database *database) {
+uint64_t sqlite_rows_changed(Sqlite *database) {
     return (uint64_t)sqlite3_total_changes64(database->connection);
 }
 
-static Status prepare(Database *database, const char *sql, Kept **kept, Problem *problem) {
+static Status prepare(Sqlite *database, const char *sql, Kept **kept, Problem *problem) {
     for (size_t i = 0; i < database->kept_count; i++)
         if (database->kept[i].sql == sql) {
             *kept = &database->kept[i];
@@ -134,7 +134,7 @@ static Status prepare(Database *database, const char *sql, Kept **kept, Problem 
     return STATUS_OK;
 }
 
-Status statement_begin(Database *database, const char *sql, const RowColumn *columns,
+Status statement_begin(Sqlite *database, const char *sql, const RowColumn *columns,
                        const void *item, Statement **statement, Problem *problem) {
     *statement = NULL;
     Kept *kept = NULL;
@@ -167,8 +167,8 @@ void statement_end(Statement *statement) {
     sqlite3_clear_bindings(statement);
 }
 
-Status database_read_part(Database *database, const char *table, const char *column, int64_t number,
-                          size_t offset, size_t size, void *target, Problem *problem) {
+Status sqlite_read_part(Sqlite *database, const char *table, const char *column, int64_t number,
+                        size_t offset, size_t size, void *target, Problem *problem) {
     sqlite3_blob *blob = NULL;
     int code = sqlite3_blob_open(database->connection, "main", table, column, number, 0, &blob);
     const size_t bytes = code == SQLITE_OK ? (size_t)sqlite3_blob_bytes(blob) : 0;
@@ -180,8 +180,8 @@ Status database_read_part(Database *database, const char *table, const char *col
                              : report(database->connection, "reading the database", problem);
 }
 
-Status database_change(Database *database, const char *sql, const RowColumn *columns,
-                       const void *item, int *changes, Problem *problem) {
+Status sqlite_change(Sqlite *database, const char *sql, const RowColumn *columns, const void *item,
+                     int *changes, Problem *problem) {
     Statement *statement;
     bool has_row;
     TRY(statement_begin(database, sql, columns, item, &statement, problem));
@@ -220,7 +220,7 @@ static Status make_file(const char *path, Problem *problem) {
     return STATUS_OK;
 }
 
-static Status read_number(Database *database, const char *sql, int64_t *number, Problem *problem) {
+static Status decode_number(Sqlite *database, const char *sql, int64_t *number, Problem *problem) {
     static const RowColumn columns[] = {{.name = "number", .kind = COLUMN_INTEGER}, ROW_END};
     Statement *statement;
     bool has_row = false;
@@ -232,20 +232,20 @@ static Status read_number(Database *database, const char *sql, int64_t *number, 
     return status;
 }
 
-Status database_touch(Database *database, Problem *problem) {
+Status sqlite_touch(Sqlite *database, Problem *problem) {
     int64_t version = 0;
     char sql[64];
-    TRY(read_number(database, "SELECT user_version AS number FROM pragma_user_version", &version,
-                    problem));
+    TRY(decode_number(database, "SELECT user_version AS number FROM pragma_user_version", &version,
+                      problem));
     sqlite3_snprintf(sizeof sql, sql, "PRAGMA user_version = %lld", (long long)version);
-    return database_execute(database, sql, problem);
+    return sqlite_execute(database, sql, problem);
 }
 
-static Status check_owner(Database *database, Problem *problem) {
+static Status check_owner(Sqlite *database, Problem *problem) {
     int64_t application = 0, tables = 0;
-    TRY(read_number(database, "SELECT application_id AS number FROM pragma_application_id",
-                    &application, problem));
-    TRY(read_number(database, "SELECT count(*) AS number FROM sqlite_schema", &tables, problem));
+    TRY(decode_number(database, "SELECT application_id AS number FROM pragma_application_id",
+                      &application, problem));
+    TRY(decode_number(database, "SELECT count(*) AS number FROM sqlite_schema", &tables, problem));
     if (application == APPLICATION || (application == 0 && tables == 0))
         return STATUS_OK;
     return problem_set(problem, STATUS_CONFLICT,
@@ -253,11 +253,11 @@ static Status check_owner(Database *database, Problem *problem) {
                        sqlite3_db_filename(database->connection, "main"));
 }
 
-Status database_open(const char *path, DatabaseMode mode, Database **database, Problem *problem) {
+Status sqlite_open(const char *path, SqliteMode mode, Sqlite **database, Problem *problem) {
     *database = NULL;
     if (path != NULL && mode == DATABASE_WRITER)
         TRY(make_file(path, problem));
-    Database *made = calloc(1, sizeof *made);
+    Sqlite *made = calloc(1, sizeof *made);
     if (made == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the database");
     const int code = sqlite3_open_v2(path != NULL ? path : ":memory:", &made->connection,
@@ -275,23 +275,23 @@ Status database_open(const char *path, DatabaseMode mode, Database **database, P
         if (mode != DATABASE_COPY)
             status = check_owner(made, problem);
         if (status == STATUS_OK && mode == DATABASE_WRITER)
-            status = database_execute(made, writer_settings, problem);
+            status = sqlite_execute(made, writer_settings, problem);
         if (status == STATUS_OK)
-            status = database_execute(made, settings, problem);
+            status = sqlite_execute(made, settings, problem);
         if (status == STATUS_OK && mode == DATABASE_READER)
-            status = database_execute(made, "PRAGMA query_only = ON", problem);
+            status = sqlite_execute(made, "PRAGMA query_only = ON", problem);
         if (status == STATUS_OK && mode == DATABASE_COPY)
-            status = database_execute(made, copy_settings, problem);
+            status = sqlite_execute(made, copy_settings, problem);
     }
     if (status != STATUS_OK) {
-        database_close(made);
+        sqlite_close(made);
         return status;
     }
     *database = made;
     return STATUS_OK;
 }
 
-void database_close(Database *database) {
+void sqlite_close(Sqlite *database) {
     if (database == NULL)
         return;
     for (size_t i = 0; i < database->kept_count; i++)
@@ -300,27 +300,27 @@ void database_close(Database *database) {
     free(database);
 }
 
-static Status migrate_step(Database *database, const EmbeddedFile *file, int64_t version,
+static Status migrate_step(Sqlite *database, const EmbeddedFile *file, int64_t version,
                            Problem *problem) {
     char footer[96];
-    TRY(database_execute(database, "BEGIN IMMEDIATE", problem));
-    Status status = database_execute(database, file->bytes, problem);
+    TRY(sqlite_execute(database, "BEGIN IMMEDIATE", problem));
+    Status status = sqlite_execute(database, file->bytes, problem);
     sqlite3_snprintf(sizeof footer, footer,
                      "PRAGMA application_id = %d; PRAGMA user_version = %lld; COMMIT", APPLICATION,
                      (long long)version);
     if (status == STATUS_OK)
-        status = database_execute(database, footer, problem);
-    if (status != STATUS_OK && database_is_in_transaction(database))
-        (void)database_execute(database, "ROLLBACK", NULL);
+        status = sqlite_execute(database, footer, problem);
+    if (status != STATUS_OK && sqlite_is_in_transaction(database))
+        (void)sqlite_execute(database, "ROLLBACK", NULL);
     return status;
 }
 
-static Status read_version(Database *database, const EmbeddedFile *files, int64_t *version,
+static Status read_version(Sqlite *database, const EmbeddedFile *files, int64_t *version,
                            int64_t *last, Problem *problem) {
     while (files[*last].path != NULL)
         ++*last;
-    TRY(read_number(database, "SELECT user_version AS number FROM pragma_user_version", version,
-                    problem));
+    TRY(decode_number(database, "SELECT user_version AS number FROM pragma_user_version", version,
+                      problem));
     if (*version < 0)
         return problem_set(
             problem, STATUS_CONFLICT,
@@ -337,8 +337,8 @@ static Status read_version(Database *database, const EmbeddedFile *files, int64_
         sqlite3_db_filename(database->connection, "main"), (long long)*version, (long long)*last);
 }
 
-Status database_is_current(Database *database, const EmbeddedFile *files, bool *is_current,
-                           Problem *problem) {
+Status sqlite_is_current(Sqlite *database, const EmbeddedFile *files, bool *is_current,
+                         Problem *problem) {
     int64_t version = 0, last = 0;
     TRY(read_version(database, files, &version, &last, problem));
     if (is_current != NULL)
@@ -346,7 +346,7 @@ Status database_is_current(Database *database, const EmbeddedFile *files, bool *
     return STATUS_OK;
 }
 
-Status database_migrate(Database *database, const EmbeddedFile *files, Problem *problem) {
+Status sqlite_migrate(Sqlite *database, const EmbeddedFile *files, Problem *problem) {
     int64_t version = 0, last = 0;
     TRY(read_version(database, files, &version, &last, problem));
     for (; version < last; version++)
@@ -356,10 +356,10 @@ Status database_migrate(Database *database, const EmbeddedFile *files, Problem *
 
 // The open transaction is what makes it one moment: without it the copy would begin anew whenever
 // another process has written.
-static Status copy_pages(Database *from, Database *to, const Progress *watch, Problem *problem) {
+static Status copy_pages(Sqlite *from, Sqlite *to, const Progress *watch, Problem *problem) {
     enum { PAGES = 64 };
     int64_t tables;
-    TRY(read_number(from, "SELECT count(*) AS number FROM sqlite_schema", &tables, problem));
+    TRY(decode_number(from, "SELECT count(*) AS number FROM sqlite_schema", &tables, problem));
     sqlite3_backup *backup = sqlite3_backup_init(to->connection, "main", from->connection, "main");
     if (backup == NULL)
         return report(to->connection, "copying the database", problem);
@@ -378,20 +378,20 @@ static Status copy_pages(Database *from, Database *to, const Progress *watch, Pr
                                : report(to->connection, "copying the database", problem);
 }
 
-Status database_copy(Database *from, Database *to, const Progress *watch, Problem *problem) {
-    TRY(database_execute(from, "BEGIN", problem));
+Status sqlite_copy(Sqlite *from, Sqlite *to, const Progress *watch, Problem *problem) {
+    TRY(sqlite_execute(from, "BEGIN", problem));
     const Status status = copy_pages(from, to, watch, problem);
-    (void)database_execute(from, "ROLLBACK", NULL);
+    (void)sqlite_execute(from, "ROLLBACK", NULL);
     TRY(status);
     // Its journal's mode came with the first page; so it needs no files beside it.
-    return database_execute(to, "PRAGMA journal_mode = MEMORY", problem);
+    return sqlite_execute(to, "PRAGMA journal_mode = MEMORY", problem);
 }
 
 static int ask(void *watch) {
     return !progress_advance(watch, 0);
 }
 
-void database_watch(Database *database, const Progress *watch) {
+void sqlite_watch(Sqlite *database, const Progress *watch) {
     enum { OPERATIONS = 20000 };
     sqlite3_progress_handler(database->connection, OPERATIONS, watch != NULL ? ask : NULL,
                              (void *)(uintptr_t)watch);

@@ -46,20 +46,20 @@ void sweep_chunk_rows_clear(SweepChunkRows *rows) {
     *rows = (SweepChunkRows){NULL, 0};
 }
 
-static Status begin(Database *database, const void *work, Problem *problem) {
+static Status begin(Sqlite *database, const void *work, Problem *problem) {
     static const char sql[] =
         "INSERT INTO sweeps (result, scene, points, metrics, chunks, retries, created_unix_ms) "
         "VALUES (:result, :scene, :points, :metrics, :chunks, 0, :created_unix_ms) "
         "ON CONFLICT (result) DO NOTHING";
-    return database_change(database, sql, sweep_columns, work, NULL, problem);
+    return sqlite_change(database, sql, sweep_columns, work, NULL, problem);
 }
 
-Status store_sweep_begin(Store *store, SweepRow *row, Problem *problem) {
+Status db_sweep_begin(Db *store, SweepRow *row, Problem *problem) {
     char result[sizeof row->result];
     memcpy(result, row->result, sizeof result);
-    TRY(store_write(store, begin, row, problem));
+    TRY(db_write(store, begin, row, problem));
     sweep_row_clear(row);
-    return store_sweep_load(store, result, row, problem);
+    return db_sweep_load(store, result, row, problem);
 }
 
 static SweepRow key_of(const char *result) {
@@ -69,13 +69,13 @@ static SweepRow key_of(const char *result) {
     return key;
 }
 
-Status store_sweep_load(Store *store, const char *result, SweepRow *row, Problem *problem) {
+Status db_sweep_load(Db *store, const char *result, SweepRow *row, Problem *problem) {
     static const char sql[] = "SELECT number, result, scene, points, metrics, chunks, retries, "
                               "created_unix_ms FROM sweeps WHERE result = :result";
     const SweepRow key = key_of(result);
     bool is_found;
     memset(row, 0, sizeof *row);
-    TRY(store_first(store, sql, sweep_columns, &key, sweep_columns, row, &is_found, problem));
+    TRY(db_first(store, sql, sweep_columns, &key, sweep_columns, row, &is_found, problem));
     return is_found ? STATUS_OK
                     : problem_set(problem, STATUS_NOT_FOUND,
                                   "there is no table of \"%.72s\": either no such result, or its "
@@ -83,55 +83,55 @@ Status store_sweep_load(Store *store, const char *result, SweepRow *row, Problem
                                   result);
 }
 
-Status store_sweep_asked(Store *store, const char *job, SweepRow *row, Problem *problem) {
+Status db_sweep_asked(Db *store, const char *job, SweepRow *row, Problem *problem) {
     static const char sql[] = "SELECT result, scene FROM jobs WHERE id = :result AND scene <> ''";
     const SweepRow key = key_of(job);
     bool is_found;
     memset(row, 0, sizeof *row);
-    TRY(store_first(store, sql, sweep_columns, &key, sweep_columns, row, &is_found, problem));
+    TRY(db_first(store, sql, sweep_columns, &key, sweep_columns, row, &is_found, problem));
     return is_found ? STATUS_OK
                     : problem_set(problem, STATUS_NOT_FOUND, "there is no job \"%.40s\"", job);
 }
 
-static Status take(Database *database, const void *work, Problem *problem) {
+static Status take(Sqlite *database, const void *work, Problem *problem) {
     static const char sql[] =
         "INSERT INTO sweep_chunks (sweep, chunk, failed, is_open, reasons, rows) VALUES (:sweep, "
         ":chunk, :failed, :is_open, :reasons, :rows) ON CONFLICT (sweep, chunk) DO UPDATE SET "
         "failed = excluded.failed, is_open = excluded.is_open, reasons = excluded.reasons, "
         "rows = excluded.rows WHERE is_open";
-    return database_change(database, sql, chunk_columns, work, NULL, problem);
+    return sqlite_change(database, sql, chunk_columns, work, NULL, problem);
 }
 
-Status store_sweep_take(Store *store, const SweepChunkRow *chunk, Problem *problem) {
-    return store_write(store, take, chunk, problem);
+Status db_sweep_take(Db *store, const SweepChunkRow *chunk, Problem *problem) {
+    return db_write(store, take, chunk, problem);
 }
 
-Status store_sweep_chunks(Store *store, int64_t sweep, SweepChunkRows *chunks, Problem *problem) {
+Status db_sweep_chunks(Db *store, int64_t sweep, SweepChunkRows *chunks, Problem *problem) {
     static const char sql[] = "SELECT number, sweep, chunk, failed, is_open FROM sweep_chunks "
                               "WHERE sweep = :sweep ORDER BY chunk";
     const SweepChunkRow key = {.sweep = sweep};
     void *at;
-    const Status status = store_all(store, sql, chunk_columns, &key, chunk_columns,
-                                    sizeof *chunks->at, &at, &chunks->count, problem);
+    const Status status = db_all(store, sql, chunk_columns, &key, chunk_columns, sizeof *chunks->at,
+                                 &at, &chunks->count, problem);
     chunks->at = at;
     if (status != STATUS_OK)
         sweep_chunk_rows_clear(chunks);
     return status;
 }
 
-Status store_sweep_chunk(Store *store, int64_t sweep, uint64_t number, SweepChunkRow *chunk,
-                         Problem *problem) {
+Status db_sweep_chunk(Db *store, int64_t sweep, uint64_t number, SweepChunkRow *chunk,
+                      Problem *problem) {
     static const char sql[] = "SELECT sweep, chunk, failed, is_open, reasons, rows "
                               "FROM sweep_chunks WHERE sweep = :sweep AND chunk = :chunk";
     const SweepChunkRow key = {.sweep = sweep, .chunk = number};
     bool is_found;
     memset(chunk, 0, sizeof *chunk);
-    TRY(store_first(store, sql, chunk_columns, &key, chunk_columns, chunk, &is_found, problem));
+    TRY(db_first(store, sql, chunk_columns, &key, chunk_columns, chunk, &is_found, problem));
     return is_found ? STATUS_OK
                     : problem_set(problem, STATUS_NOT_FOUND, "the chunk is not there yet");
 }
 
-static Status check_there(Database *database, const char *sql, const RowColumn *columns,
+static Status check_there(Sqlite *database, const char *sql, const RowColumn *columns,
                           const void *item, Problem *problem) {
     Statement *statement;
     bool is_there = false;
@@ -144,7 +144,7 @@ static Status check_there(Database *database, const char *sql, const RowColumn *
                              "the sweep's rows were deleted or made anew while they were read");
 }
 
-static Status read_parts(Database *database, const SweepRow *sweep, const SweepChunkRows *chunks,
+static Status read_parts(Sqlite *database, const SweepRow *sweep, const SweepChunkRows *chunks,
                          size_t offset, size_t size, unsigned char *target, Problem *problem) {
     static const char sweep_sql[] = "SELECT 1 FROM sweeps WHERE number = :number AND result = "
                                     ":result AND created_unix_ms = :created_unix_ms";
@@ -154,50 +154,50 @@ static Status read_parts(Database *database, const SweepRow *sweep, const SweepC
     TRY(check_there(database, sweep_sql, sweep_columns, sweep, problem));
     for (size_t i = 0; i < chunks->count; i++) {
         TRY(check_there(database, chunk_sql, chunk_columns, &chunks->at[i], problem));
-        TRY(database_read_part(database, "sweep_chunks", "rows", chunks->at[i].number, offset, size,
-                               target + i * size, problem));
+        TRY(sqlite_read_part(database, "sweep_chunks", "rows", chunks->at[i].number, offset, size,
+                             target + i * size, problem));
     }
     return STATUS_OK;
 }
 
-Status store_sweep_read(Store *store, const SweepRow *sweep, const SweepChunkRows *chunks,
-                        size_t offset, size_t size, unsigned char *target, Problem *problem) {
-    Database *database = store_take(store);
+Status db_sweep_read(Db *store, const SweepRow *sweep, const SweepChunkRows *chunks, size_t offset,
+                     size_t size, unsigned char *target, Problem *problem) {
+    Sqlite *database = db_take(store);
     // One transaction: what was found to be the same stays so while it is read.
-    Status status = database_execute(database, "BEGIN", problem);
+    Status status = sqlite_execute(database, "BEGIN", problem);
     if (status == STATUS_OK) {
         status = read_parts(database, sweep, chunks, offset, size, target, problem);
-        const Status ended = database_execute(database, "COMMIT", NULL);
+        const Status ended = sqlite_execute(database, "COMMIT", NULL);
         status = status == STATUS_OK ? ended : status;
     }
-    store_put(store, database);
+    db_put(store, database);
     return status;
 }
 
-static Status reopen(Database *database, const void *work, Problem *problem) {
+static Status reopen(Sqlite *database, const void *work, Problem *problem) {
     static const char chunks[] = "UPDATE sweep_chunks SET is_open = 1 WHERE failed > 0 AND sweep = "
                                  "(SELECT number FROM sweeps WHERE result = :result)";
     static const char sweep[] = "UPDATE sweeps SET retries = retries + 1 WHERE result = :result";
     int changes = 0;
-    TRY(database_change(database, chunks, sweep_columns, work, &changes, problem));
+    TRY(sqlite_change(database, chunks, sweep_columns, work, &changes, problem));
     if (changes == 0)
         return problem_set(problem, STATUS_CONFLICT, "no point of the sweep has failed");
-    return database_change(database, sweep, sweep_columns, work, NULL, problem);
+    return sqlite_change(database, sweep, sweep_columns, work, NULL, problem);
 }
 
-Status store_sweep_reopen(Store *store, const char *result, Problem *problem) {
+Status db_sweep_reopen(Db *store, const char *result, Problem *problem) {
     const SweepRow key = key_of(result);
-    return store_write(store, reopen, &key, problem);
+    return db_write(store, reopen, &key, problem);
 }
 
-static Status tidy(Database *database, const void *work, Problem *problem) {
+static Status tidy(Sqlite *database, const void *work, Problem *problem) {
     static const char sql[] =
         "DELETE FROM sweeps WHERE result NOT IN (SELECT id FROM results) AND result NOT IN "
         "(SELECT result FROM jobs WHERE state < 2)";
-    return database_change(database, sql, sweep_columns, work, NULL, problem);
+    return sqlite_change(database, sql, sweep_columns, work, NULL, problem);
 }
 
-Status store_sweep_tidy(Store *store, Problem *problem) {
+Status db_sweep_tidy(Db *store, Problem *problem) {
     const SweepRow none = {0};
-    return store_write(store, tidy, &none, problem);
+    return db_write(store, tidy, &none, problem);
 }

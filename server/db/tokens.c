@@ -28,7 +28,7 @@ static const RowColumn found_columns[] = {ROW_COLUMN(Found, count, COLUMN_INTEGE
                                           ROW_COLUMN(Found, revoked_unix_ms, COLUMN_INTEGER),
                                           ROW_COLUMN(Found, is_there, COLUMN_FLAG), ROW_END};
 
-static Status find(Database *database, const TokenRow *row, Found *found, Problem *problem) {
+static Status find(Sqlite *database, const TokenRow *row, Found *found, Problem *problem) {
     static const char sql[] =
         "SELECT count(*) AS count, coalesce(max(name = :name), 0) AS is_there, "
         "coalesce(max(revoked_unix_ms) FILTER (WHERE name = :name), 0) AS revoked_unix_ms "
@@ -44,7 +44,7 @@ static Status find(Database *database, const TokenRow *row, Found *found, Proble
     return status;
 }
 
-static Status require(Database *database, const TokenRow *row, Found *found, Problem *problem) {
+static Status require(Sqlite *database, const TokenRow *row, Found *found, Problem *problem) {
     TRY(find(database, row, found, problem));
     if (found->is_there)
         return STATUS_OK;
@@ -52,7 +52,7 @@ static Status require(Database *database, const TokenRow *row, Found *found, Pro
                        "there is no token \"%.64s\"; `impactd token list` shows them", row->name);
 }
 
-static Status add(Database *database, const void *work, Problem *problem) {
+static Status add(Sqlite *database, const void *work, Problem *problem) {
     static const char sql[] =
         "INSERT INTO tokens (name, digest, scopes, created_unix_ms, used_unix_ms, expires_unix_ms, "
         "revoked_unix_ms) VALUES (:name, :digest, :scopes, :created_unix_ms, :used_unix_ms, "
@@ -68,18 +68,18 @@ static Status add(Database *database, const void *work, Problem *problem) {
         return problem_set(problem, STATUS_LIMIT,
                            "%d tokens are kept, no more; forget those that are revoked",
                            TOKENS_MAX);
-    return database_change(database, sql, token_columns, row, NULL, problem);
+    return sqlite_change(database, sql, token_columns, row, NULL, problem);
 }
 
-Status store_token_add(Store *store, const TokenRow *row, Problem *problem) {
-    return store_write(store, add, row, problem);
+Status db_token_add(Db *store, const TokenRow *row, Problem *problem) {
+    return db_write(store, add, row, problem);
 }
 
-Status store_tokens(Store *store, TokenRows *rows, Problem *problem) {
+Status db_tokens(Db *store, TokenRows *rows, Problem *problem) {
     static const char sql[] = "SELECT * FROM tokens ORDER BY name";
     void *at;
-    const Status status = store_all(store, sql, NULL, NULL, token_columns, sizeof *rows->at, &at,
-                                    &rows->count, problem);
+    const Status status =
+        db_all(store, sql, NULL, NULL, token_columns, sizeof *rows->at, &at, &rows->count, problem);
     rows->at = at;
     if (status != STATUS_OK) {
         free(at);
@@ -88,7 +88,7 @@ Status store_tokens(Store *store, TokenRows *rows, Problem *problem) {
     return status;
 }
 
-static Status revoke(Database *database, const void *work, Problem *problem) {
+static Status revoke(Sqlite *database, const void *work, Problem *problem) {
     static const char sql[] =
         "UPDATE tokens SET revoked_unix_ms = :revoked_unix_ms WHERE name = :name";
     const TokenRow *row = work;
@@ -97,14 +97,14 @@ static Status revoke(Database *database, const void *work, Problem *problem) {
     if (found.revoked_unix_ms > 0)
         return problem_set(problem, STATUS_CONFLICT, "the token \"%.64s\" is revoked already",
                            row->name);
-    return database_change(database, sql, token_columns, row, NULL, problem);
+    return sqlite_change(database, sql, token_columns, row, NULL, problem);
 }
 
-Status store_token_revoke(Store *store, const TokenRow *row, Problem *problem) {
-    return store_write(store, revoke, row, problem);
+Status db_token_revoke(Db *store, const TokenRow *row, Problem *problem) {
+    return db_write(store, revoke, row, problem);
 }
 
-static Status forget(Database *database, const void *work, Problem *problem) {
+static Status forget(Sqlite *database, const void *work, Problem *problem) {
     static const char sql[] = "DELETE FROM tokens WHERE name = :name";
     const TokenRow *row = work;
     Found found;
@@ -112,18 +112,18 @@ static Status forget(Database *database, const void *work, Problem *problem) {
     if (found.revoked_unix_ms == 0)
         return problem_set(problem, STATUS_CONFLICT,
                            "the token \"%.64s\" is in use; revoke it first", row->name);
-    return database_change(database, sql, token_columns, row, NULL, problem);
+    return sqlite_change(database, sql, token_columns, row, NULL, problem);
 }
 
-Status store_token_forget(Store *store, const TokenRow *row, Problem *problem) {
-    return store_write(store, forget, row, problem);
+Status db_token_forget(Db *store, const TokenRow *row, Problem *problem) {
+    return db_write(store, forget, row, problem);
 }
 
-static Status used(Database *database, const void *work, Problem *problem) {
+static Status used(Sqlite *database, const void *work, Problem *problem) {
     static const char sql[] = "UPDATE tokens SET used_unix_ms = :used_unix_ms WHERE name = :name";
-    return database_change(database, sql, token_columns, work, NULL, problem);
+    return sqlite_change(database, sql, token_columns, work, NULL, problem);
 }
 
-Status store_token_used(Store *store, const TokenRow *row, Problem *problem) {
-    return store_write(store, used, row, problem);
+Status db_token_used(Db *store, const TokenRow *row, Problem *problem) {
+    return db_write(store, used, row, problem);
 }

@@ -20,14 +20,14 @@ typedef struct TokenRows {
 } TokenRows;
 
 // STATUS_CONFLICT where the name is taken, STATUS_LIMIT where there are TOKENS_MAX.
-Status store_token_add(Store *store, const TokenRow *row, Problem *problem);
+Status db_token_add(Db *store, const TokenRow *row, Problem *problem);
 // All, by name.
-Status store_tokens(Store *store, TokenRows *rows, Problem *problem);
+Status db_tokens(Db *store, TokenRows *rows, Problem *problem);
 // Revokes at row->revoked_unix_ms; STATUS_NOT_FOUND, STATUS_CONFLICT if it is revoked already.
-Status store_token_revoke(Store *store, const TokenRow *row, Problem *problem);
+Status db_token_revoke(Db *store, const TokenRow *row, Problem *problem);
 // Strikes it from the list; STATUS_NOT_FOUND, STATUS_CONFLICT unless it is revoked.
-Status store_token_forget(Store *store, const TokenRow *row, Problem *problem);
+Status db_token_forget(Db *store, const TokenRow *row, Problem *problem);
 // Notes row->used_unix_ms.
-Status store_token_used(Store *store, const TokenRow *row, Problem *problem);
+Status db_token_used(Db *store, const TokenRow *row, Problem *problem);
 
 #endif

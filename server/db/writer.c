@@ -1,5 +1,5 @@
-// Group commit. While one transaction is made durable the next ones queue up, and all of them
-// become the next transaction:
+// MaterialGroup commit. While one transaction is made durable the next ones queue up, and all of
+// them become the next transaction:
 //
 //     BEGIN IMMEDIATE   apply...   COMMIT
 //
@@ -23,17 +23,17 @@ static const int64_t delay_ms[STORE_TURNS] = {[STORE_SOON] = 5, [STORE_LATER] = 
 
 // Tickets in the order of their coming.
 typedef struct Line {
-    StoreTicket *first, **last;
+    PendingWrite *first, **last;
 } Line;
 
 // One write: on the stack of a caller who waits, or on the heap with a copy of its work behind it.
-struct StoreTicket {
-    StoreTicket *next, **link; // `link` points at what points here
-    Line *line;                // NULL: it is queued no more
-    int64_t due_ns;            // 0: at once
+struct PendingWrite {
+    PendingWrite *next, **link; // `link` points at what points here
+    Line *line;                 // NULL: it is queued no more
+    int64_t due_ns;             // 0: at once
     StoreApply *apply;
     const void *work;
-    StoreDone done; // `call` NULL: its caller waits
+    WriteDone done; // `call` NULL: its caller waits
     Status status;
     bool is_done;
     pthread_cond_t settled;
@@ -41,50 +41,50 @@ struct StoreTicket {
 };
 
 struct Writer {
-    Database *database;
-    Store *shared;
+    Sqlite *database;
+    Db *shared;
     pthread_t thread;
     pthread_mutex_t lock;
     pthread_cond_t some;
     Line lines[STORE_TURNS];
     int64_t wakes_ns; // when the thread wakes by itself; INT64_MAX: never, 0: it does not sleep
     bool is_stopping, is_writing;
-    StoreTotals totals;
+    DbStats totals;
     Problem problem; // of the write in hand; the thread's own, for it is large
 };
 
-static void settle(StoreTicket *write, Status status, const Problem *problem) {
+static void settle(PendingWrite *write, Status status, const Problem *problem) {
     write->status = status;
     if (status != STATUS_OK)
         memcpy(write->detail, problem->detail, sizeof write->detail);
 }
 
-static Status apply_saved(Writer *writer, Database *database, StoreTicket *write) {
+static Status apply_saved(Writer *writer, Sqlite *database, PendingWrite *write) {
     static const char open[] = "SAVEPOINT one", undo[] = "ROLLBACK TO one", end[] = "RELEASE one";
-    Status status = database_change(database, open, NULL, NULL, NULL, &writer->problem);
+    Status status = sqlite_change(database, open, NULL, NULL, NULL, &writer->problem);
     if (status == STATUS_OK) {
         status = write->apply(database, write->work, &writer->problem);
-        if (status != STATUS_OK && database_is_in_transaction(database))
-            (void)database_change(database, undo, NULL, NULL, NULL, NULL);
-        if (database_is_in_transaction(database))
-            (void)database_change(database, end, NULL, NULL, NULL, NULL);
+        if (status != STATUS_OK && sqlite_is_in_transaction(database))
+            (void)sqlite_change(database, undo, NULL, NULL, NULL, NULL);
+        if (sqlite_is_in_transaction(database))
+            (void)sqlite_change(database, end, NULL, NULL, NULL, NULL);
     }
     return status;
 }
 
 // Does writes from `first` up to `end` in one transaction. False if all of it is lost;
 // writer->problem then says why. Without savepoints one failure loses all.
-static bool commit(Writer *writer, Database *database, StoreTicket *first, const StoreTicket *end,
+static bool commit(Writer *writer, Sqlite *database, PendingWrite *first, const PendingWrite *end,
                    bool has_savepoints) {
     static const char begin[] = "BEGIN IMMEDIATE", commit[] = "COMMIT", undo[] = "ROLLBACK";
     const int64_t began_ns = clock_monotonic_ns();
-    const uint64_t rows = database_rows_changed(database);
+    const uint64_t rows = sqlite_rows_changed(database);
     uint64_t writes = 0;
     problem_clear(&writer->problem);
-    Status status = database_change(database, begin, NULL, NULL, NULL, &writer->problem);
+    Status status = sqlite_change(database, begin, NULL, NULL, NULL, &writer->problem);
     if (status == STATUS_OK)
-        status = database_check_place(database, &writer->problem);
-    for (StoreTicket *write = first; status == STATUS_OK && write != end; write = write->next) {
+        status = sqlite_check_place(database, &writer->problem);
+    for (PendingWrite *write = first; status == STATUS_OK && write != end; write = write->next) {
         problem_clear(&writer->problem);
         if (!has_savepoints) {
             status = write->apply(database, write->work, &writer->problem);
@@ -94,29 +94,29 @@ static bool commit(Writer *writer, Database *database, StoreTicket *first, const
         }
         settle(write, apply_saved(writer, database, write), &writer->problem);
         writes += write->status == STATUS_OK;
-        if (!database_is_in_transaction(database)) {
+        if (!sqlite_is_in_transaction(database)) {
             counter_add(&writer->totals.errors, 1);
             return false;
         }
     }
     if (status == STATUS_OK) {
         problem_clear(&writer->problem);
-        status = database_change(database, commit, NULL, NULL, NULL, &writer->problem);
+        status = sqlite_change(database, commit, NULL, NULL, NULL, &writer->problem);
     }
-    if (status != STATUS_OK && database_is_in_transaction(database))
-        (void)database_change(database, undo, NULL, NULL, NULL, NULL);
+    if (status != STATUS_OK && sqlite_is_in_transaction(database))
+        (void)sqlite_change(database, undo, NULL, NULL, NULL, NULL);
     if (status == STATUS_OK) {
         atomic_store(&writer->totals.is_failing, false);
         histogram_add(&writer->totals.commits, clock_monotonic_ns() - began_ns);
         counter_add(&writer->totals.writes, writes);
-        counter_add(&writer->totals.rows, database_rows_changed(database) - rows);
+        counter_add(&writer->totals.rows, sqlite_rows_changed(database) - rows);
     } else {
         counter_add(&writer->totals.errors, 1);
     }
     return status == STATUS_OK;
 }
 
-static void commit_alone(Writer *writer, Database *database, StoreTicket *write) {
+static void commit_alone(Writer *writer, Sqlite *database, PendingWrite *write) {
     write->status = STATUS_OK;
     if (commit(writer, database, write, write->next, true) || write->status != STATUS_OK)
         return;
@@ -125,21 +125,21 @@ static void commit_alone(Writer *writer, Database *database, StoreTicket *write)
     settle(write, status != STATUS_OK ? status : STATUS_IO, &writer->problem);
 }
 
-static void commit_all(Writer *writer, StoreTicket *first) {
-    Database *database = writer->shared != NULL ? store_take(writer->shared) : writer->database;
+static void commit_all(Writer *writer, PendingWrite *first) {
+    Sqlite *database = writer->shared != NULL ? db_take(writer->shared) : writer->database;
     if (!commit(writer, database, first, NULL, false) &&
         (first->next == NULL || !commit(writer, database, first, NULL, true)))
-        for (StoreTicket *write = first; write != NULL; write = write->next)
+        for (PendingWrite *write = first; write != NULL; write = write->next)
             commit_alone(writer, database, write);
     if (writer->shared != NULL)
-        store_put(writer->shared, database);
+        db_put(writer->shared, database);
 }
 
 // With the lock held, which is let go while others are told.
-static void tell(Writer *writer, StoreTicket *write) {
+static void tell(Writer *writer, PendingWrite *write) {
     while (write != NULL) {
         // Its owner may be gone as soon as the lock is free, not before.
-        StoreTicket *next = write->next;
+        PendingWrite *next = write->next;
         if (write->done.call == NULL) {
             write->is_done = true;
             pthread_cond_signal(&write->settled);
@@ -154,7 +154,7 @@ static void tell(Writer *writer, StoreTicket *write) {
     }
 }
 
-static void append(Line *line, StoreTicket *write) {
+static void append(Line *line, PendingWrite *write) {
     write->line = line;
     write->link = line->last;
     write->next = NULL;
@@ -162,7 +162,7 @@ static void append(Line *line, StoreTicket *write) {
     line->last = &write->next;
 }
 
-static void leave(StoreTicket *write) {
+static void leave(PendingWrite *write) {
     *write->link = write->next;
     if (write->next != NULL)
         write->next->link = write->link;
@@ -173,27 +173,27 @@ static void leave(StoreTicket *write) {
 }
 
 // With the lock held.
-static void call_up(Writer *writer, StoreTurn turn, int64_t until_ns) {
+static void call_up(Writer *writer, WritePriority turn, int64_t until_ns) {
     const Line *line = &writer->lines[turn];
     while (line->first != NULL && line->first->due_ns <= until_ns) {
-        StoreTicket *write = line->first;
+        PendingWrite *write = line->first;
         leave(write);
         append(&writer->lines[STORE_NOW], write);
     }
 }
 
 // With the lock held: all that is to be written now, else one of what is low; NULL: nothing.
-static StoreTicket *take(Writer *writer) {
+static PendingWrite *take(Writer *writer) {
     Line *line = &writer->lines[STORE_NOW];
     const int64_t now_ns = writer->is_stopping ? INT64_MAX : clock_monotonic_ns();
     call_up(writer, STORE_LATER, now_ns);
     call_up(writer, STORE_SOON, now_ns);
     if (line->first != NULL)
         call_up(writer, STORE_SOON, INT64_MAX);
-    StoreTicket *write = line->first != NULL ? line->first : writer->lines[STORE_LOW].first;
+    PendingWrite *write = line->first != NULL ? line->first : writer->lines[STORE_LOW].first;
     if (line->first == NULL && write != NULL)
         leave(write);
-    for (StoreTicket *at = line->first; at != NULL; at = at->next)
+    for (PendingWrite *at = line->first; at != NULL; at = at->next)
         at->line = NULL;
     *line = (Line){NULL, &line->first};
     return write;
@@ -219,7 +219,7 @@ static void wait(Writer *writer) {
 
 static void *work(void *context) {
     Writer *writer = context;
-    StoreTicket *write;
+    PendingWrite *write;
     pthread_mutex_lock(&writer->lock);
     for (;;) {
         while ((write = take(writer)) == NULL && !writer->is_stopping)
@@ -237,7 +237,7 @@ static void *work(void *context) {
     return NULL;
 }
 
-Status writer_start(Database *database, Store *shared, Writer **writer, Problem *problem) {
+Status writer_start(Sqlite *database, Db *shared, Writer **writer, Problem *problem) {
     *writer = NULL;
     Writer *made = calloc(1, sizeof *made);
     if (made == NULL)
@@ -276,12 +276,12 @@ void writer_stop(Writer *writer) {
     free(writer);
 }
 
-const StoreTotals *writer_totals(const Writer *writer) {
+const DbStats *writer_totals(const Writer *writer) {
     return &writer->totals;
 }
 
 // With the lock held.
-static void enqueue(Writer *writer, StoreTicket *write, StoreTurn turn) {
+static void enqueue(Writer *writer, PendingWrite *write, WritePriority turn) {
     write->due_ns = delay_ms[turn] > 0 ? clock_monotonic_ns() + delay_ms[turn] * 1000000 : 0;
     append(&writer->lines[turn], write);
     if (write->due_ns < writer->wakes_ns) {
@@ -291,7 +291,7 @@ static void enqueue(Writer *writer, StoreTicket *write, StoreTurn turn) {
 }
 
 Status writer_do(Writer *writer, StoreApply *apply, const void *work_, Problem *problem) {
-    StoreTicket write = {.apply = apply, .work = work_};
+    PendingWrite write = {.apply = apply, .work = work_};
     pthread_cond_init(&write.settled, NULL);
     pthread_mutex_lock(&writer->lock);
     enqueue(writer, &write, STORE_NOW);
@@ -304,9 +304,9 @@ Status writer_do(Writer *writer, StoreApply *apply, const void *work_, Problem *
     return write.status;
 }
 
-Status writer_post(Writer *writer, StoreApply *apply, const void *work_, size_t size,
-                   StoreTurn turn, const StoreDone *done, StoreTicket **ticket) {
-    StoreTicket *write = malloc(sizeof *write + size);
+Status writer_enqueue(Writer *writer, StoreApply *apply, const void *work_, size_t size,
+                      WritePriority turn, const WriteDone *done, PendingWrite **ticket) {
+    PendingWrite *write = malloc(sizeof *write + size);
     if (write == NULL)
         return STATUS_NO_MEMORY;
     write->apply = apply;
@@ -320,7 +320,7 @@ Status writer_post(Writer *writer, StoreApply *apply, const void *work_, size_t 
     return STATUS_OK;
 }
 
-bool writer_withdraw(Writer *writer, StoreTicket *write) {
+bool writer_cancel(Writer *writer, PendingWrite *write) {
     pthread_mutex_lock(&writer->lock);
     const bool is_queued = write->line != NULL;
     if (is_queued)
@@ -331,7 +331,7 @@ bool writer_withdraw(Writer *writer, StoreTicket *write) {
     return is_queued;
 }
 
-void writer_hurry(Writer *writer, StoreTicket *write) {
+void writer_expedite(Writer *writer, PendingWrite *write) {
     pthread_mutex_lock(&writer->lock);
     if (write->line == &writer->lines[STORE_LATER]) {
         leave(write);
@@ -340,12 +340,12 @@ void writer_hurry(Writer *writer, StoreTicket *write) {
     pthread_mutex_unlock(&writer->lock);
 }
 
-static Status write_nothing(Database *database, const void *work_, Problem *problem) {
+static Status write_nothing(Sqlite *database, const void *work_, Problem *problem) {
     (void)database, (void)work_, (void)problem;
     return STATUS_OK;
 }
 
-void writer_settle(Writer *writer) {
+void writer_flush(Writer *writer) {
     pthread_mutex_lock(&writer->lock);
     call_up(writer, STORE_LATER, INT64_MAX);
     call_up(writer, STORE_SOON, INT64_MAX);

@@ -6,18 +6,18 @@
 
 static void put_stop(Bytes *bytes, const DerivedList *derived) {
     bytes_text(bytes, ",");
-    cells_real(bytes, derived->count > 0 ? derived->at[0].stiffness : (double)NAN);
+    csv_cells_real(bytes, derived->count > 0 ? derived->at[0].stiffness : (double)NAN);
     bytes_text(bytes, ",");
-    cells_real(bytes, derived->count > 0 ? derived->at[0].damping : (double)NAN);
+    csv_cells_real(bytes, derived->count > 0 ? derived->at[0].damping : (double)NAN);
 }
 
 void compare_csv(const Comparison *comparison, Bytes *bytes) {
     bytes_text(bytes, "model,separation,status,stiffness,damping [N s/m],steps");
-    cells_header(bytes, summary_fields);
-    cells_header_of(bytes, "contacts", compare_contacts_fields);
-    cells_header_of(bytes, "difference", compare_differences_fields);
-    cells_header_of(bytes, "psd", spectrum_distance_fields);
-    cells_header_of(bytes, "displacement", signal_comparison_fields);
+    csv_cells_header(bytes, summary_fields);
+    csv_cells_header_of(bytes, "contacts", compare_contacts_fields);
+    csv_cells_header_of(bytes, "difference", compare_differences_fields);
+    csv_cells_header_of(bytes, "psd", spectrum_distance_fields);
+    csv_cells_header_of(bytes, "displacement", signal_comparison_fields);
     bytes_text(bytes, ",divergence [s],why\n");
     for (size_t i = 0; i < comparison->entries.count; i++) {
         const CompareEntry *entry = &comparison->entries.at[i];
@@ -26,16 +26,16 @@ void compare_csv(const Comparison *comparison, Bytes *bytes) {
                      compare_status_names[entry->status]);
         put_stop(bytes, &entry->derived);
         bytes_text(bytes, ",");
-        cells_real(bytes, entry->steps);
-        cells_members(bytes, summary_fields, &entry->summary);
-        cells_members(bytes, compare_contacts_fields, &entry->contacts);
-        cells_members(bytes, compare_differences_fields, &entry->differences);
-        cells_members(bytes, spectrum_distance_fields, &entry->psd);
-        cells_members(bytes, signal_comparison_fields, &entry->displacement);
+        csv_cells_real(bytes, entry->steps);
+        csv_cells_members(bytes, summary_fields, &entry->summary);
+        csv_cells_members(bytes, compare_contacts_fields, &entry->contacts);
+        csv_cells_members(bytes, compare_differences_fields, &entry->differences);
+        csv_cells_members(bytes, spectrum_distance_fields, &entry->psd);
+        csv_cells_members(bytes, signal_comparison_fields, &entry->displacement);
         bytes_text(bytes, ",");
-        cells_real(bytes, entry->divergence.time);
+        csv_cells_real(bytes, entry->divergence.time);
         bytes_text(bytes, ",");
-        cells_text(bytes, entry->why);
+        csv_cells_text(bytes, entry->why);
         bytes_text(bytes, "\n");
     }
 }

@@ -8,7 +8,7 @@
 
 static char *put_real(char *at, double value) {
     if (isfinite(value))
-        return at + shortest_write(at, value);
+        return at + dtoa_write(at, value);
     const char *text = isnan(value) ? "nan" : value < 0 ? "-inf" : "inf";
     const size_t length = strlen(text);
     memcpy(at, text, length);
@@ -60,7 +60,7 @@ static bool csv_next(const Table *table, TextPlace *place, Bytes *bytes) {
     return end < table->count;
 }
 
-const Encoder encoder_csv = {
+const TableFormat encoder_csv = {
     .extension = "csv",
     .content_type = "text/csv; charset=utf-8",
     .is_binary = false,

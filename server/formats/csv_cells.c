@@ -6,7 +6,7 @@ static bool is_number(const Field *field) {
     return field->kind == FIELD_KIND_REAL || field->kind == FIELD_KIND_COUNT;
 }
 
-void cells_header_of(Bytes *bytes, const char *before, const Field *fields) {
+void csv_cells_header_of(Bytes *bytes, const char *before, const Field *fields) {
     for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
         if (!is_number(field))
             continue;
@@ -16,25 +16,25 @@ void cells_header_of(Bytes *bytes, const char *before, const Field *fields) {
     }
 }
 
-void cells_header(Bytes *bytes, const Field *fields) {
-    cells_header_of(bytes, "", fields);
+void csv_cells_header(Bytes *bytes, const Field *fields) {
+    csv_cells_header_of(bytes, "", fields);
 }
 
-void cells_real(Bytes *bytes, double value) {
+void csv_cells_real(Bytes *bytes, double value) {
     if (isfinite(value))
         bytes_real(bytes, value);
     else
         bytes_text(bytes, isnan(value) ? "nan" : value < 0 ? "-inf" : "inf");
 }
 
-void cells_members(Bytes *bytes, const Field *fields, const void *item) {
+void csv_cells_members(Bytes *bytes, const Field *fields, const void *item) {
     for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
         const void *member = (const char *)item + field->offset;
         if (!is_number(field))
             continue;
         bytes_text(bytes, ",");
         if (field->kind == FIELD_KIND_REAL)
-            cells_real(bytes, *(const double *)member);
+            csv_cells_real(bytes, *(const double *)member);
         else if (*(const uint64_t *)member == COUNT_ABSENT)
             bytes_text(bytes, "nan");
         else
@@ -42,7 +42,7 @@ void cells_members(Bytes *bytes, const Field *fields, const void *item) {
     }
 }
 
-void cells_text(Bytes *bytes, const char *text) {
+void csv_cells_text(Bytes *bytes, const char *text) {
     if (text == NULL)
         return;
     bytes_text(bytes, "\"");

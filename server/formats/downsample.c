@@ -12,7 +12,7 @@ static inline double larger(double a, double b) {
     return a > b ? a : b;
 }
 
-void buckets_extremes(const double *values, size_t count, double *least, double *most) {
+void downsample_extremes(const double *values, size_t count, double *least, double *most) {
     double low = values[0], high = values[0];
     size_t i = 0;
     if (count >= LANES) {
@@ -38,8 +38,8 @@ void buckets_extremes(const double *values, size_t count, double *least, double 
     *most = high;
 }
 
-Status buckets_make(const Column *const *columns, size_t column_count, size_t first, size_t count,
-                    size_t bucket, Columns *buckets, Problem *problem) {
+Status downsample(const Column *const *columns, size_t column_count, size_t first, size_t count,
+                  size_t bucket, Columns *buckets, Problem *problem) {
     const size_t rows = (count + bucket - 1) / bucket;
     TRY(columns_allocate(buckets, 2 * column_count, rows, 0, problem));
     for (size_t c = 0; c < column_count; c++) {
@@ -52,8 +52,8 @@ Status buckets_make(const Column *const *columns, size_t column_count, size_t fi
         columns_name(buckets, 2 * c + 1, name, columns[c]->unit);
         for (size_t i = 0; i < rows; i++) {
             const size_t from = i * bucket, left = count - from;
-            buckets_extremes(values + from, left < bucket ? left : bucket, &pair[0].values[i],
-                             &pair[1].values[i]);
+            downsample_extremes(values + from, left < bucket ? left : bucket, &pair[0].values[i],
+                                &pair[1].values[i]);
         }
     }
     return STATUS_OK;

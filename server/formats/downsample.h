@@ -6,11 +6,11 @@
 #include "core/base/columns.h"
 
 // The least and the largest of `count` values, at least one, all of them finite.
-void buckets_extremes(const double *values, size_t count, double *least, double *most);
+void downsample_extremes(const double *values, size_t count, double *least, double *most);
 
 // Values first ... first + count - 1 of each column in buckets of `bucket`, the last one perhaps
 // shorter: two columns for each, "NAME_min" and "NAME_max". Cleared by columns_clear.
-Status buckets_make(const Column *const *columns, size_t column_count, size_t first, size_t count,
-                    size_t bucket, Columns *buckets, Problem *problem);
+Status downsample(const Column *const *columns, size_t column_count, size_t first, size_t count,
+                  size_t bucket, Columns *buckets, Problem *problem);
 
 #endif

@@ -6,9 +6,9 @@
 #include "server/util/dtoa.h"
 
 struct Encoding {
-    const Encoder *encoder; // of a text; NULL: all stands in the layout
+    const TableFormat *encoder; // of a text; NULL: all stands in the layout
     Table table;
-    Layout layout;
+    Segments layout;
     uint64_t at, end; // of the layout
     TextPlace place;
     bool is_last; // the piece is
@@ -22,53 +22,54 @@ static size_t piece_room(const Table *table) {
     return (ENCODER_PIECE_NUMBERS + table->column_count + 2) * (SHORTEST_SIZE + 1) + names;
 }
 
-static Status tell(const Layout *layout, Problem *problem) {
+static Status tell(const Segments *layout, Problem *problem) {
     return layout->is_failed
                ? problem_set(problem, STATUS_NO_MEMORY, "no memory for the answer's layout")
                : STATUS_OK;
 }
 
-Status encoding_write(const Encoder *encoder, const Table *table, Bytes *bytes, Problem *problem) {
+Status encoding_write(const TableFormat *encoder, const Table *table, Bytes *bytes,
+                      Problem *problem) {
     if (encoder->next != NULL) {
         TextPlace place = {0, 0};
         while (encoder->next(table, &place, bytes) && !bytes->is_failed)
             continue;
         return STATUS_OK;
     }
-    Layout layout = {0};
+    Segments layout = {0};
     Status status = encoder->lay(table, &layout, problem);
     if (status == STATUS_OK)
         status = tell(&layout, problem);
     if (status == STATUS_OK)
-        layout_write(&layout, bytes);
-    layout_clear(&layout);
+        segments_write(&layout, bytes);
+    segments_clear(&layout);
     return status;
 }
 
-Status encoding_open_layout(Layout *layout, Encoding **encoding, Problem *problem) {
+Status encoding_open_layout(Segments *layout, Encoding **encoding, Problem *problem) {
     Status status = tell(layout, problem);
     *encoding = status == STATUS_OK ? calloc(1, sizeof **encoding) : NULL;
     if (*encoding == NULL) {
-        layout_clear(layout);
+        segments_clear(layout);
         return status != STATUS_OK
                    ? status
                    : problem_set(problem, STATUS_NO_MEMORY, "no memory for the answer");
     }
     (*encoding)->layout = *layout;
     (*encoding)->end = layout->size;
-    *layout = (Layout){0};
+    *layout = (Segments){0};
     return STATUS_OK;
 }
 
-Status encoding_open(const Encoder *encoder, const Table *table, Encoding **encoding,
+Status encoding_open(const TableFormat *encoder, const Table *table, Encoding **encoding,
                      Problem *problem) {
     *encoding = NULL;
     if (encoder->next == NULL) {
-        Layout layout = {0};
+        Segments layout = {0};
         const Status status = encoder->lay(table, &layout, problem);
         if (status == STATUS_OK)
             return encoding_open_layout(&layout, encoding, problem);
-        layout_clear(&layout);
+        segments_clear(&layout);
         return status;
     }
     Encoding *made = calloc(1, sizeof *made);
@@ -89,7 +90,7 @@ Status encoding_open(const Encoder *encoder, const Table *table, Encoding **enco
 void encoding_close(Encoding *encoding) {
     if (encoding == NULL)
         return;
-    layout_clear(&encoding->layout);
+    segments_clear(&encoding->layout);
     bytes_clear(&encoding->piece);
     free(encoding);
 }
@@ -127,7 +128,7 @@ size_t encoding_next(Encoding *encoding, char *target, size_t size) {
         return next_of_text(encoding, target, size);
     const uint64_t left = encoding->end - encoding->at;
     const size_t count = left < size ? (size_t)left : size;
-    layout_read(&encoding->layout, encoding->at, target, count);
+    segments_read(&encoding->layout, encoding->at, target, count);
     encoding->at += count;
     return count;
 }

@@ -9,13 +9,14 @@ typedef struct Encoding Encoding;
 
 // Appends the whole document. STATUS_LIMIT where the format has no room for it; what `bytes` has no
 // room for is told by `bytes` itself.
-Status encoding_write(const Encoder *encoder, const Table *table, Bytes *bytes, Problem *problem);
+Status encoding_write(const TableFormat *encoder, const Table *table, Bytes *bytes,
+                      Problem *problem);
 
 // Borrows the table's columns and their list until encoding_close.
-Status encoding_open(const Encoder *encoder, const Table *table, Encoding **encoding,
+Status encoding_open(const TableFormat *encoder, const Table *table, Encoding **encoding,
                      Problem *problem);
 // A document whose every byte has its place. Takes what `layout` holds, also when it fails.
-Status encoding_open_layout(Layout *layout, Encoding **encoding, Problem *problem);
+Status encoding_open_layout(Segments *layout, Encoding **encoding, Problem *problem);
 void encoding_close(Encoding *encoding);
 
 uint64_t encoding_size(const Encoding *encoding); // UINT64_MAX: not known beforehand

@@ -4,15 +4,15 @@
 
 void ensemble_csv(const Ensemble *ensemble, Bytes *bytes) {
     bytes_text(bytes, "seed,steps");
-    cells_header(bytes, summary_fields);
+    csv_cells_header(bytes, summary_fields);
     bytes_text(bytes, ",why\n");
     for (size_t i = 0; i < ensemble->table.count; i++) {
         const RunRecord *run = &ensemble->table.at[i];
         bytes_format(bytes, "%llu,", (unsigned long long)run->number);
-        cells_real(bytes, run->steps);
-        cells_members(bytes, summary_fields, &run->summary);
+        csv_cells_real(bytes, run->steps);
+        csv_cells_members(bytes, summary_fields, &run->summary);
         bytes_text(bytes, ",");
-        cells_text(bytes, run->why);
+        csv_cells_text(bytes, run->why);
         bytes_text(bytes, "\n");
     }
 }

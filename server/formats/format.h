@@ -24,7 +24,7 @@ typedef struct Table {
     size_t bucket, samples;
     // Where the columns' numbers lie instead, by their place in `columns`; NULL: in memory. For
     // formats that are laid out.
-    const LayoutSource *source;
+    const SegmentSource *source;
 } Table;
 
 // Where the values of a column, or of the axis, that are written begin.
@@ -32,11 +32,11 @@ static inline const double *table_values(const Table *table, const double *value
     return values + (table->bucket > 0 ? 0 : table->first);
 }
 
-static inline void table_lay_column(const Table *table, size_t column, Layout *layout) {
+static inline void table_lay_column(const Table *table, size_t column, Segments *layout) {
     if (table->source != NULL)
-        layout_source(layout, table->source, column, sizeof(double) * (uint64_t)table->count);
+        segments_source(layout, table->source, column, sizeof(double) * (uint64_t)table->count);
     else
-        layout_values(layout, table_values(table, table->columns[column]->values), table->count);
+        segments_values(layout, table_values(table, table->columns[column]->values), table->count);
 }
 
 // A division, so that row 50 at 1000 Hz reads 0.05.
@@ -50,19 +50,19 @@ typedef struct TextPlace {
     size_t part, row;
 } TextPlace;
 
-typedef struct Encoder {
+typedef struct TableFormat {
     const char *extension;    // "csv"
     const char *content_type; // "text/csv; charset=utf-8"
     bool is_binary;           // Range requests make sense
     // One of the two. What the whole document is made of, where every byte's place is known...
-    Status (*lay)(const Table *table, Layout *layout, Problem *problem);
+    Status (*lay)(const Table *table, Segments *layout, Problem *problem);
     // ... or the next piece of a text, appended to `bytes`; false: that was the last one.
     bool (*next)(const Table *table, TextPlace *place, Bytes *bytes);
-} Encoder;
+} TableFormat;
 
 enum { ENCODER_PIECE_NUMBERS = 2048 }; // of a text's piece, about
 
-extern const Encoder *const encoders[];             // NULL-terminated; json first
-const Encoder *encoder_find(const char *extension); // NULL if there is none
+extern const TableFormat *const encoders[];            // NULL-terminated; json first
+const TableFormat *format_find(const char *extension); // NULL if there is none
 
 #endif

@@ -8,11 +8,11 @@
 #include "server/formats/npz.h"
 #include "server/formats/svg.h"
 
-const Encoder *const encoders[] = {
+const TableFormat *const encoders[] = {
     &encoder_json, &encoder_csv, &encoder_npy, &encoder_npz, &encoder_mat, &encoder_svg, NULL,
 };
 
-const Encoder *encoder_find(const char *extension) {
+const TableFormat *format_find(const char *extension) {
     for (size_t i = 0; encoders[i] != NULL; i++)
         if (strcmp(encoders[i]->extension, extension) == 0)
             return encoders[i];

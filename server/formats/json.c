@@ -103,7 +103,7 @@ static bool json_next(const Table *table, TextPlace *place, Bytes *bytes) {
     return true;
 }
 
-const Encoder encoder_json = {
+const TableFormat encoder_json = {
     .extension = "json",
     .content_type = "application/json",
     .is_binary = false,

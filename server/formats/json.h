@@ -5,6 +5,6 @@
 
 #include "server/formats/format.h"
 
-extern const Encoder encoder_json;
+extern const TableFormat encoder_json;
 
 #endif

@@ -39,7 +39,7 @@ void mat_name(const char *name, char target[MAT_NAME_SIZE]) {
 }
 
 // All that stands before a variable's numbers. STATUS_LIMIT where they are too many.
-static Status open_variable(Layout *layout, const char *name, size_t rows, Problem *problem) {
+static Status open_variable(Segments *layout, const char *name, size_t rows, Problem *problem) {
     char known[MAT_NAME_SIZE];
     mat_name(name, known);
     const size_t length = strlen(known), padding = (8 - length % 8) % 8;
@@ -49,32 +49,32 @@ static Status open_variable(Layout *layout, const char *name, size_t rows, Probl
                            "%s has %zu values, more than a variable of such a file can hold: ask "
                            "for a shorter time, or for .npy",
                            name, rows);
-    layout_number(layout, MI_MATRIX, 4);
-    layout_number(layout, size, 4);
-    layout_number(layout, MI_UINT32, 4);
-    layout_number(layout, 8, 4);
-    layout_number(layout, MX_DOUBLE, 8);
-    layout_number(layout, MI_INT32, 4);
-    layout_number(layout, 8, 4);
-    layout_number(layout, rows, 4);
-    layout_number(layout, 1, 4);
-    layout_number(layout, MI_INT8, 4);
-    layout_number(layout, length, 4);
-    layout_put(layout, known, length);
-    layout_fill(layout, '\0', padding);
-    layout_number(layout, MI_DOUBLE, 4);
-    layout_number(layout, 8 * (uint64_t)rows, 4);
+    segments_number(layout, MI_MATRIX, 4);
+    segments_number(layout, size, 4);
+    segments_number(layout, MI_UINT32, 4);
+    segments_number(layout, 8, 4);
+    segments_number(layout, MX_DOUBLE, 8);
+    segments_number(layout, MI_INT32, 4);
+    segments_number(layout, 8, 4);
+    segments_number(layout, rows, 4);
+    segments_number(layout, 1, 4);
+    segments_number(layout, MI_INT8, 4);
+    segments_number(layout, length, 4);
+    segments_put(layout, known, length);
+    segments_fill(layout, '\0', padding);
+    segments_number(layout, MI_DOUBLE, 4);
+    segments_number(layout, 8 * (uint64_t)rows, 4);
     return STATUS_OK;
 }
 
-static Status mat_lay(const Table *table, Layout *layout, Problem *problem) {
+static Status mat_lay(const Table *table, Segments *layout, Problem *problem) {
     char text[TEXT + 1];
     // No time of day: the same result is the same bytes.
     snprintf(text, sizeof text, "%-*s", TEXT, "MATLAB 5.0 MAT-file, written by impactd");
-    layout_put(layout, text, TEXT);
-    layout_fill(layout, '\0', 8);
-    layout_number(layout, VERSION, 2);
-    layout_put(layout, "IM", 2); // little-endian
+    segments_put(layout, text, TEXT);
+    segments_fill(layout, '\0', 8);
+    segments_number(layout, VERSION, 2);
+    segments_put(layout, "IM", 2); // little-endian
     if (table->axis_name != NULL) {
         TRY(open_variable(layout, table->axis_name, table->count, problem));
         npy_put_axis(layout, table);
@@ -86,7 +86,7 @@ static Status mat_lay(const Table *table, Layout *layout, Problem *problem) {
     return STATUS_OK;
 }
 
-const Encoder encoder_mat = {
+const TableFormat encoder_mat = {
     .extension = "mat",
     .content_type = "application/x-matlab-data",
     .is_binary = true,

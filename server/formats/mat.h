@@ -10,6 +10,6 @@ enum { MAT_NAME_SIZE = 64 }; // 63 characters, MATLAB's longest, and a NUL
 // A name that MATLAB takes for a variable's: letters, digits and underscores, a letter first.
 void mat_name(const char *name, char target[MAT_NAME_SIZE]);
 
-extern const Encoder encoder_mat;
+extern const TableFormat encoder_mat;
 
 #endif

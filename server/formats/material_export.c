@@ -38,7 +38,7 @@ static int verdict(const char *status) {
 // Quotes where they are needed or tell that there is an empty text.
 static void put_cell(Bytes *bytes, const char *text) {
     if (text[0] == '\0' || strpbrk(text, ",\"\r\n") != NULL || text[0] == ' ' || text[0] == '\t')
-        cells_text(bytes, text);
+        csv_cells_text(bytes, text);
     else
         bytes_text(bytes, text);
 }
@@ -48,7 +48,7 @@ static void put_json_cell(Bytes *bytes, const Field *field, const void *item) {
     Bytes json = {.most = 0};
     const Field alone[] = {*field, FIELD_END};
     static const size_t around = sizeof "{\"\": " - 1;
-    write_item(&json, alone, item, WRITE_SCENE);
+    encode_item(&json, alone, item, WRITE_SCENE);
     const size_t before = around + strlen(field->name);
     if (json.is_failed || json.count <= before) {
         bytes->is_failed = bytes->is_failed || json.is_failed;
@@ -114,17 +114,17 @@ static void put_header(Bytes *bytes, const Field *fields, size_t *count) {
     }
 }
 
-static void put_row(const ExchangeText *text, Bytes *bytes, const ExchangeRow *row,
+static void put_row(const MaterialExport *text, Bytes *bytes, const ExchangeRow *row,
                     const char *document) {
     size_t count = 0;
     if (text->is_table) {
         put_cells(bytes, exchange_row_fields, row, document, &count);
         bytes_text(bytes, "\r\n");
     } else if (document == NULL) {
-        write_item(bytes, exchange_revision_fields, row, WRITE_SCENE);
+        encode_item(bytes, exchange_revision_fields, row, WRITE_SCENE);
     } else {
         bytes_text(bytes, "{");
-        write_members(bytes, exchange_measurement_fields, row, WRITE_SCENE);
+        encode_members(bytes, exchange_measurement_fields, row, WRITE_SCENE);
         bytes_format(bytes, ", \"test\": ");
         bytes_text(bytes, document);
         bytes_text(bytes, "}");
@@ -140,7 +140,7 @@ static Status no_memory(Problem *problem) {
     return problem_set(problem, STATUS_NO_MEMORY, "no memory for the materials");
 }
 
-static Status put_reviewed(ExchangeText *text, Bytes *bytes, MaterialRevision *revision,
+static Status put_reviewed(MaterialExport *text, Bytes *bytes, MaterialRevision *revision,
                            const MaterialReviews *reviews, Problem *problem) {
     ExchangeRow row;
     const size_t count = reviews->count;
@@ -148,7 +148,7 @@ static Status put_reviewed(ExchangeText *text, Bytes *bytes, MaterialRevision *r
     ExchangeReview *shown = calloc(count + 1, sizeof *shown);
     Created *times = calloc(count + 1, sizeof *times);
     Status status = shown != NULL && times != NULL && row_default(&row)
-                        ? catalogue_read_lists(revision, problem)
+                        ? material_read_lists(revision, problem)
                         : no_memory(problem);
     for (size_t i = 0; status == STATUS_OK && i < count; i++) {
         const MaterialReview *review = &reviews->at[i];
@@ -174,18 +174,18 @@ static Status put_reviewed(ExchangeText *text, Bytes *bytes, MaterialRevision *r
     return status;
 }
 
-static Status put_revision(ExchangeText *text, Bytes *bytes, MaterialRevision *revision,
+static Status put_revision(MaterialExport *text, Bytes *bytes, MaterialRevision *revision,
                            Problem *problem) {
     MaterialReviews reviews;
-    Status status = store_reviews_of(text->store, &text->moment, revision->slug, revision->revision,
-                                     &reviews, problem);
+    Status status = db_reviews_of(text->store, &text->moment, revision->slug, revision->revision,
+                                  &reviews, problem);
     if (status == STATUS_OK)
         status = put_reviewed(text, bytes, revision, &reviews, problem);
     material_reviews_clear(&reviews);
     return status;
 }
 
-static Status put_measurement(ExchangeText *text, Bytes *bytes,
+static Status put_measurement(MaterialExport *text, Bytes *bytes,
                               const MaterialMeasurement *measurement, Problem *problem) {
     ExchangeRow row;
     char created[32];
@@ -204,11 +204,11 @@ static Status put_measurement(ExchangeText *text, Bytes *bytes,
     return STATUS_OK;
 }
 
-static Status next_material(ExchangeText *text, Bytes *bytes, bool *is_last, Problem *problem) {
+static Status next_material(MaterialExport *text, Bytes *bytes, bool *is_last, Problem *problem) {
     MaterialRevision first;
     bool is_found;
     Status status =
-        store_material_behind(text->store, &text->moment, text->slug, &first, &is_found, problem);
+        db_material_behind(text->store, &text->moment, text->slug, &first, &is_found, problem);
     *is_last = status == STATUS_OK && !is_found;
     if (*is_last)
         bytes_text(bytes, text->is_table ? "" : "]}\n");
@@ -224,11 +224,11 @@ static Status next_material(ExchangeText *text, Bytes *bytes, bool *is_last, Pro
     return status;
 }
 
-static Status next_revision(ExchangeText *text, Bytes *bytes, Problem *problem) {
+static Status next_revision(MaterialExport *text, Bytes *bytes, Problem *problem) {
     MaterialRevision revision;
     bool is_found;
-    Status status = store_revision_behind(text->store, &text->moment, text->slug, text->number,
-                                          &revision, &is_found, problem);
+    Status status = db_revision_behind(text->store, &text->moment, text->slug, text->number,
+                                       &revision, &is_found, problem);
     if (status == STATUS_OK && !text->is_table)
         bytes_text(bytes, is_found ? ",\n" : "]");
     if (status == STATUS_OK && is_found)
@@ -242,11 +242,11 @@ static Status next_revision(ExchangeText *text, Bytes *bytes, Problem *problem) 
     return status;
 }
 
-static Status next_measurement(ExchangeText *text, Bytes *bytes, Problem *problem) {
+static Status next_measurement(MaterialExport *text, Bytes *bytes, Problem *problem) {
     MaterialMeasurement measurement;
     bool is_found;
-    Status status = store_measurement_behind(text->store, &text->moment, text->slug, text->number,
-                                             &measurement, &is_found, problem);
+    Status status = db_measurement_behind(text->store, &text->moment, text->slug, text->number,
+                                          &measurement, &is_found, problem);
     if (status == STATUS_OK && is_found)
         status = put_measurement(text, bytes, &measurement, problem);
     if (status == STATUS_OK && !is_found) {
@@ -258,7 +258,7 @@ static Status next_measurement(ExchangeText *text, Bytes *bytes, Problem *proble
     return status;
 }
 
-static void begin(ExchangeText *text, Bytes *bytes) {
+static void begin(MaterialExport *text, Bytes *bytes) {
     size_t count = 0;
     text->has_begun = true;
     if (text->is_table) {
@@ -270,12 +270,12 @@ static void begin(ExchangeText *text, Bytes *bytes) {
     }
 }
 
-Status exchange_text_open(Store *store, bool is_table, ExchangeText *text, Problem *problem) {
-    *text = (ExchangeText){.store = store, .is_table = is_table};
-    return store_material_moment(store, &text->moment, problem);
+Status material_export_open(Db *store, bool is_table, MaterialExport *text, Problem *problem) {
+    *text = (MaterialExport){.store = store, .is_table = is_table};
+    return db_material_moment(store, &text->moment, problem);
 }
 
-Status exchange_text_next(ExchangeText *text, Bytes *bytes, bool *is_last, Problem *problem) {
+Status material_export_next(MaterialExport *text, Bytes *bytes, bool *is_last, Problem *problem) {
     *is_last = false;
     if (!text->has_begun)
         begin(text, bytes);

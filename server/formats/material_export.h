@@ -6,28 +6,28 @@
 #include "server/db/material_export.h"
 #include "server/util/bytes.h"
 
-typedef enum ExchangeStage {
+typedef enum MaterialExportStage {
     EXCHANGE_BETWEEN, // materials
     EXCHANGE_REVISIONS,
     EXCHANGE_MEASUREMENTS
-} ExchangeStage;
+} MaterialExportStage;
 
 // How far it is.
-typedef struct ExchangeText {
-    Store *store;
+typedef struct MaterialExport {
+    Db *store;
     MaterialMoment moment;
     bool is_table;
     bool has_begun;
-    ExchangeStage stage;
+    MaterialExportStage stage;
     size_t measurements;              // of this material so far
     char slug[MATERIAL_SLUG_MAX + 1]; // the material's; "" before the first
     uint64_t number;                  // of its last revision, or measurement
-} ExchangeText;
+} MaterialExport;
 
-Status exchange_text_open(Store *store, bool is_table, ExchangeText *text, Problem *problem);
+Status material_export_open(Db *store, bool is_table, MaterialExport *text, Problem *problem);
 
 // Appends the next piece, at most one revision with its reviews or one measurement; *is_last behind
 // it all.
-Status exchange_text_next(ExchangeText *text, Bytes *bytes, bool *is_last, Problem *problem);
+Status material_export_next(MaterialExport *text, Bytes *bytes, bool *is_last, Problem *problem);
 
 #endif

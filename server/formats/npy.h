@@ -5,13 +5,13 @@
 
 #include "server/formats/format.h"
 
-extern const Encoder encoder_npy;
+extern const TableFormat encoder_npy;
 
 // The header alone; `columns` 0: of one dimension.
-void npy_put_header(Layout *layout, size_t rows, size_t columns);
+void npy_put_header(Segments *layout, size_t rows, size_t columns);
 // The same of another type: "|S7".
-void npy_put_header_of(Layout *layout, const char *type, size_t rows, size_t columns);
+void npy_put_header_of(Segments *layout, const char *type, size_t rows, size_t columns);
 // The axis's numbers alone; nothing where there is no axis.
-void npy_put_axis(Layout *layout, const Table *table);
+void npy_put_axis(Segments *layout, const Table *table);
 
 #endif

@@ -6,18 +6,18 @@
 #include "server/formats/npy.h"
 #include "server/formats/zip.h"
 
-static Status put(Zip *zip, const char *name, const Layout *array, Problem *problem) {
+static Status put(Zip *zip, const char *name, const Segments *array, Problem *problem) {
     char file[ZIP_NAME_MAX + 1];
     snprintf(file, sizeof file, "%.74s.npy", name);
     return zip_put(zip, file, array, problem);
 }
 
-static Status npz_lay(const Table *table, Layout *layout, Problem *problem) {
+static Status npz_lay(const Table *table, Segments *layout, Problem *problem) {
     Zip zip = {.layout = layout};
     Status status = STATUS_OK;
     for (size_t c = table->axis_name != NULL ? 0 : 1;
          c <= table->column_count && status == STATUS_OK; c++) {
-        Layout array = {0};
+        Segments array = {0};
         npy_put_header(&array, table->count, 0);
         if (c == 0)
             npy_put_axis(&array, table);
@@ -25,13 +25,13 @@ static Status npz_lay(const Table *table, Layout *layout, Problem *problem) {
             table_lay_column(table, c - 1, &array);
         status =
             put(&zip, c == 0 ? table->axis_name : table->columns[c - 1]->name, &array, problem);
-        layout_clear(&array);
+        segments_clear(&array);
     }
     const Status ended = zip_end(&zip, status == STATUS_OK ? problem : NULL);
     return status != STATUS_OK ? status : ended;
 }
 
-const Encoder encoder_npz = {
+const TableFormat encoder_npz = {
     .extension = "npz",
     .content_type = "application/x-npz",
     .is_binary = true,

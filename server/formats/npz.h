@@ -5,6 +5,6 @@
 
 #include "server/formats/format.h"
 
-extern const Encoder encoder_npz;
+extern const TableFormat encoder_npz;
 
 #endif

@@ -12,13 +12,13 @@ enum { FIRST_SEGMENTS = 16, CHUNK = 1024, LANES = 8 }; // numbers that are count
 
 static const double offsets[LANES] = {0, 1, 2, 3, 4, 5, 6, 7};
 
-void layout_clear(Layout *layout) {
+void segments_clear(Segments *layout) {
     free(layout->at);
     bytes_clear(&layout->text);
-    *layout = (Layout){0};
+    *layout = (Segments){0};
 }
 
-static Segment *add(Layout *layout, uint64_t size) {
+static Segment *add(Segments *layout, uint64_t size) {
     if (layout->is_failed || size == 0)
         return NULL;
     if (layout->count == layout->room) {
@@ -41,7 +41,7 @@ static bool is_text(const Segment *segment) {
     return segment->values == NULL && segment->rate == 0 && segment->source == NULL;
 }
 
-void layout_put(Layout *layout, const void *data, size_t size) {
+void segments_put(Segments *layout, const void *data, size_t size) {
     const size_t text = layout->text.count;
     bytes_put(&layout->text, data, size);
     layout->is_failed = layout->is_failed || layout->text.is_failed;
@@ -58,22 +58,22 @@ void layout_put(Layout *layout, const void *data, size_t size) {
         segment->text = text;
 }
 
-void layout_number(Layout *layout, uint64_t value, size_t size) {
-    layout_put(layout, &value, size);
+void segments_number(Segments *layout, uint64_t value, size_t size) {
+    segments_put(layout, &value, size);
 }
 
-void layout_fill(Layout *layout, char with, size_t count) {
+void segments_fill(Segments *layout, char with, size_t count) {
     for (size_t i = 0; i < count; i++)
-        layout_put(layout, &with, 1);
+        segments_put(layout, &with, 1);
 }
 
-void layout_values(Layout *layout, const double *values, size_t count) {
+void segments_values(Segments *layout, const double *values, size_t count) {
     Segment *segment = add(layout, count * sizeof *values);
     if (segment != NULL)
         segment->values = values;
 }
 
-void layout_counted(Layout *layout, size_t first, size_t step, double rate, size_t count) {
+void segments_counted(Segments *layout, size_t first, size_t step, double rate, size_t count) {
     Segment *segment = add(layout, count * sizeof(double));
     if (segment == NULL)
         return;
@@ -82,7 +82,7 @@ void layout_counted(Layout *layout, size_t first, size_t step, double rate, size
     segment->rate = rate;
 }
 
-void layout_source(Layout *layout, const LayoutSource *source, size_t column, uint64_t size) {
+void segments_source(Segments *layout, const SegmentSource *source, size_t column, uint64_t size) {
     Segment *segment = add(layout, size);
     if (segment == NULL)
         return;
@@ -90,12 +90,12 @@ void layout_source(Layout *layout, const LayoutSource *source, size_t column, ui
     segment->column = column;
 }
 
-void layout_join(Layout *layout, const Layout *other) {
+void segments_join(Segments *layout, const Segments *other) {
     layout->is_failed = layout->is_failed || other->is_failed;
     for (size_t i = 0; i < other->count && !layout->is_failed; i++) {
         const Segment *from = &other->at[i];
         if (is_text(from)) {
-            layout_put(layout, other->text.at + from->text, (size_t)from->size);
+            segments_put(layout, other->text.at + from->text, (size_t)from->size);
             continue;
         }
         Segment *segment = add(layout, from->size);
@@ -137,7 +137,7 @@ static void read_counted(const Segment *segment, uint64_t offset, char *target, 
 }
 
 // The last segment that begins at or before a place.
-static const Segment *find(const Layout *layout, uint64_t place) {
+static const Segment *find(const Segments *layout, uint64_t place) {
     size_t low = 0, high = layout->count;
     while (high - low > 1) {
         const size_t middle = low + (high - low) / 2;
@@ -149,7 +149,7 @@ static const Segment *find(const Layout *layout, uint64_t place) {
     return &layout->at[low];
 }
 
-void layout_read(const Layout *layout, uint64_t start, void *target, size_t size) {
+void segments_read(const Segments *layout, uint64_t start, void *target, size_t size) {
     char *to = target;
     if (size == 0)
         return;
@@ -170,39 +170,39 @@ void layout_read(const Layout *layout, uint64_t start, void *target, size_t size
     }
 }
 
-void layout_write(const Layout *layout, Bytes *bytes) {
+void segments_write(const Segments *layout, Bytes *bytes) {
     if (layout->is_failed) {
         bytes->is_failed = true;
     } else if (bytes_reserve(bytes, (size_t)layout->size)) {
-        layout_read(layout, 0, bytes->at + bytes->count, (size_t)layout->size);
+        segments_read(layout, 0, bytes->at + bytes->count, (size_t)layout->size);
         bytes->count += (size_t)layout->size;
         bytes->at[bytes->count] = '\0';
     }
 }
 
-uint32_t layout_crc32(const Layout *layout) {
+uint32_t segments_crc32(const Segments *layout) {
     uint32_t crc = 0;
     double numbers[CHUNK];
     for (size_t i = 0; i < layout->count; i++) {
         const Segment *segment = &layout->at[i];
         if (segment->values != NULL) {
-            crc = deflate_crc32(crc, segment->values, (size_t)segment->size);
+            crc = gzip_crc32(crc, segment->values, (size_t)segment->size);
         } else if (segment->source != NULL) {
             for (uint64_t at = 0; at < segment->size;) {
                 const uint64_t left = segment->size - at;
                 const size_t size = left < sizeof numbers ? (size_t)left : sizeof numbers;
                 segment->source->read(segment->source->context, segment->column, at, numbers, size);
-                crc = deflate_crc32(crc, numbers, size);
+                crc = gzip_crc32(crc, numbers, size);
                 at += size;
             }
         } else if (segment->rate == 0) {
-            crc = deflate_crc32(crc, layout->text.at + segment->text, (size_t)segment->size);
+            crc = gzip_crc32(crc, layout->text.at + segment->text, (size_t)segment->size);
         } else {
             const size_t count = (size_t)(segment->size / sizeof *numbers);
             for (size_t k = 0; k < count; k += CHUNK) {
                 const size_t made = count - k < CHUNK ? count - k : CHUNK;
                 count_up(segment, k, made, numbers);
-                crc = deflate_crc32(crc, numbers, made * sizeof *numbers);
+                crc = gzip_crc32(crc, numbers, made * sizeof *numbers);
             }
         }
     }

@@ -10,44 +10,44 @@
 
 // Bytes that are somewhere else: `read` copies `size` of them from `offset` of column `column` on,
 // and keeps for itself where it cannot.
-typedef struct LayoutSource {
+typedef struct SegmentSource {
     void (*read)(void *context, size_t column, uint64_t offset, void *target, size_t size);
     void *context;
-} LayoutSource;
+} SegmentSource;
 
 typedef struct Segment {
-    uint64_t start, size;       // in the document
-    const double *values;       // borrowed; NULL: text, or counted
-    size_t text;                // where it begins in the layout's text
-    double first, step, rate;   // counted: number i is (first + i step) / rate; else rate 0
-    const LayoutSource *source; // borrowed; NULL: not from there
-    size_t column;              // of the source
+    uint64_t start, size;        // in the document
+    const double *values;        // borrowed; NULL: text, or counted
+    size_t text;                 // where it begins in the layout's text
+    double first, step, rate;    // counted: number i is (first + i step) / rate; else rate 0
+    const SegmentSource *source; // borrowed; NULL: not from there
+    size_t column;               // of the source
 } Segment;
 
 // All zero is empty. Once it failed (memory) it stays so, like Bytes.
-typedef struct Layout {
+typedef struct Segments {
     Segment *at;
     size_t count, room;
     uint64_t size;
     Bytes text;
     bool is_failed;
-} Layout;
+} Segments;
 
-void layout_clear(Layout *layout);
-void layout_put(Layout *layout, const void *data, size_t size); // copied
-void layout_number(Layout *layout, uint64_t value,
-                   size_t size); // its `size` lowest bytes, lowest first
-void layout_fill(Layout *layout, char with, size_t count);
-void layout_values(Layout *layout, const double *values, size_t count); // borrowed
+void segments_clear(Segments *layout);
+void segments_put(Segments *layout, const void *data, size_t size); // copied
+void segments_number(Segments *layout, uint64_t value,
+                     size_t size); // its `size` lowest bytes, lowest first
+void segments_fill(Segments *layout, char with, size_t count);
+void segments_values(Segments *layout, const double *values, size_t count); // borrowed
 // (first + i step) / rate for i = 0 ... count - 1.
-void layout_counted(Layout *layout, size_t first, size_t step, double rate, size_t count);
+void segments_counted(Segments *layout, size_t first, size_t step, double rate, size_t count);
 // All `size` bytes of a column of `source`, which is borrowed.
-void layout_source(Layout *layout, const LayoutSource *source, size_t column, uint64_t size);
-void layout_join(Layout *layout, const Layout *other); // behind; borrows what `other` borrows
+void segments_source(Segments *layout, const SegmentSource *source, size_t column, uint64_t size);
+void segments_join(Segments *layout, const Segments *other); // behind; borrows what `other` borrows
 
 // Copies `size` bytes from `start` on; both within the document.
-void layout_read(const Layout *layout, uint64_t start, void *target, size_t size);
-void layout_write(const Layout *layout, Bytes *bytes); // appends the whole
-uint32_t layout_crc32(const Layout *layout);           // of the whole
+void segments_read(const Segments *layout, uint64_t start, void *target, size_t size);
+void segments_write(const Segments *layout, Bytes *bytes); // appends the whole
+uint32_t segments_crc32(const Segments *layout);           // of the whole
 
 #endif

@@ -8,9 +8,9 @@ static void put_closed(Bytes *bytes, const char *parameter, const char *what,
                        const SensitivityStop *stop, double value, double derivative) {
     bytes_format(bytes, "%s,%s %llu %s,", parameter, what, (unsigned long long)stop->damper,
                  side_names[stop->side]);
-    cells_real(bytes, value);
+    csv_cells_real(bytes, value);
     bytes_text(bytes, ",");
-    cells_real(bytes, derivative);
+    csv_cells_real(bytes, derivative);
     bytes_format(bytes, ",0,%s\n", isnan(derivative) ? "false" : "true");
 }
 
@@ -35,11 +35,11 @@ void sensitivity_csv(const Sensitivity *sensitivity, Bytes *bytes) {
             const SensitivitySlope *slope = &row->slopes.at[k];
             bytes_format(bytes, "%s,%s,", sensitivity_parameter_names[row->parameter],
                          statistics_metric_names[slope->metric]);
-            cells_real(bytes, slope->value);
+            csv_cells_real(bytes, slope->value);
             bytes_text(bytes, ",");
-            cells_real(bytes, slope->derivative);
+            csv_cells_real(bytes, slope->derivative);
             bytes_text(bytes, ",");
-            cells_real(bytes, slope->spread);
+            csv_cells_real(bytes, slope->spread);
             bytes_format(bytes, ",%s\n", slope->is_settled ? "true" : "false");
         }
     }

@@ -14,8 +14,8 @@ static double number_of(const Field *field, const char *item) {
                                              : (double)*(const int *)at;
 }
 
-Status records_columns(const Field *fields, const void *items, size_t count, size_t size,
-                       Columns *columns, Problem *problem) {
+Status struct_columns(const Field *fields, const void *items, size_t count, size_t size,
+                      Columns *columns, Problem *problem) {
     size_t wide = 0;
     for (const Field *field = fields; field->kind != FIELD_KIND_END; field++)
         wide += is_number(field);

@@ -9,7 +9,7 @@
 
 // Of `count` structs of `size` bytes, one behind the other. The rows are REAL, COUNT and CHOICE;
 // others are passed over. Cleared by columns_clear.
-Status records_columns(const Field *fields, const void *items, size_t count, size_t size,
-                       Columns *columns, Problem *problem);
+Status struct_columns(const Field *fields, const void *items, size_t count, size_t size,
+                      Columns *columns, Problem *problem);
 
 #endif

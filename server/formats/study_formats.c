@@ -78,7 +78,7 @@ static const char csv_type[] = "text/csv; charset=utf-8";
 
 static const struct {
     const StudyKind *study;
-    AnswerFormat formats[ANSWER_FORMATS];
+    StudyFormat formats[STUDY_FORMATS_MAX];
 } all[] = {
     {&study_tradeoff,
      {{"json", "application/json", false, json_write},
@@ -109,23 +109,23 @@ static const struct {
       {NULL, NULL, false, NULL}}},
 };
 
-static const AnswerFormat none[] = {{"json", "application/json", false, json_write},
-                                    {NULL, NULL, false, NULL}};
+static const StudyFormat none[] = {{"json", "application/json", false, json_write},
+                                   {NULL, NULL, false, NULL}};
 
-const AnswerFormat *answer_formats(const Kind *kind) {
+const StudyFormat *study_formats(const Kind *kind) {
     for (size_t i = 0; i < COUNT(all); i++)
         if (all[i].study->answer == kind)
             return all[i].formats;
     return none;
 }
 
-const AnswerFormat *answer_format_find(const AnswerFormat *formats, const char *extension) {
+const StudyFormat *study_format_find(const StudyFormat *formats, const char *extension) {
     while (formats->extension != NULL && strcmp(formats->extension, extension) != 0)
         formats++;
     return formats->extension != NULL ? formats : NULL;
 }
 
-void answer_formats_name(const AnswerFormat *formats, const char *before, char *target,
+void study_formats_names(const StudyFormat *formats, const char *before, char *target,
                          size_t size) {
     *target = '\0';
     for (; formats->extension != NULL; formats++) {

@@ -6,21 +6,20 @@
 #include "core/study/study.h"
 #include "server/util/bytes.h"
 
-enum { ANSWER_FORMATS = 7 }; // at most, with the end
+enum { STUDY_FORMATS_MAX = 7 }; // at most, with the end
 
-typedef struct AnswerFormat {
+typedef struct StudyFormat {
     const char *extension; // "svg"; NULL: the end
     const char *content_type;
     bool is_binary;                                     // Range requests make sense
     void (*write)(const Variant *answer, Bytes *bytes); // appends the whole document
-} AnswerFormat;
+} StudyFormat;
 
 // All formats of an answer of this kind, json first.
-const AnswerFormat *answer_formats(const Kind *kind);
-const AnswerFormat *answer_format_find(const AnswerFormat *formats, const char *extension);
+const StudyFormat *study_formats(const Kind *kind);
+const StudyFormat *study_format_find(const StudyFormat *formats, const char *extension);
 
 // "json, svg", each behind `before`.
-void answer_formats_name(const AnswerFormat *formats, const char *before, char *target,
-                         size_t size);
+void study_formats_names(const StudyFormat *formats, const char *before, char *target, size_t size);
 
 #endif

@@ -36,8 +36,8 @@ static void svg_thin(const Table *table, size_t line, size_t part, double *low, 
     double other;
     for (size_t i = 0; i * part < table->count; i++) {
         const size_t left = table->count - i * part, count = left < part ? left : part;
-        buckets_extremes(least + i * part, count, &low[i], &other);
-        buckets_extremes(most + i * part, count, &other, &high[i]);
+        downsample_extremes(least + i * part, count, &low[i], &other);
+        downsample_extremes(most + i * part, count, &other, &high[i]);
     }
 }
 
@@ -134,7 +134,7 @@ static bool svg_next(const Table *table, TextPlace *place, Bytes *bytes) {
     return false;
 }
 
-const Encoder encoder_svg = {
+const TableFormat encoder_svg = {
     .extension = "svg",
     .content_type = chart_type,
     .is_binary = false,

@@ -4,6 +4,6 @@
 
 #include "server/formats/format.h"
 
-extern const Encoder encoder_svg;
+extern const TableFormat encoder_svg;
 
 #endif

@@ -27,7 +27,7 @@ static const char *name_of(const Sweep *sweep, size_t place) {
     return *pointer == '/' ? pointer + 1 : pointer;
 }
 
-Status sweep_columns_lay(SweepArchive *archive, const Encoder *encoder, Layout *layout,
+Status sweep_columns_lay(SweepArchive *archive, const TableFormat *encoder, Segments *layout,
                          Problem *problem) {
     const Sweep *sweep = archive->sweep;
     const size_t count = 2 + sweep->axes.count + sweep->metrics.count;
@@ -38,7 +38,7 @@ Status sweep_columns_lay(SweepArchive *archive, const Encoder *encoder, Layout *
                         : problem_set(problem, STATUS_NO_MEMORY, "no memory for the table");
     if (status == STATUS_OK) {
         archive->is_places = true;
-        archive->columns = (LayoutSource){read_place, archive};
+        archive->columns = (SegmentSource){read_place, archive};
         for (size_t i = 0; i < count; i++) {
             text_fit(columns[i].name, sizeof columns[i].name, name_of(sweep, i));
             chosen[i] = &columns[i];
@@ -54,13 +54,13 @@ Status sweep_columns_lay(SweepArchive *archive, const Encoder *encoder, Layout *
     return status;
 }
 
-void sweep_columns(const Sweep *sweep, const Encoder *encoder, Bytes *bytes) {
+void sweep_columns(const Sweep *sweep, const TableFormat *encoder, Bytes *bytes) {
     const SweepSource source = sweep_source(sweep);
     SweepArchive archive = {.sweep = sweep, .source = &source};
-    Layout layout = {0};
+    Segments layout = {0};
     if (sweep_columns_lay(&archive, encoder, &layout, NULL) != STATUS_OK)
         bytes->is_failed = true;
     else
-        layout_write(&layout, bytes);
-    layout_clear(&layout);
+        segments_write(&layout, bytes);
+    segments_clear(&layout);
 }

@@ -8,9 +8,9 @@
 #include "server/formats/sweep_npz.h"
 
 // As sweep_npz_lay, in another format; the columns of the CSV in its order.
-Status sweep_columns_lay(SweepArchive *archive, const Encoder *encoder, Layout *layout,
+Status sweep_columns_lay(SweepArchive *archive, const TableFormat *encoder, Segments *layout,
                          Problem *problem);
 
-void sweep_columns(const Sweep *sweep, const Encoder *encoder, Bytes *bytes);
+void sweep_columns(const Sweep *sweep, const TableFormat *encoder, Bytes *bytes);
 
 #endif

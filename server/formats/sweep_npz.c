@@ -96,15 +96,15 @@ static Status put(SweepArchive *archive, Zip *zip, const char *name, size_t colu
                   Problem *problem) {
     const size_t rows = archive->source->rows, texts = width_of(archive, column);
     char file[ZIP_NAME_MAX + 1], type[32] = "<f8";
-    Layout array = {0};
+    Segments array = {0};
     if (texts > 0)
         snprintf(type, sizeof type, "|S%zu", texts);
     npy_put_header_of(&array, type, rows, 0);
-    layout_source(&array, &archive->columns, column,
-                  (uint64_t)rows * (texts > 0 ? texts : sizeof(double)));
+    segments_source(&array, &archive->columns, column,
+                    (uint64_t)rows * (texts > 0 ? texts : sizeof(double)));
     snprintf(file, sizeof file, "%.74s.npy", *name == '/' ? name + 1 : name);
     const Status status = zip_put(zip, file, &array, problem);
-    layout_clear(&array);
+    segments_clear(&array);
     if (status == STATUS_OK && archive->is_broken)
         return problem_set(problem, STATUS_CONFLICT,
                            "the sweep's rows were deleted or made anew while they were read");
@@ -131,10 +131,10 @@ static void measure(SweepArchive *archive) {
     }
 }
 
-Status sweep_npz_lay(SweepArchive *archive, Layout *layout, Problem *problem) {
+Status sweep_npz_lay(SweepArchive *archive, Segments *layout, Problem *problem) {
     const Sweep *sweep = archive->sweep;
     Zip zip = {.layout = layout};
-    archive->columns = (LayoutSource){sweep_archive_read, archive};
+    archive->columns = (SegmentSource){sweep_archive_read, archive};
     measure(archive);
     Status status = put(archive, &zip, "index", SWEEP_CELL_POINT, problem);
     for (size_t i = 0; i < sweep->axes.count && status == STATUS_OK; i++)
@@ -150,10 +150,10 @@ Status sweep_npz_lay(SweepArchive *archive, Layout *layout, Problem *problem) {
 void sweep_npz(const Sweep *sweep, Bytes *bytes) {
     const SweepSource source = sweep_source(sweep);
     SweepArchive archive = {.sweep = sweep, .source = &source};
-    Layout layout = {0};
+    Segments layout = {0};
     if (sweep_npz_lay(&archive, &layout, NULL) != STATUS_OK)
         bytes->is_failed = true;
     else
-        layout_write(&layout, bytes);
-    layout_clear(&layout);
+        segments_write(&layout, bytes);
+    segments_clear(&layout);
 }

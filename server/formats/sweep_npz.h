@@ -12,7 +12,7 @@
 typedef struct SweepArchive {
     const Sweep *sweep;
     const SweepSource *source;
-    LayoutSource columns;
+    SegmentSource columns;
     size_t axis_widths[SWEEP_AXES]; // of texts; 0: numbers
     size_t status_width;
     bool is_places; // texts are told by their place among the axis's values, from 0
@@ -23,7 +23,7 @@ typedef struct SweepArchive {
 void sweep_archive_read(void *context, size_t column, uint64_t offset, void *target, size_t size);
 
 // `layout` borrows `archive`.
-Status sweep_npz_lay(SweepArchive *archive, Layout *layout, Problem *problem);
+Status sweep_npz_lay(SweepArchive *archive, Segments *layout, Problem *problem);
 
 void sweep_npz(const Sweep *sweep, Bytes *bytes);
 

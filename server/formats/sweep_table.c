@@ -131,7 +131,7 @@ static bool put_column(SweepText *text, size_t column, Bytes *bytes) {
 }
 
 static void put_links(Bytes *bytes, const char *result) {
-    const char *base = link_base();
+    const char *base = base_path();
     bytes_format(bytes, ", \"links\": {\"self\": \"%s/v1/results/%s/table.json\"", base, result);
     bytes_format(bytes, ", \"point\": \"%s/v1/results/%s/points/{index}\"", base, result);
     bytes_format(bytes, ", \"scene\": \"%s/v1/results/%s/points/{index}/scene\"}", base, result);

@@ -10,13 +10,13 @@ enum { ZIP_NAME_MAX = 79 };
 
 // The archive as it is laid out. All zero but `layout` is an empty one.
 typedef struct Zip {
-    Layout *layout;
-    Layout directory; // what comes at the end
+    Segments *layout;
+    Segments directory; // what comes at the end
     size_t count;
 } Zip;
 
 // Puts a member behind the last one; `content` is what it is made of. STATUS_LIMIT from 4 GiB on.
-Status zip_put(Zip *zip, const char *name, const Layout *content, Problem *problem);
+Status zip_put(Zip *zip, const char *name, const Segments *content, Problem *problem);
 // Puts the directory, and clears `zip`, whatever it returns.
 Status zip_end(Zip *zip, Problem *problem);
 

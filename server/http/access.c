@@ -5,10 +5,10 @@
 #include "server/util/clock.h"
 #include "server/util/log.h"
 
-const char *const journal_mode_names[] = {"off", "errors", "all", NULL};
+const char *const log_mode_names[] = {"off", "errors", "all", NULL};
 
-Status doorman_admit(const Doorman *doorman, const char *scope, Request *request,
-                     Problem *problem) {
+Status access_authorize(const AccessControl *doorman, const char *scope, Request *request,
+                        Problem *problem) {
     request->client = NULL;
     if (doorman == NULL || doorman->tokens == NULL || strcmp(scope, "open") == 0)
         return STATUS_OK;
@@ -17,7 +17,7 @@ Status doorman_admit(const Doorman *doorman, const char *scope, Request *request
     return STATUS_OK;
 }
 
-Status doorman_owns(const Request *request, const char *owner, const char *what, Problem *problem) {
+Status access_owns(const Request *request, const char *owner, const char *what, Problem *problem) {
     if (request->client == NULL || request->holder.is_admin || owner == NULL ||
         strcmp(owner, request->client) == 0)
         return STATUS_OK;
@@ -33,18 +33,18 @@ static void write_line(const Request *request, const Reply *reply, int64_t ns, u
     Bytes line = {.most = 4096};
     clock_rfc3339(clock_unix_ms(), now);
     bytes_text(&line, now);
-    journal_put(&line, "request", request->id, NAME_SHOWN);
-    journal_put(&line, "client", request->client, NAME_SHOWN);
-    journal_put(&line, "method", request->method, NAME_SHOWN);
+    log_put(&line, "request", request->id, NAME_SHOWN);
+    log_put(&line, "client", request->client, NAME_SHOWN);
+    log_put(&line, "method", request->method, NAME_SHOWN);
     // Without the query: people put there what should not stand in a journal.
-    journal_put(&line, "path", request->path, PATH_SHOWN);
+    log_put(&line, "path", request->path, PATH_SHOWN);
     bytes_format(&line, " code=%d ms=%.3f sent=%llu", reply->code, 1e-6 * (double)ns,
                  (unsigned long long)sent);
-    journal_write(&line);
+    log_write(&line);
     bytes_clear(&line);
 }
 
-void doorman_note(const Doorman *doorman, const Request *request, const Reply *reply) {
+void access_log(const AccessControl *doorman, const Request *request, const Reply *reply) {
     if (doorman == NULL)
         return;
     const int64_t ns = clock_monotonic_ns() - request->started_ns;
@@ -53,7 +53,8 @@ void doorman_note(const Doorman *doorman, const Request *request, const Reply *r
                           : reply->stream.size != UINT64_MAX ? reply->stream.size
                                                              : 0;
     if (doorman->meter != NULL)
-        meter_count(doorman->meter, request->route, reply->code, ns, request->received, sent);
+        request_metrics_count(doorman->meter, request->route, reply->code, ns, request->received,
+                              sent);
     const int code = reply->code;
     const bool is_fault = code >= 500 && code != 501 && code != 503 && code != 505;
     if (doorman->journal == JOURNAL_ALL || (doorman->journal == JOURNAL_ERRORS && is_fault))

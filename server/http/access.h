@@ -7,30 +7,31 @@
 #include "server/auth/tokens.h"
 #include "server/http/request_metrics.h"
 
-typedef enum JournalMode {
+typedef enum LogMode {
     JOURNAL_OFF,
     JOURNAL_ERRORS, // answers of 500 and more, but for those that ask to come back later
     JOURNAL_ALL,
-} JournalMode;
-extern const char *const journal_mode_names[];
+} LogMode;
+extern const char *const log_mode_names[];
 
 // All may be NULL, which is an open door that counts nothing.
-typedef struct Doorman {
+typedef struct AccessControl {
     Tokens *tokens;
-    Meter *meter;
-    JournalMode journal;
-} Doorman;
+    RequestMetrics *meter;
+    LogMode journal;
+} AccessControl;
 
 // Whether the request may use a route of this scope ("open": whoever it is); request->client
 // becomes who it is. STATUS_UNAUTHORIZED, STATUS_FORBIDDEN.
-Status doorman_admit(const Doorman *doorman, const char *scope, Request *request, Problem *problem);
+Status access_authorize(const AccessControl *doorman, const char *scope, Request *request,
+                        Problem *problem);
 
 // Whether an admitted request may undo what `owner` (a token's name; NULL: nobody in particular)
 // made: its own and nobody's, all with the scope admin or where no tokens are asked for.
 // STATUS_FORBIDDEN says of `what` ("the job j-7f3a") whose it is.
-Status doorman_owns(const Request *request, const char *owner, const char *what, Problem *problem);
+Status access_owns(const Request *request, const char *owner, const char *what, Problem *problem);
 
 // Once per answer, when it is ready to be sent; request->route may be NULL.
-void doorman_note(const Doorman *doorman, const Request *request, const Reply *reply);
+void access_log(const AccessControl *doorman, const Request *request, const Reply *reply);
 
 #endif

@@ -21,7 +21,7 @@ Status body_require_json(const Request *request, Problem *problem) {
     return body_require(request, problem);
 }
 
-Status body_refuse_large(size_t most, Problem *problem) {
+Status body_error_large(size_t most, Problem *problem) {
     return problem_set(problem, STATUS_TOO_LARGE,
                        "the body is larger than %zu bytes; impactd serve --max-body lets in more",
                        most);
@@ -35,7 +35,7 @@ Status body_require(const Request *request, Problem *problem) {
                            "as %.60s",
                            encoding);
     if (request->is_too_large)
-        return body_refuse_large(request->body_most, problem);
+        return body_error_large(request->body_most, problem);
     if (request->body == NULL || request->body_size == 0)
         return problem_set(problem, STATUS_UNREADABLE, "there is no body; send the scene as JSON");
     return STATUS_OK;
@@ -44,12 +44,12 @@ Status body_require(const Request *request, Problem *problem) {
 void body_problem(Reply *reply, const Problem *problem, int code, const char *instance,
                   const char *request_id) {
     if (code == 0)
-        code = write_problem_code(problem->status);
+        code = encode_problem_code(problem->status);
     if (reply->release != NULL)
         reply->release(reply->context);
     reply->release = NULL;
     Bytes bytes = {.most = 1 << 20};
-    write_problem(&bytes, problem, code, instance);
+    encode_problem(&bytes, problem, code, instance);
     if (request_id != NULL && bytes.count > 0) {
         bytes.count--; // the closing brace
         bytes_text(&bytes, ", \"request_id\": ");

@@ -12,9 +12,9 @@ Status body_require_json(const Request *request, Problem *problem);
 // The same of any type.
 Status body_require(const Request *request, Problem *problem);
 // STATUS_TOO_LARGE, with what lets in more than `most` bytes.
-Status body_refuse_large(size_t most, Problem *problem);
+Status body_error_large(size_t most, Problem *problem);
 
-// Makes the reply problem+json. `code` 0: write_problem_code(problem->status). Headers already set
+// Makes the reply problem+json. `code` 0: encode_problem_code(problem->status). Headers already set
 // in `reply` (Allow, Retry-After, Content-Range) stay. Never fails: without memory the body is a
 // constant.
 // `instance` and `request_id` may be NULL.

@@ -64,7 +64,7 @@ static Status finish(const Dispatcher *dispatcher, const Route *route, uint64_t 
     const bool is_kept = dispatcher->hot != NULL && reply->is_immutable && reply->code == 200 &&
                          reply->stream.next == NULL && !reply->varies_by_accept;
     if (is_kept)
-        hot_put(dispatcher->hot, age, request->target, is_packed, route, reply);
+        response_cache_put(dispatcher->hot, age, request->target, is_packed, route, reply);
     return reply_range(reply, request, problem);
 }
 
@@ -73,16 +73,16 @@ static Status answer(const Dispatcher *dispatcher, const Route *route, Handler *
                      Problem *problem) {
     char scratch[512];
     if (!request->is_admitted)
-        TRY(doorman_admit(dispatcher->doorman, route->scope, request, problem));
+        TRY(access_authorize(dispatcher->doorman, route->scope, request, problem));
     request->is_admitted = false; // whoever sleeps is judged again
     TRY(check_queries(route, request, problem));
     TRY(set_parameters(request, spans, count, scratch, sizeof scratch, problem));
-    const uint64_t age = dispatcher->hot != NULL ? hot_age(dispatcher->hot) : 0;
+    const uint64_t age = dispatcher->hot != NULL ? response_cache_age(dispatcher->hot) : 0;
     TRY(handle(dispatcher->app, request, reply, problem));
     if (reply->wait_ms > 0 || reply->code == 0)
         return STATUS_OK;
-    link_apply(reply->location, sizeof reply->location);
-    link_apply(reply->link, sizeof reply->link);
+    base_path_apply(reply->location, sizeof reply->location);
+    base_path_apply(reply->link, sizeof reply->link);
     return finish(dispatcher, route, age, request, reply, problem);
 }
 
@@ -96,10 +96,10 @@ static Status refuse(const Dispatcher *dispatcher, const Request *request, const
     }
     if (route_nearest(dispatcher->table, request->path, near))
         return problem_set(problem, STATUS_NOT_FOUND,
-                           "there is nothing at this path; did you mean %s%s?", link_base(), near);
+                           "there is nothing at this path; did you mean %s%s?", base_path(), near);
     return problem_set(problem, STATUS_NOT_FOUND,
                        "there is nothing at this path; GET %s/openapi.json lists what there is",
-                       link_base());
+                       base_path());
 }
 
 // Turns a fault into its problem document, and has the answer noted if it is one.
@@ -110,11 +110,11 @@ static void close_up(const Dispatcher *dispatcher, Request *request, Status stat
         if (problem->status == STATUS_OK)
             problem_set(problem, status, "%s", status_title(status));
         reply->wait_ms = 0;
-        link_apply(reply->link, sizeof reply->link);
+        base_path_apply(reply->link, sizeof reply->link);
         body_problem(reply, problem, reply->code == 416 ? 416 : 0, request->target, request->id);
     }
     if (reply->wait_ms == 0)
-        doorman_note(dispatcher->doorman, request, reply);
+        access_log(dispatcher->doorman, request, reply);
 }
 
 static const Route *find(const Dispatcher *dispatcher, Request *request, RouteSpan *spans,
@@ -129,7 +129,7 @@ void dispatch(void *context, Request *request, Reply *reply) {
     RouteSpan spans[REQUEST_PARAMETERS];
     size_t count = 0;
     char allow[64];
-    // A Problem is large: problem_clear and write_problem touch only what is used of it.
+    // A Problem is large: problem_clear and encode_problem touch only what is used of it.
     Problem problem;
     problem_clear(&problem);
     const Route *route = find(dispatcher, request, spans, &count, allow);
@@ -147,9 +147,9 @@ bool dispatch_admits(void *context, Request *request, Reply *reply) {
     Problem problem;
     problem_clear(&problem);
     const Route *route = find(dispatcher, request, spans, &count, allow);
-    const Status status = route != NULL
-                              ? doorman_admit(dispatcher->doorman, route->scope, request, &problem)
-                              : refuse(dispatcher, request, allow, reply, &problem);
+    const Status status =
+        route != NULL ? access_authorize(dispatcher->doorman, route->scope, request, &problem)
+                      : refuse(dispatcher, request, allow, reply, &problem);
     request->is_admitted = status == STATUS_OK;
     if (request->is_admitted)
         return true;
@@ -160,12 +160,12 @@ bool dispatch_admits(void *context, Request *request, Reply *reply) {
 bool dispatch_still_admits(void *context, Request *request) {
     const Dispatcher *dispatcher = context;
     return request->route == NULL ||
-           doorman_admit(dispatcher->doorman, request->route->scope, request, NULL) == STATUS_OK;
+           access_authorize(dispatcher->doorman, request->route->scope, request, NULL) == STATUS_OK;
 }
 
 void dispatch_note(void *context, const Request *request, const Reply *reply) {
     const Dispatcher *dispatcher = context;
-    doorman_note(dispatcher->doorman, request, reply);
+    access_log(dispatcher->doorman, request, reply);
 }
 
 static bool find_hot(const Dispatcher *dispatcher, Request *request, Reply *reply) {
@@ -173,8 +173,8 @@ static bool find_hot(const Dispatcher *dispatcher, Request *request, Reply *repl
         return false;
     const bool takes_gzip = header_accepts_gzip(request->accept_encoding);
     const Route **route = &request->route;
-    if (!takes_gzip || !hot_find(dispatcher->hot, request->target, true, reply, route)) {
-        if (!hot_find(dispatcher->hot, request->target, false, reply, route))
+    if (!takes_gzip || !response_cache_find(dispatcher->hot, request->target, true, reply, route)) {
+        if (!response_cache_find(dispatcher->hot, request->target, false, reply, route))
             return false;
         if (takes_gzip && reply->varies_by_encoding) {
             reply_clear(reply); // it is made once more, to be packed
@@ -183,7 +183,7 @@ static bool find_hot(const Dispatcher *dispatcher, Request *request, Reply *repl
     }
     Problem problem;
     problem_clear(&problem);
-    Status status = doorman_admit(dispatcher->doorman, request->route->scope, request, &problem);
+    Status status = access_authorize(dispatcher->doorman, request->route->scope, request, &problem);
     if (status != STATUS_OK)
         reply_clear(reply);
     else if (!reply_is_known(reply, request))
@@ -199,7 +199,7 @@ static Handler *find_quick(const Dispatcher *dispatcher, const Route *route) {
     return quick != NULL ? quick->quick : NULL;
 }
 
-bool dispatch_at_once(void *context, Request *request, Reply *reply) {
+bool dispatch_quick(void *context, Request *request, Reply *reply) {
     const Dispatcher *dispatcher = context;
     enum { QUICK_BYTES = 64 * 1024 }; // of a body that is read in a moment
     if (find_hot(dispatcher, request, reply))

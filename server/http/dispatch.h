@@ -11,9 +11,9 @@
 typedef struct Dispatcher {
     App *app;
     const Route *table;
-    const QuickHandler *quick; // of the table's; may be NULL
-    Hot *hot;                  // whole answers that never change; may be NULL
-    const Doorman *doorman;    // NULL: whoever comes, nothing counted
+    const QuickHandler *quick;    // of the table's; may be NULL
+    ResponseCache *hot;           // whole answers that never change; may be NULL
+    const AccessControl *doorman; // NULL: whoever comes, nothing counted
 } Dispatcher;
 
 // Fills `reply` in any case; reply->wait_ms > 0 asks to be called again. `context` is a Dispatcher.
@@ -21,7 +21,7 @@ void dispatch(void *context, Request *request, Reply *reply);
 
 // The same for what takes no more than a moment: an answer that is there already, or a quick
 // route's. False if it is neither, with `reply` untouched.
-bool dispatch_at_once(void *context, Request *request, Reply *reply);
+bool dispatch_quick(void *context, Request *request, Reply *reply);
 
 // Judges a request by its head, before its body is taken: false where dispatch would refuse it for
 // its path or its token, with the refusal in `reply`.

@@ -9,31 +9,31 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
-typedef struct Bell {
+typedef struct EventFd {
     int descriptor;
     atomic_bool is_rung; // since it was answered last: whoever rings again need not
-} Bell;
+} EventFd;
 
 // False and errno if it fails. To be closed.
-static inline bool bell_open(Bell *bell) {
+static inline bool eventfd_open(EventFd *bell) {
     atomic_init(&bell->is_rung, false);
     bell->descriptor = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     return bell->descriptor >= 0;
 }
 
-static inline void bell_close(Bell *bell) { // one that is not open: no harm
+static inline void eventfd_close(EventFd *bell) { // one that is not open: no harm
     close(bell->descriptor);
     bell->descriptor = -1;
 }
 
-static inline void bell_ring(Bell *bell) {
+static inline void eventfd_signal(EventFd *bell) {
     const uint64_t one = 1;
     if (!atomic_exchange(&bell->is_rung, true))
         (void)!write(bell->descriptor, &one, sizeof one);
 }
 
 // Whether it was rung. One who rings meanwhile is heard now or is_rung next time.
-static inline bool bell_answer(Bell *bell) {
+static inline bool eventfd_read_all(EventFd *bell) {
     uint64_t count;
     if (!atomic_exchange(&bell->is_rung, false))
         return false;

@@ -33,7 +33,7 @@ enum {
 static void make_problem(Exchange *exchange, int code, const Problem *problem, Reply *reply) {
     reply_default(reply);
     body_problem(reply, problem, code, NULL, exchange->request.id);
-    const ListenerSettings *settings = &exchange->desk->settings;
+    const ServerSettings *settings = &exchange->desk->settings;
     if (settings->note != NULL)
         settings->note(settings->context, &exchange->request, reply);
 }
@@ -42,7 +42,7 @@ static enum MHD_Result take_header(void *context, enum MHD_ValueKind kind, const
                                    size_t name_size, const char *value, size_t value_size) {
     (void)kind;
     Exchange *exchange = context;
-    gate_header(&exchange->gate, name, name_size, value, value_size);
+    validate_header(&exchange->gate, name, name_size, value, value_size);
     if (value != NULL)
         request_header(&exchange->request, name, value);
     return MHD_YES;
@@ -58,13 +58,13 @@ static void write_id(char id[REQUEST_ID_SIZE], uint64_t number) {
 static void await_body(Exchange *exchange, bool has_body) {
     exchange->is_reading = has_body;
     exchange->loop->reading += has_body;
-    seat_limit(exchange->seat, has_body ? BODY_MS : 0);
+    timer_limit(exchange->seat, has_body ? BODY_MS : 0);
 }
 
 // Takes the refusal; sent now or, with `drains`, once the body has been thrown away.
 static enum MHD_Result refuse(Exchange *exchange, Reply *refusal, bool drains) {
     if (!drains)
-        return sending_queue(exchange, refusal, true);
+        return response_queue(exchange, refusal, true);
     exchange->reply = *refusal;
     exchange->is_answered = true;
     await_body(exchange, true);
@@ -74,14 +74,14 @@ static enum MHD_Result refuse(Exchange *exchange, Reply *refusal, bool drains) {
 // The head is complete: judge it, and refuse at once what cannot be read to its end.
 static enum MHD_Result begin(Exchange *exchange, struct MHD_Connection *connection,
                              const char *method, const char *version) {
-    Desk *desk = exchange->desk;
+    ServerShared *desk = exchange->desk;
     Request *request = &exchange->request;
     exchange->is_begun = true;
     exchange->connection = connection;
     request->method = method;
     request->path = request->target = exchange->target;
     request->started_ns = clock_monotonic_ns();
-    request->waker = seat_waker(exchange->seat);
+    request->waker = timer_callback(exchange->seat);
     request->body_most = desk->settings.body_most;
     exchange->gate.names = desk->settings.hosts;
     MHD_get_connection_values_n(connection, MHD_HEADER_KIND, take_header, exchange);
@@ -93,10 +93,10 @@ static enum MHD_Result begin(Exchange *exchange, struct MHD_Connection *connecti
 
     Problem problem;
     problem_clear(&problem);
-    int code = gate_judge(&exchange->gate, method, exchange->target, version, &problem);
+    int code = validate_request(&exchange->gate, method, exchange->target, version, &problem);
     const bool is_framed = code == 0; // it is certain where the body ends
     if (code == 0 && request_open(request, exchange->target, &problem) != STATUS_OK)
-        code = write_problem_code(problem.status);
+        code = encode_problem_code(problem.status);
     const unsigned long long body_size = exchange->gate.length;
     const size_t most = request->body_most;
     const bool waits_for_leave =
@@ -107,7 +107,7 @@ static enum MHD_Result begin(Exchange *exchange, struct MHD_Connection *connecti
     }
     if (code == 0 && body_size > (waits_for_leave ? most : DRAINED * most)) {
         code = 413;
-        body_refuse_large(most, &problem);
+        body_error_large(most, &problem);
     }
     const bool has_body = body_size > 0 || exchange->gate.is_chunked;
     const bool drains =
@@ -121,7 +121,7 @@ static enum MHD_Result begin(Exchange *exchange, struct MHD_Connection *connecti
         request->method = "GET";
         request->range = NULL;
     }
-    const ListenerSettings *settings = &desk->settings;
+    const ServerSettings *settings = &desk->settings;
     if (has_body && settings->admits != NULL) {
         reply_default(&refusal);
         if (!settings->admits(settings->context, request, &refusal))
@@ -147,7 +147,7 @@ static void drop_body(Exchange *exchange) {
 }
 
 static enum MHD_Result take_body(Exchange *exchange, const char *data, size_t size) {
-    Desk *desk = exchange->desk;
+    ServerShared *desk = exchange->desk;
     const size_t most = desk->settings.body_most;
     exchange->received += size;
     if (exchange->received > DRAINED * most)
@@ -182,22 +182,22 @@ static void note_wait(Exchange *exchange, const Reply *reply) {
 
 // What the last sleep ended by.
 static void note_wake(Exchange *exchange) {
-    exchange->request.is_woken = seat_was_woken(exchange->seat);
+    exchange->request.is_woken = timer_was_woken(exchange->seat);
     exchange->request.is_expired = !exchange->request.is_woken;
 }
 
 // Another thread's word: the loop does not hear of it by itself. The exchange may be gone when this
 // returns.
 static void resume(Exchange *exchange) {
-    Bell *bell = &exchange->loop->bell;
+    EventFd *bell = &exchange->loop->bell;
     MHD_resume_connection(exchange->connection);
-    bell_ring(bell);
+    eventfd_signal(bell);
 }
 
 // In the pool.
-static void answer_in_pool(Task *task) {
+static void answer_in_pool(WorkItem *task) {
     Exchange *exchange = (Exchange *)(void *)task;
-    const ListenerSettings *settings = &exchange->desk->settings;
+    const ServerSettings *settings = &exchange->desk->settings;
     if (exchange->is_asleep)
         note_wake(exchange);
     for (;;) {
@@ -207,7 +207,7 @@ static void answer_in_pool(Task *task) {
         if (reply->wait_ms == 0)
             break;
         note_wait(exchange, reply);
-        if (seat_sleep(exchange->seat, exchange, reply->wait_ms))
+        if (timer_sleep(exchange->seat, exchange, reply->wait_ms))
             return; // it may be in the pool again already
         note_wake(exchange);
     }
@@ -224,18 +224,18 @@ static enum MHD_Result hand_over(Exchange *exchange) {
     exchange->task.run = answer_in_pool;
     // The state first: the answer may be there before this returns.
     MHD_suspend_connection(exchange->connection);
-    pool_put(exchange->desk->pool, &exchange->task);
+    thread_pool_add(exchange->desk->pool, &exchange->task);
     return MHD_YES;
 }
 
 static enum MHD_Result answer(Exchange *exchange) {
     end_reading(exchange);
-    const ListenerSettings *settings = &exchange->desk->settings;
+    const ServerSettings *settings = &exchange->desk->settings;
     Request *request = &exchange->request;
     if (exchange->is_answered) {
         Reply reply = exchange->reply;
         reply_default(&exchange->reply);
-        return sending_queue(exchange, &reply, false);
+        return response_queue(exchange, &reply, false);
     }
     if (exchange->is_busy) {
         Problem problem;
@@ -243,13 +243,13 @@ static enum MHD_Result answer(Exchange *exchange) {
         problem_set(&problem, STATUS_BUSY, "too many large bodies at once");
         Reply refusal;
         make_problem(exchange, 0, &problem, &refusal);
-        return sending_queue(exchange, &refusal, false);
+        return response_queue(exchange, &refusal, false);
     }
     if (exchange->is_asleep) {
         note_wake(exchange);
     } else {
-        seat_limit(exchange->seat, 0);
-        seat_begin(exchange->seat);
+        timer_limit(exchange->seat, 0);
+        timer_begin(exchange->seat);
         request->body = exchange->body.at;
         request->body_size = exchange->body.count;
         request->received = exchange->received;
@@ -262,10 +262,10 @@ static enum MHD_Result answer(Exchange *exchange) {
         if (reply.wait_ms == 0) {
             request->kept = reply.keep;
             exchange->forget = reply.forget;
-            return sending_queue(exchange, &reply, false);
+            return response_queue(exchange, &reply, false);
         }
         note_wait(exchange, &reply);
-        if (seat_sleep(exchange->seat, exchange, reply.wait_ms))
+        if (timer_sleep(exchange->seat, exchange, reply.wait_ms))
             return MHD_YES;
         note_wake(exchange);
     }
@@ -281,32 +281,32 @@ static void fall_asleep(void *context) {
 static void wake_up(void *context) {
     Exchange *exchange = context;
     if (exchange->is_in_pool)
-        pool_put(exchange->desk->pool, &exchange->task);
+        thread_pool_add(exchange->desk->pool, &exchange->task);
     else
         resume(exchange);
 }
 
-const HallCalls exchange_calls = {fall_asleep, wake_up};
+const TimerCallbacks exchange_calls = {fall_asleep, wake_up};
 
 void exchange_connection(void *context, struct MHD_Connection *connection, void **seat,
                          enum MHD_ConnectionNotificationCode code) {
-    Loop *loop = context;
+    EventLoop *loop = context;
     if (code == MHD_CONNECTION_NOTIFY_STARTED) {
         const union MHD_ConnectionInfo *info =
             MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
-        *seat = info != NULL ? seat_take(loop->desk->hall, info->connect_fd) : NULL;
+        *seat = info != NULL ? timer_take(loop->desk->hall, info->connect_fd) : NULL;
         if (*seat != NULL)
-            seat_limit(*seat, HEAD_MS);
+            timer_limit(*seat, HEAD_MS);
         return;
     }
     if (*seat != NULL)
-        seat_leave(*seat);
+        timer_leave(*seat);
     *seat = NULL;
     atomic_fetch_sub(&loop->connections, 1);
 }
 
 // A few are kept for the next requests: they are too large for the allocator's quick ways.
-static Exchange *exchange_take(Loop *loop) {
+static Exchange *exchange_take(EventLoop *loop) {
     if (loop->spare_count == 0)
         return calloc(1, sizeof(Exchange));
     Exchange *exchange = loop->spare[--loop->spare_count];
@@ -314,24 +314,24 @@ static Exchange *exchange_take(Loop *loop) {
     return exchange;
 }
 
-static void exchange_put(Loop *loop, Exchange *exchange) {
+static void exchange_put(EventLoop *loop, Exchange *exchange) {
     if (loop->spare_count < EXCHANGES_KEPT)
         loop->spare[loop->spare_count++] = exchange;
     else
         free(exchange);
 }
 
-void exchange_forget(Loop *loop) {
+void exchange_forget(EventLoop *loop) {
     while (loop->spare_count > 0)
         free(loop->spare[--loop->spare_count]);
 }
 
 // The request line is in; `target` is as sent.
 void *exchange_open(void *context, const char *target, struct MHD_Connection *connection) {
-    Loop *loop = context;
+    EventLoop *loop = context;
     const union MHD_ConnectionInfo *info =
         MHD_get_connection_info(connection, MHD_CONNECTION_INFO_SOCKET_CONTEXT);
-    Seat *seat = info != NULL ? info->socket_context : NULL;
+    ConnectionTimer *seat = info != NULL ? info->socket_context : NULL;
     Exchange *exchange = seat != NULL ? exchange_take(loop) : NULL;
     if (exchange == NULL)
         return NULL;
@@ -344,7 +344,7 @@ void *exchange_open(void *context, const char *target, struct MHD_Connection *co
     exchange->desk = loop->desk;
     exchange->seat = seat;
     atomic_fetch_add(&loop->desk->exchanges, 1);
-    seat_limit(seat, HEAD_MS);
+    timer_limit(seat, HEAD_MS);
     return exchange;
 }
 
@@ -353,7 +353,7 @@ enum MHD_Result exchange_go_on(void *loop, struct MHD_Connection *connection, co
                                size_t *size, void **state) {
     (void)url; // the url is decoded and cut at a NUL; the target is what counts
     Exchange *exchange = *state;
-    ((Loop *)loop)->turns++;
+    ((EventLoop *)loop)->turns++;
     if (exchange == NULL)
         return MHD_NO;
     if (!exchange->is_begun)
@@ -369,7 +369,7 @@ enum MHD_Result exchange_go_on(void *loop, struct MHD_Connection *connection, co
 void exchange_close(void *context, struct MHD_Connection *connection, void **state,
                     enum MHD_RequestTerminationCode code) {
     (void)connection;
-    Loop *loop = context;
+    EventLoop *loop = context;
     Exchange *exchange = *state;
     if (exchange == NULL)
         return;
@@ -385,7 +385,7 @@ void exchange_close(void *context, struct MHD_Connection *connection, void **sta
     end_reading(exchange);
     request_close(&exchange->request);
     // One that ended in an error the library closes only when its client is heard of again.
-    seat_limit(exchange->seat, code == MHD_REQUEST_TERMINATED_COMPLETED_OK ? IDLE_MS : 1);
+    timer_limit(exchange->seat, code == MHD_REQUEST_TERMINATED_COMPLETED_OK ? IDLE_MS : 1);
     free(exchange->target);
     exchange_put(loop, exchange);
     atomic_fetch_sub(&loop->desk->exchanges, 1);

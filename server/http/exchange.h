@@ -17,25 +17,25 @@
 #include "server/util/thread_pool.h"
 
 // What all exchanges of a listener share.
-typedef struct Desk {
-    ListenerSettings settings;
-    Hall *hall;
-    Pool *pool;
+typedef struct ServerShared {
+    ServerSettings settings;
+    TimerWheel *hall;
+    ThreadPool *pool;
     const char *url;
     uint64_t first_id;
     atomic_uint_fast64_t requests;
     atomic_size_t exchanges; // under way
     atomic_size_t held;      // bytes of bodies
-} Desk;
+} ServerShared;
 
 enum { EXCHANGES_KEPT = 32 };
 
 // An event loop: its daemon and its thread alone, but for what is locked.
-typedef struct Loop {
-    Desk *desk;
+typedef struct EventLoop {
+    ServerShared *desk;
     struct MHD_Daemon *daemon;
     pthread_t thread;
-    Bell bell;      // there are arrivals, or connections to go on with, or it is to stop
+    EventFd bell;   // there are arrivals, or connections to go on with, or it is to stop
     size_t turns;   // calls of exchange_go_on
     size_t reading; // exchanges whose body is still to come
     pthread_mutex_t lock;
@@ -43,19 +43,19 @@ typedef struct Loop {
     size_t arrival_count, arrival_room;
     atomic_bool is_stopping;
     atomic_size_t connections; // with the arrivals
-    SentAgain sent_again[SENT_AGAIN];
+    SharedResponse sent_again[SENT_AGAIN];
     struct Exchange *spare[EXCHANGES_KEPT];
     size_t spare_count;
-} Loop;
+} EventLoop;
 
 typedef struct Exchange {
-    Task task; // in the pool
-    Loop *loop;
-    Desk *desk;
+    WorkItem task; // in the pool
+    EventLoop *loop;
+    ServerShared *desk;
     struct MHD_Connection *connection;
-    Seat *seat;
+    ConnectionTimer *seat;
     Request request;
-    Gate gate;
+    RequestValidator gate;
     Bytes body;
     size_t received;
     char *target;
@@ -67,10 +67,10 @@ typedef struct Exchange {
     bool is_answered; // there, or before its body was read, with `reply`
 } Exchange;
 
-// For hall_open.
-extern const HallCalls exchange_calls;
+// For timer_wheel_open.
+extern const TimerCallbacks exchange_calls;
 
-// The callbacks; `loop` is a Loop.
+// The callbacks; `loop` is a EventLoop.
 void exchange_connection(void *loop, struct MHD_Connection *connection, void **seat,
                          enum MHD_ConnectionNotificationCode code);
 void *exchange_open(void *loop, const char *target, struct MHD_Connection *connection);
@@ -80,6 +80,6 @@ enum MHD_Result exchange_go_on(void *loop, struct MHD_Connection *connection, co
 void exchange_close(void *loop, struct MHD_Connection *connection, void **exchange,
                     enum MHD_RequestTerminationCode code);
 // Frees what the loop kept for the next requests.
-void exchange_forget(Loop *loop);
+void exchange_forget(EventLoop *loop);
 
 #endif

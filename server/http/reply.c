@@ -99,7 +99,8 @@ bool reply_pack(Reply *reply, const Request *request) {
     if (reply->body_size > MOST || !header_accepts_gzip(request->accept_encoding))
         return false;
     Bytes packed = {0};
-    if (!deflate_gzip(&packed, reply->body, reply->body_size) || packed.count >= reply->body_size) {
+    if (!gzip_compress(&packed, reply->body, reply->body_size) ||
+        packed.count >= reply->body_size) {
         bytes_clear(&packed);
         return false;
     }

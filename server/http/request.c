@@ -73,7 +73,7 @@ Status request_open(Request *request, const char *target, Problem *problem) {
     char *question = strchr(path, '?');
     if (question != NULL)
         *question = '\0';
-    request->path = link_inside(path);
+    request->path = base_path_strip(path);
     if (question == NULL)
         return STATUS_OK;
     memcpy(queries, question + 1, strlen(question + 1) + 1);

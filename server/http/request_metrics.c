@@ -10,18 +10,18 @@ typedef struct Row {
     Histogram seconds;
 } Row;
 
-struct Meter {
+struct RequestMetrics {
     const Route *table;
     size_t count;
     Counter received, sent;
     Row rows[]; // by route, and one more for requests without
 };
 
-Meter *meter_new(const Route *table) {
+RequestMetrics *request_metrics_new(const Route *table) {
     size_t count = 0;
     while (table[count].method != NULL)
         count++;
-    Meter *meter = calloc(1, sizeof *meter + (count + 1) * sizeof meter->rows[0]);
+    RequestMetrics *meter = calloc(1, sizeof *meter + (count + 1) * sizeof meter->rows[0]);
     if (meter == NULL)
         return NULL;
     meter->table = table;
@@ -29,12 +29,12 @@ Meter *meter_new(const Route *table) {
     return meter;
 }
 
-void meter_free(Meter *meter) {
+void request_metrics_free(RequestMetrics *meter) {
     free(meter);
 }
 
-void meter_count(Meter *meter, const Route *route, int code, int64_t ns, uint64_t received,
-                 uint64_t sent) {
+void request_metrics_count(RequestMetrics *meter, const Route *route, int code, int64_t ns,
+                           uint64_t received, uint64_t sent) {
     Row *row = &meter->rows[route != NULL ? (size_t)(route - meter->table) : meter->count];
     counter_add(&row->classes[code / 100 > 0 && code / 100 < CLASSES ? code / 100 : 0], 1);
     histogram_add(&row->seconds, ns);
@@ -43,18 +43,18 @@ void meter_count(Meter *meter, const Route *route, int code, int64_t ns, uint64_
 }
 
 // Patterns hold nothing that a label's value would have to escape.
-static void label(const Meter *meter, size_t i, char target[256]) {
+static void label(const RequestMetrics *meter, size_t i, char target[256]) {
     const bool is_none = i == meter->count;
     snprintf(target, 256, "route=\"%s\",method=\"%s\"", is_none ? "none" : meter->table[i].pattern,
              is_none ? "any" : meter->table[i].method);
 }
 
-void meter_write(const Meter *meter, Bytes *bytes) {
+void request_metrics_write(const RequestMetrics *meter, Bytes *bytes) {
     char labels[256], all[288];
     static const char requests[] = "impactd_http_requests_total";
     static const char seconds[] = "impactd_http_request_duration_seconds";
-    tally_family(bytes, requests, "counter",
-                 "Requests answered, by route, method and class of code.");
+    metrics_family(bytes, requests, "counter",
+                   "Requests answered, by route, method and class of code.");
     for (size_t i = 0; i <= meter->count; i++)
         for (int class = 1; class < CLASSES; class ++) {
             const uint64_t count = counter_get(&meter->rows[i].classes[class]);
@@ -62,20 +62,20 @@ void meter_write(const Meter *meter, Bytes *bytes) {
                 continue;
             label(meter, i, labels);
             snprintf(all, sizeof all, "%s,code=\"%dxx\"", labels, class);
-            tally_count(bytes, requests, all, count);
+            metrics_count(bytes, requests, all, count);
         }
-    tally_family(bytes, seconds, "histogram",
-                 "From a request's head to its answer, its waiting included.");
+    metrics_family(bytes, seconds, "histogram",
+                   "From a request's head to its answer, its waiting included.");
     for (size_t i = 0; i <= meter->count; i++) {
         if (histogram_count(&meter->rows[i].seconds) == 0)
             continue;
         label(meter, i, labels);
-        tally_histogram(bytes, seconds, labels, &meter->rows[i].seconds);
+        metrics_histogram(bytes, seconds, labels, &meter->rows[i].seconds);
     }
-    tally_counter(bytes, "impactd_http_received_bytes_total", "Bytes of request bodies.",
-                  counter_get(&meter->received));
-    tally_counter(bytes, "impactd_http_sent_bytes_total",
-                  "Bytes of answers' bodies before compression; streamed ones of unknown length "
-                  "are not in it.",
-                  counter_get(&meter->sent));
+    metrics_counter(bytes, "impactd_http_received_bytes_total", "Bytes of request bodies.",
+                    counter_get(&meter->received));
+    metrics_counter(bytes, "impactd_http_sent_bytes_total",
+                    "Bytes of answers' bodies before compression; streamed ones of unknown length "
+                    "are not in it.",
+                    counter_get(&meter->sent));
 }

@@ -6,16 +6,16 @@
 #include "server/http/route.h"
 #include "server/util/metrics.h"
 
-typedef struct Meter Meter;
+typedef struct RequestMetrics RequestMetrics;
 
 // NULL without memory. Borrows `table`, which ends with method == NULL.
-Meter *meter_new(const Route *table);
-void meter_free(Meter *meter);
+RequestMetrics *request_metrics_new(const Route *table);
+void request_metrics_free(RequestMetrics *meter);
 
 // `route` NULL: a request that no route fits, or that was refused by its head.
-void meter_count(Meter *meter, const Route *route, int code, int64_t ns, uint64_t received,
-                 uint64_t sent);
+void request_metrics_count(RequestMetrics *meter, const Route *route, int code, int64_t ns,
+                           uint64_t received, uint64_t sent);
 // In the Prometheus text format; routes that were never asked for are left out.
-void meter_write(const Meter *meter, Bytes *bytes);
+void request_metrics_write(const RequestMetrics *meter, Bytes *bytes);
 
 #endif

@@ -21,7 +21,7 @@ typedef struct Sending {
 // A body that takes long outlives what its client may do.
 static bool is_still_admitted(Sending *sending) {
     enum { LOOK_MS = 500 };
-    const ListenerSettings *settings = &sending->exchange->desk->settings;
+    const ServerSettings *settings = &sending->exchange->desk->settings;
     const int64_t now_ns = clock_monotonic_ns();
     if (settings->still_admits == NULL || now_ns - sending->admitted_ns < LOOK_MS * 1000000LL)
         return true;
@@ -38,7 +38,7 @@ static ssize_t send_next(void *context, uint64_t position, char *target, size_t 
         if (!is_still_admitted(sending))
             return MHD_CONTENT_READER_END_WITH_ERROR;
         // Forgotten before looking: whoever wakes it from here on has it look again.
-        (void)seat_was_woken(exchange->seat);
+        (void)timer_was_woken(exchange->seat);
         const ptrdiff_t count = sending->stream.next(sending->context, target, size);
         if (count == STREAM_END)
             return MHD_CONTENT_READER_END_OF_STREAM;
@@ -46,9 +46,9 @@ static ssize_t send_next(void *context, uint64_t position, char *target, size_t 
             return MHD_CONTENT_READER_END_WITH_ERROR;
         if (count != STREAM_WAIT)
             return count;
-        if (hall_is_closing(exchange->desk->hall))
+        if (timer_wheel_is_closing(exchange->desk->hall))
             return MHD_CONTENT_READER_END_OF_STREAM;
-        if (seat_sleep(exchange->seat, exchange, sending->stream.wait_ms))
+        if (timer_sleep(exchange->seat, exchange, sending->stream.wait_ms))
             return 0;
     }
 }
@@ -112,7 +112,7 @@ static void add_headers(struct MHD_Response *response, const Reply *reply, bool 
     add_header(response, MHD_HTTP_HEADER_WWW_AUTHENTICATE, reply->authenticate);
     add_header(response, "Content-Security-Policy",
                reply->policy != NULL ? reply->policy : shield_policy);
-    for (const ShieldHeader *header = shield_headers; header->name != NULL; header++)
+    for (const SecurityHeader *header = shield_headers; header->name != NULL; header++)
         add_header(response, header->name, header->value);
     if (has_tls)
         add_header(response, shield_tls.name, shield_tls.value);
@@ -137,7 +137,7 @@ static struct MHD_Response *make(Exchange *exchange, Reply *reply) {
 // The same for a small whole answer out of the cache; the response stays the loop's.
 static struct MHD_Response *make_again(Exchange *exchange, Reply *reply) {
     const size_t place = (uintptr_t)reply->shared / 64 % SENT_AGAIN;
-    SentAgain *one = &exchange->loop->sent_again[place];
+    SharedResponse *one = &exchange->loop->sent_again[place];
     if (one->shared == reply->shared) {
         // The response has a hold of its own on the shared body.
         reply->release(reply->context);
@@ -150,23 +150,23 @@ static struct MHD_Response *make_again(Exchange *exchange, Reply *reply) {
         return NULL;
     if (one->response != NULL)
         MHD_destroy_response(one->response);
-    *one = (SentAgain){reply->shared, response};
+    *one = (SharedResponse){reply->shared, response};
     return response;
 }
 
-void sending_forget(SentAgain sent_again[SENT_AGAIN]) {
+void response_forget(SharedResponse sent_again[SENT_AGAIN]) {
     for (size_t i = 0; i < SENT_AGAIN; i++) {
         if (sent_again[i].response != NULL)
             MHD_destroy_response(sent_again[i].response);
-        sent_again[i] = (SentAgain){NULL, NULL};
+        sent_again[i] = (SharedResponse){NULL, NULL};
     }
 }
 
 enum { SMALL = 64 * 1024 };
 
-enum MHD_Result sending_queue(Exchange *exchange, Reply *reply, bool closes) {
+enum MHD_Result response_queue(Exchange *exchange, Reply *reply, bool closes) {
     const int code = reply->code;
-    closes = closes || hall_is_closing(exchange->desk->hall);
+    closes = closes || timer_wheel_is_closing(exchange->desk->hall);
     const bool is_kept =
         reply->shared != NULL && code == 200 && reply->body_size <= SMALL && !closes;
     struct MHD_Response *response = is_kept ? make_again(exchange, reply) : make(exchange, reply);

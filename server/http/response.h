@@ -14,14 +14,14 @@ enum { SENT_AGAIN = 64 };
 
 // A small answer out of the cache of whole answers, made into a response once for each event loop:
 // making one costs as much as sending it.
-typedef struct SentAgain {
+typedef struct SharedResponse {
     const void *shared; // the Reply's
     struct MHD_Response *response;
-} SentAgain;
+} SharedResponse;
 
 // Takes what `reply` owns.
-enum MHD_Result sending_queue(struct Exchange *exchange, Reply *reply, bool closes);
+enum MHD_Result response_queue(struct Exchange *exchange, Reply *reply, bool closes);
 
-void sending_forget(SentAgain sent_again[SENT_AGAIN]);
+void response_forget(SharedResponse sent_again[SENT_AGAIN]);
 
 #endif

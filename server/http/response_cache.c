@@ -23,17 +23,17 @@ typedef struct Entry {
     char target[];
 } Entry;
 
-struct Hot {
+struct ResponseCache {
     pthread_mutex_t lock;
     Entry *buckets[BUCKETS];
     Entry *newest, *oldest;
     size_t most_bytes;
-    HotTally tally;
+    ResponseCacheStats tally;
     uint64_t age;
 };
 
-Hot *hot_new(size_t most_bytes) {
-    Hot *hot = calloc(1, sizeof *hot);
+ResponseCache *response_cache_new(size_t most_bytes) {
+    ResponseCache *hot = calloc(1, sizeof *hot);
     if (hot == NULL)
         return NULL;
     pthread_mutex_init(&hot->lock, NULL);
@@ -57,7 +57,7 @@ static uint64_t hash_of(const char *target, bool is_packed) {
     return hash;
 }
 
-static Entry **place(Hot *hot, uint64_t hash, const char *target, bool is_packed) {
+static Entry **place(ResponseCache *hot, uint64_t hash, const char *target, bool is_packed) {
     Entry **at = &hot->buckets[hash % BUCKETS];
     while (*at != NULL && ((*at)->hash != hash || (*at)->is_packed != is_packed ||
                            strcmp((*at)->target, target) != 0))
@@ -65,19 +65,19 @@ static Entry **place(Hot *hot, uint64_t hash, const char *target, bool is_packed
     return at;
 }
 
-static void unlink_entry(Hot *hot, Entry *entry) {
+static void unlink_entry(ResponseCache *hot, Entry *entry) {
     *(entry->newer != NULL ? &entry->newer->older : &hot->newest) = entry->older;
     *(entry->older != NULL ? &entry->older->newer : &hot->oldest) = entry->newer;
 }
 
-static void link_newest(Hot *hot, Entry *entry) {
+static void link_newest(ResponseCache *hot, Entry *entry) {
     entry->newer = NULL;
     entry->older = hot->newest;
     *(hot->newest != NULL ? &hot->newest->newer : &hot->oldest) = entry;
     hot->newest = entry;
 }
 
-static void evict(Hot *hot, Entry *entry) {
+static void evict(ResponseCache *hot, Entry *entry) {
     *place(hot, entry->hash, entry->target, entry->is_packed) = entry->next;
     unlink_entry(hot, entry);
     hot->tally.bytes -= entry->bytes;
@@ -85,7 +85,7 @@ static void evict(Hot *hot, Entry *entry) {
     entry_drop(entry);
 }
 
-void hot_clear(Hot *hot) {
+void response_cache_clear(ResponseCache *hot) {
     pthread_mutex_lock(&hot->lock);
     hot->age++;
     while (hot->oldest != NULL)
@@ -93,17 +93,17 @@ void hot_clear(Hot *hot) {
     pthread_mutex_unlock(&hot->lock);
 }
 
-uint64_t hot_age(Hot *hot) {
+uint64_t response_cache_age(ResponseCache *hot) {
     pthread_mutex_lock(&hot->lock);
     const uint64_t age = hot->age;
     pthread_mutex_unlock(&hot->lock);
     return age;
 }
 
-void hot_free(Hot *hot) {
+void response_cache_free(ResponseCache *hot) {
     if (hot == NULL)
         return;
-    hot_clear(hot);
+    response_cache_clear(hot);
     pthread_mutex_destroy(&hot->lock);
     free(hot);
 }
@@ -116,8 +116,8 @@ static void lend(Entry *entry, Reply *reply) {
     reply->shared = entry;
 }
 
-void hot_put(Hot *hot, uint64_t age, const char *target, bool is_packed, const struct Route *route,
-             Reply *reply) {
+void response_cache_put(ResponseCache *hot, uint64_t age, const char *target, bool is_packed,
+                        const struct Route *route, Reply *reply) {
     const size_t bytes = sizeof(Entry) + strlen(target) + 1 + reply->body_size;
     if (bytes > hot->most_bytes / SHARE)
         return;
@@ -154,8 +154,8 @@ void hot_put(Hot *hot, uint64_t age, const char *target, bool is_packed, const s
     pthread_mutex_unlock(&hot->lock);
 }
 
-bool hot_find(Hot *hot, const char *target, bool is_packed, Reply *reply,
-              const struct Route **route) {
+bool response_cache_find(ResponseCache *hot, const char *target, bool is_packed, Reply *reply,
+                         const struct Route **route) {
     const uint64_t hash = hash_of(target, is_packed);
     pthread_mutex_lock(&hot->lock);
     Entry *entry = *place(hot, hash, target, is_packed);
@@ -172,9 +172,9 @@ bool hot_find(Hot *hot, const char *target, bool is_packed, Reply *reply,
     return entry != NULL;
 }
 
-HotTally hot_tally(Hot *hot) {
+ResponseCacheStats response_cache_tally(ResponseCache *hot) {
     pthread_mutex_lock(&hot->lock);
-    const HotTally tally = hot->tally;
+    const ResponseCacheStats tally = hot->tally;
     pthread_mutex_unlock(&hot->lock);
     return tally;
 }

@@ -6,32 +6,32 @@
 
 #include "server/http/request.h"
 
-typedef struct Hot Hot;
+typedef struct ResponseCache ResponseCache;
 
-Hot *hot_new(size_t most_bytes); // NULL without memory
-void hot_free(Hot *hot);         // NULL is fine; answers still held live on
+ResponseCache *response_cache_new(size_t most_bytes); // NULL without memory
+void response_cache_free(ResponseCache *hot);         // NULL is fine; answers still held live on
 
-// Grows with each hot_clear.
-uint64_t hot_age(Hot *hot);
+// Grows with each response_cache_clear.
+uint64_t response_cache_age(ResponseCache *hot);
 
 // Keeps a finished 200 of a body that is whole in memory: what `reply` owns moves into the cache,
 // and `reply` becomes a borrower of it. One that is too large for the budget stays as it is.
 // `target` is as sent, `is_packed` says that the body is gzip, `route` whose it is.
 // Nothing is kept that was begun at another `age`: it may have been deleted since.
-void hot_put(Hot *hot, uint64_t age, const char *target, bool is_packed, const struct Route *route,
-             Reply *reply);
+void response_cache_put(ResponseCache *hot, uint64_t age, const char *target, bool is_packed,
+                        const struct Route *route, Reply *reply);
 
 // Fills `reply`, a borrower, and *route. False if it is not there.
-bool hot_find(Hot *hot, const char *target, bool is_packed, Reply *reply,
-              const struct Route **route);
+bool response_cache_find(ResponseCache *hot, const char *target, bool is_packed, Reply *reply,
+                         const struct Route **route);
 
 // Forgets all: something that never changes was deleted.
-void hot_clear(Hot *hot);
+void response_cache_clear(ResponseCache *hot);
 
-typedef struct HotTally {
+typedef struct ResponseCacheStats {
     size_t count, bytes;
     uint64_t hits, misses, evictions;
-} HotTally;
-HotTally hot_tally(Hot *hot);
+} ResponseCacheStats;
+ResponseCacheStats response_cache_tally(ResponseCache *hot);
 
 #endif

@@ -2,14 +2,14 @@
 
 #include <stddef.h>
 
-const ShieldHeader shield_headers[] = {
+const SecurityHeader shield_headers[] = {
     {"X-Content-Type-Options", "nosniff"},
     {"Referrer-Policy", "no-referrer"},
     {"Cross-Origin-Resource-Policy", "same-origin"},
     {NULL, NULL},
 };
 
-const ShieldHeader shield_tls = {"Strict-Transport-Security", "max-age=31536000"};
+const SecurityHeader shield_tls = {"Strict-Transport-Security", "max-age=31536000"};
 
 const char shield_policy[] =
     "default-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";

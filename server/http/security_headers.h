@@ -3,12 +3,12 @@
 #ifndef SERVER_HTTP_SECURITY_HEADERS_H
 #define SERVER_HTTP_SECURITY_HEADERS_H
 
-typedef struct ShieldHeader {
+typedef struct SecurityHeader {
     const char *name, *value;
-} ShieldHeader;
+} SecurityHeader;
 
-extern const ShieldHeader shield_headers[]; // ends with name == NULL
-extern const ShieldHeader shield_tls;       // under TLS as well
+extern const SecurityHeader shield_headers[]; // ends with name == NULL
+extern const SecurityHeader shield_tls;       // under TLS as well
 
 // Content-Security-Policy of what is no page; of a drawing, which has its colours in itself; of the
 // dashboard: its own files and answers, no inline script or style, and no text becomes markup.

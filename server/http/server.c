@@ -29,19 +29,19 @@ enum {
     IN_VAIN = 16,   // runs in a row that called nothing, before a pause
 };
 
-struct Listener {
-    Desk desk;
+struct Server {
+    ServerShared desk;
     char url[96];
     int descriptor; // the listening socket
-    Bell bell;      // rung to end the accepting thread
+    EventFd bell;   // rung to end the accepting thread
     pthread_t acceptor;
     bool is_accepting;
     size_t connections_most;
     size_t loop_count;
-    Loop loops[LOOPS_MAX];
+    EventLoop loops[LOOPS_MAX];
 };
 
-static void take_arrivals(Loop *loop) {
+static void take_arrivals(EventLoop *loop) {
     enum { MOST = 64 };
     int arrivals[MOST];
     size_t count;
@@ -65,7 +65,7 @@ static void take_arrivals(Loop *loop) {
 }
 
 static void *run_loop(void *context) {
-    Loop *loop = context;
+    EventLoop *loop = context;
     const union MHD_DaemonInfo *info = MHD_get_daemon_info(loop->daemon, MHD_DAEMON_INFO_EPOLL_FD);
     struct pollfd events[] = {{.fd = info->epoll_fd, .events = POLLIN},
                               {.fd = loop->bell.descriptor, .events = POLLIN}};
@@ -85,7 +85,7 @@ static void *run_loop(void *context) {
                 wait_ms = 1;
             (void)poll(events, 2, wait_ms);
         }
-        if (bell_answer(&loop->bell))
+        if (eventfd_read_all(&loop->bell))
             take_arrivals(loop);
         const size_t turns = loop->turns;
         MHD_run(loop->daemon);
@@ -94,16 +94,16 @@ static void *run_loop(void *context) {
     return NULL;
 }
 
-size_t listener_connections(const Listener *listener) {
+size_t server_connections(const Server *listener) {
     size_t count = 0;
     for (size_t i = 0; i < listener->loop_count; i++)
         count += atomic_load(&listener->loops[i].connections);
     return count;
 }
 
-static void hand_on(Listener *listener, int descriptor) {
+static void hand_on(Server *listener, int descriptor) {
     // A few together wake a loop less often for each.
-    Loop *least = &listener->loops[0];
+    EventLoop *least = &listener->loops[0];
     for (size_t i = 1; i < listener->loop_count && atomic_load(&least->connections) >= TOGETHER;
          i++)
         if (atomic_load(&listener->loops[i].connections) < atomic_load(&least->connections))
@@ -123,11 +123,11 @@ static void hand_on(Listener *listener, int descriptor) {
     least->arrivals[least->arrival_count++] = descriptor;
     atomic_fetch_add(&least->connections, 1);
     pthread_mutex_unlock(&least->lock);
-    bell_ring(&least->bell);
+    eventfd_signal(&least->bell);
 }
 
 static void *accept_all(void *context) {
-    Listener *listener = context;
+    Server *listener = context;
     const struct timespec moment = {.tv_nsec = 5000000};
     struct pollfd events[] = {{.fd = listener->descriptor, .events = POLLIN},
                               {.fd = listener->bell.descriptor, .events = POLLIN}};
@@ -136,7 +136,7 @@ static void *accept_all(void *context) {
         if (events[1].revents != 0)
             return NULL;
         // Beyond the limit newcomers wait in the kernel's queue until someone leaves.
-        const bool is_full = listener_connections(listener) >= listener->connections_most;
+        const bool is_full = server_connections(listener) >= listener->connections_most;
         const int descriptor = is_full ? -1 : accept(listener->descriptor, NULL, NULL);
         if (descriptor >= 0)
             hand_on(listener, descriptor);
@@ -146,8 +146,8 @@ static void *accept_all(void *context) {
     }
 }
 
-static Status loop_start(Loop *loop, Desk *desk, size_t most, Problem *problem) {
-    const ListenerSettings *settings = &desk->settings;
+static Status loop_start(EventLoop *loop, ServerShared *desk, size_t most, Problem *problem) {
+    const ServerSettings *settings = &desk->settings;
     loop->desk = desk;
     const bool is_tls = settings->certificate != NULL;
     const unsigned flags = MHD_USE_EPOLL | MHD_USE_NO_LISTEN_SOCKET | MHD_ALLOW_SUSPEND_RESUME |
@@ -170,34 +170,34 @@ static Status loop_start(Loop *loop, Desk *desk, size_t most, Problem *problem) 
     if (loop->daemon == NULL)
         return problem_set(problem, STATUS_INTERNAL, "the HTTP library cannot start%s",
                            is_tls ? " with this certificate and key" : "");
-    const bool has_bell = bell_open(&loop->bell);
+    const bool has_bell = eventfd_open(&loop->bell);
     pthread_mutex_init(&loop->lock, NULL);
     const int code = has_bell ? pthread_create(&loop->thread, NULL, run_loop, loop) : errno;
     if (code == 0)
         return STATUS_OK;
     MHD_stop_daemon(loop->daemon);
     pthread_mutex_destroy(&loop->lock);
-    bell_close(&loop->bell);
+    eventfd_close(&loop->bell);
     return problem_set(problem, STATUS_INTERNAL, "an event loop cannot be started: %s",
                        strerror(code));
 }
 
 // No callback runs any more.
-static void loop_halt(Loop *loop) {
+static void loop_halt(EventLoop *loop) {
     atomic_store(&loop->is_stopping, true);
-    bell_ring(&loop->bell);
+    eventfd_signal(&loop->bell);
     pthread_join(loop->thread, NULL);
 }
 
-static void loop_end(Loop *loop) {
+static void loop_end(EventLoop *loop) {
     for (size_t i = 0; i < loop->arrival_count; i++)
         close(loop->arrivals[i]);
     free(loop->arrivals);
     MHD_stop_daemon(loop->daemon);
-    sending_forget(loop->sent_again);
+    response_forget(loop->sent_again);
     exchange_forget(loop);
     pthread_mutex_destroy(&loop->lock);
-    bell_close(&loop->bell);
+    eventfd_close(&loop->bell);
 }
 
 // As many files as we may, and how many connections that allows.
@@ -214,11 +214,11 @@ static size_t connections_allowed(void) {
     return room < CONNECTIONS_MAX ? room : CONNECTIONS_MAX;
 }
 
-static Status start(Listener *listener, Problem *problem) {
-    Desk *desk = &listener->desk;
-    ListenerSettings *settings = &desk->settings;
-    TRY(hall_open(&exchange_calls, &desk->hall, problem));
-    TRY(pool_open(THREADS, &desk->pool, problem));
+static Status start(Server *listener, Problem *problem) {
+    ServerShared *desk = &listener->desk;
+    ServerSettings *settings = &desk->settings;
+    TRY(timer_wheel_open(&exchange_calls, &desk->hall, problem));
+    TRY(thread_pool_open(THREADS, &desk->pool, problem));
     TRY(address_open(&settings->address, &listener->descriptor, problem));
     address_url(&settings->address, settings->certificate != NULL, listener->url);
     desk->url = listener->url;
@@ -231,7 +231,7 @@ static Status start(Listener *listener, Problem *problem) {
     for (; listener->loop_count < most; listener->loop_count++)
         TRY(loop_start(&listener->loops[listener->loop_count], desk, listener->connections_most,
                        problem));
-    const int code = bell_open(&listener->bell)
+    const int code = eventfd_open(&listener->bell)
                          ? pthread_create(&listener->acceptor, NULL, accept_all, listener)
                          : errno;
     listener->is_accepting = code == 0;
@@ -241,38 +241,38 @@ static Status start(Listener *listener, Problem *problem) {
     return STATUS_OK;
 }
 
-Status listener_open(const ListenerSettings *settings, Listener **listener, Problem *problem) {
+Status server_open(const ServerSettings *settings, Server **listener, Problem *problem) {
     *listener = NULL;
-    Listener *made = calloc(1, sizeof *made);
+    Server *made = calloc(1, sizeof *made);
     if (made == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the listener");
     made->desk.settings = *settings;
     made->descriptor = made->bell.descriptor = -1;
     const Status status = start(made, problem);
     if (status != STATUS_OK) {
-        listener_free(made);
+        server_free(made);
         return status;
     }
     *listener = made;
     return STATUS_OK;
 }
 
-const char *listener_url(const Listener *listener) {
+const char *server_url(const Server *listener) {
     return listener->url;
 }
 
-void listener_stop(Listener *listener, int grace_ms) {
+void server_stop(Server *listener, int grace_ms) {
     if (listener == NULL || listener->desk.pool == NULL)
         return;
-    Desk *desk = &listener->desk;
+    ServerShared *desk = &listener->desk;
     if (listener->is_accepting) {
-        bell_ring(&listener->bell);
+        eventfd_signal(&listener->bell);
         pthread_join(listener->acceptor, NULL);
         listener->is_accepting = false;
     }
     close(listener->descriptor); // -1: no harm
     listener->descriptor = -1;
-    hall_wake_all(desk->hall);
+    timer_wheel_wake_all(desk->hall);
     const int64_t until = clock_monotonic_ns() + (int64_t)grace_ms * 1000000;
     const struct timespec pause = {.tv_nsec = 5000000};
     while (atomic_load(&desk->exchanges) > 0 && clock_monotonic_ns() < until)
@@ -280,17 +280,17 @@ void listener_stop(Listener *listener, int grace_ms) {
     for (size_t i = 0; i < listener->loop_count; i++)
         loop_halt(&listener->loops[i]);
     // The library takes no end while a connection is suspended: what is in the pool is done.
-    pool_close(desk->pool);
+    thread_pool_close(desk->pool);
     desk->pool = NULL;
     while (listener->loop_count > 0)
         loop_end(&listener->loops[--listener->loop_count]);
-    bell_close(&listener->bell);
+    eventfd_close(&listener->bell);
 }
 
-void listener_free(Listener *listener) {
+void server_free(Server *listener) {
     if (listener == NULL)
         return;
-    listener_stop(listener, 0);
-    hall_close(listener->desk.hall);
+    server_stop(listener, 0);
+    timer_wheel_close(listener->desk.hall);
     free(listener);
 }

@@ -10,9 +10,9 @@
 #include "server/http/tls.h"
 #include "server/http/validate.h"
 
-typedef struct Listener Listener;
+typedef struct Server Server;
 
-typedef struct ListenerSettings {
+typedef struct ServerSettings {
     Address address;
     size_t body_most; // bytes; a larger body is answered 413
     // Both are called from several threads. The first answers what takes no waiting and no more
@@ -28,21 +28,21 @@ typedef struct ListenerSettings {
     // Told of refusals that none of them made. May be NULL.
     void (*note)(void *context, const Request *request, const Reply *reply);
     void *context;
-    const GateHosts *hosts;         // NULL: gate_loopback
+    const AcceptedHosts *hosts;     // NULL: gate_loopback
     CertificateSource *certificate; // NULL: no TLS
-} ListenerSettings;
+} ServerSettings;
 
 // Fails as address_open does.
-Status listener_open(const ListenerSettings *settings, Listener **listener, Problem *problem);
+Status server_open(const ServerSettings *settings, Server **listener, Problem *problem);
 // "http://127.0.0.1:8080", with the port that was chosen.
-const char *listener_url(const Listener *listener);
+const char *server_url(const Server *listener);
 // Takes no more connections, ends all waiting and lets requests under way finish for at most
 // `grace_ms`. When this returns nothing is being answered.
-void listener_stop(Listener *listener, int grace_ms);
+void server_stop(Server *listener, int grace_ms);
 // Frees what wakers point to: after whoever may call them is gone.
-void listener_free(Listener *listener);
+void server_free(Server *listener);
 
 // How many clients are connected now.
-size_t listener_connections(const Listener *listener);
+size_t server_connections(const Server *listener);
 
 #endif

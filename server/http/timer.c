@@ -1,7 +1,8 @@
 // A seat:   empty -> taken -> (asleep -> taken)* -> empty
 //
-// All state but the limits is under the Hall's one lock: each change is a few stores. The clock
-// thread sleeps until the earliest time any seat waits for, and is nudged only by an earlier one.
+// All state but the limits is under the TimerWheel's one lock: each change is a few stores. The
+// clock thread sleeps until the earliest time any seat waits for, and is nudged only by an earlier
+// one.
 #include "server/http/timer.h"
 
 #include <errno.h>
@@ -13,11 +14,11 @@
 
 #include "server/util/clock.h"
 
-struct Seat {
-    Hall *hall;
-    Seat *next; // of all
-    Seat *next_empty;
-    Waker waker;
+struct ConnectionTimer {
+    TimerWheel *hall;
+    ConnectionTimer *next; // of all
+    ConnectionTimer *next_empty;
+    Callback waker;
     int descriptor; // -1: empty
     void *asleep;   // the suspended connection, or NULL
     atomic_bool is_woken;
@@ -25,18 +26,18 @@ struct Seat {
     _Atomic(int64_t) limit_ns; // the same; set without the lock, several times a request
 };
 
-struct Hall {
-    HallCalls calls;
+struct TimerWheel {
+    TimerCallbacks calls;
     pthread_mutex_t lock;
     pthread_cond_t nudge;
     pthread_t clock;
-    Seat *all, *empty;
+    ConnectionTimer *all, *empty;
     _Atomic(int64_t) next_ns; // when the clock thread wakes; lowered without the lock as well
     atomic_bool is_closing;
     bool is_closed;
 };
 
-static void wake_locked(Seat *seat) {
+static void wake_locked(ConnectionTimer *seat) {
     if (seat->asleep == NULL)
         return;
     void *connection = seat->asleep;
@@ -46,7 +47,7 @@ static void wake_locked(Seat *seat) {
 }
 
 static void wake(void *context) {
-    Seat *seat = context;
+    ConnectionTimer *seat = context;
     pthread_mutex_lock(&seat->hall->lock);
     seat->is_woken = true;
     wake_locked(seat);
@@ -54,14 +55,14 @@ static void wake(void *context) {
 }
 
 // Does what is due and returns when the next thing is.
-static int64_t serve_due(Hall *hall, int64_t now) {
+static int64_t serve_due(TimerWheel *hall, int64_t now) {
     int64_t next = INT64_MAX;
-    for (Seat *seat = hall->all; seat != NULL; seat = seat->next) {
+    for (ConnectionTimer *seat = hall->all; seat != NULL; seat = seat->next) {
         if (seat->wake_ns <= now)
             wake_locked(seat);
         int64_t limit = atomic_load(&seat->limit_ns);
         if (limit <= now) {
-            // seat_leave, which comes before the descriptor is closed, takes the lock.
+            // timer_leave, which comes before the descriptor is closed, takes the lock.
             shutdown(seat->descriptor, SHUT_RDWR);
             atomic_compare_exchange_strong(&seat->limit_ns, &limit, INT64_MAX);
             limit = INT64_MAX;
@@ -73,7 +74,7 @@ static int64_t serve_due(Hall *hall, int64_t now) {
 }
 
 static void *keep_time(void *context) {
-    Hall *hall = context;
+    TimerWheel *hall = context;
     pthread_mutex_lock(&hall->lock);
     while (!hall->is_closed) {
         // A limit set while the seats are looked at either is seen there or lowers this again.
@@ -95,9 +96,9 @@ static void *keep_time(void *context) {
     return NULL;
 }
 
-Status hall_open(const HallCalls *calls, Hall **hall, Problem *problem) {
+Status timer_wheel_open(const TimerCallbacks *calls, TimerWheel **hall, Problem *problem) {
     *hall = NULL;
-    Hall *made = calloc(1, sizeof *made);
+    TimerWheel *made = calloc(1, sizeof *made);
     if (made == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the listener");
     made->calls = *calls;
@@ -119,19 +120,19 @@ Status hall_open(const HallCalls *calls, Hall **hall, Problem *problem) {
     return STATUS_OK;
 }
 
-void hall_wake_all(Hall *hall) {
+void timer_wheel_wake_all(TimerWheel *hall) {
     pthread_mutex_lock(&hall->lock);
     hall->is_closing = true;
-    for (Seat *seat = hall->all; seat != NULL; seat = seat->next)
+    for (ConnectionTimer *seat = hall->all; seat != NULL; seat = seat->next)
         wake_locked(seat);
     pthread_mutex_unlock(&hall->lock);
 }
 
-bool hall_is_closing(Hall *hall) {
+bool timer_wheel_is_closing(TimerWheel *hall) {
     return atomic_load(&hall->is_closing);
 }
 
-void hall_close(Hall *hall) {
+void timer_wheel_close(TimerWheel *hall) {
     if (hall == NULL)
         return;
     pthread_mutex_lock(&hall->lock);
@@ -140,7 +141,7 @@ void hall_close(Hall *hall) {
     pthread_mutex_unlock(&hall->lock);
     pthread_join(hall->clock, NULL);
     while (hall->all != NULL) {
-        Seat *next = hall->all->next;
+        ConnectionTimer *next = hall->all->next;
         free(hall->all);
         hall->all = next;
     }
@@ -149,14 +150,14 @@ void hall_close(Hall *hall) {
     free(hall);
 }
 
-Seat *seat_take(Hall *hall, int descriptor) {
+ConnectionTimer *timer_take(TimerWheel *hall, int descriptor) {
     pthread_mutex_lock(&hall->lock);
-    Seat *seat = hall->empty;
+    ConnectionTimer *seat = hall->empty;
     if (seat != NULL) {
         hall->empty = seat->next_empty;
     } else if ((seat = malloc(sizeof *seat)) != NULL) {
         seat->hall = hall;
-        seat->waker = (Waker){seat, wake};
+        seat->waker = (Callback){seat, wake};
         seat->next = hall->all;
         hall->all = seat;
     }
@@ -171,8 +172,8 @@ Seat *seat_take(Hall *hall, int descriptor) {
     return seat;
 }
 
-void seat_leave(Seat *seat) {
-    Hall *hall = seat->hall;
+void timer_leave(ConnectionTimer *seat) {
+    TimerWheel *hall = seat->hall;
     pthread_mutex_lock(&hall->lock);
     seat->descriptor = -1;
     seat->asleep = NULL;
@@ -183,12 +184,12 @@ void seat_leave(Seat *seat) {
     pthread_mutex_unlock(&hall->lock);
 }
 
-const Waker *seat_waker(const Seat *seat) {
+const Callback *timer_callback(const ConnectionTimer *seat) {
     return &seat->waker;
 }
 
 // Whether the clock thread has to wake earlier than it means to.
-static bool is_earlier(Hall *hall, int64_t time_ns) {
+static bool is_earlier(TimerWheel *hall, int64_t time_ns) {
     int64_t next = atomic_load(&hall->next_ns);
     while (time_ns < next)
         if (atomic_compare_exchange_weak(&hall->next_ns, &next, time_ns))
@@ -196,7 +197,7 @@ static bool is_earlier(Hall *hall, int64_t time_ns) {
     return false;
 }
 
-void seat_limit(Seat *seat, int64_t most_ms) {
+void timer_limit(ConnectionTimer *seat, int64_t most_ms) {
     const int64_t limit_ns = most_ms > 0 ? clock_monotonic_ns() + most_ms * 1000000 : INT64_MAX;
     atomic_store(&seat->limit_ns, limit_ns);
     if (!is_earlier(seat->hall, limit_ns))
@@ -207,12 +208,12 @@ void seat_limit(Seat *seat, int64_t most_ms) {
     pthread_mutex_unlock(&seat->hall->lock);
 }
 
-void seat_begin(Seat *seat) {
+void timer_begin(ConnectionTimer *seat) {
     atomic_store(&seat->is_woken, false);
 }
 
-bool seat_sleep(Seat *seat, void *connection, int64_t most_ms) {
-    Hall *hall = seat->hall;
+bool timer_sleep(ConnectionTimer *seat, void *connection, int64_t most_ms) {
+    TimerWheel *hall = seat->hall;
     const int64_t wake_ns = clock_monotonic_ns() + most_ms * 1000000;
     pthread_mutex_lock(&hall->lock);
     const bool sleeps = !seat->is_woken && !hall->is_closing;
@@ -228,6 +229,6 @@ bool seat_sleep(Seat *seat, void *connection, int64_t most_ms) {
     return sleeps;
 }
 
-bool seat_was_woken(Seat *seat) {
+bool timer_was_woken(ConnectionTimer *seat) {
     return atomic_exchange(&seat->is_woken, false);
 }

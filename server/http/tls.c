@@ -76,8 +76,8 @@ static void certificate_free(Certificate *certificate) {
     free(certificate);
 }
 
-Status certificate_use(const char *cert, const char *cert_path, const char *key,
-                       const char *key_path, Problem *problem) {
+Status tls_use(const char *cert, const char *cert_path, const char *key, const char *key_path,
+               Problem *problem) {
     const gnutls_datum_t cert_text = {(unsigned char *)cert, (unsigned)strlen(cert)};
     const gnutls_datum_t key_text = {(unsigned char *)key, (unsigned)strlen(key)};
     TRY(check(cert, cert_path, key, key_path, problem));
@@ -116,11 +116,11 @@ static int retrieve(gnutls_session_t session, const gnutls_datum_t *authorities,
     return 0;
 }
 
-CertificateSource *certificate_source(void) {
+CertificateSource *tls_source(void) {
     return atomic_load(&in_use) != NULL ? (CertificateSource *)retrieve : NULL;
 }
 
-void certificate_forget(void) {
+void tls_forget(void) {
     Certificate *certificate = atomic_exchange(&in_use, NULL), *before;
     for (; certificate != NULL; certificate = before) {
         before = certificate->before;

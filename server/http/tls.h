@@ -9,14 +9,14 @@
 // Answers handshakes with this one from now on; both as PEM text. STATUS_USAGE for what cannot be
 // read, for a key that is not the certificate's, and for a certificate whose time is over:
 // `cert_path` and `key_path` are named in the fault, and what was used before stays.
-Status certificate_use(const char *cert, const char *cert_path, const char *key,
-                       const char *key_path, Problem *problem);
+Status tls_use(const char *cert, const char *cert_path, const char *key, const char *key_path,
+               Problem *problem);
 
 // A gnutls_certificate_retrieve_function2 that hands out the one in use; NULL while there is none.
 typedef void CertificateSource(void);
-CertificateSource *certificate_source(void);
+CertificateSource *tls_source(void);
 
 // When no connection is left.
-void certificate_forget(void);
+void tls_forget(void);
 
 #endif

@@ -15,7 +15,7 @@ static const char *const known_methods[] = {"GET",    "HEAD",    "POST", "PUT",
                                             "DELETE", "OPTIONS", "PATCH"};
 
 static const char *const loopback[] = {"localhost", "127.0.0.1", "[::1]", NULL};
-const GateHosts gate_loopback = {loopback, false};
+const AcceptedHosts gate_loopback = {loopback, false};
 
 // The size of the name in "name:port"; 0 where the port is no port. An IPv6 address has brackets.
 static size_t name_size_of(const char *host, size_t size) {
@@ -46,11 +46,11 @@ static bool is_address(const char *name, size_t size) {
     return inet_pton(has_brackets ? AF_INET6 : AF_INET, text, ignored) == 1;
 }
 
-static const GateHosts *gate_names(const Gate *gate) {
+static const AcceptedHosts *gate_names(const RequestValidator *gate) {
     return gate->names != NULL ? gate->names : &gate_loopback;
 }
 
-bool gate_host_is_ours(const GateHosts *hosts, const char *host, size_t size) {
+bool validate_host_is_ours(const AcceptedHosts *hosts, const char *host, size_t size) {
     const size_t name_size = name_size_of(host, size);
     if (name_size == 0)
         return false;
@@ -85,8 +85,8 @@ static bool is_token(const char *text, size_t size) {
     return size > 0;
 }
 
-void gate_header(Gate *gate, const char *name, size_t name_size, const char *value,
-                 size_t value_size) {
+void validate_header(RequestValidator *gate, const char *name, size_t name_size, const char *value,
+                     size_t value_size) {
     if (value == NULL)
         value_size = 0;
     if (!gate->has_control && (!is_token(name, name_size) || has_control(value, value_size))) {
@@ -98,7 +98,7 @@ void gate_header(Gate *gate, const char *name, size_t name_size, const char *val
     if (is_name(name, name_size, "Host")) {
         gate->hosts++;
         gate->own_host = value;
-        if (!gate_host_is_ours(gate_names(gate), value_size > 0 ? value : "", value_size)) {
+        if (!validate_host_is_ours(gate_names(gate), value_size > 0 ? value : "", value_size)) {
             gate->is_foreign_host = true;
             if (value_size > 0 && !has_control(value, value_size))
                 text_fit(gate->host, sizeof gate->host, value);
@@ -149,8 +149,8 @@ static const char *path_fault(const char *target) {
     return strstr(target, "%00") != NULL ? "the target holds an escaped NUL" : NULL;
 }
 
-static int refuse_host(const Gate *gate, Problem *problem) {
-    const GateHosts *hosts = gate_names(gate);
+static int refuse_host(const RequestValidator *gate, Problem *problem) {
+    const AcceptedHosts *hosts = gate_names(gate);
     char list[256] = "";
     for (size_t i = 0; hosts->names[i] != NULL; i++) {
         const size_t used = strlen(list);
@@ -169,21 +169,21 @@ static int refuse_host(const Gate *gate, Problem *problem) {
 
 // Whether an Origin header names this server: the authority of the Host header, or a name given by
 // --host or --base-url, for a proxy that changes the Host.
-static bool gate_origin_is_ours(const Gate *gate) {
+static bool gate_origin_is_ours(const RequestValidator *gate) {
     const char *const mark = strstr(gate->origin, "://");
     if (mark == NULL)
         return false;
     const char *const authority = mark + 3;
     if (gate->own_host != NULL && strcasecmp(authority, gate->own_host) == 0)
         return true;
-    const GateHosts named = {gate_names(gate)->names, false};
+    const AcceptedHosts named = {gate_names(gate)->names, false};
     const size_t size = strlen(authority);
-    return gate_host_is_ours(&named, authority, size) &&
-           !gate_host_is_ours(&gate_loopback, authority, size);
+    return validate_host_is_ours(&named, authority, size) &&
+           !validate_host_is_ours(&gate_loopback, authority, size);
 }
 
 // Another site's page may send requests with the rights of this machine (CSRF); browsers mark them.
-static bool gate_is_from_other_site(const Gate *gate, const char *method) {
+static bool gate_is_from_other_site(const RequestValidator *gate, const char *method) {
     if (strcmp(method, "GET") == 0 || strcmp(method, "HEAD") == 0 || strcmp(method, "OPTIONS") == 0)
         return false;
     return (gate->fetch_site != NULL && (strcasecmp(gate->fetch_site, "cross-site") == 0 ||
@@ -191,8 +191,8 @@ static bool gate_is_from_other_site(const Gate *gate, const char *method) {
            (gate->origin != NULL && !gate_origin_is_ours(gate));
 }
 
-int gate_judge(const Gate *gate, const char *method, const char *target, const char *version,
-               Problem *problem) {
+int validate_request(const RequestValidator *gate, const char *method, const char *target,
+                     const char *version, Problem *problem) {
     if (strcmp(version, "HTTP/1.1") != 0 && strcmp(version, "HTTP/1.0") != 0)
         return refuse(problem, 505, "this server speaks HTTP/1.1 and HTTP/1.0");
     bool is_known = false;

@@ -11,15 +11,15 @@
 #include "core/base/status.h"
 
 // The names that requests may call us by.
-typedef struct GateHosts {
+typedef struct AcceptedHosts {
     const char *const *names; // without port, "[::1]", NULL-terminated
     bool takes_addresses;     // any numeric address as well: no other site's name leads to it
-} GateHosts;
-extern const GateHosts gate_loopback; // localhost, 127.0.0.1 and [::1]
+} AcceptedHosts;
+extern const AcceptedHosts gate_loopback; // localhost, 127.0.0.1 and [::1]
 
 // Facts gathered header by header; all zero to begin with, but for `names`.
-typedef struct Gate {
-    const GateHosts *names; // NULL: gate_loopback
+typedef struct RequestValidator {
+    const AcceptedHosts *names; // NULL: gate_loopback
     size_t hosts, lengths, encodings, authorizations;
     unsigned long long length; // of the body, as told
     bool is_chunked, is_foreign_host, has_bad_length, has_control;
@@ -27,17 +27,17 @@ typedef struct Gate {
     // Values of headers as given, of the caller; NULL where there is none.
     const char *own_host, *origin, *fetch_site;
     char host[64];
-} Gate;
+} RequestValidator;
 
-void gate_header(Gate *gate, const char *name, size_t name_size, const char *value,
-                 size_t value_size);
+void validate_header(RequestValidator *gate, const char *name, size_t name_size, const char *value,
+                     size_t value_size);
 
 // 0 if the request may go on, else the HTTP status (400, 403, 414, 421, 501, 505), with the reason
 // in `problem`. 403: another site's page sends a request that is not GET, HEAD or OPTIONS.
-int gate_judge(const Gate *gate, const char *method, const char *target, const char *version,
-               Problem *problem);
+int validate_request(const RequestValidator *gate, const char *method, const char *target,
+                     const char *version, Problem *problem);
 
 // Whether a Host header's value is one of the names, with any port or none.
-bool gate_host_is_ours(const GateHosts *hosts, const char *host, size_t size);
+bool validate_host_is_ours(const AcceptedHosts *hosts, const char *host, size_t size);
 
 #endif

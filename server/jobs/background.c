@@ -1,43 +1,43 @@
-// All under one lock of the Asides, which nobody holds for long.
+// All under one lock of the BackgroundTasks, which nobody holds for long.
 #include "server/jobs/background.h"
 
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 
-struct Aside {
-    Asides *all;
-    Aside *next; // of those that run
-    AsideWork work;
-    Waker waker;
+struct BackgroundTask {
+    BackgroundTasks *all;
+    BackgroundTask *next; // of those that run
+    BackgroundWork work;
+    Callback waker;
     atomic_bool is_stopped;
     bool is_done, is_dropped;
 };
 
-struct Asides {
+struct BackgroundTasks {
     pthread_mutex_t lock;
     pthread_cond_t idle;
-    Aside *running;
+    BackgroundTask *running;
     size_t count, most;
 };
 
-static void aside_free(Aside *aside) {
+static void aside_free(BackgroundTask *aside) {
     aside->work.release(aside->work.context);
     free(aside);
 }
 
 static bool go_on(void *context, double fraction) {
     (void)fraction;
-    return !atomic_load(&((Aside *)context)->is_stopped);
+    return !atomic_load(&((BackgroundTask *)context)->is_stopped);
 }
 
 static void *aside_main(void *context) {
-    Aside *aside = context;
-    Asides *all = aside->all;
+    BackgroundTask *aside = context;
+    BackgroundTasks *all = aside->all;
     const Progress watch = {aside, go_on};
     aside->work.run(aside->work.context, &watch);
     pthread_mutex_lock(&all->lock);
-    Aside **at = &all->running;
+    BackgroundTask **at = &all->running;
     while (*at != aside)
         at = &(*at)->next;
     *at = aside->next;
@@ -56,7 +56,7 @@ static void *aside_main(void *context) {
     return NULL;
 }
 
-Status asides_open(size_t most, Asides **asides, Problem *problem) {
+Status background_open(size_t most, BackgroundTasks **asides, Problem *problem) {
     *asides = calloc(1, sizeof **asides);
     if (*asides == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for readers' work");
@@ -66,11 +66,11 @@ Status asides_open(size_t most, Asides **asides, Problem *problem) {
     return STATUS_OK;
 }
 
-void asides_close(Asides *asides) {
+void background_close(BackgroundTasks *asides) {
     if (asides == NULL)
         return;
     pthread_mutex_lock(&asides->lock);
-    for (Aside *aside = asides->running; aside != NULL; aside = aside->next)
+    for (BackgroundTask *aside = asides->running; aside != NULL; aside = aside->next)
         atomic_store(&aside->is_stopped, true);
     while (asides->count > 0)
         pthread_cond_wait(&asides->idle, &asides->lock);
@@ -81,7 +81,7 @@ void asides_close(Asides *asides) {
 }
 
 // With the lock held.
-static Status start(Asides *asides, Aside *made, Problem *problem) {
+static Status start(BackgroundTasks *asides, BackgroundTask *made, Problem *problem) {
     if (asides->count >= asides->most)
         return problem_set(problem, STATUS_BUSY,
                            "as much is being computed for readers as may be at once; ask again a "
@@ -100,10 +100,10 @@ static Status start(Asides *asides, Aside *made, Problem *problem) {
     return STATUS_OK;
 }
 
-Status aside_start(Asides *asides, const AsideWork *work, const Waker *waker, Aside **aside,
-                   Problem *problem) {
+Status background_start(BackgroundTasks *asides, const BackgroundWork *work, const Callback *waker,
+                        BackgroundTask **aside, Problem *problem) {
     *aside = NULL;
-    Aside *made = calloc(1, sizeof *made);
+    BackgroundTask *made = calloc(1, sizeof *made);
     if (made == NULL) {
         work->release(work->context);
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a reader's work");
@@ -122,21 +122,21 @@ Status aside_start(Asides *asides, const AsideWork *work, const Waker *waker, As
     return status;
 }
 
-bool aside_is_done(Aside *aside) {
+bool background_is_done(BackgroundTask *aside) {
     pthread_mutex_lock(&aside->all->lock);
     const bool is_done = aside->is_done;
     pthread_mutex_unlock(&aside->all->lock);
     return is_done;
 }
 
-void *aside_context(Aside *aside) {
+void *background_context(BackgroundTask *aside) {
     return aside->work.context;
 }
 
-void aside_drop(Aside *aside) {
+void background_unref(BackgroundTask *aside) {
     if (aside == NULL)
         return;
-    Asides *all = aside->all;
+    BackgroundTasks *all = aside->all;
     pthread_mutex_lock(&all->lock);
     const bool is_done = aside->is_done;
     aside->is_dropped = true;

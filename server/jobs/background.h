@@ -7,25 +7,25 @@
 #include "core/base/progress.h"
 #include "server/jobs/job.h"
 
-typedef struct Asides Asides;
-typedef struct Aside Aside;
+typedef struct BackgroundTasks BackgroundTasks;
+typedef struct BackgroundTask BackgroundTask;
 
-Status asides_open(size_t most, Asides **asides, Problem *problem);
-// Stops all that runs, waits for it and frees what is left; then nobody may hold an Aside.
-void asides_close(Asides *asides);
+Status background_open(size_t most, BackgroundTasks **asides, Problem *problem);
+// Stops all that runs, waits for it and frees what is left; then nobody may hold an BackgroundTask.
+void background_close(BackgroundTasks *asides);
 
-typedef struct AsideWork {
+typedef struct BackgroundWork {
     void *context; // freed by `release` once neither the thread nor the reader needs it
     void (*run)(void *context, const Progress *watch);
     void (*release)(void *context);
-} AsideWork;
+} BackgroundWork;
 
 // Begins at once; `waker` is called when it is done. Takes work->context, also when it fails.
 // STATUS_BUSY where there is no room. *aside is a hold.
-Status aside_start(Asides *asides, const AsideWork *work, const Waker *waker, Aside **aside,
-                   Problem *problem);
-bool aside_is_done(Aside *aside);
-void *aside_context(Aside *aside); // once it is done
-void aside_drop(Aside *aside);     // stops it if it is not done
+Status background_start(BackgroundTasks *asides, const BackgroundWork *work, const Callback *waker,
+                        BackgroundTask **aside, Problem *problem);
+bool background_is_done(BackgroundTask *aside);
+void *background_context(BackgroundTask *aside); // once it is done
+void background_unref(BackgroundTask *aside);    // stops it if it is not done
 
 #endif

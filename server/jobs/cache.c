@@ -7,19 +7,19 @@
 #include "server/util/hashmap.h"
 
 typedef struct Entry {
-    IndexEntry indexed; // by id
+    HashMapEntry indexed; // by id
     struct Entry *newer, *older;
-    Outcome *outcome; // or NULL
-    Head *head;       // or NULL
+    Outcome *outcome;    // or NULL
+    ResultSummary *head; // or NULL
     size_t series_bytes, head_bytes;
     char id[72];
 } Entry;
 
 struct Cache {
-    Index *index;
+    HashMap *index;
     Entry *newest, *oldest;
     size_t most_bytes;
-    LayerTally series, heads;
+    CacheStats series, heads;
 };
 
 Cache *cache_new(size_t most_bytes) {
@@ -27,7 +27,7 @@ Cache *cache_new(size_t most_bytes) {
     if (cache == NULL)
         return NULL;
     cache->most_bytes = most_bytes;
-    cache->index = index_new();
+    cache->index = hashmap_new();
     if (cache->index == NULL) {
         free(cache);
         return NULL;
@@ -49,13 +49,13 @@ static void link_newest(Cache *cache, Entry *entry) {
 
 static void evict(Cache *cache, Entry *entry) {
     unlink_entry(cache, entry);
-    index_remove(cache->index, &entry->indexed);
+    hashmap_remove(cache->index, &entry->indexed);
     cache->series.bytes -= entry->series_bytes;
     cache->heads.bytes -= entry->head_bytes;
     cache->series.count -= entry->outcome != NULL;
     cache->heads.count -= entry->head != NULL;
     outcome_unref(entry->outcome);
-    head_drop(entry->head);
+    result_summary_unref(entry->head);
     free(entry);
 }
 
@@ -64,25 +64,25 @@ void cache_free(Cache *cache) {
         return;
     while (cache->oldest != NULL)
         evict(cache, cache->oldest);
-    index_free(cache->index);
+    hashmap_free(cache->index);
     free(cache);
 }
 
-void cache_put(Cache *cache, const char *id, Outcome *outcome, Head *head) {
-    Entry *old = index_find(cache->index, id), *entry = calloc(1, sizeof *entry);
+void cache_put(Cache *cache, const char *id, Outcome *outcome, ResultSummary *head) {
+    Entry *old = hashmap_find(cache->index, id), *entry = calloc(1, sizeof *entry);
     if (entry == NULL)
         return;
     text_fit(entry->id, sizeof entry->id, id);
     Outcome *kept = outcome != NULL ? outcome : old != NULL ? old->outcome : NULL;
     if (kept != NULL)
         entry->outcome = outcome_ref(kept);
-    entry->head = head_hold(head != NULL ? head : old != NULL ? old->head : NULL);
+    entry->head = result_summary_ref(head != NULL ? head : old != NULL ? old->head : NULL);
     if (old != NULL)
         evict(cache, old);
     entry->series_bytes = kept != NULL ? outcome_bytes(kept) : 0;
     entry->head_bytes = sizeof *entry + (entry->head != NULL ? entry->head->bytes : 0);
     entry->indexed.key = entry->id;
-    index_add(cache->index, &entry->indexed);
+    hashmap_add(cache->index, &entry->indexed);
     link_newest(cache, entry);
     cache->series.bytes += entry->series_bytes;
     cache->heads.bytes += entry->head_bytes;
@@ -96,7 +96,7 @@ void cache_put(Cache *cache, const char *id, Outcome *outcome, Head *head) {
 }
 
 static Entry *use(Cache *cache, const char *id) {
-    Entry *entry = index_find(cache->index, id);
+    Entry *entry = hashmap_find(cache->index, id);
     if (entry != NULL) {
         unlink_entry(cache, entry);
         link_newest(cache, entry);
@@ -112,26 +112,26 @@ Outcome *cache_find(Cache *cache, const char *id) {
     return is_hit ? outcome_ref(entry->outcome) : NULL;
 }
 
-Head *cache_head(Cache *cache, const char *id) {
+ResultSummary *cache_head(Cache *cache, const char *id) {
     Entry *entry = use(cache, id);
     const bool is_hit = entry != NULL && entry->head != NULL;
     cache->heads.hits += is_hit;
     cache->heads.misses += !is_hit;
-    return is_hit ? head_hold(entry->head) : NULL;
+    return is_hit ? result_summary_ref(entry->head) : NULL;
 }
 
 bool cache_has(const Cache *cache, const char *id, bool with_series) {
-    const Entry *entry = index_find(cache->index, id);
+    const Entry *entry = hashmap_find(cache->index, id);
     return entry != NULL && (with_series ? entry->outcome != NULL : entry->head != NULL);
 }
 
 void cache_forget(Cache *cache, const char *id) {
-    Entry *entry = index_find(cache->index, id);
+    Entry *entry = hashmap_find(cache->index, id);
     if (entry != NULL)
         evict(cache, entry);
 }
 
-void cache_tally(const Cache *cache, LayerTally *series, LayerTally *heads) {
+void cache_tally(const Cache *cache, CacheStats *series, CacheStats *heads) {
     *series = cache->series;
     *heads = cache->heads;
     series->most_bytes = heads->most_bytes = cache->most_bytes;

@@ -15,12 +15,12 @@ void cache_free(Cache *cache);
 // Keeps holds of its own; of `outcome` and `head` what is not NULL takes the place of what was
 // there. The newest one is kept even if it is larger than the budget, so that whoever asked for it
 // finds it. Without memory nothing is kept.
-void cache_put(Cache *cache, const char *id, Outcome *outcome, Head *head);
-Outcome *cache_find(Cache *cache, const char *id); // a hold for the caller, or NULL
-Head *cache_head(Cache *cache, const char *id);    // a hold for the caller, or NULL
+void cache_put(Cache *cache, const char *id, Outcome *outcome, ResultSummary *head);
+Outcome *cache_find(Cache *cache, const char *id);       // a hold for the caller, or NULL
+ResultSummary *cache_head(Cache *cache, const char *id); // a hold for the caller, or NULL
 bool cache_has(const Cache *cache, const char *id, bool with_series); // is not a use of it
 void cache_forget(Cache *cache, const char *id);
 // Of the series, and of the documents: how often asked for, and kept. Both share the budget.
-void cache_tally(const Cache *cache, LayerTally *series, LayerTally *heads);
+void cache_tally(const Cache *cache, CacheStats *series, CacheStats *heads);
 
 #endif

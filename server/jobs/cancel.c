@@ -11,31 +11,31 @@ static Status refuse_finished(const char *id, int state, Problem *problem) {
 
 static void dismissed(void *context, Status status, const char *detail) {
     Job *job = context;
-    Intake *intake = job->intake;
+    JobManager *intake = job->intake;
     pthread_mutex_lock(&intake->lock);
     job->is_kept = status == STATUS_OK;
     job->refusal = status;
     text_fit(job->refused, sizeof job->refused, detail);
     // Until the store has it, the job is found here.
     if (status == STATUS_OK) {
-        intake_retire(job);
+        jobs_retire(job);
     } else if (!intake->is_closing) {
         job->next_undismissed = intake->undismissed;
-        intake->undismissed = job_hold(job);
+        intake->undismissed = job_ref(job);
     }
-    wakers_call(&job->keepers);
-    intake_settle(intake);
+    subscribers_call(&job->keepers);
+    jobs_settle(intake);
     pthread_mutex_unlock(&intake->lock);
-    job_drop(job); // the post's hold
+    job_unref(job); // the post's hold
 }
 
-void intake_retry_dismissed(Intake *intake) {
+void jobs_retry_dismissed(JobManager *intake) {
     Job *job = intake->undismissed, *next;
     intake->undismissed = NULL;
     for (; job != NULL; job = next) {
         next = job->next_undismissed;
-        const StoreDone done = {dismissed, job}; // takes the list's hold
-        if (store_job_update_post(intake->store, &job->closing, &done) == STATUS_OK) {
+        const WriteDone done = {dismissed, job}; // takes the list's hold
+        if (db_job_update_post(intake->store, &job->closing, &done) == STATUS_OK) {
             intake->posted++;
         } else {
             job->next_undismissed = intake->undismissed;
@@ -45,7 +45,7 @@ void intake_retry_dismissed(Intake *intake) {
 }
 
 // Live jobs only: dismissed for all at once, and on its way to the store.
-static Status dismiss(Intake *intake, Job *job, const char *id, Problem *problem) {
+static Status dismiss(JobManager *intake, Job *job, const char *id, Problem *problem) {
     pthread_mutex_lock(&intake->lock);
     if (job->is_closing || job_state_is_final(job->row.state)) {
         const int state = job->is_closing ? job->closing.state : job->row.state;
@@ -59,41 +59,41 @@ static Status dismiss(Intake *intake, Job *job, const char *id, Problem *problem
     job->row.total = 1e-9 * (double)(clock_monotonic_ns() - job->submitted_ns);
     if (job->started_ns == 0)
         job->row.queued = job->row.total;
-    intake_withdraw(job);
+    jobs_withdraw(job);
     job->is_closing = true;
     job->closing = job->row;
     job->closing.is_unsaved = !job->is_kept;
     job->is_kept = false;
-    intake_detach(job);
-    intake_release(job);
-    const StoreDone done = {dismissed, job_hold(job)};
-    const Status status = store_job_update_post(intake->store, &job->closing, &done);
+    jobs_detach(job);
+    jobs_release(job);
+    const WriteDone done = {dismissed, job_ref(job)};
+    const Status status = db_job_update_post(intake->store, &job->closing, &done);
     if (status == STATUS_OK) {
         intake->posted++;
     } else {
         job->refusal = status;
         text_fit(job->refused, sizeof job->refused, "no memory to save the job");
-        wakers_call(&job->keepers);
-        job_drop(job); // the post's hold
+        subscribers_call(&job->keepers);
+        job_unref(job); // the post's hold
     }
-    wakers_call(&job->wakers);
-    totals_ended(&intake->totals, JOB_DISMISSED, false);
+    subscribers_call(&job->wakers);
+    job_metrics_ended(&intake->totals, JOB_DISMISSED, false);
     pthread_mutex_unlock(&intake->lock);
     return STATUS_OK;
 }
 
-Status intake_dismiss(Intake *intake, const char *id, Job **dismissed, Problem *problem) {
+Status jobs_cancel(JobManager *intake, const char *id, Job **dismissed, Problem *problem) {
     *dismissed = NULL;
-    Job *job = intake_find_live(intake, id);
+    Job *job = jobs_find_live(intake, id);
     Status status;
     if (job != NULL) {
         status = dismiss(intake, job, id, problem);
     } else {
-        TRY(intake_find(intake, id, &job, problem));
+        TRY(jobs_find(intake, id, &job, problem));
         status = refuse_finished(id, job->row.state, problem);
     }
     if (status != STATUS_OK) {
-        job_drop(job);
+        job_unref(job);
         return status;
     }
     *dismissed = job;

@@ -1,7 +1,7 @@
 // What has run goes to the store without anyone waiting: result and jobs in one transaction,
 // posted.
 //
-//     worker ---- intake_save ----> store ---- saved ----> finished, for all who asked
+//     worker ---- jobs_save ----> store ---- saved ----> finished, for all who asked
 //                     ^                          |
 //                     +---- who joined since ----+
 //
@@ -21,10 +21,10 @@
 enum { SAVING_MAX = 4096, SAVING_BYTES = 256 << 20 };
 
 typedef struct Saving {
-    Intake *intake;
-    Computation *computation;
-    Findings findings;
-    Head *head; // of a successful one
+    JobManager *intake;
+    Task *computation;
+    RunResult findings;
+    ResultSummary *head; // of a successful one
     size_t bytes;
     bool is_saved;       // the result is in the store
     bool is_told;        // that it could not be saved
@@ -36,7 +36,7 @@ typedef struct Saving {
 
 static void saved(void *context, Status status, const char *detail);
 
-bool intake_is_behind(const Intake *intake) {
+bool jobs_is_behind(const JobManager *intake) {
     return intake->saving >= SAVING_MAX || intake->saving_bytes >= SAVING_BYTES;
 }
 
@@ -47,7 +47,7 @@ static char *problem_text(Status status, const char *detail) {
     Bytes bytes = {.most = 1 << 20};
     problem_clear(problem);
     problem_set(problem, status, "%s", detail);
-    write_problem(&bytes, problem, write_problem_code(status), NULL);
+    encode_problem(&bytes, problem, encode_problem_code(status), NULL);
     free(problem);
     return bytes_take(&bytes, NULL);
 }
@@ -70,7 +70,7 @@ static bool make_room(Saving *saving, size_t count) {
 // With the lock held: the rows as they go to the store, of at most so many jobs that have none on
 // the way.
 static void close_jobs(Saving *saving, size_t most) {
-    const Findings *findings = &saving->findings;
+    const RunResult *findings = &saving->findings;
     const int64_t now_ms = clock_unix_ms(), now_ns = clock_monotonic_ns();
     size_t count = 0;
     for (Job *job = saving->computation->jobs; job != NULL; job = job->next_shared)
@@ -82,7 +82,7 @@ static void close_jobs(Saving *saving, size_t most) {
          job = job->next_shared) {
         if (job->is_closing)
             continue;
-        intake_withdraw(job);
+        jobs_withdraw(job);
         job->is_closing = true;
         job->closing = job->row;
         JobRow *row = &job->closing;
@@ -92,38 +92,38 @@ static void close_jobs(Saving *saving, size_t most) {
         row->run = 1e-9 * (double)(findings->ended_ns - findings->began_ns);
         row->total = 1e-9 * (double)(now_ns - job->submitted_ns);
         row->problem = findings->problem == NULL ? NULL : strdup(findings->problem);
-        saving->jobs[saving->count] = job_hold(job);
+        saving->jobs[saving->count] = job_ref(job);
         saving->rows[saving->count++] = row;
     }
 }
 
 // With the lock held.
 static void tell_askers(const Saving *saving) {
-    Intake *intake = saving->intake;
-    Computation *computation = saving->computation;
+    JobManager *intake = saving->intake;
+    Task *computation = saving->computation;
     if (computation->askers.count > 0 && saving->findings.status != STATUS_OK) {
         Failure *failure = &intake->failures[intake->next_failure++ % OUTCOME_FAILURES];
         text_fit(failure->result, sizeof failure->result, computation->result);
         text_fit(failure->detail, sizeof failure->detail, saving->findings.detail);
         failure->status = saving->findings.status;
     }
-    wakers_call(&computation->askers);
+    subscribers_call(&computation->askers);
 }
 
 // With the lock held: nobody waits for it any more. saving_free is to follow without the lock.
 static void end(Saving *saving) {
-    Intake *intake = saving->intake;
-    Computation *computation = saving->computation;
-    index_remove(intake->in_flight, &computation->indexed);
+    JobManager *intake = saving->intake;
+    Task *computation = saving->computation;
+    hashmap_remove(intake->in_flight, &computation->indexed);
     tell_askers(saving);
     while (computation->jobs != NULL) {
         Job *job = computation->jobs;
         computation->jobs = job->next_shared;
         job->computation = NULL;
         job->next_shared = NULL;
-        job_drop(job); // the computation's hold
+        job_unref(job); // the computation's hold
     }
-    const bool was_behind = intake_is_behind(intake);
+    const bool was_behind = jobs_is_behind(intake);
     intake->saving--;
     intake->saving_bytes -= saving->bytes;
     if (was_behind) {
@@ -133,15 +133,15 @@ static void end(Saving *saving) {
 }
 
 static void saving_free(Saving *saving) {
-    computation_free(saving->computation);
-    findings_clear(&saving->findings);
-    head_drop(saving->head);
+    task_free(saving->computation);
+    run_result_clear(&saving->findings);
+    result_summary_unref(saving->head);
     free(saving->jobs);
     free(saving->rows);
     free(saving);
 }
 
-bool status_is_passing(Status status) {
+bool status_is_transient(Status status) {
     return status == STATUS_IO || status == STATUS_FULL || status == STATUS_BUSY ||
            status == STATUS_NO_MEMORY;
 }
@@ -155,7 +155,7 @@ static void publish(Saving *saving, Status status, const char *detail, bool may_
         if (status != STATUS_OK && !job->is_kept) {
             free(job->closing.problem);
             job->closing.problem = NULL;
-            intake_refuse(job, status, detail);
+            jobs_refuse(job, status, detail);
         } else if (status != STATUS_OK && may_wait) {
             free(job->closing.problem);
             job->closing.problem = NULL;
@@ -167,25 +167,25 @@ static void publish(Saving *saving, Status status, const char *detail, bool may_
                 free(job->row.problem);
                 job->row.problem = problem_text(status, detail);
                 job->row.state = JOB_FAILED;
-                intake_release(job);
+                jobs_release(job);
             } else {
                 if (job->row.state == JOB_SUCCESSFUL)
-                    job->head = head_hold(saving->head);
+                    job->head = result_summary_ref(saving->head);
                 job->is_kept = true;
-                intake_retire(job);
+                jobs_retire(job);
             }
-            totals_ended(&saving->intake->totals, job->row.state, false);
-            wakers_call(&job->wakers);
-            wakers_call(&job->keepers);
+            job_metrics_ended(&saving->intake->totals, job->row.state, false);
+            subscribers_call(&job->wakers);
+            subscribers_call(&job->keepers);
         }
-        job_drop(job); // close_jobs's hold
+        job_unref(job); // close_jobs's hold
     }
     saving->count = 0;
 }
 
 // A result that can never be saved, because it is too large, makes its jobs failed ones.
 static void give_up(Saving *saving, Status status, const char *detail) {
-    Findings *findings = &saving->findings;
+    RunResult *findings = &saving->findings;
     free(findings->problem);
     findings->problem = problem_text(status, detail);
     findings->status = status;
@@ -199,7 +199,7 @@ static void give_up(Saving *saving, Status status, const char *detail) {
 }
 
 // With the lock held: whether others will have run in a moment, to be saved together with this.
-static bool is_followed(const Intake *intake) {
+static bool is_followed(const JobManager *intake) {
     static const double moment = 5e-3; // [s]
     return queue_seconds(intake->queue) < moment * (double)queue_count(intake->queue);
 }
@@ -207,8 +207,8 @@ static bool is_followed(const Intake *intake) {
 // With the lock held.
 static Status post(Saving *saving) {
     const bool has_result = saving->findings.status == STATUS_OK && !saving->is_saved;
-    const StoreDone done = {saved, saving};
-    const Status status = store_result_post(
+    const WriteDone done = {saved, saving};
+    const Status status = db_result_post(
         saving->intake->store, has_result ? &saving->findings.result : NULL, saving->rows,
         saving->count, is_followed(saving->intake) ? STORE_SOON : STORE_NOW, &done);
     if (status == STATUS_OK)
@@ -231,7 +231,7 @@ static bool go_on(Saving *saving) {
 
 // With the lock held: whether it is tried again when there may be room.
 static bool wait_for_room(Saving *saving) {
-    Intake *intake = saving->intake;
+    JobManager *intake = saving->intake;
     if (saving->computation->jobs == NULL || intake->is_closing)
         return false;
     saving->next = intake->delayed;
@@ -242,25 +242,26 @@ static bool wait_for_room(Saving *saving) {
 // The store has answered; its writer's thread.
 static void saved(void *context, Status status, const char *detail) {
     Saving *saving = context;
-    Intake *intake = saving->intake;
+    JobManager *intake = saving->intake;
     if (status != STATUS_OK && !saving->is_told) {
         Bytes line = {.most = 1024};
         bytes_format(&line, "the result %s could not be saved: %s", saving->computation->result,
                      detail);
-        journal_write(&line);
+        log_write(&line);
         bytes_clear(&line);
     }
     saving->is_told = status != STATUS_OK;
     pthread_mutex_lock(&intake->lock);
     bool goes_on;
-    if (status != STATUS_OK && !status_is_passing(status) && saving->findings.status == STATUS_OK) {
+    if (status != STATUS_OK && !status_is_transient(status) &&
+        saving->findings.status == STATUS_OK) {
         give_up(saving, status, detail);
         goes_on = post(saving) == STATUS_OK;
         if (!goes_on) {
             publish(saving, STATUS_NO_MEMORY, "no memory to save the job", false);
             goes_on = go_on(saving);
         }
-    } else if (status_is_passing(status)) {
+    } else if (status_is_transient(status)) {
         publish(saving, status, detail, !intake->is_closing);
         goes_on = wait_for_room(saving) || go_on(saving);
     } else {
@@ -275,13 +276,13 @@ static void saved(void *context, Status status, const char *detail) {
     }
     if (!goes_on)
         end(saving);
-    intake_settle(intake);
+    jobs_settle(intake);
     pthread_mutex_unlock(&intake->lock);
     if (!goes_on)
         saving_free(saving);
 }
 
-void intake_retry(Intake *intake) {
+void jobs_retry_sweep(JobManager *intake) {
     Saving *ended = NULL, *next;
     pthread_mutex_lock(&intake->lock);
     Saving *saving = intake->delayed;
@@ -294,7 +295,7 @@ void intake_retry(Intake *intake) {
         saving->next = ended;
         ended = saving;
     }
-    intake_retry_dismissed(intake);
+    jobs_retry_dismissed(intake);
     studies_resume(intake);
     pthread_mutex_unlock(&intake->lock);
     for (; ended != NULL; ended = next) {
@@ -303,13 +304,13 @@ void intake_retry(Intake *intake) {
     }
 }
 
-void intake_abandon_delayed(Intake *intake) {
+void jobs_abandon_delayed(JobManager *intake) {
     while (intake->delayed != NULL) {
         Saving *saving = intake->delayed;
         intake->delayed = saving->next;
         for (Job *job = saving->computation->jobs; job != NULL; job = job->next_shared) {
-            intake_retire(job);
-            wakers_call(&job->wakers);
+            jobs_retire(job);
+            subscribers_call(&job->wakers);
         }
         end(saving);
         saving_free(saving);
@@ -320,7 +321,7 @@ static size_t text_bytes(const char *text) {
     return text != NULL ? strlen(text) : 0;
 }
 
-static size_t findings_bytes(const Findings *findings) {
+static size_t run_result_bytes(const RunResult *findings) {
     const ResultRow *row = &findings->result;
     return sizeof(Saving) + (findings->outcome != NULL ? outcome_bytes(findings->outcome) : 0) +
            text_bytes(row->scene) + text_bytes(row->plan) + text_bytes(row->summary) +
@@ -330,7 +331,7 @@ static size_t findings_bytes(const Findings *findings) {
 
 // With the lock held: without memory for a Saving its jobs are failed here, and computed again at
 // the next start.
-static void lose(Intake *intake, Computation *computation, Findings *findings) {
+static void lose(JobManager *intake, Task *computation, RunResult *findings) {
     Job *jobs[1];
     const JobRow *rows[1];
     Saving saving = {.intake = intake,
@@ -349,29 +350,29 @@ static void lose(Intake *intake, Computation *computation, Findings *findings) {
     end(&saving);
 }
 
-void intake_save(Intake *intake, Computation *computation, Findings *findings) {
+void jobs_save(JobManager *intake, Task *computation, RunResult *findings) {
     Saving *saving = calloc(1, sizeof *saving);
     if (saving == NULL) {
         pthread_mutex_lock(&intake->lock);
         lose(intake, computation, findings);
         pthread_mutex_unlock(&intake->lock);
-        computation_free(computation);
+        task_free(computation);
         return;
     }
     *saving = (Saving){.intake = intake,
                        .computation = computation,
                        .findings = *findings,
-                       .bytes = findings_bytes(findings)};
-    *findings = (Findings){0};
+                       .bytes = run_result_bytes(findings)};
+    *findings = (RunResult){0};
     if (saving->findings.status == STATUS_OK && !computation->is_again)
-        saving->head = head_new(&saving->findings.result);
+        saving->head = result_summary_new(&saving->findings.result);
     pthread_mutex_lock(&intake->lock);
     intake->saving++;
     intake->saving_bytes += saving->bytes;
     // Only the series was wanted: the result is saved already. But it may have been deleted
     // meanwhile, and what is in the cache counts as known.
     if (saving->findings.outcome != NULL && computation->is_again &&
-        store_result_exists(intake->store, computation->result))
+        db_result_exists(intake->store, computation->result))
         cache_put(intake->cache, computation->result, saving->findings.outcome, NULL);
     const bool goes_on = go_on(saving);
     if (!goes_on)

@@ -5,26 +5,26 @@
 #include "server/json/encode.h"
 
 void document_plan(Bytes *bytes, const PlanReport *plan) {
-    write_item(bytes, plan_report_fields, plan, WRITE_REPORT);
+    encode_item(bytes, plan_report_fields, plan, WRITE_REPORT);
 }
 
 void document_summary(Bytes *bytes, const Outcome *outcome) {
     bytes_text(bytes, "{");
-    (void)write_members(bytes, summary_fields, &outcome->summary, WRITE_REPORT);
+    (void)encode_members(bytes, summary_fields, &outcome->summary, WRITE_REPORT);
     if (outcome->has_reduction) {
         bytes_text(bytes, ", ");
-        (void)write_members(bytes, reduction_fields, &outcome->reduction, WRITE_REPORT);
+        (void)encode_members(bytes, reduction_fields, &outcome->reduction, WRITE_REPORT);
     }
     bytes_text(bytes, "}");
 }
 
 void document_work(Bytes *bytes, const WorkCounters *work) {
-    write_item(bytes, work_counters_fields, work, WRITE_REPORT);
+    encode_item(bytes, work_counters_fields, work, WRITE_REPORT);
 }
 
 void document_warnings(Bytes *bytes, const Warnings *warnings) {
-    write_list(bytes, warning_fields, warnings->at, warnings->count, sizeof *warnings->at,
-               WRITE_REPORT);
+    encode_list(bytes, warning_fields, warnings->at, warnings->count, sizeof *warnings->at,
+                WRITE_REPORT);
 }
 
 void document_join(Bytes *bytes, const char *first, const char *second) {
@@ -44,7 +44,7 @@ void document_join(Bytes *bytes, const char *first, const char *second) {
 
 void document_energy(Bytes *bytes, const Energy *energy) {
     bytes_text(bytes, "{\"unit\": \"J\", ");
-    (void)write_members(bytes, energy_fields, energy, WRITE_REPORT);
+    (void)encode_members(bytes, energy_fields, energy, WRITE_REPORT);
     bytes_text(bytes, "}");
 }
 
@@ -63,7 +63,7 @@ bool document_impacts(Bytes *bytes, const Response *response, const Progress *wa
         if (i % WATCH_IMPACTS == 0 && !progress_advance(watch, 1))
             return false;
         bytes_text(bytes, i > 0 ? ", " : "");
-        write_item(bytes, impact_fields, &impacts->at[i], WRITE_REPORT);
+        encode_item(bytes, impact_fields, &impacts->at[i], WRITE_REPORT);
     }
     bytes_text(bytes, "]}");
     return true;
@@ -115,17 +115,17 @@ void document_scene(Bytes *bytes, const StudyRequest *inquiry) {
     StudyRequest plain = *inquiry; // a borrowed view: nothing is cleared
     plain.simulation.title = NULL;
     plain.simulation.labels = (Texts){NULL, 0};
-    write_item(bytes, study_request_fields, &plain, WRITE_SCENE);
+    encode_item(bytes, study_request_fields, &plain, WRITE_SCENE);
 }
 
 void document_study(Bytes *bytes, const StudyAnswer *answer) {
-    write_item(bytes, study_answer_fields, answer, WRITE_SCENE);
+    encode_item(bytes, study_answer_fields, answer, WRITE_SCENE);
 }
 
 void document_answer(Bytes *bytes, const Variant *answer) {
     bytes_text(bytes, "{\"kind\": ");
     bytes_json_string(bytes, answer->kind->name);
     bytes_text(bytes, ", ");
-    (void)write_members(bytes, answer->kind->fields, answer, WRITE_REPORT);
+    (void)encode_members(bytes, answer->kind->fields, answer, WRITE_REPORT);
     bytes_text(bytes, "}");
 }

@@ -3,12 +3,12 @@
 #include "server/db/records.h"
 #include "server/jobs/jobs_private.h"
 
-Status intake_record_delete(Intake *intake, const char *name, Problem *problem) {
+Status jobs_record_delete(JobManager *intake, const char *name, Problem *problem) {
     RecordUses uses;
-    store_settle(intake->store); // most of it with the scenes let in
+    db_flush(intake->store); // most of it with the scenes let in
     naming_close(&intake->naming);
-    store_settle(intake->store);
-    const Status status = store_record_delete(intake->store, name, &uses, problem);
+    db_flush(intake->store);
+    const Status status = db_record_delete(intake->store, name, &uses, problem);
     naming_open(&intake->naming);
     return status;
 }

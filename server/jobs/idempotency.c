@@ -26,14 +26,14 @@ static Status read_key(const char *text, char key[KEY_MAX + 1], Problem *problem
     return STATUS_OK;
 }
 
-static bool is_taken(const Intake *intake, const KeyHold *hold) {
-    for (const KeyHold *other = intake->keys; other != NULL; other = other->next)
+static bool is_taken(const JobManager *intake, const IdempotencyHold *hold) {
+    for (const IdempotencyHold *other = intake->keys; other != NULL; other = other->next)
         if (strcmp(other->key, hold->key) == 0 && strcmp(other->client, hold->client) == 0)
             return true;
     return false;
 }
 
-static Status check_same(const KeyHold *hold, const JobRow *row, Problem *problem) {
+static Status check_same(const IdempotencyHold *hold, const JobRow *row, Problem *problem) {
     if (row->request != NULL && strcmp(row->request, hold->request) == 0)
         return STATUS_OK;
     return problem_set(problem, STATUS_REUSED,
@@ -44,13 +44,14 @@ static Status check_same(const KeyHold *hold, const JobRow *row, Problem *proble
 
 // With the lock held: *found is the job of that key which the store may not have yet, held, or
 // NULL. Those that it has, or never will have, are let go.
-static Status find_new(Intake *intake, const KeyHold *hold, Job **found, Problem *problem) {
+static Status find_new(JobManager *intake, const IdempotencyHold *hold, Job **found,
+                       Problem *problem) {
     Job *same = NULL;
     for (Job **at = &intake->keyed; *at != NULL;) {
         Job *job = *at;
         if (job->is_kept || job->refusal != STATUS_OK) {
             *at = job->next_keyed;
-            job_drop(job);
+            job_unref(job);
             continue;
         }
         const char *client = job->row.client != NULL ? job->row.client : "";
@@ -61,13 +62,13 @@ static Status find_new(Intake *intake, const KeyHold *hold, Job **found, Problem
     *found = NULL;
     if (same != NULL) {
         TRY(check_same(hold, &same->row, problem));
-        *found = job_hold(same);
+        *found = job_ref(same);
     }
     return STATUS_OK;
 }
 
-Status keyed_begin(Intake *intake, const Submission *submission, KeyHold *hold, Job **job,
-                   Problem *problem) {
+Status idempotency_begin(JobManager *intake, const Submission *submission, IdempotencyHold *hold,
+                         Job **job, Problem *problem) {
     *job = NULL;
     hold->is_held = false;
     hold->key[0] = '\0';
@@ -75,16 +76,16 @@ Status keyed_begin(Intake *intake, const Submission *submission, KeyHold *hold, 
         return STATUS_OK;
     hold->client = submission->client != NULL ? submission->client : "";
     TRY(read_key(submission->idempotency_key, hold->key, problem));
-    Digest *digest = digest_new();
+    Sha256 *digest = sha256_new();
     if (digest == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
     if (submission->retry_of != NULL) {
-        digest_take(digest, "retry ", 6);
-        digest_take(digest, submission->retry_of, strlen(submission->retry_of));
+        sha256_add(digest, "retry ", 6);
+        sha256_add(digest, submission->retry_of, strlen(submission->retry_of));
     } else {
-        digest_take(digest, submission->text, submission->size);
+        sha256_add(digest, submission->text, submission->size);
     }
-    digest_end(digest, hold->request);
+    sha256_end(digest, hold->request);
 
     pthread_mutex_lock(&intake->lock);
     while (is_taken(intake, hold))
@@ -98,8 +99,7 @@ Status keyed_begin(Intake *intake, const Submission *submission, KeyHold *hold, 
         return status;
 
     JobRow row;
-    const Status known =
-        store_job_keyed(intake->store, submission->client, hold->key, &row, problem);
+    const Status known = db_job_keyed(intake->store, submission->client, hold->key, &row, problem);
     if (known == STATUS_NOT_FOUND) {
         problem_clear(problem);
         return STATUS_OK;
@@ -109,23 +109,23 @@ Status keyed_begin(Intake *intake, const Submission *submission, KeyHold *hold, 
     char id[40];
     text_fit(id, sizeof id, row.id);
     job_row_clear(&row);
-    return same == STATUS_OK ? intake_find(intake, id, job, problem) : same;
+    return same == STATUS_OK ? jobs_find(intake, id, job, problem) : same;
 }
 
-void keyed_remember(Intake *intake, const KeyHold *hold, Job *job) {
+void idempotency_remember(JobManager *intake, const IdempotencyHold *hold, Job *job) {
     if (!hold->is_held)
         return;
     pthread_mutex_lock(&intake->lock);
     job->next_keyed = intake->keyed;
-    intake->keyed = job_hold(job);
+    intake->keyed = job_ref(job);
     pthread_mutex_unlock(&intake->lock);
 }
 
-void keyed_end(Intake *intake, KeyHold *hold) {
+void idempotency_end(JobManager *intake, IdempotencyHold *hold) {
     if (!hold->is_held)
         return;
     pthread_mutex_lock(&intake->lock);
-    for (KeyHold **at = &intake->keys; *at != NULL; at = &(*at)->next)
+    for (IdempotencyHold **at = &intake->keys; *at != NULL; at = &(*at)->next)
         if (*at == hold) {
             *at = hold->next;
             break;

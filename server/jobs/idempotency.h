@@ -7,22 +7,22 @@
 
 enum { KEY_MAX = 255 };
 
-// Lies on the stack of whoever submits, between keyed_begin and keyed_end.
-typedef struct KeyHold {
-    struct KeyHold *next;
+// Lies on the stack of whoever submits, between idempotency_begin and idempotency_end.
+typedef struct IdempotencyHold {
+    struct IdempotencyHold *next;
     const char *client; // "" for nobody in particular
     char key[KEY_MAX + 1];
     char request[65]; // SHA-256 of the body
     bool is_held;
-} KeyHold;
+} IdempotencyHold;
 
 // Waits for others who submit under the same key. Then *job is the job of an earlier request, or
-// NULL and the key is this submission's until keyed_end, which must follow in any case.
+// NULL and the key is this submission's until idempotency_end, which must follow in any case.
 // STATUS_USAGE for a key that is none, STATUS_REUSED.
-Status keyed_begin(Intake *intake, const Submission *submission, KeyHold *hold, Job **job,
-                   Problem *problem);
+Status idempotency_begin(JobManager *intake, const Submission *submission, IdempotencyHold *hold,
+                         Job **job, Problem *problem);
 // The job of a new submission: found from now on, also before the store has it.
-void keyed_remember(Intake *intake, const KeyHold *hold, Job *job);
-void keyed_end(Intake *intake, KeyHold *hold);
+void idempotency_remember(JobManager *intake, const IdempotencyHold *hold, Job *job);
+void idempotency_end(JobManager *intake, IdempotencyHold *hold);
 
 #endif

@@ -13,11 +13,11 @@ bool job_state_is_final(int state) {
     return state != JOB_ACCEPTED && state != JOB_RUNNING;
 }
 
-bool wakers_add(Wakers *wakers, const Waker *waker) {
+bool subscribers_add(Subscribers *wakers, const Callback *waker) {
     for (size_t i = 0; i < wakers->count; i++)
         if (wakers->at[i].context == waker->context)
             return true;
-    Waker *grown = realloc(wakers->at, (wakers->count + 1) * sizeof *grown);
+    Callback *grown = realloc(wakers->at, (wakers->count + 1) * sizeof *grown);
     if (grown == NULL)
         return false;
     wakers->at = grown;
@@ -25,7 +25,7 @@ bool wakers_add(Wakers *wakers, const Waker *waker) {
     return true;
 }
 
-void wakers_remove(Wakers *wakers, const Waker *waker) {
+void subscribers_remove(Subscribers *wakers, const Callback *waker) {
     for (size_t i = 0; i < wakers->count; i++)
         if (wakers->at[i].context == waker->context) {
             wakers->at[i] = wakers->at[--wakers->count];
@@ -33,14 +33,14 @@ void wakers_remove(Wakers *wakers, const Waker *waker) {
         }
 }
 
-void wakers_call(Wakers *wakers) {
+void subscribers_call(Subscribers *wakers) {
     for (size_t i = 0; i < wakers->count; i++)
         wakers->at[i].wake(wakers->at[i].context);
     free(wakers->at);
-    *wakers = (Wakers){NULL, 0};
+    *wakers = (Subscribers){NULL, 0};
 }
 
-Job *job_new(Intake *intake) {
+Job *job_new(JobManager *intake) {
     Job *job = calloc(1, sizeof *job);
     if (job == NULL)
         return NULL;
@@ -51,19 +51,19 @@ Job *job_new(Intake *intake) {
     return job;
 }
 
-Job *job_hold(Job *job) {
+Job *job_ref(Job *job) {
     atomic_fetch_add(&job->holds, 1);
     return job;
 }
 
-void job_drop(Job *job) {
+void job_unref(Job *job) {
     if (job == NULL || atomic_fetch_sub(&job->holds, 1) != 1)
         return;
     job_row_clear(&job->row);
-    head_drop(job->head);
+    result_summary_unref(job->head);
     free(job->wakers.at);
     free(job->keepers.at);
-    intake_drop(job->intake);
+    jobs_drop(job->intake);
     free(job);
 }
 
@@ -93,8 +93,8 @@ static bool copy(char **target, const char *text) {
     return text == NULL || *target != NULL;
 }
 
-Status job_show(Job *job, JobShow *show) {
-    *show = (JobShow){0};
+Status job_view(Job *job, JobView *show) {
+    *show = (JobView){0};
     lock(job);
     const JobRow *row = &job->row;
     text_fit(show->id, sizeof show->id, row->id);
@@ -129,7 +129,7 @@ Status job_show(Job *job, JobShow *show) {
                           copy(&show->warnings, row->warnings) && copy(&show->title, row->title) &&
                           copy(&show->labels, row->labels) && copy(&show->study, row->study) &&
                           copy(&show->client, row->client);
-    show->head = head_hold(job->head);
+    show->head = result_summary_ref(job->head);
     unlock(job);
     if (show->head != NULL) {
         show->plan = show->head->plan;
@@ -140,18 +140,18 @@ Status job_show(Job *job, JobShow *show) {
     return is_whole ? STATUS_OK : STATUS_NO_MEMORY;
 }
 
-void job_show_clear(JobShow *show) {
+void job_view_clear(JobView *show) {
     free(show->problem);
     free(show->warnings);
     free(show->title);
     free(show->labels);
     free(show->study);
     free(show->client);
-    head_drop(show->head);
-    *show = (JobShow){0};
+    result_summary_unref(show->head);
+    *show = (JobView){0};
 }
 
-JobState job_glance(Job *job, double *progress) {
+JobState job_peek(Job *job, double *progress) {
     lock(job);
     const JobState state = (JobState)job->row.state;
     *progress = state == JOB_SUCCESSFUL    ? 100
@@ -161,43 +161,43 @@ JobState job_glance(Job *job, double *progress) {
     return state;
 }
 
-Status job_kept(Job *job, bool *is_kept, Problem *problem) {
+Status job_is_durable(Job *job, bool *is_kept, Problem *problem) {
     lock(job);
     *is_kept = job->is_kept;
     Status status = STATUS_OK;
     if (!job->is_kept && job->refusal != STATUS_OK)
         status = problem_set(problem, job->refusal, "%s", job->refused);
     if (job->ticket != NULL)
-        store_hurry(job->intake->store, job->ticket);
+        db_expedite(job->intake->store, job->ticket);
     unlock(job);
     return status;
 }
 
-bool job_watch(Job *job, const Waker *waker) {
+bool job_subscribe(Job *job, const Callback *waker) {
     lock(job);
     bool is_watched = true;
     if (job_state_is_final(job->row.state))
         waker->wake(waker->context);
     else
-        is_watched = wakers_add(&job->wakers, waker);
+        is_watched = subscribers_add(&job->wakers, waker);
     unlock(job);
     return is_watched;
 }
 
-bool job_watch_kept(Job *job, const Waker *waker) {
+bool job_subscribe_durable(Job *job, const Callback *waker) {
     lock(job);
     bool is_watched = true;
     if (job->is_kept || job->refusal != STATUS_OK)
         waker->wake(waker->context);
     else
-        is_watched = wakers_add(&job->keepers, waker);
+        is_watched = subscribers_add(&job->keepers, waker);
     unlock(job);
     return is_watched;
 }
 
-void job_unwatch(Job *job, const Waker *waker) {
+void job_unsubscribe(Job *job, const Callback *waker) {
     lock(job);
-    wakers_remove(&job->wakers, waker);
-    wakers_remove(&job->keepers, waker);
+    subscribers_remove(&job->wakers, waker);
+    subscribers_remove(&job->keepers, waker);
     unlock(job);
 }

@@ -1,4 +1,4 @@
-// One run asked for: state, progress, cancel. Counted and locked; read it through job_show.
+// One run asked for: state, progress, cancel. Counted and locked; read it through job_view.
 #ifndef SERVER_JOBS_JOB_H
 #define SERVER_JOBS_JOB_H
 
@@ -20,13 +20,13 @@ extern const char *const job_state_names[];
 bool job_state_is_final(int state); // nothing changes it any more
 
 // Called once, from any thread, when something a waiter waits for has happened. Must be quick.
-typedef struct Waker {
+typedef struct Callback {
     void *context;
     void (*wake)(void *context);
-} Waker;
+} Callback;
 
-// A copy of what a job is now. Texts are owned by the show (job_show_clear).
-typedef struct JobShow {
+// A copy of what a job is now. Texts are owned by the show (job_view_clear).
+typedef struct JobView {
     char id[40];
     JobState state;
     double progress; // percent
@@ -34,41 +34,41 @@ typedef struct JobShow {
     char result[72];                                            // "" while there is none
     int64_t created_unix_ms, started_unix_ms, finished_unix_ms; // 0: not yet
     double queued, run, total;                                  // [s]
-    char *problem;       // problem+json of a failed job; NULL
-    const char *plan;    // JSON; NULL while unknown
-    const char *summary; // JSON; NULL while unknown
-    const char *work;    // JSON; NULL while unknown
-    char *warnings;      // JSON array, of the scene
-    const char *notes;   // JSON array, of the run; NULL: none
-    char *title;         // NULL if none
-    struct Head *head;   // holds plan, summary, work and notes; NULL: they are the maker's
-    char *labels;        // JSON array; NULL: none
-    char *study;         // the kind of its study; NULL: none
-    char *client;        // who sent it: a token's name; NULL: nobody in particular
+    char *problem;              // problem+json of a failed job; NULL
+    const char *plan;           // JSON; NULL while unknown
+    const char *summary;        // JSON; NULL while unknown
+    const char *work;           // JSON; NULL while unknown
+    char *warnings;             // JSON array, of the scene
+    const char *notes;          // JSON array, of the run; NULL: none
+    char *title;                // NULL if none
+    struct ResultSummary *head; // holds plan, summary, work and notes; NULL: they are the maker's
+    char *labels;               // JSON array; NULL: none
+    char *study;                // the kind of its study; NULL: none
+    char *client;               // who sent it: a token's name; NULL: nobody in particular
     bool is_result_deleted;
     uint64_t points, points_done, points_failed; // of a sweep that is under way; 0: none is
-} JobShow;
+} JobView;
 
-Job *job_hold(Job *job);
-void job_drop(Job *job);
+Job *job_ref(Job *job);
+void job_unref(Job *job);
 bool job_is_finished(Job *job);
-// Who sent it, as JobShow has it; lives as long as the job.
+// Who sent it, as JobView has it; lives as long as the job.
 const char *job_client(const Job *job);
-Status job_show(Job *job, JobShow *show);
-void job_show_clear(JobShow *show);
+Status job_view(Job *job, JobView *show);
+void job_view_clear(JobView *show);
 // Its state and, in *progress, percent: what may be looked at often.
-JobState job_glance(Job *job, double *progress);
+JobState job_peek(Job *job, double *progress);
 
 // Whether the store has the job as it is now, that is accepted or in its final state: nobody may be
 // told of it before. STATUS_OK with *is_kept false while that is under way, which asking hurries;
 // otherwise why it could not be kept. A job that could not be accepted never was.
-Status job_kept(Job *job, bool *is_kept, Problem *problem);
+Status job_is_durable(Job *job, bool *is_kept, Problem *problem);
 
 // Has `waker` called once when the job finishes (at once if it is finished). False without memory.
-bool job_watch(Job *job, const Waker *waker);
+bool job_subscribe(Job *job, const Callback *waker);
 // The same for when the store has it, or could not take it.
-bool job_watch_kept(Job *job, const Waker *waker);
+bool job_subscribe_durable(Job *job, const Callback *waker);
 // Takes it back; after this returns it will not be called.
-void job_unwatch(Job *job, const Waker *waker);
+void job_unsubscribe(Job *job, const Callback *waker);
 
 #endif

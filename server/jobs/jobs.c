@@ -12,8 +12,8 @@
 // Of scenes that wait, where the settings say nothing.
 static const size_t queue_bytes_usual = (size_t)256 << 20;
 
-Computation *computation_new(const char *result) {
-    Computation *computation = calloc(1, sizeof *computation);
+Task *task_new(const char *result) {
+    Task *computation = calloc(1, sizeof *computation);
     if (computation == NULL)
         return NULL;
     text_fit(computation->result, sizeof computation->result, result);
@@ -23,7 +23,7 @@ Computation *computation_new(const char *result) {
     return computation;
 }
 
-void computation_free(Computation *computation) {
+void task_free(Task *computation) {
     if (computation == NULL)
         return;
     study_run_free(computation->study);
@@ -34,28 +34,28 @@ void computation_free(Computation *computation) {
     free(computation);
 }
 
-Computation *computation_of(QueueEntry *entry) {
-    return (Computation *)(void *)((char *)entry - offsetof(Computation, queued));
+Task *task_of(QueueEntry *entry) {
+    return (Task *)(void *)((char *)entry - offsetof(Task, queued));
 }
 
-void intake_call_worker(Intake *intake) {
+void jobs_call_worker(JobManager *intake) {
     pthread_cond_signal(&intake->work);
     if (intake->slow_running >= intake->settings.workers)
         pthread_cond_signal(&intake->spare_work);
 }
 
-void intake_enqueue(Intake *intake, Computation *computation, Client *client) {
-    index_add(intake->in_flight, &computation->indexed);
-    study_foretell(computation, &intake->settings.limits);
-    prepare_records_drop(&computation->inquiry); // until it is its turn
+void jobs_enqueue(JobManager *intake, Task *computation, QueueClient *client) {
+    hashmap_add(intake->in_flight, &computation->indexed);
+    study_estimate(computation, &intake->settings.limits);
+    resolve_records_drop(&computation->inquiry); // until it is its turn
     if (client == NULL)
-        queue_urge(intake->queue, &computation->queued);
+        queue_push_front(intake->queue, &computation->queued);
     else
         queue_put(intake->queue, &computation->queued, client, 1e-9 * (double)clock_monotonic_ns());
-    intake_call_worker(intake);
+    jobs_call_worker(intake);
 }
 
-void intake_release(Job *job) {
+void jobs_release(Job *job) {
     if (!job->is_counted)
         return;
     job->is_counted = false;
@@ -64,39 +64,39 @@ void intake_release(Job *job) {
     job->intake->scene_bytes -= job->scene_size;
 }
 
-void intake_retire(Job *job) {
-    intake_release(job);
+void jobs_retire(Job *job) {
+    jobs_release(job);
     if (!job->is_live)
         return;
     job->is_live = false;
-    index_remove(job->intake->jobs, &job->indexed);
-    job_drop(job);
+    hashmap_remove(job->intake->jobs, &job->indexed);
+    job_unref(job);
 }
 
-void intake_settle(Intake *intake) {
+void jobs_settle(JobManager *intake) {
     if (--intake->posted == 0)
         pthread_cond_broadcast(&intake->settled);
 }
 
-void intake_refuse(Job *job, Status status, const char *detail) {
+void jobs_refuse(Job *job, Status status, const char *detail) {
     job->refusal = status;
     text_fit(job->refused, sizeof job->refused, detail);
     job->row.state = JOB_FAILED;
-    wakers_call(&job->wakers);
-    wakers_call(&job->keepers);
-    intake_detach(job);
-    intake_retire(job);
+    subscribers_call(&job->wakers);
+    subscribers_call(&job->keepers);
+    jobs_detach(job);
+    jobs_retire(job);
 }
 
-void intake_withdraw(Job *job) {
-    if (job->ticket == NULL || !store_withdraw(job->intake->store, job->ticket))
+void jobs_withdraw(Job *job) {
+    if (job->ticket == NULL || !db_cancel_write(job->intake->store, job->ticket))
         return;
     job->ticket = NULL;
-    intake_settle(job->intake);
-    job_drop(job); // the post's hold
+    jobs_settle(job->intake);
+    job_unref(job); // the post's hold
 }
 
-void intake_drop(Intake *intake) {
+void jobs_drop(JobManager *intake) {
     if (intake == NULL || atomic_fetch_sub(&intake->holds, 1) != 1)
         return;
     pthread_cond_destroy(&intake->work);
@@ -109,8 +109,8 @@ void intake_drop(Intake *intake) {
     free(intake);
 }
 
-void intake_detach(Job *job) {
-    Computation *computation = job->computation;
+void jobs_detach(Job *job) {
+    Task *computation = job->computation;
     if (computation == NULL)
         return;
     for (Job **at = &computation->jobs; *at != NULL; at = &(*at)->next_shared)
@@ -120,25 +120,25 @@ void intake_detach(Job *job) {
         }
     job->computation = NULL;
     job->next_shared = NULL;
-    job_drop(job); // the computation's hold
+    job_unref(job); // the computation's hold
     if (computation->jobs != NULL || computation->askers.count > 0)
         return;
     // Nobody wants it any more. Whoever asks for the same scene from now on starts anew.
-    index_remove(job->intake->in_flight, &computation->indexed);
+    hashmap_remove(job->intake->in_flight, &computation->indexed);
     if (computation->is_running) {
         atomic_store(&computation->is_stopped, true);
         if (computation->study != NULL)
             study_stop(computation->study);
     } else {
         queue_remove(job->intake->queue, &computation->queued);
-        computation_free(computation);
+        task_free(computation);
     }
 }
 
-void intake_attach(Job *job, Computation *computation) {
+void jobs_attach(Job *job, Task *computation) {
     job->computation = computation;
     job->next_shared = computation->jobs;
-    computation->jobs = job_hold(job);
+    computation->jobs = job_ref(job);
     if (computation->is_running) {
         job->row.state = JOB_RUNNING;
         job->row.started_unix_ms = clock_unix_ms();
@@ -146,9 +146,9 @@ void intake_attach(Job *job, Computation *computation) {
     }
 }
 
-void intake_admit(Intake *intake, Job *job) {
+void jobs_admit(JobManager *intake, Job *job) {
     job->scene_size = strlen(job->row.scene);
-    index_add(intake->jobs, &job_hold(job)->indexed);
+    hashmap_add(intake->jobs, &job_ref(job)->indexed);
     job->is_live = true;
     job->is_counted = true;
     intake->live++;
@@ -156,18 +156,18 @@ void intake_admit(Intake *intake, Job *job) {
     intake->scene_bytes += job->scene_size;
 }
 
-static Status take_up_all(Intake *intake, Problem *problem) {
+static Status take_up_all(JobManager *intake, Problem *problem) {
     JobRows rows = {NULL, 0};
-    Status status = store_job_unfinished(intake->store, &rows, problem);
+    Status status = db_job_unfinished(intake->store, &rows, problem);
     for (size_t i = 0; i < rows.count && status == STATUS_OK; i++)
-        status = intake_take_up(intake, &rows.at[i], problem);
+        status = jobs_take_up(intake, &rows.at[i], problem);
     job_rows_clear(&rows);
     return status;
 }
 
-Status intake_open(Store *store, const IntakeSettings *settings, Intake **opened,
-                   Problem *problem) {
-    Intake *intake = calloc(1, sizeof *intake);
+Status jobs_open(Db *store, const JobManagerSettings *settings, JobManager **opened,
+                 Problem *problem) {
+    JobManager *intake = calloc(1, sizeof *intake);
     *opened = NULL;
     if (intake == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the job queue");
@@ -185,8 +185,8 @@ Status intake_open(Store *store, const IntakeSettings *settings, Intake **opened
     intake->pace = 1;
     intake->queue = queue_new();
     pthread_cond_init(&intake->settled, NULL);
-    intake->jobs = index_new();
-    intake->in_flight = index_new();
+    intake->jobs = hashmap_new();
+    intake->in_flight = hashmap_new();
     intake->cache = cache_new(settings->cache_bytes);
     intake->workers = calloc(settings->workers + 1, sizeof *intake->workers);
     Status status = STATUS_OK;
@@ -194,7 +194,7 @@ Status intake_open(Store *store, const IntakeSettings *settings, Intake **opened
         intake->queue == NULL || intake->workers == NULL)
         status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the job queue");
     if (status == STATUS_OK)
-        status = store_sweep_tidy(store, problem);
+        status = db_sweep_tidy(store, problem);
     if (status == STATUS_OK)
         status = take_up_all(intake, problem);
     pthread_mutex_lock(&intake->lock); // those that run already look at the others
@@ -210,27 +210,27 @@ Status intake_open(Store *store, const IntakeSettings *settings, Intake **opened
     }
     pthread_mutex_unlock(&intake->lock);
     if (status != STATUS_OK) {
-        intake_close(intake);
+        jobs_close(intake);
         return status;
     }
     *opened = intake;
     return STATUS_OK;
 }
 
-static void let_go(Computation *computation) {
+static void let_go(Task *computation) {
     while (computation->jobs != NULL) {
         Job *job = computation->jobs;
         computation->jobs = job->next_shared;
         job->computation = NULL;
-        intake_retire(job);
-        wakers_call(&job->wakers);
-        job_drop(job); // the computation's hold
+        jobs_retire(job);
+        subscribers_call(&job->wakers);
+        job_unref(job); // the computation's hold
     }
-    wakers_call(&computation->askers);
-    computation_free(computation);
+    subscribers_call(&computation->askers);
+    task_free(computation);
 }
 
-void intake_close(Intake *intake) {
+void jobs_close(JobManager *intake) {
     if (intake == NULL)
         return;
     pthread_mutex_lock(&intake->lock);
@@ -251,70 +251,70 @@ void intake_close(Intake *intake) {
     pthread_mutex_unlock(&intake->lock);
     // Whoever is still queued stays unfinished in the store, for the next start.
     while (intake->stalled != NULL) {
-        Computation *computation = intake->stalled;
+        Task *computation = intake->stalled;
         intake->stalled = computation->next_stalled;
         let_go(computation);
     }
     while (intake->studies != NULL) {
-        Computation *computation = intake->studies->computation;
+        Task *computation = intake->studies->computation;
         intake->studies = intake->studies->next;
         queue_remove(intake->queue, &computation->queued);
         let_go(computation);
     }
     for (QueueEntry *entry; (entry = queue_take(intake->queue, false)) != NULL;)
-        let_go(computation_of(entry));
-    intake_abandon_delayed(intake);
+        let_go(task_of(entry));
+    jobs_abandon_delayed(intake);
     for (Job *job; (job = intake->undismissed) != NULL;) {
         intake->undismissed = job->next_undismissed;
-        job_drop(job);
+        job_unref(job);
     }
     for (Job *job; (job = intake->keyed) != NULL;) {
         intake->keyed = job->next_keyed;
-        job_drop(job);
+        job_unref(job);
     }
     // Those whose end could not be stored are still here.
-    for (Job *job; (job = index_any(intake->jobs)) != NULL;)
-        intake_retire(job);
+    for (Job *job; (job = hashmap_any(intake->jobs)) != NULL;)
+        jobs_retire(job);
     cache_free(intake->cache);
     queue_free(intake->queue);
-    index_free(intake->jobs);
-    index_free(intake->in_flight);
+    hashmap_free(intake->jobs);
+    hashmap_free(intake->in_flight);
     free(intake->workers);
-    intake_drop(intake);
+    jobs_drop(intake);
 }
 
-Job *intake_find_live(Intake *intake, const char *id) {
+Job *jobs_find_live(JobManager *intake, const char *id) {
     pthread_mutex_lock(&intake->lock);
-    Job *job = index_find(intake->jobs, id);
+    Job *job = hashmap_find(intake->jobs, id);
     if (job != NULL)
-        job_hold(job);
+        job_ref(job);
     pthread_mutex_unlock(&intake->lock);
     return job;
 }
 
-Status intake_find(Intake *intake, const char *id, Job **found, Problem *problem) {
-    *found = intake_find_live(intake, id);
+Status jobs_find(JobManager *intake, const char *id, Job **found, Problem *problem) {
+    *found = jobs_find_live(intake, id);
     if (*found != NULL)
         return STATUS_OK;
     Job *job = job_new(NULL);
     if (job == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
     job->is_kept = true;
-    const Status status = store_job_load(intake->store, id, &job->row, problem);
+    const Status status = db_job_load(intake->store, id, &job->row, problem);
     if (status != STATUS_OK) {
-        job_drop(job);
+        job_unref(job);
         return status;
     }
     ResultRow result = {0};
     if (job->row.state == JOB_SUCCESSFUL &&
-        store_result_head(intake->store, job->row.result, &result, NULL) == STATUS_OK)
-        job->head = head_new(&result);
+        db_result_head(intake->store, job->row.result, &result, NULL) == STATUS_OK)
+        job->head = result_summary_new(&result);
     result_row_clear(&result);
     *found = job;
     return STATUS_OK;
 }
 
-void intake_forget(Intake *intake, const char *result) {
+void jobs_forget(JobManager *intake, const char *result) {
     pthread_mutex_lock(&intake->lock);
     cache_forget(intake->cache, result);
     pthread_mutex_unlock(&intake->lock);
@@ -322,44 +322,44 @@ void intake_forget(Intake *intake, const char *result) {
         intake->settings.deleted.wake(intake->settings.deleted.context);
 }
 
-Status intake_delete(Intake *intake, const char *result, Problem *problem) {
+Status jobs_delete(JobManager *intake, const char *result, Problem *problem) {
     pthread_mutex_lock(&intake->lock);
-    const bool is_wanted = index_find(intake->in_flight, result) != NULL;
+    const bool is_wanted = hashmap_find(intake->in_flight, result) != NULL;
     pthread_mutex_unlock(&intake->lock);
     if (is_wanted)
         return problem_set(problem, STATUS_CONFLICT,
                            "the result is being computed; dismiss its job first, or wait");
-    TRY(store_result_delete(intake->store, result, problem));
-    intake_forget(intake, result);
+    TRY(db_result_delete(intake->store, result, problem));
+    jobs_forget(intake, result);
     return STATUS_OK;
 }
 
-void intake_layers(Intake *intake, const char *result, IntakeLayers *layers) {
+void jobs_layers(JobManager *intake, const char *result, CacheLayers *layers) {
     pthread_mutex_lock(&intake->lock);
-    *layers = (IntakeLayers){.in_memory = cache_has(intake->cache, result, false),
-                             .series_in_memory = cache_has(intake->cache, result, true)};
+    *layers = (CacheLayers){.in_memory = cache_has(intake->cache, result, false),
+                            .series_in_memory = cache_has(intake->cache, result, true)};
     pthread_mutex_unlock(&intake->lock);
-    layers->in_database = store_result_exists(intake->store, result);
-    layers->series_in_database = store_series_exists(intake->store, result);
+    layers->in_database = db_result_exists(intake->store, result);
+    layers->series_in_database = db_series_exists(intake->store, result);
 }
 
-const Totals *intake_totals(const Intake *intake) {
+const JobMetrics *jobs_totals(const JobManager *intake) {
     return &intake->totals;
 }
 
-void intake_tally(Intake *intake, IntakeTally *tally) {
+void jobs_tally(JobManager *intake, JobStats *tally) {
     pthread_mutex_lock(&intake->lock);
-    *tally = (IntakeTally){.queued = queue_count(intake->queue),
-                           .workers = intake->settings.workers,
-                           .queue_most = intake->settings.queue_most,
-                           .saving = intake->saving,
-                           .rows = intake->rows,
-                           .stored = intake->stored};
+    *tally = (JobStats){.queued = queue_count(intake->queue),
+                        .workers = intake->settings.workers,
+                        .queue_most = intake->settings.queue_most,
+                        .saving = intake->saving,
+                        .rows = intake->rows,
+                        .stored = intake->stored};
     cache_tally(intake->cache, &tally->series, &tally->heads);
     tally->cached_outcomes = tally->series.count;
     tally->cached_bytes = tally->series.bytes + tally->heads.bytes;
     for (size_t i = 0; i < intake->worker_count; i++)
         tally->running += intake->workers[i].running != NULL || intake->workers[i].study != NULL;
     pthread_mutex_unlock(&intake->lock);
-    tally->stored.most_bytes = intake->settings.store_bytes;
+    tally->stored.most_bytes = intake->settings.db_bytes;
 }

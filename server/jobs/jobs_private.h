@@ -18,53 +18,53 @@ enum { OUTCOME_FAILURES = 64 };
 
 struct StudyRun;
 
-typedef struct Wakers {
-    Waker *at;
+typedef struct Subscribers {
+    Callback *at;
     size_t count;
-} Wakers;
+} Subscribers;
 
 // One computation of one scene, for all jobs and readers who want it.
-typedef struct Computation {
-    IndexEntry indexed; // in flight, by result; not once it was stopped
+typedef struct Task {
+    HashMapEntry indexed; // in flight, by result; not once it was stopped
     char result[72];
     StudyRequest inquiry;
     char *scene, *warnings; // documents
     QueueEntry queued;      // also for the next turn of a study
     bool is_running;
     int64_t began_ns;
-    bool is_again; // only its series is wanted: the result is saved already
-    Job *jobs;     // those who wait for it, by next_shared
-    Wakers askers; // readers of the outcome
+    bool is_again;      // only its series is wanted: the result is saved already
+    Job *jobs;          // those who wait for it, by next_shared
+    Subscribers askers; // readers of the outcome
     atomic_bool is_stopped;
     atomic_uint progress;   // in 1/10,000
     struct StudyRun *study; // that is under way, under the lock
-    struct Computation *next_stalled;
-} Computation;
+    struct Task *next_stalled;
+} Task;
 
 // A job goes to the store twice: when it is accepted and when it is final. Both are posted; where
 // the second comes before the first was begun, the first is withdrawn. `row` is what others see.
 struct Job {
-    IndexEntry indexed; // live, by id
+    HashMapEntry indexed; // live, by id
     atomic_size_t holds;
-    Intake *intake; // held, for its lock; NULL: read from the store, never changes
+    JobManager *intake; // held, for its lock; NULL: read from the store, never changes
     JobRow row;
     JobRow opening, closing; // as posted; both borrow row's texts, but for closing.problem
-    StoreTicket *ticket;     // of `opening`, until the store has answered or it was withdrawn
+    PendingWrite *ticket;    // of `opening`, until the store has answered or it was withdrawn
     bool is_closing;         // its last state is on the way to the store
     bool is_kept;            // the store has it as `row` shows it
     Status refusal;          // why not
     char refused[256];
-    size_t scene_size;        // in bytes, counted while it is live
-    bool is_live;             // in the index, which holds it
-    bool is_counted;          // takes a place in the queue
-    Head *head;               // of the result
-    Computation *computation; // NULL: not yet or no more
-    Client *client;           // NULL while it was not admitted
-    Job *next_keyed;          // in intake->keyed
-    Job *next_undismissed;    // in intake->undismissed
+    size_t scene_size;     // in bytes, counted while it is live
+    bool is_live;          // in the index, which holds it
+    bool is_counted;       // takes a place in the queue
+    ResultSummary *head;   // of the result
+    Task *computation;     // NULL: not yet or no more
+    QueueClient *client;   // NULL while it was not admitted
+    Job *next_keyed;       // in intake->keyed
+    Job *next_undismissed; // in intake->undismissed
     Job *next_shared;
     int64_t submitted_ns, started_ns;
-    Wakers wakers, keepers; // for when it is finished; for when it is kept
+    Subscribers wakers, keepers; // for when it is finished; for when it is kept
 };
 
 typedef struct Failure {
@@ -74,40 +74,40 @@ typedef struct Failure {
 } Failure;
 
 typedef struct Worker {
-    Intake *intake;
+    JobManager *intake;
     pthread_t thread;
-    Computation *running;   // or NULL
+    Task *running;          // or NULL
     struct StudyRun *study; // of which it has a chunk in hand, or NULL
     size_t chunk;           // its first member
     bool is_spare;       // beyond the number asked for: takes quick work while all others are slow
     Workspace workspace; // of its thread alone
 } Worker;
 
-struct Intake {
+struct JobManager {
     atomic_size_t holds; // the owner's and one of each Job: a job may be looked at after the intake
                          // has closed
-    Store *store;
-    IntakeSettings settings;
+    Db *store;
+    JobManagerSettings settings;
     pthread_mutex_t lock;
     pthread_cond_t work;       // for a worker, or room for what it makes
     pthread_cond_t spare_work; // for the spare worker alone
     pthread_cond_t settled;    // nothing is posted any more
-    pthread_cond_t keys_free;  // a KeyHold was given up
+    pthread_cond_t keys_free;  // a IdempotencyHold was given up
     pthread_mutex_t retries;   // retries of sweeps come one by one; taken before `lock`
     Naming naming;             // taken before `lock`
-    struct KeyHold *keys;
+    struct IdempotencyHold *keys;
     Job *keyed;          // held, by next_keyed: came with a key, and the store may not have them
     Worker *workers;     // settings.workers of them, and the spare one
     size_t worker_count; // started
     size_t slow_running;
     double pace; // run time over what was foretold, of late
     bool is_closing;
-    Index *jobs;                     // not yet finished
-    Index *in_flight;                // computations
+    HashMap *jobs;                   // not yet finished
+    HashMap *in_flight;              // computations
     Queue *queue;                    // of computations
     struct StudyRun *studies;        // under way
     size_t study_count, study_bytes; // of them, and that they hold
-    Computation *stalled;            // studies that could not begin for want of room
+    Task *stalled;                   // studies that could not begin for want of room
     size_t live;                     // jobs not yet finished
     size_t scene_bytes;              // of them all
     size_t posted;                   // writes that the store has yet to answer
@@ -115,57 +115,57 @@ struct Intake {
     struct Saving *delayed;          // of these, what waits for room in the store
     Job *undismissed;                // held: dismissed, but the store could not be told
     Cache *cache;
-    LayerTally rows, stored;            // results and series found in the database
+    CacheStats rows, stored;            // results and series found in the database
     size_t keeping_bytes;               // of series on the way there
     atomic_int large_plans;             // requests that plan large structures
     Failure failures[OUTCOME_FAILURES]; // of computations for readers, told once
     size_t next_failure;
-    Totals totals;
+    JobMetrics totals;
 };
 
-bool wakers_add(Wakers *wakers, const Waker *waker); // false without memory
-void wakers_remove(Wakers *wakers, const Waker *waker);
-void wakers_call(Wakers *wakers); // calls and forgets all
+bool subscribers_add(Subscribers *wakers, const Callback *waker); // false without memory
+void subscribers_remove(Subscribers *wakers, const Callback *waker);
+void subscribers_call(Subscribers *wakers); // calls and forgets all
 
-Job *job_new(Intake *intake); // one hold; NULL without memory
+Job *job_new(JobManager *intake); // one hold; NULL without memory
 
-Computation *computation_new(const char *result);
-void computation_free(Computation *computation);
+Task *task_new(const char *result);
+void task_free(Task *computation);
 
-void intake_drop(Intake *intake); // frees what is left with the last hold
+void jobs_drop(JobManager *intake); // frees what is left with the last hold
 
 // Held for the caller; NULL if no such job is in memory.
-Job *intake_find_live(Intake *intake, const char *id);
+Job *jobs_find_live(JobManager *intake, const char *id);
 
-// With the lock held: what intake_retry does for jobs that were dismissed.
-void intake_retry_dismissed(Intake *intake);
+// With the lock held: what jobs_retry_sweep does for jobs that were dismissed.
+void jobs_retry_dismissed(JobManager *intake);
 // Nobody else is there any more: what waits for room stays unfinished in the store.
-void intake_abandon_delayed(Intake *intake);
+void jobs_abandon_delayed(JobManager *intake);
 
 // With the lock held.
 // Gives back its place in the queue; it can still be found.
-void intake_release(Job *job);
-void intake_retire(Job *job); // it is live no more; drops the index's hold
+void jobs_release(Job *job);
+void jobs_retire(Job *job); // it is live no more; drops the index's hold
 // `client` NULL: ahead of all.
-void intake_enqueue(Intake *intake, Computation *computation, Client *client);
-void intake_call_worker(Intake *intake); // something was put into the queue
-Computation *computation_of(QueueEntry *entry);
-void intake_admit(Intake *intake, Job *job); // it is live, held by the index
-void intake_attach(Job *job, Computation *computation);
-void intake_detach(Job *job); // from its computation, which stops when nobody is left
+void jobs_enqueue(JobManager *intake, Task *computation, QueueClient *client);
+void jobs_call_worker(JobManager *intake); // something was put into the queue
+Task *task_of(QueueEntry *entry);
+void jobs_admit(JobManager *intake, Job *job); // it is live, held by the index
+void jobs_attach(Job *job, Task *computation);
+void jobs_detach(Job *job); // from its computation, which stops when nobody is left
 // The store has answered one of the posted writes.
-void intake_settle(Intake *intake);
+void jobs_settle(JobManager *intake);
 // It could not be kept: whoever waits is told, and it is live no more.
-void intake_refuse(Job *job, Status status, const char *detail);
+void jobs_refuse(Job *job, Status status, const char *detail);
 // What was posted first need not be written if it was not begun.
-void intake_withdraw(Job *job);
+void jobs_withdraw(Job *job);
 
 // An unfinished job of the store, from an earlier life. Takes the row. Only what concerns the whole
 // program is an error.
-Status intake_take_up(Intake *intake, JobRow *row, Problem *problem);
+Status jobs_take_up(JobManager *intake, JobRow *row, Problem *problem);
 
 // What a computation came to, as documents.
-typedef struct Findings {
+typedef struct RunResult {
     Status status;
     Outcome *outcome;   // NULL unless STATUS_OK
     StudyAnswer answer; // its study NULL where none was asked for
@@ -174,19 +174,20 @@ typedef struct Findings {
     char detail[256];
     int64_t began_ns, ended_ns;
     double seconds; // of CPU, of the scene's own run
-} Findings;
-void findings_clear(Findings *findings);
+} RunResult;
+void run_result_clear(RunResult *findings);
 
 // Without the lock. Takes the computation, which has run, and what is in `findings`: saves them
 // with the jobs that wait for them, and says that these are finished once that is durable.
-void intake_save(Intake *intake, Computation *computation, Findings *findings);
+void jobs_save(JobManager *intake, Task *computation, RunResult *findings);
 // Whether what failed is worth another try: a full disk and the like pass.
-bool status_is_passing(Status status);
+bool status_is_transient(Status status);
 // With the lock held: whether a worker should wait before it makes more to be saved.
-bool intake_is_behind(const Intake *intake);
+bool jobs_is_behind(const JobManager *intake);
 
 // Without the lock: has the series kept by the store if it is dearer to compute than to read.
-void intake_keep_series(Intake *intake, const char *result, const Outcome *outcome, double seconds);
+void jobs_keep_series(JobManager *intake, const char *result, const Outcome *outcome,
+                      double seconds);
 
 void *worker_main(void *worker);
 

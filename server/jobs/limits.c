@@ -10,7 +10,7 @@
 #include "server/jobs/study.h"
 #include "server/util/clock.h"
 
-static double allowance(const Intake *intake, const Client *client) {
+static double allowance(const JobManager *intake, const QueueClient *client) {
     const double most = intake->settings.rate;
     if (client->allowed_ns == 0)
         return most;
@@ -18,7 +18,7 @@ static double allowance(const Intake *intake, const Client *client) {
     return fmin(most, client->allowance + passed * most / 60);
 }
 
-Status quota_send(Intake *intake, Client *client, Problem *problem) {
+Status limits_add(JobManager *intake, QueueClient *client, Problem *problem) {
     if (!(intake->settings.rate > 0) || client->name[0] == '\0')
         return STATUS_OK;
     const double left = allowance(intake, client);
@@ -31,7 +31,7 @@ Status quota_send(Intake *intake, Client *client, Problem *problem) {
     return STATUS_OK;
 }
 
-Status quota_admit(const Intake *intake, const Client *client, Problem *problem) {
+Status limits_check(const JobManager *intake, const QueueClient *client, Problem *problem) {
     const size_t most = intake->settings.quota;
     if (most == 0 || client->name[0] == '\0' || client->live < most)
         return STATUS_OK;
@@ -41,7 +41,7 @@ Status quota_admit(const Intake *intake, const Client *client, Problem *problem)
                        client->name, client->live, most);
 }
 
-static bool is_of(const Computation *computation, const Client *client) {
+static bool is_of(const Task *computation, const QueueClient *client) {
     for (const Job *job = computation->jobs; job != NULL; job = job->next_shared)
         if (job->client == client)
             return true;
@@ -49,7 +49,7 @@ static bool is_of(const Computation *computation, const Client *client) {
 }
 
 // Until `computation`, which runs, will have ended.
-static double left_of(const Intake *intake, Computation *computation) {
+static double left_of(const JobManager *intake, Task *computation) {
     const double passed = 1e-9 * (double)(clock_monotonic_ns() - computation->began_ns);
     const double done = atomic_load(&computation->progress) / 10000.0;
     // The first part of a run may go faster than the rest.
@@ -58,18 +58,18 @@ static double left_of(const Intake *intake, Computation *computation) {
     return fmax(fmax(foretold, seen), 0);
 }
 
-int intake_retry_after(Intake *intake, const char *name, Status status) {
+int jobs_retry_after(JobManager *intake, const char *name, Status status) {
     double seconds = 0;
     pthread_mutex_lock(&intake->lock);
-    const Client *client = queue_client(intake->queue, name != NULL ? name : "");
+    const QueueClient *client = queue_client(intake->queue, name != NULL ? name : "");
     const bool is_own = status == STATUS_QUOTA && client != NULL;
-    const bool is_many = is_own && quota_admit(intake, client, NULL) != STATUS_OK;
+    const bool is_many = is_own && limits_check(intake, client, NULL) != STATUS_OK;
     if (is_own && !is_many && intake->settings.rate > 0) {
         seconds = (1 - allowance(intake, client)) * 60 / intake->settings.rate;
     } else {
         double soonest = INFINITY;
         for (size_t i = 0; i < intake->worker_count; i++) {
-            Computation *running = intake->workers[i].running;
+            Task *running = intake->workers[i].running;
             if (running != NULL && (!is_own || is_of(running, client)))
                 soonest = fmin(soonest, left_of(intake, running));
         }

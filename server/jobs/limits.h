@@ -7,8 +7,8 @@
 
 // With the lock held. Counts one more submission of `client` against the jobs a minute, or
 // STATUS_QUOTA.
-Status quota_send(Intake *intake, Client *client, Problem *problem);
+Status limits_add(JobManager *intake, QueueClient *client, Problem *problem);
 // With the lock held. Whether it may have one more unfinished job.
-Status quota_admit(const Intake *intake, const Client *client, Problem *problem);
+Status limits_check(const JobManager *intake, const QueueClient *client, Problem *problem);
 
 #endif

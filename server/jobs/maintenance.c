@@ -13,9 +13,9 @@
 
 enum { LOOK_MS = 5000, PAUSE_MS = 10, RETRY_MS = 1000 };
 
-struct Keeper {
-    Store *store;
-    Intake *intake;
+struct Maintenance {
+    Db *store;
+    JobManager *intake;
     KeepRules rules;
     pthread_t thread;
     pthread_mutex_t lock;
@@ -24,7 +24,7 @@ struct Keeper {
 };
 
 // Until then, a second at most. False where it is to stop.
-static bool pause_for(Keeper *keeper, int64_t until_ns) {
+static bool pause_for(Maintenance *keeper, int64_t until_ns) {
     const int64_t retry_ns = clock_monotonic_ns() + RETRY_MS * 1000000LL;
     const int64_t end_ns = until_ns < retry_ns ? until_ns : retry_ns;
     const struct timespec end = {(time_t)(end_ns / 1000000000), (long)(end_ns % 1000000000)};
@@ -38,17 +38,17 @@ static bool pause_for(Keeper *keeper, int64_t until_ns) {
 }
 
 static void *work(void *context) {
-    Keeper *keeper = context;
+    Maintenance *keeper = context;
     int64_t next_ns = 0; // to look for what is to go
     uint64_t pages = 0;
     do {
-        intake_retry(keeper->intake);
+        jobs_retry_sweep(keeper->intake);
         if (clock_monotonic_ns() < next_ns)
             continue;
         Removed removed;
-        const Status status = store_remove(keeper->store, &keeper->rules, &removed, NULL);
+        const Status status = db_remove(keeper->store, &keeper->rules, &removed, NULL);
         for (size_t i = 0; status == STATUS_OK && i < removed.results; i++)
-            intake_forget(keeper->intake, removed.result[i]);
+            jobs_forget(keeper->intake, removed.result[i]);
         const int64_t pause_ms = status == STATUS_OK && removed.is_more ? PAUSE_MS : LOOK_MS;
         process_trim_memory(&pages);
         next_ns = clock_monotonic_ns() + pause_ms * 1000000;
@@ -56,16 +56,16 @@ static void *work(void *context) {
     return NULL;
 }
 
-static void keeper_free(Keeper *keeper) {
+static void maintenance_free(Maintenance *keeper) {
     pthread_cond_destroy(&keeper->wake);
     pthread_mutex_destroy(&keeper->lock);
     free(keeper);
 }
 
-Status keeper_start(Store *store, Intake *intake, const KeepRules *rules, Keeper **keeper,
-                    Problem *problem) {
+Status maintenance_start(Db *store, JobManager *intake, const KeepRules *rules,
+                         Maintenance **keeper, Problem *problem) {
     *keeper = NULL;
-    Keeper *made = calloc(1, sizeof *made);
+    Maintenance *made = calloc(1, sizeof *made);
     if (made == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the keeper");
     made->store = store;
@@ -78,14 +78,14 @@ Status keeper_start(Store *store, Intake *intake, const KeepRules *rules, Keeper
     pthread_cond_init(&made->wake, &monotonic);
     pthread_condattr_destroy(&monotonic);
     if (pthread_create(&made->thread, NULL, work, made) != 0) {
-        keeper_free(made);
+        maintenance_free(made);
         return problem_set(problem, STATUS_INTERNAL, "the keeper's thread cannot be started");
     }
     *keeper = made;
     return STATUS_OK;
 }
 
-void keeper_stop(Keeper *keeper) {
+void maintenance_stop(Maintenance *keeper) {
     if (keeper == NULL)
         return;
     pthread_mutex_lock(&keeper->lock);
@@ -93,5 +93,5 @@ void keeper_stop(Keeper *keeper) {
     pthread_cond_signal(&keeper->wake);
     pthread_mutex_unlock(&keeper->lock);
     pthread_join(keeper->thread, NULL);
-    keeper_free(keeper);
+    maintenance_free(keeper);
 }

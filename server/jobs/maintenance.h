@@ -6,11 +6,11 @@
 #include "server/db/retention.h"
 #include "server/jobs/jobs.h"
 
-typedef struct Keeper Keeper;
+typedef struct Maintenance Maintenance;
 
-// Borrows store and intake until keeper_stop.
-Status keeper_start(Store *store, Intake *intake, const KeepRules *rules, Keeper **keeper,
-                    Problem *problem);
-void keeper_stop(Keeper *keeper); // NULL is fine
+// Borrows store and intake until maintenance_stop.
+Status maintenance_start(Db *store, JobManager *intake, const KeepRules *rules,
+                         Maintenance **keeper, Problem *problem);
+void maintenance_stop(Maintenance *keeper); // NULL is fine
 
 #endif

@@ -11,11 +11,11 @@ static const char layout[8] = {'i', 'm', 'p', 'a', 'c', 't', ' ', '1'};
 
 enum { HEAD = 24, IMPACT = 13 };
 
-typedef struct Reader {
+typedef struct Decoder {
     const char *at;
     size_t left;
     bool is_bad;
-} Reader;
+} Decoder;
 
 static void put_numbers(Bytes *bytes, const double *values, size_t count) {
     bytes_put(bytes, values, count * sizeof *values);
@@ -30,7 +30,7 @@ static void put_columns(Bytes *bytes, const Columns *columns) {
         put_numbers(bytes, columns->at[i].values, columns->rows);
 }
 
-void numbers_write(Bytes *bytes, const Outcome *outcome) {
+void outcome_blob_write(Bytes *bytes, const Outcome *outcome) {
     const Response *response = &outcome->response;
     const Spectrum *spectrum = &outcome->spectrum;
     const Energy *energy = &response->energy;
@@ -80,7 +80,7 @@ void numbers_write(Bytes *bytes, const Outcome *outcome) {
     put_columns(bytes, &spectrum->densities);
 }
 
-static void take(Reader *reader, void *target, size_t size) {
+static void take(Decoder *reader, void *target, size_t size) {
     if (reader->is_bad || reader->left < size) {
         reader->is_bad = true;
         memset(target, 0, size);
@@ -92,13 +92,13 @@ static void take(Reader *reader, void *target, size_t size) {
 }
 
 // A count that cannot be within what is left is none.
-static size_t as_count(Reader *reader, double value, size_t size) {
+static size_t as_count(Decoder *reader, double value, size_t size) {
     if (!(value >= 0 && value <= (double)(reader->left / size)))
         reader->is_bad = true;
     return reader->is_bad ? 0 : (size_t)value;
 }
 
-static void take_columns(Reader *reader, size_t count, size_t rows, Columns *columns) {
+static void take_columns(Decoder *reader, size_t count, size_t rows, Columns *columns) {
     if (reader->is_bad || columns_allocate(columns, count, rows, reader->left, NULL) != STATUS_OK) {
         reader->is_bad = true;
         return;
@@ -112,7 +112,7 @@ static void take_columns(Reader *reader, size_t count, size_t rows, Columns *col
     take(reader, columns->block, count * rows * sizeof(double));
 }
 
-static void take_impacts(Reader *reader, size_t count, Impacts *impacts) {
+static void take_impacts(Decoder *reader, size_t count, Impacts *impacts) {
     impacts->at = calloc(count > 0 ? count : 1, sizeof *impacts->at);
     if (impacts->at == NULL)
         reader->is_bad = true;
@@ -135,7 +135,7 @@ static void take_impacts(Reader *reader, size_t count, Impacts *impacts) {
     }
 }
 
-static void take_response(Reader *reader, const double head[HEAD], Response *response) {
+static void take_response(Decoder *reader, const double head[HEAD], Response *response) {
     response->sample_rate = head[0];
     response->count = (size_t)head[1];
     response->is_unlisted = head[5] != 0;
@@ -153,7 +153,7 @@ static void take_response(Reader *reader, const double head[HEAD], Response *res
                  &response->series);
 }
 
-static void take_spectrum(Reader *reader, const double head[HEAD], Spectrum *spectrum) {
+static void take_spectrum(Decoder *reader, const double head[HEAD], Spectrum *spectrum) {
     const size_t rows = as_count(reader, head[16], sizeof(double));
     spectrum->settings = (WelchSettings){.segment = (size_t)head[17],
                                          .overlap = (size_t)head[18],
@@ -167,8 +167,8 @@ static void take_spectrum(Reader *reader, const double head[HEAD], Spectrum *spe
     take_columns(reader, as_count(reader, head[15], 1), rows, &spectrum->densities);
 }
 
-Outcome *numbers_read(const char *at, size_t size) {
-    Reader reader = {at, size, false};
+Outcome *outcome_blob_read(const char *at, size_t size) {
+    Decoder reader = {at, size, false};
     char name[sizeof layout];
     double head[HEAD];
     take(&reader, name, sizeof name);

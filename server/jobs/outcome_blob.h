@@ -6,8 +6,8 @@
 #include "core/simulation/simulation.h"
 #include "server/util/bytes.h"
 
-void numbers_write(Bytes *bytes, const Outcome *outcome);
-// One hold; NULL for what numbers_write did not write, and without memory.
-Outcome *numbers_read(const char *at, size_t size);
+void outcome_blob_write(Bytes *bytes, const Outcome *outcome);
+// One hold; NULL for what outcome_blob_write did not write, and without memory.
+Outcome *outcome_blob_read(const char *at, size_t size);
 
 #endif

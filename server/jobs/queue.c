@@ -23,7 +23,7 @@ static const double turn_after = 0.05; // [s]
 enum { QUICK, SLOW, TURNS };
 
 struct Queue {
-    Client *first, **last; // in order of their first job
+    QueueClient *first, **last; // in order of their first job
     QueueEntry *urgent, *urgent_last;
     size_t count;
     double seconds;
@@ -42,19 +42,19 @@ void queue_free(Queue *queue) {
     if (queue == NULL)
         return;
     while (queue->first != NULL) {
-        Client *client = queue->first;
+        QueueClient *client = queue->first;
         queue->first = client->next;
         free(client);
     }
     free(queue);
 }
 
-Client *queue_client(Queue *queue, const char *name) {
-    for (Client *client = queue->first; client != NULL; client = client->next)
+QueueClient *queue_client(Queue *queue, const char *name) {
+    for (QueueClient *client = queue->first; client != NULL; client = client->next)
         if (strcmp(client->name, name) == 0)
             return client;
     const size_t size = strlen(name) + 1;
-    Client *client = calloc(1, sizeof *client + size);
+    QueueClient *client = calloc(1, sizeof *client + size);
     if (client == NULL)
         return NULL;
     memcpy(client->name, name, size);
@@ -106,7 +106,7 @@ static QueueEntry *merge_all(QueueEntry *first) {
     return root;
 }
 
-static QueueEntry **lane_of(Client *client, const QueueEntry *entry) {
+static QueueEntry **lane_of(QueueClient *client, const QueueEntry *entry) {
     return &client->lanes[entry->is_turn ? TURNS : entry->seconds <= queue_quick ? QUICK : SLOW];
 }
 
@@ -125,7 +125,7 @@ static void count_out(Queue *queue, QueueEntry *entry) {
     queue->seconds = queue->count > 0 ? queue->seconds - entry->seconds : 0;
 }
 
-static void join(Queue *queue, QueueEntry *entry, Client *client) {
+static void join(Queue *queue, QueueEntry *entry, QueueClient *client) {
     if (client->waiting++ == 0 && client->served < queue->reached)
         client->served = queue->reached;
     entry->client = client;
@@ -133,13 +133,13 @@ static void join(Queue *queue, QueueEntry *entry, Client *client) {
     *lane = merge(*lane, entry);
 }
 
-void queue_put(Queue *queue, QueueEntry *entry, Client *client, double now) {
+void queue_put(Queue *queue, QueueEntry *entry, QueueClient *client, double now) {
     count_in(queue, entry);
     entry->rank = now + patience * entry->seconds;
     join(queue, entry, client);
 }
 
-void queue_urge(Queue *queue, QueueEntry *entry) {
+void queue_push_front(Queue *queue, QueueEntry *entry) {
     count_in(queue, entry);
     entry->client = NULL;
     entry->previous = queue->urgent_last;
@@ -148,7 +148,7 @@ void queue_urge(Queue *queue, QueueEntry *entry) {
 }
 
 static void leave(QueueEntry *entry) {
-    Client *client = entry->client;
+    QueueClient *client = entry->client;
     QueueEntry **lane = lane_of(client, entry);
     QueueEntry *children = merge_all(entry->child);
     client->waiting--;
@@ -175,7 +175,7 @@ void queue_remove(Queue *queue, QueueEntry *entry) {
     count_out(queue, entry);
 }
 
-void queue_share(Queue *queue, QueueEntry *entry, Client *client) {
+void queue_rebalance(Queue *queue, QueueEntry *entry, QueueClient *client) {
     if (entry->number == 0 || entry->client == NULL || entry->client == client ||
         entry->client->waiting <= client->waiting + 1)
         return;
@@ -184,7 +184,7 @@ void queue_share(Queue *queue, QueueEntry *entry, Client *client) {
     join(queue, entry, client);
 }
 
-static QueueEntry *first_of(const Client *client, bool only_quick) {
+static QueueEntry *first_of(const QueueClient *client, bool only_quick) {
     QueueEntry *first = client->lanes[QUICK], *slow = client->lanes[SLOW];
     if (only_quick)
         return first;
@@ -195,13 +195,13 @@ static QueueEntry *first_of(const Client *client, bool only_quick) {
 }
 
 QueueEntry *queue_take(Queue *queue, bool only_quick) {
-    Client *next = NULL;
+    QueueClient *next = NULL;
     if (queue->urgent != NULL && (!only_quick || queue->urgent->seconds <= queue_quick)) {
         QueueEntry *entry = queue->urgent;
         queue_remove(queue, entry);
         return entry;
     }
-    for (Client *client = queue->first; client != NULL; client = client->next)
+    for (QueueClient *client = queue->first; client != NULL; client = client->next)
         if (first_of(client, only_quick) != NULL && (next == NULL || client->served < next->served))
             next = client;
     if (next == NULL)

@@ -13,8 +13,8 @@ typedef struct Queue Queue;
 
 // Who sends jobs: the name of a token, "" for nobody in particular. There are as many as tokens;
 // each lives as long as the queue.
-typedef struct Client {
-    struct Client *next;
+typedef struct QueueClient {
+    struct QueueClient *next;
     size_t live;        // unfinished jobs
     double allowance;   // jobs it may send now, and when that was so; see quota.h
     int64_t allowed_ns; // 0: never asked
@@ -23,14 +23,14 @@ typedef struct Client {
     double ordinary;    // of these, since the last turn
     struct QueueEntry *lanes[3];
     char name[];
-} Client;
+} QueueClient;
 
 // First member of what waits. All zero: it does not.
 typedef struct QueueEntry {
     struct QueueEntry *child, *next, *previous;
-    Client *client; // NULL: ahead of all
-    double seconds; // of CPU foretold
-    double charge;  // of these, what its client is counted when it is taken; 0: all
+    QueueClient *client; // NULL: ahead of all
+    double seconds;      // of CPU foretold
+    double charge;       // of these, what its client is counted when it is taken; 0: all
     bool is_turn; // of long work that is done bit by bit: it goes between a client's ordinary work
     double rank;
     uint64_t number; // of arrival, from 1; 0: does not wait
@@ -42,17 +42,18 @@ extern const double queue_quick;
 Queue *queue_new(void); // NULL without memory
 void queue_free(Queue *queue);
 
-Client *queue_client(Queue *queue, const char *name); // made at first sight; NULL without memory
+QueueClient *queue_client(Queue *queue,
+                          const char *name); // made at first sight; NULL without memory
 
 // `now` in seconds on any clock that only rises; entry->seconds is set. Not waiting yet.
-void queue_put(Queue *queue, QueueEntry *entry, Client *client, double now);
+void queue_put(Queue *queue, QueueEntry *entry, QueueClient *client, double now);
 // Ahead of all clients, behind those that were urged before.
-void queue_urge(Queue *queue, QueueEntry *entry);
+void queue_push_front(Queue *queue, QueueEntry *entry);
 // Whose turn it is, or NULL; `only_quick` passes over what is not quick.
 QueueEntry *queue_take(Queue *queue, bool only_quick);
 void queue_remove(Queue *queue, QueueEntry *entry); // fine if it does not wait
 // As if it had come from `client`, where that has fewer that wait.
-void queue_share(Queue *queue, QueueEntry *entry, Client *client);
+void queue_rebalance(Queue *queue, QueueEntry *entry, QueueClient *client);
 
 size_t queue_count(const Queue *queue);
 double queue_seconds(const Queue *queue); // of CPU foretold for all that wait

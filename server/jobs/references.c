@@ -26,14 +26,14 @@ static void add(Bytes *bytes, const Buffer *buffer) {
     bytes_text(bytes, "\n");
 }
 
-void uses_write(Bytes *bytes, const StudyRequest *inquiry) {
+void references_write(Bytes *bytes, const StudyRequest *inquiry) {
     const Dampers *dampers = &inquiry->simulation.scene.dampers;
     for (size_t i = 0; i < dampers->count; i++) {
         add(bytes, &dampers->at[i].buffer);
         add(bytes, &dampers->at[i].left_buffer);
         add(bytes, &dampers->at[i].right_buffer);
     }
-    prepare_record_uses(inquiry, bytes);
+    resolve_record_uses(inquiry, bytes);
     if (inquiry->study == NULL || study_kind(inquiry->study) != &study_sweep)
         return;
     const SweepStudy *study = (const SweepStudy *)(const void *)inquiry->study;
@@ -41,10 +41,10 @@ void uses_write(Bytes *bytes, const StudyRequest *inquiry) {
         add(bytes, &study->materials.at[i]);
 }
 
-bool uses_next(const char **lines, Use *use) {
+bool references_next(const char **lines, ReferenceRow *use) {
     const size_t size = *lines == NULL ? 0 : strcspn(*lines, "\n");
     const size_t length = size == 0 ? 0 : strcspn(*lines, "@\n");
-    *use = (Use){.slug = ""};
+    *use = (ReferenceRow){.slug = ""};
     if (size == 0)
         return false;
     if (length < size && length < sizeof use->slug) {

@@ -8,14 +8,14 @@
 
 // Adds a line for each revision of a material, "sponge@1\n", and each record,
 // "record:elcentro\n", that the prepared scene or its sweep names.
-void uses_write(Bytes *bytes, const StudyRequest *inquiry);
+void references_write(Bytes *bytes, const StudyRequest *inquiry);
 
 // One of those lines.
-typedef struct Use {
+typedef struct ReferenceRow {
     char slug[128];
     unsigned long long revision; // 0: it is of no material
-} Use;
+} ReferenceRow;
 // Takes the next line off `*lines`; false at their end.
-bool uses_next(const char **lines, Use *use);
+bool references_next(const char **lines, ReferenceRow *use);
 
 #endif

@@ -4,20 +4,20 @@
 
 enum { WINDOW_BYTES = 32 << 20, WINDOW_PER_SLOT = 8 };
 
-Status order_make(StudyWork *work, size_t slots, Order *order, Problem *problem) {
+Status reorder_make(StudyWork *work, size_t slots, ReorderBuffer *order, Problem *problem) {
     const size_t by_bytes = WINDOW_BYTES / (work->part_bytes + 1);
     const size_t by_slots = WINDOW_PER_SLOT * slots;
     const size_t window = by_bytes > by_slots ? by_bytes : by_slots;
-    *order = (Order){.work = work,
-                     .window = window < work->members ? window : work->members + 1,
-                     .expected = work->expected};
+    *order = (ReorderBuffer){.work = work,
+                             .window = window < work->members ? window : work->members + 1,
+                             .expected = work->expected};
     pthread_mutex_init(&order->lock, NULL);
     order->parts = calloc(order->window, sizeof *order->parts);
     return order->parts != NULL ? STATUS_OK
                                 : problem_set(problem, STATUS_NO_MEMORY, "no memory for the study");
 }
 
-void order_clear(Order *order) {
+void reorder_clear(ReorderBuffer *order) {
     for (size_t i = 0; order->parts != NULL && i < order->window; i++)
         study_part_free(order->work, order->parts[i]);
     free(order->parts);
@@ -25,7 +25,7 @@ void order_clear(Order *order) {
 }
 
 // With the lock held, which is given up for each member: nobody else folds meanwhile.
-static Status fold(Order *order, Problem *problem) {
+static Status fold(ReorderBuffer *order, Problem *problem) {
     Status status = STATUS_OK;
     while (status == STATUS_OK && order->next < order->work->wanted) {
         StudyPart **place = &order->parts[order->next % order->window], *part = *place;
@@ -42,7 +42,7 @@ static Status fold(Order *order, Problem *problem) {
     return status;
 }
 
-Status order_put(Order *order, size_t member, StudyPart *part, Problem *problem) {
+Status reorder_put(ReorderBuffer *order, size_t member, StudyPart *part, Problem *problem) {
     Status status = STATUS_OK;
     pthread_mutex_lock(&order->lock);
     order->parts[member % order->window] = part;
@@ -55,7 +55,7 @@ Status order_put(Order *order, size_t member, StudyPart *part, Problem *problem)
     return status;
 }
 
-bool order_begin(Order *order, size_t most, size_t *from, size_t *to) {
+bool reorder_begin(ReorderBuffer *order, size_t most, size_t *from, size_t *to) {
     bool is_open = true;
     pthread_mutex_lock(&order->lock);
     *from = *to = order->begun;
@@ -73,7 +73,7 @@ bool order_begin(Order *order, size_t most, size_t *from, size_t *to) {
     return is_open;
 }
 
-size_t order_expected(Order *order) {
+size_t reorder_expected(ReorderBuffer *order) {
     pthread_mutex_lock(&order->lock);
     const size_t expected = order->expected;
     pthread_mutex_unlock(&order->lock);

@@ -11,7 +11,7 @@
 //     folded | window: wait for those before them, under way, or not begun | nobody may begin
 //
 // The window bounds what waits.
-typedef struct Order {
+typedef struct ReorderBuffer {
     pthread_mutex_t lock;
     StudyWork *work;
     StudyPart **parts; // member i's at i % window
@@ -20,21 +20,21 @@ typedef struct Order {
     size_t begun;      // members that somebody was asked for
     size_t expected;   // as the work tells it
     bool is_folding;
-} Order;
+} ReorderBuffer;
 
-// `slots` make members side by side. `order` is cleared by order_clear, also after a failure.
-Status order_make(StudyWork *work, size_t slots, Order *order, Problem *problem);
-void order_clear(Order *order);
+// `slots` make members side by side. `order` is cleared by reorder_clear, also after a failure.
+Status reorder_make(StudyWork *work, size_t slots, ReorderBuffer *order, Problem *problem);
+void reorder_clear(ReorderBuffer *order);
 
 // Takes what a member came to. Whoever brings the next one folds it and all that follow; the others
 // leave theirs and go on.
-Status order_put(Order *order, size_t member, StudyPart *part, Problem *problem);
+Status reorder_put(ReorderBuffer *order, size_t member, StudyPart *part, Problem *problem);
 
 // Members that are wanted and that there is room for, begun herewith: *from ... *to - 1, at most so
 // many. None while half the window is on its way, or while others fold: those are to ask after
 // that. False: all that is wanted is folded.
-bool order_begin(Order *order, size_t most, size_t *from, size_t *to);
+bool reorder_begin(ReorderBuffer *order, size_t most, size_t *from, size_t *to);
 
-size_t order_expected(Order *order); // members, in all
+size_t reorder_expected(ReorderBuffer *order); // members, in all
 
 #endif

@@ -18,7 +18,7 @@
 // milliseconds) a request needs a place, so that others are answered meanwhile.
 enum { LARGE_STOREYS = 40, LARGE_PLACES = 4 };
 
-static Status prepare_place(Intake *intake, const StudyRequest *inquiry, bool *has_place,
+static Status resolve_place(JobManager *intake, const StudyRequest *inquiry, bool *has_place,
                             Problem *problem) {
     const Scene *scene = &inquiry->simulation.scene;
     if (scene->structure == NULL || structure_storeys(scene_structure(scene)) < LARGE_STOREYS)
@@ -33,36 +33,36 @@ static Status prepare_place(Intake *intake, const StudyRequest *inquiry, bool *h
                        LARGE_PLACES, LARGE_STOREYS);
 }
 
-void intake_leave_place(Intake *intake, bool has_place) {
+void jobs_leave_place(JobManager *intake, bool has_place) {
     if (has_place)
         atomic_fetch_sub(&intake->large_plans, 1);
 }
 
 // `has_place` NULL: not for a request.
-static Status prepare(Store *store, Intake *intake, const char *text, size_t size,
+static Status prepare(Db *store, JobManager *intake, const char *text, size_t size,
                       const SimulationLimits *limits, bool *has_place, StudyRequest *inquiry,
                       Warnings *warnings, Problem *problem) {
     // All three add to one problem: what could not be read is judged no further, the rest is.
     Problem *own = NULL;
     if (problem == NULL && (problem = own = calloc(1, sizeof *own)) == NULL)
         return STATUS_NO_MEMORY;
-    Status status = read_json(text, size, study_request_fields, inquiry, problem);
+    Status status = json_parse(text, size, study_request_fields, inquiry, problem);
     const bool is_object = problem->count == 0 || problem->faults[0].pointer[0] != '\0';
     const bool is_read = is_object && (status == STATUS_OK || status == STATUS_INVALID);
     const Status place = is_read && has_place != NULL
-                             ? prepare_place(intake, inquiry, has_place, problem)
+                             ? resolve_place(intake, inquiry, has_place, problem)
                              : STATUS_OK;
     if (place != STATUS_OK) {
         status = place;
     } else if (is_read) {
-        Status resolved = prepare_materials(store, &inquiry->simulation, warnings, problem);
-        const Status record = prepare_record(store, &inquiry->simulation, problem);
+        Status resolved = resolve_materials(store, &inquiry->simulation, warnings, problem);
+        const Status record = resolve_record_motion(store, &inquiry->simulation, problem);
         if (resolved == STATUS_OK || (record != STATUS_OK && record != STATUS_INVALID))
             resolved = record;
         if (resolved != STATUS_OK && resolved != STATUS_INVALID)
             status = resolved;
         else if (inquiry->study != NULL && study_kind(inquiry->study) == &study_sweep)
-            status = prepare_sweep(store, inquiry, limits, warnings, problem);
+            status = resolve_sweep_axes(store, inquiry, limits, warnings, problem);
         else
             status = study_request_complete(inquiry, limits, warnings, problem);
         if (status == STATUS_OK)
@@ -72,12 +72,12 @@ static Status prepare(Store *store, Intake *intake, const char *text, size_t siz
     return status;
 }
 
-Status intake_prepare(Store *store, const char *text, size_t size, const SimulationLimits *limits,
-                      StudyRequest *inquiry, Warnings *warnings, Problem *problem) {
+Status jobs_prepare(Db *store, const char *text, size_t size, const SimulationLimits *limits,
+                    StudyRequest *inquiry, Warnings *warnings, Problem *problem) {
     return prepare(store, NULL, text, size, limits, NULL, inquiry, warnings, problem);
 }
 
-static Status prepare_limit_study(const Intake *intake, const StudyRequest *inquiry,
+static Status resolve_limit_study(const JobManager *intake, const StudyRequest *inquiry,
                                   Problem *problem) {
     const double most = intake->settings.study_seconds;
     Cost cost;
@@ -92,23 +92,23 @@ static Status prepare_limit_study(const Intake *intake, const StudyRequest *inqu
                        cost.cpu_seconds, most);
 }
 
-Status intake_prepare_request(Intake *intake, const char *text, size_t size,
-                              const SimulationLimits *limits, bool *has_place,
-                              StudyRequest *inquiry, Warnings *warnings, Problem *problem) {
+Status jobs_prepare_request(JobManager *intake, const char *text, size_t size,
+                            const SimulationLimits *limits, bool *has_place, StudyRequest *inquiry,
+                            Warnings *warnings, Problem *problem) {
     *has_place = false;
     TRY(prepare(intake->store, intake, text, size, limits, has_place, inquiry, warnings, problem));
-    return limits != NULL ? prepare_limit_study(intake, inquiry, problem) : STATUS_OK;
+    return limits != NULL ? resolve_limit_study(intake, inquiry, problem) : STATUS_OK;
 }
 
-void intake_result_id(const StudyRequest *inquiry, char target[72]) {
+void jobs_result_id(const StudyRequest *inquiry, char target[72]) {
     char hex[65];
-    Digest *digest = digest_new();
+    Sha256 *digest = sha256_new();
     target[0] = '\0';
     if (digest == NULL)
         return;
-    digest_take(digest, engine_version, strlen(engine_version) + 1);
-    canonical_write(study_request_fields, inquiry, digest_take, digest);
-    digest_end(digest, hex);
+    sha256_add(digest, engine_version, strlen(engine_version) + 1);
+    canonical_write(study_request_fields, inquiry, sha256_add, digest);
+    sha256_end(digest, hex);
     snprintf(target, 72, "r-%s", hex);
 }
 
@@ -118,25 +118,25 @@ void dry_run_clear(DryRun *dry_run) {
     fields_clear(plan_report_fields, &dry_run->plan);
 }
 
-static Status prepare_dry_run(Intake *intake, const char *text, size_t size, bool *has_place,
+static Status resolve_dry_run(JobManager *intake, const char *text, size_t size, bool *has_place,
                               DryRun *dry_run, Problem *problem) {
-    TRY(intake_prepare_request(intake, text, size, &intake->settings.limits, has_place,
-                               &dry_run->inquiry, &dry_run->warnings, problem));
-    intake_result_id(&dry_run->inquiry, dry_run->result);
+    TRY(jobs_prepare_request(intake, text, size, &intake->settings.limits, has_place,
+                             &dry_run->inquiry, &dry_run->warnings, problem));
+    jobs_result_id(&dry_run->inquiry, dry_run->result);
     TRY(simulation_plan(&dry_run->inquiry.simulation, &dry_run->plan, problem));
     if (scene_warnings_of_pairs(&dry_run->inquiry.simulation.scene, &dry_run->plan.derived,
                                 &dry_run->warnings) != STATUS_OK)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a warning");
     TRY(study_request_cost(&dry_run->inquiry, &intake->settings.limits, &dry_run->cost, problem));
-    dry_run->is_cached = store_result_exists(intake->store, dry_run->result);
+    dry_run->is_cached = db_result_exists(intake->store, dry_run->result);
     return STATUS_OK;
 }
 
-Status intake_dry_run(Intake *intake, const char *text, size_t size, DryRun *dry_run,
-                      Problem *problem) {
+Status jobs_dry_run(JobManager *intake, const char *text, size_t size, DryRun *dry_run,
+                    Problem *problem) {
     memset(dry_run, 0, sizeof *dry_run);
     bool has_place;
-    const Status status = prepare_dry_run(intake, text, size, &has_place, dry_run, problem);
-    intake_leave_place(intake, has_place);
+    const Status status = resolve_dry_run(intake, text, size, &has_place, dry_run, problem);
+    jobs_leave_place(intake, has_place);
     return status;
 }

@@ -32,7 +32,7 @@ static bool split_name(const char *name, char slug[128], uint64_t *revision) {
 }
 
 // "no material is called ..., there are: ...", with the nearest one suggested.
-static Status refuse_unknown(Store *store, const char *name, const char *slug, const char *pointer,
+static Status refuse_unknown(Db *store, const char *name, const char *slug, const char *pointer,
                              Problem *problem) {
     Fault fault = {.detail = ""};
     Texts known;
@@ -40,7 +40,7 @@ static Status refuse_unknown(Store *store, const char *name, const char *slug, c
     text_quote(fault.value, sizeof fault.value, name);
     char short_name[80], list[200] = "";
     text_fit(short_name, sizeof short_name, name);
-    if (problem->count < SUGGESTED && store_material_slugs(store, &known, NULL) == STATUS_OK) {
+    if (problem->count < SUGGESTED && db_material_slugs(store, &known, NULL) == STATUS_OK) {
         // One more, for the NULL behind the last one.
         const char **slugs = calloc(known.count + 1, sizeof *slugs);
         for (size_t i = 0; i < known.count; i++) {
@@ -95,15 +95,15 @@ static Status refuse_for_now(const char *slug, Status status, Problem *problem) 
 
 // Why a name stands for no revision: it is no material's, or the material has none of that number,
 // or, where it names none, all of them are deprecated.
-static Status refuse(Store *store, const char *name, const char *slug, uint64_t revision,
+static Status refuse(Db *store, const char *name, const char *slug, uint64_t revision,
                      const char *pointer, Problem *problem) {
     MaterialRevision known = {0};
     if (problem->count >= PROBLEM_FAULTS) // is counted alone
         return problem_add(problem, STATUS_INVALID, pointer, "is not there");
-    Status status = store_material(store, slug, 0, &known, NULL);
+    Status status = db_material(store, slug, 0, &known, NULL);
     const bool has_head = status == STATUS_OK;
     if (status == STATUS_NOT_FOUND)
-        status = store_material(store, slug, 1, &known, NULL);
+        status = db_material(store, slug, 1, &known, NULL);
     if (has_head) {
         status = refuse_revision(&known, "head", name, pointer, problem);
     } else if (status == STATUS_OK) {
@@ -263,7 +263,7 @@ static Status fill(Buffer *buffer, MaterialRevision *found, const char *pointer,
                    Problem *problem) {
     char name[NAME];
     snprintf(name, sizeof name, "%s@%llu", found->slug, (unsigned long long)found->revision);
-    if (isnan(found->material.restitution) && catalogue_read_lists(found, NULL) != STATUS_OK)
+    if (isnan(found->material.restitution) && material_read_lists(found, NULL) != STATUS_OK)
         return problem_set(problem, STATUS_INTERNAL, "the table of %s cannot be read", name);
     TRY(fill_numbers(buffer, &found->material, pointer, name, problem));
     fill_test(&buffer->test, &found->material);
@@ -276,7 +276,7 @@ static Status fill(Buffer *buffer, MaterialRevision *found, const char *pointer,
     return STATUS_OK;
 }
 
-Status prepare_buffer(Store *store, Buffer *buffer, const char *pointer, Warnings *warnings,
+Status resolve_buffer(Db *store, Buffer *buffer, const char *pointer, Warnings *warnings,
                       Problem *problem) {
     char slug[128];
     uint64_t revision;
@@ -285,7 +285,7 @@ Status prepare_buffer(Store *store, Buffer *buffer, const char *pointer, Warning
         return STATUS_OK;
     if (!split_name(buffer->material, slug, &revision))
         return refuse_unknown(store, buffer->material, buffer->material, pointer, problem);
-    Status status = store_material(store, slug, revision, &found, NULL);
+    Status status = db_material(store, slug, revision, &found, NULL);
     if (status == STATUS_OK)
         status = fill(buffer, &found, pointer, warnings, problem);
     else if (status == STATUS_NOT_FOUND)
@@ -296,8 +296,7 @@ Status prepare_buffer(Store *store, Buffer *buffer, const char *pointer, Warning
     return status;
 }
 
-Status prepare_materials(Store *store, Simulation *simulation, Warnings *warnings,
-                         Problem *problem) {
+Status resolve_materials(Db *store, Simulation *simulation, Warnings *warnings, Problem *problem) {
     Status status = STATUS_OK;
     for (size_t i = 0; i < simulation->scene.dampers.count; i++) {
         Damper *damper = &simulation->scene.dampers.at[i];
@@ -306,7 +305,7 @@ Status prepare_materials(Store *store, Simulation *simulation, Warnings *warning
         for (size_t j = 0; j < COUNT(buffers); j++) {
             char pointer[64];
             snprintf(pointer, sizeof pointer, "/dampers/%zu/%s", i, names[j]);
-            const Status one = prepare_buffer(store, buffers[j], pointer, warnings, problem);
+            const Status one = resolve_buffer(store, buffers[j], pointer, warnings, problem);
             if (one != STATUS_OK && one != STATUS_INVALID)
                 return one;
             if (one != STATUS_OK)

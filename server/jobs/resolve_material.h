@@ -1,5 +1,5 @@
 // The materials that a scene names become revisions and their numbers. Not the records that one
-// names, nor the judging of either. Used by prepare.c and prepare_sweep.c.
+// names, nor the judging of either. Used by prepare.c and resolve_sweep_axes.c.
 #ifndef SERVER_JOBS_RESOLVE_MATERIAL_H
 #define SERVER_JOBS_RESOLVE_MATERIAL_H
 
@@ -8,11 +8,10 @@
 
 // Every buffer that names a material gets "slug@revision", its numbers and what is known of its
 // test. Adds all faults; STATUS_INVALID where there are any.
-Status prepare_materials(Store *store, Simulation *simulation, Warnings *warnings,
-                         Problem *problem);
+Status resolve_materials(Db *store, Simulation *simulation, Warnings *warnings, Problem *problem);
 
 // The same for one buffer, at `pointer`; one that names none stays as it is.
-Status prepare_buffer(Store *store, Buffer *buffer, const char *pointer, Warnings *warnings,
+Status resolve_buffer(Db *store, Buffer *buffer, const char *pointer, Warnings *warnings,
                       Problem *problem);
 
 #endif

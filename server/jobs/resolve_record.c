@@ -17,8 +17,7 @@ enum { PINNED_SAMPLES = 1 << 24 };
 static const char axis_pointer[] = "/excitation/name";
 
 // "no record is called ...; there are ...", with the nearest one suggested.
-static Status refuse_unknown(Store *store, const char *name, const char *pointer,
-                             Problem *problem) {
+static Status refuse_unknown(Db *store, const char *name, const char *pointer, Problem *problem) {
     enum { LISTED = 1000, SUGGESTED = 10 }; // SUGGESTED: faults that tell what names there are
     Fault fault = {.detail = ""};
     RecordRows known = {NULL, 0};
@@ -26,7 +25,7 @@ static Status refuse_unknown(Store *store, const char *name, const char *pointer
     text_fit(fault.pointer, sizeof fault.pointer, pointer);
     text_quote(fault.value, sizeof fault.value, name);
     text_fit(short_name, sizeof short_name, name);
-    if (store_is_private(store)) {
+    if (db_is_private(store)) {
         snprintf(fault.detail, sizeof fault.detail,
                  "\"%s\" is a record of a daemon, and there is none here: put the samples into the "
                  "scene (impactd import FILE), or send it to the daemon (impactd submit)",
@@ -34,7 +33,7 @@ static Status refuse_unknown(Store *store, const char *name, const char *pointer
         return problem_add_fault(problem, STATUS_INVALID, &fault);
     }
     const bool is_suggested = problem->count < SUGGESTED;
-    if (is_suggested && store_records(store, NULL, "", LISTED, &known, NULL) == STATUS_OK) {
+    if (is_suggested && db_records(store, NULL, "", LISTED, &known, NULL) == STATUS_OK) {
         const char **names = calloc(known.count + 1, sizeof *names);
         for (size_t i = 0; i < known.count; i++) {
             text_list(list, sizeof list, known.at[i].name);
@@ -56,12 +55,12 @@ static Status refuse_unknown(Store *store, const char *name, const char *pointer
 }
 
 // `pointer` is where the name stands, `place` where a digest would.
-static Status find(Store *store, const char *name, const char *digest, const char *pointer,
+static Status find(Db *store, const char *name, const char *digest, const char *pointer,
                    const char *place, NamedRecord **named, Problem *problem) {
     *named = NULL;
     if (!record_name_is_sound(name))
         return refuse_unknown(store, name, pointer, problem);
-    const Status status = store_record_named(store, name, named, NULL);
+    const Status status = db_record_named(store, name, named, NULL);
     if (status == STATUS_NOT_FOUND)
         return refuse_unknown(store, name, pointer, problem);
     if (status != STATUS_OK)
@@ -88,7 +87,7 @@ static ExcitationRecord *record_of(const Simulation *simulation) {
     return record->name != NULL ? record : NULL;
 }
 
-Status prepare_record(Store *store, Simulation *simulation, Problem *problem) {
+Status resolve_record_motion(Db *store, Simulation *simulation, Problem *problem) {
     ExcitationRecord *record = record_of(simulation);
     NamedRecord *named;
     if (record == NULL || record->named != NULL)
@@ -140,7 +139,7 @@ static Status add_samples(const Refcount *named, size_t *samples, const char *pl
 }
 
 // What was found before stays; it only needs to be there still.
-static Status hold(Store *store, const char *name, const char *digest, const char *pointer,
+static Status hold(Db *store, const char *name, const char *digest, const char *pointer,
                    const char *place, Refcount **named, Problem *problem) {
     NamedRecord *found;
     TRY(find(store, name, digest, pointer, place, &found, problem));
@@ -152,7 +151,7 @@ static Status hold(Store *store, const char *name, const char *digest, const cha
 }
 
 // One that came with the sweep.
-static Status resolve_pinned(Store *store, PinnedRecord *pinned, size_t index, Problem *problem) {
+static Status resolve_pinned(Db *store, PinnedRecord *pinned, size_t index, Problem *problem) {
     char name[64], digest[64];
     snprintf(name, sizeof name, "/study/records/%zu/name", index);
     snprintf(digest, sizeof digest, "/study/records/%zu/digest", index);
@@ -166,8 +165,8 @@ static Status resolve_pinned(Store *store, PinnedRecord *pinned, size_t index, P
 }
 
 // One value of an axis. What is no text is for the axis to refuse.
-static Status resolve_value(Store *store, const char *value, PinnedRecords *records,
-                            size_t *samples, const char *place, Problem *problem) {
+static Status resolve_value(Db *store, const char *value, PinnedRecords *records, size_t *samples,
+                            const char *place, Problem *problem) {
     JsonScalar scalar;
     NamedRecord *named;
     char *room = malloc(strlen(value) + 1);
@@ -192,7 +191,7 @@ static SweepStudy *sweep_of(const StudyRequest *inquiry) {
                : NULL;
 }
 
-Status prepare_sweep_records(Store *store, StudyRequest *inquiry, Problem *problem) {
+Status resolve_sweep_records(Db *store, StudyRequest *inquiry, Problem *problem) {
     SweepStudy *study = sweep_of(inquiry);
     Status status = STATUS_OK;
     size_t samples = 0;
@@ -228,7 +227,7 @@ Status prepare_sweep_records(Store *store, StudyRequest *inquiry, Problem *probl
     return status;
 }
 
-void prepare_records_drop(StudyRequest *inquiry) {
+void resolve_records_drop(StudyRequest *inquiry) {
     ExcitationRecord *record = record_of(&inquiry->simulation);
     SweepStudy *study = sweep_of(inquiry);
     if (record != NULL) {
@@ -241,7 +240,7 @@ void prepare_records_drop(StudyRequest *inquiry) {
     }
 }
 
-Status prepare_records_again(Store *store, StudyRequest *inquiry, Problem *problem) {
+Status resolve_records_again(Db *store, StudyRequest *inquiry, Problem *problem) {
     ExcitationRecord *record = record_of(&inquiry->simulation);
     SweepStudy *study = sweep_of(inquiry);
     if (record != NULL)
@@ -259,7 +258,7 @@ static void put_use(Bytes *uses, const char *name) {
     bytes_text(uses, "\n");
 }
 
-void prepare_record_uses(const StudyRequest *inquiry, Bytes *uses) {
+void resolve_record_uses(const StudyRequest *inquiry, Bytes *uses) {
     const ExcitationRecord *record = record_of(&inquiry->simulation);
     const SweepStudy *study = sweep_of(inquiry);
     if (record != NULL)

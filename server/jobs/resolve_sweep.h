@@ -6,9 +6,9 @@
 #include "core/study/study.h"
 #include "server/db/db.h"
 
-// Behind prepare_materials, in place of study_request_complete, of an inquiry whose study is a
+// Behind resolve_materials, in place of study_request_complete, of an inquiry whose study is a
 // sweep. Adds all faults, those of names among them.
-Status prepare_sweep(Store *store, StudyRequest *inquiry, const SimulationLimits *limits,
-                     Warnings *warnings, Problem *problem);
+Status resolve_sweep_axes(Db *store, StudyRequest *inquiry, const SimulationLimits *limits,
+                          Warnings *warnings, Problem *problem);
 
 #endif

@@ -4,12 +4,12 @@
 #include <string.h>
 
 // The texts stand behind the struct, in one block.
-Head *head_new(const ResultRow *row) {
+ResultSummary *result_summary_new(const ResultRow *row) {
     const char *const texts[] = {row->plan, row->summary, row->work, row->notes};
-    size_t bytes = sizeof(Head);
+    size_t bytes = sizeof(ResultSummary);
     for (size_t i = 0; i < COUNT(texts); i++)
         bytes += texts[i] != NULL ? strlen(texts[i]) + 1 : 0;
-    Head *head = malloc(bytes);
+    ResultSummary *head = malloc(bytes);
     if (head == NULL)
         return NULL;
     char *at = (char *)(head + 1);
@@ -30,13 +30,13 @@ Head *head_new(const ResultRow *row) {
     return head;
 }
 
-Head *head_hold(Head *head) {
+ResultSummary *result_summary_ref(ResultSummary *head) {
     if (head != NULL)
         atomic_fetch_add(&head->holds, 1);
     return head;
 }
 
-void head_drop(Head *head) {
+void result_summary_unref(ResultSummary *head) {
     if (head != NULL && atomic_fetch_sub(&head->holds, 1) == 1)
         free(head);
 }

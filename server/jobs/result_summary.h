@@ -8,15 +8,15 @@
 
 #include "server/db/db.h"
 
-typedef struct Head {
+typedef struct ResultSummary {
     atomic_size_t holds;
     const char *plan, *summary, *work, *notes; // NULL: unknown
     size_t bytes;
-} Head;
+} ResultSummary;
 
 // Copies them out of `row`. One hold; NULL without memory.
-Head *head_new(const ResultRow *row);
-Head *head_hold(Head *head); // NULL is fine here and below
-void head_drop(Head *head);
+ResultSummary *result_summary_new(const ResultRow *row);
+ResultSummary *result_summary_ref(ResultSummary *head); // NULL is fine here and below
+void result_summary_unref(ResultSummary *head);
 
 #endif

@@ -13,26 +13,26 @@ enum { KEEPING_BYTES = 64 << 20 }; // on the way to the database; more are not k
 
 // A series on its way, of so many bytes.
 typedef struct Keeping {
-    Intake *intake;
+    JobManager *intake;
     size_t size;
 } Keeping;
 
 static void kept(void *context, Status status, const char *detail) {
     Keeping *keeping = context;
-    Intake *intake = keeping->intake;
+    JobManager *intake = keeping->intake;
     (void)status; // it is computed again then
     (void)detail;
     pthread_mutex_lock(&intake->lock);
     intake->keeping_bytes -= keeping->size;
-    intake_settle(intake);
+    jobs_settle(intake);
     pthread_mutex_unlock(&intake->lock);
     free(keeping);
 }
 
-void intake_keep_series(Intake *intake, const char *result, const Outcome *outcome,
-                        double seconds) {
+void jobs_keep_series(JobManager *intake, const char *result, const Outcome *outcome,
+                      double seconds) {
     const size_t size = outcome_bytes(outcome);
-    if (outcome->response.series.count == 0 || size > intake->settings.store_bytes ||
+    if (outcome->response.series.count == 0 || size > intake->settings.db_bytes ||
         seconds <= read_once + (double)size / read_rate)
         return;
     Keeping *keeping = malloc(sizeof *keeping);
@@ -50,22 +50,22 @@ void intake_keep_series(Intake *intake, const char *result, const Outcome *outco
         return;
     }
     *keeping = (Keeping){intake, size};
-    numbers_write(&bytes, outcome);
-    const StoreDone done = {kept, keeping};
+    outcome_blob_write(&bytes, outcome);
+    const WriteDone done = {kept, keeping};
     size_t count = 0;
     char *body = bytes_take(&bytes, &count);
-    if (body == NULL || store_series_post(intake->store, result, body, count,
-                                          intake->settings.store_bytes, &done) != STATUS_OK)
+    if (body == NULL || db_series_post(intake->store, result, body, count,
+                                       intake->settings.db_bytes, &done) != STATUS_OK)
         kept(keeping, STATUS_NO_MEMORY, "");
 }
 
 // From the database, and then in memory; NULL where it is not there.
-static Outcome *load_series(Intake *intake, const char *result) {
+static Outcome *load_series(JobManager *intake, const char *result) {
     char *body = NULL;
     size_t size = 0;
     Outcome *outcome = NULL;
-    if (store_series_load(intake->store, result, &body, &size, NULL) == STATUS_OK)
-        outcome = numbers_read(body, size);
+    if (db_series_load(intake->store, result, &body, &size, NULL) == STATUS_OK)
+        outcome = outcome_blob_read(body, size);
     free(body);
     pthread_mutex_lock(&intake->lock);
     intake->stored.hits += outcome != NULL;
@@ -77,7 +77,7 @@ static Outcome *load_series(Intake *intake, const char *result) {
 }
 
 // With the lock held: a failure of an earlier computation for readers is told once.
-static Status tell_failure(Intake *intake, const char *result, Problem *problem) {
+static Status tell_failure(JobManager *intake, const char *result, Problem *problem) {
     for (size_t i = 0; i < OUTCOME_FAILURES; i++) {
         Failure *failure = &intake->failures[i];
         if (failure->status != STATUS_OK && strcmp(failure->result, result) == 0) {
@@ -89,13 +89,13 @@ static Status tell_failure(Intake *intake, const char *result, Problem *problem)
     return STATUS_OK;
 }
 
-static Status compute_again(Intake *intake, const char *result, const Waker *waker,
+static Status compute_again(JobManager *intake, const char *result, const Callback *waker,
                             Problem *problem) {
     ResultRow row = {0};
     StudyRequest inquiry = {0};
     Warnings warnings = {NULL, 0};
-    Computation *computation = NULL;
-    Status status = store_result_scene(intake->store, result, &row, problem);
+    Task *computation = NULL;
+    Status status = db_result_scene(intake->store, result, &row, problem);
     if (status == STATUS_OK && strcmp(row.engine, engine_version) != 0)
         status = problem_set(problem, STATUS_GONE,
                              "the series was made by %s, this is %s: to have it again, POST to "
@@ -103,48 +103,50 @@ static Status compute_again(Intake *intake, const char *result, const Waker *wak
                              row.engine, engine_version, result);
     // The scene was judged when it came; today's limits are no reason to refuse it now.
     if (status == STATUS_OK)
-        status = intake_prepare(intake->store, row.scene, strlen(row.scene), NULL, &inquiry,
-                                &warnings, problem);
+        status = jobs_prepare(intake->store, row.scene, strlen(row.scene), NULL, &inquiry,
+                              &warnings, problem);
     char id[72] = "";
     if (status == STATUS_OK)
-        intake_result_id(&inquiry, id);
+        jobs_result_id(&inquiry, id);
     if (status == STATUS_OK && strcmp(id, result) != 0)
         status = problem_set(problem, STATUS_INTERNAL,
                              "the stored scene no longer stands for this result");
-    if (status == STATUS_OK && (computation = computation_new(result)) == NULL)
+    if (status == STATUS_OK && (computation = task_new(result)) == NULL)
         status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the series");
     if (status == STATUS_OK) {
         computation->inquiry = inquiry;
         inquiry = (StudyRequest){0};
         computation->is_again = true;
         pthread_mutex_lock(&intake->lock);
-        Computation *other = index_find(intake->in_flight, result);
-        const bool is_asked = wakers_add(&(other != NULL ? other : computation)->askers, waker);
+        Task *other = hashmap_find(intake->in_flight, result);
+        const bool is_asked =
+            subscribers_add(&(other != NULL ? other : computation)->askers, waker);
         if (other == NULL && is_asked && !intake->is_closing) {
-            intake_enqueue(intake, computation, NULL);
+            jobs_enqueue(intake, computation, NULL);
             computation = NULL;
         }
         if (!is_asked || intake->is_closing)
             status = problem_set(problem, STATUS_BUSY, "the series cannot be computed now");
         pthread_mutex_unlock(&intake->lock);
     }
-    computation_free(computation);
+    task_free(computation);
     study_request_clear(&inquiry);
     warnings_clear(&warnings);
     result_row_clear(&row);
     return status;
 }
 
-Status intake_outcome(Intake *intake, const char *result, const Waker *waker, Outcome **outcome,
-                      Problem *problem) {
+Status jobs_outcome(JobManager *intake, const char *result, const Callback *waker,
+                    Outcome **outcome, Problem *problem) {
     pthread_mutex_lock(&intake->lock);
     Status status = STATUS_OK;
     *outcome = cache_find(intake->cache, result);
-    Computation *computation = NULL;
+    Task *computation = NULL;
     if (*outcome == NULL) {
         status = tell_failure(intake, result, problem);
-        computation = index_find(intake->in_flight, result);
-        if (status == STATUS_OK && computation != NULL && !wakers_add(&computation->askers, waker))
+        computation = hashmap_find(intake->in_flight, result);
+        if (status == STATUS_OK && computation != NULL &&
+            !subscribers_add(&computation->askers, waker))
             status = problem_set(problem, STATUS_NO_MEMORY, "no memory for a reader");
     }
     pthread_mutex_unlock(&intake->lock);

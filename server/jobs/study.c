@@ -20,12 +20,12 @@
 // Each that is under way holds its scene's outcome and what it folds.
 enum { STUDIES_BYTES = 512 << 20, STUDIES_PER_WORKER = 2 };
 
-bool study_is_shared(const Computation *computation) {
+bool study_is_shared(const Task *computation) {
     const Variant *study = computation->inquiry.study;
     return study != NULL && !computation->is_again && study_has_members(study);
 }
 
-void study_foretell(Computation *computation, const SimulationLimits *limits) {
+void study_estimate(Task *computation, const SimulationLimits *limits) {
     const StudyRequest *inquiry = &computation->inquiry;
     const Cost own = simulation_cost(&inquiry->simulation);
     Cost whole = own;
@@ -36,7 +36,7 @@ void study_foretell(Computation *computation, const SimulationLimits *limits) {
     computation->queued.charge = study_is_shared(computation) ? own.cpu_seconds : 0;
 }
 
-void shift_free(StudyRun *run, Shift *shift) {
+void chunk_run_free(StudyRun *run, ChunkRun *shift) {
     if (shift == NULL)
         return;
     if (run->gather->drop != NULL)
@@ -48,32 +48,32 @@ void study_run_free(StudyRun *run) {
     if (run == NULL)
         return;
     while (run->first != NULL) {
-        Shift *shift = run->first;
+        ChunkRun *shift = run->first;
         run->first = shift->next;
-        shift_free(run, shift);
+        chunk_run_free(run, shift);
     }
     run->gather->free(run);
     study_free(run->work);
-    findings_clear(&run->findings);
+    run_result_clear(&run->findings);
     free(run);
 }
 
 // With the lock held: the next turn is in the queue if there is something to do.
 static void enqueue(StudyRun *run) {
-    Intake *intake = run->intake;
-    Computation *computation = run->computation;
+    JobManager *intake = run->intake;
+    Task *computation = run->computation;
     QueueEntry *entry = &computation->queued;
     if (entry->number != 0 || run->first == NULL || run->is_paused)
         return;
     entry->is_turn = true;
     entry->seconds = fmax(run->turn, 1e-3 * STUDY_TURN_MS);
     entry->charge = 0;
-    Client *client = computation->jobs != NULL ? computation->jobs->client : entry->client;
+    QueueClient *client = computation->jobs != NULL ? computation->jobs->client : entry->client;
     queue_put(intake->queue, entry, client, 1e-9 * (double)clock_monotonic_ns());
-    intake_call_worker(intake);
+    jobs_call_worker(intake);
 }
 
-void study_wait(StudyRun *run, Shift *shift, bool is_first) {
+void study_wait(StudyRun *run, ChunkRun *shift, bool is_first) {
     if (is_first || run->first == NULL) {
         shift->next = run->first;
         run->first = shift;
@@ -91,7 +91,7 @@ static Status no_memory(Problem *problem) {
     return problem_set(problem, STATUS_NO_MEMORY, "no memory for the study");
 }
 
-static Status open_run(Worker *worker, StudyRun *run, Findings *findings, const Progress *watch,
+static Status open_run(Worker *worker, StudyRun *run, RunResult *findings, const Progress *watch,
                        Problem *problem) {
     const StudyRequest *inquiry = &run->computation->inquiry;
     const StudyTools tools = {.limits = &worker->intake->settings.limits,
@@ -103,9 +103,9 @@ static Status open_run(Worker *worker, StudyRun *run, Findings *findings, const 
     return run->gather->open(worker, run, problem);
 }
 
-Status study_open(Worker *worker, Computation *computation, Findings *findings,
-                  const Progress *watch, Problem *problem) {
-    Intake *intake = worker->intake;
+Status study_open(Worker *worker, Task *computation, RunResult *findings, const Progress *watch,
+                  Problem *problem) {
+    JobManager *intake = worker->intake;
     StudyRun *run = calloc(1, sizeof *run);
     if (run == NULL)
         return no_memory(problem);
@@ -132,27 +132,27 @@ static void fail(StudyRun *run, Status status, const Problem *problem) {
         return;
     run->is_failed = true;
     atomic_store(&run->is_over, true);
-    findings_fail(&run->findings, status, problem);
+    run_result_fail(&run->findings, status, problem);
 }
 
-bool study_must_wait(const Intake *intake, const Computation *computation) {
+bool study_must_wait(const JobManager *intake, const Task *computation) {
     return study_is_shared(computation) &&
            intake->study_count >= STUDIES_PER_WORKER * intake->settings.workers &&
            intake->study_bytes >= STUDIES_BYTES;
 }
 
 // With the lock held.
-static void resume_stalled(Intake *intake) {
+static void resume_stalled(JobManager *intake) {
     while (intake->stalled != NULL) {
-        Computation *computation = intake->stalled;
+        Task *computation = intake->stalled;
         intake->stalled = computation->next_stalled;
-        queue_urge(intake->queue, &computation->queued);
-        intake_call_worker(intake);
+        queue_push_front(intake->queue, &computation->queued);
+        jobs_call_worker(intake);
     }
 }
 
 static bool is_over(StudyRun *run) {
-    return !study_goes_on(run, 0);
+    return !study_continues(run, 0);
 }
 
 // With the lock held, by whoever had something of it in hand: whether it is to be ended now, by
@@ -162,7 +162,7 @@ static bool let_go(StudyRun *run) {
         run->in_hand--;
         return false;
     }
-    Intake *intake = run->intake;
+    JobManager *intake = run->intake;
     queue_remove(intake->queue, &run->computation->queued);
     intake->study_count--;
     intake->study_bytes -= run->bytes;
@@ -175,11 +175,11 @@ static bool let_go(StudyRun *run) {
     return true;
 }
 
-void study_launch(Worker *worker, Computation *computation, Findings *findings, Problem *problem) {
-    Intake *intake = worker->intake;
+void study_start(Worker *worker, Task *computation, RunResult *findings, Problem *problem) {
+    JobManager *intake = worker->intake;
     StudyRun *run = computation->study;
     run->findings = *findings;
-    *findings = (Findings){0};
+    *findings = (RunResult){0};
     pthread_mutex_lock(&intake->lock);
     run->next = intake->studies;
     intake->studies = run;
@@ -198,14 +198,14 @@ void study_launch(Worker *worker, Computation *computation, Findings *findings, 
         study_finish(worker, run, problem);
 }
 
-Shift *study_take(StudyRun *run, bool *is_ended) {
+ChunkRun *study_take(StudyRun *run, bool *is_ended) {
     run->in_hand++;
     *is_ended = false;
     if (is_over(run)) {
         *is_ended = let_go(run);
         return NULL;
     }
-    Shift *shift = run->first; // there is one: else it would have no turn
+    ChunkRun *shift = run->first; // there is one: else it would have no turn
     run->first = shift->next;
     if (run->first == NULL)
         run->last = NULL;
@@ -218,11 +218,11 @@ void study_stop(StudyRun *run) {
     if (run->in_hand > 0)
         return; // they will see
     queue_remove(run->intake->queue, &run->computation->queued);
-    queue_urge(run->intake->queue, &run->computation->queued);
-    intake_call_worker(run->intake);
+    queue_push_front(run->intake->queue, &run->computation->queued);
+    jobs_call_worker(run->intake);
 }
 
-void studies_resume(Intake *intake) {
+void studies_resume(JobManager *intake) {
     resume_stalled(intake);
     for (StudyRun *run = intake->studies; run != NULL; run = run->next)
         if (run->is_paused) {
@@ -236,22 +236,22 @@ static void pause(StudyRun *run, const Problem *problem) {
     if (!run->is_told) {
         Bytes line = {.most = 1024};
         bytes_format(&line, "the sweep %s pauses: %s", run->computation->result, problem->detail);
-        journal_write(&line);
+        log_write(&line);
         bytes_clear(&line);
     }
     run->is_told = run->is_paused = true;
     queue_remove(run->intake->queue, &run->computation->queued);
 }
 
-void study_work(Worker *worker, StudyRun *run, Shift *shift, Problem *problem) {
-    Intake *intake = worker->intake;
+void study_work(Worker *worker, StudyRun *run, ChunkRun *shift, Problem *problem) {
+    JobManager *intake = worker->intake;
     const size_t done = shift->done;
     const int64_t began_ns = clock_monotonic_ns(), began_cpu_ns = clock_thread_cpu_ns();
     problem_clear(problem);
     Status status = shift->is_made ? STATUS_OK : study_chunk_make(worker, run, shift, problem);
     const double seconds = 1e-9 * (double)(clock_monotonic_ns() - began_ns);
     const bool is_parked = status == STATUS_BUSY;
-    totals_study_part(&intake->totals, clock_thread_cpu_ns() - began_cpu_ns);
+    job_metrics_study_part(&intake->totals, clock_thread_cpu_ns() - began_cpu_ns);
     if (status == STATUS_OK && run->gather->end != NULL)
         status = run->gather->end(run, shift, problem);
     pthread_mutex_lock(&intake->lock);
@@ -262,7 +262,7 @@ void study_work(Worker *worker, StudyRun *run, Shift *shift, Problem *problem) {
         run->turn = seconds / (double)(shift->done - done);
     if (status == STATUS_OK) {
         run->is_told = false;
-    } else if (is_parked || (run->gather->is_kept && status_is_passing(status))) {
+    } else if (is_parked || (run->gather->is_kept && status_is_transient(status))) {
         if (!is_parked)
             pause(run, problem);
         study_wait(run, shift, true);
@@ -271,7 +271,7 @@ void study_work(Worker *worker, StudyRun *run, Shift *shift, Problem *problem) {
         fail(run, status, problem);
     }
     // Before the run is let go: another may be the last one then, and free it.
-    shift_free(run, shift);
+    chunk_run_free(run, shift);
     const bool is_ended = let_go(run);
     pthread_mutex_unlock(&intake->lock);
     if (is_ended)
@@ -280,34 +280,34 @@ void study_work(Worker *worker, StudyRun *run, Shift *shift, Problem *problem) {
 
 // What remains to be told, and the study's document.
 static Status tell_end(Worker *worker, StudyRun *run, Problem *problem) {
-    const Progress watch = {run->computation, computation_is_wanted};
+    const Progress watch = {run->computation, task_is_wanted};
     const StudyTools tools = {.limits = &worker->intake->settings.limits,
                               .progress = &watch,
                               .workspace = &worker->workspace};
     problem_clear(problem);
     if (run->gather->finish != NULL)
         TRY(run->gather->finish(run, &tools, problem));
-    return findings_tell_study(&run->findings, problem);
+    return run_result_add_to_study(&run->findings, problem);
 }
 
 void study_finish(Worker *worker, StudyRun *run, Problem *problem) {
-    Intake *intake = worker->intake;
-    Computation *computation = run->computation;
+    JobManager *intake = worker->intake;
+    Task *computation = run->computation;
     run->executor->cancel(run);
     if (!run->is_failed && !atomic_load(&computation->is_stopped)) {
         const int64_t began_ns = clock_thread_cpu_ns();
         const Status status = tell_end(worker, run, problem);
-        totals_study_part(&intake->totals, clock_thread_cpu_ns() - began_ns);
+        job_metrics_study_part(&intake->totals, clock_thread_cpu_ns() - began_ns);
         if (status != STATUS_OK)
-            findings_fail(&run->findings, status, problem);
+            run_result_fail(&run->findings, status, problem);
     }
     run->findings.ended_ns = clock_monotonic_ns();
     if (atomic_load(&computation->is_stopped)) {
-        computation_abandon(intake, computation); // and the run
+        task_abandon(intake, computation); // and the run
     } else {
-        Findings findings = run->findings;
-        run->findings = (Findings){0};
-        computation_finish(intake, computation, &findings);
-        findings_clear(&findings);
+        RunResult findings = run->findings;
+        run->findings = (RunResult){0};
+        task_finish(intake, computation, &findings);
+        run_result_clear(&findings);
     }
 }

@@ -14,7 +14,7 @@ typedef struct Making {
     uint_fast64_t told; // millionths of it
 } Making;
 
-bool study_goes_on(void *context, double fraction) {
+bool study_continues(void *context, double fraction) {
     (void)fraction;
     StudyRun *run = context;
     return !atomic_load(&run->is_over) && !atomic_load(&run->computation->is_stopped);
@@ -43,10 +43,10 @@ static bool advance(void *context, double fraction) {
         atomic_fetch_add(&making->run->millionths, done - making->told);
         making->told = done;
     }
-    return study_goes_on(making->run, fraction);
+    return study_continues(making->run, fraction);
 }
 
-static Status make_member(Worker *worker, StudyRun *run, Shift *shift, Problem *problem) {
+static Status make_member(Worker *worker, StudyRun *run, ChunkRun *shift, Problem *problem) {
     const Chunk *chunk = &shift->chunk;
     Making making = {run, 0};
     const Progress watch = {&making, advance};
@@ -66,7 +66,7 @@ static Status make_member(Worker *worker, StudyRun *run, Shift *shift, Problem *
     return run->gather->take(run, shift, part, problem);
 }
 
-static bool others_wait(Intake *intake, const StudyRun *run) {
+static bool others_wait(JobManager *intake, const StudyRun *run) {
     pthread_mutex_lock(&intake->lock);
     const size_t own = run->computation->queued.number != 0;
     const bool is_wanted = queue_count(intake->queue) > own || intake->is_closing;
@@ -74,7 +74,7 @@ static bool others_wait(Intake *intake, const StudyRun *run) {
     return is_wanted;
 }
 
-Status study_chunk_make(Worker *worker, StudyRun *run, Shift *shift, Problem *problem) {
+Status study_chunk_make(Worker *worker, StudyRun *run, ChunkRun *shift, Problem *problem) {
     const int64_t turn_ns = (int64_t)STUDY_TURN_MS * 1000000;
     const int64_t began_ns = clock_monotonic_ns();
     int64_t looked_ns = began_ns;
@@ -92,7 +92,7 @@ Status study_chunk_make(Worker *worker, StudyRun *run, Shift *shift, Problem *pr
                 break;
             }
         }
-        if (!study_goes_on(run, 0))
+        if (!study_continues(run, 0))
             status = STATUS_CANCELLED;
         else
             status = make_member(worker, run, shift, problem);

@@ -6,7 +6,7 @@
 #include "server/jobs/study_sink.h"
 
 typedef struct Fold {
-    Order order;
+    ReorderBuffer order;
     ExecutorLimits limits;
     double seconds; // of CPU a member, as foretold
 } Fold;
@@ -23,7 +23,7 @@ static Status fold_open(Worker *worker, StudyRun *run, Problem *problem) {
         return no_memory(problem);
     run->fold = fold;
     const Status status = run->executor->probe(worker->intake, &fold->limits, problem);
-    TRY(order_make(run->work, fold->limits.slots, &fold->order, problem));
+    TRY(reorder_make(run->work, fold->limits.slots, &fold->order, problem));
     TRY(status);
     TRY(study_request_cost(inquiry, &worker->intake->settings.limits, &cost, problem));
     fold->seconds = cost.cpu_seconds / (double)(run->work->members + 1);
@@ -45,15 +45,15 @@ static Status submit_stretch(StudyRun *run, size_t from, size_t to, Problem *pro
 
 static Status fold_submit(StudyRun *run, Problem *problem) {
     size_t from, to;
-    if (!order_begin(&run->fold->order, SIZE_MAX, &from, &to))
+    if (!reorder_begin(&run->fold->order, SIZE_MAX, &from, &to))
         atomic_store(&run->is_over, true);
-    atomic_store(&run->expected, order_expected(&run->fold->order));
+    atomic_store(&run->expected, reorder_expected(&run->fold->order));
     return to > from ? submit_stretch(run, from, to, problem) : STATUS_OK;
 }
 
-static Status fold_take(StudyRun *run, Shift *shift, StudyPart *part, Problem *problem) {
-    TRY(order_put(&run->fold->order, shift->chunk.first + shift->done * shift->chunk.stride, part,
-                  problem));
+static Status fold_take(StudyRun *run, ChunkRun *shift, StudyPart *part, Problem *problem) {
+    TRY(reorder_put(&run->fold->order, shift->chunk.first + shift->done * shift->chunk.stride, part,
+                    problem));
     return fold_submit(run, problem);
 }
 
@@ -64,11 +64,11 @@ static Status fold_finish(StudyRun *run, const StudyTools *tools, Problem *probl
 static void fold_free(StudyRun *run) {
     if (run->fold == NULL)
         return;
-    order_clear(&run->fold->order);
+    reorder_clear(&run->fold->order);
     free(run->fold);
 }
 
-const Gather gather_fold = {
+const StudySink gather_fold = {
     .open = fold_open,
     .submit = fold_submit,
     .take = fold_take,

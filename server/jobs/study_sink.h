@@ -7,26 +7,26 @@
 
 #include "server/jobs/study.h"
 
-typedef struct Gather {
+typedef struct StudySink {
     bool is_kept; // what it has outlives the daemon, and waits where the store has no room
     // Makes ready, before the study is launched.
     Status (*open)(Worker *worker, StudyRun *run, Problem *problem);
     // Hands chunks to the executor: those that are not there and that nobody is at.
     Status (*submit)(StudyRun *run, Problem *problem);
     // Takes the part that the shift's next member came to, in any case.
-    Status (*take)(StudyRun *run, Shift *shift, StudyPart *part, Problem *problem);
+    Status (*take)(StudyRun *run, ChunkRun *shift, StudyPart *part, Problem *problem);
     void (*free)(StudyRun *run);
     // What follows is NULL where there is nothing to be done. Before the first member of a chunk:
-    Status (*begin)(StudyRun *run, Shift *shift, Problem *problem);
+    Status (*begin)(StudyRun *run, ChunkRun *shift, Problem *problem);
     // Whether the shift's next member is there already.
-    bool (*has)(const StudyRun *run, const Shift *shift);
+    bool (*has)(const StudyRun *run, const ChunkRun *shift);
     // After the last member of a chunk, again where there was no room.
-    Status (*end)(StudyRun *run, Shift *shift, Problem *problem);
+    Status (*end)(StudyRun *run, ChunkRun *shift, Problem *problem);
     // When all that was wanted is there: what remains to be told.
     Status (*finish)(StudyRun *run, const StudyTools *tools, Problem *problem);
-    void (*drop)(Shift *shift); // what it holds of a chunk
-} Gather;
+    void (*drop)(ChunkRun *shift); // what it holds of a chunk
+} StudySink;
 
-extern const Gather gather_rows, gather_fold;
+extern const StudySink gather_rows, gather_fold;
 
 #endif

@@ -19,13 +19,13 @@
 
 // With the lock held: one of this scene that is under way, to be shared. One for readers alone
 // saves nothing.
-static Computation *find_shared(const Intake *intake, const char *result) {
-    Computation *computation = index_find(intake->in_flight, result);
+static Task *find_shared(const JobManager *intake, const char *result) {
+    Task *computation = hashmap_find(intake->in_flight, result);
     return computation != NULL && computation->is_again ? NULL : computation;
 }
 
 // Plan, summary, work and notes of a result that is there already. STATUS_NOT_FOUND if it is not.
-static Status find_known(Intake *intake, Job *job, Problem *problem) {
+static Status find_known(JobManager *intake, Job *job, Problem *problem) {
     pthread_mutex_lock(&intake->lock);
     job->head = cache_head(intake->cache, job->row.result);
     // What is in flight is not there either.
@@ -36,9 +36,9 @@ static Status find_known(Intake *intake, Job *job, Problem *problem) {
     if (is_new)
         return STATUS_NOT_FOUND;
     ResultRow row = {0};
-    const Status status = store_result_head(intake->store, job->row.result, &row, NULL);
+    const Status status = db_result_head(intake->store, job->row.result, &row, NULL);
     if (status == STATUS_OK)
-        job->head = head_new(&row);
+        job->head = result_summary_new(&row);
     result_row_clear(&row);
     pthread_mutex_lock(&intake->lock);
     intake->rows.hits += status == STATUS_OK;
@@ -54,7 +54,7 @@ static Status find_known(Intake *intake, Job *job, Problem *problem) {
 // The store has answered that it was accepted.
 static void opened(void *context, Status status, const char *detail) {
     Job *job = context;
-    Intake *intake = job->intake;
+    JobManager *intake = job->intake;
     pthread_mutex_lock(&intake->lock);
     job->ticket = NULL;
     // What closes it saves the whole, and tells.
@@ -63,30 +63,30 @@ static void opened(void *context, Status status, const char *detail) {
         job->row.scene = NULL;
     }
     if (!job->is_closing && status != STATUS_OK)
-        intake_refuse(job, status, detail);
+        jobs_refuse(job, status, detail);
     if (status == STATUS_OK && (!job->is_closing || !job_state_is_final(job->row.state))) {
         job->is_kept = true;
-        wakers_call(&job->keepers);
+        subscribers_call(&job->keepers);
     }
-    intake_settle(intake);
+    jobs_settle(intake);
     pthread_mutex_unlock(&intake->lock);
-    job_drop(job); // the post's hold
+    job_unref(job); // the post's hold
 }
 
 // With the lock held.
-static Status post(Intake *intake, Job *job, StoreTurn turn, Problem *problem) {
-    const StoreDone done = {opened, job_hold(job)};
+static Status post(JobManager *intake, Job *job, WritePriority turn, Problem *problem) {
+    const WriteDone done = {opened, job_ref(job)};
     job->opening = job->row;
-    const Status status = store_job_post(intake->store, &job->opening, turn, &done, &job->ticket);
+    const Status status = db_job_post(intake->store, &job->opening, turn, &done, &job->ticket);
     if (status == STATUS_OK) {
         intake->posted++;
         return STATUS_OK;
     }
-    job_drop(job); // the post's hold
+    job_unref(job); // the post's hold
     return problem_set(problem, status, "no memory for a job");
 }
 
-static Status finish_known(Intake *intake, Job *job, Problem *problem) {
+static Status finish_known(JobManager *intake, Job *job, Problem *problem) {
     JobRow *row = &job->row;
     row->state = JOB_SUCCESSFUL;
     row->is_cached = true;
@@ -96,12 +96,12 @@ static Status finish_known(Intake *intake, Job *job, Problem *problem) {
     const Status status = post(intake, job, STORE_NOW, problem);
     pthread_mutex_unlock(&intake->lock);
     if (status == STATUS_OK)
-        totals_ended(&intake->totals, JOB_SUCCESSFUL, true);
+        job_metrics_ended(&intake->totals, JOB_SUCCESSFUL, true);
     return status;
 }
 
 // With the lock held: whether there is room in the queue.
-static Status find_room(const Intake *intake, const Job *job, Problem *problem) {
+static Status find_room(const JobManager *intake, const Job *job, Problem *problem) {
     if (intake->is_closing)
         return problem_set(problem, STATUS_BUSY, "the daemon is stopping");
     if (intake->live >= intake->settings.queue_most)
@@ -112,12 +112,12 @@ static Status find_room(const Intake *intake, const Job *job, Problem *problem) 
         return problem_set(problem, STATUS_BUSY,
                            "the queue is full: %zu bytes of scenes wait, %zu are allowed",
                            intake->scene_bytes, intake->settings.queue_bytes);
-    return quota_admit(intake, job->client, problem);
+    return limits_check(intake, job->client, problem);
 }
 
 // A computation of this scene, without jobs. Takes the inquiry. NULL without memory.
-static Computation *begin(const JobRow *row, StudyRequest *inquiry) {
-    Computation *computation = computation_new(row->result);
+static Task *begin(const JobRow *row, StudyRequest *inquiry) {
+    Task *computation = task_new(row->result);
     if (computation != NULL) {
         computation->scene = strdup(row->scene);
         computation->warnings = strdup(row->warnings);
@@ -126,43 +126,43 @@ static Computation *begin(const JobRow *row, StudyRequest *inquiry) {
         if (computation->scene != NULL && computation->warnings != NULL)
             return computation;
     }
-    computation_free(computation);
+    task_free(computation);
     study_request_clear(inquiry);
     return NULL;
 }
 
 // Queues it, or lets it share what is under way. Takes the inquiry.
-static Status start(Intake *intake, Job *job, StudyRequest *inquiry, bool is_retry,
+static Status start(JobManager *intake, Job *job, StudyRequest *inquiry, bool is_retry,
                     Problem *problem) {
-    Computation *computation = begin(&job->row, inquiry);
+    Task *computation = begin(&job->row, inquiry);
     if (computation == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
     pthread_mutex_lock(&intake->lock);
-    Computation *other = find_shared(intake, job->row.result);
+    Task *other = find_shared(intake, job->row.result);
     // It mostly has run before anyone must be told that it was accepted, and is then written once.
     // But a sweep's rows need their job beside them.
-    const StoreTurn turn = job->row.study == NULL ? STORE_LATER : STORE_NOW;
+    const WritePriority turn = job->row.study == NULL ? STORE_LATER : STORE_NOW;
     // It may have become known meanwhile.
     if (other == NULL && !is_retry &&
         (job->head = cache_head(intake->cache, job->row.result)) != NULL) {
         pthread_mutex_unlock(&intake->lock);
-        computation_free(computation);
+        task_free(computation);
         return finish_known(intake, job, problem);
     }
     Status status = find_room(intake, job, problem);
     if (status == STATUS_OK)
         status = post(intake, job, turn, problem);
     if (status == STATUS_OK) {
-        intake_admit(intake, job);
+        jobs_admit(intake, job);
         if (other == NULL)
-            intake_enqueue(intake, computation, job->client);
+            jobs_enqueue(intake, computation, job->client);
         else
-            queue_share(intake->queue, &other->queued, job->client);
-        intake_attach(job, other != NULL ? other : computation);
+            queue_rebalance(intake->queue, &other->queued, job->client);
+        jobs_attach(job, other != NULL ? other : computation);
     }
     pthread_mutex_unlock(&intake->lock);
     if (status != STATUS_OK || other != NULL)
-        computation_free(computation);
+        task_free(computation);
     return status;
 }
 
@@ -205,7 +205,7 @@ static Status fill_notes(JobRow *row, const StudyRequest *inquiry, Problem *prob
     return is_whole ? STATUS_OK : STATUS_NO_MEMORY;
 }
 
-static Status fill_sender(Job *job, const Submission *submission, const KeyHold *hold) {
+static Status fill_sender(Job *job, const Submission *submission, const IdempotencyHold *hold) {
     JobRow *row = &job->row;
     const bool has_key = hold->key[0] != '\0';
     row->client = submission->client == NULL ? NULL : strdup(submission->client);
@@ -225,12 +225,12 @@ static Status fill_job(Job *job, const StudyRequest *inquiry, const Warnings *wa
         return problem_set(problem, STATUS_INTERNAL, "no random numbers for a job's id");
     job->indexed.key = row->id;
     row->created_unix_ms = clock_unix_ms();
-    intake_result_id(inquiry, row->result);
+    jobs_result_id(inquiry, row->result);
     document_scene(&scene, inquiry);
     document_warnings(&told, warnings);
     row->scene = bytes_take(&scene, NULL);
     row->warnings = bytes_take(&told, NULL);
-    prepare_record_uses(inquiry, &uses);
+    resolve_record_uses(inquiry, &uses);
     const bool has_uses = uses.count > 0;
     row->uses = bytes_take(&uses, NULL);
     if (row->uses != NULL && !has_uses) {
@@ -246,13 +246,13 @@ static Status fill_job(Job *job, const StudyRequest *inquiry, const Warnings *wa
 
 static void fail_row(JobRow *row, const Problem *problem) {
     Bytes bytes = {.most = 1 << 20};
-    write_problem(&bytes, problem, write_problem_code(problem->status), NULL);
+    encode_problem(&bytes, problem, encode_problem_code(problem->status), NULL);
     row->state = JOB_FAILED;
     row->problem = bytes_take(&bytes, NULL);
     row->finished_unix_ms = clock_unix_ms();
 }
 
-static Status submit(Intake *intake, Job *job, StudyRequest *inquiry, bool is_retry,
+static Status submit(JobManager *intake, Job *job, StudyRequest *inquiry, bool is_retry,
                      Problem *problem) {
     const Status known = is_retry ? STATUS_NOT_FOUND : find_known(intake, job, problem);
     if (known == STATUS_OK)
@@ -263,40 +263,41 @@ static Status submit(Intake *intake, Job *job, StudyRequest *inquiry, bool is_re
 }
 
 // Who asks, if it may.
-static Status enter_client(Intake *intake, const char *name, Client **client, Problem *problem) {
+static Status enter_client(JobManager *intake, const char *name, QueueClient **client,
+                           Problem *problem) {
     Status status = STATUS_OK;
     pthread_mutex_lock(&intake->lock);
     *client = queue_client(intake->queue, name != NULL ? name : "");
     if (*client == NULL)
         status = problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
     else
-        status = quota_send(intake, *client, problem);
+        status = limits_add(intake, *client, problem);
     pthread_mutex_unlock(&intake->lock);
     return status;
 }
 
-Status intake_charge(Intake *intake, const char *client, Problem *problem) {
-    Client *charged;
+Status jobs_charge(JobManager *intake, const char *client, Problem *problem) {
+    QueueClient *charged;
     return enter_client(intake, client, &charged, problem);
 }
 
 // A record that it names may have been deleted since it was looked up under `generation`. From here
 // on none is before the store knows of the job.
-static Status submit_named(Intake *intake, Job *job, StudyRequest *inquiry, uint64_t generation,
+static Status submit_named(JobManager *intake, Job *job, StudyRequest *inquiry, uint64_t generation,
                            const Submission *submission, Problem *problem) {
     Status status = STATUS_OK;
     naming_enter(&intake->naming);
-    if (store_generation(intake->store) != generation)
-        status = prepare_records_again(intake->store, inquiry, problem);
+    if (db_catalog_version(intake->store) != generation)
+        status = resolve_records_again(intake->store, inquiry, problem);
     if (status == STATUS_OK)
         status = submit(intake, job, inquiry, submission->retry_of != NULL, problem);
     naming_leave(&intake->naming);
     return status;
 }
 
-static Status submit_new(Intake *intake, const Submission *submission, const KeyHold *hold,
-                         Job **accepted, Problem *problem) {
-    Client *client;
+static Status submit_new(JobManager *intake, const Submission *submission,
+                         const IdempotencyHold *hold, Job **accepted, Problem *problem) {
+    QueueClient *client;
     TRY(enter_client(intake, submission->client, &client, problem));
     Job *job = job_new(intake);
     if (job == NULL)
@@ -305,11 +306,11 @@ static Status submit_new(Intake *intake, const Submission *submission, const Key
     job->client = client;
     StudyRequest inquiry = {0};
     Warnings warnings = {NULL, 0};
-    const uint64_t generation = store_generation(intake->store);
+    const uint64_t generation = db_catalog_version(intake->store);
     bool has_place;
     Status status =
-        intake_prepare_request(intake, submission->text, submission->size, &intake->settings.limits,
-                               &has_place, &inquiry, &warnings, problem);
+        jobs_prepare_request(intake, submission->text, submission->size, &intake->settings.limits,
+                             &has_place, &inquiry, &warnings, problem);
     if (status == STATUS_OK)
         status = fill_job(job, &inquiry, &warnings, problem);
     if (status == STATUS_OK)
@@ -318,22 +319,22 @@ static Status submit_new(Intake *intake, const Submission *submission, const Key
         status = submit(intake, job, &inquiry, submission->retry_of != NULL, problem);
     else if (status == STATUS_OK)
         status = submit_named(intake, job, &inquiry, generation, submission, problem);
-    intake_leave_place(intake, has_place);
+    jobs_leave_place(intake, has_place);
     study_request_clear(&inquiry);
     warnings_clear(&warnings);
     if (status != STATUS_OK) {
-        job_drop(job);
+        job_unref(job);
         return status;
     }
     *accepted = job;
     return STATUS_OK;
 }
 
-static Status submit_retry(Intake *intake, const Submission *submission, const KeyHold *hold,
-                           Job **accepted, Problem *problem) {
+static Status submit_retry(JobManager *intake, const Submission *submission,
+                           const IdempotencyHold *hold, Job **accepted, Problem *problem) {
     SweepRow row;
     pthread_mutex_lock(&intake->retries);
-    Status status = retry_open(intake, submission->retry_of, &row, problem);
+    Status status = sweep_retry_open(intake, submission->retry_of, &row, problem);
     if (status == STATUS_OK) {
         Submission scene = *submission;
         scene.text = row.scene;
@@ -345,10 +346,10 @@ static Status submit_retry(Intake *intake, const Submission *submission, const K
     return status;
 }
 
-Status intake_submit(Intake *intake, const Submission *submission, Job **accepted,
-                     Problem *problem) {
-    KeyHold hold;
-    Status status = keyed_begin(intake, submission, &hold, accepted, problem);
+Status jobs_submit(JobManager *intake, const Submission *submission, Job **accepted,
+                   Problem *problem) {
+    IdempotencyHold hold;
+    Status status = idempotency_begin(intake, submission, &hold, accepted, problem);
     if (submission->is_replayed != NULL)
         *submission->is_replayed = *accepted != NULL;
     if (status == STATUS_OK && *accepted == NULL) {
@@ -356,24 +357,24 @@ Status intake_submit(Intake *intake, const Submission *submission, Job **accepte
                      ? submit_retry(intake, submission, &hold, accepted, problem)
                      : submit_new(intake, submission, &hold, accepted, problem);
         if (status == STATUS_OK)
-            keyed_remember(intake, &hold, *accepted);
+            idempotency_remember(intake, &hold, *accepted);
     }
-    keyed_end(intake, &hold);
+    idempotency_end(intake, &hold);
     return status;
 }
 
 // Takes the row and the inquiry.
-static Status resume(Intake *intake, JobRow *row, StudyRequest *inquiry, Problem *problem) {
+static Status resume(JobManager *intake, JobRow *row, StudyRequest *inquiry, Problem *problem) {
     Job *job = job_new(intake);
-    Client *client = queue_client(intake->queue, row->client != NULL ? row->client : "");
-    Computation *computation = NULL;
-    intake_result_id(inquiry, row->result);
+    QueueClient *client = queue_client(intake->queue, row->client != NULL ? row->client : "");
+    Task *computation = NULL;
+    jobs_result_id(inquiry, row->result);
     if (job != NULL && client != NULL && row->result[0] != '\0' &&
-        (computation = index_find(intake->in_flight, row->result)) == NULL &&
+        (computation = hashmap_find(intake->in_flight, row->result)) == NULL &&
         (computation = begin(row, inquiry)) != NULL)
-        intake_enqueue(intake, computation, client);
+        jobs_enqueue(intake, computation, client);
     if (computation == NULL) {
-        job_drop(job);
+        job_unref(job);
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the unfinished jobs");
     }
     // Its age counts as waiting.
@@ -385,28 +386,28 @@ static Status resume(Intake *intake, JobRow *row, StudyRequest *inquiry, Problem
     job->row.state = JOB_ACCEPTED;
     job->client = client;
     job->indexed.key = job->row.id;
-    intake_admit(intake, job);
-    intake_attach(job, computation);
+    jobs_admit(intake, job);
+    jobs_attach(job, computation);
     free(job->row.scene);
     job->row.scene = NULL;
-    job_drop(job);
+    job_unref(job);
     return STATUS_OK;
 }
 
-Status intake_take_up(Intake *intake, JobRow *row, Problem *problem) {
+Status jobs_take_up(JobManager *intake, JobRow *row, Problem *problem) {
     Problem *fault = calloc(1, sizeof *fault);
     StudyRequest inquiry = {0};
     Warnings warnings = {NULL, 0};
     if (fault == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the unfinished jobs");
-    Status status = intake_prepare(intake->store, row->scene, strlen(row->scene),
-                                   &intake->settings.limits, &inquiry, &warnings, fault);
+    Status status = jobs_prepare(intake->store, row->scene, strlen(row->scene),
+                                 &intake->settings.limits, &inquiry, &warnings, fault);
     if (status == STATUS_OK) {
         status = resume(intake, row, &inquiry, problem);
     } else if (status == STATUS_INVALID || status == STATUS_UNREADABLE) {
         // The limits or the program changed meanwhile: the job's owner learns why.
         fail_row(row, fault);
-        status = store_job_update(intake->store, row, problem);
+        status = db_job_update(intake->store, row, problem);
     } else {
         problem_set(problem, status, "%s", fault->detail);
     }

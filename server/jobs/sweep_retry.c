@@ -3,34 +3,34 @@
 
 #include <string.h>
 
-static Status judge(Intake *intake, const char *id, SweepRow *row, Problem *problem) {
+static Status judge(JobManager *intake, const char *id, SweepRow *row, Problem *problem) {
     Job *job = NULL;
     char result[72];
-    TRY(intake_find(intake, id, &job, problem));
+    TRY(jobs_find(intake, id, &job, problem));
     const bool is_finished = job_is_finished(job);
     memcpy(result, job->row.result, sizeof result); // never changes
-    job_drop(job);
+    job_unref(job);
     if (!is_finished)
         return problem_set(problem, STATUS_CONFLICT,
                            "the job %.40s is not finished: its failed points can be made again "
                            "when it is",
                            id);
-    TRY(store_sweep_load(intake->store, result, row, problem));
-    if (!store_result_exists(intake->store, result))
+    TRY(db_sweep_load(intake->store, result, row, problem));
+    if (!db_result_exists(intake->store, result))
         return problem_set(problem, STATUS_CONFLICT,
                            "the sweep was not brought to an end: submit its scene again");
     return STATUS_OK;
 }
 
 // Chunks of another engine's cannot be mended by this one.
-static Status judge_engine(Intake *intake, const SweepRow *row, Problem *problem) {
+static Status judge_engine(JobManager *intake, const SweepRow *row, Problem *problem) {
     StudyRequest inquiry = {0};
     Warnings warnings = {NULL, 0};
     char result[72] = "";
-    Status status = intake_prepare(intake->store, row->scene, strlen(row->scene), NULL, &inquiry,
-                                   &warnings, problem);
+    Status status = jobs_prepare(intake->store, row->scene, strlen(row->scene), NULL, &inquiry,
+                                 &warnings, problem);
     if (status == STATUS_OK)
-        intake_result_id(&inquiry, result);
+        jobs_result_id(&inquiry, result);
     if (status == STATUS_OK && strcmp(result, row->result) != 0)
         status = problem_set(problem, STATUS_GONE,
                              "the sweep was made by another engine version, this is %s: POST to "
@@ -42,15 +42,15 @@ static Status judge_engine(Intake *intake, const SweepRow *row, Problem *problem
 }
 
 // With the retries' lock held, so that nobody opens chunks of a sweep that is under way.
-static Status reopen(Intake *intake, const char *result, Problem *problem) {
+static Status reopen(JobManager *intake, const char *result, Problem *problem) {
     pthread_mutex_lock(&intake->lock);
-    const Computation *computation = index_find(intake->in_flight, result);
+    const Task *computation = hashmap_find(intake->in_flight, result);
     const bool is_under_way = computation != NULL && !computation->is_again;
     pthread_mutex_unlock(&intake->lock);
-    return is_under_way ? STATUS_OK : store_sweep_reopen(intake->store, result, problem);
+    return is_under_way ? STATUS_OK : db_sweep_reopen(intake->store, result, problem);
 }
 
-Status retry_open(Intake *intake, const char *id, SweepRow *row, Problem *problem) {
+Status sweep_retry_open(JobManager *intake, const char *id, SweepRow *row, Problem *problem) {
     memset(row, 0, sizeof *row);
     TRY(judge(intake, id, row, problem));
     TRY(judge_engine(intake, row, problem));

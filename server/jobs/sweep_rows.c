@@ -15,19 +15,19 @@ static Status no_memory(Problem *problem) {
     return problem_set(problem, STATUS_NO_MEMORY, "no memory for the sweep's table");
 }
 
-static Status read_scene(SweepShow *show, Problem *problem) {
+static Status read_scene(SweepView *show, Problem *problem) {
     Problem *fault = calloc(1, sizeof *fault);
     if (fault == NULL)
         return no_memory(problem);
-    const Status status = read_json(show->row.scene, strlen(show->row.scene), study_request_fields,
-                                    &show->inquiry, fault);
+    const Status status = json_parse(show->row.scene, strlen(show->row.scene), study_request_fields,
+                                     &show->inquiry, fault);
     // A fault here is ours, not the client's.
     if (status != STATUS_OK)
         problem_set(problem, STATUS_INTERNAL, "the stored scene cannot be read: %s", fault->detail);
     // Points' scenes take their records from here. Where one is gone they say so.
     if (status == STATUS_OK) {
-        (void)prepare_record(show->store, &show->inquiry.simulation, fault);
-        (void)prepare_sweep_records(show->store, &show->inquiry, fault);
+        (void)resolve_record_motion(show->store, &show->inquiry.simulation, fault);
+        (void)resolve_sweep_records(show->store, &show->inquiry, fault);
     }
     free(fault);
     if (status != STATUS_OK)
@@ -39,11 +39,11 @@ static Status read_scene(SweepShow *show, Problem *problem) {
                              "the scene asked for no sweep: submit it with a member study");
 }
 
-static const SweepStudy *study_of(const SweepShow *show) {
+static const SweepStudy *study_of(const SweepView *show) {
     return (const SweepStudy *)(const void *)show->inquiry.study;
 }
 
-static Status tell(SweepShow *show, Problem *problem) {
+static Status tell(SweepView *show, Problem *problem) {
     show->sweep = (Sweep *)(void *)variant_new(study_sweep.answer);
     if (show->sweep == NULL)
         return no_memory(problem);
@@ -73,7 +73,7 @@ static void take_failures(const SweepRow *row, const SweepChunkRow *chunk, Faile
 }
 
 // Chunk by chunk, those alone that have any.
-static Status find_failures(SweepShow *show, Problem *problem) {
+static Status find_failures(SweepView *show, Problem *problem) {
     Failed failed[SWEEP_STATUSES] = {{0}};
     SweepTable *table = &show->sweep->table;
     for (size_t i = 0; i < show->chunks.count; i++) {
@@ -81,7 +81,7 @@ static Status find_failures(SweepShow *show, Problem *problem) {
         SweepChunkRow chunk = {0};
         if (head->failed == 0)
             continue;
-        TRY(store_sweep_chunk(show->store, show->row.number, head->chunk, &chunk, problem));
+        TRY(db_sweep_chunk(show->store, show->row.number, head->chunk, &chunk, problem));
         take_failures(&show->row, &chunk, failed);
         sweep_chunk_row_clear(&chunk);
     }
@@ -103,29 +103,29 @@ static Status find_failures(SweepShow *show, Problem *problem) {
 }
 
 // A sweep that has not begun has no rows, but is one.
-static Status find(Store *store, const char *id, bool is_job, SweepRow *row, Problem *problem) {
+static Status find(Db *store, const char *id, bool is_job, SweepRow *row, Problem *problem) {
     JobRow job;
     if (!is_job)
-        return store_sweep_load(store, id, row, problem);
-    TRY(store_job_load(store, id, &job, problem));
+        return db_sweep_load(store, id, row, problem);
+    TRY(db_job_load(store, id, &job, problem));
     const bool has_scene = job.state != JOB_SUCCESSFUL; // that was its result's
-    const Status status = store_sweep_load(store, job.result, row, has_scene ? NULL : problem);
+    const Status status = db_sweep_load(store, job.result, row, has_scene ? NULL : problem);
     job_row_clear(&job);
     if (status == STATUS_NOT_FOUND && has_scene)
-        return store_sweep_asked(store, id, row, problem);
+        return db_sweep_asked(store, id, row, problem);
     return status == STATUS_OK || status == STATUS_NOT_FOUND
                ? status
                : problem_set(problem, status, "the sweeps cannot be searched");
 }
 
-Status sweep_show_load(Store *store, const char *id, bool is_job, bool has_rows, SweepShow *show,
+Status sweep_view_load(Db *store, const char *id, bool is_job, bool has_rows, SweepView *show,
                        Problem *problem) {
     memset(show, 0, sizeof *show);
     show->store = store;
     TRY(find(store, id, is_job, &show->row, problem));
     TRY(read_scene(show, problem));
     TRY(tell(show, problem));
-    TRY(store_sweep_chunks(store, show->row.number, &show->chunks, problem));
+    TRY(db_sweep_chunks(store, show->row.number, &show->chunks, problem));
     show->is_complete = show->row.chunks > 0 && show->chunks.count == show->row.chunks;
     for (size_t i = 0; i < show->chunks.count; i++) {
         show->is_complete = show->is_complete && !show->chunks.at[i].is_open;
@@ -134,18 +134,18 @@ Status sweep_show_load(Store *store, const char *id, bool is_job, bool has_rows,
     return has_rows ? find_failures(show, problem) : STATUS_OK;
 }
 
-void sweep_show_clear(SweepShow *show) {
+void sweep_view_clear(SweepView *show) {
     sweep_row_clear(&show->row);
     study_request_clear(&show->inquiry);
     variant_free((Variant *)(void *)show->sweep);
     sweep_chunk_rows_clear(&show->chunks);
     free(show->window);
-    *show = (SweepShow){.sweep = NULL};
+    *show = (SweepView){.sweep = NULL};
 }
 
 // Rows at these places of all chunks that are there: as many places as fit, the last perhaps not
 // there.
-static bool load_window(SweepShow *show, size_t place) {
+static bool load_window(SweepView *show, size_t place) {
     const size_t size = sweep_row_size(&show->row) * show->chunks.count;
     if (show->window == NULL) {
         const size_t all = (size_t)((show->row.points + show->row.chunks - 1) / show->row.chunks);
@@ -156,15 +156,14 @@ static bool load_window(SweepShow *show, size_t place) {
             return false;
     }
     show->is_loaded =
-        store_sweep_read(show->store, &show->row, &show->chunks, place * sweep_row_size(&show->row),
-                         show->places * sweep_row_size(&show->row), show->window,
-                         NULL) == STATUS_OK;
+        db_sweep_read(show->store, &show->row, &show->chunks, place * sweep_row_size(&show->row),
+                      show->places * sweep_row_size(&show->row), show->window, NULL) == STATUS_OK;
     show->place = place;
     return show->is_loaded;
 }
 
-bool sweep_show_read(void *of, size_t cell, size_t first, size_t count, double *target) {
-    SweepShow *show = of;
+bool sweep_view_read(void *of, size_t cell, size_t first, size_t count, double *target) {
+    SweepView *show = of;
     const size_t wide = show->chunks.count, size = sweep_row_size(&show->row);
     if (count == 0)
         return true;
@@ -188,19 +187,19 @@ bool sweep_show_read(void *of, size_t cell, size_t first, size_t count, double *
     return true;
 }
 
-Status sweep_point_load(Store *store, const SweepShow *show, uint64_t point, SweepPointShow *target,
+Status sweep_point_load(Db *store, const SweepView *show, uint64_t point, SweepPointView *target,
                         Problem *problem) {
     SweepGrid *grid;
     SweepChunkRow chunk = {0};
     const SweepRow *row = &show->row;
-    *target = (SweepPointShow){.status = SWEEP_PENDING};
+    *target = (SweepPointView){.status = SWEEP_PENDING};
     if (point >= row->points)
         return problem_set(problem, STATUS_NOT_FOUND, "the sweep has points 0 to %llu",
                            (unsigned long long)(row->points - 1));
     target->values = calloc(row->metrics, sizeof *target->values);
     if (target->values == NULL)
         return no_memory(problem);
-    const Status known = store_sweep_chunk(store, row->number, point % row->chunks, &chunk, NULL);
+    const Status known = db_sweep_chunk(store, row->number, point % row->chunks, &chunk, NULL);
     if (known != STATUS_OK && known != STATUS_NOT_FOUND)
         return problem_set(problem, known, "the sweep's rows cannot be read");
     const size_t place = (size_t)(point / row->chunks);

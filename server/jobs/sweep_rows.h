@@ -8,11 +8,11 @@
 #include "server/db/db.h"
 
 // A sweep read back. All zero is empty.
-typedef struct SweepShow {
+typedef struct SweepView {
     SweepRow row;
     StudyRequest inquiry; // with its study
     Sweep *sweep;         // the answer; of its table what failed, where it was asked for
-    Store *store;
+    Db *store;
     SweepChunkRows chunks; // that are there, without their rows
     size_t rows;           // of those
     bool is_complete;      // every chunk is there and none is open
@@ -20,28 +20,28 @@ typedef struct SweepShow {
     unsigned char *window;
     size_t place, places;
     bool is_loaded;
-} SweepShow;
+} SweepView;
 
 // By its result, or (`is_job`) by a job that makes it or did. `has_rows`: what failed too. Cleared
-// by sweep_show_clear in any case.
-Status sweep_show_load(Store *store, const char *id, bool is_job, bool has_rows, SweepShow *show,
+// by sweep_view_clear in any case.
+Status sweep_view_load(Db *store, const char *id, bool is_job, bool has_rows, SweepView *show,
                        Problem *problem);
-void sweep_show_clear(SweepShow *show);
+void sweep_view_clear(SweepView *show);
 
 // Cell `cell` (0 the point, 1 its status, 2 ... the metrics) of rows first ... first + count - 1,
-// which stand in the order of their points; `show` is a SweepShow. Memory is one window, whatever
+// which stand in the order of their points; `show` is a SweepView. Memory is one window, whatever
 // their number. False: the rows are no longer what they were when it was loaded, or cannot be read.
-bool sweep_show_read(void *show, size_t cell, size_t first, size_t count, double *target);
+bool sweep_view_read(void *show, size_t cell, size_t first, size_t count, double *target);
 
 // One point of it.
-typedef struct SweepPointShow {
+typedef struct SweepPointView {
     SweepStatus status;
     char why[200];      // "" unless it failed
     double *values;     // of the metrics; freed by the caller
     StudyRequest scene; // completed, as it can be submitted; by study_request_clear
-} SweepPointShow;
+} SweepPointView;
 // STATUS_NOT_FOUND beyond the last. Cleared by the caller in any case.
-Status sweep_point_load(Store *store, const SweepShow *show, uint64_t point, SweepPointShow *target,
+Status sweep_point_load(Db *store, const SweepView *show, uint64_t point, SweepPointView *target,
                         Problem *problem);
 
 #endif

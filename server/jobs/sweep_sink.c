@@ -17,7 +17,7 @@ static Status no_memory(Problem *problem) {
 
 // CPU that a point takes, about, by some of them [s].
 static Status fly_pilot(Worker *worker, StudyRun *run, double *seconds, Problem *problem) {
-    const Progress watch = {run, study_goes_on};
+    const Progress watch = {run, study_continues};
     const StudyTools tools = {.limits = &worker->intake->settings.limits,
                               .progress = &watch,
                               .workspace = &worker->workspace};
@@ -40,11 +40,11 @@ static Status fly_pilot(Worker *worker, StudyRun *run, double *seconds, Problem 
 
 // Intent is durable before anything runs; an earlier one stands.
 static Status rows_open(Worker *worker, StudyRun *run, Problem *problem) {
-    Store *store = worker->intake->store;
-    const Computation *computation = run->computation;
+    Db *store = worker->intake->store;
+    const Task *computation = run->computation;
     const SweepStudy *study = (const SweepStudy *)(const void *)computation->inquiry.study;
     const uint64_t points = run->work->members, metrics = study->metrics.count;
-    const Status known = store_sweep_load(store, computation->result, &run->row, NULL);
+    const Status known = db_sweep_load(store, computation->result, &run->row, NULL);
     if (known != STATUS_OK && known != STATUS_NOT_FOUND)
         return problem_set(problem, known, "the sweeps could not be searched");
     if (known == STATUS_NOT_FOUND) {
@@ -62,7 +62,7 @@ static Status rows_open(Worker *worker, StudyRun *run, Problem *problem) {
         run->row.created_unix_ms = clock_unix_ms();
     }
     // Also what is there: it may be on the way out, with the last job before this one.
-    TRY(store_sweep_begin(store, &run->row, problem));
+    TRY(db_sweep_begin(store, &run->row, problem));
     if (run->row.points != points || run->row.metrics != metrics)
         return problem_set(problem, STATUS_INTERNAL,
                            "the stored sweep no longer stands for this scene");
@@ -107,7 +107,7 @@ static size_t list_missing(StudyRun *run, const SweepChunkRows *there, Chunk *ch
 
 static Status rows_submit(StudyRun *run, Problem *problem) {
     SweepChunkRows there = {NULL, 0};
-    TRY(store_sweep_chunks(run->intake->store, run->row.number, &there, problem));
+    TRY(db_sweep_chunks(run->intake->store, run->row.number, &there, problem));
     Chunk *chunks = calloc(run->row.chunks, sizeof *chunks);
     Status status = chunks != NULL ? STATUS_OK : no_memory(problem);
     if (status == STATUS_OK)
@@ -118,11 +118,11 @@ static Status rows_submit(StudyRun *run, Problem *problem) {
 }
 
 // Room for the rows; those that are there already where only failed ones are made again.
-static Status rows_begin(StudyRun *run, Shift *shift, Problem *problem) {
+static Status rows_begin(StudyRun *run, ChunkRun *shift, Problem *problem) {
     const size_t rows = shift->chunk.count, size = rows * sweep_row_size(&run->row);
     if (run->row.retries > 0) {
-        const Status known = store_sweep_chunk(run->intake->store, run->row.number,
-                                               shift->chunk.first, &shift->row, problem);
+        const Status known = db_sweep_chunk(run->intake->store, run->row.number, shift->chunk.first,
+                                            &shift->row, problem);
         shift->is_again = known == STATUS_OK && shift->row.rows.size == size;
         if (known != STATUS_OK && known != STATUS_NOT_FOUND)
             return known;
@@ -143,11 +143,11 @@ static Status rows_begin(StudyRun *run, Shift *shift, Problem *problem) {
     return shift->row.rows.at == NULL ? no_memory(problem) : STATUS_OK;
 }
 
-static bool rows_has(const StudyRun *run, const Shift *shift) {
+static bool rows_has(const StudyRun *run, const ChunkRun *shift) {
     return shift->is_again && sweep_row_status(&run->row, &shift->row, shift->done) == SWEEP_MADE;
 }
 
-static void keep_reason(Shift *shift, const char *why) {
+static void keep_reason(ChunkRun *shift, const char *why) {
     char line[REASON];
     if (shift->row.failed++ >= REASONS)
         return;
@@ -158,7 +158,7 @@ static void keep_reason(Shift *shift, const char *why) {
     bytes_format(&shift->reasons, "%zu %s\n", shift->done, line);
 }
 
-static Status rows_take(StudyRun *run, Shift *shift, StudyPart *part, Problem *problem) {
+static Status rows_take(StudyRun *run, ChunkRun *shift, StudyPart *part, Problem *problem) {
     const SweepStudy *study = run->work->study;
     double values[SWEEP_METRICS];
     (void)problem;
@@ -173,18 +173,18 @@ static Status rows_take(StudyRun *run, Shift *shift, StudyPart *part, Problem *p
     return STATUS_OK;
 }
 
-static Status rows_end(StudyRun *run, Shift *shift, Problem *problem) {
+static Status rows_end(StudyRun *run, ChunkRun *shift, Problem *problem) {
     if (shift->reasons.count > 0 &&
         (shift->row.reasons = bytes_take(&shift->reasons, NULL)) == NULL)
         return no_memory(problem);
-    TRY(store_sweep_take(run->intake->store, &shift->row, problem));
+    TRY(db_sweep_take(run->intake->store, &shift->row, problem));
     pthread_mutex_lock(&run->intake->lock);
     set_left(run, run->left - 1);
     pthread_mutex_unlock(&run->intake->lock);
     return STATUS_OK;
 }
 
-static void rows_drop(Shift *shift) {
+static void rows_drop(ChunkRun *shift) {
     sweep_chunk_row_clear(&shift->row);
     bytes_clear(&shift->reasons);
 }
@@ -193,7 +193,7 @@ static void rows_free(StudyRun *run) {
     sweep_row_clear(&run->row);
 }
 
-const Gather gather_rows = {
+const StudySink gather_rows = {
     .is_kept = true,
     .open = rows_open,
     .submit = rows_submit,

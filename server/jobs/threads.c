@@ -9,7 +9,7 @@
 static const double chunk_seconds = 0.25;
 enum { CHUNKS = 4096, CHUNK_MEMBERS = 1 << 16 };
 
-static Status threads_probe(Intake *intake, ExecutorLimits *limits, Problem *problem) {
+static Status threads_probe(JobManager *intake, ExecutorLimits *limits, Problem *problem) {
     (void)problem;
     *limits = (ExecutorLimits){.slots = intake->settings.workers,
                                .chunk_seconds = chunk_seconds,
@@ -20,23 +20,23 @@ static Status threads_probe(Intake *intake, ExecutorLimits *limits, Problem *pro
 
 static void drop_waiting(StudyRun *run) {
     while (run->first != NULL) {
-        Shift *shift = run->first;
+        ChunkRun *shift = run->first;
         run->first = shift->next;
-        shift_free(run, shift);
+        chunk_run_free(run, shift);
     }
     run->last = NULL;
 }
 
 static Status threads_submit(StudyRun *run, const Chunk *chunks, size_t count, Problem *problem) {
-    Shift *first = NULL, **last = &first;
-    Intake *intake = run->intake;
+    ChunkRun *first = NULL, **last = &first;
+    JobManager *intake = run->intake;
     for (size_t i = 0; i < count; i++) {
         *last = calloc(1, sizeof **last);
         if (*last == NULL) {
             while (first != NULL) {
-                Shift *shift = first;
+                ChunkRun *shift = first;
                 first = shift->next;
-                shift_free(run, shift);
+                chunk_run_free(run, shift);
             }
             return problem_set(problem, STATUS_NO_MEMORY, "no memory for %zu chunks", count);
         }
@@ -45,7 +45,7 @@ static Status threads_submit(StudyRun *run, const Chunk *chunks, size_t count, P
     }
     pthread_mutex_lock(&intake->lock);
     while (first != NULL) {
-        Shift *shift = first;
+        ChunkRun *shift = first;
         first = shift->next;
         study_wait(run, shift, false);
     }
@@ -56,7 +56,7 @@ static Status threads_submit(StudyRun *run, const Chunk *chunks, size_t count, P
 static ChunkState threads_poll(StudyRun *run, const Chunk *chunk) {
     ChunkState state = CHUNK_DEAD;
     pthread_mutex_lock(&run->intake->lock);
-    for (const Shift *shift = run->first; shift != NULL; shift = shift->next)
+    for (const ChunkRun *shift = run->first; shift != NULL; shift = shift->next)
         if (shift->chunk.first == chunk->first)
             state = CHUNK_LIVE;
     for (size_t i = 0; i < run->intake->worker_count; i++)

@@ -17,7 +17,7 @@
 
 // A computation's run, or the study after it, as a part of the whole.
 typedef struct Part {
-    Computation *computation;
+    Task *computation;
     double from, share;
 } Part;
 
@@ -29,18 +29,18 @@ static bool advance(void *context, double fraction) {
     return !atomic_load(&part->computation->is_stopped);
 }
 
-bool computation_is_wanted(void *context, double fraction) {
-    const Computation *computation = context;
+bool task_is_wanted(void *context, double fraction) {
+    const Task *computation = context;
     (void)fraction;
     return !atomic_load(&computation->is_stopped);
 }
 
-void findings_clear(Findings *findings) {
+void run_result_clear(RunResult *findings) {
     outcome_unref(findings->outcome);
     fields_clear(study_answer_fields, &findings->answer);
     result_row_clear(&findings->result);
     free(findings->problem);
-    *findings = (Findings){0};
+    *findings = (RunResult){0};
 }
 
 static char *take(Bytes *bytes, Status *status) {
@@ -50,8 +50,8 @@ static char *take(Bytes *bytes, Status *status) {
     return text;
 }
 
-static Status describe(Computation *computation, Findings *findings) {
-    const Progress watch = {computation, computation_is_wanted};
+static Status describe(Task *computation, RunResult *findings) {
+    const Progress watch = {computation, task_is_wanted};
     const Outcome *outcome = findings->outcome;
     ResultRow *row = &findings->result;
     Bytes plan = {0}, summary = {0}, work = {0}, notes = {0}, energy = {0}, uses = {0};
@@ -65,7 +65,7 @@ static Status describe(Computation *computation, Findings *findings) {
     if (!document_impacts(&impacts, &outcome->response, &watch) ||
         (outcome->spectrum.densities.count > 0 && !document_psd(&psd, &outcome->spectrum, &watch)))
         status = STATUS_CANCELLED;
-    uses_write(&uses, &computation->inquiry);
+    references_write(&uses, &computation->inquiry);
     text_fit(row->id, sizeof row->id, computation->result);
     row->engine = strdup(engine_version);
     row->scene = strdup(computation->scene);
@@ -86,7 +86,7 @@ static Status describe(Computation *computation, Findings *findings) {
                                                                               : status;
 }
 
-Status findings_tell_study(Findings *findings, Problem *problem) {
+Status run_result_add_to_study(RunResult *findings, Problem *problem) {
     Bytes study = {.most = DOCUMENT_BYTES};
     Status status = STATUS_OK;
     document_study(&study, &findings->answer);
@@ -95,11 +95,11 @@ Status findings_tell_study(Findings *findings, Problem *problem) {
     return problem_set(problem, status, "no memory for the study's document");
 }
 
-void findings_fail(Findings *findings, Status status, const Problem *problem) {
+void run_result_fail(RunResult *findings, Status status, const Problem *problem) {
     findings->status = status;
     text_fit(findings->detail, sizeof findings->detail, problem->detail);
     Bytes bytes = {.most = 1 << 20};
-    write_problem(&bytes, problem, write_problem_code(status), NULL);
+    encode_problem(&bytes, problem, encode_problem_code(status), NULL);
     free(findings->problem);
     findings->problem = bytes_take(&bytes, NULL);
 }
@@ -109,8 +109,7 @@ static double thread_cpu(void *context) {
     return 1e-9 * (double)clock_thread_cpu_ns();
 }
 
-static Status run_study(Worker *worker, Computation *computation, Findings *findings,
-                        Problem *problem) {
+static Status run_study(Worker *worker, Task *computation, RunResult *findings, Problem *problem) {
     Part part = {computation, STUDY_OWN, 1 - STUDY_OWN};
     const Progress watch = {&part, advance};
     const StudyTools tools = {.limits = &worker->intake->settings.limits,
@@ -125,8 +124,8 @@ static Status run_study(Worker *worker, Computation *computation, Findings *find
                      &findings->answer.study, problem);
 }
 
-static void run(Worker *worker, Computation *computation, Findings *findings, Problem *problem) {
-    Intake *intake = worker->intake;
+static void run(Worker *worker, Task *computation, RunResult *findings, Problem *problem) {
+    JobManager *intake = worker->intake;
     // Only the scene's own series is ever wanted again.
     const bool has_study = computation->inquiry.study != NULL && !computation->is_again;
     Part part = {computation, 0, has_study ? STUDY_OWN : 1};
@@ -136,17 +135,17 @@ static void run(Worker *worker, Computation *computation, Findings *findings, Pr
     problem_clear(problem);
     findings->began_ns = clock_monotonic_ns();
     const int64_t run_ns = clock_thread_cpu_ns();
-    Status status = prepare_records_again(intake->store, &computation->inquiry, problem);
+    Status status = resolve_records_again(intake->store, &computation->inquiry, problem);
     if (status == STATUS_OK)
         status = simulation_run(&computation->inquiry.simulation, limits, &watch,
                                 &worker->workspace, &findings->outcome, problem);
     const int64_t study_ns = clock_thread_cpu_ns();
     findings->seconds = 1e-9 * (double)(study_ns - run_ns);
     if (status == STATUS_OK)
-        totals_run(&intake->totals, findings->outcome, study_ns - run_ns);
+        job_metrics_run(&intake->totals, findings->outcome, study_ns - run_ns);
     if (status == STATUS_OK && has_study) {
         status = run_study(worker, computation, findings, problem);
-        totals_study(&intake->totals, clock_thread_cpu_ns() - study_ns);
+        job_metrics_study(&intake->totals, clock_thread_cpu_ns() - study_ns);
     }
     findings->ended_ns = clock_monotonic_ns();
     if (status == STATUS_OK && !computation->is_again) {
@@ -154,72 +153,72 @@ static void run(Worker *worker, Computation *computation, Findings *findings, Pr
         if (status != STATUS_OK)
             (void)problem_set(problem, status, "no memory for the result's documents");
         else if (has_study && computation->study == NULL)
-            status = findings_tell_study(findings, problem);
+            status = run_result_add_to_study(findings, problem);
     }
     if (status != STATUS_OK)
-        findings_fail(findings, status, problem);
+        run_result_fail(findings, status, problem);
     findings->status = status;
 }
 
 // Nobody waits for it any more, or the daemon ends and its jobs stay unfinished in the store.
-void computation_abandon(Intake *intake, Computation *computation) {
+void task_abandon(JobManager *intake, Task *computation) {
     const bool has_rows = computation->study != NULL && computation->study->gather->is_kept;
     pthread_mutex_lock(&intake->lock);
-    index_remove(intake->in_flight, &computation->indexed);
+    hashmap_remove(intake->in_flight, &computation->indexed);
     while (computation->jobs != NULL) {
         Job *job = computation->jobs;
         computation->jobs = job->next_shared;
         job->computation = NULL;
         job->next_shared = NULL;
-        intake_retire(job);
-        wakers_call(&job->wakers);
-        job_drop(job); // the computation's hold
+        jobs_retire(job);
+        subscribers_call(&job->wakers);
+        job_unref(job); // the computation's hold
     }
-    wakers_call(&computation->askers);
+    subscribers_call(&computation->askers);
     pthread_mutex_unlock(&intake->lock);
-    computation_free(computation); // and its study
+    task_free(computation); // and its study
     if (has_rows)
-        (void)store_sweep_tidy(intake->store, NULL);
+        (void)db_sweep_tidy(intake->store, NULL);
 }
 
-void computation_finish(Intake *intake, Computation *computation, Findings *findings) {
+void task_finish(JobManager *intake, Task *computation, RunResult *findings) {
     char result[sizeof computation->result];
     const double seconds = findings->seconds;
     Outcome *outcome = findings->outcome != NULL ? outcome_ref(findings->outcome) : NULL;
     memcpy(result, computation->result, sizeof result);
-    intake_save(intake, computation, findings);
+    jobs_save(intake, computation, findings);
     if (outcome != NULL)
-        intake_keep_series(intake, result, outcome, seconds);
+        jobs_keep_series(intake, result, outcome, seconds);
     outcome_unref(outcome);
 }
 
-static bool is_slow(const Computation *computation) {
+static bool is_slow(const Task *computation) {
     return computation->queued.seconds > queue_quick;
 }
 
 // What a worker does next: a computation, or a chunk of a study, or the end of one (no chunk).
-typedef struct Task {
-    Computation *computation;
+typedef struct WorkItem {
+    Task *computation;
     StudyRun *study;
-    Shift *shift;
-} Task;
+    ChunkRun *shift;
+} WorkItem;
 
 // The spare worker has nothing to do while an ordinary one is idle or busy with something quick.
 static QueueEntry *take_entry(const Worker *worker) {
-    Intake *intake = worker->intake;
+    JobManager *intake = worker->intake;
     if (worker->is_spare && intake->slow_running < intake->settings.workers)
         return NULL;
     return queue_take(intake->queue, worker->is_spare);
 }
 
 // What may take long keeps the spare worker ready for what does not.
-static void begin_slow(Intake *intake) {
+static void begin_slow(JobManager *intake) {
     if (++intake->slow_running == intake->settings.workers)
         pthread_cond_signal(&intake->spare_work);
 }
 
-static void begin_computation(Worker *worker, Computation *computation) {
-    Intake *intake = worker->intake;
+static void begin_computation(Worker *worker, Task *computation) {
+    JobManager *intake = worker->intake;
     computation->is_running = true;
     worker->running = computation;
     if (is_slow(computation))
@@ -235,36 +234,35 @@ static void begin_computation(Worker *worker, Computation *computation) {
     }
 }
 
-static void leave(Worker *worker, const Computation *computation) {
+static void leave(Worker *worker, const Task *computation) {
     worker->running = NULL;
     worker->intake->slow_running -= is_slow(computation);
 }
 
 // It waits for room, of whatever kind, and then begins anew.
-static void stall(Intake *intake, Computation *computation) {
-    prepare_records_drop(&computation->inquiry);
+static void stall(JobManager *intake, Task *computation) {
+    resolve_records_drop(&computation->inquiry);
     computation->next_stalled = intake->stalled;
     intake->stalled = computation;
 }
 
 static QueueEntry *wait_for_entry(Worker *worker) {
-    Intake *intake = worker->intake;
+    JobManager *intake = worker->intake;
     QueueEntry *entry = NULL;
-    while (!intake->is_closing &&
-           (intake_is_behind(intake) || (entry = take_entry(worker)) == NULL))
+    while (!intake->is_closing && (jobs_is_behind(intake) || (entry = take_entry(worker)) == NULL))
         pthread_cond_wait(worker->is_spare ? &intake->spare_work : &intake->work, &intake->lock);
     return entry;
 }
 
 // With the lock held. False when the daemon ends.
-static bool next_task(Worker *worker, Task *task) {
-    *task = (Task){NULL, NULL, NULL};
+static bool next_task(Worker *worker, WorkItem *task) {
+    *task = (WorkItem){NULL, NULL, NULL};
     for (;;) {
         bool is_ended;
         QueueEntry *entry = wait_for_entry(worker);
         if (entry == NULL)
             return false;
-        Computation *computation = computation_of(entry);
+        Task *computation = task_of(entry);
         if (computation->study == NULL) {
             begin_computation(worker, computation);
             if (study_must_wait(worker->intake, computation)) {
@@ -288,16 +286,16 @@ static bool next_task(Worker *worker, Task *task) {
 }
 
 // How long runs take beside what was foretold, for those who ask when to come back.
-static void keep_pace(Intake *intake, const Computation *computation, const Findings *findings) {
+static void keep_pace(JobManager *intake, const Task *computation, const RunResult *findings) {
     const double foretold = computation->queued.seconds;
     const double ratio = 1e-9 * (double)(findings->ended_ns - findings->began_ns) / foretold;
     if (foretold > 0 && ratio > 1e-3 && ratio < 1e3)
         intake->pace += 0.1 * (ratio - intake->pace);
 }
 
-static void compute(Worker *worker, Computation *computation, Problem *problem) {
-    Intake *intake = worker->intake;
-    Findings findings = {0};
+static void compute(Worker *worker, Task *computation, Problem *problem) {
+    JobManager *intake = worker->intake;
+    RunResult findings = {0};
     run(worker, computation, &findings, problem);
     const bool is_launched = findings.status == STATUS_OK && computation->study != NULL;
     const bool is_stalled = findings.status == STATUS_FULL;
@@ -309,19 +307,19 @@ static void compute(Worker *worker, Computation *computation, Problem *problem) 
         stall(intake, computation);
     pthread_mutex_unlock(&intake->lock);
     if (findings.status == STATUS_CANCELLED)
-        computation_abandon(intake, computation);
+        task_abandon(intake, computation);
     else if (is_launched)
-        study_launch(worker, computation, &findings, problem);
+        study_start(worker, computation, &findings, problem);
     else if (!is_stalled)
-        computation_finish(intake, computation, &findings);
-    findings_clear(&findings);
+        task_finish(intake, computation, &findings);
+    run_result_clear(&findings);
 }
 
 void *worker_main(void *context) {
     Worker *worker = context;
-    Intake *intake = worker->intake;
+    JobManager *intake = worker->intake;
     Problem problem; // large, but a thread's stack is larger
-    Task task;
+    WorkItem task;
     pthread_mutex_lock(&intake->lock);
     while (next_task(worker, &task)) {
         pthread_mutex_unlock(&intake->lock);

@@ -13,20 +13,20 @@
 
 enum { POINTER_SIZE = sizeof((Fault){0}.pointer), KINDS_SHOWN = 64 };
 
-static void walk_members(Reader *reader, const json_t *object, const Field *fields, void *item,
+static void walk_members(Decoder *reader, const json_t *object, const Field *fields, void *item,
                          const char *pointer, const KindTable *kinds);
 
-static void read_count(Reader *reader, const json_t *value, const Field *field, uint64_t *target,
+static void read_count(Decoder *reader, const json_t *value, const Field *field, uint64_t *target,
                        const char *pointer) {
     if (!json_is_number(value)) {
-        refuse_type(reader, pointer, value, field, "a whole number");
+        decode_error_type(reader, pointer, value, field, "a whole number");
         return;
     }
     if (json_is_integer(value) && json_integer_value(value) >= 0) {
         *target = (uint64_t)json_integer_value(value);
         return;
     }
-    const double number = read_number(value);
+    const double number = decode_number(value);
     if (number >= 0 && number < 0x1p63 && floor(number) == number) {
         *target = (uint64_t)number;
         return;
@@ -34,41 +34,42 @@ static void read_count(Reader *reader, const json_t *value, const Field *field, 
     char least[32], most[32], is[SHORTEST_SIZE + 1];
     text_real(least, field->range.min > 0 ? field->range.min : 0);
     text_real(most, field->range.max < 0x1p63 ? field->range.max : 0x1p63);
-    refuse_text(value, is, sizeof is);
+    decode_error_text(value, is, sizeof is);
     if (isinf(field->range.max))
-        refuse_value(reader, pointer, value, field->unit, NULL,
-                     "must be a whole number of at least %s, is %s", least, is);
+        decode_error_value(reader, pointer, value, field->unit, NULL,
+                           "must be a whole number of at least %s, is %s", least, is);
     else
-        refuse_value(reader, pointer, value, field->unit, NULL,
-                     "must be a whole number within [%s, %s], is %s", least, most, is);
+        decode_error_value(reader, pointer, value, field->unit, NULL,
+                           "must be a whole number within [%s, %s], is %s", least, most, is);
 }
 
-static void read_text(Reader *reader, const json_t *value, const Field *field, char **target,
+static void read_text(Decoder *reader, const json_t *value, const Field *field, char **target,
                       const char *pointer) {
     const bool takes_null = (field->flags & FIELD_NULL_IS_EMPTY) != 0;
     if (!json_is_string(value) && !(takes_null && json_is_null(value))) {
-        refuse_type(reader, pointer, value, field, takes_null ? "a string or null" : "a string");
+        decode_error_type(reader, pointer, value, field,
+                          takes_null ? "a string or null" : "a string");
         return;
     }
     const size_t length = json_string_length(value);
     if (field->max > 0 && length > field->max) {
-        refuse_value(reader, pointer, value, NULL, NULL, "must have at most %zu bytes, has %zu",
-                     field->max, length);
+        decode_error_value(reader, pointer, value, NULL, NULL,
+                           "must have at most %zu bytes, has %zu", field->max, length);
         return;
     }
     char *text = strdup(json_is_null(value) ? "" : json_string_value(value));
     if (text == NULL) {
-        read_no_memory(reader);
+        decode_no_memory(reader);
         return;
     }
     free(*target);
     *target = text;
 }
 
-static void read_choice(Reader *reader, const json_t *value, const Field *field, int *target,
+static void read_choice(Decoder *reader, const json_t *value, const Field *field, int *target,
                         const char *pointer) {
     if (!json_is_string(value)) {
-        refuse_type(reader, pointer, value, field, "a string");
+        decode_error_type(reader, pointer, value, field, "a string");
         return;
     }
     for (int i = 0; field->choices[i] != NULL; i++) {
@@ -77,37 +78,37 @@ static void read_choice(Reader *reader, const json_t *value, const Field *field,
             return;
         }
     }
-    refuse_name(reader, pointer, value, field->choices);
+    decode_error_name(reader, pointer, value, field->choices);
 }
 
-static void read_list(Reader *reader, const json_t *value, const Field *field, void *target,
+static void read_list(Decoder *reader, const json_t *value, const Field *field, void *target,
                       const char *pointer) {
     if (!json_is_array(value)) {
-        refuse_type(reader, pointer, value, field, "an array of objects");
+        decode_error_type(reader, pointer, value, field, "an array of objects");
         return;
     }
     const size_t count = json_array_size(value);
-    if (count == 0 || !read_allows(reader, value, field, count, "elements", pointer))
+    if (count == 0 || !decode_allows(reader, value, field, count, "elements", pointer))
         return;
     List list = {calloc(count, field->size), 0};
     if (list.at == NULL) {
-        read_no_memory(reader);
+        decode_no_memory(reader);
         return;
     }
     for (size_t i = 0; i < count; i++) {
         void *element = (char *)list.at + i * field->size;
         list.count = i + 1;
         if (fields_default(field->fields, element) != STATUS_OK) {
-            read_no_memory(reader);
+            decode_no_memory(reader);
             break;
         }
         char place[POINTER_SIZE];
         json_pointer_index(place, sizeof place, pointer, i);
         const json_t *object = json_array_get(value, i);
         if (json_is_object(object))
-            walk_object(reader, object, field->fields, element, place);
+            decode_object(reader, object, field->fields, element, place);
         else
-            refuse_type(reader, place, object, NULL, "an object");
+            decode_error_type(reader, place, object, NULL, "an object");
     }
     // A typed twin of List is written as bytes, as field.c reads it. Lists have no default elements
     // to free.
@@ -115,7 +116,7 @@ static void read_list(Reader *reader, const json_t *value, const Field *field, v
 }
 
 // A string under a shorthand is short for an object of that one member.
-static void read_item(Reader *reader, const json_t *value, const Field *field, void *target,
+static void read_item(Decoder *reader, const json_t *value, const Field *field, void *target,
                       const char *pointer) {
     const bool takes_null = (field->flags & FIELD_NULL_IS_EMPTY) != 0;
     const bool is_short = json_is_string(value) && field->shorthand != NULL;
@@ -124,28 +125,28 @@ static void read_item(Reader *reader, const json_t *value, const Field *field, v
         return;
     }
     if (!json_is_object(value) && !is_short) {
-        refuse_type(reader, pointer, value, NULL,
-                    takes_null                 ? "an object or null"
-                    : field->shorthand != NULL ? "an object or a string"
-                                               : "an object");
+        decode_error_type(reader, pointer, value, NULL,
+                          takes_null                 ? "an object or null"
+                          : field->shorthand != NULL ? "an object or a string"
+                                                     : "an object");
         return;
     }
     // What stays absent as a whole has its members' defaults only once it is there.
     if (field->presence != PRESENCE_DEFAULT && fields_default(field->fields, target) != STATUS_OK) {
-        read_no_memory(reader);
+        decode_no_memory(reader);
     } else if (is_short) {
         size_t offset = 0;
         const Field *row = fields_find(field->fields, field->shorthand, &offset);
         read_text(reader, value, row, (char **)(void *)((char *)target + offset + row->offset),
                   pointer);
     } else {
-        walk_object(reader, value, field->fields, target, pointer);
+        decode_object(reader, value, field->fields, target, pointer);
     }
 }
 
 // The kind that the tag names. Where it names none that is told, and *is_known false: the kind is
 // then the nearest, or NULL where none is near.
-static const Kind *read_kind(Reader *reader, const json_t *object, const KindTable *kinds,
+static const Kind *read_kind(Decoder *reader, const json_t *object, const KindTable *kinds,
                              const char *pointer, bool *is_known) {
     const json_t *tag = json_object_get(object, kinds->tag);
     *is_known = true;
@@ -161,49 +162,49 @@ static const Kind *read_kind(Reader *reader, const json_t *object, const KindTab
     for (size_t i = 0; i < KINDS_SHOWN && kinds->at(i) != NULL; i++)
         names[i] = kinds->at(i)->name;
     if (tag == NULL) {
-        refuse_unnamed(reader, place, names);
+        decode_error_unnamed(reader, place, names);
         return NULL;
     }
     if (!json_is_string(tag)) {
-        refuse_type(reader, place, tag, NULL, "a string");
+        decode_error_type(reader, place, tag, NULL, "a string");
         return NULL;
     }
-    const char *meant = refuse_name(reader, place, tag, names);
+    const char *meant = decode_error_name(reader, place, tag, names);
     return meant != NULL ? kind_find(kinds, meant) : NULL;
 }
 
 // Under a kind that was not named rightly its members are read all the same, so that they are not
 // said to be missing, but nothing is said against them.
-static void read_variant(Reader *reader, const json_t *value, const Field *field, Variant **target,
+static void read_variant(Decoder *reader, const json_t *value, const Field *field, Variant **target,
                          const char *pointer) {
     if (!json_is_object(value)) {
-        refuse_type(reader, pointer, value, NULL, "an object");
+        decode_error_type(reader, pointer, value, NULL, "an object");
         return;
     }
     bool is_known;
     const Kind *kind = read_kind(reader, value, field->kinds, pointer, &is_known);
     Variant *variant = variant_new(kind != NULL ? kind : field->kinds->at(0));
     if (variant == NULL) {
-        read_no_memory(reader);
+        decode_no_memory(reader);
         return;
     }
     variant_free(*target);
     *target = variant;
-    Reader silent = {0};
+    Decoder silent = {0};
     walk_members(is_known ? reader : &silent, value, variant->kind->fields, variant, pointer,
                  field->kinds);
     if (silent.is_out_of_memory)
-        read_no_memory(reader);
+        decode_no_memory(reader);
 }
 
-static void read_value(Reader *reader, const json_t *value, const Field *field, void *member,
+static void read_value(Decoder *reader, const json_t *value, const Field *field, void *member,
                        const char *pointer) {
     switch (field->kind) {
     case FIELD_KIND_REAL:
         if (json_is_number(value))
-            *(double *)member = read_number(value);
+            *(double *)member = decode_number(value);
         else
-            refuse_type(reader, pointer, value, field, "a number");
+            decode_error_type(reader, pointer, value, field, "a number");
         break;
     case FIELD_KIND_COUNT:
         read_count(reader, value, field, member, pointer);
@@ -212,7 +213,7 @@ static void read_value(Reader *reader, const json_t *value, const Field *field, 
         if (json_is_boolean(value))
             *(bool *)member = json_is_true(value);
         else
-            refuse_type(reader, pointer, value, field, "true or false");
+            decode_error_type(reader, pointer, value, field, "true or false");
         break;
     case FIELD_KIND_TEXT:
         read_text(reader, value, field, member, pointer);
@@ -221,13 +222,13 @@ static void read_value(Reader *reader, const json_t *value, const Field *field, 
         read_choice(reader, value, field, member, pointer);
         break;
     case FIELD_KIND_REALS:
-        read_reals(reader, value, field, member, pointer);
+        decode_reals(reader, value, field, member, pointer);
         break;
     case FIELD_KIND_ROWS:
-        read_rows(reader, value, field, member, pointer);
+        decode_rows(reader, value, field, member, pointer);
         break;
     case FIELD_KIND_TEXTS:
-        read_texts(reader, value, field, member, pointer);
+        decode_texts(reader, value, field, member, pointer);
         break;
     case FIELD_KIND_LIST:
         read_list(reader, value, field, member, pointer);
@@ -246,7 +247,7 @@ static void read_value(Reader *reader, const json_t *value, const Field *field, 
 }
 
 // Says which kinds have the key, where `own`, the default perhaps, has not.
-static void refuse_key(Reader *reader, const char *pointer, const json_t *value, const char *key,
+static void refuse_key(Decoder *reader, const char *pointer, const json_t *value, const char *key,
                        const Field *fields, const KindTable *kinds, const Kind *own) {
     char others[sizeof((Fault){0}.detail)] = "";
     size_t length = 0;
@@ -256,19 +257,19 @@ static void refuse_key(Reader *reader, const char *pointer, const json_t *value,
             length += (size_t)snprintf(others + length, sizeof others - length, "%s%s",
                                        length > 0 ? ", " : "", kind->name);
     if (length > 0) {
-        refuse_value(reader, pointer, value, NULL, NULL,
-                     "unknown key of %s %s; it belongs to %s %s", kinds->tag, own->name, kinds->tag,
-                     others);
+        decode_error_value(reader, pointer, value, NULL, NULL,
+                           "unknown key of %s %s; it belongs to %s %s", kinds->tag, own->name,
+                           kinds->tag, others);
         return;
     }
     const char *meant = spelling_nearest_field(fields, key);
     if (meant == NULL && kinds != NULL)
         meant = spelling_nearest((const char *const[]){kinds->tag, NULL}, key);
-    refuse_value(reader, pointer, value, NULL, meant, "unknown key");
+    decode_error_value(reader, pointer, value, NULL, meant, "unknown key");
 }
 
 // `kinds`: those of a variant, which `item` then is and whose tag is passed over; else NULL.
-static void walk_members(Reader *reader, const json_t *object, const Field *fields, void *item,
+static void walk_members(Decoder *reader, const json_t *object, const Field *fields, void *item,
                          const char *pointer, const KindTable *kinds) {
     const char *key;
     json_t *value;
@@ -277,7 +278,7 @@ static void walk_members(Reader *reader, const json_t *object, const Field *fiel
             continue;
         size_t offset = 0;
         const Field *field = fields_find(fields, key, &offset);
-        if (field == NULL && !refuse_wants_detail(reader))
+        if (field == NULL && !decode_error_has_detail(reader))
             continue;
         char place[POINTER_SIZE];
         json_pointer_join(place, sizeof place, pointer, key);
@@ -289,12 +290,12 @@ static void walk_members(Reader *reader, const json_t *object, const Field *fiel
     }
 }
 
-void walk_object(Reader *reader, const json_t *object, const Field *fields, void *item,
-                 const char *pointer) {
+void decode_object(Decoder *reader, const json_t *object, const Field *fields, void *item,
+                   const char *pointer) {
     walk_members(reader, object, fields, item, pointer, NULL);
 }
 
-void walk_value(Reader *reader, const json_t *value, const Field *field, void *item,
-                const char *pointer) {
+void decode_value(Decoder *reader, const json_t *value, const Field *field, void *item,
+                  const char *pointer) {
     read_value(reader, value, field, (char *)item + field->offset, pointer);
 }

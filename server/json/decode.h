@@ -8,11 +8,11 @@
 
 // Reads the members of `object` into `item`, which has its defaults, adding what is wrong below
 // `pointer`.
-void walk_object(Reader *reader, const json_t *object, const Field *fields, void *item,
-                 const char *pointer);
+void decode_object(Decoder *reader, const json_t *object, const Field *fields, void *item,
+                   const char *pointer);
 
 // Reads `value`, which stands at `pointer`, into the member under `field` of `item`.
-void walk_value(Reader *reader, const json_t *value, const Field *field, void *item,
-                const char *pointer);
+void decode_value(Decoder *reader, const json_t *value, const Field *field, void *item,
+                  const char *pointer);
 
 #endif

@@ -11,20 +11,20 @@
 
 enum { POINTER_SIZE = sizeof((Fault){0}.pointer) };
 
-void read_no_memory(Reader *reader) {
+void decode_no_memory(Decoder *reader) {
     reader->is_out_of_memory = true;
 }
 
-double read_number(const json_t *value) {
+double decode_number(const json_t *value) {
     return json_number_value(value) + 0.0; // -0 becomes 0
 }
 
-bool read_allows(Reader *reader, const json_t *value, const Field *field, size_t has,
-                 const char *what, const char *pointer) {
+bool decode_allows(Decoder *reader, const json_t *value, const Field *field, size_t has,
+                   const char *what, const char *pointer) {
     if (field->max == 0 || has <= field->max)
         return true;
-    refuse_value(reader, pointer, value, NULL, NULL, "must have at most %zu %s, has %zu",
-                 field->max, what, has);
+    decode_error_value(reader, pointer, value, NULL, NULL, "must have at most %zu %s, has %zu",
+                       field->max, what, has);
     return false;
 }
 
@@ -38,69 +38,69 @@ static double allowed_number(const Range *range) {
     return 0;
 }
 
-void read_reals(Reader *reader, const json_t *value, const Field *field, Reals *target,
-                const char *pointer) {
+void decode_reals(Decoder *reader, const json_t *value, const Field *field, Reals *target,
+                  const char *pointer) {
     const bool takes_number = (field->flags & FIELD_LONE) != 0;
     if (!json_is_array(value) && !(takes_number && json_is_number(value))) {
-        refuse_type(reader, pointer, value, field,
-                    takes_number ? "a number or an array of numbers" : "an array of numbers");
+        decode_error_type(reader, pointer, value, field,
+                          takes_number ? "a number or an array of numbers" : "an array of numbers");
         return;
     }
     if (json_is_number(value)) {
         double *at = malloc(sizeof *at);
         if (at == NULL) {
-            read_no_memory(reader);
+            decode_no_memory(reader);
             return;
         }
-        *at = read_number(value);
+        *at = decode_number(value);
         free(target->at);
         *target = (Reals){at, 1};
         return;
     }
     const size_t count = json_array_size(value);
-    if (!read_allows(reader, value, field, count, "numbers", pointer))
+    if (!decode_allows(reader, value, field, count, "numbers", pointer))
         return;
     double *at = count > 0 ? malloc(count * sizeof *at) : NULL;
     if (at == NULL && count > 0) {
-        read_no_memory(reader);
+        decode_no_memory(reader);
         return;
     }
     for (size_t i = 0; i < count; i++) {
         const json_t *element = json_array_get(value, i);
         if (json_is_number(element)) {
-            at[i] = read_number(element);
+            at[i] = decode_number(element);
             continue;
         }
         at[i] = allowed_number(&field->range);
-        if (!refuse_wants_detail(reader))
+        if (!decode_error_has_detail(reader))
             continue;
         char place[POINTER_SIZE];
         json_pointer_index(place, sizeof place, pointer, i);
-        refuse_type(reader, place, element, field, "a number");
+        decode_error_type(reader, place, element, field, "a number");
     }
     free(target->at);
     *target = (Reals){at, count};
 }
 
 // A row that could not be read stays empty, so that those behind it keep their places.
-void read_rows(Reader *reader, const json_t *value, const Field *field, Rows *target,
-               const char *pointer) {
+void decode_rows(Decoder *reader, const json_t *value, const Field *field, Rows *target,
+                 const char *pointer) {
     if (!json_is_array(value)) {
-        refuse_type(reader, pointer, value, field, "an array of rows of numbers");
+        decode_error_type(reader, pointer, value, field, "an array of rows of numbers");
         return;
     }
     const size_t count = json_array_size(value);
-    if (!read_allows(reader, value, field, count, "rows", pointer))
+    if (!decode_allows(reader, value, field, count, "rows", pointer))
         return;
     Reals *at = count > 0 ? calloc(count, sizeof *at) : NULL;
     if (at == NULL && count > 0) {
-        read_no_memory(reader);
+        decode_no_memory(reader);
         return;
     }
     for (size_t i = 0; i < count; i++) {
         char place[POINTER_SIZE];
         json_pointer_index(place, sizeof place, pointer, i);
-        read_reals(reader, json_array_get(value, i), field, &at[i], place);
+        decode_reals(reader, json_array_get(value, i), field, &at[i], place);
     }
     for (size_t i = 0; i < target->count; i++)
         free(target->at[i].at);
@@ -129,52 +129,52 @@ static char *scalar_text(const json_t *value) {
     else if (json_is_integer(value) && json_integer_value(value) > (json_int_t)1 << 53)
         bytes_format(&bytes, "%lld", (long long)json_integer_value(value));
     else
-        bytes_real(&bytes, read_number(value));
+        bytes_real(&bytes, decode_number(value));
     return bytes_take(&bytes, NULL);
 }
 
-static void add_scalar(Reader *reader, const json_t *value, Texts *texts, const char *place) {
+static void add_scalar(Decoder *reader, const json_t *value, Texts *texts, const char *place) {
     const bool is_scalar = json_is_string(value) || json_is_boolean(value) || json_is_number(value);
     if (!is_scalar)
-        refuse_type(reader, place, value, NULL, "a number, a string, true or false");
+        decode_error_type(reader, place, value, NULL, "a number, a string, true or false");
     char *text = is_scalar ? scalar_text(value) : strdup("0");
     if (text == NULL)
-        read_no_memory(reader);
+        decode_no_memory(reader);
     else
         texts->at[texts->count++] = text;
 }
 
 // What is no string is told and its place kept by an allowed text, so that those behind it keep
 // theirs.
-static void add_text(Reader *reader, const json_t *value, const char *key, const Field *field,
+static void add_text(Decoder *reader, const json_t *value, const char *key, const Field *field,
                      Texts *texts, const char *place) {
     const char *content = json_string_value(value);
     if (content == NULL) {
-        refuse_type(reader, place, value, NULL, "a string");
+        decode_error_type(reader, place, value, NULL, "a string");
         content = field->choices != NULL ? field->choices[0] : "";
     }
     char *text = pair_text(key, content);
     if (text == NULL)
-        read_no_memory(reader);
+        decode_no_memory(reader);
     else
         texts->at[texts->count++] = text;
 }
 
-void read_texts(Reader *reader, const json_t *value, const Field *field, Texts *target,
-                const char *pointer) {
+void decode_texts(Decoder *reader, const json_t *value, const Field *field, Texts *target,
+                  const char *pointer) {
     const bool is_pairs = json_is_object(value) && (field->flags & FIELD_PAIRS) != 0;
     if (!json_is_array(value) && !is_pairs) {
-        refuse_type(reader, pointer, value, field,
-                    (field->flags & FIELD_PAIRS) != 0 ? "an array or an object of strings"
-                                                      : "an array of strings");
+        decode_error_type(reader, pointer, value, field,
+                          (field->flags & FIELD_PAIRS) != 0 ? "an array or an object of strings"
+                                                            : "an array of strings");
         return;
     }
     const size_t count = is_pairs ? json_object_size(value) : json_array_size(value);
-    if (!read_allows(reader, value, field, count, "texts", pointer))
+    if (!decode_allows(reader, value, field, count, "texts", pointer))
         return;
     Texts texts = {count > 0 ? calloc(count, sizeof *texts.at) : NULL, 0};
     if (texts.at == NULL && count > 0) {
-        read_no_memory(reader);
+        decode_no_memory(reader);
         return;
     }
     char place[POINTER_SIZE];

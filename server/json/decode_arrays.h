@@ -5,19 +5,19 @@
 
 #include "server/json/decode_errors.h"
 
-void read_no_memory(Reader *reader);
-double read_number(const json_t *value);
+void decode_no_memory(Decoder *reader);
+double decode_number(const json_t *value);
 
 // False, and told, where an array has more than its row allows.
-bool read_allows(Reader *reader, const json_t *value, const Field *field, size_t has,
-                 const char *what, const char *pointer);
+bool decode_allows(Decoder *reader, const json_t *value, const Field *field, size_t has,
+                   const char *what, const char *pointer);
 
 // Replace what `target` holds; what cannot be read as an array leaves it as it was.
-void read_reals(Reader *reader, const json_t *value, const Field *field, Reals *target,
-                const char *pointer);
-void read_rows(Reader *reader, const json_t *value, const Field *field, Rows *target,
-               const char *pointer);
-void read_texts(Reader *reader, const json_t *value, const Field *field, Texts *target,
-                const char *pointer);
+void decode_reals(Decoder *reader, const json_t *value, const Field *field, Reals *target,
+                  const char *pointer);
+void decode_rows(Decoder *reader, const json_t *value, const Field *field, Rows *target,
+                 const char *pointer);
+void decode_texts(Decoder *reader, const json_t *value, const Field *field, Texts *target,
+                  const char *pointer);
 
 #endif

@@ -30,7 +30,7 @@ static const char *type_name(const json_t *value) {
     return "null";
 }
 
-void refuse_text(const json_t *value, char *target, size_t size) {
+void decode_error_text(const json_t *value, char *target, size_t size) {
     char digits[SHORTEST_SIZE + 1];
     switch (json_typeof(value)) {
     case JSON_STRING:
@@ -40,7 +40,7 @@ void refuse_text(const json_t *value, char *target, size_t size) {
         snprintf(target, size, "%lld", (long long)json_integer_value(value));
         break;
     case JSON_REAL:
-        digits[shortest_write(digits, json_real_value(value))] = '\0';
+        digits[dtoa_write(digits, json_real_value(value))] = '\0';
         text_fit(target, size, digits);
         break;
     case JSON_OBJECT:
@@ -53,7 +53,7 @@ void refuse_text(const json_t *value, char *target, size_t size) {
     }
 }
 
-bool refuse_wants_detail(Reader *reader) {
+bool decode_error_has_detail(Decoder *reader) {
     reader->is_faulty = true;
     if (reader->problem != NULL && reader->problem->count < PROBLEM_FAULTS)
         return true;
@@ -61,9 +61,9 @@ bool refuse_wants_detail(Reader *reader) {
     return false;
 }
 
-void refuse_value(Reader *reader, const char *pointer, const json_t *value, const char *unit,
-                  const char *meant, const char *format, ...) {
-    if (!refuse_wants_detail(reader))
+void decode_error_value(Decoder *reader, const char *pointer, const json_t *value, const char *unit,
+                        const char *meant, const char *format, ...) {
+    if (!decode_error_has_detail(reader))
         return;
     Fault fault = {0};
     char text[2 * sizeof fault.detail];
@@ -73,18 +73,18 @@ void refuse_value(Reader *reader, const char *pointer, const json_t *value, cons
     va_end(arguments);
     text_fit(fault.pointer, sizeof fault.pointer, pointer);
     text_fit(fault.detail, sizeof fault.detail, text);
-    refuse_text(value, fault.value, sizeof fault.value);
+    decode_error_text(value, fault.value, sizeof fault.value);
     text_fit(fault.unit, sizeof fault.unit, unit != NULL ? unit : "");
     text_fit(fault.did_you_mean, sizeof fault.did_you_mean, meant != NULL ? meant : "");
     problem_add_fault(reader->problem, STATUS_INVALID, &fault);
 }
 
-void refuse_type(Reader *reader, const char *pointer, const json_t *value, const Field *field,
-                 const char *wanted) {
+void decode_error_type(Decoder *reader, const char *pointer, const json_t *value,
+                       const Field *field, const char *wanted) {
     const char *unit = field != NULL ? field->unit : NULL;
-    refuse_value(reader, pointer, value, unit, NULL, "must be %s%s%s%s, is %s", wanted,
-                 unit != NULL ? " [" : "", unit != NULL ? unit : "", unit != NULL ? "]" : "",
-                 type_name(value));
+    decode_error_value(reader, pointer, value, unit, NULL, "must be %s%s%s%s, is %s", wanted,
+                       unit != NULL ? " [" : "", unit != NULL ? unit : "", unit != NULL ? "]" : "",
+                       type_name(value));
 }
 
 enum { NAMES_SIZE = sizeof((Fault){0}.detail) };
@@ -97,23 +97,24 @@ static void list_names(const char *const *names, char list[NAMES_SIZE]) {
                                    names[i]);
 }
 
-void refuse_unnamed(Reader *reader, const char *pointer, const char *const *names) {
+void decode_error_unnamed(Decoder *reader, const char *pointer, const char *const *names) {
     char list[NAMES_SIZE];
-    if (!refuse_wants_detail(reader))
+    if (!decode_error_has_detail(reader))
         return;
     list_names(names, list);
     problem_add(reader->problem, STATUS_INVALID, pointer, "is required, one of %s", list);
 }
 
-const char *refuse_name(Reader *reader, const char *pointer, const json_t *value,
-                        const char *const *names) {
+const char *decode_error_name(Decoder *reader, const char *pointer, const json_t *value,
+                              const char *const *names) {
     const char *name = json_string_value(value);
     const char *meant = spelling_nearest(names, name);
-    if (!refuse_wants_detail(reader))
+    if (!decode_error_has_detail(reader))
         return meant;
     char list[NAMES_SIZE], shown[64];
     list_names(names, list);
     text_quote(shown, sizeof shown, name);
-    refuse_value(reader, pointer, value, NULL, meant, "must be one of %s, is %s", list, shown);
+    decode_error_value(reader, pointer, value, NULL, meant, "must be one of %s, is %s", list,
+                       shown);
     return meant;
 }

@@ -1,5 +1,5 @@
-// A walk over both trees at once. Pointers are cut like those of faults; depth is what READ_DEPTH
-// lets in.
+// A walk over both trees at once. Pointers are cut like those of faults; depth is what
+// JSON_DEPTH_MAX lets in.
 #include "server/json/diff.h"
 
 #include <jansson.h>
@@ -12,10 +12,10 @@
 
 enum { POINTER = 256, NUMBERS = 16 };
 
-typedef struct Walk {
+typedef struct ImportContext {
     Differences *differences;
     bool is_out_of_memory;
-} Walk;
+} ImportContext;
 
 static void put_json(Bytes *bytes, const json_t *value) {
     const char *name, *separator = "";
@@ -87,7 +87,7 @@ static void say_long(const json_t *a, const json_t *b, char *text, size_t size) 
              count_b, first + 1);
 }
 
-static void add(Walk *walk, const char *pointer, const json_t *a, const json_t *b) {
+static void add(ImportContext *walk, const char *pointer, const json_t *a, const json_t *b) {
     Differences *differences = walk->differences;
     if (differences->count == DIFFER_MAX) {
         differences->more++;
@@ -115,9 +115,10 @@ static bool is_long_numbers(const json_t *array) {
     return json_array_size(array) > NUMBERS && json_is_number(json_array_get(array, 0));
 }
 
-static void walk_values(Walk *walk, const char *pointer, const json_t *a, const json_t *b);
+static void walk_values(ImportContext *walk, const char *pointer, const json_t *a, const json_t *b);
 
-static void walk_objects(Walk *walk, const char *pointer, const json_t *a, const json_t *b) {
+static void walk_objects(ImportContext *walk, const char *pointer, const json_t *a,
+                         const json_t *b) {
     const char *name;
     json_t *value;
     char place[POINTER];
@@ -138,7 +139,8 @@ static bool is_equal(const json_t *a, const json_t *b) {
                                                   : json_equal(a, b) != 0;
 }
 
-static void walk_values(Walk *walk, const char *pointer, const json_t *a, const json_t *b) {
+static void walk_values(ImportContext *walk, const char *pointer, const json_t *a,
+                        const json_t *b) {
     char place[POINTER];
     if (a == NULL || b == NULL || json_typeof(a) != json_typeof(b)) {
         if (a == NULL || b == NULL || !is_equal(a, b))
@@ -155,9 +157,9 @@ static void walk_values(Walk *walk, const char *pointer, const json_t *a, const 
     }
 }
 
-Status differ_json(const char *a, const char *b, const char *besides, Differences *differences,
-                   Problem *problem) {
-    Walk walk = {.differences = differences};
+Status json_diff(const char *a, const char *b, const char *besides, Differences *differences,
+                 Problem *problem) {
+    ImportContext walk = {.differences = differences};
     *differences = (Differences){0};
     json_t *trees[2] = {json_loads(a, JSON_REJECT_DUPLICATES, NULL),
                         json_loads(b, JSON_REJECT_DUPLICATES, NULL)};

@@ -26,8 +26,8 @@ typedef struct Differences {
 // Objects are compared member by member, arrays of numbers longer than 16 as a whole, other arrays
 // item by item; the member `besides` of the documents (NULL: none) is left out. Cleared by
 // differences_clear in any case. STATUS_INTERNAL: one is not JSON.
-Status differ_json(const char *a, const char *b, const char *besides, Differences *differences,
-                   Problem *problem);
+Status json_diff(const char *a, const char *b, const char *besides, Differences *differences,
+                 Problem *problem);
 void differences_clear(Differences *differences);
 
 // [{"pointer", "a", "b", "detail"}], what is not there null.

@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
-static void put_members(Bytes *bytes, const Field *fields, const void *item, WriteStyle style,
+static void put_members(Bytes *bytes, const Field *fields, const void *item, EncodeStyle style,
                         size_t *count);
 
 static void put_name(Bytes *bytes, const char *name, size_t *count) {
@@ -50,7 +50,7 @@ static void put_texts(Bytes *bytes, const Texts *texts, bool is_json) {
 }
 
 static void put_variant(Bytes *bytes, const KindTable *kinds, const Variant *variant,
-                        WriteStyle style) {
+                        EncodeStyle style) {
     size_t count = 0;
     bytes_text(bytes, "{");
     put_name(bytes, kinds->tag, &count);
@@ -59,7 +59,7 @@ static void put_variant(Bytes *bytes, const KindTable *kinds, const Variant *var
     bytes_text(bytes, "}");
 }
 
-static void put_value(Bytes *bytes, const Field *field, const void *member, WriteStyle style) {
+static void put_value(Bytes *bytes, const Field *field, const void *member, EncodeStyle style) {
     switch (field->kind) {
     case FIELD_KIND_REAL:
         bytes_real(bytes, *(const double *)member);
@@ -91,12 +91,12 @@ static void put_value(Bytes *bytes, const Field *field, const void *member, Writ
         put_texts(bytes, member, (field->flags & FIELD_SCALARS) != 0);
         break;
     case FIELD_KIND_ITEM:
-        write_item(bytes, field->fields, member, style);
+        encode_item(bytes, field->fields, member, style);
         break;
     case FIELD_KIND_LIST: {
         List list;
         memcpy(&list, member, sizeof list);
-        write_list(bytes, field->fields, list.at, list.count, field->size, style);
+        encode_list(bytes, field->fields, list.at, list.count, field->size, style);
         break;
     }
     case FIELD_KIND_VARIANT:
@@ -127,7 +127,7 @@ static bool is_array(const Field *field) {
            field->kind == FIELD_KIND_TEXTS || field->kind == FIELD_KIND_LIST;
 }
 
-static void put_members(Bytes *bytes, const Field *fields, const void *item, WriteStyle style,
+static void put_members(Bytes *bytes, const Field *fields, const void *item, EncodeStyle style,
                         size_t *count) {
     for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
         const void *member = (const char *)item + field->offset;
@@ -146,25 +146,25 @@ static void put_members(Bytes *bytes, const Field *fields, const void *item, Wri
     }
 }
 
-size_t write_members(Bytes *bytes, const Field *fields, const void *item, WriteStyle style) {
+size_t encode_members(Bytes *bytes, const Field *fields, const void *item, EncodeStyle style) {
     size_t count = 0;
     put_members(bytes, fields, item, style, &count);
     return count;
 }
 
-void write_item(Bytes *bytes, const Field *fields, const void *item, WriteStyle style) {
+void encode_item(Bytes *bytes, const Field *fields, const void *item, EncodeStyle style) {
     bytes_text(bytes, "{");
-    write_members(bytes, fields, item, style);
+    encode_members(bytes, fields, item, style);
     bytes_text(bytes, "}");
 }
 
-void write_list(Bytes *bytes, const Field *fields, const void *at, size_t count, size_t size,
-                WriteStyle style) {
+void encode_list(Bytes *bytes, const Field *fields, const void *at, size_t count, size_t size,
+                 EncodeStyle style) {
     bytes_text(bytes, "[");
     for (size_t i = 0; i < count; i++) {
         if (i > 0)
             bytes_text(bytes, ", ");
-        write_item(bytes, fields, (const char *)at + i * size, style);
+        encode_item(bytes, fields, (const char *)at + i * size, style);
     }
     bytes_text(bytes, "]");
 }
@@ -193,7 +193,7 @@ static void put_fault(Bytes *bytes, const Fault *fault) {
     bytes_text(bytes, "}");
 }
 
-int write_problem_code(Status status) {
+int encode_problem_code(Status status) {
     // clang-format off
     static const int codes[STATUS_COUNT] = {
         [STATUS_OK] = 200,             [STATUS_UNREADABLE] = 400,     [STATUS_INVALID] = 422,
@@ -210,7 +210,7 @@ int write_problem_code(Status status) {
     return (size_t)status < COUNT(codes) && codes[status] != 0 ? codes[status] : 500;
 }
 
-void write_problem(Bytes *bytes, const Problem *problem, int status_code, const char *instance) {
+void encode_problem(Bytes *bytes, const Problem *problem, int status_code, const char *instance) {
     size_t count = 0;
     bytes_text(bytes, "{");
     put_name(bytes, "type", &count);

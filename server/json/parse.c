@@ -91,25 +91,26 @@ static Status parse(const Part *part, json_t **root, Problem *problem) {
     return *root != NULL ? STATUS_OK : refuse_parse(problem, part, &error);
 }
 
-static Status told(const Reader *reader) {
+static Status told(const Decoder *reader) {
     if (reader->is_out_of_memory)
         return no_memory(reader->problem);
     return reader->is_faulty ? STATUS_INVALID : STATUS_OK;
 }
 
 static Status read_part(const Part *part, const Field *fields, void *item, Problem *problem) {
-    Reader reader = {.problem = problem};
+    Decoder reader = {.problem = problem};
     json_t *root;
     TRY(parse(part, &root, problem));
     if (json_is_object(root))
-        walk_object(&reader, root, fields, item, part->pointer);
+        decode_object(&reader, root, fields, item, part->pointer);
     else
-        refuse_type(&reader, part->pointer, root, NULL, "an object");
+        decode_error_type(&reader, part->pointer, root, NULL, "an object");
     json_decref(root);
     return told(&reader);
 }
 
-Status read_json(const char *text, size_t size, const Field *fields, void *item, Problem *problem) {
+Status json_parse(const char *text, size_t size, const Field *fields, void *item,
+                  Problem *problem) {
     if (fields_default(fields, item) != STATUS_OK)
         return no_memory(problem);
     if (size == 0)
@@ -119,20 +120,20 @@ Status read_json(const char *text, size_t size, const Field *fields, void *item,
                      fields, item, problem);
 }
 
-Status read_json_part(const char *text, size_t size, size_t first, size_t count,
-                      const char *pointer, const Field *fields, void *item, Problem *problem) {
+Status json_parse_part(const char *text, size_t size, size_t first, size_t count,
+                       const char *pointer, const Field *fields, void *item, Problem *problem) {
     if (fields_default(fields, item) != STATUS_OK)
         return no_memory(problem);
     return read_part(&(Part){text, size, first, count, pointer, STATUS_UNREADABLE}, fields, item,
                      problem);
 }
 
-Status read_json_value(const char *text, size_t size, const Field *field, void *item,
-                       const char *pointer, Problem *problem) {
-    Reader reader = {.problem = problem};
+Status json_parse_value(const char *text, size_t size, const Field *field, void *item,
+                        const char *pointer, Problem *problem) {
+    Decoder reader = {.problem = problem};
     json_t *root;
     TRY(parse(&(Part){text, size, 0, size, pointer, STATUS_INVALID}, &root, problem));
-    walk_value(&reader, root, field, item, pointer);
+    decode_value(&reader, root, field, item, pointer);
     json_decref(root);
     return told(&reader);
 }

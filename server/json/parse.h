@@ -6,7 +6,7 @@
 
 #include "core/base/field.h"
 
-enum { READ_DEPTH = 32 };
+enum { JSON_DEPTH_MAX = 32 };
 
 // Reads `text[size]`, which may begin with a byte order mark that counts for no column, into
 // `item`, which gets its defaults first (so it may be uninitialised; on failure it is still
@@ -14,16 +14,16 @@ enum { READ_DEPTH = 32 };
 // UTF-8, with line, column and where known a pointer. STATUS_INVALID: the faults, one at "" where
 // it is no object at all; what could be read has been read, so that fields_validate and others can
 // add theirs to the same problem.
-Status read_json(const char *text, size_t size, const Field *fields, void *item, Problem *problem);
+Status json_parse(const char *text, size_t size, const Field *fields, void *item, Problem *problem);
 
 // The same of `count` bytes of the text from `first` on, which are a document by themselves and
 // stand at `pointer` of the whole.
-Status read_json_part(const char *text, size_t size, size_t first, size_t count,
-                      const char *pointer, const Field *fields, void *item, Problem *problem);
+Status json_parse_part(const char *text, size_t size, size_t first, size_t count,
+                       const char *pointer, const Field *fields, void *item, Problem *problem);
 
 // A text that is one value, into the member of `item` under `field`; `item` has its defaults, and
 // the value stands at `pointer`. STATUS_INVALID also where it is not JSON.
-Status read_json_value(const char *text, size_t size, const Field *field, void *item,
-                       const char *pointer, Problem *problem);
+Status json_parse_value(const char *text, size_t size, const Field *field, void *item,
+                        const char *pointer, Problem *problem);
 
 #endif

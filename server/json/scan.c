@@ -25,11 +25,11 @@ typedef struct Scan {
     size_t at;
     size_t depth, containers;
     bool is_key_next;
-    Frame frames[READ_DEPTH];
+    Frame frames[JSON_DEPTH_MAX];
 } Scan;
 
 static bool is_too_deep(const Scan *scan) {
-    return scan->depth > READ_DEPTH;
+    return scan->depth > JSON_DEPTH_MAX;
 }
 
 static bool has_too_many_members(const Scan *scan) {
@@ -38,7 +38,7 @@ static bool has_too_many_members(const Scan *scan) {
 }
 
 static void open_container(Scan *scan, bool is_array) {
-    if (scan->depth < READ_DEPTH)
+    if (scan->depth < JSON_DEPTH_MAX)
         scan->frames[scan->depth] = (Frame){.is_array = is_array};
     scan->depth++;
     scan->containers++;
@@ -127,7 +127,7 @@ bool scan_allows(const char *text, size_t size, size_t *position, const char **s
     }
     return true;
 }
-_Static_assert(READ_DEPTH == 32 && SCAN_CONTAINERS == 131072 && SCAN_MEMBERS == 4096,
+_Static_assert(JSON_DEPTH_MAX == 32 && SCAN_CONTAINERS == 131072 && SCAN_MEMBERS == 4096,
                "the sentences name these numbers");
 
 // The key as people know it: escapes decoded by the parser itself, or left where they are none.
@@ -211,7 +211,7 @@ void scan_place(const char *text, size_t size, size_t position, ScanPlace *place
     }
 
     place->pointer[0] = '\0';
-    for (size_t i = 0; i < scan.depth && i < READ_DEPTH; i++) {
+    for (size_t i = 0; i < scan.depth && i < JSON_DEPTH_MAX; i++) {
         const Frame *frame = &scan.frames[i];
         char base[sizeof place->pointer];
         memcpy(base, place->pointer, sizeof base);

@@ -1,6 +1,6 @@
 // One pass over JSON text without reading it: how deep it nests, and which member a byte belongs
 // to. Not a parser: it takes any bytes, and is right up to the first byte that is not JSON. Memory
-// is bounded by READ_DEPTH..
+// is bounded by JSON_DEPTH_MAX..
 #ifndef SERVER_JSON_SCAN_H
 #define SERVER_JSON_SCAN_H
 

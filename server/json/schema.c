@@ -365,7 +365,7 @@ static void print_object(Printer *printer, const Field *fields, const KindTable 
     word_member(printer, "additionalProperties", "false");
 }
 
-void describe_schema(Bytes *bytes, const char *id, const char *title, const Field *fields) {
+void schema_write(Bytes *bytes, const char *id, const char *title, const Field *fields) {
     Printer printer = {.bytes = bytes};
     open_bracket(&printer, "{");
     text_member(&printer, "$schema", "https://json-schema.org/draft/2020-12/schema");
@@ -376,8 +376,8 @@ void describe_schema(Bytes *bytes, const char *id, const char *title, const Fiel
     bytes_text(bytes, "\n");
 }
 
-void describe_document(Bytes *bytes, const SchemaDocument *document) {
+void schema_write_document(Bytes *bytes, const SchemaDocument *document) {
     char id[64];
     snprintf(id, sizeof id, "/schemas/%s", document->name);
-    describe_schema(bytes, id, document->title, document->fields);
+    schema_write(bytes, id, document->title, document->fields);
 }

@@ -7,7 +7,7 @@
 #include "server/util/bytes.h"
 
 // A whole schema document, indented, ending in a newline. Units stand under "x-unit".
-void describe_schema(Bytes *bytes, const char *id, const char *title, const Field *fields);
+void schema_write(Bytes *bytes, const char *id, const char *title, const Field *fields);
 
 // The documents that exist: "scene", "material" ... One line each in describe.c.
 typedef struct SchemaDocument {
@@ -17,6 +17,6 @@ typedef struct SchemaDocument {
 extern const SchemaDocument schema_documents[]; // ends with name == NULL
 
 // The document's schema under "/schemas/NAME": what schema/NAME.schema.json holds.
-void describe_document(Bytes *bytes, const SchemaDocument *document);
+void schema_write_document(Bytes *bytes, const SchemaDocument *document);
 
 #endif

@@ -46,7 +46,7 @@ static Status read_spectra(const json_t *root, Columns *columns, Problem *proble
     return is_read ? STATUS_OK : refuse("spectra", problem);
 }
 
-Status kept_spectra(const char *text, Columns *columns, Problem *problem) {
+Status stored_spectra(const char *text, Columns *columns, Problem *problem) {
     *columns = (Columns){.count = 0};
     json_t *root = json_loads(text, JSON_REJECT_DUPLICATES, NULL);
     const Status status = read_spectra(root, columns, problem);
@@ -66,7 +66,7 @@ static size_t count_objects(const char *text) {
 
 static const char list[] = "\"impacts\": [";
 
-Status kept_impacts(const char *text, Impacts *impacts, Problem *problem) {
+Status stored_impacts(const char *text, Impacts *impacts, Problem *problem) {
     *impacts = (Impacts){NULL, 0};
     const char *at = strstr(text, list);
     if (at == NULL)
@@ -80,8 +80,8 @@ Status kept_impacts(const char *text, Impacts *impacts, Problem *problem) {
         at = strchr(at, '{');
         const char *end = strchr(at, '}');
         status = end == NULL ? refuse("impacts", problem)
-                             : report_read(at, (size_t)(end - at) + 1, impact_fields,
-                                           &impacts->at[impacts->count++], problem);
+                             : stored_report_read(at, (size_t)(end - at) + 1, impact_fields,
+                                                  &impacts->at[impacts->count++], problem);
         at = end;
     }
     if (status != STATUS_OK) {
@@ -103,8 +103,8 @@ static double impact_time(const char *row, const char *name) {
 }
 
 // Only the two times of a row are read, and none behind the window: 200,000 rows are 60 MB of text.
-Status kept_impacts_window(const char *text, const ImpactWindow *window, bool is_numbered,
-                           Bytes *bytes, Problem *problem) {
+Status stored_impacts_window(const char *text, const ImpactWindow *window, bool is_numbered,
+                             Bytes *bytes, Problem *problem) {
     const char *at = strstr(text, list);
     if (at == NULL)
         return refuse("impacts", problem);

@@ -9,10 +9,10 @@
 
 // psd.json: the frequency and behind it a density a channel. Cleared by columns_clear; empty on
 // failure. STATUS_INTERNAL: it is not what was written.
-Status kept_spectra(const char *text, Columns *columns, Problem *problem);
+Status stored_spectra(const char *text, Columns *columns, Problem *problem);
 
 // impacts.json. impacts->at is to be freed; NULL on failure.
-Status kept_impacts(const char *text, Impacts *impacts, Problem *problem);
+Status stored_impacts(const char *text, Impacts *impacts, Problem *problem);
 
 // Which impacts: those whose contact meets [from, to], of them the first `limit` whose number in
 // the ledger, counted from 1, is at least `first`.
@@ -24,7 +24,7 @@ typedef struct ImpactWindow {
 // Appends impacts.json with those impacts alone, to the letter as they were saved; the counts stay
 // those of the whole ledger. With `is_numbered` every impact begins with its number and "matching"
 // tells behind the list how many meet [from, to]. STATUS_INTERNAL: it is not what was written.
-Status kept_impacts_window(const char *text, const ImpactWindow *window, bool is_numbered,
-                           Bytes *bytes, Problem *problem);
+Status stored_impacts_window(const char *text, const ImpactWindow *window, bool is_numbered,
+                             Bytes *bytes, Problem *problem);
 
 #endif

@@ -5,11 +5,11 @@
 
 #include "server/json/decode.h"
 
-Status report_read(const char *text, size_t size, const Field *fields, void *item,
-                   Problem *problem) {
+Status stored_report_read(const char *text, size_t size, const Field *fields, void *item,
+                          Problem *problem) {
     if (fields_default(fields, item) != STATUS_OK)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory to read a report");
-    Reader reader = {.problem = NULL};
+    Decoder reader = {.problem = NULL};
     json_t *root = json_loadb(text, size, JSON_REJECT_DUPLICATES, NULL);
     bool is_read = json_is_object(root);
     if (is_read) {
@@ -20,7 +20,7 @@ Status report_read(const char *text, size_t size, const Field *fields, void *ite
             if (json_is_null(value) || fields_find(fields, name, NULL) == NULL)
                 json_object_del(root, name);
         }
-        walk_object(&reader, root, fields, item, "");
+        decode_object(&reader, root, fields, item, "");
         is_read = !reader.is_faulty && !reader.is_out_of_memory;
     }
     json_decref(root);

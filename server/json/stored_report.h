@@ -9,7 +9,7 @@
 // One object of numbers and texts; `item` gets its defaults first and is clearable in any case.
 // What has no row is passed over: another version of the program may have told more.
 // STATUS_INTERNAL: it is not what was written.
-Status report_read(const char *text, size_t size, const Field *fields, void *item,
-                   Problem *problem);
+Status stored_report_read(const char *text, size_t size, const Field *fields, void *item,
+                          Problem *problem);
 
 #endif

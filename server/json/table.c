@@ -22,7 +22,7 @@ void text_make_printable(char *text) {
 }
 
 // Takes `text`; NULL: no memory.
-static void listing_take(Listing *table, char *text) {
+static void print_table_take(PrintTable *table, char *text) {
     char **cells = text != NULL ? realloc(table->cells, (table->count + 1) * sizeof *cells) : NULL;
     if (cells == NULL) {
         free(text);
@@ -34,7 +34,7 @@ static void listing_take(Listing *table, char *text) {
     table->cells[table->count++] = text;
 }
 
-void listing_add(Listing *table, const char *format, ...) {
+void print_table_add(PrintTable *table, const char *format, ...) {
     va_list arguments, again;
     va_start(arguments, format);
     va_copy(again, arguments);
@@ -44,20 +44,20 @@ void listing_add(Listing *table, const char *format, ...) {
         (void)vsnprintf(text, (size_t)size + 1, format, again);
     va_end(again);
     va_end(arguments);
-    listing_take(table, text);
+    print_table_take(table, text);
 }
 
-void listing_number(Listing *table, const char *format, double value) {
+void print_table_number(PrintTable *table, const char *format, double value) {
     char text[64];
     snprintf(text, sizeof text, format, value);
-    listing_take(table, strdup(isnan(value) ? "-" : text));
+    print_table_take(table, strdup(isnan(value) ? "-" : text));
 }
 
-void listing_clear(Listing *table) {
+void print_table_clear(PrintTable *table) {
     for (size_t i = 0; i < table->count; i++)
         free(table->cells[i]);
     free(table->cells);
-    *table = (Listing){.columns = table->columns};
+    *table = (PrintTable){.columns = table->columns};
 }
 
 // Characters of UTF-8, as a terminal counts most of them.
@@ -68,17 +68,17 @@ static int text_width(const char *text) {
     return width;
 }
 
-static const char *listing_cell(const Listing *table, size_t index) {
+static const char *print_table_cell(const PrintTable *table, size_t index) {
     const bool is_unknown =
         table->cells[index][0] == '\0' && table->has_heads && index >= table->columns;
     return is_unknown ? "-" : table->cells[index];
 }
 
 // Whether a column has heads and, below, nothing but numbers.
-static bool listing_is_numeric(const Listing *table, size_t column) {
+static bool print_table_is_numeric(const PrintTable *table, size_t column) {
     bool is_numeric = table->has_heads;
     for (size_t i = table->columns + column; i < table->count && is_numeric; i += table->columns) {
-        const char *cell = listing_cell(table, i);
+        const char *cell = print_table_cell(table, i);
         char *end;
         (void)strtod(cell, &end);
         is_numeric = *end == '\0' || strcmp(cell, "-") == 0;
@@ -86,20 +86,20 @@ static bool listing_is_numeric(const Listing *table, size_t column) {
     return is_numeric;
 }
 
-void listing_print(Listing *table, FILE *file) {
+void print_table_print(PrintTable *table, FILE *file) {
     int widths[LISTING_COLUMNS] = {0};
     bool is_numeric[LISTING_COLUMNS];
     const size_t columns = table->columns;
     for (size_t k = 0; k < columns; k++) {
-        is_numeric[k] = listing_is_numeric(table, k);
+        is_numeric[k] = print_table_is_numeric(table, k);
         for (size_t i = k; i < table->count; i += columns) {
             // A wider cell shifts its own row alone.
-            const int width = text_width(listing_cell(table, i));
+            const int width = text_width(print_table_cell(table, i));
             widths[k] = width > widths[k] && width <= WIDTH_MAX ? width : widths[k];
         }
     }
     for (size_t i = 0; i < table->count; i++) {
-        const char *cell = listing_cell(table, i);
+        const char *cell = print_table_cell(table, i);
         const size_t k = i % columns;
         const int pad = widths[k] > text_width(cell) ? widths[k] - text_width(cell) : 0;
         const bool is_last = k + 1 == columns || i + 1 == table->count;
@@ -108,11 +108,11 @@ void listing_print(Listing *table, FILE *file) {
     }
     if (table->is_failed)
         fputs("... no memory for the rest\n", file);
-    listing_clear(table);
+    print_table_clear(table);
 }
 
 typedef struct Printer {
-    const ListingView *view;
+    const PrintTableView *view;
     FILE *file;
     size_t blocks, longest;
     char heading[HEADING_SIZE]; // of the last block
@@ -146,7 +146,7 @@ static const char *printer_unit(const Printer *printer, const char *name) {
 
 // Prints the table, unless it is empty, under its heading, unless that was just printed or the
 // table is the document's first.
-static void printer_table(Printer *printer, Listing *table, const char *heading) {
+static void printer_table(Printer *printer, PrintTable *table, const char *heading) {
     char text[HEADING_SIZE];
     if (table->count == 0 || printer->blocks > BLOCKS_MAX)
         return;
@@ -163,7 +163,7 @@ static void printer_table(Printer *printer, Listing *table, const char *heading)
     text_fit(printer->heading, sizeof printer->heading, text);
     const size_t rows = table->count / table->columns - (table->has_heads ? 1 : 0);
     printer->longest = rows > printer->longest ? rows : printer->longest;
-    listing_print(table, printer->file);
+    print_table_print(table, printer->file);
 }
 
 // A scalar, or a list of them: what fits into a cell.
@@ -203,19 +203,19 @@ static void value_put(Bytes *cell, const json_t *value) {
     }
 }
 
-static void value_add(Listing *table, const json_t *value, const char *unit) {
+static void value_add(PrintTable *table, const json_t *value, const char *unit) {
     Bytes cell = {.most = CELL_BYTES};
     value_put(&cell, value);
     if (unit != NULL && (json_is_number(value) || json_is_array(value)))
         bytes_format(&cell, " %s", unit);
-    listing_add(table, "%s", cell.is_failed ? "..." : cell.at != NULL ? cell.at : "");
+    print_table_add(table, "%s", cell.is_failed ? "..." : cell.at != NULL ? cell.at : "");
     bytes_clear(&cell);
 }
 
-static void head_add(const Printer *printer, Listing *table, const char *name) {
+static void head_add(const Printer *printer, PrintTable *table, const char *name) {
     const char *unit = printer_unit(printer, name);
-    listing_add(table, "%s%s%s%s", name, unit != NULL ? " [" : "", unit != NULL ? unit : "",
-                unit != NULL ? "]" : "");
+    print_table_add(table, "%s%s%s%s", name, unit != NULL ? " [" : "", unit != NULL ? unit : "",
+                    unit != NULL ? "]" : "");
 }
 
 static void heading_join(char target[HEADING_SIZE], const char *heading, const char *name) {
@@ -226,11 +226,11 @@ static void heading_join(char target[HEADING_SIZE], const char *heading, const c
 static void values_print(Printer *printer, json_t *object, const char *heading) {
     const char *name;
     json_t *value;
-    Listing table = {.columns = 2};
+    PrintTable table = {.columns = 2};
     json_object_foreach(object, name, value) {
         if (!value_is_plain(value) || value_is_empty(value) || printer_skips(printer, name))
             continue;
-        listing_add(&table, "%s", name);
+        print_table_add(&table, "%s", name);
         value_add(&table, value, printer_unit(printer, name));
     }
     printer_table(printer, &table, heading);
@@ -246,8 +246,9 @@ static bool list_has(const json_t *list, const char *name) {
     return false;
 }
 
-static const ListingColumns *list_find(const Printer *printer, const char *name) {
-    for (const ListingColumns *one = printer->view->lists; one != NULL && one->list != NULL; one++)
+static const PrintTableColumns *list_find(const Printer *printer, const char *name) {
+    for (const PrintTableColumns *one = printer->view->lists; one != NULL && one->list != NULL;
+         one++)
         if (strcmp(one->list, name) == 0)
             return one;
     return NULL;
@@ -270,7 +271,7 @@ static size_t list_members(const Printer *printer, const json_t *list, const cha
     return count;
 }
 
-static void list_print(Printer *printer, const json_t *list, const ListingColumns *wanted,
+static void list_print(Printer *printer, const json_t *list, const PrintTableColumns *wanted,
                        const char *heading) {
     const char *columns[LISTING_COLUMNS];
     size_t count = 0;
@@ -279,7 +280,7 @@ static void list_print(Printer *printer, const json_t *list, const ListingColumn
             columns[count++] = wanted->columns[i];
     if (wanted == NULL)
         count = list_members(printer, list, columns);
-    Listing table = {.columns = count, .has_heads = true};
+    PrintTable table = {.columns = count, .has_heads = true};
     for (size_t k = 0; k < count; k++)
         head_add(printer, &table, columns[k]);
     for (size_t i = 0; i < json_array_size(list) && i < ROWS_MAX; i++)
@@ -292,13 +293,13 @@ static void list_print(Printer *printer, const json_t *list, const ListingColumn
 }
 
 // Neighbouring objects with the same members.
-typedef struct Group {
+typedef struct MaterialGroup {
     const char *names[LISTING_COLUMNS - 1];
     json_t *objects[LISTING_COLUMNS - 1];
     size_t count;
-} Group;
+} MaterialGroup;
 
-static bool group_takes(const Group *group, const json_t *object) {
+static bool group_takes(const MaterialGroup *group, const json_t *object) {
     const char *name;
     json_t *value;
     if (group->count == COUNT(group->names) ||
@@ -311,7 +312,7 @@ static bool group_takes(const Group *group, const json_t *object) {
     return true;
 }
 
-static bool group_has(const Group *group, const char *name) {
+static bool group_has(const MaterialGroup *group, const char *name) {
     for (size_t k = 0; k < group->count; k++) {
         const json_t *value = json_object_get(group->objects[k], name);
         if (value_is_plain(value) && !value_is_empty(value))
@@ -321,17 +322,17 @@ static bool group_has(const Group *group, const char *name) {
 }
 
 // A column for each object, a row for each member.
-static void group_table(Printer *printer, const Group *group, const char *heading) {
+static void group_table(Printer *printer, const MaterialGroup *group, const char *heading) {
     const char *name;
     json_t *value;
-    Listing table = {.columns = group->count + 1, .has_heads = true};
-    listing_add(&table, "%s", "");
+    PrintTable table = {.columns = group->count + 1, .has_heads = true};
+    print_table_add(&table, "%s", "");
     for (size_t k = 0; k < group->count; k++)
         head_add(printer, &table, group->names[k]);
     json_object_foreach(group->objects[0], name, value) {
         if (!group_has(group, name) || printer_skips(printer, name))
             continue;
-        listing_add(&table, "%s", name);
+        print_table_add(&table, "%s", name);
         for (size_t k = 0; k < group->count; k++)
             value_add(&table, json_object_get(group->objects[k], name),
                       printer_unit(printer, name));
@@ -341,7 +342,7 @@ static void group_table(Printer *printer, const Group *group, const char *headin
 
 static void parts_print(Printer *printer, json_t *object, const char *heading, int depth);
 
-static void group_print(Printer *printer, Group *group, const char *heading, int depth) {
+static void group_print(Printer *printer, MaterialGroup *group, const char *heading, int depth) {
     if (group->count > 1)
         group_table(printer, group, heading);
     for (size_t k = 0; k < group->count; k++) {
@@ -359,7 +360,7 @@ static void objects_print(Printer *printer, const json_t *list, const char *name
                           const char *heading, int depth) {
     const char *key;
     json_t *value;
-    const ListingColumns *wanted = list_find(printer, name);
+    const PrintTableColumns *wanted = list_find(printer, name);
     bool has_parts = false;
     json_object_foreach(json_array_get(list, 0), key, value) has_parts =
         has_parts || (json_is_object(value) && !printer_skips(printer, key));
@@ -380,7 +381,7 @@ static void objects_print(Printer *printer, const json_t *list, const char *name
 static void parts_print(Printer *printer, json_t *object, const char *heading, int depth) {
     const char *name;
     json_t *value;
-    Group group = {.count = 0};
+    MaterialGroup group = {.count = 0};
     if (depth > DEPTH_MAX)
         return;
     json_object_foreach(object, name, value) {
@@ -400,8 +401,8 @@ static void parts_print(Printer *printer, json_t *object, const char *heading, i
     group_print(printer, &group, heading, depth);
 }
 
-Status listing_print_json(const char *text, size_t size, const ListingView *view, FILE *file,
-                          size_t *longest, Problem *problem) {
+Status print_table_print_json(const char *text, size_t size, const PrintTableView *view, FILE *file,
+                              size_t *longest, Problem *problem) {
     size_t position;
     const char *sentence;
     Printer printer = {.view = view, .file = file};

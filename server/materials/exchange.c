@@ -148,7 +148,7 @@ static bool take_reviews(ImportRevision *revision, ExchangeReviews *reviews, Pro
 }
 
 // What both kinds of rows have.
-static void mark_row(ImportMark *mark, const ExchangeRow *row, const char *place, const char *name,
+static void mark_row(RowInfo *mark, const ExchangeRow *row, const char *place, const char *name,
                      size_t order, Problem *problem) {
     char number[POINTER_SIZE];
     json_pointer_join(number, sizeof number, place, name);
@@ -170,7 +170,7 @@ static uint64_t number_of(const ExchangeRow *row) {
 
 static Status take_revision(ImportRevision *revision, char *slug, ExchangeRow *row, size_t faults,
                             Problem *problem) {
-    ImportMark *mark = &revision->mark;
+    RowInfo *mark = &revision->mark;
     MaterialRevision *said = &revision->said;
     said->slug = slug;
     (void)material_validate(&row->material, mark->place, problem);
@@ -185,12 +185,12 @@ static Status take_revision(ImportRevision *revision, char *slug, ExchangeRow *r
     memset(&row->material, 0, sizeof row->material);
     const bool is_taken = take_reviews(revision, &row->reviews, problem);
     mark->is_faulty = problem->count > faults;
-    return is_taken ? catalogue_write_lists(said, problem) : no_memory(problem);
+    return is_taken ? material_write_lists(said, problem) : no_memory(problem);
 }
 
 static Status take_measurement(ImportMeasurement *measurement, char *slug, ExchangeRow *row,
                                size_t faults, Problem *problem) {
-    ImportMark *mark = &measurement->mark;
+    RowInfo *mark = &measurement->mark;
     MaterialMeasurement *made = &measurement->made;
     char test[POINTER_SIZE];
     made->slug = slug;
@@ -206,7 +206,7 @@ static Status take_measurement(ImportMeasurement *measurement, char *slug, Excha
     if (mark->is_faulty)
         return STATUS_OK;
     Bytes bytes = {.most = 0};
-    write_item(&bytes, drop_test_fields, &row->test, WRITE_SCENE);
+    encode_item(&bytes, drop_test_fields, &row->test, WRITE_SCENE);
     made->document = bytes_take(&bytes, NULL);
     return made->document != NULL ? STATUS_OK : no_memory(problem);
 }

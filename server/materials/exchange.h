@@ -62,8 +62,8 @@ Status exchange_drift(Exchange *exchange, const char *slug, const char *place, P
 Status exchange_refuse_many(Problem *problem);
 
 // Sorts what was taken, tells what cannot stand beside each other, and imports it for `who` (NULL:
-// the local user): store_material_import.
-Status exchange_import(Exchange *exchange, Store *store, const char *who, bool may_all, bool is_dry,
+// the local user): db_material_import.
+Status exchange_import(Exchange *exchange, Db *store, const char *who, bool may_all, bool is_dry,
                        ImportTally *tally, Problem *problem);
 
 #endif

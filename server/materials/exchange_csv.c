@@ -23,7 +23,7 @@ typedef struct Column {
 } Column;
 
 typedef struct Table {
-    CsvScan scan;
+    CsvReader scan;
     Column columns[COLUMNS_MAX];
     size_t count;
     bool lacks_name, lacks_source, lacks_restitution; // columns that revisions need
@@ -43,8 +43,8 @@ static void refuse(const Table *table, const char *column, const char *sentence)
     (void)problem_add(table->problem, STATUS_INVALID, place, "%s", sentence);
 }
 
-static void refuse_text(const Table *table, const char *column, const char *text, const char *unit,
-                        const char *meant, const char *sentence) {
+static void decode_error_text(const Table *table, const char *column, const char *text,
+                              const char *unit, const char *meant, const char *sentence) {
     Fault fault = {.row = 0};
     place_of(fault.pointer, table->scan.row, column);
     text_quote(fault.value, sizeof fault.value, text);
@@ -97,14 +97,14 @@ static void read_column(Table *table, const CsvCell *cell) {
     if (cell->fault != NULL) {
         refuse(table, whole, cell->fault);
     } else if (whole[0] != '\0' && field == NULL) {
-        refuse_text(table, whole, whole, NULL, spelling_nearest_field(exchange_row_fields, name),
-                    "unknown column");
+        decode_error_text(table, whole, whole, NULL,
+                          spelling_nearest_field(exchange_row_fields, name), "unknown column");
     } else if (field != NULL && is_known(table, field)) {
         refuse(table, name, "the column stands there twice");
     } else if (field != NULL && unit[0] != '\0' && strcmp(unit, wanted) != 0) {
         snprintf(sentence, sizeof sentence, "must be in [%s], is in [%.40s]",
                  wanted[0] != '\0' ? wanted : "-", unit);
-        refuse_text(table, name, whole, wanted, NULL, sentence);
+        decode_error_text(table, name, whole, wanted, NULL, sentence);
     } else {
         column.field = field;
     }
@@ -117,8 +117,8 @@ static bool has_column(const Table *table, const char *name) {
 
 // Whether it is worth to read on.
 static bool read_header(Table *table) {
-    const CsvScan *scan = &table->scan;
-    if (!csv_scan_next(&table->scan)) {
+    const CsvReader *scan = &table->scan;
+    if (!csv_reader_next(&table->scan)) {
         (void)problem_add(table->problem, STATUS_INVALID, "", "there is no header of names");
         return false;
     }
@@ -127,8 +127,8 @@ static bool read_header(Table *table) {
         return false;
     }
     if (scan->count == 1 && strpbrk(scan->cells[0].text, ";\t") != NULL) {
-        refuse_text(table, "1", scan->cells[0].text, NULL, NULL,
-                    "cells must be parted by commas, and decimals by points");
+        decode_error_text(table, "1", scan->cells[0].text, NULL, NULL,
+                          "cells must be parted by commas, and decimals by points");
         return false;
     }
     for (size_t i = 0; i < scan->count; i++)
@@ -160,7 +160,7 @@ static bool put_number(const Table *table, const Field *field, const char *text,
     }
     snprintf(sentence, sizeof sentence, "must be a number%s%s%s", field->unit != NULL ? " [" : "",
              field->unit != NULL ? field->unit : "", field->unit != NULL ? "]" : "");
-    refuse_text(table, field->name, text, field->unit, NULL, sentence);
+    decode_error_text(table, field->name, text, field->unit, NULL, sentence);
     return false;
 }
 
@@ -191,8 +191,8 @@ static Status read_cell(const Table *table, const Column *column, const CsvCell 
     else if (put_value(table, field, cell->text, &json))
         status = json.is_failed
                      ? STATUS_NO_MEMORY
-                     : read_json_value(json.at, json.count, field, (char *)row + column->offset,
-                                       place, table->problem);
+                     : json_parse_value(json.at, json.count, field, (char *)row + column->offset,
+                                        place, table->problem);
     bytes_clear(&json);
     return status == STATUS_INVALID ? STATUS_OK : status;
 }
@@ -299,14 +299,14 @@ Status exchange_read_csv(const char *text, size_t size, Exchange *exchange, Prob
     exchange->import.revision_name = exchange->import.measurement_name = "number";
     const bool goes_on = read_header(&table);
     exchange->import.is_partial = table.lacks_name || table.lacks_source || table.lacks_restitution;
-    while (goes_on && status == STATUS_OK && csv_scan_next(&table.scan))
+    while (goes_on && status == STATUS_OK && csv_reader_next(&table.scan))
         status = table.scan.row > EXCHANGE_ROWS_MAX + 1 ? exchange_refuse_many(problem)
                                                         : read_row(&table, exchange);
     if (table.scan.is_failed && table.scan.count >= CSV_CELLS_MAX)
         refuse(&table, "", "there are more than 1000 cells in a row");
     else if (table.scan.is_failed || status == STATUS_NO_MEMORY)
         status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the materials");
-    csv_scan_clear(&table.scan);
+    csv_reader_clear(&table.scan);
     return status != STATUS_OK ? status : problem->count > 0 ? STATUS_INVALID : STATUS_OK;
 }
 _Static_assert(CSV_CELLS_MAX == 1000, "the sentence names this number");

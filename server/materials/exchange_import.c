@@ -9,8 +9,8 @@
 #include "server/util/clock.h"
 
 // By slug, by number, what has none last, then as in the file.
-static int order(const char *slug_a, uint64_t number_a, const ImportMark *a, const char *slug_b,
-                 uint64_t number_b, const ImportMark *b) {
+static int order(const char *slug_a, uint64_t number_a, const RowInfo *a, const char *slug_b,
+                 uint64_t number_b, const RowInfo *b) {
     const int by_slug = strcmp(slug_a, slug_b);
     if (by_slug != 0)
         return by_slug;
@@ -90,7 +90,7 @@ static Status check_tests(const MaterialImport *import, Problem *problem) {
     return STATUS_OK;
 }
 
-Status exchange_import(Exchange *exchange, Store *store, const char *who, bool may_all, bool is_dry,
+Status exchange_import(Exchange *exchange, Db *store, const char *who, bool may_all, bool is_dry,
                        ImportTally *tally, Problem *problem) {
     MaterialImport *import = &exchange->import;
     if (import->revision_count > 0)
@@ -105,5 +105,5 @@ Status exchange_import(Exchange *exchange, Store *store, const char *who, bool m
     import->may_all = may_all;
     import->now_unix_ms = clock_unix_ms();
     import->says_same = exchange_says_same;
-    return store_material_import(store, import, is_dry, tally, problem);
+    return db_material_import(store, import, is_dry, tally, problem);
 }

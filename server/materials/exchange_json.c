@@ -55,7 +55,7 @@ static Status read_envelope(const char *text, size_t size, const ScanList *list,
         bytes_put(&outer, text + list->end, size - list->end);
     if (outer.is_failed)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the materials");
-    const Status status = read_json(outer.at, outer.count, envelope_fields, &envelope, problem);
+    const Status status = json_parse(outer.at, outer.count, envelope_fields, &envelope, problem);
     if (status == STATUS_OK || status == STATUS_INVALID) {
         (void)fields_validate(envelope_fields, &envelope, "", problem);
         if (envelope.format != NULL && strcmp(envelope.format, exchange_format) != 0)
@@ -106,7 +106,7 @@ static Status read_one(Exchange *exchange, const char *text, size_t size, const 
     const size_t faults = problem->count;
     json_pointer_index(pointer, sizeof pointer, "/materials", index);
     Status status =
-        read_json_part(text, size, list->first, list->count, pointer, one_fields, &one, problem);
+        json_parse_part(text, size, list->first, list->count, pointer, one_fields, &one, problem);
     if (status == STATUS_OK || status == STATUS_INVALID)
         status = take_one(exchange, &one, pointer, faults, problem);
     fields_clear(one_fields, &one);

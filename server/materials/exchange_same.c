@@ -18,7 +18,7 @@ static bool is_list(const Field *field) {
 // One member alone as text, without its name.
 static void put_member(Bytes *bytes, const Field *field, const void *item) {
     const Field alone[] = {*field, FIELD_END};
-    write_item(bytes, alone, item, WRITE_SCENE);
+    encode_item(bytes, alone, item, WRITE_SCENE);
 }
 
 static void show(char *target, size_t size, const Bytes *bytes, const Field *field) {
@@ -91,8 +91,8 @@ static bool compare_lists(const MaterialRevision *ours, const MaterialRevision *
         return false;
     memset(&one, 0, sizeof one);
     memset(&other, 0, sizeof other);
-    (void)read_json(a, strlen(a), material_list_fields, &one, NULL);
-    (void)read_json(b, strlen(b), material_list_fields, &other, NULL);
+    (void)json_parse(a, strlen(a), material_list_fields, &one, NULL);
+    (void)json_parse(b, strlen(b), material_list_fields, &other, NULL);
     (void)compare(material_list_fields, true, &one, &other, there, place, problem);
     fields_clear(material_list_fields, &one);
     fields_clear(material_list_fields, &other);

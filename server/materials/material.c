@@ -8,18 +8,18 @@
 #include "server/util/base_path.h"
 #include "server/util/clock.h"
 
-Status catalogue_read_lists(MaterialRevision *revision, Problem *problem) {
+Status material_read_lists(MaterialRevision *revision, Problem *problem) {
     Material *material = &revision->material;
     material->tags = (Texts){NULL, 0};
     material->table = (MaterialRows){NULL, 0};
     material->measurements = (Reals){NULL, 0};
     if (revision->lists == NULL)
         return STATUS_OK;
-    return read_json(revision->lists, strlen(revision->lists), material_list_fields, material,
-                     problem);
+    return json_parse(revision->lists, strlen(revision->lists), material_list_fields, material,
+                      problem);
 }
 
-Status catalogue_write_lists(MaterialRevision *revision, Problem *problem) {
+Status material_write_lists(MaterialRevision *revision, Problem *problem) {
     const Material *material = &revision->material;
     free(revision->lists);
     revision->lists = NULL;
@@ -27,16 +27,16 @@ Status catalogue_write_lists(MaterialRevision *revision, Problem *problem) {
         material->measurements.count == 0)
         return STATUS_OK;
     Bytes bytes = {0};
-    write_item(&bytes, material_list_fields, material, WRITE_SCENE);
+    encode_item(&bytes, material_list_fields, material, WRITE_SCENE);
     revision->lists = bytes_take(&bytes, NULL);
     return revision->lists != NULL ? STATUS_OK
                                    : problem_set(problem, STATUS_NO_MEMORY, "no memory for it");
 }
 
-Status catalogue_find(Store *store, const char *slug, uint64_t revision, MaterialRevision *found,
-                      Problem *problem) {
-    TRY(store_material(store, slug, revision, found, problem));
-    return catalogue_read_lists(found, problem);
+Status material_find(Db *store, const char *slug, uint64_t revision, MaterialRevision *found,
+                     Problem *problem) {
+    TRY(db_material(store, slug, revision, found, problem));
+    return material_read_lists(found, problem);
 }
 
 void material_put_text(Bytes *bytes, const char *name, const char *text) {
@@ -67,15 +67,15 @@ static void write_review(Bytes *bytes, const MaterialRevision *revision) {
     bytes_text(bytes, "}");
 }
 
-void catalogue_write(Bytes *bytes, const MaterialRevision *revision) {
-    const char *slug = revision->slug, *base = link_base();
+void material_write(Bytes *bytes, const MaterialRevision *revision) {
+    const char *slug = revision->slug, *base = base_path();
     const unsigned long long number = revision->revision;
     bytes_format(bytes,
                  "{\"slug\": \"%s\", \"revision\": %llu, \"latest\": %llu, \"version\": %llu, "
                  "\"status\": \"%s\", ",
                  slug, number, (unsigned long long)revision->latest,
                  (unsigned long long)revision->version, revision->status);
-    (void)write_members(bytes, material_fields, &revision->material, WRITE_REPORT);
+    (void)encode_members(bytes, material_fields, &revision->material, WRITE_REPORT);
     material_put_text(bytes, "author", revision->author);
     material_put_text(bytes, "comment", revision->comment);
     if (revision->reverts > 0)
@@ -92,9 +92,9 @@ void catalogue_write(Bytes *bytes, const MaterialRevision *revision) {
                  base, slug, base, slug, number, base, slug, base, slug, base, slug, base, slug);
 }
 
-void catalogue_write_said(Bytes *bytes, const MaterialRevision *revision) {
+void material_write_stated(Bytes *bytes, const MaterialRevision *revision) {
     bytes_format(bytes, "{\"slug\": \"%s\", \"revision\": %llu, \"status\": \"%s\", ",
                  revision->slug, (unsigned long long)revision->revision, revision->status);
-    (void)write_members(bytes, material_fields, &revision->material, WRITE_REPORT);
+    (void)encode_members(bytes, material_fields, &revision->material, WRITE_REPORT);
     bytes_text(bytes, "}");
 }

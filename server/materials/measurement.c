@@ -18,7 +18,7 @@ static Status read_test(const MaterialMeasurement *row, DropTest *test, Problem 
     Problem *fault = calloc(1, sizeof *fault);
     if (fault == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the measurement");
-    Status status = read_json(row->document, strlen(row->document), drop_test_fields, test, fault);
+    Status status = json_parse(row->document, strlen(row->document), drop_test_fields, test, fault);
     if (status != STATUS_OK)
         status = problem_set(problem, STATUS_INTERNAL,
                              "measurement %llu of \"%.63s\" cannot be read: %s",
@@ -27,9 +27,9 @@ static Status read_test(const MaterialMeasurement *row, DropTest *test, Problem 
     return status;
 }
 
-Status stored_test_load(Store *store, const char *slug, uint64_t number, StoredTest *stored,
+Status stored_test_load(Db *store, const char *slug, uint64_t number, StoredTest *stored,
                         Problem *problem) {
-    TRY(store_material_measurement(store, slug, number, &stored->row, problem));
+    TRY(db_material_measurement(store, slug, number, &stored->row, problem));
     const Status status = read_test(&stored->row, &stored->test, problem);
     free(stored->row.document); // it may be as large as the test
     stored->row.document = NULL;
@@ -45,7 +45,7 @@ void measurement_write_row(Bytes *bytes, const MaterialMeasurement *row) {
 }
 
 void measurement_write_links(Bytes *bytes, const char *slug, uint64_t number) {
-    const char *base = link_base();
+    const char *base = base_path();
     const unsigned long long n = number;
     bytes_format(bytes,
                  "\"links\": {\"self\": \"%s/v1/materials/%s/measurements/%llu\", \"material\": "
@@ -54,7 +54,7 @@ void measurement_write_links(Bytes *bytes, const char *slug, uint64_t number) {
                  base, slug, n, base, slug, base, slug, n);
 }
 
-Status measurement_write_brief(Bytes *bytes, const MaterialBrief *brief, Problem *problem) {
+Status measurement_write_brief(Bytes *bytes, const MeasurementSummary *brief, Problem *problem) {
     DropTest test;
     memset(&test, 0, sizeof test);
     const Status status = read_test(&brief->row, &test, problem);
@@ -63,7 +63,7 @@ Status measurement_write_brief(Bytes *bytes, const MaterialBrief *brief, Problem
         measurement_write_row(bytes, &brief->row);
         bytes_format(bytes, ", \"drops\": %llu, \"traces\": %llu, \"test\": ",
                      (unsigned long long)brief->drops, (unsigned long long)brief->traces);
-        write_item(bytes, drop_test_fields, &test, WRITE_SCENE);
+        encode_item(bytes, drop_test_fields, &test, WRITE_SCENE);
         bytes_text(bytes, ", ");
         measurement_write_links(bytes, brief->row.slug, brief->row.measurement);
         bytes_text(bytes, "}");
@@ -74,13 +74,13 @@ Status measurement_write_brief(Bytes *bytes, const MaterialBrief *brief, Problem
 
 static void write_warnings(Bytes *bytes, const Evaluation *evaluation) {
     bytes_text(bytes, ", \"warnings\": ");
-    write_list(bytes, warning_fields, evaluation->warnings.at, evaluation->warnings.count,
-               sizeof *evaluation->warnings.at, WRITE_REPORT);
+    encode_list(bytes, warning_fields, evaluation->warnings.at, evaluation->warnings.count,
+                sizeof *evaluation->warnings.at, WRITE_REPORT);
 }
 
 void evaluation_write(Bytes *bytes, const Evaluation *evaluation) {
     bytes_text(bytes, "\"evaluation\": ");
-    write_item(bytes, evaluation_fields, evaluation, WRITE_REPORT);
+    encode_item(bytes, evaluation_fields, evaluation, WRITE_REPORT);
     write_warnings(bytes, evaluation);
 }
 

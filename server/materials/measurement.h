@@ -14,14 +14,14 @@ typedef struct StoredTest {
 } StoredTest;
 
 // STATUS_NOT_FOUND. Cleared by stored_test_clear in any case; `stored` is all zero before.
-Status stored_test_load(Store *store, const char *slug, uint64_t number, StoredTest *stored,
+Status stored_test_load(Db *store, const char *slug, uint64_t number, StoredTest *stored,
                         Problem *problem);
 void stored_test_clear(StoredTest *stored);
 
 // Whose it is, and when: `"slug": ..., "measurement": ...` without braces.
 void measurement_write_row(Bytes *bytes, const MaterialMeasurement *row);
 // Of the test all but its readings, of which the numbers are told; a whole object.
-Status measurement_write_brief(Bytes *bytes, const MaterialBrief *brief, Problem *problem);
+Status measurement_write_brief(Bytes *bytes, const MeasurementSummary *brief, Problem *problem);
 // `"links": {...}`.
 void measurement_write_links(Bytes *bytes, const char *slug, uint64_t number);
 // `"evaluation": {...}, "warnings": [...]`.

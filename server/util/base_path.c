@@ -6,15 +6,15 @@
 
 static char base[LINK_BASE_SIZE];
 
-void link_base_set(const char *path) {
+void base_path_set(const char *path) {
     snprintf(base, sizeof base, "%s", path);
 }
 
-const char *link_base(void) {
+const char *base_path(void) {
     return base;
 }
 
-const char *link_inside(const char *path) {
+const char *base_path_strip(const char *path) {
     const size_t size = strlen(base);
     if (size == 0 || strncmp(path, base, size) != 0)
         return path;
@@ -23,7 +23,7 @@ const char *link_inside(const char *path) {
     return path[size] == '\0' ? "/" : path;
 }
 
-void link_apply(char *text, size_t size) {
+void base_path_apply(char *text, size_t size) {
     const size_t base_size = strlen(base);
     for (char *at = text; base_size > 0 && *at != '\0'; at++) {
         const bool is_path = *at == '/' && (at == text || at[-1] == '<');

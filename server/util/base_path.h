@@ -9,14 +9,14 @@
 enum { LINK_BASE_SIZE = 64 };
 
 // "/sim", or "" for none; at most LINK_BASE_SIZE - 1 bytes of it. A link is written as "%s/v1/...".
-void link_base_set(const char *path);
-const char *link_base(void);
+void base_path_set(const char *path);
+const char *base_path(void);
 
 // Puts the base before `text` if it is a path, and before each "</path>" in it: headers Location
 // and Link. Left as it is where it would not fit.
-void link_apply(char *text, size_t size);
+void base_path_apply(char *text, size_t size);
 
 // `path` without the base, if it begins with it.
-const char *link_inside(const char *path);
+const char *base_path_strip(const char *path);
 
 #endif

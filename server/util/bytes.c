@@ -83,7 +83,7 @@ void bytes_format(Bytes *bytes, const char *format, ...) {
 void bytes_real(Bytes *bytes, double value) {
     char digits[SHORTEST_SIZE];
     if (isfinite(value))
-        bytes_put(bytes, digits, shortest_write(digits, value));
+        bytes_put(bytes, digits, dtoa_write(digits, value));
     else
         bytes_put(bytes, "null", 4);
 }
@@ -96,7 +96,7 @@ void bytes_reals(Bytes *bytes, const double *values, size_t count) {
         char *at = bytes->at + bytes->count;
         if (i > 0)
             *at++ = ',';
-        at += shortest_list(at, values + i, some);
+        at += dtoa_list(at, values + i, some);
         *at = '\0';
         bytes->count = (size_t)(at - bytes->at);
     }

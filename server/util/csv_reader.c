@@ -5,11 +5,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-static bool is_end(const CsvScan *scan) {
+static bool is_end(const CsvReader *scan) {
     return scan->at == scan->size || scan->text[scan->at] == '\n' || scan->text[scan->at] == '\r';
 }
 
-static void skip_end(CsvScan *scan) {
+static void skip_end(CsvReader *scan) {
     const size_t left = scan->size - scan->at;
     if (left > 1 && memcmp(scan->text + scan->at, "\r\n", 2) == 0)
         scan->at += 2;
@@ -17,7 +17,7 @@ static void skip_end(CsvScan *scan) {
         scan->at++;
 }
 
-static CsvCell *add_cell(CsvScan *scan) {
+static CsvCell *add_cell(CsvReader *scan) {
     if (scan->count == scan->room) {
         const size_t room = scan->room > 0 ? 2 * scan->room : 64;
         CsvCell *grown =
@@ -33,7 +33,7 @@ static CsvCell *add_cell(CsvScan *scan) {
 }
 
 // Up to the quote that closes; what is behind it up to the cell's end is passed over.
-static void read_quoted(CsvScan *scan, CsvCell *cell) {
+static void read_quoted(CsvReader *scan, CsvCell *cell) {
     cell->is_quoted = true;
     scan->at++;
     for (;;) {
@@ -57,7 +57,7 @@ static void read_quoted(CsvScan *scan, CsvCell *cell) {
                           "written twice";
 }
 
-static void read_plain(CsvScan *scan) {
+static void read_plain(CsvReader *scan) {
     const size_t first = scan->at;
     while (!is_end(scan) && scan->text[scan->at] != ',')
         scan->at++;
@@ -65,7 +65,7 @@ static void read_plain(CsvScan *scan) {
 }
 
 // False where there is no room for all its cells.
-static bool read_row(CsvScan *scan) {
+static bool read_row(CsvReader *scan) {
     scan->count = 0;
     scan->texts.count = 0;
     for (;;) {
@@ -87,7 +87,7 @@ static bool read_row(CsvScan *scan) {
 }
 
 // The texts have come to rest. What has a NUL in it ends there.
-static bool settle(CsvScan *scan) {
+static bool settle(CsvReader *scan) {
     bool has_any = false;
     for (size_t i = 0; i < scan->count; i++) {
         CsvCell *cell = &scan->cells[i];
@@ -102,7 +102,7 @@ static bool settle(CsvScan *scan) {
     return has_any;
 }
 
-bool csv_scan_next(CsvScan *scan) {
+bool csv_reader_next(CsvReader *scan) {
     while (scan->at < scan->size && !scan->is_failed) {
         scan->is_failed = !read_row(scan);
         if (!scan->is_failed && settle(scan))
@@ -111,8 +111,8 @@ bool csv_scan_next(CsvScan *scan) {
     return false;
 }
 
-void csv_scan_clear(CsvScan *scan) {
+void csv_reader_clear(CsvReader *scan) {
     free(scan->cells);
     bytes_clear(&scan->texts);
-    *scan = (CsvScan){.text = NULL};
+    *scan = (CsvReader){.text = NULL};
 }

@@ -15,7 +15,7 @@ typedef struct CsvCell {
 } CsvCell;
 
 // One pass over a text, which is borrowed. All zero but text and size at first.
-typedef struct CsvScan {
+typedef struct CsvReader {
     const char *text;
     size_t size, at;
     size_t row; // of the cells, from 1; rows of nothing count
@@ -23,11 +23,11 @@ typedef struct CsvScan {
     size_t count, room;
     Bytes texts;
     bool is_failed; // no memory, or a row of more than CSV_CELLS_MAX cells
-} CsvScan;
+} CsvReader;
 
 // The next row that has anything in it, until the call after; false behind the last, or
 // scan->is_failed.
-bool csv_scan_next(CsvScan *scan);
-void csv_scan_clear(CsvScan *scan);
+bool csv_reader_next(CsvReader *scan);
+void csv_reader_clear(CsvReader *scan);
 
 #endif

@@ -90,7 +90,7 @@ char *write_exponent(char *at, int exponent) {
 }
 
 // What stands behind digit number `shift`, from 1 to 15; then nothing of any meaning.
-void store_behind(char *at, const Digits &digits, int shift) {
+void db_behind(char *at, const Digits &digits, int shift) {
     const int bits = 8 * shift;
     if (shift < 8) {
         store(at, digits.middle >> bits | digits.last << (64 - bits));
@@ -118,7 +118,7 @@ void store_behind(char *at, const Digits &digits, int shift) {
         if (digits.count <= whole)
             return at + whole;
         at[whole] = '.';
-        store_behind(at + whole + 1, digits, exponent);
+        db_behind(at + whole + 1, digits, exponent);
         return at + digits.count + 1;
     }
     at[1] = '.';
@@ -148,11 +148,11 @@ void store_behind(char *at, const Digits &digits, int shift) {
 
 } // namespace
 
-std::size_t shortest_write(char *target, double value) {
+std::size_t dtoa_write(char *target, double value) {
     return static_cast<std::size_t>(write(target, value) - target);
 }
 
-std::size_t shortest_list(char *target, const double *values, std::size_t count) {
+std::size_t dtoa_list(char *target, const double *values, std::size_t count) {
     char *at = target;
     for (std::size_t i = 0; i < count; i++) {
         std::uint64_t bits;

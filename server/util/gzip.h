@@ -7,9 +7,9 @@
 #include "server/util/bytes.h"
 
 // Appends `size` bytes as one gzip member, the same bytes every time. False without memory.
-bool deflate_gzip(Bytes *bytes, const void *data, size_t size);
+bool gzip_compress(Bytes *bytes, const void *data, size_t size);
 
 // CRC-32 as of zlib and ZIP; `crc` is 0 at first, then what the call before gave.
-uint32_t deflate_crc32(uint32_t crc, const void *data, size_t size);
+uint32_t gzip_crc32(uint32_t crc, const void *data, size_t size);
 
 #endif

@@ -8,15 +8,15 @@
 // buckets that are not used take no memory.
 enum { BUCKETS = 65536 };
 
-struct Index {
-    IndexEntry *buckets[BUCKETS];
+struct HashMap {
+    HashMapEntry *buckets[BUCKETS];
 };
 
-Index *index_new(void) {
-    return calloc(1, sizeof(Index));
+HashMap *hashmap_new(void) {
+    return calloc(1, sizeof(HashMap));
 }
 
-void index_free(Index *index) {
+void hashmap_free(HashMap *index) {
     free(index);
 }
 
@@ -28,31 +28,31 @@ static size_t bucket(const char *key) {
     return (size_t)(hash % BUCKETS);
 }
 
-void index_add(Index *index, IndexEntry *entry) {
-    IndexEntry **head = &index->buckets[bucket(entry->key)];
+void hashmap_add(HashMap *index, HashMapEntry *entry) {
+    HashMapEntry **head = &index->buckets[bucket(entry->key)];
     entry->next = *head;
     *head = entry;
 }
 
-void index_remove(Index *index, IndexEntry *entry) {
+void hashmap_remove(HashMap *index, HashMapEntry *entry) {
     if (entry->key == NULL)
         return;
-    for (IndexEntry **at = &index->buckets[bucket(entry->key)]; *at != NULL; at = &(*at)->next)
+    for (HashMapEntry **at = &index->buckets[bucket(entry->key)]; *at != NULL; at = &(*at)->next)
         if (*at == entry) {
             *at = entry->next;
             return;
         }
 }
 
-void *index_any(const Index *index) {
+void *hashmap_any(const HashMap *index) {
     for (size_t i = 0; i < BUCKETS; i++)
         if (index->buckets[i] != NULL)
             return index->buckets[i];
     return NULL;
 }
 
-void *index_find(const Index *index, const char *key) {
-    for (IndexEntry *at = index->buckets[bucket(key)]; at != NULL; at = at->next)
+void *hashmap_find(const HashMap *index, const char *key) {
+    for (HashMapEntry *at = index->buckets[bucket(key)]; at != NULL; at = at->next)
         if (strcmp(at->key, key) == 0)
             return at;
     return NULL;

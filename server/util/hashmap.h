@@ -5,19 +5,19 @@
 
 #include <stddef.h>
 
-typedef struct Index Index;
+typedef struct HashMap HashMap;
 
 // First member of what is indexed.
-typedef struct IndexEntry {
-    struct IndexEntry *next;
+typedef struct HashMapEntry {
+    struct HashMapEntry *next;
     const char *key; // lives as long as the thing is in the index
-} IndexEntry;
+} HashMapEntry;
 
-Index *index_new(void); // NULL without memory
-void index_free(Index *index);
-void index_add(Index *index, IndexEntry *entry);
-void index_remove(Index *index, IndexEntry *entry);    // fine if it is not there
-void *index_any(const Index *index);                   // any thing of it, or NULL where it is empty
-void *index_find(const Index *index, const char *key); // the thing, or NULL
+HashMap *hashmap_new(void); // NULL without memory
+void hashmap_free(HashMap *index);
+void hashmap_add(HashMap *index, HashMapEntry *entry);
+void hashmap_remove(HashMap *index, HashMapEntry *entry); // fine if it is not there
+void *hashmap_any(const HashMap *index); // any thing of it, or NULL where it is empty
+void *hashmap_find(const HashMap *index, const char *key); // the thing, or NULL
 
 #endif

@@ -6,7 +6,7 @@
 #include <string.h>
 #include <unistd.h>
 
-void journal_put(Bytes *bytes, const char *name, const char *text, size_t most) {
+void log_put(Bytes *bytes, const char *name, const char *text, size_t most) {
     if (text == NULL)
         return;
     bytes_format(bytes, " %s=\"", name);
@@ -22,7 +22,7 @@ void journal_put(Bytes *bytes, const char *name, const char *text, size_t most) 
 
 // A pipe that nobody empties must not hold up who writes: where there is no room the line is lost.
 // The lock keeps the room that was found for the line that it was found for.
-void journal_write(const Bytes *line) {
+void log_write(const Bytes *line) {
     static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
     static unsigned long lost;
     if (line->at == NULL)

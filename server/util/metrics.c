@@ -28,7 +28,7 @@ uint64_t histogram_count(const Histogram *histogram) {
     return count;
 }
 
-void tally_family(Bytes *bytes, const char *name, const char *type, const char *help) {
+void metrics_family(Bytes *bytes, const char *name, const char *type, const char *help) {
     bytes_format(bytes, "# HELP %s %s\n# TYPE %s %s\n", name, help, name, type);
 }
 
@@ -40,19 +40,19 @@ static void put_name(Bytes *bytes, const char *name, const char *suffix, const c
     bytes_text(bytes, " ");
 }
 
-void tally_count(Bytes *bytes, const char *name, const char *labels, uint64_t value) {
+void metrics_count(Bytes *bytes, const char *name, const char *labels, uint64_t value) {
     put_name(bytes, name, "", labels);
     bytes_format(bytes, "%llu\n", (unsigned long long)value);
 }
 
-void tally_real(Bytes *bytes, const char *name, const char *labels, double value) {
+void metrics_real(Bytes *bytes, const char *name, const char *labels, double value) {
     put_name(bytes, name, "", labels);
     bytes_real(bytes, value);
     bytes_text(bytes, "\n");
 }
 
-void tally_histogram(Bytes *bytes, const char *name, const char *labels,
-                     const Histogram *histogram) {
+void metrics_histogram(Bytes *bytes, const char *name, const char *labels,
+                       const Histogram *histogram) {
     uint64_t count = 0;
     const char *comma = labels[0] != '\0' ? "," : "";
     for (int i = 0; i <= TALLY_BUCKETS; i++) {
@@ -67,12 +67,12 @@ void tally_histogram(Bytes *bytes, const char *name, const char *labels,
     bytes_format(bytes, "%llu\n", (unsigned long long)count);
 }
 
-void tally_counter(Bytes *bytes, const char *name, const char *help, uint64_t value) {
-    tally_family(bytes, name, "counter", help);
-    tally_count(bytes, name, "", value);
+void metrics_counter(Bytes *bytes, const char *name, const char *help, uint64_t value) {
+    metrics_family(bytes, name, "counter", help);
+    metrics_count(bytes, name, "", value);
 }
 
-void tally_gauge(Bytes *bytes, const char *name, const char *help, double value) {
-    tally_family(bytes, name, "gauge", help);
-    tally_real(bytes, name, "", value);
+void metrics_gauge(Bytes *bytes, const char *name, const char *help, double value) {
+    metrics_family(bytes, name, "gauge", help);
+    metrics_real(bytes, name, "", value);
 }

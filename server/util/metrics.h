@@ -27,14 +27,14 @@ void histogram_add(Histogram *histogram, int64_t ns);
 uint64_t histogram_count(const Histogram *histogram);
 
 // "# HELP" and "# TYPE" of a family; its samples follow. `type`: "counter", "gauge", "histogram".
-void tally_family(Bytes *bytes, const char *name, const char *type, const char *help);
+void metrics_family(Bytes *bytes, const char *name, const char *type, const char *help);
 // One sample. `labels` is "" or "a=\"b\",c=\"d\"", escaped already.
-void tally_count(Bytes *bytes, const char *name, const char *labels, uint64_t value);
-void tally_real(Bytes *bytes, const char *name, const char *labels, double value);
-void tally_histogram(Bytes *bytes, const char *name, const char *labels,
-                     const Histogram *histogram);
+void metrics_count(Bytes *bytes, const char *name, const char *labels, uint64_t value);
+void metrics_real(Bytes *bytes, const char *name, const char *labels, double value);
+void metrics_histogram(Bytes *bytes, const char *name, const char *labels,
+                       const Histogram *histogram);
 // A family of one sample.
-void tally_counter(Bytes *bytes, const char *name, const char *help, uint64_t value);
-void tally_gauge(Bytes *bytes, const char *name, const char *help, double value);
+void metrics_counter(Bytes *bytes, const char *name, const char *help, uint64_t value);
+void metrics_gauge(Bytes *bytes, const char *name, const char *help, double value);
 
 #endif

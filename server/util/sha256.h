@@ -4,17 +4,17 @@
 
 #include <stddef.h>
 
-typedef struct Digest Digest;
+typedef struct Sha256 Sha256;
 
-Digest *digest_new(void);                                       // NULL without memory
-void digest_take(void *digest, const void *bytes, size_t size); // fits canonical_write's callback
+Sha256 *sha256_new(void);                                      // NULL without memory
+void sha256_add(void *digest, const void *bytes, size_t size); // fits canonical_write's callback
 // Ends and frees; 64 lower-case hexadecimal digits and a NUL.
-void digest_end(Digest *digest, char target[65]);
+void sha256_end(Sha256 *digest, char target[65]);
 
 enum { DIGEST_BYTES = 32 };
 // The digest of all of `bytes` at once, as it is.
-void digest_sum(const void *bytes, size_t size, unsigned char target[DIGEST_BYTES]);
+void sha256_sum(const void *bytes, size_t size, unsigned char target[DIGEST_BYTES]);
 // The same as 64 digits and a NUL.
-void digest_spell(const unsigned char sum[DIGEST_BYTES], char target[65]);
+void sha256_hex(const unsigned char sum[DIGEST_BYTES], char target[65]);
 
 #endif

@@ -9,7 +9,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-void notify_send(const char *state) {
+void systemd_notify(const char *state) {
     const char *path = getenv("NOTIFY_SOCKET");
     struct sockaddr_un name = {.sun_family = AF_UNIX};
     if (path == NULL || (path[0] != '/' && path[0] != '@'))
@@ -29,7 +29,7 @@ void notify_send(const char *state) {
     close(door);
 }
 
-int64_t notify_watchdog_ms(void) {
+int64_t systemd_watchdog_ms(void) {
     const char *period = getenv("WATCHDOG_USEC"), *process = getenv("WATCHDOG_PID");
     if (period == NULL || (process != NULL && strtol(process, NULL, 10) != (long)getpid()))
         return 0;

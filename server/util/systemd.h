@@ -6,8 +6,8 @@
 #include <stdint.h>
 
 // Sends "READY=1", "STOPPING=1", "WATCHDOG=1" and the like; a datagram that is not taken is lost.
-void notify_send(const char *state);
+void systemd_notify(const char *state);
 // How often "WATCHDOG=1" is to be sent: half of WATCHDOG_USEC. 0: not asked for.
-int64_t notify_watchdog_ms(void);
+int64_t systemd_watchdog_ms(void);
 
 #endif

@@ -4,22 +4,22 @@
 #include <stdbool.h>
 #include <stdlib.h>
 
-struct Pool {
+struct ThreadPool {
     pthread_mutex_t lock;
     pthread_cond_t some;
-    Task *first, **last;
+    WorkItem *first, **last;
     bool is_closing;
     size_t count; // of threads
     pthread_t threads[];
 };
 
 static void *work(void *context) {
-    Pool *pool = context;
+    ThreadPool *pool = context;
     pthread_mutex_lock(&pool->lock);
     for (;;) {
         while (pool->first == NULL && !pool->is_closing)
             pthread_cond_wait(&pool->some, &pool->lock);
-        Task *task = pool->first;
+        WorkItem *task = pool->first;
         if (task == NULL)
             break;
         pool->first = task->next;
@@ -33,9 +33,9 @@ static void *work(void *context) {
     return NULL;
 }
 
-Status pool_open(size_t threads, Pool **pool, Problem *problem) {
+Status thread_pool_open(size_t threads, ThreadPool **pool, Problem *problem) {
     *pool = NULL;
-    Pool *made = calloc(1, sizeof *made + threads * sizeof *made->threads);
+    ThreadPool *made = calloc(1, sizeof *made + threads * sizeof *made->threads);
     if (made == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the threads that answer");
     pthread_mutex_init(&made->lock, NULL);
@@ -45,7 +45,7 @@ Status pool_open(size_t threads, Pool **pool, Problem *problem) {
            pthread_create(&made->threads[made->count], NULL, work, made) == 0)
         made->count++;
     if (made->count < threads) {
-        pool_close(made);
+        thread_pool_close(made);
         return problem_set(problem, STATUS_INTERNAL,
                            "the threads that answer requests cannot be started");
     }
@@ -53,7 +53,7 @@ Status pool_open(size_t threads, Pool **pool, Problem *problem) {
     return STATUS_OK;
 }
 
-void pool_put(Pool *pool, Task *task) {
+void thread_pool_add(ThreadPool *pool, WorkItem *task) {
     task->next = NULL;
     pthread_mutex_lock(&pool->lock);
     *pool->last = task;
@@ -62,7 +62,7 @@ void pool_put(Pool *pool, Task *task) {
     pthread_mutex_unlock(&pool->lock);
 }
 
-void pool_close(Pool *pool) {
+void thread_pool_close(ThreadPool *pool) {
     if (pool == NULL)
         return;
     pthread_mutex_lock(&pool->lock);

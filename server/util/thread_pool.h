@@ -7,17 +7,17 @@
 
 #include "core/base/status.h"
 
-typedef struct Pool Pool;
+typedef struct ThreadPool ThreadPool;
 
 // First member of what is to be done; it lives until `run` is called, and is not touched after.
-typedef struct Task {
-    struct Task *next;
-    void (*run)(struct Task *task);
-} Task;
+typedef struct WorkItem {
+    struct WorkItem *next;
+    void (*run)(struct WorkItem *task);
+} WorkItem;
 
-Status pool_open(size_t threads, Pool **pool, Problem *problem);
-void pool_put(Pool *pool, Task *task); // from any thread
+Status thread_pool_open(size_t threads, ThreadPool **pool, Problem *problem);
+void thread_pool_add(ThreadPool *pool, WorkItem *task); // from any thread
 // Does what was put, then ends the threads; nobody may put any more. NULL is fine.
-void pool_close(Pool *pool);
+void thread_pool_close(ThreadPool *pool);
 
 #endif

@@ -52,7 +52,7 @@ static void encode(Bytes *bytes, uint32_t character) {
     bytes_put(bytes, at, size);
 }
 
-void fold_put(Bytes *bytes, const char *text) {
+void utf8_fold(Bytes *bytes, const char *text) {
     pthread_once(&once, open_locale);
     const unsigned char *at = (const unsigned char *)text;
     while (*at != '\0') {

@@ -7,6 +7,6 @@
 
 // Appends UTF-8 in lower case, of any script, with a space for each control character. What is no
 // UTF-8 is kept as it is.
-void fold_put(Bytes *bytes, const char *text);
+void utf8_fold(Bytes *bytes, const char *text);
 
 #endif

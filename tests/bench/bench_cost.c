@@ -105,7 +105,7 @@ static int draw_int(int first, int last) {
     return first + (int)draws_uniform(&draws, 0, last - first + 1);
 }
 
-static void write_list(FILE *out, const char *name, int count, double a, double b) {
+static void encode_list(FILE *out, const char *name, int count, double a, double b) {
     fprintf(out, "\"%s\": [", name);
     for (int i = 0; i < count; i++)
         fprintf(out, "%s%.6g", i > 0 ? ", " : "", draws_uniform(&draws, a, b));
@@ -119,12 +119,12 @@ static void write_structure(FILE *out, int storeys) {
         return;
     }
     fprintf(out, "\"structure\": {\"kind\": \"frame\", ");
-    write_list(out, "masses", storeys, 0.5, 2);
+    encode_list(out, "masses", storeys, 0.5, 2);
     fprintf(out, ", ");
-    write_list(out, "stiffnesses", storeys, 500, 5000);
+    encode_list(out, "stiffnesses", storeys, 500, 5000);
     fprintf(out, ", ");
     if (draws_chance(&draws, 0.3))
-        write_list(out, "dampings", storeys, 0.2, 2);
+        encode_list(out, "dampings", storeys, 0.2, 2);
     else
         fprintf(out, "\"damping_ratio\": %.3g", draws_uniform(&draws, 0.005, 0.05));
     fprintf(out, "}");
@@ -168,7 +168,7 @@ static void write_excitation(FILE *out, int storeys) {
     switch (draw_int(0, 6)) {
     case 0:
         fprintf(out, "\"free\", ");
-        write_list(out, "displacement", storeys, -0.05, 0.05);
+        encode_list(out, "displacement", storeys, -0.05, 0.05);
         fprintf(out, "}");
         break;
     case 1:
@@ -192,7 +192,7 @@ static void write_excitation(FILE *out, int storeys) {
         break;
     default:
         fprintf(out, "\"record\", \"interval\": %.6g, ", draws_scattered(&draws, 1e-3, 0.05));
-        write_list(out, "samples", draw_int(100, 2000), -2 * amplitude, 2 * amplitude);
+        encode_list(out, "samples", draw_int(100, 2000), -2 * amplitude, 2 * amplitude);
         fprintf(out, "}");
     }
 }
@@ -240,14 +240,14 @@ static bool cost_advance(void *context, double fraction) {
     return (double)(clock_thread_cpu_ns() - *(const int64_t *)context) * 1e-9 < STOPPED_AFTER;
 }
 
-typedef struct Measured {
+typedef struct MeasuredUpload {
     double cpu, bytes;
     double steps; // counted by the solver; NAN: the run was stopped
-} Measured;
+} MeasuredUpload;
 
-static bool cost_measure(const Simulation *simulation, Measured *measured) {
+static bool cost_measure(const Simulation *simulation, MeasuredUpload *measured) {
     Problem problem;
-    *measured = (Measured){INFINITY, 0, (double)NAN};
+    *measured = (MeasuredUpload){INFINITY, 0, (double)NAN};
     for (int i = 0; i < 2; i++) {
         Outcome *outcome = NULL;
         problem_clear(&problem);
@@ -306,7 +306,7 @@ static void cost_print(const char *name, const Row *rows, size_t count, size_t k
 }
 
 static bool cost_compare(const Simulation *simulation, Row *row, const char *text) {
-    Measured measured;
+    MeasuredUpload measured;
     const Cost cost = simulation_cost(simulation);
     if (cost.cpu_seconds > PREDICTED_MAX || !cost_measure(simulation, &measured))
         return false;
@@ -337,7 +337,7 @@ int main(int argc, char **argv) {
         char *text = scene_text(&kinds[count % KINDS]);
         rows[count].kind = count % KINDS;
         problem_clear(&problem);
-        (void)read_json(text, strlen(text), simulation_fields, &simulation, &problem);
+        (void)json_parse(text, strlen(text), simulation_fields, &simulation, &problem);
         if (simulation_complete(&simulation, NULL, NULL, &problem) != STATUS_OK) {
             refused++;
             if (argc > 3 && problem.count > 0)

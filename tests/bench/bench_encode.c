@@ -60,7 +60,7 @@ static double time_memcpy(const double *source, double *target) {
     return 1e-3 * (double)(clock_thread_cpu_ns() - start);
 }
 
-static double time_encoder(const Encoder *encoder, const Table *table, Bytes *bytes) {
+static double time_encoder(const TableFormat *encoder, const Table *table, Bytes *bytes) {
     bytes->count = 0;
     const int64_t start = clock_thread_cpu_ns();
     const Status status = encoding_write(encoder, table, bytes, NULL);
@@ -85,7 +85,7 @@ static double time_buckets(const Column *column, size_t bucket) {
     for (size_t r = 0; r < REPEATS; r++) {
         Columns buckets;
         const int64_t start = clock_thread_cpu_ns();
-        if (buckets_make(&column, 1, 0, SAMPLES, bucket, &buckets, NULL) != STATUS_OK)
+        if (downsample(&column, 1, 0, SAMPLES, bucket, &buckets, NULL) != STATUS_OK)
             return (double)NAN;
         times[r] = 1e-3 * (double)(clock_thread_cpu_ns() - start);
         columns_clear(&buckets);
@@ -114,7 +114,7 @@ int main(void) {
     for (size_t r = 0; r < REPEATS; r++) {
         times[MEMCPY][r] = time_memcpy(values, target);
         for (size_t i = NPY; i < WAYS; i++)
-            times[i][r] = time_encoder(encoder_find(names[i]), &series.table, &bytes[i]);
+            times[i][r] = time_encoder(format_find(names[i]), &series.table, &bytes[i]);
         if (document == NULL)
             document = json_loadb(bytes[JSON].at, bytes[JSON].count, 0, NULL);
         times[JANSSON][r] = document != NULL ? time_jansson(document) : (double)NAN;

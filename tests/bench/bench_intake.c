@@ -52,12 +52,12 @@ static void stop(const char *what) {
     exit(1);
 }
 
-static void measure_core(Store *store) {
+static void measure_core(Db *store) {
     char text[2400];
     StudyRequest inquiry = {0};
     Warnings warnings = {NULL, 0};
     const int size = scene_text(text, 1);
-    if (intake_prepare(store, text, (size_t)size, NULL, &inquiry, &warnings, &problem) != STATUS_OK)
+    if (jobs_prepare(store, text, (size_t)size, NULL, &inquiry, &warnings, &problem) != STATUS_OK)
         stop("the scene");
     Workspace workspace = {0};
     size_t count = 0;
@@ -79,19 +79,19 @@ static void measure_core(Store *store) {
     warnings_clear(&warnings);
 }
 
-typedef struct Client {
-    Intake *intake;
+typedef struct QueueClient {
+    JobManager *intake;
     pthread_mutex_t lock;
     pthread_cond_t woken;
     bool is_woken;
     size_t count;
     double end;
-} Client;
+} QueueClient;
 
 static atomic_uint next_number = 1;
 
 static void wake(void *context) {
-    Client *client = context;
+    QueueClient *client = context;
     pthread_mutex_lock(&client->lock);
     client->is_woken = true;
     pthread_cond_signal(&client->woken);
@@ -100,44 +100,44 @@ static void wake(void *context) {
 
 // New jobs, each until it is finished and durable.
 static void *submit_new(void *context) {
-    Client *client = context;
+    QueueClient *client = context;
     Problem *fault = calloc(1, sizeof *fault);
     char text[2400];
     while (fault != NULL && now() < client->end) {
         const int size = scene_text(text, atomic_fetch_add(&next_number, 1));
         const Submission submission = {.text = text, .size = (size_t)size};
-        const Waker waker = {client, wake};
+        const Callback waker = {client, wake};
         Job *job = NULL;
         client->is_woken = false;
         problem_clear(fault);
-        if (intake_submit(client->intake, &submission, &job, fault) != STATUS_OK)
+        if (jobs_submit(client->intake, &submission, &job, fault) != STATUS_OK)
             continue;
-        (void)job_watch(job, &waker);
+        (void)job_subscribe(job, &waker);
         pthread_mutex_lock(&client->lock);
         while (!client->is_woken)
             pthread_cond_wait(&client->woken, &client->lock);
         pthread_mutex_unlock(&client->lock);
         bool is_kept = false;
-        client->count += job_kept(job, &is_kept, fault) == STATUS_OK && is_kept;
-        job_drop(job);
+        client->count += job_is_durable(job, &is_kept, fault) == STATUS_OK && is_kept;
+        job_unref(job);
     }
     free(fault);
     return NULL;
 }
 
-static void measure_jobs(Store *store, size_t workers, size_t clients) {
-    static Client all[CLIENTS];
+static void measure_jobs(Db *store, size_t workers, size_t clients) {
+    static QueueClient all[CLIENTS];
     pthread_t threads[CLIENTS];
-    const IntakeSettings settings = {.workers = workers,
-                                     .queue_most = 10000,
-                                     .cache_bytes = (size_t)64 << 20,
-                                     .limits = {.samples = 1 << 25, .impacts = 500000}};
-    Intake *intake;
-    if (intake_open(store, &settings, &intake, &problem) != STATUS_OK)
+    const JobManagerSettings settings = {.workers = workers,
+                                         .queue_most = 10000,
+                                         .cache_bytes = (size_t)64 << 20,
+                                         .limits = {.samples = 1 << 25, .impacts = 500000}};
+    JobManager *intake;
+    if (jobs_open(store, &settings, &intake, &problem) != STATUS_OK)
         stop("the intake");
     const double began = now(), cpu_began = cpu();
     for (size_t i = 0; i < clients; i++) {
-        all[i] = (Client){.intake = intake, .end = began + seconds};
+        all[i] = (QueueClient){.intake = intake, .end = began + seconds};
         pthread_mutex_init(&all[i].lock, NULL);
         pthread_cond_init(&all[i].woken, NULL);
         if (pthread_create(&threads[i], NULL, submit_new, &all[i]) != 0)
@@ -153,35 +153,35 @@ static void measure_jobs(Store *store, size_t workers, size_t clients) {
     snprintf(name, sizeof name, "new jobs, durable, %zu clients, %zu workers", clients, workers);
     printf("%-44s %10.0f /s %8.2f us of CPU\n", name, (double)count / took,
            1e6 * (cpu() - cpu_began) / (double)count);
-    intake_close(intake);
+    jobs_close(intake);
 }
 
 // Until the job is finished; false where it computed something.
-static bool submit_known(Intake *intake, const Submission *submission) {
+static bool submit_known(JobManager *intake, const Submission *submission) {
     Job *job = NULL;
-    JobShow show;
-    if (intake_submit(intake, submission, &job, &problem) != STATUS_OK)
+    JobView show;
+    if (jobs_submit(intake, submission, &job, &problem) != STATUS_OK)
         stop("a scene");
     while (!job_is_finished(job))
         nanosleep(&(struct timespec){0, 1000000}, NULL);
-    if (job_show(job, &show) != STATUS_OK)
+    if (job_view(job, &show) != STATUS_OK)
         stop("a job");
     const bool is_cached = show.is_cached;
-    job_show_clear(&show);
-    job_drop(job);
+    job_view_clear(&show);
+    job_unref(job);
     return is_cached;
 }
 
-static void measure_known(Store *store) {
+static void measure_known(Db *store) {
     char text[2400];
     const int size = scene_text(text, 0);
     const Submission submission = {.text = text, .size = (size_t)size};
-    const IntakeSettings settings = {.workers = 1,
-                                     .queue_most = 10000,
-                                     .cache_bytes = (size_t)64 << 20,
-                                     .limits = {.samples = 1 << 25, .impacts = 500000}};
-    Intake *intake;
-    if (intake_open(store, &settings, &intake, &problem) != STATUS_OK)
+    const JobManagerSettings settings = {.workers = 1,
+                                         .queue_most = 10000,
+                                         .cache_bytes = (size_t)64 << 20,
+                                         .limits = {.samples = 1 << 25, .impacts = 500000}};
+    JobManager *intake;
+    if (jobs_open(store, &settings, &intake, &problem) != STATUS_OK)
         stop("the intake");
     bool is_cached = false;
     while (!is_cached)
@@ -193,12 +193,12 @@ static void measure_known(Store *store) {
             stop("a cached scene");
         count++;
     } while (now() - began < seconds);
-    store_settle(store);
+    db_flush(store);
     const double took = now() - began;
     printf("%-44s %10.0f /s %8.2f us of CPU with its row, durable\n",
            "cached scenes of 2 KB, one thread", (double)count / took,
            1e6 * (cpu() - cpu_began) / (double)count);
-    intake_close(intake);
+    jobs_close(intake);
 }
 
 static void measure_disk(void) {
@@ -248,8 +248,8 @@ static void note(void *context, Status status, const char *detail) {
 static void measure_rows(bool is_grouped, bool is_rising) {
     char directory[4100], command[4200];
     snprintf(directory, sizeof directory, "%s/rows", folder);
-    Store *store;
-    if (store_open(directory, &store, &problem) != STATUS_OK)
+    Db *store;
+    if (db_open(directory, &store, &problem) != STATUS_OK)
         stop("the store");
     enum { ON_THE_WAY = 64 };
     static JobRow rows[ON_THE_WAY];
@@ -262,9 +262,9 @@ static void measure_rows(bool is_grouped, bool is_rising) {
         JobRow *row = &rows[count % ON_THE_WAY];
         *row = (JobRow){.scene = "", .warnings = "[]"};
         name_row(row, is_rising, count);
-        const StoreDone done = {note, NULL};
-        const Status status = is_grouped ? store_job_post(store, row, STORE_NOW, &done, NULL)
-                                         : store_job_add(store, row, &problem);
+        const WriteDone done = {note, NULL};
+        const Status status = is_grouped ? db_job_post(store, row, STORE_NOW, &done, NULL)
+                                         : db_job_add(store, row, &problem);
         if (status != STATUS_OK)
             stop("a row");
         count++;
@@ -277,7 +277,7 @@ static void measure_rows(bool is_grouped, bool is_rising) {
              is_grouped ? "64 on the way" : "one commit each", is_rising ? "rising" : "random");
     printf("%-44s %10.0f /s %8.2f us of CPU\n", name, (double)count / took,
            1e6 * (cpu() - cpu_began) / (double)count);
-    store_close(store);
+    db_close(store);
     snprintf(command, sizeof command, "rm -rf '%s'", directory);
     if (system(command) != 0)
         stop("the folder");
@@ -292,16 +292,16 @@ int main(int argc, char **argv) {
     if (mkdtemp(folder) == NULL)
         stop(folder);
     fft_start();
-    Store *store;
+    Db *store;
     char directory[4100], command[4200];
     snprintf(directory, sizeof directory, "%s/jobs", folder);
-    if (store_open(directory, &store, &problem) != STATUS_OK)
+    if (db_open(directory, &store, &problem) != STATUS_OK)
         stop("the store");
     measure_core(store);
     measure_jobs(store, 2, CLIENTS);
     measure_jobs(store, 1, 1);
     measure_known(store);
-    store_close(store);
+    db_close(store);
     if (argc <= 3) {
         measure_disk();
         measure_rows(false, true);

@@ -46,14 +46,14 @@ static double process_cpu(void) {
 }
 
 // The core's part: scenes made beforehand, run one after the other.
-typedef struct Loop {
+typedef struct EventLoop {
     const Simulation *scenes;
     size_t first;
     pthread_t thread;
-} Loop;
+} EventLoop;
 
 static void *run_loop(void *context) {
-    const Loop *loop = context;
+    const EventLoop *loop = context;
     Workspace workspace = {0};
     for (size_t i = loop->first; i < points; i += threads) {
         Outcome *outcome;
@@ -65,10 +65,10 @@ static void *run_loop(void *context) {
 }
 
 static double time_core(const Simulation *scenes) {
-    Loop loops[64];
+    EventLoop loops[64];
     const int64_t began_ns = clock_monotonic_ns();
     for (size_t i = 0; i < threads; i++) {
-        loops[i] = (Loop){.scenes = scenes, .first = i};
+        loops[i] = (EventLoop){.scenes = scenes, .first = i};
         pthread_create(&loops[i].thread, NULL, run_loop, &loops[i]);
     }
     for (size_t i = 0; i < threads; i++)
@@ -77,18 +77,18 @@ static double time_core(const Simulation *scenes) {
 }
 
 // A new sweep each time: the structure's mass is another.
-static double time_room(Intake *intake, size_t round, Problem *problem) {
+static double time_room(JobManager *intake, size_t round, Problem *problem) {
     char text[1024];
     Job *job;
     scene_text(text, points, 1.35 + 1e-9 * (double)round);
     const Submission submission = {.text = text, .size = strlen(text)};
     const int64_t began_ns = clock_monotonic_ns();
-    if (intake_submit(intake, &submission, &job, problem) != STATUS_OK)
+    if (jobs_submit(intake, &submission, &job, problem) != STATUS_OK)
         return -1;
     const struct timespec nap = {0, 500000};
     while (!job_is_finished(job))
         nanosleep(&nap, NULL);
-    job_drop(job);
+    job_unref(job);
     return 1e-9 * (double)(clock_monotonic_ns() - began_ns);
 }
 
@@ -102,7 +102,7 @@ static double median(double *values, size_t count) {
     return values[count / 2];
 }
 
-static int bench_judging(Store *store, Problem *problem) {
+static int bench_judging(Db *store, Problem *problem) {
     char text[1024];
     StudyRequest inquiry = {0};
     Warnings warnings = {NULL, 0};
@@ -110,8 +110,7 @@ static int bench_judging(Store *store, Problem *problem) {
     const SimulationLimits limits = {.samples = 1 << 25, .points = 1 << 20};
     scene_text(text, 100000, 1.35);
     int64_t began_ns = clock_monotonic_ns();
-    if (intake_prepare(store, text, strlen(text), &limits, &inquiry, &warnings, problem) !=
-        STATUS_OK)
+    if (jobs_prepare(store, text, strlen(text), &limits, &inquiry, &warnings, problem) != STATUS_OK)
         return fail("judging", problem);
     printf("POST of 100000 points, its axes judged: %.3f s\n",
            1e-9 * (double)(clock_monotonic_ns() - began_ns));
@@ -128,19 +127,19 @@ static int bench_judging(Store *store, Problem *problem) {
     return 0;
 }
 
-static int bench_rows(Store *store, Problem *problem) {
+static int bench_rows(Db *store, Problem *problem) {
     enum { CHUNKS = 64, ROWS = 10000, METRICS = 6 };
     SweepRow row = {.points = (uint64_t)CHUNKS * ROWS, .metrics = METRICS, .chunks = CHUNKS};
     strcpy(row.result, "r-bench");
     row.scene = strdup("{}");
     SweepChunkRow chunk = {.rows = {calloc(ROWS, 1 + 8 * METRICS), ROWS * (1 + 8 * METRICS)}};
-    if (chunk.rows.at == NULL || store_sweep_begin(store, &row, problem) != STATUS_OK)
+    if (chunk.rows.at == NULL || db_sweep_begin(store, &row, problem) != STATUS_OK)
         return fail("rows", problem);
     chunk.sweep = row.number;
     const int64_t began_ns = clock_monotonic_ns();
     for (size_t i = 0; i < CHUNKS; i++) {
         chunk.chunk = i;
-        if (store_sweep_take(store, &chunk, problem) != STATUS_OK)
+        if (db_sweep_take(store, &chunk, problem) != STATUS_OK)
             return fail("rows", problem);
     }
     const double took = 1e-9 * (double)(clock_monotonic_ns() - began_ns);
@@ -163,22 +162,21 @@ int main(int argc, char **argv) {
     if (points < 2 || threads < 1 || threads > 64 || rounds < 1 || rounds > ROUNDS_MAX ||
         mkdtemp(folder) == NULL)
         return 2;
-    Store *store;
-    Intake *intake;
-    const IntakeSettings settings = {.workers = threads,
-                                     .queue_most = 100,
-                                     .cache_bytes = 1 << 24,
-                                     .limits = {.samples = 1 << 25, .points = 1 << 24}};
+    Db *store;
+    JobManager *intake;
+    const JobManagerSettings settings = {.workers = threads,
+                                         .queue_most = 100,
+                                         .cache_bytes = 1 << 24,
+                                         .limits = {.samples = 1 << 25, .points = 1 << 24}};
     fft_start();
-    if (store_open(folder, &store, &problem) != STATUS_OK ||
-        intake_open(store, &settings, &intake, &problem) != STATUS_OK)
+    if (db_open(folder, &store, &problem) != STATUS_OK ||
+        jobs_open(store, &settings, &intake, &problem) != STATUS_OK)
         return fail("opening", &problem);
     StudyRequest inquiry = {0};
     Warnings warnings = {NULL, 0};
     SweepGrid *plan;
     scene_text(text, points, 1.35);
-    if (intake_prepare(store, text, strlen(text), NULL, &inquiry, &warnings, &problem) !=
-            STATUS_OK ||
+    if (jobs_prepare(store, text, strlen(text), NULL, &inquiry, &warnings, &problem) != STATUS_OK ||
         sweep_grid_new((const SweepStudy *)(const void *)inquiry.study, &inquiry.simulation, NULL,
                        &plan, &problem) != STATUS_OK)
         return fail("planning", &problem);
@@ -217,8 +215,8 @@ int main(int argc, char **argv) {
     sweep_grid_free(plan);
     study_request_clear(&inquiry);
     warnings_clear(&warnings);
-    intake_close(intake);
-    store_close(store);
+    jobs_close(intake);
+    db_close(store);
     snprintf(text, sizeof text, "rm -rf '%s'", folder);
     return system(text) != 0 ? 1 : code;
 }

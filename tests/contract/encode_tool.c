@@ -12,7 +12,7 @@ enum { COLUMNS_MAX = 16 };
 int main(int count, char **arguments) {
     if (count != 6 && count != 7)
         return 2;
-    const Encoder *encoder = encoder_find(arguments[1]);
+    const TableFormat *encoder = format_find(arguments[1]);
     const size_t columns = strtoul(arguments[2], NULL, 10);
     size_t values = 0;
     double *block = doubles_read(&values);

@@ -21,7 +21,7 @@ int main(int argc, char **argv) {
         char path[4096];
         snprintf(path, sizeof path, "%s/%s.schema.json", argv[1], document->name);
         Bytes bytes = {0};
-        describe_document(&bytes, document);
+        schema_write_document(&bytes, document);
         if (bytes.is_failed || !write_file(path, &bytes)) {
             fprintf(stderr, "cannot write %s\n", path);
             bytes_clear(&bytes);

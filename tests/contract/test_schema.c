@@ -35,7 +35,7 @@ static void the_committed_schemas_are_what_the_tables_say(void **state) {
     (void)state;
     for (const SchemaDocument *document = schema_documents; document->name != NULL; document++) {
         Bytes bytes = {0};
-        describe_document(&bytes, document);
+        schema_write_document(&bytes, document);
         assert_false(bytes.is_failed);
         char *committed = read_file(document->name);
         if (strcmp(committed, bytes.at) != 0)
@@ -70,7 +70,7 @@ static void every_schema_is_an_object_that_refuses_unknown_members(void **state)
     (void)state;
     for (const SchemaDocument *document = schema_documents; document->name != NULL; document++) {
         Bytes bytes = {0};
-        describe_document(&bytes, document);
+        schema_write_document(&bytes, document);
         json_error_t error;
         json_t *schema = json_loadb(bytes.at, bytes.count, JSON_REJECT_DUPLICATES, &error);
         if (schema == NULL)

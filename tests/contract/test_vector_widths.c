@@ -33,7 +33,7 @@ static void digest_columns(uint64_t *digest, const Columns *columns) {
 static uint64_t outcome_digest(const char *path) {
     static char text[1 << 20];
     Problem problem;
-    Store *store;
+    Db *store;
     StudyRequest request = {0};
     Warnings warnings = {NULL, 0};
     Outcome *outcome;
@@ -43,8 +43,8 @@ static uint64_t outcome_digest(const char *path) {
     fclose(file);
     text[size] = 0;
     problem_clear(&problem);
-    assert_int_equal(store_open(NULL, &store, &problem), STATUS_OK);
-    assert_int_equal(intake_prepare(store, text, size, NULL, &request, &warnings, &problem),
+    assert_int_equal(db_open(NULL, &store, &problem), STATUS_OK);
+    assert_int_equal(jobs_prepare(store, text, size, NULL, &request, &warnings, &problem),
                      STATUS_OK);
     assert_int_equal(simulation_run(&request.simulation, NULL, NULL, NULL, &outcome, &problem),
                      STATUS_OK);
@@ -59,7 +59,7 @@ static uint64_t outcome_digest(const char *path) {
     outcome_unref(outcome);
     study_request_clear(&request);
     warnings_clear(&warnings);
-    store_close(store);
+    db_close(store);
     return digest;
 }
 

@@ -102,21 +102,21 @@ static const char *judge_faults(Status status, bool is_table, const Problem *pro
 }
 
 // What was brought in comes out of another database as it went in.
-static const char *judge_round(Store *store, Problem *problem) {
+static const char *judge_round(Db *store, Problem *problem) {
     Bytes texts[2] = {{.most = 0}, {.most = 0}};
     Exchange exchange = {.revision_room = 0};
     ImportTally tally = {0};
-    Store *other = NULL, *stores[2] = {store, NULL};
+    Db *other = NULL, *stores[2] = {store, NULL};
     const char *wrong = NULL;
-    if (store_open(NULL, &other, problem) != STATUS_OK)
+    if (db_open(NULL, &other, problem) != STATUS_OK)
         return "no second database";
     stores[1] = other;
     for (int i = 0; i < 2 && wrong == NULL; i++) {
-        ExchangeText text;
+        MaterialExport text;
         bool is_last = false;
-        Status status = exchange_text_open(stores[i], false, &text, problem);
+        Status status = material_export_open(stores[i], false, &text, problem);
         while (status == STATUS_OK && !is_last)
-            status = exchange_text_next(&text, &texts[i], &is_last, problem);
+            status = material_export_next(&text, &texts[i], &is_last, problem);
         if (status != STATUS_OK)
             wrong = "cannot be exported";
         else if (i == 0 && (exchange_read_json(texts[0].at, texts[0].count, &exchange, problem) !=
@@ -130,12 +130,12 @@ static const char *judge_round(Store *store, Problem *problem) {
     exchange_clear(&exchange);
     bytes_clear(&texts[0]);
     bytes_clear(&texts[1]);
-    store_close(other);
+    db_close(other);
     return wrong;
 }
 
 // Reads a text and imports it.
-static Status bring(Store *store, const char *text, size_t size, bool is_table, bool is_dry,
+static Status bring(Db *store, const char *text, size_t size, bool is_table, bool is_dry,
                     Problem *problem) {
     Exchange exchange = {.revision_room = 0};
     ImportTally tally;
@@ -150,13 +150,13 @@ static Status bring(Store *store, const char *text, size_t size, bool is_table, 
 }
 
 static const char *judge_import(const char *text, size_t size, bool is_table, Problem *problem) {
-    Store *store = NULL;
-    if (store_open(NULL, &store, problem) != STATUS_OK)
+    Db *store = NULL;
+    if (db_open(NULL, &store, problem) != STATUS_OK)
         return "no database";
     const char *wrong = bring(store, text, size, is_table, false, problem) == STATUS_OK
                             ? judge_round(store, problem)
                             : "judged as good, and refused";
-    store_close(store);
+    db_close(store);
     return wrong;
 }
 
@@ -166,8 +166,8 @@ int main(int argc, char **argv) {
     state = argc > 2 ? strtoull(argv[2], NULL, 10) : 1;
     const time_t start = time(NULL);
     unsigned long long rounds = 0, passed = 0;
-    Store *store = NULL; // of the paper's five alone
-    if (store_open(NULL, &store, &problem) != STATUS_OK)
+    Db *store = NULL; // of the paper's five alone
+    if (db_open(NULL, &store, &problem) != STATUS_OK)
         return 1;
     while (difftime(time(NULL), start) < seconds)
         for (int i = 0; i < ROUNDS_TIMED; i++, rounds++) {
@@ -197,6 +197,6 @@ int main(int argc, char **argv) {
             }
         }
     printf("%llu texts, %llu of them good\n", rounds, passed);
-    store_close(store);
+    db_close(store);
     return 0;
 }

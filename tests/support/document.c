@@ -19,7 +19,7 @@ Status document_complete(Simulation *simulation, const char *members, Problem *p
     assert_non_null(text);
     snprintf(text, size, "{\"duration\": 1, \"sample_rate\": 100, %s}", members);
     problem_clear(problem);
-    (void)read_json(text, strlen(text), simulation_fields, simulation, problem);
+    (void)json_parse(text, strlen(text), simulation_fields, simulation, problem);
     free(text);
     static const SimulationLimits limits = {.samples = 1 << 25, .impacts = 1000000, .steps = 1e10};
     return simulation_complete(simulation, &limits, NULL, problem);

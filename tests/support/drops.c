@@ -57,7 +57,7 @@ void drops_make(DropTest *test, size_t count) {
 
 Status drops_read(const char *text, DropTest *test, Problem *problem) {
     problem_clear(problem);
-    const Status status = read_json(text, strlen(text), drop_test_fields, test, problem);
+    const Status status = json_parse(text, strlen(text), drop_test_fields, test, problem);
     const Status judged = drop_test_validate(test, "", problem);
     return status != STATUS_OK ? status : judged;
 }

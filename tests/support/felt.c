@@ -7,11 +7,11 @@
 
 #include <cmocka.h>
 
-Store *felt_store(const char *directory) {
-    Store *store;
+Db *felt_store(const char *directory) {
+    Db *store;
     static Problem problem;
     problem_clear(&problem);
-    if (store_open(directory, &store, &problem) != STATUS_OK)
+    if (db_open(directory, &store, &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
     return store;
 }
@@ -32,7 +32,7 @@ MaterialRevision felt_saying(double restitution) {
     return revision;
 }
 
-Status felt_review(Store *store, uint64_t revision, const char *status, const char *reviewer,
+Status felt_review(Db *store, uint64_t revision, const char *status, const char *reviewer,
                    uint64_t version) {
     const MaterialReview asked = {.slug = "felt",
                                   .revision = revision,
@@ -40,5 +40,5 @@ Status felt_review(Store *store, uint64_t revision, const char *status, const ch
                                   .reason = "because",
                                   .reviewer = (char *)reviewer,
                                   .created_unix_ms = 6000};
-    return store_material_review(store, &asked, version, NULL);
+    return db_material_review(store, &asked, version, NULL);
 }

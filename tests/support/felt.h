@@ -5,13 +5,13 @@
 #include "server/db/materials.h"
 
 // A store in `directory` (NULL: in memory); fails the test if it cannot be opened.
-Store *felt_store(const char *directory);
+Db *felt_store(const char *directory);
 
 // What one says of "felt" with that restitution; texts are borrowed.
 MaterialRevision felt_saying(double restitution);
 
 // Gives a revision of it that status; `reviewer` may be NULL.
-Status felt_review(Store *store, uint64_t revision, const char *status, const char *reviewer,
+Status felt_review(Db *store, uint64_t revision, const char *status, const char *reviewer,
                    uint64_t version);
 
 #endif

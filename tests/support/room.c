@@ -13,19 +13,19 @@
 static Problem problem;
 
 void room_open(Room *room) {
-    const IntakeSettings settings = {.workers = room->workers,
-                                     .queue_most = 1000,
-                                     .cache_bytes = 1 << 24,
-                                     .limits = {.samples = 1 << 25, .impacts = 1 << 20}};
+    const JobManagerSettings settings = {.workers = room->workers,
+                                         .queue_most = 1000,
+                                         .cache_bytes = 1 << 24,
+                                         .limits = {.samples = 1 << 25, .impacts = 1 << 20}};
     problem_clear(&problem);
-    if (store_open(room->directory, &room->store, &problem) != STATUS_OK ||
-        intake_open(room->store, &settings, &room->intake, &problem) != STATUS_OK)
+    if (db_open(room->directory, &room->store, &problem) != STATUS_OK ||
+        jobs_open(room->store, &settings, &room->intake, &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
 }
 
 void room_close(Room *room) {
-    intake_close(room->intake);
-    store_close(room->store);
+    jobs_close(room->intake);
+    db_close(room->store);
 }
 
 Room room_make(size_t workers) {
@@ -42,32 +42,32 @@ void room_end(Room *room) {
 
 void room_submit(const Room *room, const char *text, const char *client, char id[40]) {
     Job *job;
-    JobShow show;
+    JobView show;
     const Submission submission = {.text = text, .size = strlen(text), .client = client};
     problem_clear(&problem);
-    if (intake_submit(room->intake, &submission, &job, &problem) != STATUS_OK)
+    if (jobs_submit(room->intake, &submission, &job, &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
-    assert_int_equal(job_show(job, &show), STATUS_OK);
+    assert_int_equal(job_view(job, &show), STATUS_OK);
     text_fit(id, 40, show.id);
-    job_show_clear(&show);
-    job_drop(job);
+    job_view_clear(&show);
+    job_unref(job);
 }
 
 void room_dismiss(const Room *room, const char *id) {
     Job *job;
-    assert_int_equal(intake_dismiss(room->intake, id, &job, NULL), STATUS_OK);
-    job_drop(job);
+    assert_int_equal(jobs_cancel(room->intake, id, &job, NULL), STATUS_OK);
+    job_unref(job);
 }
 
 JobState room_state(const Room *room, const char *id, char result[72]) {
     Job *job;
-    JobShow show;
-    assert_int_equal(intake_find(room->intake, id, &job, NULL), STATUS_OK);
-    assert_int_equal(job_show(job, &show), STATUS_OK);
-    job_drop(job);
+    JobView show;
+    assert_int_equal(jobs_find(room->intake, id, &job, NULL), STATUS_OK);
+    assert_int_equal(job_view(job, &show), STATUS_OK);
+    job_unref(job);
     const JobState state = show.state;
     text_fit(result, 72, show.result);
-    job_show_clear(&show);
+    job_view_clear(&show);
     return state;
 }
 

@@ -7,8 +7,8 @@
 
 typedef struct Room {
     char directory[SCRATCH_SIZE];
-    Store *store;
-    Intake *intake;
+    Db *store;
+    JobManager *intake;
     size_t workers;
 } Room;
 

@@ -91,7 +91,7 @@ static void answer_read(Answer *answer, const char *text, const Solver *solver, 
     memset(answer, 0, sizeof *answer);
     problem_clear(&problem);
     answer->status =
-        read_json(text, strlen(text), simulation_fields, &answer->simulation, &problem);
+        json_parse(text, strlen(text), simulation_fields, &answer->simulation, &problem);
     if (solver != NULL && answer->status == STATUS_OK) {
         variant_free(answer->simulation.accuracy);
         answer->simulation.accuracy = variant_new(&solver->kind);

@@ -8,7 +8,7 @@
 static const Quad STRIDE = 0.5, NOTHING = 1e-29;
 
 // Which condition of damper d fails first on the series; *what: side met, or 1 for inwards.
-static bool look(const Walk *walk, size_t d, Quad *s, int *what) {
+static bool look(const ImportContext *walk, size_t d, Quad *s, int *what) {
     const Mass *mass = &walk->mass[d];
     Quad f[TERMS], at;
     bool is_found = false;
@@ -55,7 +55,7 @@ static bool look(const Walk *walk, size_t d, Quad *s, int *what) {
 }
 
 // ImpactLog and state over the part up to s.
-static void pass(Walk *walk, Quad s) {
+static void pass(ImportContext *walk, Quad s) {
     const int degree = walk->degree;
     for (size_t d = 0; d < walk->m; d++) {
         Mass *mass = &walk->mass[d];
@@ -93,7 +93,7 @@ static void pass(Walk *walk, Quad s) {
     walk->t += s * walk->h;
 }
 
-static void sample(Walk *walk, size_t i) {
+static void sample(ImportContext *walk, size_t i) {
     FrameTruth *truth = walk->truth;
     Quad rate, until;
     const Quad a = walk_ground(walk, &rate, &until);
@@ -115,7 +115,7 @@ static void sample(Walk *walk, size_t i) {
     }
 }
 
-static bool go(Walk *walk, double most) {
+static bool go(ImportContext *walk, double most) {
     const Plan *plan = walk->plan;
     size_t next = 0, idle = 0;
     for (double steps = 0; next < plan->count; steps++) {
@@ -167,7 +167,7 @@ static bool go(Walk *walk, double most) {
 }
 
 void frame_truth(const Plan *plan, const Base *base, double most, FrameTruth *truth) {
-    Walk *walk = calloc(1, sizeof *walk);
+    ImportContext *walk = calloc(1, sizeof *walk);
     memset(truth, 0, sizeof *truth);
     const size_t n = plan->storeys, m = plan->damper_count;
     truth->count = plan->count;

@@ -4,12 +4,12 @@
 
 static const Quad CLOSING = 1e-18;
 
-Quad walk_room(const Walk *walk, size_t d, int side) {
+Quad walk_room(const ImportContext *walk, size_t d, int side) {
     const Quad clearance = walk->plan->dampers[d].clearance;
     return walk->mass[d].at < 0 ? clearance / 2 : walk->mass[d].at == side ? 0 : clearance;
 }
 
-static void open_row(Walk *walk, size_t d, bool is_resting, Quad approach) {
+static void open_row(ImportContext *walk, size_t d, bool is_resting, Quad approach) {
     Mass *mass = &walk->mass[d];
     mass->is_open = true;
     mass->impulse = mass->lost = mass->peak = 0;
@@ -22,7 +22,7 @@ static void open_row(Walk *walk, size_t d, bool is_resting, Quad approach) {
                                .separation = NAN};
 }
 
-void walk_close_row(Walk *walk, size_t d, double end, double separation) {
+void walk_close_row(ImportContext *walk, size_t d, double end, double separation) {
     Mass *mass = &walk->mass[d];
     mass->open.end = end;
     mass->open.separation = separation;
@@ -34,7 +34,7 @@ void walk_close_row(Walk *walk, size_t d, double end, double separation) {
         walk->truth->impacts[walk->truth->impact_count++] = mass->open;
 }
 
-static void push(Walk *walk, const Quad *impulses) {
+static void push(ImportContext *walk, const Quad *impulses) {
     for (size_t d = 0; d < walk->m; d++) {
         for (size_t j = 0; j < walk->n; j++)
             walk->v[j] += walk->inverse[j][walk->plan->dampers[d].storey] * impulses[d];
@@ -44,9 +44,9 @@ static void push(Walk *walk, const Quad *impulses) {
 }
 
 // Every set of pressed stops is tried until one meets all conditions.
-static void collide(Walk *walk, const bool *is_met, const Quad *parting, Quad *impulses) {
+static void collide(ImportContext *walk, const bool *is_met, const Quad *parting, Quad *impulses) {
     for (unsigned set = (1U << walk->m); set-- > 0;) {
-        Walk trial = *walk;
+        ImportContext trial = *walk;
         Quad want[D] = {0};
         bool is_good = true;
         for (size_t d = 0; d < walk->m; d++) {
@@ -75,7 +75,7 @@ static void collide(Walk *walk, const bool *is_met, const Quad *parting, Quad *i
     push(walk, impulses);
 }
 
-static void rest(Walk *walk, size_t d) {
+static void rest(ImportContext *walk, size_t d) {
     Mass *mass = &walk->mass[d];
     mass->phase = RESTING;
     mass->zeros = 0;
@@ -83,7 +83,7 @@ static void rest(Walk *walk, size_t d) {
     open_row(walk, d, true, 0);
 }
 
-static void bounce(Walk *walk, size_t d) {
+static void bounce(ImportContext *walk, size_t d) {
     bool is_met[D] = {false};
     Quad parting[D] = {0}, closing[D] = {0}, impulses[D];
     for (size_t e = 0; e < walk->m; e++) {
@@ -149,7 +149,7 @@ static void bounce(Walk *walk, size_t d) {
     }
 }
 
-void walk_touch(Walk *walk, size_t d, int side) {
+void walk_touch(ImportContext *walk, size_t d, int side) {
     Mass *mass = &walk->mass[d];
     const ContactStop *stop = &walk->plan->dampers[d].stops[side];
     mass->side = mass->at = side;
@@ -170,7 +170,7 @@ static Quad spring(const Mass *mass) {
     return mass->k * mass->u * mass->u / 2;
 }
 
-void walk_end_phase(Walk *walk, size_t d, bool is_inwards) {
+void walk_end_phase(ImportContext *walk, size_t d, bool is_inwards) {
     Mass *mass = &walk->mass[d];
     const Quad sign = walk_sign(mass->side);
     if (mass->phase == RESTING) {

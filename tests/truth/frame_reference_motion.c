@@ -5,7 +5,7 @@
 
 #include <string.h>
 
-Quad walk_ground(const Walk *walk, Quad *rate, Quad *until) {
+Quad walk_ground(const ImportContext *walk, Quad *rate, Quad *until) {
     const Base *base = walk->base;
     *rate = 0;
     *until = INFINITY;
@@ -26,7 +26,7 @@ Quad walk_ground(const Walk *walk, Quad *rate, Quad *until) {
 }
 
 // Constraint forces of those that rest, from what they would do without: elimination.
-void walk_constrain(const Walk *walk, const Quad *without, Quad *force) {
+void walk_constrain(const ImportContext *walk, const Quad *without, Quad *force) {
     size_t who[D], count = 0;
     for (size_t d = 0; d < walk->m; d++)
         if (walk->mass[d].phase == RESTING)
@@ -49,7 +49,7 @@ void walk_constrain(const Walk *walk, const Quad *without, Quad *force) {
         force[who[i]] = A[i][count] / A[i][i];
 }
 
-double walk_rate(const Walk *walk) {
+double walk_rate(const ImportContext *walk) {
     double rate = walk->flight_rate;
     for (size_t d = 0; d < walk->m; d++)
         if (walk->mass[d].phase == TOUCHING)
@@ -58,7 +58,7 @@ double walk_rate(const Walk *walk) {
     return rate;
 }
 
-void walk_series(Walk *walk, Quad h, Quad a, Quad rate) {
+void walk_series(ImportContext *walk, Quad h, Quad a, Quad rate) {
     const size_t n = walk->n, m = walk->m;
     const double rho = (double)h * walk_rate(walk);
     walk->h = h;
@@ -116,7 +116,7 @@ void walk_series(Walk *walk, Quad h, Quad a, Quad rate) {
     }
 }
 
-Quad walk_acceleration(Walk *walk, size_t d) {
+Quad walk_acceleration(ImportContext *walk, size_t d) {
     Quad rate, until;
     const Quad a = walk_ground(walk, &rate, &until);
     walk_series(walk, (Quad)1e-3 / walk_rate(walk), a, rate);
@@ -144,7 +144,7 @@ static void invert(const double *matrix, size_t n, Quad inverse[N][N]) {
         }
 }
 
-void walk_start(Walk *walk) {
+void walk_start(ImportContext *walk) {
     const Plan *plan = walk->plan;
     const size_t n = walk->n;
     invert(plan->mass, n, walk->inverse);

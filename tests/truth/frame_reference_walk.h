@@ -24,7 +24,7 @@ typedef struct Mass {
     bool is_open;
 } Mass;
 
-typedef struct Walk {
+typedef struct ImportContext {
     const Plan *plan;
     const Base *base;
     FrameTruth *truth;
@@ -36,7 +36,7 @@ typedef struct Walk {
     int degree;
     Quad h, xs[N][TERMS], us[D][TERMS], ns[D][TERMS], as[TERMS];
     double flight_rate;
-} Walk;
+} ImportContext;
 
 static inline Quad walk_sign(int side) {
     return side == SIDE_RIGHT ? 1 : -1;
@@ -49,21 +49,21 @@ Quad quad_slope(const Quad *f, int degree, Quad s);
 bool quad_crossing(const Quad *f, int degree, int zeros, Quad *s);
 
 // The state of a plan at t = 0.
-void walk_start(Walk *walk);
+void walk_start(ImportContext *walk);
 // The base's acceleration now, its rate, and how long that rate holds.
-Quad walk_ground(const Walk *walk, Quad *rate, Quad *until);
-double walk_rate(const Walk *walk);
+Quad walk_ground(const ImportContext *walk, Quad *rate, Quad *until);
+double walk_rate(const ImportContext *walk);
 // Forces that take `without` (relative accelerations, or speeds) of those that rest to 0.
-void walk_constrain(const Walk *walk, const Quad *without, Quad *force);
+void walk_constrain(const ImportContext *walk, const Quad *without, Quad *force);
 // The motion from now over h, where the base has acceleration a and that rate.
-void walk_series(Walk *walk, Quad h, Quad a, Quad rate);
+void walk_series(ImportContext *walk, Quad h, Quad a, Quad rate);
 // u'' of a mass now.
-Quad walk_acceleration(Walk *walk, size_t d);
+Quad walk_acceleration(ImportContext *walk, size_t d);
 
 // Between the mass and that stop where u = 0.
-Quad walk_room(const Walk *walk, size_t d, int side);
-void walk_touch(Walk *walk, size_t d, int side);
-void walk_end_phase(Walk *walk, size_t d, bool is_inwards);
-void walk_close_row(Walk *walk, size_t d, double end, double separation);
+Quad walk_room(const ImportContext *walk, size_t d, int side);
+void walk_touch(ImportContext *walk, size_t d, int side);
+void walk_end_phase(ImportContext *walk, size_t d, bool is_inwards);
+void walk_close_row(ImportContext *walk, size_t d, double end, double separation);
 
 #endif

@@ -25,7 +25,7 @@ enum {
 
 enum { FLIGHT_PARTS = 16 }; // of a step, in which dips are looked for
 
-typedef struct Walk {
+typedef struct ImportContext {
     const Plan *plan;
     const Base *base;
     double t0; // of the integrator's own clock
@@ -38,13 +38,13 @@ typedef struct Walk {
     gsl_odeiv2_evolve *evolve;
     gsl_odeiv2_control *control;
     double next; // length of the next step [s]
-} Walk;
+} ImportContext;
 
 static double sign_of(int side) {
     return side == SIDE_RIGHT ? 1 : -1;
 }
 
-static ContactForce force_of(const Walk *walk, const double *y) {
+static ContactForce force_of(const ImportContext *walk, const double *y) {
     const double sign = sign_of(walk->side);
     if (walk->side < 0)
         return (ContactForce){0};
@@ -52,7 +52,7 @@ static ContactForce force_of(const Walk *walk, const double *y) {
 }
 
 static int rate(double t, const double *y, double *out, void *context) {
-    const Walk *walk = context;
+    const ImportContext *walk = context;
     const Plan *plan = walk->plan;
     const double N = walk->side < 0 ? 0 : sign_of(walk->side) * force_of(walk, y).value;
     const double own = (plan->stiffness[0] * y[X] + plan->damping[0] * y[V]) / plan->mass[0];
@@ -65,7 +65,7 @@ static int rate(double t, const double *y, double *out, void *context) {
 }
 
 // The watched functions and their slopes; NAN: unknown.
-static void watch(const Walk *walk, const double *y, double *value, double *slope) {
+static void watch(const ImportContext *walk, const double *y, double *value, double *slope) {
     const double d = walk->plan->dampers[0].clearance;
     if (walk->side >= 0) {
         const double sign = sign_of(walk->side);
@@ -90,7 +90,7 @@ static double next_kink(const Base *base, double t, double until) {
     return fmin(kink, until);
 }
 
-static void begin(Walk *walk, PowerTruth *truth, int side, double t, double *y) {
+static void begin(ImportContext *walk, PowerTruth *truth, int side, double t, double *y) {
     walk->side = walk->last = side;
     y[R] = y[J] = 0;
     walk->contact = stops_freeze(&walk->plan->dampers[0].stops[side], fabs(y[W]));
@@ -101,7 +101,7 @@ static void begin(Walk *walk, PowerTruth *truth, int side, double t, double *y) 
                                                    .separation = (double)NAN};
 }
 
-static void end(Walk *walk, PowerTruth *truth, double t, double *y) {
+static void end(ImportContext *walk, PowerTruth *truth, double t, double *y) {
     PowerImpact *impact = &truth->impacts[truth->count - 1];
     impact->end = t;
     impact->separation = fabs(y[W]);
@@ -110,7 +110,7 @@ static void end(Walk *walk, PowerTruth *truth, double t, double *y) {
     y[R] = 0;
 }
 
-static void stop_integrator(Walk *walk) {
+static void stop_integrator(ImportContext *walk) {
     if (walk->evolve != NULL)
         gsl_odeiv2_evolve_free(walk->evolve);
     if (walk->control != NULL)
@@ -122,7 +122,7 @@ static void stop_integrator(Walk *walk) {
     walk->step = NULL;
 }
 
-static void start_integrator(Walk *walk, const double *y) {
+static void start_integrator(ImportContext *walk, const double *y) {
     const PlanDamper *damper = &walk->plan->dampers[0];
     const double v = fabs(y[W]) + 1e-3 * fabs(y[V]) + 1e-6;
     const double p = walk->side < 0 ? damper->clearance
@@ -139,8 +139,8 @@ static void start_integrator(Walk *walk, const double *y) {
 }
 
 // The watched functions after a step of h from (t0, y0).
-static void look(Walk *walk, const gsl_odeiv2_system *system, double t0, const double *y0, double h,
-                 double *y, double *value, double *slope) {
+static void look(ImportContext *walk, const gsl_odeiv2_system *system, double t0, const double *y0,
+                 double h, double *y, double *value, double *slope) {
     double error[SIZE];
     memcpy(y, y0, SIZE * sizeof *y);
     if (h > 0)
@@ -149,7 +149,7 @@ static void look(Walk *walk, const gsl_odeiv2_system *system, double t0, const d
 }
 
 // One step from *t, at most to `until`, cut short where a watched function falls to zero.
-static bool advance(Walk *walk, double until, double *t, double *y, int *root) {
+static bool advance(ImportContext *walk, double until, double *t, double *y, int *root) {
     const gsl_odeiv2_system system = {.function = rate, .dimension = SIZE, .params = walk};
     const double t0 = *t;
     double y0[SIZE], at[SIZE], from[ROOTS], from_slope[ROOTS], value[ROOTS], slope[ROOTS];
@@ -201,7 +201,7 @@ static bool advance(Walk *walk, double until, double *t, double *y, int *root) {
 }
 
 void power_truth(const Plan *plan, const Base *base, size_t most, PowerTruth *truth) {
-    Walk walk = {.plan = plan, .base = base, .side = -1, .last = -1};
+    ImportContext walk = {.plan = plan, .base = base, .side = -1, .last = -1};
     const PlanDamper *damper = &plan->dampers[0];
     double y[SIZE] = {plan->displacement[0], plan->velocity[0], damper->position, damper->velocity};
     *truth = (PowerTruth){.x = calloc(plan->count, sizeof *truth->x),

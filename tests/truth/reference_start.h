@@ -15,7 +15,7 @@ typedef struct NAME(Series) {
     real h, x[TERMS], r[TERMS], g[TERMS], n[TERMS];
 } NAME(Series);
 
-typedef struct NAME(Walk) {
+typedef struct NAME(ImportContext) {
     const ReferenceScene *scene;
     ReferenceAnswer *answer;
     real omega2, damping, share, effective, base_omega, base_amplitude;
@@ -33,7 +33,7 @@ typedef struct NAME(Walk) {
     real peak, impulse, lost;
     size_t idle;
     real nodes[NODES], weights[NODES];
-} NAME(Walk);
+} NAME(ImportContext);
 
 // At least sqrt(y); rates need no more.
 static real NAME(root_bound)(real y) {
@@ -41,7 +41,7 @@ static real NAME(root_bound)(real y) {
 }
 
 // Nodes and weights of Gauss and Legendre on [0, 1].
-static void NAME(gauss)(NAME(Walk) * walk) {
+static void NAME(gauss)(NAME(ImportContext) * walk) {
     for (int i = 0; i < NODES; i++) {
         real z = (real)cos(3.141592653589793 * (i + 0.75) / (NODES + 0.5)), slope = 0;
         for (int turn = 0; turn < 8; turn++) {
@@ -78,7 +78,8 @@ static real NAME(zero_force)(real loss, real pi) {
     return turn * turn;
 }
 
-static void NAME(start)(NAME(Walk) * walk, const ReferenceScene *scene, ReferenceAnswer *answer) {
+static void NAME(start)(NAME(ImportContext) * walk, const ReferenceScene *scene,
+                        ReferenceAnswer *answer) {
     memset(walk, 0, sizeof *walk);
     walk->scene = scene;
     walk->answer = answer;

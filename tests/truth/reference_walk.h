@@ -8,7 +8,7 @@
 //   while resting.
 
 // a_g and its slope (sine: the cosine part) from time t on, and the next kink.
-static real NAME(base)(NAME(Walk) * walk, real *value, real *slope) {
+static real NAME(base)(NAME(ImportContext) * walk, real *value, real *slope) {
     const ReferenceScene *scene = walk->scene;
     *value = *slope = 0;
     if (scene->base == REFERENCE_SINE) {
@@ -28,11 +28,11 @@ static real NAME(base)(NAME(Walk) * walk, real *value, real *slope) {
     return (real)(walk->kink + 1) * interval;
 }
 
-static real NAME(push)(const NAME(Walk) * walk) {
+static real NAME(push)(const NAME(ImportContext) * walk) {
     return walk->damping * walk->v + walk->omega2 * walk->x;
 }
 
-static real NAME(pressure)(const NAME(Walk) * walk) {
+static real NAME(pressure)(const NAME(ImportContext) * walk) {
     switch (walk->phase) {
     case NAME(CONTACT):
         return walk->contact_damping[walk->side] * walk->w +
@@ -44,7 +44,7 @@ static real NAME(pressure)(const NAME(Walk) * walk) {
     }
 }
 
-static void NAME(series)(const NAME(Walk) * walk, real h, real value, real slope, real rho,
+static void NAME(series)(const NAME(ImportContext) * walk, real h, real value, real slope, real rho,
                          NAME(Series) * series) {
     const bool is_sine = walk->scene->base == REFERENCE_SINE;
     const real h2 = h * h, turn2 = walk->base_omega * walk->base_omega * h2;
@@ -81,7 +81,7 @@ static void NAME(series)(const NAME(Walk) * walk, real h, real value, real slope
 }
 
 // Peak, impulse and loss of the open contact over the series' part [0, end].
-static void NAME(collect)(NAME(Walk) * walk, const NAME(Series) * series, real end) {
+static void NAME(collect)(NAME(ImportContext) * walk, const NAME(Series) * series, real end) {
     real slope[TERMS], further[TERMS], speed[TERMS];
     const int degree = series->degree;
     const real *n = series->n;
@@ -110,7 +110,7 @@ static void NAME(collect)(NAME(Walk) * walk, const NAME(Series) * series, real e
     }
 }
 
-static void NAME(advance)(NAME(Walk) * walk, const NAME(Series) * series, real s) {
+static void NAME(advance)(NAME(ImportContext) * walk, const NAME(Series) * series, real s) {
     real slope[TERMS];
     const int degree = series->degree;
     walk->x = NAME(value)(series->x, degree, s);
@@ -124,7 +124,7 @@ static void NAME(advance)(NAME(Walk) * walk, const NAME(Series) * series, real s
     walk->base_speed += NAME(integral)(series->g, degree, s) * series->h;
 }
 
-static bool NAME(list)(NAME(Walk) * walk, const ReferenceImpact *impact) {
+static bool NAME(list)(NAME(ImportContext) * walk, const ReferenceImpact *impact) {
     ReferenceAnswer *answer = walk->answer;
     if (answer->impact_count == answer->impact_room) {
         const size_t room = answer->impact_room * 2 + 64;
@@ -139,7 +139,7 @@ static bool NAME(list)(NAME(Walk) * walk, const ReferenceImpact *impact) {
     return true;
 }
 
-static void NAME(open)(NAME(Walk) * walk, NAME(ExactPhase) phase) {
+static void NAME(open)(NAME(ImportContext) * walk, NAME(ExactPhase) phase) {
     walk->phase = phase;
     walk->open = (ReferenceImpact){
         phase == NAME(REST), walk->side, (double)walk->t, NAN, NAN, NAN, NAN, NAN, NAN};
@@ -152,7 +152,7 @@ static void NAME(open)(NAME(Walk) * walk, NAME(ExactPhase) phase) {
     walk->impulse = walk->lost = 0;
 }
 
-static bool NAME(close)(NAME(Walk) * walk, bool is_over) {
+static bool NAME(close)(NAME(ImportContext) * walk, bool is_over) {
     if (is_over)
         walk->open.end = (double)walk->t;
     if (is_over && walk->phase == NAME(CONTACT))
@@ -164,7 +164,7 @@ static bool NAME(close)(NAME(Walk) * walk, bool is_over) {
     return NAME(list)(walk, &walk->open);
 }
 
-static bool NAME(touch)(NAME(Walk) * walk, int side) {
+static bool NAME(touch)(NAME(ImportContext) * walk, int side) {
     const real sign = side == 1 ? 1 : -1, clearance = walk->scene->clearance;
     walk->side = side;
     walk->r = 0;
@@ -205,7 +205,7 @@ static bool NAME(touch)(NAME(Walk) * walk, int side) {
     return true;
 }
 
-static void NAME(sample)(NAME(Walk) * walk) {
+static void NAME(sample)(NAME(ImportContext) * walk) {
     const size_t i = walk->sample;
     double *const *to = walk->answer->channels;
     const real n = NAME(pressure)(walk), rate = walk->scene->sample_rate;
@@ -225,7 +225,7 @@ static void NAME(sample)(NAME(Walk) * walk) {
 }
 
 // Goes to the series' end or to the first event before it. False where the run must end.
-static bool NAME(stretch)(NAME(Walk) * walk, const NAME(Series) * series, bool *is_event) {
+static bool NAME(stretch)(NAME(ImportContext) * walk, const NAME(Series) * series, bool *is_event) {
     real f[TERMS], s = 1;
     int side = walk->side;
     bool is_pressed = false;
@@ -301,7 +301,7 @@ static bool NAME(stretch)(NAME(Walk) * walk, const NAME(Series) * series, bool *
 }
 
 // A free mass that starts at a stop and moves, or is about to move, into it.
-static bool NAME(begin)(NAME(Walk) * walk, real value, real slope) {
+static bool NAME(begin)(NAME(ImportContext) * walk, real value, real slope) {
     NAME(Series) series;
     const real h = (real)0.01 / (walk->flight_rate + (real)walk->scene->sample_rate);
     for (int turn = 0; turn < 2000 && walk->phase == NAME(FLIGHT); turn++) {
@@ -320,7 +320,7 @@ static bool NAME(begin)(NAME(Walk) * walk, real value, real slope) {
 
 static void NAME(run)(const ReferenceScene *scene, double stride, double most,
                       ReferenceAnswer *answer) {
-    NAME(Walk) walk;
+    NAME(ImportContext) walk;
     NAME(Series) series;
     memset(answer, 0, sizeof *answer);
     answer->count = (size_t)(scene->duration * scene->sample_rate * (1 + 1e-12)) + 1;

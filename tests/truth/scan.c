@@ -20,7 +20,7 @@ static const char *const phase_names[] = {"a gap closes", "a buffer presses agai
 
 // r is the free mass's displacement relative to the stop last touched, before that to the middle: a
 // penetration of a stiff stop has no digits to lose.
-typedef struct Walk {
+typedef struct ImportContext {
     const ReferenceScene *scene;
     Scan *scan;
     Real omega2, damping, share, base_omega, base_amplitude;
@@ -30,7 +30,7 @@ typedef struct Walk {
     ExactPhase phase;
     int side;
     Real length, speed, push; // largest there are
-} Walk;
+} ImportContext;
 
 // Coefficients in s = t / h, 0 <= s <= 1.
 typedef struct Piece {
@@ -88,7 +88,7 @@ static bool either(const Real *f, const Real *g, Real a, Real b, const Real *ben
 }
 
 // The base from now on, and until when it is smooth.
-static Real base(const Walk *walk, Real *value, Real *slope) {
+static Real base(const ImportContext *walk, Real *value, Real *slope) {
     const ReferenceScene *scene = walk->scene;
     *value = *slope = 0;
     if (scene->base == REFERENCE_SINE) {
@@ -107,7 +107,7 @@ static Real base(const Walk *walk, Real *value, Real *slope) {
     return (Real)(k + 1) * interval;
 }
 
-static void piece_make(const Walk *walk, Real h, Real value, Real slope, Piece *piece) {
+static void piece_make(const ImportContext *walk, Real h, Real value, Real slope, Piece *piece) {
     const bool is_near = walk->phase == CONTACT || walk->phase == INSIDE;
     const Real k = is_near ? walk->contact_omega2[walk->side] : 0;
     const Real c = is_near ? walk->contact_damping[walk->side] : 0;
@@ -132,7 +132,7 @@ static void piece_make(const Walk *walk, Real h, Real value, Real slope, Piece *
     }
 }
 
-static void piece_end(Walk *walk, const Piece *piece, Real h) {
+static void piece_end(ImportContext *walk, const Piece *piece, Real h) {
     walk->x = at(piece->x, 1);
     walk->v = slope_at_end(piece->x) / h;
     walk->r = at(piece->r, 1);
@@ -140,7 +140,7 @@ static void piece_end(Walk *walk, const Piece *piece, Real h) {
 }
 
 // A little further, or back.
-static void step(Walk *walk, Real h) {
+static void step(ImportContext *walk, Real h) {
     Real value, slope;
     Piece piece;
     base(walk, &value, &slope);
@@ -149,7 +149,7 @@ static void step(Walk *walk, Real h) {
 }
 
 // What must stay positive: the gap to a stop, the penetration or the force, the push into the stop.
-static void guard(const Walk *walk, const Piece *piece, int side, Real *f) {
+static void guard(const ImportContext *walk, const Piece *piece, int side, Real *f) {
     const Real sign = side == SIDE_RIGHT ? 1 : -1;
     const bool is_force = walk->phase == CONTACT && walk->scene->is_zero_force;
     const bool is_gap = walk->phase == FLIGHT || walk->phase == INSIDE;
@@ -162,17 +162,17 @@ static void guard(const Walk *walk, const Piece *piece, int side, Real *f) {
         f[0] += walk->room[side];
 }
 
-static Real allowed_length(const Walk *walk) {
+static Real allowed_length(const ImportContext *walk) {
     return MISS * walk->length + 4 * ULP * (Real)walk->scene->duration * walk->speed;
 }
 
 // What that length presses.
-static Real allowed_force(const Walk *walk, int side) {
+static Real allowed_force(const ImportContext *walk, int side) {
     return walk->contact_omega2[side] * allowed_length(walk) +
            walk->contact_damping[side] * MISS * walk->speed;
 }
 
-static Real allowed(const Walk *walk) {
+static Real allowed(const ImportContext *walk) {
     if (walk->phase == REST)
         return MISS * walk->push;
     const bool is_force = walk->phase == CONTACT && walk->scene->is_zero_force;
@@ -187,7 +187,7 @@ static Real bend_of(const Real *f) {
 }
 
 // A buffer that let go does not press again: outside of it, or no force.
-static bool prove_inside(Walk *walk, const Piece *piece) {
+static bool prove_inside(ImportContext *walk, const Piece *piece) {
     Real force[TERMS], gap[TERMS];
     for (int i = 0; i < TERMS; i++) {
         force[i] = walk->side == SIDE_RIGHT ? -piece->press[i] : piece->press[i];
@@ -202,7 +202,7 @@ static bool prove_inside(Walk *walk, const Piece *piece) {
     return false;
 }
 
-static bool prove(Walk *walk, const Piece *piece, int side) {
+static bool prove(ImportContext *walk, const Piece *piece, int side) {
     Real f[TERMS], most = 0;
     guard(walk, piece, side, f);
     for (int i = 1; i < TERMS; i++)
@@ -223,7 +223,7 @@ static bool prove(Walk *walk, const Piece *piece, int side) {
 }
 
 // Goes to `until`, proving all the way.
-static bool advance(Walk *walk, Real until) {
+static bool advance(ImportContext *walk, Real until) {
     while (walk->t < until) {
         const bool is_near = walk->phase == CONTACT || walk->phase == INSIDE;
         const Real rate = is_near ? walk->rate[walk->side] : walk->flight_rate;
@@ -251,7 +251,7 @@ static bool advance(Walk *walk, Real until) {
     return true;
 }
 
-static bool meets(Walk *walk, const char *what, Real miss, Real limit) {
+static bool meets(ImportContext *walk, const char *what, Real miss, Real limit) {
     walk->scan->worst = fmax(walk->scan->worst, (double)(miss / limit));
     if (miss <= limit)
         return true;
@@ -260,13 +260,13 @@ static bool meets(Walk *walk, const char *what, Real miss, Real limit) {
     return false;
 }
 
-static Real press(const Walk *walk) {
+static Real press(const ImportContext *walk) {
     return walk->contact_omega2[walk->side] * walk->r + walk->contact_damping[walk->side] * walk->w;
 }
 
 // A contact ends where it is listed to. An ulp of the time is much in a short one: it goes on to
 // where p, or the force, is 0 and that is called the end.
-static bool let_go(Walk *walk, Real end) {
+static bool let_go(ImportContext *walk, Real end) {
     const bool is_force = walk->scene->is_zero_force;
     const Real miss = is_force ? fabsl(press(walk)) : fabsl(walk->r);
     if (!meets(walk, "the end of the contact", miss, allowed(walk)))
@@ -286,7 +286,7 @@ static bool let_go(Walk *walk, Real end) {
     return true;
 }
 
-static bool event(Walk *walk, const Impact *impact) {
+static bool event(ImportContext *walk, const Impact *impact) {
     const int side = impact->side;
     const Real sign = side == SIDE_RIGHT ? 1 : -1, e = walk->scene->restitution[side];
     const Real end = isnan(impact->end) ? (Real)walk->scene->duration : (Real)impact->end;
@@ -348,19 +348,19 @@ static Real zero_force(Real e) {
 
 void scan_run(const ReferenceScene *scene, const Impacts *impacts, double reach, Scan *scan) {
     const Real M = scene->mass, m = scene->damper_mass, pi = acosl(-1);
-    Walk walk = {.scene = scene,
-                 .scan = scan,
-                 .omega2 = (Real)scene->stiffness / M,
-                 .damping = (Real)scene->damping / M,
-                 .share = m / (M + m),
-                 .room = {(Real)scene->clearance / 2, (Real)scene->clearance / 2},
-                 .x = scene->displacement,
-                 .v = scene->velocity,
-                 .r = scene->position,
-                 .w = scene->relative_velocity,
-                 .phase = FLIGHT,
-                 .length = fmaxl(scene->clearance, reach),
-                 .speed = fabsl(scene->relative_velocity)};
+    ImportContext walk = {.scene = scene,
+                          .scan = scan,
+                          .omega2 = (Real)scene->stiffness / M,
+                          .damping = (Real)scene->damping / M,
+                          .share = m / (M + m),
+                          .room = {(Real)scene->clearance / 2, (Real)scene->clearance / 2},
+                          .x = scene->displacement,
+                          .v = scene->velocity,
+                          .r = scene->position,
+                          .w = scene->relative_velocity,
+                          .phase = FLIGHT,
+                          .length = fmaxl(scene->clearance, reach),
+                          .speed = fabsl(scene->relative_velocity)};
     memset(scan, 0, sizeof *scan);
     if (scene->base == REFERENCE_SINE) {
         walk.base_omega = 2 * pi * (Real)scene->frequency;

@@ -229,7 +229,7 @@ static void scene_judge(Draws *draws) {
     draw(draws, &runs, &has_damper, &has_force, text, sizeof text);
     StudyRequest inquiry;
     problem_clear(&problem);
-    if (read_json(text, strlen(text), study_request_fields, &inquiry, &problem) != STATUS_OK ||
+    if (json_parse(text, strlen(text), study_request_fields, &inquiry, &problem) != STATUS_OK ||
         study_request_complete(&inquiry, NULL, NULL, &problem) != STATUS_OK)
         fail_msg("%s: %s %s", text, problem.faults[0].pointer, problem.detail);
     EnsembleStudy *study = (EnsembleStudy *)(void *)inquiry.study;

@@ -203,7 +203,7 @@ static Drawn draw(uint64_t number, bool has_dampers) {
     say(&text, "\"output\": {\"psd\": null}, \"duration\": %.17g, \"sample_rate\": %.17g}",
         duration, rate);
     problem_clear(&problem);
-    (void)read_json(text.at, text.length, simulation_fields, &drawn.simulation, &problem);
+    (void)json_parse(text.at, text.length, simulation_fields, &drawn.simulation, &problem);
     if (simulation_complete(&drawn.simulation, NULL, NULL, &problem) != STATUS_OK ||
         error_metrics_request(&drawn.simulation, &problem) != STATUS_OK) {
         printf("%s: %s\n", problem.count > 0 ? problem.faults[0].pointer : "",

@@ -161,7 +161,7 @@ static Outcome *run(const char *accuracy, bool has_contact, double clearance, co
     Simulation simulation;
     Outcome *outcome = NULL;
     problem_clear(&problem);
-    (void)read_json(text, (size_t)length, simulation_fields, &simulation, &problem);
+    (void)json_parse(text, (size_t)length, simulation_fields, &simulation, &problem);
     if (simulation_complete(&simulation, NULL, NULL, &problem) != STATUS_OK ||
         simulation_run(&simulation, NULL, NULL, NULL, &outcome, &problem) != STATUS_OK)
         fail_msg("%s %s", problem.detail, problem.count > 0 ? problem.faults[0].detail : "");
@@ -326,7 +326,7 @@ static size_t run_line(bool is_cut, double *values, size_t *impacts) {
     RunColumn columns[4];
     Plan *plan;
     problem_clear(&problem);
-    (void)read_json(text, strlen(text), simulation_fields, &simulation, &problem);
+    (void)json_parse(text, strlen(text), simulation_fields, &simulation, &problem);
     assert_int_equal(simulation_complete(&simulation, NULL, NULL, &problem), STATUS_OK);
     assert_int_equal(plan_new(&simulation.scene, "exact", "exact", &plan, &problem), STATUS_OK);
     if (is_cut)

@@ -163,7 +163,7 @@ static bool scene_make(Simulation *simulation, const char *accuracy) {
         abort();
     snprintf(members, sizeof members, "{%s, \"accuracy\": {%s}}", text, accuracy);
     const bool is_good =
-        read_json(members, strlen(members), simulation_fields, simulation, problem) == STATUS_OK &&
+        json_parse(members, strlen(members), simulation_fields, simulation, problem) == STATUS_OK &&
         simulation_complete(simulation, &limits, NULL, problem) == STATUS_OK &&
         error_metrics_request(simulation, problem) == STATUS_OK;
     free(problem);

@@ -96,7 +96,7 @@ static void no_text_has_the_samples_and_no_text_gives_them(void **state) {
     ExcitationRecord *record = record_make("elcentro"), read;
     Bytes text = {0}, resolved = {0}, bare = {0};
     assert_true(record_resolve(record, named));
-    write_item(&text, excitation_record.kind.fields, record, WRITE_SCENE);
+    encode_item(&text, excitation_record.kind.fields, record, WRITE_SCENE);
     assert_string_equal(text.at, "{\"name\": \"elcentro\", \"digest\": "
                                  "\"0123456789abcdef0123456789abcdef0123456789abcdef0123456789abcde"
                                  "f\", \"scale\": 1}");
@@ -113,7 +113,7 @@ static void no_text_has_the_samples_and_no_text_gives_them(void **state) {
     static const char given[] = "{\"name\": \"elcentro\", \"named\": 1}";
     problem_clear(&problem);
     assert_int_equal(
-        read_json(given, strlen(given), excitation_record.kind.fields, &read, &problem),
+        json_parse(given, strlen(given), excitation_record.kind.fields, &read, &problem),
         STATUS_INVALID);
     assert_string_equal(problem.faults[0].pointer, "/named");
     assert_string_equal(problem.faults[0].detail, "unknown key");

@@ -15,16 +15,16 @@
 #include "server/jobs/jobs.h"
 
 static void read_scene(const char *text, size_t size, StudyRequest *inquiry) {
-    Store *store = NULL;
+    Db *store = NULL;
     Warnings warnings = {NULL, 0};
     Problem problem;
     problem_clear(&problem);
-    assert_int_equal(store_open(NULL, &store, &problem), STATUS_OK);
-    const Status status = intake_prepare(store, text, size, NULL, inquiry, &warnings, &problem);
+    assert_int_equal(db_open(NULL, &store, &problem), STATUS_OK);
+    const Status status = jobs_prepare(store, text, size, NULL, inquiry, &warnings, &problem);
     if (status != STATUS_OK)
         print_error("%s\n", problem.detail);
     assert_int_equal(status, STATUS_OK);
-    store_close(store);
+    db_close(store);
     warnings_clear(&warnings);
 }
 

@@ -22,7 +22,7 @@ static Outcome *run(const char *text, bool is_exact, const SimulationLimits *lim
     Simulation simulation;
     Outcome *outcome = NULL;
     problem_clear(&told);
-    assert_int_equal(read_json(text, strlen(text), simulation_fields, &simulation, &told),
+    assert_int_equal(json_parse(text, strlen(text), simulation_fields, &simulation, &told),
                      STATUS_OK);
     if (is_exact) {
         variant_free(simulation.accuracy);

@@ -43,7 +43,7 @@ static Simulation simulation_of(const char *members) {
     assert_non_null(text);
     snprintf(text, size, "{%s}", members);
     problem_clear(&problem);
-    (void)read_json(text, strlen(text), simulation_fields, &simulation, &problem);
+    (void)json_parse(text, strlen(text), simulation_fields, &simulation, &problem);
     if (simulation_complete(&simulation, NULL, NULL, &problem) != STATUS_OK)
         fail_msg("%s: %s", text, problem.count > 0 ? problem.faults[0].detail : problem.detail);
     free(text);

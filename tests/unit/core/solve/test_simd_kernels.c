@@ -148,7 +148,7 @@ static void rows_are_what_plain_loops_make_of_them(void **state) {
     }
 }
 
-static void totals_are_what_plain_loops_make_of_them(void **state) {
+static void job_metrics_are_what_plain_loops_make_of_them(void **state) {
     (void)state;
     static Given given;
     static Results got;
@@ -194,7 +194,7 @@ static void all_widths_give_the_same_bytes(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(rows_are_what_plain_loops_make_of_them),
-        cmocka_unit_test(totals_are_what_plain_loops_make_of_them),
+        cmocka_unit_test(job_metrics_are_what_plain_loops_make_of_them),
         cmocka_unit_test(all_widths_give_the_same_bytes),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

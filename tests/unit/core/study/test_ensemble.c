@@ -185,13 +185,13 @@ static void what_is_not_known_is_not_told(void **state) {
     study_request_clear(&inquiry);
 }
 
-typedef struct Patience {
+typedef struct CpuBudget {
     int left, asked;
     double last;
-} Patience;
+} CpuBudget;
 
 static bool lose(void *context, double fraction) {
-    Patience *patience = context;
+    CpuBudget *patience = context;
     assert_true(fraction >= patience->last - 1e-12 && fraction <= 1 + 1e-9);
     patience->last = fraction;
     patience->asked++;
@@ -204,14 +204,14 @@ static void it_tells_its_progress_and_can_be_stopped_wherever_it_is(void **state
     study_of(&inquiry)->target = 0.1;
     complete(&inquiry);
     Ensemble *answer;
-    Patience patience = {.left = 1 << 30};
+    CpuBudget patience = {.left = 1 << 30};
     const Progress progress = {&patience, lose};
     assert_int_equal(run(&inquiry, &progress, NULL, NULL, &answer), STATUS_OK);
     const int whole = patience.asked;
     assert_true(whole >= (int)answer->made && patience.last > 0.5);
     variant_free(&answer->variant);
     for (int left = 0; left < whole; left += 1 + whole / 40) {
-        patience = (Patience){.left = left};
+        patience = (CpuBudget){.left = left};
         problem_clear(&problem);
         assert_int_equal(run(&inquiry, &progress, NULL, NULL, &answer), STATUS_CANCELLED);
         assert_null(answer);

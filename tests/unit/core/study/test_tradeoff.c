@@ -129,13 +129,13 @@ static void a_point_that_fails_or_is_refused_stands_with_its_reason(void **state
     study_request_clear(&inquiry);
 }
 
-typedef struct Patience {
+typedef struct CpuBudget {
     int left, asked;
     double last;
-} Patience;
+} CpuBudget;
 
 static bool lose(void *context, double fraction) {
-    Patience *patience = context;
+    CpuBudget *patience = context;
     assert_true(fraction >= 0 && fraction <= 1 + 1e-9);
     patience->last = fraction;
     patience->asked++;
@@ -148,14 +148,14 @@ static void it_can_be_stopped_wherever_it_is(void **state) {
     Tradeoff *answer;
     solver_add(&inquiry, "exact");
     complete(&inquiry);
-    Patience patience = {.left = 1 << 30};
+    CpuBudget patience = {.left = 1 << 30};
     const Progress progress = {&patience, lose};
     assert_int_equal(run(&inquiry, &progress, NULL, &answer), STATUS_OK);
     variant_free(&answer->variant);
     const int whole = patience.asked;
     assert_true(whole > 8);
     for (int left = 0; left < whole; left += 1 + whole / 40) {
-        patience = (Patience){.left = left};
+        patience = (CpuBudget){.left = left};
         problem_clear(&problem);
         assert_int_equal(run(&inquiry, &progress, NULL, &answer), STATUS_CANCELLED);
         assert_null(answer);

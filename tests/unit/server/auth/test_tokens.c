@@ -16,14 +16,14 @@
 #include "server/auth/tokens.h"
 #include "server/util/clock.h"
 
-static Status add(Store *store, const char *name, const char *scopes, int64_t expires_unix_ms,
+static Status add(Db *store, const char *name, const char *scopes, int64_t expires_unix_ms,
                   char header[128]) {
     TokenRow row = {0};
     char token[TOKEN_SIZE];
     TRY(token_make(scopes, expires_unix_ms, &row, token, NULL));
     snprintf(row.name, sizeof row.name, "%s", name);
     snprintf(header, 128, "Bearer %s", token);
-    return store_token_add(store, &row, NULL);
+    return db_token_add(store, &row, NULL);
 }
 
 static Status check(Tokens *tokens, const char *authorization, const char *scope,
@@ -52,10 +52,10 @@ static void until(Tokens *tokens, const char *authorization, Status wanted) {
 
 static void without_tokens_the_door_is_open(void **state) {
     (void)state;
-    Store *store;
+    Db *store;
     Tokens *tokens;
     char client[TOKEN_NAME_SIZE] = "x";
-    assert_int_equal(store_open(NULL, &store, NULL), STATUS_OK);
+    assert_int_equal(db_open(NULL, &store, NULL), STATUS_OK);
     assert_int_equal(tokens_open(store, false, &tokens, NULL), STATUS_OK);
     assert_int_equal(check(tokens, NULL, "admin", client), STATUS_OK);
     assert_string_equal(client, "");
@@ -66,15 +66,15 @@ static void without_tokens_the_door_is_open(void **state) {
     assert_int_equal(tokens_open(store, true, &tokens, NULL), STATUS_OK);
     assert_int_equal(check(tokens, NULL, "read", client), STATUS_UNAUTHORIZED);
     tokens_close(tokens);
-    store_close(store);
+    db_close(store);
 }
 
 static void a_token_opens_what_its_scopes_say(void **state) {
     (void)state;
-    Store *store;
+    Db *store;
     Tokens *tokens;
     char reader[128], worker[128], chief[128], other[128], client[TOKEN_NAME_SIZE];
-    assert_int_equal(store_open(NULL, &store, NULL), STATUS_OK);
+    assert_int_equal(db_open(NULL, &store, NULL), STATUS_OK);
     assert_int_equal(add(store, "reader", "read", 0, reader), STATUS_OK);
     assert_int_equal(add(store, "worker", "submit,materials", 0, worker), STATUS_OK);
     assert_int_equal(add(store, "chief", "admin", 0, chief), STATUS_OK);
@@ -101,15 +101,15 @@ static void a_token_opens_what_its_scopes_say(void **state) {
     assert_int_equal(tokens_check(tokens, reader, "admin", &holder, &problem), STATUS_FORBIDDEN);
     assert_non_null(strstr(problem.detail, "\"admin\""));
     tokens_close(tokens);
-    store_close(store);
+    db_close(store);
 }
 
 static void what_is_no_token_of_ours_stays_out(void **state) {
     (void)state;
-    Store *store;
+    Db *store;
     Tokens *tokens;
     char good[128], text[160], client[TOKEN_NAME_SIZE];
-    assert_int_equal(store_open(NULL, &store, NULL), STATUS_OK);
+    assert_int_equal(db_open(NULL, &store, NULL), STATUS_OK);
     assert_int_equal(add(store, "a", "read", 0, good), STATUS_OK);
     assert_int_equal(tokens_open(store, false, &tokens, NULL), STATUS_OK);
     const char *token = good + strlen("Bearer ");
@@ -145,18 +145,18 @@ static void what_is_no_token_of_ours_stays_out(void **state) {
     assert_int_equal(check(tokens, text, "read", client), STATUS_OK);
     assert_int_equal(check(tokens, NULL, "read", client), STATUS_UNAUTHORIZED);
     tokens_close(tokens);
-    store_close(store);
+    db_close(store);
 }
 
 static void tokens_made_and_revoked_elsewhere_are_followed(void **state) {
     (void)state;
     char folder[] = "/tmp/impactd-tokens-XXXXXX", first[128], second[128], client[TOKEN_NAME_SIZE];
     assert_non_null(mkdtemp(folder));
-    Store *daemon, *beside;
+    Db *daemon, *beside;
     Tokens *tokens;
-    assert_int_equal(store_open(folder, &daemon, NULL), STATUS_OK);
-    assert_int_equal(store_open(folder, &beside, NULL), STATUS_CONFLICT);
-    assert_int_equal(store_open_beside(folder, &beside, NULL), STATUS_OK);
+    assert_int_equal(db_open(folder, &daemon, NULL), STATUS_OK);
+    assert_int_equal(db_open(folder, &beside, NULL), STATUS_CONFLICT);
+    assert_int_equal(db_open_beside(folder, &beside, NULL), STATUS_OK);
     assert_int_equal(tokens_open(daemon, false, &tokens, NULL), STATUS_OK);
     assert_int_equal(add(beside, "first", "read", 0, first), STATUS_OK);
     until(tokens, NULL, STATUS_UNAUTHORIZED);
@@ -164,26 +164,26 @@ static void tokens_made_and_revoked_elsewhere_are_followed(void **state) {
     assert_int_equal(add(beside, "second", "read", 0, second), STATUS_OK);
     until(tokens, second, STATUS_OK);
     TokenRow row = {.name = "first", .revoked_unix_ms = clock_unix_ms()};
-    assert_int_equal(store_token_forget(beside, &row, NULL), STATUS_CONFLICT);
-    assert_int_equal(store_token_revoke(beside, &row, NULL), STATUS_OK);
-    assert_int_equal(store_token_revoke(beside, &row, NULL), STATUS_CONFLICT);
+    assert_int_equal(db_token_forget(beside, &row, NULL), STATUS_CONFLICT);
+    assert_int_equal(db_token_revoke(beside, &row, NULL), STATUS_OK);
+    assert_int_equal(db_token_revoke(beside, &row, NULL), STATUS_CONFLICT);
     until(tokens, first, STATUS_UNAUTHORIZED);
     assert_int_equal(check(tokens, second, "read", client), STATUS_OK);
-    assert_int_equal(store_token_forget(beside, &row, NULL), STATUS_OK);
-    assert_int_equal(store_token_forget(beside, &row, NULL), STATUS_NOT_FOUND);
+    assert_int_equal(db_token_forget(beside, &row, NULL), STATUS_OK);
+    assert_int_equal(db_token_forget(beside, &row, NULL), STATUS_NOT_FOUND);
 
     // The last use is written at the latest when the daemon ends.
     tokens_close(tokens);
     TokenRows rows;
-    assert_int_equal(store_tokens(beside, &rows, NULL), STATUS_OK);
+    assert_int_equal(db_tokens(beside, &rows, NULL), STATUS_OK);
     assert_int_equal(rows.count, 1);
     assert_string_equal(rows.at[0].name, "second");
     assert_true(rows.at[0].used_unix_ms > 0);
     // Nothing of the token itself is kept.
     assert_null(strstr(second, rows.at[0].digest));
     free(rows.at);
-    store_close(beside);
-    store_close(daemon);
+    db_close(beside);
+    db_close(daemon);
     char command[64];
     static const char *const files[] = {"impactd.db", "impactd.lock", "impactd.db-wal",
                                         "impactd.db-shm"};
@@ -196,27 +196,27 @@ static void tokens_made_and_revoked_elsewhere_are_followed(void **state) {
 
 static void the_last_revoked_token_leaves_the_door_shut(void **state) {
     (void)state;
-    Store *store;
+    Db *store;
     Tokens *tokens;
     char header[128], client[TOKEN_NAME_SIZE];
-    assert_int_equal(store_open(NULL, &store, NULL), STATUS_OK);
+    assert_int_equal(db_open(NULL, &store, NULL), STATUS_OK);
     assert_int_equal(add(store, "a", "read", 0, header), STATUS_OK);
     TokenRow row = {.name = "a", .revoked_unix_ms = 1};
-    assert_int_equal(store_token_revoke(store, &row, NULL), STATUS_OK);
+    assert_int_equal(db_token_revoke(store, &row, NULL), STATUS_OK);
     assert_int_equal(tokens_open(store, false, &tokens, NULL), STATUS_OK);
     assert_int_equal(tokens_usable(tokens), 0);
     assert_int_equal(check(tokens, NULL, "read", client), STATUS_UNAUTHORIZED);
     assert_int_equal(check(tokens, header, "read", client), STATUS_UNAUTHORIZED);
     tokens_close(tokens);
-    store_close(store);
+    db_close(store);
 }
 
 static void an_expired_token_says_so(void **state) {
     (void)state;
-    Store *store;
+    Db *store;
     Tokens *tokens;
     char old[128], fresh[128], client[TOKEN_NAME_SIZE];
-    assert_int_equal(store_open(NULL, &store, NULL), STATUS_OK);
+    assert_int_equal(db_open(NULL, &store, NULL), STATUS_OK);
     assert_int_equal(add(store, "old", "read", clock_unix_ms() - 1, old), STATUS_OK);
     assert_int_equal(add(store, "fresh", "read", clock_unix_ms() + 3600000, fresh), STATUS_OK);
     assert_int_equal(tokens_open(store, false, &tokens, NULL), STATUS_OK);
@@ -228,7 +228,7 @@ static void an_expired_token_says_so(void **state) {
     assert_int_equal(check(tokens, fresh, "read", client), STATUS_OK);
     assert_int_equal(tokens_usable(tokens), 1);
     tokens_close(tokens);
-    store_close(store);
+    db_close(store);
 }
 
 static void scopes_are_a_list_of_known_names(void **state) {
@@ -265,10 +265,10 @@ static void *ask(void *context) {
 
 static void many_threads_ask_while_the_table_changes(void **state) {
     (void)state;
-    Store *store;
+    Db *store;
     Tokens *tokens;
     char header[128], other[128], name[16], client[TOKEN_NAME_SIZE];
-    assert_int_equal(store_open(NULL, &store, NULL), STATUS_OK);
+    assert_int_equal(db_open(NULL, &store, NULL), STATUS_OK);
     assert_int_equal(add(store, "a", "read", 0, header), STATUS_OK);
     assert_int_equal(tokens_open(store, false, &tokens, NULL), STATUS_OK);
     Asker askers[4];
@@ -288,7 +288,7 @@ static void many_threads_ask_while_the_table_changes(void **state) {
         assert_int_equal(askers[i].refused, 0);
     }
     tokens_close(tokens);
-    store_close(store);
+    db_close(store);
 }
 
 int main(void) {

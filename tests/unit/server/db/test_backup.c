@@ -35,10 +35,10 @@ static int folders_remove(void **state) {
     return 0;
 }
 
-static Store *open_store(const char *folder) {
-    Store *store;
+static Db *open_store(const char *folder) {
+    Db *store;
     problem_clear(&problem);
-    if (store_open(folder, &store, &problem) != STATUS_OK)
+    if (db_open(folder, &store, &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
     return store;
 }
@@ -66,7 +66,7 @@ static size_t files_in(const char *folder) {
 }
 
 typedef struct Stream {
-    Store *store;
+    Db *store;
     atomic_ulong added; // rows that are acknowledged
     atomic_bool is_over;
 } Stream;
@@ -75,7 +75,7 @@ static void *stream(void *of) {
     Stream *rows = of;
     for (unsigned long number = 0; !atomic_load(&rows->is_over); number++) {
         const JobRow row = job_row(number);
-        if (store_job_add(rows->store, &row, NULL) != STATUS_OK)
+        if (db_job_add(rows->store, &row, NULL) != STATUS_OK)
             break;
         atomic_store(&rows->added, number + 1);
     }
@@ -96,18 +96,18 @@ static void every_row_that_was_added_before_is_in_the_copy(void **state) {
         if (copy(NULL, &backup) != STATUS_OK)
             fail_msg("%s", problem.detail);
         assert_true(backup.jobs >= last);
-        Store *store = open_store(target);
+        Db *store = open_store(target);
         for (unsigned long number = last > 300 ? last - 300 : 0; number < last; number++) {
             const JobRow row = job_row(number);
             JobRow loaded;
-            assert_int_equal(store_job_load(store, row.id, &loaded, NULL), STATUS_OK);
+            assert_int_equal(db_job_load(store, row.id, &loaded, NULL), STATUS_OK);
             job_row_clear(&loaded);
         }
-        store_close(store);
+        db_close(store);
     }
     atomic_store(&rows.is_over, true);
     pthread_join(thread, NULL);
-    store_close(rows.store);
+    db_close(rows.store);
 }
 
 static bool stop_at(void *context, double fraction) {
@@ -119,13 +119,13 @@ static bool stop_at(void *context, double fraction) {
 static void stopped_at_any_moment_it_leaves_nothing(void **state) {
     (void)state;
     enum { TITLE = 60000, JOBS = 40 }; // some steps of copying
-    Store *store = open_store(data);
+    Db *store = open_store(data);
     char *title = calloc(1, TITLE);
     memset(title, 'x', TITLE - 1);
     for (unsigned long number = 0; number < JOBS; number++) {
         JobRow row = job_row(number);
         row.title = title;
-        assert_int_equal(store_job_add(store, &row, NULL), STATUS_OK);
+        assert_int_equal(db_job_add(store, &row, NULL), STATUS_OK);
     }
     free(title);
     Status status = STATUS_CANCELLED;
@@ -142,7 +142,7 @@ static void stopped_at_any_moment_it_leaves_nothing(void **state) {
     assert_int_equal(status, STATUS_OK);
     assert_true(moment > 5);
     assert_int_equal(files_in(target), 1);
-    store_close(store);
+    db_close(store);
 }
 
 #define IN_FOLDERS(test) cmocka_unit_test_setup_teardown(test, folders_make, folders_remove)

@@ -31,9 +31,9 @@ static int remove_folder(void **state) {
     return 0;
 }
 
-static uint64_t head_of(Store *store) {
+static uint64_t head_of(Db *store) {
     MaterialRevision found;
-    const Status status = store_material(store, "felt", 0, &found, NULL);
+    const Status status = db_material(store, "felt", 0, &found, NULL);
     const uint64_t revision = status == STATUS_OK ? found.revision : 0;
     material_revision_clear(&found);
     return revision;
@@ -41,57 +41,57 @@ static uint64_t head_of(Store *store) {
 
 static void who_has_not_seen_the_present_version_is_told(void **state) {
     (void)state;
-    Store *store = felt_store(NULL);
+    Db *store = felt_store(NULL);
     MaterialRevision one = felt_saying(0.5);
     MaterialMeasurement drop = {.slug = "felt", .comment = "c", .document = "{}"};
     static Problem problem;
     problem_clear(&problem);
-    assert_int_equal(store_material_revise(store, &one, ANY_VERSION, NULL), STATUS_NOT_FOUND);
-    assert_int_equal(store_material_add(store, &one, NULL), STATUS_OK);
-    assert_int_equal(store_material_revise(store, &one, 1, NULL), STATUS_OK);
-    assert_int_equal(store_material_revise(store, &one, 1, &problem), STATUS_STALE);
+    assert_int_equal(db_material_revise(store, &one, ANY_VERSION, NULL), STATUS_NOT_FOUND);
+    assert_int_equal(db_material_add(store, &one, NULL), STATUS_OK);
+    assert_int_equal(db_material_revise(store, &one, 1, NULL), STATUS_OK);
+    assert_int_equal(db_material_revise(store, &one, 1, &problem), STATUS_STALE);
     assert_non_null(strstr(problem.detail, "version 2"));
-    assert_int_equal(store_material_measure(store, &drop, 1, NULL), STATUS_STALE);
+    assert_int_equal(db_material_measure(store, &drop, 1, NULL), STATUS_STALE);
     assert_int_equal(felt_review(store, 1, "approved", NULL, 3), STATUS_STALE);
-    assert_int_equal(store_material_measure(store, &drop, 2, NULL), STATUS_OK);
-    assert_int_equal(store_material_measure(store, &drop, ANY_VERSION, NULL), STATUS_OK);
+    assert_int_equal(db_material_measure(store, &drop, 2, NULL), STATUS_OK);
+    assert_int_equal(db_material_measure(store, &drop, ANY_VERSION, NULL), STATUS_OK);
     assert_int_equal(drop.measurement, 2);
     MaterialState now;
-    assert_int_equal(store_material_state(store, "felt", &now, NULL), STATUS_OK);
+    assert_int_equal(db_material_state(store, "felt", &now, NULL), STATUS_OK);
     assert_int_equal(now.latest, 2);
     assert_int_equal(now.version, 4);
     assert_int_equal(now.measurements, 2);
-    assert_int_equal(store_material_state(store, "wood", &now, NULL), STATUS_NOT_FOUND);
-    store_close(store);
+    assert_int_equal(db_material_state(store, "wood", &now, NULL), STATUS_NOT_FOUND);
+    db_close(store);
 }
 
 static void a_measurement_changes_what_is_told_but_not_what_a_name_means(void **state) {
     (void)state;
-    Store *store = felt_store(NULL);
+    Db *store = felt_store(NULL);
     MaterialRevision one = felt_saying(0.5), head;
     MaterialMeasurement made = {.slug = "felt", .comment = "", .document = "{}"};
-    assert_int_equal(store_material_add(store, &one, NULL), STATUS_OK);
+    assert_int_equal(db_material_add(store, &one, NULL), STATUS_OK);
     assert_int_equal(head_of(store), 1); // and is remembered
-    const uint64_t generation = store_generation(store);
-    assert_int_equal(store_material_measure(store, &made, ANY_VERSION, NULL), STATUS_OK);
-    assert_int_equal(store_generation(store), generation);
-    assert_int_equal(store_material(store, "felt", 0, &head, NULL), STATUS_OK);
+    const uint64_t generation = db_catalog_version(store);
+    assert_int_equal(db_material_measure(store, &made, ANY_VERSION, NULL), STATUS_OK);
+    assert_int_equal(db_catalog_version(store), generation);
+    assert_int_equal(db_material(store, "felt", 0, &head, NULL), STATUS_OK);
     assert_int_equal(head.version, 2);
     material_revision_clear(&head);
-    store_close(store);
+    db_close(store);
 }
 
 static void the_head_is_the_newest_approved_then_the_newest_draft(void **state) {
     (void)state;
-    Store *store = felt_store(NULL);
+    Db *store = felt_store(NULL);
     MaterialRevision one = felt_saying(0.5);
-    assert_int_equal(store_material_add(store, &one, NULL), STATUS_OK);
+    assert_int_equal(db_material_add(store, &one, NULL), STATUS_OK);
     for (int i = 0; i < 3; i++)
-        assert_int_equal(store_material_revise(store, &one, ANY_VERSION, NULL), STATUS_OK);
-    const uint64_t generation = store_generation(store);
+        assert_int_equal(db_material_revise(store, &one, ANY_VERSION, NULL), STATUS_OK);
+    const uint64_t generation = db_catalog_version(store);
     assert_int_equal(head_of(store), 4);
     assert_int_equal(felt_review(store, 2, "approved", NULL, ANY_VERSION), STATUS_OK);
-    assert_true(store_generation(store) > generation);
+    assert_true(db_catalog_version(store) > generation);
     assert_int_equal(head_of(store), 2);
     assert_int_equal(felt_review(store, 1, "approved", NULL, ANY_VERSION), STATUS_OK);
     assert_int_equal(head_of(store), 2);
@@ -104,74 +104,74 @@ static void the_head_is_the_newest_approved_then_the_newest_draft(void **state) 
         assert_int_equal(felt_review(store, i, "deprecated", NULL, ANY_VERSION), STATUS_OK);
     assert_int_equal(head_of(store), 0);
     assert_int_equal(felt_review(store, 5, "deprecated", NULL, ANY_VERSION), STATUS_NOT_FOUND);
-    MaterialDeeds deeds;
-    assert_int_equal(store_material_trail(store, "felt", 100, 100, &deeds, NULL), STATUS_OK);
+    AuditEntries deeds;
+    assert_int_equal(db_audit_entries(store, "felt", 100, 100, &deeds, NULL), STATUS_OK);
     assert_int_equal(deeds.count, 12);
     assert_int_equal(deeds.at[0].version, 12);
     assert_string_equal(deeds.at[7].action, "approve");
     assert_string_equal(deeds.at[7].why, "because");
     assert_int_equal(deeds.at[7].revision, 2);
-    material_deeds_clear(&deeds);
-    assert_int_equal(store_material_trail(store, "felt", 3, 1, &deeds, NULL), STATUS_OK);
+    audit_entries_clear(&deeds);
+    assert_int_equal(db_audit_entries(store, "felt", 3, 1, &deeds, NULL), STATUS_OK);
     assert_int_equal(deeds.count, 1);
     assert_int_equal(deeds.at[0].version, 2);
-    material_deeds_clear(&deeds);
-    store_close(store);
+    audit_entries_clear(&deeds);
+    db_close(store);
 }
 
 // What one statement changes in the database of a store.
-static void change(Store *store, const char *sql) {
-    Database *database = store_take(store);
-    assert_int_equal(database_execute(database, sql, NULL), STATUS_OK);
-    store_put(store, database);
+static void change(Db *store, const char *sql) {
+    Sqlite *database = db_take(store);
+    assert_int_equal(sqlite_execute(database, sql, NULL), STATUS_OK);
+    db_put(store, database);
 }
 
 static void what_is_kept_for_good_has_an_end(void **state) {
     (void)state;
-    Store *store = felt_store(NULL);
+    Db *store = felt_store(NULL);
     MaterialRevision one = felt_saying(0.5), other = felt_saying(0.5);
     MaterialMeasurement made = {.slug = "felt", .comment = "", .document = "{}"};
     Problem problem;
     problem_clear(&problem);
-    assert_int_equal(store_material_add(store, &one, NULL), STATUS_OK);
+    assert_int_equal(db_material_add(store, &one, NULL), STATUS_OK);
     change(store, "INSERT INTO materials (number, slug) VALUES (100000, 'last')");
     other.slug = "wood";
-    assert_int_equal(store_material_add(store, &other, &problem), STATUS_LIMIT);
+    assert_int_equal(db_material_add(store, &other, &problem), STATUS_LIMIT);
     assert_non_null(strstr(problem.detail, "100000 materials"));
     change(store, "INSERT INTO material_revisions (material, revision, name, restitution, source, "
                   "comment, created_unix_ms) SELECT number, 10000, 'F', 0.5, 's', '', 1 FROM "
                   "materials WHERE slug = 'felt'");
     problem_clear(&problem);
-    assert_int_equal(store_material_revise(store, &one, ANY_VERSION, &problem), STATUS_LIMIT);
+    assert_int_equal(db_material_revise(store, &one, ANY_VERSION, &problem), STATUS_LIMIT);
     assert_non_null(strstr(problem.detail, "10000 revisions"));
-    assert_int_equal(store_material_measure(store, &made, ANY_VERSION, NULL), STATUS_OK);
+    assert_int_equal(db_material_measure(store, &made, ANY_VERSION, NULL), STATUS_OK);
     change(store, "UPDATE material_room SET bytes = (64 << 30) - 300");
     problem_clear(&problem);
-    assert_int_equal(store_material_measure(store, &made, ANY_VERSION, &problem), STATUS_LIMIT);
+    assert_int_equal(db_material_measure(store, &made, ANY_VERSION, &problem), STATUS_LIMIT);
     assert_non_null(strstr(problem.detail, "64 GiB"));
     assert_int_equal(felt_review(store, 1, "approved", NULL, ANY_VERSION), STATUS_LIMIT);
     MaterialState now;
-    assert_int_equal(store_material_state(store, "felt", &now, NULL), STATUS_OK);
+    assert_int_equal(db_material_state(store, "felt", &now, NULL), STATUS_OK);
     assert_int_equal(now.measurements, 1);
-    store_close(store);
+    db_close(store);
 }
 
 static void nobody_approves_their_own(void **state) {
     (void)state;
-    Store *store = felt_store(NULL);
+    Db *store = felt_store(NULL);
     MaterialRevision one = felt_saying(0.5);
     one.author = "ann";
-    assert_int_equal(store_material_add(store, &one, NULL), STATUS_OK);
+    assert_int_equal(db_material_add(store, &one, NULL), STATUS_OK);
     assert_int_equal(felt_review(store, 1, "approved", "ann", ANY_VERSION), STATUS_FORBIDDEN);
     assert_int_equal(felt_review(store, 1, "approved", "ann", 1), STATUS_FORBIDDEN);
     assert_int_equal(felt_review(store, 1, "approved", "anne", 1), STATUS_OK);
     assert_int_equal(felt_review(store, 1, "deprecated", "ann", 2), STATUS_OK);
     assert_int_equal(felt_review(store, 1, "approved", NULL, 3), STATUS_OK);
-    store_close(store);
+    db_close(store);
 }
 
 typedef struct Writer {
-    Store *store;
+    Db *store;
     int taken, told, other;
     atomic_int *of_version; // how many were taken that had seen it
 } Writer;
@@ -181,9 +181,9 @@ static void *write_much(void *context) {
     for (int i = 0; i < 200; i++) {
         MaterialRevision one = felt_saying(0.5);
         MaterialState now;
-        Status status = store_material_state(own->store, "felt", &now, NULL);
+        Status status = db_material_state(own->store, "felt", &now, NULL);
         if (status == STATUS_OK)
-            status = store_material_revise(own->store, &one, now.version, NULL);
+            status = db_material_revise(own->store, &one, now.version, NULL);
         own->taken += status == STATUS_OK;
         if (status == STATUS_OK)
             atomic_fetch_add(&own->of_version[now.version], 1);
@@ -195,9 +195,9 @@ static void *write_much(void *context) {
 
 static void of_eight_writers_each_is_taken_or_told(void **state) {
     (void)state;
-    Store *store = felt_store(folder);
+    Db *store = felt_store(folder);
     MaterialRevision one = felt_saying(0.5);
-    assert_int_equal(store_material_add(store, &one, NULL), STATUS_OK);
+    assert_int_equal(db_material_add(store, &one, NULL), STATUS_OK);
     static atomic_int of_version[8 * 200 + 2];
     pthread_t threads[8];
     Writer writers[8];
@@ -213,12 +213,12 @@ static void of_eight_writers_each_is_taken_or_told(void **state) {
         taken += (uint64_t)writers[i].taken;
     }
     MaterialState now;
-    assert_int_equal(store_material_state(store, "felt", &now, NULL), STATUS_OK);
+    assert_int_equal(db_material_state(store, "felt", &now, NULL), STATUS_OK);
     assert_int_equal(now.latest, taken + 1);
     assert_int_equal(now.version, taken + 1);
     for (uint64_t version = 1; version <= taken; version++)
         assert_int_equal(atomic_load(&of_version[version]), 1);
-    store_close(store);
+    db_close(store);
 }
 
 #define IN_FOLDER(test) cmocka_unit_test_setup_teardown(test, make_folder, remove_folder)

@@ -34,7 +34,7 @@ static int remove_folder(void **state) {
 
 static void a_revision_comes_back_as_it_went(void **state) {
     (void)state;
-    Store *store = felt_store(folder);
+    Db *store = felt_store(folder);
     MaterialRevision whole = felt_saying(0.5), found;
     Material *said = &whole.material;
     said->kind = "foam";
@@ -55,16 +55,16 @@ static void a_revision_comes_back_as_it_went(void **state) {
     said->base = MATERIAL_BASE_FREE;
     said->base_mass = 7;
     whole.author = "ann";
-    assert_int_equal(store_material_add(store, &whole, NULL), STATUS_OK);
-    assert_int_equal(store_material_add(store, &whole, NULL), STATUS_CONFLICT);
+    assert_int_equal(db_material_add(store, &whole, NULL), STATUS_OK);
+    assert_int_equal(db_material_add(store, &whole, NULL), STATUS_CONFLICT);
     MaterialRevision bare = felt_saying(0.4);
     bare.lists = NULL;
-    assert_int_equal(store_material_revise(store, &bare, 1, NULL), STATUS_OK);
+    assert_int_equal(db_material_revise(store, &bare, 1, NULL), STATUS_OK);
     assert_int_equal(bare.revision, 2);
-    store_close(store);
+    db_close(store);
 
     store = felt_store(folder);
-    assert_int_equal(store_material(store, "felt", 1, &found, NULL), STATUS_OK);
+    assert_int_equal(db_material(store, "felt", 1, &found, NULL), STATUS_OK);
     assert_string_equal(found.material.notes, said->notes);
     assert_string_equal(found.material.hardness, said->hardness);
     assert_string_equal(found.material.impactor, said->impactor);
@@ -80,26 +80,26 @@ static void a_revision_comes_back_as_it_went(void **state) {
     assert_int_equal(found.latest, 2);
     assert_int_equal(found.version, 2);
     material_revision_clear(&found);
-    assert_int_equal(store_material(store, "felt", 2, &found, NULL), STATUS_OK);
+    assert_int_equal(db_material(store, "felt", 2, &found, NULL), STATUS_OK);
     assert_null(found.lists);
     assert_null(found.author);
     assert_null(found.material.kind);
     assert_true(isnan(found.material.contact_time) && isnan(found.material.base_mass));
     assert_int_equal(found.material.base, CHOICE_ABSENT);
     material_revision_clear(&found);
-    store_close(store);
+    db_close(store);
 }
 
-static Database *open_database(void) {
+static Sqlite *open_database(void) {
     char path[128];
-    Database *database;
+    Sqlite *database;
     snprintf(path, sizeof path, "%s/impactd.db", folder);
-    assert_int_equal(database_open(path, DATABASE_WRITER, &database, NULL), STATUS_OK);
+    assert_int_equal(sqlite_open(path, DATABASE_WRITER, &database, NULL), STATUS_OK);
     return database;
 }
 
 // All that the materials' tables hold, as one text.
-static char *dump(Database *database) {
+static char *dump(Sqlite *database) {
     static const char sql[] =
         "SELECT (SELECT group_concat(json_array(number, slug)) FROM materials) || "
         "(SELECT group_concat(json_array(number, material, revision, name, kind, thickness, "
@@ -169,31 +169,31 @@ static void no_sql_changes_what_was_said(void **state) {
         "UPDATE material_states SET restitution = 0.9",
         "DELETE FROM material_states",
         "INSERT INTO material_states (slug) VALUES ('felt')"};
-    Store *store = felt_store(folder);
+    Db *store = felt_store(folder);
     MaterialRevision one = felt_saying(0.5);
     MaterialMeasurement drop = {.slug = "felt", .comment = "c", .document = "{\"a\": 1}"};
-    assert_int_equal(store_material_add(store, &one, NULL), STATUS_OK);
-    assert_int_equal(store_material_measure(store, &drop, ANY_VERSION, NULL), STATUS_OK);
+    assert_int_equal(db_material_add(store, &one, NULL), STATUS_OK);
+    assert_int_equal(db_material_measure(store, &drop, ANY_VERSION, NULL), STATUS_OK);
     assert_int_equal(felt_review(store, 1, "approved", NULL, ANY_VERSION), STATUS_OK);
-    store_close(store);
+    db_close(store);
 
-    Database *database = open_database();
+    Sqlite *database = open_database();
     char *before = dump(database);
     for (size_t i = 0; i < COUNT(harm); i++)
         for (size_t k = 0; k < COUNT(tables); k++) {
             char sql[400];
             snprintf(sql, sizeof sql, harm[i], tables[k], tables[k]);
-            if (database_execute(database, sql, NULL) == STATUS_OK)
+            if (sqlite_execute(database, sql, NULL) == STATUS_OK)
                 fail_msg("taken: %s", sql);
         }
     for (size_t i = 0; i < COUNT(named); i++)
-        if (database_execute(database, named[i], NULL) == STATUS_OK)
+        if (sqlite_execute(database, named[i], NULL) == STATUS_OK)
             fail_msg("taken: %s", named[i]);
     char *after = dump(database);
     assert_string_equal(before, after);
     free(before);
     free(after);
-    database_close(database);
+    sqlite_close(database);
 }
 
 // A result on "sponge@1" and a revision of somebody's, as each step has them.
@@ -207,28 +207,28 @@ static const char data_of_before[] =
     "'{\"dampers\": [{\"left_buffer\": {\"material\": \"sponge@1\"}, \"right_buffer\": "
     "{\"material\": \"sponge@1\"}}], \"title\": \"a@b\"}', '{}')";
 
-static void check_migrated(Store *store) {
+static void check_migrated(Db *store) {
     MaterialRevision found;
-    assert_int_equal(store_material(store, "sponge", 0, &found, NULL), STATUS_OK);
+    assert_int_equal(db_material(store, "sponge", 0, &found, NULL), STATUS_OK);
     assert_int_equal(found.revision, 2);
     assert_string_equal(found.material.name, "Sponge, new");
     assert_string_equal(found.reason, "better");
     assert_true(found.material.restitution == 0.55 && isnan(found.material.contact_time));
     assert_int_equal(found.version, 5);
     material_revision_clear(&found);
-    assert_int_equal(store_material(store, "sponge", 1, &found, NULL), STATUS_OK);
+    assert_int_equal(db_material(store, "sponge", 1, &found, NULL), STATUS_OK);
     assert_string_equal(found.status, "deprecated");
     assert_true(found.material.restitution == 0.61 && found.material.impactor_mass == 0.11);
     material_revision_clear(&found);
-    MaterialDeeds deeds;
-    assert_int_equal(store_material_trail(store, "sponge", 100, 100, &deeds, NULL), STATUS_OK);
+    AuditEntries deeds;
+    assert_int_equal(db_audit_entries(store, "sponge", 100, 100, &deeds, NULL), STATUS_OK);
     static const char *const actions[] = {"deprecate", "approve", "approve", "revise", "create"};
     assert_int_equal(deeds.count, COUNT(actions));
     for (size_t i = 0; i < COUNT(actions); i++)
         assert_string_equal(deeds.at[i].action, actions[i]);
-    material_deeds_clear(&deeds);
-    MaterialUses uses;
-    assert_int_equal(store_material_uses(store, "sponge", &uses, NULL), STATUS_OK);
+    audit_entries_clear(&deeds);
+    MaterialReferences uses;
+    assert_int_equal(db_material_uses(store, "sponge", &uses, NULL), STATUS_OK);
     assert_int_equal(uses.count, 2);
     assert_int_equal(uses.at[0].revision, 2);
     assert_int_equal(uses.at[0].results, 0);
@@ -238,23 +238,22 @@ static void check_migrated(Store *store) {
     free(uses.at);
     ResultUses results;
     uint64_t total;
-    assert_int_equal(store_result_uses(store, "sponge@1", 10, 0, &results, &total, NULL),
-                     STATUS_OK);
+    assert_int_equal(db_result_uses(store, "sponge@1", 10, 0, &results, &total, NULL), STATUS_OK);
     assert_int_equal(total, 1);
     assert_string_equal(results.at[0].id, "r-1");
     free(results.at);
     MaterialRevision next = felt_saying(0.5);
     next.slug = "sponge";
-    assert_int_equal(store_material_revise(store, &next, 5, NULL), STATUS_OK);
+    assert_int_equal(db_material_revise(store, &next, 5, NULL), STATUS_OK);
     assert_int_equal(next.revision, 3);
     MaterialRevisions heads;
-    assert_int_equal(store_material_heads(store, "", 100, &heads, NULL), STATUS_OK);
+    assert_int_equal(db_material_heads(store, "", 100, &heads, NULL), STATUS_OK);
     assert_int_equal(heads.count, 5);
     for (size_t i = 0; i < heads.count; i++)
         assert_string_equal(heads.at[i].status, "approved");
     material_revisions_clear(&heads);
     Texts slugs;
-    assert_int_equal(store_material_slugs(store, &slugs, NULL), STATUS_OK);
+    assert_int_equal(db_material_slugs(store, &slugs, NULL), STATUS_OK);
     assert_int_equal(slugs.count, 5);
     assert_string_equal(slugs.at[4], "sponge");
     material_slugs_clear(&slugs);
@@ -268,14 +267,14 @@ static void a_database_of_each_step_before_goes_on(void **state) {
         for (size_t i = 0; i < steps; i++)
             files[i] = embedded_sql[i];
         scratch_make(folder);
-        Database *database = open_database();
-        assert_int_equal(database_migrate(database, files, NULL), STATUS_OK);
-        assert_int_equal(database_execute(database, data_of_before, NULL), STATUS_OK);
-        database_close(database);
-        Store *store = felt_store(folder);
+        Sqlite *database = open_database();
+        assert_int_equal(sqlite_migrate(database, files, NULL), STATUS_OK);
+        assert_int_equal(sqlite_execute(database, data_of_before, NULL), STATUS_OK);
+        sqlite_close(database);
+        Db *store = felt_store(folder);
         check_migrated(store);
-        store_close(store);
-        store_close(felt_store(folder));
+        db_close(store);
+        db_close(felt_store(folder));
         scratch_remove(folder);
     }
 }

@@ -19,23 +19,22 @@
 static Problem problem;
 static char folder[SCRATCH_SIZE];
 
-static Store *store_make(void) {
-    Store *store;
+static Db *db_make(void) {
+    Db *store;
     scratch_make(folder);
     problem_clear(&problem);
-    if (store_open(folder, &store, &problem) != STATUS_OK)
+    if (db_open(folder, &store, &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
     return store;
 }
 
-static void store_end(Store *store) {
-    store_close(store);
+static void db_end(Db *store) {
+    db_close(store);
     scratch_remove(folder);
 }
 
 // A record whose first sample is `first`.
-static Status add(Store *store, const char *name, double first, const char *source,
-                  bool *is_there) {
+static Status add(Db *store, const char *name, double first, const char *source, bool *is_there) {
     double values[] = {first, -2, 0.5};
     const Reals samples = {values, 3};
     char digest[RECORD_DIGEST_SIZE];
@@ -50,10 +49,10 @@ static Status add(Store *store, const char *name, double first, const char *sour
                            .digest = digest,
                            .created_unix_ms = 1000};
     problem_clear(&problem);
-    return store_record_add(store, &row, &samples, is_there, &problem);
+    return db_record_add(store, &row, &samples, is_there, &problem);
 }
 
-static void add_new(Store *store, const char *name, double first) {
+static void add_new(Db *store, const char *name, double first) {
     bool is_there = true;
     if (add(store, name, first, NULL, &is_there) != STATUS_OK)
         fail_msg("%s", problem.detail);
@@ -62,33 +61,33 @@ static void add_new(Store *store, const char *name, double first) {
 
 static void a_record_comes_back_to_the_bit(void **state) {
     (void)state;
-    Store *store = store_make();
-    const uint64_t generation = store_generation(store);
+    Db *store = db_make();
+    const uint64_t generation = db_catalog_version(store);
     NamedRecord *named, *again;
     RecordRow row;
     add_new(store, "elcentro", 0.1);
-    assert_true(store_generation(store) > generation);
-    assert_int_equal(store_record(store, "elcentro", &row, &problem), STATUS_OK);
+    assert_true(db_catalog_version(store) > generation);
+    assert_int_equal(db_record(store, "elcentro", &row, &problem), STATUS_OK);
     assert_true(row.count == 3 && row.interval == 0.02 && row.peak == 2);
     assert_null(row.author);
     record_row_clear(&row);
-    assert_int_equal(store_record_named(store, "elcentro", &named, &problem), STATUS_OK);
+    assert_int_equal(db_record_named(store, "elcentro", &named, &problem), STATUS_OK);
     assert_true(named->samples.count == 3 && named->interval == 0.02);
     assert_true(named->samples.at[0] == 0.1 && named->samples.at[2] == 0.5);
     // Others share them, also when something else came in between.
     add_new(store, "other", 0.2);
-    assert_int_equal(store_record_named(store, "elcentro", &again, &problem), STATUS_OK);
+    assert_int_equal(db_record_named(store, "elcentro", &again, &problem), STATUS_OK);
     assert_ptr_equal(named, again);
     refcount_unref(&named->shared);
     refcount_unref(&again->shared);
-    assert_int_equal(store_record_named(store, "elcentr", &named, &problem), STATUS_NOT_FOUND);
+    assert_int_equal(db_record_named(store, "elcentr", &named, &problem), STATUS_NOT_FOUND);
     assert_null(named);
-    store_end(store);
+    db_end(store);
 }
 
 static void what_is_there_already_is_told_from_what_would_change_it(void **state) {
     (void)state;
-    Store *store = store_make();
+    Db *store = db_make();
     bool is_there = false;
     add_new(store, "elcentro", 0.1);
     assert_int_equal(add(store, "elcentro", 0.1, NULL, &is_there), STATUS_OK);
@@ -98,58 +97,58 @@ static void what_is_there_already_is_told_from_what_would_change_it(void **state
     assert_int_equal(add(store, "elcentro", 0.1, "PEER", &is_there), STATUS_CONFLICT);
     assert_non_null(strstr(problem.detail, "another source"));
     RecordRow row;
-    assert_int_equal(store_record(store, "elcentro", &row, &problem), STATUS_OK);
+    assert_int_equal(db_record(store, "elcentro", &row, &problem), STATUS_OK);
     assert_null(row.source);
     RecordRows twins;
-    assert_int_equal(store_record_twins(store, &row, &twins, &problem), STATUS_OK);
+    assert_int_equal(db_record_twins(store, &row, &twins, &problem), STATUS_OK);
     assert_int_equal(twins.count, 0);
     add_new(store, "same", 0.1);
-    assert_int_equal(store_record_twins(store, &row, &twins, &problem), STATUS_OK);
+    assert_int_equal(db_record_twins(store, &row, &twins, &problem), STATUS_OK);
     assert_int_equal(twins.count, 1);
     assert_string_equal(twins.at[0].name, "same");
     record_rows_clear(&twins);
     record_row_clear(&row);
-    store_end(store);
+    db_end(store);
 }
 
 static void a_list_goes_on_behind_a_name_and_searches_words(void **state) {
     (void)state;
     static const char *const names[] = {"b", "a", "C", "d"};
-    Store *store = store_make();
+    Db *store = db_make();
     RecordRows rows;
     bool is_there;
     for (size_t i = 0; i < COUNT(names); i++)
         assert_int_equal(
             add(store, names[i], (double)i, i == 3 ? "The Imperial Valley" : NULL, &is_there),
             STATUS_OK);
-    assert_int_equal(store_records(store, NULL, "", 2, &rows, &problem), STATUS_OK);
+    assert_int_equal(db_records(store, NULL, "", 2, &rows, &problem), STATUS_OK);
     assert_int_equal(rows.count, 2);
     assert_string_equal(rows.at[0].name, "C");
     assert_string_equal(rows.at[1].name, "a");
     record_rows_clear(&rows);
-    assert_int_equal(store_records(store, NULL, "a", 9, &rows, &problem), STATUS_OK);
+    assert_int_equal(db_records(store, NULL, "a", 9, &rows, &problem), STATUS_OK);
     assert_int_equal(rows.count, 2);
     record_rows_clear(&rows);
-    assert_int_equal(store_records(store, "imperial", "", 9, &rows, &problem), STATUS_OK);
+    assert_int_equal(db_records(store, "imperial", "", 9, &rows, &problem), STATUS_OK);
     assert_int_equal(rows.count, 1);
     assert_string_equal(rows.at[0].name, "d");
     record_rows_clear(&rows);
-    assert_int_equal(store_records(store, "%", "", 9, &rows, &problem), STATUS_OK);
+    assert_int_equal(db_records(store, "%", "", 9, &rows, &problem), STATUS_OK);
     assert_int_equal(rows.count, 0);
     record_rows_clear(&rows);
-    store_end(store);
+    db_end(store);
 }
 
-static JobRow job_add(Store *store, const char *id, int state, const char *uses) {
+static JobRow job_add(Db *store, const char *id, int state, const char *uses) {
     JobRow row = {.state = state, .scene = "{}", .warnings = "[]", .uses = (char *)uses};
     snprintf(row.id, sizeof row.id, "%s", id);
-    assert_int_equal(store_job_add(store, &row, &problem), STATUS_OK);
+    assert_int_equal(db_job_add(store, &row, &problem), STATUS_OK);
     return row;
 }
 
 static void a_record_in_use_is_not_deleted(void **state) {
     (void)state;
-    Store *store = store_make();
+    Db *store = db_make();
     RecordUses uses;
     NamedRecord *named;
     add_new(store, "elcentro", 0.1);
@@ -165,29 +164,29 @@ static void a_record_in_use_is_not_deleted(void **state) {
                         .energy = "{}",
                         .impacts = "{}",
                         .uses = "sponge@1\nrecord:elcentro\n"};
-    assert_int_equal(store_result_save(store, &result, NULL, 0, &problem), STATUS_OK);
-    assert_int_equal(store_record_uses(store, "elcentro", &uses, &problem), STATUS_OK);
+    assert_int_equal(db_result_save(store, &result, NULL, 0, &problem), STATUS_OK);
+    assert_int_equal(db_record_uses(store, "elcentro", &uses, &problem), STATUS_OK);
     assert_true(uses.results == 1 && uses.jobs == 1);
-    assert_int_equal(store_record_delete(store, "kobe", &uses, NULL), STATUS_CONFLICT);
+    assert_int_equal(db_record_delete(store, "kobe", &uses, NULL), STATUS_CONFLICT);
     assert_true(uses.results == 0 && uses.jobs == 1);
     problem_clear(&problem);
-    assert_int_equal(store_record_delete(store, "elcentro", &uses, &problem), STATUS_CONFLICT);
+    assert_int_equal(db_record_delete(store, "elcentro", &uses, &problem), STATUS_CONFLICT);
     assert_true(uses.results == 1 && uses.jobs == 1);
     assert_non_null(strstr(problem.detail, "1 result and 1 unfinished job:"));
     // A job that has ended uses nothing any more.
     job.state = 3;
-    assert_int_equal(store_job_update(store, &job, &problem), STATUS_OK);
-    assert_int_equal(store_record_uses(store, "elcentro", &uses, &problem), STATUS_OK);
+    assert_int_equal(db_job_update(store, &job, &problem), STATUS_OK);
+    assert_int_equal(db_record_uses(store, "elcentro", &uses, &problem), STATUS_OK);
     assert_true(uses.results == 1 && uses.jobs == 0);
-    assert_int_equal(store_record_delete(store, "kobe", &uses, &problem), STATUS_OK);
-    assert_int_equal(store_record_named(store, "kobe", &named, NULL), STATUS_NOT_FOUND);
-    assert_int_equal(store_record_delete(store, "kobe", &uses, NULL), STATUS_NOT_FOUND);
+    assert_int_equal(db_record_delete(store, "kobe", &uses, &problem), STATUS_OK);
+    assert_int_equal(db_record_named(store, "kobe", &named, NULL), STATUS_NOT_FOUND);
+    assert_int_equal(db_record_delete(store, "kobe", &uses, NULL), STATUS_NOT_FOUND);
     // The name is free, and means the new samples at once.
     add_new(store, "kobe", 0.7);
-    assert_int_equal(store_record_named(store, "kobe", &named, &problem), STATUS_OK);
+    assert_int_equal(db_record_named(store, "kobe", &named, &problem), STATUS_OK);
     assert_true(named->samples.at[0] == 0.7);
     refcount_unref(&named->shared);
-    store_end(store);
+    db_end(store);
 }
 
 static void nothing_written_beside_the_daemon_changes_a_record(void **state) {
@@ -208,9 +207,9 @@ static void nothing_written_beside_the_daemon_changes_a_record(void **state) {
         "0",
         "DELETE FROM records",
     };
-    Store *store = store_make();
+    Db *store = db_make();
     char path[SCRATCH_SIZE + 16];
-    Database *database;
+    Sqlite *database;
     NamedRecord *named;
     add_new(store, "elcentro", 0.1);
     ResultRow result = {.id = "r-1",
@@ -222,24 +221,24 @@ static void nothing_written_beside_the_daemon_changes_a_record(void **state) {
                         .energy = "{}",
                         .impacts = "{}",
                         .uses = "record:elcentro\n"};
-    assert_int_equal(store_result_save(store, &result, NULL, 0, &problem), STATUS_OK);
-    store_close(store);
+    assert_int_equal(db_result_save(store, &result, NULL, 0, &problem), STATUS_OK);
+    db_close(store);
     snprintf(path, sizeof path, "%s/impactd.db", folder);
-    assert_int_equal(database_open(path, DATABASE_WRITER, &database, &problem), STATUS_OK);
+    assert_int_equal(sqlite_open(path, DATABASE_WRITER, &database, &problem), STATUS_OK);
     for (size_t i = 0; i < COUNT(attempts); i++) {
         problem_clear(&problem);
-        if (database_execute(database, attempts[i], &problem) == STATUS_OK)
+        if (sqlite_execute(database, attempts[i], &problem) == STATUS_OK)
             fail_msg("%s", attempts[i]);
         if (strstr(problem.detail, "record") == NULL)
             fail_msg("%s: %s", attempts[i], problem.detail);
     }
-    database_close(database);
+    sqlite_close(database);
     problem_clear(&problem);
-    assert_int_equal(store_open(folder, &store, &problem), STATUS_OK);
-    assert_int_equal(store_record_named(store, "elcentro", &named, &problem), STATUS_OK);
+    assert_int_equal(db_open(folder, &store, &problem), STATUS_OK);
+    assert_int_equal(db_record_named(store, "elcentro", &named, &problem), STATUS_OK);
     assert_true(named->interval == 0.02 && named->samples.at[0] == 0.1);
     refcount_unref(&named->shared);
-    store_end(store);
+    db_end(store);
 }
 
 static void there_are_only_so_many(void **state) {
@@ -254,32 +253,32 @@ static void there_are_only_so_many(void **state) {
         "peak_velocity, end_velocity, digest, created_unix_ms) SELECT 'huge', 'json', 'g', 1, "
         "2147483645 - sum(count), 0, 0, 0, 0, printf('%064d', 0), 0 FROM records";
     char path[SCRATCH_SIZE + 16];
-    Store *store = store_make();
-    Database *database;
+    Db *store = db_make();
+    Sqlite *database;
     RecordUses uses;
     bool is_there;
     snprintf(path, sizeof path, "%s/impactd.db", folder);
-    assert_int_equal(database_open(path, DATABASE_WRITER, &database, &problem), STATUS_OK);
-    assert_int_equal(database_execute(database, many, &problem), STATUS_OK);
+    assert_int_equal(sqlite_open(path, DATABASE_WRITER, &database, &problem), STATUS_OK);
+    assert_int_equal(sqlite_execute(database, many, &problem), STATUS_OK);
     assert_int_equal(add(store, "one_more", 1, NULL, &is_there), STATUS_LIMIT);
     assert_non_null(strstr(problem.detail, "20000 records"));
     for (int i = 1; i <= 3; i++) {
         char name[16];
         snprintf(name, sizeof name, "n%d", i);
-        assert_int_equal(store_record_delete(store, name, &uses, &problem), STATUS_OK);
+        assert_int_equal(db_record_delete(store, name, &uses, &problem), STATUS_OK);
     }
     // Now there is room for two, and for three samples.
-    assert_int_equal(database_execute(database, huge, &problem), STATUS_OK);
+    assert_int_equal(sqlite_execute(database, huge, &problem), STATUS_OK);
     add_new(store, "three", 1);
-    assert_int_equal(store_record_delete(store, "n4", &uses, &problem), STATUS_OK);
+    assert_int_equal(db_record_delete(store, "n4", &uses, &problem), STATUS_OK);
     assert_int_equal(add(store, "three_more", 2, NULL, &is_there), STATUS_LIMIT);
     assert_non_null(strstr(problem.detail, "2147483648"));
-    database_close(database);
-    store_end(store);
+    sqlite_close(database);
+    db_end(store);
 }
 
 typedef struct Racer {
-    Store *store;
+    Db *store;
     pthread_t thread;
     Status status;
     bool is_there;
@@ -297,13 +296,13 @@ static void *race(void *of) {
                            .interval = 0.02,
                            .count = 3,
                            .digest = digest};
-    racer->status = store_record_add(racer->store, &row, &samples, &racer->is_there, NULL);
+    racer->status = db_record_add(racer->store, &row, &samples, &racer->is_there, NULL);
     return NULL;
 }
 
 static void of_two_same_uploads_at_once_one_is_kept(void **state) {
     (void)state;
-    Store *store = store_make();
+    Db *store = db_make();
     Racer racers[8];
     size_t kept = 0;
     for (size_t i = 0; i < COUNT(racers); i++) {
@@ -316,7 +315,7 @@ static void of_two_same_uploads_at_once_one_is_kept(void **state) {
         kept += !racers[i].is_there;
     }
     assert_int_equal(kept, 1);
-    store_end(store);
+    db_end(store);
 }
 
 static void names_are_fit_for_paths_and_files(void **state) {

@@ -13,7 +13,7 @@
 
 enum { WRITES = 8 };
 
-static Store *store;
+static Db *store;
 static pthread_mutex_t lock;
 static atomic_bool is_held_up;
 static atomic_int done_count;
@@ -27,17 +27,17 @@ static int open_store(void **state) {
     atomic_store(&is_held_up, false);
     atomic_store(&done_count, 0);
     atomic_store(&count, 0);
-    return store_open(NULL, &store, NULL) != STATUS_OK;
+    return db_open(NULL, &store, NULL) != STATUS_OK;
 }
 
 static int close_store(void **state) {
     (void)state;
-    store_close(store);
+    db_close(store);
     pthread_mutex_destroy(&lock);
     return 0;
 }
 
-static Status wait_for_leave(Database *database, const void *work, Problem *problem) {
+static Status wait_for_leave(Sqlite *database, const void *work, Problem *problem) {
     (void)database, (void)work, (void)problem;
     atomic_store(&is_held_up, true);
     pthread_mutex_lock(&lock);
@@ -45,11 +45,11 @@ static Status wait_for_leave(Database *database, const void *work, Problem *prob
     return STATUS_OK;
 }
 
-static Status note(Database *database, const void *work, Problem *problem) {
+static Status note(Sqlite *database, const void *work, Problem *problem) {
     (void)database, (void)problem;
     const size_t place = atomic_fetch_add(&count, 1);
     order[place] = *(const int *)work;
-    written_before[place] = counter_get(&store_totals(store)->writes);
+    written_before[place] = counter_get(&db_totals(store)->writes);
     return STATUS_OK;
 }
 
@@ -59,12 +59,12 @@ static void count_done(void *context, Status status, const char *detail) {
 }
 
 static const struct timespec moment = {0, 1000000};
-static const StoreDone done = {count_done, NULL};
+static const WriteDone done = {count_done, NULL};
 
 // The writer is in a transaction of which nothing else is part, until let_go.
 static void hold_up(void) {
     pthread_mutex_lock(&lock);
-    assert_int_equal(store_post(store, wait_for_leave, NULL, 0, STORE_NOW, &done, NULL), STATUS_OK);
+    assert_int_equal(db_enqueue(store, wait_for_leave, NULL, 0, STORE_NOW, &done, NULL), STATUS_OK);
     while (!atomic_load(&is_held_up))
         nanosleep(&moment, NULL);
 }
@@ -73,9 +73,9 @@ static void let_go(void) {
     pthread_mutex_unlock(&lock);
 }
 
-static StoreTicket *post(int number, StoreTurn turn) {
-    StoreTicket *ticket = NULL;
-    assert_int_equal(store_post(store, note, &number, sizeof number, turn, &done, &ticket),
+static PendingWrite *post(int number, WritePriority turn) {
+    PendingWrite *ticket = NULL;
+    assert_int_equal(db_enqueue(store, note, &number, sizeof number, turn, &done, &ticket),
                      STATUS_OK);
     return ticket;
 }
@@ -89,9 +89,9 @@ static void what_is_hurried_comes_before_what_waits(void **state) {
     (void)state;
     hold_up();
     post(1, STORE_LATER);
-    StoreTicket *hurried = post(2, STORE_LATER);
-    store_hurry(store, hurried);
-    store_hurry(store, post(3, STORE_NOW)); // changes nothing
+    PendingWrite *hurried = post(2, STORE_LATER);
+    db_expedite(store, hurried);
+    db_expedite(store, post(3, STORE_NOW)); // changes nothing
     post(4, STORE_NOW);
     let_go();
     wait_for(5);
@@ -122,20 +122,20 @@ static void what_is_settled_was_all_written(void **state) {
     post(1, STORE_LATER);
     post(2, STORE_SOON);
     post(3, STORE_LATER);
-    store_settle(store);
+    db_flush(store);
     assert_int_equal(atomic_load(&count), 3);
-    store_settle(store); // there is nothing
+    db_flush(store); // there is nothing
     wait_for(3);
 }
 
 static void what_was_withdrawn_is_not_written(void **state) {
     (void)state;
     hold_up();
-    StoreTicket *const tickets[] = {post(1, STORE_LATER), post(2, STORE_SOON), post(3, STORE_NOW)};
+    PendingWrite *const tickets[] = {post(1, STORE_LATER), post(2, STORE_SOON), post(3, STORE_NOW)};
     post(4, STORE_NOW);
     post(5, STORE_LATER);
     for (size_t i = 0; i < COUNT(tickets); i++)
-        assert_true(store_withdraw(store, tickets[i]));
+        assert_true(db_cancel_write(store, tickets[i]));
     let_go();
     wait_for(3);
     assert_int_equal(atomic_load(&count), 2);
@@ -159,7 +159,7 @@ static void closing_writes_what_waits(void **state) {
     post(2, STORE_SOON);
     post(3, STORE_LOW);
     let_go();
-    store_close(store);
+    db_close(store);
     store = NULL;
     assert_int_equal(atomic_load(&done_count), 4);
     assert_int_equal(atomic_load(&count), 3);

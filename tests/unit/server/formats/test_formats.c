@@ -52,7 +52,7 @@ static Table over_frequency(size_t first, size_t count) {
 
 static void assert_text(const char *extension, Table table, const char *expected) {
     Bytes bytes = {0};
-    assert_int_equal(encoding_write(encoder_find(extension), &table, &bytes, NULL), STATUS_OK);
+    assert_int_equal(encoding_write(format_find(extension), &table, &bytes, NULL), STATUS_OK);
     assert_false(bytes.is_failed);
     assert_string_equal(bytes.at, expected);
     assert_int_equal(bytes.count, strlen(expected));
@@ -96,7 +96,7 @@ static void npy_has_its_header_and_columns_as_they_lie_in_memory(void **state) {
     (void)state;
     const Table table = series(50, 4500);
     Bytes bytes = {0};
-    assert_int_equal(encoding_write(encoder_find("npy"), &table, &bytes, NULL), STATUS_OK);
+    assert_int_equal(encoding_write(format_find("npy"), &table, &bytes, NULL), STATUS_OK);
     const size_t header = 128;
     assert_int_equal(bytes.count, header + 4500 * 3 * 8);
     assert_memory_equal(bytes.at, "\x93NUMPY\x01\x00\x76\x00", 10);
@@ -120,7 +120,7 @@ static void every_part_of_a_binary_format_can_be_read_alone(void **state) {
     static const char *const names[] = {"npy", "npz", "mat"};
     for (size_t n = 0; n < 3; n++) {
         const Table table = series(50, 4500);
-        const Encoder *encoder = encoder_find(names[n]);
+        const TableFormat *encoder = format_find(names[n]);
         Bytes whole = {0};
         assert_int_equal(encoding_write(encoder, &table, &whole, NULL), STATUS_OK);
         unsigned seed = 1;
@@ -173,8 +173,8 @@ static void archives_are_the_same_each_time_and_stored(void **state) {
     (void)state;
     const Table table = series(0, 100);
     Bytes first = {0}, second = {0};
-    assert_int_equal(encoding_write(encoder_find("npz"), &table, &first, NULL), STATUS_OK);
-    assert_int_equal(encoding_write(encoder_find("npz"), &table, &second, NULL), STATUS_OK);
+    assert_int_equal(encoding_write(format_find("npz"), &table, &first, NULL), STATUS_OK);
+    assert_int_equal(encoding_write(format_find("npz"), &table, &second, NULL), STATUS_OK);
     assert_int_equal(first.count, second.count);
     assert_memory_equal(first.at, second.at, first.count);
     assert_memory_equal(first.at, "PK\3\4\x14\0\0\0\0\0\0\0\x21\0", 14);
@@ -199,7 +199,7 @@ static void what_is_too_large_for_a_format_is_refused(void **state) {
         Problem problem;
         problem_clear(&problem);
         assert_int_equal(
-            encoding_open(encoder_find(cases[i].extension), &table, &encoding, &problem),
+            encoding_open(format_find(cases[i].extension), &table, &encoding, &problem),
             STATUS_LIMIT);
         assert_null(encoding);
         assert_non_null(strstr(problem.detail, cases[i].words));
@@ -222,7 +222,7 @@ static void names_become_variables(void **state) {
 static void buckets_are_labelled(void **state) {
     (void)state;
     Columns buckets;
-    assert_int_equal(buckets_make(both, 1, 49, 5, 2, &buckets, NULL), STATUS_OK);
+    assert_int_equal(downsample(both, 1, 49, 5, 2, &buckets, NULL), STATUS_OK);
     const Column *const pair[] = {&buckets.at[0], &buckets.at[1]};
     Table table = series(49, 3);
     table.bucket = 2;
@@ -258,7 +258,7 @@ static void buckets_keep_the_extremes_of_ten_thousand_windows(void **state) {
         seed = seed * 6364136223846793005u + 1442695040888963407u;
         const size_t bucket = 1 + (size_t)(seed >> 33) % (w % 3 == 0 ? 5 : count);
         Columns buckets;
-        assert_int_equal(buckets_make(columns, 1, first, count, bucket, &buckets, NULL), STATUS_OK);
+        assert_int_equal(downsample(columns, 1, first, count, bucket, &buckets, NULL), STATUS_OK);
         assert_int_equal(buckets.rows, (count + bucket - 1) / bucket);
         for (size_t i = 0; i < buckets.rows; i++) {
             double least = INFINITY, most = -INFINITY;
@@ -290,13 +290,13 @@ static void formats_are_found_by_extension_and_json_is_first(void **state) {
     (void)state;
     assert_string_equal(encoders[0]->extension, "json");
     for (size_t i = 0; encoders[i] != NULL; i++) {
-        assert_ptr_equal(encoder_find(encoders[i]->extension), encoders[i]);
+        assert_ptr_equal(format_find(encoders[i]->extension), encoders[i]);
         assert_non_null(strchr(encoders[i]->content_type, '/'));
     }
-    assert_true(encoder_find("npy")->is_binary);
-    assert_false(encoder_find("csv")->is_binary);
-    assert_null(encoder_find("xml"));
-    assert_null(encoder_find(""));
+    assert_true(format_find("npy")->is_binary);
+    assert_false(format_find("csv")->is_binary);
+    assert_null(format_find("xml"));
+    assert_null(format_find(""));
 }
 
 int main(void) {

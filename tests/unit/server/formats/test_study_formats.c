@@ -12,8 +12,8 @@
 
 static char unstable[] = "the \"numbers\" grew";
 
-static const AnswerFormat *format(const StudyKind *kind, const char *extension) {
-    const AnswerFormat *found = answer_format_find(answer_formats(kind->answer), extension);
+static const StudyFormat *format(const StudyKind *kind, const char *extension) {
+    const StudyFormat *found = study_format_find(study_formats(kind->answer), extension);
     assert_non_null(found);
     return found;
 }
@@ -21,18 +21,18 @@ static const AnswerFormat *format(const StudyKind *kind, const char *extension) 
 static void every_study_has_its_formats_json_first(void **state) {
     (void)state;
     for (size_t i = 0; studies[i] != NULL; i++) {
-        const AnswerFormat *formats = answer_formats(studies[i]->answer);
+        const StudyFormat *formats = study_formats(studies[i]->answer);
         assert_string_equal(formats->extension, "json");
         size_t count = 0;
         while (formats[count].extension != NULL)
             count++;
-        assert_true(count < ANSWER_FORMATS);
+        assert_true(count < STUDY_FORMATS_MAX);
     }
     char names[64];
-    answer_formats_name(answer_formats(study_ensemble.answer), ".", names, sizeof names);
+    study_formats_names(study_formats(study_ensemble.answer), ".", names, sizeof names);
     assert_string_equal(names, ".json, .csv, .svg");
-    assert_null(answer_format_find(answer_formats(study_tradeoff.answer), "csv"));
-    answer_formats_name(answer_formats(study_ensemble.answer), "", names, 8);
+    assert_null(study_format_find(study_formats(study_tradeoff.answer), "csv"));
+    study_formats_names(study_formats(study_ensemble.answer), "", names, 8);
     assert_string_equal(names, "json, c"); // cut, not overrun
 }
 

@@ -30,8 +30,8 @@ static const Route table[] = {
 };
 
 typedef struct House {
-    Store *store;
-    Doorman doorman;
+    Db *store;
+    AccessControl doorman;
     Dispatcher dispatcher;
     char lab[128]; // the Authorization header of a token that may read
 } House;
@@ -40,12 +40,12 @@ static int open_house(void **state) {
     static House house;
     TokenRow row = {.name = "lab"};
     char token[TOKEN_SIZE];
-    if (store_open(NULL, &house.store, NULL) != STATUS_OK ||
+    if (db_open(NULL, &house.store, NULL) != STATUS_OK ||
         token_make("read", 0, &row, token, NULL) != STATUS_OK ||
-        store_token_add(house.store, &row, NULL) != STATUS_OK)
+        db_token_add(house.store, &row, NULL) != STATUS_OK)
         return -1;
     snprintf(house.lab, sizeof house.lab, "Bearer %s", token);
-    house.doorman.meter = meter_new(table);
+    house.doorman.meter = request_metrics_new(table);
     house.dispatcher = (Dispatcher){NULL, table, NULL, NULL, &house.doorman};
     *state = &house;
     return tokens_open(house.store, false, &house.doorman.tokens, NULL) == STATUS_OK ? 0 : -1;
@@ -54,8 +54,8 @@ static int open_house(void **state) {
 static int close_house(void **state) {
     House *house = *state;
     tokens_close(house->doorman.tokens);
-    meter_free(house->doorman.meter);
-    store_close(house->store);
+    request_metrics_free(house->doorman.meter);
+    db_close(house->store);
     return 0;
 }
 
@@ -109,12 +109,12 @@ static void answers_are_counted_where_they_belong(void **state) {
     House *house = *state;
     Reply reply;
     Bytes before = {0}, after = {0};
-    meter_write(house->doorman.meter, &before);
+    request_metrics_write(house->doorman.meter, &before);
     for (int i = 0; i < 3; i++)
         ask(house, "GET", "/open", NULL, &reply);
     ask(house, "PUT", "/open", NULL, &reply);
     reply_clear(&reply);
-    meter_write(house->doorman.meter, &after);
+    request_metrics_write(house->doorman.meter, &after);
     assert_non_null(strstr(before.at, "{route=\"/open\",method=\"GET\",code=\"2xx\"} 1\n"));
     assert_non_null(strstr(after.at, "{route=\"/open\",method=\"GET\",code=\"2xx\"} 4\n"));
     assert_non_null(strstr(after.at, "{route=\"none\",method=\"any\",code=\"4xx\"} 2\n"));
@@ -126,13 +126,13 @@ static void answers_are_counted_where_they_belong(void **state) {
 static void links_in_headers_begin_with_the_base(void **state) {
     House *house = *state;
     Reply reply;
-    link_base_set("/sim");
+    base_path_set("/sim");
     assert_int_equal(ask(house, "GET", "/sim/v1/a", house->lab, &reply), 200);
     assert_string_equal(reply.location, "/sim/v1/a");
     assert_string_equal(reply.link, "</sim/v1/a>; rel=\"next\"");
     assert_int_equal(ask(house, "GET", "/v1/a", house->lab, &reply), 200);
     assert_string_equal(reply.location, "/sim/v1/a");
-    link_base_set("");
+    base_path_set("");
 }
 
 static void without_a_doorman_everyone_comes_in(void **state) {

@@ -16,7 +16,7 @@
 #include "server/http/timer.h"
 #include "server/util/clock.h"
 
-// Stands for a connection: counts what the Hall does to it.
+// Stands for a connection: counts what the TimerWheel does to it.
 typedef struct Connection {
     atomic_int suspended, resumed;
 } Connection;
@@ -31,7 +31,7 @@ static void resume(void *context) {
     atomic_fetch_add(&connection->resumed, 1);
 }
 
-static const HallCalls calls = {suspend, resume};
+static const TimerCallbacks calls = {suspend, resume};
 
 static void pause_ms(long ms) {
     const struct timespec time = {.tv_sec = ms / 1000, .tv_nsec = ms % 1000 * 1000000};
@@ -51,100 +51,100 @@ static double wait_resumed(Connection *connection, int count) {
 
 static void a_wake_before_the_sleep_is_not_lost(void **state) {
     (void)state;
-    Hall *hall;
+    TimerWheel *hall;
     Connection connection = {0};
-    assert_int_equal(hall_open(&calls, &hall, NULL), STATUS_OK);
-    Seat *seat = seat_take(hall, -1);
-    const Waker *waker = seat_waker(seat);
-    seat_begin(seat);
+    assert_int_equal(timer_wheel_open(&calls, &hall, NULL), STATUS_OK);
+    ConnectionTimer *seat = timer_take(hall, -1);
+    const Callback *waker = timer_callback(seat);
+    timer_begin(seat);
     waker->wake(waker->context);
-    assert_false(seat_sleep(seat, &connection, 1000));
-    assert_true(seat_was_woken(seat));
-    assert_false(seat_was_woken(seat));
+    assert_false(timer_sleep(seat, &connection, 1000));
+    assert_true(timer_was_woken(seat));
+    assert_false(timer_was_woken(seat));
     assert_int_equal(connection.suspended, 0);
-    hall_close(hall);
+    timer_wheel_close(hall);
 }
 
 static void time_ends_a_sleep_and_a_wake_ends_it_sooner(void **state) {
     (void)state;
-    Hall *hall;
+    TimerWheel *hall;
     Connection connection = {0};
-    assert_int_equal(hall_open(&calls, &hall, NULL), STATUS_OK);
-    Seat *seat = seat_take(hall, -1);
-    seat_begin(seat);
-    assert_true(seat_sleep(seat, &connection, 50));
+    assert_int_equal(timer_wheel_open(&calls, &hall, NULL), STATUS_OK);
+    ConnectionTimer *seat = timer_take(hall, -1);
+    timer_begin(seat);
+    assert_true(timer_sleep(seat, &connection, 50));
     const double took = wait_resumed(&connection, 1);
     assert_true(took >= 40 && took < 2000);
-    assert_false(seat_was_woken(seat));
+    assert_false(timer_was_woken(seat));
 
-    assert_true(seat_sleep(seat, &connection, 60000));
-    const Waker *waker = seat_waker(seat);
+    assert_true(timer_sleep(seat, &connection, 60000));
+    const Callback *waker = timer_callback(seat);
     waker->wake(waker->context);
     waker->wake(waker->context);
     assert_true(wait_resumed(&connection, 2) < 2000);
-    assert_true(seat_was_woken(seat));
+    assert_true(timer_was_woken(seat));
     assert_int_equal(connection.resumed, 2); // the second call found nobody asleep
-    hall_close(hall);
+    timer_wheel_close(hall);
 }
 
 static void an_earlier_time_overtakes_a_later_one(void **state) {
     (void)state;
-    Hall *hall;
+    TimerWheel *hall;
     Connection late = {0}, early = {0};
-    assert_int_equal(hall_open(&calls, &hall, NULL), STATUS_OK);
-    Seat *first = seat_take(hall, -1), *second = seat_take(hall, -1);
-    seat_begin(first);
-    seat_begin(second);
-    assert_true(seat_sleep(first, &late, 60000));
+    assert_int_equal(timer_wheel_open(&calls, &hall, NULL), STATUS_OK);
+    ConnectionTimer *first = timer_take(hall, -1), *second = timer_take(hall, -1);
+    timer_begin(first);
+    timer_begin(second);
+    assert_true(timer_sleep(first, &late, 60000));
     pause_ms(20);
-    assert_true(seat_sleep(second, &early, 30));
+    assert_true(timer_sleep(second, &early, 30));
     const double took = wait_resumed(&early, 1);
     assert_true(took >= 0 && took < 2000);
     assert_int_equal(late.resumed, 0);
-    hall_wake_all(hall);
+    timer_wheel_wake_all(hall);
     assert_int_equal(late.resumed, 1);
-    assert_false(seat_sleep(first, &late, 60000));
-    assert_true(hall_is_closing(hall));
-    hall_close(hall);
+    assert_false(timer_sleep(first, &late, 60000));
+    assert_true(timer_wheel_is_closing(hall));
+    timer_wheel_close(hall);
 }
 
 static void a_late_wake_of_a_left_seat_does_no_harm(void **state) {
     (void)state;
-    Hall *hall;
+    TimerWheel *hall;
     Connection next = {0};
-    assert_int_equal(hall_open(&calls, &hall, NULL), STATUS_OK);
-    Seat *seat = seat_take(hall, -1);
-    const Waker *waker = seat_waker(seat);
-    seat_leave(seat);
+    assert_int_equal(timer_wheel_open(&calls, &hall, NULL), STATUS_OK);
+    ConnectionTimer *seat = timer_take(hall, -1);
+    const Callback *waker = timer_callback(seat);
+    timer_leave(seat);
     waker->wake(waker->context);
-    Seat *again = seat_take(hall, -1);
+    ConnectionTimer *again = timer_take(hall, -1);
     assert_ptr_equal(again, seat);
-    seat_begin(again);
-    assert_true(seat_sleep(again, &next, 60000));
+    timer_begin(again);
+    assert_true(timer_sleep(again, &next, 60000));
     waker->wake(waker->context); // wakes the next one, who looks and sleeps on
     assert_int_equal(next.resumed, 1);
-    assert_true(seat_was_woken(again));
-    assert_true(seat_sleep(again, &next, 60000));
-    hall_wake_all(hall);
-    hall_close(hall);
+    assert_true(timer_was_woken(again));
+    assert_true(timer_sleep(again, &next, 60000));
+    timer_wheel_wake_all(hall);
+    timer_wheel_close(hall);
 }
 
 static void a_peer_that_is_too_slow_is_shut_down(void **state) {
     (void)state;
-    Hall *hall;
+    TimerWheel *hall;
     int pair[2];
     char byte;
-    assert_int_equal(hall_open(&calls, &hall, NULL), STATUS_OK);
+    assert_int_equal(timer_wheel_open(&calls, &hall, NULL), STATUS_OK);
     assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM, 0, pair), 0);
-    Seat *seat = seat_take(hall, pair[0]);
-    seat_limit(seat, 10000);
-    seat_limit(seat, 0);
-    seat_limit(seat, 30);
+    ConnectionTimer *seat = timer_take(hall, pair[0]);
+    timer_limit(seat, 10000);
+    timer_limit(seat, 0);
+    timer_limit(seat, 30);
     assert_int_equal(read(pair[1], &byte, 1), 0); // the other end sees it closed
-    seat_leave(seat);
+    timer_leave(seat);
     close(pair[0]);
     close(pair[1]);
-    hall_close(hall);
+    timer_wheel_close(hall);
 }
 
 // Two threads: one sleeps over and over, the other wakes without end; a sleep that lasts its whole
@@ -152,7 +152,7 @@ static void a_peer_that_is_too_slow_is_shut_down(void **state) {
 enum { ROUNDS = 2000 };
 
 typedef struct Alarm {
-    const Waker *waker;
+    const Callback *waker;
     atomic_bool is_off;
 } Alarm;
 
@@ -165,23 +165,23 @@ static void *ring(void *context) {
 
 static void no_wake_is_lost_between_two_threads(void **state) {
     (void)state;
-    Hall *hall;
+    TimerWheel *hall;
     Connection connection = {0};
     pthread_t thread;
-    assert_int_equal(hall_open(&calls, &hall, NULL), STATUS_OK);
-    Seat *seat = seat_take(hall, -1);
-    Alarm alarm = {.waker = seat_waker(seat)};
-    seat_begin(seat);
+    assert_int_equal(timer_wheel_open(&calls, &hall, NULL), STATUS_OK);
+    ConnectionTimer *seat = timer_take(hall, -1);
+    Alarm alarm = {.waker = timer_callback(seat)};
+    timer_begin(seat);
     assert_int_equal(pthread_create(&thread, NULL, ring, &alarm), 0);
     int slept = 0, lost = 0;
     for (int i = 0; i < ROUNDS && lost == 0; i++) {
-        if (seat_sleep(seat, &connection, 5000)) {
+        if (timer_sleep(seat, &connection, 5000)) {
             slept++;
             while (atomic_load(&connection.resumed) < slept)
                 sched_yield();
-            lost += !seat_was_woken(seat);
+            lost += !timer_was_woken(seat);
         } else {
-            seat_was_woken(seat);
+            timer_was_woken(seat);
         }
     }
     atomic_store(&alarm.is_off, true);
@@ -189,7 +189,7 @@ static void no_wake_is_lost_between_two_threads(void **state) {
     assert_int_equal(lost, 0);
     assert_int_equal(connection.suspended, slept);
     assert_int_equal(connection.resumed, slept);
-    hall_close(hall);
+    timer_wheel_close(hall);
 }
 
 int main(void) {

@@ -10,28 +10,28 @@
 #include "server/http/validate.h"
 
 // One request head: up to four headers.
-typedef struct Head {
+typedef struct ResultSummary {
     const char *method, *target, *version;
     const char *headers[4][2];
     int code;
-} Head;
+} ResultSummary;
 
-static int judge(const Head *head) {
-    Gate gate = {0};
+static int judge(const ResultSummary *head) {
+    RequestValidator gate = {0};
     Problem problem;
     problem_clear(&problem);
     for (size_t i = 0; i < 4 && head->headers[i][0] != NULL; i++) {
         const char *name = head->headers[i][0], *value = head->headers[i][1];
-        gate_header(&gate, name, strlen(name), value, strlen(value));
+        validate_header(&gate, name, strlen(name), value, strlen(value));
     }
-    const int code = gate_judge(&gate, head->method, head->target, head->version, &problem);
+    const int code = validate_request(&gate, head->method, head->target, head->version, &problem);
     assert_int_equal(code != 0, problem.status != STATUS_OK);
     return code;
 }
 
 static void ordinary_requests_pass(void **state) {
     (void)state;
-    static const Head heads[] = {
+    static const ResultSummary heads[] = {
         {"GET", "/", "HTTP/1.1", {{"Host", "localhost"}}, 0},
         {"GET", "/", "HTTP/1.0", {{NULL, NULL}}, 0},
         {"POST",
@@ -62,7 +62,7 @@ static void ordinary_requests_pass(void **state) {
 
 static void ambiguous_or_foreign_heads_are_refused(void **state) {
     (void)state;
-    static const Head heads[] = {
+    static const ResultSummary heads[] = {
         {"GET", "/", "HTTP/1.2", {{"Host", "localhost"}}, 505},
         {"GET", "/", "HTTP/2.0", {{"Host", "localhost"}}, 505},
         {"BREW", "/", "HTTP/1.1", {{"Host", "localhost"}}, 501},
@@ -138,7 +138,7 @@ static void ambiguous_or_foreign_heads_are_refused(void **state) {
 static void hosts_are_those_that_were_named(void **state) {
     (void)state;
     static const char *const names[] = {"sim.example.org", "192.168.1.5", NULL};
-    const GateHosts named = {names, false}, any = {names, true};
+    const AcceptedHosts named = {names, false}, any = {names, true};
     static const struct {
         const char *host;
         bool is_named, is_any;
@@ -162,8 +162,8 @@ static void hosts_are_those_that_were_named(void **state) {
     };
     for (size_t i = 0; i < COUNT(hosts); i++) {
         const size_t size = strlen(hosts[i].host);
-        if (gate_host_is_ours(&named, hosts[i].host, size) != hosts[i].is_named ||
-            gate_host_is_ours(&any, hosts[i].host, size) != hosts[i].is_any)
+        if (validate_host_is_ours(&named, hosts[i].host, size) != hosts[i].is_named ||
+            validate_host_is_ours(&any, hosts[i].host, size) != hosts[i].is_any)
             fail_msg("\"%s\" is judged otherwise", hosts[i].host);
     }
 }
@@ -171,12 +171,12 @@ static void hosts_are_those_that_were_named(void **state) {
 static void a_foreign_host_is_told_the_names_that_are_right(void **state) {
     (void)state;
     static const char *const names[] = {"sim.example.org", "localhost", NULL};
-    const GateHosts named = {names, true};
-    Gate gate = {.names = &named};
+    const AcceptedHosts named = {names, true};
+    RequestValidator gate = {.names = &named};
     Problem problem;
     problem_clear(&problem);
-    gate_header(&gate, "Host", 4, "evil", 4);
-    assert_int_equal(gate_judge(&gate, "GET", "/", "HTTP/1.1", &problem), 421);
+    validate_header(&gate, "Host", 4, "evil", 4);
+    assert_int_equal(validate_request(&gate, "GET", "/", "HTTP/1.1", &problem), 421);
     assert_non_null(strstr(problem.detail, "sim.example.org or localhost, or an address"));
     assert_non_null(strstr(problem.detail, "\"evil\""));
 }
@@ -184,7 +184,7 @@ static void a_foreign_host_is_told_the_names_that_are_right(void **state) {
 static void a_name_given_for_a_proxy_is_no_foreign_origin(void **state) {
     (void)state;
     static const char *const names[] = {"localhost", "sim.example.org", NULL};
-    const GateHosts named = {names, false};
+    const AcceptedHosts named = {names, false};
     static const struct {
         const char *origin;
         int code;
@@ -194,23 +194,23 @@ static void a_name_given_for_a_proxy_is_no_foreign_origin(void **state) {
                  {"https://example.org", 403},
                  {"http://localhost:3000", 403}};
     for (size_t i = 0; i < COUNT(cases); i++) {
-        Gate gate = {.names = &named};
+        RequestValidator gate = {.names = &named};
         Problem problem;
         problem_clear(&problem);
-        gate_header(&gate, "Host", 4, "localhost:8080", 14);
-        gate_header(&gate, "Origin", 6, cases[i].origin, strlen(cases[i].origin));
-        assert_int_equal(gate_judge(&gate, "POST", "/", "HTTP/1.1", &problem), cases[i].code);
+        validate_header(&gate, "Host", 4, "localhost:8080", 14);
+        validate_header(&gate, "Origin", 6, cases[i].origin, strlen(cases[i].origin));
+        assert_int_equal(validate_request(&gate, "POST", "/", "HTTP/1.1", &problem), cases[i].code);
     }
 }
 
 static void a_nul_inside_a_value_is_seen_by_its_size(void **state) {
     (void)state;
-    Gate gate = {0};
+    RequestValidator gate = {0};
     Problem problem;
     problem_clear(&problem);
-    gate_header(&gate, "Host", 4, "localhost", 9);
-    gate_header(&gate, "X-A", 3, "a\0b", 3);
-    assert_int_equal(gate_judge(&gate, "GET", "/", "HTTP/1.1", &problem), 400);
+    validate_header(&gate, "Host", 4, "localhost", 9);
+    validate_header(&gate, "X-A", 3, "a\0b", 3);
+    assert_int_equal(validate_request(&gate, "GET", "/", "HTTP/1.1", &problem), 400);
     assert_non_null(strstr(problem.detail, "X-A"));
 }
 
@@ -220,7 +220,7 @@ static void a_target_of_4097_bytes_is_too_long(void **state) {
     memset(target, 'a', sizeof target - 1);
     target[0] = '/';
     target[4097] = '\0';
-    Head head = {"GET", target, "HTTP/1.1", {{"Host", "localhost"}}, 414};
+    ResultSummary head = {"GET", target, "HTTP/1.1", {{"Host", "localhost"}}, 414};
     assert_int_equal(judge(&head), 414);
     target[4096] = '\0';
     assert_int_equal(judge(&head), 0);

@@ -16,12 +16,12 @@ static void wake(void *context) {
     atomic_fetch_add(&woken, 1);
 }
 
-static const Waker waker = {NULL, wake};
+static const Callback waker = {NULL, wake};
 
-typedef struct Task {
+typedef struct WorkItem {
     atomic_bool may_end;
     bool was_stopped;
-} Task;
+} WorkItem;
 
 static void rest(void) {
     const struct timespec pause = {.tv_nsec = 1000000};
@@ -29,7 +29,7 @@ static void rest(void) {
 }
 
 static void task_run(void *context, const Progress *watch) {
-    Task *task = context;
+    WorkItem *task = context;
     while (!atomic_load(&task->may_end) && !task->was_stopped) {
         task->was_stopped = !watch->advance(watch->context, 0);
         rest();
@@ -41,76 +41,76 @@ static void task_free(void *context) {
     free(context);
 }
 
-static Status begin(Asides *asides, bool may_end, Aside **aside) {
-    Task *task = calloc(1, sizeof *task);
+static Status begin(BackgroundTasks *asides, bool may_end, BackgroundTask **aside) {
+    WorkItem *task = calloc(1, sizeof *task);
     atomic_init(&task->may_end, may_end);
-    const AsideWork work = {task, task_run, task_free};
-    return aside_start(asides, &work, &waker, aside, NULL);
+    const BackgroundWork work = {task, task_run, task_free};
+    return background_start(asides, &work, &waker, aside, NULL);
 }
 
 static void a_reader_is_woken_when_it_is_done(void **state) {
     (void)state;
-    Asides *asides;
-    Aside *aside;
+    BackgroundTasks *asides;
+    BackgroundTask *aside;
     atomic_store(&woken, 0);
     atomic_store(&released, 0);
-    assert_int_equal(asides_open(1, &asides, NULL), STATUS_OK);
+    assert_int_equal(background_open(1, &asides, NULL), STATUS_OK);
     assert_int_equal(begin(asides, true, &aside), STATUS_OK);
     while (atomic_load(&woken) == 0)
         rest();
-    assert_true(aside_is_done(aside));
-    assert_false(((Task *)aside_context(aside))->was_stopped);
+    assert_true(background_is_done(aside));
+    assert_false(((WorkItem *)background_context(aside))->was_stopped);
     assert_int_equal(atomic_load(&released), 0);
-    aside_drop(aside);
+    background_unref(aside);
     assert_int_equal(atomic_load(&released), 1);
-    asides_close(asides);
+    background_close(asides);
 }
 
 static void beyond_its_room_it_refuses(void **state) {
     (void)state;
-    Asides *asides;
-    Aside *aside, *other;
+    BackgroundTasks *asides;
+    BackgroundTask *aside, *other;
     atomic_store(&released, 0);
-    assert_int_equal(asides_open(1, &asides, NULL), STATUS_OK);
+    assert_int_equal(background_open(1, &asides, NULL), STATUS_OK);
     assert_int_equal(begin(asides, false, &aside), STATUS_OK);
     assert_int_equal(begin(asides, false, &other), STATUS_BUSY);
     assert_null(other);
     assert_int_equal(atomic_load(&released), 1);
-    assert_false(aside_is_done(aside));
-    aside_drop(aside); // stops it
+    assert_false(background_is_done(aside));
+    background_unref(aside); // stops it
     while (begin(asides, true, &other) != STATUS_OK)
         rest();
-    aside_drop(other);
-    asides_close(asides);
+    background_unref(other);
+    background_close(asides);
 }
 
 static void the_end_stops_what_runs_and_waits(void **state) {
     (void)state;
-    Asides *asides;
-    Aside *aside;
+    BackgroundTasks *asides;
+    BackgroundTask *aside;
     atomic_store(&released, 0);
-    assert_int_equal(asides_open(3, &asides, NULL), STATUS_OK);
+    assert_int_equal(background_open(3, &asides, NULL), STATUS_OK);
     for (size_t i = 0; i < 3; i++) {
         assert_int_equal(begin(asides, false, &aside), STATUS_OK);
         if (i < 2)
-            aside_drop(aside);
+            background_unref(aside);
     }
-    aside_drop(aside);
-    asides_close(asides);
+    background_unref(aside);
+    background_close(asides);
     assert_int_equal(atomic_load(&released), 3);
 }
 
 static void many_come_and_go(void **state) {
     (void)state;
-    Asides *asides;
-    assert_int_equal(asides_open(4, &asides, NULL), STATUS_OK);
+    BackgroundTasks *asides;
+    assert_int_equal(background_open(4, &asides, NULL), STATUS_OK);
     atomic_store(&released, 0);
     for (int i = 0; i < 500; i++) {
-        Aside *aside;
+        BackgroundTask *aside;
         if (begin(asides, i % 2 == 0, &aside) == STATUS_OK)
-            aside_drop(aside);
+            background_unref(aside);
     }
-    asides_close(asides);
+    background_close(asides);
     assert_int_equal(atomic_load(&released), 500);
 }
 

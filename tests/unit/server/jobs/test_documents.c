@@ -22,7 +22,7 @@ static void impacts_are_written_as_one_list(void **state) {
     Response response = {.impacts = {.at = test_calloc(MANY, sizeof(Impact)), .count = MANY}};
     Bytes whole = {0}, list = {0};
     assert_true(document_impacts(&whole, &response, NULL));
-    write_list(&list, impact_fields, response.impacts.at, MANY, sizeof(Impact), WRITE_REPORT);
+    encode_list(&list, impact_fields, response.impacts.at, MANY, sizeof(Impact), WRITE_REPORT);
     assert_true(whole.count > list.count + 1);
     assert_string_equal(whole.at + whole.count - list.count - 1 + list.count, "}");
     assert_memory_equal(whole.at + whole.count - list.count - 1, list.at, list.count);

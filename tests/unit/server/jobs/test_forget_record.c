@@ -14,12 +14,12 @@
 
 static Problem problem;
 static char folder[SCRATCH_SIZE];
-static Store *store;
-static Intake *intake;
+static Db *store;
+static JobManager *intake;
 
 static int set_up(void **state) {
     (void)state;
-    const IntakeSettings settings = {
+    const JobManagerSettings settings = {
         .workers = 1, .queue_most = 1000, .cache_bytes = (size_t)64 << 20};
     double values[] = {1, -2, 2};
     const Reals samples = {values, 3};
@@ -34,17 +34,17 @@ static int set_up(void **state) {
                            .digest = digest};
     scratch_make(folder);
     problem_clear(&problem);
-    return store_open(folder, &store, &problem) == STATUS_OK &&
-                   store_record_add(store, &row, &samples, &is_there, &problem) == STATUS_OK &&
-                   intake_open(store, &settings, &intake, &problem) == STATUS_OK
+    return db_open(folder, &store, &problem) == STATUS_OK &&
+                   db_record_add(store, &row, &samples, &is_there, &problem) == STATUS_OK &&
+                   jobs_open(store, &settings, &intake, &problem) == STATUS_OK
                ? 0
                : 1;
 }
 
 static int tear_down(void **state) {
     (void)state;
-    intake_close(intake);
-    store_close(store);
+    jobs_close(intake);
+    db_close(store);
     scratch_remove(folder);
     return 0;
 }
@@ -61,19 +61,19 @@ static Job *submit(const char *excitation) {
              excitation);
     const Submission submission = {.text = text, .size = strlen(text)};
     problem_clear(&problem);
-    if (intake_submit(intake, &submission, &job, &problem) != STATUS_OK)
+    if (jobs_submit(intake, &submission, &job, &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
     return job;
 }
 
 static void dismiss(Job *job) {
-    JobShow now;
+    JobView now;
     Job *same;
-    assert_int_equal(job_show(job, &now), STATUS_OK);
-    assert_int_equal(intake_dismiss(intake, now.id, &same, &problem), STATUS_OK);
-    job_show_clear(&now);
-    job_drop(same);
-    job_drop(job);
+    assert_int_equal(job_view(job, &now), STATUS_OK);
+    assert_int_equal(jobs_cancel(intake, now.id, &same, &problem), STATUS_OK);
+    job_view_clear(&now);
+    job_unref(same);
+    job_unref(job);
 }
 
 static void a_scene_that_names_none_is_accepted_meanwhile(void **state) {
@@ -90,18 +90,18 @@ static void a_job_that_waits_keeps_its_record_but_not_in_memory(void **state) {
     Job *first = submit("\"kind\": \"sine\", \"frequency\": 1, \"amplitude\": 2");
     const struct timespec moment = {0, 1000000};
     double progress;
-    for (int i = 0; i < 60000 && job_glance(first, &progress) != JOB_RUNNING; i++)
+    for (int i = 0; i < 60000 && job_peek(first, &progress) != JOB_RUNNING; i++)
         nanosleep(&moment, NULL);
     Job *second = submit("\"kind\": \"record\", \"name\": \"a\"");
-    assert_int_equal(store_record_named(store, "a", &named, &problem), STATUS_OK);
+    assert_int_equal(db_record_named(store, "a", &named, &problem), STATUS_OK);
     // The memory's and ours.
     assert_int_equal(atomic_load(&named->shared.count), 2);
     refcount_unref(&named->shared);
-    assert_int_equal(intake_record_delete(intake, "a", &problem), STATUS_CONFLICT);
+    assert_int_equal(jobs_record_delete(intake, "a", &problem), STATUS_CONFLICT);
     assert_non_null(strstr(problem.detail, "0 results and 1 unfinished job:"));
     dismiss(second);
     problem_clear(&problem);
-    assert_int_equal(intake_record_delete(intake, "a", &problem), STATUS_OK);
+    assert_int_equal(jobs_record_delete(intake, "a", &problem), STATUS_OK);
     dismiss(first);
 }
 

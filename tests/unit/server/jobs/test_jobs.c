@@ -24,23 +24,23 @@
 
 typedef struct Room {
     char directory[SCRATCH_SIZE];
-    Store *store;
-    Intake *intake;
-    IntakeSettings settings;
+    Db *store;
+    JobManager *intake;
+    JobManagerSettings settings;
 } Room;
 
 static Problem problem;
 
 static void room_open(Room *room) {
     problem_clear(&problem);
-    if (store_open(room->directory, &room->store, &problem) != STATUS_OK ||
-        intake_open(room->store, &room->settings, &room->intake, &problem) != STATUS_OK)
+    if (db_open(room->directory, &room->store, &problem) != STATUS_OK ||
+        jobs_open(room->store, &room->settings, &room->intake, &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
 }
 
 static void room_close(Room *room) {
-    intake_close(room->intake);
-    store_close(room->store);
+    jobs_close(room->intake);
+    db_close(room->store);
     room->intake = NULL;
     room->store = NULL;
 }
@@ -73,9 +73,9 @@ static void scene_text(char target[1024], double displacement, double duration,
              buffer, displacement, duration);
 }
 
-static Status submit_text(Intake *intake, const char *text, Job **job, Problem *told) {
+static Status submit_text(JobManager *intake, const char *text, Job **job, Problem *told) {
     const Submission submission = {.text = text, .size = strlen(text)};
-    return intake_submit(intake, &submission, job, told);
+    return jobs_submit(intake, &submission, job, told);
 }
 
 static const struct timespec moment = {0, 1000000};
@@ -84,7 +84,7 @@ static Status wait_until_kept(Job *job, Problem *told) {
     bool is_kept = false;
     Status status = STATUS_OK;
     for (int i = 0; i < 60000 && status == STATUS_OK && !is_kept; i++) {
-        status = job_kept(job, &is_kept, told);
+        status = job_is_durable(job, &is_kept, told);
         if (!is_kept)
             nanosleep(&moment, NULL);
     }
@@ -115,9 +115,9 @@ static void wait_for(Job *job) {
     assert_true(job_is_finished(job));
 }
 
-static JobShow show(Job *job) {
-    JobShow now;
-    assert_int_equal(job_show(job, &now), STATUS_OK);
+static JobView show(Job *job) {
+    JobView now;
+    assert_int_equal(job_view(job, &now), STATUS_OK);
     return now;
 }
 
@@ -126,20 +126,20 @@ static void a_job_finishes_and_is_found_again(void **state) {
     Room room = room_make(2);
     Job *job = submit(&room, 0.015, 2), *again = NULL;
     wait_for(job);
-    JobShow first = show(job);
+    JobView first = show(job);
     assert_int_equal(first.state, JOB_SUCCESSFUL);
     assert_false(first.is_cached);
     assert_non_null(first.plan);
     assert_non_null(strstr(first.summary, "\"impacts\": "));
-    assert_int_equal(intake_find(room.intake, first.id, &again, &problem), STATUS_OK);
-    JobShow second = show(again);
+    assert_int_equal(jobs_find(room.intake, first.id, &again, &problem), STATUS_OK);
+    JobView second = show(again);
     assert_string_equal(second.summary, first.summary);
     assert_string_equal(second.plan, first.plan);
-    job_show_clear(&first);
-    job_show_clear(&second);
-    job_drop(job);
-    job_drop(again);
-    assert_int_equal(intake_find(room.intake, "j-none", &again, &problem), STATUS_NOT_FOUND);
+    job_view_clear(&first);
+    job_view_clear(&second);
+    job_unref(job);
+    job_unref(again);
+    assert_int_equal(jobs_find(room.intake, "j-none", &again, &problem), STATUS_NOT_FOUND);
     room_end(&room);
 }
 
@@ -151,16 +151,16 @@ static void a_known_scene_computes_nothing(void **state) {
         wait_for(job);
         Job *same = submit(&room, 0.015, 2);
         assert_true(job_is_finished(same));
-        JobShow first = show(job), second = show(same);
+        JobView first = show(job), second = show(same);
         assert_true(second.is_cached);
         assert_true(first.is_cached == is_reopened);
         assert_string_equal(first.result, second.result);
         assert_string_not_equal(first.id, second.id);
         assert_string_equal(first.summary, second.summary);
-        job_show_clear(&first);
-        job_show_clear(&second);
-        job_drop(job);
-        job_drop(same);
+        job_view_clear(&first);
+        job_view_clear(&second);
+        job_unref(job);
+        job_unref(same);
         room_close(&room);
         room_open(&room);
     }
@@ -173,18 +173,18 @@ static void equal_scenes_in_flight_share_a_computation(void **state) {
     Job *blocker = submit(&room, 0.001, 400), *jobs[8];
     for (size_t i = 0; i < 8; i++)
         jobs[i] = submit(&room, 0.015, 2);
-    IntakeTally tally;
-    intake_tally(room.intake, &tally);
+    JobStats tally;
+    jobs_tally(room.intake, &tally);
     assert_true(tally.queued <= 2);
     for (size_t i = 0; i < 8; i++) {
         wait_for(jobs[i]);
-        JobShow now = show(jobs[i]);
+        JobView now = show(jobs[i]);
         assert_int_equal(now.state, JOB_SUCCESSFUL);
-        job_show_clear(&now);
-        job_drop(jobs[i]);
+        job_view_clear(&now);
+        job_unref(jobs[i]);
     }
     wait_for(blocker);
-    job_drop(blocker);
+    job_unref(blocker);
     room_end(&room);
 }
 
@@ -193,31 +193,31 @@ static void a_dismissed_job_stops_and_stays_dismissed(void **state) {
     Room room = room_make(1);
     Job *running = submit(&room, 0.001, 30000), *queued = submit(&room, 0.002, 30000),
         *again = NULL;
-    JobShow a = show(running), b = show(queued);
+    JobView a = show(running), b = show(queued);
     for (int i = 0; i < 2000 && a.state != JOB_RUNNING; i++) {
         nanosleep(&moment, NULL);
-        job_show_clear(&a);
+        job_view_clear(&a);
         a = show(running);
     }
     assert_int_equal(a.state, JOB_RUNNING);
     Job *dismissed[2] = {NULL, NULL};
-    assert_int_equal(intake_dismiss(room.intake, b.id, &dismissed[0], &problem), STATUS_OK);
-    assert_int_equal(intake_dismiss(room.intake, a.id, &dismissed[1], &problem), STATUS_OK);
+    assert_int_equal(jobs_cancel(room.intake, b.id, &dismissed[0], &problem), STATUS_OK);
+    assert_int_equal(jobs_cancel(room.intake, a.id, &dismissed[1], &problem), STATUS_OK);
     assert_true(job_is_finished(running) && job_is_finished(queued));
     problem_clear(&problem);
-    assert_int_equal(intake_dismiss(room.intake, a.id, &again, &problem), STATUS_CONFLICT);
+    assert_int_equal(jobs_cancel(room.intake, a.id, &again, &problem), STATUS_CONFLICT);
     // The worker is free at once: another job does not wait for 30,000 s of simulated time.
     Job *next = submit(&room, 0.003, 1);
     wait_for(next);
-    assert_int_equal(intake_find(room.intake, a.id, &again, &problem), STATUS_OK);
-    JobShow c = show(again);
+    assert_int_equal(jobs_find(room.intake, a.id, &again, &problem), STATUS_OK);
+    JobView c = show(again);
     assert_int_equal(c.state, JOB_DISMISSED);
-    job_show_clear(&a);
-    job_show_clear(&b);
-    job_show_clear(&c);
+    job_view_clear(&a);
+    job_view_clear(&b);
+    job_view_clear(&c);
     Job *all[] = {running, queued, dismissed[0], dismissed[1], next, again};
     for (size_t i = 0; i < COUNT(all); i++)
-        job_drop(all[i]);
+        job_unref(all[i]);
     room_end(&room);
 }
 
@@ -236,7 +236,7 @@ static void a_full_queue_refuses(void **state) {
     assert_int_equal(submit_text(room.intake, text, &more, &problem), STATUS_BUSY);
     assert_null(more);
     for (size_t i = 0; i < 3; i++)
-        job_drop(jobs[i]);
+        job_unref(jobs[i]);
     room_end(&room);
 }
 
@@ -247,22 +247,22 @@ static void unfinished_jobs_go_on_after_a_restart(void **state) {
     char ids[6][40];
     for (size_t i = 0; i < 6; i++) {
         jobs[i] = submit(&room, 0.001 * (double)(i / 2 + 1), 300);
-        JobShow now = show(jobs[i]);
+        JobView now = show(jobs[i]);
         strcpy(ids[i], now.id);
-        job_show_clear(&now);
+        job_view_clear(&now);
     }
     room_close(&room);
     for (size_t i = 0; i < 6; i++)
-        job_drop(jobs[i]);
+        job_unref(jobs[i]);
     room_open(&room);
     for (size_t i = 0; i < 6; i++) {
         Job *job;
-        assert_int_equal(intake_find(room.intake, ids[i], &job, &problem), STATUS_OK);
+        assert_int_equal(jobs_find(room.intake, ids[i], &job, &problem), STATUS_OK);
         wait_for(job);
-        JobShow now = show(job);
+        JobView now = show(job);
         assert_int_equal(now.state, JOB_SUCCESSFUL);
-        job_show_clear(&now);
-        job_drop(job);
+        job_view_clear(&now);
+        job_unref(job);
     }
     room_end(&room);
 }
@@ -274,12 +274,11 @@ static void note_wake(void *context) {
 static Outcome *outcome_of(Room *room, const char *result) {
     atomic_int wakes;
     atomic_init(&wakes, 0);
-    const Waker waker = {&wakes, note_wake};
+    const Callback waker = {&wakes, note_wake};
     Outcome *outcome = NULL;
     for (int i = 0; i < 20000; i++) {
         const int seen = atomic_load(&wakes);
-        assert_int_equal(intake_outcome(room->intake, result, &waker, &outcome, &problem),
-                         STATUS_OK);
+        assert_int_equal(jobs_outcome(room->intake, result, &waker, &outcome, &problem), STATUS_OK);
         if (outcome != NULL)
             return outcome;
         for (int j = 0; j < 20000 && atomic_load(&wakes) == seen; j++)
@@ -293,7 +292,7 @@ static void a_series_that_is_gone_is_computed_again_with_the_same_bytes(void **s
     Room room = room_make(2);
     Job *job = submit(&room, 0.015, 20);
     wait_for(job);
-    JobShow now = show(job);
+    JobView now = show(job);
     Outcome *kept = outcome_of(&room, now.result);
     room_close(&room);
     room.settings.cache_bytes = 0;
@@ -303,14 +302,14 @@ static void a_series_that_is_gone_is_computed_again_with_the_same_bytes(void **s
     assert_int_equal(kept->response.count, anew->response.count);
     assert_memory_equal(kept->response.series.block, anew->response.series.block,
                         kept->response.count * sizeof(double));
-    const Waker waker = {NULL, note_wake};
+    const Callback waker = {NULL, note_wake};
     Outcome *none = NULL;
-    assert_int_equal(intake_outcome(room.intake, "r-none", &waker, &none, &problem),
+    assert_int_equal(jobs_outcome(room.intake, "r-none", &waker, &none, &problem),
                      STATUS_NOT_FOUND);
     outcome_unref(kept);
     outcome_unref(anew);
-    job_show_clear(&now);
-    job_drop(job);
+    job_view_clear(&now);
+    job_unref(job);
     room_end(&room);
 }
 
@@ -322,12 +321,12 @@ static void a_failing_job_says_why(void **state) {
     room_open(&room);
     Job *job = submit(&room, 0.015, 20);
     wait_for(job);
-    JobShow now = show(job);
+    JobView now = show(job);
     assert_int_equal(now.state, JOB_FAILED);
     assert_non_null(strstr(now.problem, "more than 3 impacts"));
     assert_string_equal(now.result, "");
-    job_show_clear(&now);
-    job_drop(job);
+    job_view_clear(&now);
+    job_unref(job);
     room_end(&room);
 }
 
@@ -353,26 +352,26 @@ static void a_studys_answer_is_kept_with_the_result_of_its_scene(void **state) {
     Job *job = submit_study(&room, 1), *twin = submit_study(&room, 1);
     wait_for(job);
     wait_for(twin);
-    JobShow now = show(job), other = show(twin);
+    JobView now = show(job), other = show(twin);
     assert_int_equal(now.state, JOB_SUCCESSFUL);
     assert_string_equal(now.result, other.result); // one measurement for both
     ResultRow row;
-    assert_int_equal(store_result_load(room.store, now.result, &row, &problem), STATUS_OK);
+    assert_int_equal(db_result_load(room.store, now.result, &row, &problem), STATUS_OK);
     assert_non_null(strstr(row.study, "{\"study\": {\"kind\": \"tradeoff\", "));
     assert_non_null(strstr(row.scene, "\"point_steps\": 1000000"));
     assert_null(strstr(row.study, "null")); // it can be read again
     result_row_clear(&row);
-    job_show_clear(&now);
-    job_show_clear(&other);
-    job_drop(job);
-    job_drop(twin);
+    job_view_clear(&now);
+    job_view_clear(&other);
+    job_unref(job);
+    job_unref(twin);
     // Another number of repeats is another study.
     job = submit_study(&room, 2);
     wait_for(job);
     now = show(job);
     assert_false(now.is_cached);
-    job_show_clear(&now);
-    job_drop(job);
+    job_view_clear(&now);
+    job_unref(job);
     room_end(&room);
 }
 
@@ -380,33 +379,33 @@ static void a_study_is_stopped_with_its_job_and_goes_on_after_a_restart(void **s
     (void)state;
     Room room = room_make(1);
     Job *job = submit_study(&room, 1000), *gone = NULL;
-    JobShow now = show(job);
+    JobView now = show(job);
     for (int i = 0; i < 60000 && now.progress <= 5; i++) { // beyond the scene's own run
         nanosleep(&moment, NULL);
-        job_show_clear(&now);
+        job_view_clear(&now);
         now = show(job);
     }
     assert_int_equal(now.state, JOB_RUNNING);
     assert_true(now.progress > 5 && now.progress < 100);
     char id[40];
     strcpy(id, now.id);
-    job_show_clear(&now);
-    job_drop(job);
+    job_view_clear(&now);
+    job_unref(job);
     room_close(&room);
     room_open(&room);
-    assert_int_equal(intake_find(room.intake, id, &job, &problem), STATUS_OK);
+    assert_int_equal(jobs_find(room.intake, id, &job, &problem), STATUS_OK);
     assert_false(job_is_finished(job));
-    assert_int_equal(intake_dismiss(room.intake, id, &gone, &problem), STATUS_OK);
+    assert_int_equal(jobs_cancel(room.intake, id, &gone, &problem), STATUS_OK);
     now = show(gone);
     assert_int_equal(now.state, JOB_DISMISSED);
-    assert_false(store_result_exists(room.store, now.result));
-    job_show_clear(&now);
-    job_drop(gone);
-    job_drop(job);
+    assert_false(db_result_exists(room.store, now.result));
+    job_view_clear(&now);
+    job_unref(gone);
+    job_unref(job);
     // The worker is free for others.
     job = submit(&room, 0.015, 1);
     wait_for(job);
-    job_drop(job);
+    job_unref(job);
     room_end(&room);
 }
 
@@ -419,7 +418,7 @@ static void names_are_resolved_and_all_faults_told(void **state) {
     scene_text(text, 0.015, 1, "spnge");
     problem_clear(&problem);
     assert_int_equal(
-        intake_prepare(room.store, text, strlen(text), NULL, &inquiry, &warnings, &problem),
+        jobs_prepare(room.store, text, strlen(text), NULL, &inquiry, &warnings, &problem),
         STATUS_INVALID);
     assert_int_equal(problem.count, 1);
     assert_string_equal(problem.faults[0].pointer, "/dampers/0/buffer");
@@ -443,7 +442,7 @@ static void names_are_resolved_and_all_faults_told(void **state) {
                  cases[i].buffer);
         problem_clear(&problem);
         assert_int_equal(
-            intake_prepare(room.store, text, strlen(text), NULL, &inquiry, &warnings, &problem),
+            jobs_prepare(room.store, text, strlen(text), NULL, &inquiry, &warnings, &problem),
             STATUS_INVALID);
         assert_true(problem_concerns(&problem, "/structure/mass"));
         if (problem.count != 2 || !problem_concerns(&problem, cases[i].pointer))
@@ -466,38 +465,37 @@ static void a_cached_scene_is_answered_with_a_job_of_its_own(void **state) {
     again = submit(&room, 0.015, 2);
     assert_true(job_is_finished(again));
     assert_int_equal(wait_until_kept(again, &problem), STATUS_OK);
-    JobShow first = show(job), now = show(again);
+    JobView first = show(job), now = show(again);
     assert_true(now.is_cached && now.state == JOB_SUCCESSFUL);
     assert_true(strcmp(first.id, now.id) < 0);
     assert_string_equal(now.result, first.result);
     assert_string_equal(now.summary, first.summary);
     room_close(&room);
     room_open(&room);
-    assert_int_equal(intake_find(room.intake, now.id, &found, &problem), STATUS_OK);
-    job_show_clear(&first);
-    job_show_clear(&now);
-    job_drop(found);
-    job_drop(again);
-    job_drop(job);
+    assert_int_equal(jobs_find(room.intake, now.id, &found, &problem), STATUS_OK);
+    job_view_clear(&first);
+    job_view_clear(&now);
+    job_unref(found);
+    job_unref(again);
+    job_unref(job);
     room_end(&room);
 }
 
 static void change_engine(const Room *room) {
     char path[128];
-    Database *other;
+    Sqlite *other;
     snprintf(path, sizeof path, "%s/impactd.db", room->directory);
-    assert_int_equal(database_open(path, DATABASE_WRITER, &other, &problem), STATUS_OK);
+    assert_int_equal(sqlite_open(path, DATABASE_WRITER, &other, &problem), STATUS_OK);
     assert_int_equal(
-        database_execute(other, "UPDATE results SET engine = 'an earlier one'", &problem),
-        STATUS_OK);
-    database_close(other);
+        sqlite_execute(other, "UPDATE results SET engine = 'an earlier one'", &problem), STATUS_OK);
+    sqlite_close(other);
 }
 
 static void a_dear_series_is_kept_and_outlasts_its_engine(void **state) {
     (void)state;
     Room room = room_make(1);
     room_close(&room);
-    room.settings.store_bytes = 1 << 26;
+    room.settings.db_bytes = 1 << 26;
     room_open(&room);
     // Few samples of a long run, and none at all.
     static const char dear[] =
@@ -517,17 +515,17 @@ static void a_dear_series_is_kept_and_outlasts_its_engine(void **state) {
         if (submit_text(room.intake, texts[i], &job, &problem) != STATUS_OK)
             fail_msg("%s", problem.detail);
         wait_for(job);
-        JobShow now = show(job);
+        JobView now = show(job);
         assert_int_equal(now.state, JOB_SUCCESSFUL);
         strcpy(results[i], now.result);
-        job_show_clear(&now);
-        job_drop(job);
+        job_view_clear(&now);
+        job_unref(job);
     }
     before = outcome_of(&room, results[0]);
-    for (int i = 0; i < 10000 && !store_series_exists(room.store, results[0]); i++)
+    for (int i = 0; i < 10000 && !db_series_exists(room.store, results[0]); i++)
         nanosleep(&moment, NULL);
-    assert_true(store_series_exists(room.store, results[0]));
-    assert_false(store_series_exists(room.store, results[1]));
+    assert_true(db_series_exists(room.store, results[0]));
+    assert_false(db_series_exists(room.store, results[1]));
     room_close(&room);
     change_engine(&room);
     room_open(&room);
@@ -538,18 +536,18 @@ static void a_dear_series_is_kept_and_outlasts_its_engine(void **state) {
                         before->response.series.count * before->response.series.rows *
                             sizeof(double));
     assert_int_equal(after->response.impacts.count, before->response.impacts.count);
-    const Waker waker = {NULL, note_wake};
+    const Callback waker = {NULL, note_wake};
     problem_clear(&problem);
-    assert_int_equal(intake_outcome(room.intake, results[1], &waker, &none, &problem), STATUS_GONE);
+    assert_int_equal(jobs_outcome(room.intake, results[1], &waker, &none, &problem), STATUS_GONE);
     assert_non_null(strstr(problem.detail, "/again"));
     // Its documents were not kept with it, nor are they looked for there.
     Job *again = NULL;
     assert_int_equal(submit_text(room.intake, dear, &again, &problem), STATUS_OK);
-    JobShow now = show(again);
+    JobView now = show(again);
     assert_true(now.is_cached);
     assert_non_null(strstr(now.summary, "\"impacts\": "));
-    job_show_clear(&now);
-    job_drop(again);
+    job_view_clear(&now);
+    job_unref(again);
     outcome_unref(before);
     outcome_unref(after);
     room_end(&room);
@@ -566,7 +564,7 @@ static void *hammer(void *context) {
     Hammer *own = context;
     static atomic_int wakes;
     Problem *fault = calloc(1, sizeof *fault);
-    const Waker waker = {&wakes, note_wake};
+    const Callback waker = {&wakes, note_wake};
     for (int i = 0; i < 60; i++) {
         char text[1024];
         Job *job = NULL, *gone = NULL;
@@ -576,23 +574,23 @@ static void *hammer(void *context) {
         problem_clear(fault);
         if (submit_text(own->room->intake, text, &job, fault) != STATUS_OK)
             continue;
-        JobShow now;
-        if (job_show(job, &now) == STATUS_OK && rand_r(&own->seed) % 3 == 0)
-            own->dismissed += intake_dismiss(own->room->intake, now.id, &gone, fault) == STATUS_OK;
-        (void)job_watch(job, &waker);
-        job_unwatch(job, &waker);
+        JobView now;
+        if (job_view(job, &now) == STATUS_OK && rand_r(&own->seed) % 3 == 0)
+            own->dismissed += jobs_cancel(own->room->intake, now.id, &gone, fault) == STATUS_OK;
+        (void)job_subscribe(job, &waker);
+        job_unsubscribe(job, &waker);
         while (!job_is_finished(job))
             nanosleep(&(struct timespec){0, 200000}, NULL);
-        job_show_clear(&now);
-        if (job_show(job, &now) == STATUS_OK && now.state == JOB_SUCCESSFUL)
-            (void)intake_outcome(own->room->intake, now.result, &waker, &outcome, fault);
+        job_view_clear(&now);
+        if (job_view(job, &now) == STATUS_OK && now.state == JOB_SUCCESSFUL)
+            (void)jobs_outcome(own->room->intake, now.result, &waker, &outcome, fault);
         own->finished++;
         if (rand_r(&own->seed) % 8 == 0)
-            store_catalogue_changed(own->room->store);
+            db_catalog_changed(own->room->store);
         outcome_unref(outcome);
-        job_show_clear(&now);
-        job_drop(job);
-        job_drop(gone);
+        job_view_clear(&now);
+        job_unref(job);
+        job_unref(gone);
     }
     free(fault);
     return NULL;
@@ -614,7 +612,7 @@ static void many_clients_at_once_leave_nothing_behind(void **state) {
     }
     assert_int_equal(finished, 360);
     JobRows rows = {NULL, 0};
-    assert_int_equal(store_job_unfinished(room.store, &rows, &problem), STATUS_OK);
+    assert_int_equal(db_job_unfinished(room.store, &rows, &problem), STATUS_OK);
     assert_int_equal(rows.count, 0);
     job_rows_clear(&rows);
     room_end(&room);
@@ -637,11 +635,11 @@ static int lift_limit(void **state) {
 // Until nothing is computed and the store has answered whatever it was sent, so that only what
 // could not be stored is unfinished.
 static void wait_until_idle(Room *room) {
-    IntakeTally tally;
+    JobStats tally;
     bool is_idle = false;
     for (int i = 0; i < 60000 && !is_idle; i++) {
         nanosleep(&moment, NULL);
-        intake_tally(room->intake, &tally);
+        jobs_tally(room->intake, &tally);
         pthread_mutex_lock(&room->intake->lock);
         is_idle = tally.queued + tally.running + room->intake->posted == 0;
         pthread_mutex_unlock(&room->intake->lock);
@@ -660,30 +658,30 @@ static void a_result_that_there_is_no_room_for_waits_for_it(void **state) {
     Job *job = submit(&room, 0.015, LONG), *dropped = submit(&room, 0.016, LONG);
     limit_files(1);
     wait_until_idle(&room);
-    intake_retry(room.intake);
+    jobs_retry_sweep(room.intake);
     wait_until_idle(&room);
-    JobShow waits = show(job), gone = show(dropped);
+    JobView waits = show(job), gone = show(dropped);
     assert_int_equal(waits.state, JOB_RUNNING);
     Job *dismissed;
-    assert_int_equal(intake_dismiss(room.intake, gone.id, &dismissed, &problem), STATUS_OK);
+    assert_int_equal(jobs_cancel(room.intake, gone.id, &dismissed, &problem), STATUS_OK);
     assert_int_equal(wait_until_kept(dismissed, &problem), STATUS_FULL);
-    job_drop(dismissed);
+    job_unref(dismissed);
     limit_files(RLIM_INFINITY);
-    intake_retry(room.intake);
+    jobs_retry_sweep(room.intake);
     wait_until_idle(&room);
     assert_true(job_is_finished(job));
-    JobShow now = show(job);
+    JobView now = show(job);
     assert_int_equal(now.state, JOB_SUCCESSFUL);
-    assert_true(store_result_exists(room.store, now.result));
+    assert_true(db_result_exists(room.store, now.result));
     assert_int_equal(wait_until_kept(dropped, &problem), STATUS_OK);
-    JobShow end = show(dropped);
+    JobView end = show(dropped);
     assert_int_equal(end.state, JOB_DISMISSED);
-    job_show_clear(&end);
-    job_show_clear(&waits);
-    job_show_clear(&gone);
-    job_show_clear(&now);
-    job_drop(job);
-    job_drop(dropped);
+    job_view_clear(&end);
+    job_view_clear(&waits);
+    job_view_clear(&gone);
+    job_view_clear(&now);
+    job_unref(job);
+    job_unref(dropped);
     room_end(&room);
 }
 
@@ -694,21 +692,21 @@ static void a_result_that_there_is_no_room_for_is_computed_again_after_a_restart
     Job *job = submit(&room, 0.015, LONG);
     limit_files(1);
     wait_until_idle(&room);
-    JobShow waits = show(job);
+    JobView waits = show(job);
     assert_int_equal(waits.state, JOB_RUNNING);
-    job_drop(job);
-    intake_close(room.intake);
+    job_unref(job);
+    jobs_close(room.intake);
     room.intake = NULL;
     limit_files(RLIM_INFINITY);
     room_close(&room);
     room_open(&room);
-    assert_int_equal(intake_find(room.intake, waits.id, &job, &problem), STATUS_OK);
+    assert_int_equal(jobs_find(room.intake, waits.id, &job, &problem), STATUS_OK);
     wait_for(job);
-    JobShow now = show(job);
+    JobView now = show(job);
     assert_int_equal(now.state, JOB_SUCCESSFUL);
-    job_show_clear(&waits);
-    job_show_clear(&now);
-    job_drop(job);
+    job_view_clear(&waits);
+    job_view_clear(&now);
+    job_unref(job);
     room_end(&room);
 }
 
@@ -727,22 +725,22 @@ static void a_job_that_cannot_be_kept_never_was(void **state) {
     limit_files(RLIM_INFINITY);
     Job *const both[] = {job, quick};
     for (size_t i = 0; i < 2; i++) {
-        JobShow now = show(both[i]);
+        JobView now = show(both[i]);
         assert_true(job_is_finished(both[i]));
-        assert_int_equal(intake_find(room.intake, now.id, &found, &problem), STATUS_NOT_FOUND);
-        assert_false(store_result_exists(room.store, now.result));
-        job_show_clear(&now);
-        job_drop(both[i]);
+        assert_int_equal(jobs_find(room.intake, now.id, &found, &problem), STATUS_NOT_FOUND);
+        assert_false(db_result_exists(room.store, now.result));
+        job_view_clear(&now);
+        job_unref(both[i]);
     }
     // Its place is free, and nobody computes for it: 20,000 s would take long.
     Job *next = submit(&room, 0.017, 1);
     wait_for(next);
-    job_drop(next);
+    job_unref(next);
     // A job may be seen finished a moment before its worker has looked up.
-    IntakeTally tally;
+    JobStats tally;
     do {
         nanosleep(&moment, NULL);
-        intake_tally(room.intake, &tally);
+        jobs_tally(room.intake, &tally);
     } while (tally.queued + tally.running > 0);
     room_end(&room);
 }
@@ -751,10 +749,10 @@ static void a_job_that_is_done_before_it_was_written_is_written_once(void **stat
     (void)state;
     Room room = room_make(1);
     char path[128];
-    Database *other;
+    Sqlite *other;
     snprintf(path, sizeof path, "%s/impactd.db", room.directory);
-    assert_int_equal(database_open(path, DATABASE_WRITER, &other, &problem), STATUS_OK);
-    assert_int_equal(database_execute(other, "BEGIN IMMEDIATE", &problem), STATUS_OK);
+    assert_int_equal(sqlite_open(path, DATABASE_WRITER, &other, &problem), STATUS_OK);
+    assert_int_equal(sqlite_execute(other, "BEGIN IMMEDIATE", &problem), STATUS_OK);
     // The first one's row holds the writer up; the others' are still queued when they are done.
     Job *jobs[4];
     for (size_t i = 0; i < 4; i++)
@@ -764,27 +762,27 @@ static void a_job_that_is_done_before_it_was_written_is_written_once(void **stat
     bool is_kept;
     for (size_t i = 0; i < 4; i++) {
         assert_false(job_is_finished(jobs[i]));
-        assert_int_equal(job_kept(jobs[i], &is_kept, &problem), STATUS_OK);
+        assert_int_equal(job_is_durable(jobs[i], &is_kept, &problem), STATUS_OK);
         assert_false(is_kept);
     }
-    assert_int_equal(database_execute(other, "ROLLBACK", &problem), STATUS_OK);
-    database_close(other);
+    assert_int_equal(sqlite_execute(other, "ROLLBACK", &problem), STATUS_OK);
+    sqlite_close(other);
     for (size_t i = 0; i < 4; i++) {
         wait_for(jobs[i]);
         assert_int_equal(wait_until_kept(jobs[i], &problem), STATUS_OK);
-        JobShow now = show(jobs[i]);
+        JobView now = show(jobs[i]);
         JobRow row;
         assert_int_equal(now.state, JOB_SUCCESSFUL);
-        assert_int_equal(store_job_load(room.store, now.id, &row, &problem), STATUS_OK);
+        assert_int_equal(db_job_load(room.store, now.id, &row, &problem), STATUS_OK);
         assert_int_equal(row.state, JOB_SUCCESSFUL);
         assert_string_equal(row.result, now.result);
         job_row_clear(&row);
-        job_show_clear(&now);
-        job_drop(jobs[i]);
+        job_view_clear(&now);
+        job_unref(jobs[i]);
     }
     JobRows rows;
     const JobSearch all = job_search_all(100);
-    assert_int_equal(store_job_search(room.store, &all, &rows, &problem), STATUS_OK);
+    assert_int_equal(db_job_search(room.store, &all, &rows, &problem), STATUS_OK);
     assert_int_equal(rows.count, 4);
     job_rows_clear(&rows);
     room_end(&room);
@@ -794,15 +792,15 @@ static void whoever_waits_for_a_job_to_be_kept_is_woken(void **state) {
     (void)state;
     Room room = room_make(1);
     static atomic_int wakes;
-    const Waker waker = {&wakes, note_wake};
+    const Callback waker = {&wakes, note_wake};
     Job *job = submit_unkept(&room, 0.015, 20000);
-    assert_true(job_watch_kept(job, &waker));
+    assert_true(job_subscribe_durable(job, &waker));
     assert_int_equal(wait_until_kept(job, &problem), STATUS_OK);
     assert_int_equal(atomic_load(&wakes), 1);
     assert_false(job_is_finished(job));
-    assert_true(job_watch_kept(job, &waker)); // at once
+    assert_true(job_subscribe_durable(job, &waker)); // at once
     assert_int_equal(atomic_load(&wakes), 2);
-    job_drop(job);
+    job_unref(job);
     room_end(&room);
 }
 
@@ -810,17 +808,17 @@ static void a_job_may_outlive_the_intake(void **state) {
     (void)state;
     Room room = room_make(1);
     static atomic_int wakes;
-    const Waker waker = {&wakes, note_wake};
+    const Callback waker = {&wakes, note_wake};
     Job *running = submit(&room, 0.015, 20000), *queued = submit(&room, 0.016, 20000);
-    assert_true(job_watch(queued, &waker));
+    assert_true(job_subscribe(queued, &waker));
     room_close(&room);
-    JobShow now = show(queued);
+    JobView now = show(queued);
     assert_int_equal(now.state, JOB_ACCEPTED);
     assert_false(job_is_finished(running));
-    job_unwatch(queued, &waker);
-    job_show_clear(&now);
-    job_drop(running);
-    job_drop(queued);
+    job_unsubscribe(queued, &waker);
+    job_view_clear(&now);
+    job_unref(running);
+    job_unref(queued);
     room_open(&room);
     room_end(&room);
 }
@@ -828,8 +826,8 @@ static void a_job_may_outlive_the_intake(void **state) {
 static void *dismiss_it(void *context) {
     void **both = context;
     Job *dismissed = NULL;
-    const Status status = intake_dismiss(both[0], both[1], &dismissed, NULL);
-    job_drop(dismissed);
+    const Status status = jobs_cancel(both[0], both[1], &dismissed, NULL);
+    job_unref(dismissed);
     return status == STATUS_OK ? both : NULL;
 }
 
@@ -837,31 +835,31 @@ static void a_dismissed_job_is_dismissed_for_all_before_the_store_has_it(void **
     (void)state;
     Room room = room_make(1);
     Job *blocker = submit(&room, 0.001, 20000), *job = submit(&room, 0.015, 20000), *found = NULL;
-    JobShow now = show(job);
+    JobView now = show(job);
     char path[128];
-    Database *other;
+    Sqlite *other;
     pthread_t thread;
     void *returned;
     snprintf(path, sizeof path, "%s/impactd.db", room.directory);
-    assert_int_equal(database_open(path, DATABASE_WRITER, &other, &problem), STATUS_OK);
-    assert_int_equal(database_execute(other, "BEGIN IMMEDIATE", &problem), STATUS_OK);
+    assert_int_equal(sqlite_open(path, DATABASE_WRITER, &other, &problem), STATUS_OK);
+    assert_int_equal(sqlite_execute(other, "BEGIN IMMEDIATE", &problem), STATUS_OK);
     assert_int_equal(pthread_create(&thread, NULL, dismiss_it, (void *[]){room.intake, now.id}), 0);
     wait_for(job);
-    assert_int_equal(intake_find(room.intake, now.id, &found, &problem), STATUS_OK);
+    assert_int_equal(jobs_find(room.intake, now.id, &found, &problem), STATUS_OK);
     assert_true(job_is_finished(found));
-    job_drop(found);
-    assert_int_equal(intake_dismiss(room.intake, now.id, &found, &problem), STATUS_CONFLICT);
+    job_unref(found);
+    assert_int_equal(jobs_cancel(room.intake, now.id, &found, &problem), STATUS_CONFLICT);
     assert_non_null(strstr(problem.detail, "dismissed already"));
-    assert_int_equal(database_execute(other, "ROLLBACK", &problem), STATUS_OK);
-    database_close(other);
+    assert_int_equal(sqlite_execute(other, "ROLLBACK", &problem), STATUS_OK);
+    sqlite_close(other);
     pthread_join(thread, &returned);
     assert_non_null(returned);
-    assert_int_equal(intake_find(room.intake, now.id, &found, &problem), STATUS_OK);
+    assert_int_equal(jobs_find(room.intake, now.id, &found, &problem), STATUS_OK);
     assert_true(job_is_finished(found));
-    job_drop(found);
-    job_show_clear(&now);
-    job_drop(job);
-    job_drop(blocker);
+    job_unref(found);
+    job_view_clear(&now);
+    job_unref(job);
+    job_unref(blocker);
     room_end(&room);
 }
 
@@ -880,21 +878,21 @@ static void waiting_scenes_have_a_limit_in_bytes(void **state) {
         problem_clear(&problem);
         status = submit_text(room.intake, text, &second, &problem);
         if (status == STATUS_OK && accepted > 1)
-            job_drop(second);
+            job_unref(second);
         else if (status == STATUS_OK)
             gone = second;
     }
     assert_int_equal(status, STATUS_BUSY);
     assert_true(accepted > 2 && accepted < 8);
     // What leaves makes room.
-    JobShow now = show(gone);
-    job_drop(gone);
-    assert_int_equal(intake_dismiss(room.intake, now.id, &gone, &problem), STATUS_OK);
-    job_drop(gone);
-    job_show_clear(&now);
+    JobView now = show(gone);
+    job_unref(gone);
+    assert_int_equal(jobs_cancel(room.intake, now.id, &gone, &problem), STATUS_OK);
+    job_unref(gone);
+    job_view_clear(&now);
     assert_int_equal(submit_text(room.intake, text, &second, &problem), STATUS_OK);
-    job_drop(second);
-    job_drop(first);
+    job_unref(second);
+    job_unref(first);
     room_end(&room);
 }
 

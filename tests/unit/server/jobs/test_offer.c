@@ -18,9 +18,9 @@
 
 typedef struct Room {
     char directory[SCRATCH_SIZE];
-    Store *store;
-    Intake *intake;
-    IntakeSettings settings;
+    Db *store;
+    JobManager *intake;
+    JobManagerSettings settings;
 } Room;
 
 static Problem problem;
@@ -28,14 +28,14 @@ static const struct timespec moment = {0, 1000000};
 
 static void room_open(Room *room) {
     problem_clear(&problem);
-    if (store_open(room->directory, &room->store, &problem) != STATUS_OK ||
-        intake_open(room->store, &room->settings, &room->intake, &problem) != STATUS_OK)
+    if (db_open(room->directory, &room->store, &problem) != STATUS_OK ||
+        jobs_open(room->store, &room->settings, &room->intake, &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
 }
 
 static void room_close(Room *room) {
-    intake_close(room->intake);
-    store_close(room->store);
+    jobs_close(room->intake);
+    db_close(room->store);
 }
 
 static Room room_make(size_t workers, size_t quota, double rate) {
@@ -76,27 +76,27 @@ static Status send(Room *room, const char *client, const char *key, double displ
                                    .idempotency_key = key,
                                    .is_replayed = is_replayed};
     problem_clear(&problem);
-    return intake_submit(room->intake, &submission, job, &problem);
+    return jobs_submit(room->intake, &submission, job, &problem);
 }
 
 static void wait_for(Job *job) {
     bool is_kept = false;
     for (int i = 0; i < 60000 && !(job_is_finished(job) && is_kept); i++) {
         nanosleep(&moment, NULL);
-        assert_int_equal(job_kept(job, &is_kept, &problem), STATUS_OK);
+        assert_int_equal(job_is_durable(job, &is_kept, &problem), STATUS_OK);
     }
     assert_true(job_is_finished(job));
 }
 
 static void dismiss(Room *room, Job *job) {
-    JobShow now;
+    JobView now;
     Job *same;
-    assert_int_equal(job_show(job, &now), STATUS_OK);
-    assert_int_equal(intake_dismiss(room->intake, now.id, &same, &problem), STATUS_OK);
+    assert_int_equal(job_view(job, &now), STATUS_OK);
+    assert_int_equal(jobs_cancel(room->intake, now.id, &same, &problem), STATUS_OK);
     wait_for(same);
-    job_show_clear(&now);
-    job_drop(same);
-    job_drop(job);
+    job_view_clear(&now);
+    job_unref(same);
+    job_unref(job);
 }
 
 static void a_token_has_no_more_unfinished_jobs_than_its_quota(void **state) {
@@ -107,7 +107,7 @@ static void a_token_has_no_more_unfinished_jobs_than_its_quota(void **state) {
     assert_int_equal(send(&room, "ann", NULL, 0.011, endless, &jobs[1], NULL), STATUS_OK);
     assert_int_equal(send(&room, "ann", NULL, 0.012, endless, &more, NULL), STATUS_QUOTA);
     assert_non_null(strstr(problem.detail, "\"ann\" has 2 unfinished jobs, 2 are allowed"));
-    assert_in_range(intake_retry_after(room.intake, "ann", STATUS_QUOTA), 1, 3600);
+    assert_in_range(jobs_retry_after(room.intake, "ann", STATUS_QUOTA), 1, 3600);
     assert_int_equal(send(&room, "bob", NULL, 0.012, endless, &jobs[2], NULL), STATUS_OK);
     for (double at = 0.02; at < 0.025; at += 0.001) { // nobody in particular has none
         assert_int_equal(send(&room, NULL, NULL, at, endless, &more, NULL), STATUS_OK);
@@ -127,13 +127,13 @@ static void a_quota_counts_the_jobs_of_an_earlier_life(void **state) {
     bool is_kept = false;
     assert_int_equal(send(&room, "ann", NULL, 0.010, endless, &job, NULL), STATUS_OK);
     while (!is_kept)
-        assert_int_equal(job_kept(job, &is_kept, &problem), STATUS_OK);
-    job_drop(job);
+        assert_int_equal(job_is_durable(job, &is_kept, &problem), STATUS_OK);
+    job_unref(job);
     room_close(&room);
     room_open(&room);
     assert_int_equal(send(&room, "ann", NULL, 0.011, endless, &more, NULL), STATUS_QUOTA);
     assert_int_equal(send(&room, "bob", NULL, 0.011, endless, &more, NULL), STATUS_OK);
-    job_drop(more);
+    job_unref(more);
     room_end(&room);
 }
 
@@ -144,13 +144,13 @@ static void a_token_sends_no_more_than_its_rate(void **state) {
     for (size_t i = 0; i < 3; i++) {
         assert_int_equal(send(&room, "ann", NULL, 0.015, 1, &job, NULL), STATUS_OK);
         wait_for(job);
-        job_drop(job);
+        job_unref(job);
     }
     assert_int_equal(send(&room, "ann", NULL, 0.015, 1, &job, NULL), STATUS_QUOTA);
     // One every 20 s.
-    assert_in_range(intake_retry_after(room.intake, "ann", STATUS_QUOTA), 1, 20);
+    assert_in_range(jobs_retry_after(room.intake, "ann", STATUS_QUOTA), 1, 20);
     assert_int_equal(send(&room, "bob", NULL, 0.015, 1, &job, NULL), STATUS_OK);
-    job_drop(job);
+    job_unref(job);
     room_end(&room);
 }
 
@@ -163,22 +163,22 @@ static void keys_are_each_clients_own(void **state) {
     assert_false(is_replayed);
     assert_int_equal(send(&room, "ann", "\"k\"", 0.015, 1, &again, &is_replayed), STATUS_OK);
     assert_true(is_replayed);
-    JobShow first, second;
-    assert_int_equal(job_show(ann, &first), STATUS_OK);
-    assert_int_equal(job_show(again, &second), STATUS_OK);
+    JobView first, second;
+    assert_int_equal(job_view(ann, &first), STATUS_OK);
+    assert_int_equal(job_view(again, &second), STATUS_OK);
     assert_string_equal(first.id, second.id);
     assert_int_equal(send(&room, "bob", "k", 0.016, 1, &bob, &is_replayed), STATUS_OK);
     assert_false(is_replayed);
     assert_int_equal(send(&room, NULL, "k", 0.017, 1, &nobody, &is_replayed), STATUS_OK);
     assert_false(is_replayed);
     wait_for(ann);
-    job_drop(again);
+    job_unref(again);
     assert_int_equal(send(&room, "ann", "k", 0.016, 1, &again, &is_replayed), STATUS_REUSED);
-    job_show_clear(&first);
-    job_show_clear(&second);
-    job_drop(ann);
-    job_drop(bob);
-    job_drop(nobody);
+    job_view_clear(&first);
+    job_view_clear(&second);
+    job_unref(ann);
+    job_unref(bob);
+    job_unref(nobody);
     room_end(&room);
 }
 
@@ -197,7 +197,7 @@ static void a_key_that_is_none_is_refused(void **state) {
     longest[255] = '\0';
     assert_int_equal(send(&room, NULL, longest, 0.015, 1, &job, NULL), STATUS_OK);
     wait_for(job);
-    job_drop(job);
+    job_unref(job);
     room_end(&room);
 }
 
@@ -214,9 +214,9 @@ static void quick_jobs_go_beside_slow_ones_that_have_every_worker(void **state) 
     for (size_t i = 0; i < 5; i++)
         unfinished += !job_is_finished(slow[i]);
     assert_true(unfinished >= 2);
-    job_drop(quick);
+    job_unref(quick);
     for (size_t i = 0; i < 5; i++)
-        job_drop(slow[i]);
+        job_unref(slow[i]);
     room_end(&room);
 }
 
@@ -226,32 +226,32 @@ static void a_deleted_result_is_known_no_more(void **state) {
     Job *job, *found;
     assert_int_equal(send(&room, NULL, NULL, 0.015, 1, &job, NULL), STATUS_OK);
     wait_for(job);
-    JobShow now, later;
-    assert_int_equal(job_show(job, &now), STATUS_OK);
-    assert_int_equal(intake_delete(room.intake, now.result, &problem), STATUS_OK);
+    JobView now, later;
+    assert_int_equal(job_view(job, &now), STATUS_OK);
+    assert_int_equal(jobs_delete(room.intake, now.result, &problem), STATUS_OK);
     problem_clear(&problem);
-    assert_int_equal(intake_delete(room.intake, now.result, &problem), STATUS_NOT_FOUND);
-    assert_int_equal(intake_find(room.intake, now.id, &found, NULL), STATUS_OK);
-    assert_int_equal(job_show(found, &later), STATUS_OK);
+    assert_int_equal(jobs_delete(room.intake, now.result, &problem), STATUS_NOT_FOUND);
+    assert_int_equal(jobs_find(room.intake, now.id, &found, NULL), STATUS_OK);
+    assert_int_equal(job_view(found, &later), STATUS_OK);
     assert_true(later.is_result_deleted);
-    job_show_clear(&later);
-    job_drop(found);
+    job_view_clear(&later);
+    job_unref(found);
     assert_int_equal(send(&room, NULL, NULL, 0.015, 1, &found, NULL), STATUS_OK);
     wait_for(found);
-    assert_int_equal(job_show(found, &later), STATUS_OK);
+    assert_int_equal(job_view(found, &later), STATUS_OK);
     assert_false(later.is_cached);
     assert_string_equal(later.result, now.result);
-    job_show_clear(&later);
-    job_show_clear(&now);
-    job_drop(found);
-    job_drop(job);
+    job_view_clear(&later);
+    job_view_clear(&now);
+    job_unref(found);
+    job_unref(job);
     room_end(&room);
 }
 
-static size_t count_jobs(Store *store) {
+static size_t count_jobs(Db *store) {
     JobRows rows;
     const JobSearch all = job_search_all(1000);
-    assert_int_equal(store_job_search(store, &all, &rows, &problem), STATUS_OK);
+    assert_int_equal(db_job_search(store, &all, &rows, &problem), STATUS_OK);
     const size_t count = rows.count;
     job_rows_clear(&rows);
     return count;
@@ -267,26 +267,26 @@ static void what_is_beyond_the_rules_goes_in_small_steps_and_no_more_than_that(v
         assert_int_equal(send(&room, NULL, NULL, 0.001 * (double)(i / 2 + 1), 0.5, &job, NULL),
                          STATUS_OK);
         wait_for(job);
-        job_drop(job);
-        store_settle(room.store); // the second of a scene is written late: not too late
+        job_unref(job);
+        db_flush(room.store); // the second of a scene is written late: not too late
     }
     const JobRow unfinished = {.id = "j-0", .scene = "{}", .warnings = "[]", .created_unix_ms = 1};
-    assert_int_equal(store_job_add(room.store, &unfinished, &problem), STATUS_OK);
+    assert_int_equal(db_job_add(room.store, &unfinished, &problem), STATUS_OK);
     const KeepRules none = {0}, jobs = {.jobs = 31}, days = {.days = 1000}, bytes = {.bytes = 1};
-    assert_int_equal(store_remove(room.store, &none, &removed, &problem), STATUS_OK);
+    assert_int_equal(db_remove(room.store, &none, &removed, &problem), STATUS_OK);
     assert_false(removed.is_more);
-    assert_int_equal(store_remove(room.store, &days, &removed, &problem), STATUS_OK);
+    assert_int_equal(db_remove(room.store, &days, &removed, &problem), STATUS_OK);
     assert_false(removed.is_more);
     size_t steps = 0, results = 0;
     do {
-        assert_int_equal(store_remove(room.store, &jobs, &removed, &problem), STATUS_OK);
+        assert_int_equal(db_remove(room.store, &jobs, &removed, &problem), STATUS_OK);
         assert_true(removed.jobs <= RETENTION_BATCH);
         results += removed.results;
     } while (removed.is_more && ++steps < 100);
     assert_int_equal(count_jobs(room.store), 31 + 1);
     assert_int_equal(results, 84); // of 169 jobs; the last one's result is named by one that stays
     for (steps = 0; steps < 100; steps++) {
-        assert_int_equal(store_remove(room.store, &bytes, &removed, &problem), STATUS_OK);
+        assert_int_equal(db_remove(room.store, &bytes, &removed, &problem), STATUS_OK);
         if (removed.jobs == 0)
             break;
     }

@@ -45,8 +45,8 @@ static void an_outcomes_numbers_come_back(void **state) {
     (void)state;
     Outcome *outcome = sample();
     Bytes bytes = {.most = 1 << 20}, again = {.most = 1 << 20};
-    numbers_write(&bytes, outcome);
-    Outcome *read = numbers_read(bytes.at, bytes.count);
+    outcome_blob_write(&bytes, outcome);
+    Outcome *read = outcome_blob_read(bytes.at, bytes.count);
     assert_non_null(read);
     assert_int_equal(read->response.count, 5);
     assert_string_equal(read->response.series.at[1].name, "contact_force");
@@ -57,7 +57,7 @@ static void an_outcomes_numbers_come_back(void **state) {
     assert_true(isnan(read->response.impacts.at[1].end));
     assert_true(read->response.impacts.at[1].is_resumed);
     assert_true(read->spectrum.frequency[2] == 500);
-    numbers_write(&again, read);
+    outcome_blob_write(&again, read);
     assert_int_equal(bytes.count, again.count);
     assert_memory_equal(bytes.at, again.at, bytes.count);
     bytes_clear(&bytes);
@@ -70,9 +70,9 @@ static void what_is_cut_or_has_wild_counts_is_not_read(void **state) {
     (void)state;
     Outcome *outcome = sample();
     Bytes bytes = {.most = 1 << 20};
-    numbers_write(&bytes, outcome);
+    outcome_blob_write(&bytes, outcome);
     for (size_t size = 0; size < bytes.count; size++)
-        assert_null(numbers_read(bytes.at, size));
+        assert_null(outcome_blob_read(bytes.at, size));
     const double wild[] = {-1, 1e300, 4e9, (double)NAN, 1e15};
     for (size_t i = 0; i < 24; i++)
         for (size_t k = 0; k < COUNT(wild); k++) {
@@ -82,12 +82,12 @@ static void what_is_cut_or_has_wild_counts_is_not_read(void **state) {
             // Plain numbers may be anything; counts of what follows may not.
             if (i == 2 || i == 3 || i == 4 || i == 15 || i == 16) {
                 memcpy(at, &wild[k], sizeof before);
-                assert_null(numbers_read(bytes.at, bytes.count));
+                assert_null(outcome_blob_read(bytes.at, bytes.count));
                 memcpy(at, &before, sizeof before);
             }
         }
     bytes.at[0] = 'x';
-    assert_null(numbers_read(bytes.at, bytes.count));
+    assert_null(outcome_blob_read(bytes.at, bytes.count));
     bytes_clear(&bytes);
     outcome_unref(outcome);
 }

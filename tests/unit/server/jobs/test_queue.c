@@ -79,7 +79,7 @@ static void turns_of_long_work_go_between_the_ordinary_jobs_of_their_client(void
     QueueEntry turn = {.seconds = 0.01, .is_turn = true}, jobs[20], other;
     for (size_t i = 0; i < 20; i++)
         put(queue, &jobs[i], "", 0.01, 100);
-    Client *client = queue_client(queue, "");
+    QueueClient *client = queue_client(queue, "");
     queue_put(queue, &turn, client, 0);
     // The spare worker leaves them alone; the others take one of six.
     assert_ptr_equal(queue_take(queue, true), &jobs[0]);
@@ -132,7 +132,7 @@ static void the_kept_worker_takes_quick_ones_alone(void **state) {
     put(queue, &slow, "a", 5, 0);
     assert_null(queue_take(queue, true));
     put(queue, &quick, "b", 0.01, 500);
-    queue_urge(queue, &urgent);
+    queue_push_front(queue, &urgent);
     assert_ptr_equal(queue_take(queue, true), &quick);
     assert_null(queue_take(queue, true));
     assert_ptr_equal(queue_take(queue, false), &urgent);
@@ -146,10 +146,10 @@ static void what_others_want_too_moves_to_whoever_waits_less(void **state) {
     QueueEntry at[20];
     for (size_t i = 0; i < 20; i++)
         put(queue, &at[i], "many", 0.01, 0);
-    queue_share(queue, &at[15], queue_client(queue, "few"));
+    queue_rebalance(queue, &at[15], queue_client(queue, "few"));
     assert_ptr_equal(queue_take(queue, false), &at[0]);
     assert_ptr_equal(queue_take(queue, false), &at[15]);
-    queue_share(queue, &at[15], queue_client(queue, "many")); // waits no more: nothing happens
+    queue_rebalance(queue, &at[15], queue_client(queue, "many")); // waits no more: nothing happens
     assert_int_equal(queue_count(queue), 18);
     queue_free(queue);
 }

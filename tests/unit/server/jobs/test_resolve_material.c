@@ -17,7 +17,7 @@
 #include "server/json/parse.h"
 #include "server/materials/material.h"
 
-static Store *store;
+static Db *store;
 static Problem problem;
 static StudyRequest inquiry;
 static Warnings warnings;
@@ -25,7 +25,7 @@ static Warnings warnings;
 static int set_up(void **state) {
     (void)state;
     problem_clear(&problem);
-    return store_open(NULL, &store, &problem) == STATUS_OK ? 0 : -1;
+    return db_open(NULL, &store, &problem) == STATUS_OK ? 0 : -1;
 }
 
 static void clear(void) {
@@ -37,21 +37,21 @@ static void clear(void) {
 static int tear_down(void **state) {
     (void)state;
     clear();
-    store_close(store);
+    db_close(store);
     return 0;
 }
 
 // A revision of what `said` says; the first of its slug makes the material.
 static void say(const char *slug, const char *said) {
     MaterialRevision revision = {.slug = (char *)slug, .comment = (char *)"measured again"};
-    assert_int_equal(read_json(said, strlen(said), material_fields, &revision.material, &problem),
+    assert_int_equal(json_parse(said, strlen(said), material_fields, &revision.material, &problem),
                      STATUS_OK);
     assert_int_equal(material_validate(&revision.material, "", &problem), STATUS_OK);
-    assert_int_equal(catalogue_write_lists(&revision, &problem), STATUS_OK);
+    assert_int_equal(material_write_lists(&revision, &problem), STATUS_OK);
     revision.created_unix_ms = 1;
-    if (store_material_add(store, &revision, &problem) != STATUS_OK) {
+    if (db_material_add(store, &revision, &problem) != STATUS_OK) {
         problem_clear(&problem);
-        assert_int_equal(store_material_revise(store, &revision, ANY_VERSION, &problem), STATUS_OK);
+        assert_int_equal(db_material_revise(store, &revision, ANY_VERSION, &problem), STATUS_OK);
     }
     free(revision.lists);
     fields_clear(material_fields, &revision.material);
@@ -63,7 +63,7 @@ static void review(const char *slug, uint64_t revision, const char *status) {
                                   .status = (char *)status,
                                   .reason = (char *)"the base was loose",
                                   .created_unix_ms = 1};
-    assert_int_equal(store_material_review(store, &given, ANY_VERSION, &problem), STATUS_OK);
+    assert_int_equal(db_material_review(store, &given, ANY_VERSION, &problem), STATUS_OK);
 }
 
 #define SAID(members) "{\"name\": \"Foam\", \"source\": \"our bench\", " members "}"
@@ -72,9 +72,9 @@ static void review(const char *slug, uint64_t revision, const char *status) {
     "\"restitution_deviation\": 0.07}, {\"approach_speed\": 0.8, \"restitution\": 0.5, "           \
     "\"contact_time\": 0.03, \"restitution_deviation\": 0.1, \"contact_time_deviation\": 0.003}]"
 
-static Status prepare_text(const char *text) {
+static Status resolve_text(const char *text) {
     clear();
-    return intake_prepare(store, text, strlen(text), NULL, &inquiry, &warnings, &problem);
+    return jobs_prepare(store, text, strlen(text), NULL, &inquiry, &warnings, &problem);
 }
 
 // The paper's scene with these members of its damper, and what else the document has.
@@ -86,10 +86,10 @@ static Status prepare(const char *damper, const char *rest) {
              "{\"kind\": \"free\", "
              "\"displacement\": 0.015}, \"duration\": 1, \"sample_rate\": 1000%s}",
              damper, rest);
-    return prepare_text(text);
+    return resolve_text(text);
 }
 
-static void prepare_well(const char *damper, const char *rest) {
+static void resolve_well(const char *damper, const char *rest) {
     const Status status = prepare(damper, rest);
     if (status != STATUS_OK)
         fail_msg("%s %s: %s: %s", damper, rest, problem.faults[0].pointer,
@@ -131,11 +131,11 @@ static void expect_member(const char *wanted) {
 static void expect_stable(void) {
     char id[72], again[72];
     char *text = canonical();
-    intake_result_id(&inquiry, id);
-    if (prepare_text(text) != STATUS_OK)
+    jobs_result_id(&inquiry, id);
+    if (resolve_text(text) != STATUS_OK)
         fail_msg("%s: %s: %s", text, problem.faults[0].pointer, problem.faults[0].detail);
     char *second = canonical();
-    intake_result_id(&inquiry, again);
+    jobs_result_id(&inquiry, again);
     assert_string_equal(text, second);
     assert_string_equal(id, again);
     free(text);
@@ -145,13 +145,13 @@ static void expect_stable(void) {
 static void a_table_stands_where_its_material_was_named(void **state) {
     (void)state;
     say("foam", SAID(TABLE_MEMBERS));
-    prepare_well("\"buffer\": \"foam\"", "");
+    resolve_well("\"buffer\": \"foam\"", "");
     expect_member("{\"material\": \"foam@1\", \"table\": [{\"approach_speed\": 0.1, "
                   "\"restitution\": 0.7, \"contact_time\": 0.02}, {\"approach_speed\": 0.8, "
                   "\"restitution\": 0.5, \"contact_time\": 0.03}]}");
     expect_stable();
     // What the model does not use is left out, and comes back for another.
-    prepare_well("\"buffer\": \"foam@1\"", ", \"contact\": {\"model\": \"impulse\"}");
+    resolve_well("\"buffer\": \"foam@1\"", ", \"contact\": {\"model\": \"impulse\"}");
     expect_member("\"table\": [{\"approach_speed\": 0.1, \"restitution\": 0.7}, "
                   "{\"approach_speed\": 0.8, \"restitution\": 0.5}]");
     expect_stable();
@@ -200,23 +200,23 @@ static void what_stands_beside_a_name_is_what_the_revision_says(void **state) {
 static void a_name_alone_is_the_approved_head_and_never_a_deprecated_one(void **state) {
     (void)state;
     say("foam", SAID("\"restitution\": 0.5"));
-    prepare_well("\"buffer\": \"foam\"", "");
+    resolve_well("\"buffer\": \"foam\"", "");
     assert_string_equal(damper()->buffer.material, "foam@1");
     assert_int_equal(warnings.count, 1);
     assert_string_equal(warnings.at[0].detail, "foam@1 is a draft that nobody has approved");
     review("foam", 1, "approved");
     say("foam", SAID("\"restitution\": 0.6"));
-    prepare_well("\"buffer\": \"foam\"", "");
+    resolve_well("\"buffer\": \"foam\"", "");
     assert_string_equal(damper()->buffer.material, "foam@1");
     assert_int_equal(warnings.count, 0);
-    prepare_well("\"buffer\": \"foam@2\"", "");
+    resolve_well("\"buffer\": \"foam@2\"", "");
     assert_true(damper()->buffer.restitution == 0.6);
     assert_int_equal(warnings.count, 1);
     review("foam", 1, "deprecated");
-    prepare_well("\"buffer\": \"foam@1\"", "");
+    resolve_well("\"buffer\": \"foam@1\"", "");
     assert_string_equal(warnings.at[0].detail, "foam@1 is deprecated: the base was loose");
     assert_string_equal(warnings.at[0].pointer, "/dampers/0/buffer");
-    prepare_well("\"buffer\": \"foam\"", "");
+    resolve_well("\"buffer\": \"foam\"", "");
     assert_string_equal(damper()->buffer.material, "foam@2");
     review("foam", 2, "deprecated");
     assert_int_equal(prepare("\"buffer\": \"foam\"", ""), STATUS_INVALID);
@@ -231,7 +231,7 @@ static void what_is_known_of_a_test_goes_with_the_buffer(void **state) {
     say("foam", SAID("\"restitution\": 0.5, \"restitution_deviation\": 0.05, \"contact_time\": "
                      "0.02, \"contact_time_deviation\": 0.001, \"least_speed\": 0.2, "
                      "\"impactor_mass\": 0.3, \"base\": \"free\", \"base_mass\": 0.6"));
-    prepare_well("\"buffer\": \"foam\"", "");
+    resolve_well("\"buffer\": \"foam\"", "");
     const BufferTest *test = &damper()->buffer.test;
     assert_true(test->least_speed == 0.2 && isnan(test->most_speed));
     assert_true(fabs(buffer_test_mass(&damper()->buffer) - 0.2) < 1e-15);
@@ -239,7 +239,7 @@ static void what_is_known_of_a_test_goes_with_the_buffer(void **state) {
     assert_true(fabs(test->contact_time_deviation - 0.05) < 1e-15);
     // A table has its own ends, and its deviations together.
     say("rubber", SAID(TABLE_MEMBERS));
-    prepare_well("\"buffer\": \"rubber\"", "");
+    resolve_well("\"buffer\": \"rubber\"", "");
     test = &damper()->buffer.test;
     assert_true(test->least_speed == 0.1 && test->most_speed == 0.8);
     assert_true(fabs(test->restitution_deviation - sqrt((0.01 + 0.04) / 2)) < 1e-15);
@@ -280,16 +280,16 @@ static void a_rig_that_is_not_given_is_that_of_the_revision(void **state) {
         expect_member(cases[i].rig);
         expect_stable();
         // Impulses have no use for it.
-        prepare_well(text, ", \"contact\": {\"model\": \"impulse\"}");
+        resolve_well(text, ", \"contact\": {\"model\": \"impulse\"}");
         assert_true(isnan(damper()->rig.impactor_mass));
     }
     // One that is given wins.
     snprintf(text, sizeof text, "%s\"buffer\": \"fixed\", \"rig\": {\"impactor_mass\": 7}", rig);
-    prepare_well(text, "");
+    resolve_well(text, "");
     expect_member("\"rig\": {\"impactor_mass\": 7}");
     // A damper has one: both sides' tests must be alike, and numbers alone tell none.
     snprintf(text, sizeof text, "%s\"left_buffer\": \"fixed\", \"right_buffer\": \"table\"", rig);
-    prepare_well(text, "");
+    resolve_well(text, "");
     snprintf(text, sizeof text, "%s\"left_buffer\": \"fixed\", \"right_buffer\": \"free\"", rig);
     assert_int_equal(prepare(text, ""), STATUS_INVALID);
     expect_fault("/dampers/0/rig", "fixed@1 and free@1 were measured with other masses");
@@ -329,10 +329,10 @@ static void canonical_forms_of_named_revisions_never_change(void **state) {
     };
     char *forms[COUNT(cases)], ids[COUNT(cases)][72];
     for (size_t i = 0; i < COUNT(cases); i++) {
-        prepare_well(cases[i].damper, cases[i].rest);
+        resolve_well(cases[i].damper, cases[i].rest);
         expect_member(cases[i].form);
         forms[i] = canonical();
-        intake_result_id(&inquiry, ids[i]);
+        jobs_result_id(&inquiry, ids[i]);
     }
     for (int i = 0; i < 100; i++) {
         say("sponge", SAID("\"restitution\": 0.3, \"restitution_deviation\": 0.1, "
@@ -343,15 +343,15 @@ static void canonical_forms_of_named_revisions_never_change(void **state) {
     review("sponge", 1, "deprecated");
     for (size_t i = 0; i < COUNT(cases); i++) {
         char id[72];
-        assert_int_equal(prepare_text(forms[i]), STATUS_OK);
+        assert_int_equal(resolve_text(forms[i]), STATUS_OK);
         char *again = canonical();
-        intake_result_id(&inquiry, id);
+        jobs_result_id(&inquiry, id);
         assert_string_equal(again, forms[i]);
         assert_string_equal(id, ids[i]);
         free(again);
         free(forms[i]);
     }
-    prepare_well("\"buffer\": \"sponge\"", "");
+    resolve_well("\"buffer\": \"sponge\"", "");
     assert_string_equal(damper()->buffer.material, "sponge@92");
 }
 
@@ -367,29 +367,29 @@ static const SensitivityStudy *study(void) {
 static void a_sensitivity_study_takes_the_recorded_spread(void **state) {
     (void)state;
     say("foam", SPREAD_SAID);
-    prepare_well("\"buffer\": \"foam\"", SENSITIVITY(""));
+    resolve_well("\"buffer\": \"foam\"", SENSITIVITY(""));
     assert_int_equal(study()->runs, 200);
     assert_int_equal(study()->uncertainty.spread.count, 1);
     assert_string_equal(study()->uncertainty.spread.at[0].source, "foam@1");
     expect_member("\"spread\": [{\"damper\": 1, \"buffer\": \"buffer\", \"source\": \"foam@1\", "
                   "\"restitution\": 0.1, \"contact_time\": 0.05}], \"runs\": 200");
     char id[72], again[72];
-    intake_result_id(&inquiry, id);
+    jobs_result_id(&inquiry, id);
     char *text = canonical();
     // It stays what it was, whatever is said later.
     say("foam", SAID("\"restitution\": 0.5, \"restitution_deviation\": 0.2"));
     review("foam", 2, "approved");
-    assert_int_equal(prepare_text(text), STATUS_OK);
-    intake_result_id(&inquiry, again);
+    assert_int_equal(resolve_text(text), STATUS_OK);
+    jobs_result_id(&inquiry, again);
     assert_string_equal(id, again);
     free(text);
     // Left and right for themselves; where nothing was recorded it is sure.
-    prepare_well("\"left_buffer\": \"foam@1\", \"right_buffer\": \"sponge\"", SENSITIVITY(""));
+    resolve_well("\"left_buffer\": \"foam@1\", \"right_buffer\": \"sponge\"", SENSITIVITY(""));
     expect_member(
         "\"spread\": [{\"damper\": 1, \"buffer\": \"left_buffer\", \"source\": \"foam@1\"");
     expect_stable();
     // What a model does not use is not drawn.
-    prepare_well("\"buffer\": \"foam@1\"",
+    resolve_well("\"buffer\": \"foam@1\"",
                  ", \"contact\": {\"model\": \"impulse\"}" SENSITIVITY(""));
     expect_member("\"contact_time_deviation\": 0, \"spread\": [{\"damper\": 1, \"buffer\": "
                   "\"buffer\", \"source\": \"foam@1\", \"restitution\": 0.1}]");
@@ -399,15 +399,15 @@ static void a_sensitivity_study_takes_the_recorded_spread(void **state) {
 static void what_a_study_says_itself_wins_over_what_was_recorded(void **state) {
     (void)state;
     say("foam", SPREAD_SAID);
-    prepare_well("\"buffer\": \"foam\"", SENSITIVITY(", \"restitution_deviation\": 0.3"));
+    resolve_well("\"buffer\": \"foam\"", SENSITIVITY(", \"restitution_deviation\": 0.3"));
     expect_member("\"restitution_deviation\": 0.3, \"spread\": [{\"damper\": 1, \"buffer\": "
                   "\"buffer\", \"source\": \"foam@1\", \"contact_time\": 0.05}]");
     expect_stable();
-    prepare_well("\"buffer\": \"foam\"", SENSITIVITY(", \"restitution_deviation\": 0, "
+    resolve_well("\"buffer\": \"foam\"", SENSITIVITY(", \"restitution_deviation\": 0, "
                                                      "\"contact_time_deviation\": 0"));
     assert_int_equal(study()->uncertainty.spread.count, 0);
     assert_int_equal(study()->runs, 0);
-    prepare_well("\"buffer\": \"foam\"",
+    resolve_well("\"buffer\": \"foam\"",
                  SENSITIVITY(", \"spread\": [{\"damper\": 1, \"restitution\": 0.02}]"));
     expect_member("\"contact_time_deviation\": 0, \"spread\": [{\"damper\": 1, \"buffer\": "
                   "\"buffer\", \"restitution\": 0.02}]");
@@ -438,7 +438,7 @@ static void what_a_study_says_itself_wins_over_what_was_recorded(void **state) {
     say("wild", SAID("\"restitution\": 0.1, \"restitution_deviation\": 0.2"));
     assert_int_equal(prepare("\"buffer\": \"wild\"", SENSITIVITY("")), STATUS_INVALID);
     expect_fault("/study/spread/0/restitution", "is 2 of its value, as wild@1 records");
-    prepare_well("\"buffer\": \"wild\"", SENSITIVITY(", \"restitution_deviation\": 0.4"));
+    resolve_well("\"buffer\": \"wild\"", SENSITIVITY(", \"restitution_deviation\": 0.4"));
 }
 
 static void points_of_a_sweep_have_the_tables_and_rigs_of_their_materials(void **state) {
@@ -446,7 +446,7 @@ static void points_of_a_sweep_have_the_tables_and_rigs_of_their_materials(void *
     say("foam", SAID(TABLE_MEMBERS ", \"impactor_mass\": 0.3, \"base\": \"fixed\""));
     say("rubber", SAID("\"restitution\": 0.5, \"contact_time\": 0.01, \"impactor_mass\": 0.4, "
                        "\"base\": \"fixed\""));
-    prepare_well("\"buffer\": \"rubber\", \"identified_for\": \"rig\"",
+    resolve_well("\"buffer\": \"rubber\", \"identified_for\": \"rig\"",
                  ", \"study\": {\"kind\": \"sweep\", \"axes\": [{\"pointer\": "
                  "\"/dampers/0/buffer\", \"values\": [\"rubber\", \"foam\"]}]}");
     const SweepStudy *sweep = (const SweepStudy *)(const void *)inquiry.study;
@@ -464,12 +464,12 @@ static void points_of_a_sweep_have_the_tables_and_rigs_of_their_materials(void *
         simulation_clear(&points[i]);
     sweep_grid_free(plan);
     Bytes uses = {0};
-    uses_write(&uses, &inquiry);
+    references_write(&uses, &inquiry);
     assert_string_equal(uses.at, "rubber@1\nfoam@1\n");
     bytes_clear(&uses);
     expect_stable();
     // A rig that somebody gave stays for all.
-    prepare_well("\"buffer\": \"rubber\", \"identified_for\": \"rig\", \"rig\": "
+    resolve_well("\"buffer\": \"rubber\", \"identified_for\": \"rig\", \"rig\": "
                  "{\"impactor_mass\": 7}",
                  ", \"study\": {\"kind\": \"sweep\", \"axes\": [{\"pointer\": "
                  "\"/dampers/0/buffer\", \"values\": [\"rubber\", \"foam\"]}]}");
@@ -484,26 +484,26 @@ static void points_of_a_sweep_have_the_tables_and_rigs_of_their_materials(void *
 static void uses_are_lines_each_once(void **state) {
     (void)state;
     Bytes uses = {0};
-    prepare_well("\"buffer\": {\"restitution\": 0.5}", "");
-    uses_write(&uses, &inquiry);
+    resolve_well("\"buffer\": {\"restitution\": 0.5}", "");
+    references_write(&uses, &inquiry);
     assert_int_equal(uses.count, 0);
-    prepare_well("\"left_buffer\": \"sponge\", \"right_buffer\": \"aluminium\"", "");
-    uses_write(&uses, &inquiry);
-    uses_write(&uses, &inquiry);
+    resolve_well("\"left_buffer\": \"sponge\", \"right_buffer\": \"aluminium\"", "");
+    references_write(&uses, &inquiry);
+    references_write(&uses, &inquiry);
     assert_string_equal(uses.at, "sponge@1\naluminium@1\n");
     const char *rest = uses.at;
-    Use use;
-    assert_true(uses_next(&rest, &use));
+    ReferenceRow use;
+    assert_true(references_next(&rest, &use));
     assert_string_equal(use.slug, "sponge");
     assert_int_equal(use.revision, 1);
-    assert_true(uses_next(&rest, &use));
+    assert_true(references_next(&rest, &use));
     assert_string_equal(use.slug, "aluminium");
-    assert_false(uses_next(&rest, &use));
+    assert_false(references_next(&rest, &use));
     bytes_clear(&uses);
     rest = "record:elcentro\nsponge@12\n";
-    assert_true(uses_next(&rest, &use));
+    assert_true(references_next(&rest, &use));
     assert_int_equal(use.revision, 0);
-    assert_true(uses_next(&rest, &use));
+    assert_true(references_next(&rest, &use));
     assert_int_equal(use.revision, 12);
 }
 

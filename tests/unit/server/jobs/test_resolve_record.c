@@ -21,17 +21,17 @@
 
 static Problem problem;
 static char folder[SCRATCH_SIZE];
-static Store *store;
+static Db *store;
 
-static int store_make(void **state) {
+static int db_make(void **state) {
     (void)state;
     scratch_make(folder);
-    return store_open(folder, &store, &problem) == STATUS_OK ? 0 : 1;
+    return db_open(folder, &store, &problem) == STATUS_OK ? 0 : 1;
 }
 
-static int store_end(void **state) {
+static int db_end(void **state) {
     (void)state;
-    store_close(store);
+    db_close(store);
     scratch_remove(folder);
     return 0;
 }
@@ -48,7 +48,7 @@ static void add(const char *name, double first) {
                            .interval = 0.02,
                            .count = 3,
                            .digest = digest};
-    assert_int_equal(store_record_add(store, &row, &samples, &is_there, &problem), STATUS_OK);
+    assert_int_equal(db_record_add(store, &row, &samples, &is_there, &problem), STATUS_OK);
 }
 
 static Status prepare(const char *excitation, const char *study, StudyRequest *inquiry) {
@@ -60,7 +60,7 @@ static Status prepare(const char *excitation, const char *study, StudyRequest *i
              excitation, study[0] != '\0' ? ", \"study\": " : "", study);
     problem_clear(&problem);
     const Status status =
-        intake_prepare(store, text, strlen(text), NULL, inquiry, &warnings, &problem);
+        jobs_prepare(store, text, strlen(text), NULL, inquiry, &warnings, &problem);
     warnings_clear(&warnings);
     return status;
 }
@@ -81,12 +81,12 @@ static void scenes_share_the_samples_of_the_record_they_name(void **state) {
     Bytes scene = {0}, again = {0};
     Warnings warnings = {NULL, 0};
     document_scene(&scene, &one);
-    intake_result_id(&one, ids[0]);
+    jobs_result_id(&one, ids[0]);
     study_request_clear(&one);
-    assert_int_equal(intake_prepare(store, scene.at, scene.count, NULL, &two, &warnings, &problem),
+    assert_int_equal(jobs_prepare(store, scene.at, scene.count, NULL, &two, &warnings, &problem),
                      STATUS_OK);
     document_scene(&again, &two);
-    intake_result_id(&two, ids[1]);
+    jobs_result_id(&two, ids[1]);
     assert_string_equal(scene.at, again.at);
     assert_string_equal(ids[0], ids[1]);
     assert_null(strstr(scene.at, "samples"));
@@ -110,7 +110,7 @@ static void a_sweep_pins_the_records_of_its_axes_once_each(void **state) {
     assert_int_equal(study->records.count, 2);
     assert_string_equal(study->records.at[0].name, "b");
     assert_string_equal(study->records.at[1].digest, record_in(&inquiry)->digest);
-    prepare_record_uses(&inquiry, &uses);
+    resolve_record_uses(&inquiry, &uses);
     assert_string_equal(uses.at, "record:a\nrecord:b\nrecord:a\n");
     bytes_clear(&uses);
     study_request_clear(&inquiry);
@@ -129,22 +129,22 @@ static void samples_are_let_go_of_and_had_again(void **state) {
         STATUS_OK);
     const PinnedRecords *pinned = &((const SweepStudy *)(const void *)inquiry.study)->records;
     const Refcount *samples = record_in(&inquiry)->named;
-    prepare_records_drop(&inquiry);
+    resolve_records_drop(&inquiry);
     assert_true(record_in(&inquiry)->named == NULL && pinned->at[1].named == NULL);
-    prepare_records_drop(&inquiry); // does nothing
-    assert_int_equal(prepare_records_again(store, &inquiry, &problem), STATUS_OK);
+    resolve_records_drop(&inquiry); // does nothing
+    assert_int_equal(resolve_records_again(store, &inquiry, &problem), STATUS_OK);
     assert_ptr_equal(record_in(&inquiry)->named, samples);
     assert_non_null(pinned->at[1].named);
     // What was found stays, but it must be there still, with the same samples.
-    assert_int_equal(prepare_records_again(store, &inquiry, &problem), STATUS_OK);
-    assert_int_equal(store_record_delete(store, "gone", &uses, &problem), STATUS_OK);
-    assert_int_equal(prepare_records_again(store, &inquiry, &problem), STATUS_INVALID);
+    assert_int_equal(resolve_records_again(store, &inquiry, &problem), STATUS_OK);
+    assert_int_equal(db_record_delete(store, "gone", &uses, &problem), STATUS_OK);
+    assert_int_equal(resolve_records_again(store, &inquiry, &problem), STATUS_INVALID);
     assert_string_equal(problem.faults[0].pointer, "/study/records/1/name");
     add("gone", 6);
     problem_clear(&problem);
-    assert_int_equal(prepare_records_again(store, &inquiry, &problem), STATUS_INVALID);
+    assert_int_equal(resolve_records_again(store, &inquiry, &problem), STATUS_INVALID);
     assert_string_equal(problem.faults[0].pointer, "/study/records/1/digest");
-    assert_int_equal(store_record_delete(store, "gone", &uses, &problem), STATUS_OK);
+    assert_int_equal(db_record_delete(store, "gone", &uses, &problem), STATUS_OK);
     study_request_clear(&inquiry);
 }
 
@@ -157,7 +157,7 @@ static void a_sweep_holds_only_so_many_samples(void **state) {
         char name[8];
         snprintf(name, sizeof name, "large%zu", i);
         assert_true(reals_allocate(&samples, RECORD_SAMPLES)); // never written
-        large[i] = record_memory_put(store_record_memory(store), store_generation(store),
+        large[i] = record_memory_put(db_record_memory(store), db_catalog_version(store),
                                      named_record_new(name, name, 1, &samples));
     }
     assert_int_equal(prepare("\"name\": \"a\"",
@@ -196,7 +196,7 @@ static void unknown_names_are_suggested_for_a_few_and_looked_up_for_a_hundred(vo
         snprintf(text + size - 2, sizeof text - (size_t)size, "]}]}}");
         problem_clear(&problem);
         assert_int_equal(
-            intake_prepare(store, text, strlen(text), NULL, &inquiry, &warnings, &problem),
+            jobs_prepare(store, text, strlen(text), NULL, &inquiry, &warnings, &problem),
             STATUS_INVALID);
         // Nothing was looked up that could not be told.
         assert_int_equal(problem.count, PROBLEM_FAULTS);
@@ -246,9 +246,9 @@ static void faults_stand_where_the_name_or_the_digest_does(void **state) {
 
 static void without_a_daemon_there_are_no_records(void **state) {
     (void)state;
-    Store *own, *kept = store;
+    Db *own, *kept = store;
     StudyRequest inquiry;
-    assert_int_equal(store_open(NULL, &own, &problem), STATUS_OK);
+    assert_int_equal(db_open(NULL, &own, &problem), STATUS_OK);
     store = own;
     const Status status = prepare("\"name\": \"a\"", "", &inquiry);
     store = kept;
@@ -257,11 +257,11 @@ static void without_a_daemon_there_are_no_records(void **state) {
     assert_string_equal(problem.faults[0].pointer, "/excitation/name");
     assert_non_null(strstr(problem.faults[0].detail, "impactd import"));
     study_request_clear(&inquiry);
-    store_close(own);
+    db_close(own);
 }
 
 static int fill(void **state) {
-    if (store_make(state) != 0)
+    if (db_make(state) != 0)
         return 1;
     add("a", 1);
     add("b", 2);
@@ -279,5 +279,5 @@ int main(void) {
         cmocka_unit_test(faults_stand_where_the_name_or_the_digest_does),
         cmocka_unit_test(without_a_daemon_there_are_no_records),
     };
-    return cmocka_run_group_tests(tests, fill, store_end);
+    return cmocka_run_group_tests(tests, fill, db_end);
 }

@@ -86,13 +86,13 @@ static void clear(StudyPart *part) {
     noted_of_all->parts--;
 }
 
-static void put(Order *order, size_t member) {
+static void put(ReorderBuffer *order, size_t member) {
     StudyPart *part = calloc(1, sizeof *part);
     assert_non_null(part);
     part->run.number = member;
     if (++noted_of_all->parts > noted_of_all->most)
         noted_of_all->most = noted_of_all->parts;
-    assert_int_equal(order_put(order, member, part, &problem), STATUS_OK);
+    assert_int_equal(reorder_put(order, member, part, &problem), STATUS_OK);
 }
 
 static const StudyKind noted_kind = {.fold = note, .clear = clear};
@@ -105,16 +105,16 @@ static size_t fold_backwards(size_t members, size_t enough, size_t part_bytes, s
                             .expected = members,
                             .part_bytes = part_bytes},
                    .enough = enough};
-    Order order;
+    ReorderBuffer order;
     size_t from, to;
     noted_of_all = &noted;
-    assert_int_equal(order_make(&noted.work, 2, &order, NULL), STATUS_OK);
-    while (order_begin(&order, SIZE_MAX, &from, &to)) {
+    assert_int_equal(reorder_make(&noted.work, 2, &order, NULL), STATUS_OK);
+    while (reorder_begin(&order, SIZE_MAX, &from, &to)) {
         assert_true(to > from && to - from <= order.window);
         while (to > from)
             put(&order, --to);
     }
-    order_clear(&order);
+    reorder_clear(&order);
     assert_int_equal(noted.parts, 0);
     *most = noted.most;
     return noted.folded;
@@ -138,7 +138,7 @@ static char *answer_of(const Room *room, const char *text) {
     ResultRow row;
     room_submit(room, text, NULL, id);
     room_finish(room, id, result);
-    assert_int_equal(store_result_load(room->store, result, &row, &problem), STATUS_OK);
+    assert_int_equal(db_result_load(room->store, result, &row, &problem), STATUS_OK);
     char *study = strdup(row.study);
     result_row_clear(&row);
     assert_non_null(study);
@@ -296,12 +296,12 @@ static void an_ensemble_that_was_interrupted_begins_again(void **state) {
 // Points or members that a job has made, of a thousand.
 static double share_of(const Room *room, const char *id) {
     Job *job;
-    JobShow show;
-    assert_int_equal(intake_find(room->intake, id, &job, NULL), STATUS_OK);
-    assert_int_equal(job_show(job, &show), STATUS_OK);
-    job_drop(job);
+    JobView show;
+    assert_int_equal(jobs_find(room->intake, id, &job, NULL), STATUS_OK);
+    assert_int_equal(job_view(job, &show), STATUS_OK);
+    job_unref(job);
     const double share = show.progress / 100;
-    job_show_clear(&show);
+    job_view_clear(&show);
     return share;
 }
 

@@ -19,16 +19,16 @@ static void submit(const Room *room, size_t points, double duration, char id[40]
 }
 
 static void assert_whole(const Room *room, const char *result, size_t points) {
-    SweepShow show;
-    assert_int_equal(sweep_show_load(room->store, result, false, true, &show, NULL), STATUS_OK);
+    SweepView show;
+    assert_int_equal(sweep_view_load(room->store, result, false, true, &show, NULL), STATUS_OK);
     assert_true(show.is_complete);
     assert_int_equal(show.rows, points);
     for (size_t i = 0; i < points; i++) {
         double point;
-        assert_true(sweep_show_read(&show, 0, i, 1, &point));
+        assert_true(sweep_view_read(&show, 0, i, 1, &point));
         assert_true(point == (double)i);
     }
-    sweep_show_clear(&show);
+    sweep_view_clear(&show);
 }
 
 static void rows_come_back_as_they_were_put(void **state) {

@@ -30,14 +30,14 @@ static Problem problem;
 
 static Status read(Item *item, const char *text) {
     problem_clear(&problem);
-    return read_json(text, strlen(text), fields, item, &problem);
+    return json_parse(text, strlen(text), fields, item, &problem);
 }
 
 static void assert_written(const char *text, const char *expected) {
     Item item;
     Bytes bytes = {0};
     assert_int_equal(read(&item, text), STATUS_OK);
-    write_item(&bytes, fields, &item, WRITE_SCENE);
+    encode_item(&bytes, fields, &item, WRITE_SCENE);
     bytes_put(&bytes, "", 1);
     assert_string_equal(bytes.at, expected);
     bytes_clear(&bytes);
@@ -86,7 +86,7 @@ static void what_is_no_matrix_is_told_where_it_is_none(void **state) {
 static void the_schema_says_all_forms(void **state) {
     (void)state;
     Bytes bytes = {0};
-    describe_schema(&bytes, "/x", "x", fields);
+    schema_write(&bytes, "/x", "x", fields);
     bytes_put(&bytes, "", 1);
     assert_non_null(strstr(bytes.at, "\"pattern\": \"^(velocity)(_[1-9][0-9]*)?$\""));
     assert_non_null(strstr(bytes.at, "\"anyOf\": [\n        {\n          \"type\": \"number\""));

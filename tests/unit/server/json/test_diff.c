@@ -16,7 +16,7 @@
 static void assert_differs(const char *a, const char *b, const char *besides, const char *wanted) {
     Differences differences;
     Bytes bytes = {0};
-    assert_int_equal(differ_json(a, b, besides, &differences, NULL), STATUS_OK);
+    assert_int_equal(json_diff(a, b, besides, &differences, NULL), STATUS_OK);
     differences_write(&bytes, &differences);
     assert_string_equal(bytes.at, wanted);
     bytes_clear(&bytes);
@@ -69,12 +69,12 @@ static void more_than_are_shown_are_counted(void **state) {
         bytes_text(&texts[t], "}");
     }
     Differences differences;
-    assert_int_equal(differ_json(texts[0].at, texts[1].at, NULL, &differences, NULL), STATUS_OK);
+    assert_int_equal(json_diff(texts[0].at, texts[1].at, NULL, &differences, NULL), STATUS_OK);
     assert_true(differences.count == DIFFER_MAX && differences.more == 5);
     differences_clear(&differences);
     bytes_clear(&texts[0]);
     bytes_clear(&texts[1]);
-    assert_int_equal(differ_json("{", "{}", NULL, &differences, NULL), STATUS_INTERNAL);
+    assert_int_equal(json_diff("{", "{}", NULL, &differences, NULL), STATUS_INTERNAL);
     differences_clear(&differences);
 }
 
@@ -83,14 +83,14 @@ static void a_report_reads_back_with_what_is_unknown(void **state) {
     Summary summary;
     static const char report[] = "{\"peak_displacement\": 0.5, \"impacts\": 3, "
                                  "\"trust_horizon\": null, \"of_another_version\": 1} and more";
-    assert_int_equal(
-        report_read(report, strlen(report) - strlen(" and more"), summary_fields, &summary, NULL),
-        STATUS_OK);
+    assert_int_equal(stored_report_read(report, strlen(report) - strlen(" and more"),
+                                        summary_fields, &summary, NULL),
+                     STATUS_OK);
     assert_true(summary.peak_displacement == 0.5 && summary.impacts == 3);
     assert_true(isnan(summary.trust_horizon) && isnan(summary.rms_displacement));
-    assert_int_equal(report_read("{\"impacts\": \"3\"}", 16, summary_fields, &summary, NULL),
+    assert_int_equal(stored_report_read("{\"impacts\": \"3\"}", 16, summary_fields, &summary, NULL),
                      STATUS_INTERNAL);
-    assert_int_equal(report_read("[", 1, summary_fields, &summary, NULL), STATUS_INTERNAL);
+    assert_int_equal(stored_report_read("[", 1, summary_fields, &summary, NULL), STATUS_INTERNAL);
 }
 
 int main(void) {

@@ -18,7 +18,7 @@
 
 static void read_whole(Whole *whole, const char *text) {
     Problem problem = {0};
-    if (read_json(text, strlen(text), whole_fields, whole, &problem) != STATUS_OK)
+    if (json_parse(text, strlen(text), whole_fields, whole, &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
 }
 
@@ -46,14 +46,14 @@ static void reading_back_gives_an_equal_struct(void **state) {
         Whole whole, again;
         Bytes text = {0}, second = {0}, canonical = {0}, expected = {0};
         read_whole(&whole, documents[i]);
-        write_item(&text, whole_fields, &whole, WRITE_SCENE);
+        encode_item(&text, whole_fields, &whole, WRITE_SCENE);
         read_whole(&again, text.at);
         canonical_write(whole_fields, &whole, take, &expected);
         canonical_write(whole_fields, &again, take, &canonical);
         assert_int_equal(canonical.count, expected.count);
         assert_memory_equal(canonical.at, expected.at, expected.count);
         // Notes are in no canonical form; the second text has them.
-        write_item(&second, whole_fields, &again, WRITE_SCENE);
+        encode_item(&second, whole_fields, &again, WRITE_SCENE);
         assert_string_equal(second.at, text.at);
         fields_clear(whole_fields, &whole);
         fields_clear(whole_fields, &again);
@@ -69,7 +69,7 @@ static void scenes_leave_out_what_is_absent(void **state) {
     Whole whole;
     Bytes text = {0};
     read_whole(&whole, "{\"mass\": 2, \"right\": \"sponge\"}");
-    write_item(&text, whole_fields, &whole, WRITE_SCENE);
+    encode_item(&text, whole_fields, &whole, WRITE_SCENE);
     assert_string_equal(
         text.at, "{\"offset\": 0.25, \"mass\": 2, \"steps\": 7, \"is_open\": true,"
                  " \"rule\": \"zero_penetration\", \"channels\": [\"velocity\", \"displacement\"],"
@@ -86,7 +86,7 @@ static void reports_write_null_for_what_is_absent(void **state) {
     Bytes text = {0};
     read_whole(&whole, "{\"extra\": null, \"samples\": [1, 2.5], \"spare\": {}}");
     whole.slope = INFINITY;
-    write_item(&text, whole_fields, &whole, WRITE_REPORT);
+    encode_item(&text, whole_fields, &whole, WRITE_REPORT);
     assert_string_equal(
         text.at,
         "{\"offset\": 0.25, \"mass\": null, \"slope\": null, \"steps\": 7, \"storey\": null,"
@@ -103,13 +103,13 @@ static void members_stand_beside_others(void **state) {
     (void)state;
     Round round = {{&shape_round}, {0.5}, 2};
     Bytes text = {0};
-    assert_int_equal(write_members(&text, shape_round.fields, &round, WRITE_SCENE), 2);
+    assert_int_equal(encode_members(&text, shape_round.fields, &round, WRITE_SCENE), 2);
     assert_string_equal(text.at, "\"offset\": 0.5, \"radius\": 2");
     bytes_clear(&text);
-    write_list(&text, shape_round.fields, &round, 1, sizeof round, WRITE_SCENE);
+    encode_list(&text, shape_round.fields, &round, 1, sizeof round, WRITE_SCENE);
     assert_string_equal(text.at, "[{\"offset\": 0.5, \"radius\": 2}]");
     bytes_clear(&text);
-    write_list(&text, shape_round.fields, NULL, 0, sizeof round, WRITE_SCENE);
+    encode_list(&text, shape_round.fields, NULL, 0, sizeof round, WRITE_SCENE);
     assert_string_equal(text.at, "[]");
     bytes_clear(&text);
 }
@@ -120,7 +120,7 @@ static void a_full_buffer_only_fails(void **state) {
     read_whole(&whole, documents[3]);
     for (size_t most = 1; most < 400; most += 13) {
         Bytes text = {.most = most};
-        write_item(&text, whole_fields, &whole, WRITE_SCENE);
+        encode_item(&text, whole_fields, &whole, WRITE_SCENE);
         assert_true(text.is_failed);
     }
     fields_clear(whole_fields, &whole);
@@ -140,7 +140,7 @@ static void problems_are_problem_documents(void **state) {
                        .column = "name"};
     problem_add_fault(&problem, STATUS_INVALID, &mass);
     Bytes text = {0};
-    write_problem(&text, &problem, 422, NULL);
+    encode_problem(&text, &problem, 422, NULL);
     assert_string_equal(
         text.at, "{\"type\": \"/problems/invalid-scene\", \"title\": \"The scene has 1 fault\","
                  " \"status\": 422, \"detail\": \"/structure/mass: must be above 0 kg, is -1\","
@@ -148,7 +148,7 @@ static void problems_are_problem_documents(void **state) {
                  " \"detail\": \"must be above 0 kg, is -1\", \"unit\": \"kg\"}]}");
     bytes_clear(&text);
     problem_add_fault(&problem, STATUS_INVALID, &key);
-    write_problem(&text, &problem, 422, "/v1/jobs");
+    encode_problem(&text, &problem, 422, "/v1/jobs");
     assert_string_equal(
         text.at, "{\"type\": \"/problems/invalid-scene\", \"title\": \"The scene has 2 faults\","
                  " \"status\": 422, \"detail\": \"/structure/mass: must be above 0 kg, is -1\","
@@ -160,7 +160,7 @@ static void problems_are_problem_documents(void **state) {
     bytes_clear(&text);
     problem_clear(&problem);
     problem_set(&problem, STATUS_NOT_FOUND, "no job \"%s\"", "j-1");
-    write_problem(&text, &problem, 404, "/v1/jobs/j-1");
+    encode_problem(&text, &problem, 404, "/v1/jobs/j-1");
     assert_string_equal(text.at, "{\"type\": \"/problems/not-found\", \"title\": \"Not found\","
                                  " \"status\": 404, \"detail\": \"no job \\\"j-1\\\"\","
                                  " \"instance\": \"/v1/jobs/j-1\"}");
@@ -179,10 +179,10 @@ static void faults_past_the_hundredth_are_counted(void **state) {
     bytes_text(&document, "}");
     Problem problem = {0};
     Whole whole;
-    assert_int_equal(read_json(document.at, document.count, whole_fields, &whole, &problem),
+    assert_int_equal(json_parse(document.at, document.count, whole_fields, &whole, &problem),
                      STATUS_INVALID);
     assert_int_equal(problem.count, 250);
-    write_problem(&text, &problem, 422, NULL);
+    encode_problem(&text, &problem, 422, NULL);
     json_t *parsed = json_loadb(text.at, text.count, JSON_REJECT_DUPLICATES, NULL);
     assert_non_null(parsed);
     assert_string_equal(json_string_value(json_object_get(parsed, "title")),

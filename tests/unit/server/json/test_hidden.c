@@ -74,10 +74,10 @@ static void they_are_no_part_of_what_is_written_or_stands_for_it(void **state) {
     canonical_write(part_fields, &with, count_bytes, &bytes_with);
     canonical_write(part_fields, &without, count_bytes, &bytes_without);
     assert_int_equal(bytes_with, bytes_without);
-    const WriteStyle styles[] = {WRITE_SCENE, WRITE_REPORT};
+    const EncodeStyle styles[] = {WRITE_SCENE, WRITE_REPORT};
     for (size_t i = 0; i < COUNT(styles); i++) {
         Bytes bytes = {0};
-        write_item(&bytes, part_fields, &with, styles[i]);
+        encode_item(&bytes, part_fields, &with, styles[i]);
         char *text = bytes_take(&bytes, NULL);
         assert_string_equal(text, "{\"stiffness\": 3}");
         free(text);
@@ -106,7 +106,7 @@ static void they_can_be_neither_read_nor_guessed(void **state) {
     static const char text[] = "{\"least\": 1, \"origin\": \"x\", \"lest\": 2}";
     Part part;
     problem_clear(&problem);
-    assert_int_equal(read_json(text, strlen(text), part_fields, &part, &problem), STATUS_INVALID);
+    assert_int_equal(json_parse(text, strlen(text), part_fields, &part, &problem), STATUS_INVALID);
     assert_int_equal(problem.count, 3);
     for (size_t i = 0; i < problem.count; i++) {
         assert_string_equal(problem.faults[i].detail, "unknown key");
@@ -120,7 +120,7 @@ static void they_can_be_neither_read_nor_guessed(void **state) {
 static void a_schema_does_not_tell_of_them(void **state) {
     (void)state;
     Bytes bytes = {0};
-    describe_schema(&bytes, "/x", "x", part_fields);
+    schema_write(&bytes, "/x", "x", part_fields);
     char *text = bytes_take(&bytes, NULL);
     assert_non_null(strstr(text, "stiffness"));
     assert_null(strstr(text, "least"));

@@ -1,4 +1,4 @@
-// What read_json makes of a document: values, defaults, and every fault at its place.
+// What json_parse makes of a document: values, defaults, and every fault at its place.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -27,7 +27,7 @@ static int tear_down(void **state) {
 }
 
 static Status read(const char *text) {
-    return read_json(text, strlen(text), whole_fields, &whole, &problem);
+    return json_parse(text, strlen(text), whole_fields, &whole, &problem);
 }
 
 static const Fault *fault_at(const char *pointer) {
@@ -295,7 +295,7 @@ static void what_is_not_json_has_line_column_and_pointer(void **state) {
     check_unreadable("{\"samples\": [1, 2, 0x3]}", "/samples/2", "line 1, column");
     check_unreadable("{\"mass\": 1,}", "", "line 1, column 12: string or '}' expected");
     const char nul[] = "{\"mass\":\0 1}";
-    assert_int_equal(read_json(nul, sizeof nul - 1, whole_fields, &whole, &problem),
+    assert_int_equal(json_parse(nul, sizeof nul - 1, whole_fields, &whole, &problem),
                      STATUS_UNREADABLE);
 }
 
@@ -314,9 +314,9 @@ static void a_byte_order_mark_at_the_beginning_is_passed_over(void **state) {
 static void the_problem_may_be_null(void **state) {
     (void)state;
     const char *text = "{\"mass\": \"x\", \"y\": 1}";
-    assert_int_equal(read_json(text, strlen(text), whole_fields, &whole, NULL), STATUS_INVALID);
+    assert_int_equal(json_parse(text, strlen(text), whole_fields, &whole, NULL), STATUS_INVALID);
     fields_clear(whole_fields, &whole);
-    assert_int_equal(read_json("{", 1, whole_fields, &whole, NULL), STATUS_UNREADABLE);
+    assert_int_equal(json_parse("{", 1, whole_fields, &whole, NULL), STATUS_UNREADABLE);
 }
 
 #define TEST(name) cmocka_unit_test_setup_teardown(name, set_up, tear_down)

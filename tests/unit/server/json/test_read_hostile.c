@@ -40,7 +40,7 @@ static Status survive(const char *text, size_t size) {
     memcpy(copy, text, size);
     Simulation simulation;
     problem_clear(&problem);
-    Status status = read_json(copy, size, simulation_fields, &simulation, &problem);
+    Status status = json_parse(copy, size, simulation_fields, &simulation, &problem);
     free(copy);
     assert_true(status == STATUS_OK || status == STATUS_INVALID || status == STATUS_UNREADABLE);
     assert_int_equal(problem.status, status);
@@ -51,7 +51,7 @@ static Status survive(const char *text, size_t size) {
     fields_clear(simulation_fields, &simulation);
     if (status != STATUS_OK) {
         Bytes answer = {0};
-        write_problem(&answer, &problem, 400, NULL);
+        encode_problem(&answer, &problem, 400, NULL);
         json_t *parsed = json_loadb(answer.at, answer.count, JSON_REJECT_DUPLICATES, NULL);
         if (parsed == NULL)
             fail_msg("no JSON: %s", answer.at);
@@ -213,8 +213,8 @@ static void nesting_is_allowed_to_32(void **state) {
             text[size++] = ']';
         text[size++] = '}';
         const Status status = survive(text, size);
-        assert_int_equal(status, depth <= READ_DEPTH ? STATUS_INVALID : STATUS_UNREADABLE);
-        if (depth == READ_DEPTH + 1) {
+        assert_int_equal(status, depth <= JSON_DEPTH_MAX ? STATUS_INVALID : STATUS_UNREADABLE);
+        if (depth == JSON_DEPTH_MAX + 1) {
             assert_string_equal(problem.faults[0].pointer,
                                 "/a/0/0/0/0/0/0/0/0/0/0/0/0/0/0/0/0/0/0/0/0/0/0/0/0/0/0/0/0/0/0/0");
             assert_string_equal(

@@ -51,7 +51,7 @@ static void elements_are_found_where_they_stand(void **state) {
 static void an_array_behind_too_many_brackets_is_none(void **state) {
     (void)state;
     char text[128] = "{\"all\": [", found[128];
-    memset(text + strlen(text), '[', READ_DEPTH + 1);
+    memset(text + strlen(text), '[', JSON_DEPTH_MAX + 1);
     assert_string_equal(elements(text, found, sizeof found), "none");
 }
 
@@ -67,13 +67,13 @@ static void a_part_is_read_with_its_place_in_the_whole(void **state) {
     One one;
     assert_true(scan_list(text, strlen(text), "all", &list));
     assert_true(scan_element(&list));
-    assert_int_equal(read_json_part(text, strlen(text), list.first, list.count, "/all/0", fields,
-                                    &one, &problem),
+    assert_int_equal(json_parse_part(text, strlen(text), list.first, list.count, "/all/0", fields,
+                                     &one, &problem),
                      STATUS_OK);
     assert_true(one.x == 1);
     assert_true(scan_element(&list));
-    assert_int_equal(read_json_part(text, strlen(text), list.first, list.count, "/all/1", fields,
-                                    &one, &problem),
+    assert_int_equal(json_parse_part(text, strlen(text), list.first, list.count, "/all/1", fields,
+                                     &one, &problem),
                      STATUS_UNREADABLE);
     assert_string_equal(problem.faults[0].pointer, "/all/1/x");
     assert_non_null(strstr(problem.faults[0].detail, "line 3, column 10"));
@@ -90,13 +90,13 @@ static void a_value_alone_is_read_by_its_row(void **state) {
         FIELD_REALS(One, numbers, NULL, ANY, 10, PRESENCE_OPTIONAL, "numbers"), FIELD_END};
     Problem problem = {.count = 0};
     One one = {NULL, {NULL, 0}};
-    assert_int_equal(read_json_value("null", 4, &fields[0], &one, "/2/text", &problem), STATUS_OK);
+    assert_int_equal(json_parse_value("null", 4, &fields[0], &one, "/2/text", &problem), STATUS_OK);
     assert_string_equal(one.text, ""); // not absent
-    assert_int_equal(read_json_value("[1,2]", 5, &fields[1], &one, "", &problem), STATUS_OK);
+    assert_int_equal(json_parse_value("[1,2]", 5, &fields[1], &one, "", &problem), STATUS_OK);
     assert_int_equal(one.numbers.count, 2);
-    assert_int_equal(read_json_value("\"too long\"", 10, &fields[0], &one, "/2/text", &problem),
+    assert_int_equal(json_parse_value("\"too long\"", 10, &fields[0], &one, "/2/text", &problem),
                      STATUS_INVALID);
-    assert_int_equal(read_json_value("[1", 2, &fields[1], &one, "/3/numbers", &problem),
+    assert_int_equal(json_parse_value("[1", 2, &fields[1], &one, "/3/numbers", &problem),
                      STATUS_INVALID);
     assert_int_equal(problem.status, STATUS_INVALID);
     assert_string_equal(problem.faults[0].pointer, "/2/text");

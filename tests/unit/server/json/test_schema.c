@@ -34,7 +34,7 @@ static void check(const json_t *at, const char *path, const char *expected) {
 static void every_kind_of_row_has_its_schema(void **state) {
     (void)state;
     Bytes bytes = {0};
-    describe_schema(&bytes, "/schemas/whole", "A whole", whole_fields);
+    schema_write(&bytes, "/schemas/whole", "A whole", whole_fields);
     assert_int_equal(bytes.at[bytes.count - 1], '\n');
     json_t *schema = json_loadb(bytes.at, bytes.count, JSON_REJECT_DUPLICATES, NULL);
     assert_non_null(schema);

@@ -14,12 +14,13 @@
 static void spectra_read_back_with_the_frequency_first(void **state) {
     (void)state;
     Columns columns;
-    assert_int_equal(kept_spectra("{\"method\": \"welch\", \"frequency\": {\"unit\": \"Hz\", "
-                                  "\"values\": [0, 0.1]}, \"channels\": {\"a\": {\"unit\": \"m\", "
-                                  "\"values\": [1e-300, null]}, \"b\": {\"unit\": \"s\", "
-                                  "\"values\": [2, 3]}}}",
-                                  &columns, NULL),
-                     STATUS_OK);
+    assert_int_equal(
+        stored_spectra("{\"method\": \"welch\", \"frequency\": {\"unit\": \"Hz\", "
+                       "\"values\": [0, 0.1]}, \"channels\": {\"a\": {\"unit\": \"m\", "
+                       "\"values\": [1e-300, null]}, \"b\": {\"unit\": \"s\", "
+                       "\"values\": [2, 3]}}}",
+                       &columns, NULL),
+        STATUS_OK);
     assert_int_equal(columns.count, 3);
     assert_int_equal(columns.rows, 2);
     assert_string_equal(columns.at[0].name, "frequency");
@@ -33,10 +34,10 @@ static void impacts_read_back_one_by_one(void **state) {
     (void)state;
     Impacts impacts;
     assert_int_equal(
-        kept_impacts("{\"count\": 1, \"resting\": 1, \"impacts\": [{\"kind\": \"impact\", "
-                     "\"start\": 0.1, \"end\": null, \"damper\": 2, \"side\": \"right\"}, "
-                     "{\"kind\": \"resting\", \"start\": 1, \"of_another_engine\": 1}]}",
-                     &impacts, NULL),
+        stored_impacts("{\"count\": 1, \"resting\": 1, \"impacts\": [{\"kind\": \"impact\", "
+                       "\"start\": 0.1, \"end\": null, \"damper\": 2, \"side\": \"right\"}, "
+                       "{\"kind\": \"resting\", \"start\": 1, \"of_another_engine\": 1}]}",
+                       &impacts, NULL),
         STATUS_OK);
     assert_int_equal(impacts.count, 2);
     assert_true(impacts.at[0].start == 0.1 && isnan(impacts.at[0].end));
@@ -44,7 +45,8 @@ static void impacts_read_back_one_by_one(void **state) {
     assert_int_equal(impacts.at[1].kind, IMPACT_RESTING);
     free(impacts.at);
     assert_int_equal(
-        kept_impacts("{\"count\": 0, \"resting\": 0, \"impacts\": []}", &impacts, NULL), STATUS_OK);
+        stored_impacts("{\"count\": 0, \"resting\": 0, \"impacts\": []}", &impacts, NULL),
+        STATUS_OK);
     assert_int_equal(impacts.count, 0);
     free(impacts.at);
 }
@@ -73,7 +75,7 @@ static void a_window_of_impacts_stands_as_it_was_saved(void **state) {
     for (size_t i = 0; i < COUNT(cases); i++) {
         Bytes bytes = {.most = 1000};
         assert_int_equal(
-            kept_impacts_window(saved, &cases[i].window, cases[i].is_numbered, &bytes, NULL),
+            stored_impacts_window(saved, &cases[i].window, cases[i].is_numbered, &bytes, NULL),
             STATUS_OK);
         assert_string_equal(bytes.at, cases[i].expected);
         bytes_clear(&bytes);
@@ -104,18 +106,18 @@ static void what_was_not_written_so_is_refused(void **state) {
     };
     for (size_t i = 0; i < COUNT(spectra); i++) {
         Columns columns;
-        assert_int_equal(kept_spectra(spectra[i], &columns, NULL), STATUS_INTERNAL);
+        assert_int_equal(stored_spectra(spectra[i], &columns, NULL), STATUS_INTERNAL);
         assert_null(columns.block);
     }
     for (size_t i = 0; i < COUNT(impacts); i++) {
         Impacts read;
-        assert_int_equal(kept_impacts(impacts[i], &read, NULL), STATUS_INTERNAL);
+        assert_int_equal(stored_impacts(impacts[i], &read, NULL), STATUS_INTERNAL);
         assert_null(read.at);
     }
     for (size_t i = 0; i < 3; i++) {
         Bytes bytes = {.most = 1000};
         assert_int_equal(
-            kept_impacts_window(impacts[i], &(ImpactWindow){0, 9, 1, 9}, true, &bytes, NULL),
+            stored_impacts_window(impacts[i], &(ImpactWindow){0, 9, 1, 9}, true, &bytes, NULL),
             STATUS_INTERNAL);
         bytes_clear(&bytes);
     }

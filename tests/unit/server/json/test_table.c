@@ -31,14 +31,14 @@ static void numbers_stand_to_the_right_and_unknown_cells_are_marked(void **state
     char *text = NULL;
     size_t size;
     FILE *file = open_memstream(&text, &size);
-    Listing listing = {.columns = 3, .has_heads = true};
+    PrintTable listing = {.columns = 3, .has_heads = true};
     static const char *const cells[] = {"name", "n", "note", "\xc3\xa4", "", "x", "bb", "12.5", ""};
     for (size_t i = 0; i < COUNT(cells); i++)
-        listing_add(&listing, "%s", cells[i]);
-    listing_print(&listing, file);
-    listing_number(&listing, "%.1f", 1);
-    listing_number(&listing, "%.1f", (double)NAN);
-    listing_print(&listing, file);
+        print_table_add(&listing, "%s", cells[i]);
+    print_table_print(&listing, file);
+    print_table_number(&listing, "%.1f", 1);
+    print_table_number(&listing, "%.1f", (double)NAN);
+    print_table_print(&listing, file);
     fclose(file);
     assert_string_equal(text, "name     n  note\n"
                               "\xc3\xa4        -  x\n"
@@ -50,13 +50,13 @@ static void numbers_stand_to_the_right_and_unknown_cells_are_marked(void **state
 // What is printed of a document.
 static Status printed(const char *json, char **text, size_t *longest) {
     static const char *const skipped[] = {"links", NULL};
-    static const ListingColumns lists[] = {{"rows", {"b", "a", "c"}}, {NULL, {NULL}}};
+    static const PrintTableColumns lists[] = {{"rows", {"b", "a", "c"}}, {NULL, {NULL}}};
     static const Field *const fields[] = {thing_fields, NULL};
-    static const ListingView view = {skipped, lists, fields};
+    static const PrintTableView view = {skipped, lists, fields};
     size_t size;
     *text = NULL;
     FILE *file = open_memstream(text, &size);
-    const Status status = listing_print_json(json, strlen(json), &view, file, longest, NULL);
+    const Status status = print_table_print_json(json, strlen(json), &view, file, longest, NULL);
     fclose(file);
     return status;
 }

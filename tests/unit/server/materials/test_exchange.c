@@ -16,7 +16,7 @@
 
 static Problem problem;
 
-static Status bring(Store *store, const char *text, const char *who, bool may_all,
+static Status bring(Db *store, const char *text, const char *who, bool may_all,
                     ImportTally *tally) {
     Exchange exchange = {.revision_room = 0};
     problem_clear(&problem);
@@ -28,19 +28,19 @@ static Status bring(Store *store, const char *text, const char *who, bool may_al
     return status;
 }
 
-static Store *open_store(void) {
-    Store *store;
-    assert_int_equal(store_open(NULL, &store, NULL), STATUS_OK);
+static Db *open_store(void) {
+    Db *store;
+    assert_int_equal(db_open(NULL, &store, NULL), STATUS_OK);
     return store;
 }
 
-static char *export_all(Store *store, bool is_table) {
+static char *export_all(Db *store, bool is_table) {
     Bytes bytes = {.most = 0};
-    ExchangeText text;
+    MaterialExport text;
     bool is_last = false;
-    assert_int_equal(exchange_text_open(store, is_table, &text, NULL), STATUS_OK);
+    assert_int_equal(material_export_open(store, is_table, &text, NULL), STATUS_OK);
     while (!is_last)
-        assert_int_equal(exchange_text_next(&text, &bytes, &is_last, NULL), STATUS_OK);
+        assert_int_equal(material_export_next(&text, &bytes, &is_last, NULL), STATUS_OK);
     char *whole = bytes_take(&bytes, NULL);
     assert_non_null(whole);
     return whole;
@@ -73,11 +73,11 @@ static void faults_are_told_at_their_places_and_nothing_is_written(void **state)
         {"slug,row,name\nsponge,measurement,X", "/2/name"},
         {"{\"format\": \"other\", \"version\": 1, \"materials\": []}", "/format"},
     };
-    Store *store = open_store();
+    Db *store = open_store();
     char *before = export_all(store, false);
     for (size_t i = 0; i < COUNT(cases); i++) {
         ImportTally tally;
-        const uint64_t generation = store_generation(store);
+        const uint64_t generation = db_catalog_version(store);
         assert_int_equal(bring(store, cases[i].text, NULL, true, &tally), STATUS_INVALID);
         bool is_told = false;
         for (size_t k = 0; k < problem.count; k++)
@@ -86,25 +86,25 @@ static void faults_are_told_at_their_places_and_nothing_is_written(void **state)
             print_error("%s: %s\n", cases[i].text, problem.detail);
         assert_true(is_told);
         assert_true(problem.count <= 2);
-        assert_true(store_generation(store) == generation);
+        assert_true(db_catalog_version(store) == generation);
     }
     char *after = export_all(store, false);
     assert_string_equal(before, after);
     free(after);
     free(before);
-    store_close(store);
+    db_close(store);
 }
 
 static void an_unknown_number_is_the_next_unless_the_newest_says_the_same(void **state) {
     (void)state;
-    Store *store = open_store();
+    Db *store = open_store();
     ImportTally tally;
-    const uint64_t generation = store_generation(store);
+    const uint64_t generation = db_catalog_version(store);
     static const char first[] = "slug,name,source,restitution\nx,X,s,0.5\n",
                       second[] = "slug,name,source,restitution,comment\nx,X,s,0.6,better\n";
     assert_int_equal(bring(store, first, NULL, true, &tally), STATUS_OK);
     assert_int_equal(tally.revisions.added, 1);
-    assert_true(store_generation(store) > generation);
+    assert_true(db_catalog_version(store) > generation);
     assert_int_equal(bring(store, first, NULL, true, &tally), STATUS_OK);
     assert_int_equal(tally.revisions.same, 1);
     assert_int_equal(bring(store, second, NULL, true, &tally), STATUS_OK);
@@ -114,17 +114,17 @@ static void an_unknown_number_is_the_next_unless_the_newest_says_the_same(void *
     assert_int_equal(bring(store, first, NULL, true, &tally), STATUS_OK);
     assert_int_equal(tally.revisions.added, 1);
     MaterialRevision newest = {0};
-    assert_int_equal(store_material(store, "x", 3, &newest, NULL), STATUS_OK);
+    assert_int_equal(db_material(store, "x", 3, &newest, NULL), STATUS_OK);
     assert_true(newest.material.restitution == 0.5);
     assert_string_equal(newest.comment, "imported");
     assert_null(newest.author);
     material_revision_clear(&newest);
-    store_close(store);
+    db_close(store);
 }
 
 static void who_may_not_speak_for_others_is_told_so(void **state) {
     (void)state;
-    Store *store = open_store();
+    Db *store = open_store();
     ImportTally tally;
     static const char by_bert[] = "slug,name,source,restitution,author\nx,X,s,0.5,bert\n",
                       by_nobody[] = "slug,name,source,restitution,author\nx,X,s,0.5,\n";
@@ -132,15 +132,15 @@ static void who_may_not_speak_for_others_is_told_so(void **state) {
     assert_string_equal(problem.faults[0].pointer, "/2/author");
     assert_int_equal(bring(store, by_nobody, "anna", false, &tally), STATUS_OK);
     MaterialRevision found = {0};
-    assert_int_equal(store_material(store, "x", 1, &found, NULL), STATUS_OK);
+    assert_int_equal(db_material(store, "x", 1, &found, NULL), STATUS_OK);
     assert_string_equal(found.author, "anna");
     material_revision_clear(&found);
-    store_close(store);
+    db_close(store);
 }
 
 static void both_kinds_of_exports_are_imports(void **state) {
     (void)state;
-    Store *store = open_store(), *others[2] = {open_store(), open_store()};
+    Db *store = open_store(), *others[2] = {open_store(), open_store()};
     ImportTally tally;
     static const char text[] =
         "row,slug,name,source,table,notes,test,reviews\r\n"
@@ -162,17 +162,17 @@ static void both_kinds_of_exports_are_imports(void **state) {
         free(back);
         free(document);
         free(whole);
-        store_close(others[i]);
+        db_close(others[i]);
     }
-    store_close(store);
+    db_close(store);
 }
 
 static void an_export_is_made_revision_by_revision(void **state) {
     (void)state;
-    Store *store = open_store();
+    Db *store = open_store();
     ImportTally tally;
     Bytes rows = {.most = 0}, piece = {.most = 0};
-    ExchangeText text;
+    MaterialExport text;
     bool is_last = false;
     size_t pieces = 0;
     bytes_text(&rows, "slug,number,name,source,restitution,notes\n");
@@ -180,16 +180,16 @@ static void an_export_is_made_revision_by_revision(void **state) {
         bytes_format(&rows, "x,%d,X,s,0.5,%0500d\n", i, i);
     char *table = bytes_take(&rows, NULL);
     assert_int_equal(bring(store, table, NULL, true, &tally), STATUS_OK);
-    assert_int_equal(exchange_text_open(store, false, &text, NULL), STATUS_OK);
+    assert_int_equal(material_export_open(store, false, &text, NULL), STATUS_OK);
     for (; !is_last; pieces++) {
-        assert_int_equal(exchange_text_next(&text, &piece, &is_last, NULL), STATUS_OK);
+        assert_int_equal(material_export_next(&text, &piece, &is_last, NULL), STATUS_OK);
         assert_true(piece.count < 2000);
         piece.count = 0;
     }
     assert_true(pieces > 55);
     bytes_clear(&piece);
     free(table);
-    store_close(store);
+    db_close(store);
 }
 
 int main(void) {

@@ -13,21 +13,21 @@
 static void expect_applied(const char *text, const char *wanted, size_t size) {
     char target[64];
     snprintf(target, sizeof target, "%s", text);
-    link_apply(target, size);
+    base_path_apply(target, size);
     assert_string_equal(target, wanted);
 }
 
 static void without_a_base_all_stays(void **state) {
     (void)state;
-    link_base_set("");
+    base_path_set("");
     expect_applied("/v1/jobs", "/v1/jobs", 64);
-    assert_string_equal(link_inside("/v1/jobs"), "/v1/jobs");
+    assert_string_equal(base_path_strip("/v1/jobs"), "/v1/jobs");
 }
 
 static void a_base_stands_before_each_path(void **state) {
     (void)state;
-    link_base_set("/sim");
-    assert_string_equal(link_base(), "/sim");
+    base_path_set("/sim");
+    assert_string_equal(base_path(), "/sim");
     expect_applied("", "", 64);
     expect_applied("/v1/jobs/j-1", "/sim/v1/jobs/j-1", 64);
     expect_applied("</v1/jobs>; rel=\"next\", </a>; rel=\"b\"",
@@ -35,18 +35,18 @@ static void a_base_stands_before_each_path(void **state) {
     expect_applied("https://example.org/v1", "https://example.org/v1", 64);
     expect_applied("/v1/jobs", "/v1/jobs", 12); // no room: as it was, not cut
     expect_applied("/v1/jobs", "/sim/v1/jobs", 13);
-    link_base_set("");
+    base_path_set("");
 }
 
 static void paths_come_in_with_and_without_it(void **state) {
     (void)state;
-    link_base_set("/sim");
-    assert_string_equal(link_inside("/sim/v1/jobs"), "/v1/jobs");
-    assert_string_equal(link_inside("/v1/jobs"), "/v1/jobs");
-    assert_string_equal(link_inside("/sim"), "/");
-    assert_string_equal(link_inside("/sim/"), "/");
-    assert_string_equal(link_inside("/simulation"), "/simulation");
-    link_base_set("");
+    base_path_set("/sim");
+    assert_string_equal(base_path_strip("/sim/v1/jobs"), "/v1/jobs");
+    assert_string_equal(base_path_strip("/v1/jobs"), "/v1/jobs");
+    assert_string_equal(base_path_strip("/sim"), "/");
+    assert_string_equal(base_path_strip("/sim/"), "/");
+    assert_string_equal(base_path_strip("/simulation"), "/simulation");
+    base_path_set("");
 }
 
 int main(void) {

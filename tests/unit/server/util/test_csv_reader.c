@@ -12,8 +12,8 @@
 
 #include "core/base/status.h"
 
-static void expect_row(CsvScan *scan, size_t row, size_t count, const char *const *cells) {
-    assert_true(csv_scan_next(scan));
+static void expect_row(CsvReader *scan, size_t row, size_t count, const char *const *cells) {
+    assert_true(csv_reader_next(scan));
     assert_int_equal(scan->row, row);
     assert_int_equal(scan->count, count);
     for (size_t i = 0; i < count; i++) {
@@ -22,56 +22,56 @@ static void expect_row(CsvScan *scan, size_t row, size_t count, const char *cons
     }
 }
 
-static CsvScan scan_of(const char *text) {
-    return (CsvScan){.text = text, .size = strlen(text)};
+static CsvReader scan_of(const char *text) {
+    return (CsvReader){.text = text, .size = strlen(text)};
 }
 
-static void cells_are_parted_by_commas_and_rows_by_any_end_of_line(void **state) {
+static void csv_cells_are_parted_by_commas_and_rows_by_any_end_of_line(void **state) {
     (void)state;
     static const char *const ends[] = {"\n", "\r\n", "\r"};
     for (size_t i = 0; i < COUNT(ends); i++) {
         char text[64];
         snprintf(text, sizeof text, "a,b%s%s,%sc,%s\"d\"", ends[i], ends[i], ends[i], ends[i]);
-        CsvScan scan = scan_of(text);
+        CsvReader scan = scan_of(text);
         expect_row(&scan, 1, 2, (const char *const[]){"a", "b"});
         // Row 2 is nothing and is passed over; row 3 has cells, but nothing in them.
         expect_row(&scan, 4, 2, (const char *const[]){"c", ""});
         expect_row(&scan, 5, 1, (const char *const[]){"d"});
-        assert_false(csv_scan_next(&scan));
+        assert_false(csv_reader_next(&scan));
         assert_false(scan.is_failed);
-        csv_scan_clear(&scan);
+        csv_reader_clear(&scan);
     }
 }
 
 static void quotes_hold_commas_lines_and_quotes(void **state) {
     (void)state;
-    CsvScan scan = scan_of("\"a,\r\nb\",\"say \"\"so\"\"\",\"\",5\" \n x ,\"y\" \n");
+    CsvReader scan = scan_of("\"a,\r\nb\",\"say \"\"so\"\"\",\"\",5\" \n x ,\"y\" \n");
     expect_row(&scan, 1, 4, (const char *const[]){"a,\r\nb", "say \"so\"", "", "5\" "});
     assert_true(scan.cells[2].is_quoted);
     assert_false(scan.cells[3].is_quoted);
     expect_row(&scan, 2, 2, (const char *const[]){" x ", "y"});
-    assert_false(csv_scan_next(&scan));
-    csv_scan_clear(&scan);
+    assert_false(csv_reader_next(&scan));
+    csv_reader_clear(&scan);
 }
 
 static void what_is_no_cell_is_told(void **state) {
     (void)state;
-    CsvScan scan = scan_of("\"a\"b,c\nx,\xffy\nz,\"open,\n\n");
-    assert_true(csv_scan_next(&scan));
+    CsvReader scan = scan_of("\"a\"b,c\nx,\xffy\nz,\"open,\n\n");
+    assert_true(csv_reader_next(&scan));
     assert_non_null(strstr(scan.cells[0].fault, "closing quote"));
     assert_string_equal(scan.cells[1].text, "c");
-    assert_true(csv_scan_next(&scan));
+    assert_true(csv_reader_next(&scan));
     assert_non_null(strstr(scan.cells[1].fault, "UTF-8"));
-    assert_true(csv_scan_next(&scan));
+    assert_true(csv_reader_next(&scan));
     assert_null(scan.cells[0].fault);
     assert_non_null(strstr(scan.cells[1].fault, "never closed"));
-    assert_false(csv_scan_next(&scan));
-    csv_scan_clear(&scan);
-    scan = (CsvScan){.text = "a\0b,c", .size = 5};
-    assert_true(csv_scan_next(&scan));
+    assert_false(csv_reader_next(&scan));
+    csv_reader_clear(&scan);
+    scan = (CsvReader){.text = "a\0b,c", .size = 5};
+    assert_true(csv_reader_next(&scan));
     assert_non_null(strstr(scan.cells[0].fault, "NUL"));
     assert_string_equal(scan.cells[1].text, "c");
-    csv_scan_clear(&scan);
+    csv_reader_clear(&scan);
 }
 
 static void a_row_has_so_many_cells_and_no_more(void **state) {
@@ -82,17 +82,17 @@ static void a_row_has_so_many_cells_and_no_more(void **state) {
     memset(text, ',', CELLS);
     text[CELLS] = '\0';
     text[0] = 'x';
-    CsvScan scan = scan_of(text);
-    assert_false(csv_scan_next(&scan));
+    CsvReader scan = scan_of(text);
+    assert_false(csv_reader_next(&scan));
     assert_true(scan.is_failed);
     assert_true(scan.count >= CSV_CELLS_MAX);
-    csv_scan_clear(&scan);
+    csv_reader_clear(&scan);
     free(text);
 }
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(cells_are_parted_by_commas_and_rows_by_any_end_of_line),
+        cmocka_unit_test(csv_cells_are_parted_by_commas_and_rows_by_any_end_of_line),
         cmocka_unit_test(quotes_hold_commas_lines_and_quotes),
         cmocka_unit_test(what_is_no_cell_is_told),
         cmocka_unit_test(a_row_has_so_many_cells_and_no_more),

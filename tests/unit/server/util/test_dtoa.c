@@ -1,4 +1,4 @@
-// The digits of shortest_write: their form, and that they read back to the same bits.
+// The digits of dtoa_write: their form, and that they read back to the same bits.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -20,7 +20,7 @@ enum { PATTERNS = IMPACTD_SANITIZED ? 300000 : 10000000 };
 static const char *written(double value) {
     static char text[SHORTEST_SIZE + 1];
     memset(text, '#', sizeof text);
-    const size_t length = shortest_write(text, value);
+    const size_t length = dtoa_write(text, value);
     assert_in_range(length, 1, SHORTEST_SIZE);
     text[length] = '\0';
     return text;
@@ -69,13 +69,13 @@ static void a_list_is_its_numbers_with_commas_between(void **state) {
     (void)state;
     static const double values[] = {0.25, (double)NAN, -0.0, 1e-9, -(double)INFINITY, 60};
     char text[COUNT(values) * (SHORTEST_SIZE + 1)];
-    size_t length = shortest_list(text, values, COUNT(values));
+    size_t length = dtoa_list(text, values, COUNT(values));
     text[length] = '\0';
     assert_string_equal(text, "0.25,null,-0.0,1e-9,null,60");
-    length = shortest_list(text, values, 1);
+    length = dtoa_list(text, values, 1);
     text[length] = '\0';
     assert_string_equal(text, "0.25");
-    assert_int_equal(shortest_list(text, values, 0), 0);
+    assert_int_equal(dtoa_list(text, values, 0), 0);
 }
 
 // JSON's number: -?(0|[1-9][0-9]*)(\.[0-9]+)?([eE][+-]?[0-9]+)?

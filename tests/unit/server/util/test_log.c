@@ -11,7 +11,7 @@
 
 static void expect(const char *text, size_t most, const char *wanted) {
     Bytes line = {0};
-    journal_put(&line, "a", text, most);
+    log_put(&line, "a", text, most);
     assert_string_equal(line.at != NULL ? line.at : "", wanted);
     bytes_clear(&line);
 }

@@ -22,7 +22,7 @@ static void a_histogram_counts_each_sample_under_its_edge(void **state) {
     histogram_add(&histogram, -5); // a clock may not go back, but a count must not be lost
     assert_int_equal(histogram_count(&histogram), 6);
     Bytes bytes = {0};
-    tally_histogram(&bytes, "x_seconds", "a=\"b\"", &histogram);
+    metrics_histogram(&bytes, "x_seconds", "a=\"b\"", &histogram);
     assert_non_null(strstr(bytes.at, "x_seconds_bucket{a=\"b\",le=\"0.0001\"} 3\n"));
     assert_non_null(strstr(bytes.at, "x_seconds_bucket{a=\"b\",le=\"0.00025\"} 4\n"));
     assert_non_null(strstr(bytes.at, "x_seconds_bucket{a=\"b\",le=\"60\"} 5\n"));
@@ -35,8 +35,8 @@ static void a_histogram_counts_each_sample_under_its_edge(void **state) {
 static void families_are_written_as_prometheus_reads_them(void **state) {
     (void)state;
     Bytes bytes = {0};
-    tally_counter(&bytes, "a_total", "Counted.", UINT64_C(18446744073709551615));
-    tally_gauge(&bytes, "b", "Now.", 0.1);
+    metrics_counter(&bytes, "a_total", "Counted.", UINT64_C(18446744073709551615));
+    metrics_gauge(&bytes, "b", "Now.", 0.1);
     assert_string_equal(bytes.at, "# HELP a_total Counted.\n# TYPE a_total counter\n"
                                   "a_total 18446744073709551615\n"
                                   "# HELP b Now.\n# TYPE b gauge\nb 0.1\n");

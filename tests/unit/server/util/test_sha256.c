@@ -12,11 +12,11 @@
 static void digests_are_those_of_the_standard(void **state) {
     (void)state;
     char text[65];
-    digest_end(digest_new(), text);
+    sha256_end(sha256_new(), text);
     assert_string_equal(text, "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
-    Digest *digest = digest_new();
-    digest_take(digest, "abc", 3);
-    digest_end(digest, text);
+    Sha256 *digest = sha256_new();
+    sha256_add(digest, "abc", 3);
+    sha256_end(digest, text);
     assert_string_equal(text, "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
 }
 
@@ -24,12 +24,12 @@ static void the_pieces_do_not_matter(void **state) {
     (void)state;
     char text[65], block[1000];
     memset(block, 'a', sizeof block);
-    Digest *digest = digest_new();
+    Sha256 *digest = sha256_new();
     for (int i = 0; i < 1000; i++) {
-        digest_take(digest, block, 1);
-        digest_take(digest, block, sizeof block - 1);
+        sha256_add(digest, block, 1);
+        sha256_add(digest, block, sizeof block - 1);
     }
-    digest_end(digest, text);
+    sha256_end(digest, text);
     assert_string_equal(text, "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
 }
 

@@ -26,7 +26,7 @@ static void upper_and_lower_case_of_any_script_are_one(void **state) {
     for (size_t i = 0; i < COUNT(cases); i++) {
         Bytes bytes = {0};
         bytes_text(&bytes, "|");
-        fold_put(&bytes, cases[i][0]);
+        utf8_fold(&bytes, cases[i][0]);
         assert_string_equal(bytes.at + 1, cases[i][1]);
         bytes_clear(&bytes);
     }
