@@ -12,13 +12,13 @@
 #include "server/jobs/jobs.h"
 
 struct App {
-    Db *store;
-    JobManager *intake;
-    BackgroundTasks *asides; // for readers of what takes a run
-    const struct RequestMetrics *meter;
-    struct ResponseCache *hot;
-    _Atomic(struct Server *) listener; // NULL until it is open
-    size_t reply_most;                 // bytes of one answer
+    Db *db;
+    JobManager *manager;
+    BackgroundTasks *background_tasks; // for readers of what takes a run
+    const struct RequestMetrics *request_metrics;
+    struct ResponseCache *response_cache;
+    _Atomic(struct Server *) server; // NULL until it is open
+    size_t reply_most;               // bytes of one answer
     char base_url[256]; // as clients see us, without a slash at its end; "": by their Host
     bool has_tls;
     int64_t started_unix_ms;

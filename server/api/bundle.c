@@ -61,18 +61,19 @@ static Status put_document(Zip *zip, const char *name, const char *text, Problem
     return put_text(zip, name, &bytes, problem);
 }
 
-static Status put_series(Zip *zip, const Response *response, ColumnReply *sheet, Problem *problem) {
+static Status put_series(Zip *zip, const Response *response, ColumnReply *column_reply,
+                         Problem *problem) {
     Segments content = {.size = 0};
-    TRY(column_reply_make(sheet, response->series.count, problem));
+    TRY(column_reply_make(column_reply, response->series.count, problem));
     for (size_t i = 0; i < response->series.count; i++)
-        sheet->chosen[i] = &response->series.at[i];
-    sheet->table = (Table){.axis_name = "time",
-                           .axis_unit = "s",
-                           .axis_rate = response->sample_rate,
-                           .count = response->count,
-                           .columns = sheet->chosen,
-                           .column_count = response->series.count};
-    Status status = encoder_npz.lay(&sheet->table, &content, problem);
+        column_reply->chosen[i] = &response->series.at[i];
+    column_reply->table = (Table){.axis_name = "time",
+                                  .axis_unit = "s",
+                                  .axis_rate = response->sample_rate,
+                                  .count = response->count,
+                                  .columns = column_reply->chosen,
+                                  .column_count = response->series.count};
+    Status status = encoder_npz.lay(&column_reply->table, &content, problem);
     if (status == STATUS_OK)
         status = zip_put(zip, "series.npz", &content, problem);
     segments_clear(&content);
@@ -81,23 +82,23 @@ static Status put_series(Zip *zip, const Response *response, ColumnReply *sheet,
 
 static Status put_spectra(Zip *zip, const char *document, Problem *problem) {
     Bytes bytes = {.most = 0};
-    ColumnReply sheet = {.encoding = NULL};
+    ColumnReply column_reply = {.encoding = NULL};
     Status status = put_document(zip, "psd.json", document, problem);
     if (status == STATUS_OK)
-        status = column_reply_psd(&sheet, document, problem);
+        status = column_reply_psd(&column_reply, document, problem);
     if (status == STATUS_OK)
-        status = encoding_write(&encoder_csv, &sheet.table, &bytes, problem);
+        status = encoding_write(&encoder_csv, &column_reply.table, &bytes, problem);
     if (status == STATUS_OK)
         status = put_text(zip, "psd.csv", &bytes, problem);
     bytes_clear(&bytes);
-    column_reply_clear(&sheet);
+    column_reply_clear(&column_reply);
     return status;
 }
 
 // The sheet keeps the outcome whose series the layout borrows.
-static Status fill(Zip *zip, const ResultRow *row, Bytes *manifest, ColumnReply *sheet,
+static Status fill(Zip *zip, const ResultRow *row, Bytes *manifest, ColumnReply *column_reply,
                    Problem *problem) {
-    const Response *response = &sheet->outcome->response;
+    const Response *response = &column_reply->outcome->response;
     Bytes readme = {.most = 0}, result = {.most = 0}, impacts = {.most = 0};
     bytes_format(&readme, about, row->id, row->engine, row->engine, row->id);
     TRY(put_text(zip, "README.txt", &readme, problem));
@@ -109,7 +110,7 @@ static Status fill(Zip *zip, const ResultRow *row, Bytes *manifest, ColumnReply 
     }
     TRY(put_text(zip, "result.json", &result, problem));
     TRY(put_text(zip, "manifest.json", manifest, problem));
-    TRY(put_series(zip, response, sheet, problem));
+    TRY(put_series(zip, response, column_reply, problem));
     const char *spectra = results_document(row, DOCUMENT_PSD);
     if (spectra != NULL)
         TRY(put_spectra(zip, spectra, problem));
@@ -120,31 +121,32 @@ static Status fill(Zip *zip, const ResultRow *row, Bytes *manifest, ColumnReply 
 }
 
 static Status pack(App *app, Reply *reply, const ResultRow *row, Bytes *manifest,
-                   ColumnReply *sheet, Problem *problem) {
+                   ColumnReply *column_reply, Problem *problem) {
     Segments layout = {.size = 0};
     Zip zip = {.layout = &layout};
-    Status status = fill(&zip, row, manifest, sheet, problem);
+    Status status = fill(&zip, row, manifest, column_reply, problem);
     const Status ended = zip_end(&zip, status == STATUS_OK ? problem : NULL);
     status = status != STATUS_OK ? status : ended;
     if (status == STATUS_OK)
-        return columns_reply_segments(app, reply, "application/zip", &layout, sheet, problem);
+        return columns_reply_segments(app, reply, "application/zip", &layout, column_reply,
+                                      problem);
     segments_clear(&layout);
-    column_reply_clear(sheet);
+    column_reply_clear(column_reply);
     return status;
 }
 
 Status results_bundle(App *app, const Request *request, Reply *reply, Problem *problem) {
     ResultRow row = {.count = 0};
     Bytes manifest = {.most = app->reply_most};
-    ColumnReply sheet = {.encoding = NULL};
-    Status status = db_result_load(app->store, request->parameters[0], &row, problem);
+    ColumnReply column_reply = {.encoding = NULL};
+    Status status = db_result_load(app->db, request->parameters[0], &row, problem);
     if (status == STATUS_OK)
         status = manifest_put(app, &row, &manifest, problem);
     // The manifest tells all that may change: a material's status and the base of the links.
     if (status == STATUS_OK && !results_tagged(request, reply, &row, "bundle", &manifest)) {
-        status = columns_choose(app, request, reply, &sheet.outcome, problem);
-        if (status == STATUS_OK && sheet.outcome != NULL)
-            status = pack(app, reply, &row, &manifest, &sheet, problem);
+        status = columns_choose(app, request, reply, &column_reply.outcome, problem);
+        if (status == STATUS_OK && column_reply.outcome != NULL)
+            status = pack(app, reply, &row, &manifest, &column_reply, problem);
     }
     bytes_clear(&manifest);
     result_row_clear(&row);

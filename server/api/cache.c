@@ -23,21 +23,21 @@ static void put_layer(Bytes *bytes, const char *name, const CacheStats *layer, b
 
 Status cache_show(App *app, const Request *request, Reply *reply, Problem *problem) {
     (void)request;
-    JobStats tally;
+    JobStats metrics;
     Bytes bytes = {.most = app->reply_most};
-    jobs_tally(app->intake, &tally);
+    jobs_tally(app->manager, &metrics);
     bytes_text(&bytes, "{");
-    put_layer(&bytes, "documents", &tally.heads, true);
+    put_layer(&bytes, "documents", &metrics.heads, true);
     bytes_text(&bytes, ", ");
-    put_layer(&bytes, "series", &tally.series, true);
+    put_layer(&bytes, "series", &metrics.series, true);
     bytes_text(&bytes, ", ");
-    put_layer(&bytes, "results", &tally.rows, false);
+    put_layer(&bytes, "results", &metrics.rows, false);
     uint64_t count, size;
-    db_series_tally(app->store, &count, &size, &tally.stored.evictions);
-    tally.stored.count = count;
-    tally.stored.bytes = size;
+    db_series_tally(app->db, &count, &size, &metrics.stored.evictions);
+    metrics.stored.count = count;
+    metrics.stored.bytes = size;
     bytes_text(&bytes, ", ");
-    put_layer(&bytes, "stored_series", &tally.stored, true);
+    put_layer(&bytes, "stored_series", &metrics.stored, true);
     bytes_text(&bytes, "}\n");
     return reply_bytes(reply, 200, type_json, &bytes, problem);
 }
@@ -73,7 +73,7 @@ static Status find_nearest(App *app, const char *scene, Bytes *bytes, Problem *p
     ResultRows rows = {NULL, 0};
     Differences least = {0};
     const ResultRow *nearest = NULL;
-    TRY(db_result_recent(app->store, RECENT_MAX, SCENE_MAX, &rows, problem));
+    TRY(db_result_recent(app->db, RECENT_MAX, SCENE_MAX, &rows, problem));
     for (size_t i = 0; i < rows.count; i++) {
         Differences other;
         const Status status = json_diff(scene, rows.at[i].scene, NULL, &other, NULL);
@@ -97,18 +97,18 @@ static Status find_nearest(App *app, const char *scene, Bytes *bytes, Problem *p
 
 static Status explain(App *app, const StudyRequest *inquiry, Bytes *bytes, Problem *problem) {
     char result[72];
-    CacheLayers layers;
+    CacheLayers cache_layers;
     Bytes scene = {.most = app->reply_most};
     jobs_result_id(inquiry, result);
-    jobs_layers(app->intake, result, &layers);
-    const bool is_known = layers.in_memory || layers.in_database;
+    jobs_layers(app->manager, result, &cache_layers);
+    const bool is_known = cache_layers.in_memory || cache_layers.in_database;
     bytes_format(bytes, "{\"result\": \"%s\", \"engine\": ", result);
     bytes_json_string(bytes, engine_version);
     bytes_format(bytes,
                  ", \"cached\": %s, \"layers\": {\"memory\": %s, \"database\": %s, "
                  "\"series_memory\": %s, \"series_database\": %s}, \"nearest\": ",
-                 flag(is_known), flag(layers.in_memory), flag(layers.in_database),
-                 flag(layers.series_in_memory), flag(layers.series_in_database));
+                 flag(is_known), flag(cache_layers.in_memory), flag(cache_layers.in_database),
+                 flag(cache_layers.series_in_memory), flag(cache_layers.series_in_database));
     Status status = STATUS_OK;
     if (is_known) {
         bytes_text(bytes, "null");
@@ -128,11 +128,11 @@ Status cache_explain(App *app, const Request *request, Reply *reply, Problem *pr
     Bytes bytes = {.most = app->reply_most};
     TRY(body_require_json(request, problem));
     bool has_place = false;
-    Status status = jobs_charge(app->intake, request->client, problem);
+    Status status = jobs_charge(app->manager, request->client, problem);
     if (status == STATUS_OK)
-        status = jobs_prepare_request(app->intake, request->body, request->body_size, NULL,
+        status = jobs_prepare_request(app->manager, request->body, request->body_size, NULL,
                                       &has_place, &inquiry, &warnings, problem);
-    jobs_leave_place(app->intake, has_place);
+    jobs_leave_place(app->manager, has_place);
     if (status == STATUS_OK)
         status = explain(app, &inquiry, &bytes, problem);
     if (status == STATUS_OK)

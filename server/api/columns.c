@@ -19,39 +19,40 @@ enum { WHOLE_MAX = 4 << 20 };
 
 static const double outcome_wait_most = 60; // [s]
 
-void column_reply_clear(ColumnReply *sheet) {
-    encoding_close(sheet->encoding);
-    free(sheet->chosen);
-    columns_clear(&sheet->own);
-    outcome_unref(sheet->outcome);
-    *sheet = (ColumnReply){.encoding = NULL};
+void column_reply_clear(ColumnReply *column_reply) {
+    encoding_close(column_reply->encoding);
+    free(column_reply->chosen);
+    columns_clear(&column_reply->own);
+    outcome_unref(column_reply->outcome);
+    *column_reply = (ColumnReply){.encoding = NULL};
 }
 
-Status column_reply_make(ColumnReply *sheet, size_t count, Problem *problem) {
-    sheet->chosen = calloc(count + 1, sizeof *sheet->chosen);
-    sheet->table.columns = sheet->chosen;
-    return sheet->chosen != NULL ? STATUS_OK
-                                 : problem_set(problem, STATUS_NO_MEMORY, "no memory for columns");
+Status column_reply_make(ColumnReply *column_reply, size_t count, Problem *problem) {
+    column_reply->chosen = calloc(count + 1, sizeof *column_reply->chosen);
+    column_reply->table.columns = column_reply->chosen;
+    return column_reply->chosen != NULL
+               ? STATUS_OK
+               : problem_set(problem, STATUS_NO_MEMORY, "no memory for columns");
 }
 
-Status column_reply_own(ColumnReply *sheet, Problem *problem) {
-    free(sheet->chosen);
-    TRY(column_reply_make(sheet, sheet->own.count, problem));
-    sheet->table.column_count = sheet->own.count;
-    sheet->table.count = sheet->own.rows;
-    for (size_t i = 0; i < sheet->own.count; i++)
-        sheet->chosen[i] = &sheet->own.at[i];
+Status column_reply_own(ColumnReply *column_reply, Problem *problem) {
+    free(column_reply->chosen);
+    TRY(column_reply_make(column_reply, column_reply->own.count, problem));
+    column_reply->table.column_count = column_reply->own.count;
+    column_reply->table.count = column_reply->own.rows;
+    for (size_t i = 0; i < column_reply->own.count; i++)
+        column_reply->chosen[i] = &column_reply->own.at[i];
     return STATUS_OK;
 }
 
-Status column_reply_own_axis(ColumnReply *sheet, Problem *problem) {
-    TRY(column_reply_own(sheet, problem));
-    Table *table = &sheet->table;
-    const Column *axis = &sheet->own.at[0];
+Status column_reply_own_axis(ColumnReply *column_reply, Problem *problem) {
+    TRY(column_reply_own(column_reply, problem));
+    Table *table = &column_reply->table;
+    const Column *axis = &column_reply->own.at[0];
     table->axis_name = axis->name;
     table->axis_unit = axis->unit;
     table->axis = axis->values;
-    table->columns = sheet->chosen + 1;
+    table->columns = column_reply->chosen + 1;
     table->column_count--;
     return STATUS_OK;
 }
@@ -76,8 +77,8 @@ Status columns_window(const Request *request, size_t count, Table *table, Proble
     return STATUS_OK;
 }
 
-Status columns_downsample(const Request *request, ColumnReply *sheet, Problem *problem) {
-    Table *table = &sheet->table;
+Status columns_downsample(const Request *request, ColumnReply *column_reply, Problem *problem) {
+    Table *table = &column_reply->table;
     Columns buckets;
     size_t most;
     if (request_query(request, "points") == NULL)
@@ -87,9 +88,9 @@ Status columns_downsample(const Request *request, ColumnReply *sheet, Problem *p
     const size_t bucket = (samples + most - 1) / most;
     TRY(downsample(table->columns, table->column_count, table->first, samples, bucket, &buckets,
                    problem));
-    columns_clear(&sheet->own);
-    sheet->own = buckets;
-    TRY(column_reply_own(sheet, problem));
+    columns_clear(&column_reply->own);
+    column_reply->own = buckets;
+    TRY(column_reply_own(column_reply, problem));
     // Without channels too there is a time for each.
     table->count = (samples + bucket - 1) / bucket;
     table->bucket = bucket;
@@ -134,7 +135,7 @@ Status columns_format(const Request *request, size_t parameter, bool has_chart, 
 Status columns_choose(App *app, const Request *request, Reply *reply, Outcome **outcome,
                       Problem *problem) {
     const char *id = request->parameters[0];
-    const Status status = jobs_outcome(app->intake, id, request->waker, outcome, problem);
+    const Status status = jobs_outcome(app->manager, id, request->callback, outcome, problem);
     if (status == STATUS_GONE)
         results_link_gone(id, reply);
     if (status == STATUS_BUSY)
@@ -158,7 +159,7 @@ Status columns_outcome(App *app, const Request *request, Reply *reply, const cha
     char tag[104];
     snprintf(tag, sizeof tag, "%.72s-%s.%s", id, what, extension);
     // Nothing is computed anew for a client who has it.
-    if (request->if_none_match != NULL && !db_result_exists(app->store, id))
+    if (request->if_none_match != NULL && !db_result_exists(app->db, id))
         return problem_set(problem, STATUS_NOT_FOUND, "there is no result %.80s", id);
     return reply_immutable(reply, request, tag)
                ? STATUS_OK
@@ -180,15 +181,15 @@ static void stream_release(void *context) {
 }
 
 // Takes what `sheet` holds, which has its encoding.
-static Status reply_stream(Reply *reply, const char *content_type, ColumnReply *sheet,
+static Status reply_stream(Reply *reply, const char *content_type, ColumnReply *column_reply,
                            Problem *problem) {
     ColumnReply *kept = malloc(sizeof *kept);
     if (kept == NULL) {
-        column_reply_clear(sheet);
+        column_reply_clear(column_reply);
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the answer");
     }
-    *kept = *sheet;
-    *sheet = (ColumnReply){.encoding = NULL};
+    *kept = *column_reply;
+    *column_reply = (ColumnReply){.encoding = NULL};
     reply_borrow(reply, 200, content_type, NULL, 0);
     reply->stream =
         (Stream){.next = stream_next, .size = encoding_size(kept->encoding), .cut = stream_cut};
@@ -203,49 +204,50 @@ static bool is_short(const Table *table) {
     return table->count <= most / (table->column_count + 1);
 }
 
-static Status reply_whole(App *app, Reply *reply, const char *content_type, ColumnReply *sheet,
-                          Problem *problem) {
+static Status reply_whole(App *app, Reply *reply, const char *content_type,
+                          ColumnReply *column_reply, Problem *problem) {
     Bytes bytes = {.most = app->reply_most};
-    const size_t size = (size_t)encoding_size(sheet->encoding);
+    const size_t size = (size_t)encoding_size(column_reply->encoding);
     if (bytes_reserve(&bytes, size)) {
-        bytes.count = encoding_next(sheet->encoding, bytes.at, size);
+        bytes.count = encoding_next(column_reply->encoding, bytes.at, size);
         bytes.at[bytes.count] = '\0';
     }
-    column_reply_clear(sheet);
+    column_reply_clear(column_reply);
     return reply_bytes(reply, 200, content_type, &bytes, problem);
 }
 
-Status columns_reply(App *app, Reply *reply, const TableFormat *encoder, ColumnReply *sheet,
+Status columns_reply(App *app, Reply *reply, const TableFormat *encoder, ColumnReply *column_reply,
                      Problem *problem) {
     reply->accepts_ranges = encoder->is_binary;
-    if (!encoder->is_binary && is_short(&sheet->table)) {
+    if (!encoder->is_binary && is_short(&column_reply->table)) {
         Bytes bytes = {.most = app->reply_most};
-        const Status status = encoding_write(encoder, &sheet->table, &bytes, problem);
-        column_reply_clear(sheet);
+        const Status status = encoding_write(encoder, &column_reply->table, &bytes, problem);
+        column_reply_clear(column_reply);
         if (status == STATUS_OK)
             return reply_bytes(reply, 200, encoder->content_type, &bytes, problem);
         bytes_clear(&bytes);
         return status;
     }
-    const Status status = encoding_open(encoder, &sheet->table, &sheet->encoding, problem);
+    const Status status =
+        encoding_open(encoder, &column_reply->table, &column_reply->encoding, problem);
     if (status != STATUS_OK) {
-        column_reply_clear(sheet);
+        column_reply_clear(column_reply);
         return status;
     }
-    if (encoding_size(sheet->encoding) <= WHOLE_MAX)
-        return reply_whole(app, reply, encoder->content_type, sheet, problem);
-    return reply_stream(reply, encoder->content_type, sheet, problem);
+    if (encoding_size(column_reply->encoding) <= WHOLE_MAX)
+        return reply_whole(app, reply, encoder->content_type, column_reply, problem);
+    return reply_stream(reply, encoder->content_type, column_reply, problem);
 }
 
 Status columns_reply_segments(App *app, Reply *reply, const char *content_type, Segments *layout,
-                              ColumnReply *sheet, Problem *problem) {
+                              ColumnReply *column_reply, Problem *problem) {
     reply->accepts_ranges = true;
-    const Status status = encoding_open_layout(layout, &sheet->encoding, problem);
+    const Status status = encoding_open_layout(layout, &column_reply->encoding, problem);
     if (status != STATUS_OK) {
-        column_reply_clear(sheet);
+        column_reply_clear(column_reply);
         return status;
     }
-    if (encoding_size(sheet->encoding) <= WHOLE_MAX)
-        return reply_whole(app, reply, content_type, sheet, problem);
-    return reply_stream(reply, content_type, sheet, problem);
+    if (encoding_size(column_reply->encoding) <= WHOLE_MAX)
+        return reply_whole(app, reply, content_type, column_reply, problem);
+    return reply_stream(reply, content_type, column_reply, problem);
 }

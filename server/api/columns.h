@@ -16,24 +16,24 @@ typedef struct ColumnReply {
     Encoding *encoding;    // made by columns_reply
 } ColumnReply;
 
-void column_reply_clear(ColumnReply *sheet);
+void column_reply_clear(ColumnReply *column_reply);
 // Room for `count` columns in sheet->chosen.
-Status column_reply_make(ColumnReply *sheet, size_t count, Problem *problem);
+Status column_reply_make(ColumnReply *column_reply, size_t count, Problem *problem);
 // Chooses all columns that are the sheet's own.
-Status column_reply_own(ColumnReply *sheet, Problem *problem);
+Status column_reply_own(ColumnReply *column_reply, Problem *problem);
 
 // The same with the first of them as the axis.
-Status column_reply_own_axis(ColumnReply *sheet, Problem *problem);
+Status column_reply_own_axis(ColumnReply *column_reply, Problem *problem);
 
 // "?from=&to=" [s]: which of `count` samples, at least one and at the table's rate, its rows are.
 // STATUS_USAGE: not numbers, or no sample is there.
 Status columns_window(const Request *request, size_t count, Table *table, Problem *problem);
 // "?points=n": least and largest value of the rows in at most n buckets, all of one size but the
 // last, are the sheet's own then. STATUS_USAGE: not a count.
-Status columns_downsample(const Request *request, ColumnReply *sheet, Problem *problem);
+Status columns_downsample(const Request *request, ColumnReply *column_reply, Problem *problem);
 
 // The table of spectra as they were saved. (ledgers.c)
-Status column_reply_psd(ColumnReply *sheet, const char *text, Problem *problem);
+Status column_reply_psd(ColumnReply *column_reply, const char *text, Problem *problem);
 
 // The encoder asked for by extension (a parameter of the path), else by Accept. `has_chart`: SVG is
 // one of the formats.
@@ -50,10 +50,10 @@ Status columns_choose(App *app, const Request *request, Reply *reply, Outcome **
                       Problem *problem);
 
 // Takes what `sheet` holds, also when it fails.
-Status columns_reply(App *app, Reply *reply, const TableFormat *encoder, ColumnReply *sheet,
+Status columns_reply(App *app, Reply *reply, const TableFormat *encoder, ColumnReply *column_reply,
                      Problem *problem);
 // The same of a document whose every byte has its place; the sheet holds what that borrows.
 Status columns_reply_segments(App *app, Reply *reply, const char *content_type, Segments *layout,
-                              ColumnReply *sheet, Problem *problem);
+                              ColumnReply *column_reply, Problem *problem);
 
 #endif

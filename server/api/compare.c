@@ -75,7 +75,7 @@ static Status show(App *app, char results[2][72], Outcome *const outcomes[SIDES]
     ResultRow rows[2] = {{.id = ""}, {.id = ""}};
     Status status = STATUS_OK;
     for (int i = 0; i < 2 && status == STATUS_OK; i++)
-        status = db_result_load(app->store, results[i], &rows[i], problem);
+        status = db_result_load(app->db, results[i], &rows[i], problem);
     if (status == STATUS_OK && (rows[0].scene == NULL || rows[1].scene == NULL ||
                                 rows[0].summary == NULL || rows[1].summary == NULL))
         status = problem_set(problem, STATUS_INTERNAL, "a stored result is not whole");

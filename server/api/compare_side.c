@@ -14,12 +14,12 @@ Status side_resolve(App *app, const char *name, const char *id, char result[72],
     JobView show = {0};
     if (strncmp(id, "j-", 2) != 0) {
         snprintf(result, 72, "%s", id);
-        return db_result_exists(app->store, result)
+        return db_result_exists(app->db, result)
                    ? STATUS_OK
                    : problem_set(problem, STATUS_NOT_FOUND, "there is no result %.80s (\"%s\")", id,
                                  name);
     }
-    TRY(jobs_find(app->intake, id, &job, problem));
+    TRY(jobs_find(app->manager, id, &job, problem));
     Status status = job_view(job, &show);
     job_unref(job);
     if (status != STATUS_OK)
@@ -77,7 +77,7 @@ Status sides_outcomes(App *app, const Request *request, Reply *reply, size_t cou
     *is_waiting = false;
     for (size_t i = 0; i < count; i++) {
         if (sides->outcomes[i] == NULL)
-            TRY(jobs_outcome(app->intake, results[i], request->waker, &sides->outcomes[i],
+            TRY(jobs_outcome(app->manager, results[i], request->callback, &sides->outcomes[i],
                              problem));
         *is_waiting = *is_waiting || sides->outcomes[i] == NULL;
     }

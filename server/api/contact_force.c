@@ -40,7 +40,7 @@ static void look_run(void *context, const Progress *watch) {
 static Status read_scene(App *app, const char *id, Reply *reply, Look *look, Problem *problem) {
     ResultRow row = {.count = 0};
     Warnings warnings = {NULL, 0};
-    Status status = db_result_scene(app->store, id, &row, problem);
+    Status status = db_result_scene(app->db, id, &row, problem);
     if (status == STATUS_OK && strcmp(row.engine, engine_version) != 0) {
         status = problem_set(problem, STATUS_GONE,
                              "the result was made by %s, this is %s: POST to /again below the "
@@ -49,7 +49,7 @@ static Status read_scene(App *app, const char *id, Reply *reply, Look *look, Pro
         results_link_gone(id, reply);
     }
     if (status == STATUS_OK)
-        status = jobs_prepare(app->store, row.scene, strlen(row.scene), NULL, &look->inquiry,
+        status = jobs_prepare(app->db, row.scene, strlen(row.scene), NULL, &look->inquiry,
                               &warnings, problem);
     if (status == STATUS_OK && !look->inquiry.simulation.output.impacts)
         status = problem_set(problem, STATUS_NOT_FOUND, "%s", no_impacts);
@@ -78,14 +78,14 @@ static Status reply_look(App *app, Reply *reply, const TableFormat *encoder, Loo
                          Problem *problem) {
     if (look->status != STATUS_OK)
         return problem_set(problem, look->status, "%s", look->problem.detail);
-    ColumnReply sheet = {.own = look->closeup.columns};
+    ColumnReply column_reply = {.own = look->closeup.columns};
     look->closeup.columns = (Columns){.count = 0};
-    const Status status = column_reply_own_axis(&sheet, problem);
+    const Status status = column_reply_own_axis(&column_reply, problem);
     if (status != STATUS_OK) {
-        column_reply_clear(&sheet);
+        column_reply_clear(&column_reply);
         return status;
     }
-    return columns_reply(app, reply, encoder, &sheet, problem);
+    return columns_reply(app, reply, encoder, &column_reply, problem);
 }
 
 static void forget(void *kept) {
@@ -93,28 +93,28 @@ static void forget(void *kept) {
 }
 
 // Takes the aside.
-static Status wait_on(const Request *request, Reply *reply, BackgroundTask *aside,
+static Status wait_on(const Request *request, Reply *reply, BackgroundTask *background,
                       Problem *problem) {
     const double left = wait_most - 1e-9 * (double)(clock_monotonic_ns() - request->started_ns);
     if (left <= 0 || request->is_expired) {
-        background_unref(aside);
+        background_unref(background);
         reply->retry_after = 30;
         return problem_set(problem, STATUS_BUSY,
                            "to run the scene again takes longer than %g s: submit a shorter scene "
                            "that holds the impact",
                            wait_most);
     }
-    reply_wait(reply, (int)(1000 * left) + 1, aside, forget);
+    reply_wait(reply, (int)(1000 * left) + 1, background, forget);
     return STATUS_OK;
 }
 
 // Takes the aside of a request that slept.
 static Status go_on(App *app, const Request *request, Reply *reply, const TableFormat *encoder,
-                    BackgroundTask *aside, Problem *problem) {
-    if (!background_is_done(aside))
-        return wait_on(request, reply, aside, problem);
-    const Status status = reply_look(app, reply, encoder, background_context(aside), problem);
-    background_unref(aside);
+                    BackgroundTask *background, Problem *problem) {
+    if (!background_is_done(background))
+        return wait_on(request, reply, background, problem);
+    const Status status = reply_look(app, reply, encoder, background_context(background), problem);
+    background_unref(background);
     return status;
 }
 
@@ -126,12 +126,13 @@ static Status look_begin(App *app, const Request *request, Reply *reply, const T
         look_free(look);
         return status;
     }
-    BackgroundTask *aside = NULL;
+    BackgroundTask *background = NULL;
     const BackgroundWork work = {look, look_run, look_free};
-    const Status status = background_start(app->asides, &work, request->waker, &aside, problem);
+    const Status status =
+        background_start(app->background_tasks, &work, request->callback, &background, problem);
     if (status == STATUS_BUSY)
         reply->retry_after = 2;
-    return status == STATUS_OK ? wait_on(request, reply, aside, problem) : status;
+    return status == STATUS_OK ? wait_on(request, reply, background, problem) : status;
 }
 
 // False: the client has it.
@@ -147,10 +148,10 @@ Status results_force(App *app, const Request *request, Reply *reply, Problem *pr
     const TableFormat *encoder = NULL;
     TRY(columns_format(request, 2, false, reply, &encoder, problem));
     if (request->kept != NULL) {
-        BackgroundTask *aside = request->kept;
-        if (background_is_done(aside))
-            (void)has_to_send(request, reply, background_context(aside), encoder);
-        return go_on(app, request, reply, encoder, aside, problem);
+        BackgroundTask *background = request->kept;
+        if (background_is_done(background))
+            (void)has_to_send(request, reply, background_context(background), encoder);
+        return go_on(app, request, reply, encoder, background, problem);
     }
     Look *look = calloc(1, sizeof *look);
     if (look == NULL)

@@ -13,11 +13,11 @@ typedef struct CpuBudget {
     bool is_crowded; // there was none
 } CpuBudget;
 
-void cpu_budget_begin(App *app, CpuBudget *patience);
+void cpu_budget_begin(App *app, CpuBudget *budget);
 // Of a Progress, whose context is the patience; on the thread that began. False: give up.
-bool cpu_budget_lasts(void *patience, double fraction);
+bool cpu_budget_lasts(void *budget, double fraction);
 // Why it was given up: STATUS_BUSY while others take long or the daemon stops, else STATUS_LIMIT.
-Status cpu_budget_report(const CpuBudget *patience, Problem *problem);
-void cpu_budget_end(CpuBudget *patience);
+Status cpu_budget_report(const CpuBudget *budget, Problem *problem);
+void cpu_budget_end(CpuBudget *budget);
 
 #endif

@@ -27,7 +27,7 @@ enum {
 typedef struct Events {
     App *app;
     Job *job;
-    const Callback *waker;
+    const Callback *callback;
     Bytes text; // not sent yet, from `sent`
     size_t sent;
     int last_id;
@@ -39,7 +39,7 @@ static const char no_memory[] = ": no memory\n\n";
 
 static void events_release(void *context) {
     Events *events = context;
-    job_unsubscribe(events->job, events->waker);
+    job_unsubscribe(events->job, events->callback);
     job_unref(events->job);
     bytes_clear(&events->text);
     free(events);
@@ -100,7 +100,7 @@ static void look(Events *events) {
     double progress;
     // Watched before it is looked at: what happens after the look wakes this. It is forgotten with
     // each call, so it is asked again.
-    (void)job_subscribe(events->job, events->waker);
+    (void)job_subscribe(events->job, events->callback);
     const JobState state = job_peek(events->job, &progress);
     if (job_state_is_final((int)state)) {
         tell_finished(events);
@@ -150,7 +150,7 @@ static int last_id(const Request *request) {
 
 Status jobs_events(App *app, const Request *request, Reply *reply, Problem *problem) {
     Job *job = NULL;
-    TRY(jobs_find(app->intake, request->parameters[0], &job, problem));
+    TRY(jobs_find(app->manager, request->parameters[0], &job, problem));
     if (last_id(request) >= FINISHED_ID) {
         job_unref(job);
         reply_borrow(reply, 204, NULL, NULL, 0);
@@ -163,7 +163,7 @@ Status jobs_events(App *app, const Request *request, Reply *reply, Problem *prob
     }
     *events = (Events){.app = app,
                        .job = job,
-                       .waker = request->waker,
+                       .callback = request->callback,
                        .last_id = last_id(request),
                        .spoke_ns = clock_monotonic_ns()};
     bytes_format(&events->text, "retry: %d\n\n", RETRY_MS);

@@ -139,24 +139,24 @@ Status health_live(App *app, const Request *request, Reply *reply, Problem *prob
 
 Status health_ready(App *app, const Request *request, Reply *reply, Problem *problem) {
     (void)request;
-    JobStats tally = {0};
+    JobStats metrics = {0};
     if (atomic_load(&app->is_stopping))
         return problem_set(problem, STATUS_BUSY, "the daemon is stopping");
-    if (!db_is_writable(app->store))
+    if (!db_is_writable(app->db))
         return problem_set(problem, STATUS_BUSY,
                            "the last write to the database failed: is the disk full or read-only?");
-    jobs_tally(app->intake, &tally);
-    if (tally.queued + tally.running >= tally.queue_most)
+    jobs_tally(app->manager, &metrics);
+    if (metrics.queued + metrics.running >= metrics.queue_most)
         return problem_set(problem, STATUS_BUSY,
                            "the queue is full: of unfinished jobs it has %zu, and may have %zu",
-                           tally.queued + tally.running, tally.queue_most);
+                           metrics.queued + metrics.running, metrics.queue_most);
     Bytes bytes = {.most = app->reply_most};
     bytes_format(&bytes,
                  "{\"status\": \"ready\", \"queued\": %zu, \"running\": %zu, \"workers\": %zu, "
                  "\"queue_most\": "
                  "%zu, \"cached_outcomes\": %zu, \"cached_bytes\": %zu}\n",
-                 tally.queued, tally.running, tally.workers, tally.queue_most,
-                 tally.cached_outcomes, tally.cached_bytes);
+                 metrics.queued, metrics.running, metrics.workers, metrics.queue_most,
+                 metrics.cached_outcomes, metrics.cached_bytes);
     return reply_bytes(reply, 200, type_json, &bytes, problem);
 }
 

@@ -14,18 +14,18 @@
 #include "server/json/parse.h"
 #include "server/json/stored_columns.h"
 
-Status column_reply_psd(ColumnReply *sheet, const char *text, Problem *problem) {
-    TRY(stored_spectra(text, &sheet->own, problem));
-    return column_reply_own_axis(sheet, problem);
+Status column_reply_psd(ColumnReply *column_reply, const char *text, Problem *problem) {
+    TRY(stored_spectra(text, &column_reply->own, problem));
+    return column_reply_own_axis(column_reply, problem);
 }
 
-static Status column_reply_impacts(ColumnReply *sheet, const char *text, Problem *problem) {
+static Status column_reply_impacts(ColumnReply *column_reply, const char *text, Problem *problem) {
     Impacts impacts;
     TRY(stored_impacts(text, &impacts, problem));
     const Status status = struct_columns(impact_fields, impacts.at, impacts.count,
-                                         sizeof *impacts.at, &sheet->own, problem);
+                                         sizeof *impacts.at, &column_reply->own, problem);
     free(impacts.at);
-    return status == STATUS_OK ? column_reply_own(sheet, problem) : status;
+    return status == STATUS_OK ? column_reply_own(column_reply, problem) : status;
 }
 
 // energy.json as it was saved.
@@ -40,7 +40,7 @@ static const Field energy_document_fields[] = {
     FIELD_END,
 };
 
-static Status column_reply_energy(ColumnReply *sheet, const char *text, Problem *problem) {
+static Status column_reply_energy(ColumnReply *column_reply, const char *text, Problem *problem) {
     EnergyDocument document = {.unit = NULL};
     Problem fault;
     problem_clear(&fault);
@@ -50,9 +50,9 @@ static Status column_reply_energy(ColumnReply *sheet, const char *text, Problem 
                              fault.detail);
     if (status == STATUS_OK)
         status = struct_columns(energy_fields, &document.energy, 1, sizeof document.energy,
-                                &sheet->own, problem);
+                                &column_reply->own, problem);
     fields_clear(energy_document_fields, &document);
-    return status == STATUS_OK ? column_reply_own(sheet, problem) : status;
+    return status == STATUS_OK ? column_reply_own(column_reply, problem) : status;
 }
 
 static const char *const document_names[] = {
@@ -74,7 +74,7 @@ static Status result_document(const ResultRow *row, Document document, const cha
 }
 
 // What a saved document is as columns.
-typedef Status Maker(ColumnReply *sheet, const char *text, Problem *problem);
+typedef Status Maker(ColumnReply *column_reply, const char *text, Problem *problem);
 static Maker *const makers[] = {
     [DOCUMENT_PSD] = column_reply_psd,
     [DOCUMENT_IMPACTS] = column_reply_impacts,
@@ -102,11 +102,11 @@ static Status reply_columns(App *app, Reply *reply, const TableFormat *encoder, 
                             const char *text, Problem *problem) {
     if (document == DOCUMENT_IMPACTS && encoder == &encoder_csv)
         return reply_impacts_csv(app, reply, text, problem);
-    ColumnReply sheet = {.encoding = NULL};
-    const Status status = makers[document](&sheet, text, problem);
+    ColumnReply column_reply = {.encoding = NULL};
+    const Status status = makers[document](&column_reply, text, problem);
     if (status == STATUS_OK)
-        return columns_reply(app, reply, encoder, &sheet, problem);
-    column_reply_clear(&sheet);
+        return columns_reply(app, reply, encoder, &column_reply, problem);
+    column_reply_clear(&column_reply);
     return status;
 }
 
@@ -146,7 +146,7 @@ static Status results_part(App *app, const Request *request, Reply *reply, Docum
     const char *text = NULL;
     Bytes window = {.most = 0};
     char tag[104];
-    Status status = db_result_load(app->store, request->parameters[0], &row, problem);
+    Status status = db_result_load(app->db, request->parameters[0], &row, problem);
     if (status == STATUS_OK)
         status = result_document(&row, document, &text, problem);
     if (status == STATUS_OK && document == DOCUMENT_IMPACTS)

@@ -25,7 +25,7 @@ static bool list_row(App *app, Bytes *bytes, const JobRow *row, int state, const
     JobView show = {0};
     Job *job = NULL;
     const bool is_unfinished = !job_state_is_final(row->state);
-    if (is_unfinished && jobs_find(app->intake, row->id, &job, NULL) == STATUS_OK) {
+    if (is_unfinished && jobs_find(app->manager, row->id, &job, NULL) == STATUS_OK) {
         const Status status = job_view(job, &show);
         const bool is_meant = state < 0 || (int)show.state == state;
         job_unref(job);
@@ -118,7 +118,7 @@ static Status list(App *app, JobSearch search, int state, Bytes *bytes, char las
     search.most = is_live ? LOOKED_AT : most + 1;
     for (;;) {
         JobRows rows = {0};
-        TRY(db_job_search(app->store, &search, &rows, problem));
+        TRY(db_job_search(app->db, &search, &rows, problem));
         bool is_full = false;
         for (size_t i = 0; i < rows.count && !is_full; i++) {
             is_full = count == most;
@@ -147,7 +147,7 @@ Status jobs_list(App *app, const Request *request, Reply *reply, Problem *proble
     TRY(read_search(request, &search, &state, problem));
     Bytes bytes = {.most = app->reply_most};
     char last[40];
-    db_flush(app->store); // whoever was answered finds the job here
+    db_flush(app->db); // whoever was answered finds the job here
     bytes_text(&bytes, "{\"jobs\": [");
     const Status status = list(app, search, state, &bytes, last, problem);
     if (status != STATUS_OK) {

@@ -45,7 +45,7 @@ static Status reply_job(App *app, Reply *reply, Job *job, int code, Problem *pro
 // What a sleeping request holds on to.
 typedef struct Pause {
     Job *job;
-    const Callback *waker;
+    const Callback *callback;
     bool is_replayed; // what the reply had said so far
 } Pause;
 
@@ -54,7 +54,7 @@ static Job *pause_end(Pause *pause, Reply *reply) {
     Job *job = pause->job;
     if (reply != NULL)
         reply->is_replayed = pause->is_replayed;
-    job_unsubscribe(job, pause->waker);
+    job_unsubscribe(job, pause->callback);
     free(pause);
     return job;
 }
@@ -66,12 +66,12 @@ static void pause_forget(void *kept) {
 // Puts the request to sleep until the waker that `watch` leaves with the job is called. False where
 // there is no memory; the hold stays with the caller then.
 static bool sleep_until(const Request *request, Reply *reply, Job *job,
-                        bool (*watch)(Job *job, const Callback *waker), int wait_ms) {
+                        bool (*watch)(Job *job, const Callback *callback), int wait_ms) {
     Pause *pause = malloc(sizeof *pause);
     if (pause == NULL)
         return false;
-    *pause = (Pause){job, request->waker, reply->is_replayed};
-    if (!watch(job, request->waker)) {
+    *pause = (Pause){job, request->callback, reply->is_replayed};
+    if (!watch(job, request->callback)) {
         free(pause);
         return false;
     }
@@ -107,15 +107,15 @@ static Status pause_until_kept(const Request *request, Reply *reply, Job *job, b
 
 Status jobs_refused(App *app, const Request *request, Reply *reply, Status status) {
     if (status == STATUS_BUSY || status == STATUS_QUOTA)
-        reply->retry_after = jobs_retry_after(app->intake, request->client, status);
+        reply->retry_after = jobs_retry_after(app->manager, request->client, status);
     return status;
 }
 
 static Status dry_run(App *app, const Request *request, Reply *reply, Problem *problem) {
     DryRun run = {0};
-    Status status = jobs_charge(app->intake, request->client, problem);
+    Status status = jobs_charge(app->manager, request->client, problem);
     if (status == STATUS_OK)
-        status = jobs_dry_run(app->intake, request->body, request->body_size, &run, problem);
+        status = jobs_dry_run(app->manager, request->body, request->body_size, &run, problem);
     if (status != STATUS_OK) {
         dry_run_clear(&run);
         return jobs_refused(app, request, reply, status);
@@ -153,7 +153,7 @@ static Status refuse_stopping(App *app, Problem *problem) {
 
 static Status submit(App *app, const Request *request, const Submission *submission, Reply *reply,
                      Job **job, Problem *problem) {
-    return jobs_refused(app, request, reply, jobs_submit(app->intake, submission, job, problem));
+    return jobs_refused(app, request, reply, jobs_submit(app->manager, submission, job, problem));
 }
 
 // Waits as long as the client likes, and at least until nobody can lose the job. Drops the hold.
@@ -194,7 +194,7 @@ Status results_again(App *app, const Request *request, Reply *reply, Problem *pr
     if (request->kept != NULL)
         return answer_job(app, request, reply, pause_end(request->kept, reply), problem);
     TRY(refuse_stopping(app, problem));
-    Status status = db_result_scene(app->store, request->parameters[0], &row, problem);
+    Status status = db_result_scene(app->db, request->parameters[0], &row, problem);
     if (status == STATUS_OK) {
         const Submission submission = {.text = row.scene,
                                        .size = strlen(row.scene),
@@ -238,7 +238,7 @@ Status jobs_show(App *app, const Request *request, Reply *reply, Problem *proble
     if (request->kept != NULL)
         job = pause_end(request->kept, reply);
     else
-        TRY(jobs_find(app->intake, request->parameters[0], &job, problem));
+        TRY(jobs_find(app->manager, request->parameters[0], &job, problem));
     if (pause_begin(request, reply, job, wait))
         return STATUS_OK;
     return reply_job(app, reply, job, 200, problem);
@@ -246,7 +246,7 @@ Status jobs_show(App *app, const Request *request, Reply *reply, Problem *proble
 
 Status jobs_scene(App *app, const Request *request, Reply *reply, Problem *problem) {
     char *scene;
-    TRY(db_job_scene(app->store, request->parameters[0], &scene, problem));
+    TRY(db_job_scene(app->db, request->parameters[0], &scene, problem));
     Bytes bytes = {.most = app->reply_most};
     bytes_text(&bytes, scene);
     bytes_text(&bytes, "\n");
@@ -258,7 +258,7 @@ Status jobs_scene(App *app, const Request *request, Reply *reply, Problem *probl
 static Status require_own(App *app, const Request *request, const char *id, Problem *problem) {
     Job *job = NULL;
     char what[64];
-    TRY(jobs_find(app->intake, id, &job, problem));
+    TRY(jobs_find(app->manager, id, &job, problem));
     snprintf(what, sizeof what, "the job %.40s", id);
     const Status status = access_owns(request, job_client(job), what, problem);
     job_unref(job);
@@ -272,7 +272,7 @@ Status jobs_dismiss(App *app, const Request *request, Reply *reply, Problem *pro
         job = pause_end(request->kept, reply);
     } else {
         TRY(require_own(app, request, request->parameters[0], problem));
-        TRY(jobs_cancel(app->intake, request->parameters[0], &job, problem));
+        TRY(jobs_cancel(app->manager, request->parameters[0], &job, problem));
     }
     TRY(pause_until_kept(request, reply, job, &is_paused, problem));
     if (is_paused)

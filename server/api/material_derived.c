@@ -54,7 +54,7 @@ static Status show(App *app, const Request *request, uint64_t revision, Reply *r
     TRY(read_query(request, &asked, problem));
     MaterialRevision material = {.slug = NULL};
     PairParameters pair = {.contacts = {NULL, 0}};
-    Status status = material_find(app->store, request->parameters[0], revision, &material, problem);
+    Status status = material_find(app->db, request->parameters[0], revision, &material, problem);
     problem->whose = "query";
     if (status == STATUS_OK)
         status = pair_parameters_run(&material.material, asked.damper_mass, asked.structure_mass,

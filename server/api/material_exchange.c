@@ -47,8 +47,8 @@ static ptrdiff_t send_next(void *context, char *target, size_t size) {
 }
 
 // The beginning at once: where that is all it is kept, and compressed.
-static Status begin(Sending *sending, Db *store, bool is_table, Problem *problem) {
-    TRY(material_export_open(store, is_table, &sending->text, problem));
+static Status begin(Sending *sending, Db *db, bool is_table, Problem *problem) {
+    TRY(material_export_open(db, is_table, &sending->text, problem));
     while (!sending->is_last && sending->made.count < WHOLE_MAX)
         TRY(material_export_next(&sending->text, &sending->made, &sending->is_last, problem));
     return STATUS_OK;
@@ -66,7 +66,7 @@ Status materials_export(App *app, const Request *request, Reply *reply, Problem 
     Sending *sending = calloc(1, sizeof *sending);
     if (sending == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the materials");
-    Status status = begin(sending, app->store, is_table, problem);
+    Status status = begin(sending, app->db, is_table, problem);
     if (status == STATUS_OK && !sending->is_last) {
         reply_borrow(reply, 200, type, NULL, 0);
         reply->stream = (Stream){.next = send_next, .size = UINT64_MAX};
@@ -96,13 +96,13 @@ static void put_count(Bytes *bytes, const char *name, const ImportCount *count) 
                  count->same);
 }
 
-static Status answer(Reply *reply, bool is_dry, const ImportTally *tally, Problem *problem) {
+static Status answer(Reply *reply, bool is_dry, const ImportTally *metrics, Problem *problem) {
     Bytes bytes = {.most = 0};
     bytes_format(&bytes, "{\"dry_run\": %s, \"materials\": %zu", is_dry ? "true" : "false",
-                 tally->materials);
-    put_count(&bytes, "revisions", &tally->revisions);
-    put_count(&bytes, "measurements", &tally->measurements);
-    put_count(&bytes, "reviews", &tally->reviews);
+                 metrics->materials);
+    put_count(&bytes, "revisions", &metrics->revisions);
+    put_count(&bytes, "measurements", &metrics->measurements);
+    put_count(&bytes, "reviews", &metrics->reviews);
     bytes_text(&bytes, "}\n");
     return reply_bytes(reply, 200, type_json, &bytes, problem);
 }
@@ -113,16 +113,16 @@ Status materials_import(App *app, const Request *request, Reply *reply, Problem 
     TRY(require_type(request, &is_table, problem));
     const bool may_all = request->client == NULL || request->holder.is_admin;
     Exchange exchange = {.revision_room = 0};
-    ImportTally tally;
+    ImportTally metrics;
     Status status = (is_table ? exchange_read_csv : exchange_read_json)(
         request->body, request->body_size, &exchange, problem);
     // What could be read is judged beside the database, so that all faults are told at once.
     if (status == STATUS_OK || status == STATUS_INVALID)
-        status = exchange_import(&exchange, app->store, request->client, may_all, is_dry, &tally,
+        status = exchange_import(&exchange, app->db, request->client, may_all, is_dry, &metrics,
                                  problem);
     exchange_clear(&exchange);
     problem->whose = "file";
     if (is_table)
         exchange_place_faults(problem);
-    return status == STATUS_OK ? answer(reply, is_dry, &tally, problem) : status;
+    return status == STATUS_OK ? answer(reply, is_dry, &metrics, problem) : status;
 }

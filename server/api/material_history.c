@@ -77,10 +77,10 @@ Status materials_revisions(App *app, const Request *request, Reply *reply, Probl
     MaterialState state;
     Page page;
     TRY(read_page(request, REVISIONS_MAX, REVISIONS_MAX, &page, problem));
-    TRY(db_material_state(app->store, slug, &state, problem));
+    TRY(db_material_state(app->db, slug, &state, problem));
     if (page.before > state.latest + 1)
         page.before = state.latest + 1;
-    TRY(db_material_page(app->store, slug, page.before, page.limit, &revisions, problem));
+    TRY(db_material_page(app->db, slug, page.before, page.limit, &revisions, problem));
     const Status status = list_revisions(app, request, &state, &revisions, reply, problem);
     material_revisions_clear(&revisions);
     return status;
@@ -106,27 +106,27 @@ static void put_deed(Bytes *bytes, const AuditEntry *deed) {
 
 Status materials_history(App *app, const Request *request, Reply *reply, Problem *problem) {
     const char *slug = request->parameters[0];
-    AuditEntries deeds = {0};
+    AuditEntries audit_entries = {0};
     MaterialState state;
     Page page;
     TRY(read_page(request, DEEDS_INITIAL, DEEDS_MAX, &page, problem));
-    TRY(db_material_state(app->store, slug, &state, problem));
+    TRY(db_material_state(app->db, slug, &state, problem));
     if (page.before > state.version + 1)
         page.before = state.version + 1;
     if (is_known(request, reply, state.latest, state.version))
         return STATUS_OK;
-    TRY(db_audit_entries(app->store, slug, page.before, page.limit, &deeds, problem));
+    TRY(db_audit_entries(app->db, slug, page.before, page.limit, &audit_entries, problem));
     Bytes bytes = {.most = app->reply_most};
     bytes_format(&bytes, "{\"slug\": \"%s\", \"version\": %llu, \"history\": [", slug,
                  (unsigned long long)state.version);
-    for (size_t i = 0; i < deeds.count; i++) {
+    for (size_t i = 0; i < audit_entries.count; i++) {
         bytes_text(&bytes, i > 0 ? ",\n " : "");
-        put_deed(&bytes, &deeds.at[i]);
+        put_deed(&bytes, &audit_entries.at[i]);
     }
     bytes_text(&bytes, "]}\n");
-    if (deeds.count > 0)
-        link_page(request, reply, deeds.at[deeds.count - 1].version);
-    audit_entries_clear(&deeds);
+    if (audit_entries.count > 0)
+        link_page(request, reply, audit_entries.at[audit_entries.count - 1].version);
+    audit_entries_clear(&audit_entries);
     return reply_bytes(reply, 200, type_json, &bytes, problem);
 }
 
@@ -177,7 +177,7 @@ static Status read_sides(App *app, const Request *request, const MaterialState *
     MaterialRevision head;
     TRY(request_count(request, "to", 1, latest, latest, to, problem));
     size_t before = *to > 1 ? *to - 1 : 1;
-    const Status status = db_material(app->store, slug, 0, &head, NULL);
+    const Status status = db_material(app->db, slug, 0, &head, NULL);
     if (status == STATUS_OK && strcmp(head.status, "approved") == 0 && head.revision < *to)
         before = (size_t)head.revision;
     material_revision_clear(&head);
@@ -202,13 +202,13 @@ Status materials_diff(App *app, const Request *request, Reply *reply, Problem *p
     MaterialState state;
     size_t from, to;
     // Before all else, so that its tag is not newer than what it stands for.
-    TRY(db_material_state(app->store, slug, &state, problem));
+    TRY(db_material_state(app->db, slug, &state, problem));
     TRY(read_sides(app, request, &state, &from, &to, problem));
     if (is_known(request, reply, state.latest, state.version))
         return STATUS_OK;
-    Status status = material_find(app->store, slug, from, &a, problem);
+    Status status = material_find(app->db, slug, from, &a, problem);
     if (status == STATUS_OK)
-        status = material_find(app->store, slug, to, &b, problem);
+        status = material_find(app->db, slug, to, &b, problem);
     if (status == STATUS_OK)
         status = diff(app, &a, &b, reply, problem);
     material_revision_clear(&a);

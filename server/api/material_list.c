@@ -112,15 +112,14 @@ static Status put_some(MaterialRevisions *materials, const Search *search, Liste
 }
 
 // At most search->limit of them.
-static Status put_list(Db *store, const Search *search, Listed *list, Bytes *bytes,
-                       Problem *problem) {
+static Status put_list(Db *db, const Search *search, Listed *list, Bytes *bytes, Problem *problem) {
     char after[QUERY_TEXT_MAX + 1] = "";
     bool is_end = false;
     if (search->after != NULL)
         text_fit(after, sizeof after, search->after);
     while (!is_end && !list->is_more) {
         MaterialRevisions materials = {0};
-        Status status = db_material_heads(store, after, LOOKED_AT, &materials, problem);
+        Status status = db_material_heads(db, after, LOOKED_AT, &materials, problem);
         if (status == STATUS_OK)
             status = put_some(&materials, search, list, bytes, problem);
         is_end = materials.count < LOOKED_AT;
@@ -137,7 +136,7 @@ static Status answer(App *app, const Request *request, const Search *search, Rep
     Listed list = {0};
     Bytes bytes = {.most = app->reply_most};
     bytes_text(&bytes, "{\"materials\": [");
-    const Status status = put_list(app->store, search, &list, &bytes, problem);
+    const Status status = put_list(app->db, search, &list, &bytes, problem);
     bytes_text(&bytes, "]}\n");
     if (status != STATUS_OK) {
         bytes_clear(&bytes);

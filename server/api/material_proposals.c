@@ -54,15 +54,15 @@ static Status take(const char *slug, const MaterialState *state, uint64_t number
     return STATUS_OK;
 }
 
-static Status load(CpuBudget *patience, const char *slug, Taken *taken, Reply *reply,
+static Status load(CpuBudget *budget, const char *slug, Taken *taken, Reply *reply,
                    Problem *problem) {
     for (size_t i = 0; i < taken->count; i++) {
-        if (!cpu_budget_lasts(patience, 0)) {
-            const Status status = cpu_budget_report(patience, problem);
+        if (!cpu_budget_lasts(budget, 0)) {
+            const Status status = cpu_budget_report(budget, problem);
             reply->retry_after = status == STATUS_BUSY ? 10 : reply->retry_after;
             return status;
         }
-        TRY(stored_test_load(patience->app->store, slug, taken->tests[i].number, &taken->stored[i],
+        TRY(stored_test_load(budget->app->db, slug, taken->tests[i].number, &taken->stored[i],
                              problem));
         // Before there are more of them in memory.
         if (evaluation_sample_count(taken->tests, i + 1) > EVALUATION_SAMPLES_MAX)
@@ -182,13 +182,13 @@ static Status propose(App *app, const Request *request, const Material *before, 
     TRY(query_choice(request, "as", proposal_form_names, PROPOSAL_CONSTANT, &form, problem));
     Evaluation evaluation = {.separation = separation};
     MaterialProposal proposal = {.why = NULL};
-    CpuBudget patience;
-    cpu_budget_begin(app, &patience);
-    Status status = load(&patience, request->parameters[0], taken, reply, problem);
+    CpuBudget budget;
+    cpu_budget_begin(app, &budget);
+    Status status = load(&budget, request->parameters[0], taken, reply, problem);
     if (status == STATUS_OK)
-        status = material_evaluate(&patience, taken->tests, taken->count, separation, &evaluation,
+        status = material_evaluate(&budget, taken->tests, taken->count, separation, &evaluation,
                                    reply, problem);
-    cpu_budget_end(&patience);
+    cpu_budget_end(&budget);
     if (status == STATUS_OK)
         status = material_proposal_run(&evaluation, taken->tests, taken->count, before,
                                        (ProposalForm)form, &proposal, problem);
@@ -208,7 +208,7 @@ Status proposals_show(App *app, const Request *request, Reply *reply, Problem *p
     TRY(choose_format(request, reply, &format, problem));
     if (format != 0)
         reply->policy = shield_drawing_policy;
-    TRY(db_material_state(app->store, slug, &state, problem));
+    TRY(db_material_state(app->db, slug, &state, problem));
     TRY(material_separation(app, request, &separation, problem));
     material_tag(slug, state.latest, state.version, tag);
     MaterialRevision before = {.slug = NULL};

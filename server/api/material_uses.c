@@ -14,7 +14,7 @@ enum { LIST_INITIAL = 20, LIST_MAX = 1000 };
 // An empty list is of a revision that is there.
 static Status require_revision(App *app, const char *slug, uint64_t revision, Problem *problem) {
     MaterialState state;
-    TRY(db_material_state(app->store, slug, &state, problem));
+    TRY(db_material_state(app->db, slug, &state, problem));
     if (revision <= state.latest)
         return STATUS_OK;
     return problem_set(problem, STATUS_NOT_FOUND,
@@ -35,7 +35,7 @@ static Status list_uses(App *app, const Request *request, uint64_t revision, Rep
     TRY(require_revision(app, slug, revision, problem));
     snprintf(name, sizeof name, "%.63s@%llu", slug, number);
     // One more than asked for tells whether there is a next page.
-    TRY(db_result_uses(app->store, name, limit + 1, (int64_t)before, &uses, &total, problem));
+    TRY(db_result_uses(app->db, name, limit + 1, (int64_t)before, &uses, &total, problem));
     const size_t count = uses.count > limit ? limit : uses.count;
     Bytes bytes = {.most = app->reply_most};
     bytes_format(&bytes, "{\"slug\": \"%s\", \"revision\": %llu, \"total\": %llu, \"results\": [",
@@ -80,8 +80,8 @@ static Status count_uses(App *app, const char *slug, Reply *reply, Problem *prob
     MaterialState state;
     MaterialReferences uses = {0};
     Bytes bytes = {.most = app->reply_most};
-    TRY(db_material_state(app->store, slug, &state, problem));
-    TRY(db_material_uses(app->store, slug, &uses, problem));
+    TRY(db_material_state(app->db, slug, &state, problem));
+    TRY(db_material_uses(app->db, slug, &uses, problem));
     put_counts(&bytes, slug, &uses);
     free(uses.at);
     return reply_bytes(reply, 200, type_json, &bytes, problem);

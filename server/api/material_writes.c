@@ -75,7 +75,7 @@ static Status judge(const MaterialBody *body, uint64_t measurements, Status stat
 static Status tell(App *app, const char *slug, uint64_t revision, uint64_t seen, int code,
                    Reply *reply, Problem *problem) {
     MaterialRevision written = {0};
-    const Status status = material_find(app->store, slug, revision, &written, problem);
+    const Status status = material_find(app->db, slug, revision, &written, problem);
     if (status == STATUS_OK) {
         char tag[MATERIAL_TAG];
         Bytes bytes = {.most = app->reply_most};
@@ -112,7 +112,7 @@ Status materials_create(App *app, const Request *request, Reply *reply, Problem 
     if (status == STATUS_OK)
         status = material_write_lists(&first, problem);
     if (status == STATUS_OK)
-        status = db_material_add(app->store, &first, problem);
+        status = db_material_add(app->db, &first, problem);
     if (status == STATUS_OK)
         status = tell(app, body.slug, 1, 0, 201, reply, problem);
     free(first.lists);
@@ -137,7 +137,7 @@ Status materials_revise(App *app, const Request *request, Reply *reply, Problem 
     if (status == STATUS_OK)
         status = material_write_lists(&next, problem);
     if (status == STATUS_OK)
-        status = db_material_revise(app->store, &next, seen, problem);
+        status = db_material_revise(app->db, &next, seen, problem);
     if (status == STATUS_OK)
         status = tell(app, slug, next.revision, seen, 201, reply, problem);
     free(next.lists);
@@ -162,7 +162,7 @@ static Status say_again(App *app, const Request *request, const MaterialRevertBo
                         uint64_t seen, Reply *reply, Problem *problem) {
     const char *slug = request->parameters[0];
     MaterialRevision old = {0};
-    Status status = db_material(app->store, slug, body->to, &old, problem);
+    Status status = db_material(app->db, slug, body->to, &old, problem);
     MaterialRevision next = {.slug = (char *)slug,
                              .material = old.material,
                              .lists = old.lists,
@@ -171,7 +171,7 @@ static Status say_again(App *app, const Request *request, const MaterialRevertBo
                              .comment = body->comment,
                              .created_unix_ms = clock_unix_ms()};
     if (status == STATUS_OK)
-        status = db_material_revise(app->store, &next, seen, problem);
+        status = db_material_revise(app->db, &next, seen, problem);
     material_revision_clear(&old);
     return status != STATUS_OK ? status : tell(app, slug, next.revision, seen, 201, reply, problem);
 }
@@ -211,7 +211,7 @@ Status materials_review(App *app, const Request *request, Reply *reply, Problem 
                                        .reason = body.reason,
                                        .reviewer = (char *)request->client,
                                        .created_unix_ms = clock_unix_ms()};
-        status = db_material_review(app->store, &review, seen, problem);
+        status = db_material_review(app->db, &review, seen, problem);
     }
     if (status == STATUS_OK)
         status = tell(app, slug, revision, seen, 200, reply, problem);

@@ -41,7 +41,7 @@ Status material_condition(App *app, const Request *request, const char *slug, bo
     uint64_t seen = 0, newest = 0;
     size_t size;
     *version = ANY_VERSION;
-    TRY(db_material_state(app->store, slug, state, problem));
+    TRY(db_material_state(app->db, slug, state, problem));
     const unsigned long long current = state->version;
     if (list == NULL && !is_required)
         return STATUS_OK;
@@ -88,7 +88,7 @@ static Status show(App *app, const Request *request, uint64_t revision, Reply *r
                    Problem *problem) {
     MaterialRevision material = {0};
     const Status status =
-        material_find(app->store, request->parameters[0], revision, &material, problem);
+        material_find(app->db, request->parameters[0], revision, &material, problem);
     if (status != STATUS_OK) {
         material_revision_clear(&material);
         return status;

@@ -34,7 +34,7 @@ Status material_latest(App *app, const char *slug, MaterialRevision *revision, P
 Status material_separation(App *app, const Request *request, int *separation, Problem *problem);
 
 // evaluation_run while patience lasts. STATUS_BUSY, STATUS_LIMIT.
-Status material_evaluate(CpuBudget *patience, const Measurement *tests, size_t count,
-                         int separation, Evaluation *evaluation, Reply *reply, Problem *problem);
+Status material_evaluate(CpuBudget *budget, const Measurement *tests, size_t count, int separation,
+                         Evaluation *evaluation, Reply *reply, Problem *problem);
 
 #endif

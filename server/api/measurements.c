@@ -33,11 +33,11 @@ Status material_separation(App *app, const Request *request, int *separation, Pr
 
 Status material_latest(App *app, const char *slug, MaterialRevision *revision, Problem *problem) {
     MaterialState state;
-    TRY(db_material_state(app->store, slug, &state, problem));
-    Status status = material_find(app->store, slug, 0, revision, NULL);
+    TRY(db_material_state(app->db, slug, &state, problem));
+    Status status = material_find(app->db, slug, 0, revision, NULL);
     if (status == STATUS_NOT_FOUND) { // all are deprecated
         material_revision_clear(revision);
-        status = material_find(app->store, slug, state.latest, revision, NULL);
+        status = material_find(app->db, slug, state.latest, revision, NULL);
     }
     if (status == STATUS_OK)
         return STATUS_OK;
@@ -45,13 +45,13 @@ Status material_latest(App *app, const char *slug, MaterialRevision *revision, P
     return problem_set(problem, status, "the material \"%.63s\" cannot be read", slug);
 }
 
-Status material_evaluate(CpuBudget *patience, const Measurement *tests, size_t count,
-                         int separation, Evaluation *evaluation, Reply *reply, Problem *problem) {
-    const Progress watch = {patience, cpu_budget_lasts};
+Status material_evaluate(CpuBudget *budget, const Measurement *tests, size_t count, int separation,
+                         Evaluation *evaluation, Reply *reply, Problem *problem) {
+    const Progress watch = {budget, cpu_budget_lasts};
     Status status =
         evaluation_run(tests, count, (Separation)separation, &watch, evaluation, problem);
     if (status == STATUS_CANCELLED)
-        status = cpu_budget_report(patience, problem);
+        status = cpu_budget_report(budget, problem);
     if (status == STATUS_BUSY)
         reply->retry_after = 10;
     return status;
@@ -59,7 +59,7 @@ Status material_evaluate(CpuBudget *patience, const Measurement *tests, size_t c
 
 // Of a test that is kept whatever it comes to. Given up, the evaluation is clear and its warnings
 // say why.
-static Status evaluate_kept(CpuBudget *patience, const Measurement *test, int separation,
+static Status evaluate_kept(CpuBudget *budget, const Measurement *test, int separation,
                             Evaluation *evaluation, bool *is_there, Reply *reply,
                             Problem *problem) {
     Problem *why = calloc(1, sizeof *why);
@@ -67,7 +67,7 @@ static Status evaluate_kept(CpuBudget *patience, const Measurement *test, int se
     *is_there = false;
     if (why == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the evaluation");
-    Status status = material_evaluate(patience, test, 1, separation, evaluation, reply, why);
+    Status status = material_evaluate(budget, test, 1, separation, evaluation, reply, why);
     *is_there = status == STATUS_OK;
     if (status == STATUS_NO_MEMORY) {
         (void)problem_set(problem, status, "%s", why->detail);
@@ -153,7 +153,7 @@ static Status keep(App *app, const Request *request, const MeasurementBody *body
                                .comment = body->comment != NULL ? body->comment : silent,
                                .created_unix_ms = clock_unix_ms(),
                                .document = text};
-    Status status = db_material_measure(app->store, &row, seen, problem);
+    Status status = db_material_measure(app->db, &row, seen, problem);
     free(text);
     if (status != STATUS_OK)
         return status;
@@ -171,13 +171,12 @@ static Status create(App *app, const Request *request, const MeasurementBody *bo
     TRY(material_separation(app, request, &separation, problem));
     const Measurement test = {COUNT_ABSENT, &body->test};
     Evaluation evaluation;
-    CpuBudget patience;
-    cpu_budget_begin(app, &patience);
+    CpuBudget budget;
+    cpu_budget_begin(app, &budget);
     Status status =
-        is_dry
-            ? material_evaluate(&patience, &test, 1, separation, &evaluation, reply, problem)
-            : evaluate_kept(&patience, &test, separation, &evaluation, &is_there, reply, problem);
-    cpu_budget_end(&patience);
+        is_dry ? material_evaluate(&budget, &test, 1, separation, &evaluation, reply, problem)
+               : evaluate_kept(&budget, &test, separation, &evaluation, &is_there, reply, problem);
+    cpu_budget_end(&budget);
     if (status == STATUS_OK && is_dry)
         status = tell_dry(app, request->parameters[0], &body->test, &evaluation, reply, problem);
     else if (status == STATUS_OK)
@@ -203,7 +202,7 @@ Status measurements_list(App *app, const Request *request, Reply *reply, Problem
     const char *slug = request->parameters[0];
     MaterialState state;
     size_t limit, before;
-    TRY(db_material_state(app->store, slug, &state, problem));
+    TRY(db_material_state(app->db, slug, &state, problem));
     const size_t count = (size_t)state.measurements;
     TRY(request_count(request, "limit", 1, LIST_MAX, LIST_INITIAL, &limit, problem));
     TRY(request_count(request, "before", 1, (size_t)1 << 53, count + 1, &before, problem));
@@ -212,7 +211,7 @@ Status measurements_list(App *app, const Request *request, Reply *reply, Problem
     if (reply_tagged(reply, request, tag))
         return STATUS_OK;
     MeasurementSummaries page;
-    Status status = db_measurement_summaries(app->store, slug, before, limit, &page, problem);
+    Status status = db_measurement_summaries(app->db, slug, before, limit, &page, problem);
     Bytes bytes = {.most = app->reply_most};
     bytes_format(&bytes, "{\"slug\": \"%s\", \"count\": %zu, \"measurements\": [", slug, count);
     for (size_t i = 0; i < page.count && status == STATUS_OK; i++) {
@@ -251,7 +250,7 @@ Status measurements_show(App *app, const Request *request, Reply *reply, Problem
     int separation;
     TRY(measurement_number(request->parameters[1], &number, problem));
     TRY(material_separation(app, request, &separation, problem));
-    TRY(db_material_state(app->store, slug, &state, problem));
+    TRY(db_material_state(app->db, slug, &state, problem));
     // What was measured never changes, and what it comes to only with the program.
     char tag[MATERIAL_TAG];
     snprintf(tag, sizeof tag, "%.63s#%llu-%s-%s", slug, (unsigned long long)number,
@@ -259,15 +258,14 @@ Status measurements_show(App *app, const Request *request, Reply *reply, Problem
     if (number <= state.measurements && reply_tagged(reply, request, tag))
         return STATUS_OK;
     StoredTest stored = {.row = {.slug = NULL}};
-    CpuBudget patience;
-    cpu_budget_begin(app, &patience);
-    Status status = stored_test_load(app->store, slug, number, &stored, problem);
+    CpuBudget budget;
+    cpu_budget_begin(app, &budget);
+    Status status = stored_test_load(app->db, slug, number, &stored, problem);
     if (status == STATUS_OK) {
         const Measurement test = {COUNT_ABSENT, &stored.test};
         Evaluation evaluation;
         bool is_there;
-        status =
-            evaluate_kept(&patience, &test, separation, &evaluation, &is_there, reply, problem);
+        status = evaluate_kept(&budget, &test, separation, &evaluation, &is_there, reply, problem);
         if (!is_there) // another time it may be
             reply->etag[0] = '\0';
         if (status == STATUS_OK)
@@ -275,7 +273,7 @@ Status measurements_show(App *app, const Request *request, Reply *reply, Problem
                 tell(app, &stored.row, &stored.test, &evaluation, is_there, 200, reply, problem);
         evaluation_clear(&evaluation);
     }
-    cpu_budget_end(&patience);
+    cpu_budget_end(&budget);
     stored_test_clear(&stored);
     return status;
 }

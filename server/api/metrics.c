@@ -8,67 +8,71 @@
 #include "server/util/process.h"
 
 // What is known already, by layer in the order in which they are asked.
-static void write_layers(Bytes *bytes, const JobStats *tally, Db *store) {
-    CacheStats stored = tally->stored;
+static void write_layers(Bytes *bytes, const JobStats *metrics, Db *db) {
+    CacheStats stored = metrics->stored;
     uint64_t count = 0, size = 0;
-    db_series_tally(store, &count, &size, &stored.evictions);
+    db_series_tally(db, &count, &size, &stored.evictions);
     stored.count = count;
     stored.bytes = size;
     const struct {
         const char *label;
         const CacheStats *layer;
-    } layers[] = {{"layer=\"documents\"", &tally->heads},
-                  {"layer=\"series\"", &tally->series},
-                  {"layer=\"results\"", &tally->rows},
-                  {"layer=\"stored_series\"", &stored}};
+    } cache_layers[] = {{"layer=\"documents\"", &metrics->heads},
+                        {"layer=\"series\"", &metrics->series},
+                        {"layer=\"results\"", &metrics->rows},
+                        {"layer=\"stored_series\"", &stored}};
     static const char hits[] = "impactd_cache_hits_total", misses[] = "impactd_cache_misses_total",
                       evictions[] = "impactd_cache_evictions_total",
                       bytes_kept[] = "impactd_cache_layer_bytes";
     metrics_family(bytes, hits, "counter", "Looks that found what was known, by layer.");
-    for (size_t i = 0; i < COUNT(layers); i++)
-        metrics_count(bytes, hits, layers[i].label, layers[i].layer->hits);
+    for (size_t i = 0; i < COUNT(cache_layers); i++)
+        metrics_count(bytes, hits, cache_layers[i].label, cache_layers[i].layer->hits);
     metrics_family(bytes, misses, "counter", "Looks that did not, by layer.");
-    for (size_t i = 0; i < COUNT(layers); i++)
-        metrics_count(bytes, misses, layers[i].label, layers[i].layer->misses);
+    for (size_t i = 0; i < COUNT(cache_layers); i++)
+        metrics_count(bytes, misses, cache_layers[i].label, cache_layers[i].layer->misses);
     metrics_family(bytes, evictions, "counter", "What made room for others, by layer.");
-    for (size_t i = 0; i < COUNT(layers); i++)
-        metrics_count(bytes, evictions, layers[i].label, layers[i].layer->evictions);
+    for (size_t i = 0; i < COUNT(cache_layers); i++)
+        metrics_count(bytes, evictions, cache_layers[i].label, cache_layers[i].layer->evictions);
     metrics_family(bytes, bytes_kept, "gauge", "What a layer takes, in memory or on disk.");
-    for (size_t i = 0; i < COUNT(layers); i++)
-        metrics_real(bytes, bytes_kept, layers[i].label, (double)layers[i].layer->bytes);
+    for (size_t i = 0; i < COUNT(cache_layers); i++)
+        metrics_real(bytes, bytes_kept, cache_layers[i].label,
+                     (double)cache_layers[i].layer->bytes);
 }
 
-static void write_queue(Bytes *bytes, JobManager *intake, Db *store) {
-    JobStats tally = {0};
-    jobs_tally(intake, &tally);
-    write_layers(bytes, &tally, store);
-    metrics_gauge(bytes, "impactd_queue_length", "Computations that wait.", (double)tally.queued);
+static void write_queue(Bytes *bytes, JobManager *manager, Db *db) {
+    JobStats metrics = {0};
+    jobs_tally(manager, &metrics);
+    write_layers(bytes, &metrics, db);
+    metrics_gauge(bytes, "impactd_queue_length", "Computations that wait.", (double)metrics.queued);
     metrics_gauge(bytes, "impactd_queue_limit", "Unfinished jobs at most.",
-                  (double)tally.queue_most);
-    metrics_gauge(bytes, "impactd_workers", "Computations at once at most.", (double)tally.workers);
-    metrics_gauge(bytes, "impactd_workers_busy", "Computations under way.", (double)tally.running);
+                  (double)metrics.queue_most);
+    metrics_gauge(bytes, "impactd_workers", "Computations at once at most.",
+                  (double)metrics.workers);
+    metrics_gauge(bytes, "impactd_workers_busy", "Computations under way.",
+                  (double)metrics.running);
     metrics_gauge(bytes, "impactd_cache_outcomes", "Results in memory with their series.",
-                  (double)tally.cached_outcomes);
+                  (double)metrics.cached_outcomes);
     metrics_gauge(bytes, "impactd_cache_bytes", "Memory of these results.",
-                  (double)tally.cached_bytes);
+                  (double)metrics.cached_bytes);
 }
 
 // Whole answers that are kept ready to be sent.
-static void write_hot(Bytes *bytes, ResponseCache *hot) {
-    const ResponseCacheStats tally = response_cache_tally(hot);
-    metrics_gauge(bytes, "impactd_reply_cache_entries", "Answers kept whole.", (double)tally.count);
+static void write_hot(Bytes *bytes, ResponseCache *response_cache) {
+    const ResponseCacheStats metrics = response_cache_tally(response_cache);
+    metrics_gauge(bytes, "impactd_reply_cache_entries", "Answers kept whole.",
+                  (double)metrics.count);
     metrics_gauge(bytes, "impactd_reply_cache_bytes", "Memory of these answers.",
-                  (double)tally.bytes);
+                  (double)metrics.bytes);
     metrics_counter(bytes, "impactd_reply_cache_hits_total", "Requests answered by these.",
-                    tally.hits);
+                    metrics.hits);
     metrics_counter(bytes, "impactd_reply_cache_misses_total",
-                    "Looks for an answer that was not there.", tally.misses);
+                    "Looks for an answer that was not there.", metrics.misses);
     metrics_counter(bytes, "impactd_reply_cache_evictions_total", "Answers that made room.",
-                    tally.evictions);
+                    metrics.evictions);
 }
 
-static void write_store(Bytes *bytes, Db *store) {
-    const DbStats *totals = db_totals(store);
+static void write_store(Bytes *bytes, Db *db) {
+    const DbStats *totals = db_totals(db);
     metrics_counter(bytes, "impactd_sqlite_transactions_total", "Transactions that were committed.",
                     histogram_count(&totals->commits));
     metrics_counter(bytes, "impactd_sqlite_writes_total",
@@ -103,17 +107,17 @@ Status metrics_show(App *app, const Request *request, Reply *reply, Problem *pro
     Bytes bytes = {.most = 4 << 20};
     metrics_family(&bytes, "impactd_build_info", "gauge", "The program's version; always 1.");
     bytes_format(&bytes, "impactd_build_info{version=\"%s\"} 1\n", program_version);
-    if (app->meter != NULL)
-        request_metrics_write(app->meter, &bytes);
-    const Server *listener = atomic_load(&app->listener);
-    if (listener != NULL)
+    if (app->request_metrics != NULL)
+        request_metrics_write(app->request_metrics, &bytes);
+    const Server *server = atomic_load(&app->server);
+    if (server != NULL)
         metrics_gauge(&bytes, "impactd_http_connections", "Clients connected.",
-                      (double)server_connections(listener));
-    if (app->hot != NULL)
-        write_hot(&bytes, app->hot);
-    write_queue(&bytes, app->intake, app->store);
-    job_metrics_write(jobs_totals(app->intake), &bytes);
-    write_store(&bytes, app->store);
+                      (double)server_connections(server));
+    if (app->response_cache != NULL)
+        write_hot(&bytes, app->response_cache);
+    write_queue(&bytes, app->manager, app->db);
+    job_metrics_write(jobs_totals(app->manager), &bytes);
+    write_store(&bytes, app->db);
     write_process(&bytes, app);
     return reply_bytes(reply, 200, "text/plain; version=0.0.4; charset=utf-8", &bytes, problem);
 }

@@ -62,7 +62,7 @@ static void put_uses(Bytes *bytes, const RecordUses *uses) {
 static Status warn_twins(App *app, RecordUpload *upload, Problem *problem) {
     RecordRows twins;
     char list[RECORD_TWINS * (RECORD_NAME_SIZE + 2) + 8] = "";
-    TRY(db_record_twins(app->store, &upload->row, &twins, problem));
+    TRY(db_record_twins(app->db, &upload->row, &twins, problem));
     for (size_t i = 0; i < twins.count; i++)
         text_list(list, sizeof list, twins.at[i].name);
     const size_t count = twins.count;
@@ -80,8 +80,8 @@ static Status answer(App *app, RecordUpload *upload, bool is_there, Reply *reply
     RecordUses uses;
     Bytes bytes = {.most = app->reply_most};
     TRY(warn_twins(app, upload, problem));
-    TRY(db_record(app->store, upload->row.name, &row, problem));
-    const Status status = db_record_uses(app->store, row.name, &uses, problem);
+    TRY(db_record(app->db, upload->row.name, &row, problem));
+    const Status status = db_record_uses(app->db, row.name, &uses, problem);
     if (status == STATUS_OK) {
         put_record(&bytes, &row);
         put_uses(&bytes, &uses);
@@ -104,7 +104,7 @@ Status records_create(App *app, const Request *request, Reply *reply, Problem *p
         (upload.row.author = strdup(request->client)) == NULL)
         status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the record");
     if (status == STATUS_OK)
-        status = db_record_add(app->store, &upload.row, &upload.samples, &is_there, problem);
+        status = db_record_add(app->db, &upload.row, &upload.samples, &is_there, problem);
     if (status == STATUS_OK)
         status = answer(app, &upload, is_there, reply, problem);
     record_upload_clear(&upload);
@@ -119,7 +119,7 @@ Status records_list(App *app, const Request *request, Reply *reply, Problem *pro
     TRY(query_text(request, "q", &words, problem));
     TRY(query_text(request, "after", &after, problem));
     // One more than asked for tells whether there is a next page.
-    TRY(db_records(app->store, words, after != NULL ? after : "", limit + 1, &rows, problem));
+    TRY(db_records(app->db, words, after != NULL ? after : "", limit + 1, &rows, problem));
     Bytes bytes = {.most = app->reply_most};
     bytes_text(&bytes, "{\"records\": [");
     for (size_t i = 0; i < rows.count && i < limit; i++) {
@@ -138,8 +138,8 @@ Status records_show(App *app, const Request *request, Reply *reply, Problem *pro
     RecordRow row;
     RecordUses uses;
     char tag[112];
-    TRY(db_record(app->store, request->parameters[0], &row, problem));
-    Status status = db_record_uses(app->store, row.name, &uses, problem);
+    TRY(db_record(app->db, request->parameters[0], &row, problem));
+    Status status = db_record_uses(app->db, row.name, &uses, problem);
     if (status != STATUS_OK) {
         record_row_clear(&row);
         return status;
@@ -159,42 +159,43 @@ Status records_show(App *app, const Request *request, Reply *reply, Problem *pro
 }
 
 // All samples, or those asked for by time, or extremes of buckets of them.
-static Status fill(const Request *request, const NamedRecord *named, ColumnReply *sheet,
+static Status fill(const Request *request, const NamedRecord *named, ColumnReply *column_reply,
                    Problem *problem) {
     const Reals *samples = &named->samples;
-    TRY(columns_allocate(&sheet->own, 1, samples->count, 0, problem));
-    columns_name(&sheet->own, 0, "acceleration", "m/s^2");
-    memcpy(sheet->own.at[0].values, samples->at, samples->count * sizeof(double));
-    sheet->table = (Table){.axis_name = "time", .axis_unit = "s", .axis_rate = 1 / named->interval};
-    TRY(column_reply_own(sheet, problem));
-    TRY(columns_window(request, samples->count, &sheet->table, problem));
-    return columns_downsample(request, sheet, problem);
+    TRY(columns_allocate(&column_reply->own, 1, samples->count, 0, problem));
+    columns_name(&column_reply->own, 0, "acceleration", "m/s^2");
+    memcpy(column_reply->own.at[0].values, samples->at, samples->count * sizeof(double));
+    column_reply->table =
+        (Table){.axis_name = "time", .axis_unit = "s", .axis_rate = 1 / named->interval};
+    TRY(column_reply_own(column_reply, problem));
+    TRY(columns_window(request, samples->count, &column_reply->table, problem));
+    return columns_downsample(request, column_reply, problem);
 }
 
 Status records_samples(App *app, const Request *request, Reply *reply, Problem *problem) {
     const TableFormat *encoder = NULL;
     NamedRecord *named;
-    ColumnReply sheet = {.encoding = NULL};
+    ColumnReply column_reply = {.encoding = NULL};
     char tag[96];
     TRY(columns_format(request, 1, false, reply, &encoder, problem));
-    TRY(db_record_named(app->store, request->parameters[0], &named, problem));
+    TRY(db_record_named(app->db, request->parameters[0], &named, problem));
     snprintf(tag, sizeof tag, "%.64s-%.8s", named->digest, encoder->extension);
-    const Status status = fill(request, named, &sheet, problem);
+    const Status status = fill(request, named, &column_reply, problem);
     refcount_unref(&named->shared);
     if (status == STATUS_OK && !reply_tagged(reply, request, tag))
-        return columns_reply(app, reply, encoder, &sheet, problem);
-    column_reply_clear(&sheet);
+        return columns_reply(app, reply, encoder, &column_reply, problem);
+    column_reply_clear(&column_reply);
     return status;
 }
 
 Status records_delete(App *app, const Request *request, Reply *reply, Problem *problem) {
     RecordRow row;
     char what[96];
-    TRY(db_record(app->store, request->parameters[0], &row, problem));
+    TRY(db_record(app->db, request->parameters[0], &row, problem));
     snprintf(what, sizeof what, "the record %.64s", row.name);
     Status status = access_owns(request, row.author, what, problem);
     if (status == STATUS_OK)
-        status = jobs_record_delete(app->intake, row.name, problem);
+        status = jobs_record_delete(app->manager, row.name, problem);
     record_row_clear(&row);
     if (status == STATUS_OK)
         reply_borrow(reply, 204, NULL, NULL, 0);

@@ -148,7 +148,7 @@ static const char *json_or(const char *json, const char *otherwise) {
 
 static void write_said(App *app, Bytes *bytes, const ReferenceRow *use) {
     MaterialRevision material = {0};
-    if (material_find(app->store, use->slug, use->revision, &material, NULL) == STATUS_OK) {
+    if (material_find(app->db, use->slug, use->revision, &material, NULL) == STATUS_OK) {
         material_write_stated(bytes, &material);
     } else { // no longer here: its numbers stand in the scene
         bytes_text(bytes, "{\"slug\": ");
@@ -241,7 +241,7 @@ Status results_put(const ResultRow *row, Bytes *bytes, Problem *problem) {
 Status results_show(App *app, const Request *request, Reply *reply, Problem *problem) {
     ResultRow row = {0};
     Bytes bytes = {.most = app->reply_most};
-    Status status = db_result_load(app->store, request->parameters[0], &row, problem);
+    Status status = db_result_load(app->db, request->parameters[0], &row, problem);
     if (status == STATUS_OK && !reply_immutable(reply, request, row.id)) {
         status = results_put(&row, &bytes, problem);
         if (status == STATUS_OK)
@@ -302,7 +302,7 @@ bool results_tagged(const Request *request, Reply *reply, const ResultRow *row, 
 Status results_manifest(App *app, const Request *request, Reply *reply, Problem *problem) {
     ResultRow row = {0};
     Bytes bytes = {.most = app->reply_most};
-    Status status = db_result_load(app->store, request->parameters[0], &row, problem);
+    Status status = db_result_load(app->db, request->parameters[0], &row, problem);
     if (status == STATUS_OK)
         status = manifest_put(app, &row, &bytes, problem);
     if (status == STATUS_OK && !results_tagged(request, reply, &row, "manifest", &bytes))
@@ -318,15 +318,15 @@ static Status require_own(App *app, const Request *request, Problem *problem) {
     char owner[72], what[128];
     if (request->client == NULL || request->holder.is_admin)
         return STATUS_OK;
-    db_flush(app->store);
-    TRY(db_result_sharer(app->store, request->parameters[0], request->client, owner, problem));
+    db_flush(app->db);
+    TRY(db_result_sharer(app->db, request->parameters[0], request->client, owner, problem));
     snprintf(what, sizeof what, "a job with the result %.80s", request->parameters[0]);
     return access_owns(request, owner[0] != '\0' ? owner : NULL, what, problem);
 }
 
 Status results_delete(App *app, const Request *request, Reply *reply, Problem *problem) {
     TRY(require_own(app, request, problem));
-    TRY(jobs_delete(app->intake, request->parameters[0], problem));
+    TRY(jobs_delete(app->manager, request->parameters[0], problem));
     reply_borrow(reply, 204, NULL, NULL, 0);
     return STATUS_OK;
 }

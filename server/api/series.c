@@ -48,30 +48,30 @@ static Status choose_columns(const Request *request, const Columns *columns, con
     return STATUS_OK;
 }
 
-static Status choose(const Request *request, ColumnReply *sheet, Problem *problem) {
-    const Response *response = &sheet->outcome->response;
-    sheet->table =
+static Status choose(const Request *request, ColumnReply *column_reply, Problem *problem) {
+    const Response *response = &column_reply->outcome->response;
+    column_reply->table =
         (Table){.axis_name = "time", .axis_unit = "s", .axis_rate = response->sample_rate};
     if (response->count == 0)
         return problem_set(problem, STATUS_NOT_FOUND, "the result has no samples");
-    TRY(column_reply_make(sheet, response->series.count, problem));
-    TRY(choose_columns(request, &response->series, sheet->chosen, &sheet->table.column_count,
-                       problem));
-    TRY(columns_window(request, response->count, &sheet->table, problem));
-    return columns_downsample(request, sheet, problem);
+    TRY(column_reply_make(column_reply, response->series.count, problem));
+    TRY(choose_columns(request, &response->series, column_reply->chosen,
+                       &column_reply->table.column_count, problem));
+    TRY(columns_window(request, response->count, &column_reply->table, problem));
+    return columns_downsample(request, column_reply, problem);
 }
 
 Status results_series(App *app, const Request *request, Reply *reply, Problem *problem) {
     const TableFormat *encoder = NULL;
-    ColumnReply sheet = {.encoding = NULL};
+    ColumnReply column_reply = {.encoding = NULL};
     TRY(columns_format(request, 1, true, reply, &encoder, problem));
-    TRY(columns_outcome(app, request, reply, "series", encoder->extension, &sheet.outcome,
+    TRY(columns_outcome(app, request, reply, "series", encoder->extension, &column_reply.outcome,
                         problem));
-    if (sheet.outcome == NULL)
+    if (column_reply.outcome == NULL)
         return STATUS_OK;
-    const Status status = choose(request, &sheet, problem);
+    const Status status = choose(request, &column_reply, problem);
     if (status == STATUS_OK)
-        return columns_reply(app, reply, encoder, &sheet, problem);
-    column_reply_clear(&sheet);
+        return columns_reply(app, reply, encoder, &column_reply, problem);
+    column_reply_clear(&column_reply);
     return status;
 }

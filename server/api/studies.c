@@ -83,7 +83,7 @@ static Status show(App *app, const Request *request, const StudyKind *kind, Repl
     StudyAnswer answer = {NULL};
     Bytes bytes = {.most = app->reply_most};
     char tag[128];
-    Status status = db_result_load(app->store, request->parameters[0], &row, problem);
+    Status status = db_result_load(app->db, request->parameters[0], &row, problem);
     if (status == STATUS_OK)
         status = answer_read(&row, kind, &answer, problem);
     if (status == STATUS_OK) {

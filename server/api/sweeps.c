@@ -167,8 +167,8 @@ Status sweeps_table(App *app, const Request *request, Reply *reply, Problem *pro
     Sending *sending = calloc(1, sizeof *sending);
     if (sending == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the table");
-    const Status status = sweep_view_load(app->store, request->parameters[0], is_of_job(request),
-                                          true, &sending->show, problem);
+    const Status status = sweep_view_load(app->db, request->parameters[0], is_of_job(request), true,
+                                          &sending->show, problem);
     if (status != STATUS_OK || is_known(request, reply, &sending->show, format->extension)) {
         sending_free(sending);
         return status;
@@ -227,10 +227,9 @@ static Status show_point(App *app, const Request *request, Reply *reply, bool is
     SweepView show = {.sweep = NULL};
     SweepPointView point = {.values = NULL};
     TRY(read_index(request, &index, problem));
-    Status status =
-        sweep_view_load(app->store, request->parameters[0], false, false, &show, problem);
+    Status status = sweep_view_load(app->db, request->parameters[0], false, false, &show, problem);
     if (status == STATUS_OK)
-        status = sweep_point_load(app->store, &show, index, &point, problem);
+        status = sweep_point_load(app->db, &show, index, &point, problem);
     if (status == STATUS_OK) {
         Bytes bytes = {.most = app->reply_most};
         if (is_scene) {

@@ -35,7 +35,7 @@ typedef struct Entry {
 } Entry;
 
 struct Tokens {
-    Db *store;
+    Db *db;
     bool are_required;
     pthread_mutex_t lock; // of entries and count, held for a look-up
     Entry *entries;
@@ -139,7 +139,7 @@ static void entry_fill(const Tokens *tokens, Entry *entry, const TokenRow *row) 
 // With `looking` held. What is there stays where the database cannot be read.
 static Status look(Tokens *tokens, Problem *problem) {
     TokenRows rows = {0};
-    TRY(db_tokens(tokens->store, &rows, problem));
+    TRY(db_tokens(tokens->db, &rows, problem));
     Entry *entries = calloc(rows.count + 1, sizeof *entries);
     if (entries == NULL) {
         free(rows.at);
@@ -179,7 +179,7 @@ static bool next_used(Tokens *tokens, int64_t apart_ms, TokenRow *row) {
 static void note_used(Tokens *tokens, int64_t apart_ms) {
     TokenRow row = {0};
     while (next_used(tokens, apart_ms, &row))
-        (void)db_token_used(tokens->store, &row, NULL);
+        (void)db_token_used(tokens->db, &row, NULL);
 }
 
 static void *follow(void *context) {
@@ -204,12 +204,12 @@ static void *follow(void *context) {
     return NULL;
 }
 
-Status tokens_open(Db *store, bool are_required, Tokens **tokens, Problem *problem) {
+Status tokens_open(Db *db, bool are_required, Tokens **tokens, Problem *problem) {
     *tokens = NULL;
     Tokens *made = calloc(1, sizeof *made);
     if (made == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the tokens");
-    made->store = store;
+    made->db = db;
     made->are_required = are_required;
     atomic_init(&made->looks_left, UNKNOWN_MAX);
     pthread_condattr_t attributes;

@@ -13,7 +13,7 @@ extern const char *const scope_names[]; // "read", ..., NULL-terminated; "admin"
 // Reads the table and starts the thread that follows it. With `are_required` a token is asked for
 // even where the database has none; otherwise from the first one on, also if it is revoked. Borrows
 // `store`.
-Status tokens_open(Db *store, bool are_required, Tokens **tokens, Problem *problem);
+Status tokens_open(Db *db, bool are_required, Tokens **tokens, Problem *problem);
 void tokens_close(Tokens *tokens);
 
 // How many could be used now.

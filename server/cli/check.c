@@ -105,13 +105,13 @@ static Status plan_show(const char *path, const Bytes *text, void *of, Problem *
     const CheckSettings *asked = of;
     const JobManagerSettings settings = {
         .workers = 1, .queue_most = 1, .limits = scene_file_limits(asked->max_cpu_seconds)};
-    Db *store = NULL;
-    JobManager *intake = NULL;
+    Db *db = NULL;
+    JobManager *manager = NULL;
     DryRun run = {0};
-    TRY(db_open(NULL, &store, problem));
-    Status status = jobs_open(store, &settings, &intake, problem);
+    TRY(db_open(NULL, &db, problem));
+    Status status = jobs_open(db, &settings, &manager, problem);
     if (status == STATUS_OK)
-        status = jobs_dry_run(intake, text->at, text->count, &run, problem);
+        status = jobs_dry_run(manager, text->at, text->count, &run, problem);
     if (status == STATUS_OK && asked->json) {
         Bytes bytes = {0};
         job_json_put_dry_run(&bytes, &run);
@@ -125,8 +125,8 @@ static Status plan_show(const char *path, const Bytes *text, void *of, Problem *
         plan_print(path, &run);
     }
     dry_run_clear(&run);
-    jobs_close(intake);
-    db_close(store);
+    jobs_close(manager);
+    db_close(db);
     return status;
 }
 

@@ -145,13 +145,12 @@ static Status scene_prepare_and_run(const char *path, const Bytes *text, void *o
                                     Problem *problem) {
     const RunSettings *settings = of;
     const SimulationLimits limits = scene_file_limits(settings->max_cpu_seconds);
-    Db *store = NULL;
+    Db *db = NULL;
     StudyRequest inquiry = {0};
     Warnings warnings = {0};
-    TRY(db_open(NULL, &store, problem));
-    Status status =
-        jobs_prepare(store, text->at, text->count, &limits, &inquiry, &warnings, problem);
-    db_close(store);
+    TRY(db_open(NULL, &db, problem));
+    Status status = jobs_prepare(db, text->at, text->count, &limits, &inquiry, &warnings, problem);
+    db_close(db);
     if (status == STATUS_OK && inquiry.study != NULL)
         status =
             problem_add(problem, STATUS_INVALID, "/study",

@@ -125,18 +125,18 @@ static Status check(const ServeSettings *settings, Problem *problem) {
     return status;
 }
 
-static void greet(const Server *listener, const ServeSettings *settings, const App *app) {
-    const char *url = app->base_url[0] != '\0' ? app->base_url : server_url(listener);
-    printf("impactd %s listens on %s\n", program_version, server_url(listener));
+static void greet(const Server *server, const ServeSettings *settings, const App *app) {
+    const char *url = app->base_url[0] != '\0' ? app->base_url : server_url(server);
+    printf("impactd %s listens on %s\n", program_version, server_url(server));
     printf("data in %s, %llu workers; Ctrl-C stops\n\n", settings->data,
            (unsigned long long)settings->workers);
     printf("curl -s %s/v1/examples/paper_free_sponge | curl -s --json @- %s/v1/jobs\n", url, url);
     fflush(stdout);
 }
 
-static void forget_answers(void *hot) {
-    if (hot != NULL)
-        response_cache_clear(hot);
+static void forget_answers(void *response_cache) {
+    if (response_cache != NULL)
+        response_cache_clear(response_cache);
 }
 
 // SIGHUP: a certificate that was renewed is used from now on.
@@ -178,11 +178,11 @@ static void let_signals_kill(const sigset_t *signals) {
     pthread_sigmask(SIG_UNBLOCK, signals, NULL);
 }
 
-static void run_until_stopped(App *app, Server *listener, const ServeSettings *settings,
+static void run_until_stopped(App *app, Server *server, const ServeSettings *settings,
                               const NetworkSettings *asked, const sigset_t *signals,
                               Problem *problem) {
-    atomic_store(&app->listener, listener);
-    greet(listener, settings, app);
+    atomic_store(&app->server, server);
+    greet(server, settings, app);
     systemd_notify("READY=1");
     const int signal = wait_for_end(signals, asked, problem);
     systemd_notify("STOPPING=1");
@@ -199,10 +199,10 @@ static void run_until_stopped(App *app, Server *listener, const ServeSettings *s
 
 static Status serve(const ServeSettings *settings, const sigset_t *signals, Problem *problem) {
     App app = {.reply_most = (size_t)1 << 30, .started_unix_ms = clock_unix_ms()};
-    AccessControl doorman = {.journal = (LogMode)settings->journal};
+    AccessControl access = {.journal = (LogMode)settings->journal};
     const size_t response_cache_bytes = settings->cache_bytes / HOT_SHARE;
     Dispatcher dispatcher = {&app, routes, quick_handlers, response_cache_new(response_cache_bytes),
-                             &doorman};
+                             &access};
     ServerSettings door = {.body_most = settings->max_body,
                            .answer_at_once = dispatch_quick,
                            .answer = dispatch,
@@ -218,7 +218,7 @@ static Status serve(const ServeSettings *settings, const sigset_t *signals, Prob
                                      .quota = settings->quota,
                                      .rate = settings->rate,
                                      .study_seconds = settings->max_study_seconds,
-                                     .deleted = {dispatcher.hot, forget_answers},
+                                     .deleted = {dispatcher.response_cache, forget_answers},
                                      .limits = {.samples = settings->max_samples,
                                                 .impacts = settings->max_impacts,
                                                 .steps = settings->max_cpu_seconds / SOLVER_STEP,
@@ -229,8 +229,8 @@ static Status serve(const ServeSettings *settings, const sigset_t *signals, Prob
     const NetworkSettings asked = {settings->host, settings->base_url, settings->tls_cert,
                                    settings->tls_key, settings->require_tokens};
     Network ready = {0};
-    RequestMetrics *meter = NULL;
-    Server *listener = NULL;
+    RequestMetrics *request_metrics = NULL;
+    Server *server = NULL;
     Maintenance *keeper = NULL;
     process_return_memory();
     fft_start();
@@ -240,42 +240,42 @@ static Status serve(const ServeSettings *settings, const sigset_t *signals, Prob
         status = network_read(&asked, &door.address, &ready, problem);
         status = together != STATUS_OK ? together : status;
     }
-    if (status == STATUS_OK && (meter = request_metrics_new(routes)) == NULL)
+    if (status == STATUS_OK && (request_metrics = request_metrics_new(routes)) == NULL)
         status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the counters");
     if (status == STATUS_OK)
-        status = db_open(settings->data, &app.store, problem);
+        status = db_open(settings->data, &app.db, problem);
     if (status == STATUS_OK)
-        status = tokens_open(app.store, ready.needs_tokens, &doorman.tokens, problem);
+        status = tokens_open(app.db, ready.needs_tokens, &access.tokens, problem);
     if (status == STATUS_OK)
-        status = network_check(&ready, &door.address, tokens_usable(doorman.tokens), problem);
+        status = network_check(&ready, &door.address, tokens_usable(access.tokens), problem);
     if (status == STATUS_OK)
-        status = jobs_open(app.store, &work, &app.intake, problem);
+        status = jobs_open(app.db, &work, &app.manager, problem);
     if (status == STATUS_OK)
-        status = maintenance_start(app.store, app.intake, &keep, &keeper, problem);
+        status = maintenance_start(app.db, app.manager, &keep, &keeper, problem);
     if (status == STATUS_OK)
-        status = background_open(ASIDES, &app.asides, problem);
+        status = background_open(ASIDES, &app.background_tasks, problem);
     if (status == STATUS_OK) {
         base_path_set(ready.url.path);
         text_fit(app.base_url, sizeof app.base_url, ready.url.text);
         app.has_tls = tls_source() != NULL;
-        app.meter = doorman.meter = meter;
-        app.hot = dispatcher.hot;
+        app.request_metrics = access.request_metrics = request_metrics;
+        app.response_cache = dispatcher.response_cache;
         door.hosts = &ready.hosts;
         door.certificate = tls_source();
-        status = server_open(&door, &listener, problem);
+        status = server_open(&door, &server, problem);
     }
     if (status == STATUS_OK)
-        run_until_stopped(&app, listener, settings, &asked, signals, problem);
-    server_stop(listener, GRACE_MS);
+        run_until_stopped(&app, server, settings, &asked, signals, problem);
+    server_stop(server, GRACE_MS);
     maintenance_stop(keeper);
-    background_close(app.asides);
-    if (app.intake != NULL)
-        jobs_close(app.intake);
-    server_free(listener);
-    response_cache_free(dispatcher.hot);
-    tokens_close(doorman.tokens);
-    db_close(app.store);
-    request_metrics_free(meter);
+    background_close(app.background_tasks);
+    if (app.manager != NULL)
+        jobs_close(app.manager);
+    server_free(server);
+    response_cache_free(dispatcher.response_cache);
+    tokens_close(access.tokens);
+    db_close(app.db);
+    request_metrics_free(request_metrics);
     network_clear(&ready);
     tls_forget();
     return status;

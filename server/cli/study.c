@@ -161,13 +161,12 @@ static Status study_scene(const char *path, const Bytes *text, void *of, Problem
     const StudyCommand *command = settings->command;
     const SimulationLimits limits = scene_file_limits(settings->max_cpu_seconds);
     const Texts *outputs = &settings->output;
-    Db *store = NULL;
+    Db *db = NULL;
     StudyRequest inquiry = {0};
     Warnings warnings = {0};
-    TRY(db_open(NULL, &store, problem));
-    Status status =
-        jobs_prepare(store, text->at, text->count, &limits, &inquiry, &warnings, problem);
-    db_close(store);
+    TRY(db_open(NULL, &db, problem));
+    Status status = jobs_prepare(db, text->at, text->count, &limits, &inquiry, &warnings, problem);
+    db_close(db);
     if (status == STATUS_OK)
         scene_file_warn(path, &warnings);
     if (status == STATUS_OK)

@@ -26,7 +26,7 @@ static const Field token_fields[] = {
 };
 // clang-format on
 
-static Status create(Db *store, const TokenSettings *settings, TokenRow *row, Problem *problem) {
+static Status create(Db *db, const TokenSettings *settings, TokenRow *row, Problem *problem) {
     static const double day_ms = 24 * 3600 * 1000.0;
     static const double days_most = 36500;
     char made[TOKEN_SIZE];
@@ -40,7 +40,7 @@ static Status create(Db *store, const TokenSettings *settings, TokenRow *row, Pr
     }
     TRY(token_make(settings->scopes != NULL ? settings->scopes : "read,submit", expires_unix_ms,
                    row, made, problem));
-    TRY(db_token_add(store, row, problem));
+    TRY(db_token_add(db, row, problem));
     fprintf(stderr,
             "The token \"%s\" (%s). It is shown this once; only its digest is kept. Use it as\n"
             "  curl -H \"Authorization: Bearer $TOKEN\" ...\n",
@@ -55,11 +55,11 @@ static const char *time_text(int64_t unix_ms, char text[32]) {
     return unix_ms > 0 ? text : NULL;
 }
 
-static Status list(Db *store, const TokenSettings *settings, TokenRow *row, Problem *problem) {
+static Status list(Db *db, const TokenSettings *settings, TokenRow *row, Problem *problem) {
     static const char *const heads[] = {"name", "scopes", "created", "used", "expires", "state"};
     TokenRows rows = {0};
     (void)row;
-    TRY(db_tokens(store, &rows, problem));
+    TRY(db_tokens(db, &rows, problem));
     const int64_t now = clock_unix_ms();
     PrintTable listing = {.columns = COUNT(heads), .has_heads = true};
     Bytes json = {0};
@@ -100,18 +100,18 @@ static Status list(Db *store, const TokenSettings *settings, TokenRow *row, Prob
     return STATUS_OK;
 }
 
-static Status revoke(Db *store, const TokenSettings *settings, TokenRow *row, Problem *problem) {
+static Status revoke(Db *db, const TokenSettings *settings, TokenRow *row, Problem *problem) {
     (void)settings;
     row->revoked_unix_ms = clock_unix_ms();
-    TRY(db_token_revoke(store, row, problem));
+    TRY(db_token_revoke(db, row, problem));
     fprintf(stderr, "The token \"%s\" is revoked; a running daemon knows within a second.\n",
             row->name);
     return STATUS_OK;
 }
 
-static Status forget(Db *store, const TokenSettings *settings, TokenRow *row, Problem *problem) {
+static Status forget(Db *db, const TokenSettings *settings, TokenRow *row, Problem *problem) {
     (void)settings;
-    TRY(db_token_forget(store, row, problem));
+    TRY(db_token_forget(db, row, problem));
     fprintf(stderr, "The token \"%s\" is forgotten.\n", row->name);
     return STATUS_OK;
 }
@@ -119,7 +119,7 @@ static Status forget(Db *store, const TokenSettings *settings, TokenRow *row, Pr
 static const struct Action {
     const char *name;
     bool needs_name;
-    Status (*act)(Db *store, const TokenSettings *settings, TokenRow *row, Problem *problem);
+    Status (*act)(Db *db, const TokenSettings *settings, TokenRow *row, Problem *problem);
 } actions[] = {
     {"create", true, create},
     {"list", false, list},
@@ -161,10 +161,10 @@ static Status act(TokenSettings *settings, const Options *options, Problem *prob
                            options->operands[2]);
     TRY(read_name(settings, options, action->needs_name, &row, problem));
     TRY(command_data_folder(&settings->data, problem));
-    Db *store = NULL;
-    TRY(db_open_beside(settings->data, &store, problem));
-    const Status status = action->act(store, settings, &row, problem);
-    db_close(store);
+    Db *db = NULL;
+    TRY(db_open_beside(settings->data, &db, problem));
+    const Status status = action->act(db, settings, &row, problem);
+    db_close(db);
     return status;
 }
 

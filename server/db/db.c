@@ -26,48 +26,48 @@ struct Db {
     Writer *writer;
     MaterialMemory *materials;
     RecordMemory *records;
-    atomic_uint_fast64_t generation; // of the catalogue
-    atomic_uint_fast64_t measured;   // materials
-    atomic_uint_fast64_t evictions;  // of series
-    atomic_bool is_probing;          // by db_is_writable
+    atomic_uint_fast64_t catalog_version; // of the catalogue
+    atomic_uint_fast64_t measured;        // materials
+    atomic_uint_fast64_t evictions;       // of series
+    atomic_bool is_probing;               // by db_is_writable
     pthread_mutex_t lock;
     pthread_cond_t some;
     Sqlite *readers[READERS]; // of which the first `free_count` are not taken
     size_t free_count;
 };
 
-static Status open_files(Db *store, const char *directory, bool is_beside, Problem *problem) {
+static Status open_files(Db *db, const char *directory, bool is_beside, Problem *problem) {
     char path[PATH_MAX];
     bool is_current = false;
     if (!is_beside)
-        TRY(data_dir_lock(directory, &store->lock_file, problem));
+        TRY(data_dir_lock(directory, &db->lock_file, problem));
     else
         TRY(data_dir_make(directory, problem));
     snprintf(path, sizeof path, "%s/impactd.db", directory);
-    TRY(sqlite_open(path, DATABASE_WRITER, &store->own, problem));
+    TRY(sqlite_open(path, DATABASE_WRITER, &db->own, problem));
     if (is_beside)
-        TRY(sqlite_is_current(store->own, embedded_sql, &is_current, problem));
+        TRY(sqlite_is_current(db->own, embedded_sql, &is_current, problem));
     if (is_beside && !is_current)
-        TRY(data_dir_lock(directory, &store->lock_file, problem));
+        TRY(data_dir_lock(directory, &db->lock_file, problem));
     if (!is_current) {
-        TRY(sqlite_migrate(store->own, embedded_sql, problem));
+        TRY(sqlite_migrate(db->own, embedded_sql, problem));
         TRY(data_dir_sync(directory, problem));
     }
-    while (store->free_count < READERS) {
-        TRY(sqlite_open(path, DATABASE_READER, &store->readers[store->free_count], problem));
-        store->free_count++;
+    while (db->free_count < READERS) {
+        TRY(sqlite_open(path, DATABASE_READER, &db->readers[db->free_count], problem));
+        db->free_count++;
     }
     return STATUS_OK;
 }
 
-static Status open_memory(Db *store, Problem *problem) {
-    TRY(sqlite_open(NULL, DATABASE_WRITER, &store->readers[0], problem));
-    store->free_count = 1;
-    return sqlite_migrate(store->readers[0], embedded_sql, problem);
+static Status open_memory(Db *db, Problem *problem) {
+    TRY(sqlite_open(NULL, DATABASE_WRITER, &db->readers[0], problem));
+    db->free_count = 1;
+    return sqlite_migrate(db->readers[0], embedded_sql, problem);
 }
 
-static Status open_store(const char *directory, bool is_beside, Db **store, Problem *problem) {
-    *store = NULL;
+static Status open_store(const char *directory, bool is_beside, Db **db, Problem *problem) {
+    *db = NULL;
     Db *made = calloc(1, sizeof *made);
     if (made == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the store");
@@ -86,36 +86,36 @@ static Status open_store(const char *directory, bool is_beside, Db **store, Prob
         db_close(made);
         return status;
     }
-    *store = made;
+    *db = made;
     return STATUS_OK;
 }
 
-Status db_open(const char *directory, Db **store, Problem *problem) {
-    return open_store(directory, false, store, problem);
+Status db_open(const char *directory, Db **db, Problem *problem) {
+    return open_store(directory, false, db, problem);
 }
 
-Status db_open_beside(const char *directory, Db **store, Problem *problem) {
-    return open_store(directory, true, store, problem);
+Status db_open_beside(const char *directory, Db **db, Problem *problem) {
+    return open_store(directory, true, db, problem);
 }
 
-void db_close(Db *store) {
-    if (store == NULL)
+void db_close(Db *db) {
+    if (db == NULL)
         return;
-    writer_stop(store->writer);
-    for (size_t i = 0; i < store->free_count; i++)
-        sqlite_close(store->readers[i]);
+    writer_stop(db->writer);
+    for (size_t i = 0; i < db->free_count; i++)
+        sqlite_close(db->readers[i]);
     // The last one to close moves the journal into the database.
-    sqlite_close(store->own);
-    data_dir_unlock(store->lock_file);
-    material_memory_free(store->materials);
-    record_memory_free(store->records);
-    pthread_cond_destroy(&store->some);
-    pthread_mutex_destroy(&store->lock);
-    free(store);
+    sqlite_close(db->own);
+    data_dir_unlock(db->lock_file);
+    material_memory_free(db->materials);
+    record_memory_free(db->records);
+    pthread_cond_destroy(&db->some);
+    pthread_mutex_destroy(&db->lock);
+    free(db);
 }
 
-const DbStats *db_totals(const Db *store) {
-    return writer_totals(store->writer);
+const DbStats *db_totals(const Db *db) {
+    return writer_totals(db->writer);
 }
 
 // Writes the database's first page as it is.
@@ -130,90 +130,90 @@ static void db_probe_ended(void *context, Status status, const char *detail) {
     atomic_store(&((Db *)context)->is_probing, false);
 }
 
-bool db_is_writable(Db *store) {
-    if (!atomic_load(&db_totals(store)->is_failing))
+bool db_is_writable(Db *db) {
+    if (!atomic_load(&db_totals(db)->is_failing))
         return true;
-    const WriteDone done = {db_probe_ended, store};
-    if (!atomic_exchange(&store->is_probing, true) &&
-        db_enqueue(store, db_apply_probe, NULL, 0, STORE_NOW, &done, NULL) != STATUS_OK)
-        atomic_store(&store->is_probing, false);
+    const WriteDone done = {db_probe_ended, db};
+    if (!atomic_exchange(&db->is_probing, true) &&
+        db_enqueue(db, db_apply_probe, NULL, 0, STORE_NOW, &done, NULL) != STATUS_OK)
+        atomic_store(&db->is_probing, false);
     return false;
 }
 
-Status db_write(Db *store, StoreApply *apply, const void *work, Problem *problem) {
-    return writer_do(store->writer, apply, work, problem);
+Status db_write(Db *db, StoreApply *apply, const void *work, Problem *problem) {
+    return writer_do(db->writer, apply, work, problem);
 }
 
-Status db_enqueue(Db *store, StoreApply *apply, const void *work, size_t size, WritePriority turn,
+Status db_enqueue(Db *db, StoreApply *apply, const void *work, size_t size, WritePriority turn,
                   const WriteDone *done, PendingWrite **ticket) {
-    return writer_enqueue(store->writer, apply, work, size, turn, done, ticket);
+    return writer_enqueue(db->writer, apply, work, size, turn, done, ticket);
 }
 
-atomic_uint_fast64_t *db_evictions(Db *store) {
-    return &store->evictions;
+atomic_uint_fast64_t *db_evictions(Db *db) {
+    return &db->evictions;
 }
 
-bool db_cancel_write(Db *store, PendingWrite *ticket) {
-    return writer_cancel(store->writer, ticket);
+bool db_cancel_write(Db *db, PendingWrite *ticket) {
+    return writer_cancel(db->writer, ticket);
 }
 
-void db_expedite(Db *store, PendingWrite *ticket) {
-    writer_expedite(store->writer, ticket);
+void db_expedite(Db *db, PendingWrite *ticket) {
+    writer_expedite(db->writer, ticket);
 }
 
-void db_flush(Db *store) {
-    writer_flush(store->writer);
+void db_flush(Db *db) {
+    writer_flush(db->writer);
 }
 
-MaterialMemory *db_material_memory(Db *store) {
-    return store->materials;
+MaterialMemory *db_material_memory(Db *db) {
+    return db->materials;
 }
 
-RecordMemory *db_record_memory(Db *store) {
-    return store->records;
+RecordMemory *db_record_memory(Db *db) {
+    return db->records;
 }
 
-bool db_is_private(const Db *store) {
-    return store->own == NULL;
+bool db_is_private(const Db *db) {
+    return db->own == NULL;
 }
 
-uint64_t db_catalog_version(Db *store) {
-    return atomic_load(&store->generation);
+uint64_t db_catalog_version(Db *db) {
+    return atomic_load(&db->catalog_version);
 }
 
-void db_catalog_changed(Db *store) {
-    atomic_fetch_add(&store->generation, 1);
+void db_catalog_changed(Db *db) {
+    atomic_fetch_add(&db->catalog_version, 1);
 }
 
 // Both only rise: their sum is the same only while both are.
-uint64_t db_audit_version(Db *store) {
-    return atomic_load(&store->generation) + atomic_load(&store->measured);
+uint64_t db_audit_version(Db *db) {
+    return atomic_load(&db->catalog_version) + atomic_load(&db->measured);
 }
 
-void db_material_measured(Db *store) {
-    atomic_fetch_add(&store->measured, 1);
+void db_material_measured(Db *db) {
+    atomic_fetch_add(&db->measured, 1);
 }
 
-Sqlite *db_take(Db *store) {
-    pthread_mutex_lock(&store->lock);
-    while (store->free_count == 0)
-        pthread_cond_wait(&store->some, &store->lock);
-    Sqlite *database = store->readers[--store->free_count];
-    pthread_mutex_unlock(&store->lock);
+Sqlite *db_take(Db *db) {
+    pthread_mutex_lock(&db->lock);
+    while (db->free_count == 0)
+        pthread_cond_wait(&db->some, &db->lock);
+    Sqlite *database = db->readers[--db->free_count];
+    pthread_mutex_unlock(&db->lock);
     return database;
 }
 
-void db_put(Db *store, Sqlite *database) {
-    pthread_mutex_lock(&store->lock);
-    store->readers[store->free_count++] = database;
-    pthread_cond_signal(&store->some);
-    pthread_mutex_unlock(&store->lock);
+void db_put(Db *db, Sqlite *database) {
+    pthread_mutex_lock(&db->lock);
+    db->readers[db->free_count++] = database;
+    pthread_cond_signal(&db->some);
+    pthread_mutex_unlock(&db->lock);
 }
 
-Status db_first(Db *store, const char *sql, const RowColumn *key_columns, const void *key,
+Status db_first(Db *db, const char *sql, const RowColumn *key_columns, const void *key,
                 const RowColumn *columns, void *target, bool *is_found, Problem *problem) {
     *is_found = false;
-    Sqlite *database = db_take(store);
+    Sqlite *database = db_take(db);
     Statement *statement;
     Status status = statement_begin(database, sql, key_columns, key, &statement, problem);
     if (status == STATUS_OK)
@@ -221,7 +221,7 @@ Status db_first(Db *store, const char *sql, const RowColumn *key_columns, const 
     if (status == STATUS_OK && *is_found)
         status = row_read(statement, columns, target, problem);
     statement_end(statement);
-    db_put(store, database);
+    db_put(db, database);
     return status;
 }
 
@@ -248,16 +248,16 @@ static Status read_all(Statement *statement, const RowColumn *columns, size_t si
     }
 }
 
-Status db_all(Db *store, const char *sql, const RowColumn *key_columns, const void *key,
+Status db_all(Db *db, const char *sql, const RowColumn *key_columns, const void *key,
               const RowColumn *columns, size_t size, void **at, size_t *count, Problem *problem) {
     *at = NULL;
     *count = 0;
-    Sqlite *database = db_take(store);
+    Sqlite *database = db_take(db);
     Statement *statement;
     Status status = statement_begin(database, sql, key_columns, key, &statement, problem);
     if (status == STATUS_OK)
         status = read_all(statement, columns, size, at, count, problem);
     statement_end(statement);
-    db_put(store, database);
+    db_put(db, database);
     return status;
 }

@@ -17,12 +17,12 @@ typedef struct Db Db;
 // Opens (and makes or migrates) DIR/impactd.db, DIR too if it is missing; `directory` NULL is a
 // private database in memory, for `impactd run`. STATUS_CONFLICT if another daemon has the folder,
 // or the database is a newer program's.
-Status db_open(const char *directory, Db **store, Problem *problem);
+Status db_open(const char *directory, Db **db, Problem *problem);
 // The same folder while a daemon has it, or none: for commands that read or write a few rows. Locks
 // the folder only where the database has to be made or migrated.
-Status db_open_beside(const char *directory, Db **store, Problem *problem);
-void db_close(Db *store);
-bool db_is_private(const Db *store); // in memory, gone with the program
+Status db_open_beside(const char *directory, Db **db, Problem *problem);
+void db_close(Db *db);
+bool db_is_private(const Db *db); // in memory, gone with the program
 
 // Writes are called "posted" where nobody waits for them. They are done in the order in which they
 // were posted, some at a time, as far as they are of the same turn. `call` comes once, from the
@@ -41,22 +41,22 @@ typedef enum WritePriority {
 } WritePriority;
 typedef struct PendingWrite PendingWrite; // lives until `call` returns
 // True: it was not begun, will never be, and `call` will not come. Otherwise it is under way.
-bool db_cancel_write(Db *store, PendingWrite *ticket);
+bool db_cancel_write(Db *db, PendingWrite *ticket);
 // What was to come later comes now.
-void db_expedite(Db *store, PendingWrite *ticket);
+void db_expedite(Db *db, PendingWrite *ticket);
 // Returns when all jobs that there are, accepted, finished or answered by what is known, are in the
 // database, or could not be written: before they are listed.
-void db_flush(Db *store);
+void db_flush(Db *db);
 
 // Rises whenever a name in a scene may come to mean something else, or be warned of otherwise: a
 // material's head, a review, a record. Whoever writes those calls db_catalog_changed once it
 // is durable.
-uint64_t db_catalog_version(Db *store);
-void db_catalog_changed(Db *store);
+uint64_t db_catalog_version(Db *db);
+void db_catalog_changed(Db *db);
 // Rises with that, and when a material was measured: its version is another one then, what its name
 // means is not.
-uint64_t db_audit_version(Db *store);
-void db_material_measured(Db *store);
+uint64_t db_audit_version(Db *db);
+void db_material_measured(Db *db);
 
 // What was written since the start; counted on.
 typedef struct DbStats {
@@ -64,10 +64,10 @@ typedef struct DbStats {
     Histogram commits;      // transactions, from their beginning until they are durable
     atomic_bool is_failing; // the last transaction could not be made durable
 } DbStats;
-const DbStats *db_totals(const Db *store);
+const DbStats *db_totals(const Db *db);
 // Whether the last transaction was made durable; if not, another one is tried meanwhile, so that a
 // later call knows whether the cause has gone. Does not wait.
-bool db_is_writable(Db *store);
+bool db_is_writable(Db *db);
 
 typedef struct JobRow {
     char id[40];
@@ -91,26 +91,26 @@ typedef struct JobRow {
 } JobRow;
 void job_row_clear(JobRow *row);
 // `scene` and `warnings` are required. STATUS_CONFLICT where the id exists.
-Status db_job_add(Db *store, const JobRow *row, Problem *problem);
+Status db_job_add(Db *db, const JobRow *row, Problem *problem);
 // The same, posted; `row` is borrowed until then.
-Status db_job_post(Db *store, const JobRow *row, WritePriority turn, const WriteDone *done,
+Status db_job_post(Db *db, const JobRow *row, WritePriority turn, const WriteDone *done,
                    PendingWrite **ticket);
 // State, is_cached, times, problem, result. STATUS_NOT_FOUND, unless it is_unsaved.
-Status db_job_update(Db *store, const JobRow *row, Problem *problem);
-Status db_job_update_post(Db *store, const JobRow *row, const WriteDone *done);
+Status db_job_update(Db *db, const JobRow *row, Problem *problem);
+Status db_job_update_post(Db *db, const JobRow *row, const WriteDone *done);
 // All but the scene, here and in the list; the unfinished ones come with theirs. `row` may be
 // uninitialised.
-Status db_job_load(Db *store, const char *id, JobRow *row, Problem *problem);
+Status db_job_load(Db *db, const char *id, JobRow *row, Problem *problem);
 // The scene that it asked for, to be freed: canonical JSON. STATUS_NOT_FOUND; STATUS_GONE where it
 // went with a deleted result.
-Status db_job_scene(Db *store, const char *id, char **scene, Problem *problem);
+Status db_job_scene(Db *db, const char *id, char **scene, Problem *problem);
 // The job that `client` (NULL: nobody in particular) sent under that key. STATUS_NOT_FOUND.
-Status db_job_keyed(Db *store, const char *client, const char *key, JobRow *row, Problem *problem);
+Status db_job_keyed(Db *db, const char *client, const char *key, JobRow *row, Problem *problem);
 typedef struct JobRows {
     JobRow *at;
     size_t count;
 } JobRows;
-Status db_job_unfinished(Db *store, JobRows *rows, Problem *problem); // oldest first
+Status db_job_unfinished(Db *db, JobRows *rows, Problem *problem); // oldest first
 void job_rows_clear(JobRows *rows);
 
 // Everything of a result but its series, which is computed anew when asked for.
@@ -131,38 +131,37 @@ typedef struct ResultRow {
 void result_row_clear(ResultRow *row);
 // Saves the result (NULL: none) and the finished jobs in one transaction; a result already there
 // stays as it is.
-Status db_result_save(Db *store, const ResultRow *result, const JobRow *const *jobs,
-                      size_t job_count, Problem *problem);
+Status db_result_save(Db *db, const ResultRow *result, const JobRow *const *jobs, size_t job_count,
+                      Problem *problem);
 // The same, posted; all of it is borrowed until then.
-Status db_result_post(Db *store, const ResultRow *result, const JobRow *const *jobs,
-                      size_t job_count, WritePriority turn, const WriteDone *done);
-Status db_result_load(Db *store, const char *id, ResultRow *row, Problem *problem);
+Status db_result_post(Db *db, const ResultRow *result, const JobRow *const *jobs, size_t job_count,
+                      WritePriority turn, const WriteDone *done);
+Status db_result_load(Db *db, const char *id, ResultRow *row, Problem *problem);
 // The same without scene, energy, impacts, psd and study, which may be long.
-Status db_result_head(Db *store, const char *id, ResultRow *row, Problem *problem);
+Status db_result_head(Db *db, const char *id, ResultRow *row, Problem *problem);
 // Id, engine and scene alone: what computing it anew takes.
-Status db_result_scene(Db *store, const char *id, ResultRow *row, Problem *problem);
-bool db_result_exists(Db *store, const char *id);
+Status db_result_scene(Db *db, const char *id, ResultRow *row, Problem *problem);
+bool db_result_exists(Db *db, const char *id);
 // A client other than `client` of whose finished jobs it is the result; "" if there is none.
-Status db_result_sharer(Db *store, const char *id, const char *client, char sharer[72],
+Status db_result_sharer(Db *db, const char *id, const char *client, char sharer[72],
                         Problem *problem);
-Status db_result_delete(Db *store, const char *id, Problem *problem); // STATUS_NOT_FOUND
+Status db_result_delete(Db *db, const char *id, Problem *problem); // STATUS_NOT_FOUND
 // Id, engine and scene of the newest ones, newest first, without scenes longer than that.
 typedef struct ResultRows {
     ResultRow *at;
     size_t count;
 } ResultRows;
-Status db_result_recent(Db *store, size_t most, size_t scene_max, ResultRows *rows,
-                        Problem *problem);
+Status db_result_recent(Db *db, size_t most, size_t scene_max, ResultRows *rows, Problem *problem);
 void result_rows_clear(ResultRows *rows);
 
 // Series of results as bytes, at most `most` of them in all: the longest unused make room. Posted
 // behind all else that is to be written. Takes `body`, which is to be freed, also when it fails.
-Status db_series_post(Db *store, const char *result, char *body, size_t size, uint64_t most,
+Status db_series_post(Db *db, const char *result, char *body, size_t size, uint64_t most,
                       const WriteDone *done);
 // *body is to be freed. STATUS_NOT_FOUND.
-Status db_series_load(Db *store, const char *result, char **body, size_t *size, Problem *problem);
-bool db_series_exists(Db *store, const char *result);
-void db_series_tally(Db *store, uint64_t *count, uint64_t *bytes, uint64_t *evictions);
+Status db_series_load(Db *db, const char *result, char **body, size_t *size, Problem *problem);
+bool db_series_exists(Db *db, const char *result);
+void db_series_tally(Db *db, uint64_t *count, uint64_t *bytes, uint64_t *evictions);
 
 typedef struct StoredBytes {
     void *at;
@@ -196,28 +195,28 @@ typedef struct SweepChunkRows {
 void sweep_chunk_rows_clear(SweepChunkRows *rows);
 
 // Writes the sweep down; one that is there already stays as it is, and `row` becomes that one.
-Status db_sweep_begin(Db *store, SweepRow *row, Problem *problem);
+Status db_sweep_begin(Db *db, SweepRow *row, Problem *problem);
 // STATUS_NOT_FOUND. `row` may be uninitialised.
-Status db_sweep_load(Db *store, const char *result, SweepRow *row, Problem *problem);
+Status db_sweep_load(Db *db, const char *result, SweepRow *row, Problem *problem);
 // What a job asked for, of which nothing may be written down yet: result and scene alone.
 // STATUS_NOT_FOUND.
-Status db_sweep_asked(Db *store, const char *job, SweepRow *row, Problem *problem);
+Status db_sweep_asked(Db *db, const char *job, SweepRow *row, Problem *problem);
 // Adds a chunk, in one transaction. One that is there already and not open stays as it is.
-Status db_sweep_take(Db *store, const SweepChunkRow *chunk, Problem *problem);
+Status db_sweep_take(Db *db, const SweepChunkRow *chunk, Problem *problem);
 // All that are there, by chunk, without reasons and rows.
-Status db_sweep_chunks(Db *store, int64_t sweep, SweepChunkRows *chunks, Problem *problem);
+Status db_sweep_chunks(Db *db, int64_t sweep, SweepChunkRows *chunks, Problem *problem);
 // One of them. STATUS_NOT_FOUND.
-Status db_sweep_chunk(Db *store, int64_t sweep, uint64_t number, SweepChunkRow *chunk,
+Status db_sweep_chunk(Db *db, int64_t sweep, uint64_t number, SweepChunkRow *chunk,
                       Problem *problem);
 void sweep_chunk_row_clear(SweepChunkRow *row);
 // Bytes `offset` ... of the rows of each of these chunks, `size` or as many as there are: those of
 // chunk i at target + i size. STATUS_CONFLICT where sweep or chunk is not what it was when it was
 // loaded.
-Status db_sweep_read(Db *store, const SweepRow *sweep, const SweepChunkRows *chunks, size_t offset,
+Status db_sweep_read(Db *db, const SweepRow *sweep, const SweepChunkRows *chunks, size_t offset,
                      size_t size, unsigned char *target, Problem *problem);
 // Opens every chunk that has failures. STATUS_CONFLICT where none has.
-Status db_sweep_reopen(Db *store, const char *result, Problem *problem);
+Status db_sweep_reopen(Db *db, const char *result, Problem *problem);
 // Forgets all sweeps that have neither a result nor an unfinished job.
-Status db_sweep_tidy(Db *store, Problem *problem);
+Status db_sweep_tidy(Db *db, Problem *problem);
 
 #endif

@@ -106,15 +106,15 @@ static Status fold(const char *text, const char *before, const char *after, char
     return *folded != NULL ? STATUS_OK : STATUS_NO_MEMORY;
 }
 
-static Status find_place(Db *store, const JobSearch *search, Asked *asked, Problem *problem) {
+static Status find_place(Db *db, const JobSearch *search, Asked *asked, Problem *problem) {
     static const char sql[] = "SELECT created_unix_ms AS before_ms, number AS before_number "
                               "FROM jobs WHERE id = :id";
     const char *before = search->before;
     bool is_found = true;
     asked->before_ms = asked->before_number = INT64_MAX;
     if (before != NULL)
-        TRY(db_first(store, sql, asked_columns, &(Asked){.id = (char *)before}, asked_columns,
-                     asked, &is_found, problem));
+        TRY(db_first(db, sql, asked_columns, &(Asked){.id = (char *)before}, asked_columns, asked,
+                     &is_found, problem));
     if (is_found)
         return STATUS_OK;
     if (search->before_unix_ms < 0)
@@ -125,7 +125,7 @@ static Status find_place(Db *store, const JobSearch *search, Asked *asked, Probl
     return STATUS_OK;
 }
 
-Status db_job_search(Db *store, const JobSearch *search, JobRows *rows, Problem *problem) {
+Status db_job_search(Db *db, const JobSearch *search, JobRows *rows, Problem *problem) {
     Asked asked = {.result = (char *)search->result,
                    .study = (char *)search->study,
                    .since = search->since_unix_ms,
@@ -134,7 +134,7 @@ Status db_job_search(Db *store, const JobSearch *search, JobRows *rows, Problem 
                    .most_state = search->most_state,
                    .most = search->most};
     *rows = (JobRows){0};
-    TRY(find_place(store, search, &asked, problem));
+    TRY(find_place(db, search, &asked, problem));
     Status status = fold(search->words, "", "", &asked.words);
     if (status == STATUS_OK)
         status = fold(search->label, "\n", "\n", &asked.label);
@@ -142,7 +142,7 @@ Status db_job_search(Db *store, const JobSearch *search, JobRows *rows, Problem 
         status = fold(search->label, "\n", "=", &asked.key);
     void *at = NULL;
     if (status == STATUS_OK)
-        status = db_all(store, choose(search), asked_columns, &asked, job_columns, sizeof *rows->at,
+        status = db_all(db, choose(search), asked_columns, &asked, job_columns, sizeof *rows->at,
                         &at, &rows->count, problem);
     else
         (void)problem_set(problem, status, "no memory for a search");

@@ -23,7 +23,7 @@ typedef struct JobSearch {
 JobSearch job_search_all(size_t most);
 
 // STATUS_NOT_FOUND where there is no job `before`, and it does not say when it came.
-Status db_job_search(Db *store, const JobSearch *search, JobRows *rows, Problem *problem);
+Status db_job_search(Db *db, const JobSearch *search, JobRows *rows, Problem *problem);
 
 // What a search by words looks into: the title's line, and one for each label.
 void job_words(Bytes *bytes, const char *title, const char *const *labels, size_t label_count);

@@ -71,13 +71,13 @@ static Status add(Sqlite *database, const void *work, Problem *problem) {
     return row->state < 2 ? use_lines_add(database, uses_sql, row->uses, problem) : STATUS_OK;
 }
 
-Status db_job_add(Db *store, const JobRow *row, Problem *problem) {
-    return db_write(store, add, row, problem);
+Status db_job_add(Db *db, const JobRow *row, Problem *problem) {
+    return db_write(db, add, row, problem);
 }
 
-Status db_job_post(Db *store, const JobRow *row, WritePriority turn, const WriteDone *done,
+Status db_job_post(Db *db, const JobRow *row, WritePriority turn, const WriteDone *done,
                    PendingWrite **ticket) {
-    return db_enqueue(store, add, row, 0, turn, done, ticket);
+    return db_enqueue(db, add, row, 0, turn, done, ticket);
 }
 
 Status job_row_save(Sqlite *database, const JobRow *row, Problem *problem) {
@@ -93,12 +93,12 @@ static Status save(Sqlite *database, const void *work, Problem *problem) {
     return job_row_save(database, work, problem);
 }
 
-Status db_job_update(Db *store, const JobRow *row, Problem *problem) {
-    return db_write(store, save, row, problem);
+Status db_job_update(Db *db, const JobRow *row, Problem *problem) {
+    return db_write(db, save, row, problem);
 }
 
-Status db_job_update_post(Db *store, const JobRow *row, const WriteDone *done) {
-    return db_enqueue(store, save, row, 0, STORE_NOW, done, NULL);
+Status db_job_update_post(Db *db, const JobRow *row, const WriteDone *done) {
+    return db_enqueue(db, save, row, 0, STORE_NOW, done, NULL);
 }
 
 typedef struct Key {
@@ -108,12 +108,12 @@ typedef struct Key {
 static const RowColumn key_columns[] = {ROW_COLUMN(Key, id, COLUMN_TEXT),
                                         ROW_COLUMN(Key, most, COLUMN_COUNT), ROW_END};
 
-Status db_job_load(Db *store, const char *id, JobRow *row, Problem *problem) {
+Status db_job_load(Db *db, const char *id, JobRow *row, Problem *problem) {
     static const char sql[] = "SELECT " JOB_SHOWN " FROM jobs WHERE id = :id";
     const Key key = {(char *)id, 0};
     bool is_found;
     memset(row, 0, sizeof *row);
-    TRY(db_first(store, sql, key_columns, &key, job_columns, row, &is_found, problem));
+    TRY(db_first(db, sql, key_columns, &key, job_columns, row, &is_found, problem));
     return is_found ? STATUS_OK : not_found(id, problem);
 }
 
@@ -125,7 +125,7 @@ static const RowColumn asked_columns[] = {ROW_COLUMN(Asked, id, COLUMN_NAME),
                                           ROW_COLUMN(Asked, result, COLUMN_NAME),
                                           ROW_COLUMN(Asked, scene, COLUMN_TEXT), ROW_END};
 
-Status db_job_scene(Db *store, const char *id, char **scene, Problem *problem) {
+Status db_job_scene(Db *db, const char *id, char **scene, Problem *problem) {
     static const char sql[] =
         "SELECT coalesce((SELECT scene FROM jobs WHERE id = :id AND scene <> ''), "
         "(SELECT scene FROM results WHERE id = :result)) AS scene";
@@ -134,11 +134,11 @@ Status db_job_scene(Db *store, const char *id, char **scene, Problem *problem) {
     bool is_found;
     *scene = NULL;
     // A job may be in memory alone as yet, its result not.
-    TRY(db_job_load(store, id, &row, problem));
+    TRY(db_job_load(db, id, &row, problem));
     memcpy(asked.id, row.id, sizeof asked.id);
     memcpy(asked.result, row.result, sizeof asked.result);
     job_row_clear(&row);
-    TRY(db_first(store, sql, asked_columns, &asked, asked_columns, &asked, &is_found, problem));
+    TRY(db_first(db, sql, asked_columns, &asked, asked_columns, &asked, &is_found, problem));
     *scene = asked.scene;
     return *scene != NULL ? STATUS_OK
                           : problem_set(problem, STATUS_GONE,
@@ -153,20 +153,20 @@ typedef struct Keyed {
 static const RowColumn idempotency_columns[] = {ROW_COLUMN(Keyed, client, COLUMN_TEXT),
                                                 ROW_COLUMN(Keyed, key, COLUMN_TEXT), ROW_END};
 
-Status db_job_keyed(Db *store, const char *client, const char *key, JobRow *row, Problem *problem) {
+Status db_job_keyed(Db *db, const char *client, const char *key, JobRow *row, Problem *problem) {
     static const char sql[] = "SELECT " JOB_SHOWN ", request FROM jobs "
                               "WHERE idempotency_key = :key AND coalesce(client, '') = :client";
     const Keyed keyed = {(char *)(client != NULL ? client : ""), (char *)key};
     bool is_found;
     memset(row, 0, sizeof *row);
-    TRY(db_first(store, sql, idempotency_columns, &keyed, job_columns, row, &is_found, problem));
+    TRY(db_first(db, sql, idempotency_columns, &keyed, job_columns, row, &is_found, problem));
     return is_found ? STATUS_OK
                     : problem_set(problem, STATUS_NOT_FOUND, "there is no job of that key");
 }
 
-static Status load(Db *store, const char *sql, const Key *key, JobRows *rows, Problem *problem) {
+static Status load(Db *db, const char *sql, const Key *key, JobRows *rows, Problem *problem) {
     void *at;
-    const Status status = db_all(store, sql, key_columns, key, job_columns, sizeof *rows->at, &at,
+    const Status status = db_all(db, sql, key_columns, key, job_columns, sizeof *rows->at, &at,
                                  &rows->count, problem);
     rows->at = at;
     if (status != STATUS_OK)
@@ -174,8 +174,8 @@ static Status load(Db *store, const char *sql, const Key *key, JobRows *rows, Pr
     return status;
 }
 
-Status db_job_unfinished(Db *store, JobRows *rows, Problem *problem) {
+Status db_job_unfinished(Db *db, JobRows *rows, Problem *problem) {
     static const char sql[] =
         "SELECT " JOB_SHORT ", scene FROM jobs WHERE state < 2 ORDER BY number";
-    return load(store, sql, &(Key){0}, rows, problem);
+    return load(db, sql, &(Key){0}, rows, problem);
 }

@@ -10,23 +10,22 @@ typedef struct MaterialMoment {
     int64_t revisions, reviews, measurements;
 } MaterialMoment;
 
-Status db_material_moment(Db *store, MaterialMoment *moment, Problem *problem);
+Status db_material_moment(Db *db, MaterialMoment *moment, Problem *problem);
 
 // What is found below may be uninitialised before, and is cleared by the caller in any case;
 // *is_found is false behind the last.
 
 // The first revision of the first material behind `slug`.
-Status db_material_behind(Db *store, const MaterialMoment *moment, const char *slug,
+Status db_material_behind(Db *db, const MaterialMoment *moment, const char *slug,
                           MaterialRevision *revision, bool *is_found, Problem *problem);
 // The first of a material's revisions behind `number`. What its last review made of it is not told.
-Status db_revision_behind(Db *store, const MaterialMoment *moment, const char *slug,
-                          uint64_t number, MaterialRevision *revision, bool *is_found,
-                          Problem *problem);
+Status db_revision_behind(Db *db, const MaterialMoment *moment, const char *slug, uint64_t number,
+                          MaterialRevision *revision, bool *is_found, Problem *problem);
 // The reviews of one revision in their order.
-Status db_reviews_of(Db *store, const MaterialMoment *moment, const char *slug, uint64_t revision,
+Status db_reviews_of(Db *db, const MaterialMoment *moment, const char *slug, uint64_t revision,
                      MaterialReviews *reviews, Problem *problem);
 // The first of a material's measurements behind `number`.
-Status db_measurement_behind(Db *store, const MaterialMoment *moment, const char *slug,
+Status db_measurement_behind(Db *db, const MaterialMoment *moment, const char *slug,
                              uint64_t number, MaterialMeasurement *measurement, bool *is_found,
                              Problem *problem);
 

@@ -21,30 +21,31 @@ static Status load_revision(Sqlite *database, const char *slug, uint64_t number,
     return import_load(database, sql, slug, number, material_revision_columns, revision, problem);
 }
 
-static void compare_revision(const ImportContext *walk, const ImportRevision *ours,
+static void compare_revision(const ImportContext *context, const ImportRevision *ours,
                              const MaterialRevision *there, MaterialGroup *group) {
     const RowInfo *mark = &ours->mark;
-    const size_t faults = walk->faults->count;
-    if (!walk->import->is_partial)
-        (void)walk->import->says_same(&ours->said, there, mark->place, walk->faults);
+    const size_t faults = context->faults->count;
+    if (!context->import->is_partial)
+        (void)context->import->says_same(&ours->said, there, mark->place, context->faults);
     const ImportOrigin is = {ours->said.author, ours->said.comment, ours->said.created_unix_ms},
                        was = {there->author, there->comment, there->created_unix_ms};
-    import_compare_origin(walk, mark, "revision", &is, &was);
+    import_compare_origin(context, mark, "revision", &is, &was);
     if (ours->said.reverts != there->reverts && !(ours->said.reverts == 0 && mark->is_faulty))
-        (void)import_fault(walk, mark->place, "reverts",
+        (void)import_fault(context, mark->place, "reverts",
                            "is not that of the revision that is there, and those never change");
-    group->revisions_done.same += walk->faults->count == faults;
+    group->revisions_done.same += context->faults->count == faults;
 }
 
 // A revision that says again what another one says.
-static Status judge_reverts(const ImportContext *walk, Sqlite *database, const ImportRevision *ours,
-                            uint64_t number, const MaterialGroup *group, Problem *problem) {
+static Status judge_reverts(const ImportContext *context, Sqlite *database,
+                            const ImportRevision *ours, uint64_t number, const MaterialGroup *group,
+                            Problem *problem) {
     const uint64_t again = ours->said.reverts;
     MaterialRevision there = {0};
     if (again == 0)
         return STATUS_OK;
     if (again >= number) {
-        (void)import_fault(walk, ours->mark.place, "reverts",
+        (void)import_fault(context, ours->mark.place, "reverts",
                            "must be a revision before %llu, is %llu", (unsigned long long)number,
                            (unsigned long long)again);
         return STATUS_OK;
@@ -56,16 +57,16 @@ static Status judge_reverts(const ImportContext *walk, Sqlite *database, const I
         if (group->revisions[i].said.revision == again && !group->revisions[i].mark.is_faulty)
             said = &group->revisions[i].said;
     if (said != NULL && !ours->mark.is_faulty &&
-        !walk->import->says_same(&ours->said, said, "", NULL))
+        !context->import->says_same(&ours->said, said, "", NULL))
         (void)import_fault(
-            walk, ours->mark.place, "reverts",
+            context, ours->mark.place, "reverts",
             "revision %llu says something else; a revision that reverts says the same",
             (unsigned long long)again);
     material_revision_clear(&there);
     return STATUS_OK;
 }
 
-static void judge_measurements(const ImportContext *walk, const ImportRevision *ours,
+static void judge_measurements(const ImportContext *context, const ImportRevision *ours,
                                const MaterialGroup *group) {
     const Reals *named = &ours->said.material.measurements;
     char list[POINTER_SIZE], place[POINTER_SIZE];
@@ -74,60 +75,60 @@ static void judge_measurements(const ImportContext *walk, const ImportRevision *
         if (named->at[i] <= (double)group->last_measurement)
             continue;
         json_pointer_index(place, sizeof place, list, i);
-        (void)import_fault(walk, place, "",
+        (void)import_fault(context, place, "",
                            "there is no measurement %.0f of \"%.64s\"; it has %llu", named->at[i],
                            group->slug, (unsigned long long)group->last_measurement);
     }
 }
 
-static Status add_revision(ImportContext *walk, Sqlite *database, const ImportRevision *ours,
+static Status add_revision(ImportContext *context, Sqlite *database, const ImportRevision *ours,
                            uint64_t number, MaterialGroup *group, Problem *problem) {
     const RowInfo *mark = &ours->mark;
-    import_validate_origin(walk, mark, ours->said.author, ours->said.created_unix_ms);
-    judge_measurements(walk, ours, group);
-    TRY(judge_reverts(walk, database, ours, number, group, problem));
+    import_validate_origin(context, mark, ours->said.author, ours->said.created_unix_ms);
+    judge_measurements(context, ours, group);
+    TRY(judge_reverts(context, database, ours, number, group, problem));
     group->revisions_done.added++;
     MaterialRevision said = ours->said;
     said.revision = number;
-    said.author = (char *)import_author(walk, mark, said.author);
+    said.author = (char *)import_author(context, mark, said.author);
     said.comment = mark->has_comment ? said.comment : (char *)"imported";
-    said.created_unix_ms = mark->has_created ? said.created_unix_ms : walk->import->now_unix_ms;
-    if (walk->writes && walk->faults->count == 0)
+    said.created_unix_ms = mark->has_created ? said.created_unix_ms : context->import->now_unix_ms;
+    if (context->writes && context->faults->count == 0)
         TRY(material_revision_add(database, &said, problem));
-    return import_reviews(walk, database, ours, &said, group, problem);
+    return import_reviews(context, database, ours, &said, group, problem);
 }
 
 // One without a number is the next, unless the newest says the same already.
-static Status import_next(ImportContext *walk, Sqlite *database, const ImportRevision *ours,
+static Status import_next(ImportContext *context, Sqlite *database, const ImportRevision *ours,
                           MaterialGroup *group, Problem *problem) {
     MaterialRevision newest = {0};
     Status status = STATUS_OK;
     if (group->key.latest > 0)
         status = load_revision(database, group->slug, group->key.latest, &newest, problem);
     if (status == STATUS_OK && newest.revision > 0 &&
-        walk->import->says_same(&ours->said, &newest, "", NULL)) {
+        context->import->says_same(&ours->said, &newest, "", NULL)) {
         group->revisions_done.same++;
-        status = import_reviews(walk, database, ours, &newest, group, problem);
+        status = import_reviews(context, database, ours, &newest, group, problem);
     } else if (status == STATUS_OK) {
-        status = add_revision(walk, database, ours, group->key.latest + 1, group, problem);
+        status = add_revision(context, database, ours, group->key.latest + 1, group, problem);
     }
     material_revision_clear(&newest);
     return status;
 }
 
-static Status import_known(ImportContext *walk, Sqlite *database, const ImportRevision *ours,
+static Status import_known(ImportContext *context, Sqlite *database, const ImportRevision *ours,
                            MaterialGroup *group, Problem *problem) {
     MaterialRevision there = {0};
     TRY(load_revision(database, group->slug, ours->said.revision, &there, problem));
-    compare_revision(walk, ours, &there, group);
-    const Status status = import_reviews(walk, database, ours, &there, group, problem);
+    compare_revision(context, ours, &there, group);
+    const Status status = import_reviews(context, database, ours, &there, group, problem);
     material_revision_clear(&there);
     return status;
 }
 
-static Status import_revisions(ImportContext *walk, Sqlite *database, MaterialGroup *group,
+static Status import_revisions(ImportContext *context, Sqlite *database, MaterialGroup *group,
                                Problem *problem) {
-    const char *name = walk->import->revision_name;
+    const char *name = context->import->revision_name;
     uint64_t before = 0, last = group->key.latest;
     for (size_t i = 0; i < group->revision_count; i++)
         group->revisions_drift = group->revisions_drift || group->revisions[i].mark.is_adrift;
@@ -137,22 +138,22 @@ static Status import_revisions(ImportContext *walk, Sqlite *database, MaterialGr
         if (ours->mark.is_adrift)
             continue;
         if (number == 0) {
-            TRY(import_next(walk, database, ours, group, problem));
+            TRY(import_next(context, database, ours, group, problem));
             continue;
         }
-        if (import_validate_number(walk, &ours->mark, name, number, before, group->revisions_drift,
-                                   &last) != STATUS_OK)
+        if (import_validate_number(context, &ours->mark, name, number, before,
+                                   group->revisions_drift, &last) != STATUS_OK)
             continue;
         before = number;
         if (number <= group->key.latest)
-            TRY(import_known(walk, database, ours, group, problem));
+            TRY(import_known(context, database, ours, group, problem));
         else
-            TRY(add_revision(walk, database, ours, number, group, problem));
+            TRY(add_revision(context, database, ours, number, group, problem));
     }
     return STATUS_OK;
 }
 
-static Status note(const ImportContext *walk, Sqlite *database, const MaterialGroup *group,
+static Status note(const ImportContext *context, Sqlite *database, const MaterialGroup *group,
                    Problem *problem) {
     char why[160];
     if (group->revisions_done.added + group->measurements_done.added + group->reviews_done.added ==
@@ -162,9 +163,9 @@ static Status note(const ImportContext *walk, Sqlite *database, const MaterialGr
              group->revisions_done.added, group->measurements_done.added,
              group->reviews_done.added);
     const AuditEntry deed = {.action = (char *)"import",
-                             .who = (char *)walk->import->who,
+                             .who = (char *)context->import->who,
                              .why = why,
-                             .created_unix_ms = walk->import->now_unix_ms};
+                             .created_unix_ms = context->import->now_unix_ms};
     return audit_entry_add(database, group->slug, &deed, problem);
 }
 
@@ -173,29 +174,29 @@ static void count(ImportCount *all, const ImportCount *some) {
     all->same += some->same;
 }
 
-static Status import_group(ImportContext *walk, Sqlite *database, MaterialGroup *group,
+static Status import_group(ImportContext *context, Sqlite *database, MaterialGroup *group,
                            Problem *problem) {
     TRY(material_key_find(database, group->slug, 0, &group->key, problem));
     if (group->key.number == 0 && group->revision_count == 0) {
-        (void)import_fault(walk, group->measurements[0].mark.place, "slug",
+        (void)import_fault(context, group->measurements[0].mark.place, "slug",
                            "there is no material \"%.64s\" to measure; bring a revision of it",
                            group->slug);
         return STATUS_OK;
     }
-    if (group->key.number == 0 && walk->writes && walk->faults->count == 0)
+    if (group->key.number == 0 && context->writes && context->faults->count == 0)
         TRY(material_row_add(database, group->slug, problem));
-    TRY(import_measurements(walk, database, group, problem));
-    TRY(import_revisions(walk, database, group, problem));
-    if (walk->writes && walk->faults->count == 0)
-        TRY(note(walk, database, group, problem));
-    count(&walk->tally->revisions, &group->revisions_done);
-    count(&walk->tally->measurements, &group->measurements_done);
-    count(&walk->tally->reviews, &group->reviews_done);
+    TRY(import_measurements(context, database, group, problem));
+    TRY(import_revisions(context, database, group, problem));
+    if (context->writes && context->faults->count == 0)
+        TRY(note(context, database, group, problem));
+    count(&context->metrics->revisions, &group->revisions_done);
+    count(&context->metrics->measurements, &group->measurements_done);
+    count(&context->metrics->reviews, &group->reviews_done);
     return STATUS_OK;
 }
 
-static Status import_all(ImportContext *walk, Sqlite *database, Problem *problem) {
-    const MaterialImport *import = walk->import;
+static Status import_all(ImportContext *context, Sqlite *database, Problem *problem) {
+    const MaterialImport *import = context->import;
     size_t r = 0, m = 0;
     while (r < import->revision_count || m < import->measurement_count) {
         const char *a = r < import->revision_count ? import->revisions[r].said.slug : NULL;
@@ -210,58 +211,58 @@ static Status import_all(ImportContext *walk, Sqlite *database, Problem *problem
                text_same(import->measurements[m].made.slug, group.slug);
              m++)
             group.measurement_count++;
-        walk->tally->materials++;
-        TRY(import_group(walk, database, &group, problem));
+        context->metrics->materials++;
+        TRY(import_group(context, database, &group, problem));
     }
     return STATUS_OK;
 }
 
-static Status refuse(const ImportContext *walk) {
-    if (walk->faults->count > 0)
+static Status refuse(const ImportContext *context) {
+    if (context->faults->count > 0)
         return STATUS_INVALID;
-    if (walk->denied == 0)
+    if (context->denied == 0)
         return STATUS_OK;
-    return problem_add(walk->faults, STATUS_FORBIDDEN, walk->denied_place,
+    return problem_add(context->faults, STATUS_FORBIDDEN, context->denied_place,
                        "%s (%zu more rows are like it): what is by others, times, and reviews "
                        "may be brought by who has the scope admin; nobody approves their own by "
                        "way of a file",
-                       walk->denied_why, walk->denied - 1);
+                       context->denied_why, context->denied - 1);
 }
 
 // May be done again from its beginning.
 static Status write_all(Sqlite *database, const void *work, Problem *problem) {
-    ImportContext walk = *(const ImportContext *)work;
-    problem_clear(walk.faults);
-    *walk.tally = (ImportTally){0};
-    TRY(import_all(&walk, database, problem));
-    return refuse(&walk);
+    ImportContext context = *(const ImportContext *)work;
+    problem_clear(context.faults);
+    *context.metrics = (ImportTally){0};
+    TRY(import_all(&context, database, problem));
+    return refuse(&context);
 }
 
 // Within one transaction of a reader, so that all of it is of one moment.
-static Status judge_all(Db *store, ImportContext *walk, Problem *problem) {
+static Status judge_all(Db *db, ImportContext *context, Problem *problem) {
     static const char begin[] = "BEGIN", end[] = "COMMIT";
-    Sqlite *database = db_take(store);
+    Sqlite *database = db_take(db);
     Status status = sqlite_change(database, begin, NULL, NULL, NULL, problem);
     if (status == STATUS_OK) {
-        status = import_all(walk, database, problem);
+        status = import_all(context, database, problem);
         (void)sqlite_change(database, end, NULL, NULL, NULL, NULL);
     }
-    db_put(store, database);
-    return status == STATUS_OK ? refuse(walk) : status;
+    db_put(db, database);
+    return status == STATUS_OK ? refuse(context) : status;
 }
 
-Status db_material_import(Db *store, const MaterialImport *import, bool is_dry, ImportTally *tally,
+Status db_material_import(Db *db, const MaterialImport *import, bool is_dry, ImportTally *metrics,
                           Problem *problem) {
-    *tally = (ImportTally){0};
-    ImportContext walk = {.import = import, .tally = tally, .faults = problem};
+    *metrics = (ImportTally){0};
+    ImportContext context = {.import = import, .metrics = metrics, .faults = problem};
     if (is_dry || problem->count > 0)
-        return judge_all(store, &walk, problem);
-    walk.writes = true;
-    TRY(db_write(store, write_all, &walk, problem));
-    if (tally->revisions.added + tally->reviews.added > 0)
-        db_catalog_changed(store);
-    else if (tally->measurements.added > 0)
-        db_material_measured(store);
+        return judge_all(db, &context, problem);
+    context.writes = true;
+    TRY(db_write(db, write_all, &context, problem));
+    if (metrics->revisions.added + metrics->reviews.added > 0)
+        db_catalog_changed(db);
+    else if (metrics->measurements.added > 0)
+        db_material_measured(db);
     return STATUS_OK;
 }
 

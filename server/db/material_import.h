@@ -60,7 +60,7 @@ typedef struct ImportTally {
 
 // Judges all of it; adds it unless `is_dry`, or `problem` has faults already or comes to have some:
 // then nothing is written. STATUS_INVALID: the faults. Tells the catalogue's readers.
-Status db_material_import(Db *store, const MaterialImport *import, bool is_dry, ImportTally *tally,
+Status db_material_import(Db *db, const MaterialImport *import, bool is_dry, ImportTally *metrics,
                           Problem *problem);
 
 void import_revision_clear(ImportRevision *revision);

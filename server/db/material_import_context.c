@@ -15,7 +15,7 @@ static const int64_t time_slack_ms = 24 * 3600 * (int64_t)1000;
 const RowColumn import_key_columns[] = {ROW_COLUMN(ImportKey, slug, COLUMN_TEXT),
                                         ROW_COLUMN(ImportKey, number, COLUMN_COUNT), ROW_END};
 
-Status import_fault(const ImportContext *walk, const char *place, const char *name,
+Status import_fault(const ImportContext *context, const char *place, const char *name,
                     const char *format, ...) {
     char pointer[POINTER_SIZE], text[sizeof((Fault){0}.detail)];
     va_list arguments;
@@ -26,14 +26,14 @@ Status import_fault(const ImportContext *walk, const char *place, const char *na
         json_pointer_join(pointer, sizeof pointer, place, name);
     else
         text_fit(pointer, sizeof pointer, place);
-    return problem_add(walk->faults, STATUS_INVALID, pointer, "%s", text);
+    return problem_add(context->faults, STATUS_INVALID, pointer, "%s", text);
 }
 
-void import_deny(ImportContext *walk, const char *place, const char *name, const char *why) {
-    if (walk->denied++ > 0)
+void import_deny(ImportContext *context, const char *place, const char *name, const char *why) {
+    if (context->denied++ > 0)
         return;
-    json_pointer_join(walk->denied_place, sizeof walk->denied_place, place, name);
-    walk->denied_why = why;
+    json_pointer_join(context->denied_place, sizeof context->denied_place, place, name);
+    context->denied_why = why;
 }
 
 Status import_load(Sqlite *database, const char *sql, const char *slug, uint64_t number,
@@ -49,21 +49,21 @@ Status import_load(Sqlite *database, const char *sql, const char *slug, uint64_t
     return status;
 }
 
-void import_compare_origin(const ImportContext *walk, const RowInfo *mark, const char *what,
+void import_compare_origin(const ImportContext *context, const RowInfo *mark, const char *what,
                            const ImportOrigin *ours, const ImportOrigin *there) {
     static const char never[] = "is not that of the %s that is there, and those never change";
     if (mark->has_author && !text_same(ours->author, there->author))
-        (void)import_fault(walk, mark->place, "author", never, what);
+        (void)import_fault(context, mark->place, "author", never, what);
     if (mark->has_comment && !text_same(ours->comment, there->comment))
-        (void)import_fault(walk, mark->place, "comment", never, what);
+        (void)import_fault(context, mark->place, "comment", never, what);
     if (mark->has_created && ours->created_unix_ms != there->created_unix_ms)
-        (void)import_fault(walk, mark->place, "created", never, what);
+        (void)import_fault(context, mark->place, "created", never, what);
 }
 
-Status import_validate_number(const ImportContext *walk, const RowInfo *mark, const char *name,
+Status import_validate_number(const ImportContext *context, const RowInfo *mark, const char *name,
                               uint64_t number, uint64_t before, bool drifts, uint64_t *last) {
     if (number == before)
-        return import_fault(walk, mark->place, name, "stands in the file twice, %llu",
+        return import_fault(context, mark->place, name, "stands in the file twice, %llu",
                             (unsigned long long)number);
     if (number <= *last)
         return STATUS_OK;
@@ -71,31 +71,31 @@ Status import_validate_number(const ImportContext *walk, const RowInfo *mark, co
     *last = number;
     if (number == next || drifts)
         return STATUS_OK;
-    return import_fault(walk, mark->place, name,
+    return import_fault(context, mark->place, name,
                         "must be %llu, the next, is %llu: numbers continue without a gap",
                         (unsigned long long)next, (unsigned long long)number);
 }
 
-const char *import_author(const ImportContext *walk, const RowInfo *mark, const char *author) {
-    return mark->has_author && walk->import->may_all ? author : walk->import->who;
+const char *import_author(const ImportContext *context, const RowInfo *mark, const char *author) {
+    return mark->has_author && context->import->may_all ? author : context->import->who;
 }
 
-void import_validate_time(const ImportContext *walk, const char *place, int64_t unix_ms,
+void import_validate_time(const ImportContext *context, const char *place, int64_t unix_ms,
                           int64_t revised_unix_ms) {
-    if (unix_ms > walk->import->now_unix_ms + time_slack_ms)
-        (void)import_fault(walk, place, "created", "lies in the future");
+    if (unix_ms > context->import->now_unix_ms + time_slack_ms)
+        (void)import_fault(context, place, "created", "lies in the future");
     else if (unix_ms < revised_unix_ms - time_slack_ms)
-        (void)import_fault(walk, place, "created",
+        (void)import_fault(context, place, "created",
                            "lies before the revision was written; give that its \"created\", too");
 }
 
-void import_validate_origin(ImportContext *walk, const RowInfo *mark, const char *author,
+void import_validate_origin(ImportContext *context, const RowInfo *mark, const char *author,
                             int64_t created_unix_ms) {
-    const bool may_all = walk->import->may_all;
-    if (!may_all && mark->has_author && author != NULL && !text_same(author, walk->import->who))
-        import_deny(walk, mark->place, "author", "is somebody else");
+    const bool may_all = context->import->may_all;
+    if (!may_all && mark->has_author && author != NULL && !text_same(author, context->import->who))
+        import_deny(context, mark->place, "author", "is somebody else");
     if (!may_all && mark->has_created)
-        import_deny(walk, mark->place, "created", "is a time of the file's own");
+        import_deny(context, mark->place, "created", "is a time of the file's own");
     if (mark->has_created)
-        import_validate_time(walk, mark->place, created_unix_ms, 0);
+        import_validate_time(context, mark->place, created_unix_ms, 0);
 }

@@ -9,7 +9,7 @@
 typedef struct ImportContext {
     const MaterialImport *import;
     bool writes;
-    ImportTally *tally;
+    ImportTally *metrics;
     Problem *faults;
     size_t denied;                                 // rows that the importer may not bring
     char denied_place[sizeof((Fault){0}.pointer)]; // the first of them
@@ -30,29 +30,29 @@ typedef struct MaterialGroup {
 } MaterialGroup;
 
 // Adds a fault at `name` below `place`; "": at `place` itself. STATUS_INVALID.
-Status import_fault(const ImportContext *walk, const char *place, const char *name,
+Status import_fault(const ImportContext *context, const char *place, const char *name,
                     const char *format, ...) __attribute__((format(printf, 4, 5)));
 // Counts what the importer may not bring.
-void import_deny(ImportContext *walk, const char *place, const char *name, const char *why);
+void import_deny(ImportContext *context, const char *place, const char *name, const char *why);
 
-const char *import_author(const ImportContext *walk, const RowInfo *mark, const char *author);
+const char *import_author(const ImportContext *context, const RowInfo *mark, const char *author);
 // Of a row that is not there yet: who wrote it, and when.
-void import_validate_origin(ImportContext *walk, const RowInfo *mark, const char *author,
+void import_validate_origin(ImportContext *context, const RowInfo *mark, const char *author,
                             int64_t created_unix_ms);
 // A time is told at "created" below `place` where it lies ahead, or before that of the revision
 // reviewed; 0: of none.
-void import_validate_time(const ImportContext *walk, const char *place, int64_t unix_ms,
+void import_validate_time(const ImportContext *context, const char *place, int64_t unix_ms,
                           int64_t revised_unix_ms);
 // Who, when and why, as far as the file tells it.
 typedef struct ImportOrigin {
     const char *author, *comment;
     int64_t created_unix_ms;
 } ImportOrigin;
-void import_compare_origin(const ImportContext *walk, const RowInfo *mark, const char *what,
+void import_compare_origin(const ImportContext *context, const RowInfo *mark, const char *what,
                            const ImportOrigin *ours, const ImportOrigin *there);
 // A number that is not there must be the one behind `last`, which it becomes; where numbers drift
 // it may be any.
-Status import_validate_number(const ImportContext *walk, const RowInfo *mark, const char *name,
+Status import_validate_number(const ImportContext *context, const RowInfo *mark, const char *name,
                               uint64_t number, uint64_t before, bool drifts, uint64_t *last);
 
 typedef struct ImportKey {
@@ -64,10 +64,10 @@ extern const RowColumn import_key_columns[];
 Status import_load(Sqlite *database, const char *sql, const char *slug, uint64_t number,
                    const RowColumn *columns, void *item, Problem *problem);
 
-Status import_measurements(ImportContext *walk, Sqlite *database, MaterialGroup *group,
+Status import_measurements(ImportContext *context, Sqlite *database, MaterialGroup *group,
                            Problem *problem);
 // Those of one revision, `said`, which is there already or has been added.
-Status import_reviews(ImportContext *walk, Sqlite *database, const ImportRevision *ours,
+Status import_reviews(ImportContext *context, Sqlite *database, const ImportRevision *ours,
                       const MaterialRevision *said, MaterialGroup *group, Problem *problem);
 
 #endif

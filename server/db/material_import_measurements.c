@@ -12,7 +12,7 @@ typedef struct Unnumbered {
     size_t count;
 } Unnumbered;
 
-static Status compare_measurement(const ImportContext *walk, Sqlite *database,
+static Status compare_measurement(const ImportContext *context, Sqlite *database,
                                   const ImportMeasurement *ours, MaterialGroup *group,
                                   Problem *problem) {
     static const char sql[] =
@@ -22,31 +22,32 @@ static Status compare_measurement(const ImportContext *walk, Sqlite *database,
     MaterialMeasurement there = {0};
     TRY(import_load(database, sql, group->slug, ours->made.measurement,
                     material_measurement_columns, &there, problem));
-    const size_t faults = walk->faults->count;
+    const size_t faults = context->faults->count;
     const ImportOrigin is = {ours->made.author, ours->made.comment, ours->made.created_unix_ms},
                        was = {there.author, there.comment, there.created_unix_ms};
-    import_compare_origin(walk, mark, "measurement", &is, &was);
+    import_compare_origin(context, mark, "measurement", &is, &was);
     if (ours->made.document != NULL && !text_same(ours->made.document, there.document))
-        (void)import_fault(walk, mark->place, "test",
+        (void)import_fault(context, mark->place, "test",
                            "is not the measurement %llu that is there, and those never change",
                            (unsigned long long)ours->made.measurement);
     material_measurement_clear(&there);
-    group->measurements_done.same += walk->faults->count == faults;
+    group->measurements_done.same += context->faults->count == faults;
     return STATUS_OK;
 }
 
-static Status add_measurement(ImportContext *walk, Sqlite *database, const ImportMeasurement *ours,
-                              MaterialGroup *group, Problem *problem) {
+static Status add_measurement(ImportContext *context, Sqlite *database,
+                              const ImportMeasurement *ours, MaterialGroup *group,
+                              Problem *problem) {
     const RowInfo *mark = &ours->mark;
-    import_validate_origin(walk, mark, ours->made.author, ours->made.created_unix_ms);
+    import_validate_origin(context, mark, ours->made.author, ours->made.created_unix_ms);
     group->measurements_done.added++;
-    if (!walk->writes || walk->faults->count > 0)
+    if (!context->writes || context->faults->count > 0)
         return STATUS_OK;
     MaterialMeasurement made = ours->made;
     made.measurement = group->last_measurement;
-    made.author = (char *)import_author(walk, mark, made.author);
+    made.author = (char *)import_author(context, mark, made.author);
     made.comment = mark->has_comment ? made.comment : (char *)"imported";
-    made.created_unix_ms = mark->has_created ? made.created_unix_ms : walk->import->now_unix_ms;
+    made.created_unix_ms = mark->has_created ? made.created_unix_ms : context->import->now_unix_ms;
     return material_measurement_add(database, &made, problem);
 }
 
@@ -110,9 +111,9 @@ static void unnumbered_clear(Unnumbered *unnumbered) {
     free(unnumbered->are_there);
 }
 
-static Status import_all(ImportContext *walk, Sqlite *database, const Unnumbered *unnumbered,
+static Status import_all(ImportContext *context, Sqlite *database, const Unnumbered *unnumbered,
                          MaterialGroup *group, Problem *problem) {
-    const char *name = walk->import->measurement_name;
+    const char *name = context->import->measurement_name;
     uint64_t before = 0;
     group->last_measurement = group->key.measurements;
     for (size_t i = 0; i < group->measurement_count; i++)
@@ -131,25 +132,25 @@ static Status import_all(ImportContext *walk, Sqlite *database, const Unnumbered
         }
         if (number == 0)
             group->last_measurement++;
-        else if (import_validate_number(walk, &ours->mark, name, number, before,
+        else if (import_validate_number(context, &ours->mark, name, number, before,
                                         group->measurements_drift,
                                         &group->last_measurement) != STATUS_OK)
             continue;
         before = number;
         if (number > 0 && number <= group->key.measurements)
-            TRY(compare_measurement(walk, database, ours, group, problem));
+            TRY(compare_measurement(context, database, ours, group, problem));
         else
-            TRY(add_measurement(walk, database, ours, group, problem));
+            TRY(add_measurement(context, database, ours, group, problem));
     }
     return STATUS_OK;
 }
 
-Status import_measurements(ImportContext *walk, Sqlite *database, MaterialGroup *group,
+Status import_measurements(ImportContext *context, Sqlite *database, MaterialGroup *group,
                            Problem *problem) {
     Unnumbered unnumbered = {.count = 0};
     Status status = load_unnumbered(database, group, &unnumbered, problem);
     if (status == STATUS_OK)
-        status = import_all(walk, database, &unnumbered, group, problem);
+        status = import_all(context, database, &unnumbered, group, problem);
     unnumbered_clear(&unnumbered);
     return status;
 }

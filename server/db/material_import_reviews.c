@@ -60,36 +60,37 @@ static bool is_review(const ImportReview *ours, const MaterialReview *there) {
 
 // What a review that is not there yet must not be. One whose reviewer nobody knows may be the
 // importer's own.
-static Status judge_review(const ImportContext *walk, const char *place, const ImportReview *ours,
-                           const char *before, const MaterialRevision *said) {
+static Status judge_review(const ImportContext *context, const char *place,
+                           const ImportReview *ours, const char *before,
+                           const MaterialRevision *said) {
     const MaterialReview *review = &ours->review;
     const bool is_known = ours->has_reviewer && review->reviewer != NULL;
-    const char *reviewer = is_known ? review->reviewer : walk->import->who;
+    const char *reviewer = is_known ? review->reviewer : context->import->who;
     if (text_same(review->status, before))
-        return import_fault(walk, place, "status", "is %s already", before);
+        return import_fault(context, place, "status", "is %s already", before);
     if (strcmp(review->status, "approved") == 0 && reviewer != NULL &&
         text_same(reviewer, said->author))
-        return import_fault(walk, place, "reviewer",
+        return import_fault(context, place, "reviewer",
                             "%s the revision's author, %.64s, and nobody approves their own",
                             is_known ? "is" : "must be told, else it is", said->author);
     if (ours->has_created)
-        import_validate_time(walk, place, review->created_unix_ms, said->created_unix_ms);
+        import_validate_time(context, place, review->created_unix_ms, said->created_unix_ms);
     return STATUS_OK;
 }
 
-static Status add_review(const ImportContext *walk, Sqlite *database, const char *slug,
+static Status add_review(const ImportContext *context, Sqlite *database, const char *slug,
                          uint64_t revision, const ImportReview *ours, Problem *problem) {
     MaterialReview review = ours->review;
     review.slug = (char *)slug;
     review.revision = revision;
     if (!ours->has_reviewer)
-        review.reviewer = (char *)walk->import->who;
+        review.reviewer = (char *)context->import->who;
     if (!ours->has_created)
-        review.created_unix_ms = walk->import->now_unix_ms;
+        review.created_unix_ms = context->import->now_unix_ms;
     return material_review_add(database, &review, problem);
 }
 
-static Status match_reviews(ImportContext *walk, Sqlite *database, const ImportRevision *ours,
+static Status match_reviews(ImportContext *context, Sqlite *database, const ImportRevision *ours,
                             const MaterialRevision *said, const Reviews *there,
                             MaterialGroup *group, Problem *problem) {
     char list[POINTER_SIZE], place[POINTER_SIZE];
@@ -102,32 +103,32 @@ static Status match_reviews(ImportContext *walk, Sqlite *database, const ImportR
     for (size_t i = 0; i < ours->review_count; i++) {
         const ImportReview *review = &ours->reviews[i];
         json_pointer_index(place, sizeof place, list, i);
-        if (problem_concerns(walk->faults, place))
+        if (problem_concerns(context->faults, place))
             continue; // it could not be read
         if (i < there->count) {
             if (is_review(review, &there->at[i]))
                 group->reviews_done.same++;
             else
                 (void)import_fault(
-                    walk, place, "",
+                    context, place, "",
                     "is not the review of %.64s@%llu that is there, and those never change",
                     group->slug, (unsigned long long)said->revision);
             continue;
         }
-        const Status judged = judge_review(walk, place, review, before, &dated);
+        const Status judged = judge_review(context, place, review, before, &dated);
         before = review->review.status;
         if (judged != STATUS_OK)
             continue;
-        if (!walk->import->may_all)
-            import_deny(walk, ours->mark.place, "reviews", "brings reviews");
+        if (!context->import->may_all)
+            import_deny(context, ours->mark.place, "reviews", "brings reviews");
         group->reviews_done.added++;
-        if (walk->writes && walk->faults->count == 0)
-            TRY(add_review(walk, database, group->slug, said->revision, review, problem));
+        if (context->writes && context->faults->count == 0)
+            TRY(add_review(context, database, group->slug, said->revision, review, problem));
     }
     return STATUS_OK;
 }
 
-Status import_reviews(ImportContext *walk, Sqlite *database, const ImportRevision *ours,
+Status import_reviews(ImportContext *context, Sqlite *database, const ImportRevision *ours,
                       const MaterialRevision *said, MaterialGroup *group, Problem *problem) {
     Reviews there = {0};
     if (ours->review_count == 0)
@@ -136,7 +137,7 @@ Status import_reviews(ImportContext *walk, Sqlite *database, const ImportRevisio
     if (said->revision <= group->key.latest)
         status = load_reviews(database, group->slug, said->revision, &there, problem);
     if (status == STATUS_OK)
-        status = match_reviews(walk, database, ours, said, &there, group, problem);
+        status = match_reviews(context, database, ours, said, &there, group, problem);
     reviews_clear(&there);
     return status;
 }

@@ -17,7 +17,7 @@ typedef struct Known {
 
 struct MaterialMemory {
     pthread_mutex_t lock;
-    uint64_t generation;
+    uint64_t catalog_version;
     size_t count;
     Known known[MOST];
 };
@@ -43,11 +43,12 @@ void material_memory_free(MaterialMemory *memory) {
     free(memory);
 }
 
-bool material_memory_find(MaterialMemory *memory, uint64_t generation, const char *slug,
+bool material_memory_find(MaterialMemory *memory, uint64_t catalog_version, const char *slug,
                           uint64_t revision, MaterialRevision *material) {
     bool is_found = false;
     pthread_mutex_lock(&memory->lock);
-    for (size_t i = 0; i < memory->count && generation == memory->generation && !is_found; i++) {
+    for (size_t i = 0; i < memory->count && catalog_version == memory->catalog_version && !is_found;
+         i++) {
         const Known *known = &memory->known[i];
         is_found =
             known->asked == revision && strcmp(known->material.slug, slug) == 0 &&
@@ -57,15 +58,15 @@ bool material_memory_find(MaterialMemory *memory, uint64_t generation, const cha
     return is_found;
 }
 
-void material_memory_put(MaterialMemory *memory, uint64_t generation, uint64_t revision,
+void material_memory_put(MaterialMemory *memory, uint64_t catalog_version, uint64_t revision,
                          const MaterialRevision *material) {
     pthread_mutex_lock(&memory->lock);
     // Never back to what the catalogue was before.
-    if (generation > memory->generation || memory->count == MOST)
+    if (catalog_version > memory->catalog_version || memory->count == MOST)
         forget(memory);
-    if (generation >= memory->generation) {
+    if (catalog_version >= memory->catalog_version) {
         Known *known = &memory->known[memory->count];
-        memory->generation = generation;
+        memory->catalog_version = catalog_version;
         known->asked = revision;
         memory->count +=
             row_copy(material_revision_columns, material, &known->material, sizeof known->material);

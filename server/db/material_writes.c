@@ -199,15 +199,15 @@ static Status add(Sqlite *database, const void *work, Problem *problem) {
 }
 
 // Readers of the catalogue are told of what was written.
-static Status write(Db *store, StoreApply *apply, const void *work, Problem *problem) {
-    const Status status = db_write(store, apply, work, problem);
+static Status write(Db *db, StoreApply *apply, const void *work, Problem *problem) {
+    const Status status = db_write(db, apply, work, problem);
     if (status == STATUS_OK)
-        db_catalog_changed(store);
+        db_catalog_changed(db);
     return status;
 }
 
-Status db_material_add(Db *store, const MaterialRevision *first, Problem *problem) {
-    return write(store, add, first, problem);
+Status db_material_add(Db *db, const MaterialRevision *first, Problem *problem) {
+    return write(db, add, first, problem);
 }
 
 typedef struct Revise {
@@ -224,9 +224,8 @@ static Status revise(Sqlite *database, const void *work, Problem *problem) {
                         asked->revision->reverts > 0 ? "revert" : "revise", problem);
 }
 
-Status db_material_revise(Db *store, MaterialRevision *revision, uint64_t version,
-                          Problem *problem) {
-    return write(store, revise, &(Revise){revision, version}, problem);
+Status db_material_revise(Db *db, MaterialRevision *revision, uint64_t version, Problem *problem) {
+    return write(db, revise, &(Revise){revision, version}, problem);
 }
 
 typedef struct Review {
@@ -261,9 +260,9 @@ static Status judge(Sqlite *database, const void *work, Problem *problem) {
     return audit_entry_add(database, review->slug, &deed, problem);
 }
 
-Status db_material_review(Db *store, const MaterialReview *review, uint64_t version,
+Status db_material_review(Db *db, const MaterialReview *review, uint64_t version,
                           Problem *problem) {
-    return write(store, judge, &(Review){review, version}, problem);
+    return write(db, judge, &(Review){review, version}, problem);
 }
 
 typedef struct Measure {
@@ -286,9 +285,9 @@ static Status measure(Sqlite *database, const void *work, Problem *problem) {
     return audit_entry_add(database, measurement->slug, &deed, problem);
 }
 
-Status db_material_measure(Db *store, MaterialMeasurement *measurement, uint64_t version,
+Status db_material_measure(Db *db, MaterialMeasurement *measurement, uint64_t version,
                            Problem *problem) {
-    TRY(db_write(store, measure, &(Measure){measurement, version}, problem));
-    db_material_measured(store);
+    TRY(db_write(db, measure, &(Measure){measurement, version}, problem));
+    db_material_measured(db);
     return STATUS_OK;
 }

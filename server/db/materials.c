@@ -50,12 +50,12 @@ static Status refuse_slug(const char *slug, Problem *problem) {
     return problem_set(problem, STATUS_NOT_FOUND, "there is no material \"%.64s\"", slug);
 }
 
-Status db_material_state(Db *store, const char *slug, MaterialState *state, Problem *problem) {
+Status db_material_state(Db *db, const char *slug, MaterialState *state, Problem *problem) {
     MaterialKey key;
     *state = (MaterialState){0};
-    Sqlite *database = db_take(store);
+    Sqlite *database = db_take(db);
     const Status status = material_key_find(database, slug, 0, &key, problem);
-    db_put(store, database);
+    db_put(db, database);
     TRY(status);
     if (key.number == 0)
         return refuse_slug(slug, problem);
@@ -63,23 +63,23 @@ Status db_material_state(Db *store, const char *slug, MaterialState *state, Prob
     return STATUS_OK;
 }
 
-Status db_material(Db *store, const char *slug, uint64_t revision, MaterialRevision *material,
+Status db_material(Db *db, const char *slug, uint64_t revision, MaterialRevision *material,
                    Problem *problem) {
     const Key key = key_of(slug, revision);
-    MaterialMemory *memory = db_material_memory(store);
-    const uint64_t generation = db_audit_version(store);
+    MaterialMemory *memory = db_material_memory(db);
+    const uint64_t catalog_version = db_audit_version(db);
     bool is_found;
     memset(material, 0, sizeof *material);
-    if (material_memory_find(memory, generation, slug, revision, material))
+    if (material_memory_find(memory, catalog_version, slug, revision, material))
         return STATUS_OK;
-    TRY(db_first(store, revision == 0 ? head_sql : revision_sql, key_columns, &key,
+    TRY(db_first(db, revision == 0 ? head_sql : revision_sql, key_columns, &key,
                  material_revision_columns, material, &is_found, problem));
     if (is_found) {
-        material_memory_put(memory, generation, revision, material);
+        material_memory_put(memory, catalog_version, revision, material);
         return STATUS_OK;
     }
     MaterialState state;
-    TRY(db_material_state(store, slug, &state, problem));
+    TRY(db_material_state(db, slug, &state, problem));
     if (revision == 0)
         return problem_set(problem, STATUS_NOT_FOUND,
                            "every revision of the material \"%.64s\" is deprecated; name one, as "
@@ -91,11 +91,11 @@ Status db_material(Db *store, const char *slug, uint64_t revision, MaterialRevis
 }
 
 // All rows of a query into a typed list; on failure it is cleared.
-static Status all(Db *store, const char *sql, const Key *key, const RowColumn *columns, size_t size,
+static Status all(Db *db, const char *sql, const Key *key, const RowColumn *columns, size_t size,
                   void *list, Problem *problem) {
     List *rows = list;
     *rows = (List){NULL, 0};
-    const Status status = db_all(store, sql, key == NULL ? NULL : key_columns, key, columns, size,
+    const Status status = db_all(db, sql, key == NULL ? NULL : key_columns, key, columns, size,
                                  &rows->at, &rows->count, problem);
     if (status == STATUS_OK)
         return status;
@@ -106,11 +106,11 @@ static Status all(Db *store, const char *sql, const Key *key, const RowColumn *c
     return status;
 }
 
-Status db_material_slugs(Db *store, Texts *slugs, Problem *problem) {
+Status db_material_slugs(Db *db, Texts *slugs, Problem *problem) {
     static const char sql[] = "SELECT slug FROM materials ORDER BY slug";
     // A row of one text is that text.
     static const RowColumn columns[] = {{.name = "slug", .kind = COLUMN_TEXT}, ROW_END};
-    return all(store, sql, NULL, columns, sizeof *slugs->at, slugs, problem);
+    return all(db, sql, NULL, columns, sizeof *slugs->at, slugs, problem);
 }
 
 void material_slugs_clear(Texts *slugs) {
@@ -120,20 +120,19 @@ void material_slugs_clear(Texts *slugs) {
     *slugs = (Texts){NULL, 0};
 }
 
-Status db_material_heads(Db *store, const char *after, size_t most, MaterialRevisions *materials,
+Status db_material_heads(Db *db, const char *after, size_t most, MaterialRevisions *materials,
                          Problem *problem) {
     const Key key = key_of_page(after, 0, most);
-    return all(store, heads_sql, &key, material_revision_columns, sizeof *materials->at, materials,
+    return all(db, heads_sql, &key, material_revision_columns, sizeof *materials->at, materials,
                problem);
 }
 
-Status db_material_page(Db *store, const char *slug, uint64_t before, size_t most,
+Status db_material_page(Db *db, const char *slug, uint64_t before, size_t most,
                         MaterialRevisions *revisions, Problem *problem) {
     static const char sql[] = "SELECT * FROM material_states WHERE slug = :slug AND revision < "
                               ":number ORDER BY revision DESC LIMIT :most";
     const Key key = key_of_page(slug, before, most);
-    return all(store, sql, &key, material_revision_columns, sizeof *revisions->at, revisions,
-               problem);
+    return all(db, sql, &key, material_revision_columns, sizeof *revisions->at, revisions, problem);
 }
 
 static void clear_all(const RowColumn *columns, size_t size, void *list) {
@@ -159,13 +158,13 @@ static const char measurement_sql[] =
     "SELECT m.slug, t.* FROM material_measurements t JOIN materials m ON m.number = t.material "
     "WHERE m.slug = :slug AND t.measurement = :number";
 
-Status db_material_measurement(Db *store, const char *slug, uint64_t number,
+Status db_material_measurement(Db *db, const char *slug, uint64_t number,
                                MaterialMeasurement *measurement, Problem *problem) {
     const Key key = key_of(slug, number);
     bool is_found;
     memset(measurement, 0, sizeof *measurement);
-    TRY(db_first(store, measurement_sql, key_columns, &key, material_measurement_columns,
-                 measurement, &is_found, problem));
+    TRY(db_first(db, measurement_sql, key_columns, &key, material_measurement_columns, measurement,
+                 &is_found, problem));
     if (is_found)
         return STATUS_OK;
     return problem_set(problem, STATUS_NOT_FOUND,
@@ -173,14 +172,14 @@ Status db_material_measurement(Db *store, const char *slug, uint64_t number,
                        (unsigned long long)number, slug);
 }
 
-Status db_measurement_summaries(Db *store, const char *slug, uint64_t before, size_t most,
+Status db_measurement_summaries(Db *db, const char *slug, uint64_t before, size_t most,
                                 MeasurementSummaries *briefs, Problem *problem) {
     static const char sql[] =
         "SELECT m.slug, t.measurement, t.author, t.comment, t.created_unix_ms, t.head, t.drops, "
         "t.traces FROM material_measurements t JOIN materials m ON m.number = t.material WHERE "
         "m.slug = :slug AND t.measurement < :number ORDER BY t.measurement DESC LIMIT :most";
     const Key key = key_of_page(slug, before, most);
-    return all(store, sql, &key, material_brief_columns, sizeof *briefs->at, briefs, problem);
+    return all(db, sql, &key, material_brief_columns, sizeof *briefs->at, briefs, problem);
 }
 
 void measurement_summaries_clear(MeasurementSummaries *briefs) {
@@ -191,15 +190,16 @@ void material_measurement_clear(MaterialMeasurement *measurement) {
     row_clear(material_measurement_columns, measurement, sizeof *measurement);
 }
 
-Status db_audit_entries(Db *store, const char *slug, uint64_t before, size_t most,
-                        AuditEntries *deeds, Problem *problem) {
+Status db_audit_entries(Db *db, const char *slug, uint64_t before, size_t most,
+                        AuditEntries *audit_entries, Problem *problem) {
     static const char sql[] =
         "SELECT t.* FROM material_trail t JOIN materials m ON m.number = t.material WHERE m.slug = "
         ":slug AND t.version < :number ORDER BY t.version DESC LIMIT :most";
     const Key key = key_of_page(slug, before, most);
-    return all(store, sql, &key, material_deed_columns, sizeof *deeds->at, deeds, problem);
+    return all(db, sql, &key, material_deed_columns, sizeof *audit_entries->at, audit_entries,
+               problem);
 }
 
-void audit_entries_clear(AuditEntries *deeds) {
-    clear_all(material_deed_columns, sizeof *deeds->at, deeds);
+void audit_entries_clear(AuditEntries *audit_entries) {
+    clear_all(material_deed_columns, sizeof *audit_entries->at, audit_entries);
 }

@@ -35,21 +35,21 @@ typedef struct MaterialState {
     uint64_t latest, version, measurements; // the newest of each; measurements 0: none
 } MaterialState;
 // As it is in the database now. STATUS_NOT_FOUND.
-Status db_material_state(Db *store, const char *slug, MaterialState *state, Problem *problem);
+Status db_material_state(Db *db, const char *slug, MaterialState *state, Problem *problem);
 
 // revision 0: the head, which is the newest approved one, else the newest draft. STATUS_NOT_FOUND,
 // also where all are deprecated.
-Status db_material(Db *store, const char *slug, uint64_t revision, MaterialRevision *material,
+Status db_material(Db *db, const char *slug, uint64_t revision, MaterialRevision *material,
                    Problem *problem);
 // The slugs of all materials, by name.
-Status db_material_slugs(Db *store, Texts *slugs, Problem *problem);
+Status db_material_slugs(Db *db, Texts *slugs, Problem *problem);
 void material_slugs_clear(Texts *slugs);
 // The heads of materials, by slug; of those that are all deprecated the newest revision. At most
 // `most` of them, those behind the slug `after` ("": from the first).
-Status db_material_heads(Db *store, const char *after, size_t most, MaterialRevisions *materials,
+Status db_material_heads(Db *db, const char *after, size_t most, MaterialRevisions *materials,
                          Problem *problem);
 // Newest first, at most `most` of one material's, those before `before`.
-Status db_material_page(Db *store, const char *slug, uint64_t before, size_t most,
+Status db_material_page(Db *db, const char *slug, uint64_t before, size_t most,
                         MaterialRevisions *revisions, Problem *problem);
 void material_revisions_clear(MaterialRevisions *materials);
 
@@ -74,7 +74,7 @@ typedef struct MaterialMeasurement {
     char *document; // the drop test, JSON
 } MaterialMeasurement;
 // STATUS_NOT_FOUND. `measurement` may be uninitialised.
-Status db_material_measurement(Db *store, const char *slug, uint64_t number,
+Status db_material_measurement(Db *db, const char *slug, uint64_t number,
                                MaterialMeasurement *measurement, Problem *problem);
 void material_measurement_clear(MaterialMeasurement *measurement);
 
@@ -88,7 +88,7 @@ typedef struct MeasurementSummaries {
     size_t count;
 } MeasurementSummaries;
 // Newest first, at most `most` of one material's, those before `before`.
-Status db_measurement_summaries(Db *store, const char *slug, uint64_t before, size_t most,
+Status db_measurement_summaries(Db *db, const char *slug, uint64_t before, size_t most,
                                 MeasurementSummaries *briefs, Problem *problem);
 void measurement_summaries_clear(MeasurementSummaries *briefs);
 
@@ -104,9 +104,9 @@ typedef struct AuditEntries {
     size_t count;
 } AuditEntries;
 // The trail of one material, newest first, at most `most` entries, those before `before`.
-Status db_audit_entries(Db *store, const char *slug, uint64_t before, size_t most,
-                        AuditEntries *deeds, Problem *problem);
-void audit_entries_clear(AuditEntries *deeds);
+Status db_audit_entries(Db *db, const char *slug, uint64_t before, size_t most,
+                        AuditEntries *audit_entries, Problem *problem);
+void audit_entries_clear(AuditEntries *audit_entries);
 
 // Each revision with how many results were made with it, newest first.
 typedef struct MaterialReference {
@@ -117,7 +117,7 @@ typedef struct MaterialReferences {
     MaterialReference *at; // freed by free
     size_t count;
 } MaterialReferences;
-Status db_material_uses(Db *store, const char *slug, MaterialReferences *uses, Problem *problem);
+Status db_material_uses(Db *db, const char *slug, MaterialReferences *uses, Problem *problem);
 
 // Results made with `name` ("sponge@1", "record:elcentro"), newest first, at most `most` of them,
 // those before the one numbered `before` (0: from the newest); *total counts all.
@@ -130,7 +130,7 @@ typedef struct ResultUses {
     ResultUse *at; // freed by free
     size_t count;
 } ResultUses;
-Status db_result_uses(Db *store, const char *name, size_t most, int64_t before, ResultUses *uses,
+Status db_result_uses(Db *db, const char *name, size_t most, int64_t before, ResultUses *uses,
                       uint64_t *total, Problem *problem);
 
 // What is kept is kept for good, so there is an end to it: STATUS_LIMIT from each that writes.
@@ -148,17 +148,15 @@ enum {
 
 // The first revision of a new material. STATUS_CONFLICT where the slug is taken. Slug, material,
 // lists, author, comment and created_unix_ms are read.
-Status db_material_add(Db *store, const MaterialRevision *first, Problem *problem);
+Status db_material_add(Db *db, const MaterialRevision *first, Problem *problem);
 // Adds a revision and sets revision->revision; `reverts` is kept (0: none), the rest as above. That
 // the measurements that it names are there is for the caller to see to.
-Status db_material_revise(Db *store, MaterialRevision *revision, uint64_t version,
-                          Problem *problem);
+Status db_material_revise(Db *db, MaterialRevision *revision, uint64_t version, Problem *problem);
 // STATUS_CONFLICT where the revision has that status already; STATUS_FORBIDDEN where its author,
 // known by name, approves it.
-Status db_material_review(Db *store, const MaterialReview *review, uint64_t version,
-                          Problem *problem);
+Status db_material_review(Db *db, const MaterialReview *review, uint64_t version, Problem *problem);
 // Adds a measurement and sets its number.
-Status db_material_measure(Db *store, MaterialMeasurement *measurement, uint64_t version,
+Status db_material_measure(Db *db, MaterialMeasurement *measurement, uint64_t version,
                            Problem *problem);
 
 #endif

@@ -11,7 +11,7 @@ static const size_t bytes_max = 64 << 20;
 typedef struct Entry {
     struct Entry *next;
     NamedRecord *named;
-    uint64_t generation; // of the catalogue, under which the name was found to stand for it
+    uint64_t catalog_version; // of the catalogue, under which the name was found to stand for it
 } Entry;
 
 struct RecordMemory {
@@ -43,17 +43,17 @@ void record_memory_free(RecordMemory *memory) {
 }
 
 // With the lock held: a hold for the caller.
-static NamedRecord *find(RecordMemory *memory, uint64_t generation, const char *name,
+static NamedRecord *find(RecordMemory *memory, uint64_t catalog_version, const char *name,
                          const char *digest) {
     for (Entry **at = &memory->first; *at != NULL; at = &(*at)->next) {
         Entry *entry = *at;
         if (strcmp(entry->named->name, name) != 0)
             continue;
-        if (digest == NULL ? entry->generation != generation
+        if (digest == NULL ? entry->catalog_version != catalog_version
                            : strcmp(entry->named->digest, digest) != 0)
             continue;
-        if (generation > entry->generation) // never back to what the catalogue was before
-            entry->generation = generation;
+        if (catalog_version > entry->catalog_version) // never back to what the catalogue was before
+            entry->catalog_version = catalog_version;
         *at = entry->next;
         entry->next = memory->first;
         memory->first = entry;
@@ -63,10 +63,10 @@ static NamedRecord *find(RecordMemory *memory, uint64_t generation, const char *
     return NULL;
 }
 
-NamedRecord *record_memory_find(RecordMemory *memory, uint64_t generation, const char *name,
+NamedRecord *record_memory_find(RecordMemory *memory, uint64_t catalog_version, const char *name,
                                 const char *digest) {
     pthread_mutex_lock(&memory->lock);
-    NamedRecord *named = find(memory, generation, name, digest);
+    NamedRecord *named = find(memory, catalog_version, name, digest);
     pthread_mutex_unlock(&memory->lock);
     return named;
 }
@@ -88,12 +88,12 @@ static void forget(RecordMemory *memory) {
     }
 }
 
-NamedRecord *record_memory_put(RecordMemory *memory, uint64_t generation, NamedRecord *named) {
+NamedRecord *record_memory_put(RecordMemory *memory, uint64_t catalog_version, NamedRecord *named) {
     Entry *entry = malloc(sizeof *entry);
     pthread_mutex_lock(&memory->lock);
-    NamedRecord *known = find(memory, generation, named->name, named->digest);
+    NamedRecord *known = find(memory, catalog_version, named->name, named->digest);
     if (known == NULL && entry != NULL) {
-        *entry = (Entry){memory->first, named, generation};
+        *entry = (Entry){memory->first, named, catalog_version};
         refcount_ref(&named->shared);
         memory->first = entry;
         entry = NULL;

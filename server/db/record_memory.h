@@ -12,10 +12,10 @@ void record_memory_free(RecordMemory *memory);
 
 // A hold for the caller; NULL where it is not there. A digest of NULL: what the name was last known
 // to stand for under that generation of the catalogue. Else what it stands for under it.
-NamedRecord *record_memory_find(RecordMemory *memory, uint64_t generation, const char *name,
+NamedRecord *record_memory_find(RecordMemory *memory, uint64_t catalog_version, const char *name,
                                 const char *digest);
 // Keeps it, for the caller too: what comes back, a hold for the caller, is `named` or, where
 // another was quicker, the same from before, in place of `named`.
-NamedRecord *record_memory_put(RecordMemory *memory, uint64_t generation, NamedRecord *named);
+NamedRecord *record_memory_put(RecordMemory *memory, uint64_t catalog_version, NamedRecord *named);
 
 #endif

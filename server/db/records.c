@@ -176,33 +176,33 @@ static Status add(Sqlite *database, const void *work, Problem *problem) {
     return sqlite_change(database, body_sql, key_columns, &key, NULL, problem);
 }
 
-Status db_record_add(Db *store, const RecordRow *row, const Reals *samples, bool *is_there,
+Status db_record_add(Db *db, const RecordRow *row, const Reals *samples, bool *is_there,
                      Problem *problem) {
-    TRY(db_write(store, add, &(Adding){row, samples, is_there}, problem));
+    TRY(db_write(db, add, &(Adding){row, samples, is_there}, problem));
     if (!*is_there)
-        db_catalog_changed(store);
+        db_catalog_changed(db);
     return STATUS_OK;
 }
 
-Status db_record(Db *store, const char *name, RecordRow *row, Problem *problem) {
+Status db_record(Db *db, const char *name, RecordRow *row, Problem *problem) {
     const Key key = {.name = (char *)name};
     bool is_found;
     memset(row, 0, sizeof *row);
-    TRY(db_first(store, one_sql, key_columns, &key, record_columns, row, &is_found, problem));
+    TRY(db_first(db, one_sql, key_columns, &key, record_columns, row, &is_found, problem));
     return is_found ? STATUS_OK : not_found(name, problem);
 }
 
-static Status list(Db *store, const char *sql, const Key *key, RecordRows *rows, Problem *problem) {
+static Status list(Db *db, const char *sql, const Key *key, RecordRows *rows, Problem *problem) {
     void *at;
-    const Status status = db_all(store, sql, key_columns, key, record_columns, sizeof *rows->at,
-                                 &at, &rows->count, problem);
+    const Status status = db_all(db, sql, key_columns, key, record_columns, sizeof *rows->at, &at,
+                                 &rows->count, problem);
     rows->at = at;
     if (status != STATUS_OK)
         record_rows_clear(rows);
     return status;
 }
 
-Status db_records(Db *store, const char *words, const char *after, size_t most, RecordRows *rows,
+Status db_records(Db *db, const char *words, const char *after, size_t most, RecordRows *rows,
                   Problem *problem) {
     static const char sql[] =
         "SELECT * FROM records WHERE name > :name AND (:words IS NULL OR instr(lower(name || "
@@ -210,24 +210,24 @@ Status db_records(Db *store, const char *words, const char *after, size_t most, 
         "coalesce(source, '') || char(10) || coalesce(processing, '') || char(10) || "
         "coalesce(notes, '')), lower(:words)) > 0) ORDER BY name LIMIT :most";
     const Key key = {.name = (char *)after, .words = (char *)words, .most = most};
-    return list(store, sql, &key, rows, problem);
+    return list(db, sql, &key, rows, problem);
 }
 
-Status db_record_twins(Db *store, const RecordRow *row, RecordRows *rows, Problem *problem) {
+Status db_record_twins(Db *db, const RecordRow *row, RecordRows *rows, Problem *problem) {
     static const char sql[] = "SELECT * FROM records WHERE digest = :digest AND name <> :name "
                               "ORDER BY number LIMIT :most";
     const Key key = {.name = row->name, .digest = row->digest, .most = RECORD_TWINS};
-    return list(store, sql, &key, rows, problem);
+    return list(db, sql, &key, rows, problem);
 }
 
 // A copy of its own, of whole numbers.
-static Status read_samples(Db *store, const RecordRow *row, Reals *samples, Problem *problem) {
+static Status read_samples(Db *db, const RecordRow *row, Reals *samples, Problem *problem) {
     static const char sql[] = "SELECT s.samples FROM record_samples s JOIN records r USING "
                               "(number) WHERE r.name = :name AND r.digest = :digest";
     const Key key = {.name = row->name, .digest = row->digest};
     Key found = {.name = NULL};
     bool is_found;
-    TRY(db_first(store, sql, key_columns, &key, key_columns, &found, &is_found, problem));
+    TRY(db_first(db, sql, key_columns, &key, key_columns, &found, &is_found, problem));
     if (!is_found)
         return not_found(row->name, problem);
     if (found.samples.size != row->count * sizeof(double)) {
@@ -239,23 +239,23 @@ static Status read_samples(Db *store, const RecordRow *row, Reals *samples, Prob
     return STATUS_OK;
 }
 
-Status db_record_named(Db *store, const char *name, NamedRecord **named, Problem *problem) {
-    RecordMemory *memory = db_record_memory(store);
-    const uint64_t generation = db_catalog_version(store);
+Status db_record_named(Db *db, const char *name, NamedRecord **named, Problem *problem) {
+    RecordMemory *memory = db_record_memory(db);
+    const uint64_t catalog_version = db_catalog_version(db);
     RecordRow row;
     Reals samples;
-    *named = record_memory_find(memory, generation, name, NULL);
+    *named = record_memory_find(memory, catalog_version, name, NULL);
     if (*named != NULL)
         return STATUS_OK;
-    Status status = db_record(store, name, &row, problem);
+    Status status = db_record(db, name, &row, problem);
     if (status == STATUS_OK)
-        *named = record_memory_find(memory, generation, name, row.digest);
+        *named = record_memory_find(memory, catalog_version, name, row.digest);
     if (status == STATUS_OK && *named == NULL) {
-        status = read_samples(store, &row, &samples, problem);
+        status = read_samples(db, &row, &samples, problem);
         if (status == STATUS_OK)
             *named = named_record_new(row.name, row.digest, row.interval, &samples);
         if (*named != NULL)
-            *named = record_memory_put(memory, generation, *named);
+            *named = record_memory_put(memory, catalog_version, *named);
         else if (status == STATUS_OK)
             status = problem_set(problem, STATUS_NO_MEMORY, "no memory for a record");
     }
@@ -271,13 +271,13 @@ static const char uses_sql[] =
     "SELECT (SELECT count(*) FROM result_uses WHERE name = :use) AS results, "
     "(SELECT count(*) FROM job_uses WHERE name = :use) AS jobs";
 
-Status db_record_uses(Db *store, const char *name, RecordUses *uses, Problem *problem) {
+Status db_record_uses(Db *db, const char *name, RecordUses *uses, Problem *problem) {
     char use[RECORD_NAME_SIZE + 8];
     record_use_name(name, use);
     const Key key = {.use = use};
     Key found = {.results = 0};
     bool is_found;
-    TRY(db_first(store, uses_sql, key_columns, &key, key_columns, &found, &is_found, problem));
+    TRY(db_first(db, uses_sql, key_columns, &key, key_columns, &found, &is_found, problem));
     *uses = (RecordUses){found.results, found.jobs};
     return STATUS_OK;
 }
@@ -306,12 +306,12 @@ static Status delete (Sqlite *database, const void *work, Problem *problem) {
     return changes > 0 ? STATUS_OK : not_found(deleting->key.name, problem);
 }
 
-Status db_record_delete(Db *store, const char *name, RecordUses *uses, Problem *problem) {
+Status db_record_delete(Db *db, const char *name, RecordUses *uses, Problem *problem) {
     char use[RECORD_NAME_SIZE + 8];
     record_use_name(name, use);
     const Deleting deleting = {{.name = (char *)name, .use = use}, uses};
     *uses = (RecordUses){0, 0};
-    TRY(db_write(store, delete, &deleting, problem));
-    db_catalog_changed(store);
+    TRY(db_write(db, delete, &deleting, problem));
+    db_catalog_changed(db);
     return STATUS_OK;
 }

@@ -42,32 +42,32 @@ void record_digest(double interval, const Reals *samples, char digest[RECORD_DIG
 // Writes both down in one transaction. One of the same name, samples and words is there already:
 // *is_there, and nothing is written; with others STATUS_CONFLICT. STATUS_LIMIT where there are
 // RECORDS_MAX, or where they would have more than RECORDS_SAMPLES.
-Status db_record_add(Db *store, const RecordRow *row, const Reals *samples, bool *is_there,
+Status db_record_add(Db *db, const RecordRow *row, const Reals *samples, bool *is_there,
                      Problem *problem);
 
 // STATUS_NOT_FOUND. `row` may be uninitialised; cleared in any case.
-Status db_record(Db *store, const char *name, RecordRow *row, Problem *problem);
+Status db_record(Db *db, const char *name, RecordRow *row, Problem *problem);
 // By name, those behind `after` ("": from the first) in which `words` (NULL: any) occur, at most
 // `most`.
-Status db_records(Db *store, const char *words, const char *after, size_t most, RecordRows *rows,
+Status db_records(Db *db, const char *words, const char *after, size_t most, RecordRows *rows,
                   Problem *problem);
 // Up to RECORD_TWINS others with the same interval and samples.
-Status db_record_twins(Db *store, const RecordRow *row, RecordRows *rows, Problem *problem);
+Status db_record_twins(Db *db, const RecordRow *row, RecordRows *rows, Problem *problem);
 
 // Interval and samples, shared by all who ask as long as one of them has them. A hold of the
 // caller's. STATUS_NOT_FOUND.
-Status db_record_named(Db *store, const char *name, NamedRecord **named, Problem *problem);
+Status db_record_named(Db *db, const char *name, NamedRecord **named, Problem *problem);
 
 // Results made with it, and unfinished jobs that will be.
 typedef struct RecordUses {
     uint64_t results, jobs;
 } RecordUses;
-Status db_record_uses(Db *store, const char *name, RecordUses *uses, Problem *problem);
+Status db_record_uses(Db *db, const char *name, RecordUses *uses, Problem *problem);
 // "record:elcentro", as result_uses has it.
 void record_use_name(const char *name, char target[RECORD_NAME_SIZE + 8]);
 
 // Deletes it; STATUS_CONFLICT, with *uses, where it is used, STATUS_NOT_FOUND. Jobs that are on
 // their way to the store are not seen: that is the caller's to prevent.
-Status db_record_delete(Db *store, const char *name, RecordUses *uses, Problem *problem);
+Status db_record_delete(Db *db, const char *name, RecordUses *uses, Problem *problem);
 
 #endif

@@ -35,7 +35,7 @@ static const RowColumn use_columns[] = {
     ROW_COLUMN(ResultUse, number, COLUMN_INTEGER), ROW_COLUMN(ResultUse, id, COLUMN_NAME),
     ROW_COLUMN(ResultUse, created_unix_ms, COLUMN_INTEGER), ROW_END};
 
-Status db_result_uses(Db *store, const char *name, size_t most, int64_t before, ResultUses *uses,
+Status db_result_uses(Db *db, const char *name, size_t most, int64_t before, ResultUses *uses,
                       uint64_t *total, Problem *problem) {
     static const char count_sql[] = "SELECT count(*) AS total FROM result_uses WHERE name = :name";
     static const char sql[] =
@@ -46,10 +46,10 @@ Status db_result_uses(Db *store, const char *name, size_t most, int64_t before, 
     bool is_found;
     void *at;
     *uses = (ResultUses){NULL, 0};
-    db_flush(store); // results whose rows wait count
-    TRY(db_first(store, count_sql, key_columns, &key, key_columns, &counted, &is_found, problem));
+    db_flush(db); // results whose rows wait count
+    TRY(db_first(db, count_sql, key_columns, &key, key_columns, &counted, &is_found, problem));
     *total = counted.total;
-    const Status status = db_all(store, sql, key_columns, &key, use_columns, sizeof *uses->at, &at,
+    const Status status = db_all(db, sql, key_columns, &key, use_columns, sizeof *uses->at, &at,
                                  &uses->count, problem);
     uses->at = at;
     if (status != STATUS_OK) {
@@ -64,15 +64,15 @@ static const RowColumn material_use_columns[] = {
     ROW_COLUMN(MaterialReference, results, COLUMN_COUNT),
     ROW_COLUMN(MaterialReference, status, COLUMN_NAME), ROW_END};
 
-Status db_material_uses(Db *store, const char *slug, MaterialReferences *uses, Problem *problem) {
+Status db_material_uses(Db *db, const char *slug, MaterialReferences *uses, Problem *problem) {
     static const char sql[] =
         "SELECT revision, status, (SELECT count(*) FROM result_uses u WHERE u.name = slug || '@' "
         "|| revision) AS results FROM material_states WHERE slug = :name ORDER BY revision DESC";
     const UseKey key = {.name = (char *)slug};
     void *at;
-    db_flush(store);
-    const Status status = db_all(store, sql, key_columns, &key, material_use_columns,
-                                 sizeof *uses->at, &at, &uses->count, problem);
+    db_flush(db);
+    const Status status = db_all(db, sql, key_columns, &key, material_use_columns, sizeof *uses->at,
+                                 &at, &uses->count, problem);
     uses->at = at;
     if (status != STATUS_OK) {
         free(at);

@@ -57,15 +57,15 @@ static Status finish(Sqlite *database, const void *work, Problem *problem) {
     return STATUS_OK;
 }
 
-Status db_result_save(Db *store, const ResultRow *result, const JobRow *const *jobs,
-                      size_t job_count, Problem *problem) {
-    return db_write(store, finish, &(Finish){result, jobs, job_count}, problem);
+Status db_result_save(Db *db, const ResultRow *result, const JobRow *const *jobs, size_t job_count,
+                      Problem *problem) {
+    return db_write(db, finish, &(Finish){result, jobs, job_count}, problem);
 }
 
-Status db_result_post(Db *store, const ResultRow *result, const JobRow *const *jobs,
-                      size_t job_count, WritePriority turn, const WriteDone *done) {
+Status db_result_post(Db *db, const ResultRow *result, const JobRow *const *jobs, size_t job_count,
+                      WritePriority turn, const WriteDone *done) {
     const Finish work = {result, jobs, job_count};
-    return db_enqueue(store, finish, &work, sizeof work, turn, done, NULL);
+    return db_enqueue(db, finish, &work, sizeof work, turn, done, NULL);
 }
 
 typedef struct Key {
@@ -73,38 +73,38 @@ typedef struct Key {
 } Key;
 static const RowColumn key_columns[] = {ROW_COLUMN(Key, id, COLUMN_TEXT), ROW_END};
 
-static Status load(Db *store, const char *sql, const char *id, ResultRow *row, Problem *problem) {
+static Status load(Db *db, const char *sql, const char *id, ResultRow *row, Problem *problem) {
     const Key key = {(char *)id};
     bool is_found;
     memset(row, 0, sizeof *row);
-    TRY(db_first(store, sql, key_columns, &key, result_columns, row, &is_found, problem));
+    TRY(db_first(db, sql, key_columns, &key, result_columns, row, &is_found, problem));
     return is_found ? STATUS_OK
                     : problem_set(problem, STATUS_NOT_FOUND, "there is no result \"%.72s\"", id);
 }
 
-Status db_result_load(Db *store, const char *id, ResultRow *row, Problem *problem) {
+Status db_result_load(Db *db, const char *id, ResultRow *row, Problem *problem) {
     static const char sql[] =
         "SELECT id, engine, sample_rate, count, created_unix_ms, summary, plan, warnings, work, "
         "notes, energy, scene, impacts, psd, study FROM results WHERE id = :id";
-    return load(store, sql, id, row, problem);
+    return load(db, sql, id, row, problem);
 }
 
-Status db_result_head(Db *store, const char *id, ResultRow *row, Problem *problem) {
+Status db_result_head(Db *db, const char *id, ResultRow *row, Problem *problem) {
     static const char sql[] =
         "SELECT id, engine, sample_rate, count, created_unix_ms, summary, plan, warnings, work, "
         "notes FROM results WHERE id = :id";
-    return load(store, sql, id, row, problem);
+    return load(db, sql, id, row, problem);
 }
 
-Status db_result_scene(Db *store, const char *id, ResultRow *row, Problem *problem) {
+Status db_result_scene(Db *db, const char *id, ResultRow *row, Problem *problem) {
     static const char sql[] = "SELECT id, engine, scene FROM results WHERE id = :id";
-    return load(store, sql, id, row, problem);
+    return load(db, sql, id, row, problem);
 }
 
-bool db_result_exists(Db *store, const char *id) {
+bool db_result_exists(Db *db, const char *id) {
     static const char sql[] = "SELECT id FROM results WHERE id = :id";
     ResultRow row;
-    return load(store, sql, id, &row, NULL) == STATUS_OK;
+    return load(db, sql, id, &row, NULL) == STATUS_OK;
 }
 
 typedef struct Sharer {
@@ -115,7 +115,7 @@ static const RowColumn sharer_columns[] = {ROW_COLUMN(Sharer, id, COLUMN_TEXT),
                                            ROW_COLUMN(Sharer, client, COLUMN_TEXT),
                                            ROW_COLUMN(Sharer, sharer, COLUMN_NAME), ROW_END};
 
-Status db_result_sharer(Db *store, const char *id, const char *client, char sharer[72],
+Status db_result_sharer(Db *db, const char *id, const char *client, char sharer[72],
                         Problem *problem) {
     static const char sql[] =
         "SELECT client AS sharer FROM jobs WHERE substr(result, 3, 12) = substr(:id, 3, 12) "
@@ -123,7 +123,7 @@ Status db_result_sharer(Db *store, const char *id, const char *client, char shar
     const Sharer key = {(char *)id, (char *)client, ""};
     Sharer found = {0};
     bool is_found;
-    TRY(db_first(store, sql, sharer_columns, &key, sharer_columns, &found, &is_found, problem));
+    TRY(db_first(db, sql, sharer_columns, &key, sharer_columns, &found, &is_found, problem));
     text_fit(sharer, sizeof found.sharer, is_found ? found.sharer : "");
     return STATUS_OK;
 }
@@ -138,8 +138,8 @@ static Status delete (Sqlite *database, const void *work, Problem *problem) {
                : problem_set(problem, STATUS_NOT_FOUND, "there is no result \"%.72s\"", key->id);
 }
 
-Status db_result_delete(Db *store, const char *id, Problem *problem) {
-    return db_write(store, delete, &(Key){(char *)id}, problem);
+Status db_result_delete(Db *db, const char *id, Problem *problem) {
+    return db_write(db, delete, &(Key){(char *)id}, problem);
 }
 
 typedef struct Recent {
@@ -148,13 +148,12 @@ typedef struct Recent {
 static const RowColumn recent_columns[] = {ROW_COLUMN(Recent, most, COLUMN_COUNT),
                                            ROW_COLUMN(Recent, scene_max, COLUMN_COUNT), ROW_END};
 
-Status db_result_recent(Db *store, size_t most, size_t scene_max, ResultRows *rows,
-                        Problem *problem) {
+Status db_result_recent(Db *db, size_t most, size_t scene_max, ResultRows *rows, Problem *problem) {
     static const char sql[] =
         "SELECT id, engine, scene FROM (SELECT * FROM results ORDER BY number DESC LIMIT :most) "
         "WHERE length(scene) <= :scene_max";
     void *at;
-    const Status status = db_all(store, sql, recent_columns, &(Recent){most, scene_max},
+    const Status status = db_all(db, sql, recent_columns, &(Recent){most, scene_max},
                                  result_columns, sizeof *rows->at, &at, &rows->count, problem);
     rows->at = at;
     if (status != STATUS_OK)

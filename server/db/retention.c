@@ -45,7 +45,7 @@ static const RowColumn bounds_columns[] = {
 
 enum { VACUUM_MIN = 256 }; // pages that are free before any are given back
 
-static Status measure(Db *store, bool counts_jobs, Extent *extent, Problem *problem) {
+static Status measure(Db *db, bool counts_jobs, Extent *extent, Problem *problem) {
     static const char sizes[] =
         "SELECT page_count AS pages, freelist_count AS free_pages, page_size "
         "FROM pragma_page_count, pragma_freelist_count, pragma_page_size";
@@ -54,17 +54,17 @@ static Status measure(Db *store, bool counts_jobs, Extent *extent, Problem *prob
                                  "FROM jobs";
     bool is_found;
     *extent = (Extent){0};
-    TRY(db_first(store, sizes, NULL, NULL, extent_columns, extent, &is_found, problem));
+    TRY(db_first(db, sizes, NULL, NULL, extent_columns, extent, &is_found, problem));
     if (counts_jobs)
-        TRY(db_first(store, counts, NULL, NULL, extent_columns, extent, &is_found, problem));
+        TRY(db_first(db, counts, NULL, NULL, extent_columns, extent, &is_found, problem));
     return STATUS_OK;
 }
 
-static Status has_older(Db *store, int64_t before, bool *has, Problem *problem) {
+static Status has_older(Db *db, int64_t before, bool *has, Problem *problem) {
     static const char sql[] = "SELECT number, result FROM jobs INDEXED BY jobs_created "
                               "WHERE created_unix_ms < :before AND state > 1 LIMIT 1";
     Victim victim = {0};
-    return db_first(store, sql, bounds_columns, &(Bounds){before, 1}, victim_columns, &victim, has,
+    return db_first(db, sql, bounds_columns, &(Bounds){before, 1}, victim_columns, &victim, has,
                     problem);
 }
 
@@ -122,16 +122,16 @@ static Status apply(Sqlite *database, const void *work, Problem *problem) {
     return STATUS_OK;
 }
 
-Status db_remove(Db *store, const KeepRules *rules, Removed *removed, Problem *problem) {
+Status db_remove(Db *db, const KeepRules *rules, Removed *removed, Problem *problem) {
     static const double day_ms = 86400000;
     const int64_t before = clock_unix_ms() - (int64_t)(rules->days * day_ms);
     Extent extent;
     Removal removal = {.removed = removed};
     bool is_older = false;
     *removed = (Removed){0};
-    TRY(measure(store, rules->jobs > 0, &extent, problem));
+    TRY(measure(db, rules->jobs > 0, &extent, problem));
     if (rules->days > 0)
-        TRY(has_older(store, before, &is_older, problem));
+        TRY(has_older(db, before, &is_older, problem));
     const uint64_t finished = extent.jobs - extent.unfinished;
     const uint64_t used = (extent.pages - extent.free_pages) * extent.page_size;
     if (rules->jobs > 0 && finished > rules->jobs)
@@ -146,7 +146,7 @@ Status db_remove(Db *store, const KeepRules *rules, Removed *removed, Problem *p
         return STATUS_OK;
     if (removal.bounds.most > RETENTION_BATCH)
         removal.bounds.most = RETENTION_BATCH;
-    TRY(db_write(store, apply, &removal, problem));
+    TRY(db_write(db, apply, &removal, problem));
     removed->is_more = removal.gives_back || removed->jobs > 0;
     return STATUS_OK;
 }

@@ -21,6 +21,6 @@ typedef struct Removed {
 
 // Removes some of what is beyond the rules, or gives some free pages back to the disk where there
 // are many, in one small transaction.
-Status db_remove(Db *store, const KeepRules *rules, Removed *removed, Problem *problem);
+Status db_remove(Db *db, const KeepRules *rules, Removed *removed, Problem *problem);
 
 #endif

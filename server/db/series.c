@@ -66,7 +66,7 @@ static void was_put(void *context, Status status, const char *detail) {
     free(blob);
 }
 
-Status db_series_post(Db *store, const char *result, char *body, size_t size, uint64_t most,
+Status db_series_post(Db *db, const char *result, char *body, size_t size, uint64_t most,
                       const WriteDone *done) {
     Blob *blob = size <= most ? calloc(1, sizeof *blob) : NULL;
     if (blob == NULL) {
@@ -77,10 +77,10 @@ Status db_series_post(Db *store, const char *result, char *body, size_t size, ui
     blob->body = (StoredBytes){body, size};
     blob->bytes = size;
     blob->most = most;
-    blob->evictions = db_evictions(store);
+    blob->evictions = db_evictions(db);
     blob->done = *done;
     const WriteDone own = {was_put, blob};
-    const Status status = db_enqueue(store, put, blob, 0, STORE_LOW, &own, NULL);
+    const Status status = db_enqueue(db, put, blob, 0, STORE_LOW, &own, NULL);
     if (status != STATUS_OK) {
         free(blob->body.at);
         free(blob);
@@ -100,20 +100,20 @@ static void was_touched(void *context, Status status, const char *detail) {
     free(context);
 }
 
-Status db_series_load(Db *store, const char *result, char **body, size_t *size, Problem *problem) {
+Status db_series_load(Db *db, const char *result, char **body, size_t *size, Problem *problem) {
     static const char sql[] = "SELECT body FROM series JOIN series_bodies USING (number) "
                               "WHERE result = :result";
     Blob blob = {.bytes = 0}, *used = calloc(1, sizeof *used);
     bool is_found = false;
     text_fit(blob.result, sizeof blob.result, result);
-    Status status = db_first(store, sql, columns, &blob, columns, &blob, &is_found, problem);
+    Status status = db_first(db, sql, columns, &blob, columns, &blob, &is_found, problem);
     *body = blob.body.at;
     *size = blob.body.size;
     if (status == STATUS_OK && is_found && used != NULL) {
         const WriteDone done = {was_touched, used};
         *used = (Blob){.bytes = 0};
         text_fit(used->result, sizeof used->result, result);
-        if (db_enqueue(store, touch, used, 0, STORE_LOW, &done, NULL) == STATUS_OK)
+        if (db_enqueue(db, touch, used, 0, STORE_LOW, &done, NULL) == STATUS_OK)
             used = NULL;
     }
     free(used);
@@ -122,16 +122,16 @@ Status db_series_load(Db *store, const char *result, char **body, size_t *size, 
     return status;
 }
 
-bool db_series_exists(Db *store, const char *result) {
+bool db_series_exists(Db *db, const char *result) {
     static const char sql[] = "SELECT bytes FROM series WHERE result = :result";
     Blob blob = {.bytes = 0};
     bool is_found = false;
     text_fit(blob.result, sizeof blob.result, result);
-    return db_first(store, sql, columns, &blob, columns, &blob, &is_found, NULL) == STATUS_OK &&
+    return db_first(db, sql, columns, &blob, columns, &blob, &is_found, NULL) == STATUS_OK &&
            is_found;
 }
 
-void db_series_tally(Db *store, uint64_t *count, uint64_t *bytes, uint64_t *evictions) {
+void db_series_tally(Db *db, uint64_t *count, uint64_t *bytes, uint64_t *evictions) {
     static const char sql[] =
         "SELECT count(*) AS count, coalesce(sum(bytes), 0) AS bytes FROM series";
     typedef struct Sum {
@@ -141,8 +141,8 @@ void db_series_tally(Db *store, uint64_t *count, uint64_t *bytes, uint64_t *evic
                                      ROW_COLUMN(Sum, bytes, COLUMN_COUNT), ROW_END};
     Sum sum = {0, 0};
     bool is_found;
-    (void)db_first(store, sql, NULL, NULL, sums, &sum, &is_found, NULL);
+    (void)db_first(db, sql, NULL, NULL, sums, &sum, &is_found, NULL);
     *count = sum.count;
     *bytes = sum.bytes;
-    *evictions = atomic_load(db_evictions(store));
+    *evictions = atomic_load(db_evictions(db));
 }

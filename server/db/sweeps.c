@@ -54,12 +54,12 @@ static Status begin(Sqlite *database, const void *work, Problem *problem) {
     return sqlite_change(database, sql, sweep_columns, work, NULL, problem);
 }
 
-Status db_sweep_begin(Db *store, SweepRow *row, Problem *problem) {
+Status db_sweep_begin(Db *db, SweepRow *row, Problem *problem) {
     char result[sizeof row->result];
     memcpy(result, row->result, sizeof result);
-    TRY(db_write(store, begin, row, problem));
+    TRY(db_write(db, begin, row, problem));
     sweep_row_clear(row);
-    return db_sweep_load(store, result, row, problem);
+    return db_sweep_load(db, result, row, problem);
 }
 
 static SweepRow key_of(const char *result) {
@@ -69,13 +69,13 @@ static SweepRow key_of(const char *result) {
     return key;
 }
 
-Status db_sweep_load(Db *store, const char *result, SweepRow *row, Problem *problem) {
+Status db_sweep_load(Db *db, const char *result, SweepRow *row, Problem *problem) {
     static const char sql[] = "SELECT number, result, scene, points, metrics, chunks, retries, "
                               "created_unix_ms FROM sweeps WHERE result = :result";
     const SweepRow key = key_of(result);
     bool is_found;
     memset(row, 0, sizeof *row);
-    TRY(db_first(store, sql, sweep_columns, &key, sweep_columns, row, &is_found, problem));
+    TRY(db_first(db, sql, sweep_columns, &key, sweep_columns, row, &is_found, problem));
     return is_found ? STATUS_OK
                     : problem_set(problem, STATUS_NOT_FOUND,
                                   "there is no table of \"%.72s\": either no such result, or its "
@@ -83,12 +83,12 @@ Status db_sweep_load(Db *store, const char *result, SweepRow *row, Problem *prob
                                   result);
 }
 
-Status db_sweep_asked(Db *store, const char *job, SweepRow *row, Problem *problem) {
+Status db_sweep_asked(Db *db, const char *job, SweepRow *row, Problem *problem) {
     static const char sql[] = "SELECT result, scene FROM jobs WHERE id = :result AND scene <> ''";
     const SweepRow key = key_of(job);
     bool is_found;
     memset(row, 0, sizeof *row);
-    TRY(db_first(store, sql, sweep_columns, &key, sweep_columns, row, &is_found, problem));
+    TRY(db_first(db, sql, sweep_columns, &key, sweep_columns, row, &is_found, problem));
     return is_found ? STATUS_OK
                     : problem_set(problem, STATUS_NOT_FOUND, "there is no job \"%.40s\"", job);
 }
@@ -102,16 +102,16 @@ static Status take(Sqlite *database, const void *work, Problem *problem) {
     return sqlite_change(database, sql, chunk_columns, work, NULL, problem);
 }
 
-Status db_sweep_take(Db *store, const SweepChunkRow *chunk, Problem *problem) {
-    return db_write(store, take, chunk, problem);
+Status db_sweep_take(Db *db, const SweepChunkRow *chunk, Problem *problem) {
+    return db_write(db, take, chunk, problem);
 }
 
-Status db_sweep_chunks(Db *store, int64_t sweep, SweepChunkRows *chunks, Problem *problem) {
+Status db_sweep_chunks(Db *db, int64_t sweep, SweepChunkRows *chunks, Problem *problem) {
     static const char sql[] = "SELECT number, sweep, chunk, failed, is_open FROM sweep_chunks "
                               "WHERE sweep = :sweep ORDER BY chunk";
     const SweepChunkRow key = {.sweep = sweep};
     void *at;
-    const Status status = db_all(store, sql, chunk_columns, &key, chunk_columns, sizeof *chunks->at,
+    const Status status = db_all(db, sql, chunk_columns, &key, chunk_columns, sizeof *chunks->at,
                                  &at, &chunks->count, problem);
     chunks->at = at;
     if (status != STATUS_OK)
@@ -119,14 +119,14 @@ Status db_sweep_chunks(Db *store, int64_t sweep, SweepChunkRows *chunks, Problem
     return status;
 }
 
-Status db_sweep_chunk(Db *store, int64_t sweep, uint64_t number, SweepChunkRow *chunk,
+Status db_sweep_chunk(Db *db, int64_t sweep, uint64_t number, SweepChunkRow *chunk,
                       Problem *problem) {
     static const char sql[] = "SELECT sweep, chunk, failed, is_open, reasons, rows "
                               "FROM sweep_chunks WHERE sweep = :sweep AND chunk = :chunk";
     const SweepChunkRow key = {.sweep = sweep, .chunk = number};
     bool is_found;
     memset(chunk, 0, sizeof *chunk);
-    TRY(db_first(store, sql, chunk_columns, &key, chunk_columns, chunk, &is_found, problem));
+    TRY(db_first(db, sql, chunk_columns, &key, chunk_columns, chunk, &is_found, problem));
     return is_found ? STATUS_OK
                     : problem_set(problem, STATUS_NOT_FOUND, "the chunk is not there yet");
 }
@@ -160,9 +160,9 @@ static Status read_parts(Sqlite *database, const SweepRow *sweep, const SweepChu
     return STATUS_OK;
 }
 
-Status db_sweep_read(Db *store, const SweepRow *sweep, const SweepChunkRows *chunks, size_t offset,
+Status db_sweep_read(Db *db, const SweepRow *sweep, const SweepChunkRows *chunks, size_t offset,
                      size_t size, unsigned char *target, Problem *problem) {
-    Sqlite *database = db_take(store);
+    Sqlite *database = db_take(db);
     // One transaction: what was found to be the same stays so while it is read.
     Status status = sqlite_execute(database, "BEGIN", problem);
     if (status == STATUS_OK) {
@@ -170,7 +170,7 @@ Status db_sweep_read(Db *store, const SweepRow *sweep, const SweepChunkRows *chu
         const Status ended = sqlite_execute(database, "COMMIT", NULL);
         status = status == STATUS_OK ? ended : status;
     }
-    db_put(store, database);
+    db_put(db, database);
     return status;
 }
 
@@ -185,9 +185,9 @@ static Status reopen(Sqlite *database, const void *work, Problem *problem) {
     return sqlite_change(database, sweep, sweep_columns, work, NULL, problem);
 }
 
-Status db_sweep_reopen(Db *store, const char *result, Problem *problem) {
+Status db_sweep_reopen(Db *db, const char *result, Problem *problem) {
     const SweepRow key = key_of(result);
-    return db_write(store, reopen, &key, problem);
+    return db_write(db, reopen, &key, problem);
 }
 
 static Status tidy(Sqlite *database, const void *work, Problem *problem) {
@@ -197,7 +197,7 @@ static Status tidy(Sqlite *database, const void *work, Problem *problem) {
     return sqlite_change(database, sql, sweep_columns, work, NULL, problem);
 }
 
-Status db_sweep_tidy(Db *store, Problem *problem) {
+Status db_sweep_tidy(Db *db, Problem *problem) {
     const SweepRow none = {0};
-    return db_write(store, tidy, &none, problem);
+    return db_write(db, tidy, &none, problem);
 }

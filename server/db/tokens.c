@@ -71,15 +71,15 @@ static Status add(Sqlite *database, const void *work, Problem *problem) {
     return sqlite_change(database, sql, token_columns, row, NULL, problem);
 }
 
-Status db_token_add(Db *store, const TokenRow *row, Problem *problem) {
-    return db_write(store, add, row, problem);
+Status db_token_add(Db *db, const TokenRow *row, Problem *problem) {
+    return db_write(db, add, row, problem);
 }
 
-Status db_tokens(Db *store, TokenRows *rows, Problem *problem) {
+Status db_tokens(Db *db, TokenRows *rows, Problem *problem) {
     static const char sql[] = "SELECT * FROM tokens ORDER BY name";
     void *at;
     const Status status =
-        db_all(store, sql, NULL, NULL, token_columns, sizeof *rows->at, &at, &rows->count, problem);
+        db_all(db, sql, NULL, NULL, token_columns, sizeof *rows->at, &at, &rows->count, problem);
     rows->at = at;
     if (status != STATUS_OK) {
         free(at);
@@ -100,8 +100,8 @@ static Status revoke(Sqlite *database, const void *work, Problem *problem) {
     return sqlite_change(database, sql, token_columns, row, NULL, problem);
 }
 
-Status db_token_revoke(Db *store, const TokenRow *row, Problem *problem) {
-    return db_write(store, revoke, row, problem);
+Status db_token_revoke(Db *db, const TokenRow *row, Problem *problem) {
+    return db_write(db, revoke, row, problem);
 }
 
 static Status forget(Sqlite *database, const void *work, Problem *problem) {
@@ -115,8 +115,8 @@ static Status forget(Sqlite *database, const void *work, Problem *problem) {
     return sqlite_change(database, sql, token_columns, row, NULL, problem);
 }
 
-Status db_token_forget(Db *store, const TokenRow *row, Problem *problem) {
-    return db_write(store, forget, row, problem);
+Status db_token_forget(Db *db, const TokenRow *row, Problem *problem) {
+    return db_write(db, forget, row, problem);
 }
 
 static Status used(Sqlite *database, const void *work, Problem *problem) {
@@ -124,6 +124,6 @@ static Status used(Sqlite *database, const void *work, Problem *problem) {
     return sqlite_change(database, sql, token_columns, work, NULL, problem);
 }
 
-Status db_token_used(Db *store, const TokenRow *row, Problem *problem) {
-    return db_write(store, used, row, problem);
+Status db_token_used(Db *db, const TokenRow *row, Problem *problem) {
+    return db_write(db, used, row, problem);
 }

@@ -20,14 +20,14 @@ typedef struct TokenRows {
 } TokenRows;
 
 // STATUS_CONFLICT where the name is taken, STATUS_LIMIT where there are TOKENS_MAX.
-Status db_token_add(Db *store, const TokenRow *row, Problem *problem);
+Status db_token_add(Db *db, const TokenRow *row, Problem *problem);
 // All, by name.
-Status db_tokens(Db *store, TokenRows *rows, Problem *problem);
+Status db_tokens(Db *db, TokenRows *rows, Problem *problem);
 // Revokes at row->revoked_unix_ms; STATUS_NOT_FOUND, STATUS_CONFLICT if it is revoked already.
-Status db_token_revoke(Db *store, const TokenRow *row, Problem *problem);
+Status db_token_revoke(Db *db, const TokenRow *row, Problem *problem);
 // Strikes it from the list; STATUS_NOT_FOUND, STATUS_CONFLICT unless it is revoked.
-Status db_token_forget(Db *store, const TokenRow *row, Problem *problem);
+Status db_token_forget(Db *db, const TokenRow *row, Problem *problem);
 // Notes row->used_unix_ms.
-Status db_token_used(Db *store, const TokenRow *row, Problem *problem);
+Status db_token_used(Db *db, const TokenRow *row, Problem *problem);
 
 #endif

@@ -177,7 +177,7 @@ static Status put_reviewed(MaterialExport *text, Bytes *bytes, MaterialRevision 
 static Status put_revision(MaterialExport *text, Bytes *bytes, MaterialRevision *revision,
                            Problem *problem) {
     MaterialReviews reviews;
-    Status status = db_reviews_of(text->store, &text->moment, revision->slug, revision->revision,
+    Status status = db_reviews_of(text->db, &text->moment, revision->slug, revision->revision,
                                   &reviews, problem);
     if (status == STATUS_OK)
         status = put_reviewed(text, bytes, revision, &reviews, problem);
@@ -208,7 +208,7 @@ static Status next_material(MaterialExport *text, Bytes *bytes, bool *is_last, P
     MaterialRevision first;
     bool is_found;
     Status status =
-        db_material_behind(text->store, &text->moment, text->slug, &first, &is_found, problem);
+        db_material_behind(text->db, &text->moment, text->slug, &first, &is_found, problem);
     *is_last = status == STATUS_OK && !is_found;
     if (*is_last)
         bytes_text(bytes, text->is_table ? "" : "]}\n");
@@ -227,8 +227,8 @@ static Status next_material(MaterialExport *text, Bytes *bytes, bool *is_last, P
 static Status next_revision(MaterialExport *text, Bytes *bytes, Problem *problem) {
     MaterialRevision revision;
     bool is_found;
-    Status status = db_revision_behind(text->store, &text->moment, text->slug, text->number,
-                                       &revision, &is_found, problem);
+    Status status = db_revision_behind(text->db, &text->moment, text->slug, text->number, &revision,
+                                       &is_found, problem);
     if (status == STATUS_OK && !text->is_table)
         bytes_text(bytes, is_found ? ",\n" : "]");
     if (status == STATUS_OK && is_found)
@@ -245,7 +245,7 @@ static Status next_revision(MaterialExport *text, Bytes *bytes, Problem *problem
 static Status next_measurement(MaterialExport *text, Bytes *bytes, Problem *problem) {
     MaterialMeasurement measurement;
     bool is_found;
-    Status status = db_measurement_behind(text->store, &text->moment, text->slug, text->number,
+    Status status = db_measurement_behind(text->db, &text->moment, text->slug, text->number,
                                           &measurement, &is_found, problem);
     if (status == STATUS_OK && is_found)
         status = put_measurement(text, bytes, &measurement, problem);
@@ -270,9 +270,9 @@ static void begin(MaterialExport *text, Bytes *bytes) {
     }
 }
 
-Status material_export_open(Db *store, bool is_table, MaterialExport *text, Problem *problem) {
-    *text = (MaterialExport){.store = store, .is_table = is_table};
-    return db_material_moment(store, &text->moment, problem);
+Status material_export_open(Db *db, bool is_table, MaterialExport *text, Problem *problem) {
+    *text = (MaterialExport){.db = db, .is_table = is_table};
+    return db_material_moment(db, &text->moment, problem);
 }
 
 Status material_export_next(MaterialExport *text, Bytes *bytes, bool *is_last, Problem *problem) {

@@ -14,7 +14,7 @@ typedef enum MaterialExportStage {
 
 // How far it is.
 typedef struct MaterialExport {
-    Db *store;
+    Db *db;
     MaterialMoment moment;
     bool is_table;
     bool has_begun;
@@ -24,7 +24,7 @@ typedef struct MaterialExport {
     uint64_t number;                  // of its last revision, or measurement
 } MaterialExport;
 
-Status material_export_open(Db *store, bool is_table, MaterialExport *text, Problem *problem);
+Status material_export_open(Db *db, bool is_table, MaterialExport *text, Problem *problem);
 
 // Appends the next piece, at most one revision with its reviews or one measurement; *is_last behind
 // it all.

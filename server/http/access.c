@@ -7,12 +7,12 @@
 
 const char *const log_mode_names[] = {"off", "errors", "all", NULL};
 
-Status access_authorize(const AccessControl *doorman, const char *scope, Request *request,
+Status access_authorize(const AccessControl *access, const char *scope, Request *request,
                         Problem *problem) {
     request->client = NULL;
-    if (doorman == NULL || doorman->tokens == NULL || strcmp(scope, "open") == 0)
+    if (access == NULL || access->tokens == NULL || strcmp(scope, "open") == 0)
         return STATUS_OK;
-    TRY(tokens_check(doorman->tokens, request->authorization, scope, &request->holder, problem));
+    TRY(tokens_check(access->tokens, request->authorization, scope, &request->holder, problem));
     request->client = request->holder.name[0] != '\0' ? request->holder.name : NULL;
     return STATUS_OK;
 }
@@ -44,19 +44,19 @@ static void write_line(const Request *request, const Reply *reply, int64_t ns, u
     bytes_clear(&line);
 }
 
-void access_log(const AccessControl *doorman, const Request *request, const Reply *reply) {
-    if (doorman == NULL)
+void access_log(const AccessControl *access, const Request *request, const Reply *reply) {
+    if (access == NULL)
         return;
     const int64_t ns = clock_monotonic_ns() - request->started_ns;
     const bool is_stream = reply->stream.next != NULL;
     const uint64_t sent = !is_stream                         ? reply->body_size
                           : reply->stream.size != UINT64_MAX ? reply->stream.size
                                                              : 0;
-    if (doorman->meter != NULL)
-        request_metrics_count(doorman->meter, request->route, reply->code, ns, request->received,
-                              sent);
+    if (access->request_metrics != NULL)
+        request_metrics_count(access->request_metrics, request->route, reply->code, ns,
+                              request->received, sent);
     const int code = reply->code;
     const bool is_fault = code >= 500 && code != 501 && code != 503 && code != 505;
-    if (doorman->journal == JOURNAL_ALL || (doorman->journal == JOURNAL_ERRORS && is_fault))
+    if (access->journal == JOURNAL_ALL || (access->journal == JOURNAL_ERRORS && is_fault))
         write_line(request, reply, ns, sent);
 }

@@ -17,13 +17,13 @@ extern const char *const log_mode_names[];
 // All may be NULL, which is an open door that counts nothing.
 typedef struct AccessControl {
     Tokens *tokens;
-    RequestMetrics *meter;
+    RequestMetrics *request_metrics;
     LogMode journal;
 } AccessControl;
 
 // Whether the request may use a route of this scope ("open": whoever it is); request->client
 // becomes who it is. STATUS_UNAUTHORIZED, STATUS_FORBIDDEN.
-Status access_authorize(const AccessControl *doorman, const char *scope, Request *request,
+Status access_authorize(const AccessControl *access, const char *scope, Request *request,
                         Problem *problem);
 
 // Whether an admitted request may undo what `owner` (a token's name; NULL: nobody in particular)
@@ -32,6 +32,6 @@ Status access_authorize(const AccessControl *doorman, const char *scope, Request
 Status access_owns(const Request *request, const char *owner, const char *what, Problem *problem);
 
 // Once per answer, when it is ready to be sent; request->route may be NULL.
-void access_log(const AccessControl *doorman, const Request *request, const Reply *reply);
+void access_log(const AccessControl *access, const Request *request, const Reply *reply);
 
 #endif

@@ -61,10 +61,12 @@ static Status set_parameters(Request *request, const RouteSpan *spans, size_t co
 static Status finish(const Dispatcher *dispatcher, const Route *route, uint64_t age,
                      const Request *request, Reply *reply, Problem *problem) {
     const bool is_packed = reply_pack(reply, request);
-    const bool is_kept = dispatcher->hot != NULL && reply->is_immutable && reply->code == 200 &&
-                         reply->stream.next == NULL && !reply->varies_by_accept;
+    const bool is_kept = dispatcher->response_cache != NULL && reply->is_immutable &&
+                         reply->code == 200 && reply->stream.next == NULL &&
+                         !reply->varies_by_accept;
     if (is_kept)
-        response_cache_put(dispatcher->hot, age, request->target, is_packed, route, reply);
+        response_cache_put(dispatcher->response_cache, age, request->target, is_packed, route,
+                           reply);
     return reply_range(reply, request, problem);
 }
 
@@ -73,11 +75,12 @@ static Status answer(const Dispatcher *dispatcher, const Route *route, Handler *
                      Problem *problem) {
     char scratch[512];
     if (!request->is_admitted)
-        TRY(access_authorize(dispatcher->doorman, route->scope, request, problem));
+        TRY(access_authorize(dispatcher->access, route->scope, request, problem));
     request->is_admitted = false; // whoever sleeps is judged again
     TRY(check_queries(route, request, problem));
     TRY(set_parameters(request, spans, count, scratch, sizeof scratch, problem));
-    const uint64_t age = dispatcher->hot != NULL ? response_cache_age(dispatcher->hot) : 0;
+    const uint64_t age =
+        dispatcher->response_cache != NULL ? response_cache_age(dispatcher->response_cache) : 0;
     TRY(handle(dispatcher->app, request, reply, problem));
     if (reply->wait_ms > 0 || reply->code == 0)
         return STATUS_OK;
@@ -114,7 +117,7 @@ static void close_up(const Dispatcher *dispatcher, Request *request, Status stat
         body_problem(reply, problem, reply->code == 416 ? 416 : 0, request->target, request->id);
     }
     if (reply->wait_ms == 0)
-        access_log(dispatcher->doorman, request, reply);
+        access_log(dispatcher->access, request, reply);
 }
 
 static const Route *find(const Dispatcher *dispatcher, Request *request, RouteSpan *spans,
@@ -148,7 +151,7 @@ bool dispatch_admits(void *context, Request *request, Reply *reply) {
     problem_clear(&problem);
     const Route *route = find(dispatcher, request, spans, &count, allow);
     const Status status =
-        route != NULL ? access_authorize(dispatcher->doorman, route->scope, request, &problem)
+        route != NULL ? access_authorize(dispatcher->access, route->scope, request, &problem)
                       : refuse(dispatcher, request, allow, reply, &problem);
     request->is_admitted = status == STATUS_OK;
     if (request->is_admitted)
@@ -160,21 +163,22 @@ bool dispatch_admits(void *context, Request *request, Reply *reply) {
 bool dispatch_still_admits(void *context, Request *request) {
     const Dispatcher *dispatcher = context;
     return request->route == NULL ||
-           access_authorize(dispatcher->doorman, request->route->scope, request, NULL) == STATUS_OK;
+           access_authorize(dispatcher->access, request->route->scope, request, NULL) == STATUS_OK;
 }
 
 void dispatch_note(void *context, const Request *request, const Reply *reply) {
     const Dispatcher *dispatcher = context;
-    access_log(dispatcher->doorman, request, reply);
+    access_log(dispatcher->access, request, reply);
 }
 
 static bool find_hot(const Dispatcher *dispatcher, Request *request, Reply *reply) {
-    if (dispatcher->hot == NULL || strcmp(request->method, "GET") != 0)
+    if (dispatcher->response_cache == NULL || strcmp(request->method, "GET") != 0)
         return false;
     const bool takes_gzip = header_accepts_gzip(request->accept_encoding);
     const Route **route = &request->route;
-    if (!takes_gzip || !response_cache_find(dispatcher->hot, request->target, true, reply, route)) {
-        if (!response_cache_find(dispatcher->hot, request->target, false, reply, route))
+    if (!takes_gzip ||
+        !response_cache_find(dispatcher->response_cache, request->target, true, reply, route)) {
+        if (!response_cache_find(dispatcher->response_cache, request->target, false, reply, route))
             return false;
         if (takes_gzip && reply->varies_by_encoding) {
             reply_clear(reply); // it is made once more, to be packed
@@ -183,7 +187,7 @@ static bool find_hot(const Dispatcher *dispatcher, Request *request, Reply *repl
     }
     Problem problem;
     problem_clear(&problem);
-    Status status = access_authorize(dispatcher->doorman, request->route->scope, request, &problem);
+    Status status = access_authorize(dispatcher->access, request->route->scope, request, &problem);
     if (status != STATUS_OK)
         reply_clear(reply);
     else if (!reply_is_known(reply, request))

@@ -11,9 +11,9 @@
 typedef struct Dispatcher {
     App *app;
     const Route *table;
-    const QuickHandler *quick;    // of the table's; may be NULL
-    ResponseCache *hot;           // whole answers that never change; may be NULL
-    const AccessControl *doorman; // NULL: whoever comes, nothing counted
+    const QuickHandler *quick;     // of the table's; may be NULL
+    ResponseCache *response_cache; // whole answers that never change; may be NULL
+    const AccessControl *access;   // NULL: whoever comes, nothing counted
 } Dispatcher;
 
 // Fills `reply` in any case; reply->wait_ms > 0 asks to be called again. `context` is a Dispatcher.

@@ -15,29 +15,29 @@ typedef struct EventFd {
 } EventFd;
 
 // False and errno if it fails. To be closed.
-static inline bool eventfd_open(EventFd *bell) {
-    atomic_init(&bell->is_rung, false);
-    bell->descriptor = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
-    return bell->descriptor >= 0;
+static inline bool eventfd_open(EventFd *wakeup) {
+    atomic_init(&wakeup->is_rung, false);
+    wakeup->descriptor = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    return wakeup->descriptor >= 0;
 }
 
-static inline void eventfd_close(EventFd *bell) { // one that is not open: no harm
-    close(bell->descriptor);
-    bell->descriptor = -1;
+static inline void eventfd_close(EventFd *wakeup) { // one that is not open: no harm
+    close(wakeup->descriptor);
+    wakeup->descriptor = -1;
 }
 
-static inline void eventfd_signal(EventFd *bell) {
+static inline void eventfd_signal(EventFd *wakeup) {
     const uint64_t one = 1;
-    if (!atomic_exchange(&bell->is_rung, true))
-        (void)!write(bell->descriptor, &one, sizeof one);
+    if (!atomic_exchange(&wakeup->is_rung, true))
+        (void)!write(wakeup->descriptor, &one, sizeof one);
 }
 
 // Whether it was rung. One who rings meanwhile is heard now or is_rung next time.
-static inline bool eventfd_read_all(EventFd *bell) {
+static inline bool eventfd_read_all(EventFd *wakeup) {
     uint64_t count;
-    if (!atomic_exchange(&bell->is_rung, false))
+    if (!atomic_exchange(&wakeup->is_rung, false))
         return false;
-    (void)!read(bell->descriptor, &count, sizeof count);
+    (void)!read(wakeup->descriptor, &count, sizeof count);
     return true;
 }
 

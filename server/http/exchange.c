@@ -33,7 +33,7 @@ enum {
 static void make_problem(Exchange *exchange, int code, const Problem *problem, Reply *reply) {
     reply_default(reply);
     body_problem(reply, problem, code, NULL, exchange->request.id);
-    const ServerSettings *settings = &exchange->desk->settings;
+    const ServerSettings *settings = &exchange->shared->settings;
     if (settings->note != NULL)
         settings->note(settings->context, &exchange->request, reply);
 }
@@ -42,7 +42,7 @@ static enum MHD_Result take_header(void *context, enum MHD_ValueKind kind, const
                                    size_t name_size, const char *value, size_t value_size) {
     (void)kind;
     Exchange *exchange = context;
-    validate_header(&exchange->gate, name, name_size, value, value_size);
+    validate_header(&exchange->validator, name, name_size, value, value_size);
     if (value != NULL)
         request_header(&exchange->request, name, value);
     return MHD_YES;
@@ -58,7 +58,7 @@ static void write_id(char id[REQUEST_ID_SIZE], uint64_t number) {
 static void await_body(Exchange *exchange, bool has_body) {
     exchange->is_reading = has_body;
     exchange->loop->reading += has_body;
-    timer_limit(exchange->seat, has_body ? BODY_MS : 0);
+    timer_limit(exchange->timer, has_body ? BODY_MS : 0);
 }
 
 // Takes the refusal; sent now or, with `drains`, once the body has been thrown away.
@@ -74,30 +74,30 @@ static enum MHD_Result refuse(Exchange *exchange, Reply *refusal, bool drains) {
 // The head is complete: judge it, and refuse at once what cannot be read to its end.
 static enum MHD_Result begin(Exchange *exchange, struct MHD_Connection *connection,
                              const char *method, const char *version) {
-    ServerShared *desk = exchange->desk;
+    ServerShared *shared = exchange->shared;
     Request *request = &exchange->request;
     exchange->is_begun = true;
     exchange->connection = connection;
     request->method = method;
     request->path = request->target = exchange->target;
     request->started_ns = clock_monotonic_ns();
-    request->waker = timer_callback(exchange->seat);
-    request->body_most = desk->settings.body_most;
-    exchange->gate.names = desk->settings.hosts;
+    request->callback = timer_callback(exchange->timer);
+    request->body_most = shared->settings.body_most;
+    exchange->validator.names = shared->settings.hosts;
     MHD_get_connection_values_n(connection, MHD_HEADER_KIND, take_header, exchange);
     if (request->id[0] == '\0')
-        write_id(request->id, desk->first_id + atomic_fetch_add(&desk->requests, 1));
+        write_id(request->id, shared->first_id + atomic_fetch_add(&shared->requests, 1));
 
     if (request->host == NULL)
-        request->host = strstr(desk->url, "://") + 3;
+        request->host = strstr(shared->url, "://") + 3;
 
     Problem problem;
     problem_clear(&problem);
-    int code = validate_request(&exchange->gate, method, exchange->target, version, &problem);
+    int code = validate_request(&exchange->validator, method, exchange->target, version, &problem);
     const bool is_framed = code == 0; // it is certain where the body ends
     if (code == 0 && request_open(request, exchange->target, &problem) != STATUS_OK)
         code = encode_problem_code(problem.status);
-    const unsigned long long body_size = exchange->gate.length;
+    const unsigned long long body_size = exchange->validator.length;
     const size_t most = request->body_most;
     const bool waits_for_leave =
         request->expect != NULL && strcasecmp(request->expect, "100-continue") == 0;
@@ -109,7 +109,7 @@ static enum MHD_Result begin(Exchange *exchange, struct MHD_Connection *connecti
         code = 413;
         body_error_large(most, &problem);
     }
-    const bool has_body = body_size > 0 || exchange->gate.is_chunked;
+    const bool has_body = body_size > 0 || exchange->validator.is_chunked;
     const bool drains =
         is_framed && has_body && request->expect == NULL && body_size <= DRAINED * most;
     Reply refusal;
@@ -121,7 +121,7 @@ static enum MHD_Result begin(Exchange *exchange, struct MHD_Connection *connecti
         request->method = "GET";
         request->range = NULL;
     }
-    const ServerSettings *settings = &desk->settings;
+    const ServerSettings *settings = &shared->settings;
     if (has_body && settings->admits != NULL) {
         reply_default(&refusal);
         if (!settings->admits(settings->context, request, &refusal))
@@ -139,7 +139,7 @@ static void end_reading(Exchange *exchange) {
 
 static void drop_body(Exchange *exchange) {
     if (exchange->is_counted)
-        atomic_fetch_sub(&exchange->desk->held, exchange->body.count);
+        atomic_fetch_sub(&exchange->shared->held, exchange->body.count);
     exchange->is_counted = false;
     bytes_clear(&exchange->body);
     exchange->request.body = NULL;
@@ -147,8 +147,8 @@ static void drop_body(Exchange *exchange) {
 }
 
 static enum MHD_Result take_body(Exchange *exchange, const char *data, size_t size) {
-    ServerShared *desk = exchange->desk;
-    const size_t most = desk->settings.body_most;
+    ServerShared *shared = exchange->shared;
+    const size_t most = shared->settings.body_most;
     exchange->received += size;
     if (exchange->received > DRAINED * most)
         return MHD_NO;
@@ -158,11 +158,11 @@ static enum MHD_Result take_body(Exchange *exchange, const char *data, size_t si
     exchange->request.is_too_large = exchange->received > most;
     if (!exchange->request.is_too_large) {
         exchange->is_counted = true;
-        exchange->is_busy = atomic_fetch_add(&desk->held, size) + size > BODIES_HELD * most &&
+        exchange->is_busy = atomic_fetch_add(&shared->held, size) + size > BODIES_HELD * most &&
                             exchange->received > BODY_SMALL;
         bytes_put(&exchange->body, data, size);
         if (exchange->body.is_failed) {
-            atomic_fetch_sub(&desk->held, exchange->received);
+            atomic_fetch_sub(&shared->held, exchange->received);
             exchange->is_counted = false;
             exchange->is_busy = true;
         }
@@ -182,22 +182,22 @@ static void note_wait(Exchange *exchange, const Reply *reply) {
 
 // What the last sleep ended by.
 static void note_wake(Exchange *exchange) {
-    exchange->request.is_woken = timer_was_woken(exchange->seat);
+    exchange->request.is_woken = timer_was_woken(exchange->timer);
     exchange->request.is_expired = !exchange->request.is_woken;
 }
 
 // Another thread's word: the loop does not hear of it by itself. The exchange may be gone when this
 // returns.
 static void resume(Exchange *exchange) {
-    EventFd *bell = &exchange->loop->bell;
+    EventFd *wakeup = &exchange->loop->wakeup;
     MHD_resume_connection(exchange->connection);
-    eventfd_signal(bell);
+    eventfd_signal(wakeup);
 }
 
 // In the pool.
 static void answer_in_pool(WorkItem *task) {
     Exchange *exchange = (Exchange *)(void *)task;
-    const ServerSettings *settings = &exchange->desk->settings;
+    const ServerSettings *settings = &exchange->shared->settings;
     if (exchange->is_asleep)
         note_wake(exchange);
     for (;;) {
@@ -207,7 +207,7 @@ static void answer_in_pool(WorkItem *task) {
         if (reply->wait_ms == 0)
             break;
         note_wait(exchange, reply);
-        if (timer_sleep(exchange->seat, exchange, reply->wait_ms))
+        if (timer_sleep(exchange->timer, exchange, reply->wait_ms))
             return; // it may be in the pool again already
         note_wake(exchange);
     }
@@ -224,13 +224,13 @@ static enum MHD_Result hand_over(Exchange *exchange) {
     exchange->task.run = answer_in_pool;
     // The state first: the answer may be there before this returns.
     MHD_suspend_connection(exchange->connection);
-    thread_pool_add(exchange->desk->pool, &exchange->task);
+    thread_pool_add(exchange->shared->pool, &exchange->task);
     return MHD_YES;
 }
 
 static enum MHD_Result answer(Exchange *exchange) {
     end_reading(exchange);
-    const ServerSettings *settings = &exchange->desk->settings;
+    const ServerSettings *settings = &exchange->shared->settings;
     Request *request = &exchange->request;
     if (exchange->is_answered) {
         Reply reply = exchange->reply;
@@ -248,8 +248,8 @@ static enum MHD_Result answer(Exchange *exchange) {
     if (exchange->is_asleep) {
         note_wake(exchange);
     } else {
-        timer_limit(exchange->seat, 0);
-        timer_begin(exchange->seat);
+        timer_limit(exchange->timer, 0);
+        timer_begin(exchange->timer);
         request->body = exchange->body.at;
         request->body_size = exchange->body.count;
         request->received = exchange->received;
@@ -265,7 +265,7 @@ static enum MHD_Result answer(Exchange *exchange) {
             return response_queue(exchange, &reply, false);
         }
         note_wait(exchange, &reply);
-        if (timer_sleep(exchange->seat, exchange, reply.wait_ms))
+        if (timer_sleep(exchange->timer, exchange, reply.wait_ms))
             return MHD_YES;
         note_wake(exchange);
     }
@@ -281,27 +281,27 @@ static void fall_asleep(void *context) {
 static void wake_up(void *context) {
     Exchange *exchange = context;
     if (exchange->is_in_pool)
-        thread_pool_add(exchange->desk->pool, &exchange->task);
+        thread_pool_add(exchange->shared->pool, &exchange->task);
     else
         resume(exchange);
 }
 
 const TimerCallbacks exchange_calls = {fall_asleep, wake_up};
 
-void exchange_connection(void *context, struct MHD_Connection *connection, void **seat,
+void exchange_connection(void *context, struct MHD_Connection *connection, void **timer,
                          enum MHD_ConnectionNotificationCode code) {
     EventLoop *loop = context;
     if (code == MHD_CONNECTION_NOTIFY_STARTED) {
         const union MHD_ConnectionInfo *info =
             MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
-        *seat = info != NULL ? timer_take(loop->desk->hall, info->connect_fd) : NULL;
-        if (*seat != NULL)
-            timer_limit(*seat, HEAD_MS);
+        *timer = info != NULL ? timer_take(loop->shared->wheel, info->connect_fd) : NULL;
+        if (*timer != NULL)
+            timer_limit(*timer, HEAD_MS);
         return;
     }
-    if (*seat != NULL)
-        timer_leave(*seat);
-    *seat = NULL;
+    if (*timer != NULL)
+        timer_leave(*timer);
+    *timer = NULL;
     atomic_fetch_sub(&loop->connections, 1);
 }
 
@@ -309,21 +309,21 @@ void exchange_connection(void *context, struct MHD_Connection *connection, void 
 static Exchange *exchange_take(EventLoop *loop) {
     if (loop->spare_count == 0)
         return calloc(1, sizeof(Exchange));
-    Exchange *exchange = loop->spare[--loop->spare_count];
+    Exchange *exchange = loop->free_list[--loop->spare_count];
     memset(exchange, 0, sizeof *exchange);
     return exchange;
 }
 
 static void exchange_put(EventLoop *loop, Exchange *exchange) {
     if (loop->spare_count < EXCHANGES_KEPT)
-        loop->spare[loop->spare_count++] = exchange;
+        loop->free_list[loop->spare_count++] = exchange;
     else
         free(exchange);
 }
 
 void exchange_forget(EventLoop *loop) {
     while (loop->spare_count > 0)
-        free(loop->spare[--loop->spare_count]);
+        free(loop->free_list[--loop->spare_count]);
 }
 
 // The request line is in; `target` is as sent.
@@ -331,8 +331,8 @@ void *exchange_open(void *context, const char *target, struct MHD_Connection *co
     EventLoop *loop = context;
     const union MHD_ConnectionInfo *info =
         MHD_get_connection_info(connection, MHD_CONNECTION_INFO_SOCKET_CONTEXT);
-    ConnectionTimer *seat = info != NULL ? info->socket_context : NULL;
-    Exchange *exchange = seat != NULL ? exchange_take(loop) : NULL;
+    ConnectionTimer *timer = info != NULL ? info->socket_context : NULL;
+    Exchange *exchange = timer != NULL ? exchange_take(loop) : NULL;
     if (exchange == NULL)
         return NULL;
     exchange->target = strdup(target);
@@ -341,10 +341,10 @@ void *exchange_open(void *context, const char *target, struct MHD_Connection *co
         return NULL;
     }
     exchange->loop = loop;
-    exchange->desk = loop->desk;
-    exchange->seat = seat;
-    atomic_fetch_add(&loop->desk->exchanges, 1);
-    timer_limit(seat, HEAD_MS);
+    exchange->shared = loop->shared;
+    exchange->timer = timer;
+    atomic_fetch_add(&loop->shared->exchanges, 1);
+    timer_limit(timer, HEAD_MS);
     return exchange;
 }
 
@@ -385,8 +385,8 @@ void exchange_close(void *context, struct MHD_Connection *connection, void **sta
     end_reading(exchange);
     request_close(&exchange->request);
     // One that ended in an error the library closes only when its client is heard of again.
-    timer_limit(exchange->seat, code == MHD_REQUEST_TERMINATED_COMPLETED_OK ? IDLE_MS : 1);
+    timer_limit(exchange->timer, code == MHD_REQUEST_TERMINATED_COMPLETED_OK ? IDLE_MS : 1);
     free(exchange->target);
     exchange_put(loop, exchange);
-    atomic_fetch_sub(&loop->desk->exchanges, 1);
+    atomic_fetch_sub(&loop->shared->exchanges, 1);
 }

@@ -19,7 +19,7 @@
 // What all exchanges of a listener share.
 typedef struct ServerShared {
     ServerSettings settings;
-    TimerWheel *hall;
+    TimerWheel *wheel;
     ThreadPool *pool;
     const char *url;
     uint64_t first_id;
@@ -32,10 +32,10 @@ enum { EXCHANGES_KEPT = 32 };
 
 // An event loop: its daemon and its thread alone, but for what is locked.
 typedef struct EventLoop {
-    ServerShared *desk;
+    ServerShared *shared;
     struct MHD_Daemon *daemon;
     pthread_t thread;
-    EventFd bell;   // there are arrivals, or connections to go on with, or it is to stop
+    EventFd wakeup; // there are arrivals, or connections to go on with, or it is to stop
     size_t turns;   // calls of exchange_go_on
     size_t reading; // exchanges whose body is still to come
     pthread_mutex_t lock;
@@ -43,19 +43,19 @@ typedef struct EventLoop {
     size_t arrival_count, arrival_room;
     atomic_bool is_stopping;
     atomic_size_t connections; // with the arrivals
-    SharedResponse sent_again[SENT_AGAIN];
-    struct Exchange *spare[EXCHANGES_KEPT];
+    SharedResponse shared_response[SENT_AGAIN];
+    struct Exchange *free_list[EXCHANGES_KEPT];
     size_t spare_count;
 } EventLoop;
 
 typedef struct Exchange {
     WorkItem task; // in the pool
     EventLoop *loop;
-    ServerShared *desk;
+    ServerShared *shared;
     struct MHD_Connection *connection;
-    ConnectionTimer *seat;
+    ConnectionTimer *timer;
     Request request;
-    RequestValidator gate;
+    RequestValidator validator;
     Bytes body;
     size_t received;
     char *target;
@@ -71,7 +71,7 @@ typedef struct Exchange {
 extern const TimerCallbacks exchange_calls;
 
 // The callbacks; `loop` is a EventLoop.
-void exchange_connection(void *loop, struct MHD_Connection *connection, void **seat,
+void exchange_connection(void *loop, struct MHD_Connection *connection, void **timer,
                          enum MHD_ConnectionNotificationCode code);
 void *exchange_open(void *loop, const char *target, struct MHD_Connection *connection);
 enum MHD_Result exchange_go_on(void *loop, struct MHD_Connection *connection, const char *url,

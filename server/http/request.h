@@ -50,7 +50,7 @@ typedef struct Request {
     bool is_woken;             // the handler asked to wait and is called again
     bool is_expired;           // ... because the time was up
     void *kept;                // what the handler kept when it asked to wait; see Reply
-    const Callback *waker;     // wakes this request; outlives it, so that a late call does no harm
+    const Callback *callback;  // wakes this request; outlives it, so that a late call does no harm
     char *storage;             // what the texts above point into
 } Request;
 

@@ -10,12 +10,12 @@ typedef struct RequestMetrics RequestMetrics;
 
 // NULL without memory. Borrows `table`, which ends with method == NULL.
 RequestMetrics *request_metrics_new(const Route *table);
-void request_metrics_free(RequestMetrics *meter);
+void request_metrics_free(RequestMetrics *request_metrics);
 
 // `route` NULL: a request that no route fits, or that was refused by its head.
-void request_metrics_count(RequestMetrics *meter, const Route *route, int code, int64_t ns,
-                           uint64_t received, uint64_t sent);
+void request_metrics_count(RequestMetrics *request_metrics, const Route *route, int code,
+                           int64_t ns, uint64_t received, uint64_t sent);
 // In the Prometheus text format; routes that were never asked for are left out.
-void request_metrics_write(const RequestMetrics *meter, Bytes *bytes);
+void request_metrics_write(const RequestMetrics *request_metrics, Bytes *bytes);
 
 #endif

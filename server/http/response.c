@@ -21,7 +21,7 @@ typedef struct Sending {
 // A body that takes long outlives what its client may do.
 static bool is_still_admitted(Sending *sending) {
     enum { LOOK_MS = 500 };
-    const ServerSettings *settings = &sending->exchange->desk->settings;
+    const ServerSettings *settings = &sending->exchange->shared->settings;
     const int64_t now_ns = clock_monotonic_ns();
     if (settings->still_admits == NULL || now_ns - sending->admitted_ns < LOOK_MS * 1000000LL)
         return true;
@@ -38,7 +38,7 @@ static ssize_t send_next(void *context, uint64_t position, char *target, size_t 
         if (!is_still_admitted(sending))
             return MHD_CONTENT_READER_END_WITH_ERROR;
         // Forgotten before looking: whoever wakes it from here on has it look again.
-        (void)timer_was_woken(exchange->seat);
+        (void)timer_was_woken(exchange->timer);
         const ptrdiff_t count = sending->stream.next(sending->context, target, size);
         if (count == STREAM_END)
             return MHD_CONTENT_READER_END_OF_STREAM;
@@ -46,9 +46,9 @@ static ssize_t send_next(void *context, uint64_t position, char *target, size_t 
             return MHD_CONTENT_READER_END_WITH_ERROR;
         if (count != STREAM_WAIT)
             return count;
-        if (timer_wheel_is_closing(exchange->desk->hall))
+        if (timer_wheel_is_closing(exchange->shared->wheel))
             return MHD_CONTENT_READER_END_OF_STREAM;
-        if (timer_sleep(exchange->seat, exchange, sending->stream.wait_ms))
+        if (timer_sleep(exchange->timer, exchange, sending->stream.wait_ms))
             return 0;
     }
 }
@@ -130,14 +130,14 @@ static struct MHD_Response *make(Exchange *exchange, Reply *reply) {
     if (response == NULL)
         reply_clear(reply);
     else
-        add_headers(response, reply, exchange->desk->settings.certificate != NULL);
+        add_headers(response, reply, exchange->shared->settings.certificate != NULL);
     return response;
 }
 
 // The same for a small whole answer out of the cache; the response stays the loop's.
 static struct MHD_Response *make_again(Exchange *exchange, Reply *reply) {
     const size_t place = (uintptr_t)reply->shared / 64 % SENT_AGAIN;
-    SharedResponse *one = &exchange->loop->sent_again[place];
+    SharedResponse *one = &exchange->loop->shared_response[place];
     if (one->shared == reply->shared) {
         // The response has a hold of its own on the shared body.
         reply->release(reply->context);
@@ -154,11 +154,11 @@ static struct MHD_Response *make_again(Exchange *exchange, Reply *reply) {
     return response;
 }
 
-void response_forget(SharedResponse sent_again[SENT_AGAIN]) {
+void response_forget(SharedResponse shared_response[SENT_AGAIN]) {
     for (size_t i = 0; i < SENT_AGAIN; i++) {
-        if (sent_again[i].response != NULL)
-            MHD_destroy_response(sent_again[i].response);
-        sent_again[i] = (SharedResponse){NULL, NULL};
+        if (shared_response[i].response != NULL)
+            MHD_destroy_response(shared_response[i].response);
+        shared_response[i] = (SharedResponse){NULL, NULL};
     }
 }
 
@@ -166,7 +166,7 @@ enum { SMALL = 64 * 1024 };
 
 enum MHD_Result response_queue(Exchange *exchange, Reply *reply, bool closes) {
     const int code = reply->code;
-    closes = closes || timer_wheel_is_closing(exchange->desk->hall);
+    closes = closes || timer_wheel_is_closing(exchange->shared->wheel);
     const bool is_kept =
         reply->shared != NULL && code == 200 && reply->body_size <= SMALL && !closes;
     struct MHD_Response *response = is_kept ? make_again(exchange, reply) : make(exchange, reply);

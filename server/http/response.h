@@ -22,6 +22,6 @@ typedef struct SharedResponse {
 // Takes what `reply` owns.
 enum MHD_Result response_queue(struct Exchange *exchange, Reply *reply, bool closes);
 
-void response_forget(SharedResponse sent_again[SENT_AGAIN]);
+void response_forget(SharedResponse shared_response[SENT_AGAIN]);
 
 #endif

@@ -30,10 +30,10 @@ enum {
 };
 
 struct Server {
-    ServerShared desk;
+    ServerShared shared;
     char url[96];
     int descriptor; // the listening socket
-    EventFd bell;   // rung to end the accepting thread
+    EventFd wakeup; // rung to end the accepting thread
     pthread_t acceptor;
     bool is_accepting;
     size_t connections_most;
@@ -68,11 +68,11 @@ static void *run_loop(void *context) {
     EventLoop *loop = context;
     const union MHD_DaemonInfo *info = MHD_get_daemon_info(loop->daemon, MHD_DAEMON_INFO_EPOLL_FD);
     struct pollfd events[] = {{.fd = info->epoll_fd, .events = POLLIN},
-                              {.fd = loop->bell.descriptor, .events = POLLIN}};
+                              {.fd = loop->wakeup.descriptor, .events = POLLIN}};
     size_t idle = 1; // runs in a row that called nothing
     while (!atomic_load(&loop->is_stopping)) {
         // Where there was something to do there mostly is more: no call to wait for it, then.
-        if (idle > 0 && !atomic_load(&loop->bell.is_rung)) {
+        if (idle > 0 && !atomic_load(&loop->wakeup.is_rung)) {
             // What is ready in memory shows in no descriptor.
             MHD_UNSIGNED_LONG_LONG left_ms;
             int wait_ms = -1;
@@ -85,7 +85,7 @@ static void *run_loop(void *context) {
                 wait_ms = 1;
             (void)poll(events, 2, wait_ms);
         }
-        if (eventfd_read_all(&loop->bell))
+        if (eventfd_read_all(&loop->wakeup))
             take_arrivals(loop);
         const size_t turns = loop->turns;
         MHD_run(loop->daemon);
@@ -94,20 +94,19 @@ static void *run_loop(void *context) {
     return NULL;
 }
 
-size_t server_connections(const Server *listener) {
+size_t server_connections(const Server *server) {
     size_t count = 0;
-    for (size_t i = 0; i < listener->loop_count; i++)
-        count += atomic_load(&listener->loops[i].connections);
+    for (size_t i = 0; i < server->loop_count; i++)
+        count += atomic_load(&server->loops[i].connections);
     return count;
 }
 
-static void hand_on(Server *listener, int descriptor) {
+static void hand_on(Server *server, int descriptor) {
     // A few together wake a loop less often for each.
-    EventLoop *least = &listener->loops[0];
-    for (size_t i = 1; i < listener->loop_count && atomic_load(&least->connections) >= TOGETHER;
-         i++)
-        if (atomic_load(&listener->loops[i].connections) < atomic_load(&least->connections))
-            least = &listener->loops[i];
+    EventLoop *least = &server->loops[0];
+    for (size_t i = 1; i < server->loop_count && atomic_load(&least->connections) >= TOGETHER; i++)
+        if (atomic_load(&server->loops[i].connections) < atomic_load(&least->connections))
+            least = &server->loops[i];
     pthread_mutex_lock(&least->lock);
     if (least->arrival_count == least->arrival_room) {
         const size_t room = 2 * least->arrival_room + 64;
@@ -123,32 +122,32 @@ static void hand_on(Server *listener, int descriptor) {
     least->arrivals[least->arrival_count++] = descriptor;
     atomic_fetch_add(&least->connections, 1);
     pthread_mutex_unlock(&least->lock);
-    eventfd_signal(&least->bell);
+    eventfd_signal(&least->wakeup);
 }
 
 static void *accept_all(void *context) {
-    Server *listener = context;
+    Server *server = context;
     const struct timespec moment = {.tv_nsec = 5000000};
-    struct pollfd events[] = {{.fd = listener->descriptor, .events = POLLIN},
-                              {.fd = listener->bell.descriptor, .events = POLLIN}};
+    struct pollfd events[] = {{.fd = server->descriptor, .events = POLLIN},
+                              {.fd = server->wakeup.descriptor, .events = POLLIN}};
     for (;;) {
         (void)poll(events, 2, -1);
         if (events[1].revents != 0)
             return NULL;
         // Beyond the limit newcomers wait in the kernel's queue until someone leaves.
-        const bool is_full = server_connections(listener) >= listener->connections_most;
-        const int descriptor = is_full ? -1 : accept(listener->descriptor, NULL, NULL);
+        const bool is_full = server_connections(server) >= server->connections_most;
+        const int descriptor = is_full ? -1 : accept(server->descriptor, NULL, NULL);
         if (descriptor >= 0)
-            hand_on(listener, descriptor);
+            hand_on(server, descriptor);
         else if (is_full || errno == EMFILE || errno == ENFILE || errno == ENOMEM ||
                  errno == ENOBUFS)
             nanosleep(&moment, NULL);
     }
 }
 
-static Status loop_start(EventLoop *loop, ServerShared *desk, size_t most, Problem *problem) {
-    const ServerSettings *settings = &desk->settings;
-    loop->desk = desk;
+static Status loop_start(EventLoop *loop, ServerShared *shared, size_t most, Problem *problem) {
+    const ServerSettings *settings = &shared->settings;
+    loop->shared = shared;
     const bool is_tls = settings->certificate != NULL;
     const unsigned flags = MHD_USE_EPOLL | MHD_USE_NO_LISTEN_SOCKET | MHD_ALLOW_SUSPEND_RESUME |
                            MHD_USE_TURBO | (is_tls ? (unsigned)MHD_USE_TLS : 0);
@@ -170,14 +169,14 @@ static Status loop_start(EventLoop *loop, ServerShared *desk, size_t most, Probl
     if (loop->daemon == NULL)
         return problem_set(problem, STATUS_INTERNAL, "the HTTP library cannot start%s",
                            is_tls ? " with this certificate and key" : "");
-    const bool has_bell = eventfd_open(&loop->bell);
+    const bool has_bell = eventfd_open(&loop->wakeup);
     pthread_mutex_init(&loop->lock, NULL);
     const int code = has_bell ? pthread_create(&loop->thread, NULL, run_loop, loop) : errno;
     if (code == 0)
         return STATUS_OK;
     MHD_stop_daemon(loop->daemon);
     pthread_mutex_destroy(&loop->lock);
-    eventfd_close(&loop->bell);
+    eventfd_close(&loop->wakeup);
     return problem_set(problem, STATUS_INTERNAL, "an event loop cannot be started: %s",
                        strerror(code));
 }
@@ -185,7 +184,7 @@ static Status loop_start(EventLoop *loop, ServerShared *desk, size_t most, Probl
 // No callback runs any more.
 static void loop_halt(EventLoop *loop) {
     atomic_store(&loop->is_stopping, true);
-    eventfd_signal(&loop->bell);
+    eventfd_signal(&loop->wakeup);
     pthread_join(loop->thread, NULL);
 }
 
@@ -194,10 +193,10 @@ static void loop_end(EventLoop *loop) {
         close(loop->arrivals[i]);
     free(loop->arrivals);
     MHD_stop_daemon(loop->daemon);
-    response_forget(loop->sent_again);
+    response_forget(loop->shared_response);
     exchange_forget(loop);
     pthread_mutex_destroy(&loop->lock);
-    eventfd_close(&loop->bell);
+    eventfd_close(&loop->wakeup);
 }
 
 // As many files as we may, and how many connections that allows.
@@ -214,83 +213,83 @@ static size_t connections_allowed(void) {
     return room < CONNECTIONS_MAX ? room : CONNECTIONS_MAX;
 }
 
-static Status start(Server *listener, Problem *problem) {
-    ServerShared *desk = &listener->desk;
-    ServerSettings *settings = &desk->settings;
-    TRY(timer_wheel_open(&exchange_calls, &desk->hall, problem));
-    TRY(thread_pool_open(THREADS, &desk->pool, problem));
-    TRY(address_open(&settings->address, &listener->descriptor, problem));
-    address_url(&settings->address, settings->certificate != NULL, listener->url);
-    desk->url = listener->url;
-    desk->first_id = (uint64_t)clock_unix_ms() << 16;
+static Status start(Server *server, Problem *problem) {
+    ServerShared *shared = &server->shared;
+    ServerSettings *settings = &shared->settings;
+    TRY(timer_wheel_open(&exchange_calls, &shared->wheel, problem));
+    TRY(thread_pool_open(THREADS, &shared->pool, problem));
+    TRY(address_open(&settings->address, &server->descriptor, problem));
+    address_url(&settings->address, settings->certificate != NULL, server->url);
+    shared->url = server->url;
+    shared->first_id = (uint64_t)clock_unix_ms() << 16;
     const long processors = sysconf(_SC_NPROCESSORS_ONLN);
     const size_t most = processors < 1           ? 1
                         : processors > LOOPS_MAX ? LOOPS_MAX
                                                  : (size_t)processors;
-    listener->connections_most = connections_allowed();
-    for (; listener->loop_count < most; listener->loop_count++)
-        TRY(loop_start(&listener->loops[listener->loop_count], desk, listener->connections_most,
+    server->connections_most = connections_allowed();
+    for (; server->loop_count < most; server->loop_count++)
+        TRY(loop_start(&server->loops[server->loop_count], shared, server->connections_most,
                        problem));
-    const int code = eventfd_open(&listener->bell)
-                         ? pthread_create(&listener->acceptor, NULL, accept_all, listener)
+    const int code = eventfd_open(&server->wakeup)
+                         ? pthread_create(&server->acceptor, NULL, accept_all, server)
                          : errno;
-    listener->is_accepting = code == 0;
-    if (!listener->is_accepting)
+    server->is_accepting = code == 0;
+    if (!server->is_accepting)
         return problem_set(problem, STATUS_INTERNAL, "the accepting thread cannot be started: %s",
                            strerror(code));
     return STATUS_OK;
 }
 
-Status server_open(const ServerSettings *settings, Server **listener, Problem *problem) {
-    *listener = NULL;
+Status server_open(const ServerSettings *settings, Server **server, Problem *problem) {
+    *server = NULL;
     Server *made = calloc(1, sizeof *made);
     if (made == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the listener");
-    made->desk.settings = *settings;
-    made->descriptor = made->bell.descriptor = -1;
+    made->shared.settings = *settings;
+    made->descriptor = made->wakeup.descriptor = -1;
     const Status status = start(made, problem);
     if (status != STATUS_OK) {
         server_free(made);
         return status;
     }
-    *listener = made;
+    *server = made;
     return STATUS_OK;
 }
 
-const char *server_url(const Server *listener) {
-    return listener->url;
+const char *server_url(const Server *server) {
+    return server->url;
 }
 
-void server_stop(Server *listener, int grace_ms) {
-    if (listener == NULL || listener->desk.pool == NULL)
+void server_stop(Server *server, int grace_ms) {
+    if (server == NULL || server->shared.pool == NULL)
         return;
-    ServerShared *desk = &listener->desk;
-    if (listener->is_accepting) {
-        eventfd_signal(&listener->bell);
-        pthread_join(listener->acceptor, NULL);
-        listener->is_accepting = false;
+    ServerShared *shared = &server->shared;
+    if (server->is_accepting) {
+        eventfd_signal(&server->wakeup);
+        pthread_join(server->acceptor, NULL);
+        server->is_accepting = false;
     }
-    close(listener->descriptor); // -1: no harm
-    listener->descriptor = -1;
-    timer_wheel_wake_all(desk->hall);
+    close(server->descriptor); // -1: no harm
+    server->descriptor = -1;
+    timer_wheel_wake_all(shared->wheel);
     const int64_t until = clock_monotonic_ns() + (int64_t)grace_ms * 1000000;
     const struct timespec pause = {.tv_nsec = 5000000};
-    while (atomic_load(&desk->exchanges) > 0 && clock_monotonic_ns() < until)
+    while (atomic_load(&shared->exchanges) > 0 && clock_monotonic_ns() < until)
         nanosleep(&pause, NULL);
-    for (size_t i = 0; i < listener->loop_count; i++)
-        loop_halt(&listener->loops[i]);
+    for (size_t i = 0; i < server->loop_count; i++)
+        loop_halt(&server->loops[i]);
     // The library takes no end while a connection is suspended: what is in the pool is done.
-    thread_pool_close(desk->pool);
-    desk->pool = NULL;
-    while (listener->loop_count > 0)
-        loop_end(&listener->loops[--listener->loop_count]);
-    eventfd_close(&listener->bell);
+    thread_pool_close(shared->pool);
+    shared->pool = NULL;
+    while (server->loop_count > 0)
+        loop_end(&server->loops[--server->loop_count]);
+    eventfd_close(&server->wakeup);
 }
 
-void server_free(Server *listener) {
-    if (listener == NULL)
+void server_free(Server *server) {
+    if (server == NULL)
         return;
-    server_stop(listener, 0);
-    timer_wheel_close(listener->desk.hall);
-    free(listener);
+    server_stop(server, 0);
+    timer_wheel_close(server->shared.wheel);
+    free(server);
 }

@@ -33,16 +33,16 @@ typedef struct ServerSettings {
 } ServerSettings;
 
 // Fails as address_open does.
-Status server_open(const ServerSettings *settings, Server **listener, Problem *problem);
+Status server_open(const ServerSettings *settings, Server **server, Problem *problem);
 // "http://127.0.0.1:8080", with the port that was chosen.
-const char *server_url(const Server *listener);
+const char *server_url(const Server *server);
 // Takes no more connections, ends all waiting and lets requests under way finish for at most
 // `grace_ms`. When this returns nothing is being answered.
-void server_stop(Server *listener, int grace_ms);
+void server_stop(Server *server, int grace_ms);
 // Frees what wakers point to: after whoever may call them is gone.
-void server_free(Server *listener);
+void server_free(Server *server);
 
 // How many clients are connected now.
-size_t server_connections(const Server *listener);
+size_t server_connections(const Server *server);
 
 #endif

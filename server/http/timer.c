@@ -15,10 +15,10 @@
 #include "server/util/clock.h"
 
 struct ConnectionTimer {
-    TimerWheel *hall;
+    TimerWheel *wheel;
     ConnectionTimer *next; // of all
     ConnectionTimer *next_empty;
-    Callback waker;
+    Callback callback;
     int descriptor; // -1: empty
     void *asleep;   // the suspended connection, or NULL
     atomic_bool is_woken;
@@ -37,67 +37,67 @@ struct TimerWheel {
     bool is_closed;
 };
 
-static void wake_locked(ConnectionTimer *seat) {
-    if (seat->asleep == NULL)
+static void wake_locked(ConnectionTimer *timer) {
+    if (timer->asleep == NULL)
         return;
-    void *connection = seat->asleep;
-    seat->asleep = NULL;
-    seat->wake_ns = INT64_MAX;
-    seat->hall->calls.resume(connection);
+    void *connection = timer->asleep;
+    timer->asleep = NULL;
+    timer->wake_ns = INT64_MAX;
+    timer->wheel->calls.resume(connection);
 }
 
 static void wake(void *context) {
-    ConnectionTimer *seat = context;
-    pthread_mutex_lock(&seat->hall->lock);
-    seat->is_woken = true;
-    wake_locked(seat);
-    pthread_mutex_unlock(&seat->hall->lock);
+    ConnectionTimer *timer = context;
+    pthread_mutex_lock(&timer->wheel->lock);
+    timer->is_woken = true;
+    wake_locked(timer);
+    pthread_mutex_unlock(&timer->wheel->lock);
 }
 
 // Does what is due and returns when the next thing is.
-static int64_t serve_due(TimerWheel *hall, int64_t now) {
+static int64_t serve_due(TimerWheel *wheel, int64_t now) {
     int64_t next = INT64_MAX;
-    for (ConnectionTimer *seat = hall->all; seat != NULL; seat = seat->next) {
-        if (seat->wake_ns <= now)
-            wake_locked(seat);
-        int64_t limit = atomic_load(&seat->limit_ns);
+    for (ConnectionTimer *timer = wheel->all; timer != NULL; timer = timer->next) {
+        if (timer->wake_ns <= now)
+            wake_locked(timer);
+        int64_t limit = atomic_load(&timer->limit_ns);
         if (limit <= now) {
             // timer_leave, which comes before the descriptor is closed, takes the lock.
-            shutdown(seat->descriptor, SHUT_RDWR);
-            atomic_compare_exchange_strong(&seat->limit_ns, &limit, INT64_MAX);
+            shutdown(timer->descriptor, SHUT_RDWR);
+            atomic_compare_exchange_strong(&timer->limit_ns, &limit, INT64_MAX);
             limit = INT64_MAX;
         }
-        next = seat->wake_ns < next ? seat->wake_ns : next;
+        next = timer->wake_ns < next ? timer->wake_ns : next;
         next = limit < next ? limit : next;
     }
     return next;
 }
 
 static void *keep_time(void *context) {
-    TimerWheel *hall = context;
-    pthread_mutex_lock(&hall->lock);
-    while (!hall->is_closed) {
+    TimerWheel *wheel = context;
+    pthread_mutex_lock(&wheel->lock);
+    while (!wheel->is_closed) {
         // A limit set while the seats are looked at either is seen there or lowers this again.
-        atomic_store(&hall->next_ns, INT64_MAX);
-        const int64_t due = serve_due(hall, clock_monotonic_ns());
-        int64_t next = atomic_load(&hall->next_ns);
-        while (due < next && !atomic_compare_exchange_weak(&hall->next_ns, &next, due))
+        atomic_store(&wheel->next_ns, INT64_MAX);
+        const int64_t due = serve_due(wheel, clock_monotonic_ns());
+        int64_t next = atomic_load(&wheel->next_ns);
+        while (due < next && !atomic_compare_exchange_weak(&wheel->next_ns, &next, due))
             ;
         next = due < next ? due : next;
         if (next == INT64_MAX) {
-            pthread_cond_wait(&hall->nudge, &hall->lock);
+            pthread_cond_wait(&wheel->nudge, &wheel->lock);
             continue;
         }
         const struct timespec until = {.tv_sec = (time_t)(next / 1000000000),
                                        .tv_nsec = (long)(next % 1000000000)};
-        pthread_cond_timedwait(&hall->nudge, &hall->lock, &until);
+        pthread_cond_timedwait(&wheel->nudge, &wheel->lock, &until);
     }
-    pthread_mutex_unlock(&hall->lock);
+    pthread_mutex_unlock(&wheel->lock);
     return NULL;
 }
 
-Status timer_wheel_open(const TimerCallbacks *calls, TimerWheel **hall, Problem *problem) {
-    *hall = NULL;
+Status timer_wheel_open(const TimerCallbacks *calls, TimerWheel **wheel, Problem *problem) {
+    *wheel = NULL;
     TimerWheel *made = calloc(1, sizeof *made);
     if (made == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the listener");
@@ -116,119 +116,119 @@ Status timer_wheel_open(const TimerCallbacks *calls, TimerWheel **hall, Problem 
         return problem_set(problem, STATUS_INTERNAL,
                            "the listener's clock thread cannot be started");
     }
-    *hall = made;
+    *wheel = made;
     return STATUS_OK;
 }
 
-void timer_wheel_wake_all(TimerWheel *hall) {
-    pthread_mutex_lock(&hall->lock);
-    hall->is_closing = true;
-    for (ConnectionTimer *seat = hall->all; seat != NULL; seat = seat->next)
-        wake_locked(seat);
-    pthread_mutex_unlock(&hall->lock);
+void timer_wheel_wake_all(TimerWheel *wheel) {
+    pthread_mutex_lock(&wheel->lock);
+    wheel->is_closing = true;
+    for (ConnectionTimer *timer = wheel->all; timer != NULL; timer = timer->next)
+        wake_locked(timer);
+    pthread_mutex_unlock(&wheel->lock);
 }
 
-bool timer_wheel_is_closing(TimerWheel *hall) {
-    return atomic_load(&hall->is_closing);
+bool timer_wheel_is_closing(TimerWheel *wheel) {
+    return atomic_load(&wheel->is_closing);
 }
 
-void timer_wheel_close(TimerWheel *hall) {
-    if (hall == NULL)
+void timer_wheel_close(TimerWheel *wheel) {
+    if (wheel == NULL)
         return;
-    pthread_mutex_lock(&hall->lock);
-    hall->is_closed = true;
-    pthread_cond_signal(&hall->nudge);
-    pthread_mutex_unlock(&hall->lock);
-    pthread_join(hall->clock, NULL);
-    while (hall->all != NULL) {
-        ConnectionTimer *next = hall->all->next;
-        free(hall->all);
-        hall->all = next;
+    pthread_mutex_lock(&wheel->lock);
+    wheel->is_closed = true;
+    pthread_cond_signal(&wheel->nudge);
+    pthread_mutex_unlock(&wheel->lock);
+    pthread_join(wheel->clock, NULL);
+    while (wheel->all != NULL) {
+        ConnectionTimer *next = wheel->all->next;
+        free(wheel->all);
+        wheel->all = next;
     }
-    pthread_cond_destroy(&hall->nudge);
-    pthread_mutex_destroy(&hall->lock);
-    free(hall);
+    pthread_cond_destroy(&wheel->nudge);
+    pthread_mutex_destroy(&wheel->lock);
+    free(wheel);
 }
 
-ConnectionTimer *timer_take(TimerWheel *hall, int descriptor) {
-    pthread_mutex_lock(&hall->lock);
-    ConnectionTimer *seat = hall->empty;
-    if (seat != NULL) {
-        hall->empty = seat->next_empty;
-    } else if ((seat = malloc(sizeof *seat)) != NULL) {
-        seat->hall = hall;
-        seat->waker = (Callback){seat, wake};
-        seat->next = hall->all;
-        hall->all = seat;
+ConnectionTimer *timer_take(TimerWheel *wheel, int descriptor) {
+    pthread_mutex_lock(&wheel->lock);
+    ConnectionTimer *timer = wheel->empty;
+    if (timer != NULL) {
+        wheel->empty = timer->next_empty;
+    } else if ((timer = malloc(sizeof *timer)) != NULL) {
+        timer->wheel = wheel;
+        timer->callback = (Callback){timer, wake};
+        timer->next = wheel->all;
+        wheel->all = timer;
     }
-    if (seat != NULL) {
-        seat->descriptor = descriptor;
-        seat->asleep = NULL;
-        seat->is_woken = false;
-        seat->wake_ns = INT64_MAX;
-        atomic_store(&seat->limit_ns, INT64_MAX);
+    if (timer != NULL) {
+        timer->descriptor = descriptor;
+        timer->asleep = NULL;
+        timer->is_woken = false;
+        timer->wake_ns = INT64_MAX;
+        atomic_store(&timer->limit_ns, INT64_MAX);
     }
-    pthread_mutex_unlock(&hall->lock);
-    return seat;
+    pthread_mutex_unlock(&wheel->lock);
+    return timer;
 }
 
-void timer_leave(ConnectionTimer *seat) {
-    TimerWheel *hall = seat->hall;
-    pthread_mutex_lock(&hall->lock);
-    seat->descriptor = -1;
-    seat->asleep = NULL;
-    seat->wake_ns = INT64_MAX;
-    atomic_store(&seat->limit_ns, INT64_MAX);
-    seat->next_empty = hall->empty;
-    hall->empty = seat;
-    pthread_mutex_unlock(&hall->lock);
+void timer_leave(ConnectionTimer *timer) {
+    TimerWheel *wheel = timer->wheel;
+    pthread_mutex_lock(&wheel->lock);
+    timer->descriptor = -1;
+    timer->asleep = NULL;
+    timer->wake_ns = INT64_MAX;
+    atomic_store(&timer->limit_ns, INT64_MAX);
+    timer->next_empty = wheel->empty;
+    wheel->empty = timer;
+    pthread_mutex_unlock(&wheel->lock);
 }
 
-const Callback *timer_callback(const ConnectionTimer *seat) {
-    return &seat->waker;
+const Callback *timer_callback(const ConnectionTimer *timer) {
+    return &timer->callback;
 }
 
 // Whether the clock thread has to wake earlier than it means to.
-static bool is_earlier(TimerWheel *hall, int64_t time_ns) {
-    int64_t next = atomic_load(&hall->next_ns);
+static bool is_earlier(TimerWheel *wheel, int64_t time_ns) {
+    int64_t next = atomic_load(&wheel->next_ns);
     while (time_ns < next)
-        if (atomic_compare_exchange_weak(&hall->next_ns, &next, time_ns))
+        if (atomic_compare_exchange_weak(&wheel->next_ns, &next, time_ns))
             return true;
     return false;
 }
 
-void timer_limit(ConnectionTimer *seat, int64_t most_ms) {
+void timer_limit(ConnectionTimer *timer, int64_t most_ms) {
     const int64_t limit_ns = most_ms > 0 ? clock_monotonic_ns() + most_ms * 1000000 : INT64_MAX;
-    atomic_store(&seat->limit_ns, limit_ns);
-    if (!is_earlier(seat->hall, limit_ns))
+    atomic_store(&timer->limit_ns, limit_ns);
+    if (!is_earlier(timer->wheel, limit_ns))
         return;
     // With the lock, so that the signal does not come between the thread's look and its sleep.
-    pthread_mutex_lock(&seat->hall->lock);
-    pthread_cond_signal(&seat->hall->nudge);
-    pthread_mutex_unlock(&seat->hall->lock);
+    pthread_mutex_lock(&timer->wheel->lock);
+    pthread_cond_signal(&timer->wheel->nudge);
+    pthread_mutex_unlock(&timer->wheel->lock);
 }
 
-void timer_begin(ConnectionTimer *seat) {
-    atomic_store(&seat->is_woken, false);
+void timer_begin(ConnectionTimer *timer) {
+    atomic_store(&timer->is_woken, false);
 }
 
-bool timer_sleep(ConnectionTimer *seat, void *connection, int64_t most_ms) {
-    TimerWheel *hall = seat->hall;
+bool timer_sleep(ConnectionTimer *timer, void *connection, int64_t most_ms) {
+    TimerWheel *wheel = timer->wheel;
     const int64_t wake_ns = clock_monotonic_ns() + most_ms * 1000000;
-    pthread_mutex_lock(&hall->lock);
-    const bool sleeps = !seat->is_woken && !hall->is_closing;
+    pthread_mutex_lock(&wheel->lock);
+    const bool sleeps = !timer->is_woken && !wheel->is_closing;
     if (sleeps) {
         // The state first: the resume may come from another thread as soon as the lock is free.
-        seat->asleep = connection;
-        seat->wake_ns = wake_ns;
-        hall->calls.suspend(connection);
-        if (is_earlier(hall, wake_ns))
-            pthread_cond_signal(&hall->nudge);
+        timer->asleep = connection;
+        timer->wake_ns = wake_ns;
+        wheel->calls.suspend(connection);
+        if (is_earlier(wheel, wake_ns))
+            pthread_cond_signal(&wheel->nudge);
     }
-    pthread_mutex_unlock(&hall->lock);
+    pthread_mutex_unlock(&wheel->lock);
     return sleeps;
 }
 
-bool timer_was_woken(ConnectionTimer *seat) {
-    return atomic_exchange(&seat->is_woken, false);
+bool timer_was_woken(ConnectionTimer *timer) {
+    return atomic_exchange(&timer->is_woken, false);
 }

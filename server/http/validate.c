@@ -46,8 +46,8 @@ static bool is_address(const char *name, size_t size) {
     return inet_pton(has_brackets ? AF_INET6 : AF_INET, text, ignored) == 1;
 }
 
-static const AcceptedHosts *gate_names(const RequestValidator *gate) {
-    return gate->names != NULL ? gate->names : &gate_loopback;
+static const AcceptedHosts *gate_names(const RequestValidator *validator) {
+    return validator->names != NULL ? validator->names : &gate_loopback;
 }
 
 bool validate_host_is_ours(const AcceptedHosts *hosts, const char *host, size_t size) {
@@ -85,39 +85,41 @@ static bool is_token(const char *text, size_t size) {
     return size > 0;
 }
 
-void validate_header(RequestValidator *gate, const char *name, size_t name_size, const char *value,
-                     size_t value_size) {
+void validate_header(RequestValidator *validator, const char *name, size_t name_size,
+                     const char *value, size_t value_size) {
     if (value == NULL)
         value_size = 0;
-    if (!gate->has_control && (!is_token(name, name_size) || has_control(value, value_size))) {
-        gate->has_control = true;
-        snprintf(gate->fault_name, sizeof gate->fault_name, "%s",
-                 is_token(name, name_size) && name_size < sizeof gate->fault_name ? name
-                                                                                  : "a header");
+    if (!validator->has_control && (!is_token(name, name_size) || has_control(value, value_size))) {
+        validator->has_control = true;
+        snprintf(validator->fault_name, sizeof validator->fault_name, "%s",
+                 is_token(name, name_size) && name_size < sizeof validator->fault_name
+                     ? name
+                     : "a header");
     }
     if (is_name(name, name_size, "Host")) {
-        gate->hosts++;
-        gate->own_host = value;
-        if (!validate_host_is_ours(gate_names(gate), value_size > 0 ? value : "", value_size)) {
-            gate->is_foreign_host = true;
+        validator->hosts++;
+        validator->own_host = value;
+        if (!validate_host_is_ours(gate_names(validator), value_size > 0 ? value : "",
+                                   value_size)) {
+            validator->is_foreign_host = true;
             if (value_size > 0 && !has_control(value, value_size))
-                text_fit(gate->host, sizeof gate->host, value);
+                text_fit(validator->host, sizeof validator->host, value);
         }
     } else if (is_name(name, name_size, "Content-Length")) {
-        gate->lengths++;
+        validator->lengths++;
         if (value_size == 0 || value_size > 18 || strspn(value, "0123456789") != value_size)
-            gate->has_bad_length = true;
+            validator->has_bad_length = true;
         else
-            gate->length = strtoull(value, NULL, 10);
+            validator->length = strtoull(value, NULL, 10);
     } else if (is_name(name, name_size, "Origin")) {
-        gate->origin = value != NULL ? value : "";
+        validator->origin = value != NULL ? value : "";
     } else if (is_name(name, name_size, "Sec-Fetch-Site")) {
-        gate->fetch_site = value;
+        validator->fetch_site = value;
     } else if (is_name(name, name_size, "Authorization")) {
-        gate->authorizations++;
+        validator->authorizations++;
     } else if (is_name(name, name_size, "Transfer-Encoding")) {
-        gate->encodings++;
-        gate->is_chunked = is_name(value_size > 0 ? value : "", value_size, "chunked");
+        validator->encodings++;
+        validator->is_chunked = is_name(value_size > 0 ? value : "", value_size, "chunked");
     }
 }
 
@@ -149,8 +151,8 @@ static const char *path_fault(const char *target) {
     return strstr(target, "%00") != NULL ? "the target holds an escaped NUL" : NULL;
 }
 
-static int refuse_host(const RequestValidator *gate, Problem *problem) {
-    const AcceptedHosts *hosts = gate_names(gate);
+static int refuse_host(const RequestValidator *validator, Problem *problem) {
+    const AcceptedHosts *hosts = gate_names(validator);
     char list[256] = "";
     for (size_t i = 0; hosts->names[i] != NULL; i++) {
         const size_t used = strlen(list);
@@ -163,35 +165,36 @@ static int refuse_host(const RequestValidator *gate, Problem *problem) {
     problem_set(
         problem, STATUS_USAGE,
         "the Host must be %s%s, with any port, is \"%s\"; the daemon's --host NAME adds one", list,
-        hosts->takes_addresses ? ", or an address in digits" : "", gate->host);
+        hosts->takes_addresses ? ", or an address in digits" : "", validator->host);
     return 421;
 }
 
 // Whether an Origin header names this server: the authority of the Host header, or a name given by
 // --host or --base-url, for a proxy that changes the Host.
-static bool gate_origin_is_ours(const RequestValidator *gate) {
-    const char *const mark = strstr(gate->origin, "://");
+static bool gate_origin_is_ours(const RequestValidator *validator) {
+    const char *const mark = strstr(validator->origin, "://");
     if (mark == NULL)
         return false;
     const char *const authority = mark + 3;
-    if (gate->own_host != NULL && strcasecmp(authority, gate->own_host) == 0)
+    if (validator->own_host != NULL && strcasecmp(authority, validator->own_host) == 0)
         return true;
-    const AcceptedHosts named = {gate_names(gate)->names, false};
+    const AcceptedHosts named = {gate_names(validator)->names, false};
     const size_t size = strlen(authority);
     return validate_host_is_ours(&named, authority, size) &&
            !validate_host_is_ours(&gate_loopback, authority, size);
 }
 
 // Another site's page may send requests with the rights of this machine (CSRF); browsers mark them.
-static bool gate_is_from_other_site(const RequestValidator *gate, const char *method) {
+static bool gate_is_from_other_site(const RequestValidator *validator, const char *method) {
     if (strcmp(method, "GET") == 0 || strcmp(method, "HEAD") == 0 || strcmp(method, "OPTIONS") == 0)
         return false;
-    return (gate->fetch_site != NULL && (strcasecmp(gate->fetch_site, "cross-site") == 0 ||
-                                         strcasecmp(gate->fetch_site, "same-site") == 0)) ||
-           (gate->origin != NULL && !gate_origin_is_ours(gate));
+    return (validator->fetch_site != NULL &&
+            (strcasecmp(validator->fetch_site, "cross-site") == 0 ||
+             strcasecmp(validator->fetch_site, "same-site") == 0)) ||
+           (validator->origin != NULL && !gate_origin_is_ours(validator));
 }
 
-int validate_request(const RequestValidator *gate, const char *method, const char *target,
+int validate_request(const RequestValidator *validator, const char *method, const char *target,
                      const char *version, Problem *problem) {
     if (strcmp(version, "HTTP/1.1") != 0 && strcmp(version, "HTTP/1.0") != 0)
         return refuse(problem, 505, "this server speaks HTTP/1.1 and HTTP/1.0");
@@ -212,31 +215,31 @@ int validate_request(const RequestValidator *gate, const char *method, const cha
     const char *fault = path_fault(target);
     if (fault != NULL)
         return refuse(problem, 400, fault);
-    if (gate->has_control) {
+    if (validator->has_control) {
         problem_set(problem, STATUS_USAGE, "the head holds a control character (in %s)",
-                    gate->fault_name);
+                    validator->fault_name);
         return 400;
     }
-    if (gate->hosts > 1)
+    if (validator->hosts > 1)
         return refuse(problem, 400, "more than one Host");
-    if (gate->hosts == 0 && strcmp(version, "HTTP/1.1") == 0)
+    if (validator->hosts == 0 && strcmp(version, "HTTP/1.1") == 0)
         return refuse(problem, 400, "HTTP/1.1 needs a Host");
-    if (gate->is_foreign_host) {
-        return refuse_host(gate, problem);
+    if (validator->is_foreign_host) {
+        return refuse_host(validator, problem);
     }
-    if (gate->lengths > 1)
+    if (validator->lengths > 1)
         return refuse(problem, 400, "more than one Content-Length");
-    if (gate->authorizations > 1)
+    if (validator->authorizations > 1)
         return refuse(problem, 400, "more than one Authorization");
-    if (gate->has_bad_length)
+    if (validator->has_bad_length)
         return refuse(problem, 400, "Content-Length must be a plain number");
-    if (gate->lengths > 0 && gate->encodings > 0)
+    if (validator->lengths > 0 && validator->encodings > 0)
         return refuse(problem, 400, "Content-Length beside Transfer-Encoding");
-    if (gate->encodings > 1 || (gate->encodings == 1 && !gate->is_chunked))
+    if (validator->encodings > 1 || (validator->encodings == 1 && !validator->is_chunked))
         return refuse(problem, 501, "the only Transfer-Encoding understood is \"chunked\"");
-    if (gate->encodings > 0 && strcmp(version, "HTTP/1.0") == 0)
+    if (validator->encodings > 0 && strcmp(version, "HTTP/1.0") == 0)
         return refuse(problem, 400, "HTTP/1.0 has no Transfer-Encoding");
-    if (gate_is_from_other_site(gate, method))
+    if (gate_is_from_other_site(validator, method))
         return refuse(problem, 403,
                       "a page of another site may not send this: Origin must be this server's, and "
                       "Sec-Fetch-Site same-origin or none");

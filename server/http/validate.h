@@ -29,12 +29,12 @@ typedef struct RequestValidator {
     char host[64];
 } RequestValidator;
 
-void validate_header(RequestValidator *gate, const char *name, size_t name_size, const char *value,
-                     size_t value_size);
+void validate_header(RequestValidator *validator, const char *name, size_t name_size,
+                     const char *value, size_t value_size);
 
 // 0 if the request may go on, else the HTTP status (400, 403, 414, 421, 501, 505), with the reason
 // in `problem`. 403: another site's page sends a request that is not GET, HEAD or OPTIONS.
-int validate_request(const RequestValidator *gate, const char *method, const char *target,
+int validate_request(const RequestValidator *validator, const char *method, const char *target,
                      const char *version, Problem *problem);
 
 // Whether a Host header's value is one of the names, with any port or none.

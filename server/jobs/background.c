@@ -9,7 +9,7 @@ struct BackgroundTask {
     BackgroundTasks *all;
     BackgroundTask *next; // of those that run
     BackgroundWork work;
-    Callback waker;
+    Callback callback;
     atomic_bool is_stopped;
     bool is_done, is_dropped;
 };
@@ -21,9 +21,9 @@ struct BackgroundTasks {
     size_t count, most;
 };
 
-static void aside_free(BackgroundTask *aside) {
-    aside->work.release(aside->work.context);
-    free(aside);
+static void aside_free(BackgroundTask *background) {
+    background->work.release(background->work.context);
+    free(background);
 }
 
 static bool go_on(void *context, double fraction) {
@@ -32,23 +32,23 @@ static bool go_on(void *context, double fraction) {
 }
 
 static void *aside_main(void *context) {
-    BackgroundTask *aside = context;
-    BackgroundTasks *all = aside->all;
-    const Progress watch = {aside, go_on};
-    aside->work.run(aside->work.context, &watch);
+    BackgroundTask *background = context;
+    BackgroundTasks *all = background->all;
+    const Progress watch = {background, go_on};
+    background->work.run(background->work.context, &watch);
     pthread_mutex_lock(&all->lock);
     BackgroundTask **at = &all->running;
-    while (*at != aside)
+    while (*at != background)
         at = &(*at)->next;
-    *at = aside->next;
-    aside->is_done = true;
-    const bool is_dropped = aside->is_dropped;
+    *at = background->next;
+    background->is_done = true;
+    const bool is_dropped = background->is_dropped;
     // A reader that is there cannot go before the lock is free.
     if (!is_dropped)
-        aside->waker.wake(aside->waker.context);
+        background->callback.wake(background->callback.context);
     pthread_mutex_unlock(&all->lock);
     if (is_dropped)
-        aside_free(aside);
+        aside_free(background);
     pthread_mutex_lock(&all->lock);
     all->count--;
     pthread_cond_signal(&all->idle);
@@ -56,33 +56,34 @@ static void *aside_main(void *context) {
     return NULL;
 }
 
-Status background_open(size_t most, BackgroundTasks **asides, Problem *problem) {
-    *asides = calloc(1, sizeof **asides);
-    if (*asides == NULL)
+Status background_open(size_t most, BackgroundTasks **background_tasks, Problem *problem) {
+    *background_tasks = calloc(1, sizeof **background_tasks);
+    if (*background_tasks == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for readers' work");
-    pthread_mutex_init(&(*asides)->lock, NULL);
-    pthread_cond_init(&(*asides)->idle, NULL);
-    (*asides)->most = most;
+    pthread_mutex_init(&(*background_tasks)->lock, NULL);
+    pthread_cond_init(&(*background_tasks)->idle, NULL);
+    (*background_tasks)->most = most;
     return STATUS_OK;
 }
 
-void background_close(BackgroundTasks *asides) {
-    if (asides == NULL)
+void background_close(BackgroundTasks *background_tasks) {
+    if (background_tasks == NULL)
         return;
-    pthread_mutex_lock(&asides->lock);
-    for (BackgroundTask *aside = asides->running; aside != NULL; aside = aside->next)
-        atomic_store(&aside->is_stopped, true);
-    while (asides->count > 0)
-        pthread_cond_wait(&asides->idle, &asides->lock);
-    pthread_mutex_unlock(&asides->lock);
-    pthread_cond_destroy(&asides->idle);
-    pthread_mutex_destroy(&asides->lock);
-    free(asides);
+    pthread_mutex_lock(&background_tasks->lock);
+    for (BackgroundTask *background = background_tasks->running; background != NULL;
+         background = background->next)
+        atomic_store(&background->is_stopped, true);
+    while (background_tasks->count > 0)
+        pthread_cond_wait(&background_tasks->idle, &background_tasks->lock);
+    pthread_mutex_unlock(&background_tasks->lock);
+    pthread_cond_destroy(&background_tasks->idle);
+    pthread_mutex_destroy(&background_tasks->lock);
+    free(background_tasks);
 }
 
 // With the lock held.
-static Status start(BackgroundTasks *asides, BackgroundTask *made, Problem *problem) {
-    if (asides->count >= asides->most)
+static Status start(BackgroundTasks *background_tasks, BackgroundTask *made, Problem *problem) {
+    if (background_tasks->count >= background_tasks->most)
         return problem_set(problem, STATUS_BUSY,
                            "as much is being computed for readers as may be at once; ask again a "
                            "little later");
@@ -94,54 +95,54 @@ static Status start(BackgroundTasks *asides, BackgroundTask *made, Problem *prob
     pthread_attr_destroy(&attributes);
     if (error != 0)
         return problem_set(problem, STATUS_BUSY, "no thread can be started now");
-    made->next = asides->running;
-    asides->running = made;
-    asides->count++;
+    made->next = background_tasks->running;
+    background_tasks->running = made;
+    background_tasks->count++;
     return STATUS_OK;
 }
 
-Status background_start(BackgroundTasks *asides, const BackgroundWork *work, const Callback *waker,
-                        BackgroundTask **aside, Problem *problem) {
-    *aside = NULL;
+Status background_start(BackgroundTasks *background_tasks, const BackgroundWork *work,
+                        const Callback *callback, BackgroundTask **background, Problem *problem) {
+    *background = NULL;
     BackgroundTask *made = calloc(1, sizeof *made);
     if (made == NULL) {
         work->release(work->context);
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a reader's work");
     }
-    made->all = asides;
+    made->all = background_tasks;
     made->work = *work;
-    made->waker = *waker;
+    made->callback = *callback;
     atomic_init(&made->is_stopped, false);
-    pthread_mutex_lock(&asides->lock);
-    const Status status = start(asides, made, problem);
-    pthread_mutex_unlock(&asides->lock);
+    pthread_mutex_lock(&background_tasks->lock);
+    const Status status = start(background_tasks, made, problem);
+    pthread_mutex_unlock(&background_tasks->lock);
     if (status == STATUS_OK)
-        *aside = made;
+        *background = made;
     else
         aside_free(made);
     return status;
 }
 
-bool background_is_done(BackgroundTask *aside) {
-    pthread_mutex_lock(&aside->all->lock);
-    const bool is_done = aside->is_done;
-    pthread_mutex_unlock(&aside->all->lock);
+bool background_is_done(BackgroundTask *background) {
+    pthread_mutex_lock(&background->all->lock);
+    const bool is_done = background->is_done;
+    pthread_mutex_unlock(&background->all->lock);
     return is_done;
 }
 
-void *background_context(BackgroundTask *aside) {
-    return aside->work.context;
+void *background_context(BackgroundTask *background) {
+    return background->work.context;
 }
 
-void background_unref(BackgroundTask *aside) {
-    if (aside == NULL)
+void background_unref(BackgroundTask *background) {
+    if (background == NULL)
         return;
-    BackgroundTasks *all = aside->all;
+    BackgroundTasks *all = background->all;
     pthread_mutex_lock(&all->lock);
-    const bool is_done = aside->is_done;
-    aside->is_dropped = true;
-    atomic_store(&aside->is_stopped, true);
+    const bool is_done = background->is_done;
+    background->is_dropped = true;
+    atomic_store(&background->is_stopped, true);
     pthread_mutex_unlock(&all->lock);
     if (is_done)
-        aside_free(aside);
+        aside_free(background);
 }

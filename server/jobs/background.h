@@ -10,9 +10,9 @@
 typedef struct BackgroundTasks BackgroundTasks;
 typedef struct BackgroundTask BackgroundTask;
 
-Status background_open(size_t most, BackgroundTasks **asides, Problem *problem);
+Status background_open(size_t most, BackgroundTasks **background_tasks, Problem *problem);
 // Stops all that runs, waits for it and frees what is left; then nobody may hold an BackgroundTask.
-void background_close(BackgroundTasks *asides);
+void background_close(BackgroundTasks *background_tasks);
 
 typedef struct BackgroundWork {
     void *context; // freed by `release` once neither the thread nor the reader needs it
@@ -22,10 +22,10 @@ typedef struct BackgroundWork {
 
 // Begins at once; `waker` is called when it is done. Takes work->context, also when it fails.
 // STATUS_BUSY where there is no room. *aside is a hold.
-Status background_start(BackgroundTasks *asides, const BackgroundWork *work, const Callback *waker,
-                        BackgroundTask **aside, Problem *problem);
-bool background_is_done(BackgroundTask *aside);
-void *background_context(BackgroundTask *aside); // once it is done
-void background_unref(BackgroundTask *aside);    // stops it if it is not done
+Status background_start(BackgroundTasks *background_tasks, const BackgroundWork *work,
+                        const Callback *callback, BackgroundTask **background, Problem *problem);
+bool background_is_done(BackgroundTask *background);
+void *background_context(BackgroundTask *background); // once it is done
+void background_unref(BackgroundTask *background);    // stops it if it is not done
 
 #endif

@@ -11,45 +11,45 @@ static Status refuse_finished(const char *id, int state, Problem *problem) {
 
 static void dismissed(void *context, Status status, const char *detail) {
     Job *job = context;
-    JobManager *intake = job->intake;
-    pthread_mutex_lock(&intake->lock);
+    JobManager *manager = job->manager;
+    pthread_mutex_lock(&manager->lock);
     job->is_kept = status == STATUS_OK;
     job->refusal = status;
     text_fit(job->refused, sizeof job->refused, detail);
     // Until the store has it, the job is found here.
     if (status == STATUS_OK) {
         jobs_retire(job);
-    } else if (!intake->is_closing) {
-        job->next_undismissed = intake->undismissed;
-        intake->undismissed = job_ref(job);
+    } else if (!manager->is_closing) {
+        job->next_undismissed = manager->retry_cancels;
+        manager->retry_cancels = job_ref(job);
     }
-    subscribers_call(&job->keepers);
-    jobs_settle(intake);
-    pthread_mutex_unlock(&intake->lock);
+    subscribers_call(&job->save_waiters);
+    jobs_settle(manager);
+    pthread_mutex_unlock(&manager->lock);
     job_unref(job); // the post's hold
 }
 
-void jobs_retry_dismissed(JobManager *intake) {
-    Job *job = intake->undismissed, *next;
-    intake->undismissed = NULL;
+void jobs_retry_dismissed(JobManager *manager) {
+    Job *job = manager->retry_cancels, *next;
+    manager->retry_cancels = NULL;
     for (; job != NULL; job = next) {
         next = job->next_undismissed;
         const WriteDone done = {dismissed, job}; // takes the list's hold
-        if (db_job_update_post(intake->store, &job->closing, &done) == STATUS_OK) {
-            intake->posted++;
+        if (db_job_update_post(manager->db, &job->final_row, &done) == STATUS_OK) {
+            manager->posted++;
         } else {
-            job->next_undismissed = intake->undismissed;
-            intake->undismissed = job;
+            job->next_undismissed = manager->retry_cancels;
+            manager->retry_cancels = job;
         }
     }
 }
 
 // Live jobs only: dismissed for all at once, and on its way to the store.
-static Status dismiss(JobManager *intake, Job *job, const char *id, Problem *problem) {
-    pthread_mutex_lock(&intake->lock);
+static Status dismiss(JobManager *manager, Job *job, const char *id, Problem *problem) {
+    pthread_mutex_lock(&manager->lock);
     if (job->is_closing || job_state_is_final(job->row.state)) {
-        const int state = job->is_closing ? job->closing.state : job->row.state;
-        pthread_mutex_unlock(&intake->lock);
+        const int state = job->is_closing ? job->final_row.state : job->row.state;
+        pthread_mutex_unlock(&manager->lock);
         return refuse_finished(id, state, problem);
     }
     job->row.state = JOB_DISMISSED;
@@ -61,35 +61,35 @@ static Status dismiss(JobManager *intake, Job *job, const char *id, Problem *pro
         job->row.queued = job->row.total;
     jobs_withdraw(job);
     job->is_closing = true;
-    job->closing = job->row;
-    job->closing.is_unsaved = !job->is_kept;
+    job->final_row = job->row;
+    job->final_row.is_unsaved = !job->is_kept;
     job->is_kept = false;
     jobs_detach(job);
     jobs_release(job);
     const WriteDone done = {dismissed, job_ref(job)};
-    const Status status = db_job_update_post(intake->store, &job->closing, &done);
+    const Status status = db_job_update_post(manager->db, &job->final_row, &done);
     if (status == STATUS_OK) {
-        intake->posted++;
+        manager->posted++;
     } else {
         job->refusal = status;
         text_fit(job->refused, sizeof job->refused, "no memory to save the job");
-        subscribers_call(&job->keepers);
+        subscribers_call(&job->save_waiters);
         job_unref(job); // the post's hold
     }
-    subscribers_call(&job->wakers);
-    job_metrics_ended(&intake->totals, JOB_DISMISSED, false);
-    pthread_mutex_unlock(&intake->lock);
+    subscribers_call(&job->subscribers);
+    job_metrics_ended(&manager->totals, JOB_DISMISSED, false);
+    pthread_mutex_unlock(&manager->lock);
     return STATUS_OK;
 }
 
-Status jobs_cancel(JobManager *intake, const char *id, Job **dismissed, Problem *problem) {
+Status jobs_cancel(JobManager *manager, const char *id, Job **dismissed, Problem *problem) {
     *dismissed = NULL;
-    Job *job = jobs_find_live(intake, id);
+    Job *job = jobs_find_live(manager, id);
     Status status;
     if (job != NULL) {
-        status = dismiss(intake, job, id, problem);
+        status = dismiss(manager, job, id, problem);
     } else {
-        TRY(jobs_find(intake, id, &job, problem));
+        TRY(jobs_find(manager, id, &job, problem));
         status = refuse_finished(id, job->row.state, problem);
     }
     if (status != STATUS_OK) {

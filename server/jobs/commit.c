@@ -21,9 +21,9 @@
 enum { SAVING_MAX = 4096, SAVING_BYTES = 256 << 20 };
 
 typedef struct Saving {
-    JobManager *intake;
-    Task *computation;
-    RunResult findings;
+    JobManager *manager;
+    Task *task;
+    RunResult run_result;
     ResultSummary *head; // of a successful one
     size_t bytes;
     bool is_saved;       // the result is in the store
@@ -36,8 +36,8 @@ typedef struct Saving {
 
 static void saved(void *context, Status status, const char *detail);
 
-bool jobs_is_behind(const JobManager *intake) {
-    return intake->saving >= SAVING_MAX || intake->saving_bytes >= SAVING_BYTES;
+bool jobs_is_behind(const JobManager *manager) {
+    return manager->saving >= SAVING_MAX || manager->saving_bytes >= SAVING_BYTES;
 }
 
 static char *problem_text(Status status, const char *detail) {
@@ -70,28 +70,28 @@ static bool make_room(Saving *saving, size_t count) {
 // With the lock held: the rows as they go to the store, of at most so many jobs that have none on
 // the way.
 static void close_jobs(Saving *saving, size_t most) {
-    const RunResult *findings = &saving->findings;
+    const RunResult *run_result = &saving->run_result;
     const int64_t now_ms = clock_unix_ms(), now_ns = clock_monotonic_ns();
     size_t count = 0;
-    for (Job *job = saving->computation->jobs; job != NULL; job = job->next_shared)
+    for (Job *job = saving->task->jobs; job != NULL; job = job->next_shared)
         count += !job->is_closing && count < most;
     saving->count = 0;
     if (!make_room(saving, count))
         count = saving->room; // the others get the next turn
-    for (Job *job = saving->computation->jobs; job != NULL && saving->count < count;
+    for (Job *job = saving->task->jobs; job != NULL && saving->count < count;
          job = job->next_shared) {
         if (job->is_closing)
             continue;
         jobs_withdraw(job);
         job->is_closing = true;
-        job->closing = job->row;
-        JobRow *row = &job->closing;
+        job->final_row = job->row;
+        JobRow *row = &job->final_row;
         row->is_unsaved = !job->is_kept;
-        row->state = findings->status == STATUS_OK ? JOB_SUCCESSFUL : JOB_FAILED;
+        row->state = run_result->status == STATUS_OK ? JOB_SUCCESSFUL : JOB_FAILED;
         row->finished_unix_ms = now_ms;
-        row->run = 1e-9 * (double)(findings->ended_ns - findings->began_ns);
+        row->run = 1e-9 * (double)(run_result->ended_ns - run_result->began_ns);
         row->total = 1e-9 * (double)(now_ns - job->submitted_ns);
-        row->problem = findings->problem == NULL ? NULL : strdup(findings->problem);
+        row->problem = run_result->problem == NULL ? NULL : strdup(run_result->problem);
         saving->jobs[saving->count] = job_ref(job);
         saving->rows[saving->count++] = row;
     }
@@ -99,42 +99,42 @@ static void close_jobs(Saving *saving, size_t most) {
 
 // With the lock held.
 static void tell_askers(const Saving *saving) {
-    JobManager *intake = saving->intake;
-    Task *computation = saving->computation;
-    if (computation->askers.count > 0 && saving->findings.status != STATUS_OK) {
-        Failure *failure = &intake->failures[intake->next_failure++ % OUTCOME_FAILURES];
-        text_fit(failure->result, sizeof failure->result, computation->result);
-        text_fit(failure->detail, sizeof failure->detail, saving->findings.detail);
-        failure->status = saving->findings.status;
+    JobManager *manager = saving->manager;
+    Task *task = saving->task;
+    if (task->result_waiters.count > 0 && saving->run_result.status != STATUS_OK) {
+        Failure *failure = &manager->failures[manager->next_failure++ % OUTCOME_FAILURES];
+        text_fit(failure->result, sizeof failure->result, task->result);
+        text_fit(failure->detail, sizeof failure->detail, saving->run_result.detail);
+        failure->status = saving->run_result.status;
     }
-    subscribers_call(&computation->askers);
+    subscribers_call(&task->result_waiters);
 }
 
 // With the lock held: nobody waits for it any more. saving_free is to follow without the lock.
 static void end(Saving *saving) {
-    JobManager *intake = saving->intake;
-    Task *computation = saving->computation;
-    hashmap_remove(intake->in_flight, &computation->indexed);
+    JobManager *manager = saving->manager;
+    Task *task = saving->task;
+    hashmap_remove(manager->in_flight, &task->indexed);
     tell_askers(saving);
-    while (computation->jobs != NULL) {
-        Job *job = computation->jobs;
-        computation->jobs = job->next_shared;
-        job->computation = NULL;
+    while (task->jobs != NULL) {
+        Job *job = task->jobs;
+        task->jobs = job->next_shared;
+        job->task = NULL;
         job->next_shared = NULL;
         job_unref(job); // the computation's hold
     }
-    const bool was_behind = jobs_is_behind(intake);
-    intake->saving--;
-    intake->saving_bytes -= saving->bytes;
+    const bool was_behind = jobs_is_behind(manager);
+    manager->saving--;
+    manager->saving_bytes -= saving->bytes;
     if (was_behind) {
-        pthread_cond_broadcast(&intake->work);
-        pthread_cond_broadcast(&intake->spare_work);
+        pthread_cond_broadcast(&manager->work);
+        pthread_cond_broadcast(&manager->spare_work);
     }
 }
 
 static void saving_free(Saving *saving) {
-    task_free(saving->computation);
-    run_result_clear(&saving->findings);
+    task_free(saving->task);
+    run_result_clear(&saving->run_result);
     result_summary_unref(saving->head);
     free(saving->jobs);
     free(saving->rows);
@@ -153,15 +153,15 @@ static void publish(Saving *saving, Status status, const char *detail, bool may_
     for (size_t i = 0; i < saving->count; i++) {
         Job *job = saving->jobs[i];
         if (status != STATUS_OK && !job->is_kept) {
-            free(job->closing.problem);
-            job->closing.problem = NULL;
+            free(job->final_row.problem);
+            job->final_row.problem = NULL;
             jobs_refuse(job, status, detail);
         } else if (status != STATUS_OK && may_wait) {
-            free(job->closing.problem);
-            job->closing.problem = NULL;
+            free(job->final_row.problem);
+            job->final_row.problem = NULL;
             job->is_closing = false;
         } else {
-            job->row = job->closing;
+            job->row = job->final_row;
             job->row.is_unsaved = false;
             if (status != STATUS_OK) {
                 free(job->row.problem);
@@ -174,9 +174,9 @@ static void publish(Saving *saving, Status status, const char *detail, bool may_
                 job->is_kept = true;
                 jobs_retire(job);
             }
-            job_metrics_ended(&saving->intake->totals, job->row.state, false);
-            subscribers_call(&job->wakers);
-            subscribers_call(&job->keepers);
+            job_metrics_ended(&saving->manager->totals, job->row.state, false);
+            subscribers_call(&job->subscribers);
+            subscribers_call(&job->save_waiters);
         }
         job_unref(job); // close_jobs's hold
     }
@@ -185,34 +185,34 @@ static void publish(Saving *saving, Status status, const char *detail, bool may_
 
 // A result that can never be saved, because it is too large, makes its jobs failed ones.
 static void give_up(Saving *saving, Status status, const char *detail) {
-    RunResult *findings = &saving->findings;
-    free(findings->problem);
-    findings->problem = problem_text(status, detail);
-    findings->status = status;
-    text_fit(findings->detail, sizeof findings->detail, detail);
+    RunResult *run_result = &saving->run_result;
+    free(run_result->problem);
+    run_result->problem = problem_text(status, detail);
+    run_result->status = status;
+    text_fit(run_result->detail, sizeof run_result->detail, detail);
     for (size_t i = 0; i < saving->count; i++) {
-        JobRow *row = &saving->jobs[i]->closing;
+        JobRow *row = &saving->jobs[i]->final_row;
         free(row->problem);
-        row->problem = findings->problem == NULL ? NULL : strdup(findings->problem);
+        row->problem = run_result->problem == NULL ? NULL : strdup(run_result->problem);
         row->state = JOB_FAILED;
     }
 }
 
 // With the lock held: whether others will have run in a moment, to be saved together with this.
-static bool is_followed(const JobManager *intake) {
+static bool is_followed(const JobManager *manager) {
     static const double moment = 5e-3; // [s]
-    return queue_seconds(intake->queue) < moment * (double)queue_count(intake->queue);
+    return queue_seconds(manager->queue) < moment * (double)queue_count(manager->queue);
 }
 
 // With the lock held.
 static Status post(Saving *saving) {
-    const bool has_result = saving->findings.status == STATUS_OK && !saving->is_saved;
+    const bool has_result = saving->run_result.status == STATUS_OK && !saving->is_saved;
     const WriteDone done = {saved, saving};
     const Status status = db_result_post(
-        saving->intake->store, has_result ? &saving->findings.result : NULL, saving->rows,
-        saving->count, is_followed(saving->intake) ? STORE_SOON : STORE_NOW, &done);
+        saving->manager->db, has_result ? &saving->run_result.result : NULL, saving->rows,
+        saving->count, is_followed(saving->manager) ? STORE_SOON : STORE_NOW, &done);
     if (status == STATUS_OK)
-        saving->intake->posted++;
+        saving->manager->posted++;
     return status;
 }
 
@@ -231,30 +231,29 @@ static bool go_on(Saving *saving) {
 
 // With the lock held: whether it is tried again when there may be room.
 static bool wait_for_room(Saving *saving) {
-    JobManager *intake = saving->intake;
-    if (saving->computation->jobs == NULL || intake->is_closing)
+    JobManager *manager = saving->manager;
+    if (saving->task->jobs == NULL || manager->is_closing)
         return false;
-    saving->next = intake->delayed;
-    intake->delayed = saving;
+    saving->next = manager->retry_commits;
+    manager->retry_commits = saving;
     return true;
 }
 
 // The store has answered; its writer's thread.
 static void saved(void *context, Status status, const char *detail) {
     Saving *saving = context;
-    JobManager *intake = saving->intake;
+    JobManager *manager = saving->manager;
     if (status != STATUS_OK && !saving->is_told) {
         Bytes line = {.most = 1024};
-        bytes_format(&line, "the result %s could not be saved: %s", saving->computation->result,
-                     detail);
+        bytes_format(&line, "the result %s could not be saved: %s", saving->task->result, detail);
         log_write(&line);
         bytes_clear(&line);
     }
     saving->is_told = status != STATUS_OK;
-    pthread_mutex_lock(&intake->lock);
+    pthread_mutex_lock(&manager->lock);
     bool goes_on;
     if (status != STATUS_OK && !status_is_transient(status) &&
-        saving->findings.status == STATUS_OK) {
+        saving->run_result.status == STATUS_OK) {
         give_up(saving, status, detail);
         goes_on = post(saving) == STATUS_OK;
         if (!goes_on) {
@@ -262,13 +261,13 @@ static void saved(void *context, Status status, const char *detail) {
             goes_on = go_on(saving);
         }
     } else if (status_is_transient(status)) {
-        publish(saving, status, detail, !intake->is_closing);
+        publish(saving, status, detail, !manager->is_closing);
         goes_on = wait_for_room(saving) || go_on(saving);
     } else {
         // What is in the cache is known, so it must be in the store.
-        if (status == STATUS_OK && saving->findings.status == STATUS_OK) {
+        if (status == STATUS_OK && saving->run_result.status == STATUS_OK) {
             saving->is_saved = true;
-            cache_put(intake->cache, saving->computation->result, saving->findings.outcome,
+            cache_put(manager->cache, saving->task->result, saving->run_result.outcome,
                       saving->head);
         }
         publish(saving, status, detail, false);
@@ -276,17 +275,17 @@ static void saved(void *context, Status status, const char *detail) {
     }
     if (!goes_on)
         end(saving);
-    jobs_settle(intake);
-    pthread_mutex_unlock(&intake->lock);
+    jobs_settle(manager);
+    pthread_mutex_unlock(&manager->lock);
     if (!goes_on)
         saving_free(saving);
 }
 
-void jobs_retry_sweep(JobManager *intake) {
+void jobs_retry_sweep(JobManager *manager) {
     Saving *ended = NULL, *next;
-    pthread_mutex_lock(&intake->lock);
-    Saving *saving = intake->delayed;
-    intake->delayed = NULL;
+    pthread_mutex_lock(&manager->lock);
+    Saving *saving = manager->retry_commits;
+    manager->retry_commits = NULL;
     for (; saving != NULL; saving = next) {
         next = saving->next;
         if (go_on(saving))
@@ -295,22 +294,22 @@ void jobs_retry_sweep(JobManager *intake) {
         saving->next = ended;
         ended = saving;
     }
-    jobs_retry_dismissed(intake);
-    studies_resume(intake);
-    pthread_mutex_unlock(&intake->lock);
+    jobs_retry_dismissed(manager);
+    studies_resume(manager);
+    pthread_mutex_unlock(&manager->lock);
     for (; ended != NULL; ended = next) {
         next = ended->next;
         saving_free(ended);
     }
 }
 
-void jobs_abandon_delayed(JobManager *intake) {
-    while (intake->delayed != NULL) {
-        Saving *saving = intake->delayed;
-        intake->delayed = saving->next;
-        for (Job *job = saving->computation->jobs; job != NULL; job = job->next_shared) {
+void jobs_abandon_delayed(JobManager *manager) {
+    while (manager->retry_commits != NULL) {
+        Saving *saving = manager->retry_commits;
+        manager->retry_commits = saving->next;
+        for (Job *job = saving->task->jobs; job != NULL; job = job->next_shared) {
             jobs_retire(job);
-            subscribers_call(&job->wakers);
+            subscribers_call(&job->subscribers);
         }
         end(saving);
         saving_free(saving);
@@ -321,9 +320,9 @@ static size_t text_bytes(const char *text) {
     return text != NULL ? strlen(text) : 0;
 }
 
-static size_t run_result_bytes(const RunResult *findings) {
-    const ResultRow *row = &findings->result;
-    return sizeof(Saving) + (findings->outcome != NULL ? outcome_bytes(findings->outcome) : 0) +
+static size_t run_result_bytes(const RunResult *run_result) {
+    const ResultRow *row = &run_result->result;
+    return sizeof(Saving) + (run_result->outcome != NULL ? outcome_bytes(run_result->outcome) : 0) +
            text_bytes(row->scene) + text_bytes(row->plan) + text_bytes(row->summary) +
            text_bytes(row->energy) + text_bytes(row->impacts) + text_bytes(row->psd) +
            text_bytes(row->study);
@@ -331,16 +330,16 @@ static size_t run_result_bytes(const RunResult *findings) {
 
 // With the lock held: without memory for a Saving its jobs are failed here, and computed again at
 // the next start.
-static void lose(JobManager *intake, Task *computation, RunResult *findings) {
+static void lose(JobManager *manager, Task *task, RunResult *run_result) {
     Job *jobs[1];
     const JobRow *rows[1];
-    Saving saving = {.intake = intake,
-                     .computation = computation,
-                     .findings = *findings,
+    Saving saving = {.manager = manager,
+                     .task = task,
+                     .run_result = *run_result,
                      .jobs = jobs,
                      .rows = rows,
                      .room = 1};
-    intake->saving++;
+    manager->saving++;
     for (;;) {
         close_jobs(&saving, COUNT(jobs));
         if (saving.count == 0)
@@ -350,34 +349,34 @@ static void lose(JobManager *intake, Task *computation, RunResult *findings) {
     end(&saving);
 }
 
-void jobs_save(JobManager *intake, Task *computation, RunResult *findings) {
+void jobs_save(JobManager *manager, Task *task, RunResult *run_result) {
     Saving *saving = calloc(1, sizeof *saving);
     if (saving == NULL) {
-        pthread_mutex_lock(&intake->lock);
-        lose(intake, computation, findings);
-        pthread_mutex_unlock(&intake->lock);
-        task_free(computation);
+        pthread_mutex_lock(&manager->lock);
+        lose(manager, task, run_result);
+        pthread_mutex_unlock(&manager->lock);
+        task_free(task);
         return;
     }
-    *saving = (Saving){.intake = intake,
-                       .computation = computation,
-                       .findings = *findings,
-                       .bytes = run_result_bytes(findings)};
-    *findings = (RunResult){0};
-    if (saving->findings.status == STATUS_OK && !computation->is_again)
-        saving->head = result_summary_new(&saving->findings.result);
-    pthread_mutex_lock(&intake->lock);
-    intake->saving++;
-    intake->saving_bytes += saving->bytes;
+    *saving = (Saving){.manager = manager,
+                       .task = task,
+                       .run_result = *run_result,
+                       .bytes = run_result_bytes(run_result)};
+    *run_result = (RunResult){0};
+    if (saving->run_result.status == STATUS_OK && !task->recompute_only)
+        saving->head = result_summary_new(&saving->run_result.result);
+    pthread_mutex_lock(&manager->lock);
+    manager->saving++;
+    manager->saving_bytes += saving->bytes;
     // Only the series was wanted: the result is saved already. But it may have been deleted
     // meanwhile, and what is in the cache counts as known.
-    if (saving->findings.outcome != NULL && computation->is_again &&
-        db_result_exists(intake->store, computation->result))
-        cache_put(intake->cache, computation->result, saving->findings.outcome, NULL);
+    if (saving->run_result.outcome != NULL && task->recompute_only &&
+        db_result_exists(manager->db, task->result))
+        cache_put(manager->cache, task->result, saving->run_result.outcome, NULL);
     const bool goes_on = go_on(saving);
     if (!goes_on)
         end(saving);
-    pthread_mutex_unlock(&intake->lock);
+    pthread_mutex_unlock(&manager->lock);
     if (!goes_on)
         saving_free(saving);
 }

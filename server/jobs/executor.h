@@ -37,7 +37,7 @@ size_t executor_chunks(const ExecutorLimits *limits, size_t members, double seco
 typedef struct Executor {
     const char *name, *doc;
     // Whether it can take work, and its limits.
-    Status (*probe)(JobManager *intake, ExecutorLimits *limits, Problem *problem);
+    Status (*probe)(JobManager *manager, ExecutorLimits *limits, Problem *problem);
     // Takes chunks. One may be submitted twice: equal bytes make that harmless. After a failure
     // none was taken.
     Status (*submit)(StudyRun *run, const Chunk *chunks, size_t count, Problem *problem);

@@ -3,12 +3,12 @@
 #include "server/db/records.h"
 #include "server/jobs/jobs_private.h"
 
-Status jobs_record_delete(JobManager *intake, const char *name, Problem *problem) {
+Status jobs_record_delete(JobManager *manager, const char *name, Problem *problem) {
     RecordUses uses;
-    db_flush(intake->store); // most of it with the scenes let in
-    naming_close(&intake->naming);
-    db_flush(intake->store);
-    const Status status = db_record_delete(intake->store, name, &uses, problem);
-    naming_open(&intake->naming);
+    db_flush(manager->db); // most of it with the scenes let in
+    naming_close(&manager->naming);
+    db_flush(manager->db);
+    const Status status = db_record_delete(manager->db, name, &uses, problem);
+    naming_open(&manager->naming);
     return status;
 }

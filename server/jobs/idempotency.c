@@ -26,8 +26,8 @@ static Status read_key(const char *text, char key[KEY_MAX + 1], Problem *problem
     return STATUS_OK;
 }
 
-static bool is_taken(const JobManager *intake, const IdempotencyHold *hold) {
-    for (const IdempotencyHold *other = intake->keys; other != NULL; other = other->next)
+static bool is_taken(const JobManager *manager, const IdempotencyHold *hold) {
+    for (const IdempotencyHold *other = manager->keys; other != NULL; other = other->next)
         if (strcmp(other->key, hold->key) == 0 && strcmp(other->client, hold->client) == 0)
             return true;
     return false;
@@ -44,10 +44,10 @@ static Status check_same(const IdempotencyHold *hold, const JobRow *row, Problem
 
 // With the lock held: *found is the job of that key which the store may not have yet, held, or
 // NULL. Those that it has, or never will have, are let go.
-static Status find_new(JobManager *intake, const IdempotencyHold *hold, Job **found,
+static Status find_new(JobManager *manager, const IdempotencyHold *hold, Job **found,
                        Problem *problem) {
     Job *same = NULL;
-    for (Job **at = &intake->keyed; *at != NULL;) {
+    for (Job **at = &manager->keyed; *at != NULL;) {
         Job *job = *at;
         if (job->is_kept || job->refusal != STATUS_OK) {
             *at = job->next_keyed;
@@ -67,7 +67,7 @@ static Status find_new(JobManager *intake, const IdempotencyHold *hold, Job **fo
     return STATUS_OK;
 }
 
-Status idempotency_begin(JobManager *intake, const Submission *submission, IdempotencyHold *hold,
+Status idempotency_begin(JobManager *manager, const Submission *submission, IdempotencyHold *hold,
                          Job **job, Problem *problem) {
     *job = NULL;
     hold->is_held = false;
@@ -87,19 +87,19 @@ Status idempotency_begin(JobManager *intake, const Submission *submission, Idemp
     }
     sha256_end(digest, hold->request);
 
-    pthread_mutex_lock(&intake->lock);
-    while (is_taken(intake, hold))
-        pthread_cond_wait(&intake->keys_free, &intake->lock);
-    hold->next = intake->keys;
-    intake->keys = hold;
+    pthread_mutex_lock(&manager->lock);
+    while (is_taken(manager, hold))
+        pthread_cond_wait(&manager->keys_free, &manager->lock);
+    hold->next = manager->keys;
+    manager->keys = hold;
     hold->is_held = true;
-    const Status status = find_new(intake, hold, job, problem);
-    pthread_mutex_unlock(&intake->lock);
+    const Status status = find_new(manager, hold, job, problem);
+    pthread_mutex_unlock(&manager->lock);
     if (status != STATUS_OK || *job != NULL)
         return status;
 
     JobRow row;
-    const Status known = db_job_keyed(intake->store, submission->client, hold->key, &row, problem);
+    const Status known = db_job_keyed(manager->db, submission->client, hold->key, &row, problem);
     if (known == STATUS_NOT_FOUND) {
         problem_clear(problem);
         return STATUS_OK;
@@ -109,27 +109,27 @@ Status idempotency_begin(JobManager *intake, const Submission *submission, Idemp
     char id[40];
     text_fit(id, sizeof id, row.id);
     job_row_clear(&row);
-    return same == STATUS_OK ? jobs_find(intake, id, job, problem) : same;
+    return same == STATUS_OK ? jobs_find(manager, id, job, problem) : same;
 }
 
-void idempotency_remember(JobManager *intake, const IdempotencyHold *hold, Job *job) {
+void idempotency_remember(JobManager *manager, const IdempotencyHold *hold, Job *job) {
     if (!hold->is_held)
         return;
-    pthread_mutex_lock(&intake->lock);
-    job->next_keyed = intake->keyed;
-    intake->keyed = job_ref(job);
-    pthread_mutex_unlock(&intake->lock);
+    pthread_mutex_lock(&manager->lock);
+    job->next_keyed = manager->keyed;
+    manager->keyed = job_ref(job);
+    pthread_mutex_unlock(&manager->lock);
 }
 
-void idempotency_end(JobManager *intake, IdempotencyHold *hold) {
+void idempotency_end(JobManager *manager, IdempotencyHold *hold) {
     if (!hold->is_held)
         return;
-    pthread_mutex_lock(&intake->lock);
-    for (IdempotencyHold **at = &intake->keys; *at != NULL; at = &(*at)->next)
+    pthread_mutex_lock(&manager->lock);
+    for (IdempotencyHold **at = &manager->keys; *at != NULL; at = &(*at)->next)
         if (*at == hold) {
             *at = hold->next;
             break;
         }
-    pthread_cond_broadcast(&intake->keys_free);
-    pthread_mutex_unlock(&intake->lock);
+    pthread_cond_broadcast(&manager->keys_free);
+    pthread_mutex_unlock(&manager->lock);
 }

@@ -19,10 +19,10 @@ typedef struct IdempotencyHold {
 // Waits for others who submit under the same key. Then *job is the job of an earlier request, or
 // NULL and the key is this submission's until idempotency_end, which must follow in any case.
 // STATUS_USAGE for a key that is none, STATUS_REUSED.
-Status idempotency_begin(JobManager *intake, const Submission *submission, IdempotencyHold *hold,
+Status idempotency_begin(JobManager *manager, const Submission *submission, IdempotencyHold *hold,
                          Job **job, Problem *problem);
 // The job of a new submission: found from now on, also before the store has it.
-void idempotency_remember(JobManager *intake, const IdempotencyHold *hold, Job *job);
-void idempotency_end(JobManager *intake, IdempotencyHold *hold);
+void idempotency_remember(JobManager *manager, const IdempotencyHold *hold, Job *job);
+void idempotency_end(JobManager *manager, IdempotencyHold *hold);
 
 #endif

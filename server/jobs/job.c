@@ -13,68 +13,68 @@ bool job_state_is_final(int state) {
     return state != JOB_ACCEPTED && state != JOB_RUNNING;
 }
 
-bool subscribers_add(Subscribers *wakers, const Callback *waker) {
-    for (size_t i = 0; i < wakers->count; i++)
-        if (wakers->at[i].context == waker->context)
+bool subscribers_add(Subscribers *subscribers, const Callback *callback) {
+    for (size_t i = 0; i < subscribers->count; i++)
+        if (subscribers->at[i].context == callback->context)
             return true;
-    Callback *grown = realloc(wakers->at, (wakers->count + 1) * sizeof *grown);
+    Callback *grown = realloc(subscribers->at, (subscribers->count + 1) * sizeof *grown);
     if (grown == NULL)
         return false;
-    wakers->at = grown;
-    grown[wakers->count++] = *waker;
+    subscribers->at = grown;
+    grown[subscribers->count++] = *callback;
     return true;
 }
 
-void subscribers_remove(Subscribers *wakers, const Callback *waker) {
-    for (size_t i = 0; i < wakers->count; i++)
-        if (wakers->at[i].context == waker->context) {
-            wakers->at[i] = wakers->at[--wakers->count];
+void subscribers_remove(Subscribers *subscribers, const Callback *callback) {
+    for (size_t i = 0; i < subscribers->count; i++)
+        if (subscribers->at[i].context == callback->context) {
+            subscribers->at[i] = subscribers->at[--subscribers->count];
             return;
         }
 }
 
-void subscribers_call(Subscribers *wakers) {
-    for (size_t i = 0; i < wakers->count; i++)
-        wakers->at[i].wake(wakers->at[i].context);
-    free(wakers->at);
-    *wakers = (Subscribers){NULL, 0};
+void subscribers_call(Subscribers *subscribers) {
+    for (size_t i = 0; i < subscribers->count; i++)
+        subscribers->at[i].wake(subscribers->at[i].context);
+    free(subscribers->at);
+    *subscribers = (Subscribers){NULL, 0};
 }
 
-Job *job_new(JobManager *intake) {
+Job *job_new(JobManager *manager) {
     Job *job = calloc(1, sizeof *job);
     if (job == NULL)
         return NULL;
-    atomic_init(&job->holds, 1);
-    job->intake = intake;
-    if (intake != NULL)
-        atomic_fetch_add(&intake->holds, 1);
+    atomic_init(&job->refcount, 1);
+    job->manager = manager;
+    if (manager != NULL)
+        atomic_fetch_add(&manager->refcount, 1);
     return job;
 }
 
 Job *job_ref(Job *job) {
-    atomic_fetch_add(&job->holds, 1);
+    atomic_fetch_add(&job->refcount, 1);
     return job;
 }
 
 void job_unref(Job *job) {
-    if (job == NULL || atomic_fetch_sub(&job->holds, 1) != 1)
+    if (job == NULL || atomic_fetch_sub(&job->refcount, 1) != 1)
         return;
     job_row_clear(&job->row);
     result_summary_unref(job->head);
-    free(job->wakers.at);
-    free(job->keepers.at);
-    jobs_drop(job->intake);
+    free(job->subscribers.at);
+    free(job->save_waiters.at);
+    jobs_drop(job->manager);
     free(job);
 }
 
 static void lock(Job *job) {
-    if (job->intake != NULL)
-        pthread_mutex_lock(&job->intake->lock);
+    if (job->manager != NULL)
+        pthread_mutex_lock(&job->manager->lock);
 }
 
 static void unlock(Job *job) {
-    if (job->intake != NULL)
-        pthread_mutex_unlock(&job->intake->lock);
+    if (job->manager != NULL)
+        pthread_mutex_unlock(&job->manager->lock);
 }
 
 bool job_is_finished(Job *job) {
@@ -109,10 +109,10 @@ Status job_view(Job *job, JobView *show) {
     if (row->state == JOB_SUCCESSFUL) {
         text_fit(show->result, sizeof show->result, row->result);
         show->progress = 100;
-        show->is_result_deleted = job->intake == NULL && !row->has_result;
-    } else if (job->computation != NULL) {
-        show->progress = atomic_load(&job->computation->progress) / 100.0;
-        StudyRun *run = job->computation->study;
+        show->is_result_deleted = job->manager == NULL && !row->has_result;
+    } else if (job->task != NULL) {
+        show->progress = atomic_load(&job->task->progress) / 100.0;
+        StudyRun *run = job->task->study;
         if (run != NULL && run->gather == &gather_rows) {
             show->points = run->row.points;
             show->points_done = atomic_load(&run->rows_done);
@@ -154,9 +154,9 @@ void job_view_clear(JobView *show) {
 JobState job_peek(Job *job, double *progress) {
     lock(job);
     const JobState state = (JobState)job->row.state;
-    *progress = state == JOB_SUCCESSFUL    ? 100
-                : job->computation == NULL ? 0
-                                           : atomic_load(&job->computation->progress) / 100.0;
+    *progress = state == JOB_SUCCESSFUL ? 100
+                : job->task == NULL     ? 0
+                                        : atomic_load(&job->task->progress) / 100.0;
     unlock(job);
     return state;
 }
@@ -168,36 +168,36 @@ Status job_is_durable(Job *job, bool *is_kept, Problem *problem) {
     if (!job->is_kept && job->refusal != STATUS_OK)
         status = problem_set(problem, job->refusal, "%s", job->refused);
     if (job->ticket != NULL)
-        db_expedite(job->intake->store, job->ticket);
+        db_expedite(job->manager->db, job->ticket);
     unlock(job);
     return status;
 }
 
-bool job_subscribe(Job *job, const Callback *waker) {
+bool job_subscribe(Job *job, const Callback *callback) {
     lock(job);
     bool is_watched = true;
     if (job_state_is_final(job->row.state))
-        waker->wake(waker->context);
+        callback->wake(callback->context);
     else
-        is_watched = subscribers_add(&job->wakers, waker);
+        is_watched = subscribers_add(&job->subscribers, callback);
     unlock(job);
     return is_watched;
 }
 
-bool job_subscribe_durable(Job *job, const Callback *waker) {
+bool job_subscribe_durable(Job *job, const Callback *callback) {
     lock(job);
     bool is_watched = true;
     if (job->is_kept || job->refusal != STATUS_OK)
-        waker->wake(waker->context);
+        callback->wake(callback->context);
     else
-        is_watched = subscribers_add(&job->keepers, waker);
+        is_watched = subscribers_add(&job->save_waiters, callback);
     unlock(job);
     return is_watched;
 }
 
-void job_unsubscribe(Job *job, const Callback *waker) {
+void job_unsubscribe(Job *job, const Callback *callback) {
     lock(job);
-    subscribers_remove(&job->wakers, waker);
-    subscribers_remove(&job->keepers, waker);
+    subscribers_remove(&job->subscribers, callback);
+    subscribers_remove(&job->save_waiters, callback);
     unlock(job);
 }

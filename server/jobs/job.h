@@ -65,10 +65,10 @@ JobState job_peek(Job *job, double *progress);
 Status job_is_durable(Job *job, bool *is_kept, Problem *problem);
 
 // Has `waker` called once when the job finishes (at once if it is finished). False without memory.
-bool job_subscribe(Job *job, const Callback *waker);
+bool job_subscribe(Job *job, const Callback *callback);
 // The same for when the store has it, or could not take it.
-bool job_subscribe_durable(Job *job, const Callback *waker);
+bool job_subscribe_durable(Job *job, const Callback *callback);
 // Takes it back; after this returns it will not be called.
-void job_unsubscribe(Job *job, const Callback *waker);
+void job_unsubscribe(Job *job, const Callback *callback);
 
 #endif

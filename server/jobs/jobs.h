@@ -28,29 +28,29 @@ typedef struct JobManagerSettings {
 // Reads a scene's JSON, perhaps with a study, resolves its materials, judges and completes it, all
 // faults at once. `inquiry` is cleared by study_request_clear in any case, `warnings` by
 // warnings_clear.
-Status jobs_prepare(Db *store, const char *text, size_t size, const SimulationLimits *limits,
+Status jobs_prepare(Db *db, const char *text, size_t size, const SimulationLimits *limits,
                     StudyRequest *inquiry, Warnings *warnings, Problem *problem);
 
 // The same for a request. Its study must be within study_seconds where there are limits, and only
 // so many requests may plan large structures at once: STATUS_BUSY beyond. *has_place is for
 // jobs_leave_place, once the request plans no more; also on failure.
-Status jobs_prepare_request(JobManager *intake, const char *text, size_t size,
+Status jobs_prepare_request(JobManager *manager, const char *text, size_t size,
                             const SimulationLimits *limits, bool *has_place, StudyRequest *inquiry,
                             Warnings *warnings, Problem *problem);
-void jobs_leave_place(JobManager *intake, bool has_place);
+void jobs_leave_place(JobManager *manager, bool has_place);
 // Counts one submission of `client` (NULL: a client without a token) against its jobs a minute:
 // STATUS_QUOTA.
-Status jobs_charge(JobManager *intake, const char *client, Problem *problem);
+Status jobs_charge(JobManager *manager, const char *client, Problem *problem);
 
 // "r-" and 64 hexadecimal digits: SHA-256 of the canonical form and the engine's version.
 void jobs_result_id(const StudyRequest *inquiry, char target[72]);
 
 // Opens the queue, takes up unfinished jobs of the store, starts the workers. Borrows `store`.
-Status jobs_open(Db *store, const JobManagerSettings *settings, JobManager **intake,
+Status jobs_open(Db *db, const JobManagerSettings *settings, JobManager **manager,
                  Problem *problem);
 // Stops: no new jobs, running ones are interrupted and stay unfinished in the store for the next
 // start.
-void jobs_close(JobManager *intake);
+void jobs_close(JobManager *manager);
 
 // What is asked, and by whom. Texts are the caller's.
 typedef struct Submission {
@@ -69,11 +69,11 @@ typedef struct Submission {
 // flight shares that computation, and a key that its client used before for the same body answers
 // with that job (STATUS_REUSED for another body). STATUS_BUSY when the queue is full, STATUS_QUOTA,
 // STATUS_INVALID with the faults. The Job is a hold of the caller's.
-Status jobs_submit(JobManager *intake, const Submission *submission, Job **job, Problem *problem);
+Status jobs_submit(JobManager *manager, const Submission *submission, Job **job, Problem *problem);
 
 // Seconds from 1 to 3600 after which a submission of `client` that was refused as `status` is worth
 // another try, as far as can be told.
-int jobs_retry_after(JobManager *intake, const char *client, Status status);
+int jobs_retry_after(JobManager *manager, const char *client, Status status);
 
 // The same without running: everything a dry run answers.
 typedef struct DryRun {
@@ -84,36 +84,36 @@ typedef struct DryRun {
     char result[72];
     bool is_cached;
 } DryRun;
-Status jobs_dry_run(JobManager *intake, const char *text, size_t size, DryRun *dry_run,
+Status jobs_dry_run(JobManager *manager, const char *text, size_t size, DryRun *dry_run,
                     Problem *problem);
 void dry_run_clear(DryRun *dry_run);
 
 // A job by its id, from memory or the store. STATUS_NOT_FOUND.
-Status jobs_find(JobManager *intake, const char *id, Job **job, Problem *problem);
+Status jobs_find(JobManager *manager, const char *id, Job **job, Problem *problem);
 
 // Dismisses, for all at once and kept soon (job_is_durable); STATUS_CONFLICT if it is finished
 // already.
-Status jobs_cancel(JobManager *intake, const char *id, Job **job, Problem *problem);
+Status jobs_cancel(JobManager *manager, const char *id, Job **job, Problem *problem);
 
 // The series-bearing Outcome of a result: from memory, from the database where it is kept (its
 // plan, summary and warnings are empty then), or computed anew by a worker. *outcome is NULL and
 // the return is STATUS_OK while it is being computed: `waker` is then called once when it is worth
 // asking again. STATUS_NOT_FOUND, STATUS_GONE for another engine version.
-Status jobs_outcome(JobManager *intake, const char *result, const Callback *waker,
+Status jobs_outcome(JobManager *manager, const char *result, const Callback *callback,
                     Outcome **outcome, Problem *problem);
 
 // Tries again to store what could not be stored for want of room; to be called now and then.
-void jobs_retry_sweep(JobManager *intake);
+void jobs_retry_sweep(JobManager *manager);
 
 // Deletes a ground-motion record that no result was made with and no unfinished job names, also
 // none that is being accepted just now. STATUS_CONFLICT, STATUS_NOT_FOUND.
-Status jobs_record_delete(JobManager *intake, const char *name, Problem *problem);
+Status jobs_record_delete(JobManager *manager, const char *name, Problem *problem);
 
 // Deletes a result for good; its jobs stay and say so. STATUS_CONFLICT while it is being computed,
 // STATUS_NOT_FOUND.
-Status jobs_delete(JobManager *intake, const char *result, Problem *problem);
+Status jobs_delete(JobManager *manager, const char *result, Problem *problem);
 // A result was deleted: nothing is answered from it any more.
-void jobs_forget(JobManager *intake, const char *result);
+void jobs_forget(JobManager *manager, const char *result);
 
 // One layer of what is known.
 typedef struct CacheStats {
@@ -125,7 +125,7 @@ typedef struct CacheStats {
 typedef struct CacheLayers {
     bool in_memory, in_database, series_in_memory, series_in_database;
 } CacheLayers;
-void jobs_layers(JobManager *intake, const char *result, CacheLayers *layers);
+void jobs_layers(JobManager *manager, const char *result, CacheLayers *cache_layers);
 
 typedef struct JobStats {
     size_t queued, running, workers, queue_most, cached_outcomes, cached_bytes;
@@ -135,9 +135,9 @@ typedef struct JobStats {
     CacheStats rows;   // results in the database: those found there and not
     CacheStats stored; // series in the database
 } JobStats;
-void jobs_tally(JobManager *intake, JobStats *tally);
+void jobs_tally(JobManager *manager, JobStats *metrics);
 // What was done since the start; counted on.
 struct JobMetrics;
-const struct JobMetrics *jobs_totals(const JobManager *intake);
+const struct JobMetrics *jobs_totals(const JobManager *manager);
 
 #endif

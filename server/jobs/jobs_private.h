@@ -32,9 +32,9 @@ typedef struct Task {
     QueueEntry queued;      // also for the next turn of a study
     bool is_running;
     int64_t began_ns;
-    bool is_again;      // only its series is wanted: the result is saved already
-    Job *jobs;          // those who wait for it, by next_shared
-    Subscribers askers; // readers of the outcome
+    bool recompute_only;        // only its series is wanted: the result is saved already
+    Job *jobs;                  // those who wait for it, by next_shared
+    Subscribers result_waiters; // readers of the outcome
     atomic_bool is_stopped;
     atomic_uint progress;   // in 1/10,000
     struct StudyRun *study; // that is under way, under the lock
@@ -45,26 +45,26 @@ typedef struct Task {
 // the second comes before the first was begun, the first is withdrawn. `row` is what others see.
 struct Job {
     HashMapEntry indexed; // live, by id
-    atomic_size_t holds;
-    JobManager *intake; // held, for its lock; NULL: read from the store, never changes
+    atomic_size_t refcount;
+    JobManager *manager; // held, for its lock; NULL: read from the store, never changes
     JobRow row;
-    JobRow opening, closing; // as posted; both borrow row's texts, but for closing.problem
-    PendingWrite *ticket;    // of `opening`, until the store has answered or it was withdrawn
-    bool is_closing;         // its last state is on the way to the store
-    bool is_kept;            // the store has it as `row` shows it
-    Status refusal;          // why not
+    JobRow insert_row, final_row; // as posted; both borrow row's texts, but for closing.problem
+    PendingWrite *ticket;         // of `opening`, until the store has answered or it was withdrawn
+    bool is_closing;              // its last state is on the way to the store
+    bool is_kept;                 // the store has it as `row` shows it
+    Status refusal;               // why not
     char refused[256];
     size_t scene_size;     // in bytes, counted while it is live
     bool is_live;          // in the index, which holds it
     bool is_counted;       // takes a place in the queue
     ResultSummary *head;   // of the result
-    Task *computation;     // NULL: not yet or no more
+    Task *task;            // NULL: not yet or no more
     QueueClient *client;   // NULL while it was not admitted
     Job *next_keyed;       // in intake->keyed
     Job *next_undismissed; // in intake->undismissed
     Job *next_shared;
     int64_t submitted_ns, started_ns;
-    Subscribers wakers, keepers; // for when it is finished; for when it is kept
+    Subscribers subscribers, save_waiters; // for when it is finished; for when it is kept
 };
 
 typedef struct Failure {
@@ -74,7 +74,7 @@ typedef struct Failure {
 } Failure;
 
 typedef struct Worker {
-    JobManager *intake;
+    JobManager *manager;
     pthread_t thread;
     Task *running;          // or NULL
     struct StudyRun *study; // of which it has a chunk in hand, or NULL
@@ -84,9 +84,9 @@ typedef struct Worker {
 } Worker;
 
 struct JobManager {
-    atomic_size_t holds; // the owner's and one of each Job: a job may be looked at after the intake
-                         // has closed
-    Db *store;
+    atomic_size_t refcount; // the owner's and one of each Job: a job may be looked at after the
+                            // intake has closed
+    Db *db;
     JobManagerSettings settings;
     pthread_mutex_t lock;
     pthread_cond_t work;       // for a worker, or room for what it makes
@@ -107,13 +107,13 @@ struct JobManager {
     Queue *queue;                    // of computations
     struct StudyRun *studies;        // under way
     size_t study_count, study_bytes; // of them, and that they hold
-    Task *stalled;                   // studies that could not begin for want of room
+    Task *waiting_for_memory;        // studies that could not begin for want of room
     size_t live;                     // jobs not yet finished
     size_t scene_bytes;              // of them all
     size_t posted;                   // writes that the store has yet to answer
     size_t saving, saving_bytes;     // computations that have run and are not yet saved
-    struct Saving *delayed;          // of these, what waits for room in the store
-    Job *undismissed;                // held: dismissed, but the store could not be told
+    struct Saving *retry_commits;    // of these, what waits for room in the store
+    Job *retry_cancels;              // held: dismissed, but the store could not be told
     Cache *cache;
     CacheStats rows, stored;            // results and series found in the database
     size_t keeping_bytes;               // of series on the way there
@@ -123,38 +123,38 @@ struct JobManager {
     JobMetrics totals;
 };
 
-bool subscribers_add(Subscribers *wakers, const Callback *waker); // false without memory
-void subscribers_remove(Subscribers *wakers, const Callback *waker);
-void subscribers_call(Subscribers *wakers); // calls and forgets all
+bool subscribers_add(Subscribers *subscribers, const Callback *callback); // false without memory
+void subscribers_remove(Subscribers *subscribers, const Callback *callback);
+void subscribers_call(Subscribers *subscribers); // calls and forgets all
 
-Job *job_new(JobManager *intake); // one hold; NULL without memory
+Job *job_new(JobManager *manager); // one hold; NULL without memory
 
 Task *task_new(const char *result);
-void task_free(Task *computation);
+void task_free(Task *task);
 
-void jobs_drop(JobManager *intake); // frees what is left with the last hold
+void jobs_drop(JobManager *manager); // frees what is left with the last hold
 
 // Held for the caller; NULL if no such job is in memory.
-Job *jobs_find_live(JobManager *intake, const char *id);
+Job *jobs_find_live(JobManager *manager, const char *id);
 
 // With the lock held: what jobs_retry_sweep does for jobs that were dismissed.
-void jobs_retry_dismissed(JobManager *intake);
+void jobs_retry_dismissed(JobManager *manager);
 // Nobody else is there any more: what waits for room stays unfinished in the store.
-void jobs_abandon_delayed(JobManager *intake);
+void jobs_abandon_delayed(JobManager *manager);
 
 // With the lock held.
 // Gives back its place in the queue; it can still be found.
 void jobs_release(Job *job);
 void jobs_retire(Job *job); // it is live no more; drops the index's hold
 // `client` NULL: ahead of all.
-void jobs_enqueue(JobManager *intake, Task *computation, QueueClient *client);
-void jobs_call_worker(JobManager *intake); // something was put into the queue
+void jobs_enqueue(JobManager *manager, Task *task, QueueClient *client);
+void jobs_call_worker(JobManager *manager); // something was put into the queue
 Task *task_of(QueueEntry *entry);
-void jobs_admit(JobManager *intake, Job *job); // it is live, held by the index
-void jobs_attach(Job *job, Task *computation);
+void jobs_admit(JobManager *manager, Job *job); // it is live, held by the index
+void jobs_attach(Job *job, Task *task);
 void jobs_detach(Job *job); // from its computation, which stops when nobody is left
 // The store has answered one of the posted writes.
-void jobs_settle(JobManager *intake);
+void jobs_settle(JobManager *manager);
 // It could not be kept: whoever waits is told, and it is live no more.
 void jobs_refuse(Job *job, Status status, const char *detail);
 // What was posted first need not be written if it was not begun.
@@ -162,7 +162,7 @@ void jobs_withdraw(Job *job);
 
 // An unfinished job of the store, from an earlier life. Takes the row. Only what concerns the whole
 // program is an error.
-Status jobs_take_up(JobManager *intake, JobRow *row, Problem *problem);
+Status jobs_take_up(JobManager *manager, JobRow *row, Problem *problem);
 
 // What a computation came to, as documents.
 typedef struct RunResult {
@@ -175,18 +175,18 @@ typedef struct RunResult {
     int64_t began_ns, ended_ns;
     double seconds; // of CPU, of the scene's own run
 } RunResult;
-void run_result_clear(RunResult *findings);
+void run_result_clear(RunResult *run_result);
 
 // Without the lock. Takes the computation, which has run, and what is in `findings`: saves them
 // with the jobs that wait for them, and says that these are finished once that is durable.
-void jobs_save(JobManager *intake, Task *computation, RunResult *findings);
+void jobs_save(JobManager *manager, Task *task, RunResult *run_result);
 // Whether what failed is worth another try: a full disk and the like pass.
 bool status_is_transient(Status status);
 // With the lock held: whether a worker should wait before it makes more to be saved.
-bool jobs_is_behind(const JobManager *intake);
+bool jobs_is_behind(const JobManager *manager);
 
 // Without the lock: has the series kept by the store if it is dearer to compute than to read.
-void jobs_keep_series(JobManager *intake, const char *result, const Outcome *outcome,
+void jobs_keep_series(JobManager *manager, const char *result, const Outcome *outcome,
                       double seconds);
 
 void *worker_main(void *worker);

@@ -7,8 +7,8 @@
 
 // With the lock held. Counts one more submission of `client` against the jobs a minute, or
 // STATUS_QUOTA.
-Status limits_add(JobManager *intake, QueueClient *client, Problem *problem);
+Status limits_add(JobManager *manager, QueueClient *client, Problem *problem);
 // With the lock held. Whether it may have one more unfinished job.
-Status limits_check(const JobManager *intake, const QueueClient *client, Problem *problem);
+Status limits_check(const JobManager *manager, const QueueClient *client, Problem *problem);
 
 #endif

@@ -14,8 +14,8 @@
 enum { LOOK_MS = 5000, PAUSE_MS = 10, RETRY_MS = 1000 };
 
 struct Maintenance {
-    Db *store;
-    JobManager *intake;
+    Db *db;
+    JobManager *manager;
     KeepRules rules;
     pthread_t thread;
     pthread_mutex_t lock;
@@ -42,13 +42,13 @@ static void *work(void *context) {
     int64_t next_ns = 0; // to look for what is to go
     uint64_t pages = 0;
     do {
-        jobs_retry_sweep(keeper->intake);
+        jobs_retry_sweep(keeper->manager);
         if (clock_monotonic_ns() < next_ns)
             continue;
         Removed removed;
-        const Status status = db_remove(keeper->store, &keeper->rules, &removed, NULL);
+        const Status status = db_remove(keeper->db, &keeper->rules, &removed, NULL);
         for (size_t i = 0; status == STATUS_OK && i < removed.results; i++)
-            jobs_forget(keeper->intake, removed.result[i]);
+            jobs_forget(keeper->manager, removed.result[i]);
         const int64_t pause_ms = status == STATUS_OK && removed.is_more ? PAUSE_MS : LOOK_MS;
         process_trim_memory(&pages);
         next_ns = clock_monotonic_ns() + pause_ms * 1000000;
@@ -62,14 +62,14 @@ static void maintenance_free(Maintenance *keeper) {
     free(keeper);
 }
 
-Status maintenance_start(Db *store, JobManager *intake, const KeepRules *rules,
-                         Maintenance **keeper, Problem *problem) {
+Status maintenance_start(Db *db, JobManager *manager, const KeepRules *rules, Maintenance **keeper,
+                         Problem *problem) {
     *keeper = NULL;
     Maintenance *made = calloc(1, sizeof *made);
     if (made == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the keeper");
-    made->store = store;
-    made->intake = intake;
+    made->db = db;
+    made->manager = manager;
     made->rules = *rules;
     pthread_mutex_init(&made->lock, NULL);
     pthread_condattr_t monotonic; // a clock that is set back makes no pause longer

@@ -9,8 +9,8 @@
 typedef struct Maintenance Maintenance;
 
 // Borrows store and intake until maintenance_stop.
-Status maintenance_start(Db *store, JobManager *intake, const KeepRules *rules,
-                         Maintenance **keeper, Problem *problem);
+Status maintenance_start(Db *db, JobManager *manager, const KeepRules *rules, Maintenance **keeper,
+                         Problem *problem);
 void maintenance_stop(Maintenance *keeper); // NULL is fine
 
 #endif

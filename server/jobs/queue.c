@@ -16,7 +16,7 @@
 
 const double queue_quick = 0.1;
 
-static const double patience = 10;     // [s] for each second
+static const double budget = 10;       // [s] for each second
 static const double least = 1e-5;      // [s] that any job counts as
 static const double turn_after = 0.05; // [s]
 
@@ -135,7 +135,7 @@ static void join(Queue *queue, QueueEntry *entry, QueueClient *client) {
 
 void queue_put(Queue *queue, QueueEntry *entry, QueueClient *client, double now) {
     count_in(queue, entry);
-    entry->rank = now + patience * entry->seconds;
+    entry->rank = now + budget * entry->seconds;
     join(queue, entry, client);
 }
 

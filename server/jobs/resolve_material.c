@@ -32,7 +32,7 @@ static bool split_name(const char *name, char slug[128], uint64_t *revision) {
 }
 
 // "no material is called ..., there are: ...", with the nearest one suggested.
-static Status refuse_unknown(Db *store, const char *name, const char *slug, const char *pointer,
+static Status refuse_unknown(Db *db, const char *name, const char *slug, const char *pointer,
                              Problem *problem) {
     Fault fault = {.detail = ""};
     Texts known;
@@ -40,7 +40,7 @@ static Status refuse_unknown(Db *store, const char *name, const char *slug, cons
     text_quote(fault.value, sizeof fault.value, name);
     char short_name[80], list[200] = "";
     text_fit(short_name, sizeof short_name, name);
-    if (problem->count < SUGGESTED && db_material_slugs(store, &known, NULL) == STATUS_OK) {
+    if (problem->count < SUGGESTED && db_material_slugs(db, &known, NULL) == STATUS_OK) {
         // One more, for the NULL behind the last one.
         const char **slugs = calloc(known.count + 1, sizeof *slugs);
         for (size_t i = 0; i < known.count; i++) {
@@ -95,15 +95,15 @@ static Status refuse_for_now(const char *slug, Status status, Problem *problem) 
 
 // Why a name stands for no revision: it is no material's, or the material has none of that number,
 // or, where it names none, all of them are deprecated.
-static Status refuse(Db *store, const char *name, const char *slug, uint64_t revision,
+static Status refuse(Db *db, const char *name, const char *slug, uint64_t revision,
                      const char *pointer, Problem *problem) {
     MaterialRevision known = {0};
     if (problem->count >= PROBLEM_FAULTS) // is counted alone
         return problem_add(problem, STATUS_INVALID, pointer, "is not there");
-    Status status = db_material(store, slug, 0, &known, NULL);
+    Status status = db_material(db, slug, 0, &known, NULL);
     const bool has_head = status == STATUS_OK;
     if (status == STATUS_NOT_FOUND)
-        status = db_material(store, slug, 1, &known, NULL);
+        status = db_material(db, slug, 1, &known, NULL);
     if (has_head) {
         status = refuse_revision(&known, "head", name, pointer, problem);
     } else if (status == STATUS_OK) {
@@ -111,7 +111,7 @@ static Status refuse(Db *store, const char *name, const char *slug, uint64_t rev
         status = revision > 0 ? refuse_revision(&known, "newest revision", name, pointer, problem)
                               : refuse_deprecated(&known, pointer, problem);
     } else if (status == STATUS_NOT_FOUND) {
-        status = refuse_unknown(store, name, slug, pointer, problem);
+        status = refuse_unknown(db, name, slug, pointer, problem);
     } else {
         status = refuse_for_now(slug, status, problem);
     }
@@ -276,7 +276,7 @@ static Status fill(Buffer *buffer, MaterialRevision *found, const char *pointer,
     return STATUS_OK;
 }
 
-Status resolve_buffer(Db *store, Buffer *buffer, const char *pointer, Warnings *warnings,
+Status resolve_buffer(Db *db, Buffer *buffer, const char *pointer, Warnings *warnings,
                       Problem *problem) {
     char slug[128];
     uint64_t revision;
@@ -284,19 +284,19 @@ Status resolve_buffer(Db *store, Buffer *buffer, const char *pointer, Warnings *
     if (buffer->material == NULL)
         return STATUS_OK;
     if (!split_name(buffer->material, slug, &revision))
-        return refuse_unknown(store, buffer->material, buffer->material, pointer, problem);
-    Status status = db_material(store, slug, revision, &found, NULL);
+        return refuse_unknown(db, buffer->material, buffer->material, pointer, problem);
+    Status status = db_material(db, slug, revision, &found, NULL);
     if (status == STATUS_OK)
         status = fill(buffer, &found, pointer, warnings, problem);
     else if (status == STATUS_NOT_FOUND)
-        status = refuse(store, buffer->material, slug, revision, pointer, problem);
+        status = refuse(db, buffer->material, slug, revision, pointer, problem);
     else
         status = refuse_for_now(slug, status, problem);
     material_revision_clear(&found);
     return status;
 }
 
-Status resolve_materials(Db *store, Simulation *simulation, Warnings *warnings, Problem *problem) {
+Status resolve_materials(Db *db, Simulation *simulation, Warnings *warnings, Problem *problem) {
     Status status = STATUS_OK;
     for (size_t i = 0; i < simulation->scene.dampers.count; i++) {
         Damper *damper = &simulation->scene.dampers.at[i];
@@ -305,7 +305,7 @@ Status resolve_materials(Db *store, Simulation *simulation, Warnings *warnings, 
         for (size_t j = 0; j < COUNT(buffers); j++) {
             char pointer[64];
             snprintf(pointer, sizeof pointer, "/dampers/%zu/%s", i, names[j]);
-            const Status one = resolve_buffer(store, buffers[j], pointer, warnings, problem);
+            const Status one = resolve_buffer(db, buffers[j], pointer, warnings, problem);
             if (one != STATUS_OK && one != STATUS_INVALID)
                 return one;
             if (one != STATUS_OK)

@@ -8,10 +8,10 @@
 
 // Every buffer that names a material gets "slug@revision", its numbers and what is known of its
 // test. Adds all faults; STATUS_INVALID where there are any.
-Status resolve_materials(Db *store, Simulation *simulation, Warnings *warnings, Problem *problem);
+Status resolve_materials(Db *db, Simulation *simulation, Warnings *warnings, Problem *problem);
 
 // The same for one buffer, at `pointer`; one that names none stays as it is.
-Status resolve_buffer(Db *store, Buffer *buffer, const char *pointer, Warnings *warnings,
+Status resolve_buffer(Db *db, Buffer *buffer, const char *pointer, Warnings *warnings,
                       Problem *problem);
 
 #endif

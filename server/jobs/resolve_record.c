@@ -17,7 +17,7 @@ enum { PINNED_SAMPLES = 1 << 24 };
 static const char axis_pointer[] = "/excitation/name";
 
 // "no record is called ...; there are ...", with the nearest one suggested.
-static Status refuse_unknown(Db *store, const char *name, const char *pointer, Problem *problem) {
+static Status refuse_unknown(Db *db, const char *name, const char *pointer, Problem *problem) {
     enum { LISTED = 1000, SUGGESTED = 10 }; // SUGGESTED: faults that tell what names there are
     Fault fault = {.detail = ""};
     RecordRows known = {NULL, 0};
@@ -25,7 +25,7 @@ static Status refuse_unknown(Db *store, const char *name, const char *pointer, P
     text_fit(fault.pointer, sizeof fault.pointer, pointer);
     text_quote(fault.value, sizeof fault.value, name);
     text_fit(short_name, sizeof short_name, name);
-    if (db_is_private(store)) {
+    if (db_is_private(db)) {
         snprintf(fault.detail, sizeof fault.detail,
                  "\"%s\" is a record of a daemon, and there is none here: put the samples into the "
                  "scene (impactd import FILE), or send it to the daemon (impactd submit)",
@@ -33,7 +33,7 @@ static Status refuse_unknown(Db *store, const char *name, const char *pointer, P
         return problem_add_fault(problem, STATUS_INVALID, &fault);
     }
     const bool is_suggested = problem->count < SUGGESTED;
-    if (is_suggested && db_records(store, NULL, "", LISTED, &known, NULL) == STATUS_OK) {
+    if (is_suggested && db_records(db, NULL, "", LISTED, &known, NULL) == STATUS_OK) {
         const char **names = calloc(known.count + 1, sizeof *names);
         for (size_t i = 0; i < known.count; i++) {
             text_list(list, sizeof list, known.at[i].name);
@@ -55,14 +55,14 @@ static Status refuse_unknown(Db *store, const char *name, const char *pointer, P
 }
 
 // `pointer` is where the name stands, `place` where a digest would.
-static Status find(Db *store, const char *name, const char *digest, const char *pointer,
+static Status find(Db *db, const char *name, const char *digest, const char *pointer,
                    const char *place, NamedRecord **named, Problem *problem) {
     *named = NULL;
     if (!record_name_is_sound(name))
-        return refuse_unknown(store, name, pointer, problem);
-    const Status status = db_record_named(store, name, named, NULL);
+        return refuse_unknown(db, name, pointer, problem);
+    const Status status = db_record_named(db, name, named, NULL);
     if (status == STATUS_NOT_FOUND)
-        return refuse_unknown(store, name, pointer, problem);
+        return refuse_unknown(db, name, pointer, problem);
     if (status != STATUS_OK)
         return problem_set(problem, status, "the record \"%.64s\" could not be looked up", name);
     if (digest == NULL || strcmp(digest, (*named)->digest) == 0)
@@ -87,12 +87,12 @@ static ExcitationRecord *record_of(const Simulation *simulation) {
     return record->name != NULL ? record : NULL;
 }
 
-Status resolve_record_motion(Db *store, Simulation *simulation, Problem *problem) {
+Status resolve_record_motion(Db *db, Simulation *simulation, Problem *problem) {
     ExcitationRecord *record = record_of(simulation);
     NamedRecord *named;
     if (record == NULL || record->named != NULL)
         return STATUS_OK;
-    TRY(find(store, record->name, record->digest, axis_pointer, "/excitation/digest", &named,
+    TRY(find(db, record->name, record->digest, axis_pointer, "/excitation/digest", &named,
              problem));
     const bool is_resolved = record_resolve(record, named);
     refcount_unref(&named->shared);
@@ -139,10 +139,10 @@ static Status add_samples(const Refcount *named, size_t *samples, const char *pl
 }
 
 // What was found before stays; it only needs to be there still.
-static Status hold(Db *store, const char *name, const char *digest, const char *pointer,
+static Status hold(Db *db, const char *name, const char *digest, const char *pointer,
                    const char *place, Refcount **named, Problem *problem) {
     NamedRecord *found;
-    TRY(find(store, name, digest, pointer, place, &found, problem));
+    TRY(find(db, name, digest, pointer, place, &found, problem));
     if (*named == NULL)
         *named = &found->shared;
     else
@@ -151,13 +151,13 @@ static Status hold(Db *store, const char *name, const char *digest, const char *
 }
 
 // One that came with the sweep.
-static Status resolve_pinned(Db *store, PinnedRecord *pinned, size_t index, Problem *problem) {
+static Status resolve_pinned(Db *db, PinnedRecord *pinned, size_t index, Problem *problem) {
     char name[64], digest[64];
     snprintf(name, sizeof name, "/study/records/%zu/name", index);
     snprintf(digest, sizeof digest, "/study/records/%zu/digest", index);
     if (pinned->name == NULL)
         return STATUS_OK; // told by the rows
-    TRY(hold(store, pinned->name, pinned->digest, name, digest, &pinned->named, problem));
+    TRY(hold(db, pinned->name, pinned->digest, name, digest, &pinned->named, problem));
     const NamedRecord *named = (const NamedRecord *)(const void *)pinned->named;
     if (pinned->digest == NULL && (pinned->digest = strdup(named->digest)) == NULL)
         return STATUS_NO_MEMORY;
@@ -165,7 +165,7 @@ static Status resolve_pinned(Db *store, PinnedRecord *pinned, size_t index, Prob
 }
 
 // One value of an axis. What is no text is for the axis to refuse.
-static Status resolve_value(Db *store, const char *value, PinnedRecords *records, size_t *samples,
+static Status resolve_value(Db *db, const char *value, PinnedRecords *records, size_t *samples,
                             const char *place, Problem *problem) {
     JsonScalar scalar;
     NamedRecord *named;
@@ -175,7 +175,7 @@ static Status resolve_value(Db *store, const char *value, PinnedRecords *records
     Status status = STATUS_OK;
     if (json_scalar_read(value, &scalar, room) && scalar.kind == JSON_SCALAR_TEXT &&
         pinned_find(records, scalar.text) == NULL) {
-        status = find(store, scalar.text, NULL, place, place, &named, problem);
+        status = find(db, scalar.text, NULL, place, place, &named, problem);
         if (status == STATUS_OK)
             status = pin(records, named);
         if (status == STATUS_OK)
@@ -191,7 +191,7 @@ static SweepStudy *sweep_of(const StudyRequest *inquiry) {
                : NULL;
 }
 
-Status resolve_sweep_records(Db *store, StudyRequest *inquiry, Problem *problem) {
+Status resolve_sweep_records(Db *db, StudyRequest *inquiry, Problem *problem) {
     SweepStudy *study = sweep_of(inquiry);
     Status status = STATUS_OK;
     size_t samples = 0;
@@ -201,7 +201,7 @@ Status resolve_sweep_records(Db *store, StudyRequest *inquiry, Problem *problem)
         snprintf(place, sizeof place, "/study/records/%zu", i);
         if (problem->count >= PROBLEM_FAULTS) // no more can be told
             return STATUS_INVALID;
-        Status one = resolve_pinned(store, pinned, i, problem);
+        Status one = resolve_pinned(db, pinned, i, problem);
         if (one == STATUS_OK && pinned->named != NULL)
             one = add_samples(pinned->named, &samples, place, problem);
         if (one != STATUS_OK && one != STATUS_INVALID)
@@ -218,7 +218,7 @@ Status resolve_sweep_records(Db *store, StudyRequest *inquiry, Problem *problem)
             if (problem->count >= PROBLEM_FAULTS)
                 return STATUS_INVALID;
             const Status one =
-                resolve_value(store, axis->values.at[k], &study->records, &samples, place, problem);
+                resolve_value(db, axis->values.at[k], &study->records, &samples, place, problem);
             if (one != STATUS_OK && one != STATUS_INVALID)
                 return one;
             status = status == STATUS_OK ? one : status;
@@ -240,14 +240,14 @@ void resolve_records_drop(StudyRequest *inquiry) {
     }
 }
 
-Status resolve_records_again(Db *store, StudyRequest *inquiry, Problem *problem) {
+Status resolve_records_again(Db *db, StudyRequest *inquiry, Problem *problem) {
     ExcitationRecord *record = record_of(&inquiry->simulation);
     SweepStudy *study = sweep_of(inquiry);
     if (record != NULL)
-        TRY(hold(store, record->name, record->digest, axis_pointer, "/excitation/digest",
+        TRY(hold(db, record->name, record->digest, axis_pointer, "/excitation/digest",
                  &record->named, problem));
     for (size_t i = 0; study != NULL && i < study->records.count; i++)
-        TRY(resolve_pinned(store, &study->records.at[i], i, problem));
+        TRY(resolve_pinned(db, &study->records.at[i], i, problem));
     return STATUS_OK;
 }
 

@@ -41,7 +41,7 @@ static bool takes_materials(const char *pointer) {
 }
 
 // One name of an axis: it becomes that of a revision. What is no text is for the axis to refuse.
-static Status resolve_value(Db *store, char **value, Buffers *materials, const char *place,
+static Status resolve_value(Db *db, char **value, Buffers *materials, const char *place,
                             Warnings *warnings, Problem *problem) {
     Buffer buffer;
     JsonScalar scalar;
@@ -54,7 +54,7 @@ static Status resolve_value(Db *store, char **value, Buffers *materials, const c
     if (json_scalar_read(*value, &scalar, room) && scalar.kind == JSON_SCALAR_TEXT) {
         buffer.material = room;
         room = NULL;
-        status = resolve_buffer(store, &buffer, place, warnings, problem);
+        status = resolve_buffer(db, &buffer, place, warnings, problem);
         if (status == STATUS_OK)
             status = pin(materials, &buffer);
         Bytes name = {0};
@@ -70,7 +70,7 @@ static Status resolve_value(Db *store, char **value, Buffers *materials, const c
     return status;
 }
 
-static Status resolve_axes(Db *store, SweepStudy *study, Warnings *warnings, Problem *problem) {
+static Status resolve_axes(Db *db, SweepStudy *study, Warnings *warnings, Problem *problem) {
     Status status = STATUS_OK;
     for (size_t i = 0; i < study->axes.count; i++) {
         const SweepAxis *axis = &study->axes.at[i];
@@ -79,8 +79,8 @@ static Status resolve_axes(Db *store, SweepStudy *study, Warnings *warnings, Pro
             if (problem->count >= PROBLEM_FAULTS) // no more can be told
                 return STATUS_INVALID;
             snprintf(place, sizeof place, "/study/axes/%zu/values/%zu", i, k);
-            const Status one = resolve_value(store, &axis->values.at[k], &study->materials, place,
-                                             warnings, problem);
+            const Status one =
+                resolve_value(db, &axis->values.at[k], &study->materials, place, warnings, problem);
             if (one != STATUS_OK && one != STATUS_INVALID)
                 return one;
             status = status == STATUS_OK ? one : status;
@@ -91,14 +91,13 @@ static Status resolve_axes(Db *store, SweepStudy *study, Warnings *warnings, Pro
 
 // Materials that were pinned are what the store says, those of the scene are pinned, and those of
 // the axes found and pinned.
-static Status resolve_sweep(Db *store, StudyRequest *inquiry, Warnings *warnings,
-                            Problem *problem) {
+static Status resolve_sweep(Db *db, StudyRequest *inquiry, Warnings *warnings, Problem *problem) {
     SweepStudy *study = (SweepStudy *)(void *)inquiry->study;
     Status status = STATUS_OK;
     for (size_t i = 0; i < study->materials.count && problem->count < PROBLEM_FAULTS; i++) {
         char place[64];
         snprintf(place, sizeof place, "/study/materials/%zu", i);
-        const Status one = resolve_buffer(store, &study->materials.at[i], place, warnings, problem);
+        const Status one = resolve_buffer(db, &study->materials.at[i], place, warnings, problem);
         if (one != STATUS_OK && one != STATUS_INVALID)
             return one;
         status = status == STATUS_OK ? one : status;
@@ -110,10 +109,10 @@ static Status resolve_sweep(Db *store, StudyRequest *inquiry, Warnings *warnings
         if (sides[i % 3]->material != NULL)
             TRY(pin(&study->materials, sides[i % 3]));
     }
-    const Status axes = resolve_axes(store, study, warnings, problem);
+    const Status axes = resolve_axes(db, study, warnings, problem);
     if (axes != STATUS_OK && axes != STATUS_INVALID)
         return axes;
-    const Status records = resolve_sweep_records(store, inquiry, problem);
+    const Status records = resolve_sweep_records(db, inquiry, problem);
     if (records != STATUS_OK && records != STATUS_INVALID)
         return records;
     return status != STATUS_OK ? status : axes != STATUS_OK ? axes : records;
@@ -121,12 +120,12 @@ static Status resolve_sweep(Db *store, StudyRequest *inquiry, Warnings *warnings
 
 // An axis's unknown name is no reason to leave the other values unjudged: its fault is told beside
 // theirs, and in place of what the same name leads to there.
-Status resolve_sweep_axes(Db *store, StudyRequest *inquiry, const SimulationLimits *limits,
+Status resolve_sweep_axes(Db *db, StudyRequest *inquiry, const SimulationLimits *limits,
                           Warnings *warnings, Problem *problem) {
     Problem *names = calloc(1, sizeof *names), *rest = calloc(1, sizeof *rest);
     Status status = STATUS_NO_MEMORY;
     if (names != NULL && rest != NULL) {
-        status = resolve_sweep(store, inquiry, warnings, names);
+        status = resolve_sweep(db, inquiry, warnings, names);
         // Where the scene has faults they are judged with it, as ever.
         const bool has_own = problem->count > 0;
         if (status == STATUS_LIMIT || names->count >= PROBLEM_FAULTS) {

@@ -8,7 +8,7 @@
 
 // Behind resolve_materials, in place of study_request_complete, of an inquiry whose study is a
 // sweep. Adds all faults, those of names among them.
-Status resolve_sweep_axes(Db *store, StudyRequest *inquiry, const SimulationLimits *limits,
+Status resolve_sweep_axes(Db *db, StudyRequest *inquiry, const SimulationLimits *limits,
                           Warnings *warnings, Problem *problem);
 
 #endif

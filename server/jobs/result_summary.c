@@ -26,17 +26,17 @@ ResultSummary *result_summary_new(const ResultRow *row) {
     head->work = copies[2];
     head->notes = copies[3];
     head->bytes = bytes;
-    atomic_init(&head->holds, 1);
+    atomic_init(&head->refcount, 1);
     return head;
 }
 
 ResultSummary *result_summary_ref(ResultSummary *head) {
     if (head != NULL)
-        atomic_fetch_add(&head->holds, 1);
+        atomic_fetch_add(&head->refcount, 1);
     return head;
 }
 
 void result_summary_unref(ResultSummary *head) {
-    if (head != NULL && atomic_fetch_sub(&head->holds, 1) == 1)
+    if (head != NULL && atomic_fetch_sub(&head->refcount, 1) == 1)
         free(head);
 }

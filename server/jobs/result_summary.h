@@ -9,7 +9,7 @@
 #include "server/db/db.h"
 
 typedef struct ResultSummary {
-    atomic_size_t holds;
+    atomic_size_t refcount;
     const char *plan, *summary, *work, *notes; // NULL: unknown
     size_t bytes;
 } ResultSummary;

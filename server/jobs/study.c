@@ -20,69 +20,69 @@
 // Each that is under way holds its scene's outcome and what it folds.
 enum { STUDIES_BYTES = 512 << 20, STUDIES_PER_WORKER = 2 };
 
-bool study_is_shared(const Task *computation) {
-    const Variant *study = computation->inquiry.study;
-    return study != NULL && !computation->is_again && study_has_members(study);
+bool study_is_shared(const Task *task) {
+    const Variant *study = task->inquiry.study;
+    return study != NULL && !task->recompute_only && study_has_members(study);
 }
 
-void study_estimate(Task *computation, const SimulationLimits *limits) {
-    const StudyRequest *inquiry = &computation->inquiry;
+void study_estimate(Task *task, const SimulationLimits *limits) {
+    const StudyRequest *inquiry = &task->inquiry;
     const Cost own = simulation_cost(&inquiry->simulation);
     Cost whole = own;
     // A series that is computed again needs no study.
-    if (!computation->is_again && study_request_cost(inquiry, limits, &whole, NULL) != STATUS_OK)
+    if (!task->recompute_only && study_request_cost(inquiry, limits, &whole, NULL) != STATUS_OK)
         whole.cpu_seconds = queue_quick; // the run will tell
-    computation->queued.seconds = whole.cpu_seconds;
-    computation->queued.charge = study_is_shared(computation) ? own.cpu_seconds : 0;
+    task->queued.seconds = whole.cpu_seconds;
+    task->queued.charge = study_is_shared(task) ? own.cpu_seconds : 0;
 }
 
-void chunk_run_free(StudyRun *run, ChunkRun *shift) {
-    if (shift == NULL)
+void chunk_run_free(StudyRun *run, ChunkRun *chunk_run) {
+    if (chunk_run == NULL)
         return;
     if (run->gather->drop != NULL)
-        run->gather->drop(shift);
-    free(shift);
+        run->gather->drop(chunk_run);
+    free(chunk_run);
 }
 
 void study_run_free(StudyRun *run) {
     if (run == NULL)
         return;
     while (run->first != NULL) {
-        ChunkRun *shift = run->first;
-        run->first = shift->next;
-        chunk_run_free(run, shift);
+        ChunkRun *chunk_run = run->first;
+        run->first = chunk_run->next;
+        chunk_run_free(run, chunk_run);
     }
     run->gather->free(run);
     study_free(run->work);
-    run_result_clear(&run->findings);
+    run_result_clear(&run->run_result);
     free(run);
 }
 
 // With the lock held: the next turn is in the queue if there is something to do.
 static void enqueue(StudyRun *run) {
-    JobManager *intake = run->intake;
-    Task *computation = run->computation;
-    QueueEntry *entry = &computation->queued;
+    JobManager *manager = run->manager;
+    Task *task = run->task;
+    QueueEntry *entry = &task->queued;
     if (entry->number != 0 || run->first == NULL || run->is_paused)
         return;
     entry->is_turn = true;
     entry->seconds = fmax(run->turn, 1e-3 * STUDY_TURN_MS);
     entry->charge = 0;
-    QueueClient *client = computation->jobs != NULL ? computation->jobs->client : entry->client;
-    queue_put(intake->queue, entry, client, 1e-9 * (double)clock_monotonic_ns());
-    jobs_call_worker(intake);
+    QueueClient *client = task->jobs != NULL ? task->jobs->client : entry->client;
+    queue_put(manager->queue, entry, client, 1e-9 * (double)clock_monotonic_ns());
+    jobs_call_worker(manager);
 }
 
-void study_wait(StudyRun *run, ChunkRun *shift, bool is_first) {
+void study_wait(StudyRun *run, ChunkRun *chunk_run, bool is_first) {
     if (is_first || run->first == NULL) {
-        shift->next = run->first;
-        run->first = shift;
+        chunk_run->next = run->first;
+        run->first = chunk_run;
         if (run->last == NULL)
-            run->last = shift;
+            run->last = chunk_run;
     } else {
-        shift->next = NULL;
-        run->last->next = shift;
-        run->last = shift;
+        chunk_run->next = NULL;
+        run->last->next = chunk_run;
+        run->last = chunk_run;
     }
     enqueue(run);
 }
@@ -91,38 +91,37 @@ static Status no_memory(Problem *problem) {
     return problem_set(problem, STATUS_NO_MEMORY, "no memory for the study");
 }
 
-static Status open_run(Worker *worker, StudyRun *run, RunResult *findings, const Progress *watch,
+static Status open_run(Worker *worker, StudyRun *run, RunResult *run_result, const Progress *watch,
                        Problem *problem) {
-    const StudyRequest *inquiry = &run->computation->inquiry;
-    const StudyTools tools = {.limits = &worker->intake->settings.limits,
+    const StudyRequest *inquiry = &run->task->inquiry;
+    const StudyTools tools = {.limits = &worker->manager->settings.limits,
                               .progress = watch,
                               .workspace = &worker->workspace};
-    TRY(study_begin(inquiry->study, &inquiry->simulation, &tools, &findings->answer.study,
+    TRY(study_begin(inquiry->study, &inquiry->simulation, &tools, &run_result->answer.study,
                     &run->work, problem));
     atomic_store(&run->expected, run->work->expected);
     return run->gather->open(worker, run, problem);
 }
 
-Status study_open(Worker *worker, Task *computation, RunResult *findings, const Progress *watch,
+Status study_open(Worker *worker, Task *task, RunResult *run_result, const Progress *watch,
                   Problem *problem) {
-    JobManager *intake = worker->intake;
+    JobManager *manager = worker->manager;
     StudyRun *run = calloc(1, sizeof *run);
     if (run == NULL)
         return no_memory(problem);
-    run->intake = intake;
-    run->computation = computation;
+    run->manager = manager;
+    run->task = task;
     run->executor = executors[0];
-    run->gather =
-        study_kind(computation->inquiry.study) == &study_sweep ? &gather_rows : &gather_fold;
+    run->gather = study_kind(task->inquiry.study) == &study_sweep ? &gather_rows : &gather_fold;
     run->in_hand = 1; // ours, until it was launched: nobody ends it meanwhile
-    const Status status = open_run(worker, run, findings, watch, problem);
+    const Status status = open_run(worker, run, run_result, watch, problem);
     if (status != STATUS_OK) {
         study_run_free(run);
         return status;
     }
-    pthread_mutex_lock(&intake->lock);
-    computation->study = run; // which frees it from here on
-    pthread_mutex_unlock(&intake->lock);
+    pthread_mutex_lock(&manager->lock);
+    task->study = run; // which frees it from here on
+    pthread_mutex_unlock(&manager->lock);
     return STATUS_OK;
 }
 
@@ -132,22 +131,22 @@ static void fail(StudyRun *run, Status status, const Problem *problem) {
         return;
     run->is_failed = true;
     atomic_store(&run->is_over, true);
-    run_result_fail(&run->findings, status, problem);
+    run_result_fail(&run->run_result, status, problem);
 }
 
-bool study_must_wait(const JobManager *intake, const Task *computation) {
-    return study_is_shared(computation) &&
-           intake->study_count >= STUDIES_PER_WORKER * intake->settings.workers &&
-           intake->study_bytes >= STUDIES_BYTES;
+bool study_must_wait(const JobManager *manager, const Task *task) {
+    return study_is_shared(task) &&
+           manager->study_count >= STUDIES_PER_WORKER * manager->settings.workers &&
+           manager->study_bytes >= STUDIES_BYTES;
 }
 
 // With the lock held.
-static void resume_stalled(JobManager *intake) {
-    while (intake->stalled != NULL) {
-        Task *computation = intake->stalled;
-        intake->stalled = computation->next_stalled;
-        queue_push_front(intake->queue, &computation->queued);
-        jobs_call_worker(intake);
+static void resume_stalled(JobManager *manager) {
+    while (manager->waiting_for_memory != NULL) {
+        Task *task = manager->waiting_for_memory;
+        manager->waiting_for_memory = task->next_stalled;
+        queue_push_front(manager->queue, &task->queued);
+        jobs_call_worker(manager);
     }
 }
 
@@ -162,12 +161,12 @@ static bool let_go(StudyRun *run) {
         run->in_hand--;
         return false;
     }
-    JobManager *intake = run->intake;
-    queue_remove(intake->queue, &run->computation->queued);
-    intake->study_count--;
-    intake->study_bytes -= run->bytes;
-    resume_stalled(intake);
-    for (StudyRun **at = &intake->studies; *at != NULL; at = &(*at)->next)
+    JobManager *manager = run->manager;
+    queue_remove(manager->queue, &run->task->queued);
+    manager->study_count--;
+    manager->study_bytes -= run->bytes;
+    resume_stalled(manager);
+    for (StudyRun **at = &manager->studies; *at != NULL; at = &(*at)->next)
         if (*at == run) {
             *at = run->next;
             break;
@@ -175,25 +174,25 @@ static bool let_go(StudyRun *run) {
     return true;
 }
 
-void study_start(Worker *worker, Task *computation, RunResult *findings, Problem *problem) {
-    JobManager *intake = worker->intake;
-    StudyRun *run = computation->study;
-    run->findings = *findings;
-    *findings = (RunResult){0};
-    pthread_mutex_lock(&intake->lock);
-    run->next = intake->studies;
-    intake->studies = run;
-    run->bytes += outcome_bytes(run->findings.outcome);
-    intake->study_count++;
-    intake->study_bytes += run->bytes;
-    pthread_mutex_unlock(&intake->lock);
+void study_start(Worker *worker, Task *task, RunResult *run_result, Problem *problem) {
+    JobManager *manager = worker->manager;
+    StudyRun *run = task->study;
+    run->run_result = *run_result;
+    *run_result = (RunResult){0};
+    pthread_mutex_lock(&manager->lock);
+    run->next = manager->studies;
+    manager->studies = run;
+    run->bytes += outcome_bytes(run->run_result.outcome);
+    manager->study_count++;
+    manager->study_bytes += run->bytes;
+    pthread_mutex_unlock(&manager->lock);
     problem_clear(problem);
     const Status status = run->gather->submit(run, problem);
-    pthread_mutex_lock(&intake->lock);
+    pthread_mutex_lock(&manager->lock);
     if (status != STATUS_OK)
         fail(run, status, problem);
     const bool is_ended = let_go(run);
-    pthread_mutex_unlock(&intake->lock);
+    pthread_mutex_unlock(&manager->lock);
     if (is_ended)
         study_finish(worker, run, problem);
 }
@@ -205,26 +204,26 @@ ChunkRun *study_take(StudyRun *run, bool *is_ended) {
         *is_ended = let_go(run);
         return NULL;
     }
-    ChunkRun *shift = run->first; // there is one: else it would have no turn
-    run->first = shift->next;
+    ChunkRun *chunk_run = run->first; // there is one: else it would have no turn
+    run->first = chunk_run->next;
     if (run->first == NULL)
         run->last = NULL;
-    shift->next = NULL;
+    chunk_run->next = NULL;
     enqueue(run);
-    return shift;
+    return chunk_run;
 }
 
 void study_stop(StudyRun *run) {
     if (run->in_hand > 0)
         return; // they will see
-    queue_remove(run->intake->queue, &run->computation->queued);
-    queue_push_front(run->intake->queue, &run->computation->queued);
-    jobs_call_worker(run->intake);
+    queue_remove(run->manager->queue, &run->task->queued);
+    queue_push_front(run->manager->queue, &run->task->queued);
+    jobs_call_worker(run->manager);
 }
 
-void studies_resume(JobManager *intake) {
-    resume_stalled(intake);
-    for (StudyRun *run = intake->studies; run != NULL; run = run->next)
+void studies_resume(JobManager *manager) {
+    resume_stalled(manager);
+    for (StudyRun *run = manager->studies; run != NULL; run = run->next)
         if (run->is_paused) {
             run->is_paused = false;
             enqueue(run);
@@ -235,79 +234,80 @@ void studies_resume(JobManager *intake) {
 static void pause(StudyRun *run, const Problem *problem) {
     if (!run->is_told) {
         Bytes line = {.most = 1024};
-        bytes_format(&line, "the sweep %s pauses: %s", run->computation->result, problem->detail);
+        bytes_format(&line, "the sweep %s pauses: %s", run->task->result, problem->detail);
         log_write(&line);
         bytes_clear(&line);
     }
     run->is_told = run->is_paused = true;
-    queue_remove(run->intake->queue, &run->computation->queued);
+    queue_remove(run->manager->queue, &run->task->queued);
 }
 
-void study_work(Worker *worker, StudyRun *run, ChunkRun *shift, Problem *problem) {
-    JobManager *intake = worker->intake;
-    const size_t done = shift->done;
+void study_work(Worker *worker, StudyRun *run, ChunkRun *chunk_run, Problem *problem) {
+    JobManager *manager = worker->manager;
+    const size_t done = chunk_run->done;
     const int64_t began_ns = clock_monotonic_ns(), began_cpu_ns = clock_thread_cpu_ns();
     problem_clear(problem);
-    Status status = shift->is_made ? STATUS_OK : study_chunk_make(worker, run, shift, problem);
+    Status status =
+        chunk_run->is_made ? STATUS_OK : study_chunk_make(worker, run, chunk_run, problem);
     const double seconds = 1e-9 * (double)(clock_monotonic_ns() - began_ns);
     const bool is_parked = status == STATUS_BUSY;
-    job_metrics_study_part(&intake->totals, clock_thread_cpu_ns() - began_cpu_ns);
+    job_metrics_study_part(&manager->totals, clock_thread_cpu_ns() - began_cpu_ns);
     if (status == STATUS_OK && run->gather->end != NULL)
-        status = run->gather->end(run, shift, problem);
-    pthread_mutex_lock(&intake->lock);
+        status = run->gather->end(run, chunk_run, problem);
+    pthread_mutex_lock(&manager->lock);
     worker->study = NULL;
-    intake->slow_running--;
+    manager->slow_running--;
     // At least one member is made at a time.
-    if (shift->done > done)
-        run->turn = seconds / (double)(shift->done - done);
+    if (chunk_run->done > done)
+        run->turn = seconds / (double)(chunk_run->done - done);
     if (status == STATUS_OK) {
         run->is_told = false;
     } else if (is_parked || (run->gather->is_kept && status_is_transient(status))) {
         if (!is_parked)
             pause(run, problem);
-        study_wait(run, shift, true);
-        shift = NULL;
+        study_wait(run, chunk_run, true);
+        chunk_run = NULL;
     } else if (status != STATUS_CANCELLED) {
         fail(run, status, problem);
     }
     // Before the run is let go: another may be the last one then, and free it.
-    chunk_run_free(run, shift);
+    chunk_run_free(run, chunk_run);
     const bool is_ended = let_go(run);
-    pthread_mutex_unlock(&intake->lock);
+    pthread_mutex_unlock(&manager->lock);
     if (is_ended)
         study_finish(worker, run, problem);
 }
 
 // What remains to be told, and the study's document.
 static Status tell_end(Worker *worker, StudyRun *run, Problem *problem) {
-    const Progress watch = {run->computation, task_is_wanted};
-    const StudyTools tools = {.limits = &worker->intake->settings.limits,
+    const Progress watch = {run->task, task_is_wanted};
+    const StudyTools tools = {.limits = &worker->manager->settings.limits,
                               .progress = &watch,
                               .workspace = &worker->workspace};
     problem_clear(problem);
     if (run->gather->finish != NULL)
         TRY(run->gather->finish(run, &tools, problem));
-    return run_result_add_to_study(&run->findings, problem);
+    return run_result_add_to_study(&run->run_result, problem);
 }
 
 void study_finish(Worker *worker, StudyRun *run, Problem *problem) {
-    JobManager *intake = worker->intake;
-    Task *computation = run->computation;
+    JobManager *manager = worker->manager;
+    Task *task = run->task;
     run->executor->cancel(run);
-    if (!run->is_failed && !atomic_load(&computation->is_stopped)) {
+    if (!run->is_failed && !atomic_load(&task->is_stopped)) {
         const int64_t began_ns = clock_thread_cpu_ns();
         const Status status = tell_end(worker, run, problem);
-        job_metrics_study_part(&intake->totals, clock_thread_cpu_ns() - began_ns);
+        job_metrics_study_part(&manager->totals, clock_thread_cpu_ns() - began_ns);
         if (status != STATUS_OK)
-            run_result_fail(&run->findings, status, problem);
+            run_result_fail(&run->run_result, status, problem);
     }
-    run->findings.ended_ns = clock_monotonic_ns();
-    if (atomic_load(&computation->is_stopped)) {
-        task_abandon(intake, computation); // and the run
+    run->run_result.ended_ns = clock_monotonic_ns();
+    if (atomic_load(&task->is_stopped)) {
+        task_abandon(manager, task); // and the run
     } else {
-        RunResult findings = run->findings;
-        run->findings = (RunResult){0};
-        task_finish(intake, computation, &findings);
-        run_result_clear(&findings);
+        RunResult run_result = run->run_result;
+        run->run_result = (RunResult){0};
+        task_finish(manager, task, &run_result);
+        run_result_clear(&run_result);
     }
 }

@@ -16,16 +16,16 @@ static Status no_memory(Problem *problem) {
 }
 
 static Status fold_open(Worker *worker, StudyRun *run, Problem *problem) {
-    const StudyRequest *inquiry = &run->computation->inquiry;
+    const StudyRequest *inquiry = &run->task->inquiry;
     Fold *fold = calloc(1, sizeof *fold);
     Cost cost;
     if (fold == NULL)
         return no_memory(problem);
     run->fold = fold;
-    const Status status = run->executor->probe(worker->intake, &fold->limits, problem);
+    const Status status = run->executor->probe(worker->manager, &fold->limits, problem);
     TRY(reorder_make(run->work, fold->limits.slots, &fold->order, problem));
     TRY(status);
-    TRY(study_request_cost(inquiry, &worker->intake->settings.limits, &cost, problem));
+    TRY(study_request_cost(inquiry, &worker->manager->settings.limits, &cost, problem));
     fold->seconds = cost.cpu_seconds / (double)(run->work->members + 1);
     run->bytes = run->work->bytes + fold->order.window * run->work->part_bytes;
     return STATUS_OK;
@@ -51,8 +51,9 @@ static Status fold_submit(StudyRun *run, Problem *problem) {
     return to > from ? submit_stretch(run, from, to, problem) : STATUS_OK;
 }
 
-static Status fold_take(StudyRun *run, ChunkRun *shift, StudyPart *part, Problem *problem) {
-    TRY(reorder_put(&run->fold->order, shift->chunk.first + shift->done * shift->chunk.stride, part,
+static Status fold_take(StudyRun *run, ChunkRun *chunk_run, StudyPart *part, Problem *problem) {
+    TRY(reorder_put(&run->fold->order,
+                    chunk_run->chunk.first + chunk_run->done * chunk_run->chunk.stride, part,
                     problem));
     return fold_submit(run, problem);
 }

@@ -13,18 +13,18 @@ typedef struct StudySink {
     Status (*open)(Worker *worker, StudyRun *run, Problem *problem);
     // Hands chunks to the executor: those that are not there and that nobody is at.
     Status (*submit)(StudyRun *run, Problem *problem);
-    // Takes the part that the shift's next member came to, in any case.
-    Status (*take)(StudyRun *run, ChunkRun *shift, StudyPart *part, Problem *problem);
+    // Takes the part that the chunk_run's next member came to, in any case.
+    Status (*take)(StudyRun *run, ChunkRun *chunk_run, StudyPart *part, Problem *problem);
     void (*free)(StudyRun *run);
     // What follows is NULL where there is nothing to be done. Before the first member of a chunk:
-    Status (*begin)(StudyRun *run, ChunkRun *shift, Problem *problem);
-    // Whether the shift's next member is there already.
-    bool (*has)(const StudyRun *run, const ChunkRun *shift);
+    Status (*begin)(StudyRun *run, ChunkRun *chunk_run, Problem *problem);
+    // Whether the chunk_run's next member is there already.
+    bool (*has)(const StudyRun *run, const ChunkRun *chunk_run);
     // After the last member of a chunk, again where there was no room.
-    Status (*end)(StudyRun *run, ChunkRun *shift, Problem *problem);
+    Status (*end)(StudyRun *run, ChunkRun *chunk_run, Problem *problem);
     // When all that was wanted is there: what remains to be told.
     Status (*finish)(StudyRun *run, const StudyTools *tools, Problem *problem);
-    void (*drop)(ChunkRun *shift); // what it holds of a chunk
+    void (*drop)(ChunkRun *chunk_run); // what it holds of a chunk
 } StudySink;
 
 extern const StudySink gather_rows, gather_fold;

@@ -19,33 +19,33 @@
 
 // With the lock held: one of this scene that is under way, to be shared. One for readers alone
 // saves nothing.
-static Task *find_shared(const JobManager *intake, const char *result) {
-    Task *computation = hashmap_find(intake->in_flight, result);
-    return computation != NULL && computation->is_again ? NULL : computation;
+static Task *find_shared(const JobManager *manager, const char *result) {
+    Task *task = hashmap_find(manager->in_flight, result);
+    return task != NULL && task->recompute_only ? NULL : task;
 }
 
 // Plan, summary, work and notes of a result that is there already. STATUS_NOT_FOUND if it is not.
-static Status find_known(JobManager *intake, Job *job, Problem *problem) {
-    pthread_mutex_lock(&intake->lock);
-    job->head = cache_head(intake->cache, job->row.result);
+static Status find_known(JobManager *manager, Job *job, Problem *problem) {
+    pthread_mutex_lock(&manager->lock);
+    job->head = cache_head(manager->cache, job->row.result);
     // What is in flight is not there either.
-    const bool is_new = job->head == NULL && find_shared(intake, job->row.result) != NULL;
-    pthread_mutex_unlock(&intake->lock);
+    const bool is_new = job->head == NULL && find_shared(manager, job->row.result) != NULL;
+    pthread_mutex_unlock(&manager->lock);
     if (job->head != NULL)
         return STATUS_OK;
     if (is_new)
         return STATUS_NOT_FOUND;
     ResultRow row = {0};
-    const Status status = db_result_head(intake->store, job->row.result, &row, NULL);
+    const Status status = db_result_head(manager->db, job->row.result, &row, NULL);
     if (status == STATUS_OK)
         job->head = result_summary_new(&row);
     result_row_clear(&row);
-    pthread_mutex_lock(&intake->lock);
-    intake->rows.hits += status == STATUS_OK;
-    intake->rows.misses += status == STATUS_NOT_FOUND;
+    pthread_mutex_lock(&manager->lock);
+    manager->rows.hits += status == STATUS_OK;
+    manager->rows.misses += status == STATUS_NOT_FOUND;
     if (job->head != NULL)
-        cache_put(intake->cache, job->row.result, NULL, job->head);
-    pthread_mutex_unlock(&intake->lock);
+        cache_put(manager->cache, job->row.result, NULL, job->head);
+    pthread_mutex_unlock(&manager->lock);
     if (status == STATUS_OK || status == STATUS_NOT_FOUND)
         return status;
     return problem_set(problem, status, "the results could not be searched");
@@ -54,8 +54,8 @@ static Status find_known(JobManager *intake, Job *job, Problem *problem) {
 // The store has answered that it was accepted.
 static void opened(void *context, Status status, const char *detail) {
     Job *job = context;
-    JobManager *intake = job->intake;
-    pthread_mutex_lock(&intake->lock);
+    JobManager *manager = job->manager;
+    pthread_mutex_lock(&manager->lock);
     job->ticket = NULL;
     // What closes it saves the whole, and tells.
     if (!job->is_closing) {
@@ -66,103 +66,103 @@ static void opened(void *context, Status status, const char *detail) {
         jobs_refuse(job, status, detail);
     if (status == STATUS_OK && (!job->is_closing || !job_state_is_final(job->row.state))) {
         job->is_kept = true;
-        subscribers_call(&job->keepers);
+        subscribers_call(&job->save_waiters);
     }
-    jobs_settle(intake);
-    pthread_mutex_unlock(&intake->lock);
+    jobs_settle(manager);
+    pthread_mutex_unlock(&manager->lock);
     job_unref(job); // the post's hold
 }
 
 // With the lock held.
-static Status post(JobManager *intake, Job *job, WritePriority turn, Problem *problem) {
+static Status post(JobManager *manager, Job *job, WritePriority turn, Problem *problem) {
     const WriteDone done = {opened, job_ref(job)};
-    job->opening = job->row;
-    const Status status = db_job_post(intake->store, &job->opening, turn, &done, &job->ticket);
+    job->insert_row = job->row;
+    const Status status = db_job_post(manager->db, &job->insert_row, turn, &done, &job->ticket);
     if (status == STATUS_OK) {
-        intake->posted++;
+        manager->posted++;
         return STATUS_OK;
     }
     job_unref(job); // the post's hold
     return problem_set(problem, status, "no memory for a job");
 }
 
-static Status finish_known(JobManager *intake, Job *job, Problem *problem) {
+static Status finish_known(JobManager *manager, Job *job, Problem *problem) {
     JobRow *row = &job->row;
     row->state = JOB_SUCCESSFUL;
     row->is_cached = true;
     row->started_unix_ms = row->finished_unix_ms = clock_unix_ms();
     row->total = 1e-9 * (double)(clock_monotonic_ns() - job->submitted_ns);
-    pthread_mutex_lock(&intake->lock);
-    const Status status = post(intake, job, STORE_NOW, problem);
-    pthread_mutex_unlock(&intake->lock);
+    pthread_mutex_lock(&manager->lock);
+    const Status status = post(manager, job, STORE_NOW, problem);
+    pthread_mutex_unlock(&manager->lock);
     if (status == STATUS_OK)
-        job_metrics_ended(&intake->totals, JOB_SUCCESSFUL, true);
+        job_metrics_ended(&manager->totals, JOB_SUCCESSFUL, true);
     return status;
 }
 
 // With the lock held: whether there is room in the queue.
-static Status find_room(const JobManager *intake, const Job *job, Problem *problem) {
-    if (intake->is_closing)
+static Status find_room(const JobManager *manager, const Job *job, Problem *problem) {
+    if (manager->is_closing)
         return problem_set(problem, STATUS_BUSY, "the daemon is stopping");
-    if (intake->live >= intake->settings.queue_most)
+    if (manager->live >= manager->settings.queue_most)
         return problem_set(problem, STATUS_BUSY,
                            "the queue is full: of unfinished jobs it has %zu, and may have %zu",
-                           intake->live, intake->settings.queue_most);
-    if (intake->scene_bytes + strlen(job->row.scene) > intake->settings.queue_bytes)
+                           manager->live, manager->settings.queue_most);
+    if (manager->scene_bytes + strlen(job->row.scene) > manager->settings.queue_bytes)
         return problem_set(problem, STATUS_BUSY,
                            "the queue is full: %zu bytes of scenes wait, %zu are allowed",
-                           intake->scene_bytes, intake->settings.queue_bytes);
-    return limits_check(intake, job->client, problem);
+                           manager->scene_bytes, manager->settings.queue_bytes);
+    return limits_check(manager, job->client, problem);
 }
 
 // A computation of this scene, without jobs. Takes the inquiry. NULL without memory.
 static Task *begin(const JobRow *row, StudyRequest *inquiry) {
-    Task *computation = task_new(row->result);
-    if (computation != NULL) {
-        computation->scene = strdup(row->scene);
-        computation->warnings = strdup(row->warnings);
-        computation->inquiry = *inquiry;
+    Task *task = task_new(row->result);
+    if (task != NULL) {
+        task->scene = strdup(row->scene);
+        task->warnings = strdup(row->warnings);
+        task->inquiry = *inquiry;
         *inquiry = (StudyRequest){0};
-        if (computation->scene != NULL && computation->warnings != NULL)
-            return computation;
+        if (task->scene != NULL && task->warnings != NULL)
+            return task;
     }
-    task_free(computation);
+    task_free(task);
     study_request_clear(inquiry);
     return NULL;
 }
 
 // Queues it, or lets it share what is under way. Takes the inquiry.
-static Status start(JobManager *intake, Job *job, StudyRequest *inquiry, bool is_retry,
+static Status start(JobManager *manager, Job *job, StudyRequest *inquiry, bool is_retry,
                     Problem *problem) {
-    Task *computation = begin(&job->row, inquiry);
-    if (computation == NULL)
+    Task *task = begin(&job->row, inquiry);
+    if (task == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
-    pthread_mutex_lock(&intake->lock);
-    Task *other = find_shared(intake, job->row.result);
+    pthread_mutex_lock(&manager->lock);
+    Task *other = find_shared(manager, job->row.result);
     // It mostly has run before anyone must be told that it was accepted, and is then written once.
     // But a sweep's rows need their job beside them.
     const WritePriority turn = job->row.study == NULL ? STORE_LATER : STORE_NOW;
     // It may have become known meanwhile.
     if (other == NULL && !is_retry &&
-        (job->head = cache_head(intake->cache, job->row.result)) != NULL) {
-        pthread_mutex_unlock(&intake->lock);
-        task_free(computation);
-        return finish_known(intake, job, problem);
+        (job->head = cache_head(manager->cache, job->row.result)) != NULL) {
+        pthread_mutex_unlock(&manager->lock);
+        task_free(task);
+        return finish_known(manager, job, problem);
     }
-    Status status = find_room(intake, job, problem);
+    Status status = find_room(manager, job, problem);
     if (status == STATUS_OK)
-        status = post(intake, job, turn, problem);
+        status = post(manager, job, turn, problem);
     if (status == STATUS_OK) {
-        jobs_admit(intake, job);
+        jobs_admit(manager, job);
         if (other == NULL)
-            jobs_enqueue(intake, computation, job->client);
+            jobs_enqueue(manager, task, job->client);
         else
-            queue_rebalance(intake->queue, &other->queued, job->client);
-        jobs_attach(job, other != NULL ? other : computation);
+            queue_rebalance(manager->queue, &other->queued, job->client);
+        jobs_attach(job, other != NULL ? other : task);
     }
-    pthread_mutex_unlock(&intake->lock);
+    pthread_mutex_unlock(&manager->lock);
     if (status != STATUS_OK || other != NULL)
-        task_free(computation);
+        task_free(task);
     return status;
 }
 
@@ -252,74 +252,75 @@ static void fail_row(JobRow *row, const Problem *problem) {
     row->finished_unix_ms = clock_unix_ms();
 }
 
-static Status submit(JobManager *intake, Job *job, StudyRequest *inquiry, bool is_retry,
+static Status submit(JobManager *manager, Job *job, StudyRequest *inquiry, bool is_retry,
                      Problem *problem) {
-    const Status known = is_retry ? STATUS_NOT_FOUND : find_known(intake, job, problem);
+    const Status known = is_retry ? STATUS_NOT_FOUND : find_known(manager, job, problem);
     if (known == STATUS_OK)
-        return finish_known(intake, job, problem);
+        return finish_known(manager, job, problem);
     if (known != STATUS_NOT_FOUND)
         return known;
-    return start(intake, job, inquiry, is_retry, problem);
+    return start(manager, job, inquiry, is_retry, problem);
 }
 
 // Who asks, if it may.
-static Status enter_client(JobManager *intake, const char *name, QueueClient **client,
+static Status enter_client(JobManager *manager, const char *name, QueueClient **client,
                            Problem *problem) {
     Status status = STATUS_OK;
-    pthread_mutex_lock(&intake->lock);
-    *client = queue_client(intake->queue, name != NULL ? name : "");
+    pthread_mutex_lock(&manager->lock);
+    *client = queue_client(manager->queue, name != NULL ? name : "");
     if (*client == NULL)
         status = problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
     else
-        status = limits_add(intake, *client, problem);
-    pthread_mutex_unlock(&intake->lock);
+        status = limits_add(manager, *client, problem);
+    pthread_mutex_unlock(&manager->lock);
     return status;
 }
 
-Status jobs_charge(JobManager *intake, const char *client, Problem *problem) {
+Status jobs_charge(JobManager *manager, const char *client, Problem *problem) {
     QueueClient *charged;
-    return enter_client(intake, client, &charged, problem);
+    return enter_client(manager, client, &charged, problem);
 }
 
 // A record that it names may have been deleted since it was looked up under `generation`. From here
 // on none is before the store knows of the job.
-static Status submit_named(JobManager *intake, Job *job, StudyRequest *inquiry, uint64_t generation,
-                           const Submission *submission, Problem *problem) {
+static Status submit_named(JobManager *manager, Job *job, StudyRequest *inquiry,
+                           uint64_t catalog_version, const Submission *submission,
+                           Problem *problem) {
     Status status = STATUS_OK;
-    naming_enter(&intake->naming);
-    if (db_catalog_version(intake->store) != generation)
-        status = resolve_records_again(intake->store, inquiry, problem);
+    naming_enter(&manager->naming);
+    if (db_catalog_version(manager->db) != catalog_version)
+        status = resolve_records_again(manager->db, inquiry, problem);
     if (status == STATUS_OK)
-        status = submit(intake, job, inquiry, submission->retry_of != NULL, problem);
-    naming_leave(&intake->naming);
+        status = submit(manager, job, inquiry, submission->retry_of != NULL, problem);
+    naming_leave(&manager->naming);
     return status;
 }
 
-static Status submit_new(JobManager *intake, const Submission *submission,
+static Status submit_new(JobManager *manager, const Submission *submission,
                          const IdempotencyHold *hold, Job **accepted, Problem *problem) {
     QueueClient *client;
-    TRY(enter_client(intake, submission->client, &client, problem));
-    Job *job = job_new(intake);
+    TRY(enter_client(manager, submission->client, &client, problem));
+    Job *job = job_new(manager);
     if (job == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
     job->submitted_ns = clock_monotonic_ns();
     job->client = client;
     StudyRequest inquiry = {0};
     Warnings warnings = {NULL, 0};
-    const uint64_t generation = db_catalog_version(intake->store);
+    const uint64_t catalog_version = db_catalog_version(manager->db);
     bool has_place;
     Status status =
-        jobs_prepare_request(intake, submission->text, submission->size, &intake->settings.limits,
+        jobs_prepare_request(manager, submission->text, submission->size, &manager->settings.limits,
                              &has_place, &inquiry, &warnings, problem);
     if (status == STATUS_OK)
         status = fill_job(job, &inquiry, &warnings, problem);
     if (status == STATUS_OK)
         status = fill_sender(job, submission, hold);
     if (status == STATUS_OK && job->row.uses == NULL)
-        status = submit(intake, job, &inquiry, submission->retry_of != NULL, problem);
+        status = submit(manager, job, &inquiry, submission->retry_of != NULL, problem);
     else if (status == STATUS_OK)
-        status = submit_named(intake, job, &inquiry, generation, submission, problem);
-    jobs_leave_place(intake, has_place);
+        status = submit_named(manager, job, &inquiry, catalog_version, submission, problem);
+    jobs_leave_place(manager, has_place);
     study_request_clear(&inquiry);
     warnings_clear(&warnings);
     if (status != STATUS_OK) {
@@ -330,50 +331,50 @@ static Status submit_new(JobManager *intake, const Submission *submission,
     return STATUS_OK;
 }
 
-static Status submit_retry(JobManager *intake, const Submission *submission,
+static Status submit_retry(JobManager *manager, const Submission *submission,
                            const IdempotencyHold *hold, Job **accepted, Problem *problem) {
     SweepRow row;
-    pthread_mutex_lock(&intake->retries);
-    Status status = sweep_retry_open(intake, submission->retry_of, &row, problem);
+    pthread_mutex_lock(&manager->retries);
+    Status status = sweep_retry_open(manager, submission->retry_of, &row, problem);
     if (status == STATUS_OK) {
         Submission scene = *submission;
         scene.text = row.scene;
         scene.size = strlen(row.scene);
-        status = submit_new(intake, &scene, hold, accepted, problem);
+        status = submit_new(manager, &scene, hold, accepted, problem);
     }
-    pthread_mutex_unlock(&intake->retries);
+    pthread_mutex_unlock(&manager->retries);
     sweep_row_clear(&row);
     return status;
 }
 
-Status jobs_submit(JobManager *intake, const Submission *submission, Job **accepted,
+Status jobs_submit(JobManager *manager, const Submission *submission, Job **accepted,
                    Problem *problem) {
     IdempotencyHold hold;
-    Status status = idempotency_begin(intake, submission, &hold, accepted, problem);
+    Status status = idempotency_begin(manager, submission, &hold, accepted, problem);
     if (submission->is_replayed != NULL)
         *submission->is_replayed = *accepted != NULL;
     if (status == STATUS_OK && *accepted == NULL) {
         status = submission->retry_of != NULL
-                     ? submit_retry(intake, submission, &hold, accepted, problem)
-                     : submit_new(intake, submission, &hold, accepted, problem);
+                     ? submit_retry(manager, submission, &hold, accepted, problem)
+                     : submit_new(manager, submission, &hold, accepted, problem);
         if (status == STATUS_OK)
-            idempotency_remember(intake, &hold, *accepted);
+            idempotency_remember(manager, &hold, *accepted);
     }
-    idempotency_end(intake, &hold);
+    idempotency_end(manager, &hold);
     return status;
 }
 
 // Takes the row and the inquiry.
-static Status resume(JobManager *intake, JobRow *row, StudyRequest *inquiry, Problem *problem) {
-    Job *job = job_new(intake);
-    QueueClient *client = queue_client(intake->queue, row->client != NULL ? row->client : "");
-    Task *computation = NULL;
+static Status resume(JobManager *manager, JobRow *row, StudyRequest *inquiry, Problem *problem) {
+    Job *job = job_new(manager);
+    QueueClient *client = queue_client(manager->queue, row->client != NULL ? row->client : "");
+    Task *task = NULL;
     jobs_result_id(inquiry, row->result);
     if (job != NULL && client != NULL && row->result[0] != '\0' &&
-        (computation = hashmap_find(intake->in_flight, row->result)) == NULL &&
-        (computation = begin(row, inquiry)) != NULL)
-        jobs_enqueue(intake, computation, client);
-    if (computation == NULL) {
+        (task = hashmap_find(manager->in_flight, row->result)) == NULL &&
+        (task = begin(row, inquiry)) != NULL)
+        jobs_enqueue(manager, task, client);
+    if (task == NULL) {
         job_unref(job);
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the unfinished jobs");
     }
@@ -386,28 +387,28 @@ static Status resume(JobManager *intake, JobRow *row, StudyRequest *inquiry, Pro
     job->row.state = JOB_ACCEPTED;
     job->client = client;
     job->indexed.key = job->row.id;
-    jobs_admit(intake, job);
-    jobs_attach(job, computation);
+    jobs_admit(manager, job);
+    jobs_attach(job, task);
     free(job->row.scene);
     job->row.scene = NULL;
     job_unref(job);
     return STATUS_OK;
 }
 
-Status jobs_take_up(JobManager *intake, JobRow *row, Problem *problem) {
+Status jobs_take_up(JobManager *manager, JobRow *row, Problem *problem) {
     Problem *fault = calloc(1, sizeof *fault);
     StudyRequest inquiry = {0};
     Warnings warnings = {NULL, 0};
     if (fault == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the unfinished jobs");
-    Status status = jobs_prepare(intake->store, row->scene, strlen(row->scene),
-                                 &intake->settings.limits, &inquiry, &warnings, fault);
+    Status status = jobs_prepare(manager->db, row->scene, strlen(row->scene),
+                                 &manager->settings.limits, &inquiry, &warnings, fault);
     if (status == STATUS_OK) {
-        status = resume(intake, row, &inquiry, problem);
+        status = resume(manager, row, &inquiry, problem);
     } else if (status == STATUS_INVALID || status == STATUS_UNREADABLE) {
         // The limits or the program changed meanwhile: the job's owner learns why.
         fail_row(row, fault);
-        status = db_job_update(intake->store, row, problem);
+        status = db_job_update(manager->db, row, problem);
     } else {
         problem_set(problem, status, "%s", fault->detail);
     }

@@ -7,6 +7,6 @@
 
 // Without the intake's lock, with that of its retries, until the scene was submitted. The sweep of
 // the job `id`, judged and opened; to be cleared in any case.
-Status sweep_retry_open(JobManager *intake, const char *id, SweepRow *row, Problem *problem);
+Status sweep_retry_open(JobManager *manager, const char *id, SweepRow *row, Problem *problem);
 
 #endif

@@ -26,8 +26,8 @@ static Status read_scene(SweepView *show, Problem *problem) {
         problem_set(problem, STATUS_INTERNAL, "the stored scene cannot be read: %s", fault->detail);
     // Points' scenes take their records from here. Where one is gone they say so.
     if (status == STATUS_OK) {
-        (void)resolve_record_motion(show->store, &show->inquiry.simulation, fault);
-        (void)resolve_sweep_records(show->store, &show->inquiry, fault);
+        (void)resolve_record_motion(show->db, &show->inquiry.simulation, fault);
+        (void)resolve_sweep_records(show->db, &show->inquiry, fault);
     }
     free(fault);
     if (status != STATUS_OK)
@@ -81,7 +81,7 @@ static Status find_failures(SweepView *show, Problem *problem) {
         SweepChunkRow chunk = {0};
         if (head->failed == 0)
             continue;
-        TRY(db_sweep_chunk(show->store, show->row.number, head->chunk, &chunk, problem));
+        TRY(db_sweep_chunk(show->db, show->row.number, head->chunk, &chunk, problem));
         take_failures(&show->row, &chunk, failed);
         sweep_chunk_row_clear(&chunk);
     }
@@ -103,29 +103,29 @@ static Status find_failures(SweepView *show, Problem *problem) {
 }
 
 // A sweep that has not begun has no rows, but is one.
-static Status find(Db *store, const char *id, bool is_job, SweepRow *row, Problem *problem) {
+static Status find(Db *db, const char *id, bool is_job, SweepRow *row, Problem *problem) {
     JobRow job;
     if (!is_job)
-        return db_sweep_load(store, id, row, problem);
-    TRY(db_job_load(store, id, &job, problem));
+        return db_sweep_load(db, id, row, problem);
+    TRY(db_job_load(db, id, &job, problem));
     const bool has_scene = job.state != JOB_SUCCESSFUL; // that was its result's
-    const Status status = db_sweep_load(store, job.result, row, has_scene ? NULL : problem);
+    const Status status = db_sweep_load(db, job.result, row, has_scene ? NULL : problem);
     job_row_clear(&job);
     if (status == STATUS_NOT_FOUND && has_scene)
-        return db_sweep_asked(store, id, row, problem);
+        return db_sweep_asked(db, id, row, problem);
     return status == STATUS_OK || status == STATUS_NOT_FOUND
                ? status
                : problem_set(problem, status, "the sweeps cannot be searched");
 }
 
-Status sweep_view_load(Db *store, const char *id, bool is_job, bool has_rows, SweepView *show,
+Status sweep_view_load(Db *db, const char *id, bool is_job, bool has_rows, SweepView *show,
                        Problem *problem) {
     memset(show, 0, sizeof *show);
-    show->store = store;
-    TRY(find(store, id, is_job, &show->row, problem));
+    show->db = db;
+    TRY(find(db, id, is_job, &show->row, problem));
     TRY(read_scene(show, problem));
     TRY(tell(show, problem));
-    TRY(db_sweep_chunks(store, show->row.number, &show->chunks, problem));
+    TRY(db_sweep_chunks(db, show->row.number, &show->chunks, problem));
     show->is_complete = show->row.chunks > 0 && show->chunks.count == show->row.chunks;
     for (size_t i = 0; i < show->chunks.count; i++) {
         show->is_complete = show->is_complete && !show->chunks.at[i].is_open;
@@ -156,7 +156,7 @@ static bool load_window(SweepView *show, size_t place) {
             return false;
     }
     show->is_loaded =
-        db_sweep_read(show->store, &show->row, &show->chunks, place * sweep_row_size(&show->row),
+        db_sweep_read(show->db, &show->row, &show->chunks, place * sweep_row_size(&show->row),
                       show->places * sweep_row_size(&show->row), show->window, NULL) == STATUS_OK;
     show->place = place;
     return show->is_loaded;
@@ -187,7 +187,7 @@ bool sweep_view_read(void *of, size_t cell, size_t first, size_t count, double *
     return true;
 }
 
-Status sweep_point_load(Db *store, const SweepView *show, uint64_t point, SweepPointView *target,
+Status sweep_point_load(Db *db, const SweepView *show, uint64_t point, SweepPointView *target,
                         Problem *problem) {
     SweepGrid *grid;
     SweepChunkRow chunk = {0};
@@ -199,7 +199,7 @@ Status sweep_point_load(Db *store, const SweepView *show, uint64_t point, SweepP
     target->values = calloc(row->metrics, sizeof *target->values);
     if (target->values == NULL)
         return no_memory(problem);
-    const Status known = db_sweep_chunk(store, row->number, point % row->chunks, &chunk, NULL);
+    const Status known = db_sweep_chunk(db, row->number, point % row->chunks, &chunk, NULL);
     if (known != STATUS_OK && known != STATUS_NOT_FOUND)
         return problem_set(problem, known, "the sweep's rows cannot be read");
     const size_t place = (size_t)(point / row->chunks);

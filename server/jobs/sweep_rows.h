@@ -12,7 +12,7 @@ typedef struct SweepView {
     SweepRow row;
     StudyRequest inquiry; // with its study
     Sweep *sweep;         // the answer; of its table what failed, where it was asked for
-    Db *store;
+    Db *db;
     SweepChunkRows chunks; // that are there, without their rows
     size_t rows;           // of those
     bool is_complete;      // every chunk is there and none is open
@@ -24,7 +24,7 @@ typedef struct SweepView {
 
 // By its result, or (`is_job`) by a job that makes it or did. `has_rows`: what failed too. Cleared
 // by sweep_view_clear in any case.
-Status sweep_view_load(Db *store, const char *id, bool is_job, bool has_rows, SweepView *show,
+Status sweep_view_load(Db *db, const char *id, bool is_job, bool has_rows, SweepView *show,
                        Problem *problem);
 void sweep_view_clear(SweepView *show);
 
@@ -41,7 +41,7 @@ typedef struct SweepPointView {
     StudyRequest scene; // completed, as it can be submitted; by study_request_clear
 } SweepPointView;
 // STATUS_NOT_FOUND beyond the last. Cleared by the caller in any case.
-Status sweep_point_load(Db *store, const SweepView *show, uint64_t point, SweepPointView *target,
+Status sweep_point_load(Db *db, const SweepView *show, uint64_t point, SweepPointView *target,
                         Problem *problem);
 
 #endif

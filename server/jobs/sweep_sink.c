@@ -18,7 +18,7 @@ static Status no_memory(Problem *problem) {
 // CPU that a point takes, about, by some of them [s].
 static Status fly_pilot(Worker *worker, StudyRun *run, double *seconds, Problem *problem) {
     const Progress watch = {run, study_continues};
-    const StudyTools tools = {.limits = &worker->intake->settings.limits,
+    const StudyTools tools = {.limits = &worker->manager->settings.limits,
                               .progress = &watch,
                               .workspace = &worker->workspace};
     const size_t points = run->work->members, most = points < PILOT ? points : PILOT;
@@ -40,20 +40,20 @@ static Status fly_pilot(Worker *worker, StudyRun *run, double *seconds, Problem 
 
 // Intent is durable before anything runs; an earlier one stands.
 static Status rows_open(Worker *worker, StudyRun *run, Problem *problem) {
-    Db *store = worker->intake->store;
-    const Task *computation = run->computation;
-    const SweepStudy *study = (const SweepStudy *)(const void *)computation->inquiry.study;
+    Db *db = worker->manager->db;
+    const Task *task = run->task;
+    const SweepStudy *study = (const SweepStudy *)(const void *)task->inquiry.study;
     const uint64_t points = run->work->members, metrics = study->metrics.count;
-    const Status known = db_sweep_load(store, computation->result, &run->row, NULL);
+    const Status known = db_sweep_load(db, task->result, &run->row, NULL);
     if (known != STATUS_OK && known != STATUS_NOT_FOUND)
         return problem_set(problem, known, "the sweeps could not be searched");
     if (known == STATUS_NOT_FOUND) {
         ExecutorLimits limits;
         double seconds = 0;
-        TRY(run->executor->probe(worker->intake, &limits, problem));
+        TRY(run->executor->probe(worker->manager, &limits, problem));
         TRY(fly_pilot(worker, run, &seconds, problem));
-        text_fit(run->row.result, sizeof run->row.result, computation->result);
-        run->row.scene = strdup(computation->scene);
+        text_fit(run->row.result, sizeof run->row.result, task->result);
+        run->row.scene = strdup(task->scene);
         if (run->row.scene == NULL)
             return no_memory(problem);
         run->row.metrics = metrics;
@@ -62,7 +62,7 @@ static Status rows_open(Worker *worker, StudyRun *run, Problem *problem) {
         run->row.created_unix_ms = clock_unix_ms();
     }
     // Also what is there: it may be on the way out, with the last job before this one.
-    TRY(db_sweep_begin(store, &run->row, problem));
+    TRY(db_sweep_begin(db, &run->row, problem));
     if (run->row.points != points || run->row.metrics != metrics)
         return problem_set(problem, STATUS_INTERNAL,
                            "the stored sweep no longer stands for this scene");
@@ -99,15 +99,15 @@ static size_t list_missing(StudyRun *run, const SweepChunkRows *there, Chunk *ch
         if (run->executor->poll(run, &chunk) == CHUNK_DEAD)
             chunks[count++] = chunk;
     }
-    pthread_mutex_lock(&run->intake->lock);
+    pthread_mutex_lock(&run->manager->lock);
     set_left(run, left);
-    pthread_mutex_unlock(&run->intake->lock);
+    pthread_mutex_unlock(&run->manager->lock);
     return count;
 }
 
 static Status rows_submit(StudyRun *run, Problem *problem) {
     SweepChunkRows there = {NULL, 0};
-    TRY(db_sweep_chunks(run->intake->store, run->row.number, &there, problem));
+    TRY(db_sweep_chunks(run->manager->db, run->row.number, &there, problem));
     Chunk *chunks = calloc(run->row.chunks, sizeof *chunks);
     Status status = chunks != NULL ? STATUS_OK : no_memory(problem);
     if (status == STATUS_OK)
@@ -118,54 +118,56 @@ static Status rows_submit(StudyRun *run, Problem *problem) {
 }
 
 // Room for the rows; those that are there already where only failed ones are made again.
-static Status rows_begin(StudyRun *run, ChunkRun *shift, Problem *problem) {
-    const size_t rows = shift->chunk.count, size = rows * sweep_row_size(&run->row);
+static Status rows_begin(StudyRun *run, ChunkRun *chunk_run, Problem *problem) {
+    const size_t rows = chunk_run->chunk.count, size = rows * sweep_row_size(&run->row);
     if (run->row.retries > 0) {
-        const Status known = db_sweep_chunk(run->intake->store, run->row.number, shift->chunk.first,
-                                            &shift->row, problem);
-        shift->is_again = known == STATUS_OK && shift->row.rows.size == size;
+        const Status known = db_sweep_chunk(run->manager->db, run->row.number,
+                                            chunk_run->chunk.first, &chunk_run->row, problem);
+        chunk_run->recompute_only = known == STATUS_OK && chunk_run->row.rows.size == size;
         if (known != STATUS_OK && known != STATUS_NOT_FOUND)
             return known;
         problem_clear(problem);
     }
-    if (!shift->is_again) {
-        sweep_chunk_row_clear(&shift->row);
-        shift->row.rows = (StoredBytes){calloc(rows, sweep_row_size(&run->row)), size};
+    if (!chunk_run->recompute_only) {
+        sweep_chunk_row_clear(&chunk_run->row);
+        chunk_run->row.rows = (StoredBytes){calloc(rows, sweep_row_size(&run->row)), size};
     }
-    free(shift->row.reasons);
-    shift->row.reasons = NULL;
-    shift->row.sweep = run->row.number;
-    shift->row.chunk = shift->chunk.first;
-    shift->row.failed = 0;
-    shift->row.is_open = false;
-    if (shift->row.rows.at == NULL)
-        shift->row.rows.size = 0;
-    return shift->row.rows.at == NULL ? no_memory(problem) : STATUS_OK;
+    free(chunk_run->row.reasons);
+    chunk_run->row.reasons = NULL;
+    chunk_run->row.sweep = run->row.number;
+    chunk_run->row.chunk = chunk_run->chunk.first;
+    chunk_run->row.failed = 0;
+    chunk_run->row.is_open = false;
+    if (chunk_run->row.rows.at == NULL)
+        chunk_run->row.rows.size = 0;
+    return chunk_run->row.rows.at == NULL ? no_memory(problem) : STATUS_OK;
 }
 
-static bool rows_has(const StudyRun *run, const ChunkRun *shift) {
-    return shift->is_again && sweep_row_status(&run->row, &shift->row, shift->done) == SWEEP_MADE;
+static bool rows_has(const StudyRun *run, const ChunkRun *chunk_run) {
+    return chunk_run->recompute_only &&
+           sweep_row_status(&run->row, &chunk_run->row, chunk_run->done) == SWEEP_MADE;
 }
 
-static void keep_reason(ChunkRun *shift, const char *why) {
+static void keep_reason(ChunkRun *chunk_run, const char *why) {
     char line[REASON];
-    if (shift->row.failed++ >= REASONS)
+    if (chunk_run->row.failed++ >= REASONS)
         return;
     text_fit(line, sizeof line, why);
     for (char *c = line; *c != '\0'; c++)
         if (*c == '\n')
             *c = ' ';
-    bytes_format(&shift->reasons, "%zu %s\n", shift->done, line);
+    bytes_format(&chunk_run->reasons, "%zu %s\n", chunk_run->done, line);
 }
 
-static Status rows_take(StudyRun *run, ChunkRun *shift, StudyPart *part, Problem *problem) {
+static Status rows_take(StudyRun *run, ChunkRun *chunk_run, StudyPart *part, Problem *problem) {
     const SweepStudy *study = run->work->study;
     double values[SWEEP_METRICS];
     (void)problem;
     sweep_values(&study->metrics, &part->run, values);
-    sweep_row_put(&run->row, &shift->row, shift->done, sweep_status(part->run.status), values);
+    sweep_row_put(&run->row, &chunk_run->row, chunk_run->done, sweep_status(part->run.status),
+                  values);
     if (part->run.why != NULL) {
-        keep_reason(shift, part->run.why);
+        keep_reason(chunk_run, part->run.why);
         atomic_fetch_add(&run->rows_failed, 1);
     }
     atomic_fetch_add(&run->rows_done, 1);
@@ -173,20 +175,20 @@ static Status rows_take(StudyRun *run, ChunkRun *shift, StudyPart *part, Problem
     return STATUS_OK;
 }
 
-static Status rows_end(StudyRun *run, ChunkRun *shift, Problem *problem) {
-    if (shift->reasons.count > 0 &&
-        (shift->row.reasons = bytes_take(&shift->reasons, NULL)) == NULL)
+static Status rows_end(StudyRun *run, ChunkRun *chunk_run, Problem *problem) {
+    if (chunk_run->reasons.count > 0 &&
+        (chunk_run->row.reasons = bytes_take(&chunk_run->reasons, NULL)) == NULL)
         return no_memory(problem);
-    TRY(db_sweep_take(run->intake->store, &shift->row, problem));
-    pthread_mutex_lock(&run->intake->lock);
+    TRY(db_sweep_take(run->manager->db, &chunk_run->row, problem));
+    pthread_mutex_lock(&run->manager->lock);
     set_left(run, run->left - 1);
-    pthread_mutex_unlock(&run->intake->lock);
+    pthread_mutex_unlock(&run->manager->lock);
     return STATUS_OK;
 }
 
-static void rows_drop(ChunkRun *shift) {
-    sweep_chunk_row_clear(&shift->row);
-    bytes_clear(&shift->reasons);
+static void rows_drop(ChunkRun *chunk_run) {
+    sweep_chunk_row_clear(&chunk_run->row);
+    bytes_clear(&chunk_run->reasons);
 }
 
 static void rows_free(StudyRun *run) {

@@ -9,9 +9,9 @@
 static const double chunk_seconds = 0.25;
 enum { CHUNKS = 4096, CHUNK_MEMBERS = 1 << 16 };
 
-static Status threads_probe(JobManager *intake, ExecutorLimits *limits, Problem *problem) {
+static Status threads_probe(JobManager *manager, ExecutorLimits *limits, Problem *problem) {
     (void)problem;
-    *limits = (ExecutorLimits){.slots = intake->settings.workers,
+    *limits = (ExecutorLimits){.slots = manager->settings.workers,
                                .chunk_seconds = chunk_seconds,
                                .chunks = CHUNKS,
                                .chunk_members = CHUNK_MEMBERS};
@@ -20,56 +20,56 @@ static Status threads_probe(JobManager *intake, ExecutorLimits *limits, Problem 
 
 static void drop_waiting(StudyRun *run) {
     while (run->first != NULL) {
-        ChunkRun *shift = run->first;
-        run->first = shift->next;
-        chunk_run_free(run, shift);
+        ChunkRun *chunk_run = run->first;
+        run->first = chunk_run->next;
+        chunk_run_free(run, chunk_run);
     }
     run->last = NULL;
 }
 
 static Status threads_submit(StudyRun *run, const Chunk *chunks, size_t count, Problem *problem) {
     ChunkRun *first = NULL, **last = &first;
-    JobManager *intake = run->intake;
+    JobManager *manager = run->manager;
     for (size_t i = 0; i < count; i++) {
         *last = calloc(1, sizeof **last);
         if (*last == NULL) {
             while (first != NULL) {
-                ChunkRun *shift = first;
-                first = shift->next;
-                chunk_run_free(run, shift);
+                ChunkRun *chunk_run = first;
+                first = chunk_run->next;
+                chunk_run_free(run, chunk_run);
             }
             return problem_set(problem, STATUS_NO_MEMORY, "no memory for %zu chunks", count);
         }
         (*last)->chunk = chunks[i];
         last = &(*last)->next;
     }
-    pthread_mutex_lock(&intake->lock);
+    pthread_mutex_lock(&manager->lock);
     while (first != NULL) {
-        ChunkRun *shift = first;
-        first = shift->next;
-        study_wait(run, shift, false);
+        ChunkRun *chunk_run = first;
+        first = chunk_run->next;
+        study_wait(run, chunk_run, false);
     }
-    pthread_mutex_unlock(&intake->lock);
+    pthread_mutex_unlock(&manager->lock);
     return STATUS_OK;
 }
 
 static ChunkState threads_poll(StudyRun *run, const Chunk *chunk) {
     ChunkState state = CHUNK_DEAD;
-    pthread_mutex_lock(&run->intake->lock);
-    for (const ChunkRun *shift = run->first; shift != NULL; shift = shift->next)
-        if (shift->chunk.first == chunk->first)
+    pthread_mutex_lock(&run->manager->lock);
+    for (const ChunkRun *chunk_run = run->first; chunk_run != NULL; chunk_run = chunk_run->next)
+        if (chunk_run->chunk.first == chunk->first)
             state = CHUNK_LIVE;
-    for (size_t i = 0; i < run->intake->worker_count; i++)
-        if (run->intake->workers[i].study == run && run->intake->workers[i].chunk == chunk->first)
+    for (size_t i = 0; i < run->manager->worker_count; i++)
+        if (run->manager->workers[i].study == run && run->manager->workers[i].chunk == chunk->first)
             state = CHUNK_LIVE;
-    pthread_mutex_unlock(&run->intake->lock);
+    pthread_mutex_unlock(&run->manager->lock);
     return state;
 }
 
 static void threads_cancel(StudyRun *run) {
-    pthread_mutex_lock(&run->intake->lock);
+    pthread_mutex_lock(&run->manager->lock);
     drop_waiting(run);
-    pthread_mutex_unlock(&run->intake->lock);
+    pthread_mutex_unlock(&run->manager->lock);
 }
 
 const Executor executor_threads = {

@@ -17,30 +17,29 @@
 
 // A computation's run, or the study after it, as a part of the whole.
 typedef struct Part {
-    Task *computation;
+    Task *task;
     double from, share;
 } Part;
 
 static bool advance(void *context, double fraction) {
     const Part *part = context;
     const double share = fraction < 0 ? 0 : fraction > 1 ? 1 : fraction;
-    atomic_store(&part->computation->progress,
-                 (unsigned)((part->from + share * part->share) * 10000));
-    return !atomic_load(&part->computation->is_stopped);
+    atomic_store(&part->task->progress, (unsigned)((part->from + share * part->share) * 10000));
+    return !atomic_load(&part->task->is_stopped);
 }
 
 bool task_is_wanted(void *context, double fraction) {
-    const Task *computation = context;
+    const Task *task = context;
     (void)fraction;
-    return !atomic_load(&computation->is_stopped);
+    return !atomic_load(&task->is_stopped);
 }
 
-void run_result_clear(RunResult *findings) {
-    outcome_unref(findings->outcome);
-    fields_clear(study_answer_fields, &findings->answer);
-    result_row_clear(&findings->result);
-    free(findings->problem);
-    *findings = (RunResult){0};
+void run_result_clear(RunResult *run_result) {
+    outcome_unref(run_result->outcome);
+    fields_clear(study_answer_fields, &run_result->answer);
+    result_row_clear(&run_result->result);
+    free(run_result->problem);
+    *run_result = (RunResult){0};
 }
 
 static char *take(Bytes *bytes, Status *status) {
@@ -50,10 +49,10 @@ static char *take(Bytes *bytes, Status *status) {
     return text;
 }
 
-static Status describe(Task *computation, RunResult *findings) {
-    const Progress watch = {computation, task_is_wanted};
-    const Outcome *outcome = findings->outcome;
-    ResultRow *row = &findings->result;
+static Status describe(Task *task, RunResult *run_result) {
+    const Progress watch = {task, task_is_wanted};
+    const Outcome *outcome = run_result->outcome;
+    ResultRow *row = &run_result->result;
     Bytes plan = {0}, summary = {0}, work = {0}, notes = {0}, energy = {0}, uses = {0};
     Bytes impacts = {.most = DOCUMENT_BYTES}, psd = {.most = DOCUMENT_BYTES};
     Status status = STATUS_OK;
@@ -65,11 +64,11 @@ static Status describe(Task *computation, RunResult *findings) {
     if (!document_impacts(&impacts, &outcome->response, &watch) ||
         (outcome->spectrum.densities.count > 0 && !document_psd(&psd, &outcome->spectrum, &watch)))
         status = STATUS_CANCELLED;
-    references_write(&uses, &computation->inquiry);
-    text_fit(row->id, sizeof row->id, computation->result);
+    references_write(&uses, &task->inquiry);
+    text_fit(row->id, sizeof row->id, task->result);
     row->engine = strdup(engine_version);
-    row->scene = strdup(computation->scene);
-    row->warnings = strdup(computation->warnings);
+    row->scene = strdup(task->scene);
+    row->warnings = strdup(task->warnings);
     row->plan = take(&plan, &status);
     row->summary = take(&summary, &status);
     row->work = take(&work, &status);
@@ -86,22 +85,22 @@ static Status describe(Task *computation, RunResult *findings) {
                                                                               : status;
 }
 
-Status run_result_add_to_study(RunResult *findings, Problem *problem) {
+Status run_result_add_to_study(RunResult *run_result, Problem *problem) {
     Bytes study = {.most = DOCUMENT_BYTES};
     Status status = STATUS_OK;
-    document_study(&study, &findings->answer);
-    findings->result.study = take(&study, &status);
-    findings->result.created_unix_ms = clock_unix_ms();
+    document_study(&study, &run_result->answer);
+    run_result->result.study = take(&study, &status);
+    run_result->result.created_unix_ms = clock_unix_ms();
     return problem_set(problem, status, "no memory for the study's document");
 }
 
-void run_result_fail(RunResult *findings, Status status, const Problem *problem) {
-    findings->status = status;
-    text_fit(findings->detail, sizeof findings->detail, problem->detail);
+void run_result_fail(RunResult *run_result, Status status, const Problem *problem) {
+    run_result->status = status;
+    text_fit(run_result->detail, sizeof run_result->detail, problem->detail);
     Bytes bytes = {.most = 1 << 20};
     encode_problem(&bytes, problem, encode_problem_code(status), NULL);
-    free(findings->problem);
-    findings->problem = bytes_take(&bytes, NULL);
+    free(run_result->problem);
+    run_result->problem = bytes_take(&bytes, NULL);
 }
 
 static double thread_cpu(void *context) {
@@ -109,229 +108,230 @@ static double thread_cpu(void *context) {
     return 1e-9 * (double)clock_thread_cpu_ns();
 }
 
-static Status run_study(Worker *worker, Task *computation, RunResult *findings, Problem *problem) {
-    Part part = {computation, STUDY_OWN, 1 - STUDY_OWN};
+static Status run_study(Worker *worker, Task *task, RunResult *run_result, Problem *problem) {
+    Part part = {task, STUDY_OWN, 1 - STUDY_OWN};
     const Progress watch = {&part, advance};
-    const StudyTools tools = {.limits = &worker->intake->settings.limits,
+    const StudyTools tools = {.limits = &worker->manager->settings.limits,
                               .progress = &watch,
                               .workspace = &worker->workspace,
                               .cpu = thread_cpu};
     // What has members goes on chunk by chunk, on all threads. What measures CPU times has none: it
     // is made here, by itself.
-    if (study_is_shared(computation))
-        return study_open(worker, computation, findings, &watch, problem);
-    return study_run(computation->inquiry.study, &computation->inquiry.simulation, &tools,
-                     &findings->answer.study, problem);
+    if (study_is_shared(task))
+        return study_open(worker, task, run_result, &watch, problem);
+    return study_run(task->inquiry.study, &task->inquiry.simulation, &tools,
+                     &run_result->answer.study, problem);
 }
 
-static void run(Worker *worker, Task *computation, RunResult *findings, Problem *problem) {
-    JobManager *intake = worker->intake;
+static void run(Worker *worker, Task *task, RunResult *run_result, Problem *problem) {
+    JobManager *manager = worker->manager;
     // Only the scene's own series is ever wanted again.
-    const bool has_study = computation->inquiry.study != NULL && !computation->is_again;
-    Part part = {computation, 0, has_study ? STUDY_OWN : 1};
+    const bool has_study = task->inquiry.study != NULL && !task->recompute_only;
+    Part part = {task, 0, has_study ? STUDY_OWN : 1};
     const Progress watch = {&part, advance};
     // A series that is computed again was within the limits when it was computed first.
-    const SimulationLimits *limits = computation->is_again ? NULL : &intake->settings.limits;
+    const SimulationLimits *limits = task->recompute_only ? NULL : &manager->settings.limits;
     problem_clear(problem);
-    findings->began_ns = clock_monotonic_ns();
+    run_result->began_ns = clock_monotonic_ns();
     const int64_t run_ns = clock_thread_cpu_ns();
-    Status status = resolve_records_again(intake->store, &computation->inquiry, problem);
+    Status status = resolve_records_again(manager->db, &task->inquiry, problem);
     if (status == STATUS_OK)
-        status = simulation_run(&computation->inquiry.simulation, limits, &watch,
-                                &worker->workspace, &findings->outcome, problem);
+        status = simulation_run(&task->inquiry.simulation, limits, &watch, &worker->workspace,
+                                &run_result->outcome, problem);
     const int64_t study_ns = clock_thread_cpu_ns();
-    findings->seconds = 1e-9 * (double)(study_ns - run_ns);
+    run_result->seconds = 1e-9 * (double)(study_ns - run_ns);
     if (status == STATUS_OK)
-        job_metrics_run(&intake->totals, findings->outcome, study_ns - run_ns);
+        job_metrics_run(&manager->totals, run_result->outcome, study_ns - run_ns);
     if (status == STATUS_OK && has_study) {
-        status = run_study(worker, computation, findings, problem);
-        job_metrics_study(&intake->totals, clock_thread_cpu_ns() - study_ns);
+        status = run_study(worker, task, run_result, problem);
+        job_metrics_study(&manager->totals, clock_thread_cpu_ns() - study_ns);
     }
-    findings->ended_ns = clock_monotonic_ns();
-    if (status == STATUS_OK && !computation->is_again) {
-        status = describe(computation, findings);
+    run_result->ended_ns = clock_monotonic_ns();
+    if (status == STATUS_OK && !task->recompute_only) {
+        status = describe(task, run_result);
         if (status != STATUS_OK)
             (void)problem_set(problem, status, "no memory for the result's documents");
-        else if (has_study && computation->study == NULL)
-            status = run_result_add_to_study(findings, problem);
+        else if (has_study && task->study == NULL)
+            status = run_result_add_to_study(run_result, problem);
     }
     if (status != STATUS_OK)
-        run_result_fail(findings, status, problem);
-    findings->status = status;
+        run_result_fail(run_result, status, problem);
+    run_result->status = status;
 }
 
 // Nobody waits for it any more, or the daemon ends and its jobs stay unfinished in the store.
-void task_abandon(JobManager *intake, Task *computation) {
-    const bool has_rows = computation->study != NULL && computation->study->gather->is_kept;
-    pthread_mutex_lock(&intake->lock);
-    hashmap_remove(intake->in_flight, &computation->indexed);
-    while (computation->jobs != NULL) {
-        Job *job = computation->jobs;
-        computation->jobs = job->next_shared;
-        job->computation = NULL;
+void task_abandon(JobManager *manager, Task *task) {
+    const bool has_rows = task->study != NULL && task->study->gather->is_kept;
+    pthread_mutex_lock(&manager->lock);
+    hashmap_remove(manager->in_flight, &task->indexed);
+    while (task->jobs != NULL) {
+        Job *job = task->jobs;
+        task->jobs = job->next_shared;
+        job->task = NULL;
         job->next_shared = NULL;
         jobs_retire(job);
-        subscribers_call(&job->wakers);
+        subscribers_call(&job->subscribers);
         job_unref(job); // the computation's hold
     }
-    subscribers_call(&computation->askers);
-    pthread_mutex_unlock(&intake->lock);
-    task_free(computation); // and its study
+    subscribers_call(&task->result_waiters);
+    pthread_mutex_unlock(&manager->lock);
+    task_free(task); // and its study
     if (has_rows)
-        (void)db_sweep_tidy(intake->store, NULL);
+        (void)db_sweep_tidy(manager->db, NULL);
 }
 
-void task_finish(JobManager *intake, Task *computation, RunResult *findings) {
-    char result[sizeof computation->result];
-    const double seconds = findings->seconds;
-    Outcome *outcome = findings->outcome != NULL ? outcome_ref(findings->outcome) : NULL;
-    memcpy(result, computation->result, sizeof result);
-    jobs_save(intake, computation, findings);
+void task_finish(JobManager *manager, Task *task, RunResult *run_result) {
+    char result[sizeof task->result];
+    const double seconds = run_result->seconds;
+    Outcome *outcome = run_result->outcome != NULL ? outcome_ref(run_result->outcome) : NULL;
+    memcpy(result, task->result, sizeof result);
+    jobs_save(manager, task, run_result);
     if (outcome != NULL)
-        jobs_keep_series(intake, result, outcome, seconds);
+        jobs_keep_series(manager, result, outcome, seconds);
     outcome_unref(outcome);
 }
 
-static bool is_slow(const Task *computation) {
-    return computation->queued.seconds > queue_quick;
+static bool is_slow(const Task *task) {
+    return task->queued.seconds > queue_quick;
 }
 
 // What a worker does next: a computation, or a chunk of a study, or the end of one (no chunk).
 typedef struct WorkItem {
-    Task *computation;
+    Task *task;
     StudyRun *study;
-    ChunkRun *shift;
+    ChunkRun *chunk_run;
 } WorkItem;
 
 // The spare worker has nothing to do while an ordinary one is idle or busy with something quick.
 static QueueEntry *take_entry(const Worker *worker) {
-    JobManager *intake = worker->intake;
-    if (worker->is_spare && intake->slow_running < intake->settings.workers)
+    JobManager *manager = worker->manager;
+    if (worker->is_spare && manager->slow_running < manager->settings.workers)
         return NULL;
-    return queue_take(intake->queue, worker->is_spare);
+    return queue_take(manager->queue, worker->is_spare);
 }
 
 // What may take long keeps the spare worker ready for what does not.
-static void begin_slow(JobManager *intake) {
-    if (++intake->slow_running == intake->settings.workers)
-        pthread_cond_signal(&intake->spare_work);
+static void begin_slow(JobManager *manager) {
+    if (++manager->slow_running == manager->settings.workers)
+        pthread_cond_signal(&manager->spare_work);
 }
 
-static void begin_computation(Worker *worker, Task *computation) {
-    JobManager *intake = worker->intake;
-    computation->is_running = true;
-    worker->running = computation;
-    if (is_slow(computation))
-        begin_slow(intake);
+static void begin_computation(Worker *worker, Task *task) {
+    JobManager *manager = worker->manager;
+    task->is_running = true;
+    worker->running = task;
+    if (is_slow(task))
+        begin_slow(manager);
     const int64_t now_ms = clock_unix_ms(), now_ns = clock_monotonic_ns();
-    computation->began_ns = now_ns;
-    for (Job *job = computation->jobs; job != NULL; job = job->next_shared) {
+    task->began_ns = now_ns;
+    for (Job *job = task->jobs; job != NULL; job = job->next_shared) {
         job->row.state = JOB_RUNNING;
         job->row.started_unix_ms = now_ms;
         job->started_ns = now_ns;
         job->row.queued = 1e-9 * (double)(now_ns - job->submitted_ns);
-        histogram_add(&intake->totals.waited, now_ns - job->submitted_ns);
+        histogram_add(&manager->totals.waited, now_ns - job->submitted_ns);
     }
 }
 
-static void leave(Worker *worker, const Task *computation) {
+static void leave(Worker *worker, const Task *task) {
     worker->running = NULL;
-    worker->intake->slow_running -= is_slow(computation);
+    worker->manager->slow_running -= is_slow(task);
 }
 
 // It waits for room, of whatever kind, and then begins anew.
-static void stall(JobManager *intake, Task *computation) {
-    resolve_records_drop(&computation->inquiry);
-    computation->next_stalled = intake->stalled;
-    intake->stalled = computation;
+static void stall(JobManager *manager, Task *task) {
+    resolve_records_drop(&task->inquiry);
+    task->next_stalled = manager->waiting_for_memory;
+    manager->waiting_for_memory = task;
 }
 
 static QueueEntry *wait_for_entry(Worker *worker) {
-    JobManager *intake = worker->intake;
+    JobManager *manager = worker->manager;
     QueueEntry *entry = NULL;
-    while (!intake->is_closing && (jobs_is_behind(intake) || (entry = take_entry(worker)) == NULL))
-        pthread_cond_wait(worker->is_spare ? &intake->spare_work : &intake->work, &intake->lock);
+    while (!manager->is_closing &&
+           (jobs_is_behind(manager) || (entry = take_entry(worker)) == NULL))
+        pthread_cond_wait(worker->is_spare ? &manager->spare_work : &manager->work, &manager->lock);
     return entry;
 }
 
 // With the lock held. False when the daemon ends.
-static bool next_task(Worker *worker, WorkItem *task) {
-    *task = (WorkItem){NULL, NULL, NULL};
+static bool next_task(Worker *worker, WorkItem *item) {
+    *item = (WorkItem){NULL, NULL, NULL};
     for (;;) {
         bool is_ended;
         QueueEntry *entry = wait_for_entry(worker);
         if (entry == NULL)
             return false;
-        Task *computation = task_of(entry);
-        if (computation->study == NULL) {
-            begin_computation(worker, computation);
-            if (study_must_wait(worker->intake, computation)) {
-                leave(worker, computation);
-                stall(worker->intake, computation);
+        Task *task = task_of(entry);
+        if (task->study == NULL) {
+            begin_computation(worker, task);
+            if (study_must_wait(worker->manager, task)) {
+                leave(worker, task);
+                stall(worker->manager, task);
                 continue;
             }
-            task->computation = computation;
+            item->task = task;
             return true;
         }
-        task->study = computation->study;
-        task->shift = study_take(task->study, &is_ended);
-        if (task->shift != NULL) {
-            worker->study = task->study;
-            worker->chunk = task->shift->chunk.first;
-            begin_slow(worker->intake);
+        item->study = task->study;
+        item->chunk_run = study_take(item->study, &is_ended);
+        if (item->chunk_run != NULL) {
+            worker->study = item->study;
+            worker->chunk = item->chunk_run->chunk.first;
+            begin_slow(worker->manager);
         }
-        if (task->shift != NULL || is_ended)
+        if (item->chunk_run != NULL || is_ended)
             return true;
     }
 }
 
 // How long runs take beside what was foretold, for those who ask when to come back.
-static void keep_pace(JobManager *intake, const Task *computation, const RunResult *findings) {
-    const double foretold = computation->queued.seconds;
-    const double ratio = 1e-9 * (double)(findings->ended_ns - findings->began_ns) / foretold;
-    if (foretold > 0 && ratio > 1e-3 && ratio < 1e3)
-        intake->pace += 0.1 * (ratio - intake->pace);
+static void keep_pace(JobManager *manager, const Task *task, const RunResult *run_result) {
+    const double estimated = task->queued.seconds;
+    const double ratio = 1e-9 * (double)(run_result->ended_ns - run_result->began_ns) / estimated;
+    if (estimated > 0 && ratio > 1e-3 && ratio < 1e3)
+        manager->pace += 0.1 * (ratio - manager->pace);
 }
 
-static void compute(Worker *worker, Task *computation, Problem *problem) {
-    JobManager *intake = worker->intake;
-    RunResult findings = {0};
-    run(worker, computation, &findings, problem);
-    const bool is_launched = findings.status == STATUS_OK && computation->study != NULL;
-    const bool is_stalled = findings.status == STATUS_FULL;
-    pthread_mutex_lock(&intake->lock);
-    leave(worker, computation);
-    if (findings.status == STATUS_OK && !is_launched)
-        keep_pace(intake, computation, &findings);
+static void compute(Worker *worker, Task *task, Problem *problem) {
+    JobManager *manager = worker->manager;
+    RunResult run_result = {0};
+    run(worker, task, &run_result, problem);
+    const bool is_launched = run_result.status == STATUS_OK && task->study != NULL;
+    const bool is_stalled = run_result.status == STATUS_FULL;
+    pthread_mutex_lock(&manager->lock);
+    leave(worker, task);
+    if (run_result.status == STATUS_OK && !is_launched)
+        keep_pace(manager, task, &run_result);
     if (is_stalled)
-        stall(intake, computation);
-    pthread_mutex_unlock(&intake->lock);
-    if (findings.status == STATUS_CANCELLED)
-        task_abandon(intake, computation);
+        stall(manager, task);
+    pthread_mutex_unlock(&manager->lock);
+    if (run_result.status == STATUS_CANCELLED)
+        task_abandon(manager, task);
     else if (is_launched)
-        study_start(worker, computation, &findings, problem);
+        study_start(worker, task, &run_result, problem);
     else if (!is_stalled)
-        task_finish(intake, computation, &findings);
-    run_result_clear(&findings);
+        task_finish(manager, task, &run_result);
+    run_result_clear(&run_result);
 }
 
 void *worker_main(void *context) {
     Worker *worker = context;
-    JobManager *intake = worker->intake;
+    JobManager *manager = worker->manager;
     Problem problem; // large, but a thread's stack is larger
-    WorkItem task;
-    pthread_mutex_lock(&intake->lock);
-    while (next_task(worker, &task)) {
-        pthread_mutex_unlock(&intake->lock);
-        if (task.computation != NULL)
-            compute(worker, task.computation, &problem);
-        else if (task.shift != NULL)
-            study_work(worker, task.study, task.shift, &problem);
+    WorkItem item;
+    pthread_mutex_lock(&manager->lock);
+    while (next_task(worker, &item)) {
+        pthread_mutex_unlock(&manager->lock);
+        if (item.task != NULL)
+            compute(worker, item.task, &problem);
+        else if (item.chunk_run != NULL)
+            study_work(worker, item.study, item.chunk_run, &problem);
         else
-            study_finish(worker, task.study, &problem);
-        pthread_mutex_lock(&intake->lock);
+            study_finish(worker, item.study, &problem);
+        pthread_mutex_lock(&manager->lock);
     }
-    pthread_mutex_unlock(&intake->lock);
+    pthread_mutex_unlock(&manager->lock);
     workspace_clear(&worker->workspace);
     return NULL;
 }

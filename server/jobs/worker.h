@@ -8,17 +8,17 @@
 
 #define STUDY_OWN 0.05 // of the progress, the scene's own run where a study follows
 
-void run_result_fail(RunResult *findings, Status status, const Problem *problem);
+void run_result_fail(RunResult *run_result, Status status, const Problem *problem);
 // The answer's document, once it is whole.
-Status run_result_add_to_study(RunResult *findings, Problem *problem);
+Status run_result_add_to_study(RunResult *run_result, Problem *problem);
 
 // Without the lock. Takes both: saves what it came to, also its series where that pays.
-void task_finish(JobManager *intake, Task *computation, RunResult *findings);
+void task_finish(JobManager *manager, Task *task, RunResult *run_result);
 
 // A Progress's advance that tells no progress: false once a computation was stopped.
-bool task_is_wanted(void *computation, double fraction);
+bool task_is_wanted(void *task, double fraction);
 // Without the lock. Takes the computation: nobody waits for it any more, or the daemon ends and its
 // jobs stay unfinished in the store.
-void task_abandon(JobManager *intake, Task *computation);
+void task_abandon(JobManager *manager, Task *task);
 
 #endif

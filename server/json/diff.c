@@ -87,15 +87,15 @@ static void say_long(const json_t *a, const json_t *b, char *text, size_t size) 
              count_b, first + 1);
 }
 
-static void add(ImportContext *walk, const char *pointer, const json_t *a, const json_t *b) {
-    Differences *differences = walk->differences;
+static void add(ImportContext *context, const char *pointer, const json_t *a, const json_t *b) {
+    Differences *differences = context->differences;
     if (differences->count == DIFFER_MAX) {
         differences->more++;
         return;
     }
     Difference *at = realloc(differences->at, (differences->count + 1) * sizeof *at);
     if (at == NULL) {
-        walk->is_out_of_memory = true;
+        context->is_out_of_memory = true;
         return;
     }
     differences->at = at;
@@ -107,29 +107,30 @@ static void add(ImportContext *walk, const char *pointer, const json_t *a, const
         say_long(a, b, detail, sizeof detail);
         one->detail = strdup(detail);
     }
-    walk->is_out_of_memory =
-        walk->is_out_of_memory || one->pointer == NULL || (is_long && one->detail == NULL);
+    context->is_out_of_memory =
+        context->is_out_of_memory || one->pointer == NULL || (is_long && one->detail == NULL);
 }
 
 static bool is_long_numbers(const json_t *array) {
     return json_array_size(array) > NUMBERS && json_is_number(json_array_get(array, 0));
 }
 
-static void walk_values(ImportContext *walk, const char *pointer, const json_t *a, const json_t *b);
+static void walk_values(ImportContext *context, const char *pointer, const json_t *a,
+                        const json_t *b);
 
-static void walk_objects(ImportContext *walk, const char *pointer, const json_t *a,
+static void walk_objects(ImportContext *context, const char *pointer, const json_t *a,
                          const json_t *b) {
     const char *name;
     json_t *value;
     char place[POINTER];
     json_object_foreach((json_t *)a, name, value) {
         json_pointer_join(place, sizeof place, pointer, name);
-        walk_values(walk, place, value, json_object_get(b, name));
+        walk_values(context, place, value, json_object_get(b, name));
     }
     json_object_foreach((json_t *)b, name, value) {
         json_pointer_join(place, sizeof place, pointer, name);
         if (json_object_get(a, name) == NULL)
-            walk_values(walk, place, NULL, value);
+            walk_values(context, place, NULL, value);
     }
 }
 
@@ -139,27 +140,27 @@ static bool is_equal(const json_t *a, const json_t *b) {
                                                   : json_equal(a, b) != 0;
 }
 
-static void walk_values(ImportContext *walk, const char *pointer, const json_t *a,
+static void walk_values(ImportContext *context, const char *pointer, const json_t *a,
                         const json_t *b) {
     char place[POINTER];
     if (a == NULL || b == NULL || json_typeof(a) != json_typeof(b)) {
         if (a == NULL || b == NULL || !is_equal(a, b))
-            add(walk, pointer, a, b);
+            add(context, pointer, a, b);
     } else if (json_is_object(a)) {
-        walk_objects(walk, pointer, a, b);
+        walk_objects(context, pointer, a, b);
     } else if (json_is_array(a) && !is_long_numbers(a) && !is_long_numbers(b)) {
         for (size_t i = 0; i < json_array_size(a) || i < json_array_size(b); i++) {
             json_pointer_index(place, sizeof place, pointer, i);
-            walk_values(walk, place, json_array_get(a, i), json_array_get(b, i));
+            walk_values(context, place, json_array_get(a, i), json_array_get(b, i));
         }
     } else if (!is_equal(a, b)) {
-        add(walk, pointer, a, b);
+        add(context, pointer, a, b);
     }
 }
 
 Status json_diff(const char *a, const char *b, const char *besides, Differences *differences,
                  Problem *problem) {
-    ImportContext walk = {.differences = differences};
+    ImportContext context = {.differences = differences};
     *differences = (Differences){0};
     json_t *trees[2] = {json_loads(a, JSON_REJECT_DUPLICATES, NULL),
                         json_loads(b, JSON_REJECT_DUPLICATES, NULL)};
@@ -167,10 +168,10 @@ Status json_diff(const char *a, const char *b, const char *besides, Differences 
     for (int i = 0; i < 2 && are_read && besides != NULL; i++)
         (void)json_object_del(trees[i], besides);
     if (are_read)
-        walk_values(&walk, "", trees[0], trees[1]);
+        walk_values(&context, "", trees[0], trees[1]);
     json_decref(trees[0]);
     json_decref(trees[1]);
-    if (walk.is_out_of_memory)
+    if (context.is_out_of_memory)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the differences");
     return are_read ? STATUS_OK
                     : problem_set(problem, STATUS_INTERNAL, "a stored scene cannot be read");

@@ -63,7 +63,7 @@ Status exchange_refuse_many(Problem *problem);
 
 // Sorts what was taken, tells what cannot stand beside each other, and imports it for `who` (NULL:
 // the local user): db_material_import.
-Status exchange_import(Exchange *exchange, Db *store, const char *who, bool may_all, bool is_dry,
-                       ImportTally *tally, Problem *problem);
+Status exchange_import(Exchange *exchange, Db *db, const char *who, bool may_all, bool is_dry,
+                       ImportTally *metrics, Problem *problem);
 
 #endif

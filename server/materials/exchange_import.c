@@ -90,8 +90,8 @@ static Status check_tests(const MaterialImport *import, Problem *problem) {
     return STATUS_OK;
 }
 
-Status exchange_import(Exchange *exchange, Db *store, const char *who, bool may_all, bool is_dry,
-                       ImportTally *tally, Problem *problem) {
+Status exchange_import(Exchange *exchange, Db *db, const char *who, bool may_all, bool is_dry,
+                       ImportTally *metrics, Problem *problem) {
     MaterialImport *import = &exchange->import;
     if (import->revision_count > 0)
         qsort(import->revisions, import->revision_count, sizeof *import->revisions,
@@ -105,5 +105,5 @@ Status exchange_import(Exchange *exchange, Db *store, const char *who, bool may_
     import->may_all = may_all;
     import->now_unix_ms = clock_unix_ms();
     import->says_same = exchange_says_same;
-    return db_material_import(store, import, is_dry, tally, problem);
+    return db_material_import(db, import, is_dry, metrics, problem);
 }

@@ -33,9 +33,9 @@ Status material_write_lists(MaterialRevision *revision, Problem *problem) {
                                    : problem_set(problem, STATUS_NO_MEMORY, "no memory for it");
 }
 
-Status material_find(Db *store, const char *slug, uint64_t revision, MaterialRevision *found,
+Status material_find(Db *db, const char *slug, uint64_t revision, MaterialRevision *found,
                      Problem *problem) {
-    TRY(db_material(store, slug, revision, found, problem));
+    TRY(db_material(db, slug, revision, found, problem));
     return material_read_lists(found, problem);
 }
 

@@ -9,7 +9,7 @@
 
 // As db_material, with tags, table and measurements read. Cleared by material_revision_clear, in
 // any case.
-Status material_find(Db *store, const char *slug, uint64_t revision, MaterialRevision *found,
+Status material_find(Db *db, const char *slug, uint64_t revision, MaterialRevision *found,
                      Problem *problem);
 
 // Reads the lists of a row into its material; once.

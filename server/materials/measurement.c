@@ -27,9 +27,9 @@ static Status read_test(const MaterialMeasurement *row, DropTest *test, Problem 
     return status;
 }
 
-Status stored_test_load(Db *store, const char *slug, uint64_t number, StoredTest *stored,
+Status stored_test_load(Db *db, const char *slug, uint64_t number, StoredTest *stored,
                         Problem *problem) {
-    TRY(db_material_measurement(store, slug, number, &stored->row, problem));
+    TRY(db_material_measurement(db, slug, number, &stored->row, problem));
     const Status status = read_test(&stored->row, &stored->test, problem);
     free(stored->row.document); // it may be as large as the test
     stored->row.document = NULL;

@@ -14,7 +14,7 @@ typedef struct StoredTest {
 } StoredTest;
 
 // STATUS_NOT_FOUND. Cleared by stored_test_clear in any case; `stored` is all zero before.
-Status stored_test_load(Db *store, const char *slug, uint64_t number, StoredTest *stored,
+Status stored_test_load(Db *db, const char *slug, uint64_t number, StoredTest *stored,
                         Problem *problem);
 void stored_test_clear(StoredTest *stored);
 

@@ -74,10 +74,10 @@ static void *work(void *context) {
     return NULL;
 }
 
-static Status read_scene(Db *store, const char *text, Lane *lane) {
+static Status read_scene(Db *db, const char *text, Lane *lane) {
     Warnings warnings = {NULL, 0};
     const Status status =
-        jobs_prepare(store, text, strlen(text), &limits, &lane->inquiry, &warnings, &lane->problem);
+        jobs_prepare(db, text, strlen(text), &limits, &lane->inquiry, &warnings, &lane->problem);
     warnings_clear(&warnings);
     if (status == STATUS_OK && excitation_of(lane)->displacement.count > 0)
         lane->displacement = excitation_of(lane)->displacement.at[0];
@@ -95,15 +95,15 @@ int main(int argc, char **argv) {
     process_return_memory(); // as the daemon does
     fft_start();
     static Lane lanes[LANES];
-    Db *store = NULL;
+    Db *db = NULL;
     Problem *problem = &lanes[0].problem;
-    Status status = db_open(NULL, &store, problem);
+    Status status = db_open(NULL, &db, problem);
     for (size_t i = 0; i < threads && status == STATUS_OK; i++) {
         problem = &lanes[i].problem;
         lanes[i].number = 1 + i;
-        status = read_scene(store, argv[1], &lanes[i]);
+        status = read_scene(db, argv[1], &lanes[i]);
     }
-    db_close(store);
+    db_close(db);
     const int64_t began = clock_monotonic_ns();
     size_t started = 0;
     for (; started < threads && status == STATUS_OK; started++) {

@@ -52,12 +52,12 @@ static void stop(const char *what) {
     exit(1);
 }
 
-static void measure_core(Db *store) {
+static void measure_core(Db *db) {
     char text[2400];
     StudyRequest inquiry = {0};
     Warnings warnings = {NULL, 0};
     const int size = scene_text(text, 1);
-    if (jobs_prepare(store, text, (size_t)size, NULL, &inquiry, &warnings, &problem) != STATUS_OK)
+    if (jobs_prepare(db, text, (size_t)size, NULL, &inquiry, &warnings, &problem) != STATUS_OK)
         stop("the scene");
     Workspace workspace = {0};
     size_t count = 0;
@@ -80,7 +80,7 @@ static void measure_core(Db *store) {
 }
 
 typedef struct QueueClient {
-    JobManager *intake;
+    JobManager *manager;
     pthread_mutex_t lock;
     pthread_cond_t woken;
     bool is_woken;
@@ -106,13 +106,13 @@ static void *submit_new(void *context) {
     while (fault != NULL && now() < client->end) {
         const int size = scene_text(text, atomic_fetch_add(&next_number, 1));
         const Submission submission = {.text = text, .size = (size_t)size};
-        const Callback waker = {client, wake};
+        const Callback callback = {client, wake};
         Job *job = NULL;
         client->is_woken = false;
         problem_clear(fault);
-        if (jobs_submit(client->intake, &submission, &job, fault) != STATUS_OK)
+        if (jobs_submit(client->manager, &submission, &job, fault) != STATUS_OK)
             continue;
-        (void)job_subscribe(job, &waker);
+        (void)job_subscribe(job, &callback);
         pthread_mutex_lock(&client->lock);
         while (!client->is_woken)
             pthread_cond_wait(&client->woken, &client->lock);
@@ -125,19 +125,19 @@ static void *submit_new(void *context) {
     return NULL;
 }
 
-static void measure_jobs(Db *store, size_t workers, size_t clients) {
+static void measure_jobs(Db *db, size_t workers, size_t clients) {
     static QueueClient all[CLIENTS];
     pthread_t threads[CLIENTS];
     const JobManagerSettings settings = {.workers = workers,
                                          .queue_most = 10000,
                                          .cache_bytes = (size_t)64 << 20,
                                          .limits = {.samples = 1 << 25, .impacts = 500000}};
-    JobManager *intake;
-    if (jobs_open(store, &settings, &intake, &problem) != STATUS_OK)
+    JobManager *manager;
+    if (jobs_open(db, &settings, &manager, &problem) != STATUS_OK)
         stop("the intake");
     const double began = now(), cpu_began = cpu();
     for (size_t i = 0; i < clients; i++) {
-        all[i] = (QueueClient){.intake = intake, .end = began + seconds};
+        all[i] = (QueueClient){.manager = manager, .end = began + seconds};
         pthread_mutex_init(&all[i].lock, NULL);
         pthread_cond_init(&all[i].woken, NULL);
         if (pthread_create(&threads[i], NULL, submit_new, &all[i]) != 0)
@@ -153,14 +153,14 @@ static void measure_jobs(Db *store, size_t workers, size_t clients) {
     snprintf(name, sizeof name, "new jobs, durable, %zu clients, %zu workers", clients, workers);
     printf("%-44s %10.0f /s %8.2f us of CPU\n", name, (double)count / took,
            1e6 * (cpu() - cpu_began) / (double)count);
-    jobs_close(intake);
+    jobs_close(manager);
 }
 
 // Until the job is finished; false where it computed something.
-static bool submit_known(JobManager *intake, const Submission *submission) {
+static bool submit_known(JobManager *manager, const Submission *submission) {
     Job *job = NULL;
     JobView show;
-    if (jobs_submit(intake, submission, &job, &problem) != STATUS_OK)
+    if (jobs_submit(manager, submission, &job, &problem) != STATUS_OK)
         stop("a scene");
     while (!job_is_finished(job))
         nanosleep(&(struct timespec){0, 1000000}, NULL);
@@ -172,7 +172,7 @@ static bool submit_known(JobManager *intake, const Submission *submission) {
     return is_cached;
 }
 
-static void measure_known(Db *store) {
+static void measure_known(Db *db) {
     char text[2400];
     const int size = scene_text(text, 0);
     const Submission submission = {.text = text, .size = (size_t)size};
@@ -180,25 +180,25 @@ static void measure_known(Db *store) {
                                          .queue_most = 10000,
                                          .cache_bytes = (size_t)64 << 20,
                                          .limits = {.samples = 1 << 25, .impacts = 500000}};
-    JobManager *intake;
-    if (jobs_open(store, &settings, &intake, &problem) != STATUS_OK)
+    JobManager *manager;
+    if (jobs_open(db, &settings, &manager, &problem) != STATUS_OK)
         stop("the intake");
     bool is_cached = false;
     while (!is_cached)
-        is_cached = submit_known(intake, &submission);
+        is_cached = submit_known(manager, &submission);
     size_t count = 0;
     const double began = now(), cpu_began = cpu();
     do {
-        if (!submit_known(intake, &submission))
+        if (!submit_known(manager, &submission))
             stop("a cached scene");
         count++;
     } while (now() - began < seconds);
-    db_flush(store);
+    db_flush(db);
     const double took = now() - began;
     printf("%-44s %10.0f /s %8.2f us of CPU with its row, durable\n",
            "cached scenes of 2 KB, one thread", (double)count / took,
            1e6 * (cpu() - cpu_began) / (double)count);
-    jobs_close(intake);
+    jobs_close(manager);
 }
 
 static void measure_disk(void) {
@@ -248,8 +248,8 @@ static void note(void *context, Status status, const char *detail) {
 static void measure_rows(bool is_grouped, bool is_rising) {
     char directory[4100], command[4200];
     snprintf(directory, sizeof directory, "%s/rows", folder);
-    Db *store;
-    if (db_open(directory, &store, &problem) != STATUS_OK)
+    Db *db;
+    if (db_open(directory, &db, &problem) != STATUS_OK)
         stop("the store");
     enum { ON_THE_WAY = 64 };
     static JobRow rows[ON_THE_WAY];
@@ -263,8 +263,8 @@ static void measure_rows(bool is_grouped, bool is_rising) {
         *row = (JobRow){.scene = "", .warnings = "[]"};
         name_row(row, is_rising, count);
         const WriteDone done = {note, NULL};
-        const Status status = is_grouped ? db_job_post(store, row, STORE_NOW, &done, NULL)
-                                         : db_job_add(store, row, &problem);
+        const Status status = is_grouped ? db_job_post(db, row, STORE_NOW, &done, NULL)
+                                         : db_job_add(db, row, &problem);
         if (status != STATUS_OK)
             stop("a row");
         count++;
@@ -277,7 +277,7 @@ static void measure_rows(bool is_grouped, bool is_rising) {
              is_grouped ? "64 on the way" : "one commit each", is_rising ? "rising" : "random");
     printf("%-44s %10.0f /s %8.2f us of CPU\n", name, (double)count / took,
            1e6 * (cpu() - cpu_began) / (double)count);
-    db_close(store);
+    db_close(db);
     snprintf(command, sizeof command, "rm -rf '%s'", directory);
     if (system(command) != 0)
         stop("the folder");
@@ -292,16 +292,16 @@ int main(int argc, char **argv) {
     if (mkdtemp(folder) == NULL)
         stop(folder);
     fft_start();
-    Db *store;
+    Db *db;
     char directory[4100], command[4200];
     snprintf(directory, sizeof directory, "%s/jobs", folder);
-    if (db_open(directory, &store, &problem) != STATUS_OK)
+    if (db_open(directory, &db, &problem) != STATUS_OK)
         stop("the store");
-    measure_core(store);
-    measure_jobs(store, 2, CLIENTS);
-    measure_jobs(store, 1, 1);
-    measure_known(store);
-    db_close(store);
+    measure_core(db);
+    measure_jobs(db, 2, CLIENTS);
+    measure_jobs(db, 1, 1);
+    measure_known(db);
+    db_close(db);
     if (argc <= 3) {
         measure_disk();
         measure_rows(false, true);

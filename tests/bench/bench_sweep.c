@@ -77,13 +77,13 @@ static double time_core(const Simulation *scenes) {
 }
 
 // A new sweep each time: the structure's mass is another.
-static double time_room(JobManager *intake, size_t round, Problem *problem) {
+static double time_room(JobManager *manager, size_t round, Problem *problem) {
     char text[1024];
     Job *job;
     scene_text(text, points, 1.35 + 1e-9 * (double)round);
     const Submission submission = {.text = text, .size = strlen(text)};
     const int64_t began_ns = clock_monotonic_ns();
-    if (jobs_submit(intake, &submission, &job, problem) != STATUS_OK)
+    if (jobs_submit(manager, &submission, &job, problem) != STATUS_OK)
         return -1;
     const struct timespec nap = {0, 500000};
     while (!job_is_finished(job))
@@ -102,7 +102,7 @@ static double median(double *values, size_t count) {
     return values[count / 2];
 }
 
-static int bench_judging(Db *store, Problem *problem) {
+static int bench_judging(Db *db, Problem *problem) {
     char text[1024];
     StudyRequest inquiry = {0};
     Warnings warnings = {NULL, 0};
@@ -110,7 +110,7 @@ static int bench_judging(Db *store, Problem *problem) {
     const SimulationLimits limits = {.samples = 1 << 25, .points = 1 << 20};
     scene_text(text, 100000, 1.35);
     int64_t began_ns = clock_monotonic_ns();
-    if (jobs_prepare(store, text, strlen(text), &limits, &inquiry, &warnings, problem) != STATUS_OK)
+    if (jobs_prepare(db, text, strlen(text), &limits, &inquiry, &warnings, problem) != STATUS_OK)
         return fail("judging", problem);
     printf("POST of 100000 points, its axes judged: %.3f s\n",
            1e-9 * (double)(clock_monotonic_ns() - began_ns));
@@ -127,19 +127,19 @@ static int bench_judging(Db *store, Problem *problem) {
     return 0;
 }
 
-static int bench_rows(Db *store, Problem *problem) {
+static int bench_rows(Db *db, Problem *problem) {
     enum { CHUNKS = 64, ROWS = 10000, METRICS = 6 };
     SweepRow row = {.points = (uint64_t)CHUNKS * ROWS, .metrics = METRICS, .chunks = CHUNKS};
     strcpy(row.result, "r-bench");
     row.scene = strdup("{}");
     SweepChunkRow chunk = {.rows = {calloc(ROWS, 1 + 8 * METRICS), ROWS * (1 + 8 * METRICS)}};
-    if (chunk.rows.at == NULL || db_sweep_begin(store, &row, problem) != STATUS_OK)
+    if (chunk.rows.at == NULL || db_sweep_begin(db, &row, problem) != STATUS_OK)
         return fail("rows", problem);
     chunk.sweep = row.number;
     const int64_t began_ns = clock_monotonic_ns();
     for (size_t i = 0; i < CHUNKS; i++) {
         chunk.chunk = i;
-        if (db_sweep_take(store, &chunk, problem) != STATUS_OK)
+        if (db_sweep_take(db, &chunk, problem) != STATUS_OK)
             return fail("rows", problem);
     }
     const double took = 1e-9 * (double)(clock_monotonic_ns() - began_ns);
@@ -162,21 +162,21 @@ int main(int argc, char **argv) {
     if (points < 2 || threads < 1 || threads > 64 || rounds < 1 || rounds > ROUNDS_MAX ||
         mkdtemp(folder) == NULL)
         return 2;
-    Db *store;
-    JobManager *intake;
+    Db *db;
+    JobManager *manager;
     const JobManagerSettings settings = {.workers = threads,
                                          .queue_most = 100,
                                          .cache_bytes = 1 << 24,
                                          .limits = {.samples = 1 << 25, .points = 1 << 24}};
     fft_start();
-    if (db_open(folder, &store, &problem) != STATUS_OK ||
-        jobs_open(store, &settings, &intake, &problem) != STATUS_OK)
+    if (db_open(folder, &db, &problem) != STATUS_OK ||
+        jobs_open(db, &settings, &manager, &problem) != STATUS_OK)
         return fail("opening", &problem);
     StudyRequest inquiry = {0};
     Warnings warnings = {NULL, 0};
     SweepGrid *plan;
     scene_text(text, points, 1.35);
-    if (jobs_prepare(store, text, strlen(text), NULL, &inquiry, &warnings, &problem) != STATUS_OK ||
+    if (jobs_prepare(db, text, strlen(text), NULL, &inquiry, &warnings, &problem) != STATUS_OK ||
         sweep_grid_new((const SweepStudy *)(const void *)inquiry.study, &inquiry.simulation, NULL,
                        &plan, &problem) != STATUS_OK)
         return fail("planning", &problem);
@@ -193,7 +193,7 @@ int main(int argc, char **argv) {
         core[i] = time_core(scenes);
         core_cpu[i] = process_cpu() - began;
         began = process_cpu();
-        room[i] = time_room(intake, i + 1, &problem);
+        room[i] = time_room(manager, i + 1, &problem);
         room_cpu[i] = process_cpu() - began;
         if (room[i] < 0)
             return fail("submitting", &problem);
@@ -206,17 +206,17 @@ int main(int argc, char **argv) {
     printf("sweep / core: %.2f\n", median(ratio, rounds));
     printf("CPU a point: core %.1f us, sweep %.1f us\n", micro * median(core_cpu, rounds),
            micro * median(room_cpu, rounds));
-    int code = bench_judging(store, &problem);
+    int code = bench_judging(db, &problem);
     if (code == 0)
-        code = bench_rows(store, &problem);
+        code = bench_rows(db, &problem);
     for (size_t i = 0; i < points; i++)
         simulation_clear(&scenes[i]);
     free(scenes);
     sweep_grid_free(plan);
     study_request_clear(&inquiry);
     warnings_clear(&warnings);
-    jobs_close(intake);
-    db_close(store);
+    jobs_close(manager);
+    db_close(db);
     snprintf(text, sizeof text, "rm -rf '%s'", folder);
     return system(text) != 0 ? 1 : code;
 }

@@ -33,7 +33,7 @@ static void digest_columns(uint64_t *digest, const Columns *columns) {
 static uint64_t outcome_digest(const char *path) {
     static char text[1 << 20];
     Problem problem;
-    Db *store;
+    Db *db;
     StudyRequest request = {0};
     Warnings warnings = {NULL, 0};
     Outcome *outcome;
@@ -43,9 +43,8 @@ static uint64_t outcome_digest(const char *path) {
     fclose(file);
     text[size] = 0;
     problem_clear(&problem);
-    assert_int_equal(db_open(NULL, &store, &problem), STATUS_OK);
-    assert_int_equal(jobs_prepare(store, text, size, NULL, &request, &warnings, &problem),
-                     STATUS_OK);
+    assert_int_equal(db_open(NULL, &db, &problem), STATUS_OK);
+    assert_int_equal(jobs_prepare(db, text, size, NULL, &request, &warnings, &problem), STATUS_OK);
     assert_int_equal(simulation_run(&request.simulation, NULL, NULL, NULL, &outcome, &problem),
                      STATUS_OK);
     uint64_t digest = 0xcbf29ce484222325;
@@ -59,7 +58,7 @@ static uint64_t outcome_digest(const char *path) {
     outcome_unref(outcome);
     study_request_clear(&request);
     warnings_clear(&warnings);
-    db_close(store);
+    db_close(db);
     return digest;
 }
 

@@ -44,7 +44,7 @@ static double cpu(void *context) {
 }
 
 // The longest time without a look [ms], of which the last counts too: stopping takes as long.
-static double longest(Db *store, const char *path, double longer) {
+static double longest(Db *db, const char *path, double longer) {
     static const SimulationLimits limits = {
         .samples = 1 << 25, .impacts = 500000, .steps = 1e15, .bytes = 4e9};
     Problem *problem = calloc(1, sizeof *problem);
@@ -57,7 +57,7 @@ static double longest(Db *store, const char *path, double longer) {
     Warnings warnings = {NULL, 0};
     double ms = 0;
     // The first look is for defaults alone; the duration is then stretched as a client would.
-    Status status = jobs_prepare(store, text, size, &limits, &inquiry, &warnings, problem);
+    Status status = jobs_prepare(db, text, size, &limits, &inquiry, &warnings, problem);
     assert_int_equal(status, STATUS_OK);
     inquiry.simulation.scene.duration *= longer;
     Outcome *outcome = NULL;
@@ -84,8 +84,8 @@ static double longest(Db *store, const char *path, double longer) {
 
 static void no_run_goes_long_without_looking_whether_it_is_to_stop(void **state) {
     (void)state;
-    Db *store;
-    assert_int_equal(db_open(NULL, &store, NULL), STATUS_OK);
+    Db *db;
+    assert_int_equal(db_open(NULL, &db, NULL), STATUS_OK);
     DIR *folder = opendir(IMPACTD_SOURCE_DIR "/schema/examples");
     assert_non_null(folder);
     size_t count = 0;
@@ -94,7 +94,7 @@ static void no_run_goes_long_without_looking_whether_it_is_to_stop(void **state)
         if (strstr(entry->d_name, ".json") == NULL)
             continue;
         snprintf(path, sizeof path, "%s/schema/examples/%s", IMPACTD_SOURCE_DIR, entry->d_name);
-        const double ms = longest(store, path, LONGER);
+        const double ms = longest(db, path, LONGER);
         if (ms > 20)
             print_message("%s: %.0f ms\n", entry->d_name, ms);
         if (ms > MAX_MS)
@@ -102,7 +102,7 @@ static void no_run_goes_long_without_looking_whether_it_is_to_stop(void **state)
         count++;
     }
     closedir(folder);
-    db_close(store);
+    db_close(db);
     assert_true(count > 20);
 }
 

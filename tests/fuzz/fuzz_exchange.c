@@ -102,11 +102,11 @@ static const char *judge_faults(Status status, bool is_table, const Problem *pro
 }
 
 // What was brought in comes out of another database as it went in.
-static const char *judge_round(Db *store, Problem *problem) {
+static const char *judge_round(Db *db, Problem *problem) {
     Bytes texts[2] = {{.most = 0}, {.most = 0}};
     Exchange exchange = {.revision_room = 0};
-    ImportTally tally = {0};
-    Db *other = NULL, *stores[2] = {store, NULL};
+    ImportTally metrics = {0};
+    Db *other = NULL, *stores[2] = {db, NULL};
     const char *wrong = NULL;
     if (db_open(NULL, &other, problem) != STATUS_OK)
         return "no second database";
@@ -121,8 +121,8 @@ static const char *judge_round(Db *store, Problem *problem) {
             wrong = "cannot be exported";
         else if (i == 0 && (exchange_read_json(texts[0].at, texts[0].count, &exchange, problem) !=
                                 STATUS_OK ||
-                            exchange_import(&exchange, other, NULL, true, false, &tally, problem) !=
-                                STATUS_OK))
+                            exchange_import(&exchange, other, NULL, true, false, &metrics,
+                                            problem) != STATUS_OK))
             wrong = "its export cannot be imported";
     }
     if (wrong == NULL && strcmp(texts[0].at, texts[1].at) != 0)
@@ -135,14 +135,14 @@ static const char *judge_round(Db *store, Problem *problem) {
 }
 
 // Reads a text and imports it.
-static Status bring(Db *store, const char *text, size_t size, bool is_table, bool is_dry,
+static Status bring(Db *db, const char *text, size_t size, bool is_table, bool is_dry,
                     Problem *problem) {
     Exchange exchange = {.revision_room = 0};
-    ImportTally tally;
+    ImportTally metrics;
     Status status =
         (is_table ? exchange_read_csv : exchange_read_json)(text, size, &exchange, problem);
     if (status == STATUS_OK || status == STATUS_INVALID)
-        status = exchange_import(&exchange, store, NULL, true, is_dry, &tally, problem);
+        status = exchange_import(&exchange, db, NULL, true, is_dry, &metrics, problem);
     exchange_clear(&exchange);
     if (is_table)
         exchange_place_faults(problem);
@@ -150,13 +150,13 @@ static Status bring(Db *store, const char *text, size_t size, bool is_table, boo
 }
 
 static const char *judge_import(const char *text, size_t size, bool is_table, Problem *problem) {
-    Db *store = NULL;
-    if (db_open(NULL, &store, problem) != STATUS_OK)
+    Db *db = NULL;
+    if (db_open(NULL, &db, problem) != STATUS_OK)
         return "no database";
-    const char *wrong = bring(store, text, size, is_table, false, problem) == STATUS_OK
-                            ? judge_round(store, problem)
+    const char *wrong = bring(db, text, size, is_table, false, problem) == STATUS_OK
+                            ? judge_round(db, problem)
                             : "judged as good, and refused";
-    db_close(store);
+    db_close(db);
     return wrong;
 }
 
@@ -166,8 +166,8 @@ int main(int argc, char **argv) {
     state = argc > 2 ? strtoull(argv[2], NULL, 10) : 1;
     const time_t start = time(NULL);
     unsigned long long rounds = 0, passed = 0;
-    Db *store = NULL; // of the paper's five alone
-    if (db_open(NULL, &store, &problem) != STATUS_OK)
+    Db *db = NULL; // of the paper's five alone
+    if (db_open(NULL, &db, &problem) != STATUS_OK)
         return 1;
     while (difftime(time(NULL), start) < seconds)
         for (int i = 0; i < ROUNDS_TIMED; i++, rounds++) {
@@ -184,7 +184,7 @@ int main(int argc, char **argv) {
             memcpy(own, text, size);
             const bool is_table = seed[0] != '{';
             problem = (Problem){.count = 0};
-            const Status status = bring(store, own, size, is_table, true, &problem);
+            const Status status = bring(db, own, size, is_table, true, &problem);
             const char *wrong = status != STATUS_OK ? judge_faults(status, is_table, &problem)
                                 : passed++ % ROUND_EACH == 0
                                     ? judge_import(own, size, is_table, &problem)
@@ -197,6 +197,6 @@ int main(int argc, char **argv) {
             }
         }
     printf("%llu texts, %llu of them good\n", rounds, passed);
-    db_close(store);
+    db_close(db);
     return 0;
 }

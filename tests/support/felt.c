@@ -8,12 +8,12 @@
 #include <cmocka.h>
 
 Db *felt_store(const char *directory) {
-    Db *store;
+    Db *db;
     static Problem problem;
     problem_clear(&problem);
-    if (db_open(directory, &store, &problem) != STATUS_OK)
+    if (db_open(directory, &db, &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
-    return store;
+    return db;
 }
 
 MaterialRevision felt_saying(double restitution) {
@@ -32,7 +32,7 @@ MaterialRevision felt_saying(double restitution) {
     return revision;
 }
 
-Status felt_review(Db *store, uint64_t revision, const char *status, const char *reviewer,
+Status felt_review(Db *db, uint64_t revision, const char *status, const char *reviewer,
                    uint64_t version) {
     const MaterialReview asked = {.slug = "felt",
                                   .revision = revision,
@@ -40,5 +40,5 @@ Status felt_review(Db *store, uint64_t revision, const char *status, const char 
                                   .reason = "because",
                                   .reviewer = (char *)reviewer,
                                   .created_unix_ms = 6000};
-    return db_material_review(store, &asked, version, NULL);
+    return db_material_review(db, &asked, version, NULL);
 }

@@ -11,7 +11,7 @@ Db *felt_store(const char *directory);
 MaterialRevision felt_saying(double restitution);
 
 // Gives a revision of it that status; `reviewer` may be NULL.
-Status felt_review(Db *store, uint64_t revision, const char *status, const char *reviewer,
+Status felt_review(Db *db, uint64_t revision, const char *status, const char *reviewer,
                    uint64_t version);
 
 #endif

@@ -18,14 +18,14 @@ void room_open(Room *room) {
                                          .cache_bytes = 1 << 24,
                                          .limits = {.samples = 1 << 25, .impacts = 1 << 20}};
     problem_clear(&problem);
-    if (db_open(room->directory, &room->store, &problem) != STATUS_OK ||
-        jobs_open(room->store, &settings, &room->intake, &problem) != STATUS_OK)
+    if (db_open(room->directory, &room->db, &problem) != STATUS_OK ||
+        jobs_open(room->db, &settings, &room->manager, &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
 }
 
 void room_close(Room *room) {
-    jobs_close(room->intake);
-    db_close(room->store);
+    jobs_close(room->manager);
+    db_close(room->db);
 }
 
 Room room_make(size_t workers) {
@@ -45,7 +45,7 @@ void room_submit(const Room *room, const char *text, const char *client, char id
     JobView show;
     const Submission submission = {.text = text, .size = strlen(text), .client = client};
     problem_clear(&problem);
-    if (jobs_submit(room->intake, &submission, &job, &problem) != STATUS_OK)
+    if (jobs_submit(room->manager, &submission, &job, &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
     assert_int_equal(job_view(job, &show), STATUS_OK);
     text_fit(id, 40, show.id);
@@ -55,14 +55,14 @@ void room_submit(const Room *room, const char *text, const char *client, char id
 
 void room_dismiss(const Room *room, const char *id) {
     Job *job;
-    assert_int_equal(jobs_cancel(room->intake, id, &job, NULL), STATUS_OK);
+    assert_int_equal(jobs_cancel(room->manager, id, &job, NULL), STATUS_OK);
     job_unref(job);
 }
 
 JobState room_state(const Room *room, const char *id, char result[72]) {
     Job *job;
     JobView show;
-    assert_int_equal(jobs_find(room->intake, id, &job, NULL), STATUS_OK);
+    assert_int_equal(jobs_find(room->manager, id, &job, NULL), STATUS_OK);
     assert_int_equal(job_view(job, &show), STATUS_OK);
     job_unref(job);
     const JobState state = show.state;

@@ -7,8 +7,8 @@
 
 typedef struct Room {
     char directory[SCRATCH_SIZE];
-    Db *store;
-    JobManager *intake;
+    Db *db;
+    JobManager *manager;
     size_t workers;
 } Room;
 

@@ -16,14 +16,14 @@
 #include "server/auth/tokens.h"
 #include "server/util/clock.h"
 
-static Status add(Db *store, const char *name, const char *scopes, int64_t expires_unix_ms,
+static Status add(Db *db, const char *name, const char *scopes, int64_t expires_unix_ms,
                   char header[128]) {
     TokenRow row = {0};
     char token[TOKEN_SIZE];
     TRY(token_make(scopes, expires_unix_ms, &row, token, NULL));
     snprintf(row.name, sizeof row.name, "%s", name);
     snprintf(header, 128, "Bearer %s", token);
-    return db_token_add(store, &row, NULL);
+    return db_token_add(db, &row, NULL);
 }
 
 static Status check(Tokens *tokens, const char *authorization, const char *scope,
@@ -52,34 +52,34 @@ static void until(Tokens *tokens, const char *authorization, Status wanted) {
 
 static void without_tokens_the_door_is_open(void **state) {
     (void)state;
-    Db *store;
+    Db *db;
     Tokens *tokens;
     char client[TOKEN_NAME_SIZE] = "x";
-    assert_int_equal(db_open(NULL, &store, NULL), STATUS_OK);
-    assert_int_equal(tokens_open(store, false, &tokens, NULL), STATUS_OK);
+    assert_int_equal(db_open(NULL, &db, NULL), STATUS_OK);
+    assert_int_equal(tokens_open(db, false, &tokens, NULL), STATUS_OK);
     assert_int_equal(check(tokens, NULL, "admin", client), STATUS_OK);
     assert_string_equal(client, "");
     assert_int_equal(check(tokens, "Bearer anything", "read", client), STATUS_OK);
     assert_string_equal(client, "");
     assert_int_equal(tokens_usable(tokens), 0);
     tokens_close(tokens);
-    assert_int_equal(tokens_open(store, true, &tokens, NULL), STATUS_OK);
+    assert_int_equal(tokens_open(db, true, &tokens, NULL), STATUS_OK);
     assert_int_equal(check(tokens, NULL, "read", client), STATUS_UNAUTHORIZED);
     tokens_close(tokens);
-    db_close(store);
+    db_close(db);
 }
 
 static void a_token_opens_what_its_scopes_say(void **state) {
     (void)state;
-    Db *store;
+    Db *db;
     Tokens *tokens;
     char reader[128], worker[128], chief[128], other[128], client[TOKEN_NAME_SIZE];
-    assert_int_equal(db_open(NULL, &store, NULL), STATUS_OK);
-    assert_int_equal(add(store, "reader", "read", 0, reader), STATUS_OK);
-    assert_int_equal(add(store, "worker", "submit,materials", 0, worker), STATUS_OK);
-    assert_int_equal(add(store, "chief", "admin", 0, chief), STATUS_OK);
-    assert_int_equal(add(store, "chief", "admin", 0, other), STATUS_CONFLICT);
-    assert_int_equal(tokens_open(store, false, &tokens, NULL), STATUS_OK);
+    assert_int_equal(db_open(NULL, &db, NULL), STATUS_OK);
+    assert_int_equal(add(db, "reader", "read", 0, reader), STATUS_OK);
+    assert_int_equal(add(db, "worker", "submit,materials", 0, worker), STATUS_OK);
+    assert_int_equal(add(db, "chief", "admin", 0, chief), STATUS_OK);
+    assert_int_equal(add(db, "chief", "admin", 0, other), STATUS_CONFLICT);
+    assert_int_equal(tokens_open(db, false, &tokens, NULL), STATUS_OK);
     assert_int_equal(tokens_usable(tokens), 3);
     assert_int_equal(check(tokens, reader, "read", client), STATUS_OK);
     assert_string_equal(client, "reader");
@@ -101,17 +101,17 @@ static void a_token_opens_what_its_scopes_say(void **state) {
     assert_int_equal(tokens_check(tokens, reader, "admin", &holder, &problem), STATUS_FORBIDDEN);
     assert_non_null(strstr(problem.detail, "\"admin\""));
     tokens_close(tokens);
-    db_close(store);
+    db_close(db);
 }
 
 static void what_is_no_token_of_ours_stays_out(void **state) {
     (void)state;
-    Db *store;
+    Db *db;
     Tokens *tokens;
     char good[128], text[160], client[TOKEN_NAME_SIZE];
-    assert_int_equal(db_open(NULL, &store, NULL), STATUS_OK);
-    assert_int_equal(add(store, "a", "read", 0, good), STATUS_OK);
-    assert_int_equal(tokens_open(store, false, &tokens, NULL), STATUS_OK);
+    assert_int_equal(db_open(NULL, &db, NULL), STATUS_OK);
+    assert_int_equal(add(db, "a", "read", 0, good), STATUS_OK);
+    assert_int_equal(tokens_open(db, false, &tokens, NULL), STATUS_OK);
     const char *token = good + strlen("Bearer ");
     assert_int_equal(strlen(token), TOKEN_SIZE - 1);
     static const char *const wrong[] = {"%s",        "Basic %s",   "Bearer%s",     "Bearer",
@@ -145,7 +145,7 @@ static void what_is_no_token_of_ours_stays_out(void **state) {
     assert_int_equal(check(tokens, text, "read", client), STATUS_OK);
     assert_int_equal(check(tokens, NULL, "read", client), STATUS_UNAUTHORIZED);
     tokens_close(tokens);
-    db_close(store);
+    db_close(db);
 }
 
 static void tokens_made_and_revoked_elsewhere_are_followed(void **state) {
@@ -196,30 +196,30 @@ static void tokens_made_and_revoked_elsewhere_are_followed(void **state) {
 
 static void the_last_revoked_token_leaves_the_door_shut(void **state) {
     (void)state;
-    Db *store;
+    Db *db;
     Tokens *tokens;
     char header[128], client[TOKEN_NAME_SIZE];
-    assert_int_equal(db_open(NULL, &store, NULL), STATUS_OK);
-    assert_int_equal(add(store, "a", "read", 0, header), STATUS_OK);
+    assert_int_equal(db_open(NULL, &db, NULL), STATUS_OK);
+    assert_int_equal(add(db, "a", "read", 0, header), STATUS_OK);
     TokenRow row = {.name = "a", .revoked_unix_ms = 1};
-    assert_int_equal(db_token_revoke(store, &row, NULL), STATUS_OK);
-    assert_int_equal(tokens_open(store, false, &tokens, NULL), STATUS_OK);
+    assert_int_equal(db_token_revoke(db, &row, NULL), STATUS_OK);
+    assert_int_equal(tokens_open(db, false, &tokens, NULL), STATUS_OK);
     assert_int_equal(tokens_usable(tokens), 0);
     assert_int_equal(check(tokens, NULL, "read", client), STATUS_UNAUTHORIZED);
     assert_int_equal(check(tokens, header, "read", client), STATUS_UNAUTHORIZED);
     tokens_close(tokens);
-    db_close(store);
+    db_close(db);
 }
 
 static void an_expired_token_says_so(void **state) {
     (void)state;
-    Db *store;
+    Db *db;
     Tokens *tokens;
     char old[128], fresh[128], client[TOKEN_NAME_SIZE];
-    assert_int_equal(db_open(NULL, &store, NULL), STATUS_OK);
-    assert_int_equal(add(store, "old", "read", clock_unix_ms() - 1, old), STATUS_OK);
-    assert_int_equal(add(store, "fresh", "read", clock_unix_ms() + 3600000, fresh), STATUS_OK);
-    assert_int_equal(tokens_open(store, false, &tokens, NULL), STATUS_OK);
+    assert_int_equal(db_open(NULL, &db, NULL), STATUS_OK);
+    assert_int_equal(add(db, "old", "read", clock_unix_ms() - 1, old), STATUS_OK);
+    assert_int_equal(add(db, "fresh", "read", clock_unix_ms() + 3600000, fresh), STATUS_OK);
+    assert_int_equal(tokens_open(db, false, &tokens, NULL), STATUS_OK);
     Problem problem;
     problem_clear(&problem);
     assert_int_equal(tokens_check(tokens, old, "read", &(Holder){.name = ""}, &problem),
@@ -228,7 +228,7 @@ static void an_expired_token_says_so(void **state) {
     assert_int_equal(check(tokens, fresh, "read", client), STATUS_OK);
     assert_int_equal(tokens_usable(tokens), 1);
     tokens_close(tokens);
-    db_close(store);
+    db_close(db);
 }
 
 static void scopes_are_a_list_of_known_names(void **state) {
@@ -265,12 +265,12 @@ static void *ask(void *context) {
 
 static void many_threads_ask_while_the_table_changes(void **state) {
     (void)state;
-    Db *store;
+    Db *db;
     Tokens *tokens;
     char header[128], other[128], name[16], client[TOKEN_NAME_SIZE];
-    assert_int_equal(db_open(NULL, &store, NULL), STATUS_OK);
-    assert_int_equal(add(store, "a", "read", 0, header), STATUS_OK);
-    assert_int_equal(tokens_open(store, false, &tokens, NULL), STATUS_OK);
+    assert_int_equal(db_open(NULL, &db, NULL), STATUS_OK);
+    assert_int_equal(add(db, "a", "read", 0, header), STATUS_OK);
+    assert_int_equal(tokens_open(db, false, &tokens, NULL), STATUS_OK);
     Asker askers[4];
     pthread_t threads[4];
     for (size_t i = 0; i < COUNT(askers); i++) {
@@ -279,7 +279,7 @@ static void many_threads_ask_while_the_table_changes(void **state) {
     }
     for (int i = 0; i < 20; i++) {
         snprintf(name, sizeof name, "b%d", i);
-        assert_int_equal(add(store, name, "read", 0, other), STATUS_OK);
+        assert_int_equal(add(db, name, "read", 0, other), STATUS_OK);
         (void)check(tokens, "Bearer nobody", "read", client);
         pause_ms(5);
     }
@@ -288,7 +288,7 @@ static void many_threads_ask_while_the_table_changes(void **state) {
         assert_int_equal(askers[i].refused, 0);
     }
     tokens_close(tokens);
-    db_close(store);
+    db_close(db);
 }
 
 int main(void) {

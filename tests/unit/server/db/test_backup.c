@@ -36,11 +36,11 @@ static int folders_remove(void **state) {
 }
 
 static Db *open_store(const char *folder) {
-    Db *store;
+    Db *db;
     problem_clear(&problem);
-    if (db_open(folder, &store, &problem) != STATUS_OK)
+    if (db_open(folder, &db, &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
-    return store;
+    return db;
 }
 
 static JobRow job_row(unsigned long number) {
@@ -66,7 +66,7 @@ static size_t files_in(const char *folder) {
 }
 
 typedef struct Stream {
-    Db *store;
+    Db *db;
     atomic_ulong added; // rows that are acknowledged
     atomic_bool is_over;
 } Stream;
@@ -75,7 +75,7 @@ static void *stream(void *of) {
     Stream *rows = of;
     for (unsigned long number = 0; !atomic_load(&rows->is_over); number++) {
         const JobRow row = job_row(number);
-        if (db_job_add(rows->store, &row, NULL) != STATUS_OK)
+        if (db_job_add(rows->db, &row, NULL) != STATUS_OK)
             break;
         atomic_store(&rows->added, number + 1);
     }
@@ -84,7 +84,7 @@ static void *stream(void *of) {
 
 static void every_row_that_was_added_before_is_in_the_copy(void **state) {
     (void)state;
-    Stream rows = {.store = open_store(data)};
+    Stream rows = {.db = open_store(data)};
     pthread_t thread;
     assert_int_equal(pthread_create(&thread, NULL, stream, &rows), 0);
     unsigned long last = 0;
@@ -96,18 +96,18 @@ static void every_row_that_was_added_before_is_in_the_copy(void **state) {
         if (copy(NULL, &backup) != STATUS_OK)
             fail_msg("%s", problem.detail);
         assert_true(backup.jobs >= last);
-        Db *store = open_store(target);
+        Db *db = open_store(target);
         for (unsigned long number = last > 300 ? last - 300 : 0; number < last; number++) {
             const JobRow row = job_row(number);
             JobRow loaded;
-            assert_int_equal(db_job_load(store, row.id, &loaded, NULL), STATUS_OK);
+            assert_int_equal(db_job_load(db, row.id, &loaded, NULL), STATUS_OK);
             job_row_clear(&loaded);
         }
-        db_close(store);
+        db_close(db);
     }
     atomic_store(&rows.is_over, true);
     pthread_join(thread, NULL);
-    db_close(rows.store);
+    db_close(rows.db);
 }
 
 static bool stop_at(void *context, double fraction) {
@@ -119,13 +119,13 @@ static bool stop_at(void *context, double fraction) {
 static void stopped_at_any_moment_it_leaves_nothing(void **state) {
     (void)state;
     enum { TITLE = 60000, JOBS = 40 }; // some steps of copying
-    Db *store = open_store(data);
+    Db *db = open_store(data);
     char *title = calloc(1, TITLE);
     memset(title, 'x', TITLE - 1);
     for (unsigned long number = 0; number < JOBS; number++) {
         JobRow row = job_row(number);
         row.title = title;
-        assert_int_equal(db_job_add(store, &row, NULL), STATUS_OK);
+        assert_int_equal(db_job_add(db, &row, NULL), STATUS_OK);
     }
     free(title);
     Status status = STATUS_CANCELLED;
@@ -142,7 +142,7 @@ static void stopped_at_any_moment_it_leaves_nothing(void **state) {
     assert_int_equal(status, STATUS_OK);
     assert_true(moment > 5);
     assert_int_equal(files_in(target), 1);
-    db_close(store);
+    db_close(db);
 }
 
 #define IN_FOLDERS(test) cmocka_unit_test_setup_teardown(test, folders_make, folders_remove)

@@ -37,12 +37,12 @@ static int remove_folder(void **state) {
 }
 
 static Db *open_store(const char *directory) {
-    Db *store;
+    Db *db;
     static Problem problem;
     problem_clear(&problem);
-    if (db_open(directory, &store, &problem) != STATUS_OK)
+    if (db_open(directory, &db, &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
-    return store;
+    return db;
 }
 
 static JobRow job_row(const char *id, int state) {
@@ -57,82 +57,82 @@ static JobRow job_row(const char *id, int state) {
 
 static void the_papers_materials_are_there(void **state) {
     (void)state;
-    Db *store = open_store(NULL);
+    Db *db = open_store(NULL);
     MaterialRevisions materials;
-    assert_int_equal(db_material_heads(store, "", 100, &materials, NULL), STATUS_OK);
+    assert_int_equal(db_material_heads(db, "", 100, &materials, NULL), STATUS_OK);
     assert_int_equal(materials.count, 5);
     assert_string_equal(materials.at[0].slug, "aluminium");
     material_revisions_clear(&materials);
 
     MaterialRevision sponge;
-    assert_int_equal(db_material(store, "sponge", 0, &sponge, NULL), STATUS_OK);
+    assert_int_equal(db_material(db, "sponge", 0, &sponge, NULL), STATUS_OK);
     assert_string_equal(sponge.material.name, "Sponge");
     assert_string_equal(sponge.status, "approved");
     assert_string_equal(sponge.material.source, "doi:10.1002/stc.238, Table I");
     assert_int_equal(sponge.revision, 1);
     assert_true(sponge.material.restitution == 0.61 && sponge.material.contact_time == 0.025);
     material_revision_clear(&sponge);
-    assert_int_equal(db_material(store, "sponge", 1, &sponge, NULL), STATUS_OK);
+    assert_int_equal(db_material(db, "sponge", 1, &sponge, NULL), STATUS_OK);
     material_revision_clear(&sponge);
-    assert_int_equal(db_material(store, "sponge", 2, &sponge, NULL), STATUS_NOT_FOUND);
-    assert_int_equal(db_material(store, "sponge", UINT64_MAX, &sponge, NULL), STATUS_NOT_FOUND);
-    assert_int_equal(db_material(store, "spong", 0, &sponge, NULL), STATUS_NOT_FOUND);
-    assert_int_equal(db_material(store, "", 0, &sponge, NULL), STATUS_NOT_FOUND);
-    db_close(store);
+    assert_int_equal(db_material(db, "sponge", 2, &sponge, NULL), STATUS_NOT_FOUND);
+    assert_int_equal(db_material(db, "sponge", UINT64_MAX, &sponge, NULL), STATUS_NOT_FOUND);
+    assert_int_equal(db_material(db, "spong", 0, &sponge, NULL), STATUS_NOT_FOUND);
+    assert_int_equal(db_material(db, "", 0, &sponge, NULL), STATUS_NOT_FOUND);
+    db_close(db);
 }
 
 static void jobs_survive_closing_and_are_listed_newest_first(void **state) {
     (void)state;
-    Db *store = open_store(folder);
+    Db *db = open_store(folder);
     JobRow row;
     const char *const ids[] = {"j-1", "j-2", "j-3"};
     for (size_t i = 0; i < 3; i++) {
         row = job_row(ids[i], 0);
-        assert_int_equal(db_job_add(store, &row, NULL), STATUS_OK);
+        assert_int_equal(db_job_add(db, &row, NULL), STATUS_OK);
     }
-    assert_int_equal(db_job_add(store, &row, NULL), STATUS_CONFLICT);
+    assert_int_equal(db_job_add(db, &row, NULL), STATUS_CONFLICT);
     row = job_row("j-2", 3);
     row.problem = "{\"status\": 500}";
     row.finished_unix_ms = 2000;
     row.run = 0.25;
-    assert_int_equal(db_job_update(store, &row, NULL), STATUS_OK);
+    assert_int_equal(db_job_update(db, &row, NULL), STATUS_OK);
     row = job_row("j-9", 3);
-    assert_int_equal(db_job_update(store, &row, NULL), STATUS_NOT_FOUND);
-    db_close(store);
+    assert_int_equal(db_job_update(db, &row, NULL), STATUS_NOT_FOUND);
+    db_close(db);
 
-    store = open_store(folder);
-    assert_int_equal(db_job_load(store, "j-2", &row, NULL), STATUS_OK);
+    db = open_store(folder);
+    assert_int_equal(db_job_load(db, "j-2", &row, NULL), STATUS_OK);
     assert_int_equal(row.state, 3);
     assert_string_equal(row.problem, "{\"status\": 500}");
     assert_string_equal(row.title, "T");
     assert_int_equal(row.created_unix_ms, 1000);
     assert_true(row.run == 0.25);
     job_row_clear(&row);
-    assert_int_equal(db_job_load(store, "j-9", &row, NULL), STATUS_NOT_FOUND);
+    assert_int_equal(db_job_load(db, "j-9", &row, NULL), STATUS_NOT_FOUND);
 
     JobRows rows;
     JobSearch search = job_search_all(2);
-    assert_int_equal(db_job_search(store, &search, &rows, NULL), STATUS_OK);
+    assert_int_equal(db_job_search(db, &search, &rows, NULL), STATUS_OK);
     assert_int_equal(rows.count, 2);
     assert_string_equal(rows.at[0].id, "j-3");
     assert_string_equal(rows.at[1].id, "j-2");
     job_rows_clear(&rows);
     search.before = "j-2";
-    assert_int_equal(db_job_search(store, &search, &rows, NULL), STATUS_OK);
+    assert_int_equal(db_job_search(db, &search, &rows, NULL), STATUS_OK);
     assert_int_equal(rows.count, 1);
     assert_string_equal(rows.at[0].id, "j-1");
     job_rows_clear(&rows);
     search.before = "j-9";
-    assert_int_equal(db_job_search(store, &search, &rows, NULL), STATUS_NOT_FOUND);
+    assert_int_equal(db_job_search(db, &search, &rows, NULL), STATUS_NOT_FOUND);
     assert_int_equal(rows.count, 0);
 
-    assert_int_equal(db_job_unfinished(store, &rows, NULL), STATUS_OK);
+    assert_int_equal(db_job_unfinished(db, &rows, NULL), STATUS_OK);
     assert_int_equal(rows.count, 2);
     assert_string_equal(rows.at[0].id, "j-1");
     assert_string_equal(rows.at[0].scene, "{\"a\": 1}");
     assert_string_equal(rows.at[1].id, "j-3");
     job_rows_clear(&rows);
-    db_close(store);
+    db_close(db);
 }
 
 static ResultRow result_row(const char *id) {
@@ -152,47 +152,47 @@ static ResultRow result_row(const char *id) {
 
 static void a_result_and_its_jobs_are_saved_together_or_not_at_all(void **state) {
     (void)state;
-    Db *store = open_store(folder);
+    Db *db = open_store(folder);
     JobRow first = job_row("j-1", 0), second = job_row("j-2", 0);
-    assert_int_equal(db_job_add(store, &first, NULL), STATUS_OK);
+    assert_int_equal(db_job_add(db, &first, NULL), STATUS_OK);
     first.state = second.state = 2;
     const JobRow *const jobs[] = {&first, &second};
     ResultRow result = result_row("r-1");
-    assert_int_equal(db_result_save(store, &result, jobs, 2, NULL), STATUS_NOT_FOUND);
-    assert_false(db_result_exists(store, "r-1"));
+    assert_int_equal(db_result_save(db, &result, jobs, 2, NULL), STATUS_NOT_FOUND);
+    assert_false(db_result_exists(db, "r-1"));
     JobRow loaded;
-    assert_int_equal(db_job_load(store, "j-1", &loaded, NULL), STATUS_OK);
+    assert_int_equal(db_job_load(db, "j-1", &loaded, NULL), STATUS_OK);
     assert_int_equal(loaded.state, 0);
     job_row_clear(&loaded);
 
-    assert_int_equal(db_result_save(store, &result, jobs, 1, NULL), STATUS_OK);
-    assert_true(db_result_exists(store, "r-1"));
+    assert_int_equal(db_result_save(db, &result, jobs, 1, NULL), STATUS_OK);
+    assert_true(db_result_exists(db, "r-1"));
     result.summary = "other";
-    assert_int_equal(db_result_save(store, &result, jobs, 1, NULL), STATUS_OK);
+    assert_int_equal(db_result_save(db, &result, jobs, 1, NULL), STATUS_OK);
     ResultRow found;
-    assert_int_equal(db_result_load(store, "r-1", &found, NULL), STATUS_OK);
+    assert_int_equal(db_result_load(db, "r-1", &found, NULL), STATUS_OK);
     assert_string_equal(found.summary, "{\"a\": 1}");
     assert_null(found.psd);
     assert_int_equal(found.count, 11);
     result_row_clear(&found);
-    assert_int_equal(db_result_head(store, "r-1", &found, NULL), STATUS_OK);
+    assert_int_equal(db_result_head(db, "r-1", &found, NULL), STATUS_OK);
     assert_string_equal(found.summary, "{\"a\": 1}");
     assert_string_equal(found.notes, "[2]");
     assert_null(found.scene);
     result_row_clear(&found);
-    assert_int_equal(db_result_load(store, "r-2", &found, NULL), STATUS_NOT_FOUND);
-    db_close(store);
+    assert_int_equal(db_result_load(db, "r-2", &found, NULL), STATUS_NOT_FOUND);
+    db_close(db);
 }
 
 static void a_second_daemon_is_refused_with_the_folders_name(void **state) {
     (void)state;
-    Db *store = open_store(folder), *other;
+    Db *db = open_store(folder), *other;
     static Problem problem;
     problem_clear(&problem);
     assert_int_equal(db_open(folder, &other, &problem), STATUS_CONFLICT);
     assert_null(other);
     assert_non_null(strstr(problem.detail, folder));
-    db_close(store);
+    db_close(db);
     db_close(open_store(folder));
 }
 
@@ -207,13 +207,13 @@ static void a_missing_folder_is_made_for_this_user_alone(void **state) {
     snprintf(file, sizeof file, "%s/impactd.db", deep);
     assert_int_equal(stat(file, &about), 0);
     assert_int_equal(about.st_mode & 0777, 0600);
-    Db *store;
-    assert_int_equal(db_open(file, &store, NULL), STATUS_IO);
-    assert_int_equal(db_open("", &store, NULL), STATUS_IO);
+    Db *db;
+    assert_int_equal(db_open(file, &db, NULL), STATUS_IO);
+    assert_int_equal(db_open("", &db, NULL), STATUS_IO);
 }
 
 typedef struct Hammer {
-    Db *store;
+    Db *db;
     int number, failures;
 } Hammer;
 
@@ -223,22 +223,22 @@ static void *hammer(void *context) {
         char id[32];
         snprintf(id, sizeof id, "j-%d-%d", own->number, i);
         JobRow row = job_row(id, 0);
-        own->failures += db_job_add(own->store, &row, NULL) != STATUS_OK;
+        own->failures += db_job_add(own->db, &row, NULL) != STATUS_OK;
         // Every other caller does something that must fail, and nobody else may notice.
         if (own->number % 2 == 0)
-            own->failures += db_job_add(own->store, &row, NULL) != STATUS_CONFLICT;
-        own->failures += db_job_load(own->store, id, &row, NULL) != STATUS_OK;
+            own->failures += db_job_add(own->db, &row, NULL) != STATUS_CONFLICT;
+        own->failures += db_job_load(own->db, id, &row, NULL) != STATUS_OK;
         job_row_clear(&row);
     }
     return NULL;
 }
 
 static void hammer_store(const char *directory) {
-    Db *store = open_store(directory);
+    Db *db = open_store(directory);
     pthread_t threads[16];
     Hammer hammers[16];
     for (int i = 0; i < 16; i++) {
-        hammers[i] = (Hammer){store, i, 0};
+        hammers[i] = (Hammer){db, i, 0};
         assert_int_equal(pthread_create(&threads[i], NULL, hammer, &hammers[i]), 0);
     }
     for (int i = 0; i < 16; i++) {
@@ -246,10 +246,10 @@ static void hammer_store(const char *directory) {
         assert_int_equal(hammers[i].failures, 0);
     }
     JobRows rows;
-    assert_int_equal(db_job_unfinished(store, &rows, NULL), STATUS_OK);
+    assert_int_equal(db_job_unfinished(db, &rows, NULL), STATUS_OK);
     assert_int_equal(rows.count, 16 * 40);
     job_rows_clear(&rows);
-    db_close(store);
+    db_close(db);
 }
 
 static void sixteen_threads_write_and_no_failure_spoils_another(void **state) {
@@ -266,14 +266,14 @@ static void what_was_acknowledged_survives_kill_9(void **state) {
         const pid_t child = fork();
         assert_true(child >= 0);
         if (child == 0) {
-            Db *store;
-            if (db_open(folder, &store, NULL) != STATUS_OK)
+            Db *db;
+            if (db_open(folder, &db, NULL) != STATUS_OK)
                 _exit(1);
             for (int i = 0;; i++) {
                 char id[40] = {0};
                 snprintf(id, sizeof id, "j-%d-%d", round, i);
                 JobRow row = job_row(id, 0);
-                if (db_job_add(store, &row, NULL) != STATUS_OK ||
+                if (db_job_add(db, &row, NULL) != STATUS_OK ||
                     write(pipe_ends[1], id, sizeof id) < 0)
                     _exit(1);
             }
@@ -290,15 +290,15 @@ static void what_was_acknowledged_survives_kill_9(void **state) {
             count++;
         close(pipe_ends[0]);
 
-        Db *store = open_store(folder);
+        Db *db = open_store(folder);
         for (int i = 0; i < count; i++) {
             char id[40];
             snprintf(id, sizeof id, "j-%d-%d", round, i);
             JobRow row;
-            assert_int_equal(db_job_load(store, id, &row, NULL), STATUS_OK);
+            assert_int_equal(db_job_load(db, id, &row, NULL), STATUS_OK);
             job_row_clear(&row);
         }
-        db_close(store);
+        db_close(db);
     }
 }
 
@@ -309,9 +309,9 @@ static void a_full_disk_is_told_and_what_was_there_stays(void **state) {
     assert_true(child >= 0);
     if (child == 0) {
         signal(SIGXFSZ, SIG_IGN);
-        Db *store = open_store(folder);
+        Db *db = open_store(folder);
         JobRow row = job_row("j-0", 0);
-        if (db_job_add(store, &row, NULL) != STATUS_OK)
+        if (db_job_add(db, &row, NULL) != STATUS_OK)
             _exit(1);
         setrlimit(RLIMIT_FSIZE, &(struct rlimit){2 << 20, 2 << 20});
         char *scene = calloc(1, 200001);
@@ -320,12 +320,12 @@ static void a_full_disk_is_told_and_what_was_there_stays(void **state) {
         for (int i = 1; i < 100 && status == STATUS_OK; i++) {
             snprintf(row.id, sizeof row.id, "j-%d", i);
             row.scene = scene;
-            status = db_job_add(store, &row, NULL);
+            status = db_job_add(db, &row, NULL);
         }
         if (status != STATUS_FULL)
             _exit(2);
         row = job_row("j-after", 0);
-        if (db_job_load(store, "j-0", &row, NULL) != STATUS_OK)
+        if (db_job_load(db, "j-0", &row, NULL) != STATUS_OK)
             _exit(3);
         _exit(0);
     }
@@ -333,11 +333,11 @@ static void a_full_disk_is_told_and_what_was_there_stays(void **state) {
     waitpid(child, &ended, 0);
     assert_true(WIFEXITED(ended));
     assert_int_equal(WEXITSTATUS(ended), 0);
-    Db *store = open_store(folder);
+    Db *db = open_store(folder);
     JobRow row;
-    assert_int_equal(db_job_load(store, "j-0", &row, NULL), STATUS_OK);
+    assert_int_equal(db_job_load(db, "j-0", &row, NULL), STATUS_OK);
     job_row_clear(&row);
-    db_close(store);
+    db_close(db);
 }
 
 static const EmbeddedFile two_steps[] = {
@@ -399,15 +399,15 @@ static void a_database_of_another_program_is_refused_and_left_alone(void **state
              "TABLE t (x)')\"",
              folder);
     assert_int_equal(system(command), 0);
-    Db *store;
+    Db *db;
     static Problem problem;
     problem_clear(&problem);
-    assert_int_equal(db_open(folder, &store, &problem), STATUS_CONFLICT);
+    assert_int_equal(db_open(folder, &db, &problem), STATUS_CONFLICT);
     assert_non_null(strstr(problem.detail, "another program"));
     snprintf(command, sizeof command, "head -c 5000 /dev/urandom > %s/impactd.db", folder);
     assert_int_equal(system(command), 0);
     problem_clear(&problem);
-    assert_int_equal(db_open(folder, &store, &problem), STATUS_IO);
+    assert_int_equal(db_open(folder, &db, &problem), STATUS_IO);
     assert_non_null(strstr(problem.detail, "impactd.db is damaged"));
     assert_non_null(strstr(problem.detail, "to begin anew"));
 }
@@ -433,16 +433,16 @@ static void revisions_of_materials_never_change(void **state) {
             NULL),
         STATUS_OK);
     sqlite_close(database);
-    Db *store = open_store(folder);
+    Db *db = open_store(folder);
     MaterialRevision sponge;
-    assert_int_equal(db_material(store, "sponge", 0, &sponge, NULL), STATUS_OK);
+    assert_int_equal(db_material(db, "sponge", 0, &sponge, NULL), STATUS_OK);
     assert_int_equal(sponge.revision, 2);
     assert_true(isnan(sponge.material.contact_time));
     material_revision_clear(&sponge);
-    assert_int_equal(db_material(store, "sponge", 3, &sponge, NULL), STATUS_OK);
+    assert_int_equal(db_material(db, "sponge", 3, &sponge, NULL), STATUS_OK);
     assert_string_equal(sponge.status, "draft");
     material_revision_clear(&sponge);
-    db_close(store);
+    db_close(db);
 }
 
 #define IN_FOLDER(test) cmocka_unit_test_setup_teardown(test, make_folder, remove_folder)
@@ -454,7 +454,7 @@ static void note_done(void *context, Status status, const char *detail) {
 
 static void series_are_kept_under_a_budget_and_the_longest_unused_goes(void **state) {
     (void)state;
-    Db *store = open_store(folder);
+    Db *db = open_store(folder);
     static Status told[5];
     char *body, id[8];
     size_t size;
@@ -464,29 +464,29 @@ static void series_are_kept_under_a_budget_and_the_longest_unused_goes(void **st
         assert_non_null(body);
         memset(body, 'a' + (int)i, 1000);
         snprintf(id, sizeof id, "r-%zu", i);
-        assert_int_equal(db_series_post(store, id, body, 1000, 3500, &done), STATUS_OK);
+        assert_int_equal(db_series_post(db, id, body, 1000, 3500, &done), STATUS_OK);
         // What is low waits for all else, so one that waits comes behind it.
-        while (!db_series_exists(store, id))
+        while (!db_series_exists(db, id))
             ;
         if (i == 2) {
-            assert_int_equal(db_series_load(store, "r-0", &body, &size, NULL), STATUS_OK);
+            assert_int_equal(db_series_load(db, "r-0", &body, &size, NULL), STATUS_OK);
             assert_int_equal(size, 1000);
             assert_int_equal(body[999], 'a');
             free(body);
         }
     }
-    assert_true(db_series_exists(store, "r-0"));
-    assert_false(db_series_exists(store, "r-1"));
-    assert_true(db_series_exists(store, "r-2") && db_series_exists(store, "r-3"));
+    assert_true(db_series_exists(db, "r-0"));
+    assert_false(db_series_exists(db, "r-1"));
+    assert_true(db_series_exists(db, "r-2") && db_series_exists(db, "r-3"));
     uint64_t count, bytes, evictions;
-    db_series_tally(store, &count, &bytes, &evictions);
+    db_series_tally(db, &count, &bytes, &evictions);
     assert_int_equal(count, 3);
     assert_int_equal(bytes, 3000);
     assert_int_equal(evictions, 1);
     const WriteDone done = {note_done, &told[4]};
-    assert_int_equal(db_series_post(store, "r-9", malloc(9000), 9000, 3500, &done), STATUS_LIMIT);
-    assert_int_equal(db_series_load(store, "r-9", &body, &size, NULL), STATUS_NOT_FOUND);
-    db_close(store);
+    assert_int_equal(db_series_post(db, "r-9", malloc(9000), 9000, 3500, &done), STATUS_LIMIT);
+    assert_int_equal(db_series_load(db, "r-9", &body, &size, NULL), STATUS_NOT_FOUND);
+    db_close(db);
 }
 
 int main(void) {

@@ -15,9 +15,10 @@ static const MaterialRevision sponge = {
     .material = {.name = "Sponge", .source = "s", .restitution = 0.61, .contact_time = 0.025},
     .status = "approved"};
 
-static bool has(MaterialMemory *memory, uint64_t generation, const char *slug, uint64_t revision) {
+static bool has(MaterialMemory *memory, uint64_t catalog_version, const char *slug,
+                uint64_t revision) {
     MaterialRevision found = {0};
-    const bool is_found = material_memory_find(memory, generation, slug, revision, &found);
+    const bool is_found = material_memory_find(memory, catalog_version, slug, revision, &found);
     if (is_found) {
         assert_string_equal(found.slug, slug);
         assert_string_equal(found.status, "approved");

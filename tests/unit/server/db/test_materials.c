@@ -34,7 +34,7 @@ static int remove_folder(void **state) {
 
 static void a_revision_comes_back_as_it_went(void **state) {
     (void)state;
-    Db *store = felt_store(folder);
+    Db *db = felt_store(folder);
     MaterialRevision whole = felt_saying(0.5), found;
     Material *said = &whole.material;
     said->kind = "foam";
@@ -55,16 +55,16 @@ static void a_revision_comes_back_as_it_went(void **state) {
     said->base = MATERIAL_BASE_FREE;
     said->base_mass = 7;
     whole.author = "ann";
-    assert_int_equal(db_material_add(store, &whole, NULL), STATUS_OK);
-    assert_int_equal(db_material_add(store, &whole, NULL), STATUS_CONFLICT);
+    assert_int_equal(db_material_add(db, &whole, NULL), STATUS_OK);
+    assert_int_equal(db_material_add(db, &whole, NULL), STATUS_CONFLICT);
     MaterialRevision bare = felt_saying(0.4);
     bare.lists = NULL;
-    assert_int_equal(db_material_revise(store, &bare, 1, NULL), STATUS_OK);
+    assert_int_equal(db_material_revise(db, &bare, 1, NULL), STATUS_OK);
     assert_int_equal(bare.revision, 2);
-    db_close(store);
+    db_close(db);
 
-    store = felt_store(folder);
-    assert_int_equal(db_material(store, "felt", 1, &found, NULL), STATUS_OK);
+    db = felt_store(folder);
+    assert_int_equal(db_material(db, "felt", 1, &found, NULL), STATUS_OK);
     assert_string_equal(found.material.notes, said->notes);
     assert_string_equal(found.material.hardness, said->hardness);
     assert_string_equal(found.material.impactor, said->impactor);
@@ -80,14 +80,14 @@ static void a_revision_comes_back_as_it_went(void **state) {
     assert_int_equal(found.latest, 2);
     assert_int_equal(found.version, 2);
     material_revision_clear(&found);
-    assert_int_equal(db_material(store, "felt", 2, &found, NULL), STATUS_OK);
+    assert_int_equal(db_material(db, "felt", 2, &found, NULL), STATUS_OK);
     assert_null(found.lists);
     assert_null(found.author);
     assert_null(found.material.kind);
     assert_true(isnan(found.material.contact_time) && isnan(found.material.base_mass));
     assert_int_equal(found.material.base, CHOICE_ABSENT);
     material_revision_clear(&found);
-    db_close(store);
+    db_close(db);
 }
 
 static Sqlite *open_database(void) {
@@ -169,13 +169,13 @@ static void no_sql_changes_what_was_said(void **state) {
         "UPDATE material_states SET restitution = 0.9",
         "DELETE FROM material_states",
         "INSERT INTO material_states (slug) VALUES ('felt')"};
-    Db *store = felt_store(folder);
+    Db *db = felt_store(folder);
     MaterialRevision one = felt_saying(0.5);
     MaterialMeasurement drop = {.slug = "felt", .comment = "c", .document = "{\"a\": 1}"};
-    assert_int_equal(db_material_add(store, &one, NULL), STATUS_OK);
-    assert_int_equal(db_material_measure(store, &drop, ANY_VERSION, NULL), STATUS_OK);
-    assert_int_equal(felt_review(store, 1, "approved", NULL, ANY_VERSION), STATUS_OK);
-    db_close(store);
+    assert_int_equal(db_material_add(db, &one, NULL), STATUS_OK);
+    assert_int_equal(db_material_measure(db, &drop, ANY_VERSION, NULL), STATUS_OK);
+    assert_int_equal(felt_review(db, 1, "approved", NULL, ANY_VERSION), STATUS_OK);
+    db_close(db);
 
     Sqlite *database = open_database();
     char *before = dump(database);
@@ -207,28 +207,28 @@ static const char data_of_before[] =
     "'{\"dampers\": [{\"left_buffer\": {\"material\": \"sponge@1\"}, \"right_buffer\": "
     "{\"material\": \"sponge@1\"}}], \"title\": \"a@b\"}', '{}')";
 
-static void check_migrated(Db *store) {
+static void check_migrated(Db *db) {
     MaterialRevision found;
-    assert_int_equal(db_material(store, "sponge", 0, &found, NULL), STATUS_OK);
+    assert_int_equal(db_material(db, "sponge", 0, &found, NULL), STATUS_OK);
     assert_int_equal(found.revision, 2);
     assert_string_equal(found.material.name, "Sponge, new");
     assert_string_equal(found.reason, "better");
     assert_true(found.material.restitution == 0.55 && isnan(found.material.contact_time));
     assert_int_equal(found.version, 5);
     material_revision_clear(&found);
-    assert_int_equal(db_material(store, "sponge", 1, &found, NULL), STATUS_OK);
+    assert_int_equal(db_material(db, "sponge", 1, &found, NULL), STATUS_OK);
     assert_string_equal(found.status, "deprecated");
     assert_true(found.material.restitution == 0.61 && found.material.impactor_mass == 0.11);
     material_revision_clear(&found);
-    AuditEntries deeds;
-    assert_int_equal(db_audit_entries(store, "sponge", 100, 100, &deeds, NULL), STATUS_OK);
+    AuditEntries audit_entries;
+    assert_int_equal(db_audit_entries(db, "sponge", 100, 100, &audit_entries, NULL), STATUS_OK);
     static const char *const actions[] = {"deprecate", "approve", "approve", "revise", "create"};
-    assert_int_equal(deeds.count, COUNT(actions));
+    assert_int_equal(audit_entries.count, COUNT(actions));
     for (size_t i = 0; i < COUNT(actions); i++)
-        assert_string_equal(deeds.at[i].action, actions[i]);
-    audit_entries_clear(&deeds);
+        assert_string_equal(audit_entries.at[i].action, actions[i]);
+    audit_entries_clear(&audit_entries);
     MaterialReferences uses;
-    assert_int_equal(db_material_uses(store, "sponge", &uses, NULL), STATUS_OK);
+    assert_int_equal(db_material_uses(db, "sponge", &uses, NULL), STATUS_OK);
     assert_int_equal(uses.count, 2);
     assert_int_equal(uses.at[0].revision, 2);
     assert_int_equal(uses.at[0].results, 0);
@@ -238,22 +238,22 @@ static void check_migrated(Db *store) {
     free(uses.at);
     ResultUses results;
     uint64_t total;
-    assert_int_equal(db_result_uses(store, "sponge@1", 10, 0, &results, &total, NULL), STATUS_OK);
+    assert_int_equal(db_result_uses(db, "sponge@1", 10, 0, &results, &total, NULL), STATUS_OK);
     assert_int_equal(total, 1);
     assert_string_equal(results.at[0].id, "r-1");
     free(results.at);
     MaterialRevision next = felt_saying(0.5);
     next.slug = "sponge";
-    assert_int_equal(db_material_revise(store, &next, 5, NULL), STATUS_OK);
+    assert_int_equal(db_material_revise(db, &next, 5, NULL), STATUS_OK);
     assert_int_equal(next.revision, 3);
     MaterialRevisions heads;
-    assert_int_equal(db_material_heads(store, "", 100, &heads, NULL), STATUS_OK);
+    assert_int_equal(db_material_heads(db, "", 100, &heads, NULL), STATUS_OK);
     assert_int_equal(heads.count, 5);
     for (size_t i = 0; i < heads.count; i++)
         assert_string_equal(heads.at[i].status, "approved");
     material_revisions_clear(&heads);
     Texts slugs;
-    assert_int_equal(db_material_slugs(store, &slugs, NULL), STATUS_OK);
+    assert_int_equal(db_material_slugs(db, &slugs, NULL), STATUS_OK);
     assert_int_equal(slugs.count, 5);
     assert_string_equal(slugs.at[4], "sponge");
     material_slugs_clear(&slugs);
@@ -271,9 +271,9 @@ static void a_database_of_each_step_before_goes_on(void **state) {
         assert_int_equal(sqlite_migrate(database, files, NULL), STATUS_OK);
         assert_int_equal(sqlite_execute(database, data_of_before, NULL), STATUS_OK);
         sqlite_close(database);
-        Db *store = felt_store(folder);
-        check_migrated(store);
-        db_close(store);
+        Db *db = felt_store(folder);
+        check_migrated(db);
+        db_close(db);
         db_close(felt_store(folder));
         scratch_remove(folder);
     }

@@ -20,21 +20,21 @@ static Problem problem;
 static char folder[SCRATCH_SIZE];
 
 static Db *db_make(void) {
-    Db *store;
+    Db *db;
     scratch_make(folder);
     problem_clear(&problem);
-    if (db_open(folder, &store, &problem) != STATUS_OK)
+    if (db_open(folder, &db, &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
-    return store;
+    return db;
 }
 
-static void db_end(Db *store) {
-    db_close(store);
+static void db_end(Db *db) {
+    db_close(db);
     scratch_remove(folder);
 }
 
 // A record whose first sample is `first`.
-static Status add(Db *store, const char *name, double first, const char *source, bool *is_there) {
+static Status add(Db *db, const char *name, double first, const char *source, bool *is_there) {
     double values[] = {first, -2, 0.5};
     const Reals samples = {values, 3};
     char digest[RECORD_DIGEST_SIZE];
@@ -49,112 +49,112 @@ static Status add(Db *store, const char *name, double first, const char *source,
                            .digest = digest,
                            .created_unix_ms = 1000};
     problem_clear(&problem);
-    return db_record_add(store, &row, &samples, is_there, &problem);
+    return db_record_add(db, &row, &samples, is_there, &problem);
 }
 
-static void add_new(Db *store, const char *name, double first) {
+static void add_new(Db *db, const char *name, double first) {
     bool is_there = true;
-    if (add(store, name, first, NULL, &is_there) != STATUS_OK)
+    if (add(db, name, first, NULL, &is_there) != STATUS_OK)
         fail_msg("%s", problem.detail);
     assert_false(is_there);
 }
 
 static void a_record_comes_back_to_the_bit(void **state) {
     (void)state;
-    Db *store = db_make();
-    const uint64_t generation = db_catalog_version(store);
+    Db *db = db_make();
+    const uint64_t catalog_version = db_catalog_version(db);
     NamedRecord *named, *again;
     RecordRow row;
-    add_new(store, "elcentro", 0.1);
-    assert_true(db_catalog_version(store) > generation);
-    assert_int_equal(db_record(store, "elcentro", &row, &problem), STATUS_OK);
+    add_new(db, "elcentro", 0.1);
+    assert_true(db_catalog_version(db) > catalog_version);
+    assert_int_equal(db_record(db, "elcentro", &row, &problem), STATUS_OK);
     assert_true(row.count == 3 && row.interval == 0.02 && row.peak == 2);
     assert_null(row.author);
     record_row_clear(&row);
-    assert_int_equal(db_record_named(store, "elcentro", &named, &problem), STATUS_OK);
+    assert_int_equal(db_record_named(db, "elcentro", &named, &problem), STATUS_OK);
     assert_true(named->samples.count == 3 && named->interval == 0.02);
     assert_true(named->samples.at[0] == 0.1 && named->samples.at[2] == 0.5);
     // Others share them, also when something else came in between.
-    add_new(store, "other", 0.2);
-    assert_int_equal(db_record_named(store, "elcentro", &again, &problem), STATUS_OK);
+    add_new(db, "other", 0.2);
+    assert_int_equal(db_record_named(db, "elcentro", &again, &problem), STATUS_OK);
     assert_ptr_equal(named, again);
     refcount_unref(&named->shared);
     refcount_unref(&again->shared);
-    assert_int_equal(db_record_named(store, "elcentr", &named, &problem), STATUS_NOT_FOUND);
+    assert_int_equal(db_record_named(db, "elcentr", &named, &problem), STATUS_NOT_FOUND);
     assert_null(named);
-    db_end(store);
+    db_end(db);
 }
 
 static void what_is_there_already_is_told_from_what_would_change_it(void **state) {
     (void)state;
-    Db *store = db_make();
+    Db *db = db_make();
     bool is_there = false;
-    add_new(store, "elcentro", 0.1);
-    assert_int_equal(add(store, "elcentro", 0.1, NULL, &is_there), STATUS_OK);
+    add_new(db, "elcentro", 0.1);
+    assert_int_equal(add(db, "elcentro", 0.1, NULL, &is_there), STATUS_OK);
     assert_true(is_there);
-    assert_int_equal(add(store, "elcentro", 0.2, NULL, &is_there), STATUS_CONFLICT);
+    assert_int_equal(add(db, "elcentro", 0.2, NULL, &is_there), STATUS_CONFLICT);
     assert_non_null(strstr(problem.detail, "samples"));
-    assert_int_equal(add(store, "elcentro", 0.1, "PEER", &is_there), STATUS_CONFLICT);
+    assert_int_equal(add(db, "elcentro", 0.1, "PEER", &is_there), STATUS_CONFLICT);
     assert_non_null(strstr(problem.detail, "another source"));
     RecordRow row;
-    assert_int_equal(db_record(store, "elcentro", &row, &problem), STATUS_OK);
+    assert_int_equal(db_record(db, "elcentro", &row, &problem), STATUS_OK);
     assert_null(row.source);
     RecordRows twins;
-    assert_int_equal(db_record_twins(store, &row, &twins, &problem), STATUS_OK);
+    assert_int_equal(db_record_twins(db, &row, &twins, &problem), STATUS_OK);
     assert_int_equal(twins.count, 0);
-    add_new(store, "same", 0.1);
-    assert_int_equal(db_record_twins(store, &row, &twins, &problem), STATUS_OK);
+    add_new(db, "same", 0.1);
+    assert_int_equal(db_record_twins(db, &row, &twins, &problem), STATUS_OK);
     assert_int_equal(twins.count, 1);
     assert_string_equal(twins.at[0].name, "same");
     record_rows_clear(&twins);
     record_row_clear(&row);
-    db_end(store);
+    db_end(db);
 }
 
 static void a_list_goes_on_behind_a_name_and_searches_words(void **state) {
     (void)state;
     static const char *const names[] = {"b", "a", "C", "d"};
-    Db *store = db_make();
+    Db *db = db_make();
     RecordRows rows;
     bool is_there;
     for (size_t i = 0; i < COUNT(names); i++)
         assert_int_equal(
-            add(store, names[i], (double)i, i == 3 ? "The Imperial Valley" : NULL, &is_there),
+            add(db, names[i], (double)i, i == 3 ? "The Imperial Valley" : NULL, &is_there),
             STATUS_OK);
-    assert_int_equal(db_records(store, NULL, "", 2, &rows, &problem), STATUS_OK);
+    assert_int_equal(db_records(db, NULL, "", 2, &rows, &problem), STATUS_OK);
     assert_int_equal(rows.count, 2);
     assert_string_equal(rows.at[0].name, "C");
     assert_string_equal(rows.at[1].name, "a");
     record_rows_clear(&rows);
-    assert_int_equal(db_records(store, NULL, "a", 9, &rows, &problem), STATUS_OK);
+    assert_int_equal(db_records(db, NULL, "a", 9, &rows, &problem), STATUS_OK);
     assert_int_equal(rows.count, 2);
     record_rows_clear(&rows);
-    assert_int_equal(db_records(store, "imperial", "", 9, &rows, &problem), STATUS_OK);
+    assert_int_equal(db_records(db, "imperial", "", 9, &rows, &problem), STATUS_OK);
     assert_int_equal(rows.count, 1);
     assert_string_equal(rows.at[0].name, "d");
     record_rows_clear(&rows);
-    assert_int_equal(db_records(store, "%", "", 9, &rows, &problem), STATUS_OK);
+    assert_int_equal(db_records(db, "%", "", 9, &rows, &problem), STATUS_OK);
     assert_int_equal(rows.count, 0);
     record_rows_clear(&rows);
-    db_end(store);
+    db_end(db);
 }
 
-static JobRow job_add(Db *store, const char *id, int state, const char *uses) {
+static JobRow job_add(Db *db, const char *id, int state, const char *uses) {
     JobRow row = {.state = state, .scene = "{}", .warnings = "[]", .uses = (char *)uses};
     snprintf(row.id, sizeof row.id, "%s", id);
-    assert_int_equal(db_job_add(store, &row, &problem), STATUS_OK);
+    assert_int_equal(db_job_add(db, &row, &problem), STATUS_OK);
     return row;
 }
 
 static void a_record_in_use_is_not_deleted(void **state) {
     (void)state;
-    Db *store = db_make();
+    Db *db = db_make();
     RecordUses uses;
     NamedRecord *named;
-    add_new(store, "elcentro", 0.1);
-    add_new(store, "kobe", 0.3);
-    JobRow job = job_add(store, "j-1", 0, "record:elcentro\nrecord:kobe\nrecord:elcentro\n");
-    job_add(store, "j-2", 2, "record:elcentro\n");
+    add_new(db, "elcentro", 0.1);
+    add_new(db, "kobe", 0.3);
+    JobRow job = job_add(db, "j-1", 0, "record:elcentro\nrecord:kobe\nrecord:elcentro\n");
+    job_add(db, "j-2", 2, "record:elcentro\n");
     ResultRow result = {.id = "r-1",
                         .engine = "e",
                         .scene = "{}",
@@ -164,29 +164,29 @@ static void a_record_in_use_is_not_deleted(void **state) {
                         .energy = "{}",
                         .impacts = "{}",
                         .uses = "sponge@1\nrecord:elcentro\n"};
-    assert_int_equal(db_result_save(store, &result, NULL, 0, &problem), STATUS_OK);
-    assert_int_equal(db_record_uses(store, "elcentro", &uses, &problem), STATUS_OK);
+    assert_int_equal(db_result_save(db, &result, NULL, 0, &problem), STATUS_OK);
+    assert_int_equal(db_record_uses(db, "elcentro", &uses, &problem), STATUS_OK);
     assert_true(uses.results == 1 && uses.jobs == 1);
-    assert_int_equal(db_record_delete(store, "kobe", &uses, NULL), STATUS_CONFLICT);
+    assert_int_equal(db_record_delete(db, "kobe", &uses, NULL), STATUS_CONFLICT);
     assert_true(uses.results == 0 && uses.jobs == 1);
     problem_clear(&problem);
-    assert_int_equal(db_record_delete(store, "elcentro", &uses, &problem), STATUS_CONFLICT);
+    assert_int_equal(db_record_delete(db, "elcentro", &uses, &problem), STATUS_CONFLICT);
     assert_true(uses.results == 1 && uses.jobs == 1);
     assert_non_null(strstr(problem.detail, "1 result and 1 unfinished job:"));
     // A job that has ended uses nothing any more.
     job.state = 3;
-    assert_int_equal(db_job_update(store, &job, &problem), STATUS_OK);
-    assert_int_equal(db_record_uses(store, "elcentro", &uses, &problem), STATUS_OK);
+    assert_int_equal(db_job_update(db, &job, &problem), STATUS_OK);
+    assert_int_equal(db_record_uses(db, "elcentro", &uses, &problem), STATUS_OK);
     assert_true(uses.results == 1 && uses.jobs == 0);
-    assert_int_equal(db_record_delete(store, "kobe", &uses, &problem), STATUS_OK);
-    assert_int_equal(db_record_named(store, "kobe", &named, NULL), STATUS_NOT_FOUND);
-    assert_int_equal(db_record_delete(store, "kobe", &uses, NULL), STATUS_NOT_FOUND);
+    assert_int_equal(db_record_delete(db, "kobe", &uses, &problem), STATUS_OK);
+    assert_int_equal(db_record_named(db, "kobe", &named, NULL), STATUS_NOT_FOUND);
+    assert_int_equal(db_record_delete(db, "kobe", &uses, NULL), STATUS_NOT_FOUND);
     // The name is free, and means the new samples at once.
-    add_new(store, "kobe", 0.7);
-    assert_int_equal(db_record_named(store, "kobe", &named, &problem), STATUS_OK);
+    add_new(db, "kobe", 0.7);
+    assert_int_equal(db_record_named(db, "kobe", &named, &problem), STATUS_OK);
     assert_true(named->samples.at[0] == 0.7);
     refcount_unref(&named->shared);
-    db_end(store);
+    db_end(db);
 }
 
 static void nothing_written_beside_the_daemon_changes_a_record(void **state) {
@@ -207,11 +207,11 @@ static void nothing_written_beside_the_daemon_changes_a_record(void **state) {
         "0",
         "DELETE FROM records",
     };
-    Db *store = db_make();
+    Db *db = db_make();
     char path[SCRATCH_SIZE + 16];
     Sqlite *database;
     NamedRecord *named;
-    add_new(store, "elcentro", 0.1);
+    add_new(db, "elcentro", 0.1);
     ResultRow result = {.id = "r-1",
                         .engine = "e",
                         .scene = "{}",
@@ -221,8 +221,8 @@ static void nothing_written_beside_the_daemon_changes_a_record(void **state) {
                         .energy = "{}",
                         .impacts = "{}",
                         .uses = "record:elcentro\n"};
-    assert_int_equal(db_result_save(store, &result, NULL, 0, &problem), STATUS_OK);
-    db_close(store);
+    assert_int_equal(db_result_save(db, &result, NULL, 0, &problem), STATUS_OK);
+    db_close(db);
     snprintf(path, sizeof path, "%s/impactd.db", folder);
     assert_int_equal(sqlite_open(path, DATABASE_WRITER, &database, &problem), STATUS_OK);
     for (size_t i = 0; i < COUNT(attempts); i++) {
@@ -234,11 +234,11 @@ static void nothing_written_beside_the_daemon_changes_a_record(void **state) {
     }
     sqlite_close(database);
     problem_clear(&problem);
-    assert_int_equal(db_open(folder, &store, &problem), STATUS_OK);
-    assert_int_equal(db_record_named(store, "elcentro", &named, &problem), STATUS_OK);
+    assert_int_equal(db_open(folder, &db, &problem), STATUS_OK);
+    assert_int_equal(db_record_named(db, "elcentro", &named, &problem), STATUS_OK);
     assert_true(named->interval == 0.02 && named->samples.at[0] == 0.1);
     refcount_unref(&named->shared);
-    db_end(store);
+    db_end(db);
 }
 
 static void there_are_only_so_many(void **state) {
@@ -253,32 +253,32 @@ static void there_are_only_so_many(void **state) {
         "peak_velocity, end_velocity, digest, created_unix_ms) SELECT 'huge', 'json', 'g', 1, "
         "2147483645 - sum(count), 0, 0, 0, 0, printf('%064d', 0), 0 FROM records";
     char path[SCRATCH_SIZE + 16];
-    Db *store = db_make();
+    Db *db = db_make();
     Sqlite *database;
     RecordUses uses;
     bool is_there;
     snprintf(path, sizeof path, "%s/impactd.db", folder);
     assert_int_equal(sqlite_open(path, DATABASE_WRITER, &database, &problem), STATUS_OK);
     assert_int_equal(sqlite_execute(database, many, &problem), STATUS_OK);
-    assert_int_equal(add(store, "one_more", 1, NULL, &is_there), STATUS_LIMIT);
+    assert_int_equal(add(db, "one_more", 1, NULL, &is_there), STATUS_LIMIT);
     assert_non_null(strstr(problem.detail, "20000 records"));
     for (int i = 1; i <= 3; i++) {
         char name[16];
         snprintf(name, sizeof name, "n%d", i);
-        assert_int_equal(db_record_delete(store, name, &uses, &problem), STATUS_OK);
+        assert_int_equal(db_record_delete(db, name, &uses, &problem), STATUS_OK);
     }
     // Now there is room for two, and for three samples.
     assert_int_equal(sqlite_execute(database, huge, &problem), STATUS_OK);
-    add_new(store, "three", 1);
-    assert_int_equal(db_record_delete(store, "n4", &uses, &problem), STATUS_OK);
-    assert_int_equal(add(store, "three_more", 2, NULL, &is_there), STATUS_LIMIT);
+    add_new(db, "three", 1);
+    assert_int_equal(db_record_delete(db, "n4", &uses, &problem), STATUS_OK);
+    assert_int_equal(add(db, "three_more", 2, NULL, &is_there), STATUS_LIMIT);
     assert_non_null(strstr(problem.detail, "2147483648"));
     sqlite_close(database);
-    db_end(store);
+    db_end(db);
 }
 
 typedef struct Racer {
-    Db *store;
+    Db *db;
     pthread_t thread;
     Status status;
     bool is_there;
@@ -296,17 +296,17 @@ static void *race(void *of) {
                            .interval = 0.02,
                            .count = 3,
                            .digest = digest};
-    racer->status = db_record_add(racer->store, &row, &samples, &racer->is_there, NULL);
+    racer->status = db_record_add(racer->db, &row, &samples, &racer->is_there, NULL);
     return NULL;
 }
 
 static void of_two_same_uploads_at_once_one_is_kept(void **state) {
     (void)state;
-    Db *store = db_make();
+    Db *db = db_make();
     Racer racers[8];
     size_t kept = 0;
     for (size_t i = 0; i < COUNT(racers); i++) {
-        racers[i] = (Racer){.store = store};
+        racers[i] = (Racer){.db = db};
         assert_int_equal(pthread_create(&racers[i].thread, NULL, race, &racers[i]), 0);
     }
     for (size_t i = 0; i < COUNT(racers); i++) {
@@ -315,7 +315,7 @@ static void of_two_same_uploads_at_once_one_is_kept(void **state) {
         kept += !racers[i].is_there;
     }
     assert_int_equal(kept, 1);
-    db_end(store);
+    db_end(db);
 }
 
 static void names_are_fit_for_paths_and_files(void **state) {

@@ -13,7 +13,7 @@
 
 enum { WRITES = 8 };
 
-static Db *store;
+static Db *db;
 static pthread_mutex_t lock;
 static atomic_bool is_held_up;
 static atomic_int done_count;
@@ -27,12 +27,12 @@ static int open_store(void **state) {
     atomic_store(&is_held_up, false);
     atomic_store(&done_count, 0);
     atomic_store(&count, 0);
-    return db_open(NULL, &store, NULL) != STATUS_OK;
+    return db_open(NULL, &db, NULL) != STATUS_OK;
 }
 
 static int close_store(void **state) {
     (void)state;
-    db_close(store);
+    db_close(db);
     pthread_mutex_destroy(&lock);
     return 0;
 }
@@ -49,7 +49,7 @@ static Status note(Sqlite *database, const void *work, Problem *problem) {
     (void)database, (void)problem;
     const size_t place = atomic_fetch_add(&count, 1);
     order[place] = *(const int *)work;
-    written_before[place] = counter_get(&db_totals(store)->writes);
+    written_before[place] = counter_get(&db_totals(db)->writes);
     return STATUS_OK;
 }
 
@@ -64,7 +64,7 @@ static const WriteDone done = {count_done, NULL};
 // The writer is in a transaction of which nothing else is part, until let_go.
 static void hold_up(void) {
     pthread_mutex_lock(&lock);
-    assert_int_equal(db_enqueue(store, wait_for_leave, NULL, 0, STORE_NOW, &done, NULL), STATUS_OK);
+    assert_int_equal(db_enqueue(db, wait_for_leave, NULL, 0, STORE_NOW, &done, NULL), STATUS_OK);
     while (!atomic_load(&is_held_up))
         nanosleep(&moment, NULL);
 }
@@ -75,8 +75,7 @@ static void let_go(void) {
 
 static PendingWrite *post(int number, WritePriority turn) {
     PendingWrite *ticket = NULL;
-    assert_int_equal(db_enqueue(store, note, &number, sizeof number, turn, &done, &ticket),
-                     STATUS_OK);
+    assert_int_equal(db_enqueue(db, note, &number, sizeof number, turn, &done, &ticket), STATUS_OK);
     return ticket;
 }
 
@@ -90,8 +89,8 @@ static void what_is_hurried_comes_before_what_waits(void **state) {
     hold_up();
     post(1, STORE_LATER);
     PendingWrite *hurried = post(2, STORE_LATER);
-    db_expedite(store, hurried);
-    db_expedite(store, post(3, STORE_NOW)); // changes nothing
+    db_expedite(db, hurried);
+    db_expedite(db, post(3, STORE_NOW)); // changes nothing
     post(4, STORE_NOW);
     let_go();
     wait_for(5);
@@ -122,9 +121,9 @@ static void what_is_settled_was_all_written(void **state) {
     post(1, STORE_LATER);
     post(2, STORE_SOON);
     post(3, STORE_LATER);
-    db_flush(store);
+    db_flush(db);
     assert_int_equal(atomic_load(&count), 3);
-    db_flush(store); // there is nothing
+    db_flush(db); // there is nothing
     wait_for(3);
 }
 
@@ -135,7 +134,7 @@ static void what_was_withdrawn_is_not_written(void **state) {
     post(4, STORE_NOW);
     post(5, STORE_LATER);
     for (size_t i = 0; i < COUNT(tickets); i++)
-        assert_true(db_cancel_write(store, tickets[i]));
+        assert_true(db_cancel_write(db, tickets[i]));
     let_go();
     wait_for(3);
     assert_int_equal(atomic_load(&count), 2);
@@ -159,8 +158,8 @@ static void closing_writes_what_waits(void **state) {
     post(2, STORE_SOON);
     post(3, STORE_LOW);
     let_go();
-    db_close(store);
-    store = NULL;
+    db_close(db);
+    db = NULL;
     assert_int_equal(atomic_load(&done_count), 4);
     assert_int_equal(atomic_load(&count), 3);
 }

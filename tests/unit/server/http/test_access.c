@@ -30,8 +30,8 @@ static const Route table[] = {
 };
 
 typedef struct House {
-    Db *store;
-    AccessControl doorman;
+    Db *db;
+    AccessControl access;
     Dispatcher dispatcher;
     char lab[128]; // the Authorization header of a token that may read
 } House;
@@ -40,22 +40,22 @@ static int open_house(void **state) {
     static House house;
     TokenRow row = {.name = "lab"};
     char token[TOKEN_SIZE];
-    if (db_open(NULL, &house.store, NULL) != STATUS_OK ||
+    if (db_open(NULL, &house.db, NULL) != STATUS_OK ||
         token_make("read", 0, &row, token, NULL) != STATUS_OK ||
-        db_token_add(house.store, &row, NULL) != STATUS_OK)
+        db_token_add(house.db, &row, NULL) != STATUS_OK)
         return -1;
     snprintf(house.lab, sizeof house.lab, "Bearer %s", token);
-    house.doorman.meter = request_metrics_new(table);
-    house.dispatcher = (Dispatcher){NULL, table, NULL, NULL, &house.doorman};
+    house.access.request_metrics = request_metrics_new(table);
+    house.dispatcher = (Dispatcher){NULL, table, NULL, NULL, &house.access};
     *state = &house;
-    return tokens_open(house.store, false, &house.doorman.tokens, NULL) == STATUS_OK ? 0 : -1;
+    return tokens_open(house.db, false, &house.access.tokens, NULL) == STATUS_OK ? 0 : -1;
 }
 
 static int close_house(void **state) {
     House *house = *state;
-    tokens_close(house->doorman.tokens);
-    request_metrics_free(house->doorman.meter);
-    db_close(house->store);
+    tokens_close(house->access.tokens);
+    request_metrics_free(house->access.request_metrics);
+    db_close(house->db);
     return 0;
 }
 
@@ -109,12 +109,12 @@ static void answers_are_counted_where_they_belong(void **state) {
     House *house = *state;
     Reply reply;
     Bytes before = {0}, after = {0};
-    request_metrics_write(house->doorman.meter, &before);
+    request_metrics_write(house->access.request_metrics, &before);
     for (int i = 0; i < 3; i++)
         ask(house, "GET", "/open", NULL, &reply);
     ask(house, "PUT", "/open", NULL, &reply);
     reply_clear(&reply);
-    request_metrics_write(house->doorman.meter, &after);
+    request_metrics_write(house->access.request_metrics, &after);
     assert_non_null(strstr(before.at, "{route=\"/open\",method=\"GET\",code=\"2xx\"} 1\n"));
     assert_non_null(strstr(after.at, "{route=\"/open\",method=\"GET\",code=\"2xx\"} 4\n"));
     assert_non_null(strstr(after.at, "{route=\"none\",method=\"any\",code=\"4xx\"} 2\n"));

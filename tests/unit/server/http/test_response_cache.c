@@ -35,18 +35,20 @@ static Reply fresh(const char *text, size_t size) {
     return reply;
 }
 
-static void put(ResponseCache *hot, const char *target, bool is_packed, const char *text,
+static void put(ResponseCache *response_cache, const char *target, bool is_packed, const char *text,
                 size_t size) {
     Reply reply = fresh(text, size);
-    response_cache_put(hot, response_cache_age(hot), target, is_packed, &route, &reply);
+    response_cache_put(response_cache, response_cache_age(response_cache), target, is_packed,
+                       &route, &reply);
     assert_string_equal(reply.body, text);
     reply_clear(&reply);
 }
 
-static bool finds(ResponseCache *hot, const char *target, bool is_packed, const char *text) {
+static bool finds(ResponseCache *response_cache, const char *target, bool is_packed,
+                  const char *text) {
     Reply reply;
     const Route *found;
-    if (!response_cache_find(hot, target, is_packed, &reply, &found))
+    if (!response_cache_find(response_cache, target, is_packed, &reply, &found))
         return false;
     assert_string_equal(reply.body, text);
     assert_ptr_equal(found, &route);
@@ -57,47 +59,48 @@ static bool finds(ResponseCache *hot, const char *target, bool is_packed, const 
 
 static void an_answer_is_found_by_target_and_packing(void **state) {
     (void)state;
-    ResponseCache *hot = response_cache_new(1 << 20);
-    put(hot, "/a", false, "plain", 100);
-    put(hot, "/a", true, "packed", 100);
-    assert_true(finds(hot, "/a", false, "plain"));
-    assert_true(finds(hot, "/a", true, "packed"));
-    assert_false(finds(hot, "/a?x=1", false, ""));
-    put(hot, "/a", false, "newer", 100);
-    assert_true(finds(hot, "/a", false, "newer"));
-    assert_int_equal(response_cache_tally(hot).count, 2);
-    assert_int_equal(response_cache_tally(hot).hits, 3);
-    assert_int_equal(response_cache_tally(hot).misses, 1);
-    response_cache_free(hot);
+    ResponseCache *response_cache = response_cache_new(1 << 20);
+    put(response_cache, "/a", false, "plain", 100);
+    put(response_cache, "/a", true, "packed", 100);
+    assert_true(finds(response_cache, "/a", false, "plain"));
+    assert_true(finds(response_cache, "/a", true, "packed"));
+    assert_false(finds(response_cache, "/a?x=1", false, ""));
+    put(response_cache, "/a", false, "newer", 100);
+    assert_true(finds(response_cache, "/a", false, "newer"));
+    assert_int_equal(response_cache_tally(response_cache).count, 2);
+    assert_int_equal(response_cache_tally(response_cache).hits, 3);
+    assert_int_equal(response_cache_tally(response_cache).misses, 1);
+    response_cache_free(response_cache);
 }
 
 static void the_longest_unused_goes_first_and_the_budget_holds(void **state) {
     (void)state;
-    ResponseCache *hot = response_cache_new(100000);
-    put(hot, "/1", false, "1", 20000);
-    put(hot, "/2", false, "2", 20000);
-    put(hot, "/3", false, "3", 20000);
-    put(hot, "/4", false, "4", 20000);
-    assert_true(finds(hot, "/1", false, "1"));
-    put(hot, "/5", false, "5", 20000);
-    assert_false(finds(hot, "/2", false, ""));
-    assert_true(finds(hot, "/1", false, "1"));
-    assert_true(response_cache_tally(hot).bytes <= 100000);
-    assert_int_equal(response_cache_tally(hot).evictions, 1);
-    put(hot, "/large", false, "large", 26000); // above its share: stays its owner's
-    assert_false(finds(hot, "/large", false, ""));
-    response_cache_free(hot);
+    ResponseCache *response_cache = response_cache_new(100000);
+    put(response_cache, "/1", false, "1", 20000);
+    put(response_cache, "/2", false, "2", 20000);
+    put(response_cache, "/3", false, "3", 20000);
+    put(response_cache, "/4", false, "4", 20000);
+    assert_true(finds(response_cache, "/1", false, "1"));
+    put(response_cache, "/5", false, "5", 20000);
+    assert_false(finds(response_cache, "/2", false, ""));
+    assert_true(finds(response_cache, "/1", false, "1"));
+    assert_true(response_cache_tally(response_cache).bytes <= 100000);
+    assert_int_equal(response_cache_tally(response_cache).evictions, 1);
+    put(response_cache, "/large", false, "large", 26000); // above its share: stays its owner's
+    assert_false(finds(response_cache, "/large", false, ""));
+    response_cache_free(response_cache);
 }
 
 static void what_is_held_outlives_the_cache(void **state) {
     (void)state;
     atomic_store(&released, 0);
-    ResponseCache *hot = response_cache_new(1 << 20);
+    ResponseCache *response_cache = response_cache_new(1 << 20);
     Reply reply = fresh("held", 100);
-    response_cache_put(hot, response_cache_age(hot), "/held", false, &route, &reply);
-    response_cache_clear(hot);
-    assert_false(finds(hot, "/held", false, ""));
-    response_cache_free(hot);
+    response_cache_put(response_cache, response_cache_age(response_cache), "/held", false, &route,
+                       &reply);
+    response_cache_clear(response_cache);
+    assert_false(finds(response_cache, "/held", false, ""));
+    response_cache_free(response_cache);
     assert_int_equal(released, 0);
     assert_string_equal(reply.body, "held");
     reply_clear(&reply);
@@ -105,28 +108,28 @@ static void what_is_held_outlives_the_cache(void **state) {
 }
 
 static void *ask_and_put(void *context) {
-    ResponseCache *hot = context;
+    ResponseCache *response_cache = context;
     for (int i = 0; i < 20000; i++) {
         char target[16];
         snprintf(target, sizeof target, "/%d", i * 7 % 50);
-        if (!finds(hot, target, false, target))
-            put(hot, target, false, target, 1000);
+        if (!finds(response_cache, target, false, target))
+            put(response_cache, target, false, target, 1000);
         if (i % 5000 == 4999)
-            response_cache_clear(hot);
+            response_cache_clear(response_cache);
     }
     return NULL;
 }
 
 static void many_threads_share_it(void **state) {
     (void)state;
-    ResponseCache *hot = response_cache_new(20000);
+    ResponseCache *response_cache = response_cache_new(20000);
     pthread_t threads[4];
     for (size_t i = 0; i < COUNT(threads); i++)
-        assert_int_equal(pthread_create(&threads[i], NULL, ask_and_put, hot), 0);
+        assert_int_equal(pthread_create(&threads[i], NULL, ask_and_put, response_cache), 0);
     for (size_t i = 0; i < COUNT(threads); i++)
         pthread_join(threads[i], NULL);
-    assert_true(response_cache_tally(hot).bytes <= 20000);
-    response_cache_free(hot);
+    assert_true(response_cache_tally(response_cache).bytes <= 20000);
+    response_cache_free(response_cache);
 }
 
 int main(void) {

@@ -51,48 +51,48 @@ static double wait_resumed(Connection *connection, int count) {
 
 static void a_wake_before_the_sleep_is_not_lost(void **state) {
     (void)state;
-    TimerWheel *hall;
+    TimerWheel *wheel;
     Connection connection = {0};
-    assert_int_equal(timer_wheel_open(&calls, &hall, NULL), STATUS_OK);
-    ConnectionTimer *seat = timer_take(hall, -1);
-    const Callback *waker = timer_callback(seat);
-    timer_begin(seat);
-    waker->wake(waker->context);
-    assert_false(timer_sleep(seat, &connection, 1000));
-    assert_true(timer_was_woken(seat));
-    assert_false(timer_was_woken(seat));
+    assert_int_equal(timer_wheel_open(&calls, &wheel, NULL), STATUS_OK);
+    ConnectionTimer *timer = timer_take(wheel, -1);
+    const Callback *callback = timer_callback(timer);
+    timer_begin(timer);
+    callback->wake(callback->context);
+    assert_false(timer_sleep(timer, &connection, 1000));
+    assert_true(timer_was_woken(timer));
+    assert_false(timer_was_woken(timer));
     assert_int_equal(connection.suspended, 0);
-    timer_wheel_close(hall);
+    timer_wheel_close(wheel);
 }
 
 static void time_ends_a_sleep_and_a_wake_ends_it_sooner(void **state) {
     (void)state;
-    TimerWheel *hall;
+    TimerWheel *wheel;
     Connection connection = {0};
-    assert_int_equal(timer_wheel_open(&calls, &hall, NULL), STATUS_OK);
-    ConnectionTimer *seat = timer_take(hall, -1);
-    timer_begin(seat);
-    assert_true(timer_sleep(seat, &connection, 50));
+    assert_int_equal(timer_wheel_open(&calls, &wheel, NULL), STATUS_OK);
+    ConnectionTimer *timer = timer_take(wheel, -1);
+    timer_begin(timer);
+    assert_true(timer_sleep(timer, &connection, 50));
     const double took = wait_resumed(&connection, 1);
     assert_true(took >= 40 && took < 2000);
-    assert_false(timer_was_woken(seat));
+    assert_false(timer_was_woken(timer));
 
-    assert_true(timer_sleep(seat, &connection, 60000));
-    const Callback *waker = timer_callback(seat);
-    waker->wake(waker->context);
-    waker->wake(waker->context);
+    assert_true(timer_sleep(timer, &connection, 60000));
+    const Callback *callback = timer_callback(timer);
+    callback->wake(callback->context);
+    callback->wake(callback->context);
     assert_true(wait_resumed(&connection, 2) < 2000);
-    assert_true(timer_was_woken(seat));
+    assert_true(timer_was_woken(timer));
     assert_int_equal(connection.resumed, 2); // the second call found nobody asleep
-    timer_wheel_close(hall);
+    timer_wheel_close(wheel);
 }
 
 static void an_earlier_time_overtakes_a_later_one(void **state) {
     (void)state;
-    TimerWheel *hall;
+    TimerWheel *wheel;
     Connection late = {0}, early = {0};
-    assert_int_equal(timer_wheel_open(&calls, &hall, NULL), STATUS_OK);
-    ConnectionTimer *first = timer_take(hall, -1), *second = timer_take(hall, -1);
+    assert_int_equal(timer_wheel_open(&calls, &wheel, NULL), STATUS_OK);
+    ConnectionTimer *first = timer_take(wheel, -1), *second = timer_take(wheel, -1);
     timer_begin(first);
     timer_begin(second);
     assert_true(timer_sleep(first, &late, 60000));
@@ -101,50 +101,50 @@ static void an_earlier_time_overtakes_a_later_one(void **state) {
     const double took = wait_resumed(&early, 1);
     assert_true(took >= 0 && took < 2000);
     assert_int_equal(late.resumed, 0);
-    timer_wheel_wake_all(hall);
+    timer_wheel_wake_all(wheel);
     assert_int_equal(late.resumed, 1);
     assert_false(timer_sleep(first, &late, 60000));
-    assert_true(timer_wheel_is_closing(hall));
-    timer_wheel_close(hall);
+    assert_true(timer_wheel_is_closing(wheel));
+    timer_wheel_close(wheel);
 }
 
 static void a_late_wake_of_a_left_seat_does_no_harm(void **state) {
     (void)state;
-    TimerWheel *hall;
+    TimerWheel *wheel;
     Connection next = {0};
-    assert_int_equal(timer_wheel_open(&calls, &hall, NULL), STATUS_OK);
-    ConnectionTimer *seat = timer_take(hall, -1);
-    const Callback *waker = timer_callback(seat);
-    timer_leave(seat);
-    waker->wake(waker->context);
-    ConnectionTimer *again = timer_take(hall, -1);
-    assert_ptr_equal(again, seat);
+    assert_int_equal(timer_wheel_open(&calls, &wheel, NULL), STATUS_OK);
+    ConnectionTimer *timer = timer_take(wheel, -1);
+    const Callback *callback = timer_callback(timer);
+    timer_leave(timer);
+    callback->wake(callback->context);
+    ConnectionTimer *again = timer_take(wheel, -1);
+    assert_ptr_equal(again, timer);
     timer_begin(again);
     assert_true(timer_sleep(again, &next, 60000));
-    waker->wake(waker->context); // wakes the next one, who looks and sleeps on
+    callback->wake(callback->context); // wakes the next one, who looks and sleeps on
     assert_int_equal(next.resumed, 1);
     assert_true(timer_was_woken(again));
     assert_true(timer_sleep(again, &next, 60000));
-    timer_wheel_wake_all(hall);
-    timer_wheel_close(hall);
+    timer_wheel_wake_all(wheel);
+    timer_wheel_close(wheel);
 }
 
 static void a_peer_that_is_too_slow_is_shut_down(void **state) {
     (void)state;
-    TimerWheel *hall;
+    TimerWheel *wheel;
     int pair[2];
     char byte;
-    assert_int_equal(timer_wheel_open(&calls, &hall, NULL), STATUS_OK);
+    assert_int_equal(timer_wheel_open(&calls, &wheel, NULL), STATUS_OK);
     assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM, 0, pair), 0);
-    ConnectionTimer *seat = timer_take(hall, pair[0]);
-    timer_limit(seat, 10000);
-    timer_limit(seat, 0);
-    timer_limit(seat, 30);
+    ConnectionTimer *timer = timer_take(wheel, pair[0]);
+    timer_limit(timer, 10000);
+    timer_limit(timer, 0);
+    timer_limit(timer, 30);
     assert_int_equal(read(pair[1], &byte, 1), 0); // the other end sees it closed
-    timer_leave(seat);
+    timer_leave(timer);
     close(pair[0]);
     close(pair[1]);
-    timer_wheel_close(hall);
+    timer_wheel_close(wheel);
 }
 
 // Two threads: one sleeps over and over, the other wakes without end; a sleep that lasts its whole
@@ -152,36 +152,36 @@ static void a_peer_that_is_too_slow_is_shut_down(void **state) {
 enum { ROUNDS = 2000 };
 
 typedef struct Alarm {
-    const Callback *waker;
+    const Callback *callback;
     atomic_bool is_off;
 } Alarm;
 
 static void *ring(void *context) {
     Alarm *alarm = context;
     while (!atomic_load(&alarm->is_off))
-        alarm->waker->wake(alarm->waker->context);
+        alarm->callback->wake(alarm->callback->context);
     return NULL;
 }
 
 static void no_wake_is_lost_between_two_threads(void **state) {
     (void)state;
-    TimerWheel *hall;
+    TimerWheel *wheel;
     Connection connection = {0};
     pthread_t thread;
-    assert_int_equal(timer_wheel_open(&calls, &hall, NULL), STATUS_OK);
-    ConnectionTimer *seat = timer_take(hall, -1);
-    Alarm alarm = {.waker = timer_callback(seat)};
-    timer_begin(seat);
+    assert_int_equal(timer_wheel_open(&calls, &wheel, NULL), STATUS_OK);
+    ConnectionTimer *timer = timer_take(wheel, -1);
+    Alarm alarm = {.callback = timer_callback(timer)};
+    timer_begin(timer);
     assert_int_equal(pthread_create(&thread, NULL, ring, &alarm), 0);
     int slept = 0, lost = 0;
     for (int i = 0; i < ROUNDS && lost == 0; i++) {
-        if (timer_sleep(seat, &connection, 5000)) {
+        if (timer_sleep(timer, &connection, 5000)) {
             slept++;
             while (atomic_load(&connection.resumed) < slept)
                 sched_yield();
-            lost += !timer_was_woken(seat);
+            lost += !timer_was_woken(timer);
         } else {
-            timer_was_woken(seat);
+            timer_was_woken(timer);
         }
     }
     atomic_store(&alarm.is_off, true);
@@ -189,7 +189,7 @@ static void no_wake_is_lost_between_two_threads(void **state) {
     assert_int_equal(lost, 0);
     assert_int_equal(connection.suspended, slept);
     assert_int_equal(connection.resumed, slept);
-    timer_wheel_close(hall);
+    timer_wheel_close(wheel);
 }
 
 int main(void) {

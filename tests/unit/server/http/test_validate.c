@@ -17,14 +17,15 @@ typedef struct ResultSummary {
 } ResultSummary;
 
 static int judge(const ResultSummary *head) {
-    RequestValidator gate = {0};
+    RequestValidator validator = {0};
     Problem problem;
     problem_clear(&problem);
     for (size_t i = 0; i < 4 && head->headers[i][0] != NULL; i++) {
         const char *name = head->headers[i][0], *value = head->headers[i][1];
-        validate_header(&gate, name, strlen(name), value, strlen(value));
+        validate_header(&validator, name, strlen(name), value, strlen(value));
     }
-    const int code = validate_request(&gate, head->method, head->target, head->version, &problem);
+    const int code =
+        validate_request(&validator, head->method, head->target, head->version, &problem);
     assert_int_equal(code != 0, problem.status != STATUS_OK);
     return code;
 }
@@ -172,11 +173,11 @@ static void a_foreign_host_is_told_the_names_that_are_right(void **state) {
     (void)state;
     static const char *const names[] = {"sim.example.org", "localhost", NULL};
     const AcceptedHosts named = {names, true};
-    RequestValidator gate = {.names = &named};
+    RequestValidator validator = {.names = &named};
     Problem problem;
     problem_clear(&problem);
-    validate_header(&gate, "Host", 4, "evil", 4);
-    assert_int_equal(validate_request(&gate, "GET", "/", "HTTP/1.1", &problem), 421);
+    validate_header(&validator, "Host", 4, "evil", 4);
+    assert_int_equal(validate_request(&validator, "GET", "/", "HTTP/1.1", &problem), 421);
     assert_non_null(strstr(problem.detail, "sim.example.org or localhost, or an address"));
     assert_non_null(strstr(problem.detail, "\"evil\""));
 }
@@ -194,23 +195,24 @@ static void a_name_given_for_a_proxy_is_no_foreign_origin(void **state) {
                  {"https://example.org", 403},
                  {"http://localhost:3000", 403}};
     for (size_t i = 0; i < COUNT(cases); i++) {
-        RequestValidator gate = {.names = &named};
+        RequestValidator validator = {.names = &named};
         Problem problem;
         problem_clear(&problem);
-        validate_header(&gate, "Host", 4, "localhost:8080", 14);
-        validate_header(&gate, "Origin", 6, cases[i].origin, strlen(cases[i].origin));
-        assert_int_equal(validate_request(&gate, "POST", "/", "HTTP/1.1", &problem), cases[i].code);
+        validate_header(&validator, "Host", 4, "localhost:8080", 14);
+        validate_header(&validator, "Origin", 6, cases[i].origin, strlen(cases[i].origin));
+        assert_int_equal(validate_request(&validator, "POST", "/", "HTTP/1.1", &problem),
+                         cases[i].code);
     }
 }
 
 static void a_nul_inside_a_value_is_seen_by_its_size(void **state) {
     (void)state;
-    RequestValidator gate = {0};
+    RequestValidator validator = {0};
     Problem problem;
     problem_clear(&problem);
-    validate_header(&gate, "Host", 4, "localhost", 9);
-    validate_header(&gate, "X-A", 3, "a\0b", 3);
-    assert_int_equal(validate_request(&gate, "GET", "/", "HTTP/1.1", &problem), 400);
+    validate_header(&validator, "Host", 4, "localhost", 9);
+    validate_header(&validator, "X-A", 3, "a\0b", 3);
+    assert_int_equal(validate_request(&validator, "GET", "/", "HTTP/1.1", &problem), 400);
     assert_non_null(strstr(problem.detail, "X-A"));
 }
 

@@ -16,7 +16,7 @@ static void wake(void *context) {
     atomic_fetch_add(&woken, 1);
 }
 
-static const Callback waker = {NULL, wake};
+static const Callback callback = {NULL, wake};
 
 typedef struct WorkItem {
     atomic_bool may_end;
@@ -41,76 +41,76 @@ static void task_free(void *context) {
     free(context);
 }
 
-static Status begin(BackgroundTasks *asides, bool may_end, BackgroundTask **aside) {
+static Status begin(BackgroundTasks *background_tasks, bool may_end, BackgroundTask **background) {
     WorkItem *task = calloc(1, sizeof *task);
     atomic_init(&task->may_end, may_end);
     const BackgroundWork work = {task, task_run, task_free};
-    return background_start(asides, &work, &waker, aside, NULL);
+    return background_start(background_tasks, &work, &callback, background, NULL);
 }
 
 static void a_reader_is_woken_when_it_is_done(void **state) {
     (void)state;
-    BackgroundTasks *asides;
-    BackgroundTask *aside;
+    BackgroundTasks *background_tasks;
+    BackgroundTask *background;
     atomic_store(&woken, 0);
     atomic_store(&released, 0);
-    assert_int_equal(background_open(1, &asides, NULL), STATUS_OK);
-    assert_int_equal(begin(asides, true, &aside), STATUS_OK);
+    assert_int_equal(background_open(1, &background_tasks, NULL), STATUS_OK);
+    assert_int_equal(begin(background_tasks, true, &background), STATUS_OK);
     while (atomic_load(&woken) == 0)
         rest();
-    assert_true(background_is_done(aside));
-    assert_false(((WorkItem *)background_context(aside))->was_stopped);
+    assert_true(background_is_done(background));
+    assert_false(((WorkItem *)background_context(background))->was_stopped);
     assert_int_equal(atomic_load(&released), 0);
-    background_unref(aside);
+    background_unref(background);
     assert_int_equal(atomic_load(&released), 1);
-    background_close(asides);
+    background_close(background_tasks);
 }
 
 static void beyond_its_room_it_refuses(void **state) {
     (void)state;
-    BackgroundTasks *asides;
-    BackgroundTask *aside, *other;
+    BackgroundTasks *background_tasks;
+    BackgroundTask *background, *other;
     atomic_store(&released, 0);
-    assert_int_equal(background_open(1, &asides, NULL), STATUS_OK);
-    assert_int_equal(begin(asides, false, &aside), STATUS_OK);
-    assert_int_equal(begin(asides, false, &other), STATUS_BUSY);
+    assert_int_equal(background_open(1, &background_tasks, NULL), STATUS_OK);
+    assert_int_equal(begin(background_tasks, false, &background), STATUS_OK);
+    assert_int_equal(begin(background_tasks, false, &other), STATUS_BUSY);
     assert_null(other);
     assert_int_equal(atomic_load(&released), 1);
-    assert_false(background_is_done(aside));
-    background_unref(aside); // stops it
-    while (begin(asides, true, &other) != STATUS_OK)
+    assert_false(background_is_done(background));
+    background_unref(background); // stops it
+    while (begin(background_tasks, true, &other) != STATUS_OK)
         rest();
     background_unref(other);
-    background_close(asides);
+    background_close(background_tasks);
 }
 
 static void the_end_stops_what_runs_and_waits(void **state) {
     (void)state;
-    BackgroundTasks *asides;
-    BackgroundTask *aside;
+    BackgroundTasks *background_tasks;
+    BackgroundTask *background;
     atomic_store(&released, 0);
-    assert_int_equal(background_open(3, &asides, NULL), STATUS_OK);
+    assert_int_equal(background_open(3, &background_tasks, NULL), STATUS_OK);
     for (size_t i = 0; i < 3; i++) {
-        assert_int_equal(begin(asides, false, &aside), STATUS_OK);
+        assert_int_equal(begin(background_tasks, false, &background), STATUS_OK);
         if (i < 2)
-            background_unref(aside);
+            background_unref(background);
     }
-    background_unref(aside);
-    background_close(asides);
+    background_unref(background);
+    background_close(background_tasks);
     assert_int_equal(atomic_load(&released), 3);
 }
 
 static void many_come_and_go(void **state) {
     (void)state;
-    BackgroundTasks *asides;
-    assert_int_equal(background_open(4, &asides, NULL), STATUS_OK);
+    BackgroundTasks *background_tasks;
+    assert_int_equal(background_open(4, &background_tasks, NULL), STATUS_OK);
     atomic_store(&released, 0);
     for (int i = 0; i < 500; i++) {
-        BackgroundTask *aside;
-        if (begin(asides, i % 2 == 0, &aside) == STATUS_OK)
-            background_unref(aside);
+        BackgroundTask *background;
+        if (begin(background_tasks, i % 2 == 0, &background) == STATUS_OK)
+            background_unref(background);
     }
-    background_close(asides);
+    background_close(background_tasks);
     assert_int_equal(atomic_load(&released), 500);
 }
 

@@ -14,8 +14,8 @@
 
 static Problem problem;
 static char folder[SCRATCH_SIZE];
-static Db *store;
-static JobManager *intake;
+static Db *db;
+static JobManager *manager;
 
 static int set_up(void **state) {
     (void)state;
@@ -34,17 +34,17 @@ static int set_up(void **state) {
                            .digest = digest};
     scratch_make(folder);
     problem_clear(&problem);
-    return db_open(folder, &store, &problem) == STATUS_OK &&
-                   db_record_add(store, &row, &samples, &is_there, &problem) == STATUS_OK &&
-                   jobs_open(store, &settings, &intake, &problem) == STATUS_OK
+    return db_open(folder, &db, &problem) == STATUS_OK &&
+                   db_record_add(db, &row, &samples, &is_there, &problem) == STATUS_OK &&
+                   jobs_open(db, &settings, &manager, &problem) == STATUS_OK
                ? 0
                : 1;
 }
 
 static int tear_down(void **state) {
     (void)state;
-    jobs_close(intake);
-    db_close(store);
+    jobs_close(manager);
+    db_close(db);
     scratch_remove(folder);
     return 0;
 }
@@ -61,7 +61,7 @@ static Job *submit(const char *excitation) {
              excitation);
     const Submission submission = {.text = text, .size = strlen(text)};
     problem_clear(&problem);
-    if (jobs_submit(intake, &submission, &job, &problem) != STATUS_OK)
+    if (jobs_submit(manager, &submission, &job, &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
     return job;
 }
@@ -70,7 +70,7 @@ static void dismiss(Job *job) {
     JobView now;
     Job *same;
     assert_int_equal(job_view(job, &now), STATUS_OK);
-    assert_int_equal(jobs_cancel(intake, now.id, &same, &problem), STATUS_OK);
+    assert_int_equal(jobs_cancel(manager, now.id, &same, &problem), STATUS_OK);
     job_view_clear(&now);
     job_unref(same);
     job_unref(job);
@@ -78,9 +78,9 @@ static void dismiss(Job *job) {
 
 static void a_scene_that_names_none_is_accepted_meanwhile(void **state) {
     (void)state;
-    naming_close(&intake->naming);
+    naming_close(&manager->naming);
     Job *job = submit("\"kind\": \"sine\", \"frequency\": 1, \"amplitude\": 1"); // would hang
-    naming_open(&intake->naming);
+    naming_open(&manager->naming);
     dismiss(job);
 }
 
@@ -93,15 +93,15 @@ static void a_job_that_waits_keeps_its_record_but_not_in_memory(void **state) {
     for (int i = 0; i < 60000 && job_peek(first, &progress) != JOB_RUNNING; i++)
         nanosleep(&moment, NULL);
     Job *second = submit("\"kind\": \"record\", \"name\": \"a\"");
-    assert_int_equal(db_record_named(store, "a", &named, &problem), STATUS_OK);
+    assert_int_equal(db_record_named(db, "a", &named, &problem), STATUS_OK);
     // The memory's and ours.
     assert_int_equal(atomic_load(&named->shared.count), 2);
     refcount_unref(&named->shared);
-    assert_int_equal(jobs_record_delete(intake, "a", &problem), STATUS_CONFLICT);
+    assert_int_equal(jobs_record_delete(manager, "a", &problem), STATUS_CONFLICT);
     assert_non_null(strstr(problem.detail, "0 results and 1 unfinished job:"));
     dismiss(second);
     problem_clear(&problem);
-    assert_int_equal(jobs_record_delete(intake, "a", &problem), STATUS_OK);
+    assert_int_equal(jobs_record_delete(manager, "a", &problem), STATUS_OK);
     dismiss(first);
 }
 

@@ -24,8 +24,8 @@
 
 typedef struct Room {
     char directory[SCRATCH_SIZE];
-    Db *store;
-    JobManager *intake;
+    Db *db;
+    JobManager *manager;
     JobManagerSettings settings;
 } Room;
 
@@ -33,16 +33,16 @@ static Problem problem;
 
 static void room_open(Room *room) {
     problem_clear(&problem);
-    if (db_open(room->directory, &room->store, &problem) != STATUS_OK ||
-        jobs_open(room->store, &room->settings, &room->intake, &problem) != STATUS_OK)
+    if (db_open(room->directory, &room->db, &problem) != STATUS_OK ||
+        jobs_open(room->db, &room->settings, &room->manager, &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
 }
 
 static void room_close(Room *room) {
-    jobs_close(room->intake);
-    db_close(room->store);
-    room->intake = NULL;
-    room->store = NULL;
+    jobs_close(room->manager);
+    db_close(room->db);
+    room->manager = NULL;
+    room->db = NULL;
 }
 
 static Room room_make(size_t workers) {
@@ -73,9 +73,9 @@ static void scene_text(char target[1024], double displacement, double duration,
              buffer, displacement, duration);
 }
 
-static Status submit_text(JobManager *intake, const char *text, Job **job, Problem *told) {
+static Status submit_text(JobManager *manager, const char *text, Job **job, Problem *told) {
     const Submission submission = {.text = text, .size = strlen(text)};
-    return jobs_submit(intake, &submission, job, told);
+    return jobs_submit(manager, &submission, job, told);
 }
 
 static const struct timespec moment = {0, 1000000};
@@ -97,7 +97,7 @@ static Job *submit_unkept(Room *room, double displacement, double duration) {
     Job *job = NULL;
     scene_text(text, displacement, duration, "sponge");
     problem_clear(&problem);
-    if (submit_text(room->intake, text, &job, &problem) != STATUS_OK)
+    if (submit_text(room->manager, text, &job, &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
     return job;
 }
@@ -131,7 +131,7 @@ static void a_job_finishes_and_is_found_again(void **state) {
     assert_false(first.is_cached);
     assert_non_null(first.plan);
     assert_non_null(strstr(first.summary, "\"impacts\": "));
-    assert_int_equal(jobs_find(room.intake, first.id, &again, &problem), STATUS_OK);
+    assert_int_equal(jobs_find(room.manager, first.id, &again, &problem), STATUS_OK);
     JobView second = show(again);
     assert_string_equal(second.summary, first.summary);
     assert_string_equal(second.plan, first.plan);
@@ -139,7 +139,7 @@ static void a_job_finishes_and_is_found_again(void **state) {
     job_view_clear(&second);
     job_unref(job);
     job_unref(again);
-    assert_int_equal(jobs_find(room.intake, "j-none", &again, &problem), STATUS_NOT_FOUND);
+    assert_int_equal(jobs_find(room.manager, "j-none", &again, &problem), STATUS_NOT_FOUND);
     room_end(&room);
 }
 
@@ -173,9 +173,9 @@ static void equal_scenes_in_flight_share_a_computation(void **state) {
     Job *blocker = submit(&room, 0.001, 400), *jobs[8];
     for (size_t i = 0; i < 8; i++)
         jobs[i] = submit(&room, 0.015, 2);
-    JobStats tally;
-    jobs_tally(room.intake, &tally);
-    assert_true(tally.queued <= 2);
+    JobStats metrics;
+    jobs_tally(room.manager, &metrics);
+    assert_true(metrics.queued <= 2);
     for (size_t i = 0; i < 8; i++) {
         wait_for(jobs[i]);
         JobView now = show(jobs[i]);
@@ -201,15 +201,15 @@ static void a_dismissed_job_stops_and_stays_dismissed(void **state) {
     }
     assert_int_equal(a.state, JOB_RUNNING);
     Job *dismissed[2] = {NULL, NULL};
-    assert_int_equal(jobs_cancel(room.intake, b.id, &dismissed[0], &problem), STATUS_OK);
-    assert_int_equal(jobs_cancel(room.intake, a.id, &dismissed[1], &problem), STATUS_OK);
+    assert_int_equal(jobs_cancel(room.manager, b.id, &dismissed[0], &problem), STATUS_OK);
+    assert_int_equal(jobs_cancel(room.manager, a.id, &dismissed[1], &problem), STATUS_OK);
     assert_true(job_is_finished(running) && job_is_finished(queued));
     problem_clear(&problem);
-    assert_int_equal(jobs_cancel(room.intake, a.id, &again, &problem), STATUS_CONFLICT);
+    assert_int_equal(jobs_cancel(room.manager, a.id, &again, &problem), STATUS_CONFLICT);
     // The worker is free at once: another job does not wait for 30,000 s of simulated time.
     Job *next = submit(&room, 0.003, 1);
     wait_for(next);
-    assert_int_equal(jobs_find(room.intake, a.id, &again, &problem), STATUS_OK);
+    assert_int_equal(jobs_find(room.manager, a.id, &again, &problem), STATUS_OK);
     JobView c = show(again);
     assert_int_equal(c.state, JOB_DISMISSED);
     job_view_clear(&a);
@@ -233,7 +233,7 @@ static void a_full_queue_refuses(void **state) {
     char text[1024];
     scene_text(text, 0.01, 30000, "sponge");
     problem_clear(&problem);
-    assert_int_equal(submit_text(room.intake, text, &more, &problem), STATUS_BUSY);
+    assert_int_equal(submit_text(room.manager, text, &more, &problem), STATUS_BUSY);
     assert_null(more);
     for (size_t i = 0; i < 3; i++)
         job_unref(jobs[i]);
@@ -257,7 +257,7 @@ static void unfinished_jobs_go_on_after_a_restart(void **state) {
     room_open(&room);
     for (size_t i = 0; i < 6; i++) {
         Job *job;
-        assert_int_equal(jobs_find(room.intake, ids[i], &job, &problem), STATUS_OK);
+        assert_int_equal(jobs_find(room.manager, ids[i], &job, &problem), STATUS_OK);
         wait_for(job);
         JobView now = show(job);
         assert_int_equal(now.state, JOB_SUCCESSFUL);
@@ -274,11 +274,12 @@ static void note_wake(void *context) {
 static Outcome *outcome_of(Room *room, const char *result) {
     atomic_int wakes;
     atomic_init(&wakes, 0);
-    const Callback waker = {&wakes, note_wake};
+    const Callback callback = {&wakes, note_wake};
     Outcome *outcome = NULL;
     for (int i = 0; i < 20000; i++) {
         const int seen = atomic_load(&wakes);
-        assert_int_equal(jobs_outcome(room->intake, result, &waker, &outcome, &problem), STATUS_OK);
+        assert_int_equal(jobs_outcome(room->manager, result, &callback, &outcome, &problem),
+                         STATUS_OK);
         if (outcome != NULL)
             return outcome;
         for (int j = 0; j < 20000 && atomic_load(&wakes) == seen; j++)
@@ -302,9 +303,9 @@ static void a_series_that_is_gone_is_computed_again_with_the_same_bytes(void **s
     assert_int_equal(kept->response.count, anew->response.count);
     assert_memory_equal(kept->response.series.block, anew->response.series.block,
                         kept->response.count * sizeof(double));
-    const Callback waker = {NULL, note_wake};
+    const Callback callback = {NULL, note_wake};
     Outcome *none = NULL;
-    assert_int_equal(jobs_outcome(room.intake, "r-none", &waker, &none, &problem),
+    assert_int_equal(jobs_outcome(room.manager, "r-none", &callback, &none, &problem),
                      STATUS_NOT_FOUND);
     outcome_unref(kept);
     outcome_unref(anew);
@@ -341,7 +342,7 @@ static Job *submit_study(Room *room, int repeats) {
     Job *job = NULL;
     snprintf(text, sizeof text, studied, repeats);
     problem_clear(&problem);
-    if (submit_text(room->intake, text, &job, &problem) != STATUS_OK)
+    if (submit_text(room->manager, text, &job, &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
     return job;
 }
@@ -356,7 +357,7 @@ static void a_studys_answer_is_kept_with_the_result_of_its_scene(void **state) {
     assert_int_equal(now.state, JOB_SUCCESSFUL);
     assert_string_equal(now.result, other.result); // one measurement for both
     ResultRow row;
-    assert_int_equal(db_result_load(room.store, now.result, &row, &problem), STATUS_OK);
+    assert_int_equal(db_result_load(room.db, now.result, &row, &problem), STATUS_OK);
     assert_non_null(strstr(row.study, "{\"study\": {\"kind\": \"tradeoff\", "));
     assert_non_null(strstr(row.scene, "\"point_steps\": 1000000"));
     assert_null(strstr(row.study, "null")); // it can be read again
@@ -393,12 +394,12 @@ static void a_study_is_stopped_with_its_job_and_goes_on_after_a_restart(void **s
     job_unref(job);
     room_close(&room);
     room_open(&room);
-    assert_int_equal(jobs_find(room.intake, id, &job, &problem), STATUS_OK);
+    assert_int_equal(jobs_find(room.manager, id, &job, &problem), STATUS_OK);
     assert_false(job_is_finished(job));
-    assert_int_equal(jobs_cancel(room.intake, id, &gone, &problem), STATUS_OK);
+    assert_int_equal(jobs_cancel(room.manager, id, &gone, &problem), STATUS_OK);
     now = show(gone);
     assert_int_equal(now.state, JOB_DISMISSED);
-    assert_false(db_result_exists(room.store, now.result));
+    assert_false(db_result_exists(room.db, now.result));
     job_view_clear(&now);
     job_unref(gone);
     job_unref(job);
@@ -417,9 +418,8 @@ static void names_are_resolved_and_all_faults_told(void **state) {
     char text[1024];
     scene_text(text, 0.015, 1, "spnge");
     problem_clear(&problem);
-    assert_int_equal(
-        jobs_prepare(room.store, text, strlen(text), NULL, &inquiry, &warnings, &problem),
-        STATUS_INVALID);
+    assert_int_equal(jobs_prepare(room.db, text, strlen(text), NULL, &inquiry, &warnings, &problem),
+                     STATUS_INVALID);
     assert_int_equal(problem.count, 1);
     assert_string_equal(problem.faults[0].pointer, "/dampers/0/buffer");
     assert_string_equal(problem.faults[0].did_you_mean, "sponge");
@@ -442,7 +442,7 @@ static void names_are_resolved_and_all_faults_told(void **state) {
                  cases[i].buffer);
         problem_clear(&problem);
         assert_int_equal(
-            jobs_prepare(room.store, text, strlen(text), NULL, &inquiry, &warnings, &problem),
+            jobs_prepare(room.db, text, strlen(text), NULL, &inquiry, &warnings, &problem),
             STATUS_INVALID);
         assert_true(problem_concerns(&problem, "/structure/mass"));
         if (problem.count != 2 || !problem_concerns(&problem, cases[i].pointer))
@@ -472,7 +472,7 @@ static void a_cached_scene_is_answered_with_a_job_of_its_own(void **state) {
     assert_string_equal(now.summary, first.summary);
     room_close(&room);
     room_open(&room);
-    assert_int_equal(jobs_find(room.intake, now.id, &found, &problem), STATUS_OK);
+    assert_int_equal(jobs_find(room.manager, now.id, &found, &problem), STATUS_OK);
     job_view_clear(&first);
     job_view_clear(&now);
     job_unref(found);
@@ -512,7 +512,7 @@ static void a_dear_series_is_kept_and_outlasts_its_engine(void **state) {
     for (size_t i = 0; i < 2; i++) {
         Job *job = NULL;
         problem_clear(&problem);
-        if (submit_text(room.intake, texts[i], &job, &problem) != STATUS_OK)
+        if (submit_text(room.manager, texts[i], &job, &problem) != STATUS_OK)
             fail_msg("%s", problem.detail);
         wait_for(job);
         JobView now = show(job);
@@ -522,10 +522,10 @@ static void a_dear_series_is_kept_and_outlasts_its_engine(void **state) {
         job_unref(job);
     }
     before = outcome_of(&room, results[0]);
-    for (int i = 0; i < 10000 && !db_series_exists(room.store, results[0]); i++)
+    for (int i = 0; i < 10000 && !db_series_exists(room.db, results[0]); i++)
         nanosleep(&moment, NULL);
-    assert_true(db_series_exists(room.store, results[0]));
-    assert_false(db_series_exists(room.store, results[1]));
+    assert_true(db_series_exists(room.db, results[0]));
+    assert_false(db_series_exists(room.db, results[1]));
     room_close(&room);
     change_engine(&room);
     room_open(&room);
@@ -536,13 +536,14 @@ static void a_dear_series_is_kept_and_outlasts_its_engine(void **state) {
                         before->response.series.count * before->response.series.rows *
                             sizeof(double));
     assert_int_equal(after->response.impacts.count, before->response.impacts.count);
-    const Callback waker = {NULL, note_wake};
+    const Callback callback = {NULL, note_wake};
     problem_clear(&problem);
-    assert_int_equal(jobs_outcome(room.intake, results[1], &waker, &none, &problem), STATUS_GONE);
+    assert_int_equal(jobs_outcome(room.manager, results[1], &callback, &none, &problem),
+                     STATUS_GONE);
     assert_non_null(strstr(problem.detail, "/again"));
     // Its documents were not kept with it, nor are they looked for there.
     Job *again = NULL;
-    assert_int_equal(submit_text(room.intake, dear, &again, &problem), STATUS_OK);
+    assert_int_equal(submit_text(room.manager, dear, &again, &problem), STATUS_OK);
     JobView now = show(again);
     assert_true(now.is_cached);
     assert_non_null(strstr(now.summary, "\"impacts\": "));
@@ -564,7 +565,7 @@ static void *hammer(void *context) {
     Hammer *own = context;
     static atomic_int wakes;
     Problem *fault = calloc(1, sizeof *fault);
-    const Callback waker = {&wakes, note_wake};
+    const Callback callback = {&wakes, note_wake};
     for (int i = 0; i < 60; i++) {
         char text[1024];
         Job *job = NULL, *gone = NULL;
@@ -572,21 +573,21 @@ static void *hammer(void *context) {
         scene_text(text, 0.001 * (1 + rand_r(&own->seed) % 12), 5 + rand_r(&own->seed) % 3,
                    "aluminium");
         problem_clear(fault);
-        if (submit_text(own->room->intake, text, &job, fault) != STATUS_OK)
+        if (submit_text(own->room->manager, text, &job, fault) != STATUS_OK)
             continue;
         JobView now;
         if (job_view(job, &now) == STATUS_OK && rand_r(&own->seed) % 3 == 0)
-            own->dismissed += jobs_cancel(own->room->intake, now.id, &gone, fault) == STATUS_OK;
-        (void)job_subscribe(job, &waker);
-        job_unsubscribe(job, &waker);
+            own->dismissed += jobs_cancel(own->room->manager, now.id, &gone, fault) == STATUS_OK;
+        (void)job_subscribe(job, &callback);
+        job_unsubscribe(job, &callback);
         while (!job_is_finished(job))
             nanosleep(&(struct timespec){0, 200000}, NULL);
         job_view_clear(&now);
         if (job_view(job, &now) == STATUS_OK && now.state == JOB_SUCCESSFUL)
-            (void)jobs_outcome(own->room->intake, now.result, &waker, &outcome, fault);
+            (void)jobs_outcome(own->room->manager, now.result, &callback, &outcome, fault);
         own->finished++;
         if (rand_r(&own->seed) % 8 == 0)
-            db_catalog_changed(own->room->store);
+            db_catalog_changed(own->room->db);
         outcome_unref(outcome);
         job_view_clear(&now);
         job_unref(job);
@@ -612,7 +613,7 @@ static void many_clients_at_once_leave_nothing_behind(void **state) {
     }
     assert_int_equal(finished, 360);
     JobRows rows = {NULL, 0};
-    assert_int_equal(db_job_unfinished(room.store, &rows, &problem), STATUS_OK);
+    assert_int_equal(db_job_unfinished(room.db, &rows, &problem), STATUS_OK);
     assert_int_equal(rows.count, 0);
     job_rows_clear(&rows);
     room_end(&room);
@@ -635,14 +636,14 @@ static int lift_limit(void **state) {
 // Until nothing is computed and the store has answered whatever it was sent, so that only what
 // could not be stored is unfinished.
 static void wait_until_idle(Room *room) {
-    JobStats tally;
+    JobStats metrics;
     bool is_idle = false;
     for (int i = 0; i < 60000 && !is_idle; i++) {
         nanosleep(&moment, NULL);
-        jobs_tally(room->intake, &tally);
-        pthread_mutex_lock(&room->intake->lock);
-        is_idle = tally.queued + tally.running + room->intake->posted == 0;
-        pthread_mutex_unlock(&room->intake->lock);
+        jobs_tally(room->manager, &metrics);
+        pthread_mutex_lock(&room->manager->lock);
+        is_idle = metrics.queued + metrics.running + room->manager->posted == 0;
+        pthread_mutex_unlock(&room->manager->lock);
     }
     assert_true(is_idle);
 }
@@ -658,21 +659,21 @@ static void a_result_that_there_is_no_room_for_waits_for_it(void **state) {
     Job *job = submit(&room, 0.015, LONG), *dropped = submit(&room, 0.016, LONG);
     limit_files(1);
     wait_until_idle(&room);
-    jobs_retry_sweep(room.intake);
+    jobs_retry_sweep(room.manager);
     wait_until_idle(&room);
     JobView waits = show(job), gone = show(dropped);
     assert_int_equal(waits.state, JOB_RUNNING);
     Job *dismissed;
-    assert_int_equal(jobs_cancel(room.intake, gone.id, &dismissed, &problem), STATUS_OK);
+    assert_int_equal(jobs_cancel(room.manager, gone.id, &dismissed, &problem), STATUS_OK);
     assert_int_equal(wait_until_kept(dismissed, &problem), STATUS_FULL);
     job_unref(dismissed);
     limit_files(RLIM_INFINITY);
-    jobs_retry_sweep(room.intake);
+    jobs_retry_sweep(room.manager);
     wait_until_idle(&room);
     assert_true(job_is_finished(job));
     JobView now = show(job);
     assert_int_equal(now.state, JOB_SUCCESSFUL);
-    assert_true(db_result_exists(room.store, now.result));
+    assert_true(db_result_exists(room.db, now.result));
     assert_int_equal(wait_until_kept(dropped, &problem), STATUS_OK);
     JobView end = show(dropped);
     assert_int_equal(end.state, JOB_DISMISSED);
@@ -695,12 +696,12 @@ static void a_result_that_there_is_no_room_for_is_computed_again_after_a_restart
     JobView waits = show(job);
     assert_int_equal(waits.state, JOB_RUNNING);
     job_unref(job);
-    jobs_close(room.intake);
-    room.intake = NULL;
+    jobs_close(room.manager);
+    room.manager = NULL;
     limit_files(RLIM_INFINITY);
     room_close(&room);
     room_open(&room);
-    assert_int_equal(jobs_find(room.intake, waits.id, &job, &problem), STATUS_OK);
+    assert_int_equal(jobs_find(room.manager, waits.id, &job, &problem), STATUS_OK);
     wait_for(job);
     JobView now = show(job);
     assert_int_equal(now.state, JOB_SUCCESSFUL);
@@ -727,8 +728,8 @@ static void a_job_that_cannot_be_kept_never_was(void **state) {
     for (size_t i = 0; i < 2; i++) {
         JobView now = show(both[i]);
         assert_true(job_is_finished(both[i]));
-        assert_int_equal(jobs_find(room.intake, now.id, &found, &problem), STATUS_NOT_FOUND);
-        assert_false(db_result_exists(room.store, now.result));
+        assert_int_equal(jobs_find(room.manager, now.id, &found, &problem), STATUS_NOT_FOUND);
+        assert_false(db_result_exists(room.db, now.result));
         job_view_clear(&now);
         job_unref(both[i]);
     }
@@ -737,11 +738,11 @@ static void a_job_that_cannot_be_kept_never_was(void **state) {
     wait_for(next);
     job_unref(next);
     // A job may be seen finished a moment before its worker has looked up.
-    JobStats tally;
+    JobStats metrics;
     do {
         nanosleep(&moment, NULL);
-        jobs_tally(room.intake, &tally);
-    } while (tally.queued + tally.running > 0);
+        jobs_tally(room.manager, &metrics);
+    } while (metrics.queued + metrics.running > 0);
     room_end(&room);
 }
 
@@ -773,7 +774,7 @@ static void a_job_that_is_done_before_it_was_written_is_written_once(void **stat
         JobView now = show(jobs[i]);
         JobRow row;
         assert_int_equal(now.state, JOB_SUCCESSFUL);
-        assert_int_equal(db_job_load(room.store, now.id, &row, &problem), STATUS_OK);
+        assert_int_equal(db_job_load(room.db, now.id, &row, &problem), STATUS_OK);
         assert_int_equal(row.state, JOB_SUCCESSFUL);
         assert_string_equal(row.result, now.result);
         job_row_clear(&row);
@@ -782,7 +783,7 @@ static void a_job_that_is_done_before_it_was_written_is_written_once(void **stat
     }
     JobRows rows;
     const JobSearch all = job_search_all(100);
-    assert_int_equal(db_job_search(room.store, &all, &rows, &problem), STATUS_OK);
+    assert_int_equal(db_job_search(room.db, &all, &rows, &problem), STATUS_OK);
     assert_int_equal(rows.count, 4);
     job_rows_clear(&rows);
     room_end(&room);
@@ -792,13 +793,13 @@ static void whoever_waits_for_a_job_to_be_kept_is_woken(void **state) {
     (void)state;
     Room room = room_make(1);
     static atomic_int wakes;
-    const Callback waker = {&wakes, note_wake};
+    const Callback callback = {&wakes, note_wake};
     Job *job = submit_unkept(&room, 0.015, 20000);
-    assert_true(job_subscribe_durable(job, &waker));
+    assert_true(job_subscribe_durable(job, &callback));
     assert_int_equal(wait_until_kept(job, &problem), STATUS_OK);
     assert_int_equal(atomic_load(&wakes), 1);
     assert_false(job_is_finished(job));
-    assert_true(job_subscribe_durable(job, &waker)); // at once
+    assert_true(job_subscribe_durable(job, &callback)); // at once
     assert_int_equal(atomic_load(&wakes), 2);
     job_unref(job);
     room_end(&room);
@@ -808,14 +809,14 @@ static void a_job_may_outlive_the_intake(void **state) {
     (void)state;
     Room room = room_make(1);
     static atomic_int wakes;
-    const Callback waker = {&wakes, note_wake};
+    const Callback callback = {&wakes, note_wake};
     Job *running = submit(&room, 0.015, 20000), *queued = submit(&room, 0.016, 20000);
-    assert_true(job_subscribe(queued, &waker));
+    assert_true(job_subscribe(queued, &callback));
     room_close(&room);
     JobView now = show(queued);
     assert_int_equal(now.state, JOB_ACCEPTED);
     assert_false(job_is_finished(running));
-    job_unsubscribe(queued, &waker);
+    job_unsubscribe(queued, &callback);
     job_view_clear(&now);
     job_unref(running);
     job_unref(queued);
@@ -843,18 +844,19 @@ static void a_dismissed_job_is_dismissed_for_all_before_the_store_has_it(void **
     snprintf(path, sizeof path, "%s/impactd.db", room.directory);
     assert_int_equal(sqlite_open(path, DATABASE_WRITER, &other, &problem), STATUS_OK);
     assert_int_equal(sqlite_execute(other, "BEGIN IMMEDIATE", &problem), STATUS_OK);
-    assert_int_equal(pthread_create(&thread, NULL, dismiss_it, (void *[]){room.intake, now.id}), 0);
+    assert_int_equal(pthread_create(&thread, NULL, dismiss_it, (void *[]){room.manager, now.id}),
+                     0);
     wait_for(job);
-    assert_int_equal(jobs_find(room.intake, now.id, &found, &problem), STATUS_OK);
+    assert_int_equal(jobs_find(room.manager, now.id, &found, &problem), STATUS_OK);
     assert_true(job_is_finished(found));
     job_unref(found);
-    assert_int_equal(jobs_cancel(room.intake, now.id, &found, &problem), STATUS_CONFLICT);
+    assert_int_equal(jobs_cancel(room.manager, now.id, &found, &problem), STATUS_CONFLICT);
     assert_non_null(strstr(problem.detail, "dismissed already"));
     assert_int_equal(sqlite_execute(other, "ROLLBACK", &problem), STATUS_OK);
     sqlite_close(other);
     pthread_join(thread, &returned);
     assert_non_null(returned);
-    assert_int_equal(jobs_find(room.intake, now.id, &found, &problem), STATUS_OK);
+    assert_int_equal(jobs_find(room.manager, now.id, &found, &problem), STATUS_OK);
     assert_true(job_is_finished(found));
     job_unref(found);
     job_view_clear(&now);
@@ -876,7 +878,7 @@ static void waiting_scenes_have_a_limit_in_bytes(void **state) {
     for (; accepted < 10 && status == STATUS_OK; accepted++) {
         scene_text(text, 0.001 * accepted, 20000, "sponge");
         problem_clear(&problem);
-        status = submit_text(room.intake, text, &second, &problem);
+        status = submit_text(room.manager, text, &second, &problem);
         if (status == STATUS_OK && accepted > 1)
             job_unref(second);
         else if (status == STATUS_OK)
@@ -887,10 +889,10 @@ static void waiting_scenes_have_a_limit_in_bytes(void **state) {
     // What leaves makes room.
     JobView now = show(gone);
     job_unref(gone);
-    assert_int_equal(jobs_cancel(room.intake, now.id, &gone, &problem), STATUS_OK);
+    assert_int_equal(jobs_cancel(room.manager, now.id, &gone, &problem), STATUS_OK);
     job_unref(gone);
     job_view_clear(&now);
-    assert_int_equal(submit_text(room.intake, text, &second, &problem), STATUS_OK);
+    assert_int_equal(submit_text(room.manager, text, &second, &problem), STATUS_OK);
     job_unref(second);
     job_unref(first);
     room_end(&room);

@@ -18,8 +18,8 @@
 
 typedef struct Room {
     char directory[SCRATCH_SIZE];
-    Db *store;
-    JobManager *intake;
+    Db *db;
+    JobManager *manager;
     JobManagerSettings settings;
 } Room;
 
@@ -28,14 +28,14 @@ static const struct timespec moment = {0, 1000000};
 
 static void room_open(Room *room) {
     problem_clear(&problem);
-    if (db_open(room->directory, &room->store, &problem) != STATUS_OK ||
-        jobs_open(room->store, &room->settings, &room->intake, &problem) != STATUS_OK)
+    if (db_open(room->directory, &room->db, &problem) != STATUS_OK ||
+        jobs_open(room->db, &room->settings, &room->manager, &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
 }
 
 static void room_close(Room *room) {
-    jobs_close(room->intake);
-    db_close(room->store);
+    jobs_close(room->manager);
+    db_close(room->db);
 }
 
 static Room room_make(size_t workers, size_t quota, double rate) {
@@ -76,7 +76,7 @@ static Status send(Room *room, const char *client, const char *key, double displ
                                    .idempotency_key = key,
                                    .is_replayed = is_replayed};
     problem_clear(&problem);
-    return jobs_submit(room->intake, &submission, job, &problem);
+    return jobs_submit(room->manager, &submission, job, &problem);
 }
 
 static void wait_for(Job *job) {
@@ -92,7 +92,7 @@ static void dismiss(Room *room, Job *job) {
     JobView now;
     Job *same;
     assert_int_equal(job_view(job, &now), STATUS_OK);
-    assert_int_equal(jobs_cancel(room->intake, now.id, &same, &problem), STATUS_OK);
+    assert_int_equal(jobs_cancel(room->manager, now.id, &same, &problem), STATUS_OK);
     wait_for(same);
     job_view_clear(&now);
     job_unref(same);
@@ -107,7 +107,7 @@ static void a_token_has_no_more_unfinished_jobs_than_its_quota(void **state) {
     assert_int_equal(send(&room, "ann", NULL, 0.011, endless, &jobs[1], NULL), STATUS_OK);
     assert_int_equal(send(&room, "ann", NULL, 0.012, endless, &more, NULL), STATUS_QUOTA);
     assert_non_null(strstr(problem.detail, "\"ann\" has 2 unfinished jobs, 2 are allowed"));
-    assert_in_range(jobs_retry_after(room.intake, "ann", STATUS_QUOTA), 1, 3600);
+    assert_in_range(jobs_retry_after(room.manager, "ann", STATUS_QUOTA), 1, 3600);
     assert_int_equal(send(&room, "bob", NULL, 0.012, endless, &jobs[2], NULL), STATUS_OK);
     for (double at = 0.02; at < 0.025; at += 0.001) { // nobody in particular has none
         assert_int_equal(send(&room, NULL, NULL, at, endless, &more, NULL), STATUS_OK);
@@ -148,7 +148,7 @@ static void a_token_sends_no_more_than_its_rate(void **state) {
     }
     assert_int_equal(send(&room, "ann", NULL, 0.015, 1, &job, NULL), STATUS_QUOTA);
     // One every 20 s.
-    assert_in_range(jobs_retry_after(room.intake, "ann", STATUS_QUOTA), 1, 20);
+    assert_in_range(jobs_retry_after(room.manager, "ann", STATUS_QUOTA), 1, 20);
     assert_int_equal(send(&room, "bob", NULL, 0.015, 1, &job, NULL), STATUS_OK);
     job_unref(job);
     room_end(&room);
@@ -228,10 +228,10 @@ static void a_deleted_result_is_known_no_more(void **state) {
     wait_for(job);
     JobView now, later;
     assert_int_equal(job_view(job, &now), STATUS_OK);
-    assert_int_equal(jobs_delete(room.intake, now.result, &problem), STATUS_OK);
+    assert_int_equal(jobs_delete(room.manager, now.result, &problem), STATUS_OK);
     problem_clear(&problem);
-    assert_int_equal(jobs_delete(room.intake, now.result, &problem), STATUS_NOT_FOUND);
-    assert_int_equal(jobs_find(room.intake, now.id, &found, NULL), STATUS_OK);
+    assert_int_equal(jobs_delete(room.manager, now.result, &problem), STATUS_NOT_FOUND);
+    assert_int_equal(jobs_find(room.manager, now.id, &found, NULL), STATUS_OK);
     assert_int_equal(job_view(found, &later), STATUS_OK);
     assert_true(later.is_result_deleted);
     job_view_clear(&later);
@@ -248,10 +248,10 @@ static void a_deleted_result_is_known_no_more(void **state) {
     room_end(&room);
 }
 
-static size_t count_jobs(Db *store) {
+static size_t count_jobs(Db *db) {
     JobRows rows;
     const JobSearch all = job_search_all(1000);
-    assert_int_equal(db_job_search(store, &all, &rows, &problem), STATUS_OK);
+    assert_int_equal(db_job_search(db, &all, &rows, &problem), STATUS_OK);
     const size_t count = rows.count;
     job_rows_clear(&rows);
     return count;
@@ -268,29 +268,29 @@ static void what_is_beyond_the_rules_goes_in_small_steps_and_no_more_than_that(v
                          STATUS_OK);
         wait_for(job);
         job_unref(job);
-        db_flush(room.store); // the second of a scene is written late: not too late
+        db_flush(room.db); // the second of a scene is written late: not too late
     }
     const JobRow unfinished = {.id = "j-0", .scene = "{}", .warnings = "[]", .created_unix_ms = 1};
-    assert_int_equal(db_job_add(room.store, &unfinished, &problem), STATUS_OK);
+    assert_int_equal(db_job_add(room.db, &unfinished, &problem), STATUS_OK);
     const KeepRules none = {0}, jobs = {.jobs = 31}, days = {.days = 1000}, bytes = {.bytes = 1};
-    assert_int_equal(db_remove(room.store, &none, &removed, &problem), STATUS_OK);
+    assert_int_equal(db_remove(room.db, &none, &removed, &problem), STATUS_OK);
     assert_false(removed.is_more);
-    assert_int_equal(db_remove(room.store, &days, &removed, &problem), STATUS_OK);
+    assert_int_equal(db_remove(room.db, &days, &removed, &problem), STATUS_OK);
     assert_false(removed.is_more);
     size_t steps = 0, results = 0;
     do {
-        assert_int_equal(db_remove(room.store, &jobs, &removed, &problem), STATUS_OK);
+        assert_int_equal(db_remove(room.db, &jobs, &removed, &problem), STATUS_OK);
         assert_true(removed.jobs <= RETENTION_BATCH);
         results += removed.results;
     } while (removed.is_more && ++steps < 100);
-    assert_int_equal(count_jobs(room.store), 31 + 1);
+    assert_int_equal(count_jobs(room.db), 31 + 1);
     assert_int_equal(results, 84); // of 169 jobs; the last one's result is named by one that stays
     for (steps = 0; steps < 100; steps++) {
-        assert_int_equal(db_remove(room.store, &bytes, &removed, &problem), STATUS_OK);
+        assert_int_equal(db_remove(room.db, &bytes, &removed, &problem), STATUS_OK);
         if (removed.jobs == 0)
             break;
     }
-    assert_int_equal(count_jobs(room.store), 1); // what is unfinished stays
+    assert_int_equal(count_jobs(room.db), 1); // what is unfinished stays
     room_end(&room);
 }
 

@@ -17,7 +17,7 @@
 #include "server/json/parse.h"
 #include "server/materials/material.h"
 
-static Db *store;
+static Db *db;
 static Problem problem;
 static StudyRequest inquiry;
 static Warnings warnings;
@@ -25,7 +25,7 @@ static Warnings warnings;
 static int set_up(void **state) {
     (void)state;
     problem_clear(&problem);
-    return db_open(NULL, &store, &problem) == STATUS_OK ? 0 : -1;
+    return db_open(NULL, &db, &problem) == STATUS_OK ? 0 : -1;
 }
 
 static void clear(void) {
@@ -37,7 +37,7 @@ static void clear(void) {
 static int tear_down(void **state) {
     (void)state;
     clear();
-    db_close(store);
+    db_close(db);
     return 0;
 }
 
@@ -49,9 +49,9 @@ static void say(const char *slug, const char *said) {
     assert_int_equal(material_validate(&revision.material, "", &problem), STATUS_OK);
     assert_int_equal(material_write_lists(&revision, &problem), STATUS_OK);
     revision.created_unix_ms = 1;
-    if (db_material_add(store, &revision, &problem) != STATUS_OK) {
+    if (db_material_add(db, &revision, &problem) != STATUS_OK) {
         problem_clear(&problem);
-        assert_int_equal(db_material_revise(store, &revision, ANY_VERSION, &problem), STATUS_OK);
+        assert_int_equal(db_material_revise(db, &revision, ANY_VERSION, &problem), STATUS_OK);
     }
     free(revision.lists);
     fields_clear(material_fields, &revision.material);
@@ -63,7 +63,7 @@ static void review(const char *slug, uint64_t revision, const char *status) {
                                   .status = (char *)status,
                                   .reason = (char *)"the base was loose",
                                   .created_unix_ms = 1};
-    assert_int_equal(db_material_review(store, &given, ANY_VERSION, &problem), STATUS_OK);
+    assert_int_equal(db_material_review(db, &given, ANY_VERSION, &problem), STATUS_OK);
 }
 
 #define SAID(members) "{\"name\": \"Foam\", \"source\": \"our bench\", " members "}"
@@ -74,7 +74,7 @@ static void review(const char *slug, uint64_t revision, const char *status) {
 
 static Status resolve_text(const char *text) {
     clear();
-    return jobs_prepare(store, text, strlen(text), NULL, &inquiry, &warnings, &problem);
+    return jobs_prepare(db, text, strlen(text), NULL, &inquiry, &warnings, &problem);
 }
 
 // The paper's scene with these members of its damper, and what else the document has.

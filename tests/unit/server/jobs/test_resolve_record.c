@@ -21,17 +21,17 @@
 
 static Problem problem;
 static char folder[SCRATCH_SIZE];
-static Db *store;
+static Db *db;
 
 static int db_make(void **state) {
     (void)state;
     scratch_make(folder);
-    return db_open(folder, &store, &problem) == STATUS_OK ? 0 : 1;
+    return db_open(folder, &db, &problem) == STATUS_OK ? 0 : 1;
 }
 
 static int db_end(void **state) {
     (void)state;
-    db_close(store);
+    db_close(db);
     scratch_remove(folder);
     return 0;
 }
@@ -48,7 +48,7 @@ static void add(const char *name, double first) {
                            .interval = 0.02,
                            .count = 3,
                            .digest = digest};
-    assert_int_equal(db_record_add(store, &row, &samples, &is_there, &problem), STATUS_OK);
+    assert_int_equal(db_record_add(db, &row, &samples, &is_there, &problem), STATUS_OK);
 }
 
 static Status prepare(const char *excitation, const char *study, StudyRequest *inquiry) {
@@ -59,8 +59,7 @@ static Status prepare(const char *excitation, const char *study, StudyRequest *i
              "\"sample_rate\": 100, \"excitation\": {\"kind\": \"record\", %s}%s%s}",
              excitation, study[0] != '\0' ? ", \"study\": " : "", study);
     problem_clear(&problem);
-    const Status status =
-        jobs_prepare(store, text, strlen(text), NULL, inquiry, &warnings, &problem);
+    const Status status = jobs_prepare(db, text, strlen(text), NULL, inquiry, &warnings, &problem);
     warnings_clear(&warnings);
     return status;
 }
@@ -83,7 +82,7 @@ static void scenes_share_the_samples_of_the_record_they_name(void **state) {
     document_scene(&scene, &one);
     jobs_result_id(&one, ids[0]);
     study_request_clear(&one);
-    assert_int_equal(jobs_prepare(store, scene.at, scene.count, NULL, &two, &warnings, &problem),
+    assert_int_equal(jobs_prepare(db, scene.at, scene.count, NULL, &two, &warnings, &problem),
                      STATUS_OK);
     document_scene(&again, &two);
     jobs_result_id(&two, ids[1]);
@@ -132,19 +131,19 @@ static void samples_are_let_go_of_and_had_again(void **state) {
     resolve_records_drop(&inquiry);
     assert_true(record_in(&inquiry)->named == NULL && pinned->at[1].named == NULL);
     resolve_records_drop(&inquiry); // does nothing
-    assert_int_equal(resolve_records_again(store, &inquiry, &problem), STATUS_OK);
+    assert_int_equal(resolve_records_again(db, &inquiry, &problem), STATUS_OK);
     assert_ptr_equal(record_in(&inquiry)->named, samples);
     assert_non_null(pinned->at[1].named);
     // What was found stays, but it must be there still, with the same samples.
-    assert_int_equal(resolve_records_again(store, &inquiry, &problem), STATUS_OK);
-    assert_int_equal(db_record_delete(store, "gone", &uses, &problem), STATUS_OK);
-    assert_int_equal(resolve_records_again(store, &inquiry, &problem), STATUS_INVALID);
+    assert_int_equal(resolve_records_again(db, &inquiry, &problem), STATUS_OK);
+    assert_int_equal(db_record_delete(db, "gone", &uses, &problem), STATUS_OK);
+    assert_int_equal(resolve_records_again(db, &inquiry, &problem), STATUS_INVALID);
     assert_string_equal(problem.faults[0].pointer, "/study/records/1/name");
     add("gone", 6);
     problem_clear(&problem);
-    assert_int_equal(resolve_records_again(store, &inquiry, &problem), STATUS_INVALID);
+    assert_int_equal(resolve_records_again(db, &inquiry, &problem), STATUS_INVALID);
     assert_string_equal(problem.faults[0].pointer, "/study/records/1/digest");
-    assert_int_equal(db_record_delete(store, "gone", &uses, &problem), STATUS_OK);
+    assert_int_equal(db_record_delete(db, "gone", &uses, &problem), STATUS_OK);
     study_request_clear(&inquiry);
 }
 
@@ -157,7 +156,7 @@ static void a_sweep_holds_only_so_many_samples(void **state) {
         char name[8];
         snprintf(name, sizeof name, "large%zu", i);
         assert_true(reals_allocate(&samples, RECORD_SAMPLES)); // never written
-        large[i] = record_memory_put(db_record_memory(store), db_catalog_version(store),
+        large[i] = record_memory_put(db_record_memory(db), db_catalog_version(db),
                                      named_record_new(name, name, 1, &samples));
     }
     assert_int_equal(prepare("\"name\": \"a\"",
@@ -195,9 +194,8 @@ static void unknown_names_are_suggested_for_a_few_and_looked_up_for_a_hundred(vo
                              100 + i);
         snprintf(text + size - 2, sizeof text - (size_t)size, "]}]}}");
         problem_clear(&problem);
-        assert_int_equal(
-            jobs_prepare(store, text, strlen(text), NULL, &inquiry, &warnings, &problem),
-            STATUS_INVALID);
+        assert_int_equal(jobs_prepare(db, text, strlen(text), NULL, &inquiry, &warnings, &problem),
+                         STATUS_INVALID);
         // Nothing was looked up that could not be told.
         assert_int_equal(problem.count, PROBLEM_FAULTS);
         assert_non_null(strstr(problem.faults[0].detail, "there are"));
@@ -246,12 +244,12 @@ static void faults_stand_where_the_name_or_the_digest_does(void **state) {
 
 static void without_a_daemon_there_are_no_records(void **state) {
     (void)state;
-    Db *own, *kept = store;
+    Db *own, *kept = db;
     StudyRequest inquiry;
     assert_int_equal(db_open(NULL, &own, &problem), STATUS_OK);
-    store = own;
+    db = own;
     const Status status = prepare("\"name\": \"a\"", "", &inquiry);
-    store = kept;
+    db = kept;
     assert_int_equal(status, STATUS_INVALID);
     assert_int_equal(problem.count, 1);
     assert_string_equal(problem.faults[0].pointer, "/excitation/name");

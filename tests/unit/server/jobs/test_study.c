@@ -138,7 +138,7 @@ static char *answer_of(const Room *room, const char *text) {
     ResultRow row;
     room_submit(room, text, NULL, id);
     room_finish(room, id, result);
-    assert_int_equal(db_result_load(room->store, result, &row, &problem), STATUS_OK);
+    assert_int_equal(db_result_load(room->db, result, &row, &problem), STATUS_OK);
     char *study = strdup(row.study);
     result_row_clear(&row);
     assert_non_null(study);
@@ -180,20 +180,20 @@ static void an_answer_has_the_same_bytes_for_any_number_of_workers(void **state)
 // How many workers have chunks in hand.
 static size_t busy(const Room *room) {
     size_t count = 0;
-    pthread_mutex_lock(&room->intake->lock);
-    for (size_t i = 0; i < room->intake->worker_count; i++)
-        count += room->intake->workers[i].study != NULL;
-    pthread_mutex_unlock(&room->intake->lock);
+    pthread_mutex_lock(&room->manager->lock);
+    for (size_t i = 0; i < room->manager->worker_count; i++)
+        count += room->manager->workers[i].study != NULL;
+    pthread_mutex_unlock(&room->manager->lock);
     return count;
 }
 
 static bool is_idle(const Room *room) {
-    pthread_mutex_lock(&room->intake->lock);
-    bool is_idle = room->intake->studies == NULL;
-    for (size_t i = 0; i < room->intake->worker_count; i++)
-        is_idle = is_idle && room->intake->workers[i].study == NULL &&
-                  room->intake->workers[i].running == NULL;
-    pthread_mutex_unlock(&room->intake->lock);
+    pthread_mutex_lock(&room->manager->lock);
+    bool is_idle = room->manager->studies == NULL;
+    for (size_t i = 0; i < room->manager->worker_count; i++)
+        is_idle = is_idle && room->manager->workers[i].study == NULL &&
+                  room->manager->workers[i].running == NULL;
+    pthread_mutex_unlock(&room->manager->lock);
     return is_idle;
 }
 
@@ -267,7 +267,7 @@ static void an_ensemble_is_dismissed_at_any_moment_and_leaves_nothing(void **sta
     room_finish(&room, id, result);
     while (!is_idle(&room))
         room_nap(1000000);
-    assert_true(room.intake->study_bytes == 0 && room.intake->study_count == 0);
+    assert_true(room.manager->study_bytes == 0 && room.manager->study_count == 0);
     room_end(&room);
 }
 
@@ -297,7 +297,7 @@ static void an_ensemble_that_was_interrupted_begins_again(void **state) {
 static double share_of(const Room *room, const char *id) {
     Job *job;
     JobView show;
-    assert_int_equal(jobs_find(room->intake, id, &job, NULL), STATUS_OK);
+    assert_int_equal(jobs_find(room->manager, id, &job, NULL), STATUS_OK);
     assert_int_equal(job_view(job, &show), STATUS_OK);
     job_unref(job);
     const double share = show.progress / 100;
@@ -362,10 +362,10 @@ static void studies_wait_where_much_is_held(void **state) {
     }
     while (share_of(&room, ids[0]) < 0.15 || share_of(&room, ids[1]) < 0.15)
         room_nap(1000000);
-    pthread_mutex_lock(&room.intake->lock);
-    assert_int_equal(room.intake->study_count, 2);
-    room.intake->study_bytes += (size_t)1 << 40;
-    pthread_mutex_unlock(&room.intake->lock);
+    pthread_mutex_lock(&room.manager->lock);
+    assert_int_equal(room.manager->study_count, 2);
+    room.manager->study_bytes += (size_t)1 << 40;
+    pthread_mutex_unlock(&room.manager->lock);
     ensemble(text, 10, 1);
     room_submit(&room, text, NULL, ids[2]);
     const double before = share_of(&room, ids[0]);

@@ -20,7 +20,7 @@ static void submit(const Room *room, size_t points, double duration, char id[40]
 
 static void assert_whole(const Room *room, const char *result, size_t points) {
     SweepView show;
-    assert_int_equal(sweep_view_load(room->store, result, false, true, &show, NULL), STATUS_OK);
+    assert_int_equal(sweep_view_load(room->db, result, false, true, &show, NULL), STATUS_OK);
     assert_true(show.is_complete);
     assert_int_equal(show.rows, points);
     for (size_t i = 0; i < points; i++) {

@@ -16,29 +16,28 @@
 
 static Problem problem;
 
-static Status bring(Db *store, const char *text, const char *who, bool may_all,
-                    ImportTally *tally) {
+static Status bring(Db *db, const char *text, const char *who, bool may_all, ImportTally *metrics) {
     Exchange exchange = {.revision_room = 0};
     problem_clear(&problem);
     Status status = (text[0] == '{' ? exchange_read_json : exchange_read_csv)(text, strlen(text),
                                                                               &exchange, &problem);
     if (status == STATUS_OK || status == STATUS_INVALID)
-        status = exchange_import(&exchange, store, who, may_all, false, tally, &problem);
+        status = exchange_import(&exchange, db, who, may_all, false, metrics, &problem);
     exchange_clear(&exchange);
     return status;
 }
 
 static Db *open_store(void) {
-    Db *store;
-    assert_int_equal(db_open(NULL, &store, NULL), STATUS_OK);
-    return store;
+    Db *db;
+    assert_int_equal(db_open(NULL, &db, NULL), STATUS_OK);
+    return db;
 }
 
-static char *export_all(Db *store, bool is_table) {
+static char *export_all(Db *db, bool is_table) {
     Bytes bytes = {.most = 0};
     MaterialExport text;
     bool is_last = false;
-    assert_int_equal(material_export_open(store, is_table, &text, NULL), STATUS_OK);
+    assert_int_equal(material_export_open(db, is_table, &text, NULL), STATUS_OK);
     while (!is_last)
         assert_int_equal(material_export_next(&text, &bytes, &is_last, NULL), STATUS_OK);
     char *whole = bytes_take(&bytes, NULL);
@@ -73,12 +72,12 @@ static void faults_are_told_at_their_places_and_nothing_is_written(void **state)
         {"slug,row,name\nsponge,measurement,X", "/2/name"},
         {"{\"format\": \"other\", \"version\": 1, \"materials\": []}", "/format"},
     };
-    Db *store = open_store();
-    char *before = export_all(store, false);
+    Db *db = open_store();
+    char *before = export_all(db, false);
     for (size_t i = 0; i < COUNT(cases); i++) {
-        ImportTally tally;
-        const uint64_t generation = db_catalog_version(store);
-        assert_int_equal(bring(store, cases[i].text, NULL, true, &tally), STATUS_INVALID);
+        ImportTally metrics;
+        const uint64_t catalog_version = db_catalog_version(db);
+        assert_int_equal(bring(db, cases[i].text, NULL, true, &metrics), STATUS_INVALID);
         bool is_told = false;
         for (size_t k = 0; k < problem.count; k++)
             is_told = is_told || strcmp(problem.faults[k].pointer, cases[i].place) == 0;
@@ -86,62 +85,62 @@ static void faults_are_told_at_their_places_and_nothing_is_written(void **state)
             print_error("%s: %s\n", cases[i].text, problem.detail);
         assert_true(is_told);
         assert_true(problem.count <= 2);
-        assert_true(db_catalog_version(store) == generation);
+        assert_true(db_catalog_version(db) == catalog_version);
     }
-    char *after = export_all(store, false);
+    char *after = export_all(db, false);
     assert_string_equal(before, after);
     free(after);
     free(before);
-    db_close(store);
+    db_close(db);
 }
 
 static void an_unknown_number_is_the_next_unless_the_newest_says_the_same(void **state) {
     (void)state;
-    Db *store = open_store();
-    ImportTally tally;
-    const uint64_t generation = db_catalog_version(store);
+    Db *db = open_store();
+    ImportTally metrics;
+    const uint64_t catalog_version = db_catalog_version(db);
     static const char first[] = "slug,name,source,restitution\nx,X,s,0.5\n",
                       second[] = "slug,name,source,restitution,comment\nx,X,s,0.6,better\n";
-    assert_int_equal(bring(store, first, NULL, true, &tally), STATUS_OK);
-    assert_int_equal(tally.revisions.added, 1);
-    assert_true(db_catalog_version(store) > generation);
-    assert_int_equal(bring(store, first, NULL, true, &tally), STATUS_OK);
-    assert_int_equal(tally.revisions.same, 1);
-    assert_int_equal(bring(store, second, NULL, true, &tally), STATUS_OK);
-    assert_int_equal(bring(store, second, NULL, true, &tally), STATUS_OK);
-    assert_int_equal(tally.revisions.same, 1);
+    assert_int_equal(bring(db, first, NULL, true, &metrics), STATUS_OK);
+    assert_int_equal(metrics.revisions.added, 1);
+    assert_true(db_catalog_version(db) > catalog_version);
+    assert_int_equal(bring(db, first, NULL, true, &metrics), STATUS_OK);
+    assert_int_equal(metrics.revisions.same, 1);
+    assert_int_equal(bring(db, second, NULL, true, &metrics), STATUS_OK);
+    assert_int_equal(bring(db, second, NULL, true, &metrics), STATUS_OK);
+    assert_int_equal(metrics.revisions.same, 1);
     // What an older one says is new all the same.
-    assert_int_equal(bring(store, first, NULL, true, &tally), STATUS_OK);
-    assert_int_equal(tally.revisions.added, 1);
+    assert_int_equal(bring(db, first, NULL, true, &metrics), STATUS_OK);
+    assert_int_equal(metrics.revisions.added, 1);
     MaterialRevision newest = {0};
-    assert_int_equal(db_material(store, "x", 3, &newest, NULL), STATUS_OK);
+    assert_int_equal(db_material(db, "x", 3, &newest, NULL), STATUS_OK);
     assert_true(newest.material.restitution == 0.5);
     assert_string_equal(newest.comment, "imported");
     assert_null(newest.author);
     material_revision_clear(&newest);
-    db_close(store);
+    db_close(db);
 }
 
 static void who_may_not_speak_for_others_is_told_so(void **state) {
     (void)state;
-    Db *store = open_store();
-    ImportTally tally;
+    Db *db = open_store();
+    ImportTally metrics;
     static const char by_bert[] = "slug,name,source,restitution,author\nx,X,s,0.5,bert\n",
                       by_nobody[] = "slug,name,source,restitution,author\nx,X,s,0.5,\n";
-    assert_int_equal(bring(store, by_bert, "anna", false, &tally), STATUS_FORBIDDEN);
+    assert_int_equal(bring(db, by_bert, "anna", false, &metrics), STATUS_FORBIDDEN);
     assert_string_equal(problem.faults[0].pointer, "/2/author");
-    assert_int_equal(bring(store, by_nobody, "anna", false, &tally), STATUS_OK);
+    assert_int_equal(bring(db, by_nobody, "anna", false, &metrics), STATUS_OK);
     MaterialRevision found = {0};
-    assert_int_equal(db_material(store, "x", 1, &found, NULL), STATUS_OK);
+    assert_int_equal(db_material(db, "x", 1, &found, NULL), STATUS_OK);
     assert_string_equal(found.author, "anna");
     material_revision_clear(&found);
-    db_close(store);
+    db_close(db);
 }
 
 static void both_kinds_of_exports_are_imports(void **state) {
     (void)state;
-    Db *store = open_store(), *others[2] = {open_store(), open_store()};
-    ImportTally tally;
+    Db *db = open_store(), *others[2] = {open_store(), open_store()};
+    ImportTally metrics;
     static const char text[] =
         "row,slug,name,source,table,notes,test,reviews\r\n"
         "revision,x,\"a,\"\"b\"\"\",\"s\r\n2\",\"[{\"\"approach_speed\"\": 0.1, "
@@ -150,13 +149,13 @@ static void both_kinds_of_exports_are_imports(void **state) {
         "0.4}]\",\"\",,\"[{\"\"status\"\": "
         "\"\"approved\"\", \"\"reason\"\": \"\"=1+1\"\"}]\"\r\n"
         "measurement,x,,,,,\"{\"\"drops\"\": [{\"\"contact_time\"\": 0.01}]}\",\r\n";
-    assert_int_equal(bring(store, text, NULL, true, &tally), STATUS_OK);
-    assert_int_equal(tally.measurements.added, 1);
-    assert_int_equal(tally.reviews.added, 1);
+    assert_int_equal(bring(db, text, NULL, true, &metrics), STATUS_OK);
+    assert_int_equal(metrics.measurements.added, 1);
+    assert_int_equal(metrics.reviews.added, 1);
     for (int i = 0; i < 2; i++) {
-        char *whole = export_all(store, i == 1), *document = export_all(store, false);
-        assert_int_equal(bring(others[i], whole, NULL, true, &tally), STATUS_OK);
-        assert_int_equal(tally.revisions.same, 5);
+        char *whole = export_all(db, i == 1), *document = export_all(db, false);
+        assert_int_equal(bring(others[i], whole, NULL, true, &metrics), STATUS_OK);
+        assert_int_equal(metrics.revisions.same, 5);
         char *back = export_all(others[i], false);
         assert_string_equal(document, back);
         free(back);
@@ -164,13 +163,13 @@ static void both_kinds_of_exports_are_imports(void **state) {
         free(whole);
         db_close(others[i]);
     }
-    db_close(store);
+    db_close(db);
 }
 
 static void an_export_is_made_revision_by_revision(void **state) {
     (void)state;
-    Db *store = open_store();
-    ImportTally tally;
+    Db *db = open_store();
+    ImportTally metrics;
     Bytes rows = {.most = 0}, piece = {.most = 0};
     MaterialExport text;
     bool is_last = false;
@@ -179,8 +178,8 @@ static void an_export_is_made_revision_by_revision(void **state) {
     for (int i = 1; i <= 50; i++)
         bytes_format(&rows, "x,%d,X,s,0.5,%0500d\n", i, i);
     char *table = bytes_take(&rows, NULL);
-    assert_int_equal(bring(store, table, NULL, true, &tally), STATUS_OK);
-    assert_int_equal(material_export_open(store, false, &text, NULL), STATUS_OK);
+    assert_int_equal(bring(db, table, NULL, true, &metrics), STATUS_OK);
+    assert_int_equal(material_export_open(db, false, &text, NULL), STATUS_OK);
     for (; !is_last; pieces++) {
         assert_int_equal(material_export_next(&text, &piece, &is_last, NULL), STATUS_OK);
         assert_true(piece.count < 2000);
@@ -189,7 +188,7 @@ static void an_export_is_made_revision_by_revision(void **state) {
     assert_true(pieces > 55);
     bytes_clear(&piece);
     free(table);
-    db_close(store);
+    db_close(db);
 }
 
 int main(void) {
