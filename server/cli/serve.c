@@ -28,7 +28,7 @@ typedef struct ServeSettings {
     char *listen, *data, *config, *base_url, *tls_cert, *tls_key;
     Texts host;
     uint64_t workers, queue, queue_bytes, max_body, max_samples, max_impacts, max_run_bytes,
-        max_points, cache_bytes, db_bytes;
+        max_points, cache_bytes, store_bytes;
     uint64_t quota, keep_jobs, keep_bytes;
     double max_cpu_seconds, max_study_seconds, rate, keep_days;
     int journal;
@@ -57,7 +57,7 @@ static const Field serve_fields[] = {
     FIELD_COUNT(ServeSettings, max_run_bytes, "B", WITHIN(1 << 20, 1099511627776.0), SIMULATION_BYTES, "memory a scene may be predicted to take; it is refused beyond"),
     FIELD_COUNT(ServeSettings, max_points, NULL, WITHIN(1, 1e7), SWEEP_POINTS, "points a sweep may have"),
     FIELD_COUNT(ServeSettings, cache_bytes, "B", WITHIN(0, 1099511627776.0), 256 * MIB, "memory for what is kept ready: whole answers a quarter, results the rest"),
-    FIELD_COUNT(ServeSettings, db_bytes, "B", WITHIN(0, 1099511627776.0), 1024 * MIB, "disk for series that are dearer to compute than to read"),
+    FIELD_COUNT(ServeSettings, store_bytes, "B", WITHIN(0, 1099511627776.0), 1024 * MIB, "disk for series that are dearer to compute than to read"),
     FIELD_REAL(ServeSettings, keep_days, "d", WITHIN(0, 36500), 0, "finished jobs are kept so long, with the results that no later job names; 0: for ever"),
     FIELD_COUNT(ServeSettings, keep_jobs, NULL, WITHIN(0, 1e12), 0, "finished jobs kept, the oldest go first; 0: all"),
     FIELD_COUNT(ServeSettings, keep_bytes, "B", WITHIN(0, 1e18), 0, "size of the database beyond which the oldest finished jobs go; 0: any"),
@@ -214,7 +214,7 @@ static Status serve(const ServeSettings *settings, const sigset_t *signals, Prob
                                      .queue_most = settings->queue,
                                      .queue_bytes = settings->queue_bytes,
                                      .cache_bytes = settings->cache_bytes - response_cache_bytes,
-                                     .db_bytes = settings->db_bytes,
+                                     .store_bytes = settings->store_bytes,
                                      .quota = settings->quota,
                                      .rate = settings->rate,
                                      .study_seconds = settings->max_study_seconds,

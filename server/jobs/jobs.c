@@ -362,5 +362,5 @@ void jobs_tally(JobManager *manager, JobStats *metrics) {
         metrics->running +=
             manager->workers[i].running != NULL || manager->workers[i].study != NULL;
     pthread_mutex_unlock(&manager->lock);
-    metrics->stored.most_bytes = manager->settings.db_bytes;
+    metrics->stored.most_bytes = manager->settings.store_bytes;
 }

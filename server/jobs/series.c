@@ -32,7 +32,7 @@ static void kept(void *context, Status status, const char *detail) {
 void jobs_keep_series(JobManager *manager, const char *result, const Outcome *outcome,
                       double seconds) {
     const size_t size = outcome_bytes(outcome);
-    if (outcome->response.series.count == 0 || size > manager->settings.db_bytes ||
+    if (outcome->response.series.count == 0 || size > manager->settings.store_bytes ||
         seconds <= read_once + (double)size / read_rate)
         return;
     Keeping *keeping = malloc(sizeof *keeping);
@@ -54,7 +54,7 @@ void jobs_keep_series(JobManager *manager, const char *result, const Outcome *ou
     const WriteDone done = {kept, keeping};
     size_t count = 0;
     char *body = bytes_take(&bytes, &count);
-    if (body == NULL || db_series_post(manager->db, result, body, count, manager->settings.db_bytes,
+    if (body == NULL || db_series_post(manager->db, result, body, count, manager->settings.store_bytes,
                                        &done) != STATUS_OK)
         kept(keeping, STATUS_NO_MEMORY, "");
 }

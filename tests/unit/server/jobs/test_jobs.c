@@ -495,7 +495,7 @@ static void a_dear_series_is_kept_and_outlasts_its_engine(void **state) {
     (void)state;
     Room room = room_make(1);
     room_close(&room);
-    room.settings.db_bytes = 1 << 26;
+    room.settings.store_bytes = 1 << 26;
     room_open(&room);
     // Few samples of a long run, and none at all.
     static const char dear[] =
