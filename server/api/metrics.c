@@ -58,7 +58,7 @@ static void write_queue(Bytes *bytes, JobManager *manager, Db *db) {
 
 // Whole answers that are kept ready to be sent.
 static void write_hot(Bytes *bytes, ResponseCache *response_cache) {
-    const ResponseCacheStats metrics = response_cache_tally(response_cache);
+    const LruStats metrics = response_cache_stats(response_cache);
     metrics_gauge(bytes, "impactd_reply_cache_entries", "Answers kept whole.",
                   (double)metrics.count);
     metrics_gauge(bytes, "impactd_reply_cache_bytes", "Memory of these answers.",

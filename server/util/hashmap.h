@@ -1,5 +1,5 @@
-// Things found by a text: a hash table whose entries live inside the things. Not locked, owns
-// nothing. Used by cache.c and intake.c.
+// A hash table of entries that live inside the caller's structs, found by a text. It is not locked
+// and owns no entry.
 #ifndef SERVER_UTIL_HASHMAP_H
 #define SERVER_UTIL_HASHMAP_H
 
@@ -7,17 +7,18 @@
 
 typedef struct HashMap HashMap;
 
-// First member of what is indexed.
+// The first member of an indexed struct.
 typedef struct HashMapEntry {
     struct HashMapEntry *next;
-    const char *key; // lives as long as the thing is in the index
+    const char *key; // lives as long as the entry is in the map
 } HashMapEntry;
 
 HashMap *hashmap_new(void); // NULL without memory
-void hashmap_free(HashMap *index);
-void hashmap_add(HashMap *index, HashMapEntry *entry);
-void hashmap_remove(HashMap *index, HashMapEntry *entry); // fine if it is not there
-void *hashmap_any(const HashMap *index); // any thing of it, or NULL where it is empty
-void *hashmap_find(const HashMap *index, const char *key); // the thing, or NULL
+void hashmap_free(HashMap *map);
+// Never fails: without memory to grow, look-ups become slower.
+void hashmap_add(HashMap *map, HashMapEntry *entry);
+void hashmap_remove(HashMap *map, HashMapEntry *entry);  // an entry that is absent is no error
+void *hashmap_any(const HashMap *map);                   // any entry; NULL if the map is empty
+void *hashmap_find(const HashMap *map, const char *key); // NULL if absent
 
 #endif

@@ -1,65 +1,87 @@
 #include "server/util/thread_pool.h"
 
 #include <pthread.h>
-#include <stdbool.h>
 #include <stdlib.h>
 
 struct ThreadPool {
     pthread_mutex_t lock;
-    pthread_cond_t some;
+    pthread_cond_t has_work;
     WorkItem *first, **last;
     bool is_closing;
-    size_t count; // of threads
+    size_t unfinished;         // items that wait or run
+    size_t count, max_threads; // of threads
     pthread_t threads[];
 };
 
-static void *work(void *context) {
+static void *thread_pool_work(void *context) {
     ThreadPool *pool = context;
     pthread_mutex_lock(&pool->lock);
     for (;;) {
         while (pool->first == NULL && !pool->is_closing)
-            pthread_cond_wait(&pool->some, &pool->lock);
-        WorkItem *task = pool->first;
-        if (task == NULL)
+            pthread_cond_wait(&pool->has_work, &pool->lock);
+        WorkItem *item = pool->first;
+        if (item == NULL)
             break;
-        pool->first = task->next;
+        pool->first = item->next;
         if (pool->first == NULL)
             pool->last = &pool->first;
         pthread_mutex_unlock(&pool->lock);
-        task->run(task);
+        item->run(item);
         pthread_mutex_lock(&pool->lock);
+        pool->unfinished--;
     }
     pthread_mutex_unlock(&pool->lock);
     return NULL;
 }
 
-Status thread_pool_open(size_t threads, ThreadPool **pool, Problem *problem) {
+// With the lock held, or before other threads know the pool.
+static void thread_pool_start_thread(ThreadPool *pool) {
+    if (pthread_create(&pool->threads[pool->count], NULL, thread_pool_work, pool) == 0)
+        pool->count++;
+}
+
+Status thread_pool_open(size_t max_threads, ThreadPool **pool, Problem *problem) {
     *pool = NULL;
-    ThreadPool *made = calloc(1, sizeof *made + threads * sizeof *made->threads);
+    ThreadPool *made = calloc(1, sizeof *made + max_threads * sizeof *made->threads);
     if (made == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the threads that answer");
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a pool of threads");
     pthread_mutex_init(&made->lock, NULL);
-    pthread_cond_init(&made->some, NULL);
+    pthread_cond_init(&made->has_work, NULL);
     made->last = &made->first;
-    while (made->count < threads &&
-           pthread_create(&made->threads[made->count], NULL, work, made) == 0)
-        made->count++;
-    if (made->count < threads) {
+    made->max_threads = max_threads;
+    thread_pool_start_thread(made); // one is certain: nothing waits for ever
+    if (made->count == 0) {
         thread_pool_close(made);
         return problem_set(problem, STATUS_INTERNAL,
-                           "the threads that answer requests cannot be started");
+                           "the first thread of a pool cannot be "
+                           "started");
     }
     *pool = made;
     return STATUS_OK;
 }
 
-void thread_pool_add(ThreadPool *pool, WorkItem *task) {
-    task->next = NULL;
+static bool thread_pool_offer(ThreadPool *pool, WorkItem *item, bool waits) {
+    item->next = NULL;
     pthread_mutex_lock(&pool->lock);
-    *pool->last = task;
-    pool->last = &task->next;
-    pthread_cond_signal(&pool->some);
+    if (pool->unfinished >= pool->count && pool->count < pool->max_threads)
+        thread_pool_start_thread(pool);
+    const bool is_taken = waits || pool->unfinished < pool->count;
+    if (is_taken) {
+        *pool->last = item;
+        pool->last = &item->next;
+        pool->unfinished++;
+        pthread_cond_signal(&pool->has_work);
+    }
     pthread_mutex_unlock(&pool->lock);
+    return is_taken;
+}
+
+void thread_pool_add(ThreadPool *pool, WorkItem *item) {
+    (void)thread_pool_offer(pool, item, true);
+}
+
+bool thread_pool_add_if_free(ThreadPool *pool, WorkItem *item) {
+    return thread_pool_offer(pool, item, false);
 }
 
 void thread_pool_close(ThreadPool *pool) {
@@ -67,11 +89,11 @@ void thread_pool_close(ThreadPool *pool) {
         return;
     pthread_mutex_lock(&pool->lock);
     pool->is_closing = true;
-    pthread_cond_broadcast(&pool->some);
+    pthread_cond_broadcast(&pool->has_work);
     pthread_mutex_unlock(&pool->lock);
     for (size_t i = 0; i < pool->count; i++)
         pthread_join(pool->threads[i], NULL);
-    pthread_cond_destroy(&pool->some);
+    pthread_cond_destroy(&pool->has_work);
     pthread_mutex_destroy(&pool->lock);
     free(pool);
 }

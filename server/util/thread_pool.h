@@ -1,23 +1,26 @@
-// Threads that do what may take a while, so that event loops never wait. Not an order of
-// importance: first come, first served. Used by exchange.c.
+// Threads that run what may take a while, first come, first served. A thread is started when there
+// is work and all others are busy, up to a limit.
 #ifndef SERVER_UTIL_THREAD_POOL_H
 #define SERVER_UTIL_THREAD_POOL_H
 
+#include <stdbool.h>
 #include <stddef.h>
 
 #include "core/base/status.h"
 
 typedef struct ThreadPool ThreadPool;
 
-// First member of what is to be done; it lives until `run` is called, and is not touched after.
+// The first member of what is run. It lives until `run` is called and is not touched after that.
 typedef struct WorkItem {
     struct WorkItem *next;
-    void (*run)(struct WorkItem *task);
+    void (*run)(struct WorkItem *item);
 } WorkItem;
 
-Status thread_pool_open(size_t threads, ThreadPool **pool, Problem *problem);
-void thread_pool_add(ThreadPool *pool, WorkItem *task); // from any thread
-// Does what was put, then ends the threads; nobody may put any more. NULL is fine.
+Status thread_pool_open(size_t max_threads, ThreadPool **pool, Problem *problem);
+void thread_pool_add(ThreadPool *pool, WorkItem *item); // from any thread
+// The same if a thread is free or can be started; else false.
+bool thread_pool_add_if_free(ThreadPool *pool, WorkItem *item);
+// Runs what was added, then ends the threads; nothing may be added any more. NULL is accepted.
 void thread_pool_close(ThreadPool *pool);
 
 #endif

@@ -67,9 +67,9 @@ static void an_answer_is_found_by_target_and_packing(void **state) {
     assert_false(finds(response_cache, "/a?x=1", false, ""));
     put(response_cache, "/a", false, "newer", 100);
     assert_true(finds(response_cache, "/a", false, "newer"));
-    assert_int_equal(response_cache_tally(response_cache).count, 2);
-    assert_int_equal(response_cache_tally(response_cache).hits, 3);
-    assert_int_equal(response_cache_tally(response_cache).misses, 1);
+    assert_int_equal(response_cache_stats(response_cache).count, 2);
+    assert_int_equal(response_cache_stats(response_cache).hits, 3);
+    assert_int_equal(response_cache_stats(response_cache).misses, 1);
     response_cache_free(response_cache);
 }
 
@@ -84,8 +84,8 @@ static void the_longest_unused_goes_first_and_the_budget_holds(void **state) {
     put(response_cache, "/5", false, "5", 20000);
     assert_false(finds(response_cache, "/2", false, ""));
     assert_true(finds(response_cache, "/1", false, "1"));
-    assert_true(response_cache_tally(response_cache).bytes <= 100000);
-    assert_int_equal(response_cache_tally(response_cache).evictions, 1);
+    assert_true(response_cache_stats(response_cache).bytes <= 100000);
+    assert_int_equal(response_cache_stats(response_cache).evictions, 1);
     put(response_cache, "/large", false, "large", 26000); // above its share: stays its owner's
     assert_false(finds(response_cache, "/large", false, ""));
     response_cache_free(response_cache);
@@ -128,7 +128,7 @@ static void many_threads_share_it(void **state) {
         assert_int_equal(pthread_create(&threads[i], NULL, ask_and_put, response_cache), 0);
     for (size_t i = 0; i < COUNT(threads); i++)
         pthread_join(threads[i], NULL);
-    assert_true(response_cache_tally(response_cache).bytes <= 20000);
+    assert_true(response_cache_stats(response_cache).bytes <= 20000);
     response_cache_free(response_cache);
 }
 
