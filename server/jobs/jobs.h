@@ -20,7 +20,7 @@ typedef struct JobManagerSettings {
     size_t quota;       // unfinished jobs of one client by name; 0: as many as the queue takes
     double rate;        // jobs a minute of one client by name; 0: any number
     Callback deleted;   // called after results were deleted; `wake` may be NULL
-    size_t store_bytes;    // of series in the database, those that are dearer to compute than to read
+    size_t store_bytes; // of series in the database, those that are dearer to compute than to read
     double study_seconds; // of CPU that a study may be predicted to take; 0: any
     SimulationLimits limits;
 } JobManagerSettings;

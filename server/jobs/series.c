@@ -54,8 +54,8 @@ void jobs_keep_series(JobManager *manager, const char *result, const Outcome *ou
     const WriteDone done = {kept, keeping};
     size_t count = 0;
     char *body = bytes_take(&bytes, &count);
-    if (body == NULL || db_series_post(manager->db, result, body, count, manager->settings.store_bytes,
-                                       &done) != STATUS_OK)
+    if (body == NULL || db_series_post(manager->db, result, body, count,
+                                       manager->settings.store_bytes, &done) != STATUS_OK)
         kept(keeping, STATUS_NO_MEMORY, "");
 }
 
