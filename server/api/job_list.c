@@ -10,7 +10,6 @@
 #include "server/api/app.h"
 #include "server/api/job_json.h"
 #include "server/api/query.h"
-#include "server/db/job_search.h"
 #include "server/http/reply.h"
 #include "server/jobs/job_id.h"
 

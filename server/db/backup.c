@@ -1,6 +1,6 @@
-// The database as it is at one moment, beside whatever a daemon writes meanwhile.
+// A copy is of one moment, whatever a daemon writes meanwhile, and is whole or not there:
 //
-//     impactd.db --> FILE.xxxxxx --> check --> sync --> FILE
+//     source --> TARGET.xxxxxx --> check --> sync --> TARGET
 #include "server/db/backup.h"
 
 #include <errno.h>
@@ -13,12 +13,11 @@
 #include <unistd.h>
 
 #include "server/db/data_dir.h"
-#include "server/db/row.h"
 #include "server/db/sqlite.h"
 #include "server/util/embedded.h"
 
-// The daemon's own, and the log of an earlier one; a copy under one of these names would be taken
-// for a part of its database.
+// The daemon's own, and the log of an earlier one; a copy under one of these names would be used as
+// a part of its database.
 static const char *const own_names[] = {"impactd.db",
                                         "impactd.db-wal",
                                         "impactd.db-shm",
@@ -27,45 +26,43 @@ static const char *const own_names[] = {"impactd.db",
                                         "impactd.db-journal",
                                         NULL};
 
-static const double copy_share = 0.8; // of the time, the rest is the check's
+static const double copy_share = 0.8; // of the time; the check takes the rest
 
-typedef struct Work {
+typedef struct Copying {
     const BackupRequest *request;
-    char folder[PATH_MAX]; // that the copy is to be in
-    char part[PATH_MAX];   // its name until it is whole
-    int file;              // that file
+    char source[PATH_MAX], target[PATH_MAX];
+    char folder[PATH_MAX]; // of the target
+    char part[PATH_MAX];   // the target's name until it is whole; "": there is none
+    int file;              // the part
     Sqlite *copy;
     Backup backup;
-} Work;
+} Copying;
 
-static bool is_same(const struct stat *a, const struct stat *b) {
+static const SqlColumn backup_columns[] = {COLUMN(Backup, jobs), COLUMN(Backup, results),
+                                           COLUMN(Backup, materials), COLUMN_END};
+
+static bool is_same_file(const struct stat *a, const struct stat *b) {
     return a->st_dev == b->st_dev && a->st_ino == b->st_ino;
 }
 
-static Status refuse_place(const char *path, Problem *problem) {
+static Status refuse_taken(const Copying *copying, Problem *problem) {
     return problem_set(problem, STATUS_CONFLICT,
-                       "%s is there already: name another file, or --force replaces it", path);
+                       "%s is there already: name another file, or --force replaces it",
+                       copying->target);
 }
 
-static Status check_place(Work *work, Problem *problem) {
-    const char *path = work->request->path, *slash = strrchr(path, '/');
-    const char *name = slash != NULL ? slash + 1 : path;
-    struct stat there, own;
+static Status check_target(const Copying *copying, Problem *problem) {
+    const char *path = copying->target, *slash = strrchr(path, '/');
+    const char *name = slash != NULL ? slash + 1 : path, *directory = copying->request->directory;
+    struct stat folder, there, own;
     char own_path[PATH_MAX];
-    snprintf(work->folder, sizeof work->folder, "%.*s",
-             slash == NULL   ? 1
-             : slash == path ? 1
-                             : (int)(slash - path),
-             slash == NULL ? "." : path);
     const bool is_there = stat(path, &there) == 0;
-    const bool is_in_folder = stat(work->folder, &there) == 0 &&
-                              stat(work->request->directory, &own) == 0 && is_same(&there, &own);
-    if (is_there)
-        (void)stat(path, &there);
+    const bool is_in_folder = stat(copying->folder, &folder) == 0 && stat(directory, &own) == 0 &&
+                              is_same_file(&folder, &own);
     for (size_t i = 0; own_names[i] != NULL; i++) {
-        snprintf(own_path, sizeof own_path, "%.4000s/%s", work->request->directory, own_names[i]);
+        snprintf(own_path, sizeof own_path, "%.4000s/%s", directory, own_names[i]);
         if ((is_in_folder && strcmp(name, own_names[i]) == 0) ||
-            (is_there && stat(own_path, &own) == 0 && is_same(&there, &own)))
+            (is_there && stat(own_path, &own) == 0 && is_same_file(&there, &own)))
             return problem_set(problem, STATUS_CONFLICT,
                                "%s is the daemon's own file: name another one", path);
     }
@@ -73,175 +70,215 @@ static Status check_place(Work *work, Problem *problem) {
         return problem_set(problem, STATUS_CONFLICT, "%s is a folder: name a file in it", path);
     if (is_there && !S_ISREG(there.st_mode))
         return problem_set(problem, STATUS_CONFLICT, "%s is not a regular file", path);
-    return is_there && !work->request->replaces ? refuse_place(path, problem) : STATUS_OK;
+    return is_there && !copying->request->replaces ? refuse_taken(copying, problem) : STATUS_OK;
 }
 
-static Status open_source(Work *work, Sqlite **source, Problem *problem) {
+static Status open_source(Copying *copying, Sqlite **source, Problem *problem) {
     static const char sql[] =
         "SELECT count(*) AS jobs FROM sqlite_schema WHERE name IN ('jobs', 'results', 'materials')";
-    static const RowColumn columns[] = {ROW_COLUMN(Backup, jobs, COLUMN_COUNT), ROW_END};
-    const char *directory = work->request->directory;
-    char path[PATH_MAX];
-    bool has_row;
-    Statement *statement;
-    snprintf(path, sizeof path, "%.4000s/impactd.db", directory);
-    if (access(path, F_OK) != 0 && errno != EACCES)
+    bool is_found, is_current;
+    TRY(sqlite_open(copying->source, DATABASE_READER, source, problem));
+    TRY(sqlite_is_current(*source, embedded_sql, &is_current, problem));
+    TRY(sqlite_first(*source, sql, NULL, NULL, backup_columns, &copying->backup, &is_found,
+                     problem));
+    if (copying->backup.jobs != 3)
         return problem_set(problem, STATUS_NOT_FOUND,
-                           "there is no database in %s; --data DIR names the daemon's folder",
-                           directory);
-    TRY(sqlite_open(path, DATABASE_READER, source, problem));
-    TRY(sqlite_is_current(*source, embedded_sql, NULL, problem));
-    TRY(statement_begin(*source, sql, NULL, NULL, &statement, problem));
-    Status status = statement_step(statement, &has_row, problem);
-    if (status == STATUS_OK && has_row)
-        status = row_read(statement, columns, &work->backup, problem);
-    statement_end(statement);
-    if (status == STATUS_OK && work->backup.jobs != 3)
-        return problem_set(problem, STATUS_NOT_FOUND,
-                           "%s holds nothing yet: no daemon has begun there", path);
-    return status;
-}
-
-static Status open_part(Work *work, Problem *problem) {
-    const char *path = work->request->path;
-    const int size = snprintf(work->part, sizeof work->part, "%s.XXXXXX", path);
-    if (size < 0 || (size_t)size >= sizeof work->part - 8)
-        return problem_set(problem, STATUS_IO, "%.200s...: the name is too long", path);
-    work->file = mkstemp(work->part); // for this user alone: tokens' digests are in it
-    if (work->file >= 0)
-        return sqlite_open(work->part, DATABASE_COPY, &work->copy, problem);
-    work->part[0] = '\0';
-    return problem_set(problem, errno == EACCES || errno == EPERM ? STATUS_FORBIDDEN : STATUS_IO,
-                       "%s cannot be written: %s", path, strerror(errno));
-}
-
-typedef struct Verdict {
-    char *text;
-} Verdict;
-
-static Status check_copy(Work *work, Problem *problem) {
-    static const char sql[] = "SELECT integrity_check AS text FROM pragma_integrity_check(1)";
-    static const RowColumn columns[] = {ROW_COLUMN(Verdict, text, COLUMN_TEXT), ROW_END};
-    Verdict verdict = {0};
-    Statement *statement;
-    bool has_row = false;
-    TRY(statement_begin(work->copy, sql, NULL, NULL, &statement, problem));
-    Status status = statement_step(statement, &has_row, problem);
-    if (status == STATUS_OK && has_row)
-        status = row_read(statement, columns, &verdict, problem);
-    statement_end(statement);
-    if (status == STATUS_OK && (verdict.text == NULL || strcmp(verdict.text, "ok") != 0))
-        status = problem_set(problem, STATUS_IO,
-                             "the database in %s is damaged (%.200s); there is no copy of it; keep "
-                             "the backups there are",
-                             work->request->directory,
-                             verdict.text != NULL ? verdict.text : "it cannot be checked");
-    row_clear(columns, &verdict, sizeof verdict);
-    return status;
-}
-
-static Status count_copy(Work *work, Problem *problem) {
-    static const char sql[] = "SELECT (SELECT count(*) FROM jobs) AS jobs, "
-                              "(SELECT count(*) FROM results) AS results, "
-                              "(SELECT count(*) FROM materials) AS materials";
-    static const RowColumn columns[] = {ROW_COLUMN(Backup, jobs, COLUMN_COUNT),
-                                        ROW_COLUMN(Backup, results, COLUMN_COUNT),
-                                        ROW_COLUMN(Backup, materials, COLUMN_COUNT), ROW_END};
-    Statement *statement;
-    bool has_row = false;
-    TRY(statement_begin(work->copy, sql, NULL, NULL, &statement, problem));
-    Status status = statement_step(statement, &has_row, problem);
-    if (status == STATUS_OK && has_row)
-        status = row_read(statement, columns, &work->backup, problem);
-    statement_end(statement);
-    return status;
-}
-
-static Status fill(Work *work, Problem *problem) {
-    Sqlite *source = NULL;
-    ProgressRange copying = {work->request->watch, 0, copy_share, 0};
-    ProgressRange checking = {work->request->watch, copy_share, 1 - copy_share, 0};
-    const Progress watches[] = {progress_range_view(&copying), progress_range_view(&checking)};
-    Status status = open_source(work, &source, problem);
-    if (status == STATUS_OK)
-        status = open_part(work, problem);
-    if (status == STATUS_OK)
-        status = sqlite_copy(source, work->copy, &watches[0], problem);
-    sqlite_close(source);
-    TRY(status);
-    sqlite_watch(work->copy, &watches[1]);
-    TRY(check_copy(work, problem));
-    TRY(count_copy(work, problem));
+                           "%s holds nothing yet: no daemon has begun there", copying->source);
     return STATUS_OK;
 }
 
-// Never over a file that has come since it was looked for, unless that may be replaced; where the
-// file system has no links to tell, what was just seen must do.
-static Status give_name(Work *work, Problem *problem) {
-    const char *path = work->request->path;
-    struct stat what;
-    if (fsync(work->file) != 0 || fstat(work->file, &what) != 0)
-        return problem_set(problem, errno == ENOSPC || errno == EDQUOT ? STATUS_FULL : STATUS_IO,
-                           "%s cannot be written: %s", path, strerror(errno));
-    work->backup.bytes = (uint64_t)what.st_size;
-    if (!progress_advance(work->request->watch, 1))
-        return problem_set(problem, STATUS_CANCELLED, "it was interrupted");
-    TRY(check_place(work, problem));
-    const bool is_linked = !work->request->replaces && link(work->part, path) == 0;
-    if (!is_linked && !work->request->replaces && errno == EEXIST)
-        return refuse_place(path, problem);
-    if (!is_linked && rename(work->part, path) != 0)
-        return problem_set(problem, STATUS_IO, "%s cannot be written: %s", path, strerror(errno));
-    if (is_linked)
-        (void)unlink(work->part);
-    work->part[0] = '\0';
-    return data_dir_sync(work->folder, problem);
+static Status open_part(Copying *copying, Problem *problem) {
+    const int size =
+        snprintf(copying->part, sizeof copying->part, "%.4080s.XXXXXX", copying->target);
+    if ((size_t)size >= sizeof copying->part - 8)
+        return problem_set(problem, STATUS_IO, "%.200s...: the name is too long", copying->target);
+    copying->file = mkstemp(copying->part); // for this user alone: it has the tokens' digests
+    if (copying->file >= 0)
+        return sqlite_open(copying->part, DATABASE_COPY, &copying->copy, problem);
+    copying->part[0] = '\0';
+    return problem_set(problem, errno == EACCES || errno == EPERM ? STATUS_FORBIDDEN : STATUS_IO,
+                       "%s cannot be written: %s", copying->target, strerror(errno));
 }
 
-// The database's own words are about itself.
-static Status tell_full(const Work *work, Problem *problem) {
-    char path[PATH_MAX];
+static Status check_copy(Copying *copying, Problem *problem) {
+    static const char sql[] = "SELECT (SELECT count(*) FROM jobs) AS jobs, "
+                              "(SELECT count(*) FROM results) AS results, "
+                              "(SELECT count(*) FROM materials) AS materials";
+    bool is_found;
+    Problem found = {0};
+    const Status status = sqlite_check(copying->copy, &found);
+    if (status != STATUS_OK)
+        return problem_set(problem, status, "%s: %s; nothing was copied, keep the other backups",
+                           copying->source, found.detail);
+    return sqlite_first(copying->copy, sql, NULL, NULL, backup_columns, &copying->backup, &is_found,
+                        problem);
+}
+
+static Status fill_part(Copying *copying, Problem *problem) {
+    Sqlite *source = NULL;
+    ProgressRange reading = {copying->request->watch, 0, copy_share, 0};
+    ProgressRange checking = {copying->request->watch, copy_share, 1 - copy_share, 0};
+    const Progress watches[] = {progress_range_view(&reading), progress_range_view(&checking)};
+    Status status = open_source(copying, &source, problem);
+    if (status == STATUS_OK)
+        status = open_part(copying, problem);
+    if (status == STATUS_OK)
+        status = sqlite_copy(source, copying->copy, &watches[0], problem);
+    sqlite_close(source);
+    TRY(status);
+    sqlite_watch(copying->copy, &watches[1]);
+    return check_copy(copying, problem);
+}
+
+static Status sync_part(Copying *copying, Problem *problem) {
+    struct stat what;
+    if (fsync(copying->file) != 0 || fstat(copying->file, &what) != 0)
+        return problem_set(problem, errno == ENOSPC || errno == EDQUOT ? STATUS_FULL : STATUS_IO,
+                           "%s cannot be written: %s", copying->target, strerror(errno));
+    copying->backup.bytes = (uint64_t)what.st_size;
+    return progress_advance(copying->request->watch, 1)
+               ? STATUS_OK
+               : problem_set(problem, STATUS_CANCELLED, "it was interrupted");
+}
+
+// Where the target may not be replaced it is not, also if it was made a moment ago; a file system
+// without links cannot tell.
+static Status rename_part(Copying *copying, bool replaces, Problem *problem) {
+    const bool is_linked = !replaces && link(copying->part, copying->target) == 0;
+    if (!is_linked && !replaces && errno == EEXIST)
+        return refuse_taken(copying, problem);
+    if (!is_linked && rename(copying->part, copying->target) != 0)
+        return problem_set(problem, STATUS_IO, "%s cannot be written: %s", copying->target,
+                           strerror(errno));
+    if (is_linked)
+        (void)unlink(copying->part);
+    copying->part[0] = '\0';
+    return data_dir_sync(copying->folder, problem);
+}
+
+// SQLite's own message is about the database, not about the copy.
+static Status report_full(const Copying *copying, Problem *problem) {
     struct statvfs disk;
     struct stat source;
-    snprintf(path, sizeof path, "%.4000s/impactd.db", work->request->directory);
-    if (stat(path, &source) != 0 || statvfs(work->folder, &disk) != 0)
+    if (stat(copying->source, &source) != 0 || statvfs(copying->folder, &disk) != 0)
         return STATUS_FULL;
     problem_clear(problem);
     return problem_set(problem, STATUS_FULL,
                        "there is no room left in %s: a copy takes %llu bytes, %llu are free",
-                       work->folder, (unsigned long long)source.st_size,
+                       copying->folder, (unsigned long long)source.st_size,
                        (unsigned long long)disk.f_bavail * (unsigned long long)disk.f_frsize);
 }
 
-static void remove_part(Work *work) {
-    static const char *const beside[] = {"", "-journal", "-wal", "-shm"};
-    char path[PATH_MAX + 16];
-    for (size_t i = 0; work->part[0] != '\0' && i < sizeof beside / sizeof *beside; i++) {
-        snprintf(path, sizeof path, "%s%s", work->part, beside[i]);
-        (void)unlink(path);
+static void remove_beside(const char *path, bool removes_path) {
+    static const char *const endings[] = {"-journal", "-wal", "-shm", ""};
+    char name[PATH_MAX + 16];
+    for (size_t i = 0; i < sizeof endings / sizeof *endings - !removes_path; i++) {
+        snprintf(name, sizeof name, "%s%s", path, endings[i]);
+        (void)unlink(name);
     }
-    if (work->file >= 0)
-        close(work->file);
+}
+
+static Status backup_begin(const BackupRequest *request, Copying **copying, Problem *problem) {
+    *copying = calloc(1, sizeof **copying);
+    if (*copying == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a backup");
+    (*copying)->request = request;
+    (*copying)->file = -1;
+    return STATUS_OK;
+}
+
+static Status backup_end(Copying *copying, Status status, Backup *backup, Problem *problem) {
+    sqlite_close(copying->copy);
+    if (copying->part[0] != '\0')
+        remove_beside(copying->part, true);
+    if (copying->file >= 0)
+        close(copying->file);
+    if (status == STATUS_FULL)
+        status = report_full(copying, problem);
+    *backup = status == STATUS_OK ? copying->backup : (Backup){0};
+    free(copying);
+    return status;
 }
 
 Status backup_write(const BackupRequest *request, Backup *backup, Problem *problem) {
-    Work *work = calloc(1, sizeof *work);
-    *backup = (Backup){0};
-    if (work == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a backup");
-    work->request = request;
-    work->file = -1;
-    Status status = check_place(work, problem);
+    Copying *copying;
+    TRY(backup_begin(request, &copying, problem));
+    const char *slash = strrchr(request->path, '/');
+    snprintf(copying->source, sizeof copying->source, "%.4000s/impactd.db", request->directory);
+    snprintf(copying->target, sizeof copying->target, "%s", request->path);
+    snprintf(copying->folder, sizeof copying->folder, "%.*s",
+             slash == NULL || slash == request->path ? 1 : (int)(slash - request->path),
+             slash == NULL ? "." : request->path);
+    Status status = check_target(copying, problem);
+    if (status == STATUS_OK && access(copying->source, F_OK) != 0 && errno != EACCES)
+        status = problem_set(problem, STATUS_NOT_FOUND,
+                             "there is no database in %s; --data DIR names the daemon's folder",
+                             request->directory);
     if (status == STATUS_OK)
-        status = fill(work, problem);
-    sqlite_close(work->copy);
+        status = fill_part(copying, problem);
+    sqlite_close(copying->copy);
+    copying->copy = NULL;
     if (status == STATUS_OK)
-        status = give_name(work, problem);
-    remove_part(work);
-    if (status == STATUS_FULL)
-        status = tell_full(work, problem);
+        status = sync_part(copying, problem);
     if (status == STATUS_OK)
-        *backup = work->backup;
-    free(work);
+        status = check_target(copying, problem);
+    if (status == STATUS_OK)
+        status = rename_part(copying, request->replaces, problem);
+    return backup_end(copying, status, backup, problem);
+}
+
+static Status check_restore(const Copying *copying, Problem *problem) {
+    const char *directory = copying->request->directory, *path = copying->source;
+    struct stat source, target;
+    if (stat(path, &source) != 0)
+        return problem_set(problem, errno == ENOENT ? STATUS_NOT_FOUND : STATUS_IO,
+                           "%s cannot be read: %s", path, strerror(errno));
+    if (!S_ISREG(source.st_mode))
+        return problem_set(problem, STATUS_CONFLICT, "%s is not a regular file", path);
+    if (stat(copying->target, &target) != 0)
+        return STATUS_OK;
+    if (is_same_file(&source, &target))
+        return problem_set(problem, STATUS_CONFLICT,
+                           "%s is the daemon's own database: name a copy of it", path);
+    return copying->request->replaces
+               ? STATUS_OK
+               : problem_set(problem, STATUS_CONFLICT,
+                             "%s has a database already: --force replaces it, or --data DIR names "
+                             "another folder",
+                             directory);
+}
+
+// The log of the database that is replaced must not be applied to the new one: it is moved into the
+// old one, which thus stays whole until the new one has its name.
+static void finish_replaced(const char *path) {
+    Sqlite *replaced;
+    if (access(path, F_OK) == 0 && sqlite_open(path, DATABASE_WRITER, &replaced, NULL) == STATUS_OK)
+        sqlite_close(replaced);
+    remove_beside(path, false);
+}
+
+Status backup_restore(const BackupRequest *request, Backup *backup, Problem *problem) {
+    Copying *copying;
+    int lock;
+    TRY(data_dir_lock(request->directory, &lock, problem));
+    Status status = backup_begin(request, &copying, problem);
+    if (status == STATUS_OK) {
+        snprintf(copying->source, sizeof copying->source, "%s", request->path);
+        snprintf(copying->folder, sizeof copying->folder, "%.4000s", request->directory);
+        snprintf(copying->target, sizeof copying->target, "%.4000s/impactd.db", request->directory);
+        status = check_restore(copying, problem);
+        if (status == STATUS_OK)
+            status = fill_part(copying, problem);
+        sqlite_close(copying->copy);
+        copying->copy = NULL;
+        if (status == STATUS_OK)
+            status = sync_part(copying, problem);
+        if (status == STATUS_OK) {
+            finish_replaced(copying->target);
+            status = rename_part(copying, true, problem);
+        }
+        status = backup_end(copying, status, backup, problem);
+    }
+    data_dir_unlock(lock);
     return status;
 }

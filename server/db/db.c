@@ -210,54 +210,36 @@ void db_put(Db *db, Sqlite *database) {
     pthread_mutex_unlock(&db->lock);
 }
 
-Status db_first(Db *db, const char *sql, const RowColumn *key_columns, const void *key,
-                const RowColumn *columns, void *target, bool *is_found, Problem *problem) {
-    *is_found = false;
+Status db_first(Db *db, const char *sql, const SqlColumn *keys, const void *key,
+                const SqlColumn *columns, void *target, bool *is_found, Problem *problem) {
     Sqlite *database = db_take(db);
-    Statement *statement;
-    Status status = statement_begin(database, sql, key_columns, key, &statement, problem);
-    if (status == STATUS_OK)
-        status = statement_step(statement, is_found, problem);
-    if (status == STATUS_OK && *is_found)
-        status = row_read(statement, columns, target, problem);
-    statement_end(statement);
+    const Status status =
+        sqlite_first(database, sql, keys, key, columns, target, is_found, problem);
     db_put(db, database);
     return status;
 }
 
-static Status read_all(Statement *statement, const RowColumn *columns, size_t size, void **at,
-                       size_t *count, Problem *problem) {
-    size_t room = 0;
-    for (;;) {
-        bool has_row;
-        TRY(statement_step(statement, &has_row, problem));
-        if (!has_row)
-            return STATUS_OK;
-        if (*count == room) {
-            room = room == 0 ? 16 : 2 * room;
-            void *grown = realloc(*at, room * size);
-            if (grown == NULL)
-                return problem_set(problem, STATUS_NO_MEMORY,
-                                   "no memory for the rows of the database");
-            *at = grown;
-        }
-        void *item = (char *)*at + *count * size;
-        memset(item, 0, size);
-        TRY(row_read(statement, columns, item, problem));
-        (*count)++;
-    }
-}
-
-Status db_all(Db *db, const char *sql, const RowColumn *key_columns, const void *key,
-              const RowColumn *columns, size_t size, void **at, size_t *count, Problem *problem) {
-    *at = NULL;
-    *count = 0;
+Status db_list(Db *db, const char *sql, const SqlColumn *keys, const void *key,
+               const SqlColumn *columns, size_t size, void *list, Problem *problem) {
     Sqlite *database = db_take(db);
-    Statement *statement;
-    Status status = statement_begin(database, sql, key_columns, key, &statement, problem);
-    if (status == STATUS_OK)
-        status = read_all(statement, columns, size, at, count, problem);
-    statement_end(statement);
+    const Status status = sqlite_list(database, sql, keys, key, columns, size, list, problem);
     db_put(db, database);
     return status;
 }
+
+Status db_all(Db *db, const char *sql, const SqlColumn *keys, const void *key,
+              const SqlColumn *columns, size_t size, void **at, size_t *count, Problem *problem) {
+    List list;
+    const Status status = db_list(db, sql, keys, key, columns, size, &list, problem);
+    *at = list.at;
+    *count = list.count;
+    return status;
+}
+
+const SqlColumn query_key_columns[] = {COLUMN(QueryKey, id),     COLUMN(QueryKey, name),
+                                       COLUMN(QueryKey, client), COLUMN(QueryKey, digest),
+                                       COLUMN(QueryKey, words),  COLUMN(QueryKey, before),
+                                       COLUMN(QueryKey, max),    COLUMN_END};
+const SqlColumn query_counts_columns[] = {COLUMN(QueryCounts, count), COLUMN(QueryCounts, bytes),
+                                          COLUMN(QueryCounts, results), COLUMN(QueryCounts, jobs),
+                                          COLUMN_END};

@@ -10,6 +10,8 @@
 
 #include "core/base/field.h"
 #include "core/base/status.h"
+#include "server/db/sqlite.h"
+#include "server/util/bytes.h"
 #include "server/util/metrics.h"
 
 typedef struct Db Db;
@@ -113,6 +115,24 @@ typedef struct JobRows {
 Status db_job_unfinished(Db *db, JobRows *rows, Problem *problem); // oldest first
 void job_rows_clear(JobRows *rows);
 
+// Jobs by name, outcome and time of arrival. Texts are the caller's; NULL: any.
+typedef struct JobSearch {
+    const char *before;          // an id: only those that follow it in the list
+    int64_t before_unix_ms;      // of its arrival, where it may be deleted; -1: it must exist
+    int least_state, most_state; // JobState
+    const char *words;           // within the title or a label, ignoring case
+    const char *label;           // one whole label, or "key" of a label "key=value"; likewise
+    const char *result;          // its id
+    const char *study;           // the study's kind; "none": without one
+    int64_t since_unix_ms, until_unix_ms; // of arrival, both included
+    size_t most;
+} JobSearch;
+JobSearch job_search_all(size_t most);
+// Newest first. STATUS_NOT_FOUND where there is no job `before`, and before_unix_ms is -1.
+Status db_job_search(Db *db, const JobSearch *search, JobRows *rows, Problem *problem);
+// The text that a search by words looks into: a line for the title and one for each label.
+void job_words(Bytes *bytes, const char *title, const char *const *labels, size_t label_count);
+
 // Everything of a result but its series, which is computed anew when asked for.
 typedef struct ResultRow {
     char id[72];
@@ -162,11 +182,6 @@ Status db_series_post(Db *db, const char *result, char *body, size_t size, uint6
 Status db_series_load(Db *db, const char *result, char **body, size_t *size, Problem *problem);
 bool db_series_exists(Db *db, const char *result);
 void db_series_tally(Db *db, uint64_t *count, uint64_t *bytes, uint64_t *evictions);
-
-typedef struct StoredBytes {
-    void *at;
-    size_t size;
-} StoredBytes;
 
 // A sweep: what is to be done, written before any of it runs.
 typedef struct SweepRow {
@@ -218,5 +233,21 @@ Status db_sweep_read(Db *db, const SweepRow *sweep, const SweepChunkRows *chunks
 Status db_sweep_reopen(Db *db, const char *result, Problem *problem);
 // Forgets all sweeps that have neither a result nor an unfinished job.
 Status db_sweep_tidy(Db *db, Problem *problem);
+
+// What is kept: the oldest finished jobs are deleted first, and with the last job of a result the
+// result. 0: no such rule.
+typedef struct KeepRules {
+    double days;
+    uint64_t jobs, bytes; // finished jobs; of the database, without its free pages
+} KeepRules;
+enum { RETENTION_BATCH = 64 };
+typedef struct Removed {
+    size_t jobs, results;
+    char result[RETENTION_BATCH][72]; // their ids
+    bool is_more;                     // call again at once
+} Removed;
+// Removes some of what exceeds the rules, or returns some free pages to the disk where there are
+// many, in one small transaction.
+Status db_remove(Db *db, const KeepRules *rules, Removed *removed, Problem *problem);
 
 #endif

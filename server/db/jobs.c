@@ -1,35 +1,38 @@
-// Jobs. The integer key rises with the order of acceptance: listing walks it downwards, a start
-// walks it upwards.
+// Jobs. The integer key rises with the order of acceptance, which a start follows. Lists are in the
+// order of (created, number), downwards. The rarest condition chooses the index of a search; the
+// others are tested row by row. Words are searched literally: "\n" separates the lines of what is
+// searched, and no text contains one.
 #include <stdlib.h>
 #include <string.h>
 
 #include "server/db/db.h"
-#include "server/db/jobs.h"
+#include "server/db/db_private.h"
+#include "server/util/utf8_fold.h"
 
 // clang-format off
-const RowColumn job_columns[] = {
-    ROW_COLUMN(JobRow, id, COLUMN_NAME),
-    ROW_COLUMN(JobRow, state, COLUMN_CHOICE),
-    ROW_COLUMN(JobRow, result, COLUMN_NAME),
-    ROW_COLUMN(JobRow, is_cached, COLUMN_FLAG),
-    ROW_COLUMN(JobRow, created_unix_ms, COLUMN_INTEGER),
-    ROW_COLUMN(JobRow, started_unix_ms, COLUMN_INTEGER),
-    ROW_COLUMN(JobRow, finished_unix_ms, COLUMN_INTEGER),
-    ROW_COLUMN(JobRow, queued, COLUMN_REAL),
-    ROW_COLUMN(JobRow, run, COLUMN_REAL),
-    ROW_COLUMN(JobRow, total, COLUMN_REAL),
-    ROW_COLUMN(JobRow, title, COLUMN_TEXT),
-    ROW_COLUMN(JobRow, problem, COLUMN_TEXT),
-    ROW_COLUMN(JobRow, warnings, COLUMN_TEXT),
-    ROW_COLUMN(JobRow, scene, COLUMN_TEXT),
-    ROW_COLUMN(JobRow, labels, COLUMN_TEXT),
-    ROW_COLUMN(JobRow, words, COLUMN_TEXT),
-    ROW_COLUMN(JobRow, study, COLUMN_TEXT),
-    ROW_COLUMN(JobRow, client, COLUMN_TEXT),
-    ROW_COLUMN(JobRow, idempotency_key, COLUMN_TEXT),
-    ROW_COLUMN(JobRow, request, COLUMN_TEXT),
-    ROW_COLUMN(JobRow, has_result, COLUMN_FLAG),
-    ROW_END
+static const SqlColumn job_columns[] = {
+    COLUMN(JobRow, id),
+    COLUMN_WITH(JobRow, state, COLUMN_MUTABLE),
+    COLUMN_WITH(JobRow, result, COLUMN_MUTABLE),
+    COLUMN_WITH(JobRow, is_cached, COLUMN_MUTABLE),
+    COLUMN(JobRow, created_unix_ms),
+    COLUMN_WITH(JobRow, started_unix_ms, COLUMN_MUTABLE),
+    COLUMN_WITH(JobRow, finished_unix_ms, COLUMN_MUTABLE),
+    COLUMN_WITH(JobRow, queued, COLUMN_MUTABLE),
+    COLUMN_WITH(JobRow, run, COLUMN_MUTABLE),
+    COLUMN_WITH(JobRow, total, COLUMN_MUTABLE),
+    COLUMN(JobRow, title),
+    COLUMN_WITH(JobRow, problem, COLUMN_MUTABLE),
+    COLUMN(JobRow, warnings),
+    COLUMN(JobRow, labels),
+    COLUMN(JobRow, study),
+    COLUMN(JobRow, client),
+    COLUMN_READ(JobRow, has_result, "EXISTS (SELECT 1 FROM results WHERE id = jobs.result)"),
+    COLUMN_WITH(JobRow, scene, COLUMN_LONG),
+    COLUMN_WITH(JobRow, words, COLUMN_LONG),
+    COLUMN_WITH(JobRow, idempotency_key, COLUMN_LONG),
+    COLUMN_WITH(JobRow, request, COLUMN_LONG),
+    COLUMN_END
 };
 // clang-format on
 
@@ -39,107 +42,89 @@ void job_row_clear(JobRow *row) {
 }
 
 void job_rows_clear(JobRows *rows) {
-    for (size_t i = 0; i < rows->count; i++)
-        job_row_clear(&rows->at[i]);
-    free(rows->at);
-    *rows = (JobRows){0};
+    rows_clear(job_columns, sizeof *rows->at, rows);
 }
 
-static Status not_found(const char *id, Problem *problem) {
+static Status job_not_found(const char *id, Problem *problem) {
     return problem_set(problem, STATUS_NOT_FOUND, "there is no job \"%.40s\"", id);
 }
 
-// The scene of a successful job is its result's.
-#define JOB_INSERT                                                                                 \
-    "INSERT INTO jobs (" JOB_SHORT                                                                 \
-    ", words, idempotency_key, request, scene) VALUES (:id, :state, :result, :is_cached, "         \
-    ":created_unix_ms, :started_unix_ms, :finished_unix_ms, :queued, :run, :total, :title, "       \
-    ":problem, :warnings, :labels, :study, :client, :words, :idempotency_key, :request, "          \
-    "CASE :state WHEN 2 THEN '' ELSE coalesce(:scene, '') END)"
-#define JOB_CHANGE                                                                                 \
-    "SET state = :state, result = :result, is_cached = :is_cached, "                               \
-    "started_unix_ms = :started_unix_ms, finished_unix_ms = :finished_unix_ms, "                   \
-    "queued = :queued, run = :run, total = :total, problem = :problem, "                           \
-    "scene = CASE :state WHEN 2 THEN '' ELSE scene END"
+static const char insert_sql[] = "INSERT INTO jobs {insert}";
 
-static Status add(Sqlite *database, const void *work, Problem *problem) {
-    static const char sql[] = JOB_INSERT;
+// The scene of a successful job is its result's.
+static Status job_insert(Sqlite *database, const char *sql, const JobRow *row, Problem *problem) {
+    JobRow stored = *row;
+    if (row->state == 2 || row->scene == NULL)
+        stored.scene = "";
+    return sqlite_change(database, sql, job_columns, &stored, NULL, problem);
+}
+
+static Status job_apply_add(Sqlite *database, const void *work, Problem *problem) {
     static const char uses_sql[] = "INSERT INTO job_uses (job, name) VALUES "
                                    "(last_insert_rowid(), :name) ON CONFLICT DO NOTHING";
     const JobRow *row = work;
-    TRY(sqlite_change(database, sql, job_columns, row, NULL, problem));
+    TRY(job_insert(database, insert_sql, row, problem));
     return row->state < 2 ? use_lines_add(database, uses_sql, row->uses, problem) : STATUS_OK;
 }
 
 Status db_job_add(Db *db, const JobRow *row, Problem *problem) {
-    return db_write(db, add, row, problem);
+    return db_write(db, job_apply_add, row, problem);
 }
 
 Status db_job_post(Db *db, const JobRow *row, WritePriority turn, const WriteDone *done,
                    PendingWrite **ticket) {
-    return db_enqueue(db, add, row, 0, turn, done, ticket);
+    return db_enqueue(db, job_apply_add, row, 0, turn, done, ticket);
 }
+
+#define JOB_UPDATE "SET {set}, scene = CASE :state WHEN 2 THEN '' ELSE scene END"
 
 Status job_row_save(Sqlite *database, const JobRow *row, Problem *problem) {
-    static const char change_sql[] = "UPDATE jobs " JOB_CHANGE " WHERE id = :id";
-    static const char put_sql[] = JOB_INSERT " ON CONFLICT (id) DO UPDATE " JOB_CHANGE;
+    static const char update_sql[] = "UPDATE jobs " JOB_UPDATE " WHERE id = :id";
+    static const char upsert_sql[] =
+        "INSERT INTO jobs {insert} ON CONFLICT (id) DO UPDATE " JOB_UPDATE;
     int changes;
-    TRY(sqlite_change(database, row->is_unsaved ? put_sql : change_sql, job_columns, row, &changes,
-                      problem));
-    return changes > 0 ? STATUS_OK : not_found(row->id, problem);
+    if (row->is_unsaved)
+        return job_insert(database, upsert_sql, row, problem);
+    TRY(sqlite_change(database, update_sql, job_columns, row, &changes, problem));
+    return changes > 0 ? STATUS_OK : job_not_found(row->id, problem);
 }
 
-static Status save(Sqlite *database, const void *work, Problem *problem) {
+static Status job_apply_save(Sqlite *database, const void *work, Problem *problem) {
     return job_row_save(database, work, problem);
 }
 
 Status db_job_update(Db *db, const JobRow *row, Problem *problem) {
-    return db_write(db, save, row, problem);
+    return db_write(db, job_apply_save, row, problem);
 }
 
 Status db_job_update_post(Db *db, const JobRow *row, const WriteDone *done) {
-    return db_enqueue(db, save, row, 0, STORE_NOW, done, NULL);
+    return db_enqueue(db, job_apply_save, row, 0, STORE_NOW, done, NULL);
 }
-
-typedef struct Key {
-    char *id;
-    uint64_t most;
-} Key;
-static const RowColumn key_columns[] = {ROW_COLUMN(Key, id, COLUMN_TEXT),
-                                        ROW_COLUMN(Key, most, COLUMN_COUNT), ROW_END};
 
 Status db_job_load(Db *db, const char *id, JobRow *row, Problem *problem) {
-    static const char sql[] = "SELECT " JOB_SHOWN " FROM jobs WHERE id = :id";
-    const Key key = {(char *)id, 0};
+    static const char sql[] = "SELECT {head} FROM jobs WHERE id = :id";
+    const QueryKey key = {.id = id};
     bool is_found;
     memset(row, 0, sizeof *row);
-    TRY(db_first(db, sql, key_columns, &key, job_columns, row, &is_found, problem));
-    return is_found ? STATUS_OK : not_found(id, problem);
+    TRY(db_first(db, sql, query_key_columns, &key, job_columns, row, &is_found, problem));
+    return is_found ? STATUS_OK : job_not_found(id, problem);
 }
-
-typedef struct Asked {
-    char id[40], result[72];
-    char *scene;
-} Asked;
-static const RowColumn asked_columns[] = {ROW_COLUMN(Asked, id, COLUMN_NAME),
-                                          ROW_COLUMN(Asked, result, COLUMN_NAME),
-                                          ROW_COLUMN(Asked, scene, COLUMN_TEXT), ROW_END};
 
 Status db_job_scene(Db *db, const char *id, char **scene, Problem *problem) {
     static const char sql[] =
         "SELECT coalesce((SELECT scene FROM jobs WHERE id = :id AND scene <> ''), "
-        "(SELECT scene FROM results WHERE id = :result)) AS scene";
-    JobRow row;
-    Asked asked = {.scene = NULL};
+        "(SELECT scene FROM results WHERE id = :name)) AS scene";
+    JobRow row, found = {.scene = NULL};
     bool is_found;
     *scene = NULL;
     // A job may be in memory alone as yet, its result not.
     TRY(db_job_load(db, id, &row, problem));
-    memcpy(asked.id, row.id, sizeof asked.id);
-    memcpy(asked.result, row.result, sizeof asked.result);
+    const QueryKey key = {.id = id, .name = row.result};
+    const Status status =
+        db_first(db, sql, query_key_columns, &key, job_columns, &found, &is_found, problem);
     job_row_clear(&row);
-    TRY(db_first(db, sql, asked_columns, &asked, asked_columns, &asked, &is_found, problem));
-    *scene = asked.scene;
+    TRY(status);
+    *scene = found.scene;
     return *scene != NULL ? STATUS_OK
                           : problem_set(problem, STATUS_GONE,
                                         "the scene of the job \"%.40s\" went with its result, "
@@ -147,35 +132,160 @@ Status db_job_scene(Db *db, const char *id, char **scene, Problem *problem) {
                                         id);
 }
 
-typedef struct Keyed {
-    char *client, *key;
-} Keyed;
-static const RowColumn idempotency_columns[] = {ROW_COLUMN(Keyed, client, COLUMN_TEXT),
-                                                ROW_COLUMN(Keyed, key, COLUMN_TEXT), ROW_END};
-
 Status db_job_keyed(Db *db, const char *client, const char *key, JobRow *row, Problem *problem) {
-    static const char sql[] = "SELECT " JOB_SHOWN ", request FROM jobs "
-                              "WHERE idempotency_key = :key AND coalesce(client, '') = :client";
-    const Keyed keyed = {(char *)(client != NULL ? client : ""), (char *)key};
+    static const char sql[] = "SELECT {head}, request FROM jobs "
+                              "WHERE idempotency_key = :name AND coalesce(client, '') = :client";
+    const QueryKey asked = {.client = client != NULL ? client : "", .name = key};
     bool is_found;
     memset(row, 0, sizeof *row);
-    TRY(db_first(db, sql, idempotency_columns, &keyed, job_columns, row, &is_found, problem));
+    TRY(db_first(db, sql, query_key_columns, &asked, job_columns, row, &is_found, problem));
     return is_found ? STATUS_OK
                     : problem_set(problem, STATUS_NOT_FOUND, "there is no job of that key");
 }
 
-static Status load(Db *db, const char *sql, const Key *key, JobRows *rows, Problem *problem) {
-    void *at;
-    const Status status = db_all(db, sql, key_columns, key, job_columns, sizeof *rows->at, &at,
-                                 &rows->count, problem);
-    rows->at = at;
-    if (status != STATUS_OK)
-        job_rows_clear(rows);
-    return status;
+Status db_job_unfinished(Db *db, JobRows *rows, Problem *problem) {
+    static const char sql[] = "SELECT {head}, scene FROM jobs WHERE state < 2 ORDER BY number";
+    return db_list(db, sql, NULL, NULL, job_columns, sizeof *rows->at, rows, problem);
 }
 
-Status db_job_unfinished(Db *db, JobRows *rows, Problem *problem) {
-    static const char sql[] =
-        "SELECT " JOB_SHORT ", scene FROM jobs WHERE state < 2 ORDER BY number";
-    return load(db, sql, &(Key){0}, rows, problem);
+typedef struct Asked {
+    const char *id, *result, *study;
+    char *words, *label, *key;
+    int64_t since, until, before_ms, before_number;
+    int least_state, most_state;
+    uint64_t most;
+} Asked;
+
+// clang-format off
+static const SqlColumn asked_columns[] = {
+    COLUMN(Asked, id),
+    COLUMN(Asked, words),
+    COLUMN(Asked, label),
+    COLUMN(Asked, key),
+    COLUMN(Asked, result),
+    COLUMN(Asked, study),
+    COLUMN(Asked, since),
+    COLUMN(Asked, until),
+    COLUMN(Asked, before_ms),
+    COLUMN(Asked, before_number),
+    COLUMN(Asked, least_state),
+    COLUMN(Asked, most_state),
+    COLUMN(Asked, most),
+    COLUMN_END
+};
+// clang-format on
+
+// created_unix_ms <= :before_ms says nothing new, but lets an index begin there.
+#define PLACE                                                                                      \
+    "created_unix_ms <= :before_ms AND created_unix_ms >= :since AND created_unix_ms <= :until "   \
+    "AND (created_unix_ms < :before_ms OR number < :before_number) "
+#define WORDS                                                                                      \
+    "AND (:words IS NULL OR instr(words, :words) > 0) "                                            \
+    "AND (:label IS NULL OR instr(words, :label) > 0 OR instr(words, :key) > 0) "
+#define KIND                                                                                       \
+    "AND state BETWEEN :least_state AND :most_state "                                              \
+    "AND (:result IS NULL OR result = :result) "                                                   \
+    "AND (:study IS NULL OR coalesce(study, 'none') = :study) "
+#define ORDER "ORDER BY created_unix_ms DESC, number DESC LIMIT :most"
+#define SELECT "SELECT {head} FROM jobs "
+
+static const char plain_sql[] = SELECT "INDEXED BY jobs_created WHERE " PLACE KIND ORDER;
+static const char words_sql[] =
+    SELECT "INDEXED BY jobs_worded WHERE words IS NOT NULL AND " PLACE WORDS KIND ORDER;
+static const char result_sql[] = SELECT
+    "INDEXED BY jobs_of_result WHERE substr(result, 3, 12) = substr(:result, 3, 12) AND " PLACE
+        WORDS KIND ORDER;
+static const char study_sql[] =
+    SELECT "INDEXED BY jobs_studied WHERE study = :study AND " PLACE WORDS KIND ORDER;
+static const char unsuccessful_sql[] =
+    SELECT "INDEXED BY jobs_unsuccessful WHERE state > 2 AND state = :least_state AND " PLACE WORDS
+        KIND ORDER;
+static const char unfinished_sql[] =
+    SELECT "INDEXED BY jobs_unfinished WHERE state < 2 AND " PLACE WORDS KIND ORDER;
+
+static const char *search_choose(const JobSearch *search) {
+    if (search->result != NULL)
+        return result_sql;
+    if (search->most_state < 2)
+        return unfinished_sql;
+    if (search->words != NULL || search->label != NULL)
+        return words_sql;
+    if (search->study != NULL && strcmp(search->study, "none") != 0)
+        return study_sql;
+    if (search->least_state > 2 && search->least_state == search->most_state)
+        return unsuccessful_sql;
+    return plain_sql;
+}
+
+JobSearch job_search_all(size_t most) {
+    return (JobSearch){
+        .before_unix_ms = -1, .most_state = 4, .until_unix_ms = INT64_MAX, .most = most};
+}
+
+void job_words(Bytes *bytes, const char *title, const char *const *labels, size_t label_count) {
+    if (title != NULL)
+        utf8_fold(bytes, title);
+    if (title != NULL || label_count > 0)
+        bytes_text(bytes, "\n");
+    for (size_t i = 0; i < label_count; i++) {
+        utf8_fold(bytes, labels[i]);
+        bytes_text(bytes, "\n");
+    }
+}
+
+// `before` and `after` fence the folded text.
+static Status search_fold(const char *text, const char *before, const char *after, char **folded) {
+    Bytes bytes = {0};
+    *folded = NULL;
+    if (text == NULL)
+        return STATUS_OK;
+    bytes_text(&bytes, before);
+    utf8_fold(&bytes, text);
+    bytes_text(&bytes, after);
+    *folded = bytes_take(&bytes, NULL);
+    return *folded != NULL ? STATUS_OK : STATUS_NO_MEMORY;
+}
+
+static Status search_find_place(Db *db, const JobSearch *search, Asked *asked, Problem *problem) {
+    static const char sql[] = "SELECT created_unix_ms AS before_ms, number AS before_number "
+                              "FROM jobs WHERE id = :id";
+    bool is_found = true;
+    asked->before_ms = asked->before_number = INT64_MAX;
+    if (search->before != NULL)
+        TRY(db_first(db, sql, asked_columns, &(Asked){.id = search->before}, asked_columns, asked,
+                     &is_found, problem));
+    if (is_found)
+        return STATUS_OK;
+    if (search->before_unix_ms < 0)
+        return job_not_found(search->before, problem);
+    // It was deleted between two pages: its place is its time of arrival.
+    asked->before_ms = search->before_unix_ms;
+    asked->before_number = 0;
+    return STATUS_OK;
+}
+
+Status db_job_search(Db *db, const JobSearch *search, JobRows *rows, Problem *problem) {
+    Asked asked = {.result = search->result,
+                   .study = search->study,
+                   .since = search->since_unix_ms,
+                   .until = search->until_unix_ms,
+                   .least_state = search->least_state,
+                   .most_state = search->most_state,
+                   .most = search->most};
+    *rows = (JobRows){0};
+    TRY(search_find_place(db, search, &asked, problem));
+    Status status = search_fold(search->words, "", "", &asked.words);
+    if (status == STATUS_OK)
+        status = search_fold(search->label, "\n", "\n", &asked.label);
+    if (status == STATUS_OK)
+        status = search_fold(search->label, "\n", "=", &asked.key);
+    if (status == STATUS_OK)
+        status = db_list(db, search_choose(search), asked_columns, &asked, job_columns,
+                         sizeof *rows->at, rows, problem);
+    else
+        (void)problem_set(problem, status, "no memory for a search");
+    free(asked.words);
+    free(asked.label);
+    free(asked.key);
+    return status;
 }

@@ -1,28 +1,30 @@
-// Results. A row is written once, in the same transaction as the jobs that it finishes.
+// Results, and what of the catalogue results and unfinished jobs were made with. A row is written
+// once, in the same transaction as the jobs that it finishes.
 #include <stdlib.h>
 #include <string.h>
 
 #include "server/db/db.h"
-#include "server/db/jobs.h"
+#include "server/db/db_private.h"
+#include "server/db/materials.h"
 
 // clang-format off
-static const RowColumn result_columns[] = {
-    ROW_COLUMN(ResultRow, id, COLUMN_NAME),
-    ROW_COLUMN(ResultRow, engine, COLUMN_TEXT),
-    ROW_COLUMN(ResultRow, sample_rate, COLUMN_REAL),
-    ROW_COLUMN(ResultRow, count, COLUMN_COUNT),
-    ROW_COLUMN(ResultRow, created_unix_ms, COLUMN_INTEGER),
-    ROW_COLUMN(ResultRow, summary, COLUMN_TEXT),
-    ROW_COLUMN(ResultRow, plan, COLUMN_TEXT),
-    ROW_COLUMN(ResultRow, warnings, COLUMN_TEXT),
-    ROW_COLUMN(ResultRow, work, COLUMN_TEXT),
-    ROW_COLUMN(ResultRow, notes, COLUMN_TEXT),
-    ROW_COLUMN(ResultRow, energy, COLUMN_TEXT),
-    ROW_COLUMN(ResultRow, scene, COLUMN_TEXT),
-    ROW_COLUMN(ResultRow, impacts, COLUMN_TEXT),
-    ROW_COLUMN(ResultRow, psd, COLUMN_TEXT),
-    ROW_COLUMN(ResultRow, study, COLUMN_TEXT),
-    ROW_END
+static const SqlColumn result_columns[] = {
+    COLUMN(ResultRow, id),
+    COLUMN(ResultRow, engine),
+    COLUMN(ResultRow, sample_rate),
+    COLUMN(ResultRow, count),
+    COLUMN(ResultRow, created_unix_ms),
+    COLUMN(ResultRow, summary),
+    COLUMN(ResultRow, plan),
+    COLUMN(ResultRow, warnings),
+    COLUMN(ResultRow, work),
+    COLUMN(ResultRow, notes),
+    COLUMN_WITH(ResultRow, energy, COLUMN_LONG),
+    COLUMN_WITH(ResultRow, scene, COLUMN_LONG),
+    COLUMN_WITH(ResultRow, impacts, COLUMN_LONG),
+    COLUMN_WITH(ResultRow, psd, COLUMN_LONG),
+    COLUMN_WITH(ResultRow, study, COLUMN_LONG),
+    COLUMN_END
 };
 // clang-format on
 
@@ -31,19 +33,37 @@ void result_row_clear(ResultRow *row) {
     row_clear(result_columns, row, sizeof *row);
 }
 
+void result_rows_clear(ResultRows *rows) {
+    rows_clear(result_columns, sizeof *rows->at, rows);
+}
+
+static Status result_not_found(const char *id, Problem *problem) {
+    return problem_set(problem, STATUS_NOT_FOUND, "there is no result \"%.72s\"", id);
+}
+
+Status use_lines_add(Sqlite *database, const char *sql, const char *lines, Problem *problem) {
+    while (lines != NULL && *lines != '\0') {
+        const size_t size = strcspn(lines, "\n");
+        char name[160];
+        if (size > 0 && size < sizeof name) {
+            memcpy(name, lines, size);
+            name[size] = '\0';
+            TRY(sqlite_change(database, sql, query_key_columns, &(QueryKey){.name = name}, NULL,
+                              problem));
+        }
+        lines += size + (lines[size] == '\n');
+    }
+    return STATUS_OK;
+}
+
 typedef struct Finish {
     const ResultRow *result;
     const JobRow *const *jobs;
     size_t job_count;
 } Finish;
 
-static Status finish(Sqlite *database, const void *work, Problem *problem) {
-    static const char sql[] =
-        "INSERT INTO results (id, engine, sample_rate, count, "
-        "created_unix_ms, summary, plan, warnings, work, notes, energy, "
-        "scene, impacts, psd, study) VALUES (:id, :engine, :sample_rate, :count, "
-        ":created_unix_ms, :summary, :plan, :warnings, :work, :notes, "
-        ":energy, :scene, :impacts, :psd, :study) ON CONFLICT (id) DO NOTHING";
+static Status result_apply_finish(Sqlite *database, const void *work, Problem *problem) {
+    static const char sql[] = "INSERT INTO results {insert} ON CONFLICT (id) DO NOTHING";
     static const char uses_sql[] = "INSERT INTO result_uses (name, result) VALUES (:name, "
                                    "last_insert_rowid()) ON CONFLICT DO NOTHING";
     const Finish *both = work;
@@ -59,111 +79,109 @@ static Status finish(Sqlite *database, const void *work, Problem *problem) {
 
 Status db_result_save(Db *db, const ResultRow *result, const JobRow *const *jobs, size_t job_count,
                       Problem *problem) {
-    return db_write(db, finish, &(Finish){result, jobs, job_count}, problem);
+    return db_write(db, result_apply_finish, &(Finish){result, jobs, job_count}, problem);
 }
 
 Status db_result_post(Db *db, const ResultRow *result, const JobRow *const *jobs, size_t job_count,
                       WritePriority turn, const WriteDone *done) {
     const Finish work = {result, jobs, job_count};
-    return db_enqueue(db, finish, &work, sizeof work, turn, done, NULL);
+    return db_enqueue(db, result_apply_finish, &work, sizeof work, turn, done, NULL);
 }
 
-typedef struct Key {
-    char *id;
-} Key;
-static const RowColumn key_columns[] = {ROW_COLUMN(Key, id, COLUMN_TEXT), ROW_END};
-
-static Status load(Db *db, const char *sql, const char *id, ResultRow *row, Problem *problem) {
-    const Key key = {(char *)id};
+static Status result_load(Db *db, const char *sql, const char *id, ResultRow *row,
+                          Problem *problem) {
+    const QueryKey key = {.id = id};
     bool is_found;
     memset(row, 0, sizeof *row);
-    TRY(db_first(db, sql, key_columns, &key, result_columns, row, &is_found, problem));
-    return is_found ? STATUS_OK
-                    : problem_set(problem, STATUS_NOT_FOUND, "there is no result \"%.72s\"", id);
+    TRY(db_first(db, sql, query_key_columns, &key, result_columns, row, &is_found, problem));
+    return is_found ? STATUS_OK : result_not_found(id, problem);
 }
 
 Status db_result_load(Db *db, const char *id, ResultRow *row, Problem *problem) {
-    static const char sql[] =
-        "SELECT id, engine, sample_rate, count, created_unix_ms, summary, plan, warnings, work, "
-        "notes, energy, scene, impacts, psd, study FROM results WHERE id = :id";
-    return load(db, sql, id, row, problem);
+    static const char sql[] = "SELECT {columns} FROM results WHERE id = :id";
+    return result_load(db, sql, id, row, problem);
 }
 
 Status db_result_head(Db *db, const char *id, ResultRow *row, Problem *problem) {
-    static const char sql[] =
-        "SELECT id, engine, sample_rate, count, created_unix_ms, summary, plan, warnings, work, "
-        "notes FROM results WHERE id = :id";
-    return load(db, sql, id, row, problem);
+    static const char sql[] = "SELECT {head} FROM results WHERE id = :id";
+    return result_load(db, sql, id, row, problem);
 }
 
 Status db_result_scene(Db *db, const char *id, ResultRow *row, Problem *problem) {
     static const char sql[] = "SELECT id, engine, scene FROM results WHERE id = :id";
-    return load(db, sql, id, row, problem);
+    return result_load(db, sql, id, row, problem);
 }
 
 bool db_result_exists(Db *db, const char *id) {
     static const char sql[] = "SELECT id FROM results WHERE id = :id";
     ResultRow row;
-    return load(db, sql, id, &row, NULL) == STATUS_OK;
+    return result_load(db, sql, id, &row, NULL) == STATUS_OK;
 }
-
-typedef struct Sharer {
-    char *id, *client;
-    char sharer[72];
-} Sharer;
-static const RowColumn sharer_columns[] = {ROW_COLUMN(Sharer, id, COLUMN_TEXT),
-                                           ROW_COLUMN(Sharer, client, COLUMN_TEXT),
-                                           ROW_COLUMN(Sharer, sharer, COLUMN_NAME), ROW_END};
 
 Status db_result_sharer(Db *db, const char *id, const char *client, char sharer[72],
                         Problem *problem) {
     static const char sql[] =
-        "SELECT client AS sharer FROM jobs WHERE substr(result, 3, 12) = substr(:id, 3, 12) "
+        "SELECT client AS id FROM jobs WHERE substr(result, 3, 12) = substr(:id, 3, 12) "
         "AND result = :id AND state = 2 AND client <> :client LIMIT 1";
-    const Sharer key = {(char *)id, (char *)client, ""};
-    Sharer found = {0};
+    const QueryKey key = {.id = id, .client = client};
+    ResultRow found = {.id = ""};
     bool is_found;
-    TRY(db_first(db, sql, sharer_columns, &key, sharer_columns, &found, &is_found, problem));
-    text_fit(sharer, sizeof found.sharer, is_found ? found.sharer : "");
+    TRY(db_first(db, sql, query_key_columns, &key, result_columns, &found, &is_found, problem));
+    text_fit(sharer, sizeof found.id, found.id);
     return STATUS_OK;
 }
 
-static Status delete (Sqlite *database, const void *work, Problem *problem) {
+static Status result_apply_delete(Sqlite *database, const void *work, Problem *problem) {
     static const char sql[] = "DELETE FROM results WHERE id = :id";
-    const Key *key = work;
+    const QueryKey *key = work;
     int changes;
-    TRY(sqlite_change(database, sql, key_columns, key, &changes, problem));
-    return changes > 0
-               ? STATUS_OK
-               : problem_set(problem, STATUS_NOT_FOUND, "there is no result \"%.72s\"", key->id);
+    TRY(sqlite_change(database, sql, query_key_columns, key, &changes, problem));
+    return changes > 0 ? STATUS_OK : result_not_found(key->id, problem);
 }
 
 Status db_result_delete(Db *db, const char *id, Problem *problem) {
-    return db_write(db, delete, &(Key){(char *)id}, problem);
+    return db_write(db, result_apply_delete, &(QueryKey){.id = id}, problem);
 }
-
-typedef struct Recent {
-    uint64_t most, scene_max;
-} Recent;
-static const RowColumn recent_columns[] = {ROW_COLUMN(Recent, most, COLUMN_COUNT),
-                                           ROW_COLUMN(Recent, scene_max, COLUMN_COUNT), ROW_END};
 
 Status db_result_recent(Db *db, size_t most, size_t scene_max, ResultRows *rows, Problem *problem) {
     static const char sql[] =
-        "SELECT id, engine, scene FROM (SELECT * FROM results ORDER BY number DESC LIMIT :most) "
-        "WHERE length(scene) <= :scene_max";
-    void *at;
-    const Status status = db_all(db, sql, recent_columns, &(Recent){most, scene_max},
-                                 result_columns, sizeof *rows->at, &at, &rows->count, problem);
-    rows->at = at;
-    if (status != STATUS_OK)
-        result_rows_clear(rows);
-    return status;
+        "SELECT id, engine, scene FROM (SELECT * FROM results ORDER BY number DESC LIMIT :max) "
+        "WHERE length(scene) <= :before";
+    const QueryKey key = {.max = most, .before = (int64_t)scene_max};
+    return db_list(db, sql, query_key_columns, &key, result_columns, sizeof *rows->at, rows,
+                   problem);
 }
 
-void result_rows_clear(ResultRows *rows) {
-    for (size_t i = 0; i < rows->count; i++)
-        result_row_clear(&rows->at[i]);
-    free(rows->at);
-    *rows = (ResultRows){0};
+static const SqlColumn use_columns[] = {COLUMN(ResultUse, number), COLUMN(ResultUse, id),
+                                        COLUMN(ResultUse, created_unix_ms), COLUMN_END};
+
+Status db_result_uses(Db *db, const char *name, size_t most, int64_t before, ResultUses *uses,
+                      uint64_t *total, Problem *problem) {
+    static const char count_sql[] = "SELECT count(*) AS count FROM result_uses WHERE name = :name";
+    static const char sql[] =
+        "SELECT r.number, r.id, r.created_unix_ms FROM result_uses u JOIN results r ON r.number = "
+        "u.result WHERE u.name = :name AND u.result < :before ORDER BY u.result DESC LIMIT :max";
+    const QueryKey key = {.name = name, .max = most, .before = before == 0 ? INT64_MAX : before};
+    QueryCounts counted = {0};
+    bool is_found;
+    *uses = (ResultUses){NULL, 0};
+    db_flush(db); // results whose rows are queued count
+    TRY(db_first(db, count_sql, query_key_columns, &key, query_counts_columns, &counted, &is_found,
+                 problem));
+    *total = counted.count;
+    return db_list(db, sql, query_key_columns, &key, use_columns, sizeof *uses->at, uses, problem);
+}
+
+static const SqlColumn material_use_columns[] = {COLUMN(MaterialReference, revision),
+                                                 COLUMN(MaterialReference, results),
+                                                 COLUMN(MaterialReference, status), COLUMN_END};
+
+Status db_material_uses(Db *db, const char *slug, MaterialReferences *uses, Problem *problem) {
+    static const char sql[] =
+        "SELECT revision, status, (SELECT count(*) FROM result_uses u WHERE u.name = slug || '@' "
+        "|| revision) AS results FROM material_states WHERE slug = :name ORDER BY revision DESC";
+    const QueryKey key = {.name = slug};
+    db_flush(db);
+    return db_list(db, sql, query_key_columns, &key, material_use_columns, sizeof *uses->at, uses,
+                   problem);
 }

@@ -1,51 +1,29 @@
-// A call looks with a reader's connection whether there is anything to do, so that nothing is
+// Each call first asks on a reader's connection whether there is anything to do, so that nothing is
 // written where there is not. Pages that deletion frees are used again; only where more than an
-// eighth of the file is free are some given back.
-#include "server/db/retention.h"
-
+// eighth of the file is free are some returned to the disk.
 #include <string.h>
 
+#include "server/db/db.h"
 #include "server/db/db_private.h"
 #include "server/util/clock.h"
 
 typedef struct Extent {
     uint64_t jobs, unfinished, pages, free_pages, page_size;
 } Extent;
+static const SqlColumn extent_columns[] = {COLUMN(Extent, jobs),      COLUMN(Extent, unfinished),
+                                           COLUMN(Extent, pages),     COLUMN(Extent, free_pages),
+                                           COLUMN(Extent, page_size), COLUMN_END};
 
 typedef struct Victim {
     int64_t number;
     char result[72];
 } Victim;
-
-typedef struct Bounds {
-    int64_t before;
-    uint64_t most;
-} Bounds;
-
-// clang-format off
-static const RowColumn extent_columns[] = {
-    ROW_COLUMN(Extent, jobs, COLUMN_COUNT),
-    ROW_COLUMN(Extent, unfinished, COLUMN_COUNT),
-    ROW_COLUMN(Extent, pages, COLUMN_COUNT),
-    ROW_COLUMN(Extent, free_pages, COLUMN_COUNT),
-    ROW_COLUMN(Extent, page_size, COLUMN_COUNT),
-    ROW_END
-};
-static const RowColumn victim_columns[] = {
-    ROW_COLUMN(Victim, number, COLUMN_INTEGER),
-    ROW_COLUMN(Victim, result, COLUMN_NAME),
-    ROW_END
-};
-static const RowColumn bounds_columns[] = {
-    ROW_COLUMN(Bounds, before, COLUMN_INTEGER),
-    ROW_COLUMN(Bounds, most, COLUMN_COUNT),
-    ROW_END
-};
-// clang-format on
+static const SqlColumn victim_columns[] = {COLUMN(Victim, number), COLUMN(Victim, result),
+                                           COLUMN_END};
 
 enum { VACUUM_MIN = 256 }; // pages that are free before any are given back
 
-static Status measure(Db *db, bool counts_jobs, Extent *extent, Problem *problem) {
+static Status retention_measure(Db *db, bool counts_jobs, Extent *extent, Problem *problem) {
     static const char sizes[] =
         "SELECT page_count AS pages, freelist_count AS free_pages, page_size "
         "FROM pragma_page_count, pragma_freelist_count, pragma_page_size";
@@ -60,42 +38,23 @@ static Status measure(Db *db, bool counts_jobs, Extent *extent, Problem *problem
     return STATUS_OK;
 }
 
+static const char victims_sql[] =
+    "SELECT number, result FROM jobs INDEXED BY jobs_created WHERE created_unix_ms < :before AND "
+    "state > 1 ORDER BY created_unix_ms, number LIMIT :max";
+
 static Status has_older(Db *db, int64_t before, bool *has, Problem *problem) {
-    static const char sql[] = "SELECT number, result FROM jobs INDEXED BY jobs_created "
-                              "WHERE created_unix_ms < :before AND state > 1 LIMIT 1";
     Victim victim = {0};
-    return db_first(db, sql, bounds_columns, &(Bounds){before, 1}, victim_columns, &victim, has,
-                    problem);
+    return db_first(db, victims_sql, query_key_columns, &(QueryKey){.before = before, .max = 1},
+                    victim_columns, &victim, has, problem);
 }
 
 typedef struct Removal {
-    Bounds bounds;
+    QueryKey bounds;
     bool gives_back;
     Removed *removed;
 } Removal;
 
-static Status list_victims(Sqlite *database, const Bounds *bounds, Victim *victims, size_t *count,
-                           Problem *problem) {
-    static const char sql[] =
-        "SELECT number, result FROM jobs INDEXED BY jobs_created "
-        "WHERE created_unix_ms < :before AND state > 1 ORDER BY created_unix_ms, number "
-        "LIMIT :most";
-    Statement *statement;
-    bool has_row = true;
-    *count = 0;
-    TRY(statement_begin(database, sql, bounds_columns, bounds, &statement, problem));
-    Status status = STATUS_OK;
-    while (status == STATUS_OK && *count < RETENTION_BATCH) {
-        status = statement_step(statement, &has_row, problem);
-        if (status != STATUS_OK || !has_row)
-            break;
-        status = row_read(statement, victim_columns, &victims[(*count)++], problem);
-    }
-    statement_end(statement);
-    return status;
-}
-
-static Status apply(Sqlite *database, const void *work, Problem *problem) {
+static Status retention_apply(Sqlite *database, const void *work, Problem *problem) {
     static const char job_sql[] = "DELETE FROM jobs WHERE number = :number";
     static const char result_sql[] =
         "DELETE FROM results WHERE id = :result AND NOT EXISTS (SELECT 1 FROM jobs "
@@ -103,23 +62,28 @@ static Status apply(Sqlite *database, const void *work, Problem *problem) {
         "AND result = :result)";
     const Removal *removal = work;
     Removed *removed = removal->removed;
-    Victim victims[RETENTION_BATCH];
-    size_t count;
+    struct {
+        Victim *at;
+        size_t count;
+    } victims;
     *removed = (Removed){0};
     if (removal->gives_back)
         return sqlite_execute(database, "PRAGMA incremental_vacuum(64)", problem);
-    memset(victims, 0, sizeof victims);
-    TRY(list_victims(database, &removal->bounds, victims, &count, problem));
-    for (size_t i = 0; i < count; i++) {
-        int changes;
-        TRY(sqlite_change(database, job_sql, victim_columns, &victims[i], NULL, problem));
-        TRY(sqlite_change(database, result_sql, victim_columns, &victims[i], &changes, problem));
+    TRY(sqlite_list(database, victims_sql, query_key_columns, &removal->bounds, victim_columns,
+                    sizeof *victims.at, &victims, problem));
+    Status status = STATUS_OK;
+    for (size_t i = 0; i < victims.count && status == STATUS_OK; i++) {
+        const Victim *victim = &victims.at[i];
+        int changes = 0;
+        status = sqlite_change(database, job_sql, victim_columns, victim, NULL, problem);
+        if (status == STATUS_OK)
+            status = sqlite_change(database, result_sql, victim_columns, victim, &changes, problem);
         removed->jobs++;
         if (changes > 0)
-            memcpy(removed->result[removed->results++], victims[i].result,
-                   sizeof victims[i].result);
+            memcpy(removed->result[removed->results++], victim->result, sizeof victim->result);
     }
-    return STATUS_OK;
+    rows_clear(victim_columns, sizeof *victims.at, &victims);
+    return status;
 }
 
 Status db_remove(Db *db, const KeepRules *rules, Removed *removed, Problem *problem) {
@@ -129,24 +93,24 @@ Status db_remove(Db *db, const KeepRules *rules, Removed *removed, Problem *prob
     Removal removal = {.removed = removed};
     bool is_older = false;
     *removed = (Removed){0};
-    TRY(measure(db, rules->jobs > 0, &extent, problem));
+    TRY(retention_measure(db, rules->jobs > 0, &extent, problem));
     if (rules->days > 0)
         TRY(has_older(db, before, &is_older, problem));
     const uint64_t finished = extent.jobs - extent.unfinished;
     const uint64_t used = (extent.pages - extent.free_pages) * extent.page_size;
     if (rules->jobs > 0 && finished > rules->jobs)
-        removal.bounds = (Bounds){INT64_MAX, finished - rules->jobs};
+        removal.bounds = (QueryKey){.before = INT64_MAX, .max = finished - rules->jobs};
     else if (rules->bytes > 0 && used > rules->bytes)
-        removal.bounds = (Bounds){INT64_MAX, RETENTION_BATCH / 4};
+        removal.bounds = (QueryKey){.before = INT64_MAX, .max = RETENTION_BATCH / 4};
     else if (is_older)
-        removal.bounds = (Bounds){before, RETENTION_BATCH};
+        removal.bounds = (QueryKey){.before = before, .max = RETENTION_BATCH};
     else if (extent.free_pages > VACUUM_MIN && extent.free_pages > extent.pages / 8)
         removal.gives_back = true;
     else
         return STATUS_OK;
-    if (removal.bounds.most > RETENTION_BATCH)
-        removal.bounds.most = RETENTION_BATCH;
-    TRY(db_write(db, apply, &removal, problem));
+    if (removal.bounds.max > RETENTION_BATCH)
+        removal.bounds.max = RETENTION_BATCH;
+    TRY(db_write(db, retention_apply, &removal, problem));
     removed->is_more = removal.gives_back || removed->jobs > 0;
     return STATUS_OK;
 }

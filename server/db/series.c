@@ -14,30 +14,22 @@ typedef struct Blob {
     WriteDone done;
 } Blob;
 
-// clang-format off
-static const RowColumn columns[] = {
-    ROW_COLUMN(Blob, result, COLUMN_NAME),
-    ROW_COLUMN(Blob, body, COLUMN_BYTES),
-    ROW_COLUMN(Blob, bytes, COLUMN_COUNT),
-    ROW_END
-};
-// clang-format on
+static const SqlColumn columns[] = {COLUMN(Blob, result), COLUMN(Blob, body), COLUMN(Blob, bytes),
+                                    COLUMN_END};
 
-static Status total(Sqlite *database, uint64_t *bytes, Problem *problem) {
-    static const char sql[] = "SELECT coalesce(sum(bytes), 0) AS bytes FROM series";
-    Statement *statement;
-    bool has_row = false;
-    Blob sum = {.bytes = 0};
-    TRY(statement_begin(database, sql, NULL, NULL, &statement, problem));
-    Status status = statement_step(statement, &has_row, problem);
-    if (status == STATUS_OK && has_row)
-        status = row_read(statement, columns, &sum, problem);
-    statement_end(statement);
+static const char sum_sql[] =
+    "SELECT count(*) AS count, coalesce(sum(bytes), 0) AS bytes FROM series";
+
+static Status series_sum(Sqlite *database, uint64_t *bytes, Problem *problem) {
+    QueryCounts sum = {0};
+    bool is_found;
+    TRY(sqlite_first(database, sum_sql, NULL, NULL, query_counts_columns, &sum, &is_found,
+                     problem));
     *bytes = sum.bytes;
-    return status;
+    return STATUS_OK;
 }
 
-static Status put(Sqlite *database, const void *work, Problem *problem) {
+static Status series_apply_put(Sqlite *database, const void *work, Problem *problem) {
     static const char drop_sql[] = "DELETE FROM series WHERE number = "
                                    "(SELECT number FROM series ORDER BY used LIMIT 1)";
     static const char again_sql[] = "DELETE FROM series WHERE result = :result";
@@ -49,17 +41,17 @@ static Status put(Sqlite *database, const void *work, Problem *problem) {
     uint64_t there;
     int changes = 1;
     TRY(sqlite_change(database, again_sql, columns, blob, NULL, problem));
-    TRY(total(database, &there, problem));
+    TRY(series_sum(database, &there, problem));
     while (there + blob->bytes > blob->most && changes > 0) {
         TRY(sqlite_change(database, drop_sql, NULL, NULL, &changes, problem));
-        TRY(total(database, &there, problem));
+        TRY(series_sum(database, &there, problem));
         atomic_fetch_add(blob->evictions, changes > 0);
     }
     TRY(sqlite_change(database, head_sql, columns, blob, NULL, problem));
     return sqlite_change(database, body_sql, columns, blob, NULL, problem);
 }
 
-static void was_put(void *context, Status status, const char *detail) {
+static void series_put_done(void *context, Status status, const char *detail) {
     Blob *blob = context;
     blob->done.call(blob->done.context, status, detail);
     free(blob->body.at);
@@ -79,8 +71,8 @@ Status db_series_post(Db *db, const char *result, char *body, size_t size, uint6
     blob->most = most;
     blob->evictions = db_evictions(db);
     blob->done = *done;
-    const WriteDone own = {was_put, blob};
-    const Status status = db_enqueue(db, put, blob, 0, STORE_LOW, &own, NULL);
+    const WriteDone own = {series_put_done, blob};
+    const Status status = db_enqueue(db, series_apply_put, blob, 0, STORE_LOW, &own, NULL);
     if (status != STATUS_OK) {
         free(blob->body.at);
         free(blob);
@@ -88,13 +80,13 @@ Status db_series_post(Db *db, const char *result, char *body, size_t size, uint6
     return status;
 }
 
-static Status touch(Sqlite *database, const void *work, Problem *problem) {
+static Status series_apply_touch(Sqlite *database, const void *work, Problem *problem) {
     static const char sql[] = "UPDATE series SET used = (SELECT max(used) + 1 FROM series) "
                               "WHERE result = :result AND used < (SELECT max(used) FROM series)";
     return sqlite_change(database, sql, columns, work, NULL, problem);
 }
 
-static void was_touched(void *context, Status status, const char *detail) {
+static void series_touch_done(void *context, Status status, const char *detail) {
     (void)status;
     (void)detail;
     free(context);
@@ -110,10 +102,10 @@ Status db_series_load(Db *db, const char *result, char **body, size_t *size, Pro
     *body = blob.body.at;
     *size = blob.body.size;
     if (status == STATUS_OK && is_found && used != NULL) {
-        const WriteDone done = {was_touched, used};
+        const WriteDone done = {series_touch_done, used};
         *used = (Blob){.bytes = 0};
         text_fit(used->result, sizeof used->result, result);
-        if (db_enqueue(db, touch, used, 0, STORE_LOW, &done, NULL) == STATUS_OK)
+        if (db_enqueue(db, series_apply_touch, used, 0, STORE_LOW, &done, NULL) == STATUS_OK)
             used = NULL;
     }
     free(used);
@@ -132,16 +124,9 @@ bool db_series_exists(Db *db, const char *result) {
 }
 
 void db_series_tally(Db *db, uint64_t *count, uint64_t *bytes, uint64_t *evictions) {
-    static const char sql[] =
-        "SELECT count(*) AS count, coalesce(sum(bytes), 0) AS bytes FROM series";
-    typedef struct Sum {
-        uint64_t count, bytes;
-    } Sum;
-    static const RowColumn sums[] = {ROW_COLUMN(Sum, count, COLUMN_COUNT),
-                                     ROW_COLUMN(Sum, bytes, COLUMN_COUNT), ROW_END};
-    Sum sum = {0, 0};
+    QueryCounts sum = {0};
     bool is_found;
-    (void)db_first(db, sql, NULL, NULL, sums, &sum, &is_found, NULL);
+    (void)db_first(db, sum_sql, NULL, NULL, query_counts_columns, &sum, &is_found, NULL);
     *count = sum.count;
     *bytes = sum.bytes;
     *evictions = atomic_load(db_evictions(db));

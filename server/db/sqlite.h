@@ -1,6 +1,5 @@
-// One connection to SQLite: opening, settings, statements kept ready, transactions, migration.
-// Not thread-safe and not the tables: each connection belongs to one thread at a time (store.c),
-// and the SQL of the tables is in *_rows.c. Used inside store/ alone.
+// A connection to SQLite, and how structs are stored: one table of columns per struct, from which
+// INSERT, SELECT and UPDATE are generated and by which members are bound, read, copied and cleared.
 #ifndef SERVER_DB_SQLITE_H
 #define SERVER_DB_SQLITE_H
 
@@ -13,26 +12,73 @@
 #include "server/util/embedded.h"
 
 typedef struct Sqlite Sqlite;
-typedef struct sqlite3_stmt Statement;
-struct RowColumn;
+typedef struct Statement Statement;
+
+typedef struct StoredBytes {
+    void *at;
+    size_t size;
+} StoredBytes;
+
+typedef enum ColumnKind {
+    COLUMN_TEXT,    // char *, owned; NULL is NULL
+    COLUMN_NAME,    // char[size]; "" is never NULL
+    COLUMN_REAL,    // double; NAN is NULL
+    COLUMN_INTEGER, // int64_t
+    COLUMN_COUNT,   // uint64_t
+    COLUMN_CHOICE,  // int; negative is NULL
+    COLUMN_FLAG,    // bool
+    COLUMN_BYTES,   // StoredBytes, owned
+} ColumnKind;
+
+enum {
+    COLUMN_LONG = 1,    // not part of {head}
+    COLUMN_MUTABLE = 2, // part of {set}
+    // Its CRC-32 is stored in the row's column `checks` and compared whenever both are read.
+    COLUMN_CHECKED = 4,
+};
+
+// One member of a stored struct.
+typedef struct SqlColumn {
+    const char *name;
+    ColumnKind kind;
+    int flags;
+    size_t offset, size;
+    const char *sql; // the expression that it is read by; it is never written. NULL: a column
+} SqlColumn;
+
+// The kind follows from the member's type; a type that is none of these does not compile: the array
+// has a negative size.
+// clang-format off
+#define COLUMN_KIND(Type, member) _Generic(&((Type *)0)->member, \
+    char **: COLUMN_TEXT, const char **: COLUMN_TEXT, double *: COLUMN_REAL, int64_t *: COLUMN_INTEGER, \
+    uint64_t *: COLUMN_COUNT, int *: COLUMN_CHOICE, bool *: COLUMN_FLAG, StoredBytes *: COLUMN_BYTES, \
+    default: _Generic(((Type *)0)->member, char *: COLUMN_NAME, default: -1))
+#define COLUMN_OF(Type, member, name_, flags_, sql_) \
+    {.name = name_, .kind = COLUMN_KIND(Type, member), .flags = flags_, \
+     .offset = offsetof(Type, member) + 0 * sizeof(char[COLUMN_KIND(Type, member) >= 0 ? 1 : -1]), \
+     .size = sizeof(((Type *)0)->member), .sql = sql_}
+#define COLUMN(Type, member) COLUMN_OF(Type, member, #member, 0, NULL)
+#define COLUMN_WITH(Type, member, flags) COLUMN_OF(Type, member, #member, flags, NULL)
+#define COLUMN_READ(Type, member, sql) COLUMN_OF(Type, member, #member, 0, sql)
+#define COLUMN_END {.name = NULL}
+// clang-format on
 
 typedef enum SqliteMode {
-    DATABASE_WRITER, // makes the file if it is missing
+    DATABASE_WRITER, // creates the file if it is missing
     DATABASE_READER,
-    DATABASE_COPY, // an empty file that nobody else has, to be filled; not durable by itself
+    DATABASE_COPY, // an empty file of this process alone, to be filled; not durable by itself
 } SqliteMode;
 
-// Opens the file at `path`; NULL is a private database in memory.
+// Opens the file at `path`; NULL is a private database in memory. Each connection is used by one
+// thread at a time.
 Status sqlite_open(const char *path, SqliteMode mode, Sqlite **database, Problem *problem);
 void sqlite_close(Sqlite *database);
 
-// Brings the schema to the last of `files`, NNN_WHAT.sql counted from 1 without a gap, each step in
-// a transaction of its own. STATUS_CONFLICT for a newer schema and for a file that is not
+// Brings the schema to the last of `files`, each a transaction of its own; the schema's version is
+// the number of files applied. STATUS_CONFLICT for any other version and for a file that is not
 // impactd's.
 Status sqlite_migrate(Sqlite *database, const EmbeddedFile *files, Problem *problem);
-
-// Whether the schema is at the last of `files` already (NULL: no matter). STATUS_CONFLICT for a
-// newer one.
+// Whether the schema is at the last of `files` already. STATUS_CONFLICT as above.
 Status sqlite_is_current(Sqlite *database, const EmbeddedFile *files, bool *is_current,
                          Problem *problem);
 
@@ -42,38 +88,59 @@ Status sqlite_execute(Sqlite *database, const char *sql, Problem *problem);
 Status sqlite_touch(Sqlite *database, Problem *problem);
 // Whether a transaction is open. A failed write may have ended it.
 bool sqlite_is_in_transaction(Sqlite *database);
-
 // STATUS_IO where the file was deleted, renamed or replaced since it was opened: what is written to
-// it then is found by nobody.
+// it then is lost.
 Status sqlite_check_place(Sqlite *database, Problem *problem);
-
-// How many rows this connection has changed, ever.
+// How many rows this connection has changed since it was opened.
 uint64_t sqlite_rows_changed(Sqlite *database);
 
-// Runs one statement with the members of `item` bound to its parameters. *changes (may be NULL):
-// rows changed.
-Status sqlite_change(Sqlite *database, const char *sql, const struct RowColumn *columns,
-                     const void *item, int *changes, Problem *problem);
+// In the functions below `sql` is a constant text, which is prepared once per connection and known
+// by its address. Every parameter ":name" is bound to the member of `item` that `keys` calls so;
+// `keys` may be NULL where there are none. Rows are read into the members of the `columns` that the
+// result has; the others stay as they are. Generated from the tables, which are the same each time:
+//
+//     {insert}    (a, b) VALUES (:a, :b)    all of `keys`, with their checks
+//     {set}       a = :a, b = :b            those of `keys` that are COLUMN_MUTABLE
+//     {columns}   a, b                      all of `columns`, with their checks
+//     {head}      a, b                      the same without those that are COLUMN_LONG
 
-// A statement, made once per connection, ready to be stepped through. `sql` is a constant text: it
-// is known by its address. To be ended before the next one of the same text.
-Status statement_begin(Sqlite *database, const char *sql, const struct RowColumn *columns,
-                       const void *item, Statement **statement, Problem *problem);
+// Runs one statement without rows. *changes (may be NULL): rows changed.
+Status sqlite_change(Sqlite *database, const char *sql, const SqlColumn *keys, const void *item,
+                     int *changes, Problem *problem);
+// The first row of a query into `target`; *is_found whether there is one.
+Status sqlite_first(Sqlite *database, const char *sql, const SqlColumn *keys, const void *item,
+                    const SqlColumn *columns, void *target, bool *is_found, Problem *problem);
+// All rows as a typed list of items of `size` bytes; on failure it is empty.
+Status sqlite_list(Sqlite *database, const char *sql, const SqlColumn *keys, const void *item,
+                   const SqlColumn *columns, size_t size, void *list, Problem *problem);
+
+// A query to be stepped through, to be ended before the next one of the same text.
+Status statement_begin(Sqlite *database, const char *sql, const SqlColumn *keys, const void *item,
+                       Statement **statement, Problem *problem);
 // *has_row is false at the end.
 Status statement_step(Statement *statement, bool *has_row, Problem *problem);
-void statement_end(Statement *statement); // NULL is fine
+// The current row. `item` owns nothing before; on failure what the columns own of it is freed.
+Status row_read(Statement *statement, const SqlColumn *columns, void *item, Problem *problem);
+void statement_end(Statement *statement); // NULL is allowed
+
+// A deep copy of the members that the columns name; the rest of `copy`, of `size` bytes, is zero.
+// False without memory, and then it is all zero.
+bool row_copy(const SqlColumn *columns, const void *item, void *copy, size_t size);
+// Frees what the columns own and sets all of `item`, of `size` bytes, to zero.
+void row_clear(const SqlColumn *columns, void *item, size_t size);
+void rows_clear(const SqlColumn *columns, size_t size, void *list);
 
 // Bytes `offset` ... of the blob in a column of the row that is `number`: `size`, or as many as it
 // has there. The rest of it is not read.
 Status sqlite_read_part(Sqlite *database, const char *table, const char *column, int64_t number,
                         size_t offset, size_t size, void *target, Problem *problem);
 
-// Fills `to` with all that is in `from` at this moment, while others write to that. `watch` (NULL:
-// nobody) is told how far it is. STATUS_CANCELLED when it wants no more.
+// Fills `to` with all that is in `from` at this moment, while others write to that. `watch` (NULL
+// is allowed) gets the progress; STATUS_CANCELLED when it stops.
 Status sqlite_copy(Sqlite *from, Sqlite *to, const Progress *watch, Problem *problem);
-
-// Until NULL is given, `watch` is asked now and then whether a statement that takes long shall go
-// on; where not it is STATUS_CANCELLED.
+// SQLite's check of the whole file; STATUS_IO with what it found.
+Status sqlite_check(Sqlite *database, Problem *problem);
+// Until NULL is given, long statements ask `watch` whether to continue; STATUS_CANCELLED if not.
 void sqlite_watch(Sqlite *database, const Progress *watch);
 
 #endif

@@ -1,9 +1,9 @@
 // The thread that keeps to the rules of retention, in the background and in small steps. Not the
-// rules: those are db/retention.h's. Used by cli/serve.c.
+// rules: those are db/db.h's. Used by cli/serve.c.
 #ifndef SERVER_JOBS_MAINTENANCE_H
 #define SERVER_JOBS_MAINTENANCE_H
 
-#include "server/db/retention.h"
+#include "server/db/db.h"
 #include "server/jobs/jobs.h"
 
 typedef struct Maintenance Maintenance;

@@ -5,7 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/db/job_search.h"
 #include "server/jobs/documents.h"
 #include "server/jobs/idempotency.h"
 #include "server/jobs/job_id.h"

@@ -1,7 +1,6 @@
 // The store from outside: durable when a call returns, one daemon a folder, seeds, jobs and
 // results.
 #include "server/db/db.h"
-#include "server/db/job_search.h"
 #include "server/db/materials.h"
 
 #include <pthread.h>

@@ -12,7 +12,7 @@
 #include <cmocka.h>
 
 #include "core/contact/contact.h"
-#include "server/db/row.h"
+#include "server/db/db_private.h"
 #include "server/db/sqlite.h"
 #include "server/util/embedded.h"
 #include "tests/support/felt.h"

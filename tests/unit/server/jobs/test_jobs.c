@@ -16,7 +16,6 @@
 #include <cmocka.h>
 
 #include "core/math/fft.h"
-#include "server/db/job_search.h"
 #include "server/db/sqlite.h"
 #include "server/jobs/jobs.h"
 #include "server/jobs/jobs_private.h"

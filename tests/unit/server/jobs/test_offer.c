@@ -11,8 +11,6 @@
 
 #include <cmocka.h>
 
-#include "server/db/job_search.h"
-#include "server/db/retention.h"
 #include "server/jobs/jobs.h"
 #include "tests/support/scratch.h"
 
