@@ -46,51 +46,44 @@ static const char *flag(bool is_so) {
     return is_so ? "true" : "false";
 }
 
-static void put_value(Bytes *bytes, const char *name, const char *json) {
-    if (json != NULL)
-        bytes_format(bytes, ", \"%s\": %s", name, json);
-}
-
-static void put_nearest(Bytes *bytes, const ResultRow *row, const Differences *differences) {
+static void put_nearest(Bytes *bytes, const ResultRow *row, const Bytes *differences,
+                        size_t count) {
     const bool is_other = strcmp(row->engine, engine_version) != 0;
     bytes_format(bytes, "{\"result\": \"%s\", \"engine\": ", row->id);
     bytes_json_string(bytes, row->engine);
-    bytes_format(bytes, ", \"engine_differs\": %s, \"count\": %zu, \"differences\": [",
-                 flag(is_other), differences->count + differences->more);
-    for (size_t i = 0; i < differences->count; i++) {
-        const Difference *one = &differences->at[i];
-        bytes_text(bytes, i > 0 ? ", {\"pointer\": " : "{\"pointer\": ");
-        bytes_json_string(bytes, one->pointer);
-        put_value(bytes, "here", one->a);
-        put_value(bytes, "there", one->b);
-        bytes_text(bytes, "}");
-    }
-    bytes_text(bytes, "]}");
+    bytes_format(bytes,
+                 ", \"engine_differs\": %s, \"count\": %zu, \"differences\": ", flag(is_other),
+                 count);
+    bytes_put(bytes, differences->at, differences->count);
+    bytes_text(bytes, "}");
 }
 
-// The known scene that differs least, or none.
+// The cached scene with the fewest differences, or null.
 static Status find_nearest(App *app, const char *scene, Bytes *bytes, Problem *problem) {
+    static const DiffFormat format = {"here", "there", false};
     ResultRows rows = {NULL, 0};
-    Differences least = {0};
+    Bytes best = {0};
+    size_t best_count = 0;
     const ResultRow *nearest = NULL;
     TRY(db_result_recent(app->db, RECENT_MAX, SCENE_MAX, &rows, problem));
     for (size_t i = 0; i < rows.count; i++) {
-        Differences other;
-        const Status status = json_diff(scene, rows.at[i].scene, NULL, &other, NULL);
-        if (status == STATUS_OK &&
-            (nearest == NULL || other.count + other.more < least.count + least.more)) {
-            differences_clear(&least);
-            least = other;
+        Bytes other = {0};
+        size_t count;
+        if (json_diff(scene, rows.at[i].scene, NULL, &format, &other, &count, NULL) == STATUS_OK &&
+            !other.is_failed && (nearest == NULL || count < best_count)) {
+            bytes_clear(&best);
+            best = other;
+            best_count = count;
             nearest = &rows.at[i];
         } else {
-            differences_clear(&other);
+            bytes_clear(&other);
         }
     }
     if (nearest != NULL)
-        put_nearest(bytes, nearest, &least);
+        put_nearest(bytes, nearest, &best, best_count);
     else
         bytes_text(bytes, "null");
-    differences_clear(&least);
+    bytes_clear(&best);
     result_rows_clear(&rows);
     return STATUS_OK;
 }

@@ -1,18 +1,23 @@
-// From jansson's tree to plain structs, by their rows.
-// Not the text's syntax (read.c) and not ranges (core/base/field.h).
-// Used by read.c alone.
+// From jansson's tree to plain structs by their Field rows. Private to json/.
 #ifndef SERVER_JSON_DECODE_H
 #define SERVER_JSON_DECODE_H
 
-#include "server/json/decode_errors.h"
+#include <jansson.h>
 
-// Reads the members of `object` into `item`, which has its defaults, adding what is wrong below
-// `pointer`.
-void decode_object(Decoder *reader, const json_t *object, const Field *fields, void *item,
-                   const char *pointer);
+#include "core/base/field.h"
 
-// Reads `value`, which stands at `pointer`, into the member under `field` of `item`.
-void decode_value(Decoder *reader, const json_t *value, const Field *field, void *item,
+typedef struct Decoder {
+    Problem *problem; // NULL: faults are not described
+    bool is_faulty, is_out_of_memory;
+} Decoder;
+
+// Reads the members of `root` into `item`, which has its defaults. Faults are added at or below
+// `pointer`; a root that is not an object is one of them.
+void decode_root(Decoder *decoder, const json_t *root, const Field *fields, void *item,
+                 const char *pointer);
+
+// Reads `value`, which is at `pointer`, into the member of `item` under `field`.
+void decode_value(Decoder *decoder, const json_t *value, const Field *field, void *item,
                   const char *pointer);
 
 #endif

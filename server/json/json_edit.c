@@ -4,25 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/json/scan.h"
-
-// NULL where it is no object. Released by json_decref.
-static json_t *json_edit_read(const Bytes *text) {
-    size_t position;
-    const char *sentence;
-    if (text->count == 0)
-        return NULL;
-    const size_t mark = scan_mark(text->at, text->count);
-    const char *json = text->at + mark;
-    const size_t size = text->count - mark;
-    json_t *root = scan_allows(json, size, &position, &sentence)
-                       ? json_loadb(json, size, JSON_REJECT_DUPLICATES, NULL)
-                       : NULL;
-    if (json_is_object(root))
-        return root;
-    json_decref(root);
-    return NULL;
-}
+#include "server/json/parse.h"
 
 // Replaces the text and releases `root`; `is_changed` false: no memory.
 static Status json_edit_write(Bytes *text, json_t *root, bool is_changed, Problem *problem) {
@@ -48,7 +30,7 @@ static Status json_edit_check_utf8(const char *name, const char *value, Problem 
 
 Status json_edit_set(Bytes *text, const char *name, const char *value, Problem *problem) {
     TRY(json_edit_check_utf8(name, value, problem));
-    json_t *root = json_edit_read(text);
+    json_t *root = json_parse_tree(text->at, text->count);
     if (root == NULL)
         return STATUS_OK;
     const bool is_set = json_object_set_new(root, name, json_string(value)) == 0;
@@ -60,7 +42,8 @@ Status json_edit_label(Bytes *text, const char *label, Problem *problem) {
     if (equals == NULL || equals == label)
         return problem_add(problem, STATUS_USAGE, "--label", "must be KEY=VALUE, is %.100s", label);
     TRY(json_edit_check_utf8("label", label, problem));
-    json_t *root = json_edit_read(text), *labels = json_object_get(root, "labels");
+    json_t *root = json_parse_tree(text->at, text->count),
+           *labels = json_object_get(root, "labels");
     if (root == NULL || (labels != NULL && !json_is_object(labels) && !json_is_array(labels))) {
         json_decref(root);
         return STATUS_OK;
@@ -81,7 +64,7 @@ Status json_edit_label(Bytes *text, const char *label, Problem *problem) {
 }
 
 Status json_edit_append(Bytes *text, const char *list, const Bytes *value, Problem *problem) {
-    json_t *root = json_edit_read(text), *items = json_object_get(root, list);
+    json_t *root = json_parse_tree(text->at, text->count), *items = json_object_get(root, list);
     if (root == NULL || (items != NULL && !json_is_array(items))) {
         json_decref(root);
         return STATUS_OK;
@@ -118,7 +101,7 @@ static void nulls_remove(json_t *value) {
 }
 
 Status json_edit_remove_nulls(Bytes *text, Problem *problem) {
-    json_t *root = json_edit_read(text);
+    json_t *root = json_parse_tree(text->at, text->count);
     if (root == NULL)
         return STATUS_OK;
     nulls_remove(root);
@@ -126,7 +109,7 @@ Status json_edit_remove_nulls(Bytes *text, Problem *problem) {
 }
 
 Status json_edit_extract(const Bytes *text, const char *name, Bytes *part, Problem *problem) {
-    json_t *root = json_edit_read(text);
+    json_t *root = json_parse_tree(text->at, text->count);
     const json_t *found = json_object_get(root, name);
     char *taken = json_is_object(found) ? json_dumps(found, JSON_COMPACT) : NULL;
     json_decref(root);

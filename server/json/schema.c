@@ -1,5 +1,5 @@
-// Rows to JSON Schema: every row becomes a property, in table order, so the same table prints the
-// same bytes.
+// Every row becomes a property, in the order of the table. The schema is written without layout and
+// with a comma in front of each member; schema_lay_out drops the first commas and indents.
 #include "server/json/schema.h"
 
 #include <stdio.h>
@@ -21,288 +21,188 @@ const SchemaDocument schema_documents[] = {
 };
 // clang-format on
 
-// Where the text stands: inside how many brackets, and whether the innermost one has a member yet.
-typedef struct Printer {
-    Bytes *bytes;
-    int depth;
-    bool has_member;
-} Printer;
+static void schema_object(Bytes *bytes, const Field *fields, const KindTable *kinds,
+                          const Kind *kind);
 
-static void begin_line(Printer *printer) {
-    bytes_text(printer->bytes, printer->has_member ? ",\n" : "\n");
-    for (int i = 0; i < printer->depth; i++)
-        bytes_text(printer->bytes, "  ");
-    printer->has_member = true;
+static void schema_text(Bytes *bytes, const char *name, const char *text) {
+    bytes_format(bytes, ",\"%s\":", name);
+    bytes_json_string(bytes, text);
 }
 
-static void open_bracket(Printer *printer, const char *bracket) {
-    bytes_text(printer->bytes, bracket);
-    printer->depth++;
-    printer->has_member = false;
+static void schema_real(Bytes *bytes, const char *name, double value) {
+    bytes_format(bytes, ",\"%s\":", name);
+    bytes_real(bytes, value);
 }
 
-static void close_bracket(Printer *printer, const char *bracket) {
-    printer->depth--;
-    if (printer->has_member) {
-        printer->has_member = false;
-        begin_line(printer);
-    }
-    bytes_text(printer->bytes, bracket);
-    printer->has_member = true;
-}
-
-static void name_member(Printer *printer, const char *name) {
-    begin_line(printer);
-    bytes_json_string(printer->bytes, name);
-    bytes_text(printer->bytes, ": ");
-}
-
-static void open_member(Printer *printer, const char *name, const char *bracket) {
-    name_member(printer, name);
-    open_bracket(printer, bracket);
-}
-
-static void text_member(Printer *printer, const char *name, const char *text) {
-    name_member(printer, name);
-    bytes_json_string(printer->bytes, text);
-}
-
-static void word_member(Printer *printer, const char *name, const char *word) {
-    name_member(printer, name);
-    bytes_text(printer->bytes, word);
-}
-
-static void real_member(Printer *printer, const char *name, double value) {
-    name_member(printer, name);
-    bytes_real(printer->bytes, value);
-}
-
-static void count_member(Printer *printer, const char *name, size_t value) {
-    name_member(printer, name);
-    bytes_format(printer->bytes, "%zu", value);
-}
-
-static void texts_member(Printer *printer, const char *name, const char *const *texts) {
-    name_member(printer, name);
-    bytes_text(printer->bytes, "[");
+static void schema_texts(Bytes *bytes, const char *name, const char *const *texts) {
+    bytes_format(bytes, ",\"%s\":[", name);
     for (size_t i = 0; texts != NULL && texts[i] != NULL; i++) {
-        bytes_text(printer->bytes, i > 0 ? ", " : "");
-        bytes_json_string(printer->bytes, texts[i]);
+        bytes_text(bytes, ",");
+        bytes_json_string(bytes, texts[i]);
     }
-    bytes_text(printer->bytes, "]");
+    bytes_text(bytes, "]");
 }
 
-static void print_object(Printer *printer, const Field *fields, const KindTable *kinds,
-                         const Kind *kind);
-
-static void print_range(Printer *printer, const Range *range) {
+static void schema_range(Bytes *bytes, const Range *range) {
     if (!isinf(range->min))
-        real_member(printer, range->is_open_below ? "exclusiveMinimum" : "minimum", range->min);
+        schema_real(bytes, range->is_open_below ? "exclusiveMinimum" : "minimum", range->min);
     if (!isinf(range->max))
-        real_member(printer, "maximum", range->max);
+        schema_real(bytes, "maximum", range->max);
 }
 
-static void print_length(Printer *printer, const Field *field) {
+static void schema_length(Bytes *bytes, const Field *field) {
     if (field->presence == PRESENCE_REQUIRED)
-        count_member(printer, "minItems", 1);
+        bytes_text(bytes, ",\"minItems\":1");
     if (field->max > 0)
-        count_member(printer, "maxItems", field->max);
+        bytes_format(bytes, ",\"maxItems\":%zu", field->max);
 }
 
-// A count is never negative, whatever its row says.
-static Range count_range(const Field *field) {
-    Range range = field->range;
-    if (range.min < 0)
-        range = (Range){0, range.max, false};
-    return range;
-}
-
-// A text of the choices, or one with a number.
-static void print_choices(Printer *printer, const Field *field) {
+// One of the choices; FIELD_NUMBERED allows a number behind it.
+static void schema_choices(Bytes *bytes, const Field *field) {
     if (field->choices == NULL)
         return;
     if ((field->flags & FIELD_NUMBERED) == 0) {
-        texts_member(printer, "enum", field->choices);
+        schema_texts(bytes, "enum", field->choices);
         return;
     }
-    name_member(printer, "pattern");
-    bytes_text(printer->bytes, "\"^(");
+    bytes_text(bytes, ",\"pattern\":\"^(");
     for (size_t i = 0; field->choices[i] != NULL; i++)
-        bytes_format(printer->bytes, "%s%s", i > 0 ? "|" : "", field->choices[i]);
-    bytes_text(printer->bytes, ")(_[1-9][0-9]*)?$\"");
+        bytes_format(bytes, "%s%s", i > 0 ? "|" : "", field->choices[i]);
+    bytes_text(bytes, ")(_[1-9][0-9]*)?$\"");
 }
 
-static void print_reals(Printer *printer, const Field *field) {
-    text_member(printer, "type", "array");
-    open_member(printer, "items", "{");
-    text_member(printer, "type", "number");
-    print_range(printer, &field->range);
-    close_bracket(printer, "}");
-    print_length(printer, field);
+static void schema_number(Bytes *bytes, const Field *field) {
+    bytes_text(bytes, ",\"type\":\"number\"");
+    schema_range(bytes, &field->range);
 }
 
-static void print_lone(Printer *printer, const Field *field) {
-    open_member(printer, "anyOf", "[");
-    begin_line(printer);
-    open_bracket(printer, "{");
-    text_member(printer, "type", "number");
-    print_range(printer, &field->range);
-    close_bracket(printer, "}");
-    begin_line(printer);
-    open_bracket(printer, "{");
-    print_reals(printer, field);
-    close_bracket(printer, "}");
-    close_bracket(printer, "]");
+static void schema_reals(Bytes *bytes, const Field *field) {
+    bytes_text(bytes, ",\"type\":\"array\",\"items\":{");
+    schema_number(bytes, field);
+    bytes_text(bytes, "}");
+    schema_length(bytes, field);
 }
 
-static void print_texts(Printer *printer, const Field *field) {
+static void schema_strings(Bytes *bytes, const Field *field) {
     const bool has_pairs = (field->flags & FIELD_PAIRS) != 0;
+    bytes_text(bytes, has_pairs ? ",\"anyOf\":[{" : "");
+    bytes_text(bytes, ",\"type\":\"array\",\"items\":{\"type\":");
+    bytes_text(bytes, (field->flags & FIELD_SCALARS) != 0 ? "[\"number\",\"string\",\"boolean\"]"
+                                                          : "\"string\"");
+    schema_choices(bytes, field);
+    bytes_text(bytes, "}");
+    schema_length(bytes, field);
     if (has_pairs) {
-        open_member(printer, "anyOf", "[");
-        begin_line(printer);
-        open_bracket(printer, "{");
-    }
-    text_member(printer, "type", "array");
-    open_member(printer, "items", "{");
-    if ((field->flags & FIELD_SCALARS) != 0)
-        word_member(printer, "type", "[\"number\", \"string\", \"boolean\"]");
-    else
-        text_member(printer, "type", "string");
-    print_choices(printer, field);
-    close_bracket(printer, "}");
-    print_length(printer, field);
-    if (has_pairs) {
-        close_bracket(printer, "}");
-        begin_line(printer);
-        open_bracket(printer, "{");
-        text_member(printer, "type", "object");
-        open_member(printer, "additionalProperties", "{");
-        text_member(printer, "type", "string");
-        close_bracket(printer, "}");
+        bytes_text(bytes, "},{\"type\":\"object\","
+                          "\"additionalProperties\":{\"type\":\"string\"}");
         if (field->max > 0)
-            count_member(printer, "maxProperties", field->max);
-        close_bracket(printer, "}");
-        close_bracket(printer, "]");
+            bytes_format(bytes, ",\"maxProperties\":%zu", field->max);
+        bytes_text(bytes, "}]");
     }
     if (field->presence == PRESENCE_DEFAULT)
-        texts_member(printer, "default", field->initial_texts);
+        schema_texts(bytes, "default", field->initial_texts);
 }
 
-// An object, or in its place a string (of the row it stands for) or null.
-static void print_item(Printer *printer, const Field *field) {
+// An object; with a shorthand also the string of the row it stands for, and null where it is
+// allowed.
+static void schema_item(Bytes *bytes, const Field *field) {
     const bool takes_null = (field->flags & FIELD_NULL_IS_EMPTY) != 0;
-    if (field->shorthand == NULL && !takes_null) {
-        print_object(printer, field->fields, NULL, NULL);
-        return;
-    }
-    open_member(printer, "anyOf", "[");
-    begin_line(printer);
-    open_bracket(printer, "{");
-    print_object(printer, field->fields, NULL, NULL);
-    close_bracket(printer, "}");
+    const bool has_forms = field->shorthand != NULL || takes_null;
+    bytes_text(bytes, has_forms ? ",\"anyOf\":[{" : "");
+    schema_object(bytes, field->fields, NULL, NULL);
     if (field->shorthand != NULL) {
         const Field *row = fields_find(field->fields, field->shorthand, NULL);
-        begin_line(printer);
-        open_bracket(printer, "{");
-        text_member(printer, "type", "string");
+        bytes_text(bytes, "},{\"type\":\"string\"");
         if (row->max > 0)
-            count_member(printer, "maxLength", row->max);
-        text_member(printer, "description", row->doc);
-        close_bracket(printer, "}");
+            bytes_format(bytes, ",\"maxLength\":%zu", row->max);
+        schema_text(bytes, "description", row->doc);
     }
-    if (takes_null) {
-        begin_line(printer);
-        open_bracket(printer, "{");
-        text_member(printer, "type", "null");
-        close_bracket(printer, "}");
-    }
-    close_bracket(printer, "]");
+    bytes_text(bytes, takes_null ? "},{\"type\":\"null\"" : "");
+    bytes_text(bytes, has_forms ? "}]" : "");
 }
 
-// One schema per kind. Only a default kind may stand without its tag, so exactly one of them fits.
-static void print_variant(Printer *printer, const Field *field) {
-    open_member(printer, "oneOf", "[");
+// One schema per kind. Only the default kind may be without its tag, so exactly one of them fits.
+static void schema_variant(Bytes *bytes, const Field *field) {
     const Kind *kind;
+    bytes_text(bytes, ",\"oneOf\":[");
     for (size_t i = 0; (kind = field->kinds->at(i)) != NULL; i++) {
-        begin_line(printer);
-        open_bracket(printer, "{");
-        text_member(printer, "title", kind->name);
-        text_member(printer, "description", kind->doc);
-        print_object(printer, kind->fields, field->kinds, kind);
-        close_bracket(printer, "}");
+        bytes_text(bytes, ",{");
+        schema_text(bytes, "title", kind->name);
+        schema_text(bytes, "description", kind->doc);
+        schema_object(bytes, kind->fields, field->kinds, kind);
+        bytes_text(bytes, "}");
     }
-    close_bracket(printer, "]");
+    bytes_text(bytes, "]");
     if (field->presence == PRESENCE_DEFAULT) {
-        open_member(printer, "default", "{");
-        text_member(printer, field->kinds->tag, field->kinds->at(0)->name);
-        close_bracket(printer, "}");
+        bytes_text(bytes, ",\"default\":{");
+        schema_text(bytes, field->kinds->tag, field->kinds->at(0)->name);
+        bytes_text(bytes, "}");
     }
 }
 
-static void print_value(Printer *printer, const Field *field) {
+static void schema_value(Bytes *bytes, const Field *field) {
     const bool has_default = field->presence == PRESENCE_DEFAULT;
-    Range range;
+    // A count is never negative, whatever its row says.
+    const Range counts = {fmax(field->range.min, 0), field->range.max,
+                          field->range.is_open_below && field->range.min >= 0};
     switch (field->kind) {
     case FIELD_KIND_REAL:
-        text_member(printer, "type", "number");
-        print_range(printer, &field->range);
+        schema_number(bytes, field);
         if (has_default)
-            real_member(printer, "default", field->initial);
+            schema_real(bytes, "default", field->initial);
         break;
     case FIELD_KIND_COUNT:
-        text_member(printer, "type", "integer");
-        range = count_range(field);
-        print_range(printer, &range);
+        bytes_text(bytes, ",\"type\":\"integer\"");
+        schema_range(bytes, &counts);
         if (has_default)
-            real_member(printer, "default", field->initial);
+            schema_real(bytes, "default", field->initial);
         break;
     case FIELD_KIND_FLAG:
-        text_member(printer, "type", "boolean");
+        bytes_text(bytes, ",\"type\":\"boolean\"");
         if (has_default)
-            word_member(printer, "default", field->initial != 0 ? "true" : "false");
+            bytes_text(bytes, field->initial != 0 ? ",\"default\":true" : ",\"default\":false");
         break;
     case FIELD_KIND_TEXT:
-        text_member(printer, "type", "string");
+        bytes_text(bytes, ",\"type\":\"string\"");
         if (field->max > 0)
-            count_member(printer, "maxLength", field->max);
+            bytes_format(bytes, ",\"maxLength\":%zu", field->max);
         break;
     case FIELD_KIND_CHOICE:
-        texts_member(printer, "enum", field->choices);
+        schema_texts(bytes, "enum", field->choices);
         if (has_default)
-            text_member(printer, "default", field->choices[(int)field->initial]);
+            schema_text(bytes, "default", field->choices[(int)field->initial]);
         break;
     case FIELD_KIND_REALS:
-        if ((field->flags & FIELD_LONE) != 0)
-            print_lone(printer, field);
-        else
-            print_reals(printer, field);
+        if ((field->flags & FIELD_LONE) != 0) {
+            bytes_text(bytes, ",\"anyOf\":[{");
+            schema_number(bytes, field);
+            bytes_text(bytes, "},{");
+        }
+        schema_reals(bytes, field);
+        bytes_text(bytes, (field->flags & FIELD_LONE) != 0 ? "}]" : "");
         break;
     case FIELD_KIND_ROWS:
-        text_member(printer, "type", "array");
-        open_member(printer, "items", "{");
-        print_reals(printer, field);
-        close_bracket(printer, "}");
-        print_length(printer, field);
+        bytes_text(bytes, ",\"type\":\"array\",\"items\":{");
+        schema_reals(bytes, field);
+        bytes_text(bytes, "}");
+        schema_length(bytes, field);
         break;
     case FIELD_KIND_TEXTS:
-        print_texts(printer, field);
+        schema_strings(bytes, field);
         break;
     case FIELD_KIND_ITEM:
-        print_item(printer, field);
-        if (has_default)
-            word_member(printer, "default", "{}");
+        schema_item(bytes, field);
+        bytes_text(bytes, has_default ? ",\"default\":{}" : "");
         break;
     case FIELD_KIND_LIST:
-        text_member(printer, "type", "array");
-        open_member(printer, "items", "{");
-        print_object(printer, field->fields, NULL, NULL);
-        close_bracket(printer, "}");
-        print_length(printer, field);
-        if (has_default)
-            word_member(printer, "default", "[]");
+        bytes_text(bytes, ",\"type\":\"array\",\"items\":{");
+        schema_object(bytes, field->fields, NULL, NULL);
+        bytes_text(bytes, "}");
+        schema_length(bytes, field);
+        bytes_text(bytes, has_default ? ",\"default\":[]" : "");
         break;
     case FIELD_KIND_VARIANT:
-        print_variant(printer, field);
+        schema_variant(bytes, field);
         break;
     case FIELD_KIND_BASE:
     case FIELD_KIND_REFCOUNT:
@@ -311,69 +211,103 @@ static void print_value(Printer *printer, const Field *field) {
     }
 }
 
-static void print_properties(Printer *printer, const Field *fields) {
+static void schema_properties(Bytes *bytes, const Field *fields) {
     for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
         if (field->kind == FIELD_KIND_BASE) {
-            print_properties(printer, field->fields);
+            schema_properties(bytes, field->fields);
             continue;
         }
         if ((field->flags & FIELD_HIDDEN) != 0)
             continue;
-        open_member(printer, field->name, "{");
+        bytes_format(bytes, ",\"%s\":{", field->name);
         if (field->doc != NULL)
-            text_member(printer, "description", field->doc);
-        print_value(printer, field);
+            schema_text(bytes, "description", field->doc);
+        schema_value(bytes, field);
         if (field->unit != NULL)
-            text_member(printer, "x-unit", field->unit);
-        close_bracket(printer, "}");
+            schema_text(bytes, "x-unit", field->unit);
+        bytes_text(bytes, "}");
     }
 }
 
-static void print_required(Printer *printer, const Field *fields, size_t *count) {
+static void schema_required(Bytes *bytes, const Field *fields) {
     for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
-        if (field->kind == FIELD_KIND_BASE) {
-            print_required(printer, field->fields, count);
-        } else if (field->presence == PRESENCE_REQUIRED) {
-            bytes_text(printer->bytes, (*count)++ > 0 ? ", " : "");
-            bytes_json_string(printer->bytes, field->name);
+        if (field->kind == FIELD_KIND_BASE)
+            schema_required(bytes, field->fields);
+        else if (field->presence == PRESENCE_REQUIRED)
+            bytes_format(bytes, ",\"%s\"", field->name);
+    }
+}
+
+// The members of an object's schema; `kind` is NULL for a plain object, else one of `kinds`, which
+// their tag names.
+static void schema_object(Bytes *bytes, const Field *fields, const KindTable *kinds,
+                          const Kind *kind) {
+    bytes_text(bytes, ",\"type\":\"object\",\"properties\":{");
+    if (kind != NULL) {
+        bytes_format(bytes, ",\"%s\":{", kinds->tag);
+        schema_text(bytes, "const", kind->name);
+        bytes_text(bytes, "}");
+    }
+    schema_properties(bytes, fields);
+    bytes_text(bytes, "},\"required\":[");
+    if (kind != NULL && (kinds->is_named || kind != kinds->at(0)))
+        bytes_format(bytes, ",\"%s\"", kinds->tag);
+    schema_required(bytes, fields);
+    bytes_text(bytes, "],\"additionalProperties\":false");
+}
+
+static void schema_new_line(Bytes *bytes, int depth) {
+    bytes_text(bytes, "\n");
+    for (int i = 0; i < depth; i++)
+        bytes_text(bytes, "  ");
+}
+
+// A member or object a line; a list of texts on one line.
+static void schema_lay_out(Bytes *bytes, const char *text) {
+    int depth = 0;
+    bool is_in_text = false, is_in_line = false;
+    for (const char *c = text; *c != '\0'; c++) {
+        if (*c == '"')
+            is_in_text = !is_in_text;
+        if (is_in_text && *c == '\\')
+            bytes_put(bytes, c++, 1);
+        const bool is_open = !is_in_text && (*c == '{' || *c == '[');
+        const bool is_close = !is_in_text && (*c == '}' || *c == ']');
+        if (is_close && !is_in_line)
+            schema_new_line(bytes, --depth);
+        is_in_line = is_in_line && !is_close;
+        bytes_put(bytes, c, 1);
+        if (is_open) {
+            const bool is_list = *c == '[';
+            c += c[1] == ',' ? 1 : 0; // of the first member
+            is_in_line = c[1] == '}' || c[1] == ']' || (is_list && c[1] != '{');
+            if (!is_in_line)
+                schema_new_line(bytes, ++depth);
+        } else if (!is_in_text && *c == ',') {
+            if (is_in_line)
+                bytes_text(bytes, " ");
+            else
+                schema_new_line(bytes, depth);
+        } else if (!is_in_text && *c == ':') {
+            bytes_text(bytes, " ");
         }
     }
-}
-
-// The members of an object's schema; `kind` is NULL for a plain object, else one of `kinds`, named
-// by their tag.
-static void print_object(Printer *printer, const Field *fields, const KindTable *kinds,
-                         const Kind *kind) {
-    text_member(printer, "type", "object");
-    open_member(printer, "properties", "{");
-    if (kind != NULL) {
-        open_member(printer, kinds->tag, "{");
-        text_member(printer, "const", kind->name);
-        close_bracket(printer, "}");
-    }
-    print_properties(printer, fields);
-    close_bracket(printer, "}");
-    name_member(printer, "required");
-    bytes_text(printer->bytes, "[");
-    size_t count = 0;
-    if (kind != NULL && (kinds->is_named || kind != kinds->at(0))) {
-        bytes_json_string(printer->bytes, kinds->tag);
-        count++;
-    }
-    print_required(printer, fields, &count);
-    bytes_text(printer->bytes, "]");
-    word_member(printer, "additionalProperties", "false");
+    bytes_text(bytes, "\n");
 }
 
 void schema_write(Bytes *bytes, const char *id, const char *title, const Field *fields) {
-    Printer printer = {.bytes = bytes};
-    open_bracket(&printer, "{");
-    text_member(&printer, "$schema", "https://json-schema.org/draft/2020-12/schema");
-    text_member(&printer, "$id", id);
-    text_member(&printer, "title", title);
-    print_object(&printer, fields, NULL, NULL);
-    close_bracket(&printer, "}");
-    bytes_text(bytes, "\n");
+    Bytes text = {0};
+    bytes_text(&text, "{");
+    schema_text(&text, "$schema", "https://json-schema.org/draft/2020-12/schema");
+    schema_text(&text, "$id", id);
+    schema_text(&text, "title", title);
+    schema_object(&text, fields, NULL, NULL);
+    bytes_text(&text, "}");
+    if (text.is_failed)
+        bytes->is_failed = true;
+    else
+        schema_lay_out(bytes, text.at);
+    bytes_clear(&text);
 }
 
 void schema_write_document(Bytes *bytes, const SchemaDocument *document) {

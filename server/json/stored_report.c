@@ -20,7 +20,7 @@ Status stored_report_read(const char *text, size_t size, const Field *fields, vo
             if (json_is_null(value) || fields_find(fields, name, NULL) == NULL)
                 json_object_del(root, name);
         }
-        decode_object(&reader, root, fields, item, "");
+        decode_root(&reader, root, fields, item, "");
         is_read = !reader.is_faulty && !reader.is_out_of_memory;
     }
     json_decref(root);

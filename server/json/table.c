@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/json/scan.h"
+#include "server/json/parse.h"
 #include "server/util/bytes.h"
 
 enum { WIDTH_MAX = 40, ROWS_MAX = 2000, BLOCKS_MAX = 200, VALUES_SHOWN = 24, DEPTH_MAX = 6 };
@@ -403,13 +403,9 @@ static void parts_print(Printer *printer, json_t *object, const char *heading, i
 
 Status print_table_print_json(const char *text, size_t size, const PrintTableView *view, FILE *file,
                               size_t *longest, Problem *problem) {
-    size_t position;
-    const char *sentence;
     Printer printer = {.view = view, .file = file};
-    json_t *root = size > 0 && scan_allows(text, size, &position, &sentence)
-                       ? json_loadb(text, size, JSON_REJECT_DUPLICATES, NULL)
-                       : NULL;
-    const bool is_object = json_is_object(root);
+    json_t *root = json_parse_tree(text, size);
+    const bool is_object = root != NULL;
     if (is_object) {
         values_print(&printer, root, "");
         parts_print(&printer, root, "", 0);

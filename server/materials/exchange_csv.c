@@ -11,7 +11,6 @@
 #include "core/base/json_pointer.h"
 #include "core/base/spelling.h"
 #include "server/json/parse.h"
-#include "server/json/scan.h"
 #include "server/util/csv_reader.h"
 
 enum { POINTER_SIZE = sizeof((Fault){0}.pointer), COLUMNS_MAX = 64 };

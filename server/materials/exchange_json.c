@@ -6,7 +6,6 @@
 
 #include "core/base/json_pointer.h"
 #include "server/json/parse.h"
-#include "server/json/scan.h"
 #include "server/util/bytes.h"
 
 typedef struct Envelope {

@@ -13,17 +13,16 @@
 #include "server/json/diff.h"
 #include "server/json/stored_report.h"
 
-static void assert_differs(const char *a, const char *b, const char *besides, const char *wanted) {
-    Differences differences;
+static void assert_differs(const char *a, const char *b, const char *ignored, const char *wanted) {
+    static const DiffFormat format = {"a", "b", true};
     Bytes bytes = {0};
-    assert_int_equal(json_diff(a, b, besides, &differences, NULL), STATUS_OK);
-    differences_write(&bytes, &differences);
+    size_t count;
+    assert_int_equal(json_diff(a, b, ignored, &format, &bytes, &count, NULL), STATUS_OK);
     assert_string_equal(bytes.at, wanted);
     bytes_clear(&bytes);
-    differences_clear(&differences);
 }
 
-static void only_what_differs_is_told_with_its_place(void **state) {
+static void each_difference_has_its_pointer(void **state) {
     (void)state;
     assert_differs("{\"a\": 1, \"b\": {\"c\": [1, {\"d\": 0.1}]}}",
                    "{\"b\": {\"c\": [1, {\"d\": 0.2}]}, \"a\": 1.0}", NULL,
@@ -31,7 +30,7 @@ static void only_what_differs_is_told_with_its_place(void **state) {
     assert_differs("{\"x\": 1}", "{\"x\": 1}", NULL, "[]");
 }
 
-static void what_is_not_there_is_null(void **state) {
+static void missing_values_are_null(void **state) {
     (void)state;
     assert_differs("{\"a\": \"t\", \"l\": [1, 2]}", "{\"b/~\": {\"q\": true}, \"l\": [1]}", NULL,
                    "[{\"pointer\": \"/a\", \"a\": \"t\", \"b\": null, \"detail\": null}, "
@@ -59,26 +58,33 @@ static void long_numbers_are_one_difference(void **state) {
                    "items, the first that differs is number 251\"}]");
 }
 
-static void more_than_are_shown_are_counted(void **state) {
+static void differences_beyond_the_limit_are_counted(void **state) {
     (void)state;
     Bytes texts[2] = {{0}, {0}};
     for (int t = 0; t < 2; t++) {
         bytes_text(&texts[t], "{");
-        for (int i = 0; i < DIFFER_MAX + 5; i++)
+        for (int i = 0; i < DIFF_MAX + 5; i++)
             bytes_format(&texts[t], "%s\"m%d\": %d", i > 0 ? ", " : "", i, t);
         bytes_text(&texts[t], "}");
     }
-    Differences differences;
-    assert_int_equal(json_diff(texts[0].at, texts[1].at, NULL, &differences, NULL), STATUS_OK);
-    assert_true(differences.count == DIFFER_MAX && differences.more == 5);
-    differences_clear(&differences);
+    static const DiffFormat format = {"here", "there", false};
+    Bytes bytes = {0};
+    size_t count, shown = 0;
+    assert_int_equal(json_diff(texts[0].at, texts[1].at, NULL, &format, &bytes, &count, NULL),
+                     STATUS_OK);
+    for (const char *at = bytes.at; (at = strstr(at, "\"here\": 0, \"there\": 1}")) != NULL; at++)
+        shown++;
+    assert_true(count == DIFF_MAX + 5 && shown == DIFF_MAX);
+    bytes_clear(&bytes);
     bytes_clear(&texts[0]);
     bytes_clear(&texts[1]);
-    assert_int_equal(json_diff("{", "{}", NULL, &differences, NULL), STATUS_INTERNAL);
-    differences_clear(&differences);
+    assert_int_equal(json_diff("{\"x\": 1}", "{}", NULL, &format, &bytes, &count, NULL), STATUS_OK);
+    assert_string_equal(bytes.at, "[{\"pointer\": \"/x\", \"here\": 1}]");
+    bytes_clear(&bytes);
+    assert_int_equal(json_diff("{", "{}", NULL, &format, &bytes, &count, NULL), STATUS_INTERNAL);
 }
 
-static void a_report_reads_back_with_what_is_unknown(void **state) {
+static void a_report_with_unknown_members_is_read(void **state) {
     (void)state;
     Summary summary;
     static const char report[] = "{\"peak_displacement\": 0.5, \"impacts\": 3, "
@@ -95,12 +101,12 @@ static void a_report_reads_back_with_what_is_unknown(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(only_what_differs_is_told_with_its_place),
-        cmocka_unit_test(what_is_not_there_is_null),
+        cmocka_unit_test(each_difference_has_its_pointer),
+        cmocka_unit_test(missing_values_are_null),
         cmocka_unit_test(a_member_may_be_left_out),
         cmocka_unit_test(long_numbers_are_one_difference),
-        cmocka_unit_test(more_than_are_shown_are_counted),
-        cmocka_unit_test(a_report_reads_back_with_what_is_unknown),
+        cmocka_unit_test(differences_beyond_the_limit_are_counted),
+        cmocka_unit_test(a_report_with_unknown_members_is_read),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,6 +1,4 @@
 // The elements of a document's array, as they stand in the text.
-#include "server/json/scan.h"
-
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
