@@ -1,5 +1,4 @@
-// One pass over the rows; nothing is built in between. ", " parts members, "," elements of arrays
-// of numbers.
+// One pass over the rows. Members are separated by ", ", elements of arrays of numbers by ",".
 #include "server/json/encode.h"
 
 #include <inttypes.h>
@@ -109,8 +108,7 @@ static void put_value(Bytes *bytes, const Field *field, const void *member, Enco
     }
 }
 
-// What null empties, and what is empty: left out it would come back with its defaults, or as if
-// nothing were said.
+// Whether the member is empty and null says so: left out it would be read back with its defaults.
 static bool is_emptied(const Field *field, const void *item) {
     if (field->kind == FIELD_KIND_TEXT && (field->flags & FIELD_NULL_IS_EMPTY) != 0) {
         const char *text = *(char *const *)(const void *)((const char *)item + field->offset);

@@ -6,14 +6,14 @@
 
 #include "server/json/parse.h"
 
-// Replaces the text and releases `root`; `is_changed` false: no memory.
+// Replaces the text by `root`, which is released; `is_changed` false: no memory.
 static Status json_edit_write(Bytes *text, json_t *root, bool is_changed, Problem *problem) {
     char *changed = is_changed ? json_dumps(root, JSON_COMPACT) : NULL;
     json_decref(root);
     bool is_written = changed != NULL;
     if (is_written) {
         bytes_clear(text);
-        text->most = 0; // what is put in may be as long as what it is put into
+        text->most = 0; // the new text may be longer
         bytes_text(text, changed);
         is_written = !text->is_failed;
     }

@@ -1,4 +1,5 @@
-// An answer may come from anywhere: rows, blocks, depth and the size of a cell have limits.
+// A document comes from a server that is not trusted: rows, blocks, depth and the size of a cell
+// have limits.
 #include "server/json/table.h"
 
 #include <jansson.h>
@@ -21,7 +22,7 @@ void text_make_printable(char *text) {
         }
 }
 
-// Takes `text`; NULL: no memory.
+// Takes ownership of `text`; NULL: no memory.
 static void print_table_take(PrintTable *table, char *text) {
     char **cells = text != NULL ? realloc(table->cells, (table->count + 1) * sizeof *cells) : NULL;
     if (cells == NULL) {
@@ -60,7 +61,7 @@ void print_table_clear(PrintTable *table) {
     *table = (PrintTable){.columns = table->columns};
 }
 
-// Characters of UTF-8, as a terminal counts most of them.
+// The number of UTF-8 characters; on a terminal most of them take one column.
 static int text_width(const char *text) {
     int width = 0;
     for (; *text != '\0'; text++)
@@ -125,7 +126,7 @@ static bool printer_skips(const Printer *printer, const char *name) {
     return false;
 }
 
-// The unit of the row of that name, also among parts of others.
+// The unit of the row of that name, also among the members of others.
 static const char *unit_find(const Field *fields, const char *name, int depth) {
     const char *unit = NULL;
     for (const Field *row = fields; row->kind != FIELD_KIND_END && unit == NULL; row++) {
@@ -144,29 +145,29 @@ static const char *printer_unit(const Printer *printer, const char *name) {
     return unit;
 }
 
-// Prints the table, unless it is empty, under its heading, unless that was just printed or the
-// table is the document's first.
+// Prints the table under its heading, which is left out if it is that of the table before.
 static void printer_table(Printer *printer, PrintTable *table, const char *heading) {
     char text[HEADING_SIZE];
-    if (table->count == 0 || printer->blocks > BLOCKS_MAX)
-        return;
-    text_fit(text, sizeof text, heading);
-    text_make_printable(text);
-    if (printer->blocks++ == BLOCKS_MAX) {
-        fputs("\n... and more; --json has all\n", printer->file);
+    if (table->count == 0 || printer->blocks >= BLOCKS_MAX) {
+        if (table->count > 0 && printer->blocks++ == BLOCKS_MAX)
+            fputs("\n... and more; --json has all\n", printer->file);
+        print_table_clear(table);
         return;
     }
-    if (printer->blocks > 1)
+    text_fit(text, sizeof text, heading);
+    text_make_printable(text);
+    if (printer->blocks++ > 0) {
         fputc('\n', printer->file);
-    if (printer->blocks > 1 && text[0] != '\0' && strcmp(text, printer->heading) != 0)
-        fprintf(printer->file, "%s\n", text);
+        if (text[0] != '\0' && strcmp(text, printer->heading) != 0)
+            fprintf(printer->file, "%s\n", text);
+    }
     text_fit(printer->heading, sizeof printer->heading, text);
     const size_t rows = table->count / table->columns - (table->has_heads ? 1 : 0);
     printer->longest = rows > printer->longest ? rows : printer->longest;
     print_table_print(table, printer->file);
 }
 
-// A scalar, or a list of them: what fits into a cell.
+// Whether a value fits into a cell: a scalar or a list of scalars.
 static bool value_is_plain(const json_t *value) {
     return !json_is_object(value) &&
            !(json_is_array(value) && json_is_object(json_array_get(value, 0)));
@@ -212,7 +213,7 @@ static void value_add(PrintTable *table, const json_t *value, const char *unit) 
     bytes_clear(&cell);
 }
 
-static void head_add(const Printer *printer, PrintTable *table, const char *name) {
+static void name_add(const Printer *printer, PrintTable *table, const char *name) {
     const char *unit = printer_unit(printer, name);
     print_table_add(table, "%s%s%s%s", name, unit != NULL ? " [" : "", unit != NULL ? unit : "",
                     unit != NULL ? "]" : "");
@@ -220,20 +221,6 @@ static void head_add(const Printer *printer, PrintTable *table, const char *name
 
 static void heading_join(char target[HEADING_SIZE], const char *heading, const char *name) {
     snprintf(target, HEADING_SIZE, "%.120s%s%.120s", heading, heading[0] != '\0' ? " " : "", name);
-}
-
-// The plain values of an object: a name and a value a row.
-static void values_print(Printer *printer, json_t *object, const char *heading) {
-    const char *name;
-    json_t *value;
-    PrintTable table = {.columns = 2};
-    json_object_foreach(object, name, value) {
-        if (!value_is_plain(value) || value_is_empty(value) || printer_skips(printer, name))
-            continue;
-        print_table_add(&table, "%s", name);
-        value_add(&table, value, printer_unit(printer, name));
-    }
-    printer_table(printer, &table, heading);
 }
 
 // Whether any object of a list has a value there that is worth a cell; "no" everywhere is not.
@@ -246,173 +233,148 @@ static bool list_has(const json_t *list, const char *name) {
     return false;
 }
 
-static const PrintTableColumns *list_find(const Printer *printer, const char *name) {
+// The columns that the view has for the list; NULL: all members of its objects.
+static const char *const *list_columns(const Printer *printer, const char *name) {
     for (const PrintTableColumns *one = printer->view->lists; one != NULL && one->list != NULL;
          one++)
         if (strcmp(one->list, name) == 0)
-            return one;
+            return one->columns;
     return NULL;
 }
 
-// The members of the list's objects, in the order in which they appear.
-static size_t list_members(const Printer *printer, const json_t *list, const char **columns) {
+static void list_add_column(const json_t *list, const char *name,
+                            const char *columns[LISTING_COLUMNS + 1]) {
     size_t count = 0;
-    for (size_t i = 0; i < json_array_size(list) && i < ROWS_MAX; i++) {
+    while (columns[count] != NULL && strcmp(columns[count], name) != 0)
+        count++;
+    if (columns[count] == NULL && count < LISTING_COLUMNS && list_has(list, name))
+        columns[count] = name;
+}
+
+static void list_print(Printer *printer, const json_t *list, const char *const *wanted,
+                       const char *heading) {
+    const char *columns[LISTING_COLUMNS + 1] = {NULL};
+    const size_t size = json_array_size(list), rows = size < ROWS_MAX ? size : ROWS_MAX;
+    for (; wanted != NULL && *wanted != NULL; wanted++)
+        list_add_column(list, *wanted, columns);
+    for (size_t i = 0; wanted == NULL && i < rows; i++) {
         const char *name;
         json_t *value;
         json_object_foreach(json_array_get(list, i), name, value) {
-            bool is_there = printer_skips(printer, name);
-            for (size_t k = 0; k < count && !is_there; k++)
-                is_there = strcmp(columns[k], name) == 0;
-            if (!is_there && count < LISTING_COLUMNS && list_has(list, name))
-                columns[count++] = name;
+            if (!printer_skips(printer, name))
+                list_add_column(list, name, columns);
         }
     }
-    return count;
-}
-
-static void list_print(Printer *printer, const json_t *list, const PrintTableColumns *wanted,
-                       const char *heading) {
-    const char *columns[LISTING_COLUMNS];
-    size_t count = 0;
-    for (size_t i = 0; wanted != NULL && wanted->columns[i] != NULL; i++)
-        if (list_has(list, wanted->columns[i]))
-            columns[count++] = wanted->columns[i];
-    if (wanted == NULL)
-        count = list_members(printer, list, columns);
-    PrintTable table = {.columns = count, .has_heads = true};
-    for (size_t k = 0; k < count; k++)
-        head_add(printer, &table, columns[k]);
-    for (size_t i = 0; i < json_array_size(list) && i < ROWS_MAX; i++)
-        for (size_t k = 0; k < count; k++)
+    PrintTable table = {.has_heads = true};
+    while (columns[table.columns] != NULL)
+        name_add(printer, &table, columns[table.columns++]);
+    for (size_t i = 0; i < rows; i++)
+        for (size_t k = 0; k < table.columns; k++)
             value_add(&table, json_object_get(json_array_get(list, i), columns[k]), NULL);
+    const bool is_cut = table.columns > 0 && size > rows;
     printer_table(printer, &table, heading);
-    if (count > 0 && json_array_size(list) > ROWS_MAX)
-        fprintf(printer->file, "... and %zu more; --json has all\n",
-                json_array_size(list) - ROWS_MAX);
+    if (is_cut)
+        fprintf(printer->file, "... and %zu more; --json has all\n", size - rows);
 }
 
-// Neighbouring objects with the same members.
-typedef struct MaterialGroup {
-    const char *names[LISTING_COLUMNS - 1];
-    json_t *objects[LISTING_COLUMNS - 1];
-    size_t count;
-} MaterialGroup;
+static void object_print(Printer *printer, json_t *object, const char *heading, int depth);
 
-static bool group_takes(const MaterialGroup *group, const json_t *object) {
-    const char *name;
-    json_t *value;
-    if (group->count == COUNT(group->names) ||
-        json_object_size(group->objects[0]) != json_object_size(object))
-        return false;
-    json_object_foreach(group->objects[0], name, value) {
-        if (json_object_get(object, name) == NULL)
-            return false;
-    }
-    return true;
-}
-
-static bool group_has(const MaterialGroup *group, const char *name) {
-    for (size_t k = 0; k < group->count; k++) {
-        const json_t *value = json_object_get(group->objects[k], name);
-        if (value_is_plain(value) && !value_is_empty(value))
-            return true;
-    }
-    return false;
-}
-
-// A column for each object, a row for each member.
-static void group_table(Printer *printer, const MaterialGroup *group, const char *heading) {
-    const char *name;
-    json_t *value;
-    PrintTable table = {.columns = group->count + 1, .has_heads = true};
-    print_table_add(&table, "%s", "");
-    for (size_t k = 0; k < group->count; k++)
-        head_add(printer, &table, group->names[k]);
-    json_object_foreach(group->objects[0], name, value) {
-        if (!group_has(group, name) || printer_skips(printer, name))
-            continue;
-        print_table_add(&table, "%s", name);
-        for (size_t k = 0; k < group->count; k++)
-            value_add(&table, json_object_get(group->objects[k], name),
-                      printer_unit(printer, name));
-    }
-    printer_table(printer, &table, heading);
-}
-
-static void parts_print(Printer *printer, json_t *object, const char *heading, int depth);
-
-static void group_print(Printer *printer, MaterialGroup *group, const char *heading, int depth) {
-    if (group->count > 1)
-        group_table(printer, group, heading);
-    for (size_t k = 0; k < group->count; k++) {
-        char inner[HEADING_SIZE];
-        heading_join(inner, heading, group->names[k]);
-        if (group->count == 1)
-            values_print(printer, group->objects[k], inner);
-        parts_print(printer, group->objects[k], inner, depth + 1);
-    }
-    group->count = 0;
-}
-
-// A list whose objects have parts is shown object by object, any other as a table.
-static void objects_print(Printer *printer, const json_t *list, const char *name,
+// Objects as a table; those with parts one by one, under their names or numbers.
+static void objects_print(Printer *printer, const json_t *list, const char *const *wanted,
                           const char *heading, int depth) {
-    const char *key;
+    const char *name;
     json_t *value;
-    const PrintTableColumns *wanted = list_find(printer, name);
     bool has_parts = false;
-    json_object_foreach(json_array_get(list, 0), key, value) has_parts =
-        has_parts || (json_is_object(value) && !printer_skips(printer, key));
+    json_object_foreach(json_array_get(list, 0), name, value) has_parts =
+        has_parts || (json_is_object(value) && !printer_skips(printer, name));
     if (!has_parts || wanted != NULL) {
         list_print(printer, list, wanted, heading);
         return;
     }
     for (size_t i = 0; i < json_array_size(list); i++) {
         char number[24], inner[HEADING_SIZE];
+        const json_t *called = json_object_get(json_array_get(list, i), "");
         snprintf(number, sizeof number, "%zu", i + 1);
-        heading_join(inner, heading, number);
-        values_print(printer, json_array_get(list, i), inner);
-        parts_print(printer, json_array_get(list, i), inner, depth + 1);
+        heading_join(inner, heading, called != NULL ? json_string_value(called) : number);
+        (void)json_object_del(json_array_get(list, i), "");
+        object_print(printer, json_array_get(list, i), inner, depth + 1);
     }
 }
 
-// The objects and lists of objects in an object.
-static void parts_print(Printer *printer, json_t *object, const char *heading, int depth) {
+static bool has_same_members(json_t *a, json_t *b) {
     const char *name;
     json_t *value;
-    MaterialGroup group = {.count = 0};
-    if (depth > DEPTH_MAX)
-        return;
-    json_object_foreach(object, name, value) {
-        char inner[HEADING_SIZE];
-        if (value_is_plain(value) || printer_skips(printer, name))
-            continue;
-        if (group.count > 0 && !(json_is_object(value) && group_takes(&group, value)))
-            group_print(printer, &group, heading, depth);
-        if (json_is_object(value)) {
-            group.names[group.count] = name;
-            group.objects[group.count++] = value;
-        } else {
-            heading_join(inner, heading, name);
-            objects_print(printer, value, name, inner, depth);
-        }
+    if (json_object_size(a) != json_object_size(b))
+        return false;
+    json_object_foreach(a, name, value) {
+        if (json_object_get(b, name) == NULL)
+            return false;
     }
-    group_print(printer, &group, heading, depth);
+    return true;
+}
+
+// Prints the objects from the member *at on that have the same members; more than one of them as a
+// list whose first column is their name. *at moves behind them.
+static void neighbours_print(Printer *printer, json_t *object, void **at, const char *heading,
+                             int depth) {
+    json_t *first = json_object_iter_value(*at), *list = json_array();
+    char inner[HEADING_SIZE];
+    heading_join(inner, heading, json_object_iter_key(*at));
+    do {
+        json_t *row = json_object();
+        const char *name = json_object_iter_key(*at), *unit = printer_unit(printer, name);
+        (void)json_object_set_new(
+            row, "", unit != NULL ? json_sprintf("%s [%s]", name, unit) : json_string(name));
+        (void)json_object_update(row, json_object_iter_value(*at));
+        (void)json_array_append_new(list, row);
+        *at = json_object_iter_next(object, *at);
+    } while (*at != NULL && !printer_skips(printer, json_object_iter_key(*at)) &&
+             json_is_object(json_object_iter_value(*at)) &&
+             has_same_members(first, json_object_iter_value(*at)));
+    if (json_array_size(list) > 1)
+        objects_print(printer, list, NULL, heading, depth);
+    else
+        object_print(printer, first, inner, depth + 1);
+    json_decref(list);
+}
+
+// The plain values of an object, a name and a value a row; then its objects and lists of objects.
+static void object_print(Printer *printer, json_t *object, const char *heading, int depth) {
+    PrintTable table = {.columns = 2};
+    const char *name;
+    json_t *value;
+    json_object_foreach(object, name, value) {
+        if (!value_is_plain(value) || value_is_empty(value) || printer_skips(printer, name))
+            continue;
+        print_table_add(&table, "%s", name);
+        value_add(&table, value, printer_unit(printer, name));
+    }
+    printer_table(printer, &table, heading);
+    for (void *at = json_object_iter(object); at != NULL && depth <= DEPTH_MAX;) {
+        char inner[HEADING_SIZE];
+        name = json_object_iter_key(at);
+        value = json_object_iter_value(at);
+        if (json_is_object(value) && !printer_skips(printer, name)) {
+            neighbours_print(printer, object, &at, heading, depth);
+            continue;
+        }
+        heading_join(inner, heading, name);
+        if (!value_is_plain(value) && !printer_skips(printer, name))
+            objects_print(printer, value, list_columns(printer, name), inner, depth);
+        at = json_object_iter_next(object, at);
+    }
 }
 
 Status print_table_print_json(const char *text, size_t size, const PrintTableView *view, FILE *file,
                               size_t *longest, Problem *problem) {
     Printer printer = {.view = view, .file = file};
     json_t *root = json_parse_tree(text, size);
-    const bool is_object = root != NULL;
-    if (is_object) {
-        values_print(&printer, root, "");
-        parts_print(&printer, root, "", 0);
-    }
-    json_decref(root);
+    if (root != NULL)
+        object_print(&printer, root, "", 0);
     *longest = printer.longest;
+    const bool is_object = root != NULL;
+    json_decref(root);
     return is_object ? STATUS_OK
                      : problem_set(problem, STATUS_UNREACHABLE,
-                                   "the answer is no document: what answers there is no impactd");
+                                   "unexpected response; is the server really impactd?");
 }

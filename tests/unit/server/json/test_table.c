@@ -80,13 +80,14 @@ static void documents_are_shown_member_by_member(void **state) {
            "n  1\n\nof\nspeed [m/s]\n          2\n          3\n");
     expect("{\"p\": {\"u\": 1, \"v\": null}, \"q\": {\"u\": 2, \"v\": null}, \"r\": {\"x\": "
            "{\"y\": 4}}}",
-           "   p  q\nu  1  2\n\nr x\ny  4\n");
+           "   u\np  1\nq  2\n\nr x\ny  4\n");
+    expect("{\"a\": {\"t\": {\"v\": 1}}, \"b\": {\"t\": {\"v\": 2}}}", "v  1\n\nb t\nv  2\n");
     expect("{\"each\": [{\"n\": 1, \"in\": {\"k\": 5}}, {\"n\": 2, \"in\": {\"k\": 6}}]}",
            "n  1\n\neach 1 in\nk  5\n\neach 2\nn  2\n\neach 2 in\nk  6\n");
     expect("{}", "");
 }
 
-static void what_is_no_object_is_refused_and_what_is_large_is_cut(void **state) {
+static void text_that_is_not_an_object_is_refused_and_a_long_list_is_cut(void **state) {
     (void)state;
     static const char *const texts[] = {"", "[1]", "{", "{\"a\": 1, \"a\": 2}"};
     char *text;
@@ -112,7 +113,7 @@ int main(void) {
         cmocka_unit_test(control_characters_are_replaced),
         cmocka_unit_test(numbers_stand_to_the_right_and_unknown_cells_are_marked),
         cmocka_unit_test(documents_are_shown_member_by_member),
-        cmocka_unit_test(what_is_no_object_is_refused_and_what_is_large_is_cut),
+        cmocka_unit_test(text_that_is_not_an_object_is_refused_and_a_long_list_is_cut),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
