@@ -13,7 +13,7 @@
 #include "server/formats/sweep_table.h"
 #include "server/http/reply.h"
 #include "server/jobs/documents.h"
-#include "server/jobs/sweep_rows.h"
+#include "server/jobs/sweep.h"
 #include "server/json/encode.h"
 #include "server/util/base_path.h"
 
@@ -194,7 +194,7 @@ static Status read_index(const Request *request, uint64_t *index, Problem *probl
 }
 
 static void put_point(Bytes *bytes, const SweepView *show, uint64_t index,
-                      const SweepPointView *point) {
+                      const SweepPoint *point) {
     const Sweep *sweep = show->sweep;
     bytes_format(bytes, "{\"index\": %llu, \"result\": \"%s\", \"status\": \"%s\", \"why\": ",
                  (unsigned long long)index, show->row.result, sweep_status_names[point->status]);
@@ -225,11 +225,11 @@ static Status show_point(App *app, const Request *request, Reply *reply, bool is
                          Problem *problem) {
     uint64_t index = 0;
     SweepView show = {.sweep = NULL};
-    SweepPointView point = {.values = NULL};
+    SweepPoint point = {.status = SWEEP_PENDING};
     TRY(read_index(request, &index, problem));
     Status status = sweep_view_load(app->db, request->parameters[0], false, false, &show, problem);
     if (status == STATUS_OK)
-        status = sweep_point_load(app->db, &show, index, &point, problem);
+        status = sweep_point_load(&show, index, &point, problem);
     if (status == STATUS_OK) {
         Bytes bytes = {.most = app->reply_most};
         if (is_scene) {
@@ -240,7 +240,6 @@ static Status show_point(App *app, const Request *request, Reply *reply, bool is
         }
         status = reply_bytes(reply, 200, type_json, &bytes, problem);
     }
-    free(point.values);
     study_request_clear(&point.scene);
     sweep_view_clear(&show);
     return status;

@@ -8,12 +8,12 @@
 #include "core/study/sweep.h"
 #include "core/study/tradeoff.h"
 #include "server/cli/command.h"
-#include "server/cli/crew.h"
 #include "server/cli/output.h"
 #include "server/cli/progress_bar.h"
 #include "server/cli/scene_file.h"
 #include "server/formats/study_formats.h"
 #include "server/jobs/jobs.h"
+#include "server/jobs/study_engine.h"
 #include "server/json/table.h"
 #include "server/util/clock.h"
 
@@ -117,10 +117,10 @@ static Status study_make(const StudyCommand *command, const StudyRequest *inquir
     Variant *answer = NULL;
     progress_bar_start(&bar);
     const Progress watch = progress_bar_watch(&bar);
-    Status status =
-        study_has_members(inquiry->study)
-            ? crew_run(inquiry->study, &inquiry->simulation, limits, &watch, &answer, problem)
-            : study_measure(inquiry, limits, &watch, &answer, problem);
+    Status status = study_has_members(inquiry->study)
+                        ? study_engine_run(inquiry->study, &inquiry->simulation, limits, &watch,
+                                           &answer, problem)
+                        : study_measure(inquiry, limits, &watch, &answer, problem);
     progress_bar_stop(&bar);
     // The document's own study prints nothing where it is written to files.
     const bool is_quiet = command->print == NULL && outputs->count > 0 && !settings->json;

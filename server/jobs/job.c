@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/jobs/study_sink.h"
+#include "server/jobs/study.h"
 #include "server/util/clock.h"
 
 const char *const job_state_names[] = {"accepted", "running",   "successful",
@@ -112,11 +112,11 @@ Status job_view(Job *job, JobView *show) {
         show->is_result_deleted = job->manager == NULL && !row->has_result;
     } else if (job->task != NULL) {
         show->progress = atomic_load(&job->task->progress) / 100.0;
-        StudyRun *run = job->task->study;
-        if (run != NULL && run->gather == &gather_rows) {
-            show->points = run->row.points;
-            show->points_done = atomic_load(&run->rows_done);
-            show->points_failed = atomic_load(&run->rows_failed);
+        SweepRun *sweep = job->task->study != NULL ? job->task->study->sweep : NULL;
+        if (sweep != NULL) {
+            show->points = sweep->row.points;
+            show->points_done = atomic_load(&sweep->made);
+            show->points_failed = atomic_load(&sweep->made_failed);
         }
     }
     if (!job_state_is_final(row->state) && job->submitted_ns > 0) {

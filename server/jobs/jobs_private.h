@@ -77,8 +77,7 @@ typedef struct Worker {
     JobManager *manager;
     pthread_t thread;
     Task *running;          // or NULL
-    struct StudyRun *study; // of which it has a chunk in hand, or NULL
-    size_t chunk;           // its first member
+    struct StudyRun *study; // of which it has a turn, or NULL
     bool is_spare;       // beyond the number asked for: takes quick work while all others are slow
     Workspace workspace; // of its thread alone
 } Worker;

@@ -1,24 +1,24 @@
-// The way of a study:
+//     a worker:    runs the scene, begins the study (a sweep's chunks are written down)
+//     any worker:  takes a turn: makes members until the turn is over and other work waits
+//     the last:    ends it: result and jobs, as of any task
 //
-//     a worker:   begin - cut into chunks (a sweep's are written down) - launch
-//     any worker: take a chunk, make its members, gather them ... until none is wanted
-//     the last:   result and jobs, as of any computation
-//
-// While it has chunks that wait, one turn of it stands in the queue: whoever takes that takes a
-// chunk and puts the next turn behind the others'. Where the store keeps what it comes to, a full
-// disk pauses it: the chunk waits in memory and is tried again now and then.
+// As long as there are members to be made, one turn of the study stands in the queue: the worker
+// that takes it puts the next one behind the turns of others. A sweep whose rows the database
+// cannot take is paused: the chunk waits in memory and is tried again.
 #include "server/jobs/study.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 
-#include "server/jobs/study_sink.h"
 #include "server/util/clock.h"
 #include "server/util/log.h"
 
-// Each that is under way holds its scene's outcome and what it folds.
-enum { STUDIES_BYTES = 512 << 20, STUDIES_PER_WORKER = 2 };
+enum {
+    STUDIES_BYTES = 512 << 20, // held by all studies in progress
+    STUDIES_PER_WORKER = 2,    // that may begin whatever they hold
+    TURN_MS = 10,              // at least, of a turn
+    LOOK_MS = 1,               // how often a turn looks whether other work waits
+};
 
 bool study_is_shared(const Task *task) {
     const Variant *study = task->inquiry.study;
@@ -31,107 +31,99 @@ void study_estimate(Task *task, const SimulationLimits *limits) {
     Cost whole = own;
     // A series that is computed again needs no study.
     if (!task->recompute_only && study_request_cost(inquiry, limits, &whole, NULL) != STATUS_OK)
-        whole.cpu_seconds = queue_quick; // the run will tell
+        whole.cpu_seconds = queue_quick; // the run will report it
     task->queued.seconds = whole.cpu_seconds;
     task->queued.charge = study_is_shared(task) ? own.cpu_seconds : 0;
 }
 
-void chunk_run_free(StudyRun *run, ChunkRun *chunk_run) {
-    if (chunk_run == NULL)
-        return;
-    if (run->gather->drop != NULL)
-        run->gather->drop(chunk_run);
-    free(chunk_run);
+// The task's progress, which never decreases. False: the task was stopped.
+static bool study_advance_task(void *context, double fraction) {
+    static const double begun = STUDY_OWN + (1 - STUDY_OWN) * STUDY_BEGUN;
+    Task *task = context;
+    const unsigned reached = (unsigned)(1e4 * (begun + (1 - begun) * fraction));
+    unsigned last = atomic_load(&task->progress);
+    while (last < reached && !atomic_compare_exchange_weak(&task->progress, &last, reached))
+        ;
+    return !atomic_load(&task->is_stopped);
+}
+
+static bool study_is_over(StudyRun *run) {
+    return atomic_load(&run->engine.is_over) || atomic_load(&run->task->is_stopped);
 }
 
 void study_run_free(StudyRun *run) {
     if (run == NULL)
         return;
-    while (run->first != NULL) {
-        ChunkRun *chunk_run = run->first;
-        run->first = chunk_run->next;
-        chunk_run_free(run, chunk_run);
-    }
-    run->gather->free(run);
+    sweep_run_free(run->sweep);
+    study_engine_close(&run->engine);
     study_free(run->work);
     run_result_clear(&run->run_result);
     free(run);
 }
 
 // With the lock held: the next turn is in the queue if there is something to do.
-static void enqueue(StudyRun *run) {
-    JobManager *manager = run->manager;
-    Task *task = run->task;
-    QueueEntry *entry = &task->queued;
-    if (entry->number != 0 || run->first == NULL || run->is_paused)
+static void study_enqueue(StudyRun *run) {
+    QueueEntry *entry = &run->task->queued;
+    const bool has_work =
+        run->sweep != NULL ? sweep_run_has_chunk(run->sweep) : study_engine_has_next(&run->engine);
+    if (entry->number != 0 || !has_work || run->is_paused)
         return;
     entry->is_turn = true;
-    entry->seconds = fmax(run->turn, 1e-3 * STUDY_TURN_MS);
+    entry->seconds = fmax(run->member_seconds, 1e-3 * TURN_MS);
     entry->charge = 0;
-    QueueClient *client = task->jobs != NULL ? task->jobs->client : entry->client;
-    queue_put(manager->queue, entry, client, 1e-9 * (double)clock_monotonic_ns());
-    jobs_call_worker(manager);
+    QueueClient *client = run->task->jobs != NULL ? run->task->jobs->client : entry->client;
+    queue_put(run->manager->queue, entry, client, 1e-9 * (double)clock_monotonic_ns());
+    jobs_call_worker(run->manager);
 }
 
-void study_wait(StudyRun *run, ChunkRun *chunk_run, bool is_first) {
-    if (is_first || run->first == NULL) {
-        chunk_run->next = run->first;
-        run->first = chunk_run;
-        if (run->last == NULL)
-            run->last = chunk_run;
-    } else {
-        chunk_run->next = NULL;
-        run->last->next = chunk_run;
-        run->last = chunk_run;
-    }
-    enqueue(run);
-}
-
-static Status no_memory(Problem *problem) {
-    return problem_set(problem, STATUS_NO_MEMORY, "no memory for the study");
-}
-
-static Status open_run(Worker *worker, StudyRun *run, RunResult *run_result, const Progress *watch,
-                       Problem *problem) {
+static Status study_open(Worker *worker, StudyRun *run, StudyAnswer *answer, Problem *problem) {
+    const JobManagerSettings *settings = &worker->manager->settings;
     const StudyRequest *inquiry = &run->task->inquiry;
-    const StudyTools tools = {.limits = &worker->manager->settings.limits,
-                              .progress = watch,
-                              .workspace = &worker->workspace};
-    TRY(study_begin(inquiry->study, &inquiry->simulation, &tools, &run_result->answer.study,
-                    &run->work, problem));
-    atomic_store(&run->expected, run->work->expected);
-    return run->gather->open(worker, run, problem);
+    ProgressRange range = {&(Progress){run->task, task_advance}, STUDY_OWN, 1 - STUDY_OWN, 0};
+    const Progress begin = progress_range_view(&range);
+    const Progress members = {run->task, study_advance_task};
+    const StudyTools tools = {
+        .limits = &settings->limits, .progress = &begin, .workspace = &worker->workspace};
+    const bool is_sweep = study_kind(inquiry->study) == &study_sweep;
+    TRY(study_begin(inquiry->study, &inquiry->simulation, &tools, &answer->study, &run->work,
+                    problem));
+    TRY(study_engine_open(&run->engine, run->work, &settings->limits, &members,
+                          is_sweep ? 0 : settings->workers, problem));
+    if (!is_sweep) {
+        run->bytes = run->work->bytes + run->engine.window * run->work->part_bytes;
+        return STATUS_OK;
+    }
+    return sweep_run_open(worker->manager->db, run->task->result, run->task->scene, &run->engine,
+                          settings->workers, &worker->workspace, &run->sweep, problem);
 }
 
-Status study_open(Worker *worker, Task *task, RunResult *run_result, const Progress *watch,
-                  Problem *problem) {
+Status study_start(Worker *worker, Task *task, RunResult *run_result, Problem *problem) {
     JobManager *manager = worker->manager;
     StudyRun *run = calloc(1, sizeof *run);
     if (run == NULL)
-        return no_memory(problem);
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the study");
+    const int64_t began_ns = clock_thread_cpu_ns();
     run->manager = manager;
     run->task = task;
-    run->executor = executors[0];
-    run->gather = study_kind(task->inquiry.study) == &study_sweep ? &gather_rows : &gather_fold;
-    run->in_hand = 1; // ours, until it was launched: nobody ends it meanwhile
-    const Status status = open_run(worker, run, run_result, watch, problem);
+    const Status status = study_open(worker, run, &run_result->answer, problem);
+    job_metrics_study(&manager->totals, clock_thread_cpu_ns() - began_ns);
     if (status != STATUS_OK) {
         study_run_free(run);
         return status;
     }
+    run->run_result = *run_result;
+    *run_result = (RunResult){0};
+    run->bytes += outcome_bytes(run->run_result.outcome);
+    run->in_hand = 1;
     pthread_mutex_lock(&manager->lock);
-    task->study = run; // which frees it from here on
+    task->study = run; // which frees it
+    run->next = manager->studies;
+    manager->studies = run;
+    manager->study_count++;
+    manager->study_bytes += run->bytes;
+    study_enqueue(run);
     pthread_mutex_unlock(&manager->lock);
     return STATUS_OK;
-}
-
-// With the lock held.
-static void fail(StudyRun *run, Status status, const Problem *problem) {
-    if (run->is_failed)
-        return;
-    run->is_failed = true;
-    atomic_store(&run->is_over, true);
-    run_result_fail(&run->run_result, status, problem);
 }
 
 bool study_must_wait(const JobManager *manager, const Task *task) {
@@ -141,7 +133,7 @@ bool study_must_wait(const JobManager *manager, const Task *task) {
 }
 
 // With the lock held.
-static void resume_stalled(JobManager *manager) {
+static void study_resume_waiting(JobManager *manager) {
     while (manager->waiting_for_memory != NULL) {
         Task *task = manager->waiting_for_memory;
         manager->waiting_for_memory = task->next_stalled;
@@ -150,153 +142,146 @@ static void resume_stalled(JobManager *manager) {
     }
 }
 
-static bool is_over(StudyRun *run) {
-    return !study_continues(run, 0);
+void studies_resume(JobManager *manager) {
+    study_resume_waiting(manager);
+    for (StudyRun *run = manager->studies; run != NULL; run = run->next)
+        if (run->is_paused) {
+            run->is_paused = false;
+            study_enqueue(run);
+        }
 }
 
-// With the lock held, by whoever had something of it in hand: whether it is to be ended now, by
-// them. It is in no list any more then, and stays in their hands.
-static bool let_go(StudyRun *run) {
-    if (!is_over(run) || run->in_hand > 1) {
+// With the lock held: ends a turn. True: the study is over and this was its last turn; it is in no
+// list any more, and the caller ends it.
+static bool study_release(StudyRun *run) {
+    JobManager *manager = run->manager;
+    if (!study_is_over(run) || run->in_hand > 1) {
         run->in_hand--;
         return false;
     }
-    JobManager *manager = run->manager;
     queue_remove(manager->queue, &run->task->queued);
     manager->study_count--;
     manager->study_bytes -= run->bytes;
-    resume_stalled(manager);
-    for (StudyRun **at = &manager->studies; *at != NULL; at = &(*at)->next)
-        if (*at == run) {
-            *at = run->next;
-            break;
-        }
+    study_resume_waiting(manager);
+    StudyRun **at = &manager->studies;
+    while (*at != run)
+        at = &(*at)->next;
+    *at = run->next;
     return true;
 }
 
-void study_start(Worker *worker, Task *task, RunResult *run_result, Problem *problem) {
-    JobManager *manager = worker->manager;
-    StudyRun *run = task->study;
-    run->run_result = *run_result;
-    *run_result = (RunResult){0};
-    pthread_mutex_lock(&manager->lock);
-    run->next = manager->studies;
-    manager->studies = run;
-    run->bytes += outcome_bytes(run->run_result.outcome);
-    manager->study_count++;
-    manager->study_bytes += run->bytes;
-    pthread_mutex_unlock(&manager->lock);
-    problem_clear(problem);
-    const Status status = run->gather->submit(run, problem);
-    pthread_mutex_lock(&manager->lock);
-    if (status != STATUS_OK)
-        fail(run, status, problem);
-    const bool is_ended = let_go(run);
-    pthread_mutex_unlock(&manager->lock);
-    if (is_ended)
-        study_finish(worker, run, problem);
-}
-
-ChunkRun *study_take(StudyRun *run, bool *is_ended) {
+bool study_take(StudyRun *run, StudyTurn *turn) {
+    *turn = (StudyTurn){.run = run};
     run->in_hand++;
-    *is_ended = false;
-    if (is_over(run)) {
-        *is_ended = let_go(run);
-        return NULL;
+    if (study_is_over(run)) {
+        turn->is_end = study_release(run);
+        return turn->is_end;
     }
-    ChunkRun *chunk_run = run->first; // there is one: else it would have no turn
-    run->first = chunk_run->next;
-    if (run->first == NULL)
-        run->last = NULL;
-    chunk_run->next = NULL;
-    enqueue(run);
-    return chunk_run;
+    bool is_taken;
+    if (run->sweep != NULL)
+        is_taken = (turn->chunk = sweep_run_take(run->sweep)) != NULL;
+    else
+        is_taken = study_engine_next(&run->engine, false, &turn->member);
+    study_enqueue(run);
+    if (!is_taken)
+        run->in_hand--;
+    return is_taken;
 }
 
 void study_stop(StudyRun *run) {
     if (run->in_hand > 0)
-        return; // they will see
+        return; // the last turn ends it
     queue_remove(run->manager->queue, &run->task->queued);
     queue_push_front(run->manager->queue, &run->task->queued);
     jobs_call_worker(run->manager);
 }
 
-void studies_resume(JobManager *manager) {
-    resume_stalled(manager);
-    for (StudyRun *run = manager->studies; run != NULL; run = run->next)
-        if (run->is_paused) {
-            run->is_paused = false;
-            enqueue(run);
-        }
+typedef struct TurnClock {
+    int64_t began_ns, looked_ns;
+    size_t made; // members
+} TurnClock;
+
+// Between two members: whether the turn is over and other work waits. If there is more to do, other
+// workers join.
+static bool study_must_yield(StudyRun *run, TurnClock *clock) {
+    JobManager *manager = run->manager;
+    const int64_t now_ns = clock_monotonic_ns();
+    if (now_ns - clock->looked_ns < (int64_t)LOOK_MS * 1000000)
+        return false;
+    clock->looked_ns = now_ns;
+    pthread_mutex_lock(&manager->lock);
+    study_enqueue(run);
+    const size_t own = run->task->queued.number != 0;
+    const bool is_wanted = queue_count(manager->queue) > own || manager->is_closing;
+    pthread_mutex_unlock(&manager->lock);
+    return is_wanted && now_ns - clock->began_ns >= (int64_t)TURN_MS * 1000000;
+}
+
+static Status study_make_members(Worker *worker, const StudyTurn *turn, TurnClock *clock,
+                                 Problem *problem) {
+    StudyEngine *engine = &turn->run->engine;
+    size_t member = turn->member;
+    do {
+        TRY(study_engine_make(engine, member, &worker->workspace, problem));
+        clock->made++;
+    } while (!study_must_yield(turn->run, clock) && study_engine_next(engine, false, &member));
+    return STATUS_OK;
+}
+
+static Status study_make_rows(Worker *worker, const StudyTurn *turn, TurnClock *clock,
+                              Problem *problem) {
+    StudyRun *run = turn->run;
+    SweepChunk *chunk = turn->chunk;
+    TRY(sweep_chunk_load(run->sweep, chunk, problem));
+    for (; chunk->done < chunk->count; chunk->done++, clock->made++) {
+        if (clock->made > 0 && study_must_yield(run, clock))
+            return STATUS_OK;
+        if (!study_engine_continues(&run->engine))
+            return STATUS_CANCELLED;
+        TRY(sweep_chunk_make(run->sweep, chunk, &worker->workspace, problem));
+    }
+    return sweep_chunk_save(run->sweep, chunk, problem);
 }
 
 // With the lock held.
-static void pause(StudyRun *run, const Problem *problem) {
-    if (!run->is_told) {
+static void study_fail(StudyRun *run, Status status, const Problem *problem) {
+    if (run->is_failed)
+        return;
+    run->is_failed = true;
+    study_engine_stop(&run->engine);
+    run_result_fail(&run->run_result, status, problem);
+}
+
+// With the lock held.
+static void study_pause(StudyRun *run, const Problem *problem) {
+    if (!run->is_pause_logged) {
         Bytes line = {.most = 1024};
         bytes_format(&line, "the sweep %s pauses: %s", run->task->result, problem->detail);
         log_write(&line);
         bytes_clear(&line);
     }
-    run->is_told = run->is_paused = true;
+    run->is_pause_logged = run->is_paused = true;
     queue_remove(run->manager->queue, &run->task->queued);
 }
 
-void study_work(Worker *worker, StudyRun *run, ChunkRun *chunk_run, Problem *problem) {
-    JobManager *manager = worker->manager;
-    const size_t done = chunk_run->done;
-    const int64_t began_ns = clock_monotonic_ns(), began_cpu_ns = clock_thread_cpu_ns();
-    problem_clear(problem);
-    Status status =
-        chunk_run->is_made ? STATUS_OK : study_chunk_make(worker, run, chunk_run, problem);
-    const double seconds = 1e-9 * (double)(clock_monotonic_ns() - began_ns);
-    const bool is_parked = status == STATUS_BUSY;
-    job_metrics_study_part(&manager->totals, clock_thread_cpu_ns() - began_cpu_ns);
-    if (status == STATUS_OK && run->gather->end != NULL)
-        status = run->gather->end(run, chunk_run, problem);
-    pthread_mutex_lock(&manager->lock);
-    worker->study = NULL;
-    manager->slow_running--;
-    // At least one member is made at a time.
-    if (chunk_run->done > done)
-        run->turn = seconds / (double)(chunk_run->done - done);
-    if (status == STATUS_OK) {
-        run->is_told = false;
-    } else if (is_parked || (run->gather->is_kept && status_is_transient(status))) {
-        if (!is_parked)
-            pause(run, problem);
-        study_wait(run, chunk_run, true);
-        chunk_run = NULL;
-    } else if (status != STATUS_CANCELLED) {
-        fail(run, status, problem);
-    }
-    // Before the run is let go: another may be the last one then, and free it.
-    chunk_run_free(run, chunk_run);
-    const bool is_ended = let_go(run);
-    pthread_mutex_unlock(&manager->lock);
-    if (is_ended)
-        study_finish(worker, run, problem);
-}
-
-// What remains to be told, and the study's document.
-static Status tell_end(Worker *worker, StudyRun *run, Problem *problem) {
+static Status study_complete(Worker *worker, StudyRun *run, Problem *problem) {
     const Progress watch = {run->task, task_is_wanted};
     const StudyTools tools = {.limits = &worker->manager->settings.limits,
                               .progress = &watch,
                               .workspace = &worker->workspace};
     problem_clear(problem);
-    if (run->gather->finish != NULL)
-        TRY(run->gather->finish(run, &tools, problem));
+    if (run->sweep == NULL)
+        TRY(study_end(run->work, &tools, problem));
     return run_result_add_to_study(&run->run_result, problem);
 }
 
-void study_finish(Worker *worker, StudyRun *run, Problem *problem) {
-    JobManager *manager = worker->manager;
+// Ends a study that is in no list any more: successful, failed or abandoned.
+static void study_finish(Worker *worker, StudyRun *run, Problem *problem) {
+    JobManager *manager = run->manager;
     Task *task = run->task;
-    run->executor->cancel(run);
     if (!run->is_failed && !atomic_load(&task->is_stopped)) {
         const int64_t began_ns = clock_thread_cpu_ns();
-        const Status status = tell_end(worker, run, problem);
+        const Status status = study_complete(worker, run, problem);
         job_metrics_study_part(&manager->totals, clock_thread_cpu_ns() - began_ns);
         if (status != STATUS_OK)
             run_result_fail(&run->run_result, status, problem);
@@ -310,4 +295,47 @@ void study_finish(Worker *worker, StudyRun *run, Problem *problem) {
         task_finish(manager, task, &run_result);
         run_result_clear(&run_result);
     }
+}
+
+void study_leave(Worker *worker, StudyRun *run, Problem *problem) {
+    JobManager *manager = run->manager;
+    pthread_mutex_lock(&manager->lock);
+    const bool is_end = study_release(run);
+    pthread_mutex_unlock(&manager->lock);
+    if (is_end)
+        study_finish(worker, run, problem);
+}
+
+void study_work(Worker *worker, const StudyTurn *turn, Problem *problem) {
+    JobManager *manager = worker->manager;
+    StudyRun *run = turn->run;
+    if (turn->is_end) {
+        study_finish(worker, run, problem);
+        return;
+    }
+    const int64_t began_ns = clock_monotonic_ns(), began_cpu_ns = clock_thread_cpu_ns();
+    TurnClock clock = {began_ns, began_ns, 0};
+    problem_clear(problem);
+    const Status status = turn->chunk != NULL ? study_make_rows(worker, turn, &clock, problem)
+                                              : study_make_members(worker, turn, &clock, problem);
+    const double seconds = 1e-9 * (double)(clock_monotonic_ns() - began_ns);
+    job_metrics_study_part(&manager->totals, clock_thread_cpu_ns() - began_cpu_ns);
+    pthread_mutex_lock(&manager->lock);
+    worker->study = NULL;
+    manager->slow_running--;
+    if (clock.made > 0)
+        run->member_seconds = seconds / (double)clock.made;
+    if (status == STATUS_OK)
+        run->is_pause_logged = false;
+    else if (run->sweep != NULL && status_is_transient(status))
+        study_pause(run, problem);
+    else if (status != STATUS_CANCELLED)
+        study_fail(run, status, problem);
+    if (run->sweep != NULL)
+        sweep_run_return(run->sweep, turn->chunk);
+    study_enqueue(run);
+    const bool is_end = study_release(run);
+    pthread_mutex_unlock(&manager->lock);
+    if (is_end)
+        study_finish(worker, run, problem);
 }

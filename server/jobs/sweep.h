@@ -1,20 +1,98 @@
-// The bytes of a sweep's rows, chunk by chunk, as the store keeps them. Not how they are made
-// (study.h, sweep_gather.c). Used by sweep_gather.c, sweep_rows.c and the benches.
+// The rows of a sweep in the database: made chunk by chunk, and read back, also while they are
+// made. Chunk i has the points i, i + chunks, i + 2 chunks ...: cost varies along an axis, so that
+// chunks cost about the same.
 #ifndef SERVER_JOBS_SWEEP_H
 #define SERVER_JOBS_SWEEP_H
 
 #include "core/study/sweep.h"
 #include "server/db/db.h"
+#include "server/jobs/study_engine.h"
+#include "server/util/bytes.h"
 
+// A row is a byte of status and then its metrics, little-endian.
 size_t sweep_rows_of(const SweepRow *row, size_t chunk);
 size_t sweep_row_size(const SweepRow *row);
-double sweep_row_cell(const unsigned char *row, size_t cell); // 0 its status, 1 ... its metrics
-SweepStatus sweep_row_status(const SweepRow *row, const SweepChunkRow *chunk, size_t place);
-void sweep_row_values(const SweepRow *row, const SweepChunkRow *chunk, size_t place,
-                      double *values);
+// Status and metrics of the row at `place`; SWEEP_PENDING and NAN if it is not there.
+SweepStatus sweep_row_get(const SweepRow *row, const SweepChunkRow *chunk, size_t place,
+                          double *values);
 void sweep_row_put(const SweepRow *row, SweepChunkRow *chunk, size_t place, SweepStatus status,
                    const double *values);
-// Why the row at `place` failed, into `why`; "" where it is not told.
+// Why the row at `place` failed; "" if that was not kept.
 void sweep_row_reason(const SweepChunkRow *chunk, size_t place, char *why, size_t size);
+
+// A chunk that waits or is being made.
+typedef struct SweepChunk {
+    struct SweepChunk *next;
+    size_t count, done; // rows
+    bool is_loaded;     // there is room for the rows
+    bool is_retry;      // rows that failed are made again, the others are there
+    bool is_saved;
+    SweepChunkRow row;
+    Bytes reasons;
+} SweepChunk;
+
+// A sweep in progress: what is to be done is in the database before any of it runs, and what the
+// database has is done.
+typedef struct SweepRun {
+    Db *db;
+    StudyEngine *engine; // over when every chunk is saved
+    SweepRow row;
+    SweepChunk *waiting;             // under the lock of its user
+    atomic_size_t left;              // chunks that are not saved
+    atomic_size_t made, made_failed; // rows; the failed ones are made too
+} SweepRun;
+
+// The sweep as it was begun before, or cut into chunks by the cost of some points. `run` is freed
+// by sweep_run_free also after a failure.
+Status sweep_run_open(Db *db, const char *result, const char *scene, StudyEngine *engine,
+                      size_t slots, Workspace *workspace, SweepRun **run, Problem *problem);
+void sweep_run_free(SweepRun *run); // NULL is fine
+// Under the lock of its user: takes a chunk to work on, or NULL; and gives it back, to be freed if
+// it is saved.
+bool sweep_run_has_chunk(const SweepRun *run);
+SweepChunk *sweep_run_take(SweepRun *run);
+void sweep_run_return(SweepRun *run, SweepChunk *chunk);
+
+// Without it: makes ready, makes the next row, and saves the whole. Any of them may be repeated
+// after a failure that passes.
+Status sweep_chunk_load(SweepRun *run, SweepChunk *chunk, Problem *problem);
+Status sweep_chunk_make(SweepRun *run, SweepChunk *chunk, Workspace *workspace, Problem *problem);
+Status sweep_chunk_save(SweepRun *run, SweepChunk *chunk, Problem *problem);
+
+// A sweep read back. All zero is empty.
+typedef struct SweepView {
+    SweepRow row;
+    StudyRequest inquiry; // with its study
+    Sweep *sweep;         // the answer; of its table the failures, if they were requested
+    Db *db;
+    SweepChunkRows chunks; // that are there, without their rows
+    size_t rows;           // of those
+    bool is_complete;      // every chunk is there and none is open
+    // What was read last: of each chunk the rows at `places` places from `place` on.
+    unsigned char *window;
+    size_t place, places;
+    bool is_loaded;
+} SweepView;
+
+// By its result, or (`is_job`) by a job that makes it or did. Cleared by sweep_view_clear in any
+// case.
+Status sweep_view_load(Db *db, const char *id, bool is_job, bool has_failures, SweepView *view,
+                       Problem *problem);
+void sweep_view_clear(SweepView *view);
+
+// Cell `cell` (0 the point, 1 its status, 2 ... the metrics) of rows first ... first + count - 1,
+// in the order of their points; `view` is a SweepView. Memory is one window, whatever their number.
+// False: the rows have changed since it was loaded, or cannot be read.
+bool sweep_view_read(void *view, size_t cell, size_t first, size_t count, double *target);
+
+// One point of it.
+typedef struct SweepPoint {
+    SweepStatus status;
+    char why[200]; // "" unless it failed
+    double values[SWEEP_METRICS];
+    StudyRequest scene; // completed, as it can be submitted
+} SweepPoint;
+// STATUS_NOT_FOUND beyond the last. Cleared by study_request_clear(&point->scene) in any case.
+Status sweep_point_load(const SweepView *view, uint64_t index, SweepPoint *point, Problem *problem);
 
 #endif

@@ -10,22 +10,15 @@
 #include "server/jobs/references.h"
 #include "server/jobs/resolve_record.h"
 #include "server/jobs/study.h"
-#include "server/jobs/study_sink.h"
 #include "server/json/encode.h"
 #include "server/util/bytes.h"
 #include "server/util/clock.h"
 
-// A computation's run, or the study after it, as a part of the whole.
-typedef struct Part {
-    Task *task;
-    double from, share;
-} Part;
-
-static bool advance(void *context, double fraction) {
-    const Part *part = context;
+bool task_advance(void *context, double fraction) {
+    Task *task = context;
     const double share = fraction < 0 ? 0 : fraction > 1 ? 1 : fraction;
-    atomic_store(&part->task->progress, (unsigned)((part->from + share * part->share) * 10000));
-    return !atomic_load(&part->task->is_stopped);
+    atomic_store(&task->progress, (unsigned)(share * 10000));
+    return !atomic_load(&task->is_stopped);
 }
 
 bool task_is_wanted(void *context, double fraction) {
@@ -108,17 +101,14 @@ static double thread_cpu(void *context) {
     return 1e-9 * (double)clock_thread_cpu_ns();
 }
 
+// A study without members measures CPU times: it is made on one thread.
 static Status run_study(Worker *worker, Task *task, RunResult *run_result, Problem *problem) {
-    Part part = {task, STUDY_OWN, 1 - STUDY_OWN};
-    const Progress watch = {&part, advance};
+    ProgressRange range = {&(Progress){task, task_advance}, STUDY_OWN, 1 - STUDY_OWN, 0};
+    const Progress watch = progress_range_view(&range);
     const StudyTools tools = {.limits = &worker->manager->settings.limits,
                               .progress = &watch,
                               .workspace = &worker->workspace,
                               .cpu = thread_cpu};
-    // What has members goes on chunk by chunk, on all threads. What measures CPU times has none: it
-    // is made here, by itself.
-    if (study_is_shared(task))
-        return study_open(worker, task, run_result, &watch, problem);
     return study_run(task->inquiry.study, &task->inquiry.simulation, &tools,
                      &run_result->answer.study, problem);
 }
@@ -127,8 +117,9 @@ static void run(Worker *worker, Task *task, RunResult *run_result, Problem *prob
     JobManager *manager = worker->manager;
     // Only the scene's own series is ever wanted again.
     const bool has_study = task->inquiry.study != NULL && !task->recompute_only;
-    Part part = {task, 0, has_study ? STUDY_OWN : 1};
-    const Progress watch = {&part, advance};
+    const bool is_measured = has_study && !study_is_shared(task);
+    ProgressRange range = {&(Progress){task, task_advance}, 0, has_study ? STUDY_OWN : 1, 0};
+    const Progress watch = progress_range_view(&range);
     // A series that is computed again was within the limits when it was computed first.
     const SimulationLimits *limits = task->recompute_only ? NULL : &manager->settings.limits;
     problem_clear(problem);
@@ -142,7 +133,7 @@ static void run(Worker *worker, Task *task, RunResult *run_result, Problem *prob
     run_result->seconds = 1e-9 * (double)(study_ns - run_ns);
     if (status == STATUS_OK)
         job_metrics_run(&manager->totals, run_result->outcome, study_ns - run_ns);
-    if (status == STATUS_OK && has_study) {
+    if (status == STATUS_OK && is_measured) {
         status = run_study(worker, task, run_result, problem);
         job_metrics_study(&manager->totals, clock_thread_cpu_ns() - study_ns);
     }
@@ -151,7 +142,7 @@ static void run(Worker *worker, Task *task, RunResult *run_result, Problem *prob
         status = describe(task, run_result);
         if (status != STATUS_OK)
             (void)problem_set(problem, status, "no memory for the result's documents");
-        else if (has_study && task->study == NULL)
+        else if (is_measured)
             status = run_result_add_to_study(run_result, problem);
     }
     if (status != STATUS_OK)
@@ -161,7 +152,7 @@ static void run(Worker *worker, Task *task, RunResult *run_result, Problem *prob
 
 // Nobody waits for it any more, or the daemon ends and its jobs stay unfinished in the store.
 void task_abandon(JobManager *manager, Task *task) {
-    const bool has_rows = task->study != NULL && task->study->gather->is_kept;
+    const bool has_rows = task->study != NULL && task->study->sweep != NULL;
     pthread_mutex_lock(&manager->lock);
     hashmap_remove(manager->in_flight, &task->indexed);
     while (task->jobs != NULL) {
@@ -195,11 +186,10 @@ static bool is_slow(const Task *task) {
     return task->queued.seconds > queue_quick;
 }
 
-// What a worker does next: a computation, or a chunk of a study, or the end of one (no chunk).
+// What a worker does next: a task, or a turn of a study (no task).
 typedef struct WorkItem {
     Task *task;
-    StudyRun *study;
-    ChunkRun *chunk_run;
+    StudyTurn turn;
 } WorkItem;
 
 // The spare worker has nothing to do while an ordinary one is idle or busy with something quick.
@@ -256,9 +246,8 @@ static QueueEntry *wait_for_entry(Worker *worker) {
 
 // With the lock held. False when the daemon ends.
 static bool next_task(Worker *worker, WorkItem *item) {
-    *item = (WorkItem){NULL, NULL, NULL};
+    item->task = NULL;
     for (;;) {
-        bool is_ended;
         QueueEntry *entry = wait_for_entry(worker);
         if (entry == NULL)
             return false;
@@ -273,15 +262,13 @@ static bool next_task(Worker *worker, WorkItem *item) {
             item->task = task;
             return true;
         }
-        item->study = task->study;
-        item->chunk_run = study_take(item->study, &is_ended);
-        if (item->chunk_run != NULL) {
-            worker->study = item->study;
-            worker->chunk = item->chunk_run->chunk.first;
+        if (!study_take(task->study, &item->turn))
+            continue;
+        if (!item->turn.is_end) {
+            worker->study = task->study;
             begin_slow(worker->manager);
         }
-        if (item->chunk_run != NULL || is_ended)
-            return true;
+        return true;
     }
 }
 
@@ -297,19 +284,28 @@ static void compute(Worker *worker, Task *task, Problem *problem) {
     JobManager *manager = worker->manager;
     RunResult run_result = {0};
     run(worker, task, &run_result, problem);
-    const bool is_launched = run_result.status == STATUS_OK && task->study != NULL;
-    const bool is_stalled = run_result.status == STATUS_FULL;
+    const bool is_shared = run_result.status == STATUS_OK && study_is_shared(task);
+    if (is_shared) {
+        problem_clear(problem);
+        const Status status = study_start(worker, task, &run_result, problem);
+        if (status != STATUS_OK)
+            run_result_fail(&run_result, status, problem);
+    }
+    StudyRun *study = is_shared && run_result.status == STATUS_OK ? task->study : NULL;
+    const Status status = run_result.status;
+    // What the database cannot do now is done later, from the beginning.
+    const bool is_stalled = status == STATUS_FULL || status == STATUS_IO || status == STATUS_BUSY;
     pthread_mutex_lock(&manager->lock);
     leave(worker, task);
-    if (run_result.status == STATUS_OK && !is_launched)
+    if (status == STATUS_OK && study == NULL)
         keep_pace(manager, task, &run_result);
     if (is_stalled)
         stall(manager, task);
     pthread_mutex_unlock(&manager->lock);
-    if (run_result.status == STATUS_CANCELLED)
+    if (status == STATUS_CANCELLED)
         task_abandon(manager, task);
-    else if (is_launched)
-        study_start(worker, task, &run_result, problem);
+    else if (study != NULL)
+        study_leave(worker, study, problem);
     else if (!is_stalled)
         task_finish(manager, task, &run_result);
     run_result_clear(&run_result);
@@ -325,10 +321,8 @@ void *worker_main(void *context) {
         pthread_mutex_unlock(&manager->lock);
         if (item.task != NULL)
             compute(worker, item.task, &problem);
-        else if (item.chunk_run != NULL)
-            study_work(worker, item.study, item.chunk_run, &problem);
         else
-            study_finish(worker, item.study, &problem);
+            study_work(worker, &item.turn, &problem);
         pthread_mutex_lock(&manager->lock);
     }
     pthread_mutex_unlock(&manager->lock);

@@ -15,7 +15,9 @@ Status run_result_add_to_study(RunResult *run_result, Problem *problem);
 // Without the lock. Takes both: saves what it came to, also its series where that pays.
 void task_finish(JobManager *manager, Task *task, RunResult *run_result);
 
-// A Progress's advance that tells no progress: false once a computation was stopped.
+// A Progress's advance: sets a task's progress. False once it was stopped.
+bool task_advance(void *task, double fraction);
+// The same without setting it.
 bool task_is_wanted(void *task, double fraction);
 // Without the lock. Takes the computation: nobody waits for it any more, or the daemon ends and its
 // jobs stay unfinished in the store.

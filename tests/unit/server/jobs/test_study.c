@@ -11,8 +11,7 @@
 #include <cmocka.h>
 
 #include "core/math/fft.h"
-#include "server/jobs/reorder.h"
-#include "server/jobs/study_sink.h"
+#include "server/jobs/study.h"
 #include "server/util/clock.h"
 #include "tests/support/room.h"
 
@@ -39,30 +38,6 @@ static void ensemble(char text[1024], size_t runs, double duration) {
     scene(text, duration, usual, study);
 }
 
-static void members_are_dealt_out_to_chunks_each_once(void **state) {
-    (void)state;
-    for (size_t from = 0; from < 3; from++)
-        for (size_t to = from + 1; to < 20; to++)
-            for (size_t chunks = 1; chunks <= to - from; chunks++) {
-                int met[20] = {0};
-                for (size_t i = 0; i < chunks; i++) {
-                    const Chunk chunk = chunk_deal(from, to, chunks, i);
-                    assert_true(chunk.count > 0);
-                    for (size_t k = 0; k < chunk.count; k++)
-                        met[chunk.first + k * chunk.stride]++;
-                }
-                for (size_t member = 0; member < 20; member++)
-                    assert_int_equal(met[member], member >= from && member < to);
-            }
-    const ExecutorLimits limits = {
-        .slots = 2, .chunk_seconds = 0.5, .chunks = 100, .chunk_members = 50};
-    assert_int_equal(executor_chunks(&limits, 3, 1e-6), 3);        // one each
-    assert_int_equal(executor_chunks(&limits, 400, 1e-6), 8);      // four a slot
-    assert_int_equal(executor_chunks(&limits, 400, 0.05), 40);     // half a second each
-    assert_int_equal(executor_chunks(&limits, 400, 10), 100);      // as many as it takes
-    assert_int_equal(executor_chunks(&limits, 50000, 1e-6), 1000); // no more than 50 members
-}
-
 // A study that notes in which order it is folded, and how many parts there are.
 typedef struct Noted {
     StudyWork work;
@@ -86,18 +61,18 @@ static void clear(StudyPart *part) {
     noted_of_all->parts--;
 }
 
-static void put(ReorderBuffer *order, size_t member) {
+static void fold(StudyEngine *engine, size_t member) {
     StudyPart *part = calloc(1, sizeof *part);
     assert_non_null(part);
     part->run.number = member;
     if (++noted_of_all->parts > noted_of_all->most)
         noted_of_all->most = noted_of_all->parts;
-    assert_int_equal(reorder_put(order, member, part, &problem), STATUS_OK);
+    assert_int_equal(study_engine_fold(engine, member, part, &problem), STATUS_OK);
 }
 
 static const StudyKind noted_kind = {.fold = note, .clear = clear};
 
-// Hands members in the last of a stretch first. How many were folded.
+// Takes all members that may be begun, and folds the last of them first. How many were folded.
 static size_t fold_backwards(size_t members, size_t enough, size_t part_bytes, size_t *most) {
     Noted noted = {.work = {.kind = &noted_kind,
                             .members = members,
@@ -105,16 +80,21 @@ static size_t fold_backwards(size_t members, size_t enough, size_t part_bytes, s
                             .expected = members,
                             .part_bytes = part_bytes},
                    .enough = enough};
-    ReorderBuffer order;
-    size_t from, to;
+    StudyEngine engine;
+    const Progress progress = {NULL, NULL};
+    size_t from, next;
     noted_of_all = &noted;
-    assert_int_equal(reorder_make(&noted.work, 2, &order, NULL), STATUS_OK);
-    while (reorder_begin(&order, SIZE_MAX, &from, &to)) {
-        assert_true(to > from && to - from <= order.window);
+    assert_int_equal(study_engine_open(&engine, &noted.work, NULL, &progress, 2, NULL), STATUS_OK);
+    while (study_engine_next(&engine, false, &from)) {
+        size_t to = from + 1;
+        while (study_engine_next(&engine, false, &next))
+            assert_int_equal(next, to++);
+        assert_true(to - from <= engine.window && !study_engine_has_next(&engine));
         while (to > from)
-            put(&order, --to);
+            fold(&engine, --to);
     }
-    reorder_clear(&order);
+    assert_true(atomic_load(&engine.is_over));
+    study_engine_close(&engine);
     assert_int_equal(noted.parts, 0);
     *most = noted.most;
     return noted.folded;
@@ -125,10 +105,10 @@ static void parts_are_folded_in_order_within_bounded_memory(void **state) {
     size_t most;
     assert_int_equal(fold_backwards(1000, SIZE_MAX, 8, &most), 1000);
     assert_int_equal(most, 1000);
-    // Large parts: some are begun, and when half of them are folded as many more.
+    // Large parts: some are begun, and as many more when those are folded.
     assert_int_equal(fold_backwards(1000, SIZE_MAX, 1 << 28, &most), 1000);
     assert_int_equal(most, 16);
-    // What was made beyond the end is of no use, and goes.
+    // Parts beyond the end are not used.
     assert_int_equal(fold_backwards(1000, 7, 1 << 28, &most), 7);
     assert_int_equal(fold_backwards(0, SIZE_MAX, 8, &most), 0);
 }
@@ -380,7 +360,6 @@ static void studies_wait_where_much_is_held(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(members_are_dealt_out_to_chunks_each_once),
         cmocka_unit_test(parts_are_folded_in_order_within_bounded_memory),
         cmocka_unit_test(an_answer_has_the_same_bytes_for_any_number_of_workers),
         cmocka_unit_test(all_workers_make_an_ensemble_together),

@@ -1,0 +1,488 @@
+#include "server/jobs/sweep.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "server/jobs/job.h"
+#include "server/jobs/resolve_record.h"
+#include "server/json/parse.h"
+#include "server/util/clock.h"
+
+enum {
+    PILOT_POINTS = 16, // whose cost decides how many chunks there are
+    CHUNKS_MAX = 4096, // unless one would have more rows than
+    CHUNK_ROWS = 1 << 16,
+    CHUNKS_PER_SLOT = 4, // at least
+    REASONS = 1000,      // kept of the failed rows of a chunk
+    REASON_BYTES = 160,
+    WINDOW_BYTES = 4 << 20, // of rows read at once, more only if one row of each chunk is
+};
+static const double pilot_seconds = 0.2; // that the pilot takes about
+// Short chunks let rows appear soon, and little is lost when the daemon is killed.
+static const double chunk_seconds = 0.25;
+
+static Status sweep_no_memory(Problem *problem) {
+    return problem_set(problem, STATUS_NO_MEMORY, "no memory for the sweep");
+}
+
+size_t sweep_rows_of(const SweepRow *row, size_t chunk) {
+    return chunk >= row->points ? 0 : (row->points - chunk + row->chunks - 1) / row->chunks;
+}
+
+size_t sweep_row_size(const SweepRow *row) {
+    return 1 + sizeof(double) * row->metrics;
+}
+
+// An unknown byte counts as a failure.
+static SweepStatus sweep_bytes_status(const unsigned char *row) {
+    return *row < SWEEP_PENDING ? (SweepStatus)*row : SWEEP_FAILED;
+}
+
+static double sweep_bytes_metric(const unsigned char *row, size_t metric) {
+    uint64_t bits = 0;
+    double value;
+    for (size_t k = 0; k < sizeof bits; k++)
+        bits |= (uint64_t)row[1 + sizeof bits * metric + k] << (8 * k);
+    memcpy(&value, &bits, sizeof value);
+    return value;
+}
+
+SweepStatus sweep_row_get(const SweepRow *row, const SweepChunkRow *chunk, size_t place,
+                          double *values) {
+    const size_t size = sweep_row_size(row);
+    const bool is_there = chunk->rows.at != NULL && (place + 1) * size <= chunk->rows.size;
+    const unsigned char *at =
+        is_there ? (const unsigned char *)chunk->rows.at + place * size : NULL;
+    for (size_t i = 0; i < row->metrics; i++)
+        values[i] = is_there ? sweep_bytes_metric(at, i) : (double)NAN;
+    return is_there ? sweep_bytes_status(at) : SWEEP_PENDING;
+}
+
+void sweep_row_put(const SweepRow *row, SweepChunkRow *chunk, size_t place, SweepStatus status,
+                   const double *values) {
+    unsigned char *at = (unsigned char *)chunk->rows.at + place * sweep_row_size(row);
+    *at++ = (unsigned char)status;
+    for (size_t i = 0; i < row->metrics; i++) {
+        uint64_t bits;
+        // One bit pattern for every NAN.
+        const double value = isnan(values[i]) ? (double)NAN : values[i];
+        memcpy(&bits, &value, sizeof bits);
+        for (size_t k = 0; k < sizeof bits; k++)
+            *at++ = (unsigned char)(bits >> (8 * k));
+    }
+}
+
+void sweep_row_reason(const SweepChunkRow *chunk, size_t place, char *why, size_t size) {
+    why[0] = '\0';
+    for (const char *line = chunk->reasons; line != NULL && *line != '\0';) {
+        char *text;
+        const size_t number = strtoul(line, &text, 10);
+        const size_t length = strcspn(text, "\n");
+        if (number == place && *text == ' ') {
+            const size_t kept = length - 1 < size ? length - 1 : size - 1;
+            memcpy(why, text + 1, kept);
+            why[kept] = '\0';
+            return;
+        }
+        line = text + length + (text[length] == '\n');
+    }
+}
+
+// Estimates the CPU time of a point by some of them [s].
+static Status sweep_run_pilot(StudyEngine *engine, Workspace *workspace, double *seconds,
+                              Problem *problem) {
+    const size_t points = engine->work->members;
+    const size_t max = points < PILOT_POINTS ? points : PILOT_POINTS;
+    const StudyTools tools = {
+        .limits = engine->limits, .progress = &engine->progress, .workspace = workspace};
+    const int64_t began_ns = clock_thread_cpu_ns();
+    for (size_t made = 0; made < max && *seconds * (double)made <= pilot_seconds;) {
+        StudyPart *part = NULL;
+        const Status status = study_part_make(
+            engine->work, (points - 1) * made / (max > 1 ? max - 1 : 1), &tools, &part, problem);
+        study_part_free(engine->work, part);
+        TRY(status);
+        made++;
+        *seconds = 1e-9 * (double)(clock_thread_cpu_ns() - began_ns) / (double)made;
+    }
+    return STATUS_OK;
+}
+
+static size_t sweep_run_chunks(size_t points, size_t slots, double seconds) {
+    const double all = (double)points;
+    double chunks = fmin(ceil(seconds * all / chunk_seconds), CHUNKS_MAX);
+    chunks = fmax(chunks, ceil(all / CHUNK_ROWS));
+    chunks = fmax(chunks, (double)(CHUNKS_PER_SLOT * slots));
+    return (size_t)fmin(chunks, all);
+}
+
+// What is to be done is durable before anything runs; what was written down before stays.
+static Status sweep_run_begin(SweepRun *run, const char *result, const char *scene, size_t slots,
+                              Workspace *workspace, Problem *problem) {
+    const StudyWork *work = run->engine->work;
+    const uint64_t points = work->members;
+    const uint64_t metrics = ((const SweepStudy *)work->study)->metrics.count;
+    const Status found = db_sweep_load(run->db, result, &run->row, NULL);
+    if (found != STATUS_OK && found != STATUS_NOT_FOUND)
+        return problem_set(problem, found, "the sweeps could not be searched");
+    if (found == STATUS_NOT_FOUND) {
+        double seconds = 0;
+        TRY(sweep_run_pilot(run->engine, workspace, &seconds, problem));
+        text_fit(run->row.result, sizeof run->row.result, result);
+        run->row.scene = strdup(scene);
+        if (run->row.scene == NULL)
+            return sweep_no_memory(problem);
+        run->row.metrics = metrics;
+        run->row.points = points;
+        run->row.chunks = sweep_run_chunks((size_t)points, slots, seconds);
+        run->row.created_unix_ms = clock_unix_ms();
+    }
+    // Also a row that is there: it may be about to be deleted with the last job before this one.
+    TRY(db_sweep_begin(run->db, &run->row, problem));
+    if (run->row.points != points || run->row.metrics != metrics)
+        return problem_set(problem, STATUS_INTERNAL,
+                           "the stored sweep no longer stands for this scene");
+    return STATUS_OK;
+}
+
+// The chunks that the database does not have, or that are open.
+static Status sweep_run_list(SweepRun *run, const SweepChunkRows *saved, Problem *problem) {
+    size_t next = saved->count;
+    for (size_t i = run->row.chunks; i-- > 0;) {
+        const SweepChunkRow *row =
+            next > 0 && saved->at[next - 1].chunk == i ? &saved->at[--next] : NULL;
+        const size_t count = sweep_rows_of(&run->row, i);
+        if (row != NULL) {
+            const size_t made = row->is_open ? count - (size_t)row->failed : count;
+            run->made += made;
+            run->made_failed += row->is_open ? 0 : (size_t)row->failed;
+            study_engine_count(run->engine, made);
+        }
+        if (row != NULL && !row->is_open)
+            continue;
+        SweepChunk *chunk = calloc(1, sizeof *chunk);
+        if (chunk == NULL)
+            return sweep_no_memory(problem);
+        chunk->count = count;
+        chunk->row.sweep = run->row.number;
+        chunk->row.chunk = i;
+        chunk->next = run->waiting;
+        run->waiting = chunk;
+        run->left++;
+    }
+    if (run->left == 0)
+        study_engine_stop(run->engine);
+    return STATUS_OK;
+}
+
+Status sweep_run_open(Db *db, const char *result, const char *scene, StudyEngine *engine,
+                      size_t slots, Workspace *workspace, SweepRun **opened, Problem *problem) {
+    SweepChunkRows saved = {NULL, 0};
+    SweepRun *run = *opened = calloc(1, sizeof *run);
+    if (run == NULL)
+        return sweep_no_memory(problem);
+    run->db = db;
+    run->engine = engine;
+    TRY(sweep_run_begin(run, result, scene, slots, workspace, problem));
+    TRY(db_sweep_chunks(db, run->row.number, &saved, problem));
+    const Status status = sweep_run_list(run, &saved, problem);
+    sweep_chunk_rows_clear(&saved);
+    return status;
+}
+
+static void sweep_chunk_free(SweepChunk *chunk) {
+    sweep_chunk_row_clear(&chunk->row);
+    bytes_clear(&chunk->reasons);
+    free(chunk);
+}
+
+void sweep_run_free(SweepRun *run) {
+    if (run == NULL)
+        return;
+    for (SweepChunk *chunk; (chunk = sweep_run_take(run)) != NULL;)
+        sweep_chunk_free(chunk);
+    sweep_row_clear(&run->row);
+    free(run);
+}
+
+bool sweep_run_has_chunk(const SweepRun *run) {
+    return run->waiting != NULL;
+}
+
+SweepChunk *sweep_run_take(SweepRun *run) {
+    SweepChunk *chunk = run->waiting;
+    if (chunk != NULL)
+        run->waiting = chunk->next;
+    return chunk;
+}
+
+void sweep_run_return(SweepRun *run, SweepChunk *chunk) {
+    if (chunk->is_saved) {
+        sweep_chunk_free(chunk);
+        return;
+    }
+    chunk->next = run->waiting;
+    run->waiting = chunk;
+}
+
+Status sweep_chunk_load(SweepRun *run, SweepChunk *chunk, Problem *problem) {
+    const size_t size = chunk->count * sweep_row_size(&run->row);
+    SweepChunkRow saved = {0};
+    if (chunk->is_loaded)
+        return STATUS_OK;
+    if (run->row.retries > 0) {
+        const Status found =
+            db_sweep_chunk(run->db, run->row.number, chunk->row.chunk, &saved, problem);
+        if (found != STATUS_OK && found != STATUS_NOT_FOUND)
+            return found;
+        problem_clear(problem);
+    }
+    chunk->is_retry = saved.rows.at != NULL && saved.rows.size == size;
+    if (!chunk->is_retry) {
+        sweep_chunk_row_clear(&saved);
+        saved.rows = (StoredBytes){calloc(1, size), size};
+        if (saved.rows.at == NULL)
+            return sweep_no_memory(problem);
+    }
+    chunk->row.rows = saved.rows;
+    saved.rows = (StoredBytes){NULL, 0};
+    sweep_chunk_row_clear(&saved);
+    chunk->is_loaded = true;
+    return STATUS_OK;
+}
+
+static void sweep_chunk_add_reason(SweepChunk *chunk, const char *why) {
+    char line[REASON_BYTES];
+    if (chunk->row.failed++ >= REASONS)
+        return;
+    text_fit(line, sizeof line, why);
+    for (char *c = line; *c != '\0'; c++)
+        if (*c == '\n')
+            *c = ' ';
+    bytes_format(&chunk->reasons, "%zu %s\n", chunk->done, line);
+}
+
+Status sweep_chunk_make(SweepRun *run, SweepChunk *chunk, Workspace *workspace, Problem *problem) {
+    const StudyWork *work = run->engine->work;
+    double values[SWEEP_METRICS];
+    StudyPart *part = NULL;
+    if (chunk->is_retry && sweep_row_get(&run->row, &chunk->row, chunk->done, values) == SWEEP_MADE)
+        return STATUS_OK;
+    const size_t point = (size_t)(chunk->row.chunk + chunk->done * run->row.chunks);
+    const Status status = study_engine_part(run->engine, point, workspace, &part, problem);
+    if (status == STATUS_OK) {
+        sweep_values(&((const SweepStudy *)work->study)->metrics, &part->run, values);
+        sweep_row_put(&run->row, &chunk->row, chunk->done, sweep_status(part->run.status), values);
+        if (part->run.why != NULL) {
+            sweep_chunk_add_reason(chunk, part->run.why);
+            run->made_failed++;
+        }
+        run->made++;
+    }
+    study_part_free(work, part);
+    return status;
+}
+
+Status sweep_chunk_save(SweepRun *run, SweepChunk *chunk, Problem *problem) {
+    if (chunk->reasons.count > 0 &&
+        (chunk->row.reasons = bytes_take(&chunk->reasons, NULL)) == NULL)
+        return sweep_no_memory(problem);
+    TRY(db_sweep_take(run->db, &chunk->row, problem));
+    chunk->is_saved = true;
+    if (atomic_fetch_sub(&run->left, 1) == 1)
+        study_engine_stop(run->engine);
+    return STATUS_OK;
+}
+
+static Status sweep_view_read_scene(SweepView *view, Problem *problem) {
+    Problem *fault = calloc(1, sizeof *fault);
+    if (fault == NULL)
+        return sweep_no_memory(problem);
+    const Status status = json_parse(view->row.scene, strlen(view->row.scene), study_request_fields,
+                                     &view->inquiry, fault);
+    // A fault here is ours, not the client's.
+    if (status != STATUS_OK)
+        problem_set(problem, STATUS_INTERNAL, "the stored scene cannot be read: %s", fault->detail);
+    // The scenes of points take their records from here; they report a record that is gone.
+    if (status == STATUS_OK) {
+        (void)resolve_record_motion(view->db, &view->inquiry.simulation, fault);
+        (void)resolve_sweep_records(view->db, &view->inquiry, fault);
+    }
+    free(fault);
+    if (status != STATUS_OK)
+        return STATUS_INTERNAL;
+    const Variant *study = view->inquiry.study;
+    return study != NULL && study_kind(study) == &study_sweep
+               ? STATUS_OK
+               : problem_set(problem, STATUS_NOT_FOUND,
+                             "the scene asked for no sweep: submit it with a member study");
+}
+
+static const SweepStudy *sweep_view_study(const SweepView *view) {
+    return (const SweepStudy *)(const void *)view->inquiry.study;
+}
+
+// The points that failed in one way; only the first has its reason.
+typedef struct SweepFailed {
+    uint64_t count, first;
+    char why[200];
+} SweepFailed;
+
+static void sweep_failed_add(const SweepRow *row, const SweepChunkRow *chunk, SweepFailed *failed) {
+    for (size_t place = 0; place < sweep_rows_of(row, chunk->chunk); place++) {
+        double values[SWEEP_METRICS];
+        const uint64_t point = chunk->chunk + place * row->chunks;
+        const SweepStatus status = sweep_row_get(row, chunk, place, values);
+        SweepFailed *one = &failed[status];
+        if (status == SWEEP_MADE)
+            continue;
+        if (one->count == 0 || point < one->first) {
+            one->first = point;
+            sweep_row_reason(chunk, place, one->why, sizeof one->why);
+        }
+        one->count++;
+    }
+}
+
+static Status sweep_view_find_failures(SweepView *view, Problem *problem) {
+    SweepFailed failed[SWEEP_STATUSES] = {{0}};
+    SweepTable *table = &view->sweep->table;
+    for (size_t i = 0; i < view->chunks.count; i++) {
+        const SweepChunkRow *head = &view->chunks.at[i];
+        SweepChunkRow chunk = {0};
+        if (head->failed == 0)
+            continue;
+        TRY(db_sweep_chunk(view->db, view->row.number, head->chunk, &chunk, problem));
+        sweep_failed_add(&view->row, &chunk, failed);
+        sweep_chunk_row_clear(&chunk);
+    }
+    table->failed = 0;
+    for (;;) {
+        SweepFailed *first = NULL;
+        for (size_t i = 0; i < SWEEP_STATUSES; i++)
+            if (failed[i].count > 0 && (first == NULL || failed[i].first < first->first))
+                first = &failed[i];
+        if (first == NULL)
+            return STATUS_OK;
+        TRY(study_result(study_failures_add(&table->failures, (int)(first - failed), NULL,
+                                            first->first, first->why),
+                         problem));
+        table->failures.at[table->failures.count - 1].count = first->count;
+        table->failed += first->count;
+        first->count = 0;
+    }
+}
+
+// A sweep that has not begun has no rows, but its job has the scene.
+static Status sweep_view_find(Db *db, const char *id, bool is_job, SweepRow *row,
+                              Problem *problem) {
+    JobRow job;
+    if (!is_job)
+        return db_sweep_load(db, id, row, problem);
+    TRY(db_job_load(db, id, &job, problem));
+    const bool has_scene = job.state != JOB_SUCCESSFUL; // that was its result's
+    const Status status = db_sweep_load(db, job.result, row, has_scene ? NULL : problem);
+    job_row_clear(&job);
+    if (status == STATUS_NOT_FOUND && has_scene)
+        return db_sweep_asked(db, id, row, problem);
+    return status == STATUS_OK || status == STATUS_NOT_FOUND
+               ? status
+               : problem_set(problem, status, "the sweeps cannot be searched");
+}
+
+Status sweep_view_load(Db *db, const char *id, bool is_job, bool has_failures, SweepView *view,
+                       Problem *problem) {
+    memset(view, 0, sizeof *view);
+    view->db = db;
+    TRY(sweep_view_find(db, id, is_job, &view->row, problem));
+    TRY(sweep_view_read_scene(view, problem));
+    view->sweep = (Sweep *)(void *)variant_new(study_sweep.answer);
+    if (view->sweep == NULL)
+        return sweep_no_memory(problem);
+    TRY(sweep_describe(sweep_view_study(view), &view->inquiry.simulation, view->sweep, problem));
+    if (view->row.chunks > 0 && view->row.metrics != sweep_view_study(view)->metrics.count)
+        return problem_set(problem, STATUS_INTERNAL,
+                           "the stored rows no longer stand for this scene");
+    TRY(db_sweep_chunks(db, view->row.number, &view->chunks, problem));
+    view->is_complete = view->row.chunks > 0 && view->chunks.count == view->row.chunks;
+    for (size_t i = 0; i < view->chunks.count; i++) {
+        view->is_complete = view->is_complete && !view->chunks.at[i].is_open;
+        view->rows += sweep_rows_of(&view->row, view->chunks.at[i].chunk);
+    }
+    return has_failures ? sweep_view_find_failures(view, problem) : STATUS_OK;
+}
+
+void sweep_view_clear(SweepView *view) {
+    sweep_row_clear(&view->row);
+    study_request_clear(&view->inquiry);
+    variant_free((Variant *)(void *)view->sweep);
+    sweep_chunk_rows_clear(&view->chunks);
+    free(view->window);
+    *view = (SweepView){.sweep = NULL};
+}
+
+// Loads the rows at these places of all chunks that are there: as many places as fit, the last
+// perhaps not there.
+static bool sweep_view_load_window(SweepView *view, size_t place) {
+    const size_t row_size = sweep_row_size(&view->row), size = row_size * view->chunks.count;
+    if (view->window == NULL) {
+        const size_t all = (size_t)((view->row.points + view->row.chunks - 1) / view->row.chunks);
+        const size_t fit = WINDOW_BYTES / size > 0 ? WINDOW_BYTES / size : 1;
+        view->places = fit < all ? fit : all;
+        view->window = malloc(size * view->places);
+        if (view->window == NULL)
+            return false;
+    }
+    view->is_loaded = db_sweep_read(view->db, &view->row, &view->chunks, place * row_size,
+                                    view->places * row_size, view->window, NULL) == STATUS_OK;
+    view->place = place;
+    return view->is_loaded;
+}
+
+bool sweep_view_read(void *of, size_t cell, size_t first, size_t count, double *target) {
+    SweepView *view = of;
+    const size_t wide = view->chunks.count, size = sweep_row_size(&view->row);
+    if (count == 0)
+        return true;
+    if (count > view->rows || first > view->rows - count)
+        return false;
+    for (size_t i = 0; i < count; i++) {
+        // The rows at one place of all chunks follow each other.
+        const size_t place = (first + i) / wide, among = (first + i) % wide;
+        if (!view->is_loaded || place < view->place || place >= view->place + view->places)
+            if (!sweep_view_load_window(view, place))
+                return false;
+        const unsigned char *row =
+            view->window + (among * view->places + place - view->place) * size;
+        target[i] = cell == 0   ? (double)(view->chunks.at[among].chunk + place * view->row.chunks)
+                    : cell == 1 ? (double)sweep_bytes_status(row)
+                                : sweep_bytes_metric(row, cell - 2);
+    }
+    return true;
+}
+
+Status sweep_point_load(const SweepView *view, uint64_t index, SweepPoint *point,
+                        Problem *problem) {
+    SweepGrid *grid;
+    SweepChunkRow chunk = {0};
+    const SweepRow *row = &view->row;
+    *point = (SweepPoint){.status = SWEEP_PENDING};
+    if (index >= row->points)
+        return problem_set(problem, STATUS_NOT_FOUND, "the sweep has points 0 to %llu",
+                           (unsigned long long)(row->points - 1));
+    const Status found = db_sweep_chunk(view->db, row->number, index % row->chunks, &chunk, NULL);
+    if (found != STATUS_OK && found != STATUS_NOT_FOUND)
+        return problem_set(problem, found, "the sweep's rows cannot be read");
+    const size_t place = (size_t)(index / row->chunks);
+    point->status = sweep_row_get(row, &chunk, place, point->values);
+    sweep_row_reason(&chunk, place, point->why, sizeof point->why);
+    sweep_chunk_row_clear(&chunk);
+    Status status =
+        sweep_grid_new(sweep_view_study(view), &view->inquiry.simulation, NULL, &grid, problem);
+    if (status == STATUS_OK)
+        status =
+            sweep_grid_scene(grid, (size_t)index, false, NULL, &point->scene.simulation, problem);
+    sweep_grid_free(grid);
+    return status;
+}
