@@ -1,18 +1,13 @@
 // schema/*.schema.json are what the tables print now, and sound JSON.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include <dirent.h>
 #include <jansson.h>
 
 #include "server/json/schema.h"
+#include "tests/support/test.h"
 
 static const char *const folder = IMPACTD_SOURCE_DIR "/schema";
 
@@ -31,8 +26,7 @@ static char *read_file(const char *name) {
     return bytes_take(&bytes, NULL);
 }
 
-static void the_committed_schemas_are_what_the_tables_say(void **state) {
-    (void)state;
+TEST(the_committed_schemas_are_what_the_tables_say) {
     for (const SchemaDocument *document = schema_documents; document->name != NULL; document++) {
         Bytes bytes = {0};
         schema_write_document(&bytes, document);
@@ -46,8 +40,7 @@ static void the_committed_schemas_are_what_the_tables_say(void **state) {
     }
 }
 
-static void every_committed_schema_has_a_table(void **state) {
-    (void)state;
+TEST(every_committed_schema_has_a_table) {
     DIR *directory = opendir(folder);
     assert_non_null(directory);
     const struct dirent *entry;
@@ -66,8 +59,7 @@ static void every_committed_schema_has_a_table(void **state) {
     closedir(directory);
 }
 
-static void every_schema_is_an_object_that_refuses_unknown_members(void **state) {
-    (void)state;
+TEST(every_schema_is_an_object_that_refuses_unknown_members) {
     for (const SchemaDocument *document = schema_documents; document->name != NULL; document++) {
         Bytes bytes = {0};
         schema_write_document(&bytes, document);
@@ -83,13 +75,4 @@ static void every_schema_is_an_object_that_refuses_unknown_members(void **state)
         json_decref(schema);
         bytes_clear(&bytes);
     }
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_committed_schemas_are_what_the_tables_say),
-        cmocka_unit_test(every_committed_schema_has_a_table),
-        cmocka_unit_test(every_schema_is_an_object_that_refuses_unknown_members),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

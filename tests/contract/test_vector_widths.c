@@ -1,18 +1,12 @@
 // Every example gives the same bytes at every vector width that the processor has.
 #include <dirent.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "core/base/canonical.h"
-#include "core/math/fft.h"
 #include "server/jobs/jobs.h"
+#include "tests/support/test.h"
 #include "tests/support/vectors.h"
 
 enum { EXAMPLES_MAX = 200 };
@@ -78,8 +72,7 @@ static size_t digest_examples(uint64_t digests[EXAMPLES_MAX], char names[EXAMPLE
     return count;
 }
 
-static void examples_have_the_same_bytes_at_every_vector_width(void **state) {
-    (void)state;
+TEST(examples_have_the_same_bytes_at_every_vector_width) {
     static uint64_t digests[VECTORS_COUNT][EXAMPLES_MAX];
     static char names[VECTORS_COUNT][EXAMPLES_MAX][64];
     Vectors first = VECTORS_COUNT;
@@ -97,12 +90,4 @@ static void examples_have_the_same_bytes_at_every_vector_width(void **state) {
                          vectors_names[vectors], vectors_names[first]);
         }
     }
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(examples_have_the_same_bytes_at_every_vector_width),
-    };
-    fft_start();
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,19 +1,13 @@
 // Every run and study looks often enough whether it is to stop: between two looks there are never
 // 100 ms of CPU, also where an example lasts long.
 #include <dirent.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
-#include "core/math/fft.h"
 #include "server/jobs/jobs.h"
 #include "server/util/clock.h"
+#include "tests/support/test.h"
 
 // Instrumented code takes many times the CPU: its times say little, so it runs for a shorter time.
 enum {
@@ -82,8 +76,7 @@ static double longest(Db *db, const char *path, double longer) {
     return ms;
 }
 
-static void no_run_goes_long_without_looking_whether_it_is_to_stop(void **state) {
-    (void)state;
+TEST(no_run_goes_long_without_looking_whether_it_is_to_stop) {
     Db *db;
     assert_int_equal(db_open(NULL, &db, NULL), STATUS_OK);
     DIR *folder = opendir(IMPACTD_SOURCE_DIR "/schema/examples");
@@ -104,12 +97,4 @@ static void no_run_goes_long_without_looking_whether_it_is_to_stop(void **state)
     closedir(folder);
     db_close(db);
     assert_true(count > 20);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(no_run_goes_long_without_looking_whether_it_is_to_stop),
-    };
-    fft_start();
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,20 +1,14 @@
 // Facts of contacts that a correct program meets: what the force does within one, what samples see
 // of it, what errors of e and T_c do, and what holds a mass at rest on its stop.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 
-#include <cmocka.h>
-
 #include "core/contact/identification.h"
 #include "core/excitation/excitation.h"
-#include "core/math/fft.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
+#include "tests/support/test.h"
 
 static const PaperBuffer *const sponge = &paper_buffers[0], *const aluminium = &paper_buffers[4];
 
@@ -52,8 +46,7 @@ static void lonely_pair(Simulation *simulation, double restitution, double conta
 }
 
 // The last part of a contact pulls: a tenth with the sponge, 15 % with bare aluminium.
-static void the_end_of_a_contact_is_tensile(void **state) {
-    (void)state;
+TEST(the_end_of_a_contact_is_tensile) {
     const struct {
         const PaperBuffer *buffer;
         double part;
@@ -75,8 +68,7 @@ static void the_end_of_a_contact_is_tensile(void **state) {
 
 // The force jumps to c_b v; a sample at that very instant shows what follows. Above a damping ratio
 // of one half nothing larger comes.
-static void the_force_jumps_at_touch_and_samples_show_what_follows(void **state) {
-    (void)state;
+TEST(the_force_jumps_at_touch_and_samples_show_what_follows) {
     const double restitutions[] = {0.05, 0.1, 0.61};
     for (size_t i = 0; i < COUNT(restitutions); i++) {
         const double e = restitutions[i], T = 0.025, v = 0.5;
@@ -98,8 +90,7 @@ static void the_force_jumps_at_touch_and_samples_show_what_follows(void **state)
 }
 
 // At 1 kHz most contacts of bare aluminium hold no sample: their peaks are the events'.
-static void peaks_of_stiff_contacts_are_not_those_of_samples(void **state) {
-    (void)state;
+TEST(peaks_of_stiff_contacts_are_not_those_of_samples) {
     Simulation simulation;
     paper_scene(&simulation, aluminium->restitution, aluminium->contact_time, 10);
     Outcome *outcome = run(&simulation);
@@ -116,8 +107,7 @@ static void peaks_of_stiff_contacts_are_not_those_of_samples(void **state) {
     outcome_unref(outcome);
 }
 
-static void the_sponge_is_hit_eighty_times_less_hard_than_aluminium(void **state) {
-    (void)state;
+TEST(the_sponge_is_hit_eighty_times_less_hard_than_aluminium) {
     double peak[2][2];
     for (int i = 0; i < 2; i++) {
         const PaperBuffer *buffer = i == 0 ? sponge : aluminium;
@@ -136,8 +126,7 @@ static void the_sponge_is_hit_eighty_times_less_hard_than_aluminium(void **state
 
 // A tenth of error in T_c with 15 % in e moves rms values by 1 to 5 %, the peak force by 9 to 14 %,
 // and single samples by 9 to 26 % of the largest.
-static void statistics_bear_errors_of_measurement_better_than_samples(void **state) {
-    (void)state;
+TEST(statistics_bear_errors_of_measurement_better_than_samples) {
     for (int is_random = 0; is_random < 2; is_random++) {
         Outcome *outcomes[2];
         for (int i = 0; i < 2; i++) {
@@ -170,8 +159,7 @@ static void statistics_bear_errors_of_measurement_better_than_samples(void **sta
 }
 
 // Under a base that goes on, a contact's length is nobody's contact time.
-static void contacts_under_a_moving_base_do_not_last_their_contact_time(void **state) {
-    (void)state;
+TEST(contacts_under_a_moving_base_do_not_last_their_contact_time) {
     Simulation simulation;
     paper_scene(&simulation, sponge->restitution, sponge->contact_time, 60);
     paper_random(&simulation, 1, 1);
@@ -188,8 +176,7 @@ static void contacts_under_a_moving_base_do_not_last_their_contact_time(void **s
 }
 
 // While it rests on its stop the force is m (C v + K x) / (M + m), and it leaves where that is 0.
-static void a_resting_mass_is_held_by_the_structures_push(void **state) {
-    (void)state;
+TEST(a_resting_mass_is_held_by_the_structures_push) {
     Simulation simulation;
     paper_scene(&simulation, 0.3, 0.025, 4);
     paper_model(&simulation, "impulse");
@@ -222,8 +209,7 @@ static void a_resting_mass_is_held_by_the_structures_push(void **state) {
 }
 
 // A buffer that gives nothing back: the mass stays where it hit, unless it is pulled off at once.
-static void without_restitution_the_mass_stays_at_its_stop(void **state) {
-    (void)state;
+TEST(without_restitution_the_mass_stays_at_its_stop) {
     Simulation simulation;
     paper_scene(&simulation, 0, NAN, 10);
     paper_model(&simulation, "impulse");
@@ -242,8 +228,7 @@ static void without_restitution_the_mass_stays_at_its_stop(void **state) {
 }
 
 // What an error of e or T_c does to k_b and c_b, to first order.
-static void parameters_are_as_sensitive_as_published(void **state) {
-    (void)state;
+TEST(parameters_are_as_sensitive_as_published) {
     const double m = 0.1, e = 0.61, T = 0.025, small = 1e-6, loss = log(e);
     const double pi2 = 9.869604401089358;
     const Separation rule = SEPARATION_ZERO_PENETRATION;
@@ -260,8 +245,7 @@ static void parameters_are_as_sensitive_as_published(void **state) {
 }
 
 // Point samples of the acceleration catch stiff spikes at random and hide that the models agree.
-static void point_samples_of_the_acceleration_tell_less_than_means(void **state) {
-    (void)state;
+TEST(point_samples_of_the_acceleration_tell_less_than_means) {
     const struct {
         const PaperBuffer *buffer;
         double low, high;
@@ -289,21 +273,4 @@ static void point_samples_of_the_acceleration_tell_less_than_means(void **state)
         outcome_unref(outcomes[0]);
         outcome_unref(outcomes[1]);
     }
-}
-
-int main(void) {
-    fft_start();
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_end_of_a_contact_is_tensile),
-        cmocka_unit_test(the_force_jumps_at_touch_and_samples_show_what_follows),
-        cmocka_unit_test(peaks_of_stiff_contacts_are_not_those_of_samples),
-        cmocka_unit_test(the_sponge_is_hit_eighty_times_less_hard_than_aluminium),
-        cmocka_unit_test(statistics_bear_errors_of_measurement_better_than_samples),
-        cmocka_unit_test(contacts_under_a_moving_base_do_not_last_their_contact_time),
-        cmocka_unit_test(a_resting_mass_is_held_by_the_structures_push),
-        cmocka_unit_test(without_restitution_the_mass_stays_at_its_stop),
-        cmocka_unit_test(parameters_are_as_sensitive_as_published),
-        cmocka_unit_test(point_samples_of_the_acceleration_tell_less_than_means),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -8,12 +8,6 @@
 // within it; and the fewest that keep it with the same confidence for somebody who knows the spread
 // from the start (told of statistics, not of spectra). No rule that keeps 99 % can do with fewer
 // than the last, in the mean.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -26,6 +20,7 @@
 #include "core/study/statistics.h"
 #include "core/study/study.h"
 #include "server/json/parse.h"
+#include "tests/support/test.h"
 #include "tests/truth/drawn.h"
 
 static unsigned long scenes = 4;
@@ -292,8 +287,7 @@ static void counts_print(void) {
     }
 }
 
-static void targets_are_kept_with_few_runs_to_spare(void **state) {
-    (void)state;
+TEST(targets_are_kept_with_few_runs_to_spare) {
     Draws draws = {seed * 0x2545f4914f6cdd1dU};
     for (unsigned long i = 0; i < scenes; i++)
         scene_judge(&draws);
@@ -325,8 +319,5 @@ int main(int argc, char **argv) {
     if (argc > 3)
         runs_of_each = strtoul(argv[3], NULL, 10);
     fft_start();
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(targets_are_kept_with_few_runs_to_spare),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return test_run(0, NULL);
 }

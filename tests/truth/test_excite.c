@@ -1,19 +1,14 @@
 // Motions of the base through the whole journey: against a plain integration in long double, and
 // against the same motion told in another way.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
-
-#include <cmocka.h>
 
 #include "core/excitation/excitation.h"
 #include "core/excitation/recorded_motion.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
+#include "tests/support/test.h"
 
 #define PI 3.14159265358979323846264338328L
 
@@ -113,8 +108,7 @@ static long double sweep(long double t) {
     return t > 8 ? 0 : sinl(2 * PI * (9 * t - 8 * t * t / 16));
 }
 
-static void pulses_between_the_samples_are_met_to_rounding(void **state) {
-    (void)state;
+TEST(pulses_between_the_samples_are_met_to_rounding) {
     static const struct {
         const char *kind;
         Ground *ground;
@@ -144,8 +138,7 @@ static ExcitationChirp *chirp(Simulation *simulation) {
 }
 
 // 200 knots in the shortest cycle: the base within 8.3e-5, what the structure does of it far less.
-static void a_sweep_is_met_to_a_billionth(void **state) {
-    (void)state;
+TEST(a_sweep_is_met_to_a_billionth) {
     Simulation simulation;
     chirp(&simulation);
     Outcome *outcome = run(&simulation);
@@ -155,8 +148,7 @@ static void a_sweep_is_met_to_a_billionth(void **state) {
     outcome_unref(outcome);
 }
 
-static void a_sweep_with_fewer_knots_errs_with_their_fourth_power(void **state) {
-    (void)state;
+TEST(a_sweep_with_fewer_knots_errs_with_their_fourth_power) {
     double errors[2];
     for (int i = 0; i < 2; i++) {
         Simulation simulation;
@@ -178,8 +170,7 @@ static void record_scene(Simulation *simulation, bool is_stiff, bool is_impulse,
 }
 
 // 2.5 ms knots meet 2 kHz samples, not those of 1 kHz; 1.7 ms ones meet 10 kHz.
-static void a_record_on_another_grid_gives_the_same_motion(void **state) {
-    (void)state;
+TEST(a_record_on_another_grid_gives_the_same_motion) {
     static const struct {
         double interval, rate;
         size_t step;
@@ -217,8 +208,7 @@ static void a_record_on_another_grid_gives_the_same_motion(void **state) {
 }
 
 // Knots 1/80 of the structure's 1/omega apart, so that all arcs are short and the base moves them.
-static void the_balance_closes_under_a_base_far_faster_than_the_structure(void **state) {
-    (void)state;
+TEST(the_balance_closes_under_a_base_far_faster_than_the_structure) {
     const double intervals[] = {0.5e-3, 0.99e-3, 0.25e-3};
     double swings[4 * SWINGS];
     for (size_t i = 0; i < COUNT(swings); i++)
@@ -234,8 +224,7 @@ static void the_balance_closes_under_a_base_far_faster_than_the_structure(void *
     }
 }
 
-static void pulses_are_what_other_kinds_make_of_them(void **state) {
-    (void)state;
+TEST(pulses_are_what_other_kinds_make_of_them) {
     Simulation simulation;
     paper_scene(&simulation, 0.61, 0.025, 3);
     pulse(&simulation, "triangular", 8, 0, 0.25);
@@ -257,8 +246,7 @@ static void pulses_are_what_other_kinds_make_of_them(void **state) {
     outcome_unref(other);
 }
 
-static void a_later_pulse_gives_the_same_motion_later(void **state) {
-    (void)state;
+TEST(a_later_pulse_gives_the_same_motion_later) {
     static const char *const kinds[] = {"half_sine", "triangular"};
     for (size_t i = 0; i < COUNT(kinds); i++)
         for (int is_stiff = 0; is_stiff < 2; is_stiff++) {
@@ -279,8 +267,7 @@ static void a_later_pulse_gives_the_same_motion_later(void **state) {
 }
 
 // 1 ns of the area of a release speed; it must not make the contacts after it any dearer.
-static void a_pulse_far_shorter_than_all_else_is_a_release(void **state) {
-    (void)state;
+TEST(a_pulse_far_shorter_than_all_else_is_a_release) {
     Simulation simulation;
     record_scene(&simulation, false, false, 1000);
     pulse(&simulation, "half_sine", (double)(PI / 2 * 0.3e9L), 0, 1e-9);
@@ -293,18 +280,4 @@ static void a_pulse_far_shorter_than_all_else_is_a_release(void **state) {
     assert_true(parted(one, other, 1, 0) < 1e-6);
     outcome_unref(one);
     outcome_unref(other);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(pulses_between_the_samples_are_met_to_rounding),
-        cmocka_unit_test(a_sweep_is_met_to_a_billionth),
-        cmocka_unit_test(a_sweep_with_fewer_knots_errs_with_their_fourth_power),
-        cmocka_unit_test(a_record_on_another_grid_gives_the_same_motion),
-        cmocka_unit_test(the_balance_closes_under_a_base_far_faster_than_the_structure),
-        cmocka_unit_test(pulses_are_what_other_kinds_make_of_them),
-        cmocka_unit_test(a_pulse_far_shorter_than_all_else_is_a_release),
-        cmocka_unit_test(a_later_pulse_gives_the_same_motion_later),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -6,12 +6,8 @@
 // child, so that a crash or a hang ends that scene alone.
 #include <errno.h>
 #include <math.h>
-#include <setjmp.h>
 #include <signal.h>
-#include <stdarg.h>
 #include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -19,9 +15,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <cmocka.h>
-
 #include "core/math/fft.h"
+#include "tests/support/test.h"
 #include "tests/truth/extremes.h"
 #include "tests/truth/extremes_judge.h"
 
@@ -173,8 +168,7 @@ static void print_tally(void) {
 // Only a campaign judges times: the suite may run in a build, or beside others, that take longer.
 static bool is_timed;
 
-static void extremes_are_right_or_say_that_they_are_not(void **state) {
-    (void)state;
+TEST(extremes_are_right_or_say_that_they_are_not) {
     for (size_t next = 0; next < scenes;)
         next = supervise(next);
     print_tally();
@@ -205,8 +199,5 @@ int main(int count, char **arguments) {
         rows = fopen(arguments[4], "w");
     setvbuf(stdout, NULL, _IOLBF, 0);
     fft_start();
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(extremes_are_right_or_say_that_they_are_not),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return test_run(0, NULL);
 }

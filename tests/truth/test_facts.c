@@ -1,20 +1,14 @@
 // Facts of the physics that a correct program meets: closed forms, Table I, known orbits, the
 // paper's thesis.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 
-#include <cmocka.h>
-
 #include "core/excitation/excitation.h"
 #include "core/excitation/recorded_motion.h"
-#include "core/math/fft.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
+#include "tests/support/test.h"
 
 static const double TURN = 6.283185307179586;
 
@@ -52,8 +46,7 @@ static void assert_near(double value, double wanted, double relative) {
         fail_msg("%.17g is not %.17g within %g", value, wanted, relative);
 }
 
-static void table_one_follows_from_restitution_and_contact_time(void **state) {
-    (void)state;
+TEST(table_one_follows_from_restitution_and_contact_time) {
     for (size_t i = 0; i < COUNT(paper_buffers); i++) {
         const PaperBuffer *buffer = &paper_buffers[i];
         Simulation simulation;
@@ -66,8 +59,7 @@ static void table_one_follows_from_restitution_and_contact_time(void **state) {
     }
 }
 
-static void the_first_impact_comes_at_the_same_instant_with_every_model(void **state) {
-    (void)state;
+TEST(the_first_impact_comes_at_the_same_instant_with_every_model) {
     for (size_t i = 0; i < COUNT(paper_buffers); i++)
         for (int is_impulse = 0; is_impulse < 2; is_impulse++) {
             Simulation simulation;
@@ -91,8 +83,7 @@ static double third_impact(double restitution, double contact_time, const char *
     return start;
 }
 
-static void where_contact_takes_time_the_models_part_at_the_third_impact(void **state) {
-    (void)state;
+TEST(where_contact_takes_time_the_models_part_at_the_third_impact) {
     const double sponge = third_impact(0.61, 0.025, "spring_damper");
     assert_near(sponge, 0.26559, 2e-5);
     assert_near(third_impact(0.61, 0.025, "impulse"), 0.16939, 3e-5);
@@ -101,8 +92,7 @@ static void where_contact_takes_time_the_models_part_at_the_third_impact(void **
 }
 
 // Two bodies alone: the contact returns just what it was identified from.
-static void an_isolated_pair_returns_restitution_and_contact_time(void **state) {
-    (void)state;
+TEST(an_isolated_pair_returns_restitution_and_contact_time) {
     const double restitutions[] = {0.02, 0.1, 0.46, 0.61, 0.9, 0.99},
                  ratios[] = {1e-3, 0.082, 1, 10};
     const double times[] = {1e-6, 0.0003, 0.025};
@@ -125,8 +115,7 @@ static void an_isolated_pair_returns_restitution_and_contact_time(void **state) 
             }
 }
 
-static void sponge_contacts_in_free_vibration_last_as_long_as_published(void **state) {
-    (void)state;
+TEST(sponge_contacts_in_free_vibration_last_as_long_as_published) {
     Simulation simulation;
     paper_scene(&simulation, 0.61, 0.025, 10);
     Outcome *outcome = run(&simulation);
@@ -156,8 +145,7 @@ static void constant_base(Simulation *simulation, double acceleration, double du
 }
 
 // A structure so heavy that it does not notice, already at rest under the pull.
-static void a_bouncing_mass_comes_to_rest_after_infinitely_many_impacts(void **state) {
-    (void)state;
+TEST(a_bouncing_mass_comes_to_rest_after_infinitely_many_impacts) {
     const double g = 9.81, e = 0.5;
     Simulation simulation;
     paper_scene(&simulation, e, 1e-3, 2);
@@ -183,8 +171,7 @@ static void a_bouncing_mass_comes_to_rest_after_infinitely_many_impacts(void **s
 }
 
 // Masri and Caughey's two symmetric impacts per cycle.
-static void the_masri_caughey_orbit_is_reached_and_kept(void **state) {
-    (void)state;
+TEST(the_masri_caughey_orbit_is_reached_and_kept) {
     const double C = 0.1, amplitude = 1 / sqrt(1 + C * C);
     Simulation simulation;
     paper_scene(&simulation, 0.6, 0.025, 300 * TURN);
@@ -238,8 +225,7 @@ static void model_distance(const PaperBuffer *buffer, bool is_random, double out
     outcome_unref(outcomes[1]);
 }
 
-static void the_models_agree_on_aluminium_and_differ_on_the_sponge(void **state) {
-    (void)state;
+TEST(the_models_agree_on_aluminium_and_differ_on_the_sponge) {
     const PaperBuffer *sponge = &paper_buffers[0], *aluminium = &paper_buffers[4];
     double soft[2], hard[2];
     model_distance(sponge, false, soft);
@@ -257,8 +243,7 @@ static void the_models_agree_on_aluminium_and_differ_on_the_sponge(void **state)
 
 // A free mass that misses its stops leaves the structure to itself; white base acceleration of
 // density G gives var(x) = G / (8 xi w^3).
-static void white_noise_gives_the_variance_of_theory(void **state) {
-    (void)state;
+TEST(white_noise_gives_the_variance_of_theory) {
     Simulation simulation;
     paper_scene(&simulation, 0.61, 0.025, 20000);
     fields_clear(damper_fields, &simulation.scene.dampers.at[0]);
@@ -279,8 +264,7 @@ static void white_noise_gives_the_variance_of_theory(void **state) {
 }
 
 // Statistics that begin late leave the transient out of peaks as of rms values.
-static void statistics_leave_the_transient_out(void **state) {
-    (void)state;
+TEST(statistics_leave_the_transient_out) {
     Simulation simulation;
     paper_scene(&simulation, 0.61, 0.025, 10);
     simulation.output.statistics_from = 5;
@@ -297,8 +281,7 @@ static void statistics_leave_the_transient_out(void **state) {
 }
 
 // Statistics that begin within a contact leave out how hard it pressed before.
-static void statistics_leave_out_how_hard_a_contact_pressed_before(void **state) {
-    (void)state;
+TEST(statistics_leave_out_how_hard_a_contact_pressed_before) {
     double peak[2] = {0, 0}; // of every 33rd of a second, and of samples that see the contact
     for (int i = 0; i < 2; i++) {
         Simulation simulation;
@@ -319,8 +302,7 @@ static void statistics_leave_out_how_hard_a_contact_pressed_before(void **state)
 
 // A base that shakes a soft structure faster than it can follow: contacts may not count its motion
 // from where the base would hold it, which is far away.
-static void contacts_of_soft_structures_keep_the_energy_balance(void **state) {
-    (void)state;
+TEST(contacts_of_soft_structures_keep_the_energy_balance) {
     for (int trial = 0; trial < 20; trial++) {
         Simulation simulation;
         paper_scene(&simulation, 0.4, trial % 2 == 0 ? 0.0002 : 0.07, 2);
@@ -337,8 +319,7 @@ static void contacts_of_soft_structures_keep_the_energy_balance(void **state) {
 
 // A hop so short that it ends within the arc in which the mass left its stop keeps its speed: stiff
 // structures at low sample rates are full of them.
-static void hops_after_a_rest_keep_the_energy_balance(void **state) {
-    (void)state;
+TEST(hops_after_a_rest_keep_the_energy_balance) {
     for (int trial = 0; trial < 40; trial++) {
         Simulation simulation;
         paper_scene(&simulation, 0.5 + 0.012 * trial, 0.025, 10);
@@ -356,8 +337,7 @@ static void hops_after_a_rest_keep_the_energy_balance(void **state) {
 
 // A whole period of a sine takes a mass without a spring back to where it stood: what energy there
 // was is gone when the balance is struck.
-static void energy_that_comes_and_goes_is_not_gained_from_nowhere(void **state) {
-    (void)state;
+TEST(energy_that_comes_and_goes_is_not_gained_from_nowhere) {
     for (int trial = 0; trial < 3; trial++) {
         Simulation simulation;
         paper_scene(&simulation, 0.61, 0.025, 1);
@@ -370,25 +350,4 @@ static void energy_that_comes_and_goes_is_not_gained_from_nowhere(void **state) 
         assert_true(outcome->summary.energy_residual < 1e-12);
         outcome_unref(outcome);
     }
-}
-
-int main(void) {
-    fft_start();
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(table_one_follows_from_restitution_and_contact_time),
-        cmocka_unit_test(the_first_impact_comes_at_the_same_instant_with_every_model),
-        cmocka_unit_test(where_contact_takes_time_the_models_part_at_the_third_impact),
-        cmocka_unit_test(an_isolated_pair_returns_restitution_and_contact_time),
-        cmocka_unit_test(sponge_contacts_in_free_vibration_last_as_long_as_published),
-        cmocka_unit_test(a_bouncing_mass_comes_to_rest_after_infinitely_many_impacts),
-        cmocka_unit_test(the_masri_caughey_orbit_is_reached_and_kept),
-        cmocka_unit_test(the_models_agree_on_aluminium_and_differ_on_the_sponge),
-        cmocka_unit_test(statistics_leave_the_transient_out),
-        cmocka_unit_test(statistics_leave_out_how_hard_a_contact_pressed_before),
-        cmocka_unit_test(contacts_of_soft_structures_keep_the_energy_balance),
-        cmocka_unit_test(hops_after_a_rest_keep_the_energy_balance),
-        cmocka_unit_test(energy_that_comes_and_goes_is_not_gained_from_nowhere),
-        cmocka_unit_test(white_noise_gives_the_variance_of_theory),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

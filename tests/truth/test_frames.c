@@ -2,19 +2,14 @@
 // may be little more than what one last digit of the scene changes: `test_frames COUNT SEED` runs a
 // longer campaign and prints it.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "core/solve/exact.h"
 #include "tests/support/doubles.h"
 #include "tests/support/frames.h"
+#include "tests/support/test.h"
 #include "tests/truth/drawn.h"
 #include "tests/truth/frame_reference.h"
 
@@ -359,8 +354,7 @@ static Verdict judge(uint64_t number) {
     return verdict;
 }
 
-static void random_frames_agree_with_quad_precision(void **state) {
-    (void)state;
+TEST(random_frames_agree_with_quad_precision) {
     size_t counts[4] = {0};
     for (uint64_t i = 0; i < scenes; i++)
         counts[judge(seed * 100000 + i)]++;
@@ -377,8 +371,5 @@ int main(int count, char **arguments) {
     }
     if (count > 2)
         seed = strtoul(arguments[2], NULL, 10);
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(random_frames_agree_with_quad_precision),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return test_run(0, NULL);
 }

@@ -1,16 +1,11 @@
 // No impact is missed: every flight, contact and rest of random scenes is proved to go on for as
 // long as the ledger says. `test_missed COUNT SEED` runs a longer campaign.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
+#include "tests/support/test.h"
 #include "tests/truth/drawn.h"
 #include "tests/truth/scan.h"
 
@@ -23,8 +18,7 @@ static void short_scene(ReferenceScene *scene, size_t i) {
     drawn_zero_force(scene, seed * 1000003 + i);
 }
 
-static void no_impact_is_missed(void **state) {
-    (void)state;
+TEST(no_impact_is_missed) {
     size_t failed = 0, refused = 0, impacts = 0, pieces = 0;
     double worst = 0;
     for (size_t i = 0; i < scenes; i++) {
@@ -55,8 +49,7 @@ static void no_impact_is_missed(void **state) {
 }
 
 // The judge itself: a row taken out, one made up, and one that begins a nanosecond late.
-static void a_ledger_that_is_not_whole_is_seen(void **state) {
-    (void)state;
+TEST(a_ledger_that_is_not_whole_is_seen) {
     size_t tried = 0;
     for (size_t i = 0; i < 60; i++) {
         ReferenceScene scene;
@@ -100,9 +93,5 @@ int main(int argc, char **argv) {
         scenes = strtoul(argv[1], NULL, 10);
     if (argc > 2)
         seed = strtoull(argv[2], NULL, 10);
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(no_impact_is_missed),
-        cmocka_unit_test(a_ledger_that_is_not_whole_is_seen),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return test_run(0, NULL);
 }

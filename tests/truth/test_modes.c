@@ -2,19 +2,15 @@
 // of them: how often the error foretold is exceeded, and by how much it is too large.
 // `test_modes COUNT SEED [KIND]` runs a longer campaign and prints it.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "core/plan/plan.h"
 #include "core/simulation/error_metrics.h"
 #include "core/solve/solver.h"
 #include "server/json/parse.h"
+#include "tests/support/test.h"
 #include "tests/truth/drawn.h"
 
 static size_t scenes = 24;
@@ -340,13 +336,11 @@ static void judge_all(bool has_dampers, double most) {
     assert_true(missed <= most * estimates);
 }
 
-static void without_dampers_the_error_foretold_is_seldom_exceeded(void **state) {
-    (void)state;
+TEST(without_dampers_the_error_foretold_is_seldom_exceeded) {
     judge_all(false, 0.03);
 }
 
-static void with_dampers_too(void **state) {
-    (void)state;
+TEST(with_dampers_too) {
     judge_all(true, 0.1);
 }
 
@@ -359,9 +353,5 @@ int main(int count, char **arguments) {
         seed = strtoul(arguments[2], NULL, 10);
     if (count > 3)
         only = atoi(arguments[3]);
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(without_dampers_the_error_foretold_is_seldom_exceeded),
-        cmocka_unit_test(with_dampers_too),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return test_run(0, NULL);
 }

@@ -3,19 +3,14 @@
 // power_reference.h; with a tolerance against full accuracy, where the run's own estimate is
 // judged. `test_power COUNT SEED` runs a longer campaign and prints it.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "core/math/fft.h"
 #include "core/solve/exact.h"
 #include "tests/support/scenes.h"
+#include "tests/support/test.h"
 #include "tests/truth/drawn.h"
 #include "tests/truth/power_reference.h"
 
@@ -182,8 +177,7 @@ static void judge_impacts(uint64_t number, const PowerScene *scene, const Answer
     }
 }
 
-static void full_accuracy_is_that_of_another_integrator(void **state) {
-    (void)state;
+TEST(full_accuracy_is_that_of_another_integrator) {
     size_t judged = 0;
     double worst = 0;
     for (uint64_t number = seed; number < seed + scenes; number++) {
@@ -227,8 +221,7 @@ static void full_accuracy_is_that_of_another_integrator(void **state) {
     assert_true(judged > scenes / 3);
 }
 
-static void a_tolerance_s_estimate_holds(void **state) {
-    (void)state;
+TEST(a_tolerance_s_estimate_holds) {
     static const double tolerances[] = {1e-2, 1e-4, 1e-6, 1e-9};
     size_t held = 0, judged = 0, wide = 0;
     for (uint64_t number = seed; number < seed + scenes; number++) {
@@ -264,10 +257,6 @@ static void a_tolerance_s_estimate_holds(void **state) {
 }
 
 int main(int argc, char **argv) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(full_accuracy_is_that_of_another_integrator),
-        cmocka_unit_test(a_tolerance_s_estimate_holds),
-    };
     fft_start();
     if (argc > 2) {
         scenes = (size_t)strtoul(argv[1], NULL, 10);
@@ -276,5 +265,5 @@ int main(int argc, char **argv) {
         if (argc > 4)
             cmocka_set_test_filter(argv[4]);
     }
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return test_run(0, NULL);
 }

@@ -2,15 +2,9 @@
 // touch at one instant: the exact solver beside the solver adaptive, which goes in plain time by
 // SUNDIALS and says itself how far it can be believed. `test_power_frames COUNT SEED` runs more.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "core/math/fft.h"
 #include "core/solve/exact.h"
@@ -18,6 +12,7 @@
 #include "core/solve/time_stepping.h"
 #include "tests/support/document.h"
 #include "tests/support/scenes.h"
+#include "tests/support/test.h"
 #include "tests/truth/drawn.h"
 
 static size_t scenes = 10;
@@ -88,8 +83,7 @@ static Outcome *run(Simulation *simulation, const char *solver) {
     return outcome;
 }
 
-static void frames_agree_with_another_integrator(void **state) {
-    (void)state;
+TEST(frames_agree_with_another_integrator) {
     size_t judged = 0, impacts = 0;
     for (uint64_t number = seed; number < seed + scenes; number++) {
         Simulation simulation;
@@ -120,11 +114,10 @@ static void frames_agree_with_another_integrator(void **state) {
 }
 
 int main(int argc, char **argv) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(frames_agree_with_another_integrator)};
     fft_start();
     if (argc > 2) {
         scenes = (size_t)strtoul(argv[1], NULL, 10);
         seed = strtoull(argv[2], NULL, 10);
     }
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return test_run(0, NULL);
 }

@@ -2,19 +2,15 @@
 // short steps of Runge and Kutta's: x = sum of phi_k q_k over the modes kept, and a free mass that
 // meets the storey so moved. Its modes are found here too, by Jacobi's rotations.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "core/plan/plan.h"
 #include "core/simulation/simulation.h"
 #include "core/solve/solver.h"
 #include "server/json/parse.h"
+#include "tests/support/test.h"
 
 enum { N = 5, SAMPLES = 101, DAMPED = 4 }; // storeys; samples; storey of the damper, from 0
 static const double RATE = 50, RATIO = 0.03, TURN = 6.283185307179586;
@@ -205,8 +201,7 @@ static const struct {
     {"\"solver\": \"adaptive\", \"tolerance\": 1e-11", 1e-7, 1e-4},
 };
 
-static void every_solver_moves_the_modes_that_are_kept(void **state) {
-    (void)state;
+TEST(every_solver_moves_the_modes_that_are_kept) {
     static Answer answer;
     Reduced reduced = {.kept = 0};
     find_modes(&reduced);
@@ -225,8 +220,7 @@ static void every_solver_moves_the_modes_that_are_kept(void **state) {
     }
 }
 
-static void a_free_mass_meets_the_storey_that_they_move(void **state) {
-    (void)state;
+TEST(a_free_mass_meets_the_storey_that_they_move) {
     static Answer answer;
     Reduced reduced = {.kept = 0};
     find_modes(&reduced);
@@ -253,8 +247,7 @@ static void a_free_mass_meets_the_storey_that_they_move(void **state) {
     }
 }
 
-static void a_mass_that_meets_nothing_stays_where_it_is(void **state) {
-    (void)state;
+TEST(a_mass_that_meets_nothing_stays_where_it_is) {
     for (size_t i = 0; i < sizeof solvers_tried / sizeof *solvers_tried; i++) {
         char accuracy[128];
         snprintf(accuracy, sizeof accuracy, "%s, \"modes\": 2", solvers_tried[i].accuracy);
@@ -271,8 +264,7 @@ static void a_mass_that_meets_nothing_stays_where_it_is(void **state) {
 }
 
 // Peaks and rms are of all storeys, and of the same motion as the samples.
-static void the_summary_is_of_the_same_motion(void **state) {
-    (void)state;
+TEST(the_summary_is_of_the_same_motion) {
     static const char *const bases[] = {
         sine,
         "{\"kind\": \"random\", \"band\": [0, 20], \"rms\": 1}",
@@ -344,8 +336,7 @@ static size_t run_line(bool is_cut, double *values, size_t *impacts) {
     return modes;
 }
 
-static void a_mode_that_nothing_sees_makes_no_difference(void **state) {
-    (void)state;
+TEST(a_mode_that_nothing_sees_makes_no_difference) {
     static double all[4 * SAMPLES], seen[4 * SAMPLES];
     size_t impacts[2];
     assert_int_equal(run_line(false, all, &impacts[0]), 3);
@@ -355,8 +346,7 @@ static void a_mode_that_nothing_sees_makes_no_difference(void **state) {
         assert_true(miss(seen + i * SAMPLES, all + i * SAMPLES, SAMPLES) < 1e-10);
 }
 
-static void fewer_modes_are_fewer_steps(void **state) {
-    (void)state;
+TEST(fewer_modes_are_fewer_steps) {
     for (int has_contact = 0; has_contact < 2; has_contact++) {
         double last = INFINITY;
         for (size_t kept = N; kept > 0; kept--) {
@@ -368,16 +358,4 @@ static void fewer_modes_are_fewer_steps(void **state) {
             outcome_unref(outcome);
         }
     }
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_solver_moves_the_modes_that_are_kept),
-        cmocka_unit_test(a_free_mass_meets_the_storey_that_they_move),
-        cmocka_unit_test(a_mass_that_meets_nothing_stays_where_it_is),
-        cmocka_unit_test(the_summary_is_of_the_same_motion),
-        cmocka_unit_test(a_mode_that_nothing_sees_makes_no_difference),
-        cmocka_unit_test(fewer_modes_are_fewer_steps),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,17 +2,12 @@
 // little more than what a plain double of the reference's own method misses. `test_reference COUNT
 // SEED` runs a longer campaign.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
 
-#include <cmocka.h>
-
+#include "tests/support/test.h"
 #include "tests/truth/drawn.h"
 #include "tests/truth/reference_compare.h"
 
@@ -109,8 +104,7 @@ static void judge(const ReferenceScene *scene, size_t number, Tally *tally) {
     reference_clear(&solved);
 }
 
-static void random_scenes_agree_with_quad_precision(void **state) {
-    (void)state;
+TEST(random_scenes_agree_with_quad_precision) {
     Tally tally = {0, 0, 0, 0, 0, 0, 0, 0};
     for (size_t i = 0; i < scenes; i++) {
         ReferenceScene scene;
@@ -130,8 +124,7 @@ static void random_scenes_agree_with_quad_precision(void **state) {
 
 // Scenes in which something is exactly 0, or happens within one sample, one arc or one unit of the
 // clock.
-static void awkward_scenes_agree_with_quad_precision(void **state) {
-    (void)state;
+TEST(awkward_scenes_agree_with_quad_precision) {
     const ReferenceScene usual = {.mass = 1,
                                   .damper_mass = 0.1,
                                   .clearance = 0.01,
@@ -224,8 +217,7 @@ static void awkward_scenes_agree_with_quad_precision(void **state) {
 
 // The reference itself: two bodies alone return just what their contact was identified from, under
 // both rules and to quad precision.
-static void the_reference_returns_restitution_and_contact_time(void **state) {
-    (void)state;
+TEST(the_reference_returns_restitution_and_contact_time) {
     const double restitutions[] = {0.02, 0.1, 0.135, 0.136, 0.46, 0.97};
     for (size_t i = 0; i < COUNT(restitutions); i++)
         for (int rule = 0; rule < 2; rule++) {
@@ -257,10 +249,5 @@ int main(int argc, char **argv) {
     if (argc > 2)
         seed = strtoull(argv[2], NULL, 10);
     is_verbose = argc > 3;
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_reference_returns_restitution_and_contact_time),
-        cmocka_unit_test(awkward_scenes_agree_with_quad_precision),
-        cmocka_unit_test(random_scenes_agree_with_quad_precision),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return test_run(0, NULL);
 }

@@ -4,19 +4,14 @@
 // `test_target COUNT SEED` runs a longer campaign and prints it; `test_target COUNT SEED NUMBER`
 // prints one of its scenes.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "core/result/response.h"
 #include "core/simulation/error_metrics.h"
 #include "server/json/parse.h"
+#include "tests/support/test.h"
 #include "tests/truth/drawn.h"
 
 static size_t scenes = 24;
@@ -313,9 +308,8 @@ static void scene_judge(uint64_t number) {
     outcome_unref(reference);
 }
 
-static void targets_are_kept_or_marked_by_work_near_the_cheapest(void **state) {
+TEST(targets_are_kept_or_marked_by_work_near_the_cheapest) {
     static const char *const names[] = {"power laws", "frames", "spectra"};
-    (void)state;
     Tally all = {0};
     for (uint64_t number = 0; number < scenes; number++)
         scene_judge(number);
@@ -353,8 +347,5 @@ int main(int argc, char **argv) {
                metric_draw(&drawn));
         return 0;
     }
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(targets_are_kept_or_marked_by_work_near_the_cheapest),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return test_run(0, NULL);
 }

@@ -1,18 +1,14 @@
 // Force traces of simulated drop tests, read: what the simulation was given comes back. With
 // arguments a campaign over a grid: trials, e, samples in contact, noise, baseline about it.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
-
-#include <cmocka.h>
 
 #include "core/base/philox.h"
 #include "core/drop_test/force_trace.h"
 #include "core/simulation/simulation.h"
 #include "tests/support/scenes.h"
+#include "tests/support/test.h"
 #include "traces.h"
 
 static const char *rule(int separation) {
@@ -27,8 +23,7 @@ static void print_score(const TraceCell *cell, const TraceScore *score) {
                   score->covered_all, score->bias, score->rms, score->stated);
 }
 
-static void without_noise_five_samples_give_e_and_contact_time(void **state) {
-    (void)state;
+TEST(without_noise_five_samples_give_e_and_contact_time) {
     static const double restitutions[] = {0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.95, 1};
     static const double samples[] = {5, 5.3, 5.9, 8, 11.2, 20, 33.3, 100, 5000};
     static const double times[] = {1e-4, 3e-2};
@@ -58,8 +53,7 @@ static void without_noise_five_samples_give_e_and_contact_time(void **state) {
     print_message("largest error of T_c %.1e\n", worst);
 }
 
-static void stated_intervals_cover_the_truth(void **state) {
-    (void)state;
+TEST(stated_intervals_cover_the_truth) {
     static const struct {
         int separation;
         double restitution, samples, noise;
@@ -89,8 +83,7 @@ static void stated_intervals_cover_the_truth(void **state) {
     }
 }
 
-static void too_few_samples_give_an_interval_that_holds_the_truth(void **state) {
-    (void)state;
+TEST(too_few_samples_give_an_interval_that_holds_the_truth) {
     static const double restitutions[] = {0.1, 0.5, 0.95}, samples[] = {1.3, 2, 2.9};
     for (int separation = 0; separation < 2; separation++)
         for (size_t i = 0; i < COUNT(restitutions); i++)
@@ -151,8 +144,7 @@ static double force_at(const ImpactHistory *closeup, double time) {
            (force[high] - force[low]) * (time - times[low]) / (times[high] - times[low]);
 }
 
-static void what_the_core_simulates_is_read_back(void **state) {
-    (void)state;
+TEST(what_the_core_simulates_is_read_back) {
     static const double restitutions[] = {0.1, 0.3, 0.5, 0.7, 0.95}, times[] = {1e-4, 2e-3, 3e-2};
     static const double rates[] = {5.2, 8, 20, 60};
     double worst = 0;
@@ -233,13 +225,7 @@ static int campaign(size_t trials, uint64_t seed) {
 }
 
 int main(int argc, char **argv) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(without_noise_five_samples_give_e_and_contact_time),
-        cmocka_unit_test(stated_intervals_cover_the_truth),
-        cmocka_unit_test(too_few_samples_give_an_interval_that_holds_the_truth),
-        cmocka_unit_test(what_the_core_simulates_is_read_back),
-    };
     if (argc > 2)
         return campaign((size_t)strtoul(argv[1], NULL, 10), strtoull(argv[2], NULL, 10));
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return test_run(0, NULL);
 }

@@ -3,20 +3,15 @@
 // largest displacement. `test_trust 40` is the whole campaign, `test_trust 40 SECONDS SEED`
 // another.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
 
-#include <cmocka.h>
-
 #include "core/excitation/excitation.h"
 #include "core/math/fft.h"
 #include "tests/support/paper.h"
+#include "tests/support/test.h"
 #include "tests/truth/drawn.h"
 
 enum { DOUBLES = 9, SPARSE = 10 };
@@ -125,8 +120,7 @@ static double ratio_of(const Trusted *trusted) {
     return fmin(trusted->horizon, duration) / fmin(trusted->parting, duration);
 }
 
-static void trust_ends_where_runs_part_from_quad_precision(void **state) {
-    (void)state;
+TEST(trust_ends_where_runs_part_from_quad_precision) {
     size_t within = 0, above = 0, told = 0;
     printf("%5s %-7s %-14s %-6s %9s %9s %9s %7s\n", "scene", "base", "buffer", "model", "earliest",
            "latest", "horizon", "ratio");
@@ -158,8 +152,5 @@ int main(int argc, char **argv) {
     if (argc > 3)
         seed = strtoull(argv[3], NULL, 10);
     fft_start();
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(trust_ends_where_runs_part_from_quad_precision),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return test_run(0, NULL);
 }

@@ -1,14 +1,9 @@
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdint.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "core/base/columns.h"
+#include "tests/support/test.h"
 
-static void columns_lie_one_behind_the_other(void **state) {
-    (void)state;
+TEST(columns_lie_one_behind_the_other) {
     Columns columns;
     assert_int_equal(columns_allocate(&columns, 3, 5, 0, NULL), STATUS_OK);
     columns_name(&columns, 1, "velocity", "m/s");
@@ -25,8 +20,7 @@ static void columns_lie_one_behind_the_other(void **state) {
     columns_clear(NULL);
 }
 
-static void no_columns_or_no_rows_are_fine(void **state) {
-    (void)state;
+TEST(no_columns_or_no_rows_are_fine) {
     Columns columns;
     assert_int_equal(columns_allocate(&columns, 0, SIZE_MAX, 0, NULL), STATUS_OK);
     columns_clear(&columns);
@@ -34,8 +28,7 @@ static void no_columns_or_no_rows_are_fine(void **state) {
     columns_clear(&columns);
 }
 
-static void too_many_bytes_are_a_limit_not_an_overflow(void **state) {
-    (void)state;
+TEST(too_many_bytes_are_a_limit_not_an_overflow) {
     Columns columns;
     Problem problem;
     problem_clear(&problem);
@@ -48,8 +41,7 @@ static void too_many_bytes_are_a_limit_not_an_overflow(void **state) {
     assert_null(columns.at);
 }
 
-static void long_names_are_cut(void **state) {
-    (void)state;
+TEST(long_names_are_cut) {
     Columns columns;
     char name[200];
     memset(name, 'n', sizeof name);
@@ -59,14 +51,4 @@ static void long_names_are_cut(void **state) {
     assert_int_equal(strlen(columns.at[0].name), sizeof columns.at[0].name - 1);
     assert_string_equal(columns.at[0].unit, "");
     columns_clear(&columns);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(columns_lie_one_behind_the_other),
-        cmocka_unit_test(no_columns_or_no_rows_are_fine),
-        cmocka_unit_test(too_many_bytes_are_a_limit_not_an_overflow),
-        cmocka_unit_test(long_names_are_cut),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

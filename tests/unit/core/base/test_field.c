@@ -1,15 +1,12 @@
 // The walkers of Field rows on structs that have every kind of row.
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "core/base/canonical.h"
 #include "core/base/field.h"
 #include "core/base/json_pointer.h"
 #include "core/base/spelling.h"
+#include "tests/support/test.h"
 
 typedef struct Part {
     char *material;
@@ -162,8 +159,7 @@ static bool same(const Text *a, const Text *b) {
     return a->length == b->length && memcmp(a->at, b->at, a->length) == 0;
 }
 
-static void defaults_are_those_of_the_rows(void **state) {
-    (void)state;
+TEST(defaults_are_those_of_the_rows) {
     Whole whole;
     memset(&whole, 0xA5, sizeof whole);
     assert_int_equal(fields_default(whole_fields, &whole), STATUS_OK);
@@ -191,8 +187,7 @@ static void defaults_are_those_of_the_rows(void **state) {
     fields_clear(whole_fields, &whole);
 }
 
-static void an_all_zero_struct_can_be_cleared(void **state) {
-    (void)state;
+TEST(an_all_zero_struct_can_be_cleared) {
     Whole whole;
     memset(&whole, 0, sizeof whole);
     fields_clear(whole_fields, &whole);
@@ -200,8 +195,7 @@ static void an_all_zero_struct_can_be_cleared(void **state) {
     fields_clear(whole_fields, NULL);
 }
 
-static void a_sound_struct_has_no_fault(void **state) {
-    (void)state;
+TEST(a_sound_struct_has_no_fault) {
     Whole whole;
     make_whole(&whole);
     problem_clear(&problem);
@@ -211,8 +205,7 @@ static void a_sound_struct_has_no_fault(void **state) {
     fields_clear(whole_fields, &whole);
 }
 
-static void all_faults_are_told_at_once_each_at_its_place(void **state) {
-    (void)state;
+TEST(all_faults_are_told_at_once_each_at_its_place) {
     Whole whole;
     make_whole(&whole);
     whole.mass = -1;
@@ -258,8 +251,7 @@ static void all_faults_are_told_at_once_each_at_its_place(void **state) {
     fields_clear(whole_fields, &whole);
 }
 
-static void what_is_required_is_told_by_its_meaning_and_unit(void **state) {
-    (void)state;
+TEST(what_is_required_is_told_by_its_meaning_and_unit) {
     Whole whole;
     assert_int_equal(fields_default(whole_fields, &whole), STATUS_OK);
     whole.spare = variant_new(&shape_square);
@@ -273,8 +265,7 @@ static void what_is_required_is_told_by_its_meaning_and_unit(void **state) {
     fields_clear(whole_fields, &whole);
 }
 
-static void a_default_made_absent_is_a_fault_where_a_number_is_needed(void **state) {
-    (void)state;
+TEST(a_default_made_absent_is_a_fault_where_a_number_is_needed) {
     Whole whole;
     make_whole(&whole);
     whole.common.offset = (double)NAN;
@@ -291,8 +282,7 @@ static void a_default_made_absent_is_a_fault_where_a_number_is_needed(void **sta
     fields_clear(whole_fields, &whole);
 }
 
-static void too_long_lists_are_one_fault_each(void **state) {
-    (void)state;
+TEST(too_long_lists_are_one_fault_each) {
     Whole whole;
     make_whole(&whole);
     free(whole.samples.at);
@@ -311,8 +301,7 @@ static void too_long_lists_are_one_fault_each(void **state) {
     fields_clear(whole_fields, &whole);
 }
 
-static void a_copy_is_equal_and_shares_nothing(void **state) {
-    (void)state;
+TEST(a_copy_is_equal_and_shares_nothing) {
     Whole whole, copy;
     make_whole(&whole);
     memset(&copy, 0x5A, sizeof copy);
@@ -332,8 +321,7 @@ static void a_copy_is_equal_and_shares_nothing(void **state) {
     fields_clear(whole_fields, &copy);
 }
 
-static void the_canonical_form_changes_with_each_member_but_not_with_notes(void **state) {
-    (void)state;
+TEST(the_canonical_form_changes_with_each_member_but_not_with_notes) {
     Whole whole;
     make_whole(&whole);
     const Text first = canonical(&whole);
@@ -371,8 +359,7 @@ static void the_canonical_form_changes_with_each_member_but_not_with_notes(void 
     fields_clear(whole_fields, &whole);
 }
 
-static void the_canonical_bytes_are_these(void **state) {
-    (void)state;
+TEST(the_canonical_bytes_are_these) {
     Part part = {.material = (char[]){"ab"}, .stiffness = 2, .damping = (double)NAN};
     Text text = {.length = 0};
     canonical_write(part_fields, &part, take, &text);
@@ -382,8 +369,7 @@ static void the_canonical_bytes_are_these(void **state) {
     assert_memory_equal(text.at, expected, text.length);
 }
 
-static void a_choice_is_written_by_its_name(void **state) {
-    (void)state;
+TEST(a_choice_is_written_by_its_name) {
     Whole whole;
     make_whole(&whole);
     const Text text = canonical(&whole);
@@ -402,8 +388,7 @@ static void count_bytes(void *context, const void *bytes, size_t size) {
     bytes_taken += size;
 }
 
-static void long_values_pass_through_the_canonical_writer(void **state) {
-    (void)state;
+TEST(long_values_pass_through_the_canonical_writer) {
     Whole whole;
     make_whole(&whole);
     const size_t before = canonical(&whole).length;
@@ -417,8 +402,7 @@ static void long_values_pass_through_the_canonical_writer(void **state) {
     fields_clear(whole_fields, &whole);
 }
 
-static void an_optional_item_is_absent_when_its_members_are(void **state) {
-    (void)state;
+TEST(an_optional_item_is_absent_when_its_members_are) {
     Whole whole;
     make_whole(&whole);
     const Field *left = fields_find(whole_fields, "left", NULL);
@@ -430,8 +414,7 @@ static void an_optional_item_is_absent_when_its_members_are(void **state) {
     fields_clear(whole_fields, &whole);
 }
 
-static void an_empty_list_is_not_the_same_as_a_default(void **state) {
-    (void)state;
+TEST(an_empty_list_is_not_the_same_as_a_default) {
     Whole whole;
     make_whole(&whole);
     const Field *field = fields_find(whole_fields, "channels", NULL);
@@ -446,8 +429,7 @@ static void an_empty_list_is_not_the_same_as_a_default(void **state) {
     fields_clear(whole_fields, &whole);
 }
 
-static void rows_are_found_also_inside_a_base(void **state) {
-    (void)state;
+TEST(rows_are_found_also_inside_a_base) {
     size_t offset = 0;
     const Field *found = fields_find(whole_fields, "offset", &offset);
     assert_ptr_equal(found, &common_fields[0]);
@@ -458,8 +440,7 @@ static void rows_are_found_also_inside_a_base(void **state) {
     assert_null(kind_find(&shapes, "oval"));
 }
 
-static void a_slip_of_the_pen_finds_the_name_that_was_meant(void **state) {
-    (void)state;
+TEST(a_slip_of_the_pen_finds_the_name_that_was_meant) {
     assert_string_equal(spelling_nearest_field(whole_fields, "mas"), "mass");
     assert_string_equal(spelling_nearest_field(whole_fields, "Storey"), "storey");
     assert_string_equal(spelling_nearest_field(whole_fields, "sotrey"), "storey");
@@ -476,8 +457,7 @@ static void a_slip_of_the_pen_finds_the_name_that_was_meant(void **state) {
     assert_null(spelling_nearest(rules, "none"));
 }
 
-static void pointers_are_escaped_and_cut(void **state) {
-    (void)state;
+TEST(pointers_are_escaped_and_cut) {
     char pointer[256];
     json_pointer_join(pointer, sizeof pointer, "/a", "b/c~d");
     assert_string_equal(pointer, "/a/b~1c~0d");
@@ -492,27 +472,4 @@ static void pointers_are_escaped_and_cut(void **state) {
     json_pointer_join(small, sizeof small, "/a", "long");
     assert_int_equal(strlen(small), sizeof small - 1);
     assert_string_equal(small, "/a...");
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(defaults_are_those_of_the_rows),
-        cmocka_unit_test(an_all_zero_struct_can_be_cleared),
-        cmocka_unit_test(a_sound_struct_has_no_fault),
-        cmocka_unit_test(all_faults_are_told_at_once_each_at_its_place),
-        cmocka_unit_test(what_is_required_is_told_by_its_meaning_and_unit),
-        cmocka_unit_test(a_default_made_absent_is_a_fault_where_a_number_is_needed),
-        cmocka_unit_test(too_long_lists_are_one_fault_each),
-        cmocka_unit_test(a_copy_is_equal_and_shares_nothing),
-        cmocka_unit_test(the_canonical_form_changes_with_each_member_but_not_with_notes),
-        cmocka_unit_test(the_canonical_bytes_are_these),
-        cmocka_unit_test(a_choice_is_written_by_its_name),
-        cmocka_unit_test(long_values_pass_through_the_canonical_writer),
-        cmocka_unit_test(an_optional_item_is_absent_when_its_members_are),
-        cmocka_unit_test(an_empty_list_is_not_the_same_as_a_default),
-        cmocka_unit_test(rows_are_found_also_inside_a_base),
-        cmocka_unit_test(a_slip_of_the_pen_finds_the_name_that_was_meant),
-        cmocka_unit_test(pointers_are_escaped_and_cut),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

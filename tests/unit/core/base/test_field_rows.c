@@ -1,16 +1,13 @@
 // Rows of numbers, lone numbers and numbered names, under every walker of Field rows.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "core/base/canonical.h"
 #include "core/base/field.h"
 #include "core/base/json_pointer.h"
 #include "tests/support/fields.h"
+#include "tests/support/test.h"
 
 typedef struct Matrix {
     Rows entries;
@@ -42,8 +39,7 @@ static Status check(const Matrix *matrix) {
     return fields_validate(fields, matrix, "", &problem);
 }
 
-static void rows_are_copied_deeply_and_cleared(void **state) {
-    (void)state;
+TEST(rows_are_copied_deeply_and_cleared) {
     double first[] = {1, 2}, second[] = {3};
     Matrix copy, matrix = matrix_of(3, (Reals[]){{first, 2}, {first, 0}, {second, 1}});
     assert_int_equal(fields_copy(fields, &matrix, &copy), STATUS_OK);
@@ -56,8 +52,7 @@ static void rows_are_copied_deeply_and_cleared(void **state) {
     fields_clear(fields, &copy);
 }
 
-static void every_number_of_every_row_is_judged(void **state) {
-    (void)state;
+TEST(every_number_of_every_row_is_judged) {
     double first[] = {1, 10}, second[] = {(double)NAN}, third[] = {1, 2, 3, 4};
     Matrix matrix = matrix_of(3, (Reals[]){{first, 2}, {second, 1}, {third, 4}});
     assert_int_equal(check(&matrix), STATUS_INVALID);
@@ -87,8 +82,7 @@ static void gather(void *context, const void *bytes, size_t size) {
     all->length += size;
 }
 
-static void the_canonical_form_tells_rows_apart(void **state) {
-    (void)state;
+TEST(the_canonical_form_tells_rows_apart) {
     double numbers[] = {1, 2, 3};
     const Reals shapes[3][3] = {{{numbers, 2}, {numbers + 2, 1}},
                                 {{numbers, 1}, {numbers + 1, 2}},
@@ -104,8 +98,7 @@ static void the_canonical_form_tells_rows_apart(void **state) {
     }
 }
 
-static void a_name_may_carry_a_number(void **state) {
-    (void)state;
+TEST(a_name_may_carry_a_number) {
     size_t length;
     assert_true(field_name_number("displacement_12", &length) == 12 && length == 12);
     assert_true(field_name_number("contact_force", &length) == 0 && length == 13);
@@ -117,8 +110,7 @@ static void a_name_may_carry_a_number(void **state) {
     assert_true(field_name_number("", &length) == 0 && length == 0);
 }
 
-static void numbered_names_are_judged_without_their_number(void **state) {
-    (void)state;
+TEST(numbered_names_are_judged_without_their_number) {
     double one = 1;
     char long_name[200];
     memset(long_name, 'd', sizeof long_name - 1);
@@ -136,8 +128,7 @@ static void numbered_names_are_judged_without_their_number(void **state) {
     fields_clear(fields, &matrix);
 }
 
-static void pointers_are_cut_at_their_room_and_escaped(void **state) {
-    (void)state;
+TEST(pointers_are_cut_at_their_room_and_escaped) {
     char target[16], name[2000];
     json_pointer_join(target, sizeof target, "/a", "b/c~d");
     assert_string_equal(target, "/a/b~1c~0d");
@@ -151,16 +142,4 @@ static void pointers_are_cut_at_their_room_and_escaped(void **state) {
     assert_int_equal(strlen(target), sizeof target - 1);
     json_pointer_join(target, sizeof target, "/x", name);
     assert_string_equal(target, "/x/~0~0~0~0~...");
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(rows_are_copied_deeply_and_cleared),
-        cmocka_unit_test(every_number_of_every_row_is_judged),
-        cmocka_unit_test(the_canonical_form_tells_rows_apart),
-        cmocka_unit_test(a_name_may_carry_a_number),
-        cmocka_unit_test(numbered_names_are_judged_without_their_number),
-        cmocka_unit_test(pointers_are_cut_at_their_room_and_escaped),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,9 +1,4 @@
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 
-#include <cmocka.h>
 
 #include <string.h>
 
@@ -12,6 +7,7 @@
 #include "core/solve/solver.h"
 #include "tests/support/fields.h"
 #include "tests/support/scenes.h"
+#include "tests/support/test.h"
 
 static char why[JSON_POINTER_MESSAGE_MAX];
 
@@ -22,8 +18,7 @@ static Status set(Simulation *simulation, const char *pointer, const char *json)
     return json_pointer_set(simulation_fields, simulation, pointer, &value, why);
 }
 
-static void scalars_are_read_as_they_were_written(void **state) {
-    (void)state;
+TEST(scalars_are_read_as_they_were_written) {
     char room[64];
     JsonScalar value;
     assert_true(json_scalar_read("0.015", &value, room));
@@ -40,8 +35,7 @@ static void scalars_are_read_as_they_were_written(void **state) {
         assert_false(json_scalar_read(bad[i], &value, room));
 }
 
-static void numbers_texts_and_elements_are_set(void **state) {
-    (void)state;
+TEST(numbers_texts_and_elements_are_set) {
     Simulation simulation;
     scene_with_damper(&simulation, 0.61, 0.025);
     assert_int_equal(set(&simulation, "/dampers/0/clearance", "0.02"), STATUS_OK);
@@ -59,8 +53,7 @@ static void numbers_texts_and_elements_are_set(void **state) {
     simulation_clear(&simulation);
 }
 
-static void another_kind_keeps_what_both_have(void **state) {
-    (void)state;
+TEST(another_kind_keeps_what_both_have) {
     Simulation simulation;
     scene_with_damper(&simulation, 0.61, 0.025);
     assert_int_equal(set(&simulation, "/accuracy/solver", "\"rk4\""), STATUS_OK);
@@ -77,8 +70,7 @@ static void another_kind_keeps_what_both_have(void **state) {
     simulation_clear(&simulation);
 }
 
-static void a_name_replaces_an_item_and_a_member_takes_the_name_away(void **state) {
-    (void)state;
+TEST(a_name_replaces_an_item_and_a_member_takes_the_name_away) {
     Simulation simulation;
     scene_with_damper(&simulation, 0.61, 0.025);
     Buffer *buffer = &simulation.scene.dampers.at[0].buffer;
@@ -95,8 +87,7 @@ static void a_name_replaces_an_item_and_a_member_takes_the_name_away(void **stat
     simulation_clear(&simulation);
 }
 
-static void what_cannot_be_there_is_told_and_changes_nothing(void **state) {
-    (void)state;
+TEST(what_cannot_be_there_is_told_and_changes_nothing) {
     Simulation simulation;
     scene_with_damper(&simulation, 0.61, 0.025);
     static const struct {
@@ -131,15 +122,4 @@ static void what_cannot_be_there_is_told_and_changes_nothing(void **state) {
     }
     assert_true(simulation.scene.dampers.at[0].clearance == 0.015);
     simulation_clear(&simulation);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(scalars_are_read_as_they_were_written),
-        cmocka_unit_test(numbers_texts_and_elements_are_set),
-        cmocka_unit_test(another_kind_keeps_what_both_have),
-        cmocka_unit_test(a_name_replaces_an_item_and_a_member_takes_the_name_away),
-        cmocka_unit_test(what_cannot_be_there_is_told_and_changes_nothing),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,16 +2,11 @@
 #include "core/base/philox.h"
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "core/base/status.h"
+#include "tests/support/test.h"
 
 // Of Random123's kat_vectors: counter, key, result.
 static const struct {
@@ -26,8 +21,7 @@ static const struct {
      {0xd16cfe09, 0x94fdcceb, 0x5001e420, 0x24126ea1}},
 };
 
-static void the_generator_gives_the_published_integers(void **state) {
-    (void)state;
+TEST(the_generator_gives_the_published_integers) {
     for (size_t i = 0; i < COUNT(known); i++) {
         uint32_t out[4];
         philox_words(known[i].counter, known[i].key, out);
@@ -35,8 +29,7 @@ static void the_generator_gives_the_published_integers(void **state) {
     }
 }
 
-static void a_pair_is_box_and_mullers_of_the_counters_words(void **state) {
-    (void)state;
+TEST(a_pair_is_box_and_mullers_of_the_counters_words) {
     const uint32_t counter[4] = {7, 1, 9, 2}, key[2] = {11, 3};
     uint32_t word[4];
     philox_words(counter, key, word);
@@ -50,8 +43,7 @@ static void a_pair_is_box_and_mullers_of_the_counters_words(void **state) {
     assert_true(fabsl(pair[1] - radius * sinl(angle)) < 1e-15L * radius);
 }
 
-static void rows_are_as_good_as_the_c_library_in_long_double(void **state) {
-    (void)state;
+TEST(rows_are_as_good_as_the_c_library_in_long_double) {
     enum { PAIRS = 100000 };
     double *pairs = malloc(2 * PAIRS * sizeof *pairs);
     assert_non_null(pairs);
@@ -71,8 +63,7 @@ static void rows_are_as_good_as_the_c_library_in_long_double(void **state) {
     free(pairs);
 }
 
-static void a_row_has_the_bits_of_its_pairs(void **state) {
-    (void)state;
+TEST(a_row_has_the_bits_of_its_pairs) {
     enum { MOST = 100 };
     double row[2 * MOST + 1];
     for (uint64_t count = 0; count <= MOST; count++) {
@@ -110,8 +101,7 @@ static void unphilox(const uint32_t out[4], const uint32_t key[2], uint32_t coun
     memcpy(counter, c, sizeof c);
 }
 
-static void even_the_rarest_words_make_finite_numbers(void **state) {
-    (void)state;
+TEST(even_the_rarest_words_make_finite_numbers) {
     const uint32_t key[2] = {0, 0}, least[4] = {0, 0, 0, 0}, most[4] = {~0u, ~0u, ~0u, ~0u};
     uint32_t c[4], back[4];
     double pair[2];
@@ -126,8 +116,7 @@ static void even_the_rarest_words_make_finite_numbers(void **state) {
     assert_true(pair[0] == 0 && pair[1] == 0);
 }
 
-static void the_normal_numbers_have_a_normal_distributions_moments(void **state) {
-    (void)state;
+TEST(the_normal_numbers_have_a_normal_distributions_moments) {
     enum { PAIRS = 1000000 };
     double sums[2][5] = {0}, product = 0, neighbours = 0, last = 0, largest = 0;
     for (uint64_t i = 0; i < PAIRS; i++) {
@@ -156,8 +145,7 @@ static void the_normal_numbers_have_a_normal_distributions_moments(void **state)
     assert_true(largest > 4.4 && largest < 6.5);
 }
 
-static void seed_stream_and_index_each_matter_in_both_halves(void **state) {
-    (void)state;
+TEST(seed_stream_and_index_each_matter_in_both_halves) {
     const uint64_t high = UINT64_C(1) << 40;
     const uint64_t at[7][3] = {{0, 0, 0},    {1, 0, 0},    {0, 1, 0},   {0, 0, 1},
                                {high, 0, 0}, {0, high, 0}, {0, 0, high}};
@@ -167,17 +155,4 @@ static void seed_stream_and_index_each_matter_in_both_halves(void **state) {
     for (size_t i = 0; i < 7; i++)
         for (size_t j = 0; j < i; j++)
             assert_true(pair[i][0] != pair[j][0] && pair[i][1] != pair[j][1]);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_generator_gives_the_published_integers),
-        cmocka_unit_test(a_pair_is_box_and_mullers_of_the_counters_words),
-        cmocka_unit_test(rows_are_as_good_as_the_c_library_in_long_double),
-        cmocka_unit_test(a_row_has_the_bits_of_its_pairs),
-        cmocka_unit_test(even_the_rarest_words_make_finite_numbers),
-        cmocka_unit_test(the_normal_numbers_have_a_normal_distributions_moments),
-        cmocka_unit_test(seed_stream_and_index_each_matter_in_both_halves),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

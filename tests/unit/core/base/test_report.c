@@ -1,14 +1,10 @@
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "core/base/report.h"
+#include "tests/support/test.h"
 
-static void warnings_are_added_with_their_own_texts(void **state) {
-    (void)state;
+TEST(warnings_are_added_with_their_own_texts) {
     Warnings warnings = {NULL, 0};
     char pointer[] = "/dampers/0/clearance";
     assert_int_equal(warnings_add(&warnings, pointer, "is %d m", 15), STATUS_OK);
@@ -23,11 +19,4 @@ static void warnings_are_added_with_their_own_texts(void **state) {
         fields_clear(warning_fields, &warnings.at[i]);
     free(warnings.at);
     assert_int_equal(warnings_add(NULL, "", "no list"), STATUS_OK);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(warnings_are_added_with_their_own_texts),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

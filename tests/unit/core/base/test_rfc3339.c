@@ -1,17 +1,10 @@
 // Dates against known ones, and what only looks like one.
 #include "core/base/rfc3339.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
-
 #include "core/base/status.h"
+#include "tests/support/test.h"
 
-static void days_and_times_are_read_and_nonsense_is_not(void **state) {
-    (void)state;
+TEST(days_and_times_are_read_and_nonsense_is_not) {
     static const struct {
         const char *text;
         int64_t unix_ms;
@@ -49,11 +42,4 @@ static void days_and_times_are_read_and_nonsense_is_not(void **state) {
         int64_t unix_ms;
         assert_false(rfc3339_read(wrong[i], &unix_ms));
     }
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(days_and_times_are_read_and_nonsense_is_not),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,18 +1,14 @@
 // Faults gathered, dropped and counted; texts cut and quoted.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "core/base/status.h"
+#include "tests/support/test.h"
 
 static Problem problem;
 
-static void every_status_has_a_slug_and_a_title(void **state) {
-    (void)state;
+TEST(every_status_has_a_slug_and_a_title) {
     for (int i = 0; i < STATUS_COUNT; i++) {
         assert_true(strlen(status_slug((Status)i)) > 0);
         assert_true(strlen(status_title((Status)i)) > 0);
@@ -21,8 +17,7 @@ static void every_status_has_a_slug_and_a_title(void **state) {
     assert_string_equal(status_slug((Status)999), "internal");
 }
 
-static void the_first_fault_sets_the_status_and_the_sentence(void **state) {
-    (void)state;
+TEST(the_first_fault_sets_the_status_and_the_sentence) {
     problem_clear(&problem);
     assert_int_equal(problem_add(&problem, STATUS_INVALID, "/a", "is %d", 7), STATUS_INVALID);
     assert_int_equal(problem_add(&problem, STATUS_LIMIT, "/b", "too much"), STATUS_LIMIT);
@@ -37,8 +32,7 @@ static void the_first_fault_sets_the_status_and_the_sentence(void **state) {
     assert_string_equal(problem.detail, "");
 }
 
-static void one_place_has_one_fault(void **state) {
-    (void)state;
+TEST(one_place_has_one_fault) {
     problem_clear(&problem);
     problem_add(&problem, STATUS_INVALID, "/a", "must be a number");
     problem_add(&problem, STATUS_INVALID, "/a", "is required");
@@ -48,8 +42,7 @@ static void one_place_has_one_fault(void **state) {
     assert_string_equal(problem.faults[0].detail, "must be a number");
 }
 
-static void faults_beyond_a_hundred_are_counted(void **state) {
-    (void)state;
+TEST(faults_beyond_a_hundred_are_counted) {
     problem_clear(&problem);
     for (int i = 0; i < 250; i++) {
         char pointer[32];
@@ -60,8 +53,7 @@ static void faults_beyond_a_hundred_are_counted(void **state) {
     assert_string_equal(problem.faults[PROBLEM_FAULTS - 1].pointer, "/99");
 }
 
-static void nobody_needs_to_listen(void **state) {
-    (void)state;
+TEST(nobody_needs_to_listen) {
     problem_clear(NULL);
     assert_int_equal(problem_set(NULL, STATUS_IO, "x"), STATUS_IO);
     assert_int_equal(problem_add(NULL, STATUS_INVALID, "/a", "x"), STATUS_INVALID);
@@ -69,8 +61,7 @@ static void nobody_needs_to_listen(void **state) {
     assert_false(problem_concerns(NULL, ""));
 }
 
-static void a_problem_concerns_what_lies_at_or_below_a_place(void **state) {
-    (void)state;
+TEST(a_problem_concerns_what_lies_at_or_below_a_place) {
     problem_clear(&problem);
     problem_add(&problem, STATUS_INVALID, "/dampers/0/buffer/restitution", "x");
     assert_true(problem_concerns(&problem, ""));
@@ -80,8 +71,7 @@ static void a_problem_concerns_what_lies_at_or_below_a_place(void **state) {
     assert_false(problem_concerns(&problem, "/dampers/0/buffer/restitution/x"));
 }
 
-static void numbers_are_json_and_what_is_not_finite_is_left_out(void **state) {
-    (void)state;
+TEST(numbers_are_json_and_what_is_not_finite_is_left_out) {
     problem_clear(&problem);
     problem_add_real(&problem, STATUS_INVALID, "/a", 0.1, "kg", "x");
     problem_add_real(&problem, STATUS_INVALID, "/b", -1e300, NULL, "x");
@@ -95,8 +85,7 @@ static void numbers_are_json_and_what_is_not_finite_is_left_out(void **state) {
     assert_string_equal(problem.faults[3].value, "");
 }
 
-static void texts_are_cut_at_a_character(void **state) {
-    (void)state;
+TEST(texts_are_cut_at_a_character) {
     char text[10];
     text_fit(text, sizeof text, "123456789");
     assert_string_equal(text, "123456789");
@@ -112,8 +101,7 @@ static void texts_are_cut_at_a_character(void **state) {
     assert_string_equal(text, "");
 }
 
-static void quoted_texts_stay_json_when_cut(void **state) {
-    (void)state;
+TEST(quoted_texts_stay_json_when_cut) {
     char text[16];
     text_quote(text, sizeof text, "a\"b\\\n");
     assert_string_equal(text, "\"a\\\"b\\\\...\"");
@@ -128,8 +116,7 @@ static void quoted_texts_stay_json_when_cut(void **state) {
     assert_string_equal(wide, "");
 }
 
-static void the_digits_of_a_message_read_back(void **state) {
-    (void)state;
+TEST(the_digits_of_a_message_read_back) {
     char text[32];
     assert_string_equal(text_real(text, 0.1), "0.1");
     assert_string_equal(text_real(text, 1.0 / 3), "0.3333333333333333");
@@ -137,8 +124,7 @@ static void the_digits_of_a_message_read_back(void **state) {
     assert_string_equal(text_real(text, 1e300), "1e+300");
 }
 
-static void a_list_has_commas_between_its_items_and_is_cut_where_it_ends(void **state) {
-    (void)state;
+TEST(a_list_has_commas_between_its_items_and_is_cut_where_it_ends) {
     char list[20] = "";
     text_list(list, sizeof list, "json");
     assert_string_equal(list, "json");
@@ -151,21 +137,4 @@ static void a_list_has_commas_between_its_items_and_is_cut_where_it_ends(void **
     char small[8] = "json";
     text_list(small, sizeof small, "csv");
     assert_string_equal(small, "json, c");
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_status_has_a_slug_and_a_title),
-        cmocka_unit_test(the_first_fault_sets_the_status_and_the_sentence),
-        cmocka_unit_test(one_place_has_one_fault),
-        cmocka_unit_test(faults_beyond_a_hundred_are_counted),
-        cmocka_unit_test(nobody_needs_to_listen),
-        cmocka_unit_test(a_problem_concerns_what_lies_at_or_below_a_place),
-        cmocka_unit_test(numbers_are_json_and_what_is_not_finite_is_left_out),
-        cmocka_unit_test(texts_are_cut_at_a_character),
-        cmocka_unit_test(quoted_texts_stay_json_when_cut),
-        cmocka_unit_test(the_digits_of_a_message_read_back),
-        cmocka_unit_test(a_list_has_commas_between_its_items_and_is_cut_where_it_ends),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

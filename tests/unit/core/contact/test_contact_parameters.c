@@ -1,14 +1,10 @@
 // Tables over approach speed, other pairs of masses, and what stays the same for all impacts.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
 
 #include "core/contact/contact_parameters.h"
 #include "core/contact/identification.h"
 #include "core/contact/power_law.h"
+#include "tests/support/test.h"
 
 static ContactRow rows[] = {{0.1, 0.8, 0.03}, {0.5, 0.6, 0.02}, {2, 0.5, 0.01}};
 static const ContactNumbers table = {NAN, NAN, NAN, NAN, 1.5, {rows, 3}};
@@ -19,8 +15,7 @@ static void assert_near(double is, double should) {
         fail_msg("%.17g should be %.17g", is, should);
 }
 
-static void a_table_is_linear_between_its_rows_and_constant_beyond(void **state) {
-    (void)state;
+TEST(a_table_is_linear_between_its_rows_and_constant_beyond) {
     const ContactRows *at = &table.rows;
     assert_true(contact_rows_interpolate(at, 0).restitution == 0.8);
     assert_true(contact_rows_interpolate(at, 0.1).contact_time == 0.03);
@@ -33,8 +28,7 @@ static void a_table_is_linear_between_its_rows_and_constant_beyond(void **state)
     assert_true(contact_rows_interpolate(at, (double)NAN).restitution == 0.8);
 }
 
-static void a_linear_impact_takes_the_tables_values_at_its_speed(void **state) {
-    (void)state;
+TEST(a_linear_impact_takes_the_tables_values_at_its_speed) {
     for (int rule = 0; rule < 2; rule++) {
         const ContactStop stop =
             contact_stop_prepare(&contact_spring_damper, rule, 0.1, 0.1, &table);
@@ -50,8 +44,7 @@ static void a_linear_impact_takes_the_tables_values_at_its_speed(void **state) {
     assert_near(contact_parameters_at(&stop, 0.3).restitution, 0.7);
 }
 
-static void without_a_table_all_impacts_are_alike(void **state) {
-    (void)state;
+TEST(without_a_table_all_impacts_are_alike) {
     const ContactStop stop = contact_stop_prepare(&contact_spring_damper, 0, 0.1, 0.1, &measured);
     const ContactParameters slow = contact_parameters_at(&stop, 1e-9),
                             fast = contact_parameters_at(&stop, 10);
@@ -59,8 +52,7 @@ static void without_a_table_all_impacts_are_alike(void **state) {
 }
 
 // T_c = h (m / k)^(1/(n+1)) v0^(2/(n+1) - 1)
-static void a_power_law_is_as_stiff_as_its_contact_time_asks_at_each_speed(void **state) {
-    (void)state;
+TEST(a_power_law_is_as_stiff_as_its_contact_time_asks_at_each_speed) {
     const ContactStop stop = contact_stop_prepare(&contact_hunt_crossley, 0, 0.1, 0.1, &measured);
     const double h = power_law_duration(power_law_factor(0.6), 1.5);
     for (double speed = 1e-6; speed < 100; speed *= 10) {
@@ -77,8 +69,7 @@ static void a_power_law_is_as_stiff_as_its_contact_time_asks_at_each_speed(void 
     assert_true(contact_parameters_at(&given, 3).stiffness == 1e5);
 }
 
-static void a_rigs_parameters_are_carried_over_to_other_masses(void **state) {
-    (void)state;
+TEST(a_rigs_parameters_are_carried_over_to_other_masses) {
     const ContactStop stop = contact_stop_prepare(&contact_spring_damper, 0, 0.5, 0.1, &measured);
     const Identification there =
         identification_from_restitution(0.5, 0.6, 0.02, SEPARATION_ZERO_PENETRATION);
@@ -89,15 +80,4 @@ static void a_rigs_parameters_are_carried_over_to_other_masses(void **state) {
     assert_near(power_law_duration(0, 1.5) * pow(0.5 / power.stiffness, 0.4) * pow(0.3, -0.2),
                 0.02);
     assert_true(power.mass == 0.1);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_table_is_linear_between_its_rows_and_constant_beyond),
-        cmocka_unit_test(a_linear_impact_takes_the_tables_values_at_its_speed),
-        cmocka_unit_test(without_a_table_all_impacts_are_alike),
-        cmocka_unit_test(a_power_law_is_as_stiff_as_its_contact_time_asks_at_each_speed),
-        cmocka_unit_test(a_rigs_parameters_are_carried_over_to_other_masses),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,13 +1,9 @@
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 
-#include <cmocka.h>
 
 #include "core/contact/contact.h"
+#include "tests/support/test.h"
 
-static void the_walkers_table_is_the_list_with_auto_first(void **state) {
-    (void)state;
+TEST(the_walkers_table_is_the_list_with_auto_first) {
     size_t i = 0;
     for (; contacts[i] != NULL; i++)
         assert_ptr_equal(contact_kinds.at(i), &contacts[i]->kind);
@@ -16,8 +12,7 @@ static void the_walkers_table_is_the_list_with_auto_first(void **state) {
     assert_string_equal(contact_kinds.tag, "model");
 }
 
-static void laws_are_found_by_name_and_know_their_form(void **state) {
-    (void)state;
+TEST(laws_are_found_by_name_and_know_their_form) {
     assert_ptr_equal(kind_find(&contact_kinds, "impulse"), &contact_impulse.kind);
     assert_ptr_equal(kind_find(&contact_kinds, "spring_damper"), &contact_spring_damper.kind);
     assert_int_equal(contact_impulse.form, CONTACT_IMPULSIVE);
@@ -25,8 +20,7 @@ static void laws_are_found_by_name_and_know_their_form(void **state) {
     assert_int_equal(contact_auto.form, CONTACT_CHOSEN);
 }
 
-static void a_power_law_has_what_it_takes(void **state) {
-    (void)state;
+TEST(a_power_law_has_what_it_takes) {
     size_t count = 0;
     for (size_t i = 0; contacts[i] != NULL; i++) {
         if (contacts[i]->form != CONTACT_POWER)
@@ -41,8 +35,7 @@ static void a_power_law_has_what_it_takes(void **state) {
     assert_null(contact_hertz.factor);
 }
 
-static void a_law_starts_with_zero_penetration(void **state) {
-    (void)state;
+TEST(a_law_starts_with_zero_penetration) {
     for (size_t i = 0; contacts[i] != NULL; i++) {
         Variant *variant = variant_new(&contacts[i]->kind);
         assert_non_null(variant);
@@ -51,14 +44,4 @@ static void a_law_starts_with_zero_penetration(void **state) {
         assert_int_equal(contact->separation, SEPARATION_ZERO_PENETRATION);
         variant_free(variant);
     }
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_walkers_table_is_the_list_with_auto_first),
-        cmocka_unit_test(laws_are_found_by_name_and_know_their_form),
-        cmocka_unit_test(a_power_law_has_what_it_takes),
-        cmocka_unit_test(a_law_starts_with_zero_penetration),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,21 +1,16 @@
 // Table I of Li and Darby 2009, and the way back.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
 
 #include "core/base/status.h"
 #include "core/contact/identification.h"
+#include "tests/support/test.h"
 
 static void assert_near(double is, double should, double relative) {
     if (!(fabs(is - should) <= relative * fabs(should)))
         fail_msg("%.17g should be %.17g within %g", is, should, relative);
 }
 
-static void table_one_of_the_paper_is_met_within_half_a_percent(void **state) {
-    (void)state;
+TEST(table_one_of_the_paper_is_met_within_half_a_percent) {
     static const struct {
         double e, T_c, k_b, c_b;
     } table[] = {
@@ -31,8 +26,7 @@ static void table_one_of_the_paper_is_met_within_half_a_percent(void **state) {
     }
 }
 
-static void the_sponge_comes_to_these_numbers(void **state) {
-    (void)state;
+TEST(the_sponge_comes_to_these_numbers) {
     const Identification sponge = identification_from_restitution(
         contact_effective_mass(1.35, 0.1107), 0.61, 0.025, SEPARATION_ZERO_PENETRATION);
     assert_near(sponge.effective_mass, 0.10231054, 5e-8);
@@ -42,8 +36,7 @@ static void the_sponge_comes_to_these_numbers(void **state) {
     assert_true(sponge.restitution == 0.61 && sponge.contact_time == 0.025);
 }
 
-static void what_was_measured_comes_back_from_stiffness_and_damping(void **state) {
-    (void)state;
+TEST(what_was_measured_comes_back_from_stiffness_and_damping) {
     static const double restitutions[] = {1e-6, 0.01, 0.1, 0.5, 0.9, 0.999999, 1};
     static const double times[] = {1e-6, 0.0003, 0.025, 10};
     for (size_t i = 0; i < COUNT(restitutions); i++)
@@ -58,8 +51,7 @@ static void what_was_measured_comes_back_from_stiffness_and_damping(void **state
         }
 }
 
-static void an_elastic_buffer_has_no_damping(void **state) {
-    (void)state;
+TEST(an_elastic_buffer_has_no_damping) {
     const Identification elastic =
         identification_from_restitution(1, 1, 0.5, SEPARATION_ZERO_PENETRATION);
     assert_true(elastic.damping == 0 && !signbit(elastic.damping));
@@ -69,8 +61,7 @@ static void an_elastic_buffer_has_no_damping(void **state) {
     assert_true(back.restitution == 1);
 }
 
-static void an_overdamped_buffer_never_lets_go(void **state) {
-    (void)state;
+TEST(an_overdamped_buffer_never_lets_go) {
     const Identification critical =
                              identification_from_stiffness(1, 1, 2, SEPARATION_ZERO_PENETRATION),
                          over = identification_from_stiffness(1, 1, 5, SEPARATION_ZERO_PENETRATION);
@@ -79,8 +70,7 @@ static void an_overdamped_buffer_never_lets_go(void **state) {
     assert_near(over.damping_ratio, 2.5, 1e-15);
 }
 
-static void the_effective_mass_neither_overflows_nor_underflows(void **state) {
-    (void)state;
+TEST(the_effective_mass_neither_overflows_nor_underflows) {
     assert_near(contact_effective_mass(1e308, 1e308), 0.5e308, 1e-15);
     assert_near(contact_effective_mass(1e-300, 1e300), 1e-300, 1e-15);
     assert_near(contact_effective_mass(1e-300, 1e-300), 0.5e-300, 1e-15);
@@ -88,8 +78,7 @@ static void the_effective_mass_neither_overflows_nor_underflows(void **state) {
     assert_near(contact_effective_mass(2, 3), 1.2, 1e-15);
 }
 
-static void zero_force_gives_back_what_was_measured(void **state) {
-    (void)state;
+TEST(zero_force_gives_back_what_was_measured) {
     static const double times[] = {1e-9, 0.0003, 0.025, 10};
     // Through Z = 1, where e = exp(-2), in steps down to the last bits.
     for (int i = 0; i < 2000; i++) {
@@ -109,8 +98,7 @@ static void zero_force_gives_back_what_was_measured(void **state) {
     }
 }
 
-static void zero_force_meets_its_branches(void **state) {
-    (void)state;
+TEST(zero_force_meets_its_branches) {
     static const double ratios[] = {0.1, 0.5, 0.9};
     for (size_t i = 0; i < COUNT(ratios); i++) {
         const double Z = ratios[i], root = sqrt(1 - Z * Z), w = 3;
@@ -139,8 +127,7 @@ static void zero_force_meets_its_branches(void **state) {
         isfinite(identification_from_restitution(1, 5e-324, 1, SEPARATION_ZERO_FORCE).damping));
 }
 
-static void zero_force_needs_a_softer_buffer(void **state) {
-    (void)state;
+TEST(zero_force_needs_a_softer_buffer) {
     static const double table[][2] = {
         {0.61, 0.025}, {0.44, 0.019}, {0.53, 0.004}, {0.49, 0.003}, {0.46, 0.0003}};
     for (size_t i = 0; i < COUNT(table); i++) {
@@ -162,8 +149,7 @@ static void assert_within(double is, double should, double within) {
 // The closed forms against differences of the identification itself.
 static const double restitutions[] = {0.02, 0.1353352832366127, 0.3, 0.46, 0.61, 0.9, 0.999};
 
-static void slopes_are_those_of_the_identification(void **state) {
-    (void)state;
+TEST(slopes_are_those_of_the_identification) {
     for (int separation = 0; separation < 2; separation++)
         for (size_t i = 0; i < COUNT(restitutions); i++) {
             const double e = restitutions[i], T = 0.025, h = 1e-5;
@@ -188,8 +174,7 @@ static void slopes_are_those_of_the_identification(void **state) {
         }
 }
 
-static void the_papers_formulas_are_met(void **state) {
-    (void)state;
+TEST(the_papers_formulas_are_met) {
     const double L = log(0.61), pi = acos(-1);
     const IdentificationSensitivity by =
         identification_sensitivity(0.61, SEPARATION_ZERO_PENETRATION);
@@ -198,8 +183,7 @@ static void the_papers_formulas_are_met(void **state) {
     assert_true(by.stiffness_by_contact_time == -2 && by.damping_by_contact_time == -1);
 }
 
-static void what_gives_all_back_has_no_damping_to_change(void **state) {
-    (void)state;
+TEST(what_gives_all_back_has_no_damping_to_change) {
     assert_true(
         isnan(identification_sensitivity(1, SEPARATION_ZERO_PENETRATION).damping_by_restitution));
     assert_true(
@@ -207,22 +191,4 @@ static void what_gives_all_back_has_no_damping_to_change(void **state) {
     const double pi = acos(-1);
     assert_within(identification_sensitivity(1, SEPARATION_ZERO_FORCE).stiffness_by_restitution,
                   4 / (pi * pi), 1e-12);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(table_one_of_the_paper_is_met_within_half_a_percent),
-        cmocka_unit_test(the_sponge_comes_to_these_numbers),
-        cmocka_unit_test(what_was_measured_comes_back_from_stiffness_and_damping),
-        cmocka_unit_test(an_elastic_buffer_has_no_damping),
-        cmocka_unit_test(an_overdamped_buffer_never_lets_go),
-        cmocka_unit_test(zero_force_gives_back_what_was_measured),
-        cmocka_unit_test(zero_force_meets_its_branches),
-        cmocka_unit_test(zero_force_needs_a_softer_buffer),
-        cmocka_unit_test(the_effective_mass_neither_overflows_nor_underflows),
-        cmocka_unit_test(slopes_are_those_of_the_identification),
-        cmocka_unit_test(the_papers_formulas_are_met),
-        cmocka_unit_test(what_gives_all_back_has_no_damping_to_change),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

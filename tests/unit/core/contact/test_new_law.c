@@ -1,26 +1,20 @@
 // The contact law that core/README.md shows as an example, compiled from that page.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
 
 #include "core/contact/contact.h"
 #include "tests/support/paper.h"
+#include "tests/support/test.h"
 
 extern const ContactLaw contact_hu_guo;
 
-static void the_example_reaches_the_restitution_of_its_formula(void **state) {
-    (void)state;
+TEST(the_example_reaches_the_restitution_of_its_formula) {
     assert_true(contact_hu_guo.factor(1) == 0);
     // D = 1.5 for e = 0.5; the root of A(-D e) = A(D), A(x) = x - ln(1 + x), by bisection.
     const double reached = contact_hu_guo.restitution(contact_hu_guo.factor(0.5), 1.5);
     assert_true(fabs(reached - 0.48774125601534846) < 1e-14);
 }
 
-static void a_scene_runs_under_the_example(void **state) {
-    (void)state;
+TEST(a_scene_runs_under_the_example) {
     const double restitution = 0.5, contact_time = 0.0003;
     Simulation simulation;
     Problem problem;
@@ -43,12 +37,4 @@ static void a_scene_runs_under_the_example(void **state) {
     assert_true(outcome->summary.energy_residual < 1e-9);
     outcome_unref(outcome);
     simulation_clear(&simulation);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_example_reaches_the_restitution_of_its_formula),
-        cmocka_unit_test(a_scene_runs_under_the_example),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

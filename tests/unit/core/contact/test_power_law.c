@@ -1,13 +1,9 @@
 // Power laws in isolated contact: factors, what they reach, how long they last.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
 
 #include "core/base/status.h"
 #include "core/contact/power_law.h"
+#include "tests/support/test.h"
 
 static void assert_near(double is, double should, double relative) {
     if (!(fabs(is - should) <= relative * fabs(should)))
@@ -15,8 +11,7 @@ static void assert_near(double is, double should, double relative) {
                  is / should - 1);
 }
 
-static void the_exact_factor_is_right_to_rounding(void **state) {
-    (void)state;
+TEST(the_exact_factor_is_right_to_rounding) {
     // By bisection in 60 decimal digits.
     static const double known[][2] = {
         {0.02, 49.999999999999998958984},  {0.1, 9.9981593974956672619221},
@@ -32,8 +27,7 @@ static void the_exact_factor_is_right_to_rounding(void **state) {
     assert_true(power_law_factor(1) == 0);
 }
 
-static void the_reached_restitution_undoes_the_exact_factor(void **state) {
-    (void)state;
+TEST(the_reached_restitution_undoes_the_exact_factor) {
     for (double e = 1e-3; e <= 1; e += 1e-3)
         assert_near(power_law_restitution(power_law_factor(e), 1.5), e, 1e-14);
     for (double off = 0.1; off > 1e-16; off /= 7)
@@ -45,8 +39,7 @@ static double reached(const ContactLaw *law, double e) {
     return law->restitution(law->factor(e), POWER_LAW_EXPONENT);
 }
 
-static void textbook_factors_reach_what_they_reach(void **state) {
-    (void)state;
+TEST(textbook_factors_reach_what_they_reach) {
     assert_true(fabs(reached(&contact_hunt_crossley, 0.5) - 0.5) < 1e-15);
     assert_true(fabs(reached(&contact_hunt_crossley_textbook, 0.5) - 0.663) < 5e-4);
     assert_true(fabs(reached(&contact_lankarani_nikravesh, 0.5) - 0.725) < 5e-4);
@@ -54,8 +47,7 @@ static void textbook_factors_reach_what_they_reach(void **state) {
     assert_true(fabs(reached(&contact_jankowski, 0.5) - 0.4946) < 5e-5);
 }
 
-static void hertz_lasts_as_in_the_books(void **state) {
-    (void)state;
+TEST(hertz_lasts_as_in_the_books) {
     // In an isolated contact's own units the greatest penetration is 1.25^(2/5).
     assert_near(power_law_duration(0, 1.5), 2.9432752 * pow(1.25, 0.4), 1e-7);
     // sqrt(pi) G(7/5) / G(9/10) is half of it.
@@ -67,8 +59,7 @@ static void hertz_lasts_as_in_the_books(void **state) {
 }
 
 // Jankowski's law with n = 1 is a damped oscillator, then a free one.
-static void a_linear_approach_has_closed_forms(void **state) {
-    (void)state;
+TEST(a_linear_approach_has_closed_forms) {
     static const double factors[] = {0.1, 0.5, 0.9};
     for (size_t i = 0; i < COUNT(factors); i++) {
         const double z = factors[i], root = sqrt(1 - z * z);
@@ -85,8 +76,7 @@ static ContactParameters contact(const ContactLaw *law, double e) {
                                .mass = 0.1};
 }
 
-static void forces_never_pull_and_know_their_slopes(void **state) {
-    (void)state;
+TEST(forces_never_pull_and_know_their_slopes) {
     for (size_t i = 0; contacts[i] != NULL; i++) {
         if (contacts[i]->form != CONTACT_POWER)
             continue;
@@ -107,16 +97,4 @@ static void forces_never_pull_and_know_their_slopes(void **state) {
                             1e-4 * fabs(force.by_speed) + 1e-3);
             }
     }
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_exact_factor_is_right_to_rounding),
-        cmocka_unit_test(the_reached_restitution_undoes_the_exact_factor),
-        cmocka_unit_test(textbook_factors_reach_what_they_reach),
-        cmocka_unit_test(hertz_lasts_as_in_the_books),
-        cmocka_unit_test(a_linear_approach_has_closed_forms),
-        cmocka_unit_test(forces_never_pull_and_know_their_slopes),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

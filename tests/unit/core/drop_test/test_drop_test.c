@@ -1,18 +1,14 @@
 // What a drop test may say, and what is said of one that contradicts itself.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "core/contact/identification.h"
 #include "server/util/bytes.h"
 #include "tests/support/drops.h"
 #include "tests/support/fields.h"
+#include "tests/support/test.h"
 
 static Problem problem;
 static DropTest test;
@@ -40,8 +36,7 @@ static void refuse(const char *text, const char *pointer, const char *says) {
                  detail, problem.faults[0].pointer, problem.faults[0].detail);
 }
 
-static void heights_and_speeds_tell_how_fast(void **state) {
-    (void)state;
+TEST(heights_and_speeds_tell_how_fast) {
     accept("{\"drops\": [{\"drop_height\": 0.1, \"rebound_height\": 0.025}, "
            "{\"approach_speed\": 2, \"rebound_speed\": 1, \"contact_time\": 1e-3}]}");
     assert_near(drop_approach_speed(&test.drops.at[0]), sqrt(2 * 9.80665 * 0.1), 1e-15);
@@ -52,8 +47,7 @@ static void heights_and_speeds_tell_how_fast(void **state) {
 }
 
 // m v = M w - m u: with e the bodies part at e v.
-static void a_free_base_takes_part_of_the_rebound(void **state) {
-    (void)state;
+TEST(a_free_base_takes_part_of_the_rebound) {
     accept("{\"impactor_mass\": 0.1, \"base\": \"free\", \"base_mass\": 0.9, "
            "\"drops\": [{\"approach_speed\": 2, \"rebound_height\": 0.01}]}");
     const double rise = sqrt(2 * 9.80665 * 0.01), base = (0.1 * 2 + 0.1 * rise) / 0.9;
@@ -68,8 +62,7 @@ static void a_free_base_takes_part_of_the_rebound(void **state) {
            "/drops/0/rebound_height", "needs impactor_mass and base_mass");
 }
 
-static void what_says_nothing_is_refused(void **state) {
-    (void)state;
+TEST(what_says_nothing_is_refused) {
     refuse("{}", "/drops", "at least one drop");
     refuse("{\"drops\": [], \"traces\": []}", "/drops", "at least one drop");
     refuse("{\"drops\": [{}]}", "/drops/0", "must have a rebound");
@@ -79,8 +72,7 @@ static void what_says_nothing_is_refused(void **state) {
     refuse("{\"traces\": [{\"interval\": 1e-4}]}", "/traces/0/force", "at least one");
 }
 
-static void a_rebound_above_the_drop_is_refused(void **state) {
-    (void)state;
+TEST(a_rebound_above_the_drop_is_refused) {
     refuse("{\"drops\": [{\"drop_height\": 0.1, \"rebound_height\": 0.05}, "
            "{\"drop_height\": 0.1, \"rebound_height\": 0.1000001}]}",
            "/drops/1/rebound_height", "at most the drop_height of 0.1 m");
@@ -97,8 +89,7 @@ static void a_rebound_above_the_drop_is_refused(void **state) {
     fields_clear(drop_test_fields, &test);
 }
 
-static void heights_and_speeds_must_agree(void **state) {
-    (void)state;
+TEST(heights_and_speeds_must_agree) {
     refuse("{\"drops\": [{\"drop_height\": 0.1, \"approach_speed\": 3, \"contact_time\": 1e-3}]}",
            "/drops/0/approach_speed", "within 20 % of the 1.4 m/s");
     refuse(
@@ -108,8 +99,7 @@ static void heights_and_speeds_must_agree(void **state) {
     fields_clear(drop_test_fields, &test);
 }
 
-static void numbers_out_of_range_are_told_one_by_one(void **state) {
-    (void)state;
+TEST(numbers_out_of_range_are_told_one_by_one) {
     refuse("{\"drops\": [{\"drop_height\": 0, \"rebound_height\": 0}]}", "/drops/0/drop_height",
            "above 0 m");
     refuse("{\"drops\": [{\"drop_height\": -1, \"rebound_height\": 0.1}]}", "/drops/0/drop_height",
@@ -130,8 +120,7 @@ static void numbers_out_of_range_are_told_one_by_one(void **state) {
     refuse("{\"drops\": [{\"hight\": 1, \"contact_time\": 1}]}", "/drops/0/hight", "unknown");
 }
 
-static void a_date_is_one_of_the_calendar(void **state) {
-    (void)state;
+TEST(a_date_is_one_of_the_calendar) {
     static const char *const good[] = {"2026-11-21", "2024-02-29", "2026-11-21T09:30:00Z",
                                        "2026-11-21T09:30:00.25+01:00", "2000-02-29"};
     static const char *const bad[] = {"2026-13-01",
@@ -158,8 +147,7 @@ static void a_date_is_one_of_the_calendar(void **state) {
     }
 }
 
-static void more_drops_than_the_limit_are_refused(void **state) {
-    (void)state;
+TEST(more_drops_than_the_limit_are_refused) {
     Bytes bytes = {0};
     bytes_text(&bytes, "{\"drops\": [{\"contact_time\": 1}");
     for (size_t i = 0; i < DROPS_MAX; i++)
@@ -171,18 +159,4 @@ static void more_drops_than_the_limit_are_refused(void **state) {
     assert_non_null(strstr(detail_at(&problem, "/drops"), "1000"));
     fields_clear(drop_test_fields, &test);
     free(text);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(heights_and_speeds_tell_how_fast),
-        cmocka_unit_test(a_free_base_takes_part_of_the_rebound),
-        cmocka_unit_test(what_says_nothing_is_refused),
-        cmocka_unit_test(a_rebound_above_the_drop_is_refused),
-        cmocka_unit_test(heights_and_speeds_must_agree),
-        cmocka_unit_test(numbers_out_of_range_are_told_one_by_one),
-        cmocka_unit_test(a_date_is_one_of_the_calendar),
-        cmocka_unit_test(more_drops_than_the_limit_are_refused),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,18 +1,14 @@
 // Drop tests whose truth is known: impacts that the core simulates, and the same blurred by noise.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "core/drop_test/evaluation.h"
 #include "core/drop_test/pulse_model.h"
 #include "server/util/bytes.h"
 #include "tests/support/drops.h"
+#include "tests/support/test.h"
 
 static Problem problem;
 static Evaluation evaluation;
@@ -52,8 +48,7 @@ static const double restitutions[] = {0.1, 0.3, 0.5, 0.7, 0.95};
 static const double times[] = {1e-4, 1e-3, 1e-2, 3e-2};
 static const double speeds[SPEEDS] = {0.2, 0.5, 1.5};
 
-static void simulated_drops_give_back_e_and_contact_time(void **state) {
-    (void)state;
+TEST(simulated_drops_give_back_e_and_contact_time) {
     for (int rule = 0; rule < 2; rule++)
         for (size_t i = 0; i < COUNT(restitutions); i++)
             for (size_t k = 0; k < COUNT(times); k++) {
@@ -85,8 +80,7 @@ static void simulated_drops_give_back_e_and_contact_time(void **state) {
             }
 }
 
-static void gravity_is_taken_out_of_drops_that_say_it(void **state) {
-    (void)state;
+TEST(gravity_is_taken_out_of_drops_that_say_it) {
     for (int rule = 0; rule < 2; rule++) {
         DropTest test;
         drops_make(&test, 2 * SPEEDS);
@@ -124,8 +118,7 @@ static void gravity_is_taken_out_of_drops_that_say_it(void **state) {
     }
 }
 
-static void the_effect_of_gravity_is_told_where_it_is_left_in(void **state) {
-    (void)state;
+TEST(the_effect_of_gravity_is_told_where_it_is_left_in) {
     DropTest test;
     read("{\"drops\": [{\"approach_speed\": 0.3, \"rebound_speed\": 0.183, \"contact_time\": "
          "0.025}, {\"approach_speed\": 1, \"rebound_speed\": 0.61, \"contact_time\": 0.025}]}",
@@ -141,8 +134,7 @@ static void the_effect_of_gravity_is_told_where_it_is_left_in(void **state) {
     fields_clear(drop_test_fields, &test);
 }
 
-static void every_reading_is_a_row_with_its_uncertainty(void **state) {
-    (void)state;
+TEST(every_reading_is_a_row_with_its_uncertainty) {
     DropTest test;
     read("{\"gravity\": 0, \"height_uncertainty\": 0.001, \"speed_uncertainty\": 0.01, "
          "\"time_uncertainty\": 1e-5, \"temperature\": 21, \"drops\": ["
@@ -172,8 +164,7 @@ static void every_reading_is_a_row_with_its_uncertainty(void **state) {
     fields_clear(drop_test_fields, &test);
 }
 
-static void only_what_counts_widens_the_ranges(void **state) {
-    (void)state;
+TEST(only_what_counts_widens_the_ranges) {
     DropTest cold, hot;
     read("{\"gravity\": 0, \"temperature\": 20, \"drops\": [{\"approach_speed\": 1, "
          "\"rebound_speed\": 0.6}]}",
@@ -192,8 +183,7 @@ static void only_what_counts_widens_the_ranges(void **state) {
     fields_clear(drop_test_fields, &hot);
 }
 
-static void heights_go_by_the_earth_and_say_so_where_another_gravity_pulls(void **state) {
-    (void)state;
+TEST(heights_go_by_the_earth_and_say_so_where_another_gravity_pulls) {
     DropTest test;
     read("{\"gravity\": 1000, \"drops\": [{\"drop_height\": 0.1, \"rebound_height\": 0.04, "
          "\"contact_time\": 1e-4}, {\"approach_speed\": 2, \"rebound_speed\": 1, "
@@ -211,8 +201,7 @@ static void heights_go_by_the_earth_and_say_so_where_another_gravity_pulls(void 
     fields_clear(drop_test_fields, &test);
 }
 
-static void a_trace_s_contact_is_shown_as_it_was_detected(void **state) {
-    (void)state;
+TEST(a_trace_s_contact_is_shown_as_it_was_detected) {
     DropTest test;
     drops_make(&test, 0);
     test.gravity = 0;
@@ -242,8 +231,7 @@ static void a_trace_s_contact_is_shown_as_it_was_detected(void **state) {
     fields_clear(drop_test_fields, &test);
 }
 
-static void a_free_base_is_reckoned_with(void **state) {
-    (void)state;
+TEST(a_free_base_is_reckoned_with) {
     // e = 0.5 of 0.1 kg on 0.3 kg: the ball rises with (e M - m) / (m + M) of its speed.
     const double v = sqrt(2 * 9.80665 * 0.2), u = v * (0.5 * 0.3 - 0.1) / 0.4;
     char text[400];
@@ -263,8 +251,7 @@ static void a_free_base_is_reckoned_with(void **state) {
     fields_clear(drop_test_fields, &test);
 }
 
-static void an_outlier_is_told_and_counts(void **state) {
-    (void)state;
+TEST(an_outlier_is_told_and_counts) {
     DropTest test;
     read("{\"gravity\": 0, \"drops\": [{\"approach_speed\": 1, \"rebound_speed\": 0.61}, "
          "{\"approach_speed\": 1, \"rebound_speed\": 0.62}, "
@@ -329,8 +316,7 @@ static int covered(Blur blur, size_t count, double noise, bool is_stated) {
     return hits;
 }
 
-static void the_stated_confidence_is_kept(void **state) {
-    (void)state;
+TEST(the_stated_confidence_is_kept) {
     static const size_t counts[] = {3, 5, 10, 30};
     static const double noises[] = {0.01, 0.05};
     for (int blur = 0; blur < 3; blur++)
@@ -341,8 +327,7 @@ static void the_stated_confidence_is_kept(void **state) {
                                     980);
 }
 
-static void a_thousand_drops_are_evaluated(void **state) {
-    (void)state;
+TEST(a_thousand_drops_are_evaluated) {
     DropTest test;
     drops_make(&test, DROPS_MAX);
     test.gravity = 9.80665;
@@ -364,8 +349,7 @@ static void a_thousand_drops_are_evaluated(void **state) {
     fields_clear(drop_test_fields, &test);
 }
 
-static void other_pairs_and_too_many_readings_are_told(void **state) {
-    (void)state;
+TEST(other_pairs_and_too_many_readings_are_told) {
     DropTest one, other;
     read("{\"impactor_mass\": 0.1, \"base\": \"fixed\", \"gravity\": 0, \"drops\": "
          "[{\"contact_time\": 0.001}]}",
@@ -414,8 +398,7 @@ static bool refuse_third(void *context, double fraction) {
     return ++*(int *)context < 3;
 }
 
-static void gravity_is_taken_out_only_while_somebody_waits(void **state) {
-    (void)state;
+TEST(gravity_is_taken_out_only_while_somebody_waits) {
     DropTest test;
     read("{\"gravity\": 9.81, \"drops\": [{\"approach_speed\": 1, \"rebound_speed\": 0.5, "
          "\"contact_time\": 0.01}, {\"approach_speed\": 1, \"rebound_speed\": 0.5, "
@@ -431,23 +414,4 @@ static void gravity_is_taken_out_only_while_somebody_waits(void **state) {
     assert_int_equal(asked, 3);
     evaluation_clear(&evaluation);
     fields_clear(drop_test_fields, &test);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(gravity_is_taken_out_only_while_somebody_waits),
-        cmocka_unit_test(simulated_drops_give_back_e_and_contact_time),
-        cmocka_unit_test(gravity_is_taken_out_of_drops_that_say_it),
-        cmocka_unit_test(the_effect_of_gravity_is_told_where_it_is_left_in),
-        cmocka_unit_test(every_reading_is_a_row_with_its_uncertainty),
-        cmocka_unit_test(only_what_counts_widens_the_ranges),
-        cmocka_unit_test(heights_go_by_the_earth_and_say_so_where_another_gravity_pulls),
-        cmocka_unit_test(a_trace_s_contact_is_shown_as_it_was_detected),
-        cmocka_unit_test(a_free_base_is_reckoned_with),
-        cmocka_unit_test(an_outlier_is_told_and_counts),
-        cmocka_unit_test(the_stated_confidence_is_kept),
-        cmocka_unit_test(a_thousand_drops_are_evaluated),
-        cmocka_unit_test(other_pairs_and_too_many_readings_are_told),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

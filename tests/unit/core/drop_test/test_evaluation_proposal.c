@@ -1,16 +1,12 @@
 // What revision is proposed of which readings, and when none is.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "core/drop_test/evaluation.h"
 #include "tests/support/drops.h"
+#include "tests/support/test.h"
 
 static Problem problem;
 static Evaluation evaluation;
@@ -71,8 +67,7 @@ static bool is_warned(const char *pointer) {
     return false;
 }
 
-static void means_and_ranges_are_taken_and_nothing_old(void **state) {
-    (void)state;
+TEST_IN(means_and_ranges_are_taken_and_nothing_old, set_up, tear_down) {
     const char *const text[] = {
         "{\"gravity\": 0, \"impactor\": \"ball\", \"impactor_mass\": 0.11, \"base\": \"fixed\", "
         "\"temperature\": 20, \"source\": \"doi:10/x\", \"drops\": ["
@@ -102,8 +97,7 @@ static void means_and_ranges_are_taken_and_nothing_old(void **state) {
     assert_int_equal(material->table.count, 0);
 }
 
-static void what_was_not_measured_is_not_said(void **state) {
-    (void)state;
+TEST_IN(what_was_not_measured_is_not_said, set_up, tear_down) {
     const char *const text[] = {"{\"drops\": [{\"drop_height\": 0.1, \"rebound_height\": 0.04}]}"};
     propose(text, 1, PROPOSAL_CONSTANT);
     const Material *material = &proposal.material;
@@ -115,16 +109,14 @@ static void what_was_not_measured_is_not_said(void **state) {
     assert_true(is_warned("/revision/contact_time"));
 }
 
-static void without_a_restitution_there_is_no_proposal(void **state) {
-    (void)state;
+TEST_IN(without_a_restitution_there_is_no_proposal, set_up, tear_down) {
     const char *const text[] = {"{\"drops\": [{\"contact_time\": 0.1}]}"};
     propose(text, 1, PROPOSAL_CONSTANT);
     assert_non_null(strstr(proposal.why, "a revision needs"));
     assert_null(proposal.material.name);
 }
 
-static void two_tests_add_up_and_their_pairs_must_agree(void **state) {
-    (void)state;
+TEST_IN(two_tests_add_up_and_their_pairs_must_agree, set_up, tear_down) {
     const char *const texts[] = {
         "{\"impactor_mass\": 0.11, \"base\": \"fixed\", \"source\": \"a\", \"temperature\": 10, "
         "\"drops\": [{\"drop_height\": 0.1, \"rebound_height\": 0.04}]}",
@@ -143,8 +135,7 @@ static void two_tests_add_up_and_their_pairs_must_agree(void **state) {
     assert_int_equal(material->measurements.count, 2);
 }
 
-static void a_table_has_a_row_for_each_speed(void **state) {
-    (void)state;
+TEST_IN(a_table_has_a_row_for_each_speed, set_up, tear_down) {
     const char *const text[] = {
         "{\"gravity\": 0, \"drops\": ["
         "{\"approach_speed\": 1.02, \"rebound_speed\": 0.612, \"contact_time\": 0.02}, "
@@ -166,8 +157,7 @@ static void a_table_has_a_row_for_each_speed(void **state) {
 }
 
 // What is left out of a table, and what does not count, is not said to be measured.
-static void only_what_stands_behind_a_revision_is_named(void **state) {
-    (void)state;
+TEST_IN(only_what_stands_behind_a_revision_is_named, set_up, tear_down) {
     const char *const texts[] = {
         "{\"gravity\": 0, \"impactor_mass\": 0.11, \"base\": \"fixed\", \"temperature\": 20, "
         "\"source\": \"a\", \"drops\": ["
@@ -189,8 +179,7 @@ static void only_what_stands_behind_a_revision_is_named(void **state) {
 }
 
 // Mean and deviation are of one kind, in a constant as in a table's row.
-static void readings_weigh_in_a_table_as_in_a_constant(void **state) {
-    (void)state;
+TEST_IN(readings_weigh_in_a_table_as_in_a_constant, set_up, tear_down) {
     static const char one[] = "{\"gravity\": 0, \"height_uncertainty\": 0.002, \"drops\": ["
                               "{\"drop_height\": 0.02, \"rebound_height\": 0.0110}, "
                               "{\"drop_height\": 0.0201, \"rebound_height\": 0.0030}, "
@@ -218,8 +207,7 @@ static void readings_weigh_in_a_table_as_in_a_constant(void **state) {
                 evaluation.rows.at[4].restitution_uncertainty, 1e-15);
 }
 
-static void a_table_of_one_speed_is_refused(void **state) {
-    (void)state;
+TEST_IN(a_table_of_one_speed_is_refused, set_up, tear_down) {
     const char *const text[] = {"{\"drops\": [{\"approach_speed\": 1, \"rebound_speed\": 0.6}, "
                                 "{\"approach_speed\": 1.05, \"rebound_speed\": 0.6}]}"};
     propose(text, 1, PROPOSAL_TABLE);
@@ -227,8 +215,7 @@ static void a_table_of_one_speed_is_refused(void **state) {
     assert_int_equal(proposal.material.table.count, 0);
 }
 
-static void what_changes_with_speed_is_told_of_a_constant(void **state) {
-    (void)state;
+TEST_IN(what_changes_with_speed_is_told_of_a_constant, set_up, tear_down) {
     const char *const text[] = {
         "{\"gravity\": 0, \"drops\": [{\"approach_speed\": 1, \"rebound_speed\": 0.7}, "
         "{\"approach_speed\": 2, \"rebound_speed\": 1.3}, "
@@ -236,25 +223,4 @@ static void what_changes_with_speed_is_told_of_a_constant(void **state) {
         "{\"approach_speed\": 4, \"rebound_speed\": 2.2}]}"};
     propose(text, 1, PROPOSAL_CONSTANT);
     assert_true(is_warned("/revision/restitution"));
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(means_and_ranges_are_taken_and_nothing_old, set_up,
-                                        tear_down),
-        cmocka_unit_test_setup_teardown(what_was_not_measured_is_not_said, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(without_a_restitution_there_is_no_proposal, set_up,
-                                        tear_down),
-        cmocka_unit_test_setup_teardown(two_tests_add_up_and_their_pairs_must_agree, set_up,
-                                        tear_down),
-        cmocka_unit_test_setup_teardown(a_table_has_a_row_for_each_speed, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(only_what_stands_behind_a_revision_is_named, set_up,
-                                        tear_down),
-        cmocka_unit_test_setup_teardown(readings_weigh_in_a_table_as_in_a_constant, set_up,
-                                        tear_down),
-        cmocka_unit_test_setup_teardown(a_table_of_one_speed_is_refused, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(what_changes_with_speed_is_told_of_a_constant, set_up,
-                                        tear_down),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

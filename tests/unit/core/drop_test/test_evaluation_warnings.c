@@ -1,17 +1,13 @@
 // Tests that are taken in once more: told where they count, and where nothing tells them apart.
 #include "core/drop_test/evaluation.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "tests/support/drops.h"
+#include "tests/support/test.h"
 
 #define READING "{\"approach_speed\": 0.3, \"rebound_speed\": 0.1, \"contact_time\": 0.02"
-#define TEST(more) "{\"gravity\": 0, " more "\"drops\": [" READING "}]}"
+#define TEST_JSON(more) "{\"gravity\": 0, " more "\"drops\": [" READING "}]}"
 
 enum { TESTS = 3 };
 static Problem problem;
@@ -37,17 +33,18 @@ static void told_at(const char *const texts[TESTS], char pointer[32]) {
         fields_clear(drop_test_fields, &tests[i]);
 }
 
-static void a_test_that_counts_twice_is_told(void **state) {
-    (void)state;
+TEST(a_test_that_counts_twice_is_told) {
     static const struct {
         const char *texts[TESTS], *place;
     } cases[] = {
-        {{TEST(""), TEST("\"date\": \"2026-11-20\", "), TEST("")}, "/measurements/6"},
-        {{TEST(""), TEST("\"temperature\": 20, "), TEST("\"notes\": \"again\", ")}, ""},
-        {{TEST(""), "{\"gravity\": 0, \"drops\": [" READING ", \"excluded\": \"slipped\"}]}",
-          TEST("\"person\": \"anna\", ")},
+        {{TEST_JSON(""), TEST_JSON("\"date\": \"2026-11-20\", "), TEST_JSON("")},
+         "/measurements/6"},
+        {{TEST_JSON(""), TEST_JSON("\"temperature\": 20, "), TEST_JSON("\"notes\": \"again\", ")},
          ""},
-        {{"{\"gravity\": 0, \"drops\": [" READING ", \"excluded\": \"slipped\"}]}", TEST(""),
+        {{TEST_JSON(""), "{\"gravity\": 0, \"drops\": [" READING ", \"excluded\": \"slipped\"}]}",
+          TEST_JSON("\"person\": \"anna\", ")},
+         ""},
+        {{"{\"gravity\": 0, \"drops\": [" READING ", \"excluded\": \"slipped\"}]}", TEST_JSON(""),
           "{\"gravity\": 0, \"drops\": [" READING ", \"excluded\": \"slipped\"}]}"},
          ""},
     };
@@ -56,9 +53,4 @@ static void a_test_that_counts_twice_is_told(void **state) {
         told_at(cases[i].texts, pointer);
         assert_string_equal(pointer, cases[i].place);
     }
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(a_test_that_counts_twice_is_told)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,16 +3,12 @@
 #include "core/drop_test/force_trace.h"
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "core/base/philox.h"
 #include "core/contact/identification.h"
+#include "tests/support/test.h"
 
 enum { MOST = 4096 };
 
@@ -64,8 +60,7 @@ static TraceAnalysis look(const Record *record, const TraceOptions *way) {
 
 static const TraceOptions usual = {.separation = SEPARATION_ZERO_PENETRATION, .threshold = NAN};
 
-static void several_contacts_are_found_whatever_sign_and_baseline(void **state) {
-    (void)state;
+TEST(several_contacts_are_found_whatever_sign_and_baseline) {
     for (int sign = -1; sign <= 1; sign += 2) {
         Record record;
         record_new(&record, 1e-4, 3000, 0.3);
@@ -100,8 +95,7 @@ static void several_contacts_are_found_whatever_sign_and_baseline(void **state) 
     }
 }
 
-static void a_threshold_reads_contact_times_short_and_by_how_much_is_told(void **state) {
-    (void)state;
+TEST(a_threshold_reads_contact_times_short_and_by_how_much_is_told) {
     static const double facts[][2] = {{0.95, 0.03}, {0.5, 0.16}, {0.1, 0.45}};
     for (size_t i = 0; i < COUNT(facts); i++) {
         Record record;
@@ -123,8 +117,7 @@ static void a_threshold_reads_contact_times_short_and_by_how_much_is_told(void *
     }
 }
 
-static void contacts_cut_off_by_the_trace_get_no_figure(void **state) {
-    (void)state;
+TEST(contacts_cut_off_by_the_trace_get_no_figure) {
     Record record;
     record_new(&record, 1e-4, 400, 0.2);
     record_add(&record, 0.02, 0.5, 0.004, 0.1, 1, 0, SEPARATION_ZERO_PENETRATION);
@@ -141,8 +134,7 @@ static void contacts_cut_off_by_the_trace_get_no_figure(void **state) {
     }
 }
 
-static void few_samples_get_an_interval_and_a_plain_sentence(void **state) {
-    (void)state;
+TEST(few_samples_get_an_interval_and_a_plain_sentence) {
     Record record;
     record_new(&record, 1e-3, 60, 0.05);
     record_add(&record, 0.0303, 0.5, 0.003, 0.1, 1, 0, SEPARATION_ZERO_PENETRATION);
@@ -156,8 +148,7 @@ static void few_samples_get_an_interval_and_a_plain_sentence(void **state) {
     trace_analysis_clear(&reading);
 }
 
-static void the_other_rule_s_pulse_is_told_to_be_none_of_this(void **state) {
-    (void)state;
+TEST(the_other_rule_s_pulse_is_told_to_be_none_of_this) {
     for (int rule = 0; rule < 2; rule++) {
         Record record;
         record_new(&record, 1e-4, 400, 0.2);
@@ -176,8 +167,7 @@ static void the_other_rule_s_pulse_is_told_to_be_none_of_this(void **state) {
     }
 }
 
-static void what_is_no_pulse_gets_no_figure(void **state) {
-    (void)state;
+TEST(what_is_no_pulse_gets_no_figure) {
     Record record;
     record_new(&record, 1e-4, 400, 0.001);
     for (size_t i = 100; i < 140; i++)
@@ -194,8 +184,7 @@ static void what_is_no_pulse_gets_no_figure(void **state) {
     trace_analysis_clear(&reading);
 }
 
-static void no_contact_at_all_is_said(void **state) {
-    (void)state;
+TEST(no_contact_at_all_is_said) {
     for (int kind = 0; kind < 4; kind++) {
         Record record;
         record_new(&record, 1e-4, 2000, kind == 0 ? 1 : 0);
@@ -209,8 +198,7 @@ static void no_contact_at_all_is_said(void **state) {
 }
 
 // A sponge dropped slowly: gravity lengthens the contact by a quarter.
-static void gravity_is_taken_out_where_it_is_told(void **state) {
-    (void)state;
+TEST(gravity_is_taken_out_where_it_is_told) {
     static const double speeds[] = {0.3, 1};
     for (int rule = 0; rule < 2; rule++)
         for (size_t i = 0; i < COUNT(speeds); i++) {
@@ -247,8 +235,7 @@ static void gravity_is_taken_out_where_it_is_told(void **state) {
         }
 }
 
-static void a_coarse_converter_is_no_contact(void **state) {
-    (void)state;
+TEST(a_coarse_converter_is_no_contact) {
     Record record;
     record_new(&record, 1e-4, 1500, 0.3);
     record_add(&record, 0.05, 0.5, 0.004, 0.1, 1, 0, SEPARATION_ZERO_FORCE);
@@ -263,8 +250,7 @@ static void a_coarse_converter_is_no_contact(void **state) {
     trace_analysis_clear(&reading);
 }
 
-static void the_pulse_is_drawn_over_the_trace(void **state) {
-    (void)state;
+TEST(the_pulse_is_drawn_over_the_trace) {
     for (int rule = 0; rule < 2; rule++) {
         // The same contact without the drifting baseline, finely: what the pulse should be at its
         // places.
@@ -307,8 +293,7 @@ static void assert_refused(double interval, double *values, size_t count, const 
     trace_analysis_clear(&reading);
 }
 
-static void what_cannot_be_read_is_a_fault(void **state) {
-    (void)state;
+TEST(what_cannot_be_read_is_a_fault) {
     double values[20] = {0};
     assert_refused(0, values, 20, "interval");
     assert_refused((double)NAN, values, 20, "interval");
@@ -319,8 +304,7 @@ static void what_cannot_be_read_is_a_fault(void **state) {
     assert_refused(1, values, 20, "sample 13");
 }
 
-static void many_contacts_end_at_a_limit_that_is_told(void **state) {
-    (void)state;
+TEST(many_contacts_end_at_a_limit_that_is_told) {
     Record record;
     record_new(&record, 1e-4, 4000, 0);
     for (size_t i = 10; i < 4000; i += 10)
@@ -329,22 +313,4 @@ static void many_contacts_end_at_a_limit_that_is_told(void **state) {
     assert_int_equal(reading.contacts.count, TRACE_CONTACTS_MAX);
     assert_non_null(strstr(reading.why, "only the first"));
     trace_analysis_clear(&reading);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(several_contacts_are_found_whatever_sign_and_baseline),
-        cmocka_unit_test(a_threshold_reads_contact_times_short_and_by_how_much_is_told),
-        cmocka_unit_test(contacts_cut_off_by_the_trace_get_no_figure),
-        cmocka_unit_test(few_samples_get_an_interval_and_a_plain_sentence),
-        cmocka_unit_test(the_other_rule_s_pulse_is_told_to_be_none_of_this),
-        cmocka_unit_test(what_is_no_pulse_gets_no_figure),
-        cmocka_unit_test(no_contact_at_all_is_said),
-        cmocka_unit_test(gravity_is_taken_out_where_it_is_told),
-        cmocka_unit_test(a_coarse_converter_is_no_contact),
-        cmocka_unit_test(the_pulse_is_drawn_over_the_trace),
-        cmocka_unit_test(what_cannot_be_read_is_a_fault),
-        cmocka_unit_test(many_contacts_end_at_a_limit_that_is_told),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

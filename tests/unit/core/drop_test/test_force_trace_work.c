@@ -1,15 +1,11 @@
 // How much work a trace is under gravity: counted, not timed.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
 
 #include "core/base/philox.h"
 #include "core/base/status.h"
 #include "core/drop_test/force_trace.h"
 #include "core/drop_test/pulse_model.h"
+#include "tests/support/test.h"
 
 // In place of the library's: each look at a pulse takes one.
 static size_t looks;
@@ -53,8 +49,7 @@ static size_t work(double pull, int separation, bool by_mass) {
     return looks - before;
 }
 
-static void gravity_does_not_make_a_fit_much_dearer(void **state) {
-    (void)state;
+TEST(gravity_does_not_make_a_fit_much_dearer) {
     static const double pulls[] = {0.2, 0.6, 1.5};
     for (int rule = 0; rule < 2; rule++) {
         const size_t without = work(0, rule, false);
@@ -67,11 +62,4 @@ static void gravity_does_not_make_a_fit_much_dearer(void **state) {
                              by_mass == 1 ? "by mass" : "by speed", with, without);
             }
     }
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(gravity_does_not_make_a_fit_much_dearer),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,18 +1,14 @@
 // What a material comes to for a pair, against the identification itself and against drawn
 // readings.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "core/contact/identification.h"
 #include "core/drop_test/pair_parameters.h"
 #include "tests/support/drops.h"
 #include "tests/support/fields.h"
+#include "tests/support/test.h"
 
 static Problem problem;
 static PairParameters pair;
@@ -59,8 +55,7 @@ static bool is_warned(const char *pointer, const char *says) {
     return false;
 }
 
-static void both_rules_are_told_for_the_pair(void **state) {
-    (void)state;
+TEST_IN(both_rules_are_told_for_the_pair, set_up, tear_down) {
     derive(0.1107, 1.35, IDENTIFIED_FOR_SCENE, CHOICE_ABSENT);
     assert_int_equal(pair.contacts.count, 2);
     for (int rule = 0; rule < 2; rule++) {
@@ -78,8 +73,7 @@ static void both_rules_are_told_for_the_pair(void **state) {
 }
 
 // Readings are drawn with the stated deviations: k_b and c_b spread as was told.
-static void uncertainties_are_those_of_drawn_readings(void **state) {
-    (void)state;
+TEST_IN(uncertainties_are_those_of_drawn_readings, set_up, tear_down) {
     enum { DRAWN = 20000 };
     for (int for_rig = 0; for_rig < 2; for_rig++)
         for (int rule = 0; rule < 2; rule++) {
@@ -119,8 +113,7 @@ static void uncertainties_are_those_of_drawn_readings(void **state) {
         }
 }
 
-static void a_rigs_stiffness_and_damping_are_carried_over(void **state) {
-    (void)state;
+TEST_IN(a_rigs_stiffness_and_damping_are_carried_over, set_up, tear_down) {
     derive(0.5, (double)NAN, IDENTIFIED_FOR_RIG, SEPARATION_ZERO_PENETRATION);
     const Identification rig =
         identification_from_restitution(0.11, 0.61, 0.025, SEPARATION_ZERO_PENETRATION);
@@ -145,8 +138,7 @@ static void a_rigs_stiffness_and_damping_are_carried_over(void **state) {
         strstr(detail_at(&problem, "/identified_for"), "does not state the masses of the test"));
 }
 
-static void another_pair_is_warned_of(void **state) {
-    (void)state;
+TEST_IN(another_pair_is_warned_of, set_up, tear_down) {
     derive(0.11, (double)NAN, IDENTIFIED_FOR_SCENE, CHOICE_ABSENT);
     assert_int_equal(pair.warnings.count, 0);
     pair_parameters_clear(&pair);
@@ -163,8 +155,7 @@ static void another_pair_is_warned_of(void **state) {
     assert_true(is_warned("/contacts", "determined under zero_force"));
 }
 
-static void without_a_contact_time_only_the_ratio_is_known(void **state) {
-    (void)state;
+TEST_IN(without_a_contact_time_only_the_ratio_is_known, set_up, tear_down) {
     material.contact_time = material.contact_time_deviation = (double)NAN;
     derive(0.11, (double)NAN, IDENTIFIED_FOR_SCENE, CHOICE_ABSENT);
     assert_true(isnan(pair.contacts.at[0].stiffness.value));
@@ -175,8 +166,7 @@ static void without_a_contact_time_only_the_ratio_is_known(void **state) {
     assert_true(is_warned("/contacts", "no contact time"));
 }
 
-static void what_is_not_stated_has_no_uncertainty(void **state) {
-    (void)state;
+TEST_IN(what_is_not_stated_has_no_uncertainty, set_up, tear_down) {
     material.contact_time_deviation = (double)NAN;
     derive(0.11, (double)NAN, IDENTIFIED_FOR_SCENE, SEPARATION_ZERO_FORCE);
     const PairContact *contact = &pair.contacts.at[0];
@@ -185,8 +175,7 @@ static void what_is_not_stated_has_no_uncertainty(void **state) {
     assert_true(is_warned("/contacts", "no standard deviation of T_c"));
 }
 
-static void e_of_one_and_of_none_are_borders(void **state) {
-    (void)state;
+TEST_IN(e_of_one_and_of_none_are_borders, set_up, tear_down) {
     material.restitution = 1;
     derive(0.11, (double)NAN, IDENTIFIED_FOR_SCENE, CHOICE_ABSENT);
     for (int rule = 0; rule < 2; rule++) {
@@ -201,16 +190,14 @@ static void e_of_one_and_of_none_are_borders(void **state) {
     assert_true(is_warned("/contacts", "without a rebound"));
 }
 
-static void an_overdamped_pair_never_parts(void **state) {
-    (void)state;
+TEST_IN(an_overdamped_pair_never_parts, set_up, tear_down) {
     material.restitution = 0.05;
     derive(1e-4, (double)NAN, IDENTIFIED_FOR_RIG, SEPARATION_ZERO_PENETRATION);
     assert_true(isnan(pair.contacts.at[0].contact_time.value));
     assert_true(is_warned("/contacts", "never ends"));
 }
 
-static void a_table_has_figures_for_each_row(void **state) {
-    (void)state;
+TEST_IN(a_table_has_figures_for_each_row, set_up, tear_down) {
     material.table.at = calloc(2, sizeof *material.table.at);
     assert_non_null(material.table.at);
     material.table.count = 2;
@@ -224,21 +211,4 @@ static void a_table_has_figures_for_each_row(void **state) {
                 1e-12);
     assert_true(isnan(pair.contacts.at[0].stiffness.uncertainty));
     assert_true(pair.contacts.at[2].stiffness.uncertainty > 0);
-}
-
-#define TEST(name) cmocka_unit_test_setup_teardown(name, set_up, tear_down)
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        TEST(both_rules_are_told_for_the_pair),
-        TEST(uncertainties_are_those_of_drawn_readings),
-        TEST(a_rigs_stiffness_and_damping_are_carried_over),
-        TEST(another_pair_is_warned_of),
-        TEST(without_a_contact_time_only_the_ratio_is_known),
-        TEST(what_is_not_stated_has_no_uncertainty),
-        TEST(e_of_one_and_of_none_are_borders),
-        TEST(an_overdamped_pair_never_parts),
-        TEST(a_table_has_figures_for_each_row),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,13 +1,9 @@
 // When a pulse ends under a pull, against the motion in small steps.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
 
 #include "core/base/status.h"
 #include "core/drop_test/pulse_model.h"
+#include "tests/support/test.h"
 
 static const double decays[] = {-0.3, 0.02, 0.3, 0.7, 1.3, 2, 3};
 static const double pulls[] = {1e-12, 1e-6, 0.05, 0.3, 1, 2, 5, 20};
@@ -33,8 +29,7 @@ static double last(const PulseModel *shape, int separation) {
     return (double)INFINITY;
 }
 
-static void a_pull_lengthens_a_pulse_as_the_motion_says(void **state) {
-    (void)state;
+TEST(a_pull_lengthens_a_pulse_as_the_motion_says) {
     int endless = 0;
     for (int rule = 0; rule < 2; rule++)
         for (size_t i = 0; i < COUNT(decays); i++)
@@ -52,8 +47,7 @@ static void a_pull_lengthens_a_pulse_as_the_motion_says(void **state) {
     assert_in_range(endless, 10, 60);
 }
 
-static void the_pull_is_known_by_how_long_the_pulse_lasts(void **state) {
-    (void)state;
+TEST(the_pull_is_known_by_how_long_the_pulse_lasts) {
     for (int rule = 0; rule < 2; rule++)
         for (size_t i = 0; i < COUNT(decays); i++)
             for (size_t j = 0; j < COUNT(pulls); j++) {
@@ -69,12 +63,4 @@ static void the_pull_is_known_by_how_long_the_pulse_lasts(void **state) {
             }
     assert_true(isinf(pulse_model_make(0.7, 100, true, SEPARATION_ZERO_PENETRATION).length));
     assert_true(isinf(pulse_model_make(0.7, 100, true, SEPARATION_ZERO_FORCE).length));
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_pull_lengthens_a_pulse_as_the_motion_says),
-        cmocka_unit_test(the_pull_is_known_by_how_long_the_pulse_lasts),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

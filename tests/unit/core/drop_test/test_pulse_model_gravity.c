@@ -1,14 +1,10 @@
 // Contacts under gravity against those the solver makes, and the way back.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
 
 #include "core/base/status.h"
 #include "core/drop_test/pulse_model.h"
 #include "tests/support/drops.h"
+#include "tests/support/test.h"
 
 static void assert_near(double is, double should, double within) {
     if (!(fabs(is - should) <= within))
@@ -17,8 +13,7 @@ static void assert_near(double is, double should, double within) {
 
 static const double restitutions[] = {0.2, 0.45, 0.61, 0.9};
 
-static void a_pulled_contact_is_the_solvers(void **state) {
-    (void)state;
+TEST(a_pulled_contact_is_the_solvers) {
     for (int rule = 0; rule < 2; rule++)
         for (size_t i = 0; i < COUNT(restitutions); i++) {
             const DropMade made =
@@ -35,8 +30,7 @@ static void a_pulled_contact_is_the_solvers(void **state) {
 }
 
 // PHYSICS.md tells the sponge's: 24 % longer and e 29 % low at 0.3 m/s, 7 % and 7 % at 1 m/s.
-static void the_sponges_contact_is_as_much_longer_as_is_known(void **state) {
-    (void)state;
+TEST(the_sponges_contact_is_as_much_longer_as_is_known) {
     GravityLoad pull = {9.81, 0.3, SEPARATION_ZERO_PENETRATION, false};
     GravityContact pulled = gravity_apply(&pull, 0.61, 0.025);
     assert_near(pulled.contact_time / 0.025, 1.24, 0.005);
@@ -47,8 +41,7 @@ static void the_sponges_contact_is_as_much_longer_as_is_known(void **state) {
     assert_near(1 - pulled.restitution / 0.61, 0.07, 0.005);
 }
 
-static void without_a_pull_nothing_changes(void **state) {
-    (void)state;
+TEST(without_a_pull_nothing_changes) {
     for (int rule = 0; rule < 2; rule++)
         for (size_t i = 0; i < COUNT(restitutions); i++) {
             const GravityLoad pull = {0, 1, (Separation)rule, false};
@@ -58,8 +51,7 @@ static void without_a_pull_nothing_changes(void **state) {
         }
 }
 
-static void gravity_is_taken_out_again(void **state) {
-    (void)state;
+TEST(gravity_is_taken_out_again) {
     int stay = 0;
     for (int rule = 0; rule < 2; rule++)
         for (int height = 0; height < 2; height++)
@@ -98,8 +90,7 @@ static void gravity_is_taken_out_again(void **state) {
             }
 }
 
-static void what_no_contact_comes_to_is_told(void **state) {
-    (void)state;
+TEST(what_no_contact_comes_to_is_told) {
     const GravityLoad pull = {9.80665, 0.1, SEPARATION_ZERO_PENETRATION, false};
     double value;
     assert_false(gravity_correct_one(&(GravityLoad){9.80665, 0.3, SEPARATION_ZERO_FORCE, true},
@@ -107,15 +98,4 @@ static void what_no_contact_comes_to_is_told(void **state) {
     // The impactor stays in a soft buffer.
     const GravityContact stays = gravity_apply(&pull, 0.3, 0.1);
     assert_true(stays.restitution == 0 && isinf(stays.contact_time));
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_pulled_contact_is_the_solvers),
-        cmocka_unit_test(the_sponges_contact_is_as_much_longer_as_is_known),
-        cmocka_unit_test(without_a_pull_nothing_changes),
-        cmocka_unit_test(gravity_is_taken_out_again),
-        cmocka_unit_test(what_no_contact_comes_to_is_told),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,15 +1,11 @@
 // Means, intervals, outliers and trends of readings made here; figures to compare with are from
 // SciPy (ttest_1samp, linregress).
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "core/drop_test/reading_statistics.h"
 #include "tests/support/drops.h"
+#include "tests/support/test.h"
 
 enum { MOST = 200 };
 
@@ -30,8 +26,7 @@ static void make(const double *values, const double *speeds, size_t count) {
                      STATUS_OK);
 }
 
-static void mean_and_interval_are_those_of_the_t_test(void **state) {
-    (void)state;
+TEST(mean_and_interval_are_those_of_the_t_test) {
     const double values[] = {0.61, 0.63, 0.58, 0.60, 0.65};
     make(values, NULL, COUNT(values));
     assert_int_equal(quantity.count, 5);
@@ -47,8 +42,7 @@ static void mean_and_interval_are_those_of_the_t_test(void **state) {
     fields_clear(reading_statistic_fields, &quantity);
 }
 
-static void the_line_is_that_of_least_squares(void **state) {
-    (void)state;
+TEST(the_line_is_that_of_least_squares) {
     const double speeds[] = {0.2, 0.4, 0.6, 0.8, 1.0, 1.2};
     const double falls[] = {0.66, 0.64, 0.61, 0.60, 0.57, 0.55};
     const double stays[] = {0.61, 0.62, 0.60, 0.61, 0.60, 0.62};
@@ -68,8 +62,7 @@ static void the_line_is_that_of_least_squares(void **state) {
     fields_clear(reading_statistic_fields, &quantity);
 }
 
-static void what_speeds_cannot_tell_is_said(void **state) {
-    (void)state;
+TEST(what_speeds_cannot_tell_is_said) {
     const double values[] = {0.61, 0.62, 0.60, 0.61}, alike[] = {0.5, 0.51, 0.5, 0.52};
     make(values, alike, 4);
     assert_int_equal(quantity.trend.verdict, CHOICE_ABSENT);
@@ -84,8 +77,7 @@ static void what_speeds_cannot_tell_is_said(void **state) {
     fields_clear(reading_statistic_fields, &quantity);
 }
 
-static void one_reading_has_its_instruments_interval_or_none(void **state) {
-    (void)state;
+TEST(one_reading_has_its_instruments_interval_or_none) {
     readings[0] = (Reading){.value = 0.6, .uncertainty = 0.01, .speed = (double)NAN};
     assert_int_equal(reading_statistics_run(readings, 1, "e", "", &quantity), STATUS_OK);
     assert_true(isnan(quantity.deviation));
@@ -98,8 +90,7 @@ static void one_reading_has_its_instruments_interval_or_none(void **state) {
     fields_clear(reading_statistic_fields, &quantity);
 }
 
-static void equal_readings_are_not_taken_for_certainty(void **state) {
-    (void)state;
+TEST(equal_readings_are_not_taken_for_certainty) {
     const double values[] = {0.6, 0.6, 0.6, 0.6};
     make(values, NULL, 4);
     assert_true(isnan(quantity.low) && quantity.deviation == 0 && quantity.outliers == 0);
@@ -112,8 +103,7 @@ static void equal_readings_are_not_taken_for_certainty(void **state) {
     fields_clear(reading_statistic_fields, &quantity);
 }
 
-static void an_outlier_is_shown_and_counts(void **state) {
-    (void)state;
+TEST(an_outlier_is_shown_and_counts) {
     const double values[] = {0.61, 0.63, 0.60, 0.62, 0.61, 0.62, 0.20};
     make(values, NULL, COUNT(values));
     assert_int_equal(quantity.outliers, 1);
@@ -129,8 +119,7 @@ static void an_outlier_is_shown_and_counts(void **state) {
 }
 
 // Far from the middle, but where the line leads.
-static void a_trend_makes_no_outliers(void **state) {
-    (void)state;
+TEST(a_trend_makes_no_outliers) {
     double values[9], speeds[9];
     for (size_t i = 0; i < 9; i++) {
         speeds[i] = i < 8 ? 0.2 + 0.01 * (double)i : 2;
@@ -142,8 +131,7 @@ static void a_trend_makes_no_outliers(void **state) {
     fields_clear(reading_statistic_fields, &quantity);
 }
 
-static void good_samples_seldom_have_outliers(void **state) {
-    (void)state;
+TEST(good_samples_seldom_have_outliers) {
     static const size_t counts[] = {3, 5, 10, 30, 100};
     uint64_t next = 0;
     for (size_t c = 0; c < COUNT(counts); c++) {
@@ -161,8 +149,7 @@ static void good_samples_seldom_have_outliers(void **state) {
     }
 }
 
-static void no_trend_is_shown_in_one_of_twenty_without_one(void **state) {
-    (void)state;
+TEST(no_trend_is_shown_in_one_of_twenty_without_one) {
     uint64_t next = 0;
     static const size_t counts[] = {3, 6, 20};
     for (size_t c = 0; c < COUNT(counts); c++) {
@@ -184,8 +171,7 @@ static void no_trend_is_shown_in_one_of_twenty_without_one(void **state) {
     }
 }
 
-static void sure_readings_weigh_more(void **state) {
-    (void)state;
+TEST(sure_readings_weigh_more) {
     const double values[] = {0.60, 0.62, 0.70, 0.59, 0.66}, u[] = {0.01, 0.02, 0.1, 0.02, 0.08};
     double weights = 0, sum = 0;
     for (size_t i = 0; i < 5; i++) {
@@ -213,8 +199,7 @@ static void sure_readings_weigh_more(void **state) {
 }
 
 // Noise that is ten times larger for the slow ones, as a ruler has it, and stated.
-static void uneven_noise_makes_no_trends(void **state) {
-    (void)state;
+TEST(uneven_noise_makes_no_trends) {
     static const size_t counts[] = {6, 20};
     uint64_t next = 0;
     for (size_t c = 0; c < COUNT(counts); c++) {
@@ -238,21 +223,4 @@ static void uneven_noise_makes_no_trends(void **state) {
         assert_in_range(shown, 25, 80);
         assert_in_range(held, 920, 980);
     }
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(mean_and_interval_are_those_of_the_t_test),
-        cmocka_unit_test(the_line_is_that_of_least_squares),
-        cmocka_unit_test(what_speeds_cannot_tell_is_said),
-        cmocka_unit_test(one_reading_has_its_instruments_interval_or_none),
-        cmocka_unit_test(equal_readings_are_not_taken_for_certainty),
-        cmocka_unit_test(an_outlier_is_shown_and_counts),
-        cmocka_unit_test(a_trend_makes_no_outliers),
-        cmocka_unit_test(good_samples_seldom_have_outliers),
-        cmocka_unit_test(no_trend_is_shown_in_one_of_twenty_without_one),
-        cmocka_unit_test(sure_readings_weigh_more),
-        cmocka_unit_test(uneven_noise_makes_no_trends),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

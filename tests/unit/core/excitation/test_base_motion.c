@@ -1,23 +1,18 @@
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdlib.h>
-
-#include <cmocka.h>
 
 #include "core/excitation/base_motion.h"
 #include "tests/support/base_at.h"
+#include "tests/support/test.h"
 
-static void a_still_base_stays_still(void **state) {
-    (void)state;
+TEST(a_still_base_stays_still) {
     Base base = {0};
     assert_true(base_at(&base, 0) == 0 && base_at(&base, 1e9) == 0);
     base_clear(&base);
     base_clear(NULL);
 }
 
-static void samples_are_joined_by_lines_and_followed_by_stillness(void **state) {
-    (void)state;
+TEST(samples_are_joined_by_lines_and_followed_by_stillness) {
     Base base = {.form = BASE_SAMPLED, .count = 3, .interval = 0.5};
     base.values = malloc(3 * sizeof *base.values);
     base.values[0] = 1;
@@ -36,8 +31,7 @@ static void samples_are_joined_by_lines_and_followed_by_stillness(void **state) 
     assert_int_equal(base.form, BASE_STILL);
 }
 
-static void one_sample_or_none_moves_nothing(void **state) {
-    (void)state;
+TEST(one_sample_or_none_moves_nothing) {
     double value = 5;
     const Base one = {.form = BASE_SAMPLED, .values = &value, .count = 1, .interval = 1};
     const Base none = {.form = BASE_SAMPLED, .interval = 1};
@@ -45,19 +39,8 @@ static void one_sample_or_none_moves_nothing(void **state) {
     assert_true(base_at(&none, 0) == 0);
 }
 
-static void a_sine_is_a_sine(void **state) {
-    (void)state;
+TEST(a_sine_is_a_sine) {
     const Base base = {.form = BASE_SINE, .amplitude = 2, .omega = 3};
     assert_true(base_at(&base, 0) == 0);
     assert_true(base_at(&base, 0.7) == 2 * sin(3 * 0.7));
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_still_base_stays_still),
-        cmocka_unit_test(samples_are_joined_by_lines_and_followed_by_stillness),
-        cmocka_unit_test(one_sample_or_none_moves_nothing),
-        cmocka_unit_test(a_sine_is_a_sine),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

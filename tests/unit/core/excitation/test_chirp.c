@@ -1,16 +1,11 @@
 // The sweep's knots, its defaults, and what is refused or doubted of it.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "core/excitation/excitation.h"
 #include "tests/support/base_at.h"
 #include "tests/support/fields.h"
+#include "tests/support/test.h"
 
 static const double TURN = 6.283185307179586;
 static const Span span = {.duration = 4, .sample_rate = 1000};
@@ -48,8 +43,7 @@ static double distance(const Base *base, const ExcitationChirp *chirp, double en
     return most;
 }
 
-static void the_knots_keep_the_error_they_state(void **state) {
-    (void)state;
+TEST(the_knots_keep_the_error_they_state) {
     static const double ends[][2] = {{1, 10}, {20, 0}, {7, 7}};
     for (size_t i = 0; i < COUNT(ends); i++) {
         ExcitationChirp chirp = sweep(ends[i][0], ends[i][1], NAN, NAN);
@@ -68,8 +62,7 @@ static void the_knots_keep_the_error_they_state(void **state) {
     }
 }
 
-static void the_base_is_still_after_the_sweep(void **state) {
-    (void)state;
+TEST(the_base_is_still_after_the_sweep) {
     ExcitationChirp chirp = sweep(1, 3.3, 1.2345, 700);
     double mean;
     assert_int_equal(complete(&chirp), STATUS_OK);
@@ -80,8 +73,7 @@ static void the_base_is_still_after_the_sweep(void **state) {
     base_clear(&base);
 }
 
-static void a_sweep_as_long_as_the_run_moves_at_its_end(void **state) {
-    (void)state;
+TEST(a_sweep_as_long_as_the_run_moves_at_its_end) {
     const double times[] = {4, 4.0000001, 9.3};
     for (size_t i = 0; i < COUNT(times); i++) {
         ExcitationChirp chirp = sweep(2, 2.03125, times[i], 333);
@@ -94,8 +86,7 @@ static void a_sweep_as_long_as_the_run_moves_at_its_end(void **state) {
     }
 }
 
-static void sweeps_that_cannot_be_made_are_refused(void **state) {
-    (void)state;
+TEST(sweeps_that_cannot_be_made_are_refused) {
     ExcitationChirp still = sweep(0, 0, NAN, NAN), coarse = sweep(1, 40, NAN, 79),
                     fine = sweep(1, 40, NAN, 1e9), fast = sweep(1, 1e300, NAN, NAN);
     assert_int_equal(complete(&still), STATUS_INVALID);
@@ -115,8 +106,7 @@ static void sweeps_that_cannot_be_made_are_refused(void **state) {
     assert_true(problem_concerns(&problem, "/excitation/rate"));
 }
 
-static void a_sweep_the_output_cannot_show_is_doubted(void **state) {
-    (void)state;
+TEST(a_sweep_the_output_cannot_show_is_doubted) {
     ExcitationChirp fast = sweep(501, 1, NAN, NAN);
     assert_int_equal(complete(&fast), STATUS_OK);
     excitation_chirp.doubt(&fast.excitation, &span, "/excitation", &problem);
@@ -137,8 +127,7 @@ static bool stop_at_once(void *data, double part) {
     return false;
 }
 
-static void making_a_sweep_can_be_stopped(void **state) {
-    (void)state;
+TEST(making_a_sweep_can_be_stopped) {
     const Progress progress = {.advance = stop_at_once};
     ExcitationChirp chirp = sweep(1, 2, NAN, NAN);
     Base base = {0};
@@ -146,16 +135,4 @@ static void making_a_sweep_can_be_stopped(void **state) {
     assert_int_equal(excitation_chirp.make(&chirp.excitation, &span, &progress, &base, &problem),
                      STATUS_CANCELLED);
     assert_null(base.values);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_knots_keep_the_error_they_state),
-        cmocka_unit_test(the_base_is_still_after_the_sweep),
-        cmocka_unit_test(a_sweep_as_long_as_the_run_moves_at_its_end),
-        cmocka_unit_test(sweeps_that_cannot_be_made_are_refused),
-        cmocka_unit_test(a_sweep_the_output_cannot_show_is_doubted),
-        cmocka_unit_test(making_a_sweep_can_be_stopped),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,15 +1,12 @@
 // Every excitation's own file beside what all of them share.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "core/excitation/excitation.h"
 #include "core/excitation/recorded_motion.h"
 #include "tests/support/fields.h"
+#include "tests/support/test.h"
 
 static Problem problem;
 static const Span span = {.duration = 10, .sample_rate = 1000};
@@ -36,8 +33,7 @@ static Base make(const Excitation *excitation) {
     return base;
 }
 
-static void the_list_begins_with_free_and_every_kind_takes_an_initial_state(void **state) {
-    (void)state;
+TEST(the_list_begins_with_free_and_every_kind_takes_an_initial_state) {
     size_t i = 0;
     for (; excitations[i] != NULL; i++) {
         assert_ptr_equal(excitation_kinds.at(i), &excitations[i]->kind);
@@ -52,8 +48,7 @@ static void the_list_begins_with_free_and_every_kind_takes_an_initial_state(void
     assert_ptr_equal(excitations[0], &excitation_free);
 }
 
-static void free_vibration_has_a_still_base(void **state) {
-    (void)state;
+TEST(free_vibration_has_a_still_base) {
     Excitation *excitation = excitation_new("free");
     Base base = make(excitation);
     assert_int_equal(base.form, BASE_STILL);
@@ -61,8 +56,7 @@ static void free_vibration_has_a_still_base(void **state) {
     variant_free(&excitation->variant);
 }
 
-static void a_sine_of_acceleration_is_taken_as_it_is(void **state) {
-    (void)state;
+TEST(a_sine_of_acceleration_is_taken_as_it_is) {
     Excitation *excitation = excitation_new("sine");
     *real_of(excitation, "frequency") = 1.5;
     *real_of(excitation, "amplitude") = 2;
@@ -75,8 +69,7 @@ static void a_sine_of_acceleration_is_taken_as_it_is(void **state) {
     variant_free(&excitation->variant);
 }
 
-static void a_sine_of_displacement_is_differentiated_twice(void **state) {
-    (void)state;
+TEST(a_sine_of_displacement_is_differentiated_twice) {
     Excitation *excitation = excitation_new("sine");
     *real_of(excitation, "frequency") = 1;
     *real_of(excitation, "amplitude") = 0.01;
@@ -88,8 +81,7 @@ static void a_sine_of_displacement_is_differentiated_twice(void **state) {
     variant_free(&excitation->variant);
 }
 
-static void a_sine_beyond_numbers_is_refused(void **state) {
-    (void)state;
+TEST(a_sine_beyond_numbers_is_refused) {
     Excitation *excitation = excitation_new("sine");
     *real_of(excitation, "frequency") = 1e200;
     *real_of(excitation, "amplitude") = 1;
@@ -103,8 +95,7 @@ static void a_sine_beyond_numbers_is_refused(void **state) {
     variant_free(&excitation->variant);
 }
 
-static void a_sine_between_the_samples_is_doubted(void **state) {
-    (void)state;
+TEST(a_sine_between_the_samples_is_doubted) {
     Excitation *excitation = excitation_new("sine");
     *real_of(excitation, "frequency") = 500;
     excitation_sine.doubt(excitation, &span, "/excitation", &problem);
@@ -117,8 +108,7 @@ static void a_sine_between_the_samples_is_doubted(void **state) {
     variant_free(&excitation->variant);
 }
 
-static void a_sine_needs_its_frequency_and_amplitude(void **state) {
-    (void)state;
+TEST(a_sine_needs_its_frequency_and_amplitude) {
     Excitation *excitation = excitation_new("sine");
     assert_int_equal(fields_validate(excitation->variant.kind->fields, excitation, "", &problem),
                      STATUS_INVALID);
@@ -130,8 +120,7 @@ static void a_sine_needs_its_frequency_and_amplitude(void **state) {
     variant_free(&excitation->variant);
 }
 
-static void a_record_is_scaled_and_copied(void **state) {
-    (void)state;
+TEST(a_record_is_scaled_and_copied) {
     Excitation *excitation = excitation_new("record");
     Reals *samples = variant_member(&excitation->variant, "samples");
     *samples = reals_of(3, (const double[]){1, -2, 0.5});
@@ -147,8 +136,7 @@ static void a_record_is_scaled_and_copied(void **state) {
     base_clear(&base);
 }
 
-static void a_record_needs_samples_that_stay_finite(void **state) {
-    (void)state;
+TEST(a_record_needs_samples_that_stay_finite) {
     Excitation *excitation = excitation_new("record");
     assert_int_equal(excitation_record.check(excitation, "/excitation", &problem), STATUS_INVALID);
     assert_string_equal(detail_at(&problem, "/excitation/samples"),
@@ -180,8 +168,7 @@ static void doubts_of(double peak, double offset, const char *said) {
     variant_free(&excitation->variant);
 }
 
-static void a_record_is_doubted_for_its_size_and_its_drift(void **state) {
-    (void)state;
+TEST(a_record_is_doubted_for_its_size_and_its_drift) {
     doubts_of(3, 0, NULL);
     doubts_of(50, 0, "reach 50 m/s^2 (sample 0), more than 5 g");
     doubts_of(5e-5, 0, "reach only 5e-05 m/s^2");
@@ -189,28 +176,10 @@ static void a_record_is_doubted_for_its_size_and_its_drift(void **state) {
     doubts_of(0, 1, NULL); // a pulse: it goes one way only
 }
 
-static void what_a_record_adds_up_to(void **state) {
-    (void)state;
+TEST(what_a_record_adds_up_to) {
     double values[] = {0, 2, -4, 1, 1};
     const Reals samples = {values, 5};
     const RecordLook look = record_look(&samples, 0.5, -2);
     assert_true(look.highest == 8 && look.lowest == -4 && look.peak_at == 2);
     assert_true(look.peak_velocity == 1.5 && look.end_velocity == 0.5);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_list_begins_with_free_and_every_kind_takes_an_initial_state),
-        cmocka_unit_test(free_vibration_has_a_still_base),
-        cmocka_unit_test(a_sine_of_acceleration_is_taken_as_it_is),
-        cmocka_unit_test(a_sine_of_displacement_is_differentiated_twice),
-        cmocka_unit_test(a_sine_beyond_numbers_is_refused),
-        cmocka_unit_test(a_sine_between_the_samples_is_doubted),
-        cmocka_unit_test(a_sine_needs_its_frequency_and_amplitude),
-        cmocka_unit_test(a_record_is_scaled_and_copied),
-        cmocka_unit_test(a_record_needs_samples_that_stay_finite),
-        cmocka_unit_test(a_record_is_doubted_for_its_size_and_its_drift),
-        cmocka_unit_test(what_a_record_adds_up_to),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,16 +1,11 @@
 // Half-sine and triangular pulses: the base they make, and what is refused or doubted of them.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "core/excitation/excitation.h"
 #include "tests/support/base_at.h"
 #include "tests/support/fields.h"
+#include "tests/support/test.h"
 
 static const Span span = {.duration = 10, .sample_rate = 1000};
 static Problem problem;
@@ -27,8 +22,7 @@ static Base make(const ExcitationPulse *pulse) {
     return base;
 }
 
-static void a_half_sine_rises_and_falls_once(void **state) {
-    (void)state;
+TEST(a_half_sine_rises_and_falls_once) {
     const ExcitationPulse half = pulse(&excitation_half_sine, -3, 0.5, 0.25);
     const Base base = make(&half);
     assert_true(base_at(&base, 0) == 0 && base_at(&base, 0.4999) == 0);
@@ -38,8 +32,7 @@ static void a_half_sine_rises_and_falls_once(void **state) {
     assert_true(base_at(&base, 0.75) == 0 && base_at(&base, 1e9) == 0);
 }
 
-static void a_triangle_is_two_lines(void **state) {
-    (void)state;
+TEST(a_triangle_is_two_lines) {
     const ExcitationPulse triangle = pulse(&excitation_triangular, 8, 0.5, 0.25);
     const Base base = make(&triangle);
     assert_true(base_at(&base, 0.4999) == 0 && base_at(&base, 0.5) == 0);
@@ -53,8 +46,7 @@ static Status complete(ExcitationPulse *pulse) {
         ->complete(&pulse->excitation, &span, "/excitation", &problem);
 }
 
-static void a_pulse_that_no_clock_can_tell_is_refused(void **state) {
-    (void)state;
+TEST(a_pulse_that_no_clock_can_tell_is_refused) {
     ExcitationPulse late = pulse(&excitation_half_sine, 1, 1e6, 1e-7);
     assert_int_equal(complete(&late), STATUS_INVALID);
     assert_string_equal(detail_at(&problem, "/excitation/length"),
@@ -67,8 +59,7 @@ static void a_pulse_that_no_clock_can_tell_is_refused(void **state) {
     assert_int_equal(complete(&fine), STATUS_OK);
 }
 
-static void a_pulse_needs_its_amplitude_and_length(void **state) {
-    (void)state;
+TEST(a_pulse_needs_its_amplitude_and_length) {
     ExcitationPulse made;
     assert_int_equal(fields_default(excitation_half_sine.kind.fields, &made), STATUS_OK);
     assert_true(made.start == 0);
@@ -86,8 +77,7 @@ static void a_pulse_needs_its_amplitude_and_length(void **state) {
     assert_string_equal(detail_at(&problem, "/start"), "must be at least 0 s, is -1");
 }
 
-static void a_pulse_after_the_end_or_between_samples_is_doubted(void **state) {
-    (void)state;
+TEST(a_pulse_after_the_end_or_between_samples_is_doubted) {
     const ExcitationPulse late = pulse(&excitation_half_sine, 1, 10, 0.5);
     excitation_half_sine.doubt(&late.excitation, &span, "/excitation", &problem);
     assert_int_equal(problem.count, 1);
@@ -100,15 +90,4 @@ static void a_pulse_after_the_end_or_between_samples_is_doubted(void **state) {
     const ExcitationPulse usual = pulse(&excitation_triangular, 1, 1, 0.011);
     excitation_triangular.doubt(&usual.excitation, &span, "/excitation", &problem);
     assert_int_equal(problem.count, 0);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_half_sine_rises_and_falls_once),
-        cmocka_unit_test(a_triangle_is_two_lines),
-        cmocka_unit_test(a_pulse_that_no_clock_can_tell_is_refused),
-        cmocka_unit_test(a_pulse_needs_its_amplitude_and_length),
-        cmocka_unit_test(a_pulse_after_the_end_or_between_samples_is_doubted),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

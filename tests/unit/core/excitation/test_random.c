@@ -4,17 +4,12 @@
 #include "core/excitation/excitation.h"
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "core/base/philox.h"
-#include "core/math/fft.h"
 #include "core/result/welch.h"
+#include "tests/support/test.h"
 
 static double band[2];
 
@@ -56,8 +51,7 @@ static long double slow_sample(const ExcitationRandom *random, size_t j) {
            sinl(angle) * slow_block(random, h + 1, i);
 }
 
-static void samples_equal_a_slow_sum_over_the_bins(void **state) {
-    (void)state;
+TEST(samples_equal_a_slow_sum_over_the_bins) {
     static const struct {
         double f0, f1, rate, duration;
     } cases[] = {
@@ -79,8 +73,7 @@ static void samples_equal_a_slow_sum_over_the_bins(void **state) {
     }
 }
 
-static void a_longer_run_begins_with_the_same_bits(void **state) {
-    (void)state;
+TEST(a_longer_run_begins_with_the_same_bits) {
     const ExcitationRandom random = random_with(0, 15, 1, 7, 1000);
     Base longest = base_of(&random, 120);
     for (double duration = 0.05; duration < 120; duration *= 7) {
@@ -92,8 +85,7 @@ static void a_longer_run_begins_with_the_same_bits(void **state) {
     base_clear(&longest);
 }
 
-static void the_samples_reach_past_the_end_of_the_run(void **state) {
-    (void)state;
+TEST(the_samples_reach_past_the_end_of_the_run) {
     const ExcitationRandom random = random_with(0, 15, 1, 7, 1000);
     Base base = base_of(&random, 10);
     assert_int_equal(base.form, BASE_SAMPLED);
@@ -107,8 +99,7 @@ static void the_samples_reach_past_the_end_of_the_run(void **state) {
     base_clear(&base);
 }
 
-static void an_rms_of_nought_is_a_still_base(void **state) {
-    (void)state;
+TEST(an_rms_of_nought_is_a_still_base) {
     const ExcitationRandom random = random_with(0, 15, 0, 7, 1000);
     Base base = base_of(&random, 3);
     assert_int_equal(base.form, BASE_STILL);
@@ -116,8 +107,7 @@ static void an_rms_of_nought_is_a_still_base(void **state) {
     base_clear(&base);
 }
 
-static void moments_are_those_of_a_gaussian_process_of_this_rms(void **state) {
-    (void)state;
+TEST(moments_are_those_of_a_gaussian_process_of_this_rms) {
     const double duration = 1200, rms = 0.7;
     const ExcitationRandom random = random_with(5, 15, rms, 1, 100);
     Base base = base_of(&random, duration);
@@ -135,8 +125,7 @@ static void moments_are_those_of_a_gaussian_process_of_this_rms(void **state) {
     base_clear(&base);
 }
 
-static void the_variance_is_the_same_at_every_sample(void **state) {
-    (void)state;
+TEST(the_variance_is_the_same_at_every_sample) {
     enum { SEEDS = 1500, PLACES = 9 };
     double variance[PLACES] = {0}, mean[PLACES] = {0};
     for (uint64_t seed = 0; seed < SEEDS; seed++) {
@@ -155,8 +144,7 @@ static void the_variance_is_the_same_at_every_sample(void **state) {
     }
 }
 
-static void the_density_is_flat_within_the_band_and_nothing_outside(void **state) {
-    (void)state;
+TEST(the_density_is_flat_within_the_band_and_nothing_outside) {
     const double rms = 2, duration = 1200;
     const ExcitationRandom random = random_with(5, 15, rms, 3, 100);
     Base base = base_of(&random, duration);
@@ -191,8 +179,7 @@ static void the_density_is_flat_within_the_band_and_nothing_outside(void **state
     base_clear(&base);
 }
 
-static void two_seeds_are_not_correlated(void **state) {
-    (void)state;
+TEST(two_seeds_are_not_correlated) {
     const double duration = 600;
     ExcitationRandom random = random_with(0, 50, 1, 1, 100);
     Base one = base_of(&random, duration);
@@ -208,8 +195,7 @@ static void two_seeds_are_not_correlated(void **state) {
     base_clear(&other);
 }
 
-static void the_bins_lie_inside_the_band_and_leave_out_the_mean(void **state) {
-    (void)state;
+TEST(the_bins_lie_inside_the_band_and_leave_out_the_mean) {
     ExcitationRandom random = random_with(0, 500, 1, 0, 1000);
     RandomBlocks blocks = random_blocks(&random);
     assert_int_equal(blocks.length, 4096);
@@ -233,8 +219,7 @@ typedef struct Refusal {
     const char *pointer, *detail;
 } Refusal;
 
-static void faults_name_the_place_the_number_and_the_limit(void **state) {
-    (void)state;
+TEST(faults_name_the_place_the_number_and_the_limit) {
     static const Refusal refusals[] = {
         {{0, 600},
          2,
@@ -283,8 +268,7 @@ static void faults_name_the_place_the_number_and_the_limit(void **state) {
     }
 }
 
-static void the_rate_and_the_band_are_judged_at_once(void **state) {
-    (void)state;
+TEST(the_rate_and_the_band_are_judged_at_once) {
     static Problem problem;
     ExcitationRandom random = random_with(20, 10, 1, 0, 1e9);
     const Span span = {.duration = 10, .sample_rate = 1000};
@@ -293,8 +277,7 @@ static void the_rate_and_the_band_are_judged_at_once(void **state) {
     assert_int_equal(problem.count, 2);
 }
 
-static void the_rate_is_the_sample_rate_if_absent(void **state) {
-    (void)state;
+TEST(the_rate_is_the_sample_rate_if_absent) {
     static Problem problem;
     ExcitationRandom random = random_with(0, 250, 1, 0, NAN);
     Span span = {.duration = 10, .sample_rate = 500, .most = 5001};
@@ -309,8 +292,7 @@ static void the_rate_is_the_sample_rate_if_absent(void **state) {
     assert_string_equal(problem.faults[0].pointer, "/excitation/rate");
 }
 
-static void what_other_rows_refused_is_not_judged_again_and_does_no_harm(void **state) {
-    (void)state;
+TEST(what_other_rows_refused_is_not_judged_again_and_does_no_harm) {
     static const double bad[] = {NAN, INFINITY, -INFINITY, -1, 0, 1e-320, 1e308};
     for (size_t i = 0; i < COUNT(bad); i++)
         for (size_t j = 0; j < COUNT(bad); j++)
@@ -326,8 +308,7 @@ static void what_other_rows_refused_is_not_judged_again_and_does_no_harm(void **
     assert_int_equal(excitation_random.complete(&random.start, &span, "", NULL), STATUS_INVALID);
 }
 
-static void the_rows_fill_in_seed_and_start(void **state) {
-    (void)state;
+TEST(the_rows_fill_in_seed_and_start) {
     ExcitationRandom random;
     assert_int_equal(fields_default(excitation_random.kind.fields, &random), STATUS_OK);
     assert_int_equal(random.seed, 0);
@@ -348,8 +329,7 @@ static bool go_on(void *context, double fraction) {
     return true;
 }
 
-static void the_watch_sees_every_block_and_can_stop(void **state) {
-    (void)state;
+TEST(the_watch_sees_every_block_and_can_stop) {
     static Problem problem;
     const ExcitationRandom random = random_with(0, 15, 1, 0, 1000);
     const Span span = {.duration = 100, .sample_rate = 1000};
@@ -368,34 +348,10 @@ static void the_watch_sees_every_block_and_can_stop(void **state) {
     base_clear(&base);
 }
 
-static void a_base_without_end_is_refused_when_made(void **state) {
-    (void)state;
+TEST(a_base_without_end_is_refused_when_made) {
     const ExcitationRandom random = random_with(0, 15, 1, 0, 1000);
     const Span span = {.duration = 1e9, .sample_rate = 1000};
     Base base = {0};
     assert_int_equal(excitation_random.make(&random.start, &span, NULL, &base, NULL), STATUS_LIMIT);
     assert_null(base.values);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(samples_equal_a_slow_sum_over_the_bins),
-        cmocka_unit_test(a_longer_run_begins_with_the_same_bits),
-        cmocka_unit_test(the_samples_reach_past_the_end_of_the_run),
-        cmocka_unit_test(an_rms_of_nought_is_a_still_base),
-        cmocka_unit_test(moments_are_those_of_a_gaussian_process_of_this_rms),
-        cmocka_unit_test(the_variance_is_the_same_at_every_sample),
-        cmocka_unit_test(the_density_is_flat_within_the_band_and_nothing_outside),
-        cmocka_unit_test(two_seeds_are_not_correlated),
-        cmocka_unit_test(the_bins_lie_inside_the_band_and_leave_out_the_mean),
-        cmocka_unit_test(faults_name_the_place_the_number_and_the_limit),
-        cmocka_unit_test(the_rate_and_the_band_are_judged_at_once),
-        cmocka_unit_test(the_rate_is_the_sample_rate_if_absent),
-        cmocka_unit_test(what_other_rows_refused_is_not_judged_again_and_does_no_harm),
-        cmocka_unit_test(the_rows_fill_in_seed_and_start),
-        cmocka_unit_test(the_watch_sees_every_block_and_can_stop),
-        cmocka_unit_test(a_base_without_end_is_refused_when_made),
-    };
-    fft_start();
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,18 +1,14 @@
 // A record by its name: samples that are shared, that no text has, and that belong to the name.
 #include "core/excitation/recorded_motion.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "core/base/canonical.h"
 #include "core/base/json_pointer.h"
 #include "server/json/encode.h"
 #include "server/json/parse.h"
+#include "tests/support/test.h"
 
 static Problem problem;
 static const char digest[] = "0123456789abcdef0123456789abcdef0123456789abcdef0123456789abcdef";
@@ -50,8 +46,7 @@ static size_t holds(const NamedRecord *named) {
     return atomic_load(&named->shared.count);
 }
 
-static void a_name_stands_for_samples_that_its_copies_share(void **state) {
-    (void)state;
+TEST(a_name_stands_for_samples_that_its_copies_share) {
     NamedRecord *named = named_make("elcentro");
     ExcitationRecord *record = record_make("elcentro"), copy;
     assert_true(record_resolve(record, named));
@@ -67,8 +62,7 @@ static void a_name_stands_for_samples_that_its_copies_share(void **state) {
     refcount_unref(&named->shared);
 }
 
-static void the_base_moves_as_the_record_says(void **state) {
-    (void)state;
+TEST(the_base_moves_as_the_record_says) {
     NamedRecord *named = named_make("elcentro");
     ExcitationRecord *record = record_make("elcentro");
     const Span span = {.duration = 1, .sample_rate = 100};
@@ -90,8 +84,7 @@ static void gather(void *context, const void *bytes, size_t size) {
     bytes_put(context, bytes, size);
 }
 
-static void no_text_has_the_samples_and_no_text_gives_them(void **state) {
-    (void)state;
+TEST(no_text_has_the_samples_and_no_text_gives_them) {
     NamedRecord *named = named_make("elcentro");
     ExcitationRecord *record = record_make("elcentro"), read;
     Bytes text = {0}, resolved = {0}, bare = {0};
@@ -125,8 +118,7 @@ static void no_text_has_the_samples_and_no_text_gives_them(void **state) {
     refcount_unref(&named->shared);
 }
 
-static void what_stands_beside_a_name_is_a_fault(void **state) {
-    (void)state;
+TEST(what_stands_beside_a_name_is_a_fault) {
     NamedRecord *named = named_make("elcentro");
     ExcitationRecord *record = record_make("elcentro");
     assert_int_equal(check(record), STATUS_INVALID); // nobody looked it up
@@ -159,8 +151,7 @@ static void what_stands_beside_a_name_is_a_fault(void **state) {
     refcount_unref(&named->shared);
 }
 
-static void a_fault_that_was_told_is_told_once(void **state) {
-    (void)state;
+TEST(a_fault_that_was_told_is_told_once) {
     ExcitationRecord *record = record_make("elcentro");
     static const char *const places[] = {"/excitation/name", "/excitation/digest"};
     for (size_t i = 0; i < COUNT(places); i++) {
@@ -173,8 +164,7 @@ static void a_fault_that_was_told_is_told_once(void **state) {
     record_free(record);
 }
 
-static void a_doubt_of_a_named_record_stands_at_its_name(void **state) {
-    (void)state;
+TEST(a_doubt_of_a_named_record_stands_at_its_name) {
     NamedRecord *named = named_make("elcentro");
     ExcitationRecord *record = record_make("elcentro");
     const Span span = {.duration = 1, .sample_rate = 100};
@@ -186,16 +176,4 @@ static void a_doubt_of_a_named_record_stands_at_its_name(void **state) {
     assert_non_null(strstr(problem.faults[0].detail, "2e+03 m/s^2 (sample 1), more than 5 g"));
     record_free(record);
     refcount_unref(&named->shared);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_name_stands_for_samples_that_its_copies_share),
-        cmocka_unit_test(the_base_moves_as_the_record_says),
-        cmocka_unit_test(no_text_has_the_samples_and_no_text_gives_them),
-        cmocka_unit_test(what_stands_beside_a_name_is_a_fault),
-        cmocka_unit_test(a_fault_that_was_told_is_told_once),
-        cmocka_unit_test(a_doubt_of_a_named_record_stands_at_its_name),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,16 +1,11 @@
 // Force traces as loggers write them.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "core/drop_test/drop_test.h"
 #include "core/formats/force_trace_text.h"
+#include "tests/support/test.h"
 
 static Problem problem;
 
@@ -48,8 +43,7 @@ static void bad(const char *text, double given, const char *words) {
         fail_msg("%s: said \"%s\" at \"%s\", not \"%s\"", text, said, place, words);
 }
 
-static void times_tell_the_interval(void **state) {
-    (void)state;
+TEST(times_tell_the_interval) {
     const double none = (double)NAN;
     good("time [s],force [N]\n0,0.5\n0.001,1.5\n0.002,-2\n", none, 0.001, 3, -2);
     good("0;1\n1e-5;2\n2e-5;3", none, 1e-5, 3, 3);
@@ -61,15 +55,13 @@ static void times_tell_the_interval(void **state) {
     good("0 1\n0.5 2\n", 0.5, 0.5, 2, 2);
 }
 
-static void forces_alone_need_an_interval(void **state) {
-    (void)state;
+TEST(forces_alone_need_an_interval) {
     good("force [N]\n1\n2\n3\n", 1e-4, 1e-4, 3, 3);
     good("1,\n2,\n", 2e-4, 2e-4, 2, 2);
     bad("1\n2\n3\n", (double)NAN, "--interval");
 }
 
-static void what_cannot_be_meant_is_told_with_its_line(void **state) {
-    (void)state;
+TEST(what_cannot_be_meant_is_told_with_its_line) {
     const double none = (double)NAN;
     bad("", none, "no line of numbers");
     bad("force [N]\n", none, "no line of numbers");
@@ -91,8 +83,7 @@ static void what_cannot_be_meant_is_told_with_its_line(void **state) {
     bad("0 1\n\x01 2\n", none, "0x01");
 }
 
-static void a_trace_has_a_most(void **state) {
-    (void)state;
+TEST(a_trace_has_a_most) {
     const size_t count = (size_t)TRACE_SAMPLES_MAX + 1;
     char *text = malloc(2 * count + 1);
     for (size_t i = 0; i < count; i++)
@@ -105,14 +96,4 @@ static void a_trace_has_a_most(void **state) {
     assert_int_equal(trace.force.count, TRACE_SAMPLES_MAX);
     free(trace.force.at);
     free(text);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(times_tell_the_interval),
-        cmocka_unit_test(forces_alone_need_an_interval),
-        cmocka_unit_test(what_cannot_be_meant_is_told_with_its_line),
-        cmocka_unit_test(a_trace_has_a_most),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

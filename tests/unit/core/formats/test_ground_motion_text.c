@@ -1,17 +1,12 @@
 // Small files of our own in each layout, and what is wrong with the bad ones.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "core/excitation/recorded_motion.h"
 #include "core/formats/ground_motion_text.h"
+#include "tests/support/test.h"
 
 static Problem problem;
 static const GroundMotionOptions nothing = {NAN, CHOICE_ABSENT}, in_g = {NAN, ACCELERATION_G},
@@ -65,8 +60,7 @@ static void check(GroundMotionText import, const char *layout, size_t count, dou
     assert_null(import.samples.at);
 }
 
-static void peers_old_and_new_headers_are_read(void **state) {
-    (void)state;
+TEST(peers_old_and_new_headers_are_read) {
     static const char *const headers[] = {
         "NPTS=  6, DT= .01000 SEC\n",    "NPTS=   6, DT=   .0100 SEC,          \n",
         "NPTS=  6, dt=  .01\n",          "npts: 6 dt: 1.D-2\n",
@@ -89,8 +83,7 @@ static void peers_old_and_new_headers_are_read(void **state) {
           0.01, 0.3 * 9.80665);
 }
 
-static void marks_bound_the_numbers(void **state) {
-    (void)state;
+TEST(marks_bound_the_numbers) {
     check(good("Prose with 4 points\nThe units are (g)\n*** Begin data ***\n"
                "NPTS=  4, DT= .02000 SEC\n 1 2\n 3 4\n\n\n",
                &nothing),
@@ -103,8 +96,7 @@ static void marks_bound_the_numbers(void **state) {
     bad("1 2\n*** End data ***\n3 4\n", &whole, "line 3", "must be empty");
 }
 
-static void a_count_and_an_interval_may_stand_before_one_column(void **state) {
-    (void)state;
+TEST(a_count_and_an_interval_may_stand_before_one_column) {
     check(good("some motion\n3 0.0100\n2.42E-07\n\n1d-3\n-3",
                &(GroundMotionOptions){NAN, ACCELERATION_METRES}),
           "count_line", 3, 0.01, -3);
@@ -112,8 +104,7 @@ static void a_count_and_an_interval_may_stand_before_one_column(void **state) {
         "must state how many values follow: states 4, but 3 follow, the last on line 5");
 }
 
-static void times_give_the_interval(void **state) {
-    (void)state;
+TEST(times_give_the_interval) {
     const char *const text = "A motion\nTime[s] Accel[g]\n0.0000\t-0.0012\n0.0100\t-0.0007\n"
                              "0.0200\t-0.0003\n0.0300\t0.5";
     check(good(text, &nothing), "time_acceleration", 4, 0.01, 0.5 * 9.80665);
@@ -131,14 +122,12 @@ static void times_give_the_interval(void **state) {
     bad(text, &whole, "line 3", "states an interval of 0.01 s, but 0.02 s is given");
 }
 
-static void columns_of_a_rising_acceleration_are_no_times(void **state) {
-    (void)state;
+TEST(columns_of_a_rising_acceleration_are_no_times) {
     check(good(PEER "NPTS= 8, DT= 0.01\n0 1\n2 3\n4 5\n6 7\n", &nothing), "at2", 8, 0.01,
           7 * 9.80665);
 }
 
-static void units_are_found_or_must_be_given(void **state) {
-    (void)state;
+TEST(units_are_found_or_must_be_given) {
     static const struct {
         const char *header;
         int unit;
@@ -178,8 +167,7 @@ static void units_are_found_or_must_be_given(void **state) {
         "is of a displacement");
 }
 
-static void what_is_not_told_must_be_given(void **state) {
-    (void)state;
+TEST(what_is_not_told_must_be_given) {
     bad("1\n2\n3\n", &in_g, "line 1", "must state the interval");
     bad(PEER "NPTS= 3\n1 2 3", &nothing, "line 4", "must state the interval");
     check(good(PEER "NPTS= 3\n1 2 3", &(GroundMotionOptions){0.5, CHOICE_ABSENT}), "at2", 3, 0.5,
@@ -188,8 +176,7 @@ static void what_is_not_told_must_be_given(void **state) {
         "states an interval of 0.01 s, but 0.02 s is given");
 }
 
-static void a_count_that_does_not_match_is_told_with_both_numbers(void **state) {
-    (void)state;
+TEST(a_count_that_does_not_match_is_told_with_both_numbers) {
     bad(PEER "NPTS= 4, DT= .01\n1 2\n3\n", &nothing, "line 4",
         "states 4, but 3 follow, the last on line 6");
     bad(PEER "NPTS= 2, DT= .01\n1 2\n3\n", &nothing, "line 4",
@@ -205,8 +192,7 @@ static void a_count_that_does_not_match_is_told_with_both_numbers(void **state) 
     bad("1 2 3\n4 5 6 7\n", &whole, "line 2", "has 4");
 }
 
-static void garbage_is_told_with_line_and_column(void **state) {
-    (void)state;
+TEST(garbage_is_told_with_line_and_column) {
     static const struct {
         const char *row, *place, *detail;
     } rows[] = {
@@ -238,8 +224,7 @@ static void garbage_is_told_with_line_and_column(void **state) {
     bad("a motion\nof words\n", &whole, "line 2", "must hold a line of numbers up to here");
 }
 
-static void what_is_no_text_is_refused(void **state) {
-    (void)state;
+TEST(what_is_no_text_is_refused) {
     assert_int_equal(read_bytes("1 2\n3\0 4\n", 9, &whole), STATUS_UNREADABLE);
     assert_string_equal(problem.faults[0].pointer, "line 2, column 2");
     assert_string_equal(problem.faults[0].detail,
@@ -259,8 +244,7 @@ static void what_is_no_text_is_refused(void **state) {
           "columns", 4, 0.02, 4);
 }
 
-static void every_beginning_of_a_file_is_refused(void **state) {
-    (void)state;
+TEST(every_beginning_of_a_file_is_refused) {
     static const char text[] =
         PEER "NPTS=  6, DT= .01000 SEC\n  -.1E-02   .2E-02   .3E-02\n  .4E-02  .5E-02 -.6E-02";
     // A last number that lost digits cannot be told from a whole one.
@@ -272,8 +256,7 @@ static void every_beginning_of_a_file_is_refused(void **state) {
     assert_int_equal(read_bytes(text, sizeof text - 1, &nothing), STATUS_OK);
 }
 
-static void long_texts_take_time_in_proportion_and_have_their_limit(void **state) {
-    (void)state;
+TEST(long_texts_take_time_in_proportion_and_have_their_limit) {
     const size_t size = (size_t)20 << 20;
     char *text = malloc(size);
     memset(text, '1', size);
@@ -292,8 +275,7 @@ static void long_texts_take_time_in_proportion_and_have_their_limit(void **state
     free(text);
 }
 
-static void a_header_is_kept_to_a_thousand_plain_bytes(void **state) {
-    (void)state;
+TEST(a_header_is_kept_to_a_thousand_plain_bytes) {
     char text[4096] = "";
     for (int i = 0; i < 60; i++)
         strcat(text, "A header line of some length, \xc3\xa9\t\n");
@@ -304,23 +286,4 @@ static void a_header_is_kept_to_a_thousand_plain_bytes(void **state) {
         assert_true(*c >= ' ' && *c <= '~');
     ground_motion_text_clear(&import);
     ground_motion_text_clear(&import);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(peers_old_and_new_headers_are_read),
-        cmocka_unit_test(marks_bound_the_numbers),
-        cmocka_unit_test(a_count_and_an_interval_may_stand_before_one_column),
-        cmocka_unit_test(times_give_the_interval),
-        cmocka_unit_test(columns_of_a_rising_acceleration_are_no_times),
-        cmocka_unit_test(units_are_found_or_must_be_given),
-        cmocka_unit_test(what_is_not_told_must_be_given),
-        cmocka_unit_test(a_count_that_does_not_match_is_told_with_both_numbers),
-        cmocka_unit_test(garbage_is_told_with_line_and_column),
-        cmocka_unit_test(what_is_no_text_is_refused),
-        cmocka_unit_test(every_beginning_of_a_file_is_refused),
-        cmocka_unit_test(long_texts_take_time_in_proportion_and_have_their_limit),
-        cmocka_unit_test(a_header_is_kept_to_a_thousand_plain_bytes),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -4,15 +4,11 @@
 
 #include <math.h>
 #include <pthread.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "core/base/status.h"
+#include "tests/support/test.h"
 
 static const size_t sizes[] = {1, 2, 3, 4, 5, 16, 17, 30, 97, 128, 1000};
 
@@ -20,8 +16,7 @@ static double number(size_t i) {
     return sin(1.7 * (double)i * (double)i + 0.3);
 }
 
-static void forward_is_the_sum_with_a_negative_exponent(void **state) {
-    (void)state;
+TEST(forward_is_the_sum_with_a_negative_exponent) {
     for (size_t s = 0; s < COUNT(sizes); s++) {
         const size_t n = sizes[s];
         Fft *fourier = fft_new(n, FFT_FORWARD);
@@ -43,8 +38,7 @@ static void forward_is_the_sum_with_a_negative_exponent(void **state) {
     }
 }
 
-static void backward_undoes_forward_up_to_the_size(void **state) {
-    (void)state;
+TEST(backward_undoes_forward_up_to_the_size) {
     for (size_t s = 0; s < COUNT(sizes); s++) {
         const size_t n = sizes[s];
         Fft *there = fft_new(n, FFT_FORWARD), *back = fft_new(n, FFT_BACKWARD);
@@ -76,8 +70,7 @@ static uint64_t transform_bits(size_t n) {
     return hash;
 }
 
-static void a_transform_has_the_same_bits_whatever_was_planned_before(void **state) {
-    (void)state;
+TEST(a_transform_has_the_same_bits_whatever_was_planned_before) {
     static const size_t mixed[] = {4096, 1000, 997, 8192, 60, 10001, 3072, 512, 32768, 4095};
     uint64_t first[COUNT(mixed)];
     for (size_t i = 0; i < COUNT(mixed); i++)
@@ -96,8 +89,7 @@ static void *plan_many(void *bits) {
     return NULL;
 }
 
-static void several_threads_may_plan_at_once(void **state) {
-    (void)state;
+TEST(several_threads_may_plan_at_once) {
     pthread_t threads[4];
     uint64_t bits[4] = {0};
     for (size_t i = 0; i < 4; i++)
@@ -108,16 +100,14 @@ static void several_threads_may_plan_at_once(void **state) {
         assert_int_equal(bits[i], bits[0]);
 }
 
-static void what_cannot_be_transformed_is_null(void **state) {
-    (void)state;
+TEST(what_cannot_be_transformed_is_null) {
     assert_null(fft_new(0, FFT_FORWARD));
     assert_null(fft_new(SIZE_MAX, FFT_FORWARD));
     assert_null(fft_new(((size_t)1 << 30) + 1, FFT_BACKWARD));
     fft_free(NULL);
 }
 
-static void a_stock_hands_out_what_was_put_into_it(void **state) {
-    (void)state;
+TEST(a_stock_hands_out_what_was_put_into_it) {
     FftCache stock = {0};
     Fft *first = fft_acquire(&stock, 64, FFT_FORWARD);
     assert_non_null(first);
@@ -138,8 +128,7 @@ static void a_stock_hands_out_what_was_put_into_it(void **state) {
     assert_null(stock.at[0]);
 }
 
-static void cosines_at_equal_steps_are_the_library_s(void **state) {
-    (void)state;
+TEST(cosines_at_equal_steps_are_the_library_s) {
     const double pi = acos(-1);
     static double cosines[5000];
     static const size_t counts[] = {0, 1, 63, 64, 65, 4096, 5000};
@@ -149,18 +138,4 @@ static void cosines_at_equal_steps_are_the_library_s(void **state) {
         for (size_t i = 0; i < counts[c]; i++)
             assert_true(fabs(cosines[i] - cos(start + (double)i * step)) < 1e-15);
     }
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(cosines_at_equal_steps_are_the_library_s),
-        cmocka_unit_test(forward_is_the_sum_with_a_negative_exponent),
-        cmocka_unit_test(backward_undoes_forward_up_to_the_size),
-        cmocka_unit_test(a_transform_has_the_same_bits_whatever_was_planned_before),
-        cmocka_unit_test(several_threads_may_plan_at_once),
-        cmocka_unit_test(what_cannot_be_transformed_is_null),
-        cmocka_unit_test(a_stock_hands_out_what_was_put_into_it),
-    };
-    fft_start();
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

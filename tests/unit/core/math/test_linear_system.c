@@ -1,15 +1,9 @@
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
 
 #include "core/math/linear_system.h"
+#include "tests/support/test.h"
 
-static void a_system_that_needs_pivots_is_solved(void **state) {
-    (void)state;
+TEST(a_system_that_needs_pivots_is_solved) {
     double A[] = {0, 1, 4, 2, 0, 1, 1, 3, 0};
     double B[] = {14, 0, 5, 2, 7, 1}; // A times (1, 2, 3), and its first column
     assert_true(linear_system_solve(A, B, 3, 2));
@@ -18,18 +12,9 @@ static void a_system_that_needs_pivots_is_solved(void **state) {
         assert_true(fabs(B[i] - X[i]) < 1e-14);
 }
 
-static void singular_and_infinite_systems_are_refused(void **state) {
-    (void)state;
+TEST(singular_and_infinite_systems_are_refused) {
     double singular[] = {1, 2, 2, 4}, infinite[] = {1, 0, 0, (double)INFINITY * 0};
     double B[] = {1, 1};
     assert_false(linear_system_solve(singular, B, 2, 1));
     assert_false(linear_system_solve(infinite, B, 2, 1));
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_system_that_needs_pivots_is_solved),
-        cmocka_unit_test(singular_and_infinite_systems_are_refused),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,18 +1,12 @@
 // exp(A h) by precise integration against closed forms.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
-
-#include <cmocka.h>
 
 #include "core/math/matrix_exponential.h"
 #include "tests/support/matrix_forms.h"
+#include "tests/support/test.h"
 
-static void an_oscillator_turns(void **state) {
-    (void)state;
+TEST(an_oscillator_turns) {
     for (long double h = 1e-6L; h < 1e3L; h *= 9) {
         const long double w = 7, A[4] = {0, 1, -w * w, 0};
         long double E[4];
@@ -24,16 +18,14 @@ static void an_oscillator_turns(void **state) {
     }
 }
 
-static void a_singular_system_is_as_good_as_any(void **state) {
-    (void)state;
+TEST(a_singular_system_is_as_good_as_any) {
     const long double A[9] = {0, 1, 0, 0, 0, 1, 0, 0, 0};
     long double E[9];
     matrix_exponential(A, 3, 100, E);
     assert_true(E[1] == 100 && fabsl(E[2] - 5000) < 1e-14L && E[5] == 100 && E[0] == 1);
 }
 
-static void a_stiff_system_decays_and_keeps_its_slow_part(void **state) {
-    (void)state;
+TEST(a_stiff_system_decays_and_keeps_its_slow_part) {
     const long double A[4] = {-1e12L, 1e12L, 0, -1}; // y1 follows y2
     long double E[4];
     matrix_exponential(A, 2, 1, E);
@@ -42,8 +34,7 @@ static void a_stiff_system_decays_and_keeps_its_slow_part(void **state) {
     assert_true(fabsl(E[1] - expl(-1)) < 1e-11L);
 }
 
-static void a_form_is_the_integral_of_the_product(void **state) {
-    (void)state;
+TEST(a_form_is_the_integral_of_the_product) {
     // y = (cos t, -sin t) from (1, 0): the integral of y1 y1 over 0..h is h/2 + sin(2h)/4, of y1 y2
     // -sin(h)^2/2.
     const long double A[4] = {0, 1, -1, 0}, one[2] = {1, 0}, two[2] = {0, 1};
@@ -54,14 +45,4 @@ static void a_form_is_the_integral_of_the_product(void **state) {
         matrix_exponential_forms(A, 2, h, 1, (const long double *const[1][2]){{one, two}}, form);
         assert_true(fabsl(form[0] + sinl(h) * sinl(h) / 2) < 1e-17L * (10 + h * h));
     }
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(an_oscillator_turns),
-        cmocka_unit_test(a_singular_system_is_as_good_as_any),
-        cmocka_unit_test(a_stiff_system_decays_and_keeps_its_slow_part),
-        cmocka_unit_test(a_form_is_the_integral_of_the_product),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

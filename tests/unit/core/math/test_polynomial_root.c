@@ -1,15 +1,10 @@
 // The first crossing: never stepped over, never invented.
 #include <float.h>
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 
-#include <cmocka.h>
-
 #include "core/math/polynomial_root.h"
+#include "tests/support/test.h"
 
 // (roots[0] - s) (roots[1] - s) ... times `scale`.
 static void product(const double *roots, size_t count, double scale, double *c) {
@@ -21,8 +16,7 @@ static void product(const double *roots, size_t count, double scale, double *c) 
             c[i] = (i <= n ? roots[n] * c[i] : 0) - (i > 0 ? c[i - 1] : 0);
 }
 
-static void a_simple_root_is_found_to_rounding(void **state) {
-    (void)state;
+TEST(a_simple_root_is_found_to_rounding) {
     for (int i = 1; i < 1000; i++) {
         const double root = i / 1000.0, roots[3] = {root, 1.5 + root, 3};
         double c[4], s = -1;
@@ -32,8 +26,7 @@ static void a_simple_root_is_found_to_rounding(void **state) {
     }
 }
 
-static void the_first_of_two_close_roots_is_taken(void **state) {
-    (void)state;
+TEST(the_first_of_two_close_roots_is_taken) {
     for (int power = 1; power <= 6; power++) {
         const double width = pow(10, -power), roots[2] = {0.4, 0.4 + width};
         double c[3], s = -1;
@@ -43,8 +36,7 @@ static void the_first_of_two_close_roots_is_taken(void **state) {
     }
 }
 
-static void a_near_miss_is_not_a_crossing(void **state) {
-    (void)state;
+TEST(a_near_miss_is_not_a_crossing) {
     for (int power = 1; power <= 14; power++) {
         const double miss = pow(10, -power);
         const double c[3] = {0.16 + miss, -0.8, 1}; // (s - 0.4)^2 + miss
@@ -53,8 +45,7 @@ static void a_near_miss_is_not_a_crossing(void **state) {
     }
 }
 
-static void a_root_at_the_start_does_not_count(void **state) {
-    (void)state;
+TEST(a_root_at_the_start_does_not_count) {
     double s = -1;
     const double leaves[4] = {0, 1, -2, 0}, turns_at_once[3] = {0, 0, -1}, opens[4] = {0, 0, 0, 1};
     assert_true(polynomial_root_first(leaves, 3, &s));
@@ -68,16 +59,14 @@ static void a_root_at_the_start_does_not_count(void **state) {
 
 // Against a scan so fine that a root of these low degrees cannot hide from it.
 // Motion that has left what doubles hold: the caller is told of no crossing, and not in 2^52 steps.
-static void coefficients_that_are_no_numbers_end_the_search(void **state) {
-    (void)state;
+TEST(coefficients_that_are_no_numbers_end_the_search) {
     double s;
     const double lost[][4] = {{1, NAN, 0, 0}, {1, -2, NAN, 1}, {NAN, -1, 0, 0}};
     for (size_t i = 0; i < sizeof lost / sizeof *lost; i++)
         assert_false(polynomial_root_first(lost[i], 3, &s));
 }
 
-static void random_polynomials_agree_with_a_scan(void **state) {
-    (void)state;
+TEST(random_polynomials_agree_with_a_scan) {
     srand(7);
     int crossings = 0;
     for (int trial = 0; trial < 20000; trial++) {
@@ -100,16 +89,4 @@ static void random_polynomials_agree_with_a_scan(void **state) {
         }
     }
     assert_true(crossings > 1000);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_simple_root_is_found_to_rounding),
-        cmocka_unit_test(the_first_of_two_close_roots_is_taken),
-        cmocka_unit_test(a_near_miss_is_not_a_crossing),
-        cmocka_unit_test(a_root_at_the_start_does_not_count),
-        cmocka_unit_test(coefficients_that_are_no_numbers_end_the_search),
-        cmocka_unit_test(random_polynomials_agree_with_a_scan),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

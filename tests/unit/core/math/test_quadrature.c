@@ -1,11 +1,7 @@
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
 
 #include "core/math/quadrature.h"
+#include "tests/support/test.h"
 
 static double power(const void *context, double u, double rest) {
     (void)rest;
@@ -22,8 +18,7 @@ static double smooth(const void *context, double u, double rest) {
     return 1 / (1 + u * u);
 }
 
-static void powers_are_right_at_either_end(void **state) {
-    (void)state;
+TEST(powers_are_right_at_either_end) {
     static const double exponents[] = {0, 0.25, 1, 1.5, 2.5, 7};
     for (size_t i = 0; i < sizeof exponents / sizeof *exponents; i++) {
         const double known = 1 / (1 + exponents[i]);
@@ -32,23 +27,12 @@ static void powers_are_right_at_either_end(void **state) {
     }
 }
 
-static void a_mild_singularity_is_no_trouble(void **state) {
-    (void)state;
+TEST(a_mild_singularity_is_no_trouble) {
     const double exponent = -0.25;
     assert_true(fabs(quadrature_unit(power, &exponent) * 0.75 - 1) < 1e-12);
     assert_true(fabs(quadrature_unit(from_the_far_end, &exponent) * 0.75 - 1) < 1e-12);
 }
 
-static void smooth_functions_are_right_to_rounding(void **state) {
-    (void)state;
+TEST(smooth_functions_are_right_to_rounding) {
     assert_true(fabs(quadrature_unit(smooth, NULL) - atan(1)) < 1e-15);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(powers_are_right_at_either_end),
-        cmocka_unit_test(a_mild_singularity_is_no_trouble),
-        cmocka_unit_test(smooth_functions_are_right_to_rounding),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,16 +2,11 @@
 #include "core/math/sparse_spectrum.h"
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "core/base/philox.h"
+#include "tests/support/test.h"
 
 typedef struct Case {
     size_t length, bins;
@@ -56,8 +51,7 @@ static double slow(const Case *of, const double *bins, size_t i) {
     return (double)(2 * sum);
 }
 
-static void samples_are_the_sum_of_their_bins(void **state) {
-    (void)state;
+TEST(samples_are_the_sum_of_their_bins) {
     double *values = malloc((1 << 22) * sizeof *values);
     assert_non_null(values);
     for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
@@ -83,8 +77,7 @@ static void samples_are_the_sum_of_their_bins(void **state) {
     free(values);
 }
 
-static void a_part_has_the_bits_of_the_whole(void **state) {
-    (void)state;
+TEST(a_part_has_the_bits_of_the_whole) {
     for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
         const Case *of = &cases[c];
         double *bins = bins_of(of, 0), *values = malloc(of->length * sizeof *values);
@@ -102,8 +95,7 @@ static void a_part_has_the_bits_of_the_whole(void **state) {
     }
 }
 
-static void a_stock_and_what_was_there_before_leave_no_trace(void **state) {
-    (void)state;
+TEST(a_stock_and_what_was_there_before_leave_no_trace) {
     FftCache stock = {0};
     double first[SPARSE_SPECTRUM_BLOCK], again[SPARSE_SPECTRUM_BLOCK];
     const Case *of = &cases[3];
@@ -123,14 +115,4 @@ static void a_stock_and_what_was_there_before_leave_no_trace(void **state) {
     assert_non_null(stock.at[0]);
     fft_cache_clear(&stock);
     free(bins);
-}
-
-int main(void) {
-    fft_start();
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(samples_are_the_sum_of_their_bins),
-        cmocka_unit_test(a_part_has_the_bits_of_the_whole),
-        cmocka_unit_test(a_stock_and_what_was_there_before_leave_no_trace),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,22 +1,17 @@
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 
-#include <cmocka.h>
 
 #include <math.h>
 
 #include "core/base/status.h"
 #include "core/math/student_t.h"
+#include "tests/support/test.h"
 
 static void assert_near(double is, double should, double most) {
     if (!(fabs(is / should - 1) <= most))
         fail_msg("is %.17g, should be %.17g", is, should);
 }
 
-static void quantiles_of_one_and_two_degrees_are_their_closed_forms(void **state) {
-    (void)state;
+TEST(quantiles_of_one_and_two_degrees_are_their_closed_forms) {
     static const double shares[] = {1e-6, 0.1, 0.5, 0.95, 0.99, 0.9999};
     for (size_t i = 0; i < COUNT(shares); i++) {
         const double p = shares[i];
@@ -25,8 +20,7 @@ static void quantiles_of_one_and_two_degrees_are_their_closed_forms(void **state
     }
 }
 
-static void quantiles_are_those_of_scipy(void **state) {
-    (void)state;
+TEST(quantiles_are_those_of_scipy) {
     // By scipy.special.betaincinv; scipy.stats.t.ppf misses some of them by 1e-9.
     static const struct {
         double share;
@@ -42,20 +36,10 @@ static void quantiles_are_those_of_scipy(void **state) {
         assert_near(student_t_quantile(known[i].share, known[i].freedom), known[i].quantile, 1e-12);
 }
 
-static void quantiles_are_where_the_share_is(void **state) {
-    (void)state;
+TEST(quantiles_are_where_the_share_is) {
     for (size_t n = 0; n < 200; n++)
         for (double p = 0.05; p < 1; p += 0.05)
             assert_true(fabs(student_t_probability(student_t_quantile(p, n), n) - p) < 1e-14);
     assert_true(student_t_probability(0, 5) == 0);
     assert_true(student_t_probability(1e300, 6) == 1);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(quantiles_of_one_and_two_degrees_are_their_closed_forms),
-        cmocka_unit_test(quantiles_are_those_of_scipy),
-        cmocka_unit_test(quantiles_are_where_the_share_is),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,17 +1,11 @@
 // Definiteness, solution and eigenpairs of small symmetric matrices.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 
-#include <cmocka.h>
-
 #include "core/math/symmetric_matrix.h"
+#include "tests/support/test.h"
 
-static void the_first_leading_block_that_is_not_definite_is_named(void **state) {
-    (void)state;
+TEST(the_first_leading_block_that_is_not_definite_is_named) {
     const double good[] = {2, -1, 0, -1, 2, -1, 0, -1, 2}, bad[] = {2, -1, 0, -1, 2, 3, 0, 3, 2},
                  worse[] = {-1, 0, 0, 1}, zero[] = {0, 0, 0, 1}, coupled_zero[] = {0, 1, 1, 1};
     assert_int_equal(symmetric_matrix_find_indefinite(3, good, 0), 0);
@@ -22,8 +16,7 @@ static void the_first_leading_block_that_is_not_definite_is_named(void **state) 
     assert_int_equal(symmetric_matrix_find_indefinite(2, coupled_zero, 1e-14), 2);
 }
 
-static void a_margin_passes_singular_matrices_or_keeps_away_from_them(void **state) {
-    (void)state;
+TEST(a_margin_passes_singular_matrices_or_keeps_away_from_them) {
     const double singular[] = {1, -1, -1, 1}, nearly[] = {1, 1 - 1e-13, 1 - 1e-13, 1};
     assert_int_equal(symmetric_matrix_find_indefinite(2, singular, 0), 2);
     assert_int_equal(symmetric_matrix_find_indefinite(2, singular, 1e-14), 0);
@@ -34,8 +27,7 @@ static void a_margin_passes_singular_matrices_or_keeps_away_from_them(void **sta
     assert_int_equal(symmetric_matrix_find_indefinite(2, wide, 0), 0);
 }
 
-static void a_system_is_solved_whatever_its_units(void **state) {
-    (void)state;
+TEST(a_system_is_solved_whatever_its_units) {
     const double A[] = {4e200, 1, 1, 1e-200}, b[] = {7e200, 4}; // as 4 1, 1 1 with 7, 4
     double x[2];
     assert_int_equal(symmetric_matrix_solve(2, A, b, x), STATUS_OK);
@@ -45,8 +37,7 @@ static void a_system_is_solved_whatever_its_units(void **state) {
     assert_true(fabs(x[0] - 1) < 1e-15 && fabs(x[1] - 1) < 1e-15);
 }
 
-static void small_eigenvalues_are_as_right_as_large_ones(void **state) {
-    (void)state;
+TEST(small_eigenvalues_are_as_right_as_large_ones) {
     // A chain of equal springs and masses: 4 sin((2 k - 1) pi / (2 (2 n + 1)))^2.
     enum { N = 60 };
     double *M = calloc(N * N, sizeof *M), *K = calloc(N * N, sizeof *K);
@@ -75,8 +66,7 @@ static void small_eigenvalues_are_as_right_as_large_ones(void **state) {
     free(Y);
 }
 
-static void equal_eigenvalues_have_orthogonal_vectors(void **state) {
-    (void)state;
+TEST(equal_eigenvalues_have_orthogonal_vectors) {
     // Two equal oscillators beside a coupled pair with one of the same value.
     const double M[] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, .5, 0, 0, .5, 1},
                  K[] = {3, 0, 0, 0, 0, 3, 0, 0, 0, 0, 3, 1.5, 0, 0, 1.5, 3};
@@ -94,22 +84,9 @@ static void equal_eigenvalues_have_orthogonal_vectors(void **state) {
     }
 }
 
-static void an_indefinite_mass_has_no_eigenvalues(void **state) {
-    (void)state;
+TEST(an_indefinite_mass_has_no_eigenvalues) {
     const double M[] = {1, 2, 2, 1}, negative[] = {-1, 0, 0, 1}, K[] = {1, 0, 0, 1};
     long double values[2], Y[4];
     assert_int_equal(symmetric_matrix_eigen(2, M, K, values, Y), STATUS_INVALID);
     assert_int_equal(symmetric_matrix_eigen(2, negative, K, values, Y), STATUS_INVALID);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_first_leading_block_that_is_not_definite_is_named),
-        cmocka_unit_test(a_margin_passes_singular_matrices_or_keeps_away_from_them),
-        cmocka_unit_test(a_system_is_solved_whatever_its_units),
-        cmocka_unit_test(small_eigenvalues_are_as_right_as_large_ones),
-        cmocka_unit_test(equal_eigenvalues_have_orthogonal_vectors),
-        cmocka_unit_test(an_indefinite_mass_has_no_eigenvalues),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

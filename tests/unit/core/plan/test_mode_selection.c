@@ -1,17 +1,13 @@
 // Modes left out of a plan: those beyond a number, and those that nothing sets moving.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdio.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "core/base/canonical.h"
 #include "core/plan/plan.h"
 #include "core/solve/solver.h"
 #include "tests/support/document.h"
+#include "tests/support/test.h"
 
 static Problem problem;
 
@@ -42,8 +38,7 @@ static const Decision *find(const PlanReport *report, const char *about) {
     return NULL;
 }
 
-static void the_lowest_modes_are_kept_as_they_were(void **state) {
-    (void)state;
+TEST(the_lowest_modes_are_kept_as_they_were) {
     Simulation simulation;
     document_pass(&simulation, FOUR SINE);
     Plan *all = plan_of(&simulation), *some = plan_of(&simulation);
@@ -68,8 +63,7 @@ static void the_lowest_modes_are_kept_as_they_were(void **state) {
     simulation_clear(&simulation);
 }
 
-static void all_modes_asked_for_are_no_decision(void **state) {
-    (void)state;
+TEST(all_modes_asked_for_are_no_decision) {
     Simulation simulation;
     document_pass(&simulation, FOUR SINE);
     Plan *plan = plan_of(&simulation);
@@ -98,8 +92,7 @@ static size_t left(const char *members, double *value) {
     return count;
 }
 
-static void what_nothing_sets_moving_is_left_out(void **state) {
-    (void)state;
+TEST(what_nothing_sets_moving_is_left_out) {
     static const struct {
         const char *members;
         size_t kept;
@@ -129,8 +122,7 @@ static void what_nothing_sets_moving_is_left_out(void **state) {
 }
 
 // Three equal masses on a line: the second mode, (1, 0, -1), has its node in the middle.
-static void a_damper_at_a_node_sees_nothing_of_a_mode(void **state) {
-    (void)state;
+TEST(a_damper_at_a_node_sees_nothing_of_a_mode) {
     static const char line[] =
         "\"structure\": {\"kind\": \"matrices\", \"mass\": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "
         "\"stiffness\": [[200, -100, 0], [-100, 200, -100], [0, -100, 200]]}, " SINE
@@ -144,8 +136,7 @@ static void a_damper_at_a_node_sees_nothing_of_a_mode(void **state) {
     assert_int_equal(left(members, &value), 3);
 }
 
-static void a_foretold_error_falls_with_the_modes_kept_to_nothing(void **state) {
-    (void)state;
+TEST(a_foretold_error_falls_with_the_modes_kept_to_nothing) {
     static const char *const excitations_of[] = {
         SINE,
         "\"excitation\": {\"displacement\": [0.1, 0, 0, -0.1]}",
@@ -193,8 +184,7 @@ static TruncationError predicted(const char *members, size_t kept) {
 }
 
 // The storey that starts with a speed lends it to its mass, which meets a stop in the end.
-static void a_mass_that_is_thrown_with_its_storey_meets_its_stops(void **state) {
-    (void)state;
+TEST(a_mass_that_is_thrown_with_its_storey_meets_its_stops) {
 #define THROWN(velocity)                                                                           \
     FOUR "\"dampers\": [{\"mass\": 1, \"clearance\": 0.01, \"velocity\": " velocity                \
          ", \"buffer\": {\"restitution\": 0.6, \"contact_time\": 0.01}}], \"excitation\": "        \
@@ -207,8 +197,7 @@ static void a_mass_that_is_thrown_with_its_storey_meets_its_stops(void **state) 
 
 // A base that is slower than none of the modes kept: they have little to show for it, and what
 // follows it in those left out is no small part.
-static void modes_below_a_random_bases_band_take_little_of_it(void **state) {
-    (void)state;
+TEST(modes_below_a_random_bases_band_take_little_of_it) {
     char members[2000];
     size_t used = (size_t)snprintf(members, sizeof members,
                                    "\"structure\": {\"kind\": \"frame\", \"masses\": [");
@@ -225,8 +214,7 @@ static void modes_below_a_random_bases_band_take_little_of_it(void **state) {
     assert_true(predicted(members, 3).rms_displacement > 0.2);
 }
 
-static void the_moved_mass_is_shared_out_among_the_modes(void **state) {
-    (void)state;
+TEST(the_moved_mass_is_shared_out_among_the_modes) {
     Simulation simulation;
     document_pass(&simulation, FOUR SINE);
     Plan *plan = plan_of(&simulation);
@@ -241,8 +229,7 @@ static void the_moved_mass_is_shared_out_among_the_modes(void **state) {
     simulation_clear(&simulation);
 }
 
-static void more_modes_than_storeys_are_a_fault(void **state) {
-    (void)state;
+TEST(more_modes_than_storeys_are_a_fault) {
     document_refuse(FOUR SINE ", \"accuracy\": {\"modes\": 5}", "/accuracy/modes",
                     "must be at most 4, the structure has one mode per storey, is 5");
     document_refuse(FOUR SINE ", \"accuracy\": {\"solver\": \"rk4\", \"modes\": 0}",
@@ -269,8 +256,7 @@ static void canonical(const char *members, Bytes *bytes) {
     simulation_clear(&simulation);
 }
 
-static void all_modes_and_none_asked_for_are_the_same_scene(void **state) {
-    (void)state;
+TEST(all_modes_and_none_asked_for_are_the_same_scene) {
     static Bytes none, all, fewer;
     canonical(FOUR SINE, &none);
     canonical(FOUR SINE ", \"accuracy\": {\"modes\": 4}", &all);
@@ -280,20 +266,4 @@ static void all_modes_and_none_asked_for_are_the_same_scene(void **state) {
     canonical("\"structure\": {\"mass\": 1, \"stiffness\": 9}", &none);
     canonical("\"structure\": {\"mass\": 1, \"stiffness\": 9}, \"accuracy\": {\"modes\": 1}", &all);
     assert_true(none.length == all.length && memcmp(none.at, all.at, all.length) == 0);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_lowest_modes_are_kept_as_they_were),
-        cmocka_unit_test(all_modes_asked_for_are_no_decision),
-        cmocka_unit_test(what_nothing_sets_moving_is_left_out),
-        cmocka_unit_test(a_damper_at_a_node_sees_nothing_of_a_mode),
-        cmocka_unit_test(a_foretold_error_falls_with_the_modes_kept_to_nothing),
-        cmocka_unit_test(a_mass_that_is_thrown_with_its_storey_meets_its_stops),
-        cmocka_unit_test(modes_below_a_random_bases_band_take_little_of_it),
-        cmocka_unit_test(the_moved_mass_is_shared_out_among_the_modes),
-        cmocka_unit_test(more_modes_than_storeys_are_a_fault),
-        cmocka_unit_test(all_modes_and_none_asked_for_are_the_same_scene),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,15 +1,10 @@
 // Modes of structures: frequencies, shapes, damping and participation.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "core/plan/modes.h"
+#include "tests/support/test.h"
 
 enum { MOST = 12 };
 
@@ -39,8 +34,7 @@ static Status make(Modes *modes, const Chain *all) {
     return modes_make(modes, all->n, all->M, all->K, all->C, all->r, NULL);
 }
 
-static void a_chain_has_its_frequencies_and_modes_are_normal(void **state) {
-    (void)state;
+TEST(a_chain_has_its_frequencies_and_modes_are_normal) {
     const Chain all = chain(10, 2000, 1e-3);
     Modes modes;
     assert_int_equal(make(&modes, &all), STATUS_OK);
@@ -61,8 +55,7 @@ static void a_chain_has_its_frequencies_and_modes_are_normal(void **state) {
     modes_clear(&modes);
 }
 
-static void proportional_damping_is_classical_and_one_odd_damper_is_not(void **state) {
-    (void)state;
+TEST(proportional_damping_is_classical_and_one_odd_damper_is_not) {
     Chain all = chain(10, 2000, 0.3e-3);
     for (size_t i = 0; i < 10; i++)
         all.C[i * 11] += 0.7 * all.M[i * 11];
@@ -81,8 +74,7 @@ static void proportional_damping_is_classical_and_one_odd_damper_is_not(void **s
     modes_clear(&modes);
 }
 
-static void a_free_chain_moves_as_one_at_frequency_zero(void **state) {
-    (void)state;
+TEST(a_free_chain_moves_as_one_at_frequency_zero) {
     const Chain all = chain(7, 0, 0);
     Modes modes;
     assert_int_equal(make(&modes, &all), STATUS_OK);
@@ -92,16 +84,14 @@ static void a_free_chain_moves_as_one_at_frequency_zero(void **state) {
     modes_clear(&modes);
 }
 
-static void springs_that_push_have_no_modes(void **state) {
-    (void)state;
+TEST(springs_that_push_have_no_modes) {
     const Chain all = chain(3, -3000, 0);
     Modes modes;
     assert_int_equal(make(&modes, &all), STATUS_UNSTABLE);
     assert_null(modes.omega);
 }
 
-static void numbers_too_far_apart_are_refused(void **state) {
-    (void)state;
+TEST(numbers_too_far_apart_are_refused) {
     for (int way = 0; way < 3; way++) {
         Chain all = chain(2, 2000, 1e-3);
         if (way == 0)
@@ -114,15 +104,4 @@ static void numbers_too_far_apart_are_refused(void **state) {
         assert_int_equal(make(&modes, &all), STATUS_UNSTABLE);
         assert_int_equal(modes.count, 0);
     }
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_chain_has_its_frequencies_and_modes_are_normal),
-        cmocka_unit_test(proportional_damping_is_classical_and_one_odd_damper_is_not),
-        cmocka_unit_test(a_free_chain_moves_as_one_at_frequency_zero),
-        cmocka_unit_test(springs_that_push_have_no_modes),
-        cmocka_unit_test(numbers_too_far_apart_are_refused),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,14 +1,10 @@
 // Plans of several storeys and dampers: modes, damping, effective masses, and which engine serves.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "tests/support/document.h"
+#include "tests/support/test.h"
 
 #define FRAME(rest) "\"structure\": {\"kind\": \"frame\", \"masses\": [3, 2, 1], " rest "}"
 #define SPRINGS "\"stiffnesses\": [3000, 2000, 1000]"
@@ -38,8 +34,7 @@ static const Decision *decision(const Plan *plan, const char *about) {
     return NULL;
 }
 
-static void a_ratio_is_the_ratio_of_every_mode(void **state) {
-    (void)state;
+TEST(a_ratio_is_the_ratio_of_every_mode) {
     Plan *plan = plan_of(FRAME(SPRINGS ", \"damping_ratio\": 0.03"));
     assert_int_equal(plan->storeys, 3);
     assert_true(plan->modes.is_classical);
@@ -61,8 +56,7 @@ static void a_ratio_is_the_ratio_of_every_mode(void **state) {
     plan_free(plan);
 }
 
-static void dampers_between_storeys_couple_the_modes(void **state) {
-    (void)state;
+TEST(dampers_between_storeys_couple_the_modes) {
     Plan *plan = plan_of(FRAME(SPRINGS ", \"dampings\": [1, 2, 3]"));
     assert_false(plan->modes.is_classical);
     assert_string_equal(decision(plan, "damping")->chose, "coupled");
@@ -75,16 +69,14 @@ static void dampers_between_storeys_couple_the_modes(void **state) {
     plan_free(plan);
 }
 
-static void a_free_mode_has_no_ratio(void **state) {
-    (void)state;
+TEST(a_free_mode_has_no_ratio) {
     Plan *plan = plan_of(FRAME("\"stiffnesses\": [0, 2000, 1000], \"damping_ratio\": 0.1"));
     assert_true(plan->report.modes.at[0].frequency == 0);
     assert_true(isnan(plan->report.modes.at[0].damping_ratio));
     plan_free(plan);
 }
 
-static void a_damper_meets_what_its_storey_moves_at_once(void **state) {
-    (void)state;
+TEST(a_damper_meets_what_its_storey_moves_at_once) {
     Plan *plan =
         plan_of(FRAME(SPRINGS) ", \"dampers\": [" DAMPER(", \"storey\": 2") ", " DAMPER("") "]");
     assert_true(plan->dampers[0].storey == 1 && plan->dampers[1].storey == 2);
@@ -105,16 +97,14 @@ static void a_damper_meets_what_its_storey_moves_at_once(void **state) {
     plan_free(plan);
 }
 
-static void the_initial_state_is_each_storeys(void **state) {
-    (void)state;
+TEST(the_initial_state_is_each_storeys) {
     Plan *plan = plan_of(FRAME(SPRINGS) ", \"excitation\": {\"displacement\": [1, 2, 3]}");
     assert_true(plan->displacement[0] == 1 && plan->displacement[2] == 3);
     assert_true(plan->velocity[0] == 0 && plan->velocity[2] == 0);
     plan_free(plan);
 }
 
-static void one_mass_and_one_damper_have_an_engine_of_their_own(void **state) {
-    (void)state;
+TEST(one_mass_and_one_damper_have_an_engine_of_their_own) {
 #define ONE "\"structure\": {\"mass\": 4, \"stiffness\": 100, \"damping\": 2}"
 #define MATRIX(r)                                                                                  \
     "\"structure\": {\"kind\": \"matrices\", \"mass\": [[4]], \"stiffness\": [[100]], "            \
@@ -144,8 +134,7 @@ static void one_mass_and_one_damper_have_an_engine_of_their_own(void **state) {
     }
 }
 
-static void numbers_too_far_apart_have_no_plan(void **state) {
-    (void)state;
+TEST(numbers_too_far_apart_have_no_plan) {
     static const char *const members[] = {
         FRAME(SPRINGS ", \"damping_ratio\": 1e308"),
         "\"structure\": {\"kind\": \"frame\", \"masses\": [1e-308, 1], \"stiffnesses\": [1e300, "
@@ -162,17 +151,4 @@ static void numbers_too_far_apart_have_no_plan(void **state) {
         assert_true(strlen(problem.detail) > 20);
         simulation_clear(&simulation);
     }
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_ratio_is_the_ratio_of_every_mode),
-        cmocka_unit_test(dampers_between_storeys_couple_the_modes),
-        cmocka_unit_test(a_free_mode_has_no_ratio),
-        cmocka_unit_test(a_damper_meets_what_its_storey_moves_at_once),
-        cmocka_unit_test(the_initial_state_is_each_storeys),
-        cmocka_unit_test(one_mass_and_one_damper_have_an_engine_of_their_own),
-        cmocka_unit_test(numbers_too_far_apart_have_no_plan),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

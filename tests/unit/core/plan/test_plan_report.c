@@ -1,14 +1,10 @@
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "core/plan/plan.h"
+#include "tests/support/test.h"
 
-static void a_report_is_cleared_by_its_rows(void **state) {
-    (void)state;
+TEST(a_report_is_cleared_by_its_rows) {
     PlanReport report, copy;
     assert_int_equal(fields_default(plan_report_fields, &report), STATUS_OK);
     report.contact_model = strdup("spring_damper");
@@ -37,11 +33,4 @@ static void a_report_is_cleared_by_its_rows(void **state) {
     assert_string_equal(copy.derived.at[0].material, "sponge@1");
     assert_int_equal(copy.derived.at[0].side, CHOICE_ABSENT);
     fields_clear(plan_report_fields, &copy);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_report_is_cleared_by_its_rows),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,18 +1,13 @@
 // What is said of a run before it begins, against the run itself with all its machinery: a mass
 // that is said to stay clear of its stops must never meet one, nor come nearer than was said.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "core/plan/plan.h"
 #include "core/solve/exact.h"
 #include "tests/support/frames.h"
+#include "tests/support/test.h"
 
 enum { SCENES = 900, SAMPLES = 401 };
 #define RATE 100.0
@@ -157,23 +152,19 @@ static void judge_all(BaseForm form, double least_part) {
     assert_true((double)told.clear >= least_part * (double)(told.clear + told.missed));
 }
 
-static void a_mass_said_to_stay_clear_over_a_still_base_does(void **state) {
-    (void)state;
+TEST(a_mass_said_to_stay_clear_over_a_still_base_does) {
     judge_all(BASE_STILL, 0.8);
 }
 
-static void a_mass_said_to_stay_clear_under_a_sine_does(void **state) {
-    (void)state;
+TEST(a_mass_said_to_stay_clear_under_a_sine_does) {
     judge_all(BASE_SINE, 0.5);
 }
 
-static void a_mass_said_to_stay_clear_under_samples_does(void **state) {
-    (void)state;
+TEST(a_mass_said_to_stay_clear_under_samples_does) {
     judge_all(BASE_SAMPLED, 0.5);
 }
 
-static void a_mass_said_to_stay_clear_under_a_pulse_does(void **state) {
-    (void)state;
+TEST(a_mass_said_to_stay_clear_under_a_pulse_does) {
     judge_all(BASE_PIECES, 0.5);
 }
 
@@ -185,8 +176,7 @@ static Plan *single(double clearance) {
     return plan;
 }
 
-static void from_rest_over_a_still_base_nothing_moves(void **state) {
-    (void)state;
+TEST(from_rest_over_a_still_base_nothing_moves) {
     Plan *plan = single(0.015);
     Base base = {0};
     Regime regime = regime_find(plan, &base);
@@ -203,8 +193,7 @@ static void from_rest_over_a_still_base_nothing_moves(void **state) {
 }
 
 // There its first touch may be at t = 0.
-static void a_mass_on_its_stop_or_without_room_is_not_clear(void **state) {
-    (void)state;
+TEST(a_mass_on_its_stop_or_without_room_is_not_clear) {
     Plan *plan = single(0.015);
     const Base base = {0};
     plan->dampers[0].position = 0.0075;
@@ -216,8 +205,7 @@ static void a_mass_on_its_stop_or_without_room_is_not_clear(void **state) {
 }
 
 // Released from 15 mm the mass stays there while the structure swings out to the other side.
-static void the_bound_of_a_release_is_no_larger_than_the_swing(void **state) {
-    (void)state;
+TEST(the_bound_of_a_release_is_no_larger_than_the_swing) {
     const Base base = {0};
     Plan *plan = single(0.0601);
     plan->displacement[0] = 0.015;
@@ -229,8 +217,7 @@ static void the_bound_of_a_release_is_no_larger_than_the_swing(void **state) {
     plan_free(plan);
 }
 
-static void what_is_no_number_proves_nothing(void **state) {
-    (void)state;
+TEST(what_is_no_number_proves_nothing) {
     Plan *plan = single(1);
     const Base base = {.form = BASE_SINE, .amplitude = 1e308, .omega = 1e-300};
     assert_false(regime_find(plan, &base).is_clear);
@@ -240,18 +227,4 @@ static void what_is_no_number_proves_nothing(void **state) {
     assert_false(regime.is_clear);
     assert_true(regime.reach == regime.reach);
     plan_free(plan);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_mass_said_to_stay_clear_over_a_still_base_does),
-        cmocka_unit_test(a_mass_said_to_stay_clear_under_a_sine_does),
-        cmocka_unit_test(a_mass_said_to_stay_clear_under_samples_does),
-        cmocka_unit_test(a_mass_said_to_stay_clear_under_a_pulse_does),
-        cmocka_unit_test(from_rest_over_a_still_base_nothing_moves),
-        cmocka_unit_test(a_mass_on_its_stop_or_without_room_is_not_clear),
-        cmocka_unit_test(the_bound_of_a_release_is_no_larger_than_the_swing),
-        cmocka_unit_test(what_is_no_number_proves_nothing),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

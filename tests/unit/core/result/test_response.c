@@ -1,14 +1,10 @@
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "core/result/response.h"
+#include "tests/support/test.h"
 
-static void channels_and_their_names_are_in_one_order(void **state) {
-    (void)state;
+TEST(channels_and_their_names_are_in_one_order) {
     for (size_t i = 0; i < CHANNEL_COUNT; i++) {
         assert_string_equal(channels[i].name, channel_requests[i + 1]);
         assert_true(channels[i].unit != NULL && channels[i].psd_unit != NULL);
@@ -19,8 +15,7 @@ static void channels_and_their_names_are_in_one_order(void **state) {
 }
 
 // The order of the contract, which CSV and JSON keep.
-static void an_impact_has_these_rows(void **state) {
-    (void)state;
+TEST(an_impact_has_these_rows) {
     static const char *const names[] = {"kind",
                                         "start",
                                         "end",
@@ -38,8 +33,7 @@ static void an_impact_has_these_rows(void **state) {
     assert_int_equal(impact_fields[COUNT(names)].kind, FIELD_KIND_END);
 }
 
-static void a_response_is_cleared_whole(void **state) {
-    (void)state;
+TEST(a_response_is_cleared_whole) {
     Response response;
     memset(&response, 0, sizeof response);
     response_clear(&response);
@@ -50,13 +44,4 @@ static void a_response_is_cleared_whole(void **state) {
     assert_null(response.impacts.at);
     assert_null(response.series.block);
     response_clear(NULL);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(channels_and_their_names_are_in_one_order),
-        cmocka_unit_test(an_impact_has_these_rows),
-        cmocka_unit_test(a_response_is_cleared_whole),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,15 +1,9 @@
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 
-#include <cmocka.h>
-
 #include "core/base/philox.h"
-#include "core/math/fft.h"
 #include "core/result/signal_comparison.h"
+#include "tests/support/test.h"
 
 static void assert_near(double is, double should, double within) {
     if (!(fabs(is - should) <= within))
@@ -29,8 +23,7 @@ static double *sampled(double rate, size_t count, double start) {
     return values;
 }
 
-static void a_motion_is_like_itself(void **state) {
-    (void)state;
+TEST(a_motion_is_like_itself) {
     double *x = sampled(100, 501, 0);
     const Signal signal = {x, 501, 100, 0};
     const SignalComparison own = signal_comparison_measure(&signal, &signal, 0.01, NULL);
@@ -40,8 +33,7 @@ static void a_motion_is_like_itself(void **state) {
     free(x);
 }
 
-static void the_coarser_ones_samples_are_compared_within_the_common_span(void **state) {
-    (void)state;
+TEST(the_coarser_ones_samples_are_compared_within_the_common_span) {
     double *x = sampled(100, 501, 0), *y = sampled(1000, 3001, 1.005);
     const Signal coarse = {x, 501, 100, 0}, fine = {y, 3001, 1000, 1.005};
     const SignalComparison told = signal_comparison_measure(&coarse, &fine, 0.01, NULL);
@@ -55,8 +47,7 @@ static void the_coarser_ones_samples_are_compared_within_the_common_span(void **
     free(y);
 }
 
-static void numbers_are_those_of_the_definitions(void **state) {
-    (void)state;
+TEST(numbers_are_those_of_the_definitions) {
     const double x[] = {1, -2, 3, 0}, y[] = {1, -2, 4, -1};
     const Signal a = {x, 4, 2, 0}, b = {y, 4, 2, 0};
     const SignalComparison told = signal_comparison_measure(&a, &b, 0.25, NULL);
@@ -70,8 +61,7 @@ static void numbers_are_those_of_the_definitions(void **state) {
     assert_true(isnan(signal_comparison_measure(&a, &b, 0.5, NULL).parting));
 }
 
-static void what_does_not_overlap_has_nothing_in_common(void **state) {
-    (void)state;
+TEST(what_does_not_overlap_has_nothing_in_common) {
     const double x[] = {1, 2};
     const Signal a = {x, 2, 1, 0}, b = {x, 2, 1, 5}, none = {NULL, 0, 1, 0};
     assert_true(signal_comparison_measure(&a, &b, 0.1, NULL).samples == 0);
@@ -82,8 +72,7 @@ static void what_does_not_overlap_has_nothing_in_common(void **state) {
     assert_int_equal(signal_comparison_align(&a, &b, 1, &pair, &rate, NULL), STATUS_LIMIT);
 }
 
-static void a_shift_is_found_to_a_part_of_a_sample(void **state) {
-    (void)state;
+TEST(a_shift_is_found_to_a_part_of_a_sample) {
     double *x = sampled(200, 2001, 0);
     const Signal a = {x, 2001, 200, 0};
     static const double shifts[] = {0, 0.25, 1.2345, -0.7};
@@ -99,8 +88,7 @@ static void a_shift_is_found_to_a_part_of_a_sample(void **state) {
     free(x);
 }
 
-static void a_copy_behind_silence_is_found_at_its_sample(void **state) {
-    (void)state;
+TEST(a_copy_behind_silence_is_found_at_its_sample) {
     enum { SILENCE = 37, COUNT_X = 2001 };
     double *x = calloc(COUNT_X, sizeof *x), *y = calloc(COUNT_X + SILENCE, sizeof *y), shift;
     assert_true(x != NULL && y != NULL);
@@ -113,8 +101,7 @@ static void a_copy_behind_silence_is_found_at_its_sample(void **state) {
     free(y);
 }
 
-static void nothing_is_more_alike_than_alike(void **state) {
-    (void)state;
+TEST(nothing_is_more_alike_than_alike) {
     for (size_t count = 2; count < 2000; count++) {
         double *x = sampled(100, count, 0);
         const Signal signal = {x, count, 100, 0};
@@ -123,8 +110,7 @@ static void nothing_is_more_alike_than_alike(void **state) {
     }
 }
 
-static void a_shift_stays_within_what_is_allowed(void **state) {
-    (void)state;
+TEST(a_shift_stays_within_what_is_allowed) {
     double *x = sampled(200, 2001, 0), *y = sampled(200, 1001, 1), shift;
     const Signal a = {x, 2001, 200, 0}, b = {y, 1001, 200, 0}; // 1 s would be right
     assert_int_equal(signal_comparison_shift(&a, &b, 0.3, &shift, NULL), STATUS_OK);
@@ -142,8 +128,7 @@ static bool stop_at_third(void *context, double fraction) {
     return ++*(int *)context < 3;
 }
 
-static void a_long_measurement_stops_soon_when_it_is_told_to(void **state) {
-    (void)state;
+TEST(a_long_measurement_stops_soon_when_it_is_told_to) {
     enum { MANY = 1 << 20 };
     double *values = test_calloc(MANY, sizeof *values);
     const Signal signal = {.values = values, .count = MANY, .rate = 1000};
@@ -153,20 +138,4 @@ static void a_long_measurement_stops_soon_when_it_is_told_to(void **state) {
     assert_int_equal(looks, 3);
     assert_true(signal_comparison_measure(&signal, &signal, 0.5, NULL).rms == 0);
     test_free(values);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_motion_is_like_itself),
-        cmocka_unit_test(the_coarser_ones_samples_are_compared_within_the_common_span),
-        cmocka_unit_test(numbers_are_those_of_the_definitions),
-        cmocka_unit_test(what_does_not_overlap_has_nothing_in_common),
-        cmocka_unit_test(a_shift_is_found_to_a_part_of_a_sample),
-        cmocka_unit_test(a_copy_behind_silence_is_found_at_its_sample),
-        cmocka_unit_test(nothing_is_more_alike_than_alike),
-        cmocka_unit_test(a_shift_stays_within_what_is_allowed),
-        cmocka_unit_test(a_long_measurement_stops_soon_when_it_is_told_to),
-    };
-    fft_start();
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

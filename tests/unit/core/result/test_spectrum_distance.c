@@ -1,12 +1,7 @@
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
 
 #include "core/result/spectrum_distance.h"
+#include "tests/support/test.h"
 
 enum { ROWS = 101 };
 static double frequency[ROWS], wanted[ROWS], other[ROWS], half_frequency[ROWS];
@@ -29,8 +24,7 @@ static void fill(void) {
     }
 }
 
-static void twice_the_density_is_three_decibels_off(void **state) {
-    (void)state;
+TEST(twice_the_density_is_three_decibels_off) {
     fill();
     const Spectrum a = spectrum_of(frequency);
     const SpectrumDistance told = spectrum_distance_measure(&a, wanted, &a, other, 10, 20);
@@ -43,8 +37,7 @@ static void twice_the_density_is_three_decibels_off(void **state) {
     assert_near(back.level, told.level);
 }
 
-static void without_a_band_it_is_where_the_power_is(void **state) {
-    (void)state;
+TEST(without_a_band_it_is_where_the_power_is) {
     fill();
     for (size_t k = 31; k < ROWS; k++)
         wanted[k] = 1e-9;
@@ -56,8 +49,7 @@ static void without_a_band_it_is_where_the_power_is(void **state) {
     assert_true(spectrum_distance_band_end(wanted, ROWS) == 31);
 }
 
-static void a_band_ends_where_the_other_has_no_bins(void **state) {
-    (void)state;
+TEST(a_band_ends_where_the_other_has_no_bins) {
     fill();
     const Spectrum a = spectrum_of(frequency), b = spectrum_of(half_frequency);
     const SpectrumDistance told = spectrum_distance_measure(&a, wanted, &b, other, 40, 90);
@@ -67,8 +59,7 @@ static void a_band_ends_where_the_other_has_no_bins(void **state) {
     assert_true(isnan(spectrum_distance_level(&a, wanted, &b, other, 1, ROWS)));
 }
 
-static void what_has_no_power_has_no_distance(void **state) {
-    (void)state;
+TEST(what_has_no_power_has_no_distance) {
     fill();
     for (size_t k = 0; k < ROWS; k++)
         wanted[k] = 0;
@@ -79,14 +70,4 @@ static void what_has_no_power_has_no_distance(void **state) {
     assert_true(isnan(told.level) && isnan(told.power) && told.to == 5);
     const Spectrum empty = {0};
     assert_true(isnan(spectrum_distance_measure(&empty, wanted, &a, other, 1, 5).from));
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(twice_the_density_is_three_decibels_off),
-        cmocka_unit_test(without_a_band_it_is_where_the_power_is),
-        cmocka_unit_test(a_band_ends_where_the_other_has_no_bins),
-        cmocka_unit_test(what_has_no_power_has_no_distance),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,17 +3,11 @@
 #include "core/result/welch.h"
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "core/base/philox.h"
-#include "core/math/fft.h"
+#include "tests/support/test.h"
 
 static const char *const unit[] = {"m^2/Hz", "(m/s)^2/Hz"};
 
@@ -94,8 +88,7 @@ static long double slow_density(const double *x, size_t rows, const WelchSetting
     return (has_mirror ? 2 : 1) * power / segments / (rate * squares);
 }
 
-static void densities_equal_a_slow_sum_for_every_window_and_trend(void **state) {
-    (void)state;
+TEST(densities_equal_a_slow_sum_for_every_window_and_trend) {
     static const struct {
         size_t rows, segment, overlap;
     } shapes[] = {
@@ -124,8 +117,7 @@ static void densities_equal_a_slow_sum_for_every_window_and_trend(void **state) 
             }
 }
 
-static void a_boxcar_density_integrates_to_the_mean_square(void **state) {
-    (void)state;
+TEST(a_boxcar_density_integrates_to_the_mean_square) {
     static const size_t counts[] = {1, 2, 3, 10, 10001, 65536, 1000000, 999983};
     for (size_t i = 0; i < COUNT(counts); i++) {
         const size_t rows = counts[i];
@@ -149,8 +141,7 @@ static void a_boxcar_density_integrates_to_the_mean_square(void **state) {
     }
 }
 
-static void many_short_segments_lose_no_digits(void **state) {
-    (void)state;
+TEST(many_short_segments_lose_no_digits) {
     Columns columns = columns_of(1000000);
     Spectrum spectrum = welch(&columns, (WelchSettings){1, 0, WELCH_HANN, WELCH_DETREND_NONE}, 4);
     long double square = 0;
@@ -163,8 +154,7 @@ static void many_short_segments_lose_no_digits(void **state) {
     columns_clear(&columns);
 }
 
-static void frequencies_names_and_units_stand_beside_the_densities(void **state) {
-    (void)state;
+TEST(frequencies_names_and_units_stand_beside_the_densities) {
     Columns columns = columns_of(1000);
     Spectrum spectrum =
         welch(&columns, (WelchSettings){100, 50, WELCH_HANN, WELCH_DETREND_CONSTANT}, 250);
@@ -181,8 +171,7 @@ static void frequencies_names_and_units_stand_beside_the_densities(void **state)
     columns_clear(&columns);
 }
 
-static void settings_that_make_no_sense_are_refused(void **state) {
-    (void)state;
+TEST(settings_that_make_no_sense_are_refused) {
     static const WelchSettings bad[] = {
         {0, 0, 0, 0}, {11, 0, 0, 0}, {5, 5, 0, 0}, {5, SIZE_MAX, 0, 0},
         {5, 0, 4, 0}, {5, 0, -1, 0}, {5, 0, 0, 3}, {5, 0, 0, -1},
@@ -210,8 +199,7 @@ static bool look(void *context, double fraction) {
     return ++looks->count < looks->most;
 }
 
-static void the_watch_sees_progress_and_can_stop(void **state) {
-    (void)state;
+TEST(the_watch_sees_progress_and_can_stop) {
     static Problem problem;
     Columns columns = columns_of(300000);
     const WelchSettings settings = {4096, 2048, WELCH_HANN, WELCH_DETREND_CONSTANT};
@@ -229,17 +217,4 @@ static void the_watch_sees_progress_and_can_stop(void **state) {
     assert_int_equal(looks.count, 3);
     assert_null(spectrum.frequency);
     columns_clear(&columns);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(densities_equal_a_slow_sum_for_every_window_and_trend),
-        cmocka_unit_test(a_boxcar_density_integrates_to_the_mean_square),
-        cmocka_unit_test(many_short_segments_lose_no_digits),
-        cmocka_unit_test(frequencies_names_and_units_stand_beside_the_densities),
-        cmocka_unit_test(settings_that_make_no_sense_are_refused),
-        cmocka_unit_test(the_watch_sees_progress_and_can_stop),
-    };
-    fft_start();
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

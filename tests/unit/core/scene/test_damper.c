@@ -1,14 +1,11 @@
 // Buffers in all their combinations, under each law.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "core/scene/damper.h"
 #include "tests/support/fields.h"
+#include "tests/support/test.h"
 
 static Problem problem;
 
@@ -42,8 +39,7 @@ static const ContactLaw *law_of(const Damper *damper, const ContactLaw *asked) {
     return dampers_contact_law(&dampers, &contact);
 }
 
-static void a_damper_stands_on_the_top_storey(void **state) {
-    (void)state;
+TEST(a_damper_stands_on_the_top_storey) {
     Damper damper = damper_new();
     set_measured(&damper.buffer, 0.6, 0.02);
     assert_int_equal(complete(&damper, &contact_spring_damper), STATUS_OK);
@@ -55,8 +51,7 @@ static void a_damper_stands_on_the_top_storey(void **state) {
     fields_clear(damper_fields, &damper);
 }
 
-static void the_free_mass_starts_between_its_stops(void **state) {
-    (void)state;
+TEST(the_free_mass_starts_between_its_stops) {
     Damper damper = damper_new();
     set_measured(&damper.buffer, 0.6, 0.02);
     damper.position = -0.0075;
@@ -80,8 +75,7 @@ static void the_free_mass_starts_between_its_stops(void **state) {
     fields_clear(damper_fields, &damper);
 }
 
-static void auto_takes_spring_and_damper_wherever_a_contact_is_known(void **state) {
-    (void)state;
+TEST(auto_takes_spring_and_damper_wherever_a_contact_is_known) {
     Damper damper = damper_new();
     damper.buffer.restitution = 0.6;
     assert_ptr_equal(law_of(&damper, &contact_auto), &contact_impulse);
@@ -133,8 +127,7 @@ static const Case cases[] = {
      "must be given in one way"},
 };
 
-static void a_buffer_is_given_in_one_way_that_its_law_takes(void **state) {
-    (void)state;
+TEST(a_buffer_is_given_in_one_way_that_its_law_takes) {
     for (size_t i = 0; i < COUNT(cases); i++) {
         const Case *one = &cases[i];
         Damper damper = damper_new();
@@ -154,8 +147,7 @@ static void a_buffer_is_given_in_one_way_that_its_law_takes(void **state) {
     }
 }
 
-static void what_impulse_does_not_use_is_erased(void **state) {
-    (void)state;
+TEST(what_impulse_does_not_use_is_erased) {
     Damper damper = damper_new();
     set_measured(&damper.left_buffer, 0.6, 0.02);
     set_measured(&damper.right_buffer, 0.5, 0.01);
@@ -166,8 +158,7 @@ static void what_impulse_does_not_use_is_erased(void **state) {
     fields_clear(damper_fields, &damper);
 }
 
-static void a_material_without_numbers_is_not_resolved(void **state) {
-    (void)state;
+TEST(a_material_without_numbers_is_not_resolved) {
     Damper damper = damper_new();
     damper.buffer.material = strdup("sponge");
     assert_int_equal(complete(&damper, &contact_spring_damper), STATUS_INVALID);
@@ -180,8 +171,7 @@ static void a_material_without_numbers_is_not_resolved(void **state) {
     fields_clear(damper_fields, &damper);
 }
 
-static void where_a_fault_is_told_already_nothing_more_is_said(void **state) {
-    (void)state;
+TEST(where_a_fault_is_told_already_nothing_more_is_said) {
     Damper damper = damper_new();
     damper.buffer.material = strdup("spunge");
     problem_clear(&problem);
@@ -201,8 +191,7 @@ static void where_a_fault_is_told_already_nothing_more_is_said(void **state) {
     fields_clear(damper_fields, &damper);
 }
 
-static void each_side_has_one_buffer(void **state) {
-    (void)state;
+TEST(each_side_has_one_buffer) {
     Damper damper = damper_new();
     assert_int_equal(complete(&damper, &contact_impulse), STATUS_INVALID);
     assert_int_equal(problem.count, 1);
@@ -221,8 +210,7 @@ static void each_side_has_one_buffer(void **state) {
     fields_clear(damper_fields, &damper);
 }
 
-static void faults_of_both_sides_are_told_at_once(void **state) {
-    (void)state;
+TEST(faults_of_both_sides_are_told_at_once) {
     Damper damper = damper_new();
     damper.left_buffer.restitution = 0.5;
     damper.right_buffer.contact_time = 0.5;
@@ -236,8 +224,7 @@ static void faults_of_both_sides_are_told_at_once(void **state) {
     fields_clear(damper_fields, &damper);
 }
 
-static void equal_dampers_have_one_form(void **state) {
-    (void)state;
+TEST(equal_dampers_have_one_form) {
     // A common buffer and one of its own become two.
     Damper damper = damper_new();
     damper.buffer.material = strdup("sponge@1");
@@ -266,8 +253,7 @@ static void equal_dampers_have_one_form(void **state) {
     fields_clear(damper_fields, &damper);
 }
 
-static void a_rig_is_given_where_it_is_used(void **state) {
-    (void)state;
+TEST(a_rig_is_given_where_it_is_used) {
     Damper damper = damper_new();
     set_measured(&damper.buffer, 0.6, 0.02);
     damper.identified_for = IDENTIFIED_FOR_RIG;
@@ -290,8 +276,7 @@ static void a_rig_is_given_where_it_is_used(void **state) {
     fields_clear(damper_fields, &damper);
 }
 
-static void a_power_law_fills_its_exponent_and_others_drop_it(void **state) {
-    (void)state;
+TEST(a_power_law_fills_its_exponent_and_others_drop_it) {
     Damper damper = damper_new();
     set_measured(&damper.buffer, 0.6, 0.02);
     assert_int_equal(complete(&damper, &contact_flores), STATUS_OK);
@@ -316,8 +301,7 @@ static void set_table(Buffer *buffer, size_t count) {
         buffer->table.at[i] = (ContactRow){0.1 * (double)(i + 1), 0.6, 0.02};
 }
 
-static void equal_tables_become_one_buffer(void **state) {
-    (void)state;
+TEST(equal_tables_become_one_buffer) {
     Damper damper = damper_new();
     set_table(&damper.left_buffer, 3);
     set_table(&damper.right_buffer, 3);
@@ -337,23 +321,4 @@ static void equal_tables_become_one_buffer(void **state) {
     assert_int_equal(complete(&damper, &contact_spring_damper), STATUS_INVALID);
     assert_int_equal(problem.count, 3);
     fields_clear(damper_fields, &damper);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_damper_stands_on_the_top_storey),
-        cmocka_unit_test(the_free_mass_starts_between_its_stops),
-        cmocka_unit_test(auto_takes_spring_and_damper_wherever_a_contact_is_known),
-        cmocka_unit_test(a_buffer_is_given_in_one_way_that_its_law_takes),
-        cmocka_unit_test(what_impulse_does_not_use_is_erased),
-        cmocka_unit_test(a_material_without_numbers_is_not_resolved),
-        cmocka_unit_test(where_a_fault_is_told_already_nothing_more_is_said),
-        cmocka_unit_test(each_side_has_one_buffer),
-        cmocka_unit_test(faults_of_both_sides_are_told_at_once),
-        cmocka_unit_test(equal_dampers_have_one_form),
-        cmocka_unit_test(a_rig_is_given_where_it_is_used),
-        cmocka_unit_test(a_power_law_fills_its_exponent_and_others_drop_it),
-        cmocka_unit_test(equal_tables_become_one_buffer),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

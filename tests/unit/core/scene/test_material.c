@@ -1,13 +1,9 @@
 // What a revision of a material may say, and what it may not.
 #include "core/scene/material.h"
+#include "tests/support/test.h"
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdint.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 static Material sponge(void) {
     Material material;
@@ -36,8 +32,7 @@ static void expect(const Material *material, const char *pointer, const char *wo
         fail_msg("%s", problem.faults[0].detail);
 }
 
-static void what_is_not_known_is_left_out(void **state) {
-    (void)state;
+TEST(what_is_not_known_is_left_out) {
     Material material = sponge();
     expect(&material, NULL, NULL);
     material.contact_time = (double)NAN;
@@ -52,8 +47,7 @@ static void what_is_not_known_is_left_out(void **state) {
     expect(&material, "/source", "must not be empty");
 }
 
-static void a_deviation_belongs_to_its_value(void **state) {
-    (void)state;
+TEST(a_deviation_belongs_to_its_value) {
     Material material = sponge();
     material.restitution_deviation = 0.01;
     material.contact_time_deviation = 0.001;
@@ -65,8 +59,7 @@ static void a_deviation_belongs_to_its_value(void **state) {
     expect(&material, "/restitution_deviation", "at least 0");
 }
 
-static void a_table_stands_in_place_of_numbers(void **state) {
-    (void)state;
+TEST(a_table_stands_in_place_of_numbers) {
     const double nan = (double)NAN;
     MaterialRow rows[] = {{0.1, 0.7, 0.02, nan, nan}, {0.5, 0.6, 0.018, 0.01, 0.001}};
     Material material = sponge();
@@ -85,8 +78,7 @@ static void a_table_stands_in_place_of_numbers(void **state) {
     expect(&material, "/table", "at least two rows");
 }
 
-static void ranges_have_their_ends_in_order(void **state) {
-    (void)state;
+TEST(ranges_have_their_ends_in_order) {
     Material material = sponge();
     material.least_speed = 0.15;
     expect(&material, NULL, NULL);
@@ -98,8 +90,7 @@ static void ranges_have_their_ends_in_order(void **state) {
     expect(&material, "/most_temperature", "at least -10 degC");
 }
 
-static void measurements_are_numbers_each_once(void **state) {
-    (void)state;
+TEST(measurements_are_numbers_each_once) {
     double numbers[] = {1, 2, 1};
     Material material = sponge();
     material.measurements = (Reals){numbers, 2};
@@ -110,8 +101,7 @@ static void measurements_are_numbers_each_once(void **state) {
     expect(&material, "/measurements/2", "must be the number of a measurement");
 }
 
-static void the_speeds_measured_are_stated_or_the_tables(void **state) {
-    (void)state;
+TEST(the_speeds_measured_are_stated_or_the_tables) {
     const double nan = (double)NAN;
     MaterialRow rows[] = {{0.1, 0.7, 0.02, nan, nan}, {0.5, 0.6, 0.018, nan, nan}};
     Material material = sponge();
@@ -126,8 +116,7 @@ static void the_speeds_measured_are_stated_or_the_tables(void **state) {
     assert_true(least == 0.1 && most == 0.7);
 }
 
-static void the_tests_pair_has_an_effective_mass_where_it_is_known(void **state) {
-    (void)state;
+TEST(the_tests_pair_has_an_effective_mass_where_it_is_known) {
     Material material = sponge();
     assert_true(isnan(material_test_mass(&material)));
     material.impactor_mass = 0.5;
@@ -141,8 +130,7 @@ static void the_tests_pair_has_an_effective_mass_where_it_is_known(void **state)
     assert_true(material_test_mass(&material) == 0.25);
 }
 
-static void slugs_are_plain(void **state) {
-    (void)state;
+TEST(slugs_are_plain) {
     char longest[MATERIAL_SLUG_MAX + 2];
     memset(longest, 'a', sizeof longest);
     longest[MATERIAL_SLUG_MAX] = '\0';
@@ -153,18 +141,4 @@ static void slugs_are_plain(void **state) {
     const char *const bad[] = {"", "Sponge", "a b", "a@1", "a/b", "\xc3\xa4", longest};
     for (size_t i = 0; i < COUNT(bad); i++)
         assert_false(material_slug_is_valid(bad[i]));
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_is_not_known_is_left_out),
-        cmocka_unit_test(a_deviation_belongs_to_its_value),
-        cmocka_unit_test(a_table_stands_in_place_of_numbers),
-        cmocka_unit_test(ranges_have_their_ends_in_order),
-        cmocka_unit_test(measurements_are_numbers_each_once),
-        cmocka_unit_test(the_speeds_measured_are_stated_or_the_tables),
-        cmocka_unit_test(the_tests_pair_has_an_effective_mass_where_it_is_known),
-        cmocka_unit_test(slugs_are_plain),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,20 +1,15 @@
 // Structures by their matrices: what makes matrices a structure, and what they default to.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdlib.h>
 
-#include <cmocka.h>
-
 #include "tests/support/document.h"
+#include "tests/support/test.h"
 
 #define MATRICES(members) "\"structure\": {\"kind\": \"matrices\", " members "}"
 #define MASS "\"mass\": [[2, 0.5], [0.5, 1]]"
 #define STIFFNESS "\"stiffness\": [[5, -3], [-3, 4]]"
 
-static void what_is_not_given_is_no_damping_and_a_base_that_carries_all(void **state) {
-    (void)state;
+TEST(what_is_not_given_is_no_damping_and_a_base_that_carries_all) {
     Simulation simulation;
     document_pass(&simulation, MATRICES(MASS ", " STIFFNESS));
     double all[14] = {0};
@@ -29,8 +24,7 @@ static void what_is_not_given_is_no_damping_and_a_base_that_carries_all(void **s
     simulation_clear(&simulation);
 }
 
-static void matrices_are_square_and_of_one_size(void **state) {
-    (void)state;
+TEST(matrices_are_square_and_of_one_size) {
     document_refuse(MATRICES("\"mass\": [[2, 0.5], [0.5]], " STIFFNESS), "/structure/mass/1",
                     "must have 2 numbers, one per row of the matrix, has 1");
     document_refuse(MATRICES(MASS ", \"stiffness\": [[5]]"), "/structure/stiffness",
@@ -44,8 +38,7 @@ static void matrices_are_square_and_of_one_size(void **state) {
                     "positive definite [kg]");
 }
 
-static void mass_and_stiffness_are_symmetric(void **state) {
-    (void)state;
+TEST(mass_and_stiffness_are_symmetric) {
     document_refuse(MATRICES("\"mass\": [[2, 0.5], [0.25, 1]], " STIFFNESS), "/structure/mass/1/0",
                     "must equal its mirror /structure/mass/0/1, 0.5: the matrix must be "
                     "symmetric, is 0.25");
@@ -56,8 +49,7 @@ static void mass_and_stiffness_are_symmetric(void **state) {
     simulation_clear(&simulation);
 }
 
-static void each_matrix_is_as_definite_as_it_must_be(void **state) {
-    (void)state;
+TEST(each_matrix_is_as_definite_as_it_must_be) {
     document_refuse(MATRICES("\"mass\": [[2, 2], [2, 1]], " STIFFNESS), "/structure/mass/1",
                     "must keep the matrix positive definite: with this row the leading 2 by 2 "
                     "block is not (or is within 1e-12 of singular)");
@@ -78,8 +70,7 @@ static void each_matrix_is_as_definite_as_it_must_be(void **state) {
     simulation_clear(&simulation);
 }
 
-static void hostile_entries_are_told(void **state) {
-    (void)state;
+TEST(hostile_entries_are_told) {
     static const char *const texts[] = {
         MATRICES("\"mass\": [[1e308, 1e308], [1e308, 1e308]], " STIFFNESS),
         MATRICES("\"mass\": [[1e308, -1e308], [-1e308, 1e-308]], " STIFFNESS),
@@ -97,15 +88,4 @@ static void hostile_entries_are_told(void **state) {
         assert_true(problem.count > 0 && problem.faults[0].pointer[0] == '/');
         simulation_clear(&simulation);
     }
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_is_not_given_is_no_damping_and_a_base_that_carries_all),
-        cmocka_unit_test(matrices_are_square_and_of_one_size),
-        cmocka_unit_test(mass_and_stiffness_are_symmetric),
-        cmocka_unit_test(each_matrix_is_as_definite_as_it_must_be),
-        cmocka_unit_test(hostile_entries_are_told),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,14 +1,11 @@
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "core/scene/scene.h"
 #include "tests/support/fields.h"
 #include "tests/support/scenes.h"
+#include "tests/support/test.h"
 
 static Problem problem;
 
@@ -17,8 +14,7 @@ static Status complete(Simulation *simulation, size_t most) {
     return scene_complete(&simulation->scene, most, &problem);
 }
 
-static void the_end_is_a_sample_too(void **state) {
-    (void)state;
+TEST(the_end_is_a_sample_too) {
     static const struct {
         double duration, rate;
         size_t count;
@@ -39,8 +35,7 @@ static void the_end_is_a_sample_too(void **state) {
     assert_int_equal(scene_sample_count(&none), 0);
 }
 
-static void too_many_samples_are_a_fault_of_the_duration(void **state) {
-    (void)state;
+TEST(too_many_samples_are_a_fault_of_the_duration) {
     Simulation simulation;
     scene_without_damper(&simulation);
     assert_int_equal(complete(&simulation, 10001), STATUS_OK);
@@ -60,8 +55,7 @@ static void too_many_samples_are_a_fault_of_the_duration(void **state) {
     simulation_clear(&simulation);
 }
 
-static void a_scene_without_dampers_has_the_usual_contact(void **state) {
-    (void)state;
+TEST(a_scene_without_dampers_has_the_usual_contact) {
     Simulation simulation;
     scene_without_damper(&simulation);
     scene_choose(&simulation.scene.contact, &contact_kinds, "impulse");
@@ -72,8 +66,7 @@ static void a_scene_without_dampers_has_the_usual_contact(void **state) {
     simulation_clear(&simulation);
 }
 
-static void auto_stays_auto_and_loses_what_its_law_does_not_use(void **state) {
-    (void)state;
+TEST(auto_stays_auto_and_loses_what_its_law_does_not_use) {
     Simulation simulation;
     scene_with_damper(&simulation, 0.5, NAN);
     assert_int_equal(complete(&simulation, 0), STATUS_OK);
@@ -89,8 +82,7 @@ static void auto_stays_auto_and_loses_what_its_law_does_not_use(void **state) {
     simulation_clear(&simulation);
 }
 
-static void a_contact_time_beyond_numbers_is_refused(void **state) {
-    (void)state;
+TEST(a_contact_time_beyond_numbers_is_refused) {
     Simulation simulation;
     scene_with_damper(&simulation, 0.61, 1e-200);
     assert_int_equal(complete(&simulation, 0), STATUS_INVALID);
@@ -100,8 +92,7 @@ static void a_contact_time_beyond_numbers_is_refused(void **state) {
     simulation_clear(&simulation);
 }
 
-static void parts_that_are_missing_are_passed_over(void **state) {
-    (void)state;
+TEST(parts_that_are_missing_are_passed_over) {
     Simulation simulation;
     scene_with_damper(&simulation, 0.61, 0.025);
     variant_free(simulation.scene.structure);
@@ -111,16 +102,4 @@ static void parts_that_are_missing_are_passed_over(void **state) {
     simulation.scene.duration = (double)NAN;
     assert_int_equal(complete(&simulation, 100), STATUS_OK);
     simulation_clear(&simulation);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_end_is_a_sample_too),
-        cmocka_unit_test(too_many_samples_are_a_fault_of_the_duration),
-        cmocka_unit_test(a_scene_without_dampers_has_the_usual_contact),
-        cmocka_unit_test(auto_stays_auto_and_loses_what_its_law_does_not_use),
-        cmocka_unit_test(a_contact_time_beyond_numbers_is_refused),
-        cmocka_unit_test(parts_that_are_missing_are_passed_over),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,21 +1,16 @@
 // Shear frames: what is refused of them, what they default to, and their matrices.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "tests/support/document.h"
+#include "tests/support/test.h"
 
 #define FRAME(rest) "\"structure\": {\"kind\": \"frame\", \"masses\": [1, 2, 3], " rest "}"
 #define SPRINGS "\"stiffnesses\": [10, 20, 30]"
 
-static void matrices_follow_the_storeys_from_the_ground_up(void **state) {
-    (void)state;
+TEST(matrices_follow_the_storeys_from_the_ground_up) {
     Simulation simulation;
     document_pass(&simulation, FRAME(SPRINGS ", \"dampings\": [1, 0, 2]"));
     double all[30] = {0};
@@ -32,8 +27,7 @@ static void matrices_follow_the_storeys_from_the_ground_up(void **state) {
     simulation_clear(&simulation);
 }
 
-static void no_damping_is_a_list_of_zeros(void **state) {
-    (void)state;
+TEST(no_damping_is_a_list_of_zeros) {
     Simulation simulation;
     document_pass(&simulation, FRAME(SPRINGS));
     const ShearFrame *frame = (const ShearFrame *)(void *)simulation.scene.structure;
@@ -46,8 +40,7 @@ static void no_damping_is_a_list_of_zeros(void **state) {
     simulation_clear(&simulation);
 }
 
-static void lists_must_be_as_long_as_the_masses(void **state) {
-    (void)state;
+TEST(lists_must_be_as_long_as_the_masses) {
     document_refuse(FRAME("\"stiffnesses\": [10, 20]"), "/structure/stiffnesses",
                     "must have 3 numbers, one per storey, has 2");
     document_refuse(FRAME(SPRINGS ", \"dampings\": [1, 2, 3, 4]"), "/structure/dampings",
@@ -60,8 +53,7 @@ static void lists_must_be_as_long_as_the_masses(void **state) {
                     "is required, with at least one: of the storeys, from the ground up [kg]");
 }
 
-static void every_number_has_its_place(void **state) {
-    (void)state;
+TEST(every_number_has_its_place) {
     document_refuse("\"structure\": {\"kind\": \"frame\", \"masses\": [1, 0, 3], " SPRINGS "}",
                     "/structure/masses/1", "must be above 0 kg, is 0");
     document_refuse(FRAME("\"stiffnesses\": [10, -20, 30]"), "/structure/stiffnesses/1",
@@ -72,8 +64,7 @@ static void every_number_has_its_place(void **state) {
                     "/structure/damping_ratio", "excludes dampings: give one of the two");
 }
 
-static void two_hundred_storeys_are_the_most(void **state) {
-    (void)state;
+TEST(two_hundred_storeys_are_the_most) {
     for (size_t storeys = 200; storeys <= 201; storeys++) {
         char list[1024] = "1", text[4096];
         for (size_t i = 1; i < storeys; i++)
@@ -93,8 +84,7 @@ static void two_hundred_storeys_are_the_most(void **state) {
     }
 }
 
-static void a_damper_stands_on_a_storey_there_is(void **state) {
-    (void)state;
+TEST(a_damper_stands_on_a_storey_there_is) {
 #define DAMPER(rest)                                                                               \
     ", \"dampers\": [{\"mass\": 1, \"clearance\": 1, \"buffer\": {\"restitution\": 0.5, "          \
     "\"contact_time\": 0.01}" rest "}]"
@@ -114,8 +104,7 @@ static void a_damper_stands_on_a_storey_there_is(void **state) {
                     "/structure/stiffnesses", "must have 3 numbers, one per storey, has 1");
 }
 
-static void the_start_is_a_list_of_each_storey(void **state) {
-    (void)state;
+TEST(the_start_is_a_list_of_each_storey) {
     Simulation simulation;
     document_pass(&simulation, FRAME(SPRINGS) ", \"excitation\": {\"displacement\": [1, 0, -1], "
                                               "\"velocity\": 0}");
@@ -133,8 +122,7 @@ static void the_start_is_a_list_of_each_storey(void **state) {
                     "/excitation/velocity", "must have 1 number, one per storey, has 2");
 }
 
-static void rates_are_near_the_first_and_the_last_frequency(void **state) {
-    (void)state;
+TEST(rates_are_near_the_first_and_the_last_frequency) {
     // Equal storeys swing at 2 sqrt(k / m) sin((2 k - 1) pi / (2 (2 n + 1))).
     Simulation simulation;
     document_pass(&simulation, "\"structure\": {\"kind\": \"frame\", \"masses\": [2, 2, 2, 2, 2], "
@@ -151,18 +139,4 @@ static void rates_are_near_the_first_and_the_last_frequency(void **state) {
                      STATUS_OK);
     assert_true(rates.slowest == 0 && rates.fastest > 100);
     simulation_clear(&simulation);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(matrices_follow_the_storeys_from_the_ground_up),
-        cmocka_unit_test(no_damping_is_a_list_of_zeros),
-        cmocka_unit_test(lists_must_be_as_long_as_the_masses),
-        cmocka_unit_test(every_number_has_its_place),
-        cmocka_unit_test(two_hundred_storeys_are_the_most),
-        cmocka_unit_test(a_damper_stands_on_a_storey_there_is),
-        cmocka_unit_test(the_start_is_a_list_of_each_storey),
-        cmocka_unit_test(rates_are_near_the_first_and_the_last_frequency),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,12 +1,8 @@
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
 
 #include "core/scene/structure.h"
 #include "tests/support/fields.h"
+#include "tests/support/test.h"
 
 static Problem problem;
 
@@ -30,16 +26,14 @@ static Status complete(SdofStructure *structure) {
     return structure_complete(&structure->structure, "/structure", &problem);
 }
 
-static void no_damping_is_damping_of_zero(void **state) {
-    (void)state;
+TEST(no_damping_is_damping_of_zero) {
     SdofStructure structure = sdof((double)NAN, (double)NAN);
     assert_int_equal(complete(&structure), STATUS_OK);
     assert_true(structure.damping == 0);
     assert_true(structure_damping(&structure) == 0);
 }
 
-static void damping_may_be_given_by_its_ratio(void **state) {
-    (void)state;
+TEST(damping_may_be_given_by_its_ratio) {
     SdofStructure structure = sdof((double)NAN, 0.016);
     assert_int_equal(complete(&structure), STATUS_OK);
     assert_true(isnan(structure.damping));
@@ -52,8 +46,7 @@ static void damping_may_be_given_by_its_ratio(void **state) {
     assert_true(fabs(structure_damping(&structure) / 1e200 - 1) < 1e-15);
 }
 
-static void both_at_once_are_a_fault(void **state) {
-    (void)state;
+TEST(both_at_once_are_a_fault) {
     SdofStructure structure = sdof(1, 0.016);
     assert_int_equal(complete(&structure), STATUS_INVALID);
     assert_string_equal(detail_at(&problem, "/structure/damping_ratio"),
@@ -61,8 +54,7 @@ static void both_at_once_are_a_fault(void **state) {
     assert_string_equal(problem.faults[0].value, "0.016");
 }
 
-static void the_rows_refuse_what_is_no_structure(void **state) {
-    (void)state;
+TEST(the_rows_refuse_what_is_no_structure) {
     SdofStructure structure = sdof(-1, (double)NAN);
     structure.mass = 0;
     structure.stiffness = -865;
@@ -74,14 +66,4 @@ static void the_rows_refuse_what_is_no_structure(void **state) {
                         "must be at least 0 N/m, is -865");
     assert_string_equal(detail_at(&problem, "/structure/damping"),
                         "must be at least 0 N s/m, is -1");
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(no_damping_is_damping_of_zero),
-        cmocka_unit_test(damping_may_be_given_by_its_ratio),
-        cmocka_unit_test(both_at_once_are_a_fault),
-        cmocka_unit_test(the_rows_refuse_what_is_no_structure),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

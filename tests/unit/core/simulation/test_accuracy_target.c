@@ -1,18 +1,14 @@
 // accuracy.target: what is asked, told, refused and stopped. Whether targets are kept is
 // tests/truth/test_target.c's question.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "core/base/canonical.h"
 #include "core/result/response.h"
 #include "core/simulation/simulation.h"
 #include "core/solve/solver.h"
 #include "tests/support/document.h"
+#include "tests/support/test.h"
 
 #define LINEAR                                                                                     \
     "\"structure\": {\"mass\": 1.35, \"stiffness\": 865, \"damping\": 1.092}, "                    \
@@ -45,8 +41,7 @@ static const Decision *find(const PlanReport *plan, const char *about) {
     return NULL;
 }
 
-static void linear_contact_is_run_exactly_and_says_so(void **state) {
-    (void)state;
+TEST(linear_contact_is_run_exactly_and_says_so) {
     Outcome *outcome = run(LINEAR ", \"accuracy\": {\"target\": 1e-3}");
     Outcome *plain = run(LINEAR);
     const PlanTarget *target = &outcome->plan.target;
@@ -65,8 +60,7 @@ static void linear_contact_is_run_exactly_and_says_so(void **state) {
     outcome_unref(plain);
 }
 
-static void a_power_law_is_followed_no_closer_than_asked_for(void **state) {
-    (void)state;
+TEST(a_power_law_is_followed_no_closer_than_asked_for) {
     Outcome *loose = run(POWER ", \"accuracy\": {\"target\": 1e-2}");
     Outcome *tight = run(POWER ", \"accuracy\": {\"target\": 1e-8}");
     Outcome *whole = run(POWER);
@@ -95,8 +89,7 @@ static void a_power_law_is_followed_no_closer_than_asked_for(void **state) {
 #define HEARD ", \"output\": {\"channels\": [\"contact_force_1\"]}"
 
 // Blows for pushes: only where they keep the target and nobody asks for a force.
-static void contacts_are_impulses_where_that_keeps_the_target(void **state) {
-    (void)state;
+TEST(contacts_are_impulses_where_that_keeps_the_target) {
     Outcome *struck = run(FRAME(1e-8) SEEN ", \"accuracy\": {\"target\": 1e-2}");
     Outcome *whole = run(FRAME(1e-8) SEEN);
     assert_string_equal(struck->plan.target.way, "exact, impulses");
@@ -126,8 +119,7 @@ static void contacts_are_impulses_where_that_keeps_the_target(void **state) {
 }
 
 // Of a motion that has died away what was wrong before is a larger part.
-static void late_statistics_are_beside_what_is_left_of_the_motion(void **state) {
-    (void)state;
+TEST(late_statistics_are_beside_what_is_left_of_the_motion) {
     Simulation simulation;
     document_pass(&simulation, POWER ", \"accuracy\": {\"target\": 1e-2, \"metric\": "
                                      "\"rms_displacement\"}");
@@ -147,8 +139,7 @@ static void late_statistics_are_beside_what_is_left_of_the_motion(void **state) 
     simulation_clear(&simulation);
 }
 
-static void what_does_not_move_has_no_error(void **state) {
-    (void)state;
+TEST(what_does_not_move_has_no_error) {
     Outcome *outcome = run("\"structure\": {\"mass\": 1, \"stiffness\": 9}, \"excitation\": "
                            "{\"kind\": \"free\"}, \"accuracy\": {\"target\": 1e-3, "
                            "\"metric\": \"rms_displacement\"}");
@@ -157,8 +148,7 @@ static void what_does_not_move_has_no_error(void **state) {
     outcome_unref(outcome);
 }
 
-static void what_no_double_can_keep_is_marked(void **state) {
-    (void)state;
+TEST(what_no_double_can_keep_is_marked) {
     Simulation simulation;
     document_pass(&simulation, CHAOTIC ", \"accuracy\": {\"target\": 1e-4}");
     simulation.scene.duration = 60;
@@ -182,8 +172,7 @@ static void what_no_double_can_keep_is_marked(void **state) {
     simulation_clear(&simulation);
 }
 
-static void a_dry_run_names_the_way(void **state) {
-    (void)state;
+TEST(a_dry_run_names_the_way) {
     Simulation simulation;
     PlanReport report;
     document_pass(&simulation, POWER ", \"accuracy\": {\"target\": 1e-4}");
@@ -200,8 +189,7 @@ static void a_dry_run_names_the_way(void **state) {
     simulation_clear(&simulation);
 }
 
-static void what_cannot_be_a_metric_is_refused(void **state) {
-    (void)state;
+TEST(what_cannot_be_a_metric_is_refused) {
     document_refuse(LINEAR ", \"accuracy\": {\"target\": 2}", "/accuracy/target",
                     "must be within [1e-15, 1], is 2");
     document_refuse(LINEAR ", \"output\": {\"psd\": null}, "
@@ -224,8 +212,7 @@ static void put(void *context, const void *bytes, size_t size) {
         text[used + i] = ((const char *)bytes)[i] == '\0' ? ' ' : ((const char *)bytes)[i];
 }
 
-static void a_metric_without_a_target_means_nothing(void **state) {
-    (void)state;
+TEST(a_metric_without_a_target_means_nothing) {
     char plain[4096] = "", with[4096] = "";
     Simulation simulation;
     document_pass(&simulation, LINEAR);
@@ -250,8 +237,7 @@ static bool advance(void *context, double fraction) {
     return --countdown->left > 0;
 }
 
-static void progress_goes_forward_over_all_runs_and_a_stop_is_heard(void **state) {
-    (void)state;
+TEST(progress_goes_forward_over_all_runs_and_a_stop_is_heard) {
     Simulation simulation;
     Problem *problem = calloc(1, sizeof *problem);
     assert_non_null(problem);
@@ -276,20 +262,4 @@ static void progress_goes_forward_over_all_runs_and_a_stop_is_heard(void **state
     }
     simulation_clear(&simulation);
     free(problem);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(linear_contact_is_run_exactly_and_says_so),
-        cmocka_unit_test(a_power_law_is_followed_no_closer_than_asked_for),
-        cmocka_unit_test(contacts_are_impulses_where_that_keeps_the_target),
-        cmocka_unit_test(late_statistics_are_beside_what_is_left_of_the_motion),
-        cmocka_unit_test(what_does_not_move_has_no_error),
-        cmocka_unit_test(what_no_double_can_keep_is_marked),
-        cmocka_unit_test(a_dry_run_names_the_way),
-        cmocka_unit_test(what_cannot_be_a_metric_is_refused),
-        cmocka_unit_test(a_metric_without_a_target_means_nothing),
-        cmocka_unit_test(progress_goes_forward_over_all_runs_and_a_stop_is_heard),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

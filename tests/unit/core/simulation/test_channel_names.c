@@ -1,14 +1,10 @@
 // Names of channels where there are several storeys or dampers, and where there are not.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "tests/support/document.h"
+#include "tests/support/test.h"
 
 #define ONE "\"structure\": {\"mass\": 1, \"stiffness\": 100}"
 #define FRAME                                                                                      \
@@ -34,8 +30,7 @@ static void assert_names(const char *members, const char *sampled, const char *s
     simulation_clear(&simulation);
 }
 
-static void one_storey_and_one_damper_have_bare_names(void **state) {
-    (void)state;
+TEST(one_storey_and_one_damper_have_bare_names) {
     assert_names(ONE ", \"dampers\": [" DAMPER "]",
                  "displacement velocity acceleration damper_displacement contact_force",
                  "mean_acceleration");
@@ -46,8 +41,7 @@ static void one_storey_and_one_damper_have_bare_names(void **state) {
                     "penetration needs a damper, the scene has none");
 }
 
-static void several_storeys_or_dampers_are_numbered_throughout(void **state) {
-    (void)state;
+TEST(several_storeys_or_dampers_are_numbered_throughout) {
     assert_names(FRAME ", \"dampers\": [" DAMPER "]",
                  "displacement_1 displacement_2 displacement_3 velocity_1 velocity_2 velocity_3 "
                  "acceleration_1 acceleration_2 acceleration_3 damper_displacement_1 "
@@ -62,8 +56,7 @@ static void several_storeys_or_dampers_are_numbered_throughout(void **state) {
     assert_names(FRAME WANT(""), "", "mean_acceleration_3");
 }
 
-static void a_bare_name_among_several_is_a_fault(void **state) {
-    (void)state;
+TEST(a_bare_name_among_several_is_a_fault) {
     static const char detail[] =
         "must carry the number of a storey, from displacement_1 to displacement_3: the scene has 3 "
         "storeys and 0 dampers";
@@ -87,8 +80,7 @@ static void a_bare_name_among_several_is_a_fault(void **state) {
     simulation_clear(&simulation);
 }
 
-static void the_usual_ones_have_a_name_and_may_stand_beside_others(void **state) {
-    (void)state;
+TEST(the_usual_ones_have_a_name_and_may_stand_beside_others) {
     assert_names(ONE WANT("\"base_acceleration\", \"usual\""),
                  "base_acceleration displacement velocity acceleration", "mean_acceleration");
     assert_names(FRAME WANT_PSD("\"velocity_1\", \"usual\""),
@@ -103,8 +95,7 @@ static void the_usual_ones_have_a_name_and_may_stand_beside_others(void **state)
 }
 
 // "usual" stands for several names; places are the document's all the same.
-static void faults_beside_the_usual_ones_stand_where_the_document_has_them(void **state) {
-    (void)state;
+TEST(faults_beside_the_usual_ones_stand_where_the_document_has_them) {
     document_refuse(ONE WANT("\"usual\", \"velocity\""), "/output/channels/1",
                     "velocity is asked for twice, first at /output/channels/0");
     document_refuse(ONE WANT("\"penetration\", \"usual\""), "/output/channels/0",
@@ -116,15 +107,13 @@ static void faults_beside_the_usual_ones_stand_where_the_document_has_them(void 
                     "velocity is asked for twice, first at /output/channels/1");
 }
 
-static void unknown_storeys_are_no_reason_to_refuse_a_number(void **state) {
-    (void)state;
+TEST(unknown_storeys_are_no_reason_to_refuse_a_number) {
     document_refuse("\"structure\": {\"kind\": \"frame\", \"masses\": [1, 2], \"stiffnesses\": "
                     "[10]}" WANT("\"displacement_7\", \"velocity\""),
                     "/structure/stiffnesses", "must have 2 numbers, one per storey, has 1");
 }
 
-static void many_channels_of_many_samples_are_too_many(void **state) {
-    (void)state;
+TEST(many_channels_of_many_samples_are_too_many) {
     char list[512] = "1", text[2048];
     for (size_t i = 1; i < 60; i++)
         snprintf(list + strlen(list), sizeof list - strlen(list), ",1");
@@ -144,17 +133,4 @@ static void many_channels_of_many_samples_are_too_many(void **state) {
                         "181 channels of 2000001 samples are 3.62e+08 values, must be at most "
                         "3.36e+08: ask for fewer channels or samples");
     simulation_clear(&simulation);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(one_storey_and_one_damper_have_bare_names),
-        cmocka_unit_test(several_storeys_or_dampers_are_numbered_throughout),
-        cmocka_unit_test(a_bare_name_among_several_is_a_fault),
-        cmocka_unit_test(the_usual_ones_have_a_name_and_may_stand_beside_others),
-        cmocka_unit_test(faults_beside_the_usual_ones_stand_where_the_document_has_them),
-        cmocka_unit_test(unknown_storeys_are_no_reason_to_refuse_a_number),
-        cmocka_unit_test(many_channels_of_many_samples_are_too_many),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

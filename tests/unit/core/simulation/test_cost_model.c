@@ -1,17 +1,11 @@
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
-#include "core/math/fft.h"
 #include "tests/support/document.h"
 #include "tests/support/fields.h"
+#include "tests/support/test.h"
 
 static Problem told;
 
@@ -32,8 +26,7 @@ static Cost cost_of(const char *members, double duration, double sample_rate) {
     return cost;
 }
 
-static void work_counted_is_about_what_was_foretold(void **state) {
-    (void)state;
+TEST(work_counted_is_about_what_was_foretold) {
     static const char *const scenes[] = {
         SDOF "," DAMPER "," RANDOM "," NO_PSD,
         SDOF "," DAMPER "," RANDOM "," NO_PSD ", \"accuracy\": {\"solver\": \"rk4\"}",
@@ -62,8 +55,7 @@ static void work_counted_is_about_what_was_foretold(void **state) {
     }
 }
 
-static void memory_foretold_holds_series_hidden_columns_and_base(void **state) {
-    (void)state;
+TEST(memory_foretold_holds_series_hidden_columns_and_base) {
     const double samples = 1e6 * sizeof(double);
     const double five = cost_of(SDOF "," DAMPER "," NO_PSD, 1000, 1000).bytes;
     const double base = cost_of(SDOF "," DAMPER "," RANDOM "," NO_PSD, 1000, 1000).bytes;
@@ -75,8 +67,7 @@ static void memory_foretold_holds_series_hidden_columns_and_base(void **state) {
 }
 
 // A record is still after its last sample, however short its interval.
-static void a_short_record_makes_no_long_run(void **state) {
-    (void)state;
+TEST(a_short_record_makes_no_long_run) {
     const Cost cost =
         cost_of(SDOF ", \"excitation\": {\"kind\": \"record\", \"samples\": [0, 1, -1, "
                      "0], \"interval\": 1e-8}," NO_PSD,
@@ -97,8 +88,7 @@ static void refuse(const char *members, const SimulationLimits *limits, double d
     simulation_clear(&simulation);
 }
 
-static void what_takes_too_long_is_refused_where_it_helps_most(void **state) {
-    (void)state;
+TEST(what_takes_too_long_is_refused_where_it_helps_most) {
     const SimulationLimits second = {.steps = 1 / SOLVER_STEP};
     refuse(SDOF "," DAMPER "," NO_PSD ", \"accuracy\": {\"solver\": \"rk4\", \"step\": 1e-6}",
            &second, 100, 100, "/accuracy", " by rk4, at most 1 s are allowed: take longer steps");
@@ -114,8 +104,7 @@ static void what_takes_too_long_is_refused_where_it_helps_most(void **state) {
            &second, 1e4, 3000, "/excitation", "to make the base's motion");
 }
 
-static void what_takes_too_much_memory_is_refused(void **state) {
-    (void)state;
+TEST(what_takes_too_much_memory_is_refused) {
     const SimulationLimits limits = {.bytes = 1e6};
     refuse(SDOF "," DAMPER "," NO_PSD, &limits, 100, 1000, "/output/channels",
            "would take about 4.11 MB of memory, at most 1 MB are allowed");
@@ -153,8 +142,7 @@ static void refuse_spectra(const char *members, uint64_t segment, uint64_t overl
 }
 
 // 8388593 and 16777213 are primes.
-static void spectra_are_priced_by_the_length_of_segments_and_its_prime_factors(void **state) {
-    (void)state;
+TEST(spectra_are_priced_by_the_length_of_segments_and_its_prime_factors) {
     Cost cached, smooth, prime;
     const SimulationLimits minute = {.steps = 60 / SOLVER_STEP};
     assert_int_equal(complete_spectra(SPECTRUM, 4096, 2048, &minute, &cached), STATUS_OK);
@@ -165,8 +153,7 @@ static void spectra_are_priced_by_the_length_of_segments_and_its_prime_factors(v
     refuse_spectra(ALL_SPECTRA, 8388593, 7549733, &minute, "a segment without large prime factors");
 }
 
-static void spectra_that_cannot_be_kept_are_refused(void **state) {
-    (void)state;
+TEST(spectra_that_cannot_be_kept_are_refused) {
     const SimulationLimits document = {.document_bytes = 9e8}, memory = {.bytes = 1e9};
     refuse_spectra(ALL_SPECTRA, 1 << 23, 0, &document,
                    "a document of about 1.01e+03 MB, at most 900 MB can be kept");
@@ -174,8 +161,7 @@ static void spectra_that_cannot_be_kept_are_refused(void **state) {
                    "MB of memory, at most 1000 MB are allowed: ask for shorter segments");
 }
 
-static void spectra_count_against_the_steps_of_a_run(void **state) {
-    (void)state;
+TEST(spectra_count_against_the_steps_of_a_run) {
     const SimulationLimits limits = {.steps = 5e4};
     for (uint64_t overlap = 0; overlap < 64; overlap += 63) {
         Simulation simulation;
@@ -195,8 +181,7 @@ static void spectra_count_against_the_steps_of_a_run(void **state) {
 }
 
 // Two masses between stops without clearance, T_c a hundred-thousandth of a sample interval.
-static void a_run_foretold_too_little_stops_at_a_count_of_its_own(void **state) {
-    (void)state;
+TEST(a_run_foretold_too_little_stops_at_a_count_of_its_own) {
     static const char members[] =
         "\"structure\": {\"mass\": 25695.8, \"stiffness\": 3134636.4, \"damping\": 9081.86},"
         "\"dampers\": [{\"mass\": 0.0319433, \"clearance\": 0, \"buffer\": {\"restitution\": "
@@ -224,8 +209,7 @@ static void a_run_foretold_too_little_stops_at_a_count_of_its_own(void **state) 
     }
 }
 
-static void many_dampers_on_many_storeys_are_foretold_to_take_long(void **state) {
-    (void)state;
+TEST(many_dampers_on_many_storeys_are_foretold_to_take_long) {
     enum { SIZE = 1 << 15 };
     char *text = malloc(SIZE);
     assert_non_null(text);
@@ -252,35 +236,14 @@ static void many_dampers_on_many_storeys_are_foretold_to_take_long(void **state)
 }
 
 // A contact is followed with all other masses, each of which adds a little.
-static void a_contact_among_many_masses_is_foretold_by_their_number(void **state) {
-    (void)state;
+TEST(a_contact_among_many_masses_is_foretold_by_their_number) {
     const double one = step_work_steps(STEP_WORK_POWER, 20, 1, false);
     assert_true(step_work_steps(STEP_WORK_POWER, 20, 16, false) < 4 * one);
     assert_true(step_work_steps(STEP_WORK_POWER, 20, 64, false) < 8 * one);
 }
 
 // As measured: 200 steps a sample of 100 storeys, 4000 of 200.
-static void coupled_flight_is_foretold_by_the_pairs_of_modes(void **state) {
-    (void)state;
+TEST(coupled_flight_is_foretold_by_the_pairs_of_modes) {
     assert_in_range(step_work_steps(STEP_WORK_FLIGHT, 100, 0, true), 200, 600);
     assert_in_range(step_work_steps(STEP_WORK_FLIGHT, 200, 0, true), 2000, 6000);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(work_counted_is_about_what_was_foretold),
-        cmocka_unit_test(memory_foretold_holds_series_hidden_columns_and_base),
-        cmocka_unit_test(a_short_record_makes_no_long_run),
-        cmocka_unit_test(what_takes_too_long_is_refused_where_it_helps_most),
-        cmocka_unit_test(what_takes_too_much_memory_is_refused),
-        cmocka_unit_test(spectra_are_priced_by_the_length_of_segments_and_its_prime_factors),
-        cmocka_unit_test(spectra_that_cannot_be_kept_are_refused),
-        cmocka_unit_test(spectra_count_against_the_steps_of_a_run),
-        cmocka_unit_test(a_run_foretold_too_little_stops_at_a_count_of_its_own),
-        cmocka_unit_test(many_dampers_on_many_storeys_are_foretold_to_take_long),
-        cmocka_unit_test(a_contact_among_many_masses_is_foretold_by_their_number),
-        cmocka_unit_test(coupled_flight_is_foretold_by_the_pairs_of_modes),
-    };
-    fft_start();
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

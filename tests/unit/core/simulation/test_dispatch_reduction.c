@@ -2,14 +2,11 @@
 #include "core/simulation/simulation.h"
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "tests/support/scenes.h"
+#include "tests/support/test.h"
 
 static Outcome *run(Simulation *simulation) {
     Outcome *outcome = NULL;
@@ -23,8 +20,7 @@ static Outcome *run(Simulation *simulation) {
     return outcome;
 }
 
-static void a_reduction_is_that_of_two_runs(void **state) {
-    (void)state;
+TEST(a_reduction_is_that_of_two_runs) {
     Simulation with, without;
     scene_with_damper(&with, 0.61, 0.025);
     scene_without_damper(&without);
@@ -47,8 +43,7 @@ static void a_reduction_is_that_of_two_runs(void **state) {
     simulation_clear(&without);
 }
 
-static void the_rest_is_as_without_it_and_its_cost_is_foretold(void **state) {
-    (void)state;
+TEST(the_rest_is_as_without_it_and_its_cost_is_foretold) {
     Simulation asked, plain;
     scene_with_damper(&asked, 0.61, 0.025);
     scene_with_damper(&plain, 0.61, 0.025);
@@ -68,8 +63,7 @@ static void the_rest_is_as_without_it_and_its_cost_is_foretold(void **state) {
     simulation_clear(&plain);
 }
 
-static void where_nothing_moves_nothing_is_known(void **state) {
-    (void)state;
+TEST(where_nothing_moves_nothing_is_known) {
     Simulation still;
     scene_with_damper(&still, 0.61, 0.025);
     scene_start(&still, 0, 0);
@@ -81,8 +75,7 @@ static void where_nothing_moves_nothing_is_known(void **state) {
     simulation_clear(&still);
 }
 
-static void every_law_and_a_target_have_one(void **state) {
-    (void)state;
+TEST(every_law_and_a_target_have_one) {
     for (size_t i = 0; contacts[i] != NULL; i++) {
         Simulation simulation;
         // Hertz's gives all energy back.
@@ -104,8 +97,7 @@ static bool never(void *context, double fraction) {
     return fraction < 0.8;
 }
 
-static void it_can_be_stopped(void **state) {
-    (void)state;
+TEST(it_can_be_stopped) {
     Simulation simulation;
     Outcome *outcome = NULL;
     const Progress progress = {NULL, never};
@@ -116,15 +108,4 @@ static void it_can_be_stopped(void **state) {
                      STATUS_CANCELLED);
     assert_null(outcome);
     simulation_clear(&simulation);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_reduction_is_that_of_two_runs),
-        cmocka_unit_test(the_rest_is_as_without_it_and_its_cost_is_foretold),
-        cmocka_unit_test(where_nothing_moves_nothing_is_known),
-        cmocka_unit_test(every_law_and_a_target_have_one),
-        cmocka_unit_test(it_can_be_stopped),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,14 +1,10 @@
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 
-#include <cmocka.h>
 
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/simulation/error_metrics.h"
+#include "tests/support/test.h"
 
 // An outcome of one storey made up by hand: samples at `rate`, a spectrum of `bins` up to half of
 // it.
@@ -44,8 +40,7 @@ static Errors measure(const Outcome *reference, const Outcome *point) {
     return error_metrics_measure(reference, point, true);
 }
 
-static void the_same_outcome_has_no_error_but_the_references_own(void **state) {
-    (void)state;
+TEST(the_same_outcome_has_no_error_but_the_references_own) {
     Outcome a = outcome_make(101, 100, 51), b = outcome_make(101, 100, 51);
     const Errors errors = measure(&a, &b);
     assert_true(errors.displacement == 1e-14);
@@ -56,8 +51,7 @@ static void the_same_outcome_has_no_error_but_the_references_own(void **state) {
     outcome_free(&b);
 }
 
-static void samples_are_compared_within_the_horizon_only(void **state) {
-    (void)state;
+TEST(samples_are_compared_within_the_horizon_only) {
     Outcome a = outcome_make(101, 100, 51), b = outcome_make(101, 100, 51);
     double largest = 0;
     for (size_t i = 0; i < 101; i++)
@@ -86,8 +80,7 @@ static void samples_are_compared_within_the_horizon_only(void **state) {
     outcome_free(&b);
 }
 
-static void fewer_samples_are_joined_by_lines_and_means_hold_for_their_interval(void **state) {
-    (void)state;
+TEST(fewer_samples_are_joined_by_lines_and_means_hold_for_their_interval) {
     Outcome a = outcome_make(9, 8, 5), b = outcome_make(3, 2, 5);
     static const double x[] = {0, 1, 2, 3, 4, 3, 2, 1, 2}, y[] = {0, 4, 1};
     memcpy(a.response.series.at[0].values, x, sizeof x);
@@ -102,8 +95,7 @@ static void fewer_samples_are_joined_by_lines_and_means_hold_for_their_interval(
     outcome_free(&b);
 }
 
-static void impacts_and_forces_are_those_within_the_horizon(void **state) {
-    (void)state;
+TEST(impacts_and_forces_are_those_within_the_horizon) {
     Outcome a = outcome_make(101, 100, 51), b = outcome_make(101, 100, 51);
     Impact own[] = {{.kind = IMPACT_IMPACT, .start = 0.1, .peak_force = 4},
                     {.kind = IMPACT_RESTING, .start = 0.2, .peak_force = 2},
@@ -132,8 +124,7 @@ static void impacts_and_forces_are_those_within_the_horizon(void **state) {
     outcome_free(&b);
 }
 
-static void spectra_are_compared_over_the_band_that_holds_the_power(void **state) {
-    (void)state;
+TEST(spectra_are_compared_over_the_band_that_holds_the_power) {
     Outcome a = outcome_make(101, 100, 51), b = outcome_make(101, 100, 51);
     double *density = b.spectrum.densities.at[0].values;
     const ReferenceSummary told = error_metrics_reference(&a);
@@ -159,15 +150,4 @@ static void spectra_are_compared_over_the_band_that_holds_the_power(void **state
     assert_true(isnan(measure(&a, &b).psd));
     outcome_free(&a);
     outcome_free(&b);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_same_outcome_has_no_error_but_the_references_own),
-        cmocka_unit_test(samples_are_compared_within_the_horizon_only),
-        cmocka_unit_test(fewer_samples_are_joined_by_lines_and_means_hold_for_their_interval),
-        cmocka_unit_test(impacts_and_forces_are_those_within_the_horizon),
-        cmocka_unit_test(spectra_are_compared_over_the_band_that_holds_the_power),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

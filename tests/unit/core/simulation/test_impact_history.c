@@ -3,16 +3,13 @@
 #include "core/simulation/simulation.h"
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "server/cli/scene_file.h"
 #include "server/jobs/jobs.h"
+#include "tests/support/test.h"
 
 static void read_scene(const char *text, size_t size, StudyRequest *inquiry) {
     Db *store = NULL;
@@ -111,8 +108,7 @@ static Misses compare_example(const char *name, size_t points) {
 
 // By trapezes, an impulse has the error of their number; where damping sets in with infinite slope
 // (Jankowski) more.
-static void every_law_base_and_structure_keeps_peak_and_impulse(void **state) {
-    (void)state;
+TEST(every_law_base_and_structure_keeps_peak_and_impulse) {
     static const struct {
         const char *name;
         double peak, impulse;
@@ -161,8 +157,7 @@ static ImpactHistory look(const Simulation *simulation, size_t number, size_t po
     return closeup;
 }
 
-static void the_rows_go_from_touch_to_release(void **state) {
-    (void)state;
+TEST(the_rows_go_from_touch_to_release) {
     StudyRequest inquiry;
     open_example("paper_free_sponge", &inquiry);
     ImpactHistory closeup = look(&inquiry.simulation, 1, IMPACT_HISTORY_POINTS);
@@ -188,8 +183,7 @@ static void the_rows_go_from_touch_to_release(void **state) {
 
 // Carried along by a base that accelerates, the mass comes to rest at the left stop, and is pushed
 // there: m times the acceleration.
-static void a_rest_has_a_force_too(void **state) {
-    (void)state;
+TEST(a_rest_has_a_force_too) {
     static const char scene[] =
         "{\"structure\": {\"mass\": 1.35, \"stiffness\": 865, \"damping\": 30}, \"dampers\": "
         "[{\"mass\": 0.1107, \"clearance\": 0.015, \"buffer\": {\"restitution\": 0.3}}], "
@@ -230,8 +224,7 @@ static bool never(void *context, double fraction) {
     return false;
 }
 
-static void what_is_not_there_is_told(void **state) {
-    (void)state;
+TEST(what_is_not_there_is_told) {
     StudyRequest inquiry;
     open_example("paper_free_sponge", &inquiry);
     assert_refused(&inquiry.simulation, 0, STATUS_NOT_FOUND, "from 1 to 22");
@@ -248,14 +241,4 @@ static void what_is_not_there_is_told(void **state) {
     open_example("no_damper", &inquiry);
     assert_refused(&inquiry.simulation, 1, STATUS_NOT_FOUND, "no impacts");
     study_request_clear(&inquiry);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_law_base_and_structure_keeps_peak_and_impulse),
-        cmocka_unit_test(the_rows_go_from_touch_to_release),
-        cmocka_unit_test(a_rest_has_a_force_too),
-        cmocka_unit_test(what_is_not_there_is_told),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,20 +1,14 @@
 #include <limits.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "core/excitation/excitation.h"
 #include "core/excitation/recorded_motion.h"
-#include "core/math/fft.h"
 #include "core/simulation/simulation.h"
 #include "tests/support/fields.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
+#include "tests/support/test.h"
 
 typedef enum BaseChoice { FREE, RANDOM, SINE, RECORD, HALF_SINE, KINDS } BaseChoice;
 
@@ -63,8 +57,7 @@ static void assert_same(const Columns *a, const Columns *b) {
         assert_memory_equal(a->at[c].values, b->at[c].values, a->rows * sizeof(double));
 }
 
-static void a_workspace_leaves_no_trace_in_a_run(void **state) {
-    (void)state;
+TEST(a_workspace_leaves_no_trace_in_a_run) {
     Workspace workspace = {0};
     for (int i = 0; i < 4 * KINDS; i++) {
         // Each kind after itself and after others.
@@ -128,22 +121,19 @@ static double stopped_at(double displacement, const char *channel, int most) {
 }
 
 // Millions of values take long to write, before the first step of all.
-static void a_run_looks_many_times_while_its_columns_are_made_ready(void **state) {
-    (void)state;
+TEST(a_run_looks_many_times_while_its_columns_are_made_ready) {
     assert_true(stopped_at(0.015, "contact_force", 60) < 0.21);
     assert_true(stopped_at(0.015, "base_acceleration", 60) < 0.21);
 }
 
-static void a_run_at_rest_can_be_stopped(void **state) {
-    (void)state;
+TEST(a_run_at_rest_can_be_stopped) {
     (void)stopped_at(0, "displacement", 60);
     (void)stopped_at(0, "damper_displacement", 3);
 }
 
 // Intervals of a hundred periods of the structure: where no stop is in reach they are one step
 // each, else the run looks whether to go on within them, too.
-static void long_intervals_take_one_step_or_many_looks(void **state) {
-    (void)state;
+TEST(long_intervals_take_one_step_or_many_looks) {
     for (int has_stops = 0; has_stops < 2; has_stops++) {
         Simulation simulation;
         Problem problem;
@@ -164,15 +154,4 @@ static void long_intervals_take_one_step_or_many_looks(void **state) {
         outcome_unref(outcome);
         simulation_clear(&simulation);
     }
-}
-
-int main(void) {
-    fft_start();
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_workspace_leaves_no_trace_in_a_run),
-        cmocka_unit_test(a_run_looks_many_times_while_its_columns_are_made_ready),
-        cmocka_unit_test(a_run_at_rest_can_be_stopped),
-        cmocka_unit_test(long_intervals_take_one_step_or_many_looks),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,19 +1,14 @@
 // Scenes whose steps once stated less than they missed: where both runs of a pair miss the same,
 // their difference tells nothing.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "core/simulation/simulation.h"
 #include "core/solve/solver.h"
 #include "server/json/parse.h"
+#include "tests/support/test.h"
 
 static Problem told;
 
@@ -67,14 +62,12 @@ static void assert_states_its_error(const char *text) {
     "\"end_frequency\": 30000}, \"duration\": 0.0025, \"sample_rate\": 200000,"
 #define END "\"output\": {\"channels\": [\"displacement\"], \"psd\": null}}"
 
-static void steps_as_long_as_the_bases_lines_have_a_shorter_neighbour(void **state) {
-    (void)state;
+TEST(steps_as_long_as_the_bases_lines_have_a_shorter_neighbour) {
     assert_states_its_error(FAST SWEEP "\"accuracy\": {\"solver\": \"rk4\"}," END);
     assert_states_its_error(FAST SWEEP "\"accuracy\": {\"solver\": \"newmark\"}," END);
 }
 
-static void a_pulse_between_two_instants_is_not_missed(void **state) {
-    (void)state;
+TEST(a_pulse_between_two_instants_is_not_missed) {
     static const char *const kinds[] = {"half_sine", "triangular"};
     static const char *const steppers[] = {"precise", "rk4", "newmark"};
     char text[1024];
@@ -88,16 +81,14 @@ static void a_pulse_between_two_instants_is_not_missed(void **state) {
     }
 }
 
-static void a_contact_that_both_runs_see_late_is_told(void **state) {
-    (void)state;
+TEST(a_contact_that_both_runs_see_late_is_told) {
     assert_states_its_error(
         FAST HEAVY("{\"restitution\": 0.001, \"contact_time\": 1}") SWEEP
         "\"contact\": {\"model\": \"flores\"}, \"accuracy\": {\"solver\": \"rk4\"}," END);
 }
 
 // The horizon is that of the first late bounce, not of the first that the two runs disagree on.
-static void a_late_bounce_ends_trust(void **state) {
-    (void)state;
+TEST(a_late_bounce_ends_trust) {
     static const char text[] =
         "{\"structure\": {\"mass\": 10, \"stiffness\": 1}, \"dampers\": [{\"mass\": 5, "
         "\"clearance\": "
@@ -109,8 +100,7 @@ static void a_late_bounce_ends_trust(void **state) {
     assert_states_its_error(text);
 }
 
-static void a_base_that_ends_at_once_is_no_error_of_adaptive_steps(void **state) {
-    (void)state;
+TEST(a_base_that_ends_at_once_is_no_error_of_adaptive_steps) {
     static const char text[] =
         "{\"structure\": {\"mass\": 329, \"stiffness\": 0.0437, \"damping\": 0.4}, \"excitation\": "
         "{\"kind\": \"record\", \"interval\": 0.00044856, \"samples\": [328, 351, 400, 380, 351, "
@@ -124,8 +114,7 @@ static void a_base_that_ends_at_once_is_no_error_of_adaptive_steps(void **state)
 }
 
 // At 0.7 of what rk4 bears, its neighbour may not take longer steps.
-static void a_neighbour_that_would_be_unstable_takes_shorter_steps(void **state) {
-    (void)state;
+TEST(a_neighbour_that_would_be_unstable_takes_shorter_steps) {
     static const char text[] =
         "{\"structure\": {\"mass\": 1, \"stiffness\": 4e6, \"damping\": 1}, \"excitation\": "
         "{\"kind\": "
@@ -138,8 +127,7 @@ static void a_neighbour_that_would_be_unstable_takes_shorter_steps(void **state)
 }
 
 // A mass that crosses its clearance many times within a step: with what speed is chance.
-static void a_speed_that_is_chance_is_told(void **state) {
-    (void)state;
+TEST(a_speed_that_is_chance_is_told) {
     assert_states_its_error(
         FAST
         "\"dampers\": [{\"mass\": 1e-6, \"clearance\": 1e-6, \"buffer\": {\"restitution\": 0.001, "
@@ -150,8 +138,7 @@ static void a_speed_that_is_chance_is_told(void **state) {
         "{\"solver\": \"rk4\"}," END);
 }
 
-static void a_mass_without_clearance_is_taken_along_from_the_start(void **state) {
-    (void)state;
+TEST(a_mass_without_clearance_is_taken_along_from_the_start) {
     assert_states_its_error(
         "{\"structure\": {\"mass\": 1, \"stiffness\": 1e4, \"damping\": 1}, \"dampers\": "
         "[{\"mass\": "
@@ -162,8 +149,7 @@ static void a_mass_without_clearance_is_taken_along_from_the_start(void **state)
 }
 
 // Nothing moves until then: what errors are measured by has to grow.
-static void adaptive_steps_follow_a_base_that_begins_late(void **state) {
-    (void)state;
+TEST(adaptive_steps_follow_a_base_that_begins_late) {
     static const char *const kinds[] = {
         "{\"kind\": \"half_sine\", \"amplitude\": 1, \"start\": 0.3, \"length\": 0.05}",
         "{\"kind\": \"triangular\", \"amplitude\": 1, \"start\": 0.3, \"length\": 0.05, "
@@ -181,28 +167,11 @@ static void adaptive_steps_follow_a_base_that_begins_late(void **state) {
     }
 }
 
-static void adaptive_steps_follow_what_a_mass_brings_to_a_structure_at_rest(void **state) {
-    (void)state;
+TEST(adaptive_steps_follow_what_a_mass_brings_to_a_structure_at_rest) {
     assert_states_its_error(
         "{\"structure\": {\"mass\": 1, \"stiffness\": 900, \"damping\": 1}, \"dampers\": "
         "[{\"mass\": 0.1, \"clearance\": 0.02, \"velocity\": 0.4, \"buffer\": {\"restitution\": "
         "0.6, \"contact_time\": 0.01}}], \"contact\": {\"model\": \"flores\"}, \"excitation\": "
         "{\"kind\": \"free\"}, \"duration\": 0.5, \"sample_rate\": 1000, "
         "\"accuracy\": {\"solver\": \"adaptive\"}," END);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(steps_as_long_as_the_bases_lines_have_a_shorter_neighbour),
-        cmocka_unit_test(a_pulse_between_two_instants_is_not_missed),
-        cmocka_unit_test(a_contact_that_both_runs_see_late_is_told),
-        cmocka_unit_test(a_speed_that_is_chance_is_told),
-        cmocka_unit_test(a_mass_without_clearance_is_taken_along_from_the_start),
-        cmocka_unit_test(a_late_bounce_ends_trust),
-        cmocka_unit_test(a_base_that_ends_at_once_is_no_error_of_adaptive_steps),
-        cmocka_unit_test(a_neighbour_that_would_be_unstable_takes_shorter_steps),
-        cmocka_unit_test(adaptive_steps_follow_a_base_that_begins_late),
-        cmocka_unit_test(adaptive_steps_follow_what_a_mass_brings_to_a_structure_at_rest),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

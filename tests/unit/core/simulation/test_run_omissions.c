@@ -1,20 +1,14 @@
 // What a scene does not require does not run: counters say so, decisions report it with a number,
 // and the answer is that of the run with everything in it.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
-#include "core/math/fft.h"
 #include "core/simulation/simulation.h"
 #include "core/solve/solver.h"
 #include "server/json/parse.h"
+#include "tests/support/test.h"
 
 #define STRUCTURE "\"structure\": {\"mass\": 1.35, \"stiffness\": 865, \"damping\": 1.092}"
 #define BUFFER "{\"restitution\": 0.61, \"contact_time\": 0.025}"
@@ -127,8 +121,7 @@ static void assert_as_with_contacts(const char *members, const Outcome *outcome)
     simulation_clear(&simulation);
 }
 
-static void where_no_stop_is_reached_none_is_looked_for(void **state) {
-    (void)state;
+TEST(where_no_stop_is_reached_none_is_looked_for) {
     static const char *const scenes[] = {
         STRUCTURE ", " DAMPER("0.1") ", " RELEASE ", " TIME ", " ALL,
         STRUCTURE ", " DAMPER("100") ", " RANDOM ", " TIME ", " ALL,
@@ -162,8 +155,7 @@ static void where_no_stop_is_reached_none_is_looked_for(void **state) {
 }
 
 // Neither steps nor roots; and a contact too stiff for the step is none's concern.
-static void solvers_that_step_look_for_no_stops_either(void **state) {
-    (void)state;
+TEST(solvers_that_step_look_for_no_stops_either) {
     static const char *const settings[] = {
         "\"solver\": \"precise\", \"step\": 1e-3", "\"solver\": \"rk4\", \"step\": 1e-3",
         "\"solver\": \"newmark\", \"step\": 1e-3", "\"solver\": \"adaptive\", \"tolerance\": 1e-9",
@@ -196,8 +188,7 @@ static void solvers_that_step_look_for_no_stops_either(void **state) {
     outcome_unref(stiff);
 }
 
-static void where_one_may_be_reached_all_of_it_runs(void **state) {
-    (void)state;
+TEST(where_one_may_be_reached_all_of_it_runs) {
     static const char *const scenes[] = {
         STRUCTURE ", " DAMPER("0.015") ", " RELEASE ", " TIME,
         STRUCTURE ", " DAMPER("0.015") ", " RANDOM ", " TIME,
@@ -218,8 +209,7 @@ static void where_one_may_be_reached_all_of_it_runs(void **state) {
     outcome_unref(frame);
 }
 
-static void bounces_and_rests_are_counted_apart(void **state) {
-    (void)state;
+TEST(bounces_and_rests_are_counted_apart) {
     Outcome *outcome =
         outcome_of(STRUCTURE ", " DAMPER("0.015") ", \"contact\": {\"model\": "
                                                   "\"impulse\"}, " RELEASE ", " TIME);
@@ -233,8 +223,7 @@ static void bounces_and_rests_are_counted_apart(void **state) {
     outcome_unref(outcome);
 }
 
-static void a_still_base_is_flown_over_in_closed_form(void **state) {
-    (void)state;
+TEST(a_still_base_is_flown_over_in_closed_form) {
     Outcome *outcome = outcome_of(STRUCTURE ", " RELEASE ", " TIME);
     assert_left_out(outcome, "forcing");
     assert_int_equal(outcome->work.unforced_samples, 10000);
@@ -249,8 +238,7 @@ static void a_still_base_is_flown_over_in_closed_form(void **state) {
     outcome_unref(outcome);
 }
 
-static void where_nothing_moves_nothing_is_integrated(void **state) {
-    (void)state;
+TEST(where_nothing_moves_nothing_is_integrated) {
     static const char *const bases[] = {
         "\"kind\": \"free\"",
         "\"kind\": \"random\", \"band\": [0, 15], \"rms\": 0",
@@ -290,8 +278,7 @@ static void where_nothing_moves_nothing_is_integrated(void **state) {
     outcome_unref(held);
 }
 
-static void what_is_not_asked_for_is_not_made(void **state) {
-    (void)state;
+TEST(what_is_not_asked_for_is_not_made) {
     Outcome *whole = outcome_of(STRUCTURE ", " DAMPER("0.015") ", " RANDOM ", " TIME);
     assert_int_equal(whole->work.channel_values, 6 * 10001);
     assert_true(whole->work.spectrum_segments > 0);
@@ -320,8 +307,7 @@ static void what_is_not_asked_for_is_not_made(void **state) {
 }
 
 // A stepping solver takes its error from impacts, a table its warning: listed or not.
-static void what_impacts_tell_is_told_without_their_list(void **state) {
-    (void)state;
+TEST(what_impacts_tell_is_told_without_their_list) {
     static const char *const scenes[] = {
         STRUCTURE
         ", " DAMPER("0.015") ", " RELEASE ", " TIME
@@ -359,8 +345,7 @@ static void what_impacts_tell_is_told_without_their_list(void **state) {
 }
 
 // Rows would be more than are allowed; counted, they take no room.
-static void an_unlisted_run_has_as_many_impacts_as_it_likes(void **state) {
-    (void)state;
+TEST(an_unlisted_run_has_as_many_impacts_as_it_likes) {
     static const SimulationLimits limits = {.impacts = 5};
     for (int is_listed = 0; is_listed < 2; is_listed++) {
         Simulation simulation =
@@ -376,8 +361,7 @@ static void an_unlisted_run_has_as_many_impacts_as_it_likes(void **state) {
     }
 }
 
-static void a_plan_tells_beforehand_what_it_can(void **state) {
-    (void)state;
+TEST(a_plan_tells_beforehand_what_it_can) {
     static const struct {
         const char *members;
         bool is_told, is_open;
@@ -401,21 +385,4 @@ static void a_plan_tells_beforehand_what_it_can(void **state) {
         fields_clear(plan_report_fields, &plan);
         simulation_clear(&simulation);
     }
-}
-
-int main(void) {
-    fft_start();
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(where_no_stop_is_reached_none_is_looked_for),
-        cmocka_unit_test(solvers_that_step_look_for_no_stops_either),
-        cmocka_unit_test(where_one_may_be_reached_all_of_it_runs),
-        cmocka_unit_test(bounces_and_rests_are_counted_apart),
-        cmocka_unit_test(a_still_base_is_flown_over_in_closed_form),
-        cmocka_unit_test(where_nothing_moves_nothing_is_integrated),
-        cmocka_unit_test(what_is_not_asked_for_is_not_made),
-        cmocka_unit_test(what_impacts_tell_is_told_without_their_list),
-        cmocka_unit_test(an_unlisted_run_has_as_many_impacts_as_it_likes),
-        cmocka_unit_test(a_plan_tells_beforehand_what_it_can),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

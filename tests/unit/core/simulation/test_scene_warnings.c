@@ -1,19 +1,14 @@
 // Warnings of implausible values, and those that depend on the result.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
-#include "core/math/fft.h"
 #include "core/result/response.h"
 #include "core/simulation/simulation.h"
 #include "tests/support/fields.h"
 #include "tests/support/scenes.h"
+#include "tests/support/test.h"
 #include "tests/support/verdict.h"
 
 static Verdict seen;
@@ -30,8 +25,7 @@ static SdofStructure *sdof_of(Simulation *simulation) {
     return (SdofStructure *)(void *)simulation->scene.structure;
 }
 
-static void implausible_values_get_a_warning_each(void **state) {
-    (void)state;
+TEST(implausible_values_get_a_warning_each) {
     Simulation simulation;
     scene_with_damper(&simulation, 0.61, 25);
     damper_of(&simulation)->clearance = 15;
@@ -67,8 +61,7 @@ static void implausible_values_get_a_warning_each(void **state) {
     simulation_clear(&simulation);
 }
 
-static void what_an_excitation_doubts_of_itself_becomes_a_warning(void **state) {
-    (void)state;
+TEST(what_an_excitation_doubts_of_itself_becomes_a_warning) {
     Simulation simulation;
     scene_with_damper(&simulation, 0.61, 0.025);
     scene_choose(&simulation.scene.excitation, &excitation_kinds, "half_sine");
@@ -81,8 +74,7 @@ static void what_an_excitation_doubts_of_itself_becomes_a_warning(void **state) 
     simulation_clear(&simulation);
 }
 
-static void a_scene_in_which_nothing_moves_gets_a_warning(void **state) {
-    (void)state;
+TEST(a_scene_in_which_nothing_moves_gets_a_warning) {
     Simulation simulation;
     scene_with_damper(&simulation, 0.61, 0.025);
     scene_start(&simulation, 0, 0);
@@ -101,8 +93,7 @@ static void a_scene_in_which_nothing_moves_gets_a_warning(void **state) {
     simulation_clear(&simulation);
 }
 
-static void a_structure_without_a_spring_has_no_period_to_warn_of(void **state) {
-    (void)state;
+TEST(a_structure_without_a_spring_has_no_period_to_warn_of) {
     Simulation simulation;
     scene_with_damper(&simulation, 0.61, 0.025);
     sdof_of(&simulation)->stiffness = 0;
@@ -189,8 +180,7 @@ static void expect_table(char *target, size_t size, const Outcome *outcome, size
     expect(target, size, outcome, damper, sides, from, to, whose, "the nearest row is used there");
 }
 
-static void impacts_outside_a_table_are_told_under_every_form_of_law(void **state) {
-    (void)state;
+TEST(impacts_outside_a_table_are_told_under_every_form_of_law) {
     static const char *const laws[] = {"spring_damper", "impulse", "flores"};
     for (size_t i = 0; i < COUNT(laws); i++) {
         Simulation simulation;
@@ -207,8 +197,7 @@ static void impacts_outside_a_table_are_told_under_every_form_of_law(void **stat
     }
 }
 
-static void speeds_between_the_first_row_and_the_last_are_not_told(void **state) {
-    (void)state;
+TEST(speeds_between_the_first_row_and_the_last_are_not_told) {
     Simulation simulation;
     scene_with_table(&simulation, 0, 1);
     Outcome *outcome = run(&simulation);
@@ -218,8 +207,7 @@ static void speeds_between_the_first_row_and_the_last_are_not_told(void **state)
     simulation_clear(&simulation);
 }
 
-static void each_stop_of_each_damper_has_its_own_table(void **state) {
-    (void)state;
+TEST(each_stop_of_each_damper_has_its_own_table) {
     Simulation simulation;
     scene_with_damper(&simulation, NAN, NAN);
     Scene *scene = &simulation.scene;
@@ -250,8 +238,7 @@ static void each_stop_of_each_damper_has_its_own_table(void **state) {
 
 // A heavy mass leaves a slow buffer without a force and is caught up with before it is out of it:
 // another row of the ledger, under the parameters of the first.
-static void contacts_that_resume_inside_a_buffer_are_of_the_impact_before(void **state) {
-    (void)state;
+TEST(contacts_that_resume_inside_a_buffer_are_of_the_impact_before) {
     Simulation simulation;
     scene_with_table(&simulation, 100, 200);
     Damper *damper = &simulation.scene.dampers.at[0];
@@ -275,8 +262,7 @@ static void contacts_that_resume_inside_a_buffer_are_of_the_impact_before(void *
 }
 
 // The ledger is never cut short: at its limit all are counted, beyond it there is no result.
-static void a_full_ledger_counts_all_and_a_fuller_one_gives_no_result(void **state) {
-    (void)state;
+TEST(a_full_ledger_counts_all_and_a_fuller_one_gives_no_result) {
     Simulation simulation;
     scene_with_table(&simulation, 0.1, 0.35);
     Outcome *outcome = run(&simulation), *limited;
@@ -304,8 +290,7 @@ static void scene_with_material(Simulation *simulation, double least, double mos
     buffer->test.most_speed = most;
 }
 
-static void impacts_outside_what_a_material_was_measured_at_are_told_with_its_name(void **state) {
-    (void)state;
+TEST(impacts_outside_what_a_material_was_measured_at_are_told_with_its_name) {
     static const struct {
         double least, most;
         const char *range;
@@ -330,8 +315,7 @@ static void impacts_outside_what_a_material_was_measured_at_are_told_with_its_na
     }
 }
 
-static void a_material_of_unknown_range_is_not_warned_of(void **state) {
-    (void)state;
+TEST(a_material_of_unknown_range_is_not_warned_of) {
     Simulation simulation;
     scene_with_material(&simulation, NAN, NAN);
     Outcome *outcome = run(&simulation);
@@ -342,8 +326,7 @@ static void a_material_of_unknown_range_is_not_warned_of(void **state) {
 }
 
 // What a material says of its test is no part of what a scene is.
-static void a_range_moves_no_bit_of_the_run(void **state) {
-    (void)state;
+TEST(a_range_moves_no_bit_of_the_run) {
     Simulation with, without;
     scene_with_material(&with, 0.1, 0.3);
     scene_with_material(&without, NAN, NAN);
@@ -375,9 +358,7 @@ static Outcome *run_tested_with(double impactor, double base, int identified_for
     return outcome;
 }
 
-static void
-a_test_with_other_masses_is_told_where_its_numbers_are_taken_for_the_scene(void **state) {
-    (void)state;
+TEST(a_test_with_other_masses_is_told_where_its_numbers_are_taken_for_the_scene) {
     // The scene's own effective mass is 0.1023 kg.
     static const struct {
         double impactor, base;
@@ -408,23 +389,4 @@ a_test_with_other_masses_is_told_where_its_numbers_are_taken_for_the_scene(void 
     }
 }
 
-int main(void) {
-    fft_start();
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(implausible_values_get_a_warning_each),
-        cmocka_unit_test(what_an_excitation_doubts_of_itself_becomes_a_warning),
-        cmocka_unit_test(a_scene_in_which_nothing_moves_gets_a_warning),
-        cmocka_unit_test(a_structure_without_a_spring_has_no_period_to_warn_of),
-        cmocka_unit_test(impacts_outside_a_table_are_told_under_every_form_of_law),
-        cmocka_unit_test(speeds_between_the_first_row_and_the_last_are_not_told),
-        cmocka_unit_test(each_stop_of_each_damper_has_its_own_table),
-        cmocka_unit_test(contacts_that_resume_inside_a_buffer_are_of_the_impact_before),
-        cmocka_unit_test(impacts_outside_what_a_material_was_measured_at_are_told_with_its_name),
-        cmocka_unit_test(a_material_of_unknown_range_is_not_warned_of),
-        cmocka_unit_test(a_range_moves_no_bit_of_the_run),
-        cmocka_unit_test(
-            a_test_with_other_masses_is_told_where_its_numbers_are_taken_for_the_scene),
-        cmocka_unit_test(a_full_ledger_counts_all_and_a_fuller_one_gives_no_result),
-    };
-    return cmocka_run_group_tests(tests, NULL, teardown);
-}
+TEST_GROUP(NULL, teardown)

@@ -1,11 +1,7 @@
 // Requests judged and completed to their canonical form.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "core/base/canonical.h"
 #include "core/simulation/simulation.h"
@@ -13,6 +9,7 @@
 #include "core/solve/solver.h"
 #include "tests/support/fields.h"
 #include "tests/support/scenes.h"
+#include "tests/support/test.h"
 #include "tests/support/verdict.h"
 
 static Verdict told;
@@ -58,8 +55,7 @@ static bool same(const CanonicalBytes *a, const CanonicalBytes *b) {
     return a->length == b->length && memcmp(a->at, b->at, a->length) == 0;
 }
 
-static void the_papers_scene_is_sound_and_complete(void **state) {
-    (void)state;
+TEST(the_papers_scene_is_sound_and_complete) {
     Simulation simulation;
     scene_with_damper(&simulation, 0.61, 0.025);
     assert_int_equal(complete(&simulation), STATUS_OK);
@@ -75,8 +71,7 @@ static void the_papers_scene_is_sound_and_complete(void **state) {
     simulation_clear(&simulation);
 }
 
-static void completing_twice_changes_nothing(void **state) {
-    (void)state;
+TEST(completing_twice_changes_nothing) {
     for (int form = 0; form < 4; form++) {
         Simulation simulation, copy;
         if (form == 3)
@@ -96,8 +91,7 @@ static void completing_twice_changes_nothing(void **state) {
     }
 }
 
-static void scenes_that_mean_the_same_have_the_same_bytes(void **state) {
-    (void)state;
+TEST(scenes_that_mean_the_same_have_the_same_bytes) {
     Simulation a, b;
     scene_with_damper(&a, 0.61, NAN);
     scene_with_damper(&b, 0.61, 0.025);
@@ -118,8 +112,7 @@ static void scenes_that_mean_the_same_have_the_same_bytes(void **state) {
     simulation_clear(&b);
 }
 
-static void all_faults_of_a_scene_are_told_at_once_and_each_once(void **state) {
-    (void)state;
+TEST(all_faults_of_a_scene_are_told_at_once_and_each_once) {
     Simulation simulation;
     scene_with_damper(&simulation, 1.3, 0);
     sdof_of(&simulation)->mass = -1;
@@ -151,8 +144,7 @@ static void all_faults_of_a_scene_are_told_at_once_and_each_once(void **state) {
     simulation_clear(&simulation);
 }
 
-static void a_fault_of_the_reader_fails_the_request_and_is_not_repeated(void **state) {
-    (void)state;
+TEST(a_fault_of_the_reader_fails_the_request_and_is_not_repeated) {
     Simulation simulation;
     scene_with_damper(&simulation, 0.61, 0.025);
     sdof_of(&simulation)->mass = (double)NAN;
@@ -169,8 +161,7 @@ static void a_fault_of_the_reader_fails_the_request_and_is_not_repeated(void **s
     simulation_clear(&simulation);
 }
 
-static void an_empty_request_names_what_is_missing(void **state) {
-    (void)state;
+TEST(an_empty_request_names_what_is_missing) {
     Simulation simulation;
     assert_int_equal(fields_default(simulation_fields, &simulation), STATUS_OK);
     assert_int_equal(complete(&simulation), STATUS_INVALID);
@@ -190,8 +181,7 @@ static void an_empty_request_names_what_is_missing(void **state) {
     simulation_clear(&simulation);
 }
 
-static void without_a_damper_its_usual_channels_are_left_out(void **state) {
-    (void)state;
+TEST(without_a_damper_its_usual_channels_are_left_out) {
     Simulation simulation;
     scene_without_damper(&simulation);
     assert_int_equal(complete(&simulation), STATUS_OK);
@@ -208,8 +198,7 @@ static void without_a_damper_its_usual_channels_are_left_out(void **state) {
     simulation_clear(&simulation);
 }
 
-static void no_channels_are_what_they_say(void **state) {
-    (void)state;
+TEST(no_channels_are_what_they_say) {
     Simulation simulation;
     scene_with_damper(&simulation, 0.61, 0.025);
     want(&simulation.output.channels, 0, NULL);
@@ -231,8 +220,7 @@ static void no_channels_are_what_they_say(void **state) {
     simulation_clear(&simulation);
 }
 
-static void a_segment_is_no_longer_than_the_series(void **state) {
-    (void)state;
+TEST(a_segment_is_no_longer_than_the_series) {
     Simulation simulation;
     scene_with_damper(&simulation, 0.61, 0.025);
     simulation.scene.duration = 1;
@@ -253,8 +241,7 @@ static void a_segment_is_no_longer_than_the_series(void **state) {
     simulation_clear(&simulation);
 }
 
-static void segments_overlap_by_less_than_themselves(void **state) {
-    (void)state;
+TEST(segments_overlap_by_less_than_themselves) {
     Simulation simulation;
     scene_with_damper(&simulation, 0.61, 0.025);
     simulation.output.psd.segment = 100;
@@ -275,8 +262,7 @@ static void segments_overlap_by_less_than_themselves(void **state) {
     simulation_clear(&simulation);
 }
 
-static void statistics_begin_within_the_run(void **state) {
-    (void)state;
+TEST(statistics_begin_within_the_run) {
     Simulation simulation;
     scene_with_damper(&simulation, 0.61, 0.025);
     simulation.output.statistics_from = 10;
@@ -288,8 +274,7 @@ static void statistics_begin_within_the_run(void **state) {
     simulation_clear(&simulation);
 }
 
-static void a_scene_that_would_take_too_long_is_refused_beforehand(void **state) {
-    (void)state;
+TEST(a_scene_that_would_take_too_long_is_refused_beforehand) {
     const SimulationLimits few = {.samples = 1 << 25, .steps = 1e6};
     Simulation simulation;
     scene_with_damper(&simulation, 0.61, 0.025);
@@ -301,8 +286,7 @@ static void a_scene_that_would_take_too_long_is_refused_beforehand(void **state)
     simulation_clear(&simulation);
 }
 
-static void so_is_one_whose_solver_would_take_too_many_steps(void **state) {
-    (void)state;
+TEST(so_is_one_whose_solver_would_take_too_many_steps) {
     const SimulationLimits few = {.samples = 1 << 25, .steps = 1e6};
     for (const Solver *const *solver = solvers; *solver != NULL; solver++) {
         if ((*solver)->cost == NULL)
@@ -321,8 +305,7 @@ static void so_is_one_whose_solver_would_take_too_many_steps(void **state) {
     }
 }
 
-static void titles_and_labels_have_their_limits(void **state) {
-    (void)state;
+TEST(titles_and_labels_have_their_limits) {
     Simulation simulation;
     scene_with_damper(&simulation, 0.61, 0.025);
     simulation.title = malloc(202);
@@ -347,8 +330,7 @@ static void damp_more(Simulation *simulation, size_t count) {
     simulation->scene.dampers = (Dampers){dampers, count};
 }
 
-static void sixty_four_dampers_are_the_most(void **state) {
-    (void)state;
+TEST(sixty_four_dampers_are_the_most) {
     Simulation simulation;
     scene_with_damper(&simulation, 0.61, 0.025);
     damp_more(&simulation, 64);
@@ -360,8 +342,7 @@ static void sixty_four_dampers_are_the_most(void **state) {
     simulation_clear(&simulation);
 }
 
-static void accuracy_is_chosen_by_its_solver(void **state) {
-    (void)state;
+TEST(accuracy_is_chosen_by_its_solver) {
     assert_string_equal(solver_kinds.tag, "solver");
     assert_ptr_equal(solver_kinds.at(0), solvers[0]);
     assert_ptr_equal(kind_find(&solver_kinds, "exact"), &solver_exact.kind);
@@ -377,8 +358,7 @@ static int teardown(void **state) {
 }
 
 // What no law of the scene uses is left out, and so is no other scene.
-static void a_tolerance_is_for_power_laws_alone(void **state) {
-    (void)state;
+TEST(a_tolerance_is_for_power_laws_alone) {
     static const char *const models[] = {"spring_damper", "impulse", "auto", "hunt_crossley",
                                          "jankowski"};
     for (size_t i = 0; i < COUNT(models); i++) {
@@ -403,25 +383,4 @@ static void a_tolerance_is_for_power_laws_alone(void **state) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_papers_scene_is_sound_and_complete),
-        cmocka_unit_test(completing_twice_changes_nothing),
-        cmocka_unit_test(scenes_that_mean_the_same_have_the_same_bytes),
-        cmocka_unit_test(all_faults_of_a_scene_are_told_at_once_and_each_once),
-        cmocka_unit_test(a_fault_of_the_reader_fails_the_request_and_is_not_repeated),
-        cmocka_unit_test(an_empty_request_names_what_is_missing),
-        cmocka_unit_test(without_a_damper_its_usual_channels_are_left_out),
-        cmocka_unit_test(no_channels_are_what_they_say),
-        cmocka_unit_test(a_segment_is_no_longer_than_the_series),
-        cmocka_unit_test(segments_overlap_by_less_than_themselves),
-        cmocka_unit_test(statistics_begin_within_the_run),
-        cmocka_unit_test(a_scene_that_would_take_too_long_is_refused_beforehand),
-        cmocka_unit_test(so_is_one_whose_solver_would_take_too_many_steps),
-        cmocka_unit_test(titles_and_labels_have_their_limits),
-        cmocka_unit_test(sixty_four_dampers_are_the_most),
-        cmocka_unit_test(accuracy_is_chosen_by_its_solver),
-        cmocka_unit_test(a_tolerance_is_for_power_laws_alone),
-    };
-    return cmocka_run_group_tests(tests, NULL, teardown);
-}
+TEST_GROUP(NULL, teardown)

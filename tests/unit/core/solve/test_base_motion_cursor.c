@@ -1,14 +1,9 @@
 // The base as the solver meets it: the same function of time on every grid.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
 
 #include "core/solve/base_motion_cursor.h"
 #include "tests/support/base_at.h"
+#include "tests/support/test.h"
 
 static double values[] = {0.5, -1, 2, 4, -3};
 
@@ -39,8 +34,7 @@ static void walk(const Base *base, double sample_rate) {
     }
 }
 
-static void every_slice_is_the_base(void **state) {
-    (void)state;
+TEST(every_slice_is_the_base) {
     const double intervals[] = {0.2, 0.1, 0.05, 0.07, 0.31, 0.013};
     const double rates[] = {10, 20, 33, 100, 1000};
     for (size_t i = 0; i < 6; i++)
@@ -53,8 +47,7 @@ static void every_slice_is_the_base(void **state) {
     walk(&(Base){.form = BASE_STILL}, 10);
 }
 
-static void every_slice_of_pieces_is_the_base(void **state) {
-    (void)state;
+TEST(every_slice_of_pieces_is_the_base) {
     const double starts[] = {0, 0.1, 0.103, 0.2999999}, omegas[] = {0, 31};
     const double rates[] = {10, 33, 100, 1000};
     for (size_t i = 0; i < 4; i++)
@@ -67,8 +60,7 @@ static void every_slice_of_pieces_is_the_base(void **state) {
                      rates[k]);
 }
 
-static void a_piece_on_a_sample_leaves_the_interval_whole(void **state) {
-    (void)state;
+TEST(a_piece_on_a_sample_leaves_the_interval_whole) {
     // Sums of starts and lengths are a rounding off the samples' times, to either side.
     for (int side = -1; side <= 1; side++) {
         Base base = {.form = BASE_PIECES, .pieces = {{700.1, 3, 2}, {700.2, 0, 0}}};
@@ -87,8 +79,7 @@ static void a_piece_on_a_sample_leaves_the_interval_whole(void **state) {
     }
 }
 
-static void a_kink_inside_an_interval_forbids_a_whole_step(void **state) {
-    (void)state;
+TEST(a_kink_inside_an_interval_forbids_a_whole_step) {
     const Base base = {.form = BASE_SAMPLED, .values = values, .count = 5, .interval = 0.07};
     BaseCursor cursor;
     Slice slice;
@@ -98,23 +89,11 @@ static void a_kink_inside_an_interval_forbids_a_whole_step(void **state) {
     assert_true(fabs(base_cursor_slice(&cursor, 0, 0.07, &slice) - 0.07) < 1e-15);
 }
 
-static void a_late_sine_keeps_its_phase(void **state) {
-    (void)state;
+TEST(a_late_sine_keeps_its_phase) {
     const Base base = {.form = BASE_SINE, .amplitude = 1, .omega = 6.283185307179586};
     BaseCursor cursor;
     Slice slice;
     base_cursor_make(&cursor, &base, 1);
     assert_true(base_cursor_interval(&cursor, 100000000, &slice)); // whole turns of 1 Hz
     assert_true(fabs(slice.value) < 1e-7 && fabs(slice.slope - 1) < 1e-12);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_slice_is_the_base),
-        cmocka_unit_test(every_slice_of_pieces_is_the_base),
-        cmocka_unit_test(a_piece_on_a_sample_leaves_the_interval_whole),
-        cmocka_unit_test(a_kink_inside_an_interval_forbids_a_whole_step),
-        cmocka_unit_test(a_late_sine_keeps_its_phase),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

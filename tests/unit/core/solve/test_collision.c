@@ -1,15 +1,10 @@
 // Collisions of many masses at one instant: who is pressed, who parts, and what stays the same.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
-
-#include <cmocka.h>
 
 #include "core/solve/engine.h"
 #include "tests/support/frames.h"
+#include "tests/support/test.h"
 
 static const Base still = {.form = BASE_STILL};
 
@@ -66,8 +61,7 @@ static void hit(ModalState *frame, size_t d, Side side, double speed, double res
     damper->separation_speed = restitution * speed;
 }
 
-static void one_mass_takes_its_effective_mass(void **state) {
-    (void)state;
+TEST(one_mass_takes_its_effective_mass) {
     Bench bench = make(0);
     start(&bench);
     double before, after, kinetic, left;
@@ -85,8 +79,7 @@ static void one_mass_takes_its_effective_mass(void **state) {
 
 // The mass of 1 kg rests at the right stop; one of 2 kg comes from the left onto the same storey's
 // right stop: a hit to the right draws the stop away from the resting mass.
-static void a_resting_mass_is_left_behind_by_a_hit_away_from_it(void **state) {
-    (void)state;
+TEST(a_resting_mass_is_left_behind_by_a_hit_away_from_it) {
     Bench bench = make(0);
     start(&bench);
     bench.frame.damper[0].in_collision = true;
@@ -100,8 +93,7 @@ static void a_resting_mass_is_left_behind_by_a_hit_away_from_it(void **state) {
 }
 
 // At the left stop it is pushed along, and both bodies together take the hit.
-static void a_resting_mass_is_pushed_along_by_a_hit_towards_it(void **state) {
-    (void)state;
+TEST(a_resting_mass_is_pushed_along_by_a_hit_towards_it) {
     Bench bench = make(0);
     start(&bench);
     bench.frame.damper[0].in_collision = true;
@@ -116,8 +108,7 @@ static void a_resting_mass_is_pushed_along_by_a_hit_towards_it(void **state) {
 }
 
 // Where M couples the storeys a hit on one is felt at once on the other.
-static void a_hit_is_felt_on_other_storeys_through_the_mass_matrix(void **state) {
-    (void)state;
+TEST(a_hit_is_felt_on_other_storeys_through_the_mass_matrix) {
     Bench apart = make(0), coupled = make(1);
     for (int i = 0; i < 2; i++) {
         Bench *bench = i == 0 ? &apart : &coupled;
@@ -141,8 +132,7 @@ static double uniform(double a, double b) {
 }
 
 // Pressed or parting fast enough, one of them equal; momentum kept and no energy gained.
-static void random_collisions_meet_their_conditions(void **state) {
-    (void)state;
+TEST(random_collisions_meet_their_conditions) {
     for (int i = 0; i < 2000; i++) {
         Bench bench = make(uniform(-3, 3));
         start(&bench);
@@ -176,8 +166,7 @@ static void random_collisions_meet_their_conditions(void **state) {
 
 // Masses far heavier than their storeys hardly feel a push that throws these to and fro: the
 // impulses of all are far larger than what any of them lacks.
-static void masses_heavier_than_their_storeys_are_no_worse(void **state) {
-    (void)state;
+TEST(masses_heavier_than_their_storeys_are_no_worse) {
     for (int i = 0; i < 500; i++) {
         Bench bench = make(0);
         for (size_t d = 0; d < 3; d++) {
@@ -206,8 +195,7 @@ static void masses_heavier_than_their_storeys_are_no_worse(void **state) {
 }
 
 // Where all masses are heavy beside what they stand on, each impulse acts on every other one.
-static void many_heavy_masses_on_one_storey_meet_their_conditions(void **state) {
-    (void)state;
+TEST(many_heavy_masses_on_one_storey_meet_their_conditions) {
     enum { MANY = 64 };
     const double mass = 1, stiffness = 100, damping = 0;
     for (int i = 0; i < 100; i++) {
@@ -237,17 +225,4 @@ static void many_heavy_masses_on_one_storey_meet_their_conditions(void **state) 
         assert_true(fabs(frame->p[0] * frame->damper[0].shape[0] - impulse) < 1e-12 * size);
         clear(&bench);
     }
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(one_mass_takes_its_effective_mass),
-        cmocka_unit_test(a_resting_mass_is_left_behind_by_a_hit_away_from_it),
-        cmocka_unit_test(a_resting_mass_is_pushed_along_by_a_hit_towards_it),
-        cmocka_unit_test(a_hit_is_felt_on_other_storeys_through_the_mass_matrix),
-        cmocka_unit_test(random_collisions_meet_their_conditions),
-        cmocka_unit_test(masses_heavier_than_their_storeys_are_no_worse),
-        cmocka_unit_test(many_heavy_masses_on_one_storey_meet_their_conditions),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,19 +1,13 @@
 // The general engine: what is known in closed form, what symmetry and conservation demand, and the
 // single engine's answers where both can run.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
-#include "core/math/fft.h"
 #include "core/solve/exact.h"
 #include "tests/support/frames.h"
 #include "tests/support/paper.h"
+#include "tests/support/test.h"
 
 enum { CHANNELS = 6 };
 static const ChannelId of_storeys[3] = {CHANNEL_DISPLACEMENT, CHANNEL_VELOCITY,
@@ -86,8 +80,7 @@ static void prepare(Simulation *simulation, Plan **plan, Base *base) {
     assert_int_equal(excitation_make(excitation, &span, NULL, base, NULL), STATUS_OK);
 }
 
-static void the_papers_scenes_are_those_of_the_single_engine(void **state) {
-    (void)state;
+TEST(the_papers_scenes_are_those_of_the_single_engine) {
     for (int i = 0; i < 5 * 2 * 3; i++) {
         const PaperBuffer *buffer = &paper_buffers[i / 6];
         Simulation simulation;
@@ -138,8 +131,7 @@ static void the_papers_scenes_are_those_of_the_single_engine(void **state) {
 }
 
 // x = shape exp(-xi w t) (cos + xi w / w_d sin): each mode of a uniform chain by itself.
-static void free_vibration_without_dampers_is_the_closed_form(void **state) {
-    (void)state;
+TEST(free_vibration_without_dampers_is_the_closed_form) {
     const size_t n = 6;
     for (size_t k = 0; k < n; k++) {
         Plan *plan = frames_new(n, 0, 5, 100);
@@ -167,8 +159,7 @@ static void free_vibration_without_dampers_is_the_closed_form(void **state) {
 }
 
 // Few samples go by arcs, many by whole intervals made beforehand.
-static void whole_intervals_are_as_exact_as_arcs(void **state) {
-    (void)state;
+TEST(whole_intervals_are_as_exact_as_arcs) {
     double values[30];
     for (size_t i = 0; i < 30; i++)
         values[i] = sin((double)(i * i));
@@ -214,8 +205,7 @@ static Plan *shaken_frame(size_t dampers, bool is_impulse, double split) {
     return plan;
 }
 
-static void two_halves_of_a_damper_move_as_the_whole(void **state) {
-    (void)state;
+TEST(two_halves_of_a_damper_move_as_the_whole) {
     for (int model = 0; model < 2; model++) {
         Plan *halves = shaken_frame(2, model == 1, 2), *whole = shaken_frame(1, model == 1, 1);
         Answer two = run(exact_run_engine, halves, &still),
@@ -234,8 +224,7 @@ static void two_halves_of_a_damper_move_as_the_whole(void **state) {
     }
 }
 
-static void a_mirrored_scene_has_the_mirrored_answer(void **state) {
-    (void)state;
+TEST(a_mirrored_scene_has_the_mirrored_answer) {
     for (int model = 0; model < 2; model++) {
         Plan *plan = shaken_frame(2, model == 1, 3), *mirror = shaken_frame(2, model == 1, 3);
         plan->dampers[1].storey = mirror->dampers[1].storey = 0;
@@ -252,8 +241,7 @@ static void a_mirrored_scene_has_the_mirrored_answer(void **state) {
     }
 }
 
-static void a_storey_on_an_unmoved_one_is_a_structure_by_itself(void **state) {
-    (void)state;
+TEST(a_storey_on_an_unmoved_one_is_a_structure_by_itself) {
     const double mass[] = {1e13, 1.35}, stiffness[] = {1e15, 865}, damping[] = {0, 1.092};
     const double alone_mass = 1.35;
     Plan *plan = frames_new(2, 1, 3, 1000), *alone = frames_new(1, 1, 3, 1000);
@@ -271,8 +259,7 @@ static void a_storey_on_an_unmoved_one_is_a_structure_by_itself(void **state) {
     plan_free(alone);
 }
 
-static void momentum_is_kept_by_everything_that_collides(void **state) {
-    (void)state;
+TEST(momentum_is_kept_by_everything_that_collides) {
     for (int model = 0; model < 2; model++) {
         const double mass[] = {2, 3, 1}, stiffness[] = {0, 900, 700}, damping[] = {0, 0.5, 1};
         Plan *plan = frames_new(3, 3, 5, 200);
@@ -302,8 +289,7 @@ static void momentum_is_kept_by_everything_that_collides(void **state) {
     }
 }
 
-static void peaks_and_sums_are_the_largest_storeys(void **state) {
-    (void)state;
+TEST(peaks_and_sums_are_the_largest_storeys) {
     Plan *plan = shaken_frame(1, false, 1);
     Answer answer = run(exact_run_engine, plan, &still);
     double peak[2] = {0, 0}, sums[2] = {0, 0};
@@ -330,8 +316,7 @@ static void peaks_and_sums_are_the_largest_storeys(void **state) {
 }
 
 // Each is let go and taken by its other stop, one after the other at one instant.
-static void many_held_masses_change_stops_together(void **state) {
-    (void)state;
+TEST(many_held_masses_change_stops_together) {
     enum { HELD = 40 };
     const double mass = 1, stiffness = 42000, damping = 0;
     Plan *plan = frames_new(1, HELD + 1, 0.6, 1000);
@@ -362,8 +347,7 @@ static Status status_of(const Plan *plan, Run with, Problem *problem) {
     return status;
 }
 
-static void limits_and_cancelling_end_a_run_with_their_reason(void **state) {
-    (void)state;
+TEST(limits_and_cancelling_end_a_run_with_their_reason) {
     Plan *plan = shaken_frame(2, false, 2);
     Problem problem;
     int asked = 0;
@@ -382,8 +366,7 @@ static void limits_and_cancelling_end_a_run_with_their_reason(void **state) {
 }
 
 // A mass that never meets its stops: the run and its neighbour take each sample once.
-static void the_work_of_the_neighbour_is_counted(void **state) {
-    (void)state;
+TEST(the_work_of_the_neighbour_is_counted) {
     Plan *plan = frames_new(3, 1, 10, 1000);
     frames_uniform(plan, 1000, 1e6, 0.02);
     frames_damper(plan, 0, 2, 10, 10, 0.5, 0.001);
@@ -408,8 +391,7 @@ static double drawn(uint64_t *state, double a, double b) {
 
 // Far from the base nothing moves at first but by rounding.
 // A bounce at the size of rounding parts a resting mass for less than the clock resolves.
-static void small_bounces_do_not_lift_resting_masses(void **state) {
-    (void)state;
+TEST(small_bounces_do_not_lift_resting_masses) {
     const Base sine = {.form = BASE_SINE, .amplitude = 1, .omega = 10};
     const double mass[] = {3, 2}, stiffness[] = {900, 700}, damping[] = {6, 4};
     Plan *plan = frames_new(2, 2, 6, 200);
@@ -426,8 +408,7 @@ static void small_bounces_do_not_lift_resting_masses(void **state) {
     plan_free(plan);
 }
 
-static void masses_held_tight_wait_for_the_base_to_reach_them(void **state) {
-    (void)state;
+TEST(masses_held_tight_wait_for_the_base_to_reach_them) {
     uint64_t at = 1;
     for (int scene = 0; scene < 600; scene++) {
         const size_t n = 2 + (size_t)scene % 9;
@@ -468,8 +449,7 @@ static bool stop_after(void *context, double fraction) {
     return ++asked->times < asked->most;
 }
 
-static void making_the_tables_of_many_coupled_storeys_is_cancelled_on_the_way(void **state) {
-    (void)state;
+TEST(making_the_tables_of_many_coupled_storeys_is_cancelled_on_the_way) {
     enum { MANY = 60 };
     Plan *plan = frames_new(MANY, 0, 10, 1000);
     Problem problem;
@@ -503,8 +483,7 @@ static double knocked(const Plan *plan, double length, double *steps) {
     return peak;
 }
 
-static void a_short_pulse_costs_what_a_long_one_does(void **state) {
-    (void)state;
+TEST(a_short_pulse_costs_what_a_long_one_does) {
     for (int is_impulse = 0; is_impulse < 2; is_impulse++) {
         double steps[2];
         Plan *plan = shaken_frame(2, is_impulse != 0, 2);
@@ -514,26 +493,4 @@ static void a_short_pulse_costs_what_a_long_one_does(void **state) {
         assert_true(steps[1] < 1.5 * steps[0] + 1000);
         plan_free(plan);
     }
-}
-
-int main(void) {
-    fft_start();
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_papers_scenes_are_those_of_the_single_engine),
-        cmocka_unit_test(free_vibration_without_dampers_is_the_closed_form),
-        cmocka_unit_test(whole_intervals_are_as_exact_as_arcs),
-        cmocka_unit_test(two_halves_of_a_damper_move_as_the_whole),
-        cmocka_unit_test(a_mirrored_scene_has_the_mirrored_answer),
-        cmocka_unit_test(a_storey_on_an_unmoved_one_is_a_structure_by_itself),
-        cmocka_unit_test(momentum_is_kept_by_everything_that_collides),
-        cmocka_unit_test(peaks_and_sums_are_the_largest_storeys),
-        cmocka_unit_test(a_short_pulse_costs_what_a_long_one_does),
-        cmocka_unit_test(many_held_masses_change_stops_together),
-        cmocka_unit_test(limits_and_cancelling_end_a_run_with_their_reason),
-        cmocka_unit_test(the_work_of_the_neighbour_is_counted),
-        cmocka_unit_test(small_bounces_do_not_lift_resting_masses),
-        cmocka_unit_test(masses_held_tight_wait_for_the_base_to_reach_them),
-        cmocka_unit_test(making_the_tables_of_many_coupled_storeys_is_cancelled_on_the_way),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

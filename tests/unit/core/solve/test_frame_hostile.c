@@ -1,16 +1,11 @@
 // Frames from the edges of what doubles hold: every run ends, with an answer or a reason.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
-
-#include <cmocka.h>
 
 #include "core/solve/exact.h"
 #include "core/solve/solver.h"
 #include "tests/support/frames.h"
+#include "tests/support/test.h"
 
 enum { RUNS = IMPACTD_SANITIZED ? 200 : 500 };
 
@@ -93,16 +88,14 @@ static void run_all(const Solver *solver, double steps_max, size_t *answered, si
     }
 }
 
-static void extreme_frames_end_with_an_answer_or_a_reason(void **state) {
-    (void)state;
+TEST(extreme_frames_end_with_an_answer_or_a_reason) {
     size_t answered, refused;
     run_all(NULL, 20000, &answered, &refused);
     assert_true(answered > RUNS / 5);
     assert_true(refused > RUNS / 70);
 }
 
-static void so_they_do_by_every_solver_that_steps(void **state) {
-    (void)state;
+TEST(so_they_do_by_every_solver_that_steps) {
     for (const Solver *const *solver = solvers; *solver != NULL; solver++) {
         if ((*solver)->run == NULL || *solver == &solver_exact)
             continue;
@@ -111,12 +104,4 @@ static void so_they_do_by_every_solver_that_steps(void **state) {
         assert_true(answered > RUNS / 6);
         assert_true(refused > RUNS / 70);
     }
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(extreme_frames_end_with_an_answer_or_a_reason),
-        cmocka_unit_test(so_they_do_by_every_solver_that_steps),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

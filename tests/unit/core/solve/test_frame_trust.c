@@ -1,16 +1,11 @@
 // How far a run of the general engine can be trusted, against runs whose inputs are one rounding
 // apart.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
-
-#include <cmocka.h>
 
 #include "core/solve/exact.h"
 #include "tests/support/frames.h"
+#include "tests/support/test.h"
 
 enum { STOREYS = 3, NEIGHBOURS = 4, SAMPLES = 30001 };
 
@@ -47,8 +42,7 @@ static void solve(const Choice *choice, int ulps, double *values, Response *resp
     plan_free(plan);
 }
 
-static void the_horizon_is_where_neighbours_part(void **state) {
-    (void)state;
+TEST(the_horizon_is_where_neighbours_part) {
     double *own = calloc(2 * STOREYS * SAMPLES, sizeof *own), *other = own + STOREYS * SAMPLES;
     assert_non_null(own);
     size_t parted = 0;
@@ -83,8 +77,7 @@ static void the_horizon_is_where_neighbours_part(void **state) {
     free(own);
 }
 
-static void without_dampers_only_the_phase_drifts(void **state) {
-    (void)state;
+TEST(without_dampers_only_the_phase_drifts) {
     Plan *plan = frames_new(STOREYS, 0, 10, 100);
     frames_uniform(plan, 10, 10 * 40 * 40, 0.01);
     plan->displacement[2] = 0.1;
@@ -96,12 +89,4 @@ static void without_dampers_only_the_phase_drifts(void **state) {
     assert_true(response.error_estimate > 1e-15 && response.error_estimate < 1e-12);
     response_clear(&response);
     plan_free(plan);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_horizon_is_where_neighbours_part),
-        cmocka_unit_test(without_dampers_only_the_phase_drifts),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,14 +2,10 @@
 // rotor has them. With z = x_1 + i x_2: z'' + (c - i g) z' + k z = 0.
 #include <complex.h>
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
 
 #include "core/solve/exact.h"
 #include "tests/support/frames.h"
+#include "tests/support/test.h"
 
 static const double STIFFNESS = 300, VISCOUS = 0.4, GYROSCOPIC = 9;
 
@@ -43,8 +39,7 @@ static Response run(const Plan *plan, double *x_1, double *x_2) {
     return response;
 }
 
-static void a_rotor_whirls_as_its_closed_form_does(void **state) {
-    (void)state;
+TEST(a_rotor_whirls_as_its_closed_form_does) {
     static double x_1[1001], x_2[1001];
     Plan *plan = rotor(0);
     Response response = run(plan, x_1, x_2);
@@ -61,8 +56,7 @@ static void a_rotor_whirls_as_its_closed_form_does(void **state) {
     plan_free(plan);
 }
 
-static void energy_is_kept_where_a_rotor_has_a_damper(void **state) {
-    (void)state;
+TEST(energy_is_kept_where_a_rotor_has_a_damper) {
     static double x_1[1001], x_2[1001];
     Plan *plan = rotor(1);
     frames_damper(plan, 0, 1, 0.1, 0.004, 0.6, 0.01);
@@ -71,12 +65,4 @@ static void energy_is_kept_where_a_rotor_has_a_damper(void **state) {
     assert_true(response.energy.residual < 1e-12);
     response_clear(&response);
     plan_free(plan);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_rotor_whirls_as_its_closed_form_does),
-        cmocka_unit_test(energy_is_kept_where_a_rotor_has_a_damper),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

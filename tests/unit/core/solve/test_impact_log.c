@@ -1,15 +1,10 @@
 // The energy balance as a judge: what was gained from nowhere fails the run, what was lost does
 // not.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "core/solve/impact_log.h"
+#include "tests/support/test.h"
 
 static Problem problem;
 
@@ -28,27 +23,23 @@ static Status balance(double end, double input, double gain_max) {
     return status;
 }
 
-static void a_gain_that_nothing_explains_fails_with_both_numbers(void **state) {
-    (void)state;
+TEST(a_gain_that_nothing_explains_fails_with_both_numbers) {
     assert_int_equal(balance(2.5, 0, 1e-6), STATUS_UNSTABLE);
     assert_non_null(strstr(problem.detail, "gained 0.5 J"));
     assert_non_null(strstr(problem.detail, "largest energy, 2.5 J"));
     assert_int_equal(balance(2 + 1e-5, 0, 1e-6), STATUS_UNSTABLE);
 }
 
-static void a_gain_from_the_base_is_explained(void **state) {
-    (void)state;
+TEST(a_gain_from_the_base_is_explained) {
     assert_int_equal(balance(2.5, 0.5, 1e-6), STATUS_OK);
 }
 
-static void a_loss_and_rounding_do_not_fail(void **state) {
-    (void)state;
+TEST(a_loss_and_rounding_do_not_fail) {
     assert_int_equal(balance(1, 0, 1e-6), STATUS_OK);
     assert_int_equal(balance(2 + 1e-7, 0, 1e-6), STATUS_OK);
 }
 
-static void a_gain_on_the_way_fails_even_if_it_is_lost_again(void **state) {
-    (void)state;
+TEST(a_gain_on_the_way_fails_even_if_it_is_lost_again) {
     Response response = {0};
     ImpactLog ledger;
     WorkCounters work;
@@ -63,18 +54,6 @@ static void a_gain_on_the_way_fails_even_if_it_is_lost_again(void **state) {
     response_clear(&response);
 }
 
-static void a_solver_that_does_not_ask_is_not_judged(void **state) {
-    (void)state;
+TEST(a_solver_that_does_not_ask_is_not_judged) {
     assert_int_equal(balance(20, 0, 0), STATUS_OK);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_gain_that_nothing_explains_fails_with_both_numbers),
-        cmocka_unit_test(a_gain_from_the_base_is_explained),
-        cmocka_unit_test(a_loss_and_rounding_do_not_fail),
-        cmocka_unit_test(a_gain_on_the_way_fails_even_if_it_is_lost_again),
-        cmocka_unit_test(a_solver_that_does_not_ask_is_not_judged),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

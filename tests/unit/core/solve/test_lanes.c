@@ -1,16 +1,11 @@
 // Eight samples at once against one arc after the other, and every width of vector against the
 // others.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "core/solve/lanes.h"
 #include "core/solve/motion_table.h"
+#include "tests/support/test.h"
 
 enum { COUNT_MAX = 203 };
 static const double INTERVAL = 1e-3;
@@ -56,8 +51,7 @@ static void fly(const Lanes *lanes, const State *start, double room, const doubl
     flown->count = lanes_fly(lanes, s, 0, COUNT_MAX, base);
 }
 
-static void lanes_agree_with_pieces(void **state) {
-    (void)state;
+TEST(lanes_agree_with_pieces) {
     double base[COUNT_MAX + 2];
     make_base(base);
     for (int kind = 0; kind < 6; kind++) {
@@ -111,8 +105,7 @@ static void lanes_agree_with_pieces(void **state) {
     }
 }
 
-static void no_width_of_vector_moves_a_bit(void **state) {
-    (void)state;
+TEST(no_width_of_vector_moves_a_bit) {
     double base[COUNT_MAX + 2];
     make_base(base);
     const Motion motion = structure(0.8);
@@ -135,8 +128,7 @@ static void no_width_of_vector_moves_a_bit(void **state) {
     }
 }
 
-static void lanes_end_before_a_stop(void **state) {
-    (void)state;
+TEST(lanes_end_before_a_stop) {
     const Motion motion = structure(0.8);
     Lanes lanes = {0};
     static MotionTable table;
@@ -159,22 +151,11 @@ static void lanes_end_before_a_stop(void **state) {
     }
 }
 
-static void an_interval_too_long_for_the_structure_is_refused(void **state) {
-    (void)state;
+TEST(an_interval_too_long_for_the_structure_is_refused) {
     const Motion motion = structure(0.8);
     Lanes lanes = {0};
     static MotionTable table;
     motion_table_make(&table, &motion, 0, 0.02);
     lanes_make(&lanes, &table, true, lanes_widest());
     assert_null(lanes.run);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(lanes_agree_with_pieces),
-        cmocka_unit_test(no_width_of_vector_moves_a_bit),
-        cmocka_unit_test(lanes_end_before_a_stop),
-        cmocka_unit_test(an_interval_too_long_for_the_structure_is_refused),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

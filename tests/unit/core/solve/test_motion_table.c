@@ -1,15 +1,10 @@
 // Pieces and blocks of linear motion against the dense exponential.
 #include <float.h>
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
 
 #include "core/solve/motion_table.h"
 #include "tests/support/matrix_forms.h"
+#include "tests/support/test.h"
 
 enum { X, V, R, W, A, B, SIZE };
 
@@ -77,8 +72,7 @@ static void make(MotionTable *table, const Motion *m, double omega, double rho) 
     motion_table_make(table, m, omega, rho / fmax(m->rate, omega));
 }
 
-static void a_piece_is_where_the_exponential_is(void **state) {
-    (void)state;
+TEST(a_piece_is_where_the_exponential_is) {
     const double ratios[] = {0, 0.155, 0.8, 1, 3}, omegas[] = {0, 127, 10858, 1e6};
     const Slice slices[] = {{0, 0, 0}, {1.5, -300, 0}, {0.4, 0.9, 6.28}, {-3, 2, 500}};
     const State start = {0.003, -0.2, 0.0001, 0.31};
@@ -106,8 +100,7 @@ static void a_piece_is_where_the_exponential_is(void **state) {
 }
 
 // Over a short length a state changes little: the change must have digits of its own.
-static void gains_are_exact_to_their_own_rounding(void **state) {
-    (void)state;
+TEST(gains_are_exact_to_their_own_rounding) {
     const Motion motion = contact_motion(127, 0.155);
     for (double rho = 1; rho > 1e-4; rho /= 10) {
         static MotionTable table;
@@ -125,8 +118,7 @@ static void gains_are_exact_to_their_own_rounding(void **state) {
 }
 
 // Lengths side by side against the same lengths one after the other.
-static void a_block_is_so_many_pieces(void **state) {
-    (void)state;
+TEST(a_block_is_so_many_pieces) {
     const Slice slices[] = {{0, 0, 0}, {1.5, -300, 0}, {0.4, 0.9, 6.28}};
     const Motion motion = contact_motion(127, 0.155);
     for (size_t k = 0; k < 3; k++) {
@@ -168,8 +160,7 @@ static void a_block_is_so_many_pieces(void **state) {
 }
 
 // Quadrature against exact integrals of the same motion, by the quadratic form.
-static void integrals_are_exact(void **state) {
-    (void)state;
+TEST(integrals_are_exact) {
     const Slice slices[] = {{0, 0, 0}, {1.5, -300, 0}};
     const State start = {0.003, -0.2, 0, 0.31};
     for (size_t k = 0; k < 2; k++)
@@ -215,8 +206,7 @@ static void integrals_are_exact(void **state) {
 }
 
 // Against a scan, on pieces of all kinds; also where the fast way gives up.
-static void the_first_root_is_found(void **state) {
-    (void)state;
+TEST(the_first_root_is_found) {
     uint64_t seed = 1;
     size_t found = 0;
     for (int i = 0; i < 20000; i++) {
@@ -244,15 +234,4 @@ static void the_first_root_is_found(void **state) {
             assert_true(fabs(polynomial_slope(c, 11, s)) < 0.02);
     }
     assert_true(found > 4000);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_piece_is_where_the_exponential_is),
-        cmocka_unit_test(gains_are_exact_to_their_own_rounding),
-        cmocka_unit_test(a_block_is_so_many_pieces),
-        cmocka_unit_test(integrals_are_exact),
-        cmocka_unit_test(the_first_root_is_found),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,21 +1,16 @@
 // One contact of two free bodies in the event engine has the restitution and the contact time that
 // its buffer was identified from, under every law and separation rule.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "core/contact/identification.h"
 #include "core/contact/power_law.h"
 #include "core/solve/exact.h"
 #include "tests/support/fields.h"
 #include "tests/support/scenes.h"
+#include "tests/support/test.h"
 
 static const double ratios[] = {1e-3, 0.082, 1, 10};
 
@@ -106,8 +101,7 @@ static void check(const Pair *pair, double restitution, double relative) {
     assert_true(residual < 1e-11);
 }
 
-static void linear_contacts_come_back_under_both_rules(void **state) {
-    (void)state;
+TEST(linear_contacts_come_back_under_both_rules) {
     static const double es[] = {0.02, 0.1, 0.1353352832366127, 0.2, 0.5, 0.61, 0.9, 0.99};
     static const double times[] = {0.0003, 0.025};
     worst_restitution = worst_time = 0;
@@ -122,8 +116,7 @@ static void linear_contacts_come_back_under_both_rules(void **state) {
     print_message("worst e %.1e, T_c %.1e\n", worst_restitution, worst_time);
 }
 
-static void power_laws_last_as_recorded_and_part_as_they_say(void **state) {
-    (void)state;
+TEST(power_laws_last_as_recorded_and_part_as_they_say) {
     static const double es[] = {0.02, 0.1, 0.5, 0.61, 0.9, 0.99, 1};
     static const double exponents[] = {1, 1.5, 2.5};
     for (size_t law = 0; contacts[law] != NULL; law++) {
@@ -153,8 +146,7 @@ static void power_laws_last_as_recorded_and_part_as_they_say(void **state) {
     }
 }
 
-static void hunt_and_crossleys_exact_factor_gives_the_restitution_asked_for(void **state) {
-    (void)state;
+TEST(hunt_and_crossleys_exact_factor_gives_the_restitution_asked_for) {
     static const double es[] = {0.001, 0.01, 0.05, 0.3, 0.5, 0.7, 0.9, 0.97, 0.999, 1};
     for (size_t i = 0; i < COUNT(es); i++) {
         const Pair pair = {"hunt_crossley", 0, 0.082, es[i], 0.01, NAN, 1.5, 0.7, NAN};
@@ -165,8 +157,7 @@ static void hunt_and_crossleys_exact_factor_gives_the_restitution_asked_for(void
     }
 }
 
-static void hertz_meets_its_closed_forms(void **state) {
-    (void)state;
+TEST(hertz_meets_its_closed_forms) {
     const double k = 1e6, v0 = 0.4, m_e = contact_effective_mass(1.35, 0.0135);
     const Pair pair = {"hertz", 0, 0.01, NAN, NAN, k, NAN, v0, NAN};
     Derived derived;
@@ -180,8 +171,7 @@ static void hertz_meets_its_closed_forms(void **state) {
     assert_true(fabs(impact.energy_lost) < 1e-11 * m_e * v0 * v0);
 }
 
-static void losses_are_those_of_the_speeds(void **state) {
-    (void)state;
+TEST(losses_are_those_of_the_speeds) {
     const double m_e = contact_effective_mass(1.35, 0.1 * 1.35);
     for (size_t law = 0; contacts[law] != NULL; law++) {
         if (contacts[law]->form != CONTACT_POWER || contacts[law]->factor == NULL)
@@ -198,8 +188,7 @@ static void losses_are_those_of_the_speeds(void **state) {
 
 // Each impact of a run has the table's values at its own approach speed. Two free bodies meet again
 // and again, slower each time.
-static void impacts_keep_to_the_table_at_their_speed(void **state) {
-    (void)state;
+TEST(impacts_keep_to_the_table_at_their_speed) {
     static const char *const models[] = {"spring_damper", "hunt_crossley", "impulse"};
     for (size_t i = 0; i < COUNT(models); i++) {
         const Pair pair = {models[i], 0, 0.5, NAN, NAN, NAN, NAN, 1, NAN};
@@ -232,8 +221,7 @@ static void impacts_keep_to_the_table_at_their_speed(void **state) {
     }
 }
 
-static void a_rigs_contact_is_that_of_its_masses(void **state) {
-    (void)state;
+TEST(a_rigs_contact_is_that_of_its_masses) {
     for (int rule = 0; rule < 2; rule++) {
         const Pair pair = {"spring_damper", rule, 0.082, 0.61, 0.025, NAN, NAN, 0.3, 0.3};
         Derived derived;
@@ -261,8 +249,7 @@ static void a_rigs_contact_is_that_of_its_masses(void **state) {
 }
 
 // Hertz with n = 1 is a spring without damping, whose motion is exact in the linear engine.
-static void a_linear_power_law_moves_as_a_spring(void **state) {
-    (void)state;
+TEST(a_linear_power_law_moves_as_a_spring) {
     Response responses[2];
     memset(responses, 0, sizeof responses);
     for (int power = 0; power < 2; power++) {
@@ -292,18 +279,4 @@ static void a_linear_power_law_moves_as_a_spring(void **state) {
     }
     response_clear(&responses[0]);
     response_clear(&responses[1]);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(linear_contacts_come_back_under_both_rules),
-        cmocka_unit_test(power_laws_last_as_recorded_and_part_as_they_say),
-        cmocka_unit_test(hunt_and_crossleys_exact_factor_gives_the_restitution_asked_for),
-        cmocka_unit_test(hertz_meets_its_closed_forms),
-        cmocka_unit_test(losses_are_those_of_the_speeds),
-        cmocka_unit_test(impacts_keep_to_the_table_at_their_speed),
-        cmocka_unit_test(a_rigs_contact_is_that_of_its_masses),
-        cmocka_unit_test(a_linear_power_law_moves_as_a_spring),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,17 +1,12 @@
 // Taylor series of a contact under a power law: their coefficients, their convergence, and the
 // error of a whole contact of two free bodies against closed forms, over the tolerance.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "core/solve/engine.h"
 #include "tests/support/frames.h"
+#include "tests/support/test.h"
 
 static Problem problem;
 
@@ -77,8 +72,7 @@ static double unit_of(double exponent) {
     return pow(0.5, 1 / (exponent + 1));
 }
 
-static void roots_make_exponents_whole(void **state) {
-    (void)state;
+TEST(roots_make_exponents_whole) {
     static const struct {
         double exponent, viscous;
         int root;
@@ -111,8 +105,7 @@ static void roots_make_exponents_whole(void **state) {
 
 // At the touch N ~ t^(3/2) has no third derivative in time. In transformed time the coefficients
 // still fall at a constant rate, as those of an analytic function.
-static void the_motion_is_smooth_at_the_touch(void **state) {
-    (void)state;
+TEST(the_motion_is_smooth_at_the_touch) {
     Pair pair;
     pair_make(&pair, &contact_hertz, 1.5, 0, POWER_CONTACT_TOLERANCE);
     const Slice still = {0, 0, 0};
@@ -134,8 +127,7 @@ static void the_motion_is_smooth_at_the_touch(void **state) {
     pair_clear(&pair);
 }
 
-static void a_contact_takes_few_steps_and_ends_as_it_should(void **state) {
-    (void)state;
+TEST(a_contact_takes_few_steps_and_ends_as_it_should) {
     static const double exponents[] = {1, 4.0 / 3, 1.37, 1.5, 2, 2.5, 3};
     for (size_t l = 0; contacts[l] != NULL; l++)
         for (size_t i = 0; i < COUNT(exponents) && contacts[l]->form == CONTACT_POWER; i++) {
@@ -158,8 +150,7 @@ static void a_contact_takes_few_steps_and_ends_as_it_should(void **state) {
 
 // The error at the end of a contact is below the tolerance, and a larger tolerance needs fewer
 // steps.
-static void a_contact_keeps_its_tolerance(void **state) {
-    (void)state;
+TEST(a_contact_keeps_its_tolerance) {
     static const double exponents[] = {1, 1.37, 1.5, 2, 3};
     double worst = 0;
     for (size_t l = 0; contacts[l] != NULL; l++)
@@ -188,8 +179,7 @@ static void a_contact_keeps_its_tolerance(void **state) {
 
 // With a fixed order half the step divides the error of a contact by 2^order, as for any smooth
 // motion, though N is not smooth in time at its start and end.
-static void the_order_is_integer_over_a_whole_contact(void **state) {
-    (void)state;
+TEST(the_order_is_integer_over_a_whole_contact) {
     static const size_t orders[] = {8, 12};
     for (size_t i = 0; i < COUNT(orders); i++) {
         double error[2];
@@ -239,8 +229,7 @@ static void the_order_is_integer_over_a_whole_contact(void **state) {
 }
 
 // A constant acceleration presses the mass into the buffer from rest.
-static void a_mass_without_speed_is_pressed_in(void **state) {
-    (void)state;
+TEST(a_mass_without_speed_is_pressed_in) {
     static const double exponents[] = {1, 1.37, 1.5, 2.2};
     for (size_t i = 0; i < COUNT(exponents); i++) {
         Pair pair;
@@ -271,16 +260,4 @@ static void a_mass_without_speed_is_pressed_in(void **state) {
         assert_true(deepest > 0.5 * pow(1e-3 / 2 * (n + 1), 1 / n));
         pair_clear(&pair);
     }
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(roots_make_exponents_whole),
-        cmocka_unit_test(the_motion_is_smooth_at_the_touch),
-        cmocka_unit_test(a_contact_takes_few_steps_and_ends_as_it_should),
-        cmocka_unit_test(a_contact_keeps_its_tolerance),
-        cmocka_unit_test(the_order_is_integer_over_a_whole_contact),
-        cmocka_unit_test(a_mass_without_speed_is_pressed_in),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

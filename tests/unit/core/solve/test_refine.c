@@ -1,20 +1,15 @@
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 
-#include <cmocka.h>
 
 #include <math.h>
 
 #include "core/solve/base_motion_cursor.h"
 #include "tests/support/base_at.h"
+#include "tests/support/test.h"
 
 static double given[4] = {1, -2, 0.5, 4};
 static const Base coarse = {.form = BASE_SAMPLED, .values = given, .count = 4, .interval = 0.005};
 
-static void a_refined_base_goes_through_the_same_points(void **state) {
-    (void)state;
+TEST(a_refined_base_goes_through_the_same_points) {
     double values[16];
     assert_int_equal(base_cursor_refined_count(&coarse, 1000, 100), 16);
     Base fine;
@@ -26,8 +21,7 @@ static void a_refined_base_goes_through_the_same_points(void **state) {
         assert_true(fine.values[5 * i] == given[i]);
 }
 
-static void a_short_run_takes_no_more_than_it_sees(void **state) {
-    (void)state;
+TEST(a_short_run_takes_no_more_than_it_sees) {
     double values[9];
     assert_int_equal(base_cursor_refined_count(&coarse, 1000, 7), 9);
     Base fine;
@@ -41,8 +35,7 @@ static bool stop_at_third(void *context, double fraction) {
 }
 
 // Also within one interval of the base, which may be as long as the run.
-static void a_long_one_stops_soon_when_it_is_told_to(void **state) {
-    (void)state;
+TEST(a_long_one_stops_soon_when_it_is_told_to) {
     enum { MANY = 1 << 22 };
     double *values = test_calloc(MANY, sizeof *values);
     assert_non_null(values);
@@ -65,22 +58,11 @@ static void a_long_one_stops_soon_when_it_is_told_to(void **state) {
     test_free(values);
 }
 
-static void other_grids_are_left_alone(void **state) {
-    (void)state;
+TEST(other_grids_are_left_alone) {
     const Base still = {.form = BASE_STILL};
     assert_int_equal(base_cursor_refined_count(&coarse, 200, 100), 0); // the same grid
     assert_int_equal(base_cursor_refined_count(&coarse, 100, 100), 0); // a coarser one
     assert_int_equal(base_cursor_refined_count(&coarse, 300, 100),
                      0); // no whole number of times as fine
     assert_int_equal(base_cursor_refined_count(&still, 1000, 100), 0);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_refined_base_goes_through_the_same_points),
-        cmocka_unit_test(a_short_run_takes_no_more_than_it_sees),
-        cmocka_unit_test(a_long_one_stops_soon_when_it_is_told_to),
-        cmocka_unit_test(other_grids_are_left_alone),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,20 +1,14 @@
 // The maps of a small error against closed forms and matrix exponentials, and the horizon against
 // the parting of runs whose inputs are one rounding apart.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "core/excitation/excitation.h"
-#include "core/math/fft.h"
 #include "core/solve/rounding_growth.h"
 #include "tests/support/matrix_forms.h"
 #include "tests/support/paper.h"
+#include "tests/support/test.h"
 
 static const double RESTITUTION = 0.46, CONTACT_TIME = 0.0003, PI = 3.141592653589793;
 // So large that neither roundings nor limits are seen beside errors of about 1.
@@ -85,8 +79,7 @@ static void assert_isolated(const RoundingGrowth *trust, double after, double la
     assert_errors(trust, centre - share * left_r, v + share * (w - left_w), left_r, left_w, 2e-4);
 }
 
-static void an_impulse_changes_an_error_as_two_free_bodies_do(void **state) {
-    (void)state;
+TEST(an_impulse_changes_an_error_as_two_free_bodies_do) {
     RoundingGrowth *trust = trust_make(0, 0, 0);
     seed(trust, 0.3, -0.7, 0.9, 0.4);
     fly(trust, 0.25);
@@ -96,8 +89,7 @@ static void an_impulse_changes_an_error_as_two_free_bodies_do(void **state) {
     free(trust);
 }
 
-static void a_contact_changes_an_error_as_two_free_bodies_do(void **state) {
-    (void)state;
+TEST(a_contact_changes_an_error_as_two_free_bodies_do) {
     static const double times[] = {CONTACT_TIME, 0.025, 0.4};
     for (size_t i = 0; i < COUNT(times); i++) {
         RoundingGrowth *trust = trust_make(0, 0, times[i]);
@@ -111,8 +103,7 @@ static void a_contact_changes_an_error_as_two_free_bodies_do(void **state) {
 }
 
 // A mass that is thrown at a stop which pushes with s: its energy error stays, but for e^2.
-static void a_late_bounce_meets_another_speed(void **state) {
-    (void)state;
+TEST(a_late_bounce_meets_another_speed) {
     RoundingGrowth *trust = trust_make(0, 0, 0);
     trust->systems[GROWTH_FLIGHT].motion.share = 0;
     const double r = 1e-3, w = 0.3, push = 4;
@@ -125,8 +116,7 @@ static void a_late_bounce_meets_another_speed(void **state) {
     free(trust);
 }
 
-static void a_contact_of_any_length_follows_its_system(void **state) {
-    (void)state;
+TEST(a_contact_of_any_length_follows_its_system) {
     static const double lengths[] = {1e-9, 0.00007, 0.0003, 0.0071, 0.33, 4.5};
     const Motion m = motion_of(865, 1.092, CONTACT_TIME);
     const long double c = m.contact_damping, k = m.contact_omega2, d = m.damping, o = m.omega2,
@@ -156,8 +146,7 @@ static void a_contact_of_any_length_follows_its_system(void **state) {
     }
 }
 
-static void a_rest_forgets_the_relative_error_and_keeps_the_momentum(void **state) {
-    (void)state;
+TEST(a_rest_forgets_the_relative_error_and_keeps_the_momentum) {
     RoundingGrowth *trust = trust_make(865, 1.092, 0);
     seed(trust, 0.3, -0.7, 0.9, 0.4);
     rounding_growth_stick(trust);
@@ -221,8 +210,7 @@ static double parting(const Outcome *outcome, const PaperBuffer *buffer, int kin
     return first == SIZE_MAX ? INFINITY : (double)first / 1000;
 }
 
-static void the_horizon_is_where_neighbours_part(void **state) {
-    (void)state;
+TEST(the_horizon_is_where_neighbours_part) {
     static const double levels[] = {0.3, 1};
     size_t parted = 0;
     for (size_t buffer = 0; buffer < COUNT(paper_buffers); buffer++)
@@ -248,8 +236,7 @@ static void the_horizon_is_where_neighbours_part(void **state) {
     assert_true(parted >= 10);
 }
 
-static void a_free_vibration_is_trusted_to_its_end(void **state) {
-    (void)state;
+TEST(a_free_vibration_is_trusted_to_its_end) {
     for (size_t i = 0; i < COUNT(paper_buffers); i++) {
         Simulation simulation;
         paper_scene(&simulation, paper_buffers[i].restitution, paper_buffers[i].contact_time, 10);
@@ -262,8 +249,7 @@ static void a_free_vibration_is_trusted_to_its_end(void **state) {
     }
 }
 
-static void without_a_damper_only_the_phase_drifts(void **state) {
-    (void)state;
+TEST(without_a_damper_only_the_phase_drifts) {
     Simulation simulation;
     paper_scene(&simulation, 0.5, 0.01, 60);
     simulation.scene.dampers.count = 0;
@@ -275,8 +261,7 @@ static void without_a_damper_only_the_phase_drifts(void **state) {
     outcome_unref(outcome);
 }
 
-static void what_does_not_move_has_no_error(void **state) {
-    (void)state;
+TEST(what_does_not_move_has_no_error) {
     Simulation simulation;
     paper_scene(&simulation, 0.5, 0.01, 1);
     paper_free(&simulation, 0);
@@ -284,20 +269,4 @@ static void what_does_not_move_has_no_error(void **state) {
     assert_true(isnan(outcome->summary.trust_horizon));
     assert_true(outcome->summary.error_estimate == 0);
     outcome_unref(outcome);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(an_impulse_changes_an_error_as_two_free_bodies_do),
-        cmocka_unit_test(a_contact_changes_an_error_as_two_free_bodies_do),
-        cmocka_unit_test(a_late_bounce_meets_another_speed),
-        cmocka_unit_test(a_contact_of_any_length_follows_its_system),
-        cmocka_unit_test(a_rest_forgets_the_relative_error_and_keeps_the_momentum),
-        cmocka_unit_test(the_horizon_is_where_neighbours_part),
-        cmocka_unit_test(a_free_vibration_is_trusted_to_its_end),
-        cmocka_unit_test(without_a_damper_only_the_phase_drifts),
-        cmocka_unit_test(what_does_not_move_has_no_error),
-    };
-    fft_start();
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,14 +1,9 @@
 // Loops over modes against plain ones, and every width of vector against the others.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "core/solve/simd_kernels.h"
+#include "tests/support/test.h"
 
 enum { MODES = 21, PADDED = 24, COUNT_MAX = 7, ROWS = COUNT_MAX + 1, COLUMNS = 6, LARGE = 72 };
 
@@ -98,8 +93,7 @@ static void near(double value, double wanted) {
     assert_true(fabs(value - wanted) < 1e-14);
 }
 
-static void rows_are_what_plain_loops_make_of_them(void **state) {
-    (void)state;
+TEST(rows_are_what_plain_loops_make_of_them) {
     static Given given;
     static Results got;
     make(&given);
@@ -148,8 +142,7 @@ static void rows_are_what_plain_loops_make_of_them(void **state) {
     }
 }
 
-static void job_metrics_are_what_plain_loops_make_of_them(void **state) {
-    (void)state;
+TEST(job_metrics_are_what_plain_loops_make_of_them) {
     static Given given;
     static Results got;
     make(&given);
@@ -179,8 +172,7 @@ static void job_metrics_are_what_plain_loops_make_of_them(void **state) {
     }
 }
 
-static void all_widths_give_the_same_bytes(void **state) {
-    (void)state;
+TEST(all_widths_give_the_same_bytes) {
     static Given given;
     static Results plain, wide;
     make(&given);
@@ -189,13 +181,4 @@ static void all_widths_give_the_same_bytes(void **state) {
         solve(&given, &simd_kernels_kinds[kind], &wide);
         assert_memory_equal(&plain, &wide, sizeof plain);
     }
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(rows_are_what_plain_loops_make_of_them),
-        cmocka_unit_test(job_metrics_are_what_plain_loops_make_of_them),
-        cmocka_unit_test(all_widths_give_the_same_bytes),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

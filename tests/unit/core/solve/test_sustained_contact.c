@@ -1,17 +1,12 @@
 // Contacts that go by whole intervals against the same ones by arcs alone: that is how stops go
 // whose parameters depend on the approach speed, here in name only.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
-
-#include <cmocka.h>
 
 #include "core/contact/contact.h"
 #include "core/solve/exact.h"
 #include "tests/support/frames.h"
+#include "tests/support/test.h"
 
 enum { STOREYS = 3, DAMPERS = 2, SAMPLES = 2001 };
 
@@ -100,8 +95,7 @@ static void near(double a, double b, double tolerance) {
         fail_msg("%.17g is not %.17g to %.2g", a, b, tolerance);
 }
 
-static void whole_intervals_of_contact_agree_with_arcs(void **state) {
-    (void)state;
+TEST(whole_intervals_of_contact_agree_with_arcs) {
     for (size_t c = 0; c < COUNT(choices); c += IMPACTD_SANITIZED ? 2 : 1) {
         Solved whole = solve(&choices[c], false), arcs = solve(&choices[c], true);
         const Peaks *peaks = &arcs.response.peaks;
@@ -130,11 +124,4 @@ static void whole_intervals_of_contact_agree_with_arcs(void **state) {
         drop(&whole);
         drop(&arcs);
     }
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(whole_intervals_of_contact_agree_with_arcs),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

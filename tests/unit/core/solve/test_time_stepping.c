@@ -1,20 +1,15 @@
 // The solvers that step: order of each where theory has one, the first order across contacts, every
 // law and rule against the exact solver, honest estimates, and how they stop.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "core/solve/solver.h"
 #include "core/solve/time_stepping.h"
 #include "tests/support/frames.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
+#include "tests/support/test.h"
 
 enum { EVERY = IMPACTD_SANITIZED ? 8 : 1 }; // of the cases
 
@@ -94,8 +89,7 @@ static Plan *swinging_frame(bool is_whirling) {
     return plan;
 }
 
-static void between_contacts_errors_are_of_the_methods_order(void **state) {
-    (void)state;
+TEST(between_contacts_errors_are_of_the_methods_order) {
     const double orders[] = {2, 4, 2}; // of precise with a base that is a sine
     const Base sine = {.form = BASE_SINE, .amplitude = 1, .omega = 12};
     for (size_t i = 0; i < 2 * COUNT(fixed); i++) {
@@ -114,8 +108,7 @@ static void between_contacts_errors_are_of_the_methods_order(void **state) {
     }
 }
 
-static void between_contacts_energy_is_right_to_the_methods_order(void **state) {
-    (void)state;
+TEST(between_contacts_energy_is_right_to_the_methods_order) {
     const double orders[] = {4, 4, 2};
     const Base sine = {.form = BASE_SINE, .amplitude = 1, .omega = 12};
     for (size_t i = 0; i < 2 * COUNT(fixed); i++) {
@@ -134,8 +127,7 @@ static void between_contacts_energy_is_right_to_the_methods_order(void **state) 
     }
 }
 
-static void precise_is_exact_where_the_base_is_linear_in_a_step(void **state) {
-    (void)state;
+TEST(precise_is_exact_where_the_base_is_linear_in_a_step) {
     Plan *plan = swinging_frame(true);
     double values[201];
     for (size_t i = 0; i < COUNT(values); i++)
@@ -157,8 +149,7 @@ static double envelope(const Solver *solver, const Plan *plan, double parts) {
     return worst;
 }
 
-static void across_a_contact_errors_are_of_first_order(void **state) {
-    (void)state;
+TEST(across_a_contact_errors_are_of_first_order) {
     Plan *plan = frames_new(1, 1, 0.15, 200);
     frames_shear(plan, (double[]){1.35}, (double[]){865}, (double[]){1.092});
     frames_damper(plan, 0, 0, 0.1107, 0.015, 0.61, 0.025);
@@ -240,8 +231,7 @@ static const struct {
     {&solver_adaptive, 1e-9, 3e-7, 1.2, 1e-7},
 };
 
-static void every_solver_comes_to_the_exact_ones_answer(void **state) {
-    (void)state;
+TEST(every_solver_comes_to_the_exact_ones_answer) {
     for (size_t k = 0; k < COUNT(allowances); k++) {
         const Solver *solver = allowances[k].solver;
         for (size_t i = 0; i < COUNT(scenes); i += EVERY) {
@@ -278,8 +268,7 @@ static Plan *frame_with_dampers(bool is_impulse, Separation separation) {
     return plan;
 }
 
-static void frames_of_many_dampers_come_to_the_exact_answer(void **state) {
-    (void)state;
+TEST(frames_of_many_dampers_come_to_the_exact_answer) {
     const Base sine = {.form = BASE_SINE, .amplitude = 2, .omega = 17};
     for (int i = 0; i < (IMPACTD_SANITIZED ? 1 : 3); i++) {
         Plan *plan = frame_with_dampers(i == 1, i == 2 ? SEPARATION_ZERO_FORCE
@@ -298,8 +287,7 @@ static void frames_of_many_dampers_come_to_the_exact_answer(void **state) {
 }
 
 // A base that pulls evenly presses the mass to a stop, on which it bounces and comes to rest.
-static void a_pushed_mass_bounces_and_rests(void **state) {
-    (void)state;
+TEST(a_pushed_mass_bounces_and_rests) {
     const double values[] = {3, 3, 3};
     const Base pull = {
         .form = BASE_SAMPLED, .values = (double *)(uintptr_t)values, .count = 3, .interval = 2};
@@ -333,8 +321,7 @@ static void a_pushed_mass_bounces_and_rests(void **state) {
     plan_free(plan);
 }
 
-static void stops_without_clearance_hold_the_mass(void **state) {
-    (void)state;
+TEST(stops_without_clearance_hold_the_mass) {
     Plan *plan = frames_new(1, 1, 2, 500);
     frames_shear(plan, (double[]){2}, (double[]){2000}, (double[]){2});
     frames_damper(plan, 0, 0, 0.5, 0, 0.5, NAN);
@@ -349,8 +336,7 @@ static void stops_without_clearance_hold_the_mass(void **state) {
 }
 
 // A mass that leaves one buffer is in the other one at once.
-static void buffers_without_room_between_them_serve_too(void **state) {
-    (void)state;
+TEST(buffers_without_room_between_them_serve_too) {
     const Base sine = {.form = BASE_SINE, .amplitude = 2, .omega = 9};
     for (int i = 0; i < 2; i++) {
         Plan *plan = frames_new(1, 1, 1, 500);
@@ -382,8 +368,7 @@ static void check_adaptive_estimates(const Plan *plan, const Base *base) {
 }
 
 // Nothing has moved before, so that the first difference of the two runs is larger than the motion.
-static void a_first_touch_at_a_sample_leaves_the_estimate_honest(void **state) {
-    (void)state;
+TEST(a_first_touch_at_a_sample_leaves_the_estimate_honest) {
     Plan *plan = frames_new(1, 1, 1, 1000);
     frames_shear(plan, (double[]){1.35}, (double[]){865}, (double[]){1.092});
     frames_damper(plan, 0, 0, 0.1107, 0.01, 0.9, 0.003);
@@ -393,8 +378,7 @@ static void a_first_touch_at_a_sample_leaves_the_estimate_honest(void **state) {
 }
 
 // Kinks limit the steps of both runs more than tolerance and sample interval do.
-static void kinks_of_the_base_leave_the_estimate_honest(void **state) {
-    (void)state;
+TEST(kinks_of_the_base_leave_the_estimate_honest) {
     double values[4000];
     for (size_t i = 0; i < COUNT(values); i++)
         values[i] = 0.3 * sin(2e-6 * (double)(i * i));
@@ -408,8 +392,7 @@ static void kinks_of_the_base_leave_the_estimate_honest(void **state) {
     plan_free(plan);
 }
 
-static void simultaneous_contacts_of_equal_dampers_end_together(void **state) {
-    (void)state;
+TEST(simultaneous_contacts_of_equal_dampers_end_together) {
     const Base sine = {.form = BASE_SINE, .amplitude = 2, .omega = 17};
     Plan *plan = frames_new(3, 4, 1, 100);
     frames_uniform(plan, 10, 10 * 40 * 40, 0.02);
@@ -419,8 +402,7 @@ static void simultaneous_contacts_of_equal_dampers_end_together(void **state) {
     plan_free(plan);
 }
 
-static void rests_on_one_storey_end_together(void **state) {
-    (void)state;
+TEST(rests_on_one_storey_end_together) {
     const Base sine = {.form = BASE_SINE, .amplitude = 5, .omega = 14.5};
     Plan *plan = frames_new(1, 2, 0.6, 500);
     frames_uniform(plan, 2, 800, 0.0125);
@@ -435,8 +417,7 @@ static void rests_on_one_storey_end_together(void **state) {
 
 // Runs with steps of twice the length may be late by the same time: that must not be taken for
 // none.
-static void few_impacts_are_not_taken_for_exact(void **state) {
-    (void)state;
+TEST(few_impacts_are_not_taken_for_exact) {
     for (int i = 0; i < 40; i += EVERY) {
         Plan *plan = frames_new(1, 1, 0.2, 1000);
         frames_shear(plan, (double[]){2}, (double[]){2000}, (double[]){2});
@@ -452,8 +433,7 @@ static void few_impacts_are_not_taken_for_exact(void **state) {
     }
 }
 
-static void a_step_that_cannot_be_stable_is_told(void **state) {
-    (void)state;
+TEST(a_step_that_cannot_be_stable_is_told) {
     Plan *plan = frames_new(1, 1, 2, 1000);
     frames_shear(plan, (double[]){1.35}, (double[]){865}, (double[]){1.092});
     frames_damper(plan, 0, 0, 0.1107, 0.015, 0.46, 0.0003);
@@ -477,8 +457,7 @@ static void a_step_that_cannot_be_stable_is_told(void **state) {
 
 // The paper's own 1 ms: 169 impacts too many in 10 s, and every number of the run says that it is
 // wrong.
-static void precise_at_a_millisecond_is_wrong_and_says_so(void **state) {
-    (void)state;
+TEST(precise_at_a_millisecond_is_wrong_and_says_so) {
     const Case aluminium = {"spring_damper", false, 0.46, 0.0003, 0, 10};
     Outcome *exact = run_scene(&aluminium, &solver_exact, 0);
     Outcome *other = run_scene(&aluminium, &solver_precise, 1e-3);
@@ -501,8 +480,7 @@ static const Decision *decision(const Outcome *outcome, const char *about) {
     return NULL;
 }
 
-static void the_plan_says_which_step_and_why(void **state) {
-    (void)state;
+TEST(the_plan_says_which_step_and_why) {
     const Case aluminium = {"spring_damper", false, 0.46, 0.0003, 0, 0.1};
     const struct {
         double asked, step;
@@ -526,8 +504,7 @@ static void the_plan_says_which_step_and_why(void **state) {
     outcome_unref(outcome);
 }
 
-static void what_a_run_costs_is_foretold(void **state) {
-    (void)state;
+TEST(what_a_run_costs_is_foretold) {
     const Base sine = {.form = BASE_SINE, .amplitude = 2, .omega = 17};
     for (const Solver *const *at = solvers; *at != NULL; at++) {
         const Solver *solver = *at;
@@ -563,8 +540,7 @@ static bool look(void *context, double fraction) {
     return ++watcher->looks < watcher->stops_at;
 }
 
-static void runs_stop_when_told_or_at_a_limit(void **state) {
-    (void)state;
+TEST(runs_stop_when_told_or_at_a_limit) {
     const Base sine = {.form = BASE_SINE, .amplitude = 2, .omega = 17};
     Plan *plan = frame_with_dampers(false, SEPARATION_ZERO_PENETRATION);
     for (const Solver *const *at = solvers; *at != NULL; at++) {
@@ -603,8 +579,7 @@ static void runs_stop_when_told_or_at_a_limit(void **state) {
     plan_free(plan);
 }
 
-static void the_same_run_gives_the_same_bytes(void **state) {
-    (void)state;
+TEST(the_same_run_gives_the_same_bytes) {
     const Base sine = {.form = BASE_SINE, .amplitude = 2, .omega = 17};
     Plan *plan = frame_with_dampers(false, SEPARATION_ZERO_FORCE);
     for (const Solver *const *at = solvers; *at != NULL; at++) {
@@ -624,8 +599,7 @@ static void the_same_run_gives_the_same_bytes(void **state) {
     plan_free(plan);
 }
 
-static void precise_refuses_power_laws(void **state) {
-    (void)state;
+TEST(precise_refuses_power_laws) {
     const Case hertz = {"hertz", false, 1, 0.01, 0, 1};
     Simulation simulation;
     make_scene(&hertz, &simulation);
@@ -635,31 +609,4 @@ static void precise_refuses_power_laws(void **state) {
     assert_string_equal(problem.faults[0].pointer, "/accuracy/solver");
     assert_non_null(strstr(problem.faults[0].detail, "hertz"));
     simulation_clear(&simulation);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(between_contacts_errors_are_of_the_methods_order),
-        cmocka_unit_test(between_contacts_energy_is_right_to_the_methods_order),
-        cmocka_unit_test(precise_is_exact_where_the_base_is_linear_in_a_step),
-        cmocka_unit_test(across_a_contact_errors_are_of_first_order),
-        cmocka_unit_test(every_solver_comes_to_the_exact_ones_answer),
-        cmocka_unit_test(frames_of_many_dampers_come_to_the_exact_answer),
-        cmocka_unit_test(a_pushed_mass_bounces_and_rests),
-        cmocka_unit_test(stops_without_clearance_hold_the_mass),
-        cmocka_unit_test(buffers_without_room_between_them_serve_too),
-        cmocka_unit_test(a_first_touch_at_a_sample_leaves_the_estimate_honest),
-        cmocka_unit_test(kinks_of_the_base_leave_the_estimate_honest),
-        cmocka_unit_test(simultaneous_contacts_of_equal_dampers_end_together),
-        cmocka_unit_test(rests_on_one_storey_end_together),
-        cmocka_unit_test(few_impacts_are_not_taken_for_exact),
-        cmocka_unit_test(a_step_that_cannot_be_stable_is_told),
-        cmocka_unit_test(precise_at_a_millisecond_is_wrong_and_says_so),
-        cmocka_unit_test(the_plan_says_which_step_and_why),
-        cmocka_unit_test(what_a_run_costs_is_foretold),
-        cmocka_unit_test(runs_stop_when_told_or_at_a_limit),
-        cmocka_unit_test(the_same_run_gives_the_same_bytes),
-        cmocka_unit_test(precise_refuses_power_laws),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,9 +1,4 @@
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 
-#include <cmocka.h>
 
 #include <math.h>
 #include <stdlib.h>
@@ -11,11 +6,11 @@
 
 #include "core/base/canonical.h"
 #include "core/excitation/excitation.h"
-#include "core/math/fft.h"
 #include "core/study/ensemble.h"
 #include "core/study/study.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
+#include "tests/support/test.h"
 
 static Problem problem;
 
@@ -56,8 +51,7 @@ static Ensemble *make(const StudyRequest *inquiry, const SimulationLimits *limit
     return answer;
 }
 
-static void each_row_is_the_scene_with_its_seed(void **state) {
-    (void)state;
+TEST(each_row_is_the_scene_with_its_seed) {
     StudyRequest inquiry = study_request_make(4, 5);
     complete(&inquiry);
     assert_int_equal(study_of(&inquiry)->first_seed, 5); // the scene's own
@@ -87,8 +81,7 @@ static void each_row_is_the_scene_with_its_seed(void **state) {
     study_request_clear(&inquiry);
 }
 
-static void a_target_ends_it_and_looser_ones_end_it_sooner(void **state) {
-    (void)state;
+TEST(a_target_ends_it_and_looser_ones_end_it_sooner) {
     static const double targets[] = {0.5, 0.1, 1e-9};
     StudyRequest inquiry = study_request_make(4, 60);
     double made[COUNT(targets)];
@@ -111,8 +104,7 @@ static void a_target_ends_it_and_looser_ones_end_it_sooner(void **state) {
     study_request_clear(&inquiry);
 }
 
-static void all_are_made_where_none_differs(void **state) {
-    (void)state;
+TEST(all_are_made_where_none_differs) {
     StudyRequest inquiry = study_request_make(1, 30);
     study_of(&inquiry)->target = 0.5;
     study_of(&inquiry)->metric = STATISTICS_IMPACTS;
@@ -127,8 +119,7 @@ static void all_are_made_where_none_differs(void **state) {
     study_request_clear(&inquiry);
 }
 
-static void a_seed_that_fails_is_a_row_with_its_reason(void **state) {
-    (void)state;
+TEST(a_seed_that_fails_is_a_row_with_its_reason) {
     StudyRequest inquiry = study_request_make(4, 20);
     complete(&inquiry);
     Ensemble *whole = make(&inquiry, NULL);
@@ -156,8 +147,7 @@ static void a_seed_that_fails_is_a_row_with_its_reason(void **state) {
     study_request_clear(&inquiry);
 }
 
-static void where_all_fail_the_study_says_so_and_nothing_else(void **state) {
-    (void)state;
+TEST(where_all_fail_the_study_says_so_and_nothing_else) {
     StudyRequest inquiry = study_request_make(4, 10);
     study_of(&inquiry)->target = 0.1;
     complete(&inquiry);
@@ -171,8 +161,7 @@ static void where_all_fail_the_study_says_so_and_nothing_else(void **state) {
     study_request_clear(&inquiry);
 }
 
-static void what_is_not_known_is_not_told(void **state) {
-    (void)state;
+TEST(what_is_not_known_is_not_told) {
     StudyRequest inquiry = study_request_make(2, 3);
     paper_model(&inquiry.simulation, "impulse");
     paper_no_psd(&inquiry.simulation);
@@ -198,8 +187,7 @@ static bool lose(void *context, double fraction) {
     return patience->left-- > 0;
 }
 
-static void it_tells_its_progress_and_can_be_stopped_wherever_it_is(void **state) {
-    (void)state;
+TEST(it_tells_its_progress_and_can_be_stopped_wherever_it_is) {
     StudyRequest inquiry = study_request_make(1, 40);
     study_of(&inquiry)->target = 0.1;
     complete(&inquiry);
@@ -233,8 +221,7 @@ static void take(void *context, const void *bytes, size_t size) {
     taken->count += size;
 }
 
-static void the_same_study_has_the_same_bytes_in_any_workspace(void **state) {
-    (void)state;
+TEST(the_same_study_has_the_same_bytes_in_any_workspace) {
     StudyRequest inquiry = study_request_make(3, 20);
     study_of(&inquiry)->target = 0.08;
     study_of(&inquiry)->metric = STATISTICS_PSD;
@@ -266,8 +253,7 @@ static void assert_refused(StudyRequest *inquiry, const SimulationLimits *limits
     study_request_clear(inquiry);
 }
 
-static void what_cannot_be_answered_is_refused(void **state) {
-    (void)state;
+TEST(what_cannot_be_answered_is_refused) {
     StudyRequest inquiry = study_request_make(1, 20);
     paper_free(&inquiry.simulation, 0.015);
     assert_refused(&inquiry, NULL, "/study/kind", "must be random, is free");
@@ -298,8 +284,7 @@ static void what_cannot_be_answered_is_refused(void **state) {
     assert_refused(&inquiry, &limits, "/study", "at most 0.03 s are allowed: ask for fewer runs");
 }
 
-static void a_metric_without_a_target_is_left_out(void **state) {
-    (void)state;
+TEST(a_metric_without_a_target_is_left_out) {
     StudyRequest inquiry = study_request_make(1, 20);
     study_of(&inquiry)->metric = STATISTICS_PSD;
     complete(&inquiry);
@@ -308,21 +293,4 @@ static void a_metric_without_a_target_is_left_out(void **state) {
     complete(&inquiry);
     assert_int_equal(study_of(&inquiry)->metric, STATISTICS_RMS_DISPLACEMENT);
     study_request_clear(&inquiry);
-}
-
-int main(void) {
-    fft_start();
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(each_row_is_the_scene_with_its_seed),
-        cmocka_unit_test(a_target_ends_it_and_looser_ones_end_it_sooner),
-        cmocka_unit_test(all_are_made_where_none_differs),
-        cmocka_unit_test(a_seed_that_fails_is_a_row_with_its_reason),
-        cmocka_unit_test(where_all_fail_the_study_says_so_and_nothing_else),
-        cmocka_unit_test(what_is_not_known_is_not_told),
-        cmocka_unit_test(it_tells_its_progress_and_can_be_stopped_wherever_it_is),
-        cmocka_unit_test(the_same_study_has_the_same_bytes_in_any_workspace),
-        cmocka_unit_test(what_cannot_be_answered_is_refused),
-        cmocka_unit_test(a_metric_without_a_target_is_left_out),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

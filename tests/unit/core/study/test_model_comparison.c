@@ -1,19 +1,14 @@
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 
-#include <cmocka.h>
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/math/fft.h"
 #include "core/study/model_comparison.h"
 #include "core/study/study.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
+#include "tests/support/test.h"
 
 static Problem problem;
 
@@ -63,8 +58,7 @@ static void clear(StudyRequest *inquiry, Comparison *answer) {
     study_request_clear(inquiry);
 }
 
-static void all_laws_and_both_rules_are_tried_and_what_cannot_be_says_why(void **state) {
-    (void)state;
+TEST(all_laws_and_both_rules_are_tried_and_what_cannot_be_says_why) {
     StudyRequest inquiry = study_request_make(0.61, 0.025, 4);
     complete(&inquiry);
     assert_true(study_of(&inquiry)->models.count == 8 &&
@@ -86,8 +80,7 @@ static void all_laws_and_both_rules_are_tried_and_what_cannot_be_says_why(void *
     clear(&inquiry, answer);
 }
 
-static void the_reference_is_the_scenes_own_run_and_apart_from_itself_by_nothing(void **state) {
-    (void)state;
+TEST(the_reference_is_the_scenes_own_run_and_apart_from_itself_by_nothing) {
     StudyRequest inquiry = study_request_make(0.61, 0.025, 4);
     name(&study_of(&inquiry)->models, "impulse");
     complete(&inquiry);
@@ -112,8 +105,7 @@ static void the_reference_is_the_scenes_own_run_and_apart_from_itself_by_nothing
     clear(&inquiry, answer);
 }
 
-static void each_variant_is_the_scene_with_that_contact(void **state) {
-    (void)state;
+TEST(each_variant_is_the_scene_with_that_contact) {
     StudyRequest inquiry = study_request_make(0.61, 0.025, 3);
     name(&study_of(&inquiry)->separations, "zero_force");
     name(&study_of(&inquiry)->models, "flores");
@@ -136,8 +128,7 @@ static void each_variant_is_the_scene_with_that_contact(void **state) {
     clear(&inquiry, answer);
 }
 
-static void impulses_alone_leave_no_contact_time_to_others(void **state) {
-    (void)state;
+TEST(impulses_alone_leave_no_contact_time_to_others) {
     StudyRequest inquiry = study_request_make(0.61, (double)NAN, 2);
     complete(&inquiry);
     Comparison *answer = make(&inquiry);
@@ -149,8 +140,7 @@ static void impulses_alone_leave_no_contact_time_to_others(void **state) {
     clear(&inquiry, answer);
 }
 
-static void aluminium_parts_by_little_in_the_band_of_the_base(void **state) {
-    (void)state;
+TEST(aluminium_parts_by_little_in_the_band_of_the_base) {
     StudyRequest inquiry = study_request_make(0.46, 0.0003, 30);
     paper_random(&inquiry.simulation, 1, 3);
     name(&study_of(&inquiry)->models, "impulse");
@@ -165,8 +155,7 @@ static void aluminium_parts_by_little_in_the_band_of_the_base(void **state) {
     clear(&inquiry, answer);
 }
 
-static void a_trace_holds_every_extreme(void **state) {
-    (void)state;
+TEST(a_trace_holds_every_extreme) {
     StudyRequest inquiry = study_request_make(0.61, 0.025, 10);
     name(&study_of(&inquiry)->models, "impulse");
     complete(&inquiry);
@@ -183,8 +172,7 @@ static void a_trace_holds_every_extreme(void **state) {
     clear(&inquiry, answer);
 }
 
-static void a_target_is_set_aside_so_that_no_variant_becomes_another(void **state) {
-    (void)state;
+TEST(a_target_is_set_aside_so_that_no_variant_becomes_another) {
     StudyRequest inquiry = study_request_make(0.46, 0.0003, 2);
     AccuracyAuto *accuracy = (AccuracyAuto *)(void *)inquiry.simulation.accuracy;
     accuracy->target = 0.1;
@@ -201,8 +189,7 @@ static bool stop(void *context, double fraction) {
     return ++*(int *)context < 3;
 }
 
-static void it_stops_when_told_and_its_cost_is_that_of_its_runs(void **state) {
-    (void)state;
+TEST(it_stops_when_told_and_its_cost_is_that_of_its_runs) {
     StudyRequest inquiry = study_request_make(0.61, 0.025, 10);
     complete(&inquiry);
     int calls = 0;
@@ -219,8 +206,7 @@ static void it_stops_when_told_and_its_cost_is_that_of_its_runs(void **state) {
     clear(&inquiry, NULL);
 }
 
-static void faults_are_told_at_their_places(void **state) {
-    (void)state;
+TEST(faults_are_told_at_their_places) {
     StudyRequest inquiry = study_request_make(0.61, 0.025, 1);
     CompareStudy *study = study_of(&inquiry);
     name(&study->models, "hertzz");
@@ -242,20 +228,4 @@ static void faults_are_told_at_their_places(void **state) {
     assert_int_equal(study_request_complete(&bare, NULL, NULL, &problem), STATUS_INVALID);
     assert_string_equal(problem.faults[0].pointer, "/study/kind");
     study_request_clear(&bare);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(all_laws_and_both_rules_are_tried_and_what_cannot_be_says_why),
-        cmocka_unit_test(the_reference_is_the_scenes_own_run_and_apart_from_itself_by_nothing),
-        cmocka_unit_test(each_variant_is_the_scene_with_that_contact),
-        cmocka_unit_test(impulses_alone_leave_no_contact_time_to_others),
-        cmocka_unit_test(aluminium_parts_by_little_in_the_band_of_the_base),
-        cmocka_unit_test(a_trace_holds_every_extreme),
-        cmocka_unit_test(a_target_is_set_aside_so_that_no_variant_becomes_another),
-        cmocka_unit_test(it_stops_when_told_and_its_cost_is_that_of_its_runs),
-        cmocka_unit_test(faults_are_told_at_their_places),
-    };
-    fft_start();
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

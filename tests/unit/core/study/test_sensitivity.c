@@ -1,19 +1,14 @@
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 
-#include <cmocka.h>
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/math/fft.h"
 #include "core/study/sensitivity.h"
 #include "core/study/study.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
+#include "tests/support/test.h"
 
 static Problem problem;
 
@@ -78,8 +73,7 @@ static Derived derive(double restitution, double contact_time, double mass) {
     return derived;
 }
 
-static void closed_forms_are_those_of_a_plans_differences(void **state) {
-    (void)state;
+TEST(closed_forms_are_those_of_a_plans_differences) {
     StudyRequest inquiry = study_request_make(0.61, 0.025, 1);
     complete(&inquiry);
     Sensitivity *answer = make(&inquiry);
@@ -98,8 +92,7 @@ static void closed_forms_are_those_of_a_plans_differences(void **state) {
     clear(&inquiry, answer);
 }
 
-static void slopes_are_central_differences_of_the_summary(void **state) {
-    (void)state;
+TEST(slopes_are_central_differences_of_the_summary) {
     StudyRequest inquiry = study_request_make(0.61, 0.025, 1);
     study_of(&inquiry)->step = 0.02;
     complete(&inquiry);
@@ -129,8 +122,7 @@ static void slopes_are_central_differences_of_the_summary(void **state) {
     clear(&inquiry, answer);
 }
 
-static void chaos_is_told_and_its_slopes_do_not_settle(void **state) {
-    (void)state;
+TEST(chaos_is_told_and_its_slopes_do_not_settle) {
     StudyRequest inquiry = study_request_make(0.46, 0.0003, 40);
     paper_random(&inquiry.simulation, 1, 5);
     complete(&inquiry);
@@ -155,8 +147,7 @@ static void draw(const SensitivityStudy *study, const StudyRequest *inquiry, uin
     }
 }
 
-static void draws_have_the_stated_spread_and_stay_below_one(void **state) {
-    (void)state;
+TEST(draws_have_the_stated_spread_and_stay_below_one) {
     StudyRequest inquiry = study_request_make(0.9, 0.025, 1);
     SensitivityStudy *study = study_of(&inquiry);
     study->uncertainty.restitution_deviation = 0.02;
@@ -205,8 +196,7 @@ static StudyRequest study_request_of_materials(void) {
     return inquiry;
 }
 
-static void each_buffer_is_drawn_by_what_its_material_tells(void **state) {
-    (void)state;
+TEST(each_buffer_is_drawn_by_what_its_material_tells) {
     StudyRequest inquiry = study_request_of_materials();
     SensitivityStudy *study = study_of(&inquiry);
     study->runs = 40;
@@ -234,8 +224,7 @@ static void each_buffer_is_drawn_by_what_its_material_tells(void **state) {
     clear(&inquiry, answer);
 }
 
-static void a_number_for_all_buffers_wins_over_their_materials(void **state) {
-    (void)state;
+TEST(a_number_for_all_buffers_wins_over_their_materials) {
     StudyRequest inquiry = study_request_of_materials();
     SensitivityStudy *study = study_of(&inquiry);
     study->uncertainty.restitution_deviation = 0;
@@ -251,8 +240,7 @@ static void a_number_for_all_buffers_wins_over_their_materials(void **state) {
     study_request_clear(&inquiry);
 }
 
-static void a_drawn_run_is_the_scene_with_its_numbers(void **state) {
-    (void)state;
+TEST(a_drawn_run_is_the_scene_with_its_numbers) {
     StudyRequest inquiry = study_request_make(0.61, 0.025, 2);
     SensitivityStudy *study = study_of(&inquiry);
     study->uncertainty.contact_time_deviation = 0.1;
@@ -289,8 +277,7 @@ static void a_drawn_run_is_the_scene_with_its_numbers(void **state) {
     clear(&inquiry, answer);
 }
 
-static void the_papers_errors_move_the_response_as_it_is_stated(void **state) {
-    (void)state;
+TEST(the_papers_errors_move_the_response_as_it_is_stated) {
     // 10 % in T_c with 15 % in e: the peak force moves by 9 to 14 %.
     StudyRequest inquiry = study_request_make(0.61, 0.025, 10);
     complete(&inquiry);
@@ -303,8 +290,7 @@ static void the_papers_errors_move_the_response_as_it_is_stated(void **state) {
     clear(&inquiry, answer);
 }
 
-static void what_has_no_closed_form_says_why(void **state) {
-    (void)state;
+TEST(what_has_no_closed_form_says_why) {
     StudyRequest inquiry = study_request_make(0.61, (double)NAN, 1);
     complete(&inquiry);
     Sensitivity *answer = make(&inquiry);
@@ -320,8 +306,7 @@ static void what_has_no_closed_form_says_why(void **state) {
     clear(&inquiry, answer);
 }
 
-static void a_restitution_at_its_end_is_stepped_to_one_side(void **state) {
-    (void)state;
+TEST(a_restitution_at_its_end_is_stepped_to_one_side) {
     StudyRequest inquiry = study_request_make(1, 0.025, 1);
     complete(&inquiry);
     assert_true(perturbation_max_step(&inquiry.simulation, SENSITIVITY_RESTITUTION, 0.01) == 0);
@@ -333,8 +318,7 @@ static void a_restitution_at_its_end_is_stepped_to_one_side(void **state) {
     clear(&inquiry, answer);
 }
 
-static void changes_begin_at_the_scenes_own_numbers(void **state) {
-    (void)state;
+TEST(changes_begin_at_the_scenes_own_numbers) {
     StudyRequest inquiry = study_request_make(0.61, 0.025, 1);
     complete(&inquiry);
     Simulation member;
@@ -360,8 +344,7 @@ static bool stop(void *context, double fraction) {
     return fraction < 0.5;
 }
 
-static void it_stops_when_told_and_its_cost_is_that_of_its_runs(void **state) {
-    (void)state;
+TEST(it_stops_when_told_and_its_cost_is_that_of_its_runs) {
     StudyRequest inquiry = study_request_make(0.61, 0.025, 2);
     study_of(&inquiry)->uncertainty.contact_time_deviation = 0.1;
     complete(&inquiry);
@@ -383,8 +366,7 @@ static void it_stops_when_told_and_its_cost_is_that_of_its_runs(void **state) {
     study_request_clear(&inquiry);
 }
 
-static void faults_are_told_at_their_places(void **state) {
-    (void)state;
+TEST(faults_are_told_at_their_places) {
     StudyRequest inquiry = study_request_make(0.61, (double)NAN, 1);
     study_of(&inquiry)->uncertainty.contact_time_deviation = 0.1; // impulses have no contact time
     assert_int_equal(study_request_complete(&inquiry, NULL, NULL, &problem), STATUS_INVALID);
@@ -402,24 +384,4 @@ static void faults_are_told_at_their_places(void **state) {
     assert_int_equal(study_request_complete(&inquiry, NULL, NULL, &problem), STATUS_INVALID);
     assert_string_equal(problem.faults[0].pointer, "/study/runs");
     study_request_clear(&inquiry);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(closed_forms_are_those_of_a_plans_differences),
-        cmocka_unit_test(slopes_are_central_differences_of_the_summary),
-        cmocka_unit_test(chaos_is_told_and_its_slopes_do_not_settle),
-        cmocka_unit_test(draws_have_the_stated_spread_and_stay_below_one),
-        cmocka_unit_test(each_buffer_is_drawn_by_what_its_material_tells),
-        cmocka_unit_test(a_number_for_all_buffers_wins_over_their_materials),
-        cmocka_unit_test(a_drawn_run_is_the_scene_with_its_numbers),
-        cmocka_unit_test(the_papers_errors_move_the_response_as_it_is_stated),
-        cmocka_unit_test(what_has_no_closed_form_says_why),
-        cmocka_unit_test(a_restitution_at_its_end_is_stepped_to_one_side),
-        cmocka_unit_test(changes_begin_at_the_scenes_own_numbers),
-        cmocka_unit_test(it_stops_when_told_and_its_cost_is_that_of_its_runs),
-        cmocka_unit_test(faults_are_told_at_their_places),
-    };
-    fft_start();
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

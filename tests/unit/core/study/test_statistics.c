@@ -1,15 +1,11 @@
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 
-#include <cmocka.h>
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/study/statistics.h"
+#include "tests/support/test.h"
 
 static void assert_near(double is, double should) {
     if (!(fabs(is / should - 1) <= 1e-10))
@@ -42,8 +38,7 @@ static RunTable seven(void) {
     return (RunTable){runs, RUNS};
 }
 
-static void statistics_are_numpys_over_the_runs_that_ended(void **state) {
-    (void)state;
+TEST(statistics_are_numpys_over_the_runs_that_ended) {
     const RunTable table = seven();
     RunStatistic of = blank();
     assert_int_equal(statistics_fill(&table, STATISTICS_RMS_DISPLACEMENT, &of), STATUS_OK);
@@ -64,8 +59,7 @@ static void statistics_are_numpys_over_the_runs_that_ended(void **state) {
     free(of.unit);
 }
 
-static void a_mean_far_from_its_spread_loses_no_digits(void **state) {
-    (void)state;
+TEST(a_mean_far_from_its_spread_loses_no_digits) {
     for (size_t i = 0; i < RUNS; i++)
         runs[i] = (RunRecord){.number = i, .summary = {.rms_displacement = 1e9 + (double)i}};
     const RunTable table = {runs, RUNS};
@@ -76,8 +70,7 @@ static void a_mean_far_from_its_spread_loses_no_digits(void **state) {
     free(of.unit);
 }
 
-static void numbers_of_any_size_have_statistics(void **state) {
-    (void)state;
+TEST(numbers_of_any_size_have_statistics) {
     static const double scales[] = {1e-300, 1e-160, 1e160, 1e307};
     for (size_t k = 0; k < COUNT(scales); k++) {
         for (size_t i = 0; i < RUNS; i++)
@@ -98,8 +91,7 @@ static void numbers_of_any_size_have_statistics(void **state) {
     }
 }
 
-static void too_few_runs_leave_numbers_unknown(void **state) {
-    (void)state;
+TEST(too_few_runs_leave_numbers_unknown) {
     RunTable table = seven();
     RunStatistic of = blank();
     assert_int_equal(statistics_fill(&table, STATISTICS_IMPACTS, &of), STATUS_OK);
@@ -112,8 +104,7 @@ static void too_few_runs_leave_numbers_unknown(void **state) {
     free(of.unit);
 }
 
-static void the_spread_tells_what_the_rule_needs(void **state) {
-    (void)state;
+TEST(the_spread_tells_what_the_rule_needs) {
     const RunTable table = seven();
     RunSpread spread;
     assert_int_equal(statistics_spread(&table, STATISTICS_RMS_DISPLACEMENT, &spread), STATUS_OK);
@@ -125,8 +116,7 @@ static void the_spread_tells_what_the_rule_needs(void **state) {
     assert_true(isinf(spread.relative));
 }
 
-static void trust_and_failures_are_counted(void **state) {
-    (void)state;
+TEST(trust_and_failures_are_counted) {
     RunTable table = seven();
     RunTrust trust = {.shortest_horizon = (double)NAN,
                       .largest_error_estimate = (double)NAN,
@@ -154,16 +144,4 @@ static void trust_and_failures_are_counted(void **state) {
         free(failures.at[i].detail);
     }
     free(failures.at);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(statistics_are_numpys_over_the_runs_that_ended),
-        cmocka_unit_test(a_mean_far_from_its_spread_loses_no_digits),
-        cmocka_unit_test(numbers_of_any_size_have_statistics),
-        cmocka_unit_test(too_few_runs_leave_numbers_unknown),
-        cmocka_unit_test(the_spread_tells_what_the_rule_needs),
-        cmocka_unit_test(trust_and_failures_are_counted),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,15 +1,11 @@
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 
-#include <cmocka.h>
 
 #include <math.h>
 #include <string.h>
 
 #include "core/study/ensemble.h"
 #include "core/study/statistics.h"
+#include "tests/support/test.h"
 
 static Problem problem;
 
@@ -59,8 +55,7 @@ static Ensemble *tell(const SpectrumAccumulator *fold) {
     return answer;
 }
 
-static void means_and_bands_are_numpys(void **state) {
-    (void)state;
+TEST(means_and_bands_are_numpys) {
     static const double mean[] = {1.875, 3, 2.25, 0},
                         deviation[] = {0.8539125638299665, 1.4142135623730951, 1.5, 0},
                         low[] = {0.9084038387497005, 1.4169440865902474, 0.7788901798292007, 0},
@@ -83,8 +78,7 @@ static void means_and_bands_are_numpys(void **state) {
     spectrum_accumulator_clear(&fold);
 }
 
-static void one_run_has_a_mean_and_no_band_and_none_has_nothing(void **state) {
-    (void)state;
+TEST(one_run_has_a_mean_and_no_band_and_none_has_nothing) {
     SpectrumAccumulator fold = fold_of(1);
     Ensemble *answer = tell(&fold);
     assert_int_equal(answer->spectra.at[0].mean.count, ROWS);
@@ -97,8 +91,7 @@ static void one_run_has_a_mean_and_no_band_and_none_has_nothing(void **state) {
     variant_free(&answer->variant);
 }
 
-static void the_spread_is_that_of_the_channel_farthest_off(void **state) {
-    (void)state;
+TEST(the_spread_is_that_of_the_channel_farthest_off) {
     SpectrumAccumulator fold = fold_of(RUNS);
     // The second channel does not differ at all: of it nothing is known, which is the farthest.
     assert_true(isinf(spectrum_accumulator_spread(&fold, 100).relative));
@@ -118,13 +111,4 @@ static void the_spread_is_that_of_the_channel_farthest_off(void **state) {
     assert_near(spread.freedom, 2.1325742019787195);
     spectrum_accumulator_clear(&alone);
     spectrum_accumulator_clear(&fold);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(means_and_bands_are_numpys),
-        cmocka_unit_test(one_run_has_a_mean_and_no_band_and_none_has_nothing),
-        cmocka_unit_test(the_spread_is_that_of_the_channel_farthest_off),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

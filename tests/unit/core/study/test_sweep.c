@@ -1,9 +1,4 @@
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 
-#include <cmocka.h>
 
 #include <stdlib.h>
 #include <string.h>
@@ -12,6 +7,7 @@
 #include "core/study/sweep.h"
 #include "tests/support/fields.h"
 #include "tests/support/scenes.h"
+#include "tests/support/test.h"
 
 static Problem problem;
 
@@ -104,8 +100,7 @@ static size_t judged(size_t storeys, size_t count, size_t scenes, int mode) {
 }
 
 // Whoever submits it waits meanwhile.
-static void how_many_points_are_judged_at_once_goes_by_what_one_costs(void **state) {
-    (void)state;
+TEST(how_many_points_are_judged_at_once_goes_by_what_one_costs) {
     assert_int_equal(judged(1, 3000, 5000, SWEEP_GRID), 3000);
     const size_t eight = judged(8, 3000, 5000, SWEEP_GRID);
     assert_in_range(eight, 100, 600);
@@ -115,13 +110,11 @@ static void how_many_points_are_judged_at_once_goes_by_what_one_costs(void **sta
 }
 
 // No look at the progress may be far from the next one, whatever a point costs.
-static void judging_all_points_looks_at_the_watch_before_each(void **state) {
-    (void)state;
+TEST(judging_all_points_looks_at_the_watch_before_each) {
     assert_int_equal(judged(20, 200, SIZE_MAX, SWEEP_LIST), 200);
 }
 
-static void a_points_scene_follows_from_its_number(void **state) {
-    (void)state;
+TEST(a_points_scene_follows_from_its_number) {
     StudyRequest inquiry = study_request_make();
     static const char *const masses[] = {"0.1", "0.2", "0.3"};
     values_add(&inquiry, "/dampers/0/mass", 3, masses);
@@ -143,8 +136,7 @@ static void a_points_scene_follows_from_its_number(void **state) {
     study_request_clear(&inquiry);
 }
 
-static void whole_numbers_of_a_range_stay_whole(void **state) {
-    (void)state;
+TEST(whole_numbers_of_a_range_stay_whole) {
     StudyRequest inquiry = study_request_make();
     range_add(&inquiry, "/output/psd/segment", 1, 3000, 3000);
     Variant *answer = variant_new(study_sweep.answer);
@@ -157,8 +149,7 @@ static void whole_numbers_of_a_range_stay_whole(void **state) {
     study_request_clear(&inquiry);
 }
 
-static void a_row_is_its_scenes_own_run(void **state) {
-    (void)state;
+TEST(a_row_is_its_scenes_own_run) {
     StudyRequest inquiry = study_request_make();
     range_add(&inquiry, "/dampers/0/clearance", 0.005, 0.02, 4);
     SweepGrid *plan = plan_of(&inquiry);
@@ -186,8 +177,7 @@ static void a_row_is_its_scenes_own_run(void **state) {
     study_request_clear(&inquiry);
 }
 
-static void faults_stand_at_their_values_and_name_the_point(void **state) {
-    (void)state;
+TEST(faults_stand_at_their_values_and_name_the_point) {
     StudyRequest inquiry = study_request_make();
     static const char *const clearances[] = {"0.01", "-1", "\"wide\"", "-2"};
     static const char *const masses[] = {"0.1", "0"};
@@ -206,8 +196,7 @@ static void faults_stand_at_their_values_and_name_the_point(void **state) {
     study_request_clear(&inquiry);
 }
 
-static void a_fault_of_two_values_together_is_found(void **state) {
-    (void)state;
+TEST(a_fault_of_two_values_together_is_found) {
     StudyRequest inquiry = study_request_make();
     const SimulationLimits limits = {0};
     range_add(&inquiry, "/dampers/0/clearance", 0.03, 0.01, 3);
@@ -217,8 +206,7 @@ static void a_fault_of_two_values_together_is_found(void **state) {
     study_request_clear(&inquiry);
 }
 
-static void too_many_points_or_values_are_refused(void **state) {
-    (void)state;
+TEST(too_many_points_or_values_are_refused) {
     const SimulationLimits limits = {.points = 100};
     StudyRequest inquiry = study_request_make();
     range_add(&inquiry, "/dampers/0/clearance", 0.01, 0.02, 11);
@@ -234,8 +222,7 @@ static void too_many_points_or_values_are_refused(void **state) {
     study_request_clear(&inquiry);
 }
 
-static void sides_and_materials_are_filled_from_what_is_pinned(void **state) {
-    (void)state;
+TEST(sides_and_materials_are_filled_from_what_is_pinned) {
     StudyRequest inquiry = study_request_make();
     static const char *const names[] = {"\"sponge@1\"", "\"steel@2\""};
     SweepStudy *study = study_of(&inquiry);
@@ -265,8 +252,7 @@ static bool stops(void *context, double fraction) {
     return fraction < 0.5;
 }
 
-static void a_sweep_stops_when_it_is_told_to(void **state) {
-    (void)state;
+TEST(a_sweep_stops_when_it_is_told_to) {
     StudyRequest inquiry = study_request_make();
     range_add(&inquiry, "/dampers/0/clearance", 0.005, 0.02, 50);
     sweep_grid_free(plan_of(&inquiry));
@@ -277,20 +263,4 @@ static void a_sweep_stops_when_it_is_told_to(void **state) {
                      STATUS_CANCELLED);
     assert_null(answer);
     study_request_clear(&inquiry);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(how_many_points_are_judged_at_once_goes_by_what_one_costs),
-        cmocka_unit_test(judging_all_points_looks_at_the_watch_before_each),
-        cmocka_unit_test(a_points_scene_follows_from_its_number),
-        cmocka_unit_test(whole_numbers_of_a_range_stay_whole),
-        cmocka_unit_test(a_row_is_its_scenes_own_run),
-        cmocka_unit_test(faults_stand_at_their_values_and_name_the_point),
-        cmocka_unit_test(a_fault_of_two_values_together_is_found),
-        cmocka_unit_test(too_many_points_or_values_are_refused),
-        cmocka_unit_test(sides_and_materials_are_filled_from_what_is_pinned),
-        cmocka_unit_test(a_sweep_stops_when_it_is_told_to),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

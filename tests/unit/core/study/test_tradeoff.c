@@ -1,19 +1,14 @@
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 
-#include <cmocka.h>
 
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/base/canonical.h"
-#include "core/math/fft.h"
 #include "core/study/study.h"
 #include "core/study/tradeoff.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
+#include "tests/support/test.h"
 
 static Problem problem;
 
@@ -69,8 +64,7 @@ static void solver_add(StudyRequest *inquiry, const char *name) {
     names->at[names->count++] = strdup(name);
 }
 
-static void every_solver_is_tried_and_the_reference_with_less(void **state) {
-    (void)state;
+TEST(every_solver_is_tried_and_the_reference_with_less) {
     StudyRequest inquiry = study_request_make(0.025, 2, 3);
     Tradeoff *answer;
     complete(&inquiry);
@@ -104,8 +98,7 @@ static void every_solver_is_tried_and_the_reference_with_less(void **state) {
     study_request_clear(&inquiry);
 }
 
-static void a_point_that_fails_or_is_refused_stands_with_its_reason(void **state) {
-    (void)state;
+TEST(a_point_that_fails_or_is_refused_stands_with_its_reason) {
     StudyRequest inquiry = study_request_make(0.0003, 2, 1);
     Tradeoff *answer;
     solver_add(&inquiry, "rk4");
@@ -142,8 +135,7 @@ static bool lose(void *context, double fraction) {
     return patience->left-- > 0;
 }
 
-static void it_can_be_stopped_wherever_it_is(void **state) {
-    (void)state;
+TEST(it_can_be_stopped_wherever_it_is) {
     StudyRequest inquiry = study_request_make(0.025, 1, 2);
     Tradeoff *answer;
     solver_add(&inquiry, "exact");
@@ -164,8 +156,7 @@ static void it_can_be_stopped_wherever_it_is(void **state) {
     study_request_clear(&inquiry);
 }
 
-static void the_same_study_has_the_same_errors(void **state) {
-    (void)state;
+TEST(the_same_study_has_the_same_errors) {
     StudyRequest inquiry = study_request_make(0.004, 2, 1);
     Tradeoff *a, *b;
     complete(&inquiry);
@@ -194,8 +185,7 @@ static void take(void *context, const void *bytes, size_t size) {
     taken->count += size;
 }
 
-static void without_a_study_an_inquiry_is_its_scene_to_the_byte(void **state) {
-    (void)state;
+TEST(without_a_study_an_inquiry_is_its_scene_to_the_byte) {
     StudyRequest inquiry = study_request_make(0.025, 2, 3);
     Taken scene = {.count = 0}, whole = {.count = 0}, studied = {.count = 0};
     complete(&inquiry);
@@ -219,8 +209,7 @@ static void assert_refused(StudyRequest *inquiry, const SimulationLimits *limits
     study_request_clear(inquiry);
 }
 
-static void what_cannot_be_answered_is_refused(void **state) {
-    (void)state;
+TEST(what_cannot_be_answered_is_refused) {
     StudyRequest inquiry = study_request_make(0.025, 2, 3);
     study_of(&inquiry)->metric = METRIC_PSD;
     paper_no_psd(&inquiry.simulation);
@@ -244,8 +233,7 @@ static void what_cannot_be_answered_is_refused(void **state) {
     assert_refused(&inquiry, &limits, "/study", "s of CPU in all, at most 0.3 s are allowed");
 }
 
-static void the_usual_error_is_the_metrics(void **state) {
-    (void)state;
+TEST(the_usual_error_is_the_metrics) {
     static const double usual[] = {1e-3, 1e-2, 1e-2, 0, 0.1, 1e-3};
     for (int metric = 0; metric < METRIC_COUNT; metric++) {
         StudyRequest inquiry = study_request_make(0.025, 2, 3);
@@ -256,8 +244,7 @@ static void the_usual_error_is_the_metrics(void **state) {
     }
 }
 
-static void every_storey_of_a_frame_is_compared(void **state) {
-    (void)state;
+TEST(every_storey_of_a_frame_is_compared) {
     StudyRequest inquiry = study_request_make(0.025, 1, 1);
     Variant **structure = &inquiry.simulation.scene.structure;
     scene_choose(structure, &structure_kinds, "frame");
@@ -288,19 +275,4 @@ static void every_storey_of_a_frame_is_compared(void **state) {
     assert_true(find(answer, "exact")->errors.mean_acceleration == 0);
     variant_free(&answer->variant);
     study_request_clear(&inquiry);
-}
-
-int main(void) {
-    fft_start();
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_solver_is_tried_and_the_reference_with_less),
-        cmocka_unit_test(a_point_that_fails_or_is_refused_stands_with_its_reason),
-        cmocka_unit_test(it_can_be_stopped_wherever_it_is),
-        cmocka_unit_test(the_same_study_has_the_same_errors),
-        cmocka_unit_test(without_a_study_an_inquiry_is_its_scene_to_the_byte),
-        cmocka_unit_test(what_cannot_be_answered_is_refused),
-        cmocka_unit_test(the_usual_error_is_the_metrics),
-        cmocka_unit_test(every_storey_of_a_frame_is_compared),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,16 +1,10 @@
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 
-#include <cmocka.h>
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/excitation/excitation.h"
-#include "core/math/fft.h"
 #include "core/simulation/error_metrics.h"
 #include "core/solve/exact.h"
 #include "core/solve/solver.h"
@@ -19,6 +13,7 @@
 #include "tests/support/document.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
+#include "tests/support/test.h"
 
 static Problem problem;
 
@@ -63,8 +58,7 @@ static size_t steps_of(const TradeoffPoints *points, const char *solver, double 
     return count;
 }
 
-static void steps_go_by_decades_from_the_sample_interval_into_the_contact(void **state) {
-    (void)state;
+TEST(steps_go_by_decades_from_the_sample_interval_into_the_contact) {
     static const struct {
         double contact_time;
         size_t count;
@@ -88,8 +82,7 @@ static size_t count_named(const TradeoffPoints *points, const char *part) {
     return count;
 }
 
-static void only_what_the_scene_has_can_be_given_up(void **state) {
-    (void)state;
+TEST(only_what_the_scene_has_can_be_given_up) {
     Simulation simulation = scene_make(0.025, 10);
     complete(&simulation);
     TradeoffPoints points = make(&simulation);
@@ -119,8 +112,7 @@ static void only_what_the_scene_has_can_be_given_up(void **state) {
     simulation_clear(&simulation);
 }
 
-static void a_frame_may_keep_half_its_modes_and_half_of_these(void **state) {
-    (void)state;
+TEST(a_frame_may_keep_half_its_modes_and_half_of_these) {
     static const struct {
         const char *masses, *stiffnesses;
         size_t count;
@@ -170,8 +162,7 @@ static Simulation apply(const Simulation *simulation, const TradeoffPoint *point
 }
 
 // Closed forms have nothing to trade, contacts under a power law their tolerance.
-static void tolerances_of_the_exact_solver_are_for_power_laws(void **state) {
-    (void)state;
+TEST(tolerances_of_the_exact_solver_are_for_power_laws) {
     static const char *const models[] = {"spring_damper", "impulse", "hunt_crossley", "jankowski"};
     for (size_t i = 0; i < COUNT(models); i++) {
         Simulation simulation = scene_make(0.025, 0.001);
@@ -207,8 +198,7 @@ static void tolerances_of_the_exact_solver_are_for_power_laws(void **state) {
     }
 }
 
-static void fewer_samples_leave_the_base_as_it_is(void **state) {
-    (void)state;
+TEST(fewer_samples_leave_the_base_as_it_is) {
     Simulation simulation = scene_make(0.025, 10);
     paper_random(&simulation, 1, 1);
     complete(&simulation);
@@ -235,8 +225,7 @@ static void fewer_samples_leave_the_base_as_it_is(void **state) {
     simulation_clear(&simulation);
 }
 
-static void what_a_point_does_not_name_stays_the_scenes(void **state) {
-    (void)state;
+TEST(what_a_point_does_not_name_stays_the_scenes) {
     Simulation simulation = scene_make(0.025, 10);
     simulation.output.statistics_from = 8;
     complete(&simulation);
@@ -257,8 +246,7 @@ static void what_a_point_does_not_name_stays_the_scenes(void **state) {
     simulation_clear(&simulation);
 }
 
-static void a_buffer_of_stiffness_and_damping_has_its_restitution_under_impulse(void **state) {
-    (void)state;
+TEST(a_buffer_of_stiffness_and_damping_has_its_restitution_under_impulse) {
     Simulation simulation = scene_make(0.025, 1);
     Buffer *buffer = &simulation.scene.dampers.at[0].buffer;
     buffer->restitution = buffer->contact_time = (double)NAN;
@@ -276,8 +264,7 @@ static void a_buffer_of_stiffness_and_damping_has_its_restitution_under_impulse(
     simulation_clear(&simulation);
 }
 
-static void a_step_ten_times_finer_costs_about_ten_times_as_much(void **state) {
-    (void)state;
+TEST(a_step_ten_times_finer_costs_about_ten_times_as_much) {
     Simulation simulation = scene_make(0.025, 10);
     complete(&simulation);
     TradeoffPoint point = exact();
@@ -290,19 +277,4 @@ static void a_step_ten_times_finer_costs_about_ten_times_as_much(void **state) {
     const double fine = candidate_settings_cost(&simulation, &point);
     assert_true(coarse > exact_cost && fine > 8 * coarse && fine < 12 * coarse);
     simulation_clear(&simulation);
-}
-
-int main(void) {
-    fft_start();
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(steps_go_by_decades_from_the_sample_interval_into_the_contact),
-        cmocka_unit_test(only_what_the_scene_has_can_be_given_up),
-        cmocka_unit_test(tolerances_of_the_exact_solver_are_for_power_laws),
-        cmocka_unit_test(a_frame_may_keep_half_its_modes_and_half_of_these),
-        cmocka_unit_test(fewer_samples_leave_the_base_as_it_is),
-        cmocka_unit_test(what_a_point_does_not_name_stays_the_scenes),
-        cmocka_unit_test(a_buffer_of_stiffness_and_damping_has_its_restitution_under_impulse),
-        cmocka_unit_test(a_step_ten_times_finer_costs_about_ten_times_as_much),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

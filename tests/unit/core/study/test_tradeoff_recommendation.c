@@ -1,14 +1,10 @@
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 
-#include <cmocka.h>
 
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/study/tradeoff.h"
+#include "tests/support/test.h"
 
 static TradeoffPoint point(char *name, double cpu, double error) {
     return (TradeoffPoint){.name = name,
@@ -17,8 +13,7 @@ static TradeoffPoint point(char *name, double cpu, double error) {
                            .errors = {.displacement = error, .psd = (double)NAN}};
 }
 
-static void a_point_is_best_if_none_is_both_cheaper_and_closer(void **state) {
-    (void)state;
+TEST(a_point_is_best_if_none_is_both_cheaper_and_closer) {
     TradeoffPoint all[] = {
         point("slow and close", 8, 1e-9), point("beaten", 8, 1e-3),
         point("fast and far", 1, 1e-1),   point("between", 2, 1e-2),
@@ -37,8 +32,7 @@ static void a_point_is_best_if_none_is_both_cheaper_and_closer(void **state) {
         assert_false(all[i].is_best);
 }
 
-static void what_was_not_measured_is_neither_best_nor_taken(void **state) {
-    (void)state;
+TEST(what_was_not_measured_is_neither_best_nor_taken) {
     TradeoffPoint all[] = {point("refused", 0, 0), point("failed", 0, 0), point("sound", 5, 1e-4)};
     all[0].status = TRADEOFF_REFUSED;
     all[1].status = TRADEOFF_FAILED;
@@ -53,8 +47,7 @@ static void what_was_not_measured_is_neither_best_nor_taken(void **state) {
     free(choice.why);
 }
 
-static void the_cheapest_that_keeps_the_error_is_taken(void **state) {
-    (void)state;
+TEST(the_cheapest_that_keeps_the_error_is_taken) {
     TradeoffPoint all[] = {point("exact", 4, 1e-12), point("fine", 8, 1e-4),
                            point("coarse", 1, 0.1), point("middle", 2, 1e-3)};
     TradeoffPoints points = {all, COUNT(all)};
@@ -84,8 +77,7 @@ static void the_cheapest_that_keeps_the_error_is_taken(void **state) {
     free(choice.why);
 }
 
-static void of_times_that_are_nearly_alike_the_closest_is_taken(void **state) {
-    (void)state;
+TEST(of_times_that_are_nearly_alike_the_closest_is_taken) {
     TradeoffPoint all[] = {point("coarse", 1, 1e-4), point("exact", 1.2, 1e-12),
                            point("closer still", 1.3, 1e-14), point("far", 0.9, 1)};
     TradeoffPoints points = {all, COUNT(all)};
@@ -94,14 +86,4 @@ static void of_times_that_are_nearly_alike_the_closest_is_taken(void **state) {
     assert_int_equal(choice.point, 2);
     assert_non_null(strstr(choice.why, "the cheapest other is coarse"));
     free(choice.why);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_point_is_best_if_none_is_both_cheaper_and_closer),
-        cmocka_unit_test(what_was_not_measured_is_neither_best_nor_taken),
-        cmocka_unit_test(of_times_that_are_nearly_alike_the_closest_is_taken),
-        cmocka_unit_test(the_cheapest_that_keeps_the_error_is_taken),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }
