@@ -703,8 +703,9 @@ static int materials(const Command *self, void *of, const Options *options, Prob
                              action->name, action->takes, count);
     if (status != STATUS_OK)
         return command_error(self->name, problem);
-    status = api_client_open(settings->server, settings->token_file, settings->ca_file,
-                             settings->wait, &daemon, problem);
+    const ClientSettings client = {settings->server, settings->token_file, settings->ca_file,
+                                   settings->wait};
+    status = api_client_open(&client, &daemon, problem);
     if (status == STATUS_OK)
         status = action->act(&call, problem);
     api_client_close(&daemon);

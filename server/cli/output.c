@@ -1,6 +1,5 @@
-// Ctrl-C must stop at once, also in the middle of a transform or of writing, and leave nothing half
-// done. All this program holds outside its memory is the one temporary file, so the signal's
-// handler can end it there and then.
+// Ctrl-C must end the program at once, also within a transform or a write. The only thing it owns
+// outside its memory is the temporary file, so the signal handler removes that and exits.
 #include "server/cli/output.h"
 
 #include <errno.h>
@@ -39,7 +38,7 @@ void output_guard(void) {
     (void)sigaction(SIGTERM, &action, NULL);
 }
 
-// Holds both signals back while the file and has_part do not agree.
+// Blocks both signals while the file and has_part do not agree.
 static void signals_hold(sigset_t *before) {
     sigset_t held;
     sigemptyset(&held);
@@ -91,6 +90,11 @@ Status output_write(const void *bytes, size_t size, Problem *problem) {
     return STATUS_OK;
 }
 
+Status output_take(void *context, const void *bytes, size_t size, Problem *problem) {
+    (void)context;
+    return output_write(bytes, size, problem);
+}
+
 Status output_close(Problem *problem) {
     // mkstemp gives 0600; the file gets what any new file would get.
     const mode_t mask = umask(0);
@@ -122,4 +126,14 @@ void output_drop(void) {
         (void)close(part);
     part = -1;
     (void)sigprocmask(SIG_SETMASK, &before, NULL);
+}
+
+Status output_file(const char *path, const Bytes *bytes, Problem *problem) {
+    Status status = output_open(path, problem);
+    if (status == STATUS_OK)
+        status = output_write(bytes->at, bytes->count, problem);
+    if (status == STATUS_OK)
+        status = output_close(problem);
+    output_drop();
+    return status;
 }

@@ -1,25 +1,31 @@
-// A file that appears whole or not at all: written beside its name, renamed at the end, removed
-// when the program is interrupted. Not a stream to a terminal.
+// A file that is written completely or not at all: it has a temporary name until it is complete,
+// and is removed if the program is interrupted.
 #ifndef SERVER_CLI_OUTPUT_H
 #define SERVER_CLI_OUTPUT_H
 
 #include <stddef.h>
 
 #include "core/base/status.h"
+#include "server/util/bytes.h"
 
 // Opens a new file beside `path`. One output at a time. STATUS_IO, with the reason.
 Status output_open(const char *path, Problem *problem);
 Status output_write(const void *bytes, size_t size, Problem *problem);
-// Makes it durable and gives it its name; removes it if that fails.
+// The same as a function of HttpAsk; the context is not used.
+Status output_take(void *context, const void *bytes, size_t size, Problem *problem);
+// Makes the file durable and gives it its name; removes it if that fails.
 Status output_close(Problem *problem);
-// Removes what was written so far; fine if nothing is open.
+// Removes an output that is open, if any.
 void output_drop(void);
+
+// Writes a whole file.
+Status output_file(const char *path, const Bytes *bytes, Problem *problem);
 
 // From here on Ctrl-C and SIGTERM remove the open output and end the program at once with exit code
 // 130.
 void output_guard(void);
 
-// What those two say on stderr from here on, a whole line; NULL: nothing.
+// Sets the line that those two print on stderr; NULL: none.
 void output_farewell(const char *text);
 
 #endif

@@ -1,45 +1,120 @@
-// The daemon reads the file and judges it; here it is sent as it is.
-#include "server/cli/command.h"
-
+// Ground motions: `impactd import` makes an excitation of a file; `impactd records` keeps files on
+// a server, which reads and checks them.
+#include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "core/excitation/recorded_motion.h"
 #include "core/formats/ground_motion_text.h"
 #include "server/cli/client.h"
+#include "server/cli/command.h"
+#include "server/cli/output.h"
 #include "server/cli/scene_file.h"
+#include "server/json/encode.h"
 #include "server/json/parse.h"
 #include "server/json/table.h"
 
-enum { PAGE = 500 }; // records a request, the most that the API allows
+#define G 9.80665 // [m/s^2]
+
+typedef struct ImportSettings {
+    double interval;
+    int unit;
+    double scale;
+    char *output;
+} ImportSettings;
+
+static void import_report(const char *path, const GroundMotionText *import,
+                          const ImportSettings *settings) {
+    const RecordLook look = record_look(&import->samples, import->interval, settings->scale);
+    const double peak = fmax(look.highest, -look.lowest);
+    const char *unit = acceleration_unit_names[import->unit];
+    fprintf(stderr, "%s: %s, %zu samples, interval %s s, duration %.6g s; unit %s\n", path,
+            import->layout, import->samples.count, real_text(import->interval).at,
+            (double)(import->samples.count - 1) * import->interval, unit);
+    fprintf(stderr,
+            "%s: peak %.6g m/s^2 (%.6g g) at %.6g s; velocity: peak %.3g m/s, at the end %.3g "
+            "m/s\n",
+            path, peak, peak / G, (double)look.peak_at * import->interval, look.peak_velocity,
+            look.end_velocity);
+    if (import->stated_unit == CHOICE_ABSENT && settings->unit == CHOICE_ABSENT)
+        fprintf(stderr, "%s: warning: the file states no unit, %s is assumed\n", path, unit);
+    else if (import->stated_unit != CHOICE_ABSENT && import->stated_unit != import->unit)
+        fprintf(stderr, "%s: warning: the file states %s, %s is used\n", path,
+                acceleration_unit_names[import->stated_unit], unit);
+}
+
+static void import_warn(const char *path, const Excitation *excitation, Problem *doubts) {
+    const Span span = {0};
+    excitation_record.doubt(excitation, &span, "", doubts);
+    for (size_t i = 0; i < doubts->count; i++)
+        fprintf(stderr, "%s: warning: %s %s\n", path, doubts->faults[i].pointer + 1,
+                doubts->faults[i].detail);
+}
+
+static Status excitation_write(const ExcitationRecord *record, const char *output,
+                               Problem *problem) {
+    Bytes bytes = {0};
+    bytes_text(&bytes, "{\"kind\": \"record\", ");
+    (void)encode_members(&bytes, excitation_record.kind.fields, record, WRITE_SCENE);
+    bytes_text(&bytes, "}\n");
+    Status status = bytes.is_failed  ? problem_set(problem, STATUS_NO_MEMORY, "no memory for it")
+                    : output != NULL ? output_file(output, &bytes, problem)
+                                     : STATUS_OK;
+    if (status == STATUS_OK && output == NULL && fwrite(bytes.at, 1, bytes.count, stdout) == 0)
+        status = problem_set(problem, STATUS_IO, "standard output cannot be written");
+    bytes_clear(&bytes);
+    return status;
+}
+
+static Status import_act(const char *path, const Bytes *text, void *of, Problem *problem) {
+    const ImportSettings *settings = of;
+    const GroundMotionOptions options = {.interval = settings->interval, .unit = settings->unit};
+    GroundMotionText import;
+    TRY(ground_motion_text_read(text->at != NULL ? text->at : "", text->count, RECORD_SAMPLES,
+                                &options, &import, problem));
+    char source[1000], named[2000];
+    const char *name = scene_file_name(path), *slash = strrchr(path, '/');
+    snprintf(named, sizeof named, "%.200s%s%s", slash != NULL ? slash + 1 : name,
+             import.header[0] != '\0' ? ": " : "", import.header);
+    text_fit(source, sizeof source, named);
+    ExcitationRecord record = {.excitation.variant.kind = &excitation_record.kind,
+                               .samples = import.samples,
+                               .interval = import.interval,
+                               .scale = settings->scale,
+                               .source = source};
+    // Checked as a part of a scene.
+    const Span span = {.duration = 1, .sample_rate = 1};
+    Status status = excitation_record.complete(&record.excitation, &span, "", problem);
+    if (status == STATUS_OK)
+        status = excitation_write(&record, settings->output, problem);
+    if (status == STATUS_OK) {
+        import_report(name, &import, settings);
+        problem_clear(problem);
+        import_warn(name, &record.excitation, problem);
+    }
+    ground_motion_text_clear(&import);
+    return status;
+}
+
+static int import_run(const Command *self, void *settings, const Options *options,
+                      Problem *problem) {
+    return scene_file_command(self, "file", options, settings, import_act, problem);
+}
+
+enum { PAGE = 500 }; // records of a request, the most that the API allows
 
 typedef struct RecordsSettings {
-    char *server, *token_file, *ca_file;
+    ClientSettings client;
     char *name, *source, *processing, *earthquake, *station, *notes, *q;
-    double interval, wait;
+    double interval;
     int unit;
     bool json;
+    const char *operand; // of the action; NULL: none
+    Status (*act)(ApiClient *client, const struct RecordsSettings *settings, Problem *problem);
 } RecordsSettings;
 
-// clang-format off
-static const Field records_fields[] = {
-    DAEMON_ROWS(RecordsSettings),
-    FIELD_TEXT(RecordsSettings, name, RECORD_NAME_SIZE - 1, PRESENCE_OPTIONAL, 0, "add: what scenes call it (the file's name without its extension)"),
-    FIELD_REAL(RecordsSettings, interval, "s", ABOVE(0), OPTIONAL, "add: time between samples, where the file does not tell it"),
-    FIELD_CHOICE(RecordsSettings, unit, acceleration_unit_names, OPTIONAL, "add: g, m/s^2 or cm/s^2, over what the file tells"),
-    FIELD_TEXT(RecordsSettings, source, 1000, PRESENCE_OPTIONAL, 0, "add: where the file comes from"),
-    FIELD_TEXT(RecordsSettings, processing, 1000, PRESENCE_OPTIONAL, 0, "add: what was done to it: filters, baseline"),
-    FIELD_TEXT(RecordsSettings, earthquake, 200, PRESENCE_OPTIONAL, 0, "add: which one"),
-    FIELD_TEXT(RecordsSettings, station, 200, PRESENCE_OPTIONAL, 0, "add: where it was measured, and in which direction"),
-    FIELD_TEXT(RecordsSettings, notes, 4000, PRESENCE_OPTIONAL, 0, "add: what else one should know"),
-    FIELD_TEXT(RecordsSettings, q, 200, PRESENCE_OPTIONAL, 0, "list: those alone that have this text in their words"),
-    FIELD_FLAG(RecordsSettings, json, false, "list and add: print what the daemon answers"),
-    FIELD_REAL(RecordsSettings, wait, "s", AT_MIN(0), 0, "wait so long for a busy daemon (0)"),
-    FIELD_END,
-};
-// clang-format on
-
-// What is read of a record that the daemon shows; what is not there is NULL, NAN or COUNT_ABSENT.
+// A record as the server sends it; missing members are NULL, NAN or COUNT_ABSENT.
 typedef struct RecordWarning {
     char *pointer, *detail;
 } RecordWarning;
@@ -54,63 +129,60 @@ typedef struct RecordsReply {
 } RecordsReply;
 
 // clang-format off
-static const Field doubt_fields[] = {
+static const Field record_warning_fields[] = {
     FIELD_TEXT(RecordWarning, pointer, 0, PRESENCE_OPTIONAL, 0, "place"),
     FIELD_TEXT(RecordWarning, detail, 0, PRESENCE_OPTIONAL, 0, "what is doubtful"),
     FIELD_END,
 };
-static const Field reply_fields[] = {
+static const Field record_reply_fields[] = {
     FIELD_TEXT(RecordReply, name, 0, PRESENCE_OPTIONAL, 0, "name"),
     FIELD_TEXT(RecordReply, layout, 0, PRESENCE_OPTIONAL, 0, "of its file"),
     FIELD_REAL(RecordReply, interval, "s", ANY, OPTIONAL, "between samples"),
     FIELD_REAL(RecordReply, duration, "s", ANY, OPTIONAL, "from the first sample to the last"),
     FIELD_REAL(RecordReply, peak, "m/s^2", ANY, OPTIONAL, "largest magnitude"),
-    FIELD_REAL(RecordReply, peak_time, "s", ANY, OPTIONAL, "when"),
+    FIELD_REAL(RecordReply, peak_time, "s", ANY, OPTIONAL, "of the peak"),
     FIELD_COUNT(RecordReply, count, NULL, ANY, OPTIONAL, "samples"),
     {.name = "warnings", .kind = FIELD_KIND_LIST, .offset = offsetof(RecordReply, warnings),
-     .fields = doubt_fields, .size = sizeof(RecordWarning), .presence = PRESENCE_OPTIONAL, .doc = "doubts"},
+     .fields = record_warning_fields, .size = sizeof(RecordWarning), .presence = PRESENCE_OPTIONAL, .doc = "doubts"},
     FIELD_END,
 };
-static const Field replies_fields[] = {
+static const Field records_reply_fields[] = {
     {.name = "records", .kind = FIELD_KIND_LIST, .offset = offsetof(RecordsReply, records),
-     .fields = reply_fields, .size = sizeof(RecordReply), .presence = PRESENCE_OPTIONAL, .doc = "records"},
+     .fields = record_reply_fields, .size = sizeof(RecordReply), .presence = PRESENCE_OPTIONAL, .doc = "records"},
     FIELD_END,
 };
 // clang-format on
 
-// A page of the list for people; the name of its last record is what the next page comes after, ""
-// behind the last page.
-static Status page_print(const HttpAnswer *answer, bool is_json, char after[RECORD_NAME_SIZE],
-                         Problem *problem) {
+// Prints a page of the list. `after` becomes the name that the next page starts behind, "" at the
+// end.
+static Status records_print(const HttpAnswer *answer, bool is_json, char after[RECORD_NAME_SIZE],
+                            Problem *problem) {
     static const char *const skipped[] = {"links", NULL};
     static const PrintTableColumns columns[] = {
         {"records", {"name", "count", "interval", "duration", "peak", "source"}}, {NULL, {NULL}}};
-    static const Field *const fields[] = {reply_fields, NULL};
+    static const Field *const fields[] = {record_reply_fields, NULL};
     static const PrintTableView view = {skipped, columns, fields};
     size_t longest;
     RecordsReply reply = {{NULL, 0}};
     Status status = STATUS_OK;
-    (void)json_parse(answer->body.at, answer->body.count, replies_fields, &reply, NULL);
-    const RecordReply *last =
-        reply.records.count > 0 ? (RecordReply *)reply.records.at + reply.records.count - 1 : NULL;
+    (void)json_parse(answer->body.at, answer->body.count, records_reply_fields, &reply, NULL);
+    const size_t count = reply.records.count;
+    const RecordReply *last = count > 0 ? (RecordReply *)reply.records.at + count - 1 : NULL;
     const char *name = last != NULL && last->name != NULL ? last->name : "";
-    // A server that goes in circles is followed no further.
-    if (reply.records.count >= PAGE && strcmp(name, after) <= 0)
+    if (count >= PAGE && strcmp(name, after) <= 0)
         status = problem_set(problem, STATUS_UNREACHABLE, "the list of records has no end");
-    text_fit(after, RECORD_NAME_SIZE, reply.records.count >= PAGE ? name : "");
+    text_fit(after, RECORD_NAME_SIZE, count >= PAGE ? name : "");
     if (status == STATUS_OK && is_json)
         api_client_print(answer);
     else if (status == STATUS_OK)
         status = print_table_print_json(answer->body.at, answer->body.count, &view, stdout,
                                         &longest, problem);
-    fields_clear(replies_fields, &reply);
+    fields_clear(records_reply_fields, &reply);
     return status;
 }
 
-static Status list(ApiClient *daemon, const RecordsSettings *settings, const char *operand,
-                   Problem *problem) {
+static Status records_list(ApiClient *client, const RecordsSettings *settings, Problem *problem) {
     char after[RECORD_NAME_SIZE] = "";
-    (void)operand;
     do {
         Bytes path = {.most = 4000};
         HttpAnswer answer;
@@ -118,17 +190,17 @@ static Status list(ApiClient *daemon, const RecordsSettings *settings, const cha
         http_query(&path, "q", settings->q);
         http_query(&path, "after", after[0] != '\0' ? after : NULL);
         Status status =
-            api_client_request(daemon, (HttpAsk){.method = "GET"}, &path, &answer, problem);
+            api_client_request(client, (HttpAsk){.method = "GET"}, &path, &answer, problem);
         if (status == STATUS_OK)
-            status = page_print(&answer, settings->json, after, problem);
+            status = records_print(&answer, settings->json, after, problem);
         http_answer_clear(&answer);
         TRY(status);
     } while (after[0] != '\0');
     return STATUS_OK;
 }
 
-// "I-ELC180" of "/data/I-ELC180.AT2", with dashes for what no name may have.
-static void name_of(const char *path, char name[RECORD_NAME_SIZE]) {
+// "I-ELC180" of "/data/I-ELC180.AT2", with dashes for characters that a name may not have.
+static void record_name(const char *path, char name[RECORD_NAME_SIZE]) {
     const char *slash = strrchr(path, '/'), *from = slash != NULL ? slash + 1 : path;
     const char *point = strrchr(from, '.');
     const size_t length = point != NULL && point > from ? (size_t)(point - from) : strlen(from);
@@ -140,12 +212,11 @@ static void name_of(const char *path, char name[RECORD_NAME_SIZE]) {
             *c = '-';
 }
 
-// What the daemon read from the file, and its doubts, on stderr.
 static void record_report(const char *path, RecordReply *record, bool is_new) {
     const RecordWarning *warnings = record->warnings.at;
     text_make_printable(record->layout);
-    fprintf(stderr, "%s: %s%s, %.0f samples, one every %.6g s; peak %.6g m/s^2 at %.6g s\n", path,
-            is_new ? "" : "was there already; ", record->layout != NULL ? record->layout : "-",
+    fprintf(stderr, "%s: %s%s, %.0f samples, interval %.6g s; peak %.6g m/s^2 at %.6g s\n", path,
+            is_new ? "" : "already stored; ", record->layout != NULL ? record->layout : "-",
             record->count == COUNT_ABSENT ? (double)NAN : (double)record->count, record->interval,
             record->peak, record->peak_time);
     for (size_t i = 0; i < record->warnings.count; i++) {
@@ -157,13 +228,13 @@ static void record_report(const char *path, RecordReply *record, bool is_new) {
     }
 }
 
-static Status send(ApiClient *daemon, const RecordsSettings *settings, const char *path,
-                   const Bytes *text, Problem *problem) {
+static Status record_send(ApiClient *client, const RecordsSettings *settings, const Bytes *text,
+                          Problem *problem) {
     char name[RECORD_NAME_SIZE];
     Bytes target = {.most = 60000};
     HttpAnswer answer = {0};
     RecordReply record = {0};
-    name_of(path, name);
+    record_name(settings->operand, name);
     bytes_text(&target, "/v1/records");
     http_query(&target, "name", settings->name != NULL ? settings->name : name);
     http_query(&target, "unit",
@@ -175,125 +246,153 @@ static Status send(ApiClient *daemon, const RecordsSettings *settings, const cha
     http_query(&target, "notes", settings->notes);
     http_query_real(&target, "interval", settings->interval);
     const HttpAsk ask = {.method = "POST", .body = text, .content_type = "text/plain"};
-    Status status = api_client_request(daemon, ask, &target, &answer, problem);
+    Status status = api_client_request(client, ask, &target, &answer, problem);
     if (status == STATUS_OK)
-        (void)json_parse(answer.body.at, answer.body.count, reply_fields, &record, NULL);
+        (void)json_parse(answer.body.at, answer.body.count, record_reply_fields, &record, NULL);
     if (status == STATUS_OK && record.name == NULL)
-        status = problem_set(problem, STATUS_UNREACHABLE,
-                             "the answer is no record: what answers there is no impactd");
+        status = api_client_unexpected("a record", problem);
     if (status == STATUS_OK && settings->json) {
         api_client_print(&answer);
     } else if (status == STATUS_OK) {
-        record_report(scene_file_name(path), &record, answer.code == 201);
+        record_report(scene_file_name(settings->operand), &record, answer.code == 201);
         text_make_printable(record.name);
         printf("%s\n", record.name);
     }
-    fields_clear(reply_fields, &record);
+    fields_clear(record_reply_fields, &record);
     http_answer_clear(&answer);
     return status;
 }
 
-static Status add(ApiClient *daemon, const RecordsSettings *settings, const char *operand,
-                  Problem *problem) {
+static Status records_add(ApiClient *client, const RecordsSettings *settings, Problem *problem) {
     Bytes text;
-    Status status = scene_file_read(operand, &text, problem);
+    Status status = scene_file_read(settings->operand, &text, problem);
     if (status == STATUS_OK)
-        status = send(daemon, settings, operand, &text, problem);
+        status = record_send(client, settings, &text, problem);
     bytes_clear(&text);
     return status;
 }
 
-static Status ask_for(ApiClient *daemon, const char *method, const char *name, Problem *problem) {
+static Status record_ask(ApiClient *client, const char *method, const char *name,
+                         Problem *problem) {
     Bytes path = {.most = 4000};
     HttpAnswer answer = {0};
     bytes_text(&path, "/v1/records/");
-    http_encode(&path, name);
+    bytes_percent(&path, name);
     const Status status =
-        api_client_request(daemon, (HttpAsk){.method = method}, &path, &answer, problem);
+        api_client_request(client, (HttpAsk){.method = method}, &path, &answer, problem);
     if (status == STATUS_OK && answer.body.count > 0)
         api_client_print(&answer);
     http_answer_clear(&answer);
     return status;
 }
 
-static Status show(ApiClient *daemon, const RecordsSettings *settings, const char *operand,
-                   Problem *problem) {
-    (void)settings;
-    return ask_for(daemon, "GET", operand, problem);
+static Status records_show(ApiClient *client, const RecordsSettings *settings, Problem *problem) {
+    return record_ask(client, "GET", settings->operand, problem);
 }
 
-static Status forget(ApiClient *daemon, const RecordsSettings *settings, const char *operand,
-                     Problem *problem) {
-    (void)settings;
-    TRY(ask_for(daemon, "DELETE", operand, problem));
-    fprintf(stderr, "The record \"%s\" is deleted.\n", operand);
+static Status records_delete(ApiClient *client, const RecordsSettings *settings, Problem *problem) {
+    TRY(record_ask(client, "DELETE", settings->operand, problem));
+    fprintf(stderr, "The record \"%s\" is deleted.\n", settings->operand);
     return STATUS_OK;
 }
 
 static const struct Action {
     const char *name, *operand; // NULL: takes none
-    Status (*act)(ApiClient *daemon, const RecordsSettings *settings, const char *operand,
-                  Problem *problem);
+    Status (*act)(ApiClient *client, const RecordsSettings *settings, Problem *problem);
 } actions[] = {
-    {"list", NULL, list},
-    {"add", "a file", add},
-    {"show", "the name of a record", show},
-    {"delete", "the name of a record", forget},
+    {"list", NULL, records_list},
+    {"add", "a file", records_add},
+    {"show", "the name of a record", records_show},
+    {"delete", "the name of a record", records_delete},
 };
 
-static const struct Action *choose(const Options *options, Problem *problem) {
+static Status records_act(ApiClient *client, void *context, Problem *problem) {
+    const RecordsSettings *settings = context;
+    return settings->act(client, settings, problem);
+}
+
+static int records_run(const Command *self, void *of, const Options *options, Problem *problem) {
+    RecordsSettings *settings = of;
     size_t index;
     if (command_action(options, &actions->name, COUNT(actions), sizeof *actions, &index, problem) !=
         STATUS_OK)
-        return NULL;
+        return command_error(self->name, problem);
     const struct Action *action = &actions[index];
     const size_t takes = action->operand != NULL ? 2 : 1;
-    if (options->operand_count == takes &&
-        (takes == 1 ||
-         (options->operands[1][0] != '\0' && strcmp(options->operands[1], "..") != 0)))
-        return action;
-    (void)problem_set(problem, STATUS_USAGE, "%s takes %s", action->name,
-                      takes == 2 ? action->operand : "nothing more");
-    return NULL;
+    settings->act = action->act;
+    settings->operand = takes == 2 && options->operand_count == 2 ? options->operands[1] : NULL;
+    const bool is_name = settings->operand == NULL ||
+                         (settings->operand[0] != '\0' && strcmp(settings->operand, "..") != 0);
+    if (options->operand_count != takes || !is_name) {
+        (void)problem_set(problem, STATUS_USAGE, "%s takes %s", action->name,
+                          takes == 2 ? action->operand : "no operand");
+        return command_error(self->name, problem);
+    }
+    return api_client_run(self, &settings->client, settings->operand, records_act, settings,
+                          problem);
 }
 
-static int records(const Command *self, void *of, const Options *options, Problem *problem) {
-    const RecordsSettings *settings = of;
-    const struct Action *action = choose(options, problem);
-    if (action == NULL)
-        return command_error(self->name, problem);
-    const char *operand = action->operand != NULL ? options->operands[1] : NULL;
-    ApiClient daemon;
-    Status status = api_client_open(settings->server, settings->token_file, settings->ca_file,
-                                    settings->wait, &daemon, problem);
-    if (status == STATUS_OK)
-        status = action->act(&daemon, settings, operand, problem);
-    api_client_close(&daemon);
-    return status == STATUS_OK
-               ? COMMAND_OK
-               : api_client_refuse(self->name, operand != NULL ? operand : "records", status,
-                                   problem);
-}
+// clang-format off
+static const Field import_fields[] = {
+    FIELD_REAL(ImportSettings, interval, "s", ABOVE(0), OPTIONAL, "time between samples, if the file does not state it"),
+    FIELD_CHOICE(ImportSettings, unit, acceleration_unit_names, OPTIONAL, "g, m/s^2 or cm/s^2; overrides the file"),
+    FIELD_REAL(ImportSettings, scale, NULL, ANY, 1, "factor on the samples"),
+    FIELD_TEXT(ImportSettings, output, 4000, PRESENCE_OPTIONAL, 0, "write to this file"),
+    FIELD_END,
+};
+static const Field records_fields[] = {
+    DAEMON_ROWS(ClientSettings),
+    FIELD_TEXT(RecordsSettings, name, RECORD_NAME_SIZE - 1, PRESENCE_OPTIONAL, 0, "add: name for scenes (name of the file without its extension)"),
+    FIELD_REAL(RecordsSettings, interval, "s", ABOVE(0), OPTIONAL, "add: time between samples, if the file does not state it"),
+    FIELD_CHOICE(RecordsSettings, unit, acceleration_unit_names, OPTIONAL, "add: g, m/s^2 or cm/s^2; overrides the file"),
+    FIELD_TEXT(RecordsSettings, source, 1000, PRESENCE_OPTIONAL, 0, "add: origin of the file"),
+    FIELD_TEXT(RecordsSettings, processing, 1000, PRESENCE_OPTIONAL, 0, "add: processing, such as filters and baseline correction"),
+    FIELD_TEXT(RecordsSettings, earthquake, 200, PRESENCE_OPTIONAL, 0, "add: earthquake"),
+    FIELD_TEXT(RecordsSettings, station, 200, PRESENCE_OPTIONAL, 0, "add: station and direction"),
+    FIELD_TEXT(RecordsSettings, notes, 4000, PRESENCE_OPTIONAL, 0, "add: remarks"),
+    FIELD_TEXT(RecordsSettings, q, 200, PRESENCE_OPTIONAL, 0, "list: only records with this text"),
+    FIELD_FLAG(RecordsSettings, json, false, "list and add: print the answer of the server as JSON"),
+    FIELD_REAL(ClientSettings, wait, "s", AT_MIN(0), 0, "how long to wait for a busy server (0)"),
+    FIELD_END,
+};
+// clang-format on
+
+const Command command_import = {
+    .name = "import",
+    .operands = "FILE",
+    .summary = "convert a ground motion file to an excitation",
+    .help =
+        "  impactd import motion.AT2                        print an excitation for a scene\n"
+        "  impactd import motion.AT2 -o motion.json         write it to a file\n"
+        "  impactd import column.txt --interval 0.02 --unit g   if the file states neither\n"
+        "  impactd import motion.AT2 --scale 2              double the acceleration\n"
+        "  impactd import - < motion.AT2                    from standard input\n"
+        "\n"
+        "Formats: PEER AT2, old and new; a count and an interval before one column; times and\n"
+        "accelerations in two columns; bare columns. A summary is printed on stderr. Exit code 3\n"
+        "if the file has faults.\n",
+    .options = import_fields,
+    .size = sizeof(ImportSettings),
+    .run = import_run,
+};
 
 const Command command_records = {
     .name = "records",
     .operands = "list|add|show|delete [FILE-or-NAME]",
-    .summary = "ground motions that a daemon keeps, for scenes to name",
+    .summary = "ground motions on a server, for scenes to name",
     .help =
         "  impactd records add I-ELC180.AT2 --source 'PEER, RSN6' --processing 'as published'\n"
         "  impactd records add column.txt --name tabas --interval 0.02 --unit g\n"
         "  impactd records list --q elcentro\n"
-        "  impactd records show I-ELC180                   all that is known of it, as JSON\n"
-        "  impactd records delete I-ELC180                 if no result was made with it\n"
+        "  impactd records show I-ELC180                   all about it, as JSON\n"
+        "  impactd records delete I-ELC180                 if no result uses it\n"
         "\n"
-        "A scene names it: \"excitation\": {\"kind\": \"record\", \"name\": \"I-ELC180\"}. The "
-        "layouts are "
-        "those of\n"
-        "\"impactd help import\". A record never changes: with other processing it is another one. "
-        "Exit code 3\n"
-        "if the file has faults, 4 if there is no such record, 1 if it is used or its name is "
-        "taken.\n",
+        "In a scene: \"excitation\": {\"kind\": \"record\", \"name\": \"I-ELC180\"}. The formats "
+        "are\n"
+        "those of \"impactd help import\". A record never changes: other processing makes another\n"
+        "record. Exit code 3 if the file has faults, 4 if there is no such record, 1 if it is in\n"
+        "use or its name is taken.\n",
     .options = records_fields,
     .size = sizeof(RecordsSettings),
-    .run = records,
+    .run = records_run,
 };

@@ -287,12 +287,12 @@ def test_a_hostile_server_is_bounded_and_refused():
             ("redirect", say(302, Location="http://127.0.0.1:1/"), "redirects are not followed"),
             ("to a file", say(301, Location="file:///etc/passwd"), "redirects are not followed"),
             ("headers", endless_headers, "headers"), ("body", endless_body, "more than"),
-            ("text", say(body=b"<html>", kind="text/html"), "no impactd"), ("nothing", say(body=b""), "no impactd"),
-            ("array", say(body=b"[1]"), "no impactd"), ("depth", say(body=b"[" * 5000000), "no impactd"),
-            ("wide", say(body=b"[" + b"{}," * 300000 + b"{}]"), "no impactd"),
-            ("types", say(body=b'{"id": [1], "status": {}}'), "no impactd"),
-            ("NUL", say(body=b'{"id": "j\\u0000", "status": "x"}'), "no impactd"),
-            ("bad id", say(body=b'{"id": "../../x", "status": "running"}'), "id"),
+            ("text", say(body=b"<html>", kind="text/html"), "really impactd"), ("nothing", say(body=b""), "really impactd"),
+            ("array", say(body=b"[1]"), "really impactd"), ("depth", say(body=b"[" * 5000000), "really impactd"),
+            ("wide", say(body=b"[" + b"{}," * 300000 + b"{}]"), "really impactd"),
+            ("types", say(body=b'{"id": [1], "status": {}}'), "really impactd"),
+            ("NUL", say(body=b'{"id": "j\\u0000", "status": "x"}'), "really impactd"),
+            ("bad id", say(body=b'{"id": "../../x", "status": "running"}'), "not a job"),
             ("no HTTP", raw(b"SSH-2.0-OpenSSH\r\n"), "HTTP"), ("cut", raw(b"HTTP/1.1 200 OK\r\nContent-Length: 50\r\n\r\n{"), "broke"),
             ("silence", raw(b""), "broke")):
         with fake(speak) as (url, seen):
@@ -304,6 +304,18 @@ def test_a_hostile_server_is_bounded_and_refused():
         assert client(url, "watch", "j-1")[0] == 7
     with fake(say(body=job)) as (url, _):
         assert client(url, "watch", "j-1", "--wait", "0.5")[0] == 8
+
+
+def test_a_silent_server_ends_the_wait():
+    """submit --wait and watch give a server that accepts and never answers up a few seconds after --wait, with 7."""
+    def silent(handler):
+        handler.rfile.read(1)  # until the client closes
+    done = say(body=b'{"id": "j-1", "status": "running"}')
+    for arguments, plan in ((("submit", SPONGE), (silent,)), (("watch", "j-1"), (done, say(404), silent))):
+        with fake(*plan) as (url, _):
+            began = time.monotonic()
+            code, _, errors = client(url, *arguments, "--wait", "1")
+            assert code == 7 and "no answer" in errors and time.monotonic() - began < 30, (arguments, code, errors)
 
 
 def test_problems_from_a_server_cannot_command_the_terminal():

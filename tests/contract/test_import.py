@@ -57,7 +57,7 @@ def test_published_records_have_their_counts_and_peaks():
 def test_an_import_runs_in_a_scene():
     """What is printed is an excitation as it stands, and -o writes the same."""
     excitation, errors = imported(HEADER + " .1 -.2\n .3 -.1\n")
-    assert "at2, 4 samples, one every 0.01 s, 0.03 s; unit g" in errors, errors
+    assert "at2, 4 samples, interval 0.01 s, duration 0.03 s; unit g" in errors, errors
     assert "peak 2.94199 m/s^2 (0.3 g) at 0.02 s" in errors, errors
     assert excitation["source"].startswith("standard input: PEER STRONG MOTION"), excitation
     scene = program.scene("record_inline")
@@ -92,9 +92,9 @@ def test_the_source_changes_no_result():
 def test_doubts_are_told():
     """A unit that is taken, another one than the file's, a drift, a size: warnings on stderr."""
     _, errors = imported("NPTS= 2, DT= 1\n1 -1\n")
-    assert "warning: the file tells no unit, g is taken" in errors, errors
+    assert "warning: the file states no unit, g is assumed" in errors, errors
     _, errors = imported(HEADER + "1 -1 2 -2\n", "--unit", "m/s^2")
-    assert "warning: the file tells g, m/s^2 is taken" in errors, errors
+    assert "warning: the file states g, m/s^2 is used" in errors, errors
     _, errors = imported(HEADER + "1 -1 2 -2\n", "--scale", "10")
     assert "more than 5 g" in errors, errors
     _, errors = imported(HEADER + ".1 -.1 .3 .1\n")

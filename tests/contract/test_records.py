@@ -511,7 +511,7 @@ def test_the_command_line_adds_lists_shows_and_deletes():
         assert (code, out) == (0, "I-ELC-180\n") and "at2, 4 samples" in errors and "/processing" in errors, (code, out, errors)
         assert daemon.get("/v1/records/I-ELC-180").json()["source"] == "PEER & co"
         code, out, errors = client(daemon.url, "records", "add", path, "--source", "PEER & co", "--station", "7")
-        assert code == 0 and "was there already" in errors, (code, out, errors)
+        assert code == 0 and "already stored" in errors, (code, out, errors)
         code, _, errors = client(daemon.url, "records", "add", path)
         assert code == 1 and "another source" in errors and path in errors, (code, errors)
         code, out, _ = client(daemon.url, "records", "add", "-", "--name", "column", "--interval", "0.5", "--unit", "cm/s^2",
