@@ -1,4 +1,4 @@
-// impactd check SCENE.json: the dry run of the daemon, for people or (--json) as the daemon answers
+// impactd check SCENE.json: the dry run of the server, as text or (--json) as the server answers
 // it.
 #include "server/cli/command.h"
 
@@ -8,7 +8,7 @@
 #include "server/api/job_json.h"
 #include "server/cli/scene_file.h"
 #include "server/jobs/jobs.h"
-#include "server/options.h"
+#include "server/json/table.h"
 
 typedef struct CheckSettings {
     bool json;
@@ -16,7 +16,8 @@ typedef struct CheckSettings {
 } CheckSettings;
 
 static const Field check_fields[] = {
-    FIELD_FLAG(CheckSettings, json, false, "the plan as JSON, as POST /v1/jobs?dry_run=1 answers"),
+    FIELD_FLAG(CheckSettings, json, false,
+               "print the plan as JSON, as POST /v1/jobs?dry_run=1 answers"),
     SCENE_FILE_CPU_ROW(CheckSettings),
     FIELD_END,
 };
@@ -71,10 +72,12 @@ static void modes_print(const PlanModes *modes) {
                modes->at[modes->count - 1].frequency);
 }
 
-static void plan_print(const char *path, const DryRun *run) {
+static void plan_print(const char *path, DryRun *run) {
+    // The title is arbitrary text of the file, which must not control the terminal.
+    text_make_printable(run->inquiry.simulation.title);
     const Scene *scene = &run->inquiry.simulation.scene;
     char duration[32], rate[32];
-    printf("%s is a good scene.\n\n", scene_file_name(path));
+    printf("%s: OK\n\n", scene_file_name(path));
     if (run->inquiry.simulation.title != NULL)
         printf("Title: %s\n", run->inquiry.simulation.title);
     printf("Result: %s\n", run->result);
@@ -137,13 +140,12 @@ static int check(const Command *self, void *settings, const Options *options, Pr
 const Command command_check = {
     .name = "check",
     .operands = "SCENE.json",
-    .summary = "say what is wrong with a scene, or show its plan",
-    .help =
-        "  impactd check scene.json          all faults at once, or what would be done and why\n"
-        "  impactd check scene.json --json   the same for programs\n"
-        "  impactd check - < scene.json      from standard input\n"
-        "\n"
-        "Runs nothing. Exit code 3 if the scene has faults.\n",
+    .summary = "report the faults of a scene, or show its plan",
+    .help = "  impactd check scene.json          all faults, or the plan and its reasons\n"
+            "  impactd check scene.json --json   the plan as JSON\n"
+            "  impactd check - < scene.json      from standard input\n"
+            "\n"
+            "Runs nothing. Exit code 3 if the scene has faults.\n",
     .options = check_fields,
     .size = sizeof(CheckSettings),
     .run = check,

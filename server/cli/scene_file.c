@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "server/cli/output.h"
+#include "server/json/table.h"
 
 SimulationLimits scene_file_limits(double cpu_seconds) {
     return (SimulationLimits){.samples = SCENE_FILE_SAMPLES,
@@ -66,11 +67,13 @@ int scene_file_command(const Command *self, const char *what, const Options *opt
 void scene_file_refuse(const char *path, const Problem *problem) {
     const char *name = scene_file_name(path);
     for (size_t i = 0; i < problem->count && i < PROBLEM_FAULTS; i++) {
-        const Fault *fault = &problem->faults[i];
-        fprintf(stderr, "%s: %s%s%s", name, fault->pointer, fault->pointer[0] != '\0' ? ": " : "",
-                fault->detail);
-        if (fault->did_you_mean[0] != '\0')
-            fprintf(stderr, " (did you mean \"%s\"?)", fault->did_you_mean);
+        Fault fault = problem->faults[i];
+        text_make_printable(fault.pointer);
+        text_make_printable(fault.detail);
+        fprintf(stderr, "%s: %s%s%s", name, fault.pointer, fault.pointer[0] != '\0' ? ": " : "",
+                fault.detail);
+        if (fault.did_you_mean[0] != '\0')
+            fprintf(stderr, " (did you mean \"%s\"?)", fault.did_you_mean);
         fputc('\n', stderr);
     }
     if (problem->count > PROBLEM_FAULTS)

@@ -187,6 +187,16 @@ def test_check_shows_the_plan():
     assert again[0] == 0 and json.loads(again[1])["result"] == plan["result"], again
 
 
+def test_a_scene_cannot_command_the_terminal():
+    """`check` prints control characters of a title, of a key and of a value as question marks."""
+    scene = {**program.scene("paper_free_sponge"), "title": "a\x1b[2Jb\x9bc\nd"}
+    code, out, errors = program.run("check", "-", text=json.dumps(scene))
+    assert code == 0 and "Title: a?[2Jb??c?d\n" in out and errors == "", (code, out, errors)
+    scene = {**scene, "k\x1b[31m": 1, "contact": {"model": "x\x1b[0m"}}
+    code, out, errors = program.run("check", "-", text=json.dumps(scene))
+    assert code == 3 and "/k?[31m: unknown key" in errors and "\x1b" not in errors, (code, errors)
+
+
 def test_what_takes_too_long_is_refused_in_seconds():
     """`run` and `check` refuse what is foretold to take more than 60 s of CPU, or --max-cpu-seconds; a run that was
     foretold too little stops, and says so."""
