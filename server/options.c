@@ -1,10 +1,10 @@
-// Four sources, one setter: each hands the text of a value and the name it was given under to
-// option_set, weakest source first, so that the last one stays.
+// The sources are read from the strongest to the weakest, which names the next: --config names the
+// file. Each gives the text of a value and the name that was used to option_set, which ignores it
+// if a stronger source has set the row.
 #include "server/options.h"
 
 #include <ctype.h>
 #include <errno.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -12,277 +12,187 @@
 
 enum { NAME_SIZE = OPTION_NAME, LINE_SIZE = 4096 };
 
-// Where the rows' values go to; one of these per options_read.
-typedef struct Decoder {
+// The destination of one options_read.
+typedef struct OptionReader {
     const Field *fields;
     void *item;
     Options *options;
     Problem *problem;
-} Decoder;
+} OptionReader;
 
-// "queue_most" as it is typed: "queue-most" after "--", "QUEUE_MOST" after the prefix.
-static void name_spell(char target[NAME_SIZE], const char *prefix, const char *name, bool is_flag) {
+// The name "max_body" as "--max-body" or, with another prefix, "IMPACTD_MAX_BODY".
+static void name_spell(char target[NAME_SIZE], const char *prefix, const char *name) {
+    const bool is_flag = strcmp(prefix, "--") == 0;
     size_t at = 0;
-    for (const char *c = prefix; *c != '\0' && at + 1 < NAME_SIZE; c++)
-        target[at++] = *c;
+    for (; *prefix != '\0' && at + 1 < NAME_SIZE; prefix++)
+        target[at++] = *prefix;
     for (const char *c = name; *c != '\0' && at + 1 < NAME_SIZE; c++)
         target[at++] = is_flag ? (*c == '_' ? '-' : *c) : (char)toupper((unsigned char)*c);
     target[at] = '\0';
 }
 
-static const Field *row_find(const Field *fields, const char *name, size_t length) {
+static const Field *row_find(const Field *fields, const char *name) {
     for (const Field *row = fields; row->kind != FIELD_KIND_END; row++)
-        if (strlen(row->name) == length && strncmp(row->name, name, length) == 0)
+        if (strcmp(row->name, name) == 0)
             return row;
     return NULL;
 }
 
-static void *member(const Decoder *reader, const Field *row) {
-    return (char *)reader->item + row->offset;
-}
-
-static Status refuse(const Decoder *reader, const char *typed, const char *value, const Field *row,
-                     const char *detail) {
+static void option_fault(const OptionReader *reader, const char *typed, const char *value,
+                         const Field *row, const char *wanted) {
     Fault fault = {0};
     text_fit(fault.pointer, sizeof fault.pointer, typed);
     text_fit(fault.value, sizeof fault.value, value);
-    if (row->unit != NULL)
-        text_fit(fault.unit, sizeof fault.unit, row->unit);
+    text_fit(fault.unit, sizeof fault.unit, row->unit != NULL ? row->unit : "");
     const char *near =
         row->kind == FIELD_KIND_CHOICE ? spelling_nearest(row->choices, value) : NULL;
-    if (near != NULL)
-        text_fit(fault.did_you_mean, sizeof fault.did_you_mean, near);
-    snprintf(fault.detail, sizeof fault.detail, "must be %s, is %.100s", detail, value);
-    return problem_add_fault(reader->problem, STATUS_USAGE, &fault);
+    text_fit(fault.did_you_mean, sizeof fault.did_you_mean, near != NULL ? near : "");
+    snprintf(fault.detail, sizeof fault.detail, "must be %s, is %.100s", wanted, value);
+    (void)problem_add_fault(reader->problem, STATUS_USAGE, &fault);
 }
 
-static Status refuse_choice(const Decoder *reader, const char *typed, const char *value,
-                            const Field *row) {
-    static const char before[] = "one of ";
-    char all[160];
-    const size_t used = sizeof before - 1;
-    memcpy(all, before, sizeof before);
-    for (size_t i = 0; row->choices[i] != NULL; i++)
-        text_list(all + used, sizeof all - used, row->choices[i]);
-    return refuse(reader, typed, value, row, all);
+static void option_no_memory(const OptionReader *reader) {
+    (void)problem_add(reader->problem, STATUS_NO_MEMORY, "", "no memory for the options");
 }
 
-static Status text_set(char **target, const char *value) {
-    char *copy = strdup(value);
-    if (copy == NULL)
-        return STATUS_NO_MEMORY;
-    free(*target);
-    *target = copy;
-    return STATUS_OK;
-}
-
-// One more; what a weaker source gave is forgotten.
-static Status texts_add(Texts *texts, const char *value, bool is_first) {
-    for (size_t i = 0; is_first && i < texts->count; i++)
-        free(texts->at[i]);
-    if (is_first)
-        texts->count = 0;
-    char **at = realloc(texts->at, (texts->count + 1) * sizeof *at);
-    char *copy = strdup(value);
-    if (at != NULL)
-        texts->at = at;
-    if (at == NULL || copy == NULL) {
-        free(copy);
-        return STATUS_NO_MEMORY;
-    }
-    texts->at[texts->count++] = copy;
-    return STATUS_OK;
-}
-
-// The row's range judges the new value, but its fault is told under the name that was typed.
-static Status range_check(const Decoder *reader, const char *typed, const Field *row) {
+// Checks the new value against its row; a fault is at the name that was used.
+static void option_check(const OptionReader *reader, const char *typed, const Field *row) {
     const Field rows[] = {*row, FIELD_END};
-    Problem *found = calloc(1, sizeof *found);
-    if (found == NULL)
-        return STATUS_NO_MEMORY;
-    const Status status = fields_validate(rows, reader->item, "", found);
-    for (size_t i = 0; status != STATUS_OK && i < found->count && i < PROBLEM_FAULTS; i++) {
-        Fault fault = found->faults[i];
-        text_fit(fault.pointer, sizeof fault.pointer, typed);
-        (void)problem_add_fault(reader->problem, STATUS_USAGE, &fault);
-    }
-    free(found);
-    return status == STATUS_OK ? STATUS_OK : STATUS_USAGE;
+    Problem *problem = reader->problem;
+    const size_t before = problem->count;
+    const Status status = problem->status;
+    if (fields_validate(rows, reader->item, "", problem) == STATUS_OK)
+        return;
+    for (size_t i = before; i < problem->count && i < PROBLEM_FAULTS; i++)
+        text_fit(problem->faults[i].pointer, sizeof problem->faults[i].pointer, typed);
+    problem->status = status != STATUS_OK ? status : STATUS_USAGE;
 }
 
-static Status option_set(const Decoder *reader, const Field *row, const char *typed,
-                         const char *value, OptionOrigin origin) {
-    char *end = NULL;
+static void option_set(const OptionReader *reader, const Field *row, const char *typed,
+                       const char *value, OptionOrigin origin) {
+    void *member = (char *)reader->item + row->offset;
+    OptionOrigin *set = &reader->options->origins[row - reader->fields];
+    char *end = NULL, *copy;
+    if (*set > origin)
+        return;
+    const bool is_first = *set != origin;
+    *set = origin;
     errno = 0;
     switch (row->kind) {
     case FIELD_KIND_REAL: {
         const double number = strtod(value, &end);
-        if (end == value || *end != '\0' || !isfinite(number))
-            return refuse(reader, typed, value, row, "a number");
-        *(double *)member(reader, row) = number;
+        if (end == value || *end != '\0' || !isfinite(number)) {
+            option_fault(reader, typed, value, row, "a number");
+            return;
+        }
+        *(double *)member = number;
         break;
     }
     case FIELD_KIND_COUNT: {
         const unsigned long long number = strtoull(value, &end, 10);
         if (!isdigit((unsigned char)value[0]) || *end != '\0' || errno != 0 ||
-            number == COUNT_ABSENT)
-            return refuse(reader, typed, value, row, "a whole number of at least 0");
-        *(uint64_t *)member(reader, row) = number;
+            number == COUNT_ABSENT) {
+            option_fault(reader, typed, value, row, "a whole number of at least 0");
+            return;
+        }
+        *(uint64_t *)member = number;
         break;
     }
     case FIELD_KIND_FLAG: {
         const bool is_on = strcmp(value, "true") == 0 || strcmp(value, "1") == 0;
-        if (!is_on && strcmp(value, "false") != 0 && strcmp(value, "0") != 0)
-            return refuse(reader, typed, value, row, "true or false");
-        *(bool *)member(reader, row) = is_on;
+        if (!is_on && strcmp(value, "false") != 0 && strcmp(value, "0") != 0) {
+            option_fault(reader, typed, value, row, "true or false");
+            return;
+        }
+        *(bool *)member = is_on;
         break;
     }
     case FIELD_KIND_CHOICE: {
+        char names[160] = "", wanted[200];
         int index = 0;
         while (row->choices[index] != NULL && strcmp(row->choices[index], value) != 0)
-            index++;
-        if (row->choices[index] == NULL)
-            return refuse_choice(reader, typed, value, row);
-        *(int *)member(reader, row) = index;
+            text_list(names, sizeof names, row->choices[index++]);
+        if (row->choices[index] == NULL) {
+            snprintf(wanted, sizeof wanted, "one of %s", names);
+            option_fault(reader, typed, value, row, wanted);
+            return;
+        }
+        *(int *)member = index;
         break;
     }
     case FIELD_KIND_TEXTS:
-        TRY(texts_add(member(reader, row), value,
-                      reader->options->origins[row - reader->fields] != origin));
+        if (is_first)
+            texts_clear(member);
+        if (texts_append(member, value) != STATUS_OK)
+            option_no_memory(reader);
         break;
     default:
-        TRY(text_set((char **)member(reader, row), value));
+        if ((copy = strdup(value)) == NULL) {
+            option_no_memory(reader);
+            return;
+        }
+        free(*(char **)member);
+        *(char **)member = copy;
         break;
     }
-    reader->options->origins[row - reader->fields] = origin;
-    return range_check(reader, typed, row);
+    option_check(reader, typed, row);
 }
 
-static Status unknown_put(const Decoder *reader, const char *typed, const char *name,
-                          bool is_flag) {
+static void option_unknown(const OptionReader *reader, const char *typed, const char *name,
+                           bool is_flag) {
     Fault fault = {0};
-    text_fit(fault.pointer, sizeof fault.pointer, typed);
-    text_fit(fault.detail, sizeof fault.detail, is_flag ? "is no option" : "is no setting");
+    char spelt[NAME_SIZE] = "";
     const char *near = spelling_nearest_field(reader->fields, name);
-    char spelt[NAME_SIZE];
-    if (near != NULL) {
-        name_spell(spelt, is_flag ? "--" : "", near, true);
-        text_fit(fault.did_you_mean, sizeof fault.did_you_mean, is_flag ? spelt : near);
-    }
-    return problem_add_fault(reader->problem, STATUS_USAGE, &fault);
+    text_fit(fault.pointer, sizeof fault.pointer, typed);
+    text_fit(fault.detail, sizeof fault.detail, is_flag ? "is not an option" : "is not a setting");
+    if (near != NULL && is_flag)
+        name_spell(spelt, "--", near);
+    text_fit(fault.did_you_mean, sizeof fault.did_you_mean,
+             spelt[0] != '\0' ? spelt
+             : near != NULL   ? near
+                              : "");
+    (void)problem_add_fault(reader->problem, STATUS_USAGE, &fault);
 }
 
-static char *trimmed(char *text) {
-    while (isspace((unsigned char)*text))
-        text++;
-    size_t length = strlen(text);
-    while (length > 0 && isspace((unsigned char)text[length - 1]))
-        text[--length] = '\0';
-    return text;
-}
-
-// "name = value" lines; "#" begins a comment at a line's start or after a space.
-static Status file_read(const Decoder *reader, const char *path) {
-    FILE *file = fopen(path, "r");
-    if (file == NULL)
-        return problem_add(reader->problem, STATUS_USAGE, path, "cannot be read: %s",
-                           strerror(errno));
-    char line[LINE_SIZE], typed[NAME_SIZE];
-    errno = 0;
-    for (size_t number = 1; fgets(line, sizeof line, file) != NULL; number++) {
-        snprintf(typed, sizeof typed, "%.64s:%zu", path, number);
-        if (strchr(line, '\n') == NULL && !feof(file)) {
-            (void)problem_add(reader->problem, STATUS_USAGE, typed,
-                              "must be a line of text of at most %d bytes", LINE_SIZE - 2);
-            break;
-        }
-        for (char *c = line; *c != '\0'; c++)
-            if (*c == '#' && (c == line || isspace((unsigned char)c[-1]))) {
-                *c = '\0';
-                break;
-            }
-        char *name = trimmed(line);
-        if (*name == '\0')
-            continue;
-        char *equals = strchr(name, '=');
-        if (equals == NULL) {
-            (void)problem_add(reader->problem, STATUS_USAGE, typed, "must read: name = value");
-            continue;
-        }
-        *equals = '\0';
-        name = trimmed(name);
-        const Field *row = row_find(reader->fields, name, strlen(name));
-        if (row == NULL)
-            (void)unknown_put(reader, typed, name, false);
-        else if (strcmp(name, "config") == 0)
-            (void)problem_add(reader->problem, STATUS_USAGE, typed,
-                              "config names a file of settings and cannot stand in one; give it as "
-                              "a flag or in the environment");
-        else
-            (void)option_set(reader, row, typed, trimmed(equals + 1), OPTION_FILE);
-    }
-    if (ferror(file))
-        (void)problem_add(reader->problem, STATUS_USAGE, path, "cannot be read: %s",
-                          strerror(errno));
-    fclose(file);
-    return STATUS_OK;
-}
-
-static void environment_read(const Decoder *reader, const char *prefix) {
-    char typed[NAME_SIZE];
-    for (const Field *row = reader->fields; row->kind != FIELD_KIND_END; row++) {
-        name_spell(typed, prefix, row->name, false);
-        const char *value = getenv(typed);
-        if (value != NULL)
-            (void)option_set(reader, row, typed, value, OPTION_ENVIRONMENT);
-    }
-}
-
-// The row that a flag names, and in *value what stands behind its "=". -o is the first row with
-// that letter.
-static const Field *flag_row(const Decoder *reader, const char *flag, char name[NAME_SIZE],
+// The row of a flag, and in *value what follows its "=". -o is the first row with that letter.
+static const Field *flag_row(const OptionReader *reader, const char *flag, char name[NAME_SIZE],
                              const char **value) {
-    *value = NULL;
+    const char *equals = strchr(flag, '=');
     if (flag[1] != '-') {
         const Field *row = reader->fields;
         while (row->kind != FIELD_KIND_END && row->name[0] != flag[1])
             row++;
-        if (flag[2] != '\0')
-            *value = flag[2] == '=' ? flag + 3 : flag + 2;
+        *value = flag[2] == '\0' ? NULL : flag[2] == '=' ? flag + 3 : flag + 2;
         snprintf(name, NAME_SIZE, "%c", flag[1]);
         return row->kind == FIELD_KIND_END ? NULL : row;
     }
-    const char *equals = strchr(flag, '=');
-    size_t length = equals == NULL ? strlen(flag + 2) : (size_t)(equals - flag - 2);
-    if (length >= NAME_SIZE)
-        length = NAME_SIZE - 1;
-    for (size_t i = 0; i < length; i++)
-        name[i] = flag[2 + i] == '-' ? '_' : flag[2 + i];
-    name[length] = '\0';
     *value = equals == NULL ? NULL : equals + 1;
-    return row_find(reader->fields, name, length);
+    snprintf(name, NAME_SIZE, "%.*s", (int)strcspn(flag + 2, "="), flag + 2);
+    for (char *c = name; *c != '\0'; c++)
+        *c = *c == '-' ? '_' : *c;
+    return row_find(reader->fields, name);
 }
 
-static void flags_read(const Decoder *reader, int argc, char *const *argv) {
+static void flags_read(const OptionReader *reader, int argc, char *const *argv) {
     Options *options = reader->options;
     bool is_ended = false;
     for (int i = 0; i < argc; i++) {
         const char *word = argv[i], *value;
         char name[NAME_SIZE], typed[NAME_SIZE];
+        if (!is_ended && strcmp(word, "--") == 0) {
+            is_ended = true;
+            continue;
+        }
         if (is_ended || word[0] != '-' || word[1] == '\0') {
             if (options->operand_count < OPTIONS_OPERANDS)
                 options->operands[options->operand_count] = word;
             options->operand_count++;
             continue;
         }
-        if (strcmp(word, "--") == 0) {
-            is_ended = true;
-            continue;
-        }
         const Field *row = flag_row(reader, word, name, &value);
         snprintf(typed, sizeof typed, "%.*s", (int)strcspn(word, "="), word);
         if (row == NULL) {
-            (void)unknown_put(reader, typed, name, true);
+            option_unknown(reader, typed, name, true);
             continue;
         }
         if (value == NULL && row->kind == FIELD_KIND_FLAG)
@@ -292,64 +202,155 @@ static void flags_read(const Decoder *reader, int argc, char *const *argv) {
         if (value == NULL)
             (void)problem_add(reader->problem, STATUS_USAGE, typed, "needs a value");
         else
-            (void)option_set(reader, row, typed, value, OPTION_FLAG);
+            option_set(reader, row, typed, value, OPTION_FLAG);
     }
 }
 
-// The file is the weakest source but is named by a stronger one, so its name is looked up first.
-static const char *config_path(const Decoder *reader, int argc, char *const *argv,
-                               const char *prefix) {
-    const Field *row = row_find(reader->fields, "config", strlen("config"));
-    if (row == NULL)
-        return NULL;
+static void environment_read(const OptionReader *reader, const char *prefix) {
     char typed[NAME_SIZE];
-    name_spell(typed, prefix, row->name, false);
-    const char *path = getenv(typed);
-    for (int i = 0; i < argc && strcmp(argv[i], "--") != 0; i++) {
-        char name[NAME_SIZE];
-        const char *value;
-        if (argv[i][0] != '-' || argv[i][1] == '\0')
-            continue;
-        const Field *found = flag_row(reader, argv[i], name, &value);
-        if (found != NULL && found->kind != FIELD_KIND_FLAG && value == NULL && i + 1 < argc)
-            value = argv[++i];
-        if (found == row && value != NULL)
-            path = value;
+    for (const Field *row = reader->fields; row->kind != FIELD_KIND_END; row++) {
+        name_spell(typed, prefix, row->name);
+        const char *value = getenv(typed);
+        if (value != NULL)
+            option_set(reader, row, typed, value, OPTION_ENVIRONMENT);
     }
-    return path;
+}
+
+static char *text_trim(char *text) {
+    while (isspace((unsigned char)*text))
+        text++;
+    size_t length = strlen(text);
+    while (length > 0 && isspace((unsigned char)text[length - 1]))
+        text[--length] = '\0';
+    return text;
+}
+
+// A line "name = value"; "#" begins a comment at the start of the line or after a space.
+static void line_read(const OptionReader *reader, const char *typed, char *line) {
+    for (char *c = line; *c != '\0'; c++)
+        if (*c == '#' && (c == line || isspace((unsigned char)c[-1]))) {
+            *c = '\0';
+            break;
+        }
+    char *name = text_trim(line), *equals = strchr(name, '=');
+    if (*name == '\0')
+        return;
+    if (equals == NULL) {
+        (void)problem_add(reader->problem, STATUS_USAGE, typed, "must read: name = value");
+        return;
+    }
+    *equals = '\0';
+    name = text_trim(name);
+    const Field *row = row_find(reader->fields, name);
+    if (row == NULL)
+        option_unknown(reader, typed, name, false);
+    else if (strcmp(name, "config") == 0)
+        (void)problem_add(reader->problem, STATUS_USAGE, typed,
+                          "config cannot be set in a file of settings; set it by a flag or in the "
+                          "environment");
+    else
+        option_set(reader, row, typed, text_trim(equals + 1), OPTION_FILE);
+}
+
+static void file_read(const OptionReader *reader, const char *path) {
+    FILE *file = fopen(path, "r");
+    char line[LINE_SIZE], typed[NAME_SIZE];
+    bool is_text = true;
+    errno = file != NULL ? 0 : errno;
+    for (size_t number = 1; file != NULL && is_text && fgets(line, sizeof line, file) != NULL;
+         number++) {
+        snprintf(typed, sizeof typed, "%.64s:%zu", path, number);
+        is_text = strchr(line, '\n') != NULL || feof(file);
+        if (is_text)
+            line_read(reader, typed, line);
+        else
+            (void)problem_add(reader->problem, STATUS_USAGE, typed,
+                              "must be a line of text of at most %d bytes", LINE_SIZE - 2);
+    }
+    if (file == NULL || ferror(file))
+        (void)problem_add(reader->problem, STATUS_USAGE, path, "cannot be read: %s",
+                          strerror(errno));
+    if (file != NULL)
+        fclose(file);
 }
 
 Status options_read(const Field *fields, void *item, int argc, char *const *argv,
                     const char *prefix, Options *options, Problem *problem) {
-    *options = (Options){0};
+    const OptionReader reader = {fields, item, options, problem};
+    const size_t before = problem->count;
     size_t rows = 0;
+    *options = (Options){0};
     while (fields[rows].kind != FIELD_KIND_END)
         rows++;
     if (rows > OPTIONS_ROWS)
         return problem_set(problem, STATUS_INTERNAL, "%zu settings, more than %d", rows,
                            OPTIONS_ROWS);
-    // Faults are counted in a Problem of its own where the caller has none.
-    Problem *own = problem == NULL ? calloc(1, sizeof *own) : NULL;
-    const Decoder reader = {fields, item, options, problem != NULL ? problem : own};
-    if (reader.problem == NULL)
-        return STATUS_NO_MEMORY;
-    const size_t before = reader.problem->count;
-    if (prefix != NULL) {
-        const char *path = config_path(&reader, argc, argv, prefix);
-        if (path != NULL)
-            (void)file_read(&reader, path);
-        environment_read(&reader, prefix);
-    }
     flags_read(&reader, argc, argv);
-    const bool has_faults = reader.problem->count > before;
-    free(own);
-    return has_faults ? STATUS_USAGE : STATUS_OK;
+    if (prefix != NULL) {
+        environment_read(&reader, prefix);
+        const Field *config = row_find(fields, "config");
+        const char *path = NULL;
+        if (config != NULL)
+            path = *(char *const *)(const void *)((const char *)item + config->offset);
+        if (path != NULL)
+            file_read(&reader, path);
+    }
+    return problem->count > before ? STATUS_USAGE : STATUS_OK;
 }
 
 char option_spell(const Field *fields, const Field *row, char name[OPTION_NAME]) {
-    name_spell(name, "--", row->name, true);
+    name_spell(name, "--", row->name);
     bool is_first = row->name[0] != 'h'; // -h is help
     for (const Field *other = fields; other < row; other++)
         is_first = is_first && other->name[0] != row->name[0];
     return is_first ? row->name[0] : '\0';
+}
+
+static void value_print(const Field *row, const void *item, FILE *file) {
+    const void *at = (const char *)item + row->offset;
+    if (row->kind == FIELD_KIND_REAL)
+        fputs(real_text(*(const double *)at).at, file);
+    else if (row->kind == FIELD_KIND_COUNT)
+        fprintf(file, "%llu", (unsigned long long)*(const uint64_t *)at);
+    else if (row->kind == FIELD_KIND_FLAG)
+        fputs(*(const bool *)at ? "true" : "false", file);
+    else if (row->kind == FIELD_KIND_CHOICE)
+        fputs(row->choices[*(const int *)at], file);
+    else if (row->kind == FIELD_KIND_TEXTS)
+        for (size_t i = 0; i < ((const Texts *)at)->count; i++)
+            fprintf(file, "%s%s", i > 0 ? ", " : "", ((const Texts *)at)->at[i]);
+    else
+        fputs(*(char *const *)at, file);
+}
+
+void options_print(const Field *fields, const void *item, const Options *options, FILE *file) {
+    static const char *const origins[] = {"default", "file", "environment", "flag"};
+    for (const Field *row = fields; row->kind != FIELD_KIND_END; row++) {
+        const bool is_set = row->kind == FIELD_KIND_FLAG || !field_is_absent(row, item);
+        // "config" and "print_config" are not settings of a file.
+        fprintf(file, "%s%s = ", is_set && strstr(row->name, "config") == NULL ? "" : "# ",
+                row->name);
+        if (is_set)
+            value_print(row, item, file);
+        fprintf(file, "  # %s\n", origins[options->origins[row - fields]]);
+    }
+}
+
+void options_help(const Field *fields, const OptionGroup *groups, FILE *file) {
+    for (const Field *row = fields; row->kind != FIELD_KIND_END; row++) {
+        char spelt[OPTION_NAME], left[2 * OPTION_NAME], letter[8] = "   ";
+        for (const OptionGroup *group = groups; group != NULL && group->first != NULL; group++)
+            if (strcmp(group->first, row->name) == 0)
+                fprintf(file, "%s%s\n", row == fields ? "" : "\n", group->title);
+        if (option_spell(fields, row, spelt) != '\0')
+            snprintf(letter, sizeof letter, "-%c,", row->name[0]);
+        snprintf(left, sizeof left, "%s %s%s", letter, spelt,
+                 row->kind == FIELD_KIND_TEXT    ? " TEXT"
+                 : row->kind == FIELD_KIND_TEXTS ? " TEXT ..."
+                 : row->kind == FIELD_KIND_FLAG  ? ""
+                 : row->kind == FIELD_KIND_COUNT ? " N"
+                                                 : " X");
+        fprintf(file, "  %-28s %s%s%s%s\n", left, row->doc, row->unit != NULL ? " [" : "",
+                row->unit != NULL ? row->unit : "", row->unit != NULL ? "]" : "");
+    }
 }

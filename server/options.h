@@ -1,6 +1,5 @@
-// Settings by Field rows: flag over environment over file over default, and where each value came
-// from. Not the settings themselves: each command has its own struct and rows of REAL, COUNT, FLAG,
-// TEXT, TEXTS and CHOICE. Used by command/.
+// Settings by Field rows, from flags, environment, file and defaults in this order of precedence.
+// Each command has its own struct and rows of REAL, COUNT, FLAG, TEXT, TEXTS and CHOICE.
 #ifndef SERVER_OPTIONS_H
 #define SERVER_OPTIONS_H
 
@@ -23,29 +22,27 @@ typedef struct Options {
     size_t operand_count;
 } Options;
 
-// Reads argv[0 ... argc - 1], the arguments behind the command's name, into `item`, which holds its
-// defaults. Row "queue_most" is --queue-most N, and -q if it is the first row with that letter;
-// "--" ends the flags. With `prefix` ("IMPACTD_"; NULL: flags only) it is also PREFIX_QUEUE_MAX of
-// the environment and, where a TEXT row "config" names a file, its line "queue_most = N". Adds all
-// faults, under the name that was typed.
+// Reads the arguments behind the command's name into `item`, which holds its defaults. Row
+// "max_body" is --max-body N, and -m if it is the first row with that letter; "--" ends the flags.
+// With `prefix` ("IMPACTD_"; NULL: flags only) it is also IMPACTD_MAX_BODY of the environment and
+// the line "max_body = N" of the file that a TEXT row "config" names. All faults are added, at the
+// name that was used; a value that a stronger source overrides is not checked.
 Status options_read(const Field *fields, void *item, int argc, char *const *argv,
                     const char *prefix, Options *options, Problem *problem);
 
-// One line per row as a config file would have it, with its origin behind a "#".
+// One line per row in the format of the file, with the origin of the value as a comment.
 void options_print(const Field *fields, const void *item, const Options *options, FILE *file);
 
-// How a row is typed: "--queue-most" into `name`; returns its letter, '\0' where another has it.
+// The flag of a row: "--max-body" into `name`; returns its letter, '\0' if another row has it.
 enum { OPTION_NAME = 96 };
 char option_spell(const Field *fields, const Field *row, char name[OPTION_NAME]);
 
-// One line per row for --help.
-void options_help(const Field *fields, FILE *file);
-
-// A heading over the row `first` and those behind it.
+// A heading above the row `first`.
 typedef struct OptionGroup {
     const char *first, *title;
 } OptionGroup;
-// The same with headings, which end with first == NULL.
-void options_help_grouped(const Field *fields, const OptionGroup *groups, FILE *file);
+
+// One line per row for --help; `groups` end with first == NULL; NULL: no headings.
+void options_help(const Field *fields, const OptionGroup *groups, FILE *file);
 
 #endif

@@ -86,10 +86,7 @@ static void command_print(const Command *command) {
     fputs(command->help, stdout);
     if (command->options != NULL) {
         putchar('\n');
-        if (command->groups != NULL)
-            options_help_grouped(command->options, command->groups, stdout);
-        else
-            options_help(command->options, stdout);
+        options_help(command->options, command->groups, stdout);
     }
 }
 

@@ -269,7 +269,7 @@ def test_wrong_words_are_usage():
                                  (("get", "r-1", "--token-file", path), "chmod 600"),
                                  (("get", "r-1", "--token-file", folder), "regular file"),
                                  (("get", "r-1", "--token-file", path + "x"), "cannot be read"),
-                                 (("get", "r-1", "--token", "x"), "--token is no option"),
+                                 (("get", "r-1", "--token", "x"), "--token is not an option"),
                                  (("submit", SPONGE, "--label", "x"), "KEY=VALUE"),
                                  (("submit", SPONGE, "--idempotency-key", "a\nb"), "printable"),
                                  (("compare", "r-1"), "ids of two results"), (("watch",), "job's id"),

@@ -58,7 +58,7 @@ static int stop(void **state) {
     options_read(fields, &settings, (int)COUNT(((char *[]){__VA_ARGS__})),                         \
                  (char *[]){__VA_ARGS__}, prefix, &options, &problem)
 
-static void texts_grow_with_each_flag_and_a_stronger_source_begins_anew(void **state) {
+static void texts_grow_with_each_flag_and_a_stronger_source_replaces_them(void **state) {
     (void)state;
     setenv("TEST_NAMES", "of the environment", 1);
     assert_int_equal(READ("TEST_", "--names", "a", "-n", "b", "--names=c d"), STATUS_OK);
@@ -78,7 +78,7 @@ static void texts_grow_with_each_flag_and_a_stronger_source_begins_anew(void **s
     assert_string_equal(problem.faults[0].pointer, "-n");
 }
 
-static void flags_set_values_and_the_rest_are_operands(void **state) {
+static void flags_set_values_and_other_arguments_are_operands(void **state) {
     (void)state;
     assert_int_equal(READ(NULL, "one", "--rate", "2.5", "--queue-most=7", "-l", "a:1", "-q=9",
                           "--quiet", "--level", "high", "-", "--", "--rate"),
@@ -95,7 +95,7 @@ static void flags_set_values_and_the_rest_are_operands(void **state) {
     assert_int_equal(options.origins[0], OPTION_FLAG);
 }
 
-static void a_flag_beats_the_environment_that_the_file_that_the_default(void **state) {
+static void flags_environment_file_and_defaults_have_precedence_in_this_order(void **state) {
     (void)state;
     char path[] = "/tmp/impactd-options-XXXXXX";
     const int file = mkstemp(path);
@@ -117,7 +117,7 @@ static void a_flag_beats_the_environment_that_the_file_that_the_default(void **s
     assert_int_equal(options.origins[4], OPTION_DEFAULT);
 }
 
-static void a_file_that_is_no_text_of_settings_is_refused(void **state) {
+static void a_file_that_is_not_text_is_refused(void **state) {
     (void)state;
     assert_int_equal(READ("TEST_", "--config", "/tmp"), STATUS_USAGE);
     assert_string_equal(problem.faults[0].pointer, "/tmp");
@@ -150,24 +150,25 @@ static void the_environment_is_not_read_without_a_prefix(void **state) {
     assert_int_equal(settings.queue_most, 50);
 }
 
-static void every_fault_is_told_under_the_name_that_was_typed(void **state) {
+static void every_fault_is_at_the_name_that_was_used(void **state) {
     (void)state;
     setenv("TEST_RATE", "1000", 1);
     assert_int_equal(
         READ("TEST_", "--queue-most", "-3", "--qiet", "--level=hihg", "--quiet=2", "--listen"),
         STATUS_USAGE);
-    static const char *const places[] = {"TEST_RATE", "--queue-most", "--qiet",
-                                         "--level",   "--quiet",      "--listen"};
+    static const char *const places[] = {"--queue-most", "--qiet",   "--level",
+                                         "--quiet",      "--listen", "TEST_RATE"};
     assert_int_equal(problem.count, COUNT(places));
     for (size_t i = 0; i < COUNT(places); i++)
         assert_string_equal(problem.faults[i].pointer, places[i]);
-    assert_string_equal(problem.faults[2].did_you_mean, "--quiet");
-    assert_string_equal(problem.faults[3].did_you_mean, "high");
-    assert_string_equal(problem.faults[3].detail, "must be one of low, high, is hihg");
-    assert_non_null(strstr(problem.faults[0].detail, "100"));
+    assert_string_equal(problem.faults[1].did_you_mean, "--quiet");
+    assert_string_equal(problem.faults[2].did_you_mean, "high");
+    assert_string_equal(problem.faults[2].detail, "must be one of low, high, is hihg");
+    assert_non_null(strstr(problem.faults[5].detail, "100"));
+    assert_int_equal(problem.status, STATUS_USAGE);
 }
 
-static void numbers_that_are_none_are_refused(void **state) {
+static void texts_that_are_not_numbers_are_refused(void **state) {
     (void)state;
     static char *const wrong[][2] = {
         {"--rate", "ten"},       {"--rate", "nan"},
@@ -184,13 +185,7 @@ static void numbers_that_are_none_are_refused(void **state) {
     }
 }
 
-static void faults_are_seen_without_a_problem_to_tell_them(void **state) {
-    (void)state;
-    char *const wrong[] = {"--no-such"};
-    assert_int_equal(options_read(fields, &settings, 1, wrong, NULL, &options, NULL), STATUS_USAGE);
-}
-
-static void what_is_printed_can_be_read_as_a_file(void **state) {
+static void printed_settings_can_be_read_as_a_file(void **state) {
     (void)state;
     assert_int_equal(READ(NULL, "--rate", "2.5", "-l", "a:1", "--quiet", "--level", "high"),
                      STATUS_OK);
@@ -215,7 +210,7 @@ static void help_has_its_headings_above_their_rows(void **state) {
     char text[2000] = "";
     FILE *file = tmpfile();
     assert_non_null(file);
-    options_help_grouped(fields, groups, file);
+    options_help(fields, groups, file);
     rewind(file);
     const size_t size = fread(text, 1, sizeof text - 1, file);
     fclose(file);
@@ -228,20 +223,18 @@ static void help_has_its_headings_above_their_rows(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(texts_grow_with_each_flag_and_a_stronger_source_begins_anew,
-                                        start, stop),
-        cmocka_unit_test_setup_teardown(flags_set_values_and_the_rest_are_operands, start, stop),
-        cmocka_unit_test_setup_teardown(a_flag_beats_the_environment_that_the_file_that_the_default,
-                                        start, stop),
-        cmocka_unit_test_setup_teardown(a_file_that_is_no_text_of_settings_is_refused, start, stop),
+        cmocka_unit_test_setup_teardown(
+            texts_grow_with_each_flag_and_a_stronger_source_replaces_them, start, stop),
+        cmocka_unit_test_setup_teardown(flags_set_values_and_other_arguments_are_operands, start,
+                                        stop),
+        cmocka_unit_test_setup_teardown(
+            flags_environment_file_and_defaults_have_precedence_in_this_order, start, stop),
+        cmocka_unit_test_setup_teardown(a_file_that_is_not_text_is_refused, start, stop),
         cmocka_unit_test_setup_teardown(a_file_names_no_other_file, start, stop),
         cmocka_unit_test_setup_teardown(the_environment_is_not_read_without_a_prefix, start, stop),
-        cmocka_unit_test_setup_teardown(every_fault_is_told_under_the_name_that_was_typed, start,
-                                        stop),
-        cmocka_unit_test_setup_teardown(numbers_that_are_none_are_refused, start, stop),
-        cmocka_unit_test_setup_teardown(faults_are_seen_without_a_problem_to_tell_them, start,
-                                        stop),
-        cmocka_unit_test_setup_teardown(what_is_printed_can_be_read_as_a_file, start, stop),
+        cmocka_unit_test_setup_teardown(every_fault_is_at_the_name_that_was_used, start, stop),
+        cmocka_unit_test_setup_teardown(texts_that_are_not_numbers_are_refused, start, stop),
+        cmocka_unit_test_setup_teardown(printed_settings_can_be_read_as_a_file, start, stop),
         cmocka_unit_test(help_has_its_headings_above_their_rows),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
