@@ -9,31 +9,31 @@
 // Exit codes of the program.
 typedef enum CommandExit {
     COMMAND_OK = 0,
-    COMMAND_FAILED = 1, // the job failed
+    COMMAND_FAILED = 1, // a job or an operation
     COMMAND_USAGE = 2,
     COMMAND_BAD_SCENE = 3,
     COMMAND_NOT_FOUND = 4,
     COMMAND_NOT_ALLOWED = 5,
     COMMAND_UNREACHABLE = 7,
-    COMMAND_TIMED_OUT = 8, // while the job goes on
+    COMMAND_TIMED_OUT = 8, // the job continues
     COMMAND_INTERRUPTED = 130,
 } CommandExit;
 
 typedef struct Command Command;
 struct Command {
     const char *name;
-    const char *operands;      // as help shows them: "SCENE.json"; NULL: takes none
+    const char *operands;      // as in the help: "SCENE.json"; NULL: none
     const char *summary;       // one line
-    const char *help;          // examples and what else one should know; whole lines
+    const char *help;          // examples, an empty line, remarks; whole lines
     const Field *options;      // rows for help; NULL: none
-    const OptionGroup *groups; // headings over them; NULL: none
+    const OptionGroup *groups; // headings of the options; NULL: none
     size_t size;               // of the struct that the options describe
-    const char *environment;   // prefix of variables that are read as options; NULL: none
-    // `settings` has what was given; it is cleared by the caller. Returns the exit code.
+    const char *environment;   // prefix of the variables that set options; NULL: none
+    // `settings` holds the options; it is cleared by the caller. Returns the exit code.
     int (*run)(const Command *self, void *settings, const Options *options, Problem *problem);
 };
 
-// Each is in the file of its name, those of studies in study.c.
+// Each is in the file of its name or of its resource: jobs.c, records.c, study.c.
 extern const Command command_serve, command_run, command_check, command_tradeoff, command_ensemble,
     command_study, command_sweep, command_import, command_materials, command_records, command_token,
     command_backup, command_submit, command_watch, command_get, command_cancel, command_compare;
@@ -44,20 +44,20 @@ const Command *command_find(const char *name); // NULL if there is none
 // The whole program: finds the command, answers --help, runs it. Returns the exit code.
 int command_main(int argc, char *const *argv);
 
-// Usage faults on stderr, "impactd run: --outpt is no option (did you mean --output?)"; returns
+// Usage faults on stderr, "impactd run: --outpt is not an option (did you mean --output?)"; returns
 // COMMAND_USAGE.
 int command_error(const char *name, const Problem *problem);
 
-// Which of `count` actions the first operand names: the index of its name. `names` points to the
-// first name, the others follow at `stride` bytes. STATUS_USAGE lists them.
+// The index of the action that the first operand names, of `count` actions. `names` points to the
+// name of the first; those of the others follow at `stride` bytes. STATUS_USAGE lists them.
 Status command_action(const Options *options, const char *const *names, size_t count, size_t stride,
                       size_t *index, Problem *problem);
 
 // Sets *folder, where it is NULL, to $IMPACTD_DATA, else to impactd under $XDG_STATE_HOME, else
-// under ~/.local/state; the caller frees it. STATUS_USAGE where none is known.
+// under ~/.local/state; the caller frees it. STATUS_USAGE if none of them is set.
 Status command_data_folder(char **folder, Problem *problem);
 
-// What a Status means to a shell.
+// The exit code of a Status.
 int command_exit(Status status);
 
 #endif

@@ -16,7 +16,7 @@ static int version_run(const Command *self, void *settings, const Options *optio
 static const Command command_help = {
     .name = "help",
     .operands = "[COMMAND]",
-    .summary = "tell more about a command",
+    .summary = "show the help of a command",
     .help = "  impactd help run\n",
     .run = help_run,
 };
@@ -37,22 +37,22 @@ const Command *const commands[] = {
 static const char overview[] =
     "impactd simulates structures with impact dampers.\n"
     "\n"
-    "  impactd serve                        start the daemon on http://127.0.0.1:8080\n"
-    "  impactd run scene.json               run one scene here and print the finished job\n"
+    "  impactd serve                        start the server on http://127.0.0.1:8080\n"
+    "  impactd run scene.json               run a scene without a server, print the job\n"
     "  impactd run scene.json -o out.csv    write its time series (npy, npz, mat, svg)\n"
-    "  impactd check scene.json             say what is wrong with a scene, or show its plan\n"
-    "  impactd tradeoff scene.json          try solvers and steps on it: error against CPU time\n"
+    "  impactd check scene.json             report the faults of a scene, or show its plan\n"
+    "  impactd tradeoff scene.json          error against CPU time of solvers and steps\n"
     "  impactd ensemble scene.json          many seeds of a random base: means and confidence\n"
-    "  impactd study scene.json             the study that it asks for: compare, sensitivity\n"
-    "  impactd sweep scene.json             the scene at many points: a grid or a list of values\n"
-    "  impactd token create --name lab      let a client in who has this token\n"
-    "  impactd materials list               what the lab has measured, and what became of it\n"
-    "  impactd backup lab.db                copy the database while the daemon runs\n"
-    "  impactd import motion.AT2            make an excitation of a ground motion's file\n"
-    "  impactd submit scene.json --wait 60  send it to a daemon, here or elsewhere\n"
-    "  impactd get JOB series -o out.npy    what became of it\n"
+    "  impactd study scene.json             the study of the scene: compare, sensitivity\n"
+    "  impactd sweep scene.json             the scene over a grid or list of values\n"
+    "  impactd token create --name lab      create an access token\n"
+    "  impactd materials list               materials of the laboratory\n"
+    "  impactd backup lab.db                copy the database while the server runs\n"
+    "  impactd import motion.AT2            convert a ground motion file to an excitation\n"
+    "  impactd submit scene.json --wait 60  run a scene on a server\n"
+    "  impactd get JOB series -o out.npy    download a part of its result\n"
     "\n"
-    "A scene: release a structure from 15 mm, a ball between two sponges inside it.\n"
+    "A scene: a structure released from 15 mm, with a ball between two sponges in it.\n"
     "\n"
     "  {\"structure\": {\"mass\": 1.35, \"stiffness\": 865, \"damping\": 1.092},\n"
     "   \"dampers\": [{\"mass\": 0.1107, \"clearance\": 0.015, \"buffer\": \"sponge\"}],\n"
@@ -62,9 +62,9 @@ static const char overview[] =
 
 static const char exits[] =
     "\n"
-    "impactd help COMMAND tells more. Exit codes: 0 ok, 1 the job failed, 2 usage, 3 bad scene,\n"
-    "4 not found, 5 not allowed, 7 server unreachable, 8 timed out while the job goes on, 130 "
-    "interrupted.\n";
+    "See impactd help COMMAND. Exit codes: 0 ok, 1 failed, 2 usage, 3 faulty scene or file,\n"
+    "4 not found, 5 permission denied, 7 server unreachable, 8 job not finished after --wait,\n"
+    "130 interrupted.\n";
 
 const Command *command_find(const char *name) {
     for (size_t i = 0; commands[i] != NULL; i++)
@@ -95,7 +95,7 @@ static int unknown_refuse(const char *name) {
     for (size_t i = 0; i < COUNT(commands); i++)
         names[i] = commands[i] == NULL ? NULL : commands[i]->name;
     const char *near = spelling_nearest(names, name);
-    fprintf(stderr, "impactd: %s is no command", name);
+    fprintf(stderr, "impactd: %s is not a command", name);
     if (near != NULL)
         fprintf(stderr, " (did you mean %s?)", near);
     fputs("; impactd --help lists them\n", stderr);
@@ -119,7 +119,7 @@ static int version_run(const Command *self, void *settings, const Options *optio
                        Problem *problem) {
     (void)settings;
     if (options->operand_count > 0) {
-        (void)problem_set(problem, STATUS_USAGE, "takes no arguments, is given %s",
+        (void)problem_set(problem, STATUS_USAGE, "takes no operands, is given %s",
                           options->operands[0]);
         return command_error(self->name, problem);
     }
@@ -137,7 +137,7 @@ int command_error(const char *name, const Problem *problem) {
     }
     if (problem->count == 0)
         fprintf(stderr, "impactd %s: %s\n", name, problem->detail);
-    fprintf(stderr, "impactd help %s shows what it takes\n", name);
+    fprintf(stderr, "see impactd help %s\n", name);
     return COMMAND_USAGE;
 }
 
@@ -198,7 +198,7 @@ Status command_data_folder(char **folder, Problem *problem) {
         return STATUS_OK;
     if (given != NULL)
         size = snprintf(text, sizeof text, "%s", given);
-    // The specification of XDG has relative paths ignored.
+    // The XDG specification ignores relative paths.
     else if (state != NULL && state[0] == '/')
         size = snprintf(text, sizeof text, "%s/impactd", state);
     else if (home != NULL && home[0] == '/')
@@ -206,7 +206,7 @@ Status command_data_folder(char **folder, Problem *problem) {
     if (size < 0 || (size_t)size >= sizeof text)
         return problem_set(
             problem, STATUS_USAGE,
-            "no place for the data: neither XDG_STATE_HOME nor HOME is set; use --data DIR");
+            "no data directory: neither XDG_STATE_HOME nor HOME is set; use --data DIR");
     *folder = strdup(text);
     return *folder != NULL ? STATUS_OK : problem_set(problem, STATUS_NO_MEMORY, "no memory");
 }
@@ -242,14 +242,14 @@ int command_main(int argc, char *const *argv) {
     const Command *command = command_find(name);
     if (command == NULL)
         return unknown_refuse(name);
-    const bool is_flag = name != argv[1]; // the rest is passed over
+    const bool is_flag = name != argv[1]; // further arguments are ignored
     for (int i = 2; i < argc && !is_flag && strcmp(argv[i], "--") != 0; i++)
         if (strcmp(argv[i], "--help") == 0 || strcmp(argv[i], "-h") == 0) {
             command_print(command);
             return COMMAND_OK;
         }
     const int code = command_run_with(command, is_flag ? 0 : argc - 2, argv + 2);
-    // What was printed must have arrived: a full disk or a closed pipe is a failure.
+    // A full disk or a closed pipe is a failure.
     if (fflush(stdout) != 0 && code == COMMAND_OK) {
         fputs("impactd: standard output cannot be written\n", stderr);
         return COMMAND_FAILED;

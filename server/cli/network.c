@@ -85,7 +85,7 @@ static Status read_file(const char *name, const char *path, bool is_secret, char
     Status status = STATUS_OK;
     if (is_secret && fstat(fileno(file), &facts) == 0 && (facts.st_mode & S_IROTH) != 0)
         status = problem_add(problem, STATUS_USAGE, name,
-                             "may be read by everyone on this machine; chmod 600 %s", path);
+                             "can be read by everyone on this machine; chmod 600 %s", path);
     char piece[4096];
     Bytes bytes = {.most = PEM_MAX};
     for (size_t count; !bytes.is_failed && (count = fread(piece, 1, sizeof piece, file)) > 0;)
@@ -94,8 +94,8 @@ static Status read_file(const char *name, const char *path, bool is_secret, char
     const bool has_nul = bytes.at != NULL && strlen(bytes.at) != bytes.count;
     if (bytes.is_failed || has_nul || bytes.count == 0) {
         bytes_clear(&bytes);
-        return problem_add(problem, STATUS_USAGE, name, "%s is no PEM file of at most a megabyte",
-                           path);
+        return problem_add(problem, STATUS_USAGE, name,
+                           "%s is not a PEM file of at most a megabyte", path);
     }
     *text = bytes_take(&bytes, NULL);
     return status;
@@ -142,9 +142,9 @@ Status network_check(const Network *reach, const Address *address, size_t tokens
         return STATUS_OK;
     const bool is_loopback = address_is_loopback(address);
     return problem_set(problem, STATUS_FORBIDDEN,
-                       "will not listen on %s%s: there is no token that could be used. Make one "
-                       "with\n    impactd token create --name NAME --scopes read,submit\n(with the "
-                       "same --data DIR, if any)%s",
+                       "does not listen on %s%s: there is no valid token. Create one with\n    "
+                       "impactd token create --name NAME --scopes read,submit\n(with the same "
+                       "--data DIR, if any)%s",
                        address->host, is_loopback ? " with --require-tokens" : "",
                        is_loopback ? "" : ", or listen on 127.0.0.1");
 }

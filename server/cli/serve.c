@@ -1,6 +1,6 @@
-// impactd serve: the daemon. Opens store, intake and listener in this order, waits for SIGTERM or
-// SIGINT, and closes them so that nobody meets a room that is gone: first no more requests, then no
-// more work, then what sleepers used.
+// impactd serve: the daemon. Opens the database, the job manager and the HTTP server in this order
+// and waits for SIGTERM or SIGINT. Then it stops requests, work and background tasks before it
+// closes what they use.
 #include <errno.h>
 #include <pthread.h>
 #include <signal.h>
@@ -35,56 +35,56 @@ typedef struct ServeSettings {
     bool require_tokens, print_config;
 } ServeSettings;
 
-// ASIDES: runs for readers at once. HOT_SHARE: whole answers take such a part of the cache's bytes.
+// ASIDES: concurrent background computations. HOT_SHARE: the part of the cache for responses.
 enum { GRACE_MS = 1500, ASIDES = 2, HOT_SHARE = 4 };
 
 #define MIB ((double)(1 << 20))
 
 // clang-format off
 static const Field serve_fields[] = {
-    FIELD_TEXT(ServeSettings, listen, 255, PRESENCE_OPTIONAL, 0, "HOST:PORT, in digits or localhost; port 0 takes any free one; beyond loopback a token must exist (127.0.0.1:8080)"),
-    FIELD_TEXT(ServeSettings, data, 4000, PRESENCE_OPTIONAL, 0, "folder of the database ($XDG_STATE_HOME/impactd, else ~/.local/state/impactd)"),
-    FIELD_COUNT(ServeSettings, workers, NULL, WITHIN(0, 256), 0, "simulations at once; 0 takes the number of processors"),
-    FIELD_COUNT(ServeSettings, queue, NULL, WITHIN(1, 1e6), 10000, "unfinished jobs at most; more are answered 503"),
-    FIELD_COUNT(ServeSettings, queue_bytes, "B", WITHIN(1024, 1099511627776.0), 256 * MIB, "of unfinished jobs' scenes at most; more are answered 503"),
-    FIELD_COUNT(ServeSettings, quota, NULL, WITHIN(0, 1e6), 0, "unfinished jobs of one token at most, more are answered 429; 0: as many as the queue takes"),
-    FIELD_REAL(ServeSettings, rate, "1/min", WITHIN(0, 1e9), 0, "jobs one token may send, more are answered 429; 0: any number"),
-    FIELD_COUNT(ServeSettings, max_body, "B", WITHIN(1024, 1024 * MIB), 16 * MIB, "a larger request body is answered 413"),
-    FIELD_COUNT(ServeSettings, max_samples, NULL, WITHIN(2, 1073741824.0), 33554432, "samples per channel a scene may ask for"),
-    FIELD_COUNT(ServeSettings, max_impacts, NULL, WITHIN(1, 1e9), 5e5, "impacts a run may have before it is stopped"),
-    FIELD_REAL(ServeSettings, max_cpu_seconds, "s", WITHIN(1e-6, 1e9), SIMULATION_CPU_SECONDS, "CPU time a scene may be predicted to take; it is refused beyond, and stopped at about three times as much"),
-    FIELD_REAL(ServeSettings, max_study_seconds, "s", WITHIN(0, 1e9), 3600, "CPU time that a study may be predicted to take; others are refused; 0: any"),
-    FIELD_COUNT(ServeSettings, max_run_bytes, "B", WITHIN(1 << 20, 1099511627776.0), SIMULATION_BYTES, "memory a scene may be predicted to take; it is refused beyond"),
-    FIELD_COUNT(ServeSettings, max_points, NULL, WITHIN(1, 1e7), SWEEP_POINTS, "points a sweep may have"),
-    FIELD_COUNT(ServeSettings, cache_bytes, "B", WITHIN(0, 1099511627776.0), 256 * MIB, "memory for what is kept ready: whole answers a quarter, results the rest"),
-    FIELD_COUNT(ServeSettings, store_bytes, "B", WITHIN(0, 1099511627776.0), 1024 * MIB, "disk for series that are dearer to compute than to read"),
-    FIELD_REAL(ServeSettings, keep_days, "d", WITHIN(0, 36500), 0, "finished jobs are kept so long, with the results that no later job names; 0: for ever"),
-    FIELD_COUNT(ServeSettings, keep_jobs, NULL, WITHIN(0, 1e12), 0, "finished jobs kept, the oldest go first; 0: all"),
-    FIELD_COUNT(ServeSettings, keep_bytes, "B", WITHIN(0, 1e18), 0, "size of the database beyond which the oldest finished jobs go; 0: any"),
-    FIELD_TEXTS(ServeSettings, host, NULL, NULL, 64, PRESENCE_OPTIONAL, 0, "another name that requests may call this machine by; may be repeated, or a list with commas"),
-    FIELD_TEXT(ServeSettings, base_url, 255, PRESENCE_OPTIONAL, 0, "how clients reach it behind a proxy, as https://sim.example.org/impactd; every link begins with it"),
-    FIELD_FLAG(ServeSettings, require_tokens, false, "ask for a token on loopback too, even while there is none"),
+    FIELD_TEXT(ServeSettings, listen, 255, PRESENCE_OPTIONAL, 0, "HOST:PORT, a numeric address or localhost; port 0: any free port; other than loopback requires a token (127.0.0.1:8080)"),
+    FIELD_TEXT(ServeSettings, data, 4000, PRESENCE_OPTIONAL, 0, "directory of the database ($XDG_STATE_HOME/impactd, else ~/.local/state/impactd)"),
+    FIELD_COUNT(ServeSettings, workers, NULL, WITHIN(0, 256), 0, "number of concurrent simulations; 0: number of processors"),
+    FIELD_COUNT(ServeSettings, queue, NULL, WITHIN(1, 1e6), 10000, "maximum number of unfinished jobs; more are answered 503"),
+    FIELD_COUNT(ServeSettings, queue_bytes, "B", WITHIN(1024, 1099511627776.0), 256 * MIB, "maximum size of the scenes of all unfinished jobs; more are answered 503"),
+    FIELD_COUNT(ServeSettings, quota, NULL, WITHIN(0, 1e6), 0, "maximum number of unfinished jobs per token, more are answered 429; 0: no limit"),
+    FIELD_REAL(ServeSettings, rate, "1/min", WITHIN(0, 1e9), 0, "rate limit of jobs per token, more are answered 429; 0: no limit"),
+    FIELD_COUNT(ServeSettings, max_body, "B", WITHIN(1024, 1024 * MIB), 16 * MIB, "maximum size of a request body, a larger one is answered 413"),
+    FIELD_COUNT(ServeSettings, max_samples, NULL, WITHIN(2, 1073741824.0), 33554432, "maximum number of samples per channel of a scene"),
+    FIELD_COUNT(ServeSettings, max_impacts, NULL, WITHIN(1, 1e9), 5e5, "maximum number of impacts of a run; it is stopped beyond"),
+    FIELD_REAL(ServeSettings, max_cpu_seconds, "s", WITHIN(1e-6, 1e9), SIMULATION_CPU_SECONDS, "reject scenes predicted to need more CPU time; running jobs are stopped at about 3 times this"),
+    FIELD_REAL(ServeSettings, max_study_seconds, "s", WITHIN(0, 1e9), 3600, "reject studies predicted to need more CPU time; 0: no limit"),
+    FIELD_COUNT(ServeSettings, max_run_bytes, "B", WITHIN(1 << 20, 1099511627776.0), SIMULATION_BYTES, "reject scenes predicted to need more memory"),
+    FIELD_COUNT(ServeSettings, max_points, NULL, WITHIN(1, 1e7), SWEEP_POINTS, "maximum number of points of a sweep"),
+    FIELD_COUNT(ServeSettings, cache_bytes, "B", WITHIN(0, 1099511627776.0), 256 * MIB, "in-memory cache: 1/4 for responses, 3/4 for results"),
+    FIELD_COUNT(ServeSettings, store_bytes, "B", WITHIN(0, 1099511627776.0), 1024 * MIB, "disk space for series that are expensive to compute"),
+    FIELD_REAL(ServeSettings, keep_days, "d", WITHIN(0, 36500), 0, "delete jobs that finished longer ago; a result is deleted with its last job; 0: never"),
+    FIELD_COUNT(ServeSettings, keep_jobs, NULL, WITHIN(0, 1e12), 0, "number of finished jobs to keep, the oldest are deleted first; 0: all"),
+    FIELD_COUNT(ServeSettings, keep_bytes, "B", WITHIN(0, 1e18), 0, "size of the database beyond which the oldest finished jobs are deleted; 0: no limit"),
+    FIELD_TEXTS(ServeSettings, host, NULL, NULL, 64, PRESENCE_OPTIONAL, 0, "additional accepted Host name; repeatable, or a list separated by commas"),
+    FIELD_TEXT(ServeSettings, base_url, 255, PRESENCE_OPTIONAL, 0, "URL for clients behind a proxy, as https://sim.example.org/impactd; links begin with it"),
+    FIELD_FLAG(ServeSettings, require_tokens, false, "require a token on loopback too, also if none exists"),
     FIELD_TEXT(ServeSettings, tls_cert, 4000, PRESENCE_OPTIONAL, 0, "PEM file of the certificate, for HTTPS"),
     FIELD_TEXT(ServeSettings, tls_key, 4000, PRESENCE_OPTIONAL, 0, "PEM file of its key"),
-    FIELD_CHOICE(ServeSettings, journal, log_mode_names, JOURNAL_ERRORS, "which requests get a line on standard error: off, errors or all"),
-    FIELD_TEXT(ServeSettings, config, 4000, PRESENCE_OPTIONAL, 0, "a file of settings, one \"name = value\" a line"),
-    FIELD_FLAG(ServeSettings, print_config, false, "print each setting and where it came from, and stop"),
+    FIELD_CHOICE(ServeSettings, journal, log_mode_names, JOURNAL_ERRORS, "requests to log on standard error: off, errors or all"),
+    FIELD_TEXT(ServeSettings, config, 4000, PRESENCE_OPTIONAL, 0, "file of settings, one \"name = value\" per line"),
+    FIELD_FLAG(ServeSettings, print_config, false, "print each setting and its origin, and exit"),
     FIELD_END,
 };
 // clang-format on
 
 static const OptionGroup serve_groups[] = {
-    {"listen", "Where it listens and keeps its data"},
-    {"workers", "Work"},
+    {"listen", "Address and data"},
+    {"workers", "Jobs"},
     {"max_body", "Limits"},
-    {"cache_bytes", "Memory"},
-    {"host", "Who can reach it, and how"},
-    {"journal", "Journal and settings"},
+    {"cache_bytes", "Cache and retention"},
+    {"host", "Network and access"},
+    {"journal", "Log and settings"},
     {NULL, NULL},
 };
 
-// The defaults that depend on where we run.
-static Status complete(ServeSettings *settings, Problem *problem) {
+// Defaults that depend on the machine.
+static Status serve_complete(ServeSettings *settings, Problem *problem) {
     TRY(command_data_folder(&settings->data, problem));
     if (settings->listen == NULL && (settings->listen = strdup("127.0.0.1:8080")) == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory");
@@ -95,37 +95,36 @@ static Status complete(ServeSettings *settings, Problem *problem) {
     return STATUS_OK;
 }
 
-static Status refuse(Problem *problem, const char *small, uint64_t value, const char *large,
-                     uint64_t other, const char *why) {
+static Status setting_too_small(Problem *problem, const char *small, uint64_t value,
+                                const char *large, uint64_t other, const char *why) {
     return problem_add(problem, STATUS_USAGE, small, "must be at least %s, %llu, is %llu: %s",
                        large, (unsigned long long)other, (unsigned long long)value, why);
 }
 
-// Settings that are right by themselves and wrong together.
-static Status check(const ServeSettings *settings, Problem *problem) {
+// Checks settings against each other.
+static Status serve_check(const ServeSettings *settings, Problem *problem) {
     Status status = STATUS_OK;
     if (settings->queue_bytes < settings->max_body)
-        status = refuse(problem, "--queue-bytes", settings->queue_bytes, "--max-body",
-                        settings->max_body, "a scene that is taken must find room in the queue");
+        status = setting_too_small(problem, "--queue-bytes", settings->queue_bytes, "--max-body",
+                                   settings->max_body,
+                                   "the queue must have space for the largest scene");
     if (settings->queue < settings->workers)
-        status = refuse(problem, "--queue", settings->queue, "--workers", settings->workers,
-                        "a worker without a job is of no use");
+        status =
+            setting_too_small(problem, "--queue", settings->queue, "--workers", settings->workers,
+                              "more workers than --queue slots would stay idle");
     if (settings->quota > settings->queue)
         status =
-            problem_add(problem, STATUS_USAGE, "--quota",
-                        "is %llu, more than the %llu jobs of --queue: no token could ever have "
-                        "so many; lower --quota or raise --queue",
-                        (unsigned long long)settings->quota, (unsigned long long)settings->queue);
+            problem_add(problem, STATUS_USAGE, "--quota", "must be at most --queue, %llu, is %llu",
+                        (unsigned long long)settings->queue, (unsigned long long)settings->quota);
     if (settings->keep_bytes > 0 && settings->keep_bytes < 1 << 20)
-        status =
-            problem_add(problem, STATUS_USAGE, "--keep-bytes",
-                        "is %llu B, less than an empty database takes: use at least %.0f, or 0 "
-                        "for no limit",
-                        (unsigned long long)settings->keep_bytes, MIB);
+        status = problem_add(problem, STATUS_USAGE, "--keep-bytes",
+                             "must be at least %.0f B, the size of an empty database, or 0 for no "
+                             "limit, is %llu",
+                             MIB, (unsigned long long)settings->keep_bytes);
     return status;
 }
 
-static void greet(const Server *server, const ServeSettings *settings, const App *app) {
+static void serve_greet(const Server *server, const ServeSettings *settings, const App *app) {
     const char *url = app->base_url[0] != '\0' ? app->base_url : server_url(server);
     printf("impactd %s listens on %s\n", program_version, server_url(server));
     printf("data in %s, %llu workers; Ctrl-C stops\n\n", settings->data,
@@ -139,21 +138,20 @@ static void forget_answers(void *response_cache) {
         response_cache_clear(response_cache);
 }
 
-// SIGHUP: a certificate that was renewed is used from now on.
-static void read_anew(const NetworkSettings *asked, Problem *problem) {
+// SIGHUP: reads a renewed certificate.
+static void serve_reload(const NetworkSettings *asked, Problem *problem) {
     problem_clear(problem);
     if (asked->tls_cert == NULL)
-        fprintf(stderr, "impactd: SIGHUP: without TLS there is nothing to read anew\n");
+        fprintf(stderr, "impactd: SIGHUP: without TLS there is nothing to reload\n");
     else if (network_read_tls(asked, problem) == STATUS_OK)
-        fprintf(stderr, "impactd: SIGHUP: the certificate in %s is used from now on\n",
-                asked->tls_cert);
+        fprintf(stderr, "impactd: SIGHUP: the certificate in %s is in use\n", asked->tls_cert);
     else
-        fprintf(stderr, "impactd: SIGHUP: the certificate stays as it was: %s\n", problem->detail);
+        fprintf(stderr, "impactd: SIGHUP: the certificate is unchanged: %s\n", problem->detail);
 }
 
-// Waits for a signal to end, and tells systemd meanwhile that we live. A terminal that is gone ends
-// what was started in it, as it always does.
-static int wait_for_end(const sigset_t *signals, const NetworkSettings *asked, Problem *problem) {
+// Waits for a signal that ends the program and notifies the watchdog of systemd meanwhile. A
+// terminal that is closed ends the program that was started in it.
+static int serve_wait(const sigset_t *signals, const NetworkSettings *asked, Problem *problem) {
     const bool has_terminal = isatty(STDIN_FILENO) != 0;
     const int64_t period_ms = systemd_watchdog_ms();
     const struct timespec period = {.tv_sec = (time_t)(period_ms / 1000),
@@ -162,7 +160,7 @@ static int wait_for_end(const sigset_t *signals, const NetworkSettings *asked, P
         const int signal =
             period_ms > 0 ? sigtimedwait(signals, NULL, &period) : sigwaitinfo(signals, NULL);
         if (signal == SIGHUP && (!has_terminal || isatty(STDIN_FILENO) != 0))
-            read_anew(asked, problem);
+            serve_reload(asked, problem);
         else if (signal > 0)
             return signal;
         else if (errno == EAGAIN)
@@ -170,29 +168,29 @@ static int wait_for_end(const sigset_t *signals, const NetworkSettings *asked, P
     }
 }
 
-// From here on a second signal ends us at once; what is acknowledged is in the database.
-static void let_signals_kill(const sigset_t *signals) {
+// From here on a second signal kills the program; acknowledged jobs are in the database.
+static void signals_unblock(const sigset_t *signals) {
     signal(SIGHUP, SIG_IGN);
     signal(SIGTERM, SIG_DFL);
     signal(SIGINT, SIG_DFL);
     pthread_sigmask(SIG_UNBLOCK, signals, NULL);
 }
 
-static void run_until_stopped(App *app, Server *server, const ServeSettings *settings,
-                              const NetworkSettings *asked, const sigset_t *signals,
-                              Problem *problem) {
+static void serve_until_stopped(App *app, Server *server, const ServeSettings *settings,
+                                const NetworkSettings *asked, const sigset_t *signals,
+                                Problem *problem) {
     atomic_store(&app->server, server);
-    greet(server, settings, app);
+    serve_greet(server, settings, app);
     systemd_notify("READY=1");
-    const int signal = wait_for_end(signals, asked, problem);
+    const int signal = serve_wait(signals, asked, problem);
     systemd_notify("STOPPING=1");
     atomic_store(&app->is_stopping, true);
-    let_signals_kill(signals);
+    signals_unblock(signals);
     Bytes line = {0};
     bytes_format(&line, "%s, stopping",
                  signal == SIGINT   ? "interrupted"
-                 : signal == SIGHUP ? "its terminal is gone"
-                                    : "asked to end");
+                 : signal == SIGHUP ? "terminal closed"
+                                    : "terminated");
     log_write(&line);
     bytes_clear(&line);
 }
@@ -236,7 +234,7 @@ static Status serve(const ServeSettings *settings, const sigset_t *signals, Prob
     fft_start();
     Status status = address_read(settings->listen, &door.address, problem);
     if (status == STATUS_OK) {
-        const Status together = check(settings, problem);
+        const Status together = serve_check(settings, problem);
         status = network_read(&asked, &door.address, &ready, problem);
         status = together != STATUS_OK ? together : status;
     }
@@ -265,7 +263,7 @@ static Status serve(const ServeSettings *settings, const sigset_t *signals, Prob
         status = server_open(&door, &server, problem);
     }
     if (status == STATUS_OK)
-        run_until_stopped(&app, server, settings, &asked, signals, problem);
+        serve_until_stopped(&app, server, settings, &asked, signals, problem);
     server_stop(server, GRACE_MS);
     maintenance_stop(keeper);
     background_close(app.background_tasks);
@@ -281,9 +279,9 @@ static Status serve(const ServeSettings *settings, const sigset_t *signals, Prob
     return status;
 }
 
-// Before any thread starts, so that only sigwait sees them, and when the settings have been read:
-// until then they end us as they end anything.
-static void hold_signals(sigset_t *signals) {
+// Called before any thread starts, so that only sigwait receives them, and after the settings have
+// been read: until then a signal kills the program.
+static void signals_block(sigset_t *signals) {
     sigemptyset(signals);
     sigaddset(signals, SIGTERM);
     sigaddset(signals, SIGINT);
@@ -293,19 +291,19 @@ static void hold_signals(sigset_t *signals) {
     signal(SIGXFSZ, SIG_IGN); // a limit on a file's size is an error of writing like any other
 }
 
-static int run(const Command *self, void *of, const Options *options, Problem *problem) {
+static int serve_run(const Command *self, void *of, const Options *options, Problem *problem) {
     ServeSettings *settings = of;
     Status status = STATUS_OK;
     if (options->operand_count > 0)
-        status = problem_set(problem, STATUS_USAGE, "takes no operands, \"%.60s\" is one",
+        status = problem_set(problem, STATUS_USAGE, "takes no operands, is given \"%.60s\"",
                              options->operands[0]);
     if (status == STATUS_OK)
-        status = complete(settings, problem);
+        status = serve_complete(settings, problem);
     if (status == STATUS_OK && settings->print_config) {
         options_print(serve_fields, settings, options, stdout);
     } else if (status == STATUS_OK) {
         sigset_t signals;
-        hold_signals(&signals);
+        signals_block(&signals);
         status = serve(settings, &signals, problem);
     }
     if (status == STATUS_OK)
@@ -319,7 +317,7 @@ static int run(const Command *self, void *of, const Options *options, Problem *p
 
 const Command command_serve = {
     .name = "serve",
-    .summary = "the daemon: takes scenes over HTTP, keeps jobs and results",
+    .summary = "run the server: jobs and results over HTTP",
     .help =
         "  impactd serve\n"
         "  impactd serve --listen 127.0.0.1:0 --data /tmp/trial\n"
@@ -327,14 +325,13 @@ const Command command_serve = {
         "  impactd token create --name lab; impactd serve --listen 0.0.0.0:8443 --tls-cert c.pem "
         "--tls-key k.pem\n"
         "\n"
-        "Prints its URL and a curl line. SIGTERM or Ctrl-C ends it within 5 seconds; "
-        "unfinished jobs go on at\n"
-        "the next start. SIGHUP reads the certificate and its key anew; where they are faulty the "
-        "old "
-        "ones stay. GET / of the URL shows what it can do.\n",
+        "Prints its URL and a curl command. SIGTERM or Ctrl-C ends it within 5 seconds; "
+        "unfinished\n"
+        "jobs continue at the next start. SIGHUP reloads the certificate and its key; if they are\n"
+        "faulty the present ones stay in use. GET / of the URL shows the API.\n",
     .options = serve_fields,
     .groups = serve_groups,
     .size = sizeof(ServeSettings),
     .environment = "IMPACTD_",
-    .run = run,
+    .run = serve_run,
 };

@@ -1,7 +1,6 @@
-# cmake --install build [--prefix X], with DESTDIR for packages: the program, its manual, completions, unit, contract.
+# cmake --install build [--prefix X], with DESTDIR for packages: program, manual, completion, unit, schemas.
 include(GNUInstallDirs)
-file(GLOB PAGES_SOURCES CONFIGURE_DEPENDS server/install/*.c)
-add_executable(print_pages ${PAGES_SOURCES})
+add_executable(print_pages server/install/pages.c)
 target_link_libraries(print_pages PRIVATE impactd_server)
 set_target_properties(print_pages PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/install)
 set(PAGES ${CMAKE_BINARY_DIR}/install)
@@ -20,7 +19,7 @@ file(GLOB INSTALLED_EXAMPLES CONFIGURE_DEPENDS schema/examples/*.json)
 install(FILES ${INSTALLED_SCHEMAS} DESTINATION ${CMAKE_INSTALL_DATADIR}/impactd/schema)
 install(FILES ${INSTALLED_EXAMPLES} DESTINATION ${CMAKE_INSTALL_DATADIR}/impactd/examples)
 install(FILES LICENSE README.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
-# The unit names the program where this very installation puts it.
+# The unit has the path of the program in this installation.
 install(CODE "
     get_filename_component(prefix \"\${CMAKE_INSTALL_PREFIX}\" ABSOLUTE)
     set(IMPACTD_BINARY \"\${prefix}/${CMAKE_INSTALL_BINDIR}/impactd\")

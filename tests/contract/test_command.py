@@ -53,7 +53,7 @@ def test_usage_faults():
             (("serve", "--workers", "many"), "--workers"),
             (("serve", "--workers", "100000"), "--workers"),
             (("serve", "--wokers", "2"), "did you mean --workers?"),
-            (("version", "x"), "takes no arguments")]:
+            (("version", "x"), "takes no operands")]:
         code, out, errors = program.run(*arguments)
         assert code == 2, (arguments, code, errors)
         assert out == "" and expected in errors, (arguments, out, errors)

@@ -332,7 +332,7 @@ def test_a_full_queue_says_when_to_come_back():
 
 def test_settings_that_contradict_each_other_are_refused_with_the_mend():
     """A quota beyond the queue, and a database kept smaller than an empty one."""
-    for flags, word in ((("--quota", "20", "--queue", "10"), "raise --queue"), (("--keep-bytes", "5"), "at least")):
+    for flags, word in ((("--quota", "20", "--queue", "10"), "at most --queue, 10"), (("--keep-bytes", "5"), "at least")):
         code, _, errors = program.run("serve", "--listen", "127.0.0.1:0", *flags)
         assert code == 2 and word in errors, (code, errors)
 

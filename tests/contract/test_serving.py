@@ -277,11 +277,11 @@ def test_a_renewed_certificate_is_used_without_an_end():
             # A key of another: told, and nothing changes.
             shutil.copy(other_key, key)
             process.send_signal(signal.SIGHUP)
-            assert until(lambda: "the certificate stays as it was" in said() and "not that of the certificate" in said()), said()
+            assert until(lambda: "the certificate is unchanged" in said() and "not that of the certificate" in said()), said()
             assert seen().split() == first.split()
             shutil.copy(other_cert, cert)
             process.send_signal(signal.SIGHUP)
-            assert until(lambda: f"the certificate in {cert} is used from now on" in said()), said()
+            assert until(lambda: f"the certificate in {cert} is in use" in said()), said()
             assert seen().split() == wanted(other_cert).split() != first.split()
             with urllib.request.urlopen(f"https://localhost:{port}/version", context=ssl.create_default_context(cafile=other_cert), timeout=20) as reply:
                 assert reply.status == 200
@@ -289,7 +289,7 @@ def test_a_renewed_certificate_is_used_without_an_end():
             assert old.getresponse().read(), "the connection from before has ended"
             os.remove(cert)
             process.send_signal(signal.SIGHUP)
-            assert until(lambda: said().count("stays as it was") == 2 and f"cannot be read: {cert}" in said()), said()
+            assert until(lambda: said().count("is unchanged") == 2 and f"cannot be read: {cert}" in said()), said()
             assert seen().split() == wanted(other_cert).split()
         finally:
             process.terminate()
@@ -301,7 +301,7 @@ def test_a_hangup_ends_what_has_lost_its_terminal_alone():
     """SIGHUP without TLS is told and nothing else; where the terminal it was started in is gone it ends well."""
     with Daemon(program.build) as daemon:
         daemon.process.send_signal(signal.SIGHUP)
-        assert until(lambda: "nothing to read anew" in daemon.stderr()), daemon.stderr()
+        assert until(lambda: "nothing to reload" in daemon.stderr()), daemon.stderr()
         assert daemon.get("/health/ready").status == 200
     with tempfile.TemporaryDirectory(prefix="impactd-") as folder:
         terminal, inside = pty.openpty()

@@ -1,15 +1,18 @@
-// man(7) source. Text from the tables is escaped: a backslash, and a point or quote that begins a
-// line, mean something there.
+// print_pages DIRECTORY: the manual pages and the bash completion, printed from the tables of the
+// program. A tool of the build, not part of the program.
 #include <math.h>
+#include <stdbool.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "core/base/field.h"
 #include "core/study/study.h"
 #include "server/api/app.h"
 #include "server/cli/command.h"
-#include "server/install/pages.h"
 #include "server/options.h"
 
+// Text as source of man(7), in which a backslash, and a point or quote at the start of a line, are
+// special.
 static void escaped(FILE *file, const char *text, bool is_line_start) {
     if (is_line_start && (*text == '.' || *text == '\''))
         fputs("\\&", file);
@@ -72,7 +75,7 @@ static void option_print(FILE *file, const Field *fields, const Field *row) {
     fputc('\n', file);
 }
 
-// The examples a command's help begins with stand as they are typed; what follows is prose.
+// The lines before the first empty one are examples, the others are text.
 static void help_print(FILE *file, const char *help) {
     fputs(".PP\n.EX\n", file);
     char line[512];
@@ -103,35 +106,37 @@ static const char front[] =
     ".I COMMAND\n"
     "[\\fIOPTION\\fR]... [\\fIOPERAND\\fR]...\n"
     ".SH DESCRIPTION\n"
-    "A free mass inside a structure that swings bounces between two stops and takes energy out of\n"
-    "the motion. A scene, written in JSON, describes structure, masses, stops and excitation, see\n"
-    ".BR impactd\\-scene (5);\n"
-    "what comes back is the motion, every single impact, spectra and an energy balance. Commands\n"
-    "work alone or ask a daemon, which is one of them.\n"
+    "An impact damper is a free mass that bounces between two stops inside a vibrating structure "
+    "and\n"
+    "dissipates its energy. A scene describes structure, masses, stops and excitation in JSON, "
+    "see\n"
+    ".BR impactd\\-scene (5).\n"
+    "The results are the motion, all impacts, spectra and an energy balance. Some commands run\n"
+    "simulations themselves, others send them to a server, which\n.B impactd serve\nis.\n"
     ".SH COMMANDS\n";
 
 static const char back[] =
     ".SH EXIT STATUS\n"
-    ".TP\n0\nok\n.TP\n1\nthe job failed\n.TP\n2\nusage\n.TP\n3\nbad scene\n.TP\n4\nnot found\n"
-    ".TP\n5\nnot allowed\n.TP\n7\nthe server cannot be reached, or is too busy\n"
-    ".TP\n8\ntimed out while the job goes on\n.TP\n130\ninterrupted\n"
+    ".TP\n0\nok\n.TP\n1\nfailed\n.TP\n2\nusage\n.TP\n3\nfaulty scene or file\n.TP\n4\nnot found\n"
+    ".TP\n5\npermission denied\n.TP\n7\nthe server cannot be reached, or is too busy\n"
+    ".TP\n8\nthe job has not finished after \\-\\-wait\n.TP\n130\ninterrupted\n"
     ".SH ENVIRONMENT\n"
-    ".TP\n.B IMPACTD_SERVER\nURL of the daemon that materials, submit, watch, get, cancel and "
-    "compare ask.\n"
-    ".TP\n.BR IMPACTD_TOKEN , \" IMPACTD_TOKEN_FILE\"\nThe bearer token they send, or a file with "
-    "it that nobody else can read.\n"
-    ".TP\n.B IMPACTD_CA_FILE\nCertificates they trust.\n"
+    ".TP\n.B IMPACTD_SERVER\nURL of the server for submit, watch, get, cancel, compare, records "
+    "and materials.\n"
+    ".TP\n.BR IMPACTD_TOKEN , \" IMPACTD_TOKEN_FILE\"\nThe bearer token for it, or a file with "
+    "the token that only its owner can read.\n"
+    ".TP\n.B IMPACTD_CA_FILE\nCertificates to trust.\n"
     ".TP\n.BI IMPACTD_ NAME\nA setting of\n.BR \"impactd serve\" :\nIMPACTD_MAX_BODY is "
     "\\-\\-max\\-body.\n"
     ".SH FILES\n"
-    ".TP\n.I $XDG_STATE_HOME/impactd\nThe daemon\\(aqs database, where \\-\\-data names no other "
-    "folder; else under\n.IR \\(ti/.local/state .\n"
-    ".TP\n.I /etc/default/impactd\nSettings of the system\\(aqs daemon, one IMPACTD_NAME=VALUE a "
+    ".TP\n.I $XDG_STATE_HOME/impactd\nThe database of the server, unless \\-\\-data names another "
+    "directory; else under\n.IR \\(ti/.local/state .\n"
+    ".TP\n.I /etc/default/impactd\nSettings of the service, one IMPACTD_NAME=VALUE per "
     "line.\n"
     ".SH SEE ALSO\n"
     ".BR impactd\\-scene (5),\n.BR impactd.service (8)\n";
 
-void manual_program(FILE *file) {
+static void manual_program(FILE *file) {
     head(file, "IMPACTD", "1");
     fputs(front, file);
     for (size_t i = 0; commands[i] != NULL; i++) {
@@ -212,19 +217,19 @@ static void rows_print(FILE *file, const Field *fields, const char *place) {
             fprintf(file, " \" with %s \" ", row->kinds->tag);
             fprintf(file, "\"%s\"\n", kind->name);
             escaped(file, kind->doc != NULL ? kind->doc : "", true);
-            fputs(i == 0 && !row->kinds->is_named ? " (taken where none is named)\n" : "\n", file);
+            fputs(i == 0 && !row->kinds->is_named ? " (default)\n" : "\n", file);
             rows_print(file, kind->fields, inner);
         }
     }
 }
 
-static const char scene_front[] =
-    ".SH NAME\n"
-    "impactd\\-scene \\- what impactd simulates, as a JSON document\n"
-    ".SH DESCRIPTION\n"
-    "SI units. Unknown members are faults; all faults of a document are told at once. The same is\n"
-    "printed as JSON Schema by the daemon under /schemas/scene.\n"
-    ".SH MEMBERS\n";
+static const char scene_front[] = ".SH NAME\n"
+                                  "impactd\\-scene \\- JSON document that describes a simulation\n"
+                                  ".SH DESCRIPTION\n"
+                                  "Quantities are in SI units. Unknown members are faults; all "
+                                  "faults are reported together. The\n"
+                                  "server has the same as JSON Schema under /schemas/scene.\n"
+                                  ".SH MEMBERS\n";
 static const char scene_back[] =
     ".SH EXAMPLE\n"
     ".EX\n"
@@ -236,9 +241,144 @@ static const char scene_back[] =
     ".SH SEE ALSO\n"
     ".BR impactd (1)\n";
 
-void manual_scene(FILE *file) {
+static void manual_scene(FILE *file) {
     head(file, "IMPACTD\\-SCENE", "5");
     fputs(scene_front, file);
     rows_print(file, study_request_fields, "");
     fputs(scene_back, file);
+}
+
+// Parts of a result for `impactd get`.
+static const char parts[] =
+    "result series psd impacts energy manifest bundle job tradeoff ensemble compare sensitivity "
+    "table";
+
+static bool has_operand(const Command *command, const char *part) {
+    return command->operands != NULL && strstr(command->operands, part) != NULL;
+}
+
+// "create list" of the operands "create|list [NAME]".
+enum { ACTIONS_SIZE = 160 };
+static bool actions_of(const Command *command, char actions[ACTIONS_SIZE]) {
+    const char *operands = command->operands != NULL ? command->operands : "";
+    const size_t length = strcspn(operands, " ");
+    if (memchr(operands, '|', length) == NULL || length >= ACTIONS_SIZE)
+        return false;
+    snprintf(actions, ACTIONS_SIZE, "%.*s", (int)length, operands);
+    for (char *bar = actions; (bar = strchr(bar, '|')) != NULL;)
+        *bar = ' ';
+    return true;
+}
+
+static void names_print(FILE *file) {
+    for (size_t i = 0; commands[i] != NULL; i++)
+        fprintf(file, "%s%s", i > 0 ? " " : "", commands[i]->name);
+}
+
+static void choices_print(FILE *file, const Field *row) {
+    for (size_t i = 0; row->choices[i] != NULL; i++)
+        fprintf(file, "%s%s", i > 0 ? " " : "", row->choices[i]);
+}
+
+// A case "run:--output | run:-o" of a row. Returns the number of cases so far.
+static size_t cases_print(FILE *file, const Command *command, const Field *row, size_t before) {
+    char name[OPTION_NAME];
+    const char letter = option_spell(command->options, row, name);
+    fprintf(file, "%s%s:%s", before > 0 ? " | " : "", command->name, name);
+    if (letter != '\0')
+        fprintf(file, " | %s:-%c", command->name, letter);
+    return before + 1;
+}
+
+static void completion_bash(FILE *file) {
+    fputs("# bash completion of impactd, printed from its tables.\n"
+          "_impactd() {\n"
+          "    local cur=${COMP_WORDS[COMP_CWORD]} prev=${COMP_WORDS[COMP_CWORD - 1]}\n"
+          "    COMPREPLY=()\n"
+          "    if [ \"$COMP_CWORD\" -eq 1 ]; then\n"
+          "        mapfile -t COMPREPLY < <(compgen -W '",
+          file);
+    names_print(file);
+    fputs(" --help --version' -- \"$cur\")\n"
+          "        return\n"
+          "    fi\n"
+          "    case ${COMP_WORDS[1]}:$prev in\n",
+          file);
+    for (size_t i = 0; commands[i] != NULL; i++)
+        for (const Field *row = commands[i]->options; row != NULL && row->kind != FIELD_KIND_END;
+             row++)
+            if (row->kind == FIELD_KIND_CHOICE) {
+                fputs("    ", file);
+                (void)cases_print(file, commands[i], row, 0);
+                fputs(") mapfile -t COMPREPLY < <(compgen -W '", file);
+                choices_print(file, row);
+                fputs("' -- \"$cur\") && return ;;\n", file);
+            }
+    for (size_t i = 0; commands[i] != NULL; i++) {
+        size_t count = 0;
+        for (const Field *row = commands[i]->options; row != NULL && row->kind != FIELD_KIND_END;
+             row++)
+            if (row->kind != FIELD_KIND_CHOICE && row->kind != FIELD_KIND_FLAG) {
+                fputs(count == 0 ? "    " : "", file);
+                count = cases_print(file, commands[i], row, count);
+            }
+        fputs(count > 0 ? ") return ;;\n" : "", file);
+    }
+    fputs("    esac\n    case ${COMP_WORDS[1]}:$cur in\n", file);
+    for (size_t i = 0; commands[i] != NULL; i++) {
+        char name[OPTION_NAME], actions[ACTIONS_SIZE];
+        fprintf(file, "    %s:-*) mapfile -t COMPREPLY < <(compgen -W '--help", commands[i]->name);
+        for (const Field *row = commands[i]->options; row != NULL && row->kind != FIELD_KIND_END;
+             row++) {
+            (void)option_spell(commands[i]->options, row, name);
+            fprintf(file, " %s", name);
+        }
+        fputs("' -- \"$cur\") ;;\n", file);
+        if (has_operand(commands[i], "COMMAND")) {
+            fprintf(file, "    %s:*) mapfile -t COMPREPLY < <(compgen -W '", commands[i]->name);
+            names_print(file);
+            fputs("' -- \"$cur\") ;;\n", file);
+        } else if (has_operand(commands[i], "WHAT")) {
+            fprintf(file,
+                    "    %s:*) [ \"$COMP_CWORD\" -lt 3 ] || mapfile -t COMPREPLY < <(compgen -W "
+                    "'%s' -- \"$cur\") ;;\n",
+                    commands[i]->name, parts);
+        } else if (actions_of(commands[i], actions)) {
+            fprintf(file,
+                    "    %s:*) [ \"$COMP_CWORD\" -ne 2 ] || mapfile -t COMPREPLY < <(compgen -W "
+                    "'%s' -- \"$cur\") ;;\n",
+                    commands[i]->name, actions);
+        }
+    }
+    fputs("    esac\n"
+          "}\n"
+          "complete -o default -F _impactd impactd\n",
+          file);
+}
+
+static const struct {
+    const char *name;
+    void (*print)(FILE *file);
+} pages[] = {
+    {"impactd.1", manual_program},
+    {"impactd-scene.5", manual_scene},
+    {"impactd.bash", completion_bash},
+};
+
+int main(int argc, char **argv) {
+    char path[4096];
+    for (size_t i = 0; argc == 2 && i < COUNT(pages); i++) {
+        snprintf(path, sizeof path, "%s/%s", argv[1], pages[i].name);
+        FILE *file = fopen(path, "w");
+        if (file == NULL) {
+            perror(path);
+            return 1;
+        }
+        pages[i].print(file);
+        if (fclose(file) != 0) {
+            perror(path);
+            return 1;
+        }
+    }
+    return argc == 2 ? 0 : 2;
 }
