@@ -42,7 +42,7 @@ FOREIGN = {
     "nvector/": ["core/solve/adaptive.c"],
     "gnutls/": ["server/util/sha256.c", "server/http/tls.c"],
     "libdeflate.h": ["server/util/gzip.c"],
-    "curl/": ["server/cli/http.c"],
+    "curl/": ["server/cli/client.c"],
     "dragonbox/": ["server/util/dtoa.cpp"],
 }
 
@@ -62,7 +62,7 @@ BANNED = {
     r"LAPACKE_\w+": ("LAPACK is symmetric_matrix.c's", ["core/math/symmetric_matrix.c"]),
     r"gnutls_\w+": ("GnuTLS is digest.c's and certificate.c's", ["server/util/sha256.c", "server/http/tls.c"]),
     r"libdeflate_\w+": ("libdeflate is deflate.c's", ["server/util/gzip.c"]),
-    r"curl_\w+": ("libcurl is cli/http.c's", ["server/cli/http.c"]),
+    r"curl_\w+": ("libcurl is cli/client.c's", ["server/cli/client.c"]),
 }
 CORE_BANNED = {
     r"fopen|fclose|fread|fwrite|fprintf|printf|puts|putchar|fputs|fputc|perror|getenv|remove|rename":
