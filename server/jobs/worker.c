@@ -293,8 +293,11 @@ static void compute(Worker *worker, Task *task, Problem *problem) {
     }
     StudyRun *study = is_shared && run_result.status == STATUS_OK ? task->study : NULL;
     const Status status = run_result.status;
-    // What the database cannot do now is done later, from the beginning.
-    const bool is_stalled = status == STATUS_FULL || status == STATUS_IO || status == STATUS_BUSY;
+    // What the database cannot do now is done later, from the beginning; readers of a series get
+    // the fault.
+    const bool is_stalled =
+        status == STATUS_FULL ||
+        (!task->recompute_only && (status == STATUS_IO || status == STATUS_BUSY));
     pthread_mutex_lock(&manager->lock);
     leave(worker, task);
     if (status == STATUS_OK && study == NULL)

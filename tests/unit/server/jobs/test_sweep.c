@@ -1,15 +1,29 @@
 // Sweeps in the jobs room, with the real engine and a real database: cancelled, interrupted and
 // resumed at any moment, beside other jobs.
+#include <errno.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <unistd.h>
 
 #include <cmocka.h>
 
 #include "core/math/fft.h"
 #include "server/jobs/sweep.h"
 #include "tests/support/room.h"
+
+// The next `failing` syncs of the database fail, after `spared` others.
+static atomic_int failing, spared;
+
+int fdatasync(int file) {
+    if (atomic_load(&failing) > 0 && atomic_fetch_sub(&spared, 1) <= 0) {
+        atomic_fetch_sub(&failing, 1);
+        errno = EIO;
+        return -1;
+    }
+    return fsync(file);
+}
 
 static void submit(const Room *room, size_t points, double duration, char id[40]) {
     char text[1024];
@@ -103,12 +117,36 @@ static void two_sweeps_and_their_doubles_share_the_workers(void **state) {
     room_end(&room);
 }
 
+static void a_sweep_waits_for_a_disk_whose_faults_pass(void **state) {
+    (void)state;
+    for (int i = 0; i < 6; i++) {
+        Room room = room_make(2);
+        char id[40], result[72];
+        JobRow row;
+        submit(&room, 300, 100, id); // its own run is longer than the write of the job
+        while (db_job_load(room.db, id, &row, NULL) != STATUS_OK)
+            room_nap(100000);
+        job_row_clear(&row);
+        atomic_store(&spared, i);
+        atomic_store(&failing, 3);
+        while (!job_state_is_final((int)room_state(&room, id, result))) {
+            room_nap(5000000);
+            jobs_retry_sweep(room.manager);
+        }
+        assert_int_equal(atomic_load(&failing), 0);
+        room_finish(&room, id, result);
+        assert_whole(&room, result, 300);
+        room_end(&room);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(rows_come_back_as_they_were_put),
         cmocka_unit_test(a_sweep_interrupted_again_and_again_comes_to_its_end),
         cmocka_unit_test(a_sweep_is_dismissed_at_any_moment_and_leaves_nothing),
         cmocka_unit_test(two_sweeps_and_their_doubles_share_the_workers),
+        cmocka_unit_test(a_sweep_waits_for_a_disk_whose_faults_pass),
     };
     fft_start();
     return cmocka_run_group_tests(tests, NULL, NULL);
