@@ -89,7 +89,7 @@ static Status show(App *app, const Request *request, const StudyKind *kind, Repl
     if (status == STATUS_OK) {
         snprintf(tag, sizeof tag, "%.72s-%s.%s", row.id, kind->kind.name, format->extension);
         if (!reply_immutable(reply, request, tag)) {
-            format->write(answer.study, &bytes);
+            format->write(answer.study, format->extension, &bytes);
             status = reply_bytes(reply, 200, format->content_type, &bytes, problem);
         }
     }

@@ -71,7 +71,8 @@ static Status study_check_outputs(const StudyCommand *command, const Texts *outp
 static Status study_write(const StudyCommand *command, const char *path, const Variant *answer,
                           Problem *problem) {
     Bytes bytes = {0};
-    study_format(command, path)->write(answer, &bytes);
+    const StudyFormat *format = study_format(command, path);
+    format->write(answer, format->extension, &bytes);
     Status status = bytes.is_failed
                         ? problem_set(problem, STATUS_NO_MEMORY, "no memory for the answer")
                         : output_open(path, problem);
@@ -103,7 +104,8 @@ static Status study_measure(const StudyRequest *inquiry, const SimulationLimits 
 // As JSON, the first format of every study.
 static void study_print_json(const Variant *answer) {
     Bytes bytes = {0};
-    study_formats(answer->kind)->write(answer, &bytes);
+    const StudyFormat *json = study_formats(answer->kind);
+    json->write(answer, json->extension, &bytes);
     if (bytes.at != NULL)
         (void)fwrite(bytes.at, 1, bytes.count, stdout);
     bytes_clear(&bytes);

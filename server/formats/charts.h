@@ -8,7 +8,7 @@
 #include "core/study/model_comparison.h"
 #include "core/study/sensitivity.h"
 #include "core/study/tradeoff.h"
-#include "server/formats/sweep_source.h"
+#include "server/formats/sweep.h"
 #include "server/util/bytes.h"
 
 // Error against CPU time, both logarithmic (a work-precision chart).

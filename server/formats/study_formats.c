@@ -1,112 +1,189 @@
 #include "server/formats/study_formats.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
+#include "core/study/ensemble.h"
+#include "core/study/model_comparison.h"
+#include "core/study/sensitivity.h"
 #include "server/formats/chart.h"
 #include "server/formats/charts.h"
-#include "server/formats/compare_csv.h"
-#include "server/formats/ensemble_csv.h"
-#include "server/formats/mat.h"
-#include "server/formats/npy.h"
-#include "server/formats/sensitivity_csv.h"
-#include "server/formats/sweep_columns.h"
-#include "server/formats/sweep_npz.h"
-#include "server/formats/sweep_table.h"
+#include "server/formats/csv_cells.h"
+#include "server/formats/sweep.h"
 #include "server/jobs/documents.h"
 
-static void json_write(const Variant *answer, Bytes *bytes) {
+static void json_write(const Variant *answer, const char *extension, Bytes *bytes) {
+    (void)extension;
     document_answer(bytes, answer);
     bytes_text(bytes, "\n");
 }
 
-static void tradeoff_chart(const Variant *answer, Bytes *bytes) {
+// A row for each seed.
+static void ensemble_csv(const Variant *answer, const char *extension, Bytes *bytes) {
+    const Ensemble *ensemble = (const Ensemble *)(const void *)answer;
+    (void)extension;
+    bytes_text(bytes, "seed,steps");
+    csv_cells_header(bytes, summary_fields);
+    bytes_text(bytes, ",why\n");
+    for (size_t i = 0; i < ensemble->table.count; i++) {
+        const RunRecord *run = &ensemble->table.at[i];
+        bytes_format(bytes, "%llu,", (unsigned long long)run->number);
+        csv_cells_real(bytes, run->steps);
+        csv_cells_members(bytes, summary_fields, &run->summary);
+        bytes_text(bytes, ",");
+        csv_cells_text(bytes, run->why);
+        bytes_text(bytes, "\n");
+    }
+}
+
+// A row for each variant, with k_b and c_b of its first stop.
+static void compare_csv(const Variant *answer, const char *extension, Bytes *bytes) {
+    const Comparison *comparison = (const Comparison *)(const void *)answer;
+    (void)extension;
+    bytes_text(bytes, "model,separation,status,stiffness,damping [N s/m],steps");
+    csv_cells_header(bytes, summary_fields);
+    csv_cells_header_of(bytes, "contacts", compare_contacts_fields);
+    csv_cells_header_of(bytes, "difference", compare_differences_fields);
+    csv_cells_header_of(bytes, "psd", spectrum_distance_fields);
+    csv_cells_header_of(bytes, "displacement", signal_comparison_fields);
+    bytes_text(bytes, ",divergence [s],why\n");
+    for (size_t i = 0; i < comparison->entries.count; i++) {
+        const CompareEntry *entry = &comparison->entries.at[i];
+        const DerivedList *derived = &entry->derived;
+        const double numbers[] = {derived->count > 0 ? derived->at[0].stiffness : (double)NAN,
+                                  derived->count > 0 ? derived->at[0].damping : (double)NAN,
+                                  entry->steps};
+        bytes_format(bytes, "%s,%s,%s", entry->contact_model,
+                     entry->separation != CHOICE_ABSENT ? separation_names[entry->separation] : "",
+                     compare_status_names[entry->status]);
+        for (size_t k = 0; k < COUNT(numbers); k++) {
+            bytes_text(bytes, ",");
+            csv_cells_real(bytes, numbers[k]);
+        }
+        csv_cells_members(bytes, summary_fields, &entry->summary);
+        csv_cells_members(bytes, compare_contacts_fields, &entry->contacts);
+        csv_cells_members(bytes, compare_differences_fields, &entry->differences);
+        csv_cells_members(bytes, spectrum_distance_fields, &entry->psd);
+        csv_cells_members(bytes, signal_comparison_fields, &entry->displacement);
+        bytes_text(bytes, ",");
+        csv_cells_real(bytes, entry->divergence.time);
+        bytes_text(bytes, ",");
+        csv_cells_text(bytes, entry->why);
+        bytes_text(bytes, "\n");
+    }
+}
+
+static void sensitivity_csv_row(Bytes *bytes, const char *parameter, const char *statistic,
+                                double value, double derivative, double spread, bool is_settled) {
+    bytes_format(bytes, "%s,%s,", parameter, statistic);
+    csv_cells_real(bytes, value);
+    bytes_text(bytes, ",");
+    csv_cells_real(bytes, derivative);
+    bytes_text(bytes, ",");
+    csv_cells_real(bytes, spread);
+    bytes_format(bytes, ",%s\n", is_settled ? "true" : "false");
+}
+
+// The closed forms of k_b and c_b of a stop.
+static void sensitivity_csv_stop(Bytes *bytes, const SensitivityStop *stop) {
+    const struct {
+        const char *parameter, *what;
+        double value, derivative;
+    } rows[] = {
+        {"restitution", "stiffness", stop->stiffness, stop->stiffness_by_restitution},
+        {"contact_time", "stiffness", stop->stiffness, stop->stiffness_by_contact_time},
+        {"mass", "stiffness", stop->stiffness, stop->by_damper_mass},
+        {"restitution", "damping", stop->damping, stop->damping_by_restitution},
+        {"contact_time", "damping", stop->damping, stop->damping_by_contact_time},
+        {"mass", "damping", stop->damping, stop->by_damper_mass},
+    };
+    for (size_t i = 0; i < COUNT(rows); i++) {
+        char statistic[64];
+        snprintf(statistic, sizeof statistic, "%s %llu %s", rows[i].what,
+                 (unsigned long long)stop->damper, side_names[stop->side]);
+        sensitivity_csv_row(bytes, rows[i].parameter, statistic, rows[i].value, rows[i].derivative,
+                            0, !isnan(rows[i].derivative));
+    }
+}
+
+// A row for each parameter and statistic, stops first. The drawn runs are in the JSON alone.
+static void sensitivity_csv(const Variant *answer, const char *extension, Bytes *bytes) {
+    const Sensitivity *sensitivity = (const Sensitivity *)(const void *)answer;
+    (void)extension;
+    bytes_text(bytes, "parameter,statistic,value,derivative,spread,is_settled\n");
+    for (size_t i = 0; i < sensitivity->contact.count; i++)
+        if (sensitivity->contact.at[i].why == NULL)
+            sensitivity_csv_stop(bytes, &sensitivity->contact.at[i]);
+    for (size_t i = 0; i < sensitivity->response.count; i++) {
+        const SensitivityRow *row = &sensitivity->response.at[i];
+        for (size_t k = 0; k < row->slopes.count; k++) {
+            const SensitivitySlope *slope = &row->slopes.at[k];
+            sensitivity_csv_row(bytes, sensitivity_parameter_names[row->parameter],
+                                statistics_metric_names[slope->metric], slope->value,
+                                slope->derivative, slope->spread, slope->is_settled);
+        }
+    }
+}
+
+static void tradeoff_chart(const Variant *answer, const char *extension, Bytes *bytes) {
+    (void)extension;
     charts_tradeoff((const Tradeoff *)(const void *)answer, bytes);
 }
 
-static void ensemble_chart(const Variant *answer, Bytes *bytes) {
+static void ensemble_chart(const Variant *answer, const char *extension, Bytes *bytes) {
+    (void)extension;
     charts_ensemble((const Ensemble *)(const void *)answer, bytes);
 }
 
-static void ensemble_table(const Variant *answer, Bytes *bytes) {
-    ensemble_csv((const Ensemble *)(const void *)answer, bytes);
-}
-
-static void sweep_whole(const Variant *answer, Bytes *bytes) {
-    sweep_json((const Sweep *)(const void *)answer, NULL, bytes);
-}
-
-static void sweep_archive(const Variant *answer, Bytes *bytes) {
-    sweep_npz((const Sweep *)(const void *)answer, bytes);
-}
-
-static void sweep_array(const Variant *answer, Bytes *bytes) {
-    sweep_columns((const Sweep *)(const void *)answer, &encoder_npy, bytes);
-}
-
-static void sweep_variables(const Variant *answer, Bytes *bytes) {
-    sweep_columns((const Sweep *)(const void *)answer, &encoder_mat, bytes);
-}
-
-static void sweep_chart(const Variant *answer, Bytes *bytes) {
-    const Sweep *sweep = (const Sweep *)(const void *)answer;
-    const SweepSource source = sweep_source(sweep);
-    (void)charts_sweep(sweep, &source, bytes);
-}
-
-static void sweep_table(const Variant *answer, Bytes *bytes) {
-    sweep_csv((const Sweep *)(const void *)answer, bytes);
-}
-
-static void compare_chart(const Variant *answer, Bytes *bytes) {
+static void compare_chart(const Variant *answer, const char *extension, Bytes *bytes) {
+    (void)extension;
     charts_compare((const Comparison *)(const void *)answer, bytes);
 }
 
-static void compare_table(const Variant *answer, Bytes *bytes) {
-    compare_csv((const Comparison *)(const void *)answer, bytes);
-}
-
-static void sensitivity_chart(const Variant *answer, Bytes *bytes) {
+static void sensitivity_chart(const Variant *answer, const char *extension, Bytes *bytes) {
+    (void)extension;
     charts_sensitivity((const Sensitivity *)(const void *)answer, bytes);
 }
 
-static void sensitivity_table(const Variant *answer, Bytes *bytes) {
-    sensitivity_csv((const Sensitivity *)(const void *)answer, bytes);
+static void sweep_chart(const Variant *answer, const char *extension, Bytes *bytes) {
+    const Sweep *sweep = (const Sweep *)(const void *)answer;
+    const SweepSource source = sweep_source(sweep);
+    (void)extension;
+    (void)charts_sweep(sweep, &source, bytes);
+}
+
+static void sweep_table(const Variant *answer, const char *extension, Bytes *bytes) {
+    sweep_write((const Sweep *)(const void *)answer, extension, bytes);
 }
 
 static const char csv_type[] = "text/csv; charset=utf-8";
 
 static const struct {
     const StudyKind *study;
-    StudyFormat formats[STUDY_FORMATS_MAX];
+    StudyFormat formats[STUDY_FORMATS_MAX]; // ended by one without extension
 } all[] = {
     {&study_tradeoff,
-     {{"json", "application/json", false, json_write},
-      {"svg", chart_type, false, tradeoff_chart},
-      {NULL, NULL, false, NULL}}},
+     {{"json", "application/json", false, json_write}, {"svg", chart_type, false, tradeoff_chart}}},
     {&study_ensemble,
      {{"json", "application/json", false, json_write},
-      {"csv", csv_type, false, ensemble_table},
-      {"svg", chart_type, false, ensemble_chart},
-      {NULL, NULL, false, NULL}}},
+      {"csv", csv_type, false, ensemble_csv},
+      {"svg", chart_type, false, ensemble_chart}}},
     {&study_sweep,
-     {{"json", "application/json", false, sweep_whole},
+     {{"json", "application/json", false, sweep_table},
       {"csv", csv_type, false, sweep_table},
-      {"npy", "application/x-npy", true, sweep_array},
-      {"npz", "application/x-npz", true, sweep_archive},
-      {"mat", "application/x-matlab-data", true, sweep_variables},
-      {"svg", chart_type, false, sweep_chart},
-      {NULL, NULL, false, NULL}}},
+      {"npy", "application/x-npy", true, sweep_table},
+      {"npz", "application/x-npz", true, sweep_table},
+      {"mat", "application/x-matlab-data", true, sweep_table},
+      {"svg", chart_type, false, sweep_chart}}},
     {&study_compare,
      {{"json", "application/json", false, json_write},
-      {"csv", csv_type, false, compare_table},
-      {"svg", chart_type, false, compare_chart},
-      {NULL, NULL, false, NULL}}},
+      {"csv", csv_type, false, compare_csv},
+      {"svg", chart_type, false, compare_chart}}},
     {&study_sensitivity,
      {{"json", "application/json", false, json_write},
-      {"csv", csv_type, false, sensitivity_table},
-      {"svg", chart_type, false, sensitivity_chart},
-      {NULL, NULL, false, NULL}}},
+      {"csv", csv_type, false, sensitivity_csv},
+      {"svg", chart_type, false, sensitivity_chart}}},
 };
 
 static const StudyFormat none[] = {{"json", "application/json", false, json_write},

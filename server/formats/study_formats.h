@@ -1,5 +1,4 @@
-// In what formats the answer of ONE kind of study can be had; answer.c lists all. Not the encoders
-// of series and spectra (encoder.h). Used by api/studies.c, api/results.c and the commands.
+// The formats of the answer of each kind of study: JSON, a table and a chart.
 #ifndef SERVER_FORMATS_STUDY_FORMATS_H
 #define SERVER_FORMATS_STUDY_FORMATS_H
 
@@ -11,8 +10,9 @@ enum { STUDY_FORMATS_MAX = 7 }; // at most, with the end
 typedef struct StudyFormat {
     const char *extension; // "svg"; NULL: the end
     const char *content_type;
-    bool is_binary;                                     // Range requests make sense
-    void (*write)(const Variant *answer, Bytes *bytes); // appends the whole document
+    bool is_binary; // Range requests make sense
+    // Appends the whole document.
+    void (*write)(const Variant *answer, const char *extension, Bytes *bytes);
 } StudyFormat;
 
 // All formats of an answer of this kind, json first.

@@ -45,7 +45,7 @@ static void a_run_that_failed_is_quoted_in_the_table(void **state) {
     assert_int_equal(fields_default(summary_fields, &runs[1].summary), STATUS_OK);
     const Ensemble ensemble = {.table = {runs, 2}};
     Bytes bytes = {0};
-    format(&study_ensemble, "csv")->write(&ensemble.variant, &bytes);
+    format(&study_ensemble, "csv")->write(&ensemble.variant, "csv", &bytes);
     assert_string_equal(
         bytes.at,
         "seed,steps,peak_displacement [m],rms_displacement [m],peak_acceleration [m/s^2],"
@@ -62,7 +62,7 @@ static void a_chart_of_nothing_known_is_whole(void **state) {
     assert_non_null(answer);
     ((Ensemble *)(void *)answer)->confidence = 0.95;
     Bytes bytes = {0};
-    format(&study_ensemble, "svg")->write(answer, &bytes);
+    format(&study_ensemble, "svg")->write(answer, "svg", &bytes);
     assert_false(bytes.is_failed);
     assert_null(strstr(bytes.at, "nan"));
     assert_null(strstr(bytes.at, "inf"));

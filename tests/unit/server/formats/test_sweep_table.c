@@ -8,7 +8,7 @@
 #include <string.h>
 
 #include "server/formats/charts.h"
-#include "server/formats/sweep_table.h"
+#include "server/formats/sweep.h"
 
 static char clearance[] = "/dampers/0/clearance", metre[] = "m", buffer[] = "/dampers/0/buffer";
 static char narrow[] = "0.01", wide[] = "0.02", soft[] = "\"soft, A\"", hard[] = "\"hard\"";
@@ -35,7 +35,7 @@ static void rows_that_are_there_are_in_the_table_with_their_status(void **state)
     (void)state;
     const Sweep sweep = sweep_make();
     Bytes bytes = {0};
-    sweep_csv(&sweep, &bytes);
+    sweep_write(&sweep, "csv", &bytes);
     assert_string_equal(bytes.at,
                         "index,/dampers/0/clearance [m],/dampers/0/buffer,rms_displacement "
                         "[m],impacts,status\n"
@@ -43,7 +43,10 @@ static void rows_that_are_there_are_in_the_table_with_their_status(void **state)
                         "2,0.02,\"soft, A\",nan,nan,unstable\n"
                         "3,0.02,hard,0.3,9,made\n");
     bytes_clear(&bytes);
-    sweep_json(&sweep, "r-1", &bytes);
+    const SweepSource source = sweep_source(&sweep);
+    SweepDocument document = {.sweep = &sweep, .source = &source, .result = "r-1"};
+    while (sweep_text("json")(&document, &bytes))
+        continue;
     assert_non_null(strstr(bytes.at,
                            "\"status\": \"partial\", \"points\": 4, \"done\": 3, \"failed\""
                            ": 1"));
