@@ -7,7 +7,7 @@
 #include <stdint.h>
 
 #include "server/db/db.h"
-#include "server/http/route.h"
+#include "server/http/request.h"
 #include "server/jobs/background.h"
 #include "server/jobs/jobs.h"
 
@@ -33,8 +33,8 @@ extern const char program_build[];   // the compiler
 Status jobs_refused(App *app, const Request *request, Reply *reply, Status status);
 
 // The handlers, by file; routes.c lists them with their patterns.
-Handler jobs_create, jobs_create_quick, jobs_list, jobs_show, jobs_dismiss, jobs_retry, jobs_scene,
-    jobs_events;
+bool jobs_are_light(const Request *request); // planned in some ten microseconds
+Handler jobs_create, jobs_list, jobs_show, jobs_dismiss, jobs_retry, jobs_scene, jobs_events;
 Handler results_again, results_delete, results_show, results_manifest, results_series, results_psd,
     results_impacts, results_energy, results_force, results_bundle, results_tradeoff,
     results_ensemble, results_compare, results_sensitivity;

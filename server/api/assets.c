@@ -6,7 +6,6 @@
 
 #include "server/api/app.h"
 #include "server/http/reply.h"
-#include "server/http/security_headers.h"
 #include "server/util/embedded.h"
 
 static const struct {
@@ -39,7 +38,7 @@ Status assets_show(App *app, const Request *request, Reply *reply, Problem *prob
     const EmbeddedFile *file = embedded_find(embedded_web, path);
     if (file == NULL || type == NULL)
         return problem_set(problem, STATUS_NOT_FOUND, "the dashboard has no file \"%.120s\"", path);
-    reply->policy = shield_page_policy;
+    reply->policy = reply_page_policy;
     return assets_reply(request, reply, file, type);
 }
 

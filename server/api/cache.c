@@ -3,7 +3,6 @@
 #include <string.h>
 
 #include "server/api/app.h"
-#include "server/http/body.h"
 #include "server/http/reply.h"
 #include "server/jobs/documents.h"
 #include "server/json/diff.h"
@@ -119,7 +118,7 @@ Status cache_explain(App *app, const Request *request, Reply *reply, Problem *pr
     StudyRequest inquiry = {0};
     Warnings warnings = {NULL, 0};
     Bytes bytes = {.most = app->reply_most};
-    TRY(body_require_json(request, problem));
+    TRY(request_require_json(request, problem));
     bool has_place = false;
     Status status = jobs_charge(app->manager, request->client, problem);
     if (status == STATUS_OK)

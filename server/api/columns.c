@@ -10,7 +10,6 @@
 #include "server/formats/svg.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
-#include "server/http/security_headers.h"
 #include "server/util/clock.h"
 #include "server/util/dtoa.h"
 
@@ -128,7 +127,7 @@ Status columns_format(const Request *request, size_t parameter, bool has_chart, 
                                  known);
     *encoder = offered[choice];
     if (*encoder == &encoder_svg)
-        reply->policy = shield_drawing_policy;
+        reply->policy = reply_drawing_policy;
     return STATUS_OK;
 }
 

@@ -7,7 +7,6 @@
 #include "core/base/spelling.h"
 #include "core/excitation/recorded_motion.h"
 #include "core/formats/ground_motion_text.h"
-#include "server/http/body.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
 #include "server/json/parse.h"
@@ -125,7 +124,7 @@ static Status require_type(const Request *request, bool *is_text, Problem *probl
             "the body must be application/json, or a table of times and accelerations as text/csv "
             "or text/plain with ?a=RESULT, is %.60s",
             request->content_type != NULL ? request->content_type : "of no given type");
-    return *is_text ? body_require(request, problem) : body_require_json(request, problem);
+    return *is_text ? request_require_body(request, problem) : request_require_json(request, problem);
 }
 
 Status measured_upload_read(const Request *request, MeasuredRequest **made, Problem *problem) {

@@ -8,7 +8,6 @@
 #include "server/api/app.h"
 #include "server/api/job_json.h"
 #include "server/http/access.h"
-#include "server/http/body.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
 #include "server/util/clock.h"
@@ -173,7 +172,7 @@ Status jobs_create(App *app, const Request *request, Reply *reply, Problem *prob
         return answer_job(app, request, reply, pause_end(request->kept, reply), problem);
     bool is_dry = false;
     TRY(request_flag(request, "dry_run", &is_dry, problem));
-    TRY(body_require_json(request, problem));
+    TRY(request_require_json(request, problem));
     if (is_dry)
         return dry_run(app, request, reply, problem);
     TRY(refuse_stopping(app, problem));
@@ -207,9 +206,9 @@ Status results_again(App *app, const Request *request, Reply *reply, Problem *pr
     return answer_job(app, request, reply, job, problem);
 }
 
-// Whether the scene is read, judged and planned in some ten microseconds: one structure of one mass
-// and nothing that asks for many runs. Nothing escaped, so that the words are seen.
-static bool is_light(const Request *request) {
+// Whether the scene is read, validated and planned in some ten microseconds: one structure of one
+// mass and nothing that asks for many runs. Nothing escaped, so that the words are seen.
+bool jobs_are_light(const Request *request) {
     static const char *const heavy[] = {"\\",           "\"study\"",  "\"frame\"",
                                         "\"matrices\"", "\"target\"", "\"reduction\""};
     enum { LIGHT_BYTES = 8192 };
@@ -220,14 +219,6 @@ static bool is_light(const Request *request) {
         if (strstr(request->body, heavy[i]) != NULL)
             return false;
     return true;
-}
-
-// Without a change to another thread and back a job costs a third less CPU: 480 us of 700 for a new
-// one with 16 clients.
-Status jobs_create_quick(App *app, const Request *request, Reply *reply, Problem *problem) {
-    if (request->kept == NULL && !is_light(request))
-        return STATUS_OK;
-    return jobs_create(app, request, reply, problem);
 }
 
 Status jobs_show(App *app, const Request *request, Reply *reply, Problem *problem) {

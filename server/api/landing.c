@@ -7,7 +7,6 @@
 #include "server/api/assets.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
-#include "server/http/security_headers.h"
 
 #define SCENE                                                                                      \
     "{\"structure\": {\"mass\": 1.35, \"stiffness\": 865, \"damping\": 1.092}, "                   \
@@ -122,7 +121,7 @@ Status landing_show(App *app, const Request *request, Reply *reply, Problem *pro
             reply_borrow(reply, 308, NULL, NULL, 0);
             return STATUS_OK;
         }
-        reply->policy = shield_page_policy;
+        reply->policy = reply_page_policy;
         return assets_reply(request, reply, dashboard, "text/html; charset=utf-8");
     }
     char url[sizeof app->base_url];

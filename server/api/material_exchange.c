@@ -7,7 +7,6 @@
 #include "server/formats/csv.h"
 #include "server/formats/format.h"
 #include "server/formats/material_export.h"
-#include "server/http/body.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
 #include "server/materials/exchange_csv.h"
@@ -88,7 +87,7 @@ static Status require_type(const Request *request, bool *is_table, Problem *prob
                            "-H 'Content-Type: text/csv' --data-binary @materials.csv",
                            request->content_type != NULL ? request->content_type
                                                          : "of no given type");
-    return body_require(request, problem);
+    return request_require_body(request, problem);
 }
 
 static void put_count(Bytes *bytes, const char *name, const ImportCount *count) {

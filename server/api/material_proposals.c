@@ -11,7 +11,6 @@
 #include "server/formats/charts.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
-#include "server/http/security_headers.h"
 #include "server/json/encode.h"
 #include "server/materials/measurement.h"
 #include "server/util/base_path.h"
@@ -207,7 +206,7 @@ Status proposals_show(App *app, const Request *request, Reply *reply, Problem *p
     char tag[MATERIAL_TAG];
     TRY(choose_format(request, reply, &format, problem));
     if (format != 0)
-        reply->policy = shield_drawing_policy;
+        reply->policy = reply_drawing_policy;
     TRY(db_material_state(app->db, slug, &state, problem));
     TRY(material_separation(app, request, &separation, problem));
     material_tag(slug, state.latest, state.version, tag);

@@ -6,7 +6,6 @@
 #include <string.h>
 
 #include "server/api/materials.h"
-#include "server/http/body.h"
 #include "server/http/reply.h"
 #include "server/json/material_bodies.h"
 #include "server/json/parse.h"
@@ -23,7 +22,7 @@ static bool is_object(Status status, const Problem *problem) {
 // The body into `item`, whose ranges are judged too. Cleared by fields_clear in any case.
 static Status read_body(const Request *request, const char *whose, const Field *fields, void *item,
                         Problem *problem) {
-    TRY(body_require_json(request, problem));
+    TRY(request_require_json(request, problem));
     problem->whose = whose;
     const Status status = json_parse(request->body, request->body_size, fields, item, problem);
     if (!is_object(status, problem))
@@ -125,7 +124,7 @@ Status materials_revise(App *app, const Request *request, Reply *reply, Problem 
     MaterialBody body = {0};
     MaterialState state;
     uint64_t seen;
-    TRY(body_require_json(request, problem));
+    TRY(request_require_json(request, problem));
     TRY(material_condition(app, request, slug, true, &seen, &state, problem));
     Status status = read_body(request, "revision", material_revision_fields, &body, problem);
     status = judge(&body, state.measurements, status, problem);
@@ -181,7 +180,7 @@ Status materials_revert(App *app, const Request *request, Reply *reply, Problem 
     MaterialRevertBody body = {0};
     MaterialState state;
     uint64_t seen;
-    TRY(body_require_json(request, problem));
+    TRY(request_require_json(request, problem));
     TRY(material_condition(app, request, slug, true, &seen, &state, problem));
     Status status = read_body(request, "revert", material_revert_fields, &body, problem);
     status = check_revert(&body, slug, state.latest, status, problem);
@@ -197,7 +196,7 @@ Status materials_review(App *app, const Request *request, Reply *reply, Problem 
     MaterialState state;
     uint64_t seen, revision;
     TRY(material_revision_number(request->parameters[1], &revision, problem));
-    TRY(body_require_json(request, problem));
+    TRY(request_require_json(request, problem));
     TRY(material_condition(app, request, slug, true, &seen, &state, problem));
     Status status = read_body(request, "review", material_review_fields, &body, problem);
     if (is_object(status, problem)) {

@@ -6,7 +6,6 @@
 
 #include "server/api/materials.h"
 #include "server/api/query.h"
-#include "server/http/body.h"
 #include "server/http/reply.h"
 #include "server/json/encode.h"
 #include "server/json/material_bodies.h"
@@ -85,7 +84,7 @@ static Status evaluate_kept(CpuBudget *budget, const Measurement *test, int sepa
 
 // The body, judged. Cleared by fields_clear in any case.
 static Status read_body(const Request *request, MeasurementBody *body, Problem *problem) {
-    TRY(body_require_json(request, problem));
+    TRY(request_require_json(request, problem));
     problem->whose = "measurement";
     const Status status =
         json_parse(request->body, request->body_size, measurement_body_fields, body, problem);
@@ -189,7 +188,7 @@ Status measurements_create(App *app, const Request *request, Reply *reply, Probl
     MeasurementBody body = {.comment = NULL};
     MaterialState state;
     uint64_t seen;
-    TRY(body_require_json(request, problem));
+    TRY(request_require_json(request, problem));
     TRY(material_condition(app, request, request->parameters[0], false, &seen, &state, problem));
     Status status = read_body(request, &body, problem);
     if (status == STATUS_OK)

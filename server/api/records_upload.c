@@ -8,7 +8,6 @@
 #include "core/base/json_pointer.h"
 #include "core/base/spelling.h"
 #include "core/formats/ground_motion_text.h"
-#include "server/http/body.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
 #include "server/json/parse.h"
@@ -181,7 +180,7 @@ static Status require_type(const Request *request, bool *is_json, Problem *probl
             "application/json, is %.60s; with curl use -H 'Content-Type: text/plain' "
             "--data-binary @motion.AT2",
             request->content_type != NULL ? request->content_type : "of no given type");
-    return body_require(request, problem);
+    return request_require_body(request, problem);
 }
 
 static Status check_name(const Asked *asked, Problem *problem) {

@@ -11,7 +11,6 @@
 #include "server/formats/study_formats.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
-#include "server/http/security_headers.h"
 #include "server/json/parse.h"
 
 Status study_read(const ResultRow *row, StudyAnswer *answer, Problem *problem) {
@@ -71,7 +70,7 @@ Status study_format(const Request *request, const StudyFormat *formats, Reply *r
                     const StudyFormat **format, Problem *problem) {
     TRY(choose_format(request, formats, reply, format, problem));
     if ((*format)->content_type == chart_type)
-        reply->policy = shield_drawing_policy;
+        reply->policy = reply_drawing_policy;
     return STATUS_OK;
 }
 

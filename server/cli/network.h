@@ -5,7 +5,7 @@
 
 #include "core/base/field.h"
 #include "server/http/address.h"
-#include "server/http/base_url.h"
+#include "server/http/address.h"
 #include "server/http/validate.h"
 
 typedef struct NetworkSettings {

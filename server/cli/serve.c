@@ -15,7 +15,6 @@
 #include "server/api/app.h"
 #include "server/cli/command.h"
 #include "server/cli/network.h"
-#include "server/http/dispatch.h"
 #include "server/http/server.h"
 #include "server/jobs/maintenance.h"
 #include "server/options.h"
@@ -199,15 +198,8 @@ static Status serve(const ServeSettings *settings, const sigset_t *signals, Prob
     App app = {.reply_most = (size_t)1 << 30, .started_unix_ms = clock_unix_ms()};
     AccessControl access = {.journal = (LogMode)settings->journal};
     const size_t response_cache_bytes = settings->cache_bytes / HOT_SHARE;
-    Dispatcher dispatcher = {&app, routes, quick_handlers, response_cache_new(response_cache_bytes),
-                             &access};
-    ServerSettings door = {.body_most = settings->max_body,
-                           .answer_at_once = dispatch_quick,
-                           .answer = dispatch,
-                           .admits = dispatch_admits,
-                           .still_admits = dispatch_still_admits,
-                           .note = dispatch_note,
-                           .context = &dispatcher};
+    const Router router = {&app, routes, response_cache_new(response_cache_bytes), &access};
+    ServerSettings door = {.body_most = settings->max_body, .router = &router};
     const JobManagerSettings work = {.workers = settings->workers,
                                      .queue_most = settings->queue,
                                      .queue_bytes = settings->queue_bytes,
@@ -216,7 +208,7 @@ static Status serve(const ServeSettings *settings, const sigset_t *signals, Prob
                                      .quota = settings->quota,
                                      .rate = settings->rate,
                                      .study_seconds = settings->max_study_seconds,
-                                     .deleted = {dispatcher.response_cache, forget_answers},
+                                     .deleted = {router.response_cache, forget_answers},
                                      .limits = {.samples = settings->max_samples,
                                                 .impacts = settings->max_impacts,
                                                 .steps = settings->max_cpu_seconds / SOLVER_STEP,
@@ -257,7 +249,7 @@ static Status serve(const ServeSettings *settings, const sigset_t *signals, Prob
         text_fit(app.base_url, sizeof app.base_url, ready.url.text);
         app.has_tls = tls_source() != NULL;
         app.request_metrics = access.request_metrics = request_metrics;
-        app.response_cache = dispatcher.response_cache;
+        app.response_cache = router.response_cache;
         door.hosts = &ready.hosts;
         door.certificate = tls_source();
         status = server_open(&door, &server, problem);
@@ -270,7 +262,7 @@ static Status serve(const ServeSettings *settings, const sigset_t *signals, Prob
     if (app.manager != NULL)
         jobs_close(app.manager);
     server_free(server);
-    response_cache_free(dispatcher.response_cache);
+    response_cache_free(router.response_cache);
     tokens_close(access.tokens);
     db_close(app.db);
     request_metrics_free(request_metrics);

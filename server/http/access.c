@@ -1,5 +1,7 @@
 #include "server/http/access.h"
 
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "server/util/clock.h"
@@ -21,13 +23,93 @@ Status access_owns(const Request *request, const char *owner, const char *what, 
     if (request->client == NULL || request->holder.is_admin || owner == NULL ||
         strcmp(owner, request->client) == 0)
         return STATUS_OK;
-    return problem_set(problem, STATUS_FORBIDDEN,
-                       "%s is of the token \"%s\": that alone or one of the scope \"admin\" may do "
-                       "this, and this one is \"%s\"",
-                       what, owner, request->client);
+    return problem_set(
+        problem, STATUS_FORBIDDEN,
+        "%s belongs to the token \"%s\": only that token or one of the scope \"admin\" "
+        "may do this, and this one is \"%s\"",
+        what, owner, request->client);
 }
 
-static void write_line(const Request *request, const Reply *reply, int64_t ns, uint64_t sent) {
+enum { CLASSES = 6 }; // 1xx to 5xx by their first digit; 0 never
+
+typedef struct RouteMetrics {
+    Counter classes[CLASSES];
+    Histogram seconds;
+} RouteMetrics;
+
+struct RequestMetrics {
+    const Route *table;
+    size_t count;
+    Counter received, sent;
+    RouteMetrics rows[]; // by route, and one more for requests without
+};
+
+RequestMetrics *request_metrics_new(const Route *table) {
+    size_t count = 0;
+    while (table[count].method != NULL)
+        count++;
+    RequestMetrics *metrics = calloc(1, sizeof *metrics + (count + 1) * sizeof metrics->rows[0]);
+    if (metrics == NULL)
+        return NULL;
+    metrics->table = table;
+    metrics->count = count;
+    return metrics;
+}
+
+void request_metrics_free(RequestMetrics *metrics) {
+    free(metrics);
+}
+
+static void request_metrics_count(RequestMetrics *metrics, const Route *route, int code, int64_t ns,
+                                  uint64_t received, uint64_t sent) {
+    RouteMetrics *row =
+        &metrics->rows[route != NULL ? (size_t)(route - metrics->table) : metrics->count];
+    counter_add(&row->classes[code / 100 > 0 && code / 100 < CLASSES ? code / 100 : 0], 1);
+    histogram_add(&row->seconds, ns);
+    counter_add(&metrics->received, received);
+    counter_add(&metrics->sent, sent);
+}
+
+// Patterns hold nothing that a label's value would have to escape.
+static void request_metrics_label(const RequestMetrics *metrics, size_t i, char target[256]) {
+    const bool is_none = i == metrics->count;
+    snprintf(target, 256, "route=\"%s\",method=\"%s\"",
+             is_none ? "none" : metrics->table[i].pattern,
+             is_none ? "any" : metrics->table[i].method);
+}
+
+void request_metrics_write(const RequestMetrics *metrics, Bytes *bytes) {
+    char labels[256], all[288];
+    static const char requests[] = "impactd_http_requests_total";
+    static const char seconds[] = "impactd_http_request_duration_seconds";
+    metrics_family(bytes, requests, "counter",
+                   "Requests answered, by route, method and class of code.");
+    for (size_t i = 0; i <= metrics->count; i++)
+        for (int class = 1; class < CLASSES; class ++) {
+            const uint64_t count = counter_get(&metrics->rows[i].classes[class]);
+            if (count == 0)
+                continue;
+            request_metrics_label(metrics, i, labels);
+            snprintf(all, sizeof all, "%s,code=\"%dxx\"", labels, class);
+            metrics_count(bytes, requests, all, count);
+        }
+    metrics_family(bytes, seconds, "histogram",
+                   "From a request's head to its answer, its waiting included.");
+    for (size_t i = 0; i <= metrics->count; i++) {
+        if (histogram_count(&metrics->rows[i].seconds) == 0)
+            continue;
+        request_metrics_label(metrics, i, labels);
+        metrics_histogram(bytes, seconds, labels, &metrics->rows[i].seconds);
+    }
+    metrics_counter(bytes, "impactd_http_received_bytes_total", "Bytes of request bodies.",
+                    counter_get(&metrics->received));
+    metrics_counter(bytes, "impactd_http_sent_bytes_total",
+                    "Bytes of answers' bodies before compression; streamed ones of unknown length "
+                    "are not in it.",
+                    counter_get(&metrics->sent));
+}
+
+static void access_log(const Request *request, const Reply *reply, int64_t ns, uint64_t sent) {
     enum { PATH_SHOWN = 200, NAME_SHOWN = 80 };
     char now[32];
     Bytes line = {.most = 4096};
@@ -36,7 +118,7 @@ static void write_line(const Request *request, const Reply *reply, int64_t ns, u
     log_put(&line, "request", request->id, NAME_SHOWN);
     log_put(&line, "client", request->client, NAME_SHOWN);
     log_put(&line, "method", request->method, NAME_SHOWN);
-    // Without the query: people put there what should not stand in a journal.
+    // Without the query, which may hold what should not be in a log.
     log_put(&line, "path", request->path, PATH_SHOWN);
     bytes_format(&line, " code=%d ms=%.3f sent=%llu", reply->code, 1e-6 * (double)ns,
                  (unsigned long long)sent);
@@ -44,7 +126,7 @@ static void write_line(const Request *request, const Reply *reply, int64_t ns, u
     bytes_clear(&line);
 }
 
-void access_log(const AccessControl *access, const Request *request, const Reply *reply) {
+void access_record(const AccessControl *access, const Request *request, const Reply *reply) {
     if (access == NULL)
         return;
     const int64_t ns = clock_monotonic_ns() - request->started_ns;
@@ -58,5 +140,5 @@ void access_log(const AccessControl *access, const Request *request, const Reply
     const int code = reply->code;
     const bool is_fault = code >= 500 && code != 501 && code != 503 && code != 505;
     if (access->journal == JOURNAL_ALL || (access->journal == JOURNAL_ERRORS && is_fault))
-        write_line(request, reply, ns, sent);
+        access_log(request, reply, ns, sent);
 }

@@ -5,11 +5,25 @@
 #include <string.h>
 
 #include "server/http/header.h"
+#include "server/json/encode.h"
 #include "server/util/gzip.h"
 
-#define PACKED "-gz" // behind the tag of what is packed: other bytes, another tag
+#define PACKED "-gz" // behind the tag of a compressed body: other bytes, another tag
 
 const char type_json[] = "application/json";
+static const char type_problem[] = "application/problem+json";
+static const char no_memory[] =
+    "{\"type\": \"/problems/no-memory\", \"title\": \"Out of memory\", \"status\": 500}\n";
+
+const char reply_policy[] =
+    "default-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+const char reply_drawing_policy[] =
+    "default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; "
+    "form-action 'none'; frame-ancestors 'none'";
+const char reply_page_policy[] =
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'; "
+    "require-trusted-types-for 'script'; trusted-types 'none'";
 
 void reply_default(Reply *reply) {
     memset(reply, 0, sizeof *reply);
@@ -53,7 +67,8 @@ Status reply_bytes(Reply *reply, int code, const char *content_type, Bytes *byte
     return STATUS_OK;
 }
 
-static bool tag(Reply *reply, const Request *request, const char *text, const char *cache_control) {
+static bool reply_tag(Reply *reply, const Request *request, const char *text,
+                      const char *cache_control) {
     snprintf(reply->etag, sizeof reply->etag, "\"%s\"", text);
     snprintf(reply->cache_control, sizeof reply->cache_control, "%s", cache_control);
     return reply_is_known(reply, request);
@@ -69,31 +84,31 @@ bool reply_is_known(Reply *reply, const Request *request) {
     const bool has_packed = !has_plain && header_etag_matches(request->if_none_match, packed);
     if (!has_plain && !has_packed)
         return false;
-    // Told is the tag of what the client has: a cache freshens the form that bears it.
+    // The tag sent is that of the form that the client has: its cache refreshes that one.
     char etag[sizeof packed], cache_control[sizeof reply->cache_control];
     snprintf(etag, sizeof etag, "%s", has_packed ? packed : reply->etag);
     memcpy(cache_control, reply->cache_control, sizeof cache_control);
     const bool varies_by_accept = reply->varies_by_accept;
-    const char *policy = reply->policy; // a cache has the page from now on under what is told here
+    const char *policy = reply->policy; // the cached page gets the headers of this answer
     reply_clear(reply);
     reply->policy = policy;
     text_fit(reply->etag, sizeof reply->etag, etag);
     memcpy(reply->cache_control, cache_control, sizeof cache_control);
-    reply->varies_by_encoding = true; // whether it would be packed shows only when it is made
+    reply->varies_by_encoding = true; // whether it would be compressed shows only when it is made
     reply->varies_by_accept = varies_by_accept;
     reply->code = 304;
     return true;
 }
 
-static bool is_text(const char *type) {
+static bool reply_is_text(const char *type) {
     return type != NULL && (strncmp(type, "text/", 5) == 0 || strstr(type, "json") != NULL ||
                             strstr(type, "xml") != NULL);
 }
 
 bool reply_pack(Reply *reply, const Request *request) {
     enum { LEAST = 1024, MOST = 64 << 20 };
-    if (!is_text(reply->content_type) || reply->stream.next != NULL || reply->body_size < LEAST ||
-        reply->code == 206 || reply->content_encoding != NULL)
+    if (!reply_is_text(reply->content_type) || reply->stream.next != NULL ||
+        reply->body_size < LEAST || reply->code == 206 || reply->content_encoding != NULL)
         return false;
     reply->varies_by_encoding = true;
     if (reply->body_size > MOST || !header_accepts_gzip(request->accept_encoding))
@@ -120,11 +135,11 @@ bool reply_pack(Reply *reply, const Request *request) {
 
 bool reply_immutable(Reply *reply, const Request *request, const char *text) {
     reply->is_immutable = true;
-    return tag(reply, request, text, "private, max-age=31536000, immutable");
+    return reply_tag(reply, request, text, "private, max-age=31536000, immutable");
 }
 
 bool reply_tagged(Reply *reply, const Request *request, const char *text) {
-    return tag(reply, request, text, "no-cache");
+    return reply_tag(reply, request, text, "no-cache");
 }
 
 Status reply_range(Reply *reply, const Request *request, Problem *problem) {
@@ -167,4 +182,33 @@ void reply_wait(Reply *reply, int wait_ms, void *keep, void (*forget)(void *keep
     reply->wait_ms = wait_ms > 0 ? wait_ms : 1;
     reply->keep = keep;
     reply->forget = forget;
+}
+
+void reply_problem(Reply *reply, const Problem *problem, int code, const char *instance,
+                   const char *request_id) {
+    if (code == 0)
+        code = encode_problem_code(problem->status);
+    if (reply->release != NULL)
+        reply->release(reply->context);
+    reply->release = NULL;
+    Bytes bytes = {.most = 1 << 20};
+    encode_problem(&bytes, problem, code, instance);
+    if (request_id != NULL && bytes.count > 0) {
+        bytes.count--; // the closing brace
+        bytes_text(&bytes, ", \"request_id\": ");
+        bytes_json_string(&bytes, request_id);
+        bytes_text(&bytes, "}");
+    }
+    bytes_text(&bytes, "\n");
+    if (reply_bytes(reply, code, type_problem, &bytes, NULL) != STATUS_OK)
+        reply_borrow(reply, code, type_problem, no_memory, sizeof no_memory - 1);
+    if (code == 503 && reply->retry_after < 0)
+        reply->retry_after = 1;
+    if (code == 401)
+        reply->authenticate = "Bearer realm=\"impactd\"";
+    reply->etag[0] = '\0';
+    reply->cache_control[0] = '\0'; // of the answer it would have been
+    reply->accepts_ranges = false;
+    reply->location[0] = '\0';
+    reply->preference_applied[0] = '\0';
 }

@@ -1,5 +1,4 @@
-// Ways to fill a Reply: owned bytes, static bytes, parts of them, "not changed".
-// Not problems (body.h) and not sending (listener.h). Used by api/ and dispatch.c.
+// Ways to fill a Reply: bytes, parts of them, "not changed", problem documents (RFC 9457).
 #ifndef SERVER_HTTP_REPLY_H
 #define SERVER_HTTP_REPLY_H
 
@@ -9,7 +8,7 @@
 extern const char type_json[]; // "application/json"
 
 void reply_default(Reply *reply);
-// Gives up whatever body and kept things `reply` owns.
+// Releases what `reply` owns.
 void reply_clear(Reply *reply);
 
 // Takes what `bytes` holds, also when it fails (STATUS_NO_MEMORY or, at the buffer's limit,
@@ -26,19 +25,28 @@ bool reply_immutable(Reply *reply, const Request *request, const char *tag);
 // The same for what may change: the client asks again each time.
 bool reply_tagged(Reply *reply, const Request *request, const char *tag);
 
-// The same for a reply that has its tag: whatever else it holds is given up where the client has
-// it.
+// The same for a reply that has its tag; the rest of it is released where the client has it.
 bool reply_is_known(Reply *reply, const Request *request);
 
-// Turns a text that is whole in memory into gzip where the client takes it and it pays.
+// Compresses a text that is whole in memory where the client accepts gzip and it becomes smaller.
 bool reply_pack(Reply *reply, const Request *request);
 
 // Turns a whole 200 into 206 or 416 where the request asks for a part of a body that accepts
 // ranges. STATUS_USAGE with code 416 set in `reply` where there is no such part.
 Status reply_range(Reply *reply, const Request *request, Problem *problem);
 
-// Asks to be called again when request->waker is called or after `wait_ms`. `keep` comes back as
+// Asks to be called again when request->callback is called or after `wait_ms`. `keep` comes back as
 // request->kept.
 void reply_wait(Reply *reply, int wait_ms, void *keep, void (*forget)(void *keep));
+
+// Makes the reply application/problem+json. `code` 0: encode_problem_code(problem->status). Headers
+// already set in `reply` (Allow, Retry-After, Content-Range) stay. Never fails: without memory the
+// body is a constant. `instance` and `request_id` may be NULL.
+void reply_problem(Reply *reply, const Problem *problem, int code, const char *instance,
+                   const char *request_id);
+
+// Content-Security-Policy of data; of a drawing, which contains its style; of the dashboard: its
+// own files and answers, no inline script or style, and no text becomes markup.
+extern const char reply_policy[], reply_drawing_policy[], reply_page_policy[];
 
 #endif

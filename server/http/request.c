@@ -1,5 +1,5 @@
-// The target of a request: "/path?name=value&name=value", escapes and all. One block of storage
-// holds the target as sent, the path as sent and the decoded queries.
+// The target of a request: "/path?name=value&name=value", with escapes. One block of storage holds
+// the target as sent, the path as sent, the decoded queries, and room for the path's parameters.
 #include "server/http/request.h"
 
 #include <math.h>
@@ -8,6 +8,7 @@
 #include <string.h>
 #include <strings.h>
 
+#include "server/http/header.h"
 #include "server/util/base_path.h"
 
 static int hex_digit(char c) {
@@ -61,13 +62,14 @@ static Status add_query(Request *request, char *pair, Problem *problem) {
 
 Status request_open(Request *request, const char *target, Problem *problem) {
     const size_t size = strlen(target) + 1;
-    request->storage = malloc(3 * size);
+    request->storage = malloc(4 * size);
     if (request->storage == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the request's target");
     char *path = request->storage + size, *queries = path + size;
     memcpy(request->storage, target, size);
     memcpy(path, target, size);
     request->target = request->storage;
+    request->parameter_storage = queries + size;
     request->query_count = 0;
 
     char *question = strchr(path, '?');
@@ -188,4 +190,38 @@ Status request_flag(const Request *request, const char *name, bool *flag, Proble
         return STATUS_OK;
     return problem_set(problem, STATUS_USAGE,
                        "the query parameter \"%s\" must be 1 or 0, is \"%.40s\"", name, text);
+}
+
+Status request_error_large(size_t max, Problem *problem) {
+    return problem_set(problem, STATUS_TOO_LARGE,
+                       "the body is larger than %zu bytes; impactd serve --max-body lets in more",
+                       max);
+}
+
+Status request_require_body(const Request *request, Problem *problem) {
+    const char *encoding = request->content_encoding;
+    if (encoding != NULL && encoding[0] != '\0' && strcasecmp(encoding, "identity") != 0)
+        return problem_set(problem, STATUS_UNSUPPORTED_TYPE,
+                           "the body must be sent as it is, without Content-Encoding, is encoded "
+                           "as %.60s",
+                           encoding);
+    if (request->is_too_large)
+        return request_error_large(request->body_most, problem);
+    if (request->body == NULL || request->body_size == 0)
+        return problem_set(problem, STATUS_UNREADABLE, "there is no body; send the scene as JSON");
+    return STATUS_OK;
+}
+
+Status request_require_json(const Request *request, Problem *problem) {
+    if (!header_type_is(request->content_type, "application/json"))
+        return problem_set(
+            problem, STATUS_UNSUPPORTED_TYPE,
+            "the body must be application/json, is %.60s; with curl use --json @scene.json, or "
+            "-H 'Content-Type: application/json'",
+            request->content_type != NULL ? request->content_type : "of no given type");
+    return request_require_body(request, problem);
+}
+
+bool request_is_empty(const Request *request) {
+    return request->body_size == 0;
 }

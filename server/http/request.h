@@ -1,5 +1,5 @@
-// One HTTP request as plain values, and the reply to it. No libmicrohttpd here (listener.c has it
-// alone). Not a parser of header values: that is header.h. Used by http/ and api/.
+// One HTTP request, its route and its reply as plain values; what every handler requires of a
+// request.
 #ifndef SERVER_HTTP_REQUEST_H
 #define SERVER_HTTP_REQUEST_H
 
@@ -22,10 +22,29 @@ typedef struct RequestPair {
     const char *name, *value; // decoded
 } RequestPair;
 
-typedef struct Request {
-    const char *method; // "GET"; HEAD is shown as GET, the listener drops the body
-    const char *target; // path and query as sent
-    const char *path;   // as sent, without query and base path
+typedef struct App App; // api/app.h
+typedef struct Request Request;
+typedef struct Reply Reply;
+
+typedef Status Handler(App *app, const Request *request, Reply *reply, Problem *problem);
+
+// One endpoint.
+typedef struct Route {
+    const char *method; // "GET"
+    // "/v1/results/{id}/series.{format}": {x} matches one segment or the rest of one
+    const char *pattern;
+    const char *scope;          // "read", "submit", "materials", "admin"; "open": needs no token
+    const char *const *queries; // names allowed in the query, NULL-terminated; NULL for none
+    const char *doc;
+    Handler *handle;
+    // Whether the handler is so quick that it may run on the event loop; NULL: never.
+    bool (*runs_on_loop)(const Request *request);
+} Route;
+
+struct Request {
+    const char *method;                         // "GET"; HEAD is shown as GET, its body is not sent
+    const char *target;                         // path and query as sent
+    const char *path;                           // as sent, without query and base path
     const char *parameters[REQUEST_PARAMETERS]; // what {..} in the route's pattern matched, in
                                                 // order, decoded
     RequestPair queries[REQUEST_QUERIES];
@@ -40,19 +59,20 @@ typedef struct Request {
         *range; // NULL if absent
     const char *expect, *authorization, *accept_encoding, *content_encoding, *if_match,
         *idempotency_key, *last_event_id;
-    char prefers[128];         // all Prefer headers in one: `prefer` points here
-    const char *client;        // the name of the token it came with; NULL: none was asked for
-    Holder holder;             // `client` points here
-    char id[REQUEST_ID_SIZE];  // the client's own or ours; for the client and the journal
-    const struct Route *route; // that fits; NULL before and where there is none
-    bool is_admitted;          // it was judged just now, before its body
-    int64_t started_ns;        // monotonic
-    bool is_woken;             // the handler asked to wait and is called again
-    bool is_expired;           // ... because the time was up
-    void *kept;                // what the handler kept when it asked to wait; see Reply
-    const Callback *callback;  // wakes this request; outlives it, so that a late call does no harm
-    char *storage;             // what the texts above point into
-} Request;
+    char prefers[128];        // all Prefer headers in one: `prefer` points here
+    const char *client;       // the name of the token it came with; NULL: none was asked for
+    Holder holder;            // `client` points here
+    char id[REQUEST_ID_SIZE]; // the client's own or ours; for the client and the log
+    const Route *route;       // NULL until it is found, and where none fits
+    uint64_t cache_age;       // response_cache_age when it was found
+    int64_t started_ns;       // monotonic
+    bool is_resumed;          // the handler asked to wait and is called again
+    bool is_expired;          // ... because the time was up
+    void *kept;               // what the handler kept when it asked to wait; see Reply
+    const Callback *callback; // resumes this request; outlives it, so that a late call is harmless
+    char *storage;            // what the texts above point into
+    char *parameter_storage;  // part of it
+};
 
 // Takes `target` apart: path, queries, percent-decoded. The rest of `request` stays. STATUS_USAGE
 // for a broken escape, a NUL, a query named twice or more than REQUEST_QUERIES of them. Closed by
@@ -79,13 +99,23 @@ Status request_flag(const Request *request, const char *name, bool *flag, Proble
 Status request_count(const Request *request, const char *name, size_t least, size_t most,
                      size_t initial, size_t *value, Problem *problem);
 
-// A body made piece by piece while it is sent, for what is too long to hold and for what is not
-// known yet. `next` writes up to `size` bytes and returns how many, STREAM_END behind the last, or
-// STREAM_WAIT to be called again when the request's waker (which the context may keep) is called or
-// after `wait_ms`, or STREAM_BROKEN where the rest cannot be had: the client sees that it is cut
-// off. It is called from one thread at a time, must be quick, and knows no Request:
-// that is gone once the handler has returned. `release(context)` is called once, also if the client
-// leaves early.
+// STATUS_UNSUPPORTED_TYPE unless the body is JSON by its Content-Type and not encoded,
+// STATUS_TOO_LARGE if it was over the limit, STATUS_UNREADABLE if there is none.
+Status request_require_json(const Request *request, Problem *problem);
+// The same of any type.
+Status request_require_body(const Request *request, Problem *problem);
+// STATUS_TOO_LARGE: the limit, and how to raise it.
+Status request_error_large(size_t max, Problem *problem);
+
+// Of Route.runs_on_loop: the request has no body.
+bool request_is_empty(const Request *request);
+
+// A body made piece by piece while it is sent, because it is too long for memory or not complete
+// yet. `next` writes up to `size` bytes and returns how many, STREAM_END after the last,
+// STREAM_WAIT to be called again when the request's callback (which the context may keep) is called
+// or after `wait_ms`, or STREAM_BROKEN where the rest cannot be had: the client sees that it is cut
+// off. It is called from one thread at a time, must be quick, and has no Request: that ends with
+// the handler. `release(context)` is called once, also if the client leaves early.
 enum { STREAM_END = -1, STREAM_WAIT = -2, STREAM_BROKEN = -3 };
 typedef struct Stream {
     ptrdiff_t (*next)(void *context, char *target, size_t size);
@@ -96,7 +126,7 @@ typedef struct Stream {
     void (*cut)(void *context, uint64_t first, uint64_t size);
 } Stream;
 
-typedef struct Reply {
+struct Reply {
     int code; // HTTP status
     const char *content_type;
     const void *body;
@@ -124,6 +154,6 @@ typedef struct Reply {
     int wait_ms; // > 0: not a reply yet; call the handler again when woken or after so long
     void *keep;  // with wait_ms: handed back as request->kept; `forget` frees it, always, after the
     void (*forget)(void *keep); // next call of the handler or when the client has gone
-} Reply;
+};
 
 #endif

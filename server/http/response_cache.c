@@ -14,8 +14,8 @@ enum { SHARE = 4 }; // no entry takes more than a SHAREth of the budget
 typedef struct CachedResponse {
     LruEntry cached;
     atomic_size_t refcount;
-    const struct Route *route; // lives as long as the program
-    Reply reply;               // owns the body
+    const Route *route; // lives as long as the program
+    Reply reply;        // owns the body
     char key[];
 } CachedResponse;
 
@@ -89,7 +89,7 @@ uint64_t response_cache_age(ResponseCache *cache) {
 }
 
 void response_cache_put(ResponseCache *cache, uint64_t age, const char *target, bool is_packed,
-                        const struct Route *route, Reply *reply) {
+                        const Route *route, Reply *reply) {
     const size_t size = strlen(target),
                  bytes = sizeof(CachedResponse) + size + 2 + reply->body_size;
     if (bytes > cache->max_bytes / SHARE || size > REQUEST_TARGET_MAX)
@@ -113,7 +113,7 @@ void response_cache_put(ResponseCache *cache, uint64_t age, const char *target, 
 }
 
 bool response_cache_find(ResponseCache *cache, const char *target, bool is_packed, Reply *reply,
-                         const struct Route **route) {
+                         const Route **route) {
     char key[REQUEST_TARGET_MAX + 2];
     const size_t size = strlen(target);
     if (size > REQUEST_TARGET_MAX)

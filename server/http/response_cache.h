@@ -18,11 +18,11 @@ uint64_t response_cache_age(ResponseCache *cache);
 // `is_packed`: the body is gzip. A response begun at another `age` is not stored: what it shows may
 // have been deleted.
 void response_cache_put(ResponseCache *cache, uint64_t age, const char *target, bool is_packed,
-                        const struct Route *route, Reply *reply);
+                        const Route *route, Reply *reply);
 
 // Fills `reply`, which borrows, and *route. False if absent.
 bool response_cache_find(ResponseCache *cache, const char *target, bool is_packed, Reply *reply,
-                         const struct Route **route);
+                         const Route **route);
 
 // Removes everything: something that never changes was deleted.
 void response_cache_clear(ResponseCache *cache);

@@ -1,7 +1,7 @@
-// One thread accepts and gives each connection to the event loop that has the fewest; each loop
-// runs a libmicrohttpd of its own. The loops are ours, not the library's: where a multiple of 128
-// connections are ready at once, 0.9.75 would wait for more before it serves them, and as many
-// threads as keep it below that number cost a third of the speed.
+// Each event loop runs a libmicrohttpd of its own. The loops are ours, not the library's: where a
+// multiple of 128 connections are ready at once, 0.9.75 would wait for more before it serves them,
+// and as many threads as keep it below that number cost a third of the speed. One loop accepts; it
+// passes this role on to the loop that has the fewest connections.
 #include "server/http/server.h"
 
 #include <errno.h>
@@ -10,144 +10,150 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/eventfd.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <time.h>
 #include <unistd.h>
 
-#include "server/http/exchange.h"
+#include "server/http/connection.h"
 #include "server/util/clock.h"
 
 enum {
     LOOPS_MAX = 16,
-    THREADS = 16,           // that answer what takes a while
-    CONNECTIONS_MAX = 8192, // over all loops, where as many files may be open
+    THREADS_MAX = 16,       // that run handlers which may take a while
+    CONNECTIONS_MAX = 8192, // over all loops, if as many files may be open
     FILES_KEPT = 64,        // for everything else
-    TOGETHER = 16,          // connections that one loop takes before another does
+    TOGETHER = 16,          // connections that one loop takes before another does: fewer wake-ups
     CONNECTION_MEMORY = 16 * 1024,
-    SILENCE_S = 60, // nothing sent or received; who is kept waiting by us is not silent
-    IN_VAIN = 16,   // runs in a row that called nothing, before a pause
+    SILENCE_S = 60,    // nothing sent or received; a client that waits for us is not silent
+    BUSY_RUNS = 16,    // in a row, before a loop looks for new connections
+    RETRY_MS = 5,      // until accepting is tried again
+    IDLE_MIN_MS = 500, // then a connection between two requests may be closed for a new one
 };
 
 struct Server {
     ServerShared shared;
     char url[96];
-    int descriptor; // the listening socket
-    EventFd wakeup; // rung to end the accepting thread
-    pthread_t acceptor;
-    bool is_accepting;
-    size_t connections_most;
-    size_t loop_count;
     EventLoop loops[LOOPS_MAX];
 };
 
-static void take_arrivals(EventLoop *loop) {
-    enum { MOST = 64 };
-    int arrivals[MOST];
-    size_t count;
-    do {
-        pthread_mutex_lock(&loop->lock);
-        count = loop->arrival_count < MOST ? loop->arrival_count : MOST;
-        loop->arrival_count -= count;
-        if (count > 0) // a bell may be stale
-            memcpy(arrivals, loop->arrivals + loop->arrival_count, count * sizeof *arrivals);
-        pthread_mutex_unlock(&loop->lock);
-        for (size_t i = 0; i < count; i++) {
-            struct sockaddr_storage peer = {.ss_family = AF_INET};
-            socklen_t size = sizeof peer;
-            (void)getpeername(arrivals[i], (struct sockaddr *)&peer, &size);
-            // Closes the descriptor if it fails.
-            if (MHD_add_connection(loop->daemon, arrivals[i], (struct sockaddr *)&peer, size) !=
-                MHD_YES)
-                atomic_fetch_sub(&loop->connections, 1);
-        }
-    } while (count == MOST);
+void loop_wake(EventLoop *loop) {
+    const uint64_t one = 1;
+    if (!atomic_exchange(&loop->is_woken, true))
+        (void)!write(loop->wakeup, &one, sizeof one);
 }
 
-static void *run_loop(void *context) {
+static size_t shared_connections(const ServerShared *shared) {
+    size_t count = 0;
+    for (size_t i = 0; i < shared->loop_count; i++)
+        count += atomic_load(&shared->loops[i].connections);
+    return count;
+}
+
+size_t server_connections(const Server *server) {
+    return shared_connections(&server->shared);
+}
+
+static void loop_pass_accepting(ServerShared *shared, size_t index) {
+    atomic_store(&shared->acceptor, index);
+    loop_wake(&shared->loops[index]);
+}
+
+// The first loop with few connections, else the one with the fewest.
+static size_t shared_next_acceptor(const ServerShared *shared) {
+    size_t least = 0;
+    for (size_t i = 1;
+         i < shared->loop_count && atomic_load(&shared->loops[least].connections) >= TOGETHER; i++)
+        if (atomic_load(&shared->loops[i].connections) <
+            atomic_load(&shared->loops[least].connections))
+            least = i;
+    return least;
+}
+
+// Beyond the limit new connections wait in the kernel's queue until another one closes: the one
+// that has been idle for longest is made to.
+static void loop_make_room(EventLoop *loop, int64_t now_ns) {
+    ServerShared *shared = loop->shared;
+    timer_wheel_close_idle(loop->wheel, IDLE_MIN_MS);
+    loop->accept_ns = now_ns + RETRY_MS * 1000000LL;
+    if (shared->loop_count > 1)
+        loop_pass_accepting(shared, (loop->index + 1) % shared->loop_count);
+}
+
+static void loop_accept(EventLoop *loop, int64_t now_ns) {
+    ServerShared *shared = loop->shared;
+    for (size_t next = loop->index; next == loop->index;) {
+        struct sockaddr_storage peer = {.ss_family = AF_INET};
+        socklen_t size = sizeof peer;
+        const bool is_full = shared_connections(shared) >= shared->connections_max;
+        const int descriptor =
+            is_full ? -1 : accept(shared->descriptor, (struct sockaddr *)&peer, &size);
+        if (descriptor < 0) {
+            if (is_full || errno == EMFILE || errno == ENFILE || errno == ENOMEM ||
+                errno == ENOBUFS)
+                loop_make_room(loop, now_ns);
+            return;
+        }
+        atomic_fetch_add(&loop->connections, 1);
+        // Closes the descriptor if it fails.
+        if (MHD_add_connection(loop->daemon, descriptor, (struct sockaddr *)&peer, size) != MHD_YES)
+            atomic_fetch_sub(&loop->connections, 1);
+        next = shared_next_acceptor(shared);
+        if (next != loop->index)
+            loop_pass_accepting(shared, next);
+    }
+}
+
+// How long the loop may sleep [ms].
+static int loop_timeout(const EventLoop *loop, int64_t now_ns, int64_t next_ns) {
+    enum { LONGEST_MS = 1000 };
+    MHD_UNSIGNED_LONG_LONG library_ms; // what is ready in memory shows in no descriptor
+    int64_t ms = next_ns == INT64_MAX ? LONGEST_MS : (next_ns - now_ns) / 1000000 + 1;
+    if (MHD_get_timeout(loop->daemon, &library_ms) == MHD_YES && (int64_t)library_ms < ms)
+        ms = (int64_t)library_ms;
+    return ms > LONGEST_MS ? LONGEST_MS : ms > 0 ? (int)ms : 0;
+}
+
+static void *loop_run(void *context) {
     EventLoop *loop = context;
+    ServerShared *shared = loop->shared;
     const union MHD_DaemonInfo *info = MHD_get_daemon_info(loop->daemon, MHD_DAEMON_INFO_EPOLL_FD);
     struct pollfd events[] = {{.fd = info->epoll_fd, .events = POLLIN},
-                              {.fd = loop->wakeup.descriptor, .events = POLLIN}};
-    size_t idle = 1; // runs in a row that called nothing
+                              {.fd = loop->wakeup, .events = POLLIN},
+                              {.events = POLLIN}};
+    size_t busy = 0; // runs in a row that called something: then there is probably more to do
     while (!atomic_load(&loop->is_stopping)) {
-        // Where there was something to do there mostly is more: no call to wait for it, then.
-        if (idle > 0 && !atomic_load(&loop->wakeup.is_rung)) {
-            // What is ready in memory shows in no descriptor.
-            MHD_UNSIGNED_LONG_LONG left_ms;
-            int wait_ms = -1;
-            if (MHD_get_timeout(loop->daemon, &left_ms) == MHD_YES)
-                wait_ms = left_ms < 1000 ? (int)left_ms : 1000;
-            // A chunk's head that fills the connection's memory stays ready until its time is up,
-            // and nothing comes of it. An answer that is being sent calls nothing either: no long
-            // pauses, therefore.
-            if (wait_ms == 0 && loop->reading > 0 && idle % IN_VAIN == 0)
-                wait_ms = 1;
-            (void)poll(events, 2, wait_ms);
+        const int64_t now_ns = clock_monotonic_ns();
+        const int64_t next_ns = timer_wheel_run(loop->wheel, now_ns);
+        connection_close_stalled(loop, now_ns);
+        if (busy % BUSY_RUNS == 0) {
+            const bool may_accept =
+                atomic_load(&shared->is_accepting) && atomic_load(&shared->acceptor) == loop->index;
+            const bool accepts = may_accept && now_ns >= loop->accept_ns;
+            int wait_ms =
+                busy > 0 || atomic_load(&loop->is_woken) ? 0 : loop_timeout(loop, now_ns, next_ns);
+            if (may_accept && !accepts && wait_ms > RETRY_MS)
+                wait_ms = RETRY_MS;
+            events[2].fd = accepts ? shared->descriptor : -1;
+            if (poll(events, COUNT(events), wait_ms) > 0 && (events[2].revents & POLLIN) != 0 &&
+                atomic_load(&shared->is_accepting))
+                loop_accept(loop, now_ns);
         }
-        if (eventfd_read_all(&loop->wakeup))
-            take_arrivals(loop);
-        const size_t turns = loop->turns;
+        uint64_t count;
+        if (atomic_exchange(&loop->is_woken, false))
+            (void)!read(loop->wakeup, &count, sizeof count);
+        const size_t calls = loop->calls;
         MHD_run(loop->daemon);
-        idle = loop->turns == turns ? idle + 1 : 0;
+        busy = loop->calls != calls ? busy + 1 : 0;
     }
     return NULL;
 }
 
-size_t server_connections(const Server *server) {
-    size_t count = 0;
-    for (size_t i = 0; i < server->loop_count; i++)
-        count += atomic_load(&server->loops[i].connections);
-    return count;
-}
-
-static void hand_on(Server *server, int descriptor) {
-    // A few together wake a loop less often for each.
-    EventLoop *least = &server->loops[0];
-    for (size_t i = 1; i < server->loop_count && atomic_load(&least->connections) >= TOGETHER; i++)
-        if (atomic_load(&server->loops[i].connections) < atomic_load(&least->connections))
-            least = &server->loops[i];
-    pthread_mutex_lock(&least->lock);
-    if (least->arrival_count == least->arrival_room) {
-        const size_t room = 2 * least->arrival_room + 64;
-        int *grown = realloc(least->arrivals, room * sizeof *grown);
-        if (grown == NULL) {
-            pthread_mutex_unlock(&least->lock);
-            close(descriptor);
-            return;
-        }
-        least->arrivals = grown;
-        least->arrival_room = room;
-    }
-    least->arrivals[least->arrival_count++] = descriptor;
-    atomic_fetch_add(&least->connections, 1);
-    pthread_mutex_unlock(&least->lock);
-    eventfd_signal(&least->wakeup);
-}
-
-static void *accept_all(void *context) {
-    Server *server = context;
-    const struct timespec moment = {.tv_nsec = 5000000};
-    struct pollfd events[] = {{.fd = server->descriptor, .events = POLLIN},
-                              {.fd = server->wakeup.descriptor, .events = POLLIN}};
-    for (;;) {
-        (void)poll(events, 2, -1);
-        if (events[1].revents != 0)
-            return NULL;
-        // Beyond the limit newcomers wait in the kernel's queue until someone leaves.
-        const bool is_full = server_connections(server) >= server->connections_most;
-        const int descriptor = is_full ? -1 : accept(server->descriptor, NULL, NULL);
-        if (descriptor >= 0)
-            hand_on(server, descriptor);
-        else if (is_full || errno == EMFILE || errno == ENFILE || errno == ENOMEM ||
-                 errno == ENOBUFS)
-            nanosleep(&moment, NULL);
-    }
-}
-
-static Status loop_start(EventLoop *loop, ServerShared *shared, size_t most, Problem *problem) {
+static Status loop_start(EventLoop *loop, ServerShared *shared, Problem *problem) {
     const ServerSettings *settings = &shared->settings;
     loop->shared = shared;
+    loop->index = shared->loop_count;
     const bool is_tls = settings->certificate != NULL;
     const unsigned flags = MHD_USE_EPOLL | MHD_USE_NO_LISTEN_SOCKET | MHD_ALLOW_SUSPEND_RESUME |
                            MHD_USE_TURBO | (is_tls ? (unsigned)MHD_USE_TLS : 0);
@@ -157,50 +163,49 @@ static Status loop_start(EventLoop *loop, ServerShared *shared, size_t most, Pro
          (void *)(uintptr_t) "SECURE128:-VERS-ALL:+VERS-TLS1.2:+VERS-TLS1.3:-RSA"},
         {MHD_OPTION_END, 0, NULL}};
     const struct MHD_OptionItem none[] = {{MHD_OPTION_END, 0, NULL}};
+    loop->wheel = timer_wheel_new(&connection_timer_calls, loop);
+    if (loop->wheel == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for an event loop");
     loop->daemon = MHD_start_daemon(
-        flags, 0, NULL, NULL, exchange_go_on, loop, MHD_OPTION_CONNECTION_LIMIT, (unsigned)most,
-        MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)CONNECTION_MEMORY,
-        MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)SILENCE_S, MHD_OPTION_STRICT_FOR_CLIENT, 0,
-        MHD_OPTION_URI_LOG_CALLBACK, exchange_open, loop, MHD_OPTION_NOTIFY_CONNECTION,
-        exchange_connection, loop, MHD_OPTION_NOTIFY_COMPLETED, exchange_close, loop,
-        MHD_OPTION_ARRAY, is_tls ? tls : none,
+        flags, 0, NULL, NULL, exchange_continue, loop, MHD_OPTION_CONNECTION_LIMIT,
+        (unsigned)shared->connections_max, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
+        (size_t)CONNECTION_MEMORY, MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)SILENCE_S,
+        MHD_OPTION_STRICT_FOR_CLIENT, 0, MHD_OPTION_URI_LOG_CALLBACK, exchange_open, loop,
+        MHD_OPTION_NOTIFY_CONNECTION, connection_notify, loop, MHD_OPTION_NOTIFY_COMPLETED,
+        exchange_close, loop, MHD_OPTION_ARRAY, is_tls ? tls : none,
         is_tls ? MHD_OPTION_HTTPS_CERT_CALLBACK : MHD_OPTION_END, settings->certificate,
         MHD_OPTION_END);
-    if (loop->daemon == NULL)
-        return problem_set(problem, STATUS_INTERNAL, "the HTTP library cannot start%s",
-                           is_tls ? " with this certificate and key" : "");
-    const bool has_bell = eventfd_open(&loop->wakeup);
-    pthread_mutex_init(&loop->lock, NULL);
-    const int code = has_bell ? pthread_create(&loop->thread, NULL, run_loop, loop) : errno;
-    if (code == 0)
+    loop->wakeup = loop->daemon != NULL ? eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK) : -1;
+    const int code = loop->wakeup < 0 ? errno : pthread_create(&loop->thread, NULL, loop_run, loop);
+    if (loop->daemon != NULL && code == 0)
         return STATUS_OK;
-    MHD_stop_daemon(loop->daemon);
-    pthread_mutex_destroy(&loop->lock);
-    eventfd_close(&loop->wakeup);
-    return problem_set(problem, STATUS_INTERNAL, "an event loop cannot be started: %s",
-                       strerror(code));
+    if (loop->daemon != NULL)
+        MHD_stop_daemon(loop->daemon);
+    close(loop->wakeup); // -1 is harmless
+    timer_wheel_free(loop->wheel);
+    return loop->daemon == NULL
+               ? problem_set(problem, STATUS_INTERNAL, "the HTTP library cannot start%s",
+                             is_tls ? " with this certificate and key" : "")
+               : problem_set(problem, STATUS_INTERNAL, "an event loop cannot be started: %s",
+                             strerror(code));
 }
 
 // No callback runs any more.
-static void loop_halt(EventLoop *loop) {
+static void loop_stop(EventLoop *loop) {
     atomic_store(&loop->is_stopping, true);
-    eventfd_signal(&loop->wakeup);
+    loop_wake(loop);
     pthread_join(loop->thread, NULL);
 }
 
-static void loop_end(EventLoop *loop) {
-    for (size_t i = 0; i < loop->arrival_count; i++)
-        close(loop->arrivals[i]);
-    free(loop->arrivals);
+static void loop_close(EventLoop *loop) {
     MHD_stop_daemon(loop->daemon);
-    response_forget(loop->shared_response);
-    exchange_forget(loop);
-    pthread_mutex_destroy(&loop->lock);
-    eventfd_close(&loop->wakeup);
+    connection_clear_kept(loop);
+    close(loop->wakeup);
+    loop->wakeup = -1;
 }
 
-// As many files as we may, and how many connections that allows.
-static size_t connections_allowed(void) {
+// As many files as permitted, and how many connections that allows.
+static size_t server_connections_max(void) {
     struct rlimit files;
     if (getrlimit(RLIMIT_NOFILE, &files) != 0)
         return 512;
@@ -213,30 +218,24 @@ static size_t connections_allowed(void) {
     return room < CONNECTIONS_MAX ? room : CONNECTIONS_MAX;
 }
 
-static Status start(Server *server, Problem *problem) {
+static Status server_start(Server *server, Problem *problem) {
     ServerShared *shared = &server->shared;
     ServerSettings *settings = &shared->settings;
-    TRY(timer_wheel_open(&exchange_calls, &shared->wheel, problem));
-    TRY(thread_pool_open(THREADS, &shared->pool, problem));
-    TRY(address_open(&settings->address, &server->descriptor, problem));
+    TRY(thread_pool_open(THREADS_MAX, &shared->pool, problem));
+    TRY(address_open(&settings->address, &shared->descriptor, problem));
     address_url(&settings->address, settings->certificate != NULL, server->url);
     shared->url = server->url;
+    shared->loops = server->loops;
     shared->first_id = (uint64_t)clock_unix_ms() << 16;
+    shared->connections_max = server_connections_max();
     const long processors = sysconf(_SC_NPROCESSORS_ONLN);
-    const size_t most = processors < 1           ? 1
-                        : processors > LOOPS_MAX ? LOOPS_MAX
-                                                 : (size_t)processors;
-    server->connections_most = connections_allowed();
-    for (; server->loop_count < most; server->loop_count++)
-        TRY(loop_start(&server->loops[server->loop_count], shared, server->connections_most,
-                       problem));
-    const int code = eventfd_open(&server->wakeup)
-                         ? pthread_create(&server->acceptor, NULL, accept_all, server)
-                         : errno;
-    server->is_accepting = code == 0;
-    if (!server->is_accepting)
-        return problem_set(problem, STATUS_INTERNAL, "the accepting thread cannot be started: %s",
-                           strerror(code));
+    const size_t count = processors < 1           ? 1
+                         : processors > LOOPS_MAX ? LOOPS_MAX
+                                                  : (size_t)processors;
+    for (; shared->loop_count < count; shared->loop_count++)
+        TRY(loop_start(&server->loops[shared->loop_count], shared, problem));
+    atomic_store(&shared->is_accepting, true);
+    loop_pass_accepting(shared, 0);
     return STATUS_OK;
 }
 
@@ -244,10 +243,10 @@ Status server_open(const ServerSettings *settings, Server **server, Problem *pro
     *server = NULL;
     Server *made = calloc(1, sizeof *made);
     if (made == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the listener");
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the server");
     made->shared.settings = *settings;
-    made->descriptor = made->wakeup.descriptor = -1;
-    const Status status = start(made, problem);
+    made->shared.descriptor = -1;
+    const Status status = server_start(made, problem);
     if (status != STATUS_OK) {
         server_free(made);
         return status;
@@ -264,32 +263,33 @@ void server_stop(Server *server, int grace_ms) {
     if (server == NULL || server->shared.pool == NULL)
         return;
     ServerShared *shared = &server->shared;
-    if (server->is_accepting) {
-        eventfd_signal(&server->wakeup);
-        pthread_join(server->acceptor, NULL);
-        server->is_accepting = false;
+    atomic_store(&shared->is_accepting, false);
+    // From here on connections are refused; a loop may still be polling it.
+    shutdown(shared->descriptor, SHUT_RDWR);
+    for (size_t i = 0; i < shared->loop_count; i++) {
+        loop_wake(&shared->loops[i]);
+        timer_wheel_wake_all(shared->loops[i].wheel);
     }
-    close(server->descriptor); // -1: no harm
-    server->descriptor = -1;
-    timer_wheel_wake_all(shared->wheel);
     const int64_t until = clock_monotonic_ns() + (int64_t)grace_ms * 1000000;
     const struct timespec pause = {.tv_nsec = 5000000};
     while (atomic_load(&shared->exchanges) > 0 && clock_monotonic_ns() < until)
         nanosleep(&pause, NULL);
-    for (size_t i = 0; i < server->loop_count; i++)
-        loop_halt(&server->loops[i]);
-    // The library takes no end while a connection is suspended: what is in the pool is done.
+    for (size_t i = 0; i < shared->loop_count; i++)
+        loop_stop(&shared->loops[i]);
+    // The library cannot be stopped while a connection is suspended: the pool ends its work first.
     thread_pool_close(shared->pool);
     shared->pool = NULL;
-    while (server->loop_count > 0)
-        loop_end(&server->loops[--server->loop_count]);
-    eventfd_close(&server->wakeup);
+    for (size_t i = 0; i < shared->loop_count; i++)
+        loop_close(&shared->loops[i]);
+    close(shared->descriptor); // -1 is harmless
+    shared->descriptor = -1;
 }
 
 void server_free(Server *server) {
     if (server == NULL)
         return;
     server_stop(server, 0);
-    timer_wheel_close(server->shared.wheel);
+    for (size_t i = 0; i < server->shared.loop_count; i++)
+        timer_wheel_free(server->loops[i].wheel);
     free(server);
 }

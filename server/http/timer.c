@@ -1,130 +1,99 @@
-// A seat:   empty -> taken -> (asleep -> taken)* -> empty
+// A timer:   free -> taken -> (waiting -> taken)* -> free
 //
-// All state but the limits is under the TimerWheel's one lock: each change is a few stores. The
-// clock thread sleeps until the earliest time any seat waits for, and is nudged only by an earlier
-// one.
+// The lock guards the waits, which other threads end; each change is a few stores. Limits are the
+// loop's alone. `next_ns` is a lower bound of all times, so that setting a later one costs nothing.
 #include "server/http/timer.h"
 
-#include <errno.h>
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <sys/socket.h>
-#include <time.h>
 
 #include "server/util/clock.h"
 
 struct ConnectionTimer {
     TimerWheel *wheel;
     ConnectionTimer *next; // of all
-    ConnectionTimer *next_empty;
+    ConnectionTimer *next_free;
     Callback callback;
-    int descriptor; // -1: empty
-    void *asleep;   // the suspended connection, or NULL
+    int descriptor; // -1: free
+    void *waiting;  // the suspended connection, or NULL
     atomic_bool is_woken;
-    int64_t wake_ns;           // INT64_MAX: none
-    _Atomic(int64_t) limit_ns; // the same; set without the lock, several times a request
+    int64_t wake_ns, limit_ns; // INT64_MAX: none
+    int64_t idle_ns;           // since when it is between two requests; INT64_MAX: it is not
 };
 
 struct TimerWheel {
     TimerCallbacks calls;
+    void *loop;
     pthread_mutex_t lock;
-    pthread_cond_t nudge;
-    pthread_t clock;
-    ConnectionTimer *all, *empty;
-    _Atomic(int64_t) next_ns; // when the clock thread wakes; lowered without the lock as well
+    ConnectionTimer *all, *free_list;
+    _Atomic(int64_t) next_ns;
     atomic_bool is_closing;
-    bool is_closed;
 };
 
-static void wake_locked(ConnectionTimer *timer) {
-    if (timer->asleep == NULL)
+static void timer_wake_locked(ConnectionTimer *timer) {
+    if (timer->waiting == NULL)
         return;
-    void *connection = timer->asleep;
-    timer->asleep = NULL;
+    void *connection = timer->waiting;
+    timer->waiting = NULL;
     timer->wake_ns = INT64_MAX;
     timer->wheel->calls.resume(connection);
 }
 
-static void wake(void *context) {
+static void timer_wake(void *context) {
     ConnectionTimer *timer = context;
     pthread_mutex_lock(&timer->wheel->lock);
     timer->is_woken = true;
-    wake_locked(timer);
+    timer_wake_locked(timer);
     pthread_mutex_unlock(&timer->wheel->lock);
 }
 
-// Does what is due and returns when the next thing is.
-static int64_t serve_due(TimerWheel *wheel, int64_t now) {
+// Whether `time_ns` is earlier than all others.
+static bool timer_lower_next(TimerWheel *wheel, int64_t time_ns) {
+    int64_t next = atomic_load(&wheel->next_ns);
+    while (time_ns < next)
+        if (atomic_compare_exchange_weak(&wheel->next_ns, &next, time_ns))
+            return true;
+    return false;
+}
+
+int64_t timer_wheel_run(TimerWheel *wheel, int64_t now_ns) {
+    if (atomic_load(&wheel->next_ns) > now_ns)
+        return atomic_load(&wheel->next_ns);
+    pthread_mutex_lock(&wheel->lock);
     int64_t next = INT64_MAX;
     for (ConnectionTimer *timer = wheel->all; timer != NULL; timer = timer->next) {
-        if (timer->wake_ns <= now)
-            wake_locked(timer);
-        int64_t limit = atomic_load(&timer->limit_ns);
-        if (limit <= now) {
-            // timer_leave, which comes before the descriptor is closed, takes the lock.
+        if (timer->wake_ns <= now_ns)
+            timer_wake_locked(timer);
+        if (timer->limit_ns <= now_ns) {
             shutdown(timer->descriptor, SHUT_RDWR);
-            atomic_compare_exchange_strong(&timer->limit_ns, &limit, INT64_MAX);
-            limit = INT64_MAX;
+            timer->limit_ns = INT64_MAX;
         }
         next = timer->wake_ns < next ? timer->wake_ns : next;
-        next = limit < next ? limit : next;
+        next = timer->limit_ns < next ? timer->limit_ns : next;
     }
+    atomic_store(&wheel->next_ns, next); // others lower it with the lock
+    pthread_mutex_unlock(&wheel->lock);
     return next;
 }
 
-static void *keep_time(void *context) {
-    TimerWheel *wheel = context;
-    pthread_mutex_lock(&wheel->lock);
-    while (!wheel->is_closed) {
-        // A limit set while the seats are looked at either is seen there or lowers this again.
-        atomic_store(&wheel->next_ns, INT64_MAX);
-        const int64_t due = serve_due(wheel, clock_monotonic_ns());
-        int64_t next = atomic_load(&wheel->next_ns);
-        while (due < next && !atomic_compare_exchange_weak(&wheel->next_ns, &next, due))
-            ;
-        next = due < next ? due : next;
-        if (next == INT64_MAX) {
-            pthread_cond_wait(&wheel->nudge, &wheel->lock);
-            continue;
-        }
-        const struct timespec until = {.tv_sec = (time_t)(next / 1000000000),
-                                       .tv_nsec = (long)(next % 1000000000)};
-        pthread_cond_timedwait(&wheel->nudge, &wheel->lock, &until);
-    }
-    pthread_mutex_unlock(&wheel->lock);
-    return NULL;
-}
-
-Status timer_wheel_open(const TimerCallbacks *calls, TimerWheel **wheel, Problem *problem) {
-    *wheel = NULL;
-    TimerWheel *made = calloc(1, sizeof *made);
-    if (made == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the listener");
-    made->calls = *calls;
-    atomic_init(&made->next_ns, INT64_MAX);
-    pthread_condattr_t attributes;
-    pthread_condattr_init(&attributes);
-    pthread_condattr_setclock(&attributes, CLOCK_MONOTONIC);
-    pthread_mutex_init(&made->lock, NULL);
-    pthread_cond_init(&made->nudge, &attributes);
-    pthread_condattr_destroy(&attributes);
-    if (pthread_create(&made->clock, NULL, keep_time, made) != 0) {
-        pthread_cond_destroy(&made->nudge);
-        pthread_mutex_destroy(&made->lock);
-        free(made);
-        return problem_set(problem, STATUS_INTERNAL,
-                           "the listener's clock thread cannot be started");
-    }
-    *wheel = made;
-    return STATUS_OK;
+TimerWheel *timer_wheel_new(const TimerCallbacks *calls, void *loop) {
+    TimerWheel *wheel = calloc(1, sizeof *wheel);
+    if (wheel == NULL)
+        return NULL;
+    wheel->calls = *calls;
+    wheel->loop = loop;
+    atomic_init(&wheel->next_ns, INT64_MAX);
+    pthread_mutex_init(&wheel->lock, NULL);
+    return wheel;
 }
 
 void timer_wheel_wake_all(TimerWheel *wheel) {
     pthread_mutex_lock(&wheel->lock);
     wheel->is_closing = true;
     for (ConnectionTimer *timer = wheel->all; timer != NULL; timer = timer->next)
-        wake_locked(timer);
+        timer_wake_locked(timer);
     pthread_mutex_unlock(&wheel->lock);
 }
 
@@ -132,41 +101,45 @@ bool timer_wheel_is_closing(TimerWheel *wheel) {
     return atomic_load(&wheel->is_closing);
 }
 
-void timer_wheel_close(TimerWheel *wheel) {
+void timer_wheel_close_idle(TimerWheel *wheel, int64_t min_ms) {
+    ConnectionTimer *longest = NULL;
+    for (ConnectionTimer *timer = wheel->all; timer != NULL; timer = timer->next)
+        if (timer->idle_ns < (longest != NULL ? longest->idle_ns : INT64_MAX))
+            longest = timer;
+    if (longest == NULL || longest->idle_ns > clock_monotonic_ns() - min_ms * 1000000)
+        return;
+    shutdown(longest->descriptor, SHUT_RDWR);
+    longest->idle_ns = INT64_MAX;
+}
+
+void timer_wheel_free(TimerWheel *wheel) {
     if (wheel == NULL)
         return;
-    pthread_mutex_lock(&wheel->lock);
-    wheel->is_closed = true;
-    pthread_cond_signal(&wheel->nudge);
-    pthread_mutex_unlock(&wheel->lock);
-    pthread_join(wheel->clock, NULL);
     while (wheel->all != NULL) {
         ConnectionTimer *next = wheel->all->next;
         free(wheel->all);
         wheel->all = next;
     }
-    pthread_cond_destroy(&wheel->nudge);
     pthread_mutex_destroy(&wheel->lock);
     free(wheel);
 }
 
 ConnectionTimer *timer_take(TimerWheel *wheel, int descriptor) {
     pthread_mutex_lock(&wheel->lock);
-    ConnectionTimer *timer = wheel->empty;
+    ConnectionTimer *timer = wheel->free_list;
     if (timer != NULL) {
-        wheel->empty = timer->next_empty;
+        wheel->free_list = timer->next_free;
     } else if ((timer = malloc(sizeof *timer)) != NULL) {
         timer->wheel = wheel;
-        timer->callback = (Callback){timer, wake};
+        timer->callback = (Callback){timer, timer_wake};
         timer->next = wheel->all;
         wheel->all = timer;
     }
     if (timer != NULL) {
         timer->descriptor = descriptor;
-        timer->asleep = NULL;
+        timer->waiting = NULL;
         timer->is_woken = false;
-        timer->wake_ns = INT64_MAX;
-        atomic_store(&timer->limit_ns, INT64_MAX);
+        timer->wake_ns = timer->limit_ns = timer->idle_ns = INT64_MAX;
     }
     pthread_mutex_unlock(&wheel->lock);
     return timer;
@@ -176,11 +149,10 @@ void timer_leave(ConnectionTimer *timer) {
     TimerWheel *wheel = timer->wheel;
     pthread_mutex_lock(&wheel->lock);
     timer->descriptor = -1;
-    timer->asleep = NULL;
-    timer->wake_ns = INT64_MAX;
-    atomic_store(&timer->limit_ns, INT64_MAX);
-    timer->next_empty = wheel->empty;
-    wheel->empty = timer;
+    timer->waiting = NULL;
+    timer->wake_ns = timer->limit_ns = timer->idle_ns = INT64_MAX;
+    timer->next_free = wheel->free_list;
+    wheel->free_list = timer;
     pthread_mutex_unlock(&wheel->lock);
 }
 
@@ -188,45 +160,32 @@ const Callback *timer_callback(const ConnectionTimer *timer) {
     return &timer->callback;
 }
 
-// Whether the clock thread has to wake earlier than it means to.
-static bool is_earlier(TimerWheel *wheel, int64_t time_ns) {
-    int64_t next = atomic_load(&wheel->next_ns);
-    while (time_ns < next)
-        if (atomic_compare_exchange_weak(&wheel->next_ns, &next, time_ns))
-            return true;
-    return false;
-}
-
-void timer_limit(ConnectionTimer *timer, int64_t most_ms) {
-    const int64_t limit_ns = most_ms > 0 ? clock_monotonic_ns() + most_ms * 1000000 : INT64_MAX;
-    atomic_store(&timer->limit_ns, limit_ns);
-    if (!is_earlier(timer->wheel, limit_ns))
-        return;
-    // With the lock, so that the signal does not come between the thread's look and its sleep.
-    pthread_mutex_lock(&timer->wheel->lock);
-    pthread_cond_signal(&timer->wheel->nudge);
-    pthread_mutex_unlock(&timer->wheel->lock);
+void timer_limit(ConnectionTimer *timer, int64_t max_ms, bool is_idle) {
+    const int64_t now_ns = max_ms > 0 ? clock_monotonic_ns() : 0;
+    timer->limit_ns = max_ms > 0 ? now_ns + max_ms * 1000000 : INT64_MAX;
+    timer->idle_ns = is_idle ? now_ns : INT64_MAX;
+    (void)timer_lower_next(timer->wheel, timer->limit_ns);
 }
 
 void timer_begin(ConnectionTimer *timer) {
     atomic_store(&timer->is_woken, false);
 }
 
-bool timer_sleep(ConnectionTimer *timer, void *connection, int64_t most_ms) {
+bool timer_sleep(ConnectionTimer *timer, void *connection, int64_t max_ms) {
     TimerWheel *wheel = timer->wheel;
-    const int64_t wake_ns = clock_monotonic_ns() + most_ms * 1000000;
+    const int64_t wake_ns = clock_monotonic_ns() + max_ms * 1000000;
     pthread_mutex_lock(&wheel->lock);
-    const bool sleeps = !timer->is_woken && !wheel->is_closing;
-    if (sleeps) {
+    const bool waits = !timer->is_woken && !wheel->is_closing;
+    if (waits) {
         // The state first: the resume may come from another thread as soon as the lock is free.
-        timer->asleep = connection;
+        timer->waiting = connection;
         timer->wake_ns = wake_ns;
         wheel->calls.suspend(connection);
-        if (is_earlier(wheel, wake_ns))
-            pthread_cond_signal(&wheel->nudge);
+        if (timer_lower_next(wheel, wake_ns))
+            wheel->calls.changed(wheel->loop);
     }
     pthread_mutex_unlock(&wheel->lock);
-    return sleeps;
+    return waits;
 }
 
 bool timer_was_woken(ConnectionTimer *timer) {

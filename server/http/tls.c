@@ -1,5 +1,5 @@
-// One in use at a time. Those before it are kept to the end: a handshake may be in the midst of
-// one, and they are a few kilobytes each.
+// One certificate is in use at a time. Those before it are kept to the end: a handshake may still
+// use one, and they are a few kilobytes each.
 #include "server/http/tls.h"
 
 #include <stdatomic.h>
@@ -23,8 +23,8 @@ typedef struct Certificate {
 
 static _Atomic(Certificate *) in_use;
 
-static Status check_time(gnutls_certificate_credentials_t credentials, const char *path,
-                         Problem *problem) {
+static Status tls_check_time(gnutls_certificate_credentials_t credentials, const char *path,
+                             Problem *problem) {
     gnutls_x509_crt_t *chain = NULL;
     unsigned count = 0;
     const int code = gnutls_certificate_get_x509_crt(credentials, 0, &chain, &count);
@@ -42,8 +42,8 @@ static Status check_time(gnutls_certificate_credentials_t credentials, const cha
                        text);
 }
 
-static Status check(const char *cert, const char *cert_path, const char *key, const char *key_path,
-                    Problem *problem) {
+static Status tls_check(const char *cert, const char *cert_path, const char *key,
+                        const char *key_path, Problem *problem) {
     gnutls_certificate_credentials_t credentials;
     const gnutls_datum_t cert_text = {(unsigned char *)cert, (unsigned)strlen(cert)};
     const gnutls_datum_t key_text = {(unsigned char *)key, (unsigned)strlen(key)};
@@ -63,7 +63,7 @@ static Status check(const char *cert, const char *cert_path, const char *key, co
                         "form: %s",
                         cert_path, key_path, gnutls_strerror(code));
     if (status == STATUS_OK)
-        status = check_time(credentials, cert_path, problem);
+        status = tls_check_time(credentials, cert_path, problem);
     gnutls_certificate_free_credentials(credentials);
     return status;
 }
@@ -80,7 +80,7 @@ Status tls_use(const char *cert, const char *cert_path, const char *key, const c
                Problem *problem) {
     const gnutls_datum_t cert_text = {(unsigned char *)cert, (unsigned)strlen(cert)};
     const gnutls_datum_t key_text = {(unsigned char *)key, (unsigned)strlen(key)};
-    TRY(check(cert, cert_path, key, key_path, problem));
+    TRY(tls_check(cert, cert_path, key, key_path, problem));
     Certificate *made = calloc(1, sizeof *made);
     if (made == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the certificate");
@@ -103,9 +103,9 @@ Status tls_use(const char *cert, const char *cert_path, const char *key, const c
     return STATUS_OK;
 }
 
-static int retrieve(gnutls_session_t session, const gnutls_datum_t *authorities, int count,
-                    const gnutls_pk_algorithm_t *algorithms, int algorithm_count,
-                    gnutls_pcert_st **chain, unsigned *chain_count, gnutls_privkey_t *key) {
+static int tls_retrieve(gnutls_session_t session, const gnutls_datum_t *authorities, int count,
+                        const gnutls_pk_algorithm_t *algorithms, int algorithm_count,
+                        gnutls_pcert_st **chain, unsigned *chain_count, gnutls_privkey_t *key) {
     (void)session, (void)authorities, (void)count, (void)algorithms, (void)algorithm_count;
     Certificate *certificate = atomic_load(&in_use);
     if (certificate == NULL)
@@ -117,7 +117,11 @@ static int retrieve(gnutls_session_t session, const gnutls_datum_t *authorities,
 }
 
 CertificateSource *tls_source(void) {
-    return atomic_load(&in_use) != NULL ? (CertificateSource *)retrieve : NULL;
+    return atomic_load(&in_use) != NULL ? (CertificateSource *)tls_retrieve : NULL;
+}
+
+bool tls_has_pending(void *session) {
+    return gnutls_record_check_pending(session) > 0;
 }
 
 void tls_forget(void) {

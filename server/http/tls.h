@@ -1,8 +1,9 @@
-// The TLS certificate and its key: looked at before they are used, so that what is wrong with them
-// is said in words, and changed for others while connections come and go. Not TLS itself
-// (http/server.c). Used by cli/network.c and cli/serve.c.
+// The TLS certificate and its key: checked before they are used, so that a fault is reported in
+// words, and replaced while connections come and go.
 #ifndef SERVER_HTTP_TLS_H
 #define SERVER_HTTP_TLS_H
+
+#include <stdbool.h>
 
 #include "core/base/status.h"
 
@@ -15,6 +16,9 @@ Status tls_use(const char *cert, const char *cert_path, const char *key, const c
 // A gnutls_certificate_retrieve_function2 that hands out the one in use; NULL while there is none.
 typedef void CertificateSource(void);
 CertificateSource *tls_source(void);
+
+// Whether a session (gnutls_session_t) has decrypted bytes that were not read yet.
+bool tls_has_pending(void *session);
 
 // When no connection is left.
 void tls_forget(void);

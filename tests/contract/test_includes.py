@@ -28,7 +28,7 @@ SYSTEM = PURE | set("dirent fcntl grp libgen locale netdb poll pthread pwd sched
                     "sys/file sys/ioctl sys/mman sys/random sys/resource sys/select sys/socket sys/stat "
                     "sys/statvfs sys/time sys/types sys/un sys/wait wctype".split())
 
-MHD_FILES = [f"server/http/{name}" for name in ("server.c", "exchange.c", "exchange.h", "response.c", "response.h")]
+MHD_FILES = [f"server/http/{name}" for name in ("server.c", "connection.c", "connection.h")]
 
 # One room per foreign library: header -> the only files or folders that may include it.
 FOREIGN = {

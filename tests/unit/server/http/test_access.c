@@ -1,5 +1,5 @@
-// The doorman over a database in memory: whom he lets in, as whom, and what he counts; and that the
-// dispatcher asks him before a body is taken.
+// Access over a database in memory: who is admitted, as whom, and what is counted; a refusal comes
+// before the body is read.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -9,8 +9,8 @@
 
 #include <cmocka.h>
 
-#include "server/http/dispatch.h"
 #include "server/http/reply.h"
+#include "server/http/router.h"
 #include "server/util/base_path.h"
 
 static Status tell(App *app, const Request *request, Reply *reply, Problem *problem) {
@@ -23,16 +23,16 @@ static Status tell(App *app, const Request *request, Reply *reply, Problem *prob
 }
 
 static const Route table[] = {
-    {"GET", "/open", "open", NULL, "", tell},
-    {"GET", "/v1/a", "read", NULL, "", tell},
-    {"POST", "/v1/a", "submit", NULL, "", tell},
-    {NULL, NULL, NULL, NULL, NULL, NULL},
+    {"GET", "/open", "open", NULL, "", tell, NULL},
+    {"GET", "/v1/a", "read", NULL, "", tell, NULL},
+    {"POST", "/v1/a", "submit", NULL, "", tell, NULL},
+    {NULL, NULL, NULL, NULL, NULL, NULL, NULL},
 };
 
 typedef struct House {
     Db *db;
     AccessControl access;
-    Dispatcher dispatcher;
+    Router router;
     char lab[128]; // the Authorization header of a token that may read
 } House;
 
@@ -46,7 +46,7 @@ static int open_house(void **state) {
         return -1;
     snprintf(house.lab, sizeof house.lab, "Bearer %s", token);
     house.access.request_metrics = request_metrics_new(table);
-    house.dispatcher = (Dispatcher){NULL, table, NULL, NULL, &house.access};
+    house.router = (Router){NULL, table, NULL, &house.access};
     *state = &house;
     return tokens_open(house.db, false, &house.access.tokens, NULL) == STATUS_OK ? 0 : -1;
 }
@@ -65,7 +65,8 @@ static int ask(House *house, const char *method, const char *target, const char 
         .method = method, .authorization = authorization, .id = "q-1", .received = 5};
     reply_default(reply);
     assert_int_equal(request_open(&request, target, NULL), STATUS_OK);
-    dispatch(&house->dispatcher, &request, reply);
+    if (router_admit(&house->router, &request, reply))
+        router_answer(&house->router, &request, reply);
     request_close(&request);
     return reply->code;
 }
@@ -95,11 +96,11 @@ static void a_body_is_not_taken_for_whom_may_not_send_it(void **state) {
     Reply reply;
     reply_default(&reply);
     assert_int_equal(request_open(&request, "/v1/a", NULL), STATUS_OK);
-    assert_false(dispatch_admits(&house->dispatcher, &request, &reply));
+    assert_false(router_admit(&house->router, &request, &reply));
     assert_int_equal(reply.code, 403);
     reply_clear(&reply);
     request.method = "GET";
-    assert_true(dispatch_admits(&house->dispatcher, &request, &reply));
+    assert_true(router_admit(&house->router, &request, &reply));
     assert_int_equal(reply.code, 0);
     assert_string_equal(request.client, "lab");
     request_close(&request);
@@ -137,7 +138,7 @@ static void links_in_headers_begin_with_the_base(void **state) {
 
 static void without_a_doorman_everyone_comes_in(void **state) {
     (void)state;
-    House house = {.dispatcher = {NULL, table, NULL, NULL, NULL}};
+    House house = {.router = {NULL, table, NULL, NULL}};
     Reply reply;
     assert_int_equal(ask(&house, "POST", "/v1/a", NULL, &reply), 200);
 }

@@ -7,7 +7,7 @@
 
 #include <cmocka.h>
 
-#include "server/http/base_url.h"
+#include "server/http/address.h"
 
 static void urls_are_taken_apart(void **state) {
     (void)state;

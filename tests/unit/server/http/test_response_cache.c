@@ -13,7 +13,6 @@
 
 #include "server/http/reply.h"
 #include "server/http/response_cache.h"
-#include "server/http/route.h"
 
 static const Route route = {.scope = "read"};
 

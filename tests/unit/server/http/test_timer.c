@@ -1,5 +1,5 @@
-// Seats: no wake-up is lost, nobody sleeps longer than asked, late wakes do no harm, slow senders
-// are cut off.
+// Timers: no wake-up is lost, no wait is longer than asked, late wakes are harmless, slow senders
+// and idle connections are shut down.
 #include <pthread.h>
 #include <sched.h>
 #include <setjmp.h>
@@ -31,29 +31,28 @@ static void resume(void *context) {
     atomic_fetch_add(&connection->resumed, 1);
 }
 
-static const TimerCallbacks calls = {suspend, resume};
-
 static void pause_ms(long ms) {
-    const struct timespec time = {.tv_sec = ms / 1000, .tv_nsec = ms % 1000 * 1000000};
+    const struct timespec time = {.tv_nsec = ms * 1000000};
     nanosleep(&time, NULL);
 }
 
-// Waits until it was resumed `count` times; the time it took [ms], or -1 after 5 s.
-static double wait_resumed(Connection *connection, int count) {
-    const int64_t begin = clock_monotonic_ns();
-    while (atomic_load(&connection->resumed) < count) {
-        if (clock_monotonic_ns() - begin > 5000000000)
-            return -1;
-        pause_ms(1);
-    }
-    return 1e-6 * (double)(clock_monotonic_ns() - begin);
+static int changes;
+
+static void changed(void *loop) {
+    ++*(int *)loop;
+}
+
+static const TimerCallbacks calls = {suspend, resume, changed};
+
+// As the loop does at a time so many milliseconds from now.
+static void run_in(TimerWheel *wheel, int64_t ms) {
+    (void)timer_wheel_run(wheel, clock_monotonic_ns() + ms * 1000000);
 }
 
 static void a_wake_before_the_sleep_is_not_lost(void **state) {
     (void)state;
-    TimerWheel *wheel;
     Connection connection = {0};
-    assert_int_equal(timer_wheel_open(&calls, &wheel, NULL), STATUS_OK);
+    TimerWheel *wheel = timer_wheel_new(&calls, &changes);
     ConnectionTimer *timer = timer_take(wheel, -1);
     const Callback *callback = timer_callback(timer);
     timer_begin(timer);
@@ -62,57 +61,60 @@ static void a_wake_before_the_sleep_is_not_lost(void **state) {
     assert_true(timer_was_woken(timer));
     assert_false(timer_was_woken(timer));
     assert_int_equal(connection.suspended, 0);
-    timer_wheel_close(wheel);
+    timer_wheel_free(wheel);
 }
 
 static void time_ends_a_sleep_and_a_wake_ends_it_sooner(void **state) {
     (void)state;
-    TimerWheel *wheel;
     Connection connection = {0};
-    assert_int_equal(timer_wheel_open(&calls, &wheel, NULL), STATUS_OK);
+    changes = 0;
+    TimerWheel *wheel = timer_wheel_new(&calls, &changes);
     ConnectionTimer *timer = timer_take(wheel, -1);
     timer_begin(timer);
     assert_true(timer_sleep(timer, &connection, 50));
-    const double took = wait_resumed(&connection, 1);
-    assert_true(took >= 40 && took < 2000);
+    assert_int_equal(changes, 1);
+    run_in(wheel, 10);
+    assert_int_equal(connection.resumed, 0);
+    run_in(wheel, 51);
+    assert_int_equal(connection.resumed, 1);
     assert_false(timer_was_woken(timer));
 
     assert_true(timer_sleep(timer, &connection, 60000));
     const Callback *callback = timer_callback(timer);
     callback->wake(callback->context);
     callback->wake(callback->context);
-    assert_true(wait_resumed(&connection, 2) < 2000);
     assert_true(timer_was_woken(timer));
-    assert_int_equal(connection.resumed, 2); // the second call found nobody asleep
-    timer_wheel_close(wheel);
+    assert_int_equal(connection.resumed, 2); // the second call found no sleeper
+    timer_wheel_free(wheel);
 }
 
-static void an_earlier_time_overtakes_a_later_one(void **state) {
+static void the_earliest_time_is_served_first_and_reported(void **state) {
     (void)state;
-    TimerWheel *wheel;
     Connection late = {0}, early = {0};
-    assert_int_equal(timer_wheel_open(&calls, &wheel, NULL), STATUS_OK);
+    changes = 0;
+    TimerWheel *wheel = timer_wheel_new(&calls, &changes);
     ConnectionTimer *first = timer_take(wheel, -1), *second = timer_take(wheel, -1);
     timer_begin(first);
     timer_begin(second);
     assert_true(timer_sleep(first, &late, 60000));
-    pause_ms(20);
     assert_true(timer_sleep(second, &early, 30));
-    const double took = wait_resumed(&early, 1);
-    assert_true(took >= 0 && took < 2000);
+    assert_int_equal(changes, 2);
+    run_in(wheel, 100);
+    assert_int_equal(early.resumed, 1);
     assert_int_equal(late.resumed, 0);
+    const int64_t left = timer_wheel_run(wheel, clock_monotonic_ns()) - clock_monotonic_ns();
+    assert_true(left > 50000000000 && left <= 60000000000);
     timer_wheel_wake_all(wheel);
     assert_int_equal(late.resumed, 1);
     assert_false(timer_sleep(first, &late, 60000));
     assert_true(timer_wheel_is_closing(wheel));
-    timer_wheel_close(wheel);
+    timer_wheel_free(wheel);
 }
 
-static void a_late_wake_of_a_left_seat_does_no_harm(void **state) {
+static void a_late_wake_of_a_free_timer_does_no_harm(void **state) {
     (void)state;
-    TimerWheel *wheel;
     Connection next = {0};
-    assert_int_equal(timer_wheel_open(&calls, &wheel, NULL), STATUS_OK);
+    TimerWheel *wheel = timer_wheel_new(&calls, &changes);
     ConnectionTimer *timer = timer_take(wheel, -1);
     const Callback *callback = timer_callback(timer);
     timer_leave(timer);
@@ -121,30 +123,60 @@ static void a_late_wake_of_a_left_seat_does_no_harm(void **state) {
     assert_ptr_equal(again, timer);
     timer_begin(again);
     assert_true(timer_sleep(again, &next, 60000));
-    callback->wake(callback->context); // wakes the next one, who looks and sleeps on
+    callback->wake(callback->context); // resumes the next connection, which waits on
     assert_int_equal(next.resumed, 1);
     assert_true(timer_was_woken(again));
     assert_true(timer_sleep(again, &next, 60000));
     timer_wheel_wake_all(wheel);
-    timer_wheel_close(wheel);
+    timer_wheel_free(wheel);
 }
 
 static void a_peer_that_is_too_slow_is_shut_down(void **state) {
     (void)state;
-    TimerWheel *wheel;
     int pair[2];
     char byte;
-    assert_int_equal(timer_wheel_open(&calls, &wheel, NULL), STATUS_OK);
+    TimerWheel *wheel = timer_wheel_new(&calls, &changes);
     assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM, 0, pair), 0);
     ConnectionTimer *timer = timer_take(wheel, pair[0]);
-    timer_limit(timer, 10000);
-    timer_limit(timer, 0);
-    timer_limit(timer, 30);
+    timer_limit(timer, 10000, false);
+    timer_limit(timer, 0, false);
+    timer_limit(timer, 30, false);
+    run_in(wheel, 31);
     assert_int_equal(read(pair[1], &byte, 1), 0); // the other end sees it closed
     timer_leave(timer);
     close(pair[0]);
     close(pair[1]);
-    timer_wheel_close(wheel);
+    timer_wheel_free(wheel);
+}
+
+static void the_longest_idle_connection_makes_room(void **state) {
+    (void)state;
+    int pairs[3][2];
+    char byte;
+    ConnectionTimer *timers[3];
+    TimerWheel *wheel = timer_wheel_new(&calls, &changes);
+    for (int i = 0; i < 3; i++) {
+        assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, pairs[i]), 0);
+        timers[i] = timer_take(wheel, pairs[i][0]);
+        timer_limit(timers[i], 60000, i != 0); // the first has a request under way
+        pause_ms(10);
+    }
+    timer_wheel_close_idle(wheel, 1000); // none is idle for so long
+    assert_int_equal(read(pairs[1][1], &byte, 1), -1);
+    timer_wheel_close_idle(wheel, 0);
+    assert_int_equal(read(pairs[0][1], &byte, 1), -1);
+    assert_int_equal(read(pairs[1][1], &byte, 1), 0);
+    assert_int_equal(read(pairs[2][1], &byte, 1), -1);
+    timer_wheel_close_idle(wheel, 0);
+    assert_int_equal(read(pairs[2][1], &byte, 1), 0);
+    timer_wheel_close_idle(wheel, 0);
+    assert_int_equal(read(pairs[0][1], &byte, 1), -1);
+    for (int i = 0; i < 3; i++) {
+        timer_leave(timers[i]);
+        close(pairs[i][0]);
+        close(pairs[i][1]);
+    }
+    timer_wheel_free(wheel);
 }
 
 // Two threads: one sleeps over and over, the other wakes without end; a sleep that lasts its whole
@@ -165,10 +197,9 @@ static void *ring(void *context) {
 
 static void no_wake_is_lost_between_two_threads(void **state) {
     (void)state;
-    TimerWheel *wheel;
     Connection connection = {0};
     pthread_t thread;
-    assert_int_equal(timer_wheel_open(&calls, &wheel, NULL), STATUS_OK);
+    TimerWheel *wheel = timer_wheel_new(&calls, &changes);
     ConnectionTimer *timer = timer_take(wheel, -1);
     Alarm alarm = {.callback = timer_callback(timer)};
     timer_begin(timer);
@@ -177,8 +208,10 @@ static void no_wake_is_lost_between_two_threads(void **state) {
     for (int i = 0; i < ROUNDS && lost == 0; i++) {
         if (timer_sleep(timer, &connection, 5000)) {
             slept++;
-            while (atomic_load(&connection.resumed) < slept)
+            while (atomic_load(&connection.resumed) < slept) {
+                run_in(wheel, 0);
                 sched_yield();
+            }
             lost += !timer_was_woken(timer);
         } else {
             timer_was_woken(timer);
@@ -189,16 +222,17 @@ static void no_wake_is_lost_between_two_threads(void **state) {
     assert_int_equal(lost, 0);
     assert_int_equal(connection.suspended, slept);
     assert_int_equal(connection.resumed, slept);
-    timer_wheel_close(wheel);
+    timer_wheel_free(wheel);
 }
 
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_wake_before_the_sleep_is_not_lost),
         cmocka_unit_test(time_ends_a_sleep_and_a_wake_ends_it_sooner),
-        cmocka_unit_test(an_earlier_time_overtakes_a_later_one),
-        cmocka_unit_test(a_late_wake_of_a_left_seat_does_no_harm),
+        cmocka_unit_test(the_earliest_time_is_served_first_and_reported),
+        cmocka_unit_test(a_late_wake_of_a_free_timer_does_no_harm),
         cmocka_unit_test(a_peer_that_is_too_slow_is_shut_down),
+        cmocka_unit_test(the_longest_idle_connection_makes_room),
         cmocka_unit_test(no_wake_is_lost_between_two_threads),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

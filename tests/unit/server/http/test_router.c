@@ -1,5 +1,4 @@
-// Routes and the dispatcher over a small table of their own: what fits, what does not, and what is
-// said then.
+// The router over a small table of its own: what fits, what does not, and what the answer is.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -9,8 +8,8 @@
 
 #include <cmocka.h>
 
-#include "server/http/dispatch.h"
 #include "server/http/reply.h"
+#include "server/http/router.h"
 
 static char seen[256];
 
@@ -38,26 +37,27 @@ static Status break_off(App *app, const Request *request, Reply *reply, Problem 
 
 static const char *const waits[] = {"wait", "limit", NULL};
 static const Route table[] = {
-    {"GET", "/v1/jobs", "read", waits, "", tell},
-    {"POST", "/v1/jobs", "read", NULL, "", break_off},
-    {"GET", "/v1/jobs/{id}", "read", waits, "", tell},
-    {"DELETE", "/v1/jobs/{id}", "read", NULL, "", tell},
-    {"GET", "/v1/results/{id}/series.{format}", "read", NULL, "", tell},
-    {"GET", "/v1/results/{id}/series", "read", NULL, "", tell},
-    {"GET", "/v1/materials/{slug}@{revision}", "read", NULL, "", tell},
-    {"GET", "/v1/materials/{slug}", "read", NULL, "", tell},
-    {"GET", "/", "read", NULL, "", tell},
-    {NULL, NULL, NULL, NULL, NULL, NULL},
+    {"GET", "/v1/jobs", "read", waits, "", tell, NULL},
+    {"POST", "/v1/jobs", "read", NULL, "", break_off, NULL},
+    {"GET", "/v1/jobs/{id}", "read", waits, "", tell, NULL},
+    {"DELETE", "/v1/jobs/{id}", "read", NULL, "", tell, NULL},
+    {"GET", "/v1/results/{id}/series.{format}", "read", NULL, "", tell, NULL},
+    {"GET", "/v1/results/{id}/series", "read", NULL, "", tell, NULL},
+    {"GET", "/v1/materials/{slug}@{revision}", "read", NULL, "", tell, NULL},
+    {"GET", "/v1/materials/{slug}", "read", NULL, "", tell, NULL},
+    {"GET", "/", "read", NULL, "", tell, NULL},
+    {NULL, NULL, NULL, NULL, NULL, NULL, NULL},
 };
 
 static Reply ask(const char *method, const char *target, const char *range) {
-    Dispatcher dispatcher = {NULL, table, NULL, NULL, NULL};
+    const Router router = {NULL, table, NULL, NULL};
     Request request = {.method = method, .range = range};
     Reply reply;
     seen[0] = '\0';
     reply_default(&reply);
     assert_int_equal(request_open(&request, target, NULL), STATUS_OK);
-    dispatch(&dispatcher, &request, &reply);
+    if (router_admit(&router, &request, &reply))
+        router_answer(&router, &request, &reply);
     request_close(&request);
     return reply;
 }
@@ -152,16 +152,17 @@ static void parts_are_206_and_parts_outside_416(void **state) {
 
 static void if_range_with_another_tag_gets_the_whole(void **state) {
     (void)state;
-    Dispatcher dispatcher = {NULL, table, NULL, NULL, NULL};
+    const Router router = {NULL, table, NULL, NULL};
     Request request = {.method = "GET", .range = "bytes=0-1", .if_range = "\"other\""};
     Reply reply;
     reply_default(&reply);
     assert_int_equal(request_open(&request, "/", NULL), STATUS_OK);
-    dispatch(&dispatcher, &request, &reply);
+    assert_true(router_admit(&router, &request, &reply));
+    router_answer(&router, &request, &reply);
     assert_int_equal(reply.code, 200);
     reply_clear(&reply);
     request.if_range = "\"tag\"";
-    dispatch(&dispatcher, &request, &reply);
+    router_answer(&router, &request, &reply);
     assert_int_equal(reply.code, 206);
     reply_clear(&reply);
     request_close(&request);
