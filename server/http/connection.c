@@ -603,7 +603,9 @@ void connection_close_stalled(EventLoop *loop, int64_t now_ns) {
                                 exchange_has_unread(exchange, info->connect_fd);
         exchange->stalled_checks = is_stalled ? exchange->stalled_checks + 1 : 0;
         exchange->checked_received = exchange->received;
-        if (exchange->stalled_checks >= CHECKS)
+        if (exchange->stalled_checks == CHECKS) {
             shutdown(info->connect_fd, SHUT_RDWR);
+            MHD_set_connection_option(exchange->connection, MHD_CONNECTION_OPTION_TIMEOUT, 1u);
+        }
     }
 }

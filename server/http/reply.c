@@ -13,7 +13,7 @@
 const char type_json[] = "application/json";
 static const char type_problem[] = "application/problem+json";
 static const char no_memory[] =
-    "{\"type\": \"/problems/no-memory\", \"title\": \"Out of memory\", \"status\": 500}\n";
+    "{\"type\": \"/problems/no-memory\", \"title\": \"Out of memory\", \"status\": 503}\n";
 
 const char reply_policy[] =
     "default-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
@@ -201,7 +201,7 @@ void reply_problem(Reply *reply, const Problem *problem, int code, const char *i
     }
     bytes_text(&bytes, "\n");
     if (reply_bytes(reply, code, type_problem, &bytes, NULL) != STATUS_OK)
-        reply_borrow(reply, code, type_problem, no_memory, sizeof no_memory - 1);
+        reply_borrow(reply, 503, type_problem, no_memory, sizeof no_memory - 1);
     if (code == 503 && reply->retry_after < 0)
         reply->retry_after = 1;
     if (code == 401)

@@ -201,7 +201,7 @@ int encode_problem_code(Status status) {
         [STATUS_UNCONDITIONAL] = 428, [STATUS_STALE] = 412, [STATUS_GONE] = 410,           [STATUS_TIMEOUT] = 504,        [STATUS_BUSY] = 503,
         [STATUS_CANCELLED] = 409,      [STATUS_LIMIT] = 422,          [STATUS_UNSTABLE] = 422,
         [STATUS_QUOTA] = 429,          [STATUS_REUSED] = 422,         [STATUS_FULL] = 507,
-        [STATUS_NO_MEMORY] = 500,      [STATUS_IO] = 500,             [STATUS_INTERNAL] = 500,
+        [STATUS_NO_MEMORY] = 503,      [STATUS_IO] = 500,             [STATUS_INTERNAL] = 500,
         [STATUS_UNREACHABLE] = 502,
     };
     // clang-format on

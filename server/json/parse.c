@@ -12,6 +12,7 @@
 
 #include "core/base/json_pointer.h"
 #include "server/json/decode.h"
+#include "server/json/memory.h"
 
 enum { POINTER_SIZE = sizeof((Fault){0}.pointer), KEY_SIZE = 2 * POINTER_SIZE };
 
@@ -222,8 +223,6 @@ static Status part_syntax_error(const Part *part, const json_error_t *error, Pro
     const char *sentence = error->text;
     char token[sizeof error->text + 80];
     switch (json_error_code(error)) {
-    case json_error_out_of_memory:
-        return part_no_memory(problem);
     case json_error_duplicate_key:
         sentence = "the key stands twice in its object";
         break;
@@ -267,7 +266,11 @@ static Status part_parse(const Part *part, json_t **root, Problem *problem) {
     const char *sentence = scan_check(text, part->count, &position);
     if (sentence != NULL)
         return part_error(part, position, sentence, problem);
-    *root = json_loadb(text, part->count, JSON_REJECT_DUPLICATES | JSON_DECODE_ANY, &error);
+    bool is_out_of_memory;
+    *root = json_memory_load(text, part->count, JSON_REJECT_DUPLICATES | JSON_DECODE_ANY, &error,
+                             &is_out_of_memory);
+    if (is_out_of_memory)
+        return part_no_memory(problem);
     return *root != NULL ? STATUS_OK : part_syntax_error(part, &error, problem);
 }
 

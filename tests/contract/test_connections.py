@@ -1,0 +1,69 @@
+#!/usr/bin/env python3
+"""Connections that bring nothing: chunk headers that never fit, and idle clients where few files may be open."""
+
+import os
+import resource
+import socket
+import sys
+import time
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
+import program  # noqa: E402
+
+HEAD = b"POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nTransfer-Encoding: chunked\r\n\r\n"
+
+
+def connect(daemon):
+    return socket.create_connection(("127.0.0.1", daemon.port), timeout=30)
+
+
+def test_a_chunk_header_that_never_fits_is_closed():
+    """A chunk's header of 60,000 bytes: the connection is closed at once, whether its client stays or leaves, and no CPU is spent."""
+    with program.daemon() as daemon:
+        stay = connect(daemon)
+        began = time.monotonic()
+        stay.sendall(HEAD + b"1;" + 60000 * b"a")
+        try:
+            assert stay.recv(1000) == b"", "an answer"
+        except ConnectionError:
+            pass
+        assert time.monotonic() - began < 15, time.monotonic() - began
+        for _ in range(20):
+            with connect(daemon) as leave:
+                leave.sendall(HEAD + b"1;" + 60000 * b"a")
+        time.sleep(3)
+        before = program.cpu_of(daemon.process.pid)
+        time.sleep(4)
+        assert program.cpu_of(daemon.process.pid) - before < 0.4, program.cpu_of(daemon.process.pid) - before
+        assert daemon.get("/version").status == 200
+
+
+def test_a_slow_chunked_body_is_read():
+    """A chunked body that pauses within a chunk's header and within a chunk is taken whole."""
+    with program.daemon() as daemon, connect(daemon) as client:
+        client.sendall(HEAD + b"2;" + 2000 * b"a")
+        time.sleep(1)
+        client.sendall(b"\r\n{")
+        time.sleep(1)
+        client.sendall(b"}\r\n0\r\n\r\n")
+        assert client.recv(1000).startswith(b"HTTP/1.1 422 "), "no answer"
+
+
+def test_idle_connections_make_room_where_few_files_may_be_open():
+    """With 90 files at most and 120 idle clients a new client is answered within seconds."""
+    limits = resource.getrlimit(resource.RLIMIT_NOFILE)
+    with program.daemon() as daemon:
+        resource.prlimit(daemon.process.pid, resource.RLIMIT_NOFILE, (90, 90))
+        idle = [connect(daemon) for _ in range(120)]
+        time.sleep(1.5)
+        for i in range(5):
+            began = time.monotonic()
+            assert daemon.get("/version").status == 200
+            assert time.monotonic() - began < 5, (i, time.monotonic() - began)
+        for client in idle:
+            client.close()
+    assert limits == resource.getrlimit(resource.RLIMIT_NOFILE)
+
+
+if __name__ == "__main__":
+    program.main(globals())
