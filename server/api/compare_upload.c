@@ -124,7 +124,8 @@ static Status require_type(const Request *request, bool *is_text, Problem *probl
             "the body must be application/json, or a table of times and accelerations as text/csv "
             "or text/plain with ?a=RESULT, is %.60s",
             request->content_type != NULL ? request->content_type : "of no given type");
-    return *is_text ? request_require_body(request, problem) : request_require_json(request, problem);
+    return *is_text ? request_require_body(request, problem)
+                    : request_require_json(request, problem);
 }
 
 Status measured_upload_read(const Request *request, MeasuredRequest **made, Problem *problem) {

@@ -5,7 +5,6 @@
 
 #include "core/base/field.h"
 #include "server/http/address.h"
-#include "server/http/address.h"
 #include "server/http/validate.h"
 
 typedef struct NetworkSettings {
