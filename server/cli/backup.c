@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "server/cli/progress_bar.h"
+#include "server/cli/output.h"
 #include "server/db/backup.h"
 
 typedef struct BackupSettings {

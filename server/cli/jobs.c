@@ -7,7 +7,6 @@
 #include "server/cli/client.h"
 #include "server/cli/command.h"
 #include "server/cli/output.h"
-#include "server/cli/progress_bar.h"
 #include "server/cli/scene_file.h"
 #include "server/json/json_edit.h"
 #include "server/json/parse.h"

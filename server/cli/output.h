@@ -1,10 +1,11 @@
-// A file that is written completely or not at all: it has a temporary name until it is complete,
-// and is removed if the program is interrupted.
+// Output of the commands: a file that is written completely or not at all (it has a temporary name
+// until it is complete, and is removed if the program is interrupted), and a progress bar.
 #ifndef SERVER_CLI_OUTPUT_H
 #define SERVER_CLI_OUTPUT_H
 
-#include <stddef.h>
+#include <stdint.h>
 
+#include "core/base/progress.h"
 #include "core/base/status.h"
 #include "server/util/bytes.h"
 
@@ -27,5 +28,16 @@ void output_guard(void);
 
 // Sets the line that those two print on stderr; NULL: none.
 void output_farewell(const char *text);
+
+// A progress bar on a terminal, shown when the work takes long; nothing if stderr is a file.
+typedef struct ProgressBar {
+    bool is_terminal, is_drawn;
+    int64_t started_ns, drawn_ns;
+} ProgressBar;
+
+void progress_bar_start(ProgressBar *bar);
+// A Progress that draws and never asks to stop. Borrows `bar`.
+Progress progress_bar_watch(ProgressBar *bar);
+void progress_bar_stop(ProgressBar *bar);
 
 #endif

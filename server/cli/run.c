@@ -9,7 +9,6 @@
 #include "core/simulation/simulation.h"
 #include "server/api/job_json.h"
 #include "server/cli/output.h"
-#include "server/cli/progress_bar.h"
 #include "server/cli/scene_file.h"
 #include "server/formats/encoding.h"
 #include "server/jobs/documents.h"

@@ -9,7 +9,6 @@
 #include "core/study/tradeoff.h"
 #include "server/cli/command.h"
 #include "server/cli/output.h"
-#include "server/cli/progress_bar.h"
 #include "server/cli/scene_file.h"
 #include "server/formats/study_formats.h"
 #include "server/jobs/jobs.h"
