@@ -22,86 +22,24 @@ static const Field check_fields[] = {
     FIELD_END,
 };
 
-static void real_print(const char *name, double value, const char *unit) {
-    char text[32];
-    if (!isnan(value))
-        printf("  %s = %s%s%s", name, text_real(text, value), unit != NULL ? " " : "",
-               unit != NULL ? unit : "");
-}
-
-// "  right of damper 1, sponge@1:  e = 0.61  T_c = 0.025 s ..."
-static void derived_print(const Derived *derived) {
-    printf("  %s stop of damper %llu", side_names[derived->side],
-           (unsigned long long)derived->damper);
-    if (derived->material != NULL)
-        printf(", %s", derived->material);
-    putchar(':');
-    real_print("e", derived->restitution, NULL);
-    real_print("T_c", derived->contact_time, "s");
-    real_print("m_e", derived->effective_mass, "kg");
-    real_print("k_b", derived->stiffness, "N/m");
-    real_print("c_b", derived->damping, "N s/m");
-    real_print("Z", derived->damping_ratio, NULL);
-    real_print("n", derived->exponent, NULL);
-    real_print("reached e", derived->reached_restitution, NULL);
-    real_print("reached T_c", derived->reached_contact_time, "s");
-    putchar('\n');
-}
-
-static void decision_print(const Decision *decision) {
-    char text[32];
-    printf("  %s: %s, because %s", decision->about, decision->chose, decision->why);
-    if (!isnan(decision->value))
-        printf(" (%s%s%s)", text_real(text, decision->value), decision->unit != NULL ? " " : "",
-               decision->unit != NULL ? decision->unit : "");
-    putchar('\n');
-}
-
-enum { MODES_SHOWN = 12 };
-
-static void modes_print(const PlanModes *modes) {
-    puts("\nModes");
-    for (size_t i = 0; i < modes->count && i < MODES_SHOWN; i++) {
-        printf("  %zu: %.6g Hz", i + 1, modes->at[i].frequency);
-        if (!isnan(modes->at[i].damping_ratio))
-            printf(", damping ratio %.4g", modes->at[i].damping_ratio);
-        putchar('\n');
-    }
-    if (modes->count > MODES_SHOWN)
-        printf("  and %zu more, to %.6g Hz\n", modes->count - MODES_SHOWN,
-               modes->at[modes->count - 1].frequency);
-}
-
-static void plan_print(const char *path, DryRun *run) {
-    // The title is arbitrary text of the file, which must not control the terminal.
-    text_make_printable(run->inquiry.simulation.title);
-    const Scene *scene = &run->inquiry.simulation.scene;
-    char duration[32], rate[32];
-    printf("%s: OK\n\n", scene_file_name(path));
-    if (run->inquiry.simulation.title != NULL)
-        printf("Title: %s\n", run->inquiry.simulation.title);
-    printf("Result: %s\n", run->result);
-    printf("Samples: %zu per channel, %s s at %s Hz, %zu channels\n", scene_sample_count(scene),
-           text_real(duration, scene->duration), text_real(rate, scene->sample_rate),
-           run->inquiry.simulation.output.channels.count);
+// The plan as tables. The title, as all of it, is text of the file that must not control a
+// terminal.
+static Status plan_print(const char *path, DryRun *run, const Bytes *json, Problem *problem) {
+    static const char *const skipped[] = {"scene", "dry_run", "cached", "links", NULL};
+    static const Field *const fields[] = {plan_report_fields, NULL};
+    static const PrintTableColumns lists[] = {
+        {"decisions", {"about", "chose", "value", "unit", "why"}}, {NULL, {NULL}}};
+    static const PrintTableView view = {skipped, lists, fields};
+    size_t longest;
+    char *title = run->inquiry.simulation.title;
+    text_make_printable(title);
+    printf("%s: OK\n", scene_file_name(path));
+    if (title != NULL)
+        printf("Title: %s\n", title);
     if (run->inquiry.study != NULL)
         printf("Study: %s\n", run->inquiry.study->kind->name);
-    printf("Cost: about %.2g s of CPU, %.3g MB\n", run->cost.cpu_seconds, run->cost.bytes * 1e-6);
-    printf("Contact model: %s\nSolver: %s\n", run->plan.contact_model, run->plan.solver);
-    if (run->plan.decisions.count > 0)
-        puts("\nDecisions");
-    for (size_t i = 0; i < run->plan.decisions.count; i++)
-        decision_print(&run->plan.decisions.at[i]);
-    if (run->plan.modes.count > 0)
-        modes_print(&run->plan.modes);
-    if (run->plan.derived.count > 0)
-        puts("\nStops");
-    for (size_t i = 0; i < run->plan.derived.count; i++)
-        derived_print(&run->plan.derived.at[i]);
-    if (run->warnings.count > 0)
-        puts("\nWarnings");
-    for (size_t i = 0; i < run->warnings.count; i++)
-        printf("  %s: %s\n", run->warnings.at[i].pointer, run->warnings.at[i].detail);
+    putchar('\n');
+    return print_table_print_json(json->at, json->count, &view, stdout, &longest, problem);
 }
 
 static Status plan_show(const char *path, const Bytes *text, void *of, Problem *problem) {
@@ -111,22 +49,20 @@ static Status plan_show(const char *path, const Bytes *text, void *of, Problem *
     Db *db = NULL;
     JobManager *manager = NULL;
     DryRun run = {0};
+    Bytes bytes = {0};
     TRY(db_open(NULL, &db, problem));
     Status status = jobs_open(db, &settings, &manager, problem);
     if (status == STATUS_OK)
         status = jobs_dry_run(manager, text->at, text->count, &run, problem);
-    if (status == STATUS_OK && asked->json) {
-        Bytes bytes = {0};
+    if (status == STATUS_OK)
         job_json_put_dry_run(&bytes, &run);
-        bytes_text(&bytes, "\n");
-        if (bytes.is_failed)
-            status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the plan");
-        else
-            (void)fwrite(bytes.at, 1, bytes.count, stdout);
-        bytes_clear(&bytes);
-    } else if (status == STATUS_OK) {
-        plan_print(path, &run);
-    }
+    if (bytes.is_failed)
+        status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the plan");
+    else if (status == STATUS_OK && asked->json)
+        printf("%s\n", bytes.at);
+    else if (status == STATUS_OK)
+        status = plan_print(path, &run, &bytes, problem);
+    bytes_clear(&bytes);
     dry_run_clear(&run);
     jobs_close(manager);
     db_close(db);
