@@ -14,7 +14,6 @@
 #include "server/jobs/jobs.h"
 #include "server/jobs/study_engine.h"
 #include "server/json/table.h"
-#include "server/util/clock.h"
 
 enum { OUTPUTS_MAX = 8, SOLVERS_MAX = 32 };
 
@@ -84,22 +83,6 @@ static Status study_write(const StudyCommand *command, const char *path, const V
     return status;
 }
 
-static double study_cpu(void *context) {
-    (void)context;
-    return 1e-9 * (double)clock_thread_cpu_ns();
-}
-
-// CPU times are measured on one thread, by itself.
-static Status study_measure(const StudyRequest *inquiry, const SimulationLimits *limits,
-                            const Progress *watch, Variant **answer, Problem *problem) {
-    Workspace workspace = {0};
-    const StudyTools tools = {
-        .limits = limits, .progress = watch, .workspace = &workspace, .cpu = study_cpu};
-    const Status status = study_run(inquiry->study, &inquiry->simulation, &tools, answer, problem);
-    workspace_clear(&workspace);
-    return status;
-}
-
 // As JSON, the first format of every study.
 static void study_print_json(const Variant *answer) {
     Bytes bytes = {0};
@@ -118,10 +101,8 @@ static Status study_make(const StudyCommand *command, const StudyRequest *inquir
     Variant *answer = NULL;
     progress_bar_start(&bar);
     const Progress watch = progress_bar_watch(&bar);
-    Status status = study_has_members(inquiry->study)
-                        ? study_engine_run(inquiry->study, &inquiry->simulation, limits, &watch,
-                                           &answer, problem)
-                        : study_measure(inquiry, limits, &watch, &answer, problem);
+    Status status =
+        study_engine_run(inquiry->study, &inquiry->simulation, limits, &watch, &answer, problem);
     progress_bar_stop(&bar);
     // The document's own study prints nothing where it is written to files.
     const bool is_quiet = command->print == NULL && outputs->count > 0 && !settings->json;

@@ -1,5 +1,5 @@
 // The materials that a scene names become revisions and their numbers. Not the records that one
-// names, nor the judging of either. Used by prepare.c and resolve_sweep_axes.c.
+// names, nor the judging of either. Used by prepare.c and resolve.c.
 #ifndef SERVER_JOBS_RESOLVE_MATERIAL_H
 #define SERVER_JOBS_RESOLVE_MATERIAL_H
 

@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <unistd.h>
 
+#include "server/util/clock.h"
+
 enum { WINDOW_BYTES = 32 << 20, WINDOW_PER_SLOT = 8, THREADS_MAX = 256, MILLION = 1000000 };
 
 static Status study_engine_no_memory(Problem *problem) {
@@ -225,14 +227,21 @@ static Status study_threads_run(StudyWork *work, const StudyTools *tools, Proble
     return status;
 }
 
+static double study_engine_cpu(void *context) {
+    (void)context;
+    return 1e-9 * (double)clock_thread_cpu_ns();
+}
+
 Status study_engine_run(const Variant *study, const Simulation *simulation,
                         const SimulationLimits *limits, const Progress *watch, Variant **answer,
                         Problem *problem) {
     Workspace workspace = {0};
     StudyWork *work;
-    const StudyTools tools = {.limits = limits, .progress = watch, .workspace = &workspace};
+    const StudyTools tools = {
+        .limits = limits, .progress = watch, .workspace = &workspace, .cpu = study_engine_cpu};
+    // A study without members is made by this thread in study_begin.
     Status status = study_begin(study, simulation, &tools, answer, &work, problem);
-    if (status == STATUS_OK)
+    if (status == STATUS_OK && study_has_members(study))
         status = study_threads_run(work, &tools, problem);
     if (status == STATUS_OK)
         status = study_end(work, &tools, problem);
