@@ -47,7 +47,8 @@ SELECT slug, r.revision, name, restitution, contact_time, source,
                  ORDER BY v.number DESC LIMIT 1), 'draft') AS status
 FROM material_revisions r JOIN materials m ON m.number = r.material;
 
--- Everything of a result but its series. The long documents stand last: reading the others does not touch them.
+-- Everything of a result but its series. What may be long stands last: reading the others does not touch it.
+-- outcome: spectra, impacts, energies and summary in binary (server/jobs/outcome_blob.c).
 CREATE TABLE results (
     number           INTEGER PRIMARY KEY,
     id               TEXT    NOT NULL UNIQUE,
@@ -58,10 +59,9 @@ CREATE TABLE results (
     summary          TEXT    NOT NULL,
     plan             TEXT    NOT NULL,
     warnings         TEXT    NOT NULL,
-    energy           TEXT    NOT NULL,
+    impact_count     INTEGER NOT NULL,
     scene            TEXT    NOT NULL,
-    impacts          TEXT    NOT NULL,
-    psd              TEXT
+    outcome          BLOB    NOT NULL
 ) STRICT;
 
 -- state: 0 accepted, 1 running, 2 successful, 3 failed, 4 dismissed. A job names its result from the start.

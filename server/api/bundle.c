@@ -4,9 +4,6 @@
 
 #include "server/api/columns.h"
 #include "server/api/results.h"
-#include "server/formats/csv.h"
-#include "server/formats/impacts_csv.h"
-#include "server/formats/npz.h"
 #include "server/formats/zip.h"
 #include "server/http/reply.h"
 
@@ -41,112 +38,105 @@ static const char about[] =
     "doi:10.1002/stc.238.\n"
     "The numbers: impactd, engine %s, result %s.\n";
 
-static Status put_text(Zip *zip, const char *name, Bytes *bytes, Problem *problem) {
+static const TableFormat bundle_format = {
+    .extension = "zip", .content_type = "application/zip", .is_binary = true};
+
+// Clears `bytes`.
+static Status bundle_put(Zip *zip, const char *name, Bytes *bytes, Problem *problem) {
     Segments content = {.size = 0};
-    if (bytes->is_failed)
-        content.is_failed = true;
-    else
-        segments_put(&content, bytes->at, bytes->count);
-    zip->layout->is_failed = zip->layout->is_failed || content.is_failed;
+    segments_text(&content, bytes);
     const Status status = zip_put(zip, name, &content, problem);
     segments_clear(&content);
-    bytes_clear(bytes);
     return status;
 }
 
-static Status put_document(Zip *zip, const char *name, const char *text, Problem *problem) {
+static Status bundle_put_table(Zip *zip, const char *name, const TableFormat *format,
+                               const Table *table, Problem *problem) {
     Bytes bytes = {.most = 0};
-    bytes_text(&bytes, text);
-    bytes_text(&bytes, "\n");
-    return put_text(zip, name, &bytes, problem);
+    TRY(format_write(format, table, &bytes, problem));
+    return bundle_put(zip, name, &bytes, problem);
 }
 
-static Status put_series(Zip *zip, const Response *response, ColumnReply *column_reply,
-                         Problem *problem) {
+static Status bundle_put_series(Zip *zip, TableStream *stream, Problem *problem) {
     Segments content = {.size = 0};
-    TRY(column_reply_make(column_reply, response->series.count, problem));
-    for (size_t i = 0; i < response->series.count; i++)
-        column_reply->chosen[i] = &response->series.at[i];
-    column_reply->table = (Table){.axis_name = "time",
-                                  .axis_unit = "s",
-                                  .axis_rate = response->sample_rate,
-                                  .count = response->count,
-                                  .columns = column_reply->chosen,
-                                  .column_count = response->series.count};
-    Status status = encoder_npz.lay(&column_reply->table, &content, problem);
+    TRY(table_stream_series(stream, problem));
+    Status status = format_npz.lay(&stream->table, &content, problem);
     if (status == STATUS_OK)
         status = zip_put(zip, "series.npz", &content, problem);
     segments_clear(&content);
     return status;
 }
 
-static Status put_spectra(Zip *zip, const char *document, Problem *problem) {
-    Bytes bytes = {.most = 0};
-    ColumnReply column_reply = {.encoding = NULL};
-    Status status = put_document(zip, "psd.json", document, problem);
-    if (status == STATUS_OK)
-        status = column_reply_psd(&column_reply, document, problem);
-    if (status == STATUS_OK)
-        status = encoding_write(&encoder_csv, &column_reply.table, &bytes, problem);
-    if (status == STATUS_OK)
-        status = put_text(zip, "psd.csv", &bytes, problem);
-    bytes_clear(&bytes);
-    column_reply_clear(&column_reply);
+// Spectra and impacts, if the scene asked for them.
+static Status bundle_put_lists(Zip *zip, Outcome *outcome, Problem *problem) {
+    TableStream *psd = table_stream_new(outcome_ref(outcome));
+    TableStream *impacts = table_stream_new(outcome_ref(outcome));
+    Status status = psd != NULL && impacts != NULL
+                        ? STATUS_OK
+                        : problem_set(problem, STATUS_NO_MEMORY, "no memory for the bundle");
+    if (status == STATUS_OK && outcome->spectrum.densities.count > 0) {
+        status = table_stream_psd(psd, problem);
+        if (status == STATUS_OK)
+            status = bundle_put_table(zip, "psd.json", &format_json, &psd->table, problem);
+        if (status == STATUS_OK)
+            status = bundle_put_table(zip, "psd.csv", &format_csv, &psd->table, problem);
+    }
+    if (status == STATUS_OK && !outcome->response.is_unlisted) {
+        status = table_stream_impacts(impacts, &format_csv, NULL, problem);
+        if (status == STATUS_OK)
+            status = bundle_put_table(zip, "impacts.csv", &format_csv, &impacts->table, problem);
+    }
+    table_stream_free(psd);
+    table_stream_free(impacts);
     return status;
 }
 
-// The sheet keeps the outcome whose series the layout borrows.
-static Status fill(Zip *zip, const ResultRow *row, Bytes *manifest, ColumnReply *column_reply,
-                   Problem *problem) {
-    const Response *response = &column_reply->outcome->response;
-    Bytes readme = {.most = 0}, result = {.most = 0}, impacts = {.most = 0};
+// The segments borrow the series of the stream's outcome.
+static Status bundle_fill(Zip *zip, const ResultRow *row, Bytes *manifest, TableStream *stream,
+                          Problem *problem) {
+    Bytes readme = {.most = 0}, scene = {.most = 0}, result = {.most = 0};
     bytes_format(&readme, about, row->id, row->engine, row->engine, row->id);
-    TRY(put_text(zip, "README.txt", &readme, problem));
-    TRY(put_document(zip, "scene.json", row->scene, problem));
+    TRY(bundle_put(zip, "README.txt", &readme, problem));
+    bytes_text(&scene, row->scene);
+    bytes_text(&scene, "\n");
+    TRY(bundle_put(zip, "scene.json", &scene, problem));
     const Status status = results_put(row, &result, problem);
     if (status != STATUS_OK) {
         bytes_clear(&result);
         return status;
     }
-    TRY(put_text(zip, "result.json", &result, problem));
-    TRY(put_text(zip, "manifest.json", manifest, problem));
-    TRY(put_series(zip, response, column_reply, problem));
-    const char *spectra = results_document(row, DOCUMENT_PSD);
-    if (spectra != NULL)
-        TRY(put_spectra(zip, spectra, problem));
-    if (response->is_unlisted)
-        return STATUS_OK;
-    impacts_csv(&response->impacts, &impacts);
-    return put_text(zip, "impacts.csv", &impacts, problem);
+    TRY(bundle_put(zip, "result.json", &result, problem));
+    TRY(bundle_put(zip, "manifest.json", manifest, problem));
+    TRY(bundle_put_series(zip, stream, problem));
+    return bundle_put_lists(zip, stream->outcome, problem);
 }
 
-static Status pack(App *app, Reply *reply, const ResultRow *row, Bytes *manifest,
-                   ColumnReply *column_reply, Problem *problem) {
-    Segments layout = {.size = 0};
-    Zip zip = {.layout = &layout};
-    Status status = fill(&zip, row, manifest, column_reply, problem);
+static Status bundle_reply(App *app, Reply *reply, const ResultRow *row, Bytes *manifest,
+                           TableStream *stream, Problem *problem) {
+    if (stream == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the bundle");
+    Zip zip = {.segments = &stream->segments};
+    Status status = bundle_fill(&zip, row, manifest, stream, problem);
     const Status ended = zip_end(&zip, status == STATUS_OK ? problem : NULL);
     status = status != STATUS_OK ? status : ended;
     if (status == STATUS_OK)
-        return columns_reply_segments(app, reply, "application/zip", &layout, column_reply,
-                                      problem);
-    segments_clear(&layout);
-    column_reply_clear(column_reply);
+        return columns_reply(app, reply, &bundle_format, stream, problem);
+    table_stream_free(stream);
     return status;
 }
 
 Status results_bundle(App *app, const Request *request, Reply *reply, Problem *problem) {
     ResultRow row = {.count = 0};
     Bytes manifest = {.most = app->reply_most};
-    ColumnReply column_reply = {.encoding = NULL};
+    Outcome *outcome = NULL;
     Status status = db_result_load(app->db, request->parameters[0], &row, problem);
     if (status == STATUS_OK)
         status = manifest_put(app, &row, &manifest, problem);
-    // The manifest tells all that may change: a material's status and the base of the links.
+    // What may change is in the manifest: a material's status and the base of the links.
     if (status == STATUS_OK && !results_tagged(request, reply, &row, "bundle", &manifest)) {
-        status = columns_choose(app, request, reply, &column_reply.outcome, problem);
-        if (status == STATUS_OK && column_reply.outcome != NULL)
-            status = pack(app, reply, &row, &manifest, &column_reply, problem);
+        status = columns_outcome(app, request, reply, &outcome, problem);
+        if (status == STATUS_OK && outcome != NULL)
+            status = bundle_reply(app, reply, &row, &manifest, table_stream_new(outcome), problem);
     }
     bytes_clear(&manifest);
     result_row_clear(&row);

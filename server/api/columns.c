@@ -1,65 +1,64 @@
+// Series, spectra, impacts and energies of a result, each in every format.
 #include "server/api/columns.h"
-#include "server/api/results.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/formats/downsample.h"
-#include "server/formats/svg.h"
+#include "server/api/results.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
+#include "server/jobs/documents.h"
 #include "server/util/clock.h"
-#include "server/util/dtoa.h"
 
-// Up to so many bytes an answer is made at once: then it can be kept, and compressed.
+// Replies of up to so many bytes are made whole, so that they can be cached and compressed.
 enum { WHOLE_MAX = 4 << 20 };
 
-static const double outcome_wait_most = 60; // [s]
+static const double wait_max = 60; // [s]
 
-void column_reply_clear(ColumnReply *column_reply) {
-    encoding_close(column_reply->encoding);
-    free(column_reply->chosen);
-    columns_clear(&column_reply->own);
-    outcome_unref(column_reply->outcome);
-    *column_reply = (ColumnReply){.encoding = NULL};
-}
+// --- parts of a reply ---
 
-Status column_reply_make(ColumnReply *column_reply, size_t count, Problem *problem) {
-    column_reply->chosen = calloc(count + 1, sizeof *column_reply->chosen);
-    column_reply->table.columns = column_reply->chosen;
-    return column_reply->chosen != NULL
-               ? STATUS_OK
-               : problem_set(problem, STATUS_NO_MEMORY, "no memory for columns");
-}
-
-Status column_reply_own(ColumnReply *column_reply, Problem *problem) {
-    free(column_reply->chosen);
-    TRY(column_reply_make(column_reply, column_reply->own.count, problem));
-    column_reply->table.column_count = column_reply->own.count;
-    column_reply->table.count = column_reply->own.rows;
-    for (size_t i = 0; i < column_reply->own.count; i++)
-        column_reply->chosen[i] = &column_reply->own.at[i];
+Status columns_format(const Request *request, size_t parameter, bool has_chart, Reply *reply,
+                      const TableFormat **format, Problem *problem) {
+    const char *extension = request->parameters[parameter];
+    char names[96] = "";
+    const char *types[16] = {NULL};
+    const TableFormat *offered[16];
+    size_t count = 0;
+    int choice = -1;
+    for (size_t i = 0; table_formats[i] != NULL && count + 1 < COUNT(types); i++) {
+        if (table_formats[i] == &format_svg && !has_chart)
+            continue;
+        text_list(names, sizeof names, table_formats[i]->extension);
+        if (extension != NULL && strcmp(extension, table_formats[i]->extension) == 0)
+            choice = (int)count;
+        offered[count] = table_formats[i];
+        types[count++] = table_formats[i]->content_type;
+    }
+    if (extension == NULL) {
+        reply->varies_by_accept = true;
+        choice = header_accept(request->accept, types);
+    }
+    if (choice < 0)
+        return extension != NULL
+                   ? problem_set(problem, STATUS_NOT_FOUND,
+                                 "there is no format \"%.20s\"; there are %s", extension, names)
+                   : problem_set(problem, STATUS_NOT_ACCEPTABLE,
+                                 "none of the formats fits Accept; there are %s, by extension too",
+                                 names);
+    *format = offered[choice];
+    if (*format == &format_svg)
+        reply->policy = reply_drawing_policy;
     return STATUS_OK;
 }
 
-Status column_reply_own_axis(ColumnReply *column_reply, Problem *problem) {
-    TRY(column_reply_own(column_reply, problem));
-    Table *table = &column_reply->table;
-    const Column *axis = &column_reply->own.at[0];
-    table->axis_name = axis->name;
-    table->axis_unit = axis->unit;
-    table->axis = axis->values;
-    table->columns = column_reply->chosen + 1;
-    table->column_count--;
-    return STATUS_OK;
-}
-
-Status columns_window(const Request *request, size_t count, Table *table, Problem *problem) {
+Status columns_window(const Request *request, size_t count, TableStream *stream, Problem *problem) {
     // The half of a rounding on either side keeps a sample that stands at the very time asked for.
+    Table *table = &stream->table;
     const double rate = table->axis_rate, end = (double)(count - 1) / rate;
     double from, to;
+    size_t points;
     TRY(request_number(request, "from", 0, 1e12, 0, &from, problem));
     TRY(request_number(request, "to", 0, 1e12, end, &to, problem));
     const double first = ceil(from * rate * (1 - 1e-12)), last = floor(to * rate * (1 + 1e-12));
@@ -73,180 +72,226 @@ Status columns_window(const Request *request, size_t count, Table *table, Proble
                            text_real(text, from), text_real(text_to, to));
     table->first = (size_t)first;
     table->count = (last < (double)count ? (size_t)last : count - 1) - table->first + 1;
-    return STATUS_OK;
-}
-
-Status columns_downsample(const Request *request, ColumnReply *column_reply, Problem *problem) {
-    Table *table = &column_reply->table;
-    Columns buckets;
-    size_t most;
     if (request_query(request, "points") == NULL)
         return STATUS_OK;
-    TRY(request_count(request, "points", 1, 1000000000, 1, &most, problem));
-    const size_t samples = table->count;
-    const size_t bucket = (samples + most - 1) / most;
-    TRY(downsample(table->columns, table->column_count, table->first, samples, bucket, &buckets,
-                   problem));
-    columns_clear(&column_reply->own);
-    column_reply->own = buckets;
-    TRY(column_reply_own(column_reply, problem));
-    // Without channels too there is a time for each.
-    table->count = (samples + bucket - 1) / bucket;
-    table->bucket = bucket;
-    table->samples = samples;
-    return STATUS_OK;
+    TRY(request_count(request, "points", 1, 1000000000, 1, &points, problem));
+    return table_stream_downsample(stream, points, problem);
 }
 
-Status columns_format(const Request *request, size_t parameter, bool has_chart, Reply *reply,
-                      const TableFormat **encoder, Problem *problem) {
-    const char *extension = request->parameters[parameter];
-    char known[96] = "";
-    const char *types[16] = {NULL};
-    const TableFormat *offered[16];
-    size_t count = 0;
-    int choice = -1;
-    for (size_t i = 0; encoders[i] != NULL && count + 1 < COUNT(types); i++) {
-        if (encoders[i] == &encoder_svg && !has_chart)
-            continue;
-        text_list(known, sizeof known, encoders[i]->extension);
-        if (extension != NULL && strcmp(extension, encoders[i]->extension) == 0)
-            choice = (int)count;
-        offered[count] = encoders[i];
-        types[count++] = encoders[i]->content_type;
+Status columns_wait(const Request *request, Reply *reply, void *kept, void (*forget)(void *kept),
+                    const char *why, Problem *problem) {
+    const double left = wait_max - 1e-9 * (double)(clock_monotonic_ns() - request->started_ns);
+    if (left > 0 && !request->is_expired) {
+        reply_wait(reply, (int)(1000 * left) + 1, kept, forget);
+        return STATUS_OK;
     }
-    if (extension == NULL) {
-        reply->varies_by_accept = true;
-        choice = header_accept(request->accept, types);
-    }
-    if (choice < 0)
-        return extension != NULL
-                   ? problem_set(problem, STATUS_NOT_FOUND,
-                                 "there is no format \"%.20s\"; there are %s", extension, known)
-                   : problem_set(problem, STATUS_NOT_ACCEPTABLE,
-                                 "none of the formats fits Accept; there are %s, by extension too",
-                                 known);
-    *encoder = offered[choice];
-    if (*encoder == &encoder_svg)
-        reply->policy = reply_drawing_policy;
-    return STATUS_OK;
+    if (forget != NULL)
+        forget(kept);
+    reply->retry_after = 5;
+    return problem_set(problem, STATUS_BUSY, "%s", why);
 }
 
-Status columns_choose(App *app, const Request *request, Reply *reply, Outcome **outcome,
-                      Problem *problem) {
+Status columns_outcome(App *app, const Request *request, Reply *reply, Outcome **outcome,
+                       Problem *problem) {
     const char *id = request->parameters[0];
     const Status status = jobs_outcome(app->manager, id, request->callback, outcome, problem);
     if (status == STATUS_GONE)
         results_link_gone(id, reply);
     if (status == STATUS_BUSY)
         reply->retry_after = 2;
-    if (status != STATUS_OK || *outcome != NULL)
-        return status;
-    const double left =
-        outcome_wait_most - 1e-9 * (double)(clock_monotonic_ns() - request->started_ns);
-    if (left <= 0 || request->is_expired) {
-        reply->retry_after = 5;
-        return problem_set(problem, STATUS_BUSY,
-                           "the series is still being computed anew; ask again a little later");
-    }
-    reply_wait(reply, (int)(1000 * left) + 1, NULL, NULL);
-    return STATUS_OK;
+    return status == STATUS_OK && *outcome == NULL
+               ? columns_wait(request, reply, NULL, NULL,
+                              "the series is still being computed anew; ask again a little later",
+                              problem)
+               : status;
 }
 
-Status columns_outcome(App *app, const Request *request, Reply *reply, const char *what,
-                       const char *extension, Outcome **outcome, Problem *problem) {
-    const char *id = request->parameters[0];
-    char tag[104];
-    snprintf(tag, sizeof tag, "%.72s-%s.%s", id, what, extension);
-    // Nothing is computed anew for a client who has it.
-    if (request->if_none_match != NULL && !db_result_exists(app->db, id))
-        return problem_set(problem, STATUS_NOT_FOUND, "there is no result %.80s", id);
-    return reply_immutable(reply, request, tag)
-               ? STATUS_OK
-               : columns_choose(app, request, reply, outcome, problem);
+static ptrdiff_t columns_stream_next(void *context, char *target, size_t size) {
+    const ptrdiff_t count = table_stream_next(context, target, size);
+    return count > 0 ? count : count == 0 ? STREAM_END : STREAM_BROKEN;
 }
 
-static ptrdiff_t stream_next(void *context, char *target, size_t size) {
-    const size_t count = encoding_next(((ColumnReply *)context)->encoding, target, size);
-    return count > 0 ? (ptrdiff_t)count : STREAM_END;
+static void columns_stream_cut(void *context, uint64_t first, uint64_t size) {
+    table_stream_cut(context, first, size);
 }
 
-static void stream_cut(void *context, uint64_t first, uint64_t size) {
-    encoding_cut(((ColumnReply *)context)->encoding, first, size);
-}
-
-static void stream_release(void *context) {
-    column_reply_clear(context);
-    free(context);
-}
-
-// Takes what `sheet` holds, which has its encoding.
-static Status reply_stream(Reply *reply, const char *content_type, ColumnReply *column_reply,
-                           Problem *problem) {
-    ColumnReply *kept = malloc(sizeof *kept);
-    if (kept == NULL) {
-        column_reply_clear(column_reply);
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the answer");
-    }
-    *kept = *column_reply;
-    *column_reply = (ColumnReply){.encoding = NULL};
-    reply_borrow(reply, 200, content_type, NULL, 0);
-    reply->stream =
-        (Stream){.next = stream_next, .size = encoding_size(kept->encoding), .cut = stream_cut};
-    reply->release = stream_release;
-    reply->context = kept;
-    return STATUS_OK;
-}
-
-// Whether a text can be no longer than WHOLE_MAX.
-static bool is_short(const Table *table) {
-    const size_t most = WHOLE_MAX / (SHORTEST_SIZE + 1);
-    return table->count <= most / (table->column_count + 1);
-}
-
-static Status reply_whole(App *app, Reply *reply, const char *content_type,
-                          ColumnReply *column_reply, Problem *problem) {
-    Bytes bytes = {.most = app->reply_most};
-    const size_t size = (size_t)encoding_size(column_reply->encoding);
-    if (bytes_reserve(&bytes, size)) {
-        bytes.count = encoding_next(column_reply->encoding, bytes.at, size);
-        bytes.at[bytes.count] = '\0';
-    }
-    column_reply_clear(column_reply);
-    return reply_bytes(reply, 200, content_type, &bytes, problem);
-}
-
-Status columns_reply(App *app, Reply *reply, const TableFormat *encoder, ColumnReply *column_reply,
+Status columns_reply(App *app, Reply *reply, const TableFormat *format, TableStream *stream,
                      Problem *problem) {
-    reply->accepts_ranges = encoder->is_binary;
-    if (!encoder->is_binary && is_short(&column_reply->table)) {
-        Bytes bytes = {.most = app->reply_most};
-        const Status status = encoding_write(encoder, &column_reply->table, &bytes, problem);
-        column_reply_clear(column_reply);
-        if (status == STATUS_OK)
-            return reply_bytes(reply, 200, encoder->content_type, &bytes, problem);
-        bytes_clear(&bytes);
-        return status;
-    }
-    const Status status =
-        encoding_open(encoder, &column_reply->table, &column_reply->encoding, problem);
+    if (stream == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the answer");
+    const Status status = table_stream_open(stream, format, problem);
     if (status != STATUS_OK) {
-        column_reply_clear(column_reply);
+        table_stream_free(stream);
         return status;
     }
-    if (encoding_size(column_reply->encoding) <= WHOLE_MAX)
-        return reply_whole(app, reply, encoder->content_type, column_reply, problem);
-    return reply_stream(reply, encoder->content_type, column_reply, problem);
+    const uint64_t size = table_stream_size(stream);
+    reply->accepts_ranges = format->is_binary;
+    if (size != UINT64_MAX ? size <= WHOLE_MAX : table_stream_is_below(stream, WHOLE_MAX)) {
+        Bytes bytes = {.most = app->reply_most};
+        table_stream_write(stream, &bytes);
+        table_stream_free(stream);
+        return reply_bytes(reply, 200, format->content_type, &bytes, problem);
+    }
+    reply_borrow(reply, 200, format->content_type, NULL, 0);
+    reply->stream = (Stream){.next = columns_stream_next, .size = size, .cut = columns_stream_cut};
+    reply->release = table_stream_free;
+    reply->context = stream;
+    return STATUS_OK;
 }
 
-Status columns_reply_segments(App *app, Reply *reply, const char *content_type, Segments *layout,
-                              ColumnReply *column_reply, Problem *problem) {
-    reply->accepts_ranges = true;
-    const Status status = encoding_open_layout(layout, &column_reply->encoding, problem);
-    if (status != STATUS_OK) {
-        column_reply_clear(column_reply);
-        return status;
+// --- series ---
+
+static void series_list_names(const Columns *columns, char *target, size_t size) {
+    target[0] = '\0';
+    for (size_t i = 0; i < columns->count; i++) {
+        const size_t used = strlen(target), more = strlen(columns->at[i].name) + 2;
+        if (used + more + sizeof ", and 1000 more" > size) {
+            snprintf(target + used, size - used, ", and %zu more", columns->count - i);
+            return;
+        }
+        snprintf(target + used, size - used, "%s%s", i > 0 ? ", " : "", columns->at[i].name);
     }
-    if (encoding_size(column_reply->encoding) <= WHOLE_MAX)
-        return reply_whole(app, reply, content_type, column_reply, problem);
-    return reply_stream(reply, content_type, column_reply, problem);
+}
+
+// "?channels=a,b": those columns in that order; all without it.
+static Status series_choose(const Request *request, const Columns *columns, TableStream *stream,
+                            Problem *problem) {
+    size_t *count = &stream->table.column_count;
+    const char *text = request_query(request, "channels");
+    if (text == NULL)
+        return STATUS_OK;
+    char there[256];
+    series_list_names(columns, there, sizeof there);
+    *count = 0;
+    for (const char *at = text; at != NULL;
+         at = strchr(at, ',') != NULL ? strchr(at, ',') + 1 : NULL) {
+        char name[48];
+        snprintf(name, sizeof name, "%.*s", (int)strcspn(at, ","), at);
+        const Column *column = columns_find(columns, name);
+        if (column == NULL)
+            return problem_set(problem, STATUS_NOT_FOUND,
+                               "the scene did not ask for the channel \"%s\"; there are: %s", name,
+                               there[0] != '\0' ? there : "none");
+        for (size_t i = 0; i < *count; i++)
+            if (stream->chosen[i] == column)
+                return problem_set(problem, STATUS_USAGE, "the channel \"%s\" is named twice",
+                                   name);
+        stream->chosen[(*count)++] = column;
+    }
+    return STATUS_OK;
+}
+
+static Status series_fill(const Request *request, const TableFormat **format, TableStream *stream,
+                          Problem *problem) {
+    const Response *response = &stream->outcome->response;
+    (void)format;
+    if (response->count == 0)
+        return problem_set(problem, STATUS_NOT_FOUND, "the result has no samples");
+    TRY(table_stream_series(stream, problem));
+    TRY(series_choose(request, &response->series, stream, problem));
+    return columns_window(request, response->count, stream, problem);
+}
+
+// --- spectra, impacts, energies ---
+
+static Status psd_fill(const Request *request, const TableFormat **format, TableStream *stream,
+                       Problem *problem) {
+    (void)request;
+    (void)format;
+    if (stream->outcome->spectrum.densities.count == 0)
+        return problem_set(problem, STATUS_NOT_FOUND, "the scene asked for no psd");
+    return table_stream_psd(stream, problem);
+}
+
+static Status impacts_fill(const Request *request, const TableFormat **format, TableStream *stream,
+                           Problem *problem) {
+    ImpactWindow window;
+    char text[32], text_to[32];
+    if (stream->outcome->response.is_unlisted)
+        return problem_set(problem, STATUS_NOT_FOUND, "%s", no_impacts);
+    if (request->query_count == 0)
+        return table_stream_impacts(stream, *format, NULL, problem);
+    TRY(request_number(request, "from", 0, 1e12, 0, &window.from, problem));
+    TRY(request_number(request, "to", 0, 1e12, 1e12, &window.to, problem));
+    TRY(request_count(request, "first", 1, 1000000000, 1, &window.first, problem));
+    TRY(request_count(request, "limit", 1, 1000000000, 1000000000, &window.limit, problem));
+    if (window.from > window.to)
+        return problem_set(problem, STATUS_USAGE, "\"from\" is %s s, behind \"to\" at %s s",
+                           text_real(text, window.from), text_real(text_to, window.to));
+    return table_stream_impacts(stream, *format, &window, problem);
+}
+
+// One object, no table.
+static const TableFormat energy_json = {.extension = "json", .content_type = type_json};
+
+static Status energy_fill(const Request *request, const TableFormat **format, TableStream *stream,
+                          Problem *problem) {
+    const Energy *energy = &stream->outcome->response.energy;
+    Bytes bytes = {.most = 0};
+    (void)request;
+    if (*format != &format_json)
+        return table_stream_records(stream, energy_fields, energy, 1, sizeof *energy, problem);
+    document_energy(&bytes, energy);
+    bytes_text(&bytes, "\n");
+    segments_text(&stream->segments, &bytes);
+    *format = &energy_json;
+    return STATUS_OK;
+}
+
+typedef struct ResultPart {
+    const char *name;
+    bool has_chart;
+    Status (*fill)(const Request *request, const TableFormat **format, TableStream *stream,
+                   Problem *problem);
+} ResultPart;
+
+static const ResultPart part_series = {"series", true, series_fill};
+static const ResultPart part_psd = {"psd", true, psd_fill};
+static const ResultPart part_impacts = {"impacts", false, impacts_fill};
+static const ResultPart part_energy = {"energy", false, energy_fill};
+
+static Status results_part(App *app, const Request *request, Reply *reply, const ResultPart *part,
+                           Problem *problem) {
+    const char *id = request->parameters[0];
+    const TableFormat *format = NULL;
+    Outcome *outcome = NULL;
+    char tag[104];
+    TRY(columns_format(request, 1, part->has_chart, reply, &format, problem));
+    snprintf(tag, sizeof tag, "%.72s-%s.%s", id, part->name, format->extension);
+    if (part == &part_series) {
+        // Nothing is computed again for a client that has it.
+        if (request->if_none_match != NULL && !db_result_exists(app->db, id))
+            return problem_set(problem, STATUS_NOT_FOUND, "there is no result %.80s", id);
+        if (reply_immutable(reply, request, tag))
+            return STATUS_OK;
+        TRY(columns_outcome(app, request, reply, &outcome, problem));
+        if (outcome == NULL)
+            return STATUS_OK;
+    } else {
+        TRY(jobs_outcome_stored(app->manager, id, &outcome, problem));
+    }
+    TableStream *stream = table_stream_new(outcome);
+    const Status status = stream != NULL
+                              ? part->fill(request, &format, stream, problem)
+                              : problem_set(problem, STATUS_NO_MEMORY, "no memory for the answer");
+    if (status == STATUS_OK && (part == &part_series || !reply_immutable(reply, request, tag)))
+        return columns_reply(app, reply, format, stream, problem);
+    table_stream_free(stream);
+    return status;
+}
+
+Status results_series(App *app, const Request *request, Reply *reply, Problem *problem) {
+    return results_part(app, request, reply, &part_series, problem);
+}
+
+Status results_psd(App *app, const Request *request, Reply *reply, Problem *problem) {
+    return results_part(app, request, reply, &part_psd, problem);
+}
+
+Status results_impacts(App *app, const Request *request, Reply *reply, Problem *problem) {
+    return results_part(app, request, reply, &part_impacts, problem);
+}
+
+Status results_energy(App *app, const Request *request, Reply *reply, Problem *problem) {
+    return results_part(app, request, reply, &part_energy, problem);
 }

@@ -11,7 +11,6 @@
 #include "server/api/compare_side.h"
 #include "server/http/reply.h"
 #include "server/json/diff.h"
-#include "server/json/stored_report.h"
 #include "server/util/base_path.h"
 
 static void put_side(Bytes *bytes, const char *name, const ResultRow *row) {
@@ -20,10 +19,10 @@ static void put_side(Bytes *bytes, const char *name, const ResultRow *row) {
     bytes_format(bytes, ", \"links\": {\"self\": \"%s/v1/results/%s\"}}", base_path(), row->id);
 }
 
-// Without outcomes (NULL), what is of series and spectra is null, and `gone` says why.
-static void put_motions(Bytes *bytes, Outcome *const outcomes[SIDES], const Summary summaries[2],
-                        const char *gone) {
-    const double horizons[2] = {summaries[0].trust_horizon, summaries[1].trust_horizon};
+// Series and spectra are null where `gone` (not NULL) states why.
+static void put_motions(Bytes *bytes, Outcome *const outcomes[SIDES], const char *gone) {
+    const double horizons[2] = {outcomes[0]->summary.trust_horizon,
+                                outcomes[1]->summary.trust_horizon};
     if (gone != NULL) {
         bytes_text(bytes, ", \"channels\": null, \"divergence\": null, \"psd\": null, "
                           "\"warnings\": [");
@@ -44,13 +43,9 @@ static void put_motions(Bytes *bytes, Outcome *const outcomes[SIDES], const Summ
 
 static Status write_comparison(App *app, const ResultRow rows[2], Outcome *const outcomes[SIDES],
                                const char *gone, Reply *reply, Problem *problem) {
-    Summary summaries[2];
     static const DiffFormat format = {"a", "b", true};
     size_t inputs = 0;
     Bytes bytes = {.most = app->reply_most};
-    for (int i = 0; i < 2; i++)
-        TRY(stored_report_read(rows[i].summary, strlen(rows[i].summary), summary_fields,
-                               &summaries[i], problem));
     bytes_text(&bytes, "{");
     put_side(&bytes, "a", &rows[0]);
     bytes_text(&bytes, ", ");
@@ -62,8 +57,8 @@ static Status write_comparison(App *app, const ResultRow rows[2], Outcome *const
     if (status == STATUS_OK) {
         bytes_format(&bytes, ", \"more_inputs\": %zu, \"metrics\": ",
                      inputs > DIFF_MAX ? inputs - DIFF_MAX : 0);
-        compare_put_metrics(&bytes, &summaries[0], &summaries[1]);
-        put_motions(&bytes, outcomes, summaries, gone);
+        compare_put_metrics(&bytes, &outcomes[0]->summary, &outcomes[1]->summary);
+        put_motions(&bytes, outcomes, gone);
         bytes_text(&bytes, "}\n");
         status = reply_bytes(reply, 200, type_json, &bytes, problem);
     }
@@ -71,15 +66,15 @@ static Status write_comparison(App *app, const ResultRow rows[2], Outcome *const
     return status;
 }
 
-static Status show(App *app, char results[2][72], Outcome *const outcomes[SIDES], const char *gone,
+static Status show(App *app, char results[2][72], Outcome *outcomes[SIDES], const char *gone,
                    Reply *reply, Problem *problem) {
     ResultRow rows[2] = {{.id = ""}, {.id = ""}};
     Status status = STATUS_OK;
-    for (int i = 0; i < 2 && status == STATUS_OK; i++)
+    for (int i = 0; i < 2 && status == STATUS_OK; i++) {
         status = db_result_load(app->db, results[i], &rows[i], problem);
-    if (status == STATUS_OK && (rows[0].scene == NULL || rows[1].scene == NULL ||
-                                rows[0].summary == NULL || rows[1].summary == NULL))
-        status = problem_set(problem, STATUS_INTERNAL, "a stored result is not whole");
+        if (status == STATUS_OK && outcomes[i] == NULL)
+            status = jobs_outcome_stored(app->manager, results[i], &outcomes[i], problem);
+    }
     if (status == STATUS_OK)
         status = write_comparison(app, rows, outcomes, gone, reply, problem);
     for (int i = 0; i < 2; i++)

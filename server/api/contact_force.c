@@ -1,6 +1,6 @@
-// One impact at full detail. The result does not keep it: the scene is run again
-// (core/simulation/impact_history.c), at once where that is predicted to be quick, else beside the
-// workers while the request sleeps.
+// One impact at full detail. The result does not have it: the scene is run again
+// (core/simulation/impact_history.c), at once where that is predicted to be quick, else in the
+// background while the request waits.
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,33 +11,34 @@
 #include "server/http/reply.h"
 #include "server/util/clock.h"
 
-static const double quick = 0.005;  // foretold CPU that a request itself may take [s]
-static const double wait_most = 60; // [s]
+static const double quick_max = 0.005; // predicted CPU time of a run within the request [s]
 
-typedef struct Look {
+// The run of one scene for one impact.
+typedef struct ForceRun {
     StudyRequest inquiry;
     size_t number, points;
-    ImpactHistory closeup;
+    ImpactHistory history;
     Status status;
     Problem problem;
-} Look;
+} ForceRun;
 
-static void look_free(void *context) {
-    Look *look = context;
-    impact_history_clear(&look->closeup);
-    study_request_clear(&look->inquiry);
-    free(look);
+static void force_free(void *context) {
+    ForceRun *force = context;
+    impact_history_clear(&force->history);
+    study_request_clear(&force->inquiry);
+    free(force);
 }
 
-// Nobody's limits: the scene was within them when its result was made.
-static void look_run(void *context, const Progress *watch) {
-    Look *look = context;
-    look->status = impact_history_make(&look->inquiry.simulation, look->number, look->points, NULL,
-                                       watch, NULL, &look->closeup, &look->problem);
+// Without limits: the scene was within them when its result was made.
+static void force_run(void *context, const Progress *watch) {
+    ForceRun *force = context;
+    force->status = impact_history_make(&force->inquiry.simulation, force->number, force->points,
+                                        NULL, watch, NULL, &force->history, &force->problem);
 }
 
 // The scene of the result, as this engine would run it again.
-static Status read_scene(App *app, const char *id, Reply *reply, Look *look, Problem *problem) {
+static Status force_read_scene(App *app, const char *id, Reply *reply, ForceRun *force,
+                               Problem *problem) {
     ResultRow row = {.count = 0};
     Warnings warnings = {NULL, 0};
     Status status = db_result_scene(app->db, id, &row, problem);
@@ -49,17 +50,17 @@ static Status read_scene(App *app, const char *id, Reply *reply, Look *look, Pro
         results_link_gone(id, reply);
     }
     if (status == STATUS_OK)
-        status = jobs_prepare(app->db, row.scene, strlen(row.scene), NULL, &look->inquiry,
+        status = jobs_prepare(app->db, row.scene, strlen(row.scene), NULL, &force->inquiry,
                               &warnings, problem);
-    if (status == STATUS_OK && !look->inquiry.simulation.output.impacts)
+    if (status == STATUS_OK && !force->inquiry.simulation.output.impacts)
         status = problem_set(problem, STATUS_NOT_FOUND, "%s", no_impacts);
     warnings_clear(&warnings);
     result_row_clear(&row);
     return status;
 }
 
-// What is asked: a whole number from 1 in the path, and how many points.
-static Status read_what(const Request *request, Look *look, Problem *problem) {
+// A number from 1 in the path, and how many points.
+static Status force_read_request(const Request *request, ForceRun *force, Problem *problem) {
     const char *text = request->parameters[1];
     char *end;
     const unsigned long long number = strtoull(text, &end, 10);
@@ -68,100 +69,100 @@ static Status read_what(const Request *request, Look *look, Problem *problem) {
                            "there is no impact \"%.20s\": they are numbered from 1, as "
                            "impacts.json lists them",
                            text);
-    look->number = (size_t)number;
+    force->number = (size_t)number;
     return request_count(request, "points", IMPACT_HISTORY_POINTS_MIN, IMPACT_HISTORY_POINTS_MAX,
-                         IMPACT_HISTORY_POINTS, &look->points, problem);
+                         IMPACT_HISTORY_POINTS, &force->points, problem);
 }
 
-// Of a look that has been taken; its columns become the sheet's.
-static Status reply_look(App *app, Reply *reply, const TableFormat *encoder, Look *look,
+// Of a run that has ended; its columns become the stream's.
+static Status force_reply(App *app, Reply *reply, const TableFormat *format, ForceRun *force,
+                          Problem *problem) {
+    if (force->status != STATUS_OK)
+        return problem_set(problem, force->status, "%s", force->problem.detail);
+    TableStream *stream = table_stream_new(NULL);
+    Status status = STATUS_OK;
+    if (stream != NULL) {
+        stream->made = force->history.columns;
+        force->history.columns = (Columns){.count = 0};
+        status = table_stream_columns(stream, &stream->made, true, problem);
+    }
+    if (status == STATUS_OK)
+        return columns_reply(app, reply, format, stream, problem);
+    table_stream_free(stream);
+    return status;
+}
+
+static void force_forget(void *background) {
+    background_unref(background);
+}
+
+// Takes the reference to the task.
+static Status force_wait(const Request *request, Reply *reply, BackgroundTask *background,
                          Problem *problem) {
-    if (look->status != STATUS_OK)
-        return problem_set(problem, look->status, "%s", look->problem.detail);
-    ColumnReply column_reply = {.own = look->closeup.columns};
-    look->closeup.columns = (Columns){.count = 0};
-    const Status status = column_reply_own_axis(&column_reply, problem);
-    if (status != STATUS_OK) {
-        column_reply_clear(&column_reply);
-        return status;
-    }
-    return columns_reply(app, reply, encoder, &column_reply, problem);
-}
-
-static void forget(void *kept) {
-    background_unref(kept);
-}
-
-// Takes the aside.
-static Status wait_on(const Request *request, Reply *reply, BackgroundTask *background,
-                      Problem *problem) {
-    const double left = wait_most - 1e-9 * (double)(clock_monotonic_ns() - request->started_ns);
-    if (left <= 0 || request->is_expired) {
-        background_unref(background);
+    const Status status = columns_wait(request, reply, background, force_forget,
+                                       "to run the scene again takes longer than 60 s: submit a "
+                                       "shorter scene that holds the impact",
+                                       problem);
+    if (status != STATUS_OK)
         reply->retry_after = 30;
-        return problem_set(problem, STATUS_BUSY,
-                           "to run the scene again takes longer than %g s: submit a shorter scene "
-                           "that holds the impact",
-                           wait_most);
-    }
-    reply_wait(reply, (int)(1000 * left) + 1, background, forget);
-    return STATUS_OK;
+    return status;
 }
 
-// Takes the aside of a request that slept.
-static Status go_on(App *app, const Request *request, Reply *reply, const TableFormat *encoder,
-                    BackgroundTask *background, Problem *problem) {
+// Takes the reference to the task of a request that waited.
+static Status force_resume(App *app, const Request *request, Reply *reply,
+                           const TableFormat *format, BackgroundTask *background,
+                           Problem *problem) {
     if (!background_is_done(background))
-        return wait_on(request, reply, background, problem);
-    const Status status = reply_look(app, reply, encoder, background_context(background), problem);
+        return force_wait(request, reply, background, problem);
+    const Status status = force_reply(app, reply, format, background_context(background), problem);
     background_unref(background);
     return status;
 }
 
-static Status look_begin(App *app, const Request *request, Reply *reply, const TableFormat *encoder,
-                         Look *look, Problem *problem) {
-    if (impact_history_steps(&look->inquiry.simulation) * SOLVER_STEP <= quick) {
-        look_run(look, NULL);
-        const Status status = reply_look(app, reply, encoder, look, problem);
-        look_free(look);
+static Status force_start(App *app, const Request *request, Reply *reply, const TableFormat *format,
+                          ForceRun *force, Problem *problem) {
+    if (impact_history_steps(&force->inquiry.simulation) * SOLVER_STEP <= quick_max) {
+        force_run(force, NULL);
+        const Status status = force_reply(app, reply, format, force, problem);
+        force_free(force);
         return status;
     }
     BackgroundTask *background = NULL;
-    const BackgroundWork work = {look, look_run, look_free};
+    const BackgroundWork work = {force, force_run, force_free};
     const Status status =
         background_start(app->background_tasks, &work, request->callback, &background, problem);
     if (status == STATUS_BUSY)
         reply->retry_after = 2;
-    return status == STATUS_OK ? wait_on(request, reply, background, problem) : status;
+    return status == STATUS_OK ? force_wait(request, reply, background, problem) : status;
 }
 
-// False: the client has it.
-static bool has_to_send(const Request *request, Reply *reply, const Look *look,
-                        const TableFormat *encoder) {
+// True: the client has it.
+static bool force_is_known(const Request *request, Reply *reply, const ForceRun *force,
+                           const TableFormat *format) {
     char tag[104];
-    snprintf(tag, sizeof tag, "%.72s-%zu-force.%s", request->parameters[0], look->number,
-             encoder->extension);
-    return !reply_immutable(reply, request, tag);
+    snprintf(tag, sizeof tag, "%.72s-%zu-force.%s", request->parameters[0], force->number,
+             format->extension);
+    return reply_immutable(reply, request, tag);
 }
 
 Status results_force(App *app, const Request *request, Reply *reply, Problem *problem) {
-    const TableFormat *encoder = NULL;
-    TRY(columns_format(request, 2, false, reply, &encoder, problem));
+    const TableFormat *format = NULL;
+    TRY(columns_format(request, 2, false, reply, &format, problem));
     if (request->kept != NULL) {
         BackgroundTask *background = request->kept;
         if (background_is_done(background))
-            (void)has_to_send(request, reply, background_context(background), encoder);
-        return go_on(app, request, reply, encoder, background, problem);
+            (void)force_is_known(request, reply, background_context(background), format);
+        return force_resume(app, request, reply, format, background, problem);
     }
-    Look *look = calloc(1, sizeof *look);
-    if (look == NULL)
+    ForceRun *force = calloc(1, sizeof *force);
+    if (force == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the impact");
-    problem_clear(&look->problem);
-    Status status = read_what(request, look, problem);
+    problem_clear(&force->problem);
+    Status status = force_read_request(request, force, problem);
     if (status == STATUS_OK)
-        status = read_scene(app, request->parameters[0], reply, look, problem);
-    if (status == STATUS_OK && has_to_send(request, reply, look, encoder))
-        return look_begin(app, request, reply, encoder, look, problem);
-    look_free(look);
+        status = force_read_scene(app, request->parameters[0], reply, force, problem);
+    if (status == STATUS_OK && !force_is_known(request, reply, force, format))
+        return force_start(app, request, reply, format, force, problem);
+    force_free(force);
     return status;
 }

@@ -4,7 +4,6 @@
 #include <string.h>
 
 #include "server/api/app.h"
-#include "server/formats/csv.h"
 #include "server/formats/format.h"
 #include "server/formats/material_export.h"
 #include "server/http/header.h"
@@ -55,8 +54,8 @@ static Status begin(Sending *sending, Db *db, bool is_table, Problem *problem) {
 
 Status materials_export(App *app, const Request *request, Reply *reply, Problem *problem) {
     const char *format = request->parameters[0];
-    const bool is_table = strcmp(format, encoder_csv.extension) == 0;
-    const char *type = is_table ? encoder_csv.content_type : type_json;
+    const bool is_table = strcmp(format, format_csv.extension) == 0;
+    const char *type = is_table ? format_csv.content_type : type_json;
     if (!is_table && strcmp(format, "json") != 0)
         return problem_set(problem, STATUS_NOT_FOUND,
                            "there are no materials.%.20s; they can be had as materials.json or "

@@ -159,32 +159,32 @@ Status records_show(App *app, const Request *request, Reply *reply, Problem *pro
 }
 
 // All samples, or those asked for by time, or extremes of buckets of them.
-static Status fill(const Request *request, const NamedRecord *named, ColumnReply *column_reply,
+static Status fill(const Request *request, const NamedRecord *named, TableStream *stream,
                    Problem *problem) {
     const Reals *samples = &named->samples;
-    TRY(columns_allocate(&column_reply->own, 1, samples->count, 0, problem));
-    columns_name(&column_reply->own, 0, "acceleration", "m/s^2");
-    memcpy(column_reply->own.at[0].values, samples->at, samples->count * sizeof(double));
-    column_reply->table =
-        (Table){.axis_name = "time", .axis_unit = "s", .axis_rate = 1 / named->interval};
-    TRY(column_reply_own(column_reply, problem));
-    TRY(columns_window(request, samples->count, &column_reply->table, problem));
-    return columns_downsample(request, column_reply, problem);
+    TRY(columns_allocate(&stream->made, 1, samples->count, 0, problem));
+    columns_name(&stream->made, 0, "acceleration", "m/s^2");
+    memcpy(stream->made.at[0].values, samples->at, samples->count * sizeof(double));
+    TRY(table_stream_columns(stream, &stream->made, false, problem));
+    stream->table.axis_name = "time";
+    stream->table.axis_unit = "s";
+    stream->table.axis_rate = 1 / named->interval;
+    return columns_window(request, samples->count, stream, problem);
 }
 
 Status records_samples(App *app, const Request *request, Reply *reply, Problem *problem) {
-    const TableFormat *encoder = NULL;
+    const TableFormat *format = NULL;
     NamedRecord *named;
-    ColumnReply column_reply = {.encoding = NULL};
     char tag[96];
-    TRY(columns_format(request, 1, false, reply, &encoder, problem));
+    TRY(columns_format(request, 1, false, reply, &format, problem));
     TRY(db_record_named(app->db, request->parameters[0], &named, problem));
-    snprintf(tag, sizeof tag, "%.64s-%.8s", named->digest, encoder->extension);
-    const Status status = fill(request, named, &column_reply, problem);
+    snprintf(tag, sizeof tag, "%.64s-%.8s", named->digest, format->extension);
+    TableStream *stream = table_stream_new(NULL);
+    const Status status = stream != NULL ? fill(request, named, stream, problem) : STATUS_OK;
     refcount_unref(&named->shared);
     if (status == STATUS_OK && !reply_tagged(reply, request, tag))
-        return columns_reply(app, reply, encoder, &column_reply, problem);
-    column_reply_clear(&column_reply);
+        return columns_reply(app, reply, format, stream, problem);
+    table_stream_free(stream);
     return status;
 }
 

@@ -15,7 +15,6 @@
 #include "server/jobs/references.h"
 #include "server/json/encode.h"
 #include "server/json/parse.h"
-#include "server/json/stored_report.h"
 #include "server/materials/material.h"
 #include "server/util/base_path.h"
 #include "server/util/clock.h"
@@ -24,14 +23,6 @@
 const char no_impacts[] =
     "the scene asked for no ledger of impacts: their number is the summary's, their energy that of "
     "energy.json; with \"output\": {\"impacts\": true} they are listed";
-
-const char *results_document(const ResultRow *row, Document document) {
-    const char *const texts[] = {[DOCUMENT_PSD] = row->psd,
-                                 [DOCUMENT_IMPACTS] = row->impacts,
-                                 [DOCUMENT_ENERGY] = row->energy};
-    const char *text = texts[document];
-    return text != NULL && strcmp(text, "null") != 0 ? text : NULL;
-}
 
 void results_link_gone(const char *id, Reply *reply) {
     snprintf(reply->link, sizeof reply->link,
@@ -93,38 +84,20 @@ static void write_ways(Bytes *bytes, const char *id, const char *part, const cha
                      base_path(), id, part, (int)size, formats);
 }
 
-// Under impulses an impact takes no time, and where there is none there is nothing to look at.
-static bool has_force(const ResultRow *row) {
-    static const Field model_fields[] = {
-        FIELD_TEXT(PlanReport, contact_model, 0, PRESENCE_OPTIONAL, 0, "as planned"), FIELD_END};
-    PlanReport plan;
-    Summary summary;
-    if (row->plan == NULL || row->summary == NULL ||
-        results_document(row, DOCUMENT_IMPACTS) == NULL)
-        return false;
-    const bool is_read =
-        stored_report_read(row->plan, strlen(row->plan), model_fields, &plan, NULL) == STATUS_OK;
-    const bool is_impulse =
-        is_read && plan.contact_model != NULL && strcmp(plan.contact_model, "impulse") == 0;
-    fields_clear(model_fields, &plan);
-    return is_read && !is_impulse &&
-           stored_report_read(row->summary, strlen(row->summary), summary_fields, &summary, NULL) ==
-               STATUS_OK &&
-           summary.impacts > 0;
-}
-
-static void write_links(Bytes *bytes, const ResultRow *row, const StudyAnswer *answer) {
+static void write_links(Bytes *bytes, const ResultRow *row, const Simulation *simulation,
+                        const StudyAnswer *answer) {
     const char *id = row->id;
+    const Output *output = &simulation->output;
     bytes_format(bytes,
                  "{\"self\": \"%s/v1/results/%s\", \"manifest\": \"%s/v1/results/%s/manifest\"",
                  base_path(), id, base_path(), id);
     write_ways(bytes, id, "series", "csv npy npz mat");
-    if (results_document(row, DOCUMENT_PSD) != NULL)
+    if (output->psd.channels.count > 0)
         write_ways(bytes, id, "psd", "csv npy npz mat");
-    if (results_document(row, DOCUMENT_IMPACTS) != NULL)
+    if (output->impacts)
         write_ways(bytes, id, "impacts", "csv npy npz mat");
-    // A template (RFC 6570): the impact's place in the ledger, from 1.
-    if (has_force(row))
+    // A template (RFC 6570): the impact's number in the list, from 1. Impulses have no force.
+    if (output->impacts && row->impact_count > 0 && simulation_has_force(simulation))
         bytes_format(bytes, ", \"force\": \"%s/v1/results/%s/impacts/{number}/force.json\"",
                      base_path(), id);
     write_ways(bytes, id, "energy", "csv npy npz mat");
@@ -221,7 +194,7 @@ static void write_result(Bytes *bytes, const ResultRow *row, const StudyRequest 
     else
         bytes_text(bytes, "null");
     bytes_text(bytes, ", \"links\": ");
-    write_links(bytes, row, answer);
+    write_links(bytes, row, simulation, answer);
     bytes_text(bytes, "}\n");
 }
 

@@ -1,15 +1,9 @@
-// The documents saved with a result, for the handlers that offer them beside other formats.
-// Used by results.c, ledgers.c and bundle.c.
+// Documents of a result, and what handlers of its parts share.
 #ifndef SERVER_API_RESULTS_H
 #define SERVER_API_RESULTS_H
 
 #include "server/api/app.h"
 #include "server/util/bytes.h"
-
-typedef enum Document { DOCUMENT_PSD, DOCUMENT_IMPACTS, DOCUMENT_ENERGY } Document;
-
-// The JSON as it was saved; NULL where the scene asked for none.
-const char *results_document(const ResultRow *row, Document document);
 
 // Append the documents of a result's row, as /v1/results/{id} and its manifest answer them.
 Status results_put(const ResultRow *row, Bytes *bytes, Problem *problem);

@@ -7,9 +7,9 @@
 #include "server/api/job_json.h"
 #include "server/api/studies.h"
 #include "server/formats/charts.h"
-#include "server/formats/encoding.h"
 #include "server/formats/study_formats.h"
 #include "server/formats/sweep.h"
+#include "server/formats/table_stream.h"
 #include "server/http/reply.h"
 #include "server/jobs/documents.h"
 #include "server/jobs/sweep.h"
@@ -49,12 +49,12 @@ typedef struct SweepReply {
     Bytes made;
     size_t taken; // of that
     bool is_last;
-    Encoding *encoding;
+    TableStream *stream;
 } SweepReply;
 
 static void sweep_reply_free(void *context) {
     SweepReply *sending = context;
-    encoding_close(sending->encoding);
+    table_stream_free(sending->stream);
     bytes_clear(&sending->made);
     sweep_view_clear(&sending->view);
     free(sending);
@@ -80,12 +80,14 @@ static ptrdiff_t sweep_reply_text(void *context, char *target, size_t size) {
 
 static ptrdiff_t sweep_reply_archive(void *context, char *target, size_t size) {
     SweepReply *sending = context;
-    const size_t count = encoding_next(sending->encoding, target, size);
-    return sending->document.is_broken ? STREAM_BROKEN : count > 0 ? (ptrdiff_t)count : STREAM_END;
+    const ptrdiff_t count = table_stream_next(sending->stream, target, size);
+    return sending->document.is_broken || count < 0 ? STREAM_BROKEN
+           : count > 0                              ? count
+                                                    : STREAM_END;
 }
 
 static void sweep_reply_cut(void *context, uint64_t first, uint64_t size) {
-    encoding_cut(((SweepReply *)context)->encoding, first, size);
+    table_stream_cut(((SweepReply *)context)->stream, first, size);
 }
 
 static Status sweep_error_changed(Problem *problem) {
@@ -106,12 +108,15 @@ static Status sweep_reply_begin_text(SweepReply *sending, Problem *problem) {
 
 static Status sweep_reply_begin_archive(SweepReply *sending, const char *extension,
                                         Problem *problem) {
-    Segments layout = {0};
-    const Status status = sweep_lay(&sending->document, extension, &layout, problem);
-    if (status == STATUS_OK)
-        return encoding_open_layout(&layout, &sending->encoding, problem);
-    segments_clear(&layout);
-    return status == STATUS_CONFLICT ? sweep_error_changed(problem) : status;
+    static const TableFormat filled = {.is_binary = true};
+    sending->stream = table_stream_new(NULL);
+    if (sending->stream == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the table");
+    const Status status =
+        sweep_lay(&sending->document, extension, &sending->stream->segments, problem);
+    if (status != STATUS_OK)
+        return status == STATUS_CONFLICT ? sweep_error_changed(problem) : status;
+    return table_stream_open(sending->stream, &filled, problem);
 }
 
 // Takes `sending` if it succeeds.
@@ -129,10 +134,10 @@ static Status sweep_reply_send(Reply *reply, const StudyFormat *format, SweepRep
     }
     reply_borrow(reply, 200, format->content_type, NULL, 0);
     // As long as rows come, no part of one document fits the next.
-    reply->accepts_ranges = sending->encoding != NULL && sending->view.is_complete;
-    reply->stream = sending->encoding != NULL
+    reply->accepts_ranges = sending->stream != NULL && sending->view.is_complete;
+    reply->stream = sending->stream != NULL
                         ? (Stream){.next = sweep_reply_archive,
-                                   .size = encoding_size(sending->encoding),
+                                   .size = table_stream_size(sending->stream),
                                    .cut = sweep_reply_cut}
                         : (Stream){.next = sweep_reply_text, .size = UINT64_MAX};
     reply->release = sweep_reply_free;

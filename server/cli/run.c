@@ -10,7 +10,7 @@
 #include "server/api/job_json.h"
 #include "server/cli/output.h"
 #include "server/cli/scene_file.h"
-#include "server/formats/encoding.h"
+#include "server/formats/table_stream.h"
 #include "server/jobs/documents.h"
 #include "server/jobs/jobs.h"
 #include "server/options.h"
@@ -29,36 +29,40 @@ static const Field run_fields[] = {
     FIELD_END,
 };
 
-// The series as the encoders take it. The caller frees *chosen.
-static Status series_write(const Response *response, const TableFormat *encoder, Bytes *bytes,
-                           Problem *problem) {
-    const Column **chosen = calloc(response->series.count + 1, sizeof *chosen);
-    if (chosen == NULL)
-        return STATUS_NO_MEMORY;
-    for (size_t i = 0; i < response->series.count; i++)
-        chosen[i] = &response->series.at[i];
-    const Table table = {.axis_name = "time",
-                         .axis_unit = "s",
-                         .axis_rate = response->sample_rate,
-                         .count = response->count,
-                         .columns = chosen,
-                         .column_count = response->series.count};
-    const Status status = encoding_write(encoder, &table, bytes, problem);
-    free(chosen);
+// A table of the outcome, without the line feed of a document if it is `inside` another one.
+static Status table_write(Outcome *outcome, const TableFormat *format, bool inside,
+                          Status (*fill)(TableStream *stream, Problem *problem), Bytes *bytes,
+                          Problem *problem) {
+    TableStream *stream = table_stream_new(outcome_ref(outcome));
+    Status status = stream != NULL ? fill(stream, problem) : STATUS_NO_MEMORY;
+    if (status == STATUS_OK)
+        status = format_write(format, &stream->table, bytes, problem);
+    table_stream_free(stream);
+    if (status == STATUS_OK && inside && bytes->count > 0)
+        bytes->count--;
     return status;
 }
 
-// {job, series, impacts, psd}, each as the daemon answers it.
-static Status whole_write(const Outcome *outcome, const Bytes *job, Bytes *bytes,
-                          Problem *problem) {
+static Status impacts_fill(TableStream *stream, Problem *problem) {
+    return table_stream_impacts(stream, &format_json, NULL, problem);
+}
+
+// {job, series, impacts, psd}, each as the daemon sends it.
+static Status whole_write(Outcome *outcome, const Bytes *job, Bytes *bytes, Problem *problem) {
     bytes_text(bytes, "{\"job\": ");
     bytes_put(bytes, job->at, job->count);
     bytes_text(bytes, ",\n\"series\": ");
-    TRY(series_write(&outcome->response, format_find("json"), bytes, problem));
+    TRY(table_write(outcome, &format_json, false, table_stream_series, bytes, problem));
     bytes_text(bytes, ",\n\"impacts\": ");
-    (void)document_impacts(bytes, &outcome->response, NULL);
+    if (outcome->response.is_unlisted)
+        bytes_text(bytes, "null");
+    else
+        TRY(table_write(outcome, &format_json, true, impacts_fill, bytes, problem));
     bytes_text(bytes, ",\n\"psd\": ");
-    (void)document_psd(bytes, &outcome->spectrum, NULL);
+    if (outcome->spectrum.densities.count == 0)
+        bytes_text(bytes, "null");
+    else
+        TRY(table_write(outcome, &format_json, true, table_stream_psd, bytes, problem));
     bytes_text(bytes, "}\n");
     return STATUS_OK;
 }
@@ -122,9 +126,10 @@ static Status scene_run(const char *path, const StudyRequest *inquiry, const War
         bytes_text(&job, "\n");
         (void)fwrite(job.at, 1, job.count, stdout);
     } else if (status == STATUS_OK) {
-        status = strcmp(settings->encoder->extension, "json") == 0
+        status = settings->encoder == &format_json
                      ? whole_write(outcome, &job, &bytes, problem)
-                     : series_write(&outcome->response, settings->encoder, &bytes, problem);
+                     : table_write(outcome, settings->encoder, false, table_stream_series, &bytes,
+                                   problem);
         if (status == STATUS_OK && bytes.is_failed)
             status = STATUS_NO_MEMORY;
         if (status == STATUS_OK)
@@ -181,9 +186,9 @@ static Status encoder_choose(const char *output, const TableFormat **encoder, Pr
     if (*encoder != NULL)
         return STATUS_OK;
     char known[128] = "";
-    for (size_t i = 0; encoders[i] != NULL; i++) {
+    for (size_t i = 0; table_formats[i] != NULL; i++) {
         char ending[16];
-        snprintf(ending, sizeof ending, ".%s", encoders[i]->extension);
+        snprintf(ending, sizeof ending, ".%s", table_formats[i]->extension);
         text_list(known, sizeof known, ending);
     }
     return problem_add(problem, STATUS_USAGE, "--output", "must end in one of %s, is %.200s", known,

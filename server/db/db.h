@@ -137,10 +137,11 @@ void job_words(Bytes *bytes, const char *title, const char *const *labels, size_
 typedef struct ResultRow {
     char id[72];
     char *engine;
-    char *scene, *plan, *summary, *warnings, *energy, *impacts; // JSON documents
-    char *work;                                                 // JSON document; NULL: not known
-    char *notes;    // JSON array, what the run itself warned of; NULL: nothing
-    char *psd;      // JSON; NULL where none was asked for
+    char *scene, *plan, *summary, *warnings; // JSON documents
+    char *work;          // JSON document; NULL: not known
+    char *notes;         // JSON array, what the run itself warned of; NULL: nothing
+    StoredBytes outcome; // jobs/outcome_blob.h
+    uint64_t impact_count;
     char *study;    // JSON, the answer of the scene's study; NULL: none
     char *uses;     // when saved: what of the catalogue it was made with, "sponge@1", a line each;
                     // NULL: nothing
@@ -156,8 +157,11 @@ Status db_result_save(Db *db, const ResultRow *result, const JobRow *const *jobs
 // The same, posted; all of it is borrowed until then.
 Status db_result_post(Db *db, const ResultRow *result, const JobRow *const *jobs, size_t job_count,
                       WritePriority turn, const WriteDone *done);
+// All but the outcome.
 Status db_result_load(Db *db, const char *id, ResultRow *row, Problem *problem);
-// The same without scene, energy, impacts, psd and study, which may be long.
+// Id and outcome alone.
+Status db_result_outcome(Db *db, const char *id, ResultRow *row, Problem *problem);
+// The same as db_result_load without scene and study, which may be long.
 Status db_result_head(Db *db, const char *id, ResultRow *row, Problem *problem);
 // Id, engine and scene alone: what computing it anew takes.
 Status db_result_scene(Db *db, const char *id, ResultRow *row, Problem *problem);

@@ -19,10 +19,9 @@ static const SqlColumn result_columns[] = {
     COLUMN(ResultRow, warnings),
     COLUMN(ResultRow, work),
     COLUMN(ResultRow, notes),
-    COLUMN_WITH(ResultRow, energy, COLUMN_LONG),
+    COLUMN(ResultRow, impact_count),
     COLUMN_WITH(ResultRow, scene, COLUMN_LONG),
-    COLUMN_WITH(ResultRow, impacts, COLUMN_LONG),
-    COLUMN_WITH(ResultRow, psd, COLUMN_LONG),
+    COLUMN_WITH(ResultRow, outcome, COLUMN_LONG),
     COLUMN_WITH(ResultRow, study, COLUMN_LONG),
     COLUMN_END
 };
@@ -98,7 +97,12 @@ static Status result_load(Db *db, const char *sql, const char *id, ResultRow *ro
 }
 
 Status db_result_load(Db *db, const char *id, ResultRow *row, Problem *problem) {
-    static const char sql[] = "SELECT {columns} FROM results WHERE id = :id";
+    static const char sql[] = "SELECT {head}, scene, study FROM results WHERE id = :id";
+    return result_load(db, sql, id, row, problem);
+}
+
+Status db_result_outcome(Db *db, const char *id, ResultRow *row, Problem *problem) {
+    static const char sql[] = "SELECT id, outcome FROM results WHERE id = :id";
     return result_load(db, sql, id, row, problem);
 }
 

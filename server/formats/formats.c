@@ -1,20 +1,76 @@
 #include <string.h>
 
-#include "server/formats/csv.h"
 #include "server/formats/format.h"
-#include "server/formats/json.h"
-#include "server/formats/mat.h"
-#include "server/formats/npy.h"
-#include "server/formats/npz.h"
-#include "server/formats/svg.h"
 
-const TableFormat *const encoders[] = {
-    &encoder_json, &encoder_csv, &encoder_npy, &encoder_npz, &encoder_mat, &encoder_svg, NULL,
+const TableFormat *const table_formats[] = {
+    &format_json, &format_csv, &format_npy, &format_npz, &format_mat, &format_svg, NULL,
 };
 
 const TableFormat *format_find(const char *extension) {
-    for (size_t i = 0; encoders[i] != NULL; i++)
-        if (strcmp(encoders[i]->extension, extension) == 0)
-            return encoders[i];
+    for (size_t i = 0; table_formats[i] != NULL; i++)
+        if (strcmp(table_formats[i]->extension, extension) == 0)
+            return table_formats[i];
     return NULL;
+}
+
+Status format_write(const TableFormat *format, const Table *table, Bytes *bytes, Problem *problem) {
+    if (format->next != NULL) {
+        TextPlace place = {0, 0};
+        while (format->next(table, &place, bytes) && !bytes->is_failed)
+            continue;
+        return STATUS_OK;
+    }
+    Segments segments = {0};
+    const Status status = format->lay(table, &segments, problem);
+    if (status == STATUS_OK)
+        segments_write(&segments, bytes);
+    segments_clear(&segments);
+    return status;
+}
+
+void table_lay_column(const Table *table, size_t column, Segments *segments) {
+    if (table->source != NULL)
+        segments_source(segments, table->source, column, sizeof(double) * (uint64_t)table->count);
+    else
+        segments_values(segments, table_values(table, table->columns[column]->values),
+                        table->count);
+}
+
+void table_lay_axis(const Table *table, Segments *segments) {
+    if (table->axis != NULL)
+        segments_values(segments, table_values(table, table->axis), table->count);
+    else
+        segments_counted(segments, table->first, table->bucket > 0 ? table->bucket : 1,
+                         table->axis_rate, table->count);
+}
+
+static bool table_has_field(const Field *field) {
+    return field->kind == FIELD_KIND_REAL || field->kind == FIELD_KIND_COUNT ||
+           field->kind == FIELD_KIND_CHOICE;
+}
+
+static double table_number(const Field *field, const char *record) {
+    const void *at = record + field->offset;
+    if (field_is_absent(field, record))
+        return (double)NAN;
+    return field->kind == FIELD_KIND_REAL    ? *(const double *)at
+           : field->kind == FIELD_KIND_COUNT ? (double)*(const uint64_t *)at
+                                             : (double)*(const int *)at;
+}
+
+Status table_records(const Field *fields, const void *records, size_t count, size_t size,
+                     Columns *columns, Problem *problem) {
+    size_t wide = 0, c = 0;
+    for (const Field *field = fields; field->kind != FIELD_KIND_END; field++)
+        wide += table_has_field(field);
+    TRY(columns_allocate(columns, wide, count, 0, problem));
+    for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
+        if (!table_has_field(field))
+            continue;
+        columns_name(columns, c, field->name, field->unit);
+        for (size_t i = 0; i < count; i++)
+            columns->at[c].values[i] = table_number(field, (const char *)records + i * size);
+        c++;
+    }
+    return STATUS_OK;
 }

@@ -1,22 +1,17 @@
 // A series: {"sample_rate", "start", "count", "channels"}; in buckets "count" counts those, and
-// "bucket" and "samples" follow. Over an axis that is given, the axis stands in place of rate and
-// start, as one more member of the form that channels have; without any, nothing does.
-#include "server/formats/json.h"
-
+// "bucket" and "samples" follow. An axis that is given is a list like a channel, in place of rate
+// and start. Records are one list of objects.
 #include <string.h>
 
-// Lists of numbers stand one after the other: the axis where it is given, then the columns.
-typedef struct Lists {
-    size_t axes, count;
-} Lists;
+#include "server/formats/format.h"
+#include "server/json/encode.h"
 
-static Lists lists_of(const Table *table) {
-    const size_t axes = table->axis != NULL ? 1 : 0;
-    return (Lists){axes, axes + table->column_count};
-}
-
-static void put_frame(const Table *table, Bytes *bytes) {
+static void json_put_head(const Table *table, Bytes *bytes) {
     bytes_text(bytes, "{");
+    if (table->members != NULL) {
+        bytes_text(bytes, table->members);
+        return;
+    }
     if (table->axis == NULL && table->axis_name != NULL) {
         bytes_text(bytes, "\"sample_rate\": ");
         bytes_real(bytes, table->axis_rate);
@@ -29,81 +24,88 @@ static void put_frame(const Table *table, Bytes *bytes) {
         bytes_format(bytes, "\"bucket\": %zu, \"samples\": %zu, ", table->bucket, table->samples);
 }
 
-static void open_member(Bytes *bytes, const char *name, const char *unit, const char *values) {
+static void json_open_list(Bytes *bytes, const char *name, const char *unit, const char *values) {
     bytes_json_string(bytes, name);
     bytes_text(bytes, ": {\"unit\": ");
     bytes_json_string(bytes, unit);
     bytes_format(bytes, ", \"%s\": [", values);
 }
 
-static void open_list(const Table *table, size_t list, Bytes *bytes) {
-    const Lists lists = lists_of(table);
-    if (list < lists.axes) {
-        open_member(bytes, table->axis_name, table->axis_unit, "values");
+// Column `c`, or the axis; in buckets two columns are the lists "min" and "max" of one channel.
+static void json_open_column(const Table *table, size_t c, bool is_axis, Bytes *bytes) {
+    if (is_axis) {
+        json_open_list(bytes, table->axis_name, table->axis_unit, "values");
         return;
     }
-    const size_t c = list - lists.axes;
     const Column *column = table->columns[c];
-    if (c == 0)
-        bytes_text(bytes, "\"channels\": {");
-    if (table->bucket == 0) {
-        bytes_text(bytes, c > 0 ? ", " : "");
-        open_member(bytes, column->name, column->unit, "values");
-    } else if (c % 2 == 0) {
-        char name[sizeof column->name];
-        text_fit(name, sizeof name, column->name);
-        const size_t length = strlen(name), ending = strlen("_min");
-        name[length > ending ? length - ending : 0] = '\0';
-        bytes_text(bytes, c > 0 ? ", " : "");
-        open_member(bytes, name, column->unit, "min");
-    } else {
+    char name[sizeof column->name];
+    if (table->bucket > 0 && c % 2 == 1) {
         bytes_text(bytes, ", \"max\": [");
+        return;
     }
+    text_fit(name, sizeof name, column->name);
+    if (table->bucket > 0 && strlen(name) > strlen("_min"))
+        name[strlen(name) - strlen("_min")] = '\0';
+    bytes_text(bytes, c > 0 ? ", " : "\"channels\": {");
+    json_open_list(bytes, name, column->unit, table->bucket > 0 ? "min" : "values");
 }
 
-static void close_list(const Table *table, size_t list, Bytes *bytes) {
-    const Lists lists = lists_of(table);
-    const bool is_first_of_two =
-        table->bucket > 0 && list >= lists.axes && (list - lists.axes) % 2 == 0;
-    bytes_text(bytes, is_first_of_two ? "]" : "]}");
-    if (list < lists.axes)
-        bytes_text(bytes, ", ");
-}
-
-static bool json_next(const Table *table, TextPlace *place, Bytes *bytes) {
-    const Lists lists = lists_of(table);
-    if (place->part == 0) {
-        put_frame(table, bytes);
-        if (table->column_count == 0 && lists.axes == 0)
-            bytes_text(bytes, "\"channels\": {");
-        place->part = 1;
-        return true;
-    }
-    const size_t list = place->part - 1;
-    if (list >= lists.count) {
-        if (table->column_count == 0 && lists.axes > 0)
-            bytes_text(bytes, "\"channels\": {");
-        bytes_text(bytes, "}}\n");
+static bool json_next_values(const Table *table, TextPlace *place, Bytes *bytes) {
+    const size_t axes = table->axis != NULL ? 1 : 0, list = place->part - 1;
+    const bool is_axis = list < axes;
+    if (list == axes + table->column_count) {
+        bytes_text(bytes, table->column_count == 0 ? "\"channels\": {}}\n" : "}}\n");
         return false;
     }
-    const double *values =
-        list < lists.axes ? table->axis : table->columns[list - lists.axes]->values;
-    const size_t left = table->count - place->row;
-    const size_t count = left < ENCODER_PIECE_NUMBERS ? left : ENCODER_PIECE_NUMBERS;
+    const size_t c = list - axes, left = table->count - place->row;
+    const size_t count = left < FORMAT_PIECE_NUMBERS ? left : FORMAT_PIECE_NUMBERS;
+    const double *values = is_axis ? table->axis : table->columns[c]->values;
     if (place->row == 0)
-        open_list(table, list, bytes);
+        json_open_column(table, c, is_axis, bytes);
     else
         bytes_text(bytes, ",");
     bytes_reals(bytes, table_values(table, values) + place->row, count);
     place->row += count;
     if (place->row == table->count) {
-        close_list(table, list, bytes);
+        const bool has_max = table->bucket > 0 && !is_axis && c % 2 == 0;
+        bytes_text(bytes, is_axis ? "]}, " : has_max ? "]" : "]}");
         *place = (TextPlace){place->part + 1, 0};
     }
     return true;
 }
 
-const TableFormat encoder_json = {
+static bool json_next_records(const Table *table, TextPlace *place, Bytes *bytes) {
+    enum { PIECE = 128 };
+    const size_t left = table->count - place->row, count = left < PIECE ? left : PIECE;
+    bytes_text(bytes, place->row == 0 ? "[" : "");
+    for (size_t i = place->row; i < place->row + count; i++) {
+        bytes_text(bytes, i > 0 ? ", {" : "{");
+        if (table->numbers != NULL)
+            bytes_format(bytes, "\"number\": %zu, ", table->numbers[i]);
+        (void)encode_members(bytes, table->fields,
+                             (const char *)table->records + i * table->record_size, WRITE_REPORT);
+        bytes_text(bytes, "}");
+    }
+    place->row += count;
+    if (place->row < table->count)
+        return true;
+    bytes_text(bytes, "]");
+    bytes_text(bytes, table->end != NULL ? table->end : "");
+    bytes_text(bytes, "}\n");
+    return false;
+}
+
+static bool json_next(const Table *table, TextPlace *place, Bytes *bytes) {
+    if (place->part == 0) {
+        json_put_head(table, bytes);
+        place->part = 1;
+        return true;
+    }
+    return table->fields != NULL ? json_next_records(table, place, bytes)
+                                 : json_next_values(table, place, bytes);
+}
+
+const TableFormat format_json = {
     .extension = "json",
     .content_type = "application/json",
     .is_binary = false,

@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/formats/csv_cells.h"
+#include "server/formats/csv.h"
 #include "server/json/encode.h"
 #include "server/json/material_bodies.h"
 #include "server/materials/exchange.h"

@@ -12,69 +12,81 @@ enum { FIRST_SEGMENTS = 16, CHUNK = 1024, LANES = 8 }; // numbers that are count
 
 static const double offsets[LANES] = {0, 1, 2, 3, 4, 5, 6, 7};
 
-void segments_clear(Segments *layout) {
-    free(layout->at);
-    bytes_clear(&layout->text);
-    *layout = (Segments){0};
+void segments_clear(Segments *segments) {
+    free(segments->at);
+    bytes_clear(&segments->text);
+    *segments = (Segments){0};
 }
 
-static Segment *add(Segments *layout, uint64_t size) {
-    if (layout->is_failed || size == 0)
+static Segment *segments_add(Segments *segments, uint64_t size) {
+    if (segments->is_failed || size == 0)
         return NULL;
-    if (layout->count == layout->room) {
-        const size_t room = layout->room > 0 ? 2 * layout->room : FIRST_SEGMENTS;
-        Segment *at = realloc(layout->at, room * sizeof *at);
+    if (segments->count == segments->room) {
+        const size_t room = segments->room > 0 ? 2 * segments->room : FIRST_SEGMENTS;
+        Segment *at = realloc(segments->at, room * sizeof *at);
         if (at == NULL) {
-            layout->is_failed = true;
+            segments->is_failed = true;
             return NULL;
         }
-        layout->at = at;
-        layout->room = room;
+        segments->at = at;
+        segments->room = room;
     }
-    Segment *segment = &layout->at[layout->count++];
-    *segment = (Segment){.start = layout->size, .size = size};
-    layout->size += size;
+    Segment *segment = &segments->at[segments->count++];
+    *segment = (Segment){.start = segments->size, .size = size};
+    segments->size += size;
     return segment;
 }
 
-static bool is_text(const Segment *segment) {
+static bool segment_is_text(const Segment *segment) {
     return segment->values == NULL && segment->rate == 0 && segment->source == NULL;
 }
 
-void segments_put(Segments *layout, const void *data, size_t size) {
-    const size_t text = layout->text.count;
-    bytes_put(&layout->text, data, size);
-    layout->is_failed = layout->is_failed || layout->text.is_failed;
-    if (layout->is_failed)
+// Where its bytes are in memory; NULL: nowhere.
+static const char *segment_memory(const Segments *segments, const Segment *segment) {
+    return segment_is_text(segment) ? segments->text.at + segment->text
+                                    : (const char *)segment->values;
+}
+
+void segments_put(Segments *segments, const void *data, size_t size) {
+    const size_t text = segments->text.count;
+    bytes_put(&segments->text, data, size);
+    segments->is_failed = segments->is_failed || segments->text.is_failed;
+    if (segments->is_failed)
         return;
-    Segment *last = layout->count > 0 ? &layout->at[layout->count - 1] : NULL;
-    if (last != NULL && is_text(last)) {
+    Segment *last = segments->count > 0 ? &segments->at[segments->count - 1] : NULL;
+    if (last != NULL && segment_is_text(last)) {
         last->size += size;
-        layout->size += size;
+        segments->size += size;
         return;
     }
-    Segment *segment = add(layout, size);
+    Segment *segment = segments_add(segments, size);
     if (segment != NULL)
         segment->text = text;
 }
 
-void segments_number(Segments *layout, uint64_t value, size_t size) {
-    segments_put(layout, &value, size);
+void segments_text(Segments *segments, Bytes *text) {
+    segments->is_failed = segments->is_failed || text->is_failed;
+    segments_put(segments, text->at, text->count);
+    bytes_clear(text);
 }
 
-void segments_fill(Segments *layout, char with, size_t count) {
+void segments_number(Segments *segments, uint64_t value, size_t size) {
+    segments_put(segments, &value, size);
+}
+
+void segments_fill(Segments *segments, char with, size_t count) {
     for (size_t i = 0; i < count; i++)
-        segments_put(layout, &with, 1);
+        segments_put(segments, &with, 1);
 }
 
-void segments_values(Segments *layout, const double *values, size_t count) {
-    Segment *segment = add(layout, count * sizeof *values);
+void segments_values(Segments *segments, const double *values, size_t count) {
+    Segment *segment = segments_add(segments, count * sizeof *values);
     if (segment != NULL)
         segment->values = values;
 }
 
-void segments_counted(Segments *layout, size_t first, size_t step, double rate, size_t count) {
-    Segment *segment = add(layout, count * sizeof(double));
+void segments_counted(Segments *segments, size_t first, size_t step, double rate, size_t count) {
+    Segment *segment = segments_add(segments, count * sizeof(double));
     if (segment == NULL)
         return;
     segment->first = (double)first;
@@ -82,37 +94,35 @@ void segments_counted(Segments *layout, size_t first, size_t step, double rate, 
     segment->rate = rate;
 }
 
-void segments_source(Segments *layout, const SegmentSource *source, size_t column, uint64_t size) {
-    Segment *segment = add(layout, size);
+void segments_source(Segments *segments, const SegmentSource *source, size_t column,
+                     uint64_t size) {
+    Segment *segment = segments_add(segments, size);
     if (segment == NULL)
         return;
     segment->source = source;
     segment->column = column;
 }
 
-void segments_join(Segments *layout, const Segments *other) {
-    layout->is_failed = layout->is_failed || other->is_failed;
-    for (size_t i = 0; i < other->count && !layout->is_failed; i++) {
+void segments_join(Segments *segments, const Segments *other) {
+    segments->is_failed = segments->is_failed || other->is_failed;
+    for (size_t i = 0; i < other->count && !segments->is_failed; i++) {
         const Segment *from = &other->at[i];
-        if (is_text(from)) {
-            segments_put(layout, other->text.at + from->text, (size_t)from->size);
+        if (segment_is_text(from)) {
+            segments_put(segments, segment_memory(other, from), (size_t)from->size);
             continue;
         }
-        Segment *segment = add(layout, from->size);
+        const uint64_t start = segments->size;
+        Segment *segment = segments_add(segments, from->size);
         if (segment == NULL)
             return;
-        segment->values = from->values;
-        segment->first = from->first;
-        segment->step = from->step;
-        segment->rate = from->rate;
-        segment->source = from->source;
-        segment->column = from->column;
+        *segment = *from;
+        segment->start = start;
     }
 }
 
 // Whole numbers below 2^53, so that each sum is exact and each quotient that of the text formats.
 // The loop over eight becomes vectors.
-static void count_up(const Segment *segment, size_t from, size_t count, double *target) {
+static void segment_count_up(const Segment *segment, size_t from, size_t count, double *target) {
     const double step = segment->step, rate = segment->rate;
     double next = segment->first + (double)from * step;
     size_t i = 0;
@@ -123,87 +133,79 @@ static void count_up(const Segment *segment, size_t from, size_t count, double *
         target[i] = next / rate;
 }
 
-static void read_counted(const Segment *segment, uint64_t offset, char *target, size_t size) {
+static void segment_read(const Segments *segments, const Segment *segment, uint64_t offset,
+                         char *target, size_t size) {
+    const char *memory = segment_memory(segments, segment);
     double numbers[CHUNK];
-    while (size > 0) {
+    if (memory != NULL)
+        memcpy(target, memory + offset, size);
+    else if (segment->source != NULL)
+        segment->source->read(segment->source->context, segment->column, offset, target, size);
+    while (segment->rate != 0 && size > 0) {
         const size_t number = (size_t)(offset / sizeof *numbers), skip = offset % sizeof *numbers;
-        const size_t most = sizeof numbers - skip, taken = size < most ? size : most;
-        count_up(segment, number, (skip + taken + sizeof *numbers - 1) / sizeof *numbers, numbers);
-        memcpy(target, (const char *)numbers + skip, taken);
-        target += taken;
-        offset += taken;
-        size -= taken;
+        const size_t max = sizeof numbers - skip, some = size < max ? size : max;
+        segment_count_up(segment, number, (skip + some + sizeof *numbers - 1) / sizeof *numbers,
+                         numbers);
+        memcpy(target, (const char *)numbers + skip, some);
+        target += some;
+        offset += some;
+        size -= some;
     }
 }
 
 // The last segment that begins at or before a place.
-static const Segment *find(const Segments *layout, uint64_t place) {
-    size_t low = 0, high = layout->count;
+static const Segment *segments_find(const Segments *segments, uint64_t place) {
+    size_t low = 0, high = segments->count;
     while (high - low > 1) {
         const size_t middle = low + (high - low) / 2;
-        if (layout->at[middle].start <= place)
+        if (segments->at[middle].start <= place)
             low = middle;
         else
             high = middle;
     }
-    return &layout->at[low];
+    return &segments->at[low];
 }
 
-void segments_read(const Segments *layout, uint64_t start, void *target, size_t size) {
+void segments_read(const Segments *segments, uint64_t start, void *target, size_t size) {
     char *to = target;
     if (size == 0)
         return;
-    for (const Segment *segment = find(layout, start); size > 0; segment++) {
+    for (const Segment *segment = segments_find(segments, start); size > 0; segment++) {
         const uint64_t offset = start - segment->start, left = segment->size - offset;
-        const size_t taken = left < size ? (size_t)left : size;
-        if (segment->values != NULL)
-            memcpy(to, (const char *)segment->values + offset, taken);
-        else if (segment->rate != 0)
-            read_counted(segment, offset, to, taken);
-        else if (segment->source != NULL)
-            segment->source->read(segment->source->context, segment->column, offset, to, taken);
-        else
-            memcpy(to, layout->text.at + segment->text + offset, taken);
-        to += taken;
-        start += taken;
-        size -= taken;
+        const size_t some = left < size ? (size_t)left : size;
+        segment_read(segments, segment, offset, to, some);
+        to += some;
+        start += some;
+        size -= some;
     }
 }
 
-void segments_write(const Segments *layout, Bytes *bytes) {
-    if (layout->is_failed) {
+void segments_write(const Segments *segments, Bytes *bytes) {
+    if (segments->is_failed) {
         bytes->is_failed = true;
-    } else if (bytes_reserve(bytes, (size_t)layout->size)) {
-        segments_read(layout, 0, bytes->at + bytes->count, (size_t)layout->size);
-        bytes->count += (size_t)layout->size;
+    } else if (bytes_reserve(bytes, (size_t)segments->size)) {
+        segments_read(segments, 0, bytes->at + bytes->count, (size_t)segments->size);
+        bytes->count += (size_t)segments->size;
         bytes->at[bytes->count] = '\0';
     }
 }
 
-uint32_t segments_crc32(const Segments *layout) {
+uint32_t segments_crc32(const Segments *segments) {
     uint32_t crc = 0;
-    double numbers[CHUNK];
-    for (size_t i = 0; i < layout->count; i++) {
-        const Segment *segment = &layout->at[i];
-        if (segment->values != NULL) {
-            crc = gzip_crc32(crc, segment->values, (size_t)segment->size);
-        } else if (segment->source != NULL) {
-            for (uint64_t at = 0; at < segment->size;) {
-                const uint64_t left = segment->size - at;
-                const size_t size = left < sizeof numbers ? (size_t)left : sizeof numbers;
-                segment->source->read(segment->source->context, segment->column, at, numbers, size);
-                crc = gzip_crc32(crc, numbers, size);
-                at += size;
-            }
-        } else if (segment->rate == 0) {
-            crc = gzip_crc32(crc, layout->text.at + segment->text, (size_t)segment->size);
-        } else {
-            const size_t count = (size_t)(segment->size / sizeof *numbers);
-            for (size_t k = 0; k < count; k += CHUNK) {
-                const size_t made = count - k < CHUNK ? count - k : CHUNK;
-                count_up(segment, k, made, numbers);
-                crc = gzip_crc32(crc, numbers, made * sizeof *numbers);
-            }
+    char piece[CHUNK * sizeof(double)];
+    for (size_t i = 0; i < segments->count; i++) {
+        const Segment *segment = &segments->at[i];
+        const char *memory = segment_memory(segments, segment);
+        if (memory != NULL) {
+            crc = gzip_crc32(crc, memory, (size_t)segment->size);
+            continue;
+        }
+        for (uint64_t at = 0; at < segment->size;) {
+            const uint64_t left = segment->size - at;
+            const size_t size = left < sizeof piece ? (size_t)left : sizeof piece;
+            segment_read(segments, segment, at, piece, size);
+            crc = gzip_crc32(crc, piece, size);
+            at += size;
         }
     }
     return crc;

@@ -9,7 +9,7 @@
 #include "core/study/sensitivity.h"
 #include "server/formats/chart.h"
 #include "server/formats/charts.h"
-#include "server/formats/csv_cells.h"
+#include "server/formats/csv.h"
 #include "server/formats/sweep.h"
 #include "server/jobs/documents.h"
 

@@ -1,4 +1,4 @@
-#include "server/formats/svg.h"
+#include "server/formats/format.h"
 
 #include <math.h>
 #include <string.h>
@@ -134,7 +134,7 @@ static bool svg_next(const Table *table, TextPlace *place, Bytes *bytes) {
     return false;
 }
 
-const TableFormat encoder_svg = {
+const TableFormat format_svg = {
     .extension = "svg",
     .content_type = chart_type,
     .is_binary = false,

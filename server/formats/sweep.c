@@ -4,9 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/formats/csv_cells.h"
+#include "server/formats/csv.h"
 #include "server/formats/format.h"
-#include "server/formats/npy.h"
 #include "server/formats/zip.h"
 #include "server/util/base_path.h"
 
@@ -341,7 +340,7 @@ static Status sweep_lay_array(SweepDocument *document, Zip *zip, size_t index, P
     Segments array = {0};
     if (width > 0)
         snprintf(type, sizeof type, "|S%zu", width);
-    npy_put_header_of(&array, type, rows, 0);
+    npy_put_header(&array, type, rows, 0);
     segments_source(&array, &document->columns, index,
                     (uint64_t)rows * (width > 0 ? width : sizeof(double)));
     snprintf(file, sizeof file, "%.74s.npy", sweep_array_name(&column));
@@ -354,7 +353,7 @@ static Status sweep_lay_array(SweepDocument *document, Zip *zip, size_t index, P
 }
 
 static Status sweep_lay_arrays(SweepDocument *document, Segments *layout, Problem *problem) {
-    Zip zip = {.layout = layout};
+    Zip zip = {.segments = layout};
     Status status = STATUS_OK;
     for (size_t i = 0; i < sweep_columns(document->sweep) && status == STATUS_OK; i++)
         status = sweep_lay_array(document, &zip, i, problem);

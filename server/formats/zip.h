@@ -1,5 +1,5 @@
 // A ZIP archive of members that are stored as they are, the same bytes every time: no times, no
-// compression. Not ZIP64: what would need it is refused. Used by npz.c and bundle.c.
+// compression. No ZIP64: what would need it is refused.
 #ifndef SERVER_FORMATS_ZIP_H
 #define SERVER_FORMATS_ZIP_H
 
@@ -8,16 +8,16 @@
 
 enum { ZIP_NAME_MAX = 79 };
 
-// The archive as it is laid out. All zero but `layout` is an empty one.
+// An archive being written to `segments`. All zero but that is empty.
 typedef struct Zip {
-    Segments *layout;
-    Segments directory; // what comes at the end
+    Segments *segments;
+    Segments directory; // the end of the archive
     size_t count;
 } Zip;
 
-// Puts a member behind the last one; `content` is what it is made of. STATUS_LIMIT from 4 GiB on.
+// Appends a member; borrows what `content` borrows. STATUS_LIMIT from 4 GiB on.
 Status zip_put(Zip *zip, const char *name, const Segments *content, Problem *problem);
-// Puts the directory, and clears `zip`, whatever it returns.
+// Appends the directory and clears `zip`, also when it fails.
 Status zip_end(Zip *zip, Problem *problem);
 
 #endif

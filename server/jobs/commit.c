@@ -324,8 +324,7 @@ static size_t run_result_bytes(const RunResult *run_result) {
     const ResultRow *row = &run_result->result;
     return sizeof(Saving) + (run_result->outcome != NULL ? outcome_bytes(run_result->outcome) : 0) +
            text_bytes(row->scene) + text_bytes(row->plan) + text_bytes(row->summary) +
-           text_bytes(row->energy) + text_bytes(row->impacts) + text_bytes(row->psd) +
-           text_bytes(row->study);
+           row->outcome.size + text_bytes(row->study);
 }
 
 // With the lock held: without memory for a Saving its jobs are failed here, and computed again at

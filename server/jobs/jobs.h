@@ -95,12 +95,15 @@ Status jobs_find(JobManager *manager, const char *id, Job **job, Problem *proble
 // already.
 Status jobs_cancel(JobManager *manager, const char *id, Job **job, Problem *problem);
 
-// The series-bearing Outcome of a result: from memory, from the database where it is kept (its
-// plan, summary and warnings are empty then), or computed anew by a worker. *outcome is NULL and
+// The Outcome of a result with its series: from memory, from the database where they are stored
+// (its plan, work and warnings are empty then), or computed again by a worker. *outcome is NULL and
 // the return is STATUS_OK while it is being computed: `waker` is then called once when it is worth
 // asking again. STATUS_NOT_FOUND, STATUS_GONE for another engine version.
 Status jobs_outcome(JobManager *manager, const char *result, const Callback *callback,
                     Outcome **outcome, Problem *problem);
+// The same without waiting for the series, which may be missing; for any engine version.
+Status jobs_outcome_stored(JobManager *manager, const char *result, Outcome **outcome,
+                           Problem *problem);
 
 // Tries again to store what could not be stored for want of room; to be called now and then.
 void jobs_retry_sweep(JobManager *manager);

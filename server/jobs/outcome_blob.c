@@ -1,187 +1,204 @@
-// All are doubles, as the machine has them: little-endian wherever this runs. The first eight bytes
-// name the layout, so that a later engine still reads it or leaves it alone.
+// Numbers of eight bytes in the order and form of the machine, which is little-endian. Structs are
+// written by their Field rows: a REAL, COUNT or CHOICE takes eight bytes.
 //
-//     "impact 1" | response's and spectrum's numbers | impacts | names | columns
+//     outcome   head | energy | summary | impacts | frequencies | densities
+//     columns   count | rows | names and units | values, column after column
 #include "server/jobs/outcome_blob.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-static const char layout[8] = {'i', 'm', 'p', 'a', 'c', 't', ' ', '1'};
+// `layout` and the two sizes tell apart blobs of a program with other rows.
+typedef struct BlobHead {
+    char layout[8];
+    uint64_t energy_bytes, impact_bytes;
+    double sample_rate;
+    uint64_t count, impacts, is_unlisted, impact_count, resting_count;
+    uint64_t segment, overlap, window, detrend, segments;
+    uint64_t rows; // of the spectra
+} BlobHead;
 
-enum { HEAD = 24, IMPACT = 13 };
+static const char blob_layout[8] = "outcome1";
 
-typedef struct Decoder {
-    const char *at;
-    size_t left;
-    bool is_bad;
-} Decoder;
-
-static void put_numbers(Bytes *bytes, const double *values, size_t count) {
-    bytes_put(bytes, values, count * sizeof *values);
+static bool blob_has(const Field *field) {
+    return field->kind == FIELD_KIND_REAL || field->kind == FIELD_KIND_COUNT ||
+           field->kind == FIELD_KIND_CHOICE;
 }
 
-static void put_columns(Bytes *bytes, const Columns *columns) {
+static uint64_t blob_row_bytes(const Field *fields) {
+    uint64_t bytes = 0;
+    for (const Field *field = fields; field->kind != FIELD_KIND_END; field++)
+        bytes += blob_has(field) ? sizeof(uint64_t) : 0;
+    return bytes;
+}
+
+static BlobHead blob_head(const Outcome *outcome) {
+    const Response *response = &outcome->response;
+    const Spectrum *spectrum = &outcome->spectrum;
+    BlobHead head = {.energy_bytes = blob_row_bytes(energy_fields) + blob_row_bytes(summary_fields),
+                     .impact_bytes = blob_row_bytes(impact_fields),
+                     .sample_rate = response->sample_rate,
+                     .count = response->count,
+                     .impacts = response->impacts.count,
+                     .is_unlisted = response->is_unlisted,
+                     .impact_count = response->impact_count,
+                     .resting_count = response->resting_count,
+                     .segment = spectrum->settings.segment,
+                     .overlap = spectrum->settings.overlap,
+                     .window = (uint64_t)spectrum->settings.window,
+                     .detrend = (uint64_t)spectrum->settings.detrend,
+                     .segments = spectrum->segments,
+                     .rows = spectrum->densities.rows};
+    memcpy(head.layout, blob_layout, sizeof head.layout);
+    return head;
+}
+
+static void blob_put_row(Bytes *bytes, const Field *fields, const void *item) {
+    for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
+        const void *member = (const char *)item + field->offset;
+        if (!blob_has(field))
+            continue;
+        const int64_t choice = field->kind == FIELD_KIND_CHOICE ? *(const int *)member : 0;
+        bytes_put(bytes, field->kind == FIELD_KIND_CHOICE ? &choice : member, sizeof choice);
+    }
+}
+
+void series_blob_write(Bytes *bytes, const Columns *columns) {
+    const uint64_t sizes[2] = {columns->count, columns->rows};
+    bytes_put(bytes, sizes, sizeof sizes);
     for (size_t i = 0; i < columns->count; i++) {
         bytes_put(bytes, columns->at[i].name, sizeof columns->at[i].name);
         bytes_put(bytes, columns->at[i].unit, sizeof columns->at[i].unit);
     }
     for (size_t i = 0; i < columns->count; i++)
-        put_numbers(bytes, columns->at[i].values, columns->rows);
+        bytes_put(bytes, columns->at[i].values, columns->rows * sizeof(double));
 }
 
 void outcome_blob_write(Bytes *bytes, const Outcome *outcome) {
     const Response *response = &outcome->response;
-    const Spectrum *spectrum = &outcome->spectrum;
-    const Energy *energy = &response->energy;
-    const double head[HEAD] = {response->sample_rate,
-                               (double)response->count,
-                               (double)response->series.count,
-                               (double)response->series.rows,
-                               (double)response->impacts.count,
-                               response->is_unlisted,
-                               (double)response->impact_count,
-                               (double)response->resting_count,
-                               energy->initial,
-                               energy->input,
-                               energy->structural_damping,
-                               energy->contact,
-                               energy->kinetic,
-                               energy->strain,
-                               energy->residual,
-                               (double)spectrum->densities.count,
-                               (double)spectrum->densities.rows,
-                               (double)spectrum->settings.segment,
-                               (double)spectrum->settings.overlap,
-                               spectrum->settings.window,
-                               spectrum->settings.detrend,
-                               (double)spectrum->segments};
-    bytes_put(bytes, layout, sizeof layout);
-    put_numbers(bytes, head, HEAD);
-    for (size_t i = 0; i < response->impacts.count; i++) {
-        const Impact *one = &response->impacts.at[i];
-        const double row[IMPACT] = {one->kind,
-                                    one->start,
-                                    one->end,
-                                    (double)one->damper,
-                                    one->side,
-                                    one->approach_speed,
-                                    one->separation_speed,
-                                    one->restitution,
-                                    one->duration,
-                                    one->peak_force,
-                                    one->impulse,
-                                    one->energy_lost,
-                                    one->is_resumed};
-        put_numbers(bytes, row, IMPACT);
-    }
-    put_columns(bytes, &response->series);
-    put_numbers(bytes, spectrum->frequency, spectrum->densities.rows);
-    put_columns(bytes, &spectrum->densities);
+    const BlobHead head = blob_head(outcome);
+    bytes_put(bytes, &head, sizeof head);
+    blob_put_row(bytes, energy_fields, &response->energy);
+    blob_put_row(bytes, summary_fields, &outcome->summary);
+    for (size_t i = 0; i < response->impacts.count; i++)
+        blob_put_row(bytes, impact_fields, &response->impacts.at[i]);
+    bytes_put(bytes, outcome->spectrum.frequency, head.rows * sizeof(double));
+    series_blob_write(bytes, &outcome->spectrum.densities);
 }
 
-static void take(Decoder *reader, void *target, size_t size) {
-    if (reader->is_bad || reader->left < size) {
-        reader->is_bad = true;
+// Once it is broken it stays so, and reads zeros.
+typedef struct BlobReader {
+    const char *at;
+    size_t left;
+    bool is_broken;
+} BlobReader;
+
+// False where `count` elements of `size` bytes are more than there is.
+static bool blob_allows(BlobReader *reader, uint64_t count, uint64_t size) {
+    reader->is_broken = reader->is_broken || (count > 0 && size > reader->left / count);
+    return !reader->is_broken;
+}
+
+static void blob_take(BlobReader *reader, void *target, size_t size) {
+    if (!blob_allows(reader, 1, size)) {
         memset(target, 0, size);
-        return;
+    } else if (size > 0) {
+        memcpy(target, reader->at, size);
+        reader->at += size;
+        reader->left -= size;
     }
-    memcpy(target, reader->at, size);
-    reader->at += size;
-    reader->left -= size;
 }
 
-// A count that cannot be within what is left is none.
-static size_t as_count(Decoder *reader, double value, size_t size) {
-    if (!(value >= 0 && value <= (double)(reader->left / size)))
-        reader->is_bad = true;
-    return reader->is_bad ? 0 : (size_t)value;
+static void blob_take_row(BlobReader *reader, const Field *fields, void *item) {
+    for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
+        int64_t choice;
+        char *member = (char *)item + field->offset;
+        if (field->kind == FIELD_KIND_CHOICE) {
+            blob_take(reader, &choice, sizeof choice);
+            *(int *)(void *)member = (int)choice;
+        } else if (blob_has(field)) {
+            blob_take(reader, member, sizeof(uint64_t));
+        }
+    }
 }
 
-static void take_columns(Decoder *reader, size_t count, size_t rows, Columns *columns) {
-    if (reader->is_bad || columns_allocate(columns, count, rows, reader->left, NULL) != STATUS_OK) {
-        reader->is_bad = true;
+static void blob_take_columns(BlobReader *reader, Columns *columns) {
+    uint64_t sizes[2];
+    blob_take(reader, sizes, sizeof sizes);
+    if (!blob_allows(reader, sizes[0], sizeof columns->at->name) ||
+        !blob_allows(reader, sizes[1], sizes[0] * sizeof(double)) ||
+        columns_allocate(columns, sizes[0], sizes[1], 0, NULL) != STATUS_OK) {
+        reader->is_broken = true;
         return;
     }
-    for (size_t i = 0; i < count; i++) {
+    for (size_t i = 0; i < columns->count; i++) {
         Column *column = &columns->at[i];
-        take(reader, column->name, sizeof column->name);
-        take(reader, column->unit, sizeof column->unit);
+        blob_take(reader, column->name, sizeof column->name);
+        blob_take(reader, column->unit, sizeof column->unit);
         column->name[sizeof column->name - 1] = column->unit[sizeof column->unit - 1] = '\0';
     }
-    take(reader, columns->block, count * rows * sizeof(double));
+    blob_take(reader, columns->block, columns->count * columns->rows * sizeof(double));
 }
 
-static void take_impacts(Decoder *reader, size_t count, Impacts *impacts) {
-    impacts->at = calloc(count > 0 ? count : 1, sizeof *impacts->at);
-    if (impacts->at == NULL)
-        reader->is_bad = true;
-    for (; impacts->count < count && !reader->is_bad; impacts->count++) {
-        double row[IMPACT];
-        take(reader, row, sizeof row);
-        impacts->at[impacts->count] = (Impact){.kind = (int)row[0],
-                                               .start = row[1],
-                                               .end = row[2],
-                                               .damper = (uint64_t)row[3],
-                                               .side = (int)row[4],
-                                               .approach_speed = row[5],
-                                               .separation_speed = row[6],
-                                               .restitution = row[7],
-                                               .duration = row[8],
-                                               .peak_force = row[9],
-                                               .impulse = row[10],
-                                               .energy_lost = row[11],
-                                               .is_resumed = row[12] != 0};
+static void blob_take_impacts(BlobReader *reader, const BlobHead *head, Impacts *impacts) {
+    if (!blob_allows(reader, head->impacts, head->impact_bytes))
+        return;
+    impacts->at = calloc(head->impacts + 1, sizeof *impacts->at);
+    reader->is_broken = impacts->at == NULL;
+    for (; impacts->count < head->impacts && !reader->is_broken; impacts->count++)
+        blob_take_row(reader, impact_fields, &impacts->at[impacts->count]);
+}
+
+static void blob_take_spectrum(BlobReader *reader, const BlobHead *head, Spectrum *spectrum) {
+    spectrum->settings = (WelchSettings){.segment = head->segment,
+                                         .overlap = head->overlap,
+                                         .window = (int)head->window,
+                                         .detrend = (int)head->detrend};
+    spectrum->segments = head->segments;
+    if (head->rows > 0 && blob_allows(reader, head->rows, sizeof(double))) {
+        spectrum->frequency = malloc(head->rows * sizeof(double));
+        reader->is_broken = spectrum->frequency == NULL;
     }
+    if (head->rows > 0 && !reader->is_broken)
+        blob_take(reader, spectrum->frequency, head->rows * sizeof(double));
+    blob_take_columns(reader, &spectrum->densities);
+    reader->is_broken = reader->is_broken || spectrum->densities.rows != head->rows ||
+                        head->window > WELCH_BLACKMAN || head->detrend > WELCH_DETREND_NONE;
 }
 
-static void take_response(Decoder *reader, const double head[HEAD], Response *response) {
-    response->sample_rate = head[0];
-    response->count = (size_t)head[1];
-    response->is_unlisted = head[5] != 0;
-    response->impact_count = (uint64_t)head[6];
-    response->resting_count = (uint64_t)head[7];
-    response->energy = (Energy){.initial = head[8],
-                                .input = head[9],
-                                .structural_damping = head[10],
-                                .contact = head[11],
-                                .kinetic = head[12],
-                                .strain = head[13],
-                                .residual = head[14]};
-    take_impacts(reader, as_count(reader, head[4], IMPACT * sizeof(double)), &response->impacts);
-    take_columns(reader, as_count(reader, head[2], sizeof(Column)), as_count(reader, head[3], 1),
-                 &response->series);
+Outcome *outcome_blob_read(const void *blob, size_t size) {
+    BlobReader reader = {blob, size, false};
+    BlobHead head;
+    Outcome *outcome = outcome_new();
+    if (outcome == NULL)
+        return NULL;
+    const BlobHead own = blob_head(outcome);
+    Response *response = &outcome->response;
+    blob_take(&reader, &head, sizeof head);
+    reader.is_broken =
+        reader.is_broken || memcmp(head.layout, own.layout, sizeof own.layout) != 0 ||
+        head.energy_bytes != own.energy_bytes || head.impact_bytes != own.impact_bytes;
+    response->sample_rate = head.sample_rate;
+    response->count = head.count;
+    response->is_unlisted = head.is_unlisted != 0;
+    response->impact_count = head.impact_count;
+    response->resting_count = head.resting_count;
+    blob_take_row(&reader, energy_fields, &response->energy);
+    blob_take_row(&reader, summary_fields, &outcome->summary);
+    blob_take_impacts(&reader, &head, &response->impacts);
+    blob_take_spectrum(&reader, &head, &outcome->spectrum);
+    if (!reader.is_broken && reader.left == 0)
+        return outcome;
+    outcome_unref(outcome);
+    return NULL;
 }
 
-static void take_spectrum(Decoder *reader, const double head[HEAD], Spectrum *spectrum) {
-    const size_t rows = as_count(reader, head[16], sizeof(double));
-    spectrum->settings = (WelchSettings){.segment = (size_t)head[17],
-                                         .overlap = (size_t)head[18],
-                                         .window = (int)head[19],
-                                         .detrend = (int)head[20]};
-    spectrum->segments = (size_t)head[21];
-    if (rows > 0 && (spectrum->frequency = malloc(rows * sizeof(double))) == NULL)
-        reader->is_bad = true;
-    if (rows > 0 && !reader->is_bad)
-        take(reader, spectrum->frequency, rows * sizeof(double));
-    take_columns(reader, as_count(reader, head[15], 1), rows, &spectrum->densities);
-}
-
-Outcome *outcome_blob_read(const char *at, size_t size) {
-    Decoder reader = {at, size, false};
-    char name[sizeof layout];
-    double head[HEAD];
-    take(&reader, name, sizeof name);
-    take(&reader, head, sizeof head);
-    Outcome *outcome = NULL;
-    if (!reader.is_bad && memcmp(name, layout, sizeof layout) == 0 &&
-        (outcome = outcome_new()) != NULL) {
-        take_response(&reader, head, &outcome->response);
-        take_spectrum(&reader, head, &outcome->spectrum);
-    }
-    if (outcome != NULL && (reader.is_bad || reader.left > 0)) {
-        outcome_unref(outcome);
-        outcome = NULL;
-    }
-    return outcome;
+bool series_blob_read(const void *blob, size_t size, Columns *series) {
+    BlobReader reader = {blob, size, false};
+    *series = (Columns){.count = 0};
+    blob_take_columns(&reader, series);
+    if (!reader.is_broken && reader.left == 0)
+        return true;
+    columns_clear(series);
+    return false;
 }

@@ -50,7 +50,7 @@ void jobs_keep_series(JobManager *manager, const char *result, const Outcome *ou
         return;
     }
     *keeping = (Keeping){manager, size};
-    outcome_blob_write(&bytes, outcome);
+    series_blob_write(&bytes, &outcome->response.series);
     const WriteDone done = {kept, keeping};
     size_t count = 0;
     char *body = bytes_take(&bytes, &count);
@@ -59,13 +59,30 @@ void jobs_keep_series(JobManager *manager, const char *result, const Outcome *ou
         kept(keeping, STATUS_NO_MEMORY, "");
 }
 
+// Without series.
+static Status outcome_load(JobManager *manager, const char *result, Outcome **outcome,
+                           Problem *problem) {
+    ResultRow row = {0};
+    *outcome = NULL;
+    TRY(db_result_outcome(manager->db, result, &row, problem));
+    *outcome = outcome_blob_read(row.outcome.at, row.outcome.size);
+    result_row_clear(&row);
+    return *outcome != NULL
+               ? STATUS_OK
+               : problem_set(problem, STATUS_INTERNAL, "the stored result cannot be read");
+}
+
 // From the database, and then in memory; NULL where it is not there.
 static Outcome *load_series(JobManager *manager, const char *result) {
     char *body = NULL;
     size_t size = 0;
     Outcome *outcome = NULL;
-    if (db_series_load(manager->db, result, &body, &size, NULL) == STATUS_OK)
-        outcome = outcome_blob_read(body, size);
+    if (db_series_load(manager->db, result, &body, &size, NULL) == STATUS_OK &&
+        outcome_load(manager, result, &outcome, NULL) == STATUS_OK &&
+        !series_blob_read(body, size, &outcome->response.series)) {
+        outcome_unref(outcome);
+        outcome = NULL;
+    }
     free(body);
     pthread_mutex_lock(&manager->lock);
     manager->stored.hits += outcome != NULL;
@@ -156,4 +173,12 @@ Status jobs_outcome(JobManager *manager, const char *result, const Callback *cal
     if (*outcome != NULL)
         return STATUS_OK;
     return compute_again(manager, result, callback, problem);
+}
+
+Status jobs_outcome_stored(JobManager *manager, const char *result, Outcome **outcome,
+                           Problem *problem) {
+    pthread_mutex_lock(&manager->lock);
+    *outcome = cache_has(manager->cache, result, true) ? cache_find(manager->cache, result) : NULL;
+    pthread_mutex_unlock(&manager->lock);
+    return *outcome != NULL ? STATUS_OK : outcome_load(manager, result, outcome, problem);
 }

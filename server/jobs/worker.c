@@ -7,6 +7,7 @@
 #include <time.h>
 
 #include "server/jobs/documents.h"
+#include "server/jobs/outcome_blob.h"
 #include "server/jobs/references.h"
 #include "server/jobs/resolve_record.h"
 #include "server/jobs/study.h"
@@ -43,20 +44,16 @@ static char *take(Bytes *bytes, Status *status) {
 }
 
 static Status describe(Task *task, RunResult *run_result) {
-    const Progress watch = {task, task_is_wanted};
     const Outcome *outcome = run_result->outcome;
     ResultRow *row = &run_result->result;
-    Bytes plan = {0}, summary = {0}, work = {0}, notes = {0}, energy = {0}, uses = {0};
-    Bytes impacts = {.most = DOCUMENT_BYTES}, psd = {.most = DOCUMENT_BYTES};
+    Bytes plan = {0}, summary = {0}, work = {0}, notes = {0}, uses = {0};
+    Bytes blob = {.most = DOCUMENT_BYTES};
     Status status = STATUS_OK;
     document_plan(&plan, &outcome->plan);
     document_summary(&summary, outcome);
     document_work(&work, &outcome->work);
     document_warnings(&notes, &outcome->warnings);
-    document_energy(&energy, &outcome->response.energy);
-    if (!document_impacts(&impacts, &outcome->response, &watch) ||
-        (outcome->spectrum.densities.count > 0 && !document_psd(&psd, &outcome->spectrum, &watch)))
-        status = STATUS_CANCELLED;
+    outcome_blob_write(&blob, outcome);
     references_write(&uses, &task->inquiry);
     text_fit(row->id, sizeof row->id, task->result);
     row->engine = strdup(engine_version);
@@ -66,16 +63,16 @@ static Status describe(Task *task, RunResult *run_result) {
     row->summary = take(&summary, &status);
     row->work = take(&work, &status);
     row->notes = take(&notes, &status);
-    row->energy = take(&energy, &status);
     row->uses = take(&uses, &status);
-    row->impacts = take(&impacts, &status);
-    if (outcome->spectrum.densities.count > 0)
-        row->psd = take(&psd, &status);
+    row->outcome.at = bytes_take(&blob, &row->outcome.size);
+    row->impact_count = outcome->summary.impacts;
     row->count = outcome->response.count;
     row->sample_rate = outcome->response.sample_rate;
     row->created_unix_ms = clock_unix_ms();
-    return row->engine == NULL || row->scene == NULL || row->warnings == NULL ? STATUS_NO_MEMORY
-                                                                              : status;
+    return row->engine == NULL || row->scene == NULL || row->warnings == NULL ||
+                   row->outcome.at == NULL
+               ? STATUS_NO_MEMORY
+               : status;
 }
 
 Status run_result_add_to_study(RunResult *run_result, Problem *problem) {

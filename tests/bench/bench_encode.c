@@ -9,7 +9,7 @@
 #include <string.h>
 
 #include "server/formats/downsample.h"
-#include "server/formats/encoding.h"
+#include "server/formats/format.h"
 #include "server/util/clock.h"
 
 enum { ROWS = 60001, CHANNELS = 5, REPEATS = 41, SAMPLES = 1000000 };
@@ -63,7 +63,7 @@ static double time_memcpy(const double *source, double *target) {
 static double time_encoder(const TableFormat *encoder, const Table *table, Bytes *bytes) {
     bytes->count = 0;
     const int64_t start = clock_thread_cpu_ns();
-    const Status status = encoding_write(encoder, table, bytes, NULL);
+    const Status status = format_write(encoder, table, bytes, NULL);
     const double time = 1e-3 * (double)(clock_thread_cpu_ns() - start);
     return status == STATUS_OK && !bytes->is_failed ? time : (double)NAN;
 }

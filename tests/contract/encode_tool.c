@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/formats/encoding.h"
+#include "server/formats/format.h"
 #include "tests/support/doubles.h"
 
 enum { COLUMNS_MAX = 16 };
@@ -43,7 +43,7 @@ int main(int count, char **arguments) {
     if (table.first > rows || table.count > rows - table.first)
         return 2;
     Bytes bytes = {0};
-    const Status status = encoding_write(encoder, &table, &bytes, NULL);
+    const Status status = format_write(encoder, &table, &bytes, NULL);
     const bool is_written = status == STATUS_OK && !bytes.is_failed &&
                             fwrite(bytes.at, 1, bytes.count, stdout) == bytes.count &&
                             fflush(stdout) == 0;

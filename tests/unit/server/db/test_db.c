@@ -141,8 +141,7 @@ static ResultRow result_row(const char *id) {
                      .summary = "{\"a\": 1}",
                      .warnings = "[]",
                      .notes = "[2]",
-                     .energy = "{}",
-                     .impacts = "{}",
+                     .outcome = {"x", 1},
                      .count = 11,
                      .sample_rate = 10};
     snprintf(row.id, sizeof row.id, "%s", id);
@@ -171,7 +170,6 @@ static void a_result_and_its_jobs_are_saved_together_or_not_at_all(void **state)
     ResultRow found;
     assert_int_equal(db_result_load(db, "r-1", &found, NULL), STATUS_OK);
     assert_string_equal(found.summary, "{\"a\": 1}");
-    assert_null(found.psd);
     assert_int_equal(found.count, 11);
     result_row_clear(&found);
     assert_int_equal(db_result_head(db, "r-1", &found, NULL), STATUS_OK);

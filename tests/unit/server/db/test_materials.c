@@ -203,9 +203,9 @@ static const char data_of_before[] =
     "INSERT INTO material_reviews (material, revision, status, reason, created_unix_ms) VALUES "
     "(1, 2, 'approved', 'better', 78), (1, 1, 'deprecated', 'old', 79);"
     "INSERT INTO results (id, engine, sample_rate, count, created_unix_ms, summary, plan, "
-    "warnings, energy, scene, impacts) VALUES ('r-1', 'e', 10, 11, 80, '{}', '{}', '[]', '{}', "
+    "warnings, impact_count, scene, outcome) VALUES ('r-1', 'e', 10, 11, 80, '{}', '{}', '[]', 0, "
     "'{\"dampers\": [{\"left_buffer\": {\"material\": \"sponge@1\"}, \"right_buffer\": "
-    "{\"material\": \"sponge@1\"}}], \"title\": \"a@b\"}', '{}')";
+    "{\"material\": \"sponge@1\"}}], \"title\": \"a@b\"}', x'00')";
 
 static void check_migrated(Db *db) {
     MaterialRevision found;

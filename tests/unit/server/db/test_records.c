@@ -161,8 +161,7 @@ static void a_record_in_use_is_not_deleted(void **state) {
                         .plan = "{}",
                         .summary = "{}",
                         .warnings = "[]",
-                        .energy = "{}",
-                        .impacts = "{}",
+                        .outcome = {"x", 1},
                         .uses = "sponge@1\nrecord:elcentro\n"};
     assert_int_equal(db_result_save(db, &result, NULL, 0, &problem), STATUS_OK);
     assert_int_equal(db_record_uses(db, "elcentro", &uses, &problem), STATUS_OK);
@@ -218,8 +217,7 @@ static void nothing_written_beside_the_daemon_changes_a_record(void **state) {
                         .plan = "{}",
                         .summary = "{}",
                         .warnings = "[]",
-                        .energy = "{}",
-                        .impacts = "{}",
+                        .outcome = {"x", 1},
                         .uses = "record:elcentro\n"};
     assert_int_equal(db_result_save(db, &result, NULL, 0, &problem), STATUS_OK);
     db_close(db);

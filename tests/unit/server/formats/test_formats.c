@@ -1,6 +1,6 @@
 // The formats to the letter, on tables small enough to read; tests/contract/test_encoders.py reads
 // large ones back with numpy.
-#include "server/formats/encoding.h"
+#include "server/formats/table_stream.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -13,7 +13,6 @@
 
 #include "core/base/status.h"
 #include "server/formats/downsample.h"
-#include "server/formats/mat.h"
 
 enum { ROWS = 5000 };
 
@@ -52,7 +51,7 @@ static Table over_frequency(size_t first, size_t count) {
 
 static void assert_text(const char *extension, Table table, const char *expected) {
     Bytes bytes = {0};
-    assert_int_equal(encoding_write(format_find(extension), &table, &bytes, NULL), STATUS_OK);
+    assert_int_equal(format_write(format_find(extension), &table, &bytes, NULL), STATUS_OK);
     assert_false(bytes.is_failed);
     assert_string_equal(bytes.at, expected);
     assert_int_equal(bytes.count, strlen(expected));
@@ -96,7 +95,7 @@ static void npy_has_its_header_and_columns_as_they_lie_in_memory(void **state) {
     (void)state;
     const Table table = series(50, 4500);
     Bytes bytes = {0};
-    assert_int_equal(encoding_write(format_find("npy"), &table, &bytes, NULL), STATUS_OK);
+    assert_int_equal(format_write(format_find("npy"), &table, &bytes, NULL), STATUS_OK);
     const size_t header = 128;
     assert_int_equal(bytes.count, header + 4500 * 3 * 8);
     assert_memory_equal(bytes.at, "\x93NUMPY\x01\x00\x76\x00", 10);
@@ -122,7 +121,7 @@ static void every_part_of_a_binary_format_can_be_read_alone(void **state) {
         const Table table = series(50, 4500);
         const TableFormat *encoder = format_find(names[n]);
         Bytes whole = {0};
-        assert_int_equal(encoding_write(encoder, &table, &whole, NULL), STATUS_OK);
+        assert_int_equal(format_write(encoder, &table, &whole, NULL), STATUS_OK);
         unsigned seed = 1;
         for (size_t i = 0; i < 500; i++) {
             seed = seed * 1664525 + 1013904223;
@@ -130,18 +129,20 @@ static void every_part_of_a_binary_format_can_be_read_alone(void **state) {
             seed = seed * 1664525 + 1013904223;
             const size_t size = 1 + (i % 2 == 0 ? seed % 64 : seed % (whole.count - first));
             const size_t most = whole.count - first, taken = size < most ? size : most;
-            Encoding *encoding;
+            TableStream *stream = table_stream_new(NULL);
             char piece[777];
-            assert_int_equal(encoding_open(encoder, &table, &encoding, NULL), STATUS_OK);
-            assert_int_equal(encoding_size(encoding), whole.count);
-            encoding_cut(encoding, first, taken);
-            size_t at = 0, count;
-            while ((count = encoding_next(encoding, piece, sizeof piece)) > 0) {
-                assert_memory_equal(piece, whole.at + first + at, count);
-                at += count;
+            stream->table = table;
+            assert_int_equal(table_stream_open(stream, encoder, NULL), STATUS_OK);
+            assert_int_equal(table_stream_size(stream), whole.count);
+            table_stream_cut(stream, first, taken);
+            size_t at = 0;
+            ptrdiff_t count;
+            while ((count = table_stream_next(stream, piece, sizeof piece)) > 0) {
+                assert_memory_equal(piece, whole.at + first + at, (size_t)count);
+                at += (size_t)count;
             }
             assert_int_equal(at, taken);
-            encoding_close(encoding);
+            table_stream_free(stream);
         }
         bytes_clear(&whole);
     }
@@ -149,20 +150,21 @@ static void every_part_of_a_binary_format_can_be_read_alone(void **state) {
 
 static void piece_by_piece_is_the_same_as_whole(void **state) {
     (void)state;
-    for (size_t e = 0; encoders[e] != NULL; e++)
+    for (size_t e = 0; table_formats[e] != NULL; e++)
         for (size_t size = 1; size < 100000; size = size * 7 + 3) {
             const Table table = e % 2 == 0 ? series(7, 4990) : over_frequency(0, ROWS);
             Bytes whole = {0}, pieces = {0};
-            Encoding *encoding;
+            TableStream *stream = table_stream_new(NULL);
             char *piece = malloc(size);
-            assert_int_equal(encoding_write(encoders[e], &table, &whole, NULL), STATUS_OK);
-            assert_int_equal(encoding_open(encoders[e], &table, &encoding, NULL), STATUS_OK);
-            size_t count;
-            while ((count = encoding_next(encoding, piece, size)) > 0)
-                bytes_put(&pieces, piece, count);
+            assert_int_equal(format_write(table_formats[e], &table, &whole, NULL), STATUS_OK);
+            stream->table = table;
+            assert_int_equal(table_stream_open(stream, table_formats[e], NULL), STATUS_OK);
+            ptrdiff_t count;
+            while ((count = table_stream_next(stream, piece, size)) > 0)
+                bytes_put(&pieces, piece, (size_t)count);
             assert_int_equal(pieces.count, whole.count);
             assert_memory_equal(pieces.at, whole.at, whole.count);
-            encoding_close(encoding);
+            table_stream_free(stream);
             bytes_clear(&whole);
             bytes_clear(&pieces);
             free(piece);
@@ -173,8 +175,8 @@ static void archives_are_the_same_each_time_and_stored(void **state) {
     (void)state;
     const Table table = series(0, 100);
     Bytes first = {0}, second = {0};
-    assert_int_equal(encoding_write(format_find("npz"), &table, &first, NULL), STATUS_OK);
-    assert_int_equal(encoding_write(format_find("npz"), &table, &second, NULL), STATUS_OK);
+    assert_int_equal(format_write(format_find("npz"), &table, &first, NULL), STATUS_OK);
+    assert_int_equal(format_write(format_find("npz"), &table, &second, NULL), STATUS_OK);
     assert_int_equal(first.count, second.count);
     assert_memory_equal(first.at, second.at, first.count);
     assert_memory_equal(first.at, "PK\3\4\x14\0\0\0\0\0\0\0\x21\0", 14);
@@ -195,13 +197,13 @@ static void what_is_too_large_for_a_format_is_refused(void **state) {
     for (size_t i = 0; i < 2; i++) {
         Table table = series(0, cases[i].rows);
         table.axis_name = NULL;
-        Encoding *encoding;
+        TableStream *stream = table_stream_new(NULL);
         Problem problem;
         problem_clear(&problem);
-        assert_int_equal(
-            encoding_open(format_find(cases[i].extension), &table, &encoding, &problem),
-            STATUS_LIMIT);
-        assert_null(encoding);
+        stream->table = table;
+        assert_int_equal(table_stream_open(stream, format_find(cases[i].extension), &problem),
+                         STATUS_LIMIT);
+        table_stream_free(stream);
         assert_non_null(strstr(problem.detail, cases[i].words));
     }
 }
@@ -275,11 +277,11 @@ static void buckets_keep_the_extremes_of_ten_thousand_windows(void **state) {
 
 static void a_full_buffer_fails_and_stays_empty(void **state) {
     (void)state;
-    for (size_t e = 0; encoders[e] != NULL; e++)
+    for (size_t e = 0; table_formats[e] != NULL; e++)
         for (size_t most = 1; most < 40000; most = most * 3 + 1) {
             const Table table = series(0, ROWS);
             Bytes bytes = {.most = most};
-            assert_int_equal(encoding_write(encoders[e], &table, &bytes, NULL), STATUS_OK);
+            assert_int_equal(format_write(table_formats[e], &table, &bytes, NULL), STATUS_OK);
             assert_true(bytes.is_failed);
             assert_int_equal(bytes.count, 0);
             bytes_clear(&bytes);
@@ -288,10 +290,10 @@ static void a_full_buffer_fails_and_stays_empty(void **state) {
 
 static void formats_are_found_by_extension_and_json_is_first(void **state) {
     (void)state;
-    assert_string_equal(encoders[0]->extension, "json");
-    for (size_t i = 0; encoders[i] != NULL; i++) {
-        assert_ptr_equal(format_find(encoders[i]->extension), encoders[i]);
-        assert_non_null(strchr(encoders[i]->content_type, '/'));
+    assert_string_equal(table_formats[0]->extension, "json");
+    for (size_t i = 0; table_formats[i] != NULL; i++) {
+        assert_ptr_equal(format_find(table_formats[i]->extension), table_formats[i]);
+        assert_non_null(strchr(table_formats[i]->content_type, '/'));
     }
     assert_true(format_find("npy")->is_binary);
     assert_false(format_find("csv")->is_binary);

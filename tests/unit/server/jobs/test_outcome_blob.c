@@ -1,4 +1,4 @@
-// Kept numbers come back bit for bit, and what was cut or changed does not come back at all.
+// Stored numbers come back bit for bit, and what was cut or changed does not come back at all.
 #include "server/jobs/outcome_blob.h"
 
 #include <math.h>
@@ -22,8 +22,7 @@ static Outcome *sample(void) {
     response->impacts.at = calloc(2, sizeof *response->impacts.at);
     assert_non_null(response->impacts.at);
     response->impacts.count = 2;
-    response->impacts.at[1] =
-        (Impact){.start = 0.1, .end = (double)NAN, .damper = 3, .side = 1, .is_resumed = true};
+    response->impacts.at[1] = (Impact){.start = 0.1, .end = (double)NAN, .damper = 3, .side = 1};
     assert_int_equal(columns_allocate(&response->series, 2, 5, 0, NULL), STATUS_OK);
     columns_name(&response->series, 0, "displacement", "m");
     columns_name(&response->series, 1, "contact_force", "N");
@@ -44,23 +43,33 @@ static Outcome *sample(void) {
 static void an_outcomes_numbers_come_back(void **state) {
     (void)state;
     Outcome *outcome = sample();
-    Bytes bytes = {.most = 1 << 20}, again = {.most = 1 << 20};
+    Bytes bytes = {.most = 1 << 20}, series = {.most = 1 << 20}, again = {.most = 1 << 20};
+    outcome->summary.impacts = 2;
+    outcome->summary.trust_horizon = (double)NAN;
     outcome_blob_write(&bytes, outcome);
     Outcome *read = outcome_blob_read(bytes.at, bytes.count);
     assert_non_null(read);
     assert_int_equal(read->response.count, 5);
-    assert_string_equal(read->response.series.at[1].name, "contact_force");
-    assert_string_equal(read->response.series.at[1].unit, "N");
-    assert_memory_equal(read->response.series.block, outcome->response.series.block,
-                        10 * sizeof(double));
+    assert_int_equal(read->response.series.count, 0);
     assert_int_equal(read->response.impacts.at[1].damper, 3);
+    assert_int_equal(read->response.impacts.at[1].side, 1);
     assert_true(isnan(read->response.impacts.at[1].end));
-    assert_true(read->response.impacts.at[1].is_resumed);
+    assert_true(read->response.energy.residual == 1e-14);
+    assert_int_equal(read->summary.impacts, 2);
+    assert_true(isnan(read->summary.trust_horizon));
     assert_true(read->spectrum.frequency[2] == 500);
     outcome_blob_write(&again, read);
     assert_int_equal(bytes.count, again.count);
     assert_memory_equal(bytes.at, again.at, bytes.count);
+
+    series_blob_write(&series, &outcome->response.series);
+    assert_true(series_blob_read(series.at, series.count, &read->response.series));
+    assert_string_equal(read->response.series.at[1].name, "contact_force");
+    assert_string_equal(read->response.series.at[1].unit, "N");
+    assert_memory_equal(read->response.series.block, outcome->response.series.block,
+                        10 * sizeof(double));
     bytes_clear(&bytes);
+    bytes_clear(&series);
     bytes_clear(&again);
     outcome_unref(outcome);
     outcome_unref(read);
@@ -68,27 +77,41 @@ static void an_outcomes_numbers_come_back(void **state) {
 
 static void what_is_cut_or_has_wild_counts_is_not_read(void **state) {
     (void)state;
+    enum { IMPACTS = 40, ROWS = 112, RECORD_BYTES = 16 }; // places in the head
     Outcome *outcome = sample();
-    Bytes bytes = {.most = 1 << 20};
+    Columns columns;
+    Bytes bytes = {.most = 1 << 20}, series = {.most = 1 << 20};
     outcome_blob_write(&bytes, outcome);
+    series_blob_write(&series, &outcome->response.series);
     for (size_t size = 0; size < bytes.count; size++)
         assert_null(outcome_blob_read(bytes.at, size));
-    const double wild[] = {-1, 1e300, 4e9, (double)NAN, 1e15};
-    for (size_t i = 0; i < 24; i++)
+    for (size_t size = 0; size < series.count; size++)
+        assert_false(series_blob_read(series.at, size, &columns));
+    const uint64_t wild[] = {UINT64_MAX, UINT64_MAX / 8, 1ULL << 61, 4000000000, 1};
+    static const size_t places[] = {IMPACTS, ROWS, RECORD_BYTES};
+    for (size_t i = 0; i < COUNT(places); i++)
         for (size_t k = 0; k < COUNT(wild); k++) {
-            double before;
-            char *at = bytes.at + 8 + i * sizeof before;
-            memcpy(&before, at, sizeof before);
-            // Plain numbers may be anything; counts of what follows may not.
-            if (i == 2 || i == 3 || i == 4 || i == 15 || i == 16) {
-                memcpy(at, &wild[k], sizeof before);
-                assert_null(outcome_blob_read(bytes.at, bytes.count));
-                memcpy(at, &before, sizeof before);
-            }
+            uint64_t before;
+            memcpy(&before, bytes.at + places[i], sizeof before);
+            memcpy(bytes.at + places[i], &wild[k], sizeof before);
+            assert_null(outcome_blob_read(bytes.at, bytes.count));
+            memcpy(bytes.at + places[i], &before, sizeof before);
         }
+    for (size_t i = 0; i < 2; i++)
+        for (size_t k = 0; k < COUNT(wild); k++) {
+            uint64_t before;
+            memcpy(&before, series.at + i * sizeof before, sizeof before);
+            memcpy(series.at + i * sizeof before, &wild[k], sizeof before);
+            assert_false(series_blob_read(series.at, series.count, &columns));
+            memcpy(series.at + i * sizeof before, &before, sizeof before);
+        }
+    Outcome *read = outcome_blob_read(bytes.at, bytes.count);
+    assert_non_null(read);
+    outcome_unref(read);
     bytes.at[0] = 'x';
     assert_null(outcome_blob_read(bytes.at, bytes.count));
     bytes_clear(&bytes);
+    bytes_clear(&series);
     outcome_unref(outcome);
 }
 

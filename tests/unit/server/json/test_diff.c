@@ -5,13 +5,10 @@
 
 #include <cmocka.h>
 
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
-#include "core/simulation/simulation.h"
 #include "server/json/diff.h"
-#include "server/json/stored_report.h"
 
 static void assert_differs(const char *a, const char *b, const char *ignored, const char *wanted) {
     static const DiffFormat format = {"a", "b", true};
@@ -84,21 +81,6 @@ static void differences_beyond_the_limit_are_counted(void **state) {
     assert_int_equal(json_diff("{", "{}", NULL, &format, &bytes, &count, NULL), STATUS_INTERNAL);
 }
 
-static void a_report_with_unknown_members_is_read(void **state) {
-    (void)state;
-    Summary summary;
-    static const char report[] = "{\"peak_displacement\": 0.5, \"impacts\": 3, "
-                                 "\"trust_horizon\": null, \"of_another_version\": 1} and more";
-    assert_int_equal(stored_report_read(report, strlen(report) - strlen(" and more"),
-                                        summary_fields, &summary, NULL),
-                     STATUS_OK);
-    assert_true(summary.peak_displacement == 0.5 && summary.impacts == 3);
-    assert_true(isnan(summary.trust_horizon) && isnan(summary.rms_displacement));
-    assert_int_equal(stored_report_read("{\"impacts\": \"3\"}", 16, summary_fields, &summary, NULL),
-                     STATUS_INTERNAL);
-    assert_int_equal(stored_report_read("[", 1, summary_fields, &summary, NULL), STATUS_INTERNAL);
-}
-
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(each_difference_has_its_pointer),
@@ -106,7 +88,6 @@ int main(void) {
         cmocka_unit_test(a_member_may_be_left_out),
         cmocka_unit_test(long_numbers_are_one_difference),
         cmocka_unit_test(differences_beyond_the_limit_are_counted),
-        cmocka_unit_test(a_report_with_unknown_members_is_read),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
