@@ -138,7 +138,7 @@ typedef struct ResultRow {
     char id[72];
     char *engine;
     char *scene, *plan, *summary, *warnings; // JSON documents
-    char *work;          // JSON document; NULL: not known
+    char *work;                              // JSON document; NULL: not known
     char *notes;         // JSON array, what the run itself warned of; NULL: nothing
     StoredBytes outcome; // jobs/outcome_blob.h
     uint64_t impact_count;

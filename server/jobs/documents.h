@@ -1,5 +1,5 @@
-// The JSON documents of a result: plan, summary, work, warnings, energy, scene and the answer of its
-// study.
+// The JSON documents of a result: plan, summary, work, warnings, energy, scene and the answer of
+// its study.
 #ifndef SERVER_JOBS_DOCUMENTS_H
 #define SERVER_JOBS_DOCUMENTS_H
 
