@@ -34,9 +34,8 @@ static const double CACHED_LENGTH = 4096, SEGMENT_SAMPLE = 0.4, SEGMENT_DOUBLING
 static const double PRIME_SAMPLE = 1, PRIME_DOUBLING = 1.1;
 static const double PLANNING = 8000, PRIME_PLANNING = 0.5; // steps; share of a transform
 
-// Bytes per sample of a segment without and with a large prime factor (FFTW, window and sums), and
-// per value of a spectrum in a JSON document.
-static const double SEGMENT_BYTES = 48, PRIME_BYTES = 96, TEXT_BYTES = 24;
+// Bytes per sample of a segment without and with a large prime factor (FFTW, window and sums).
+static const double SEGMENT_BYTES = 48, PRIME_BYTES = 96;
 static const double IMPACTS_KEPT = 1e5; // limit of the estimate of memory for impacts
 
 // Taylor steps of flight where the fastest motion is shorter than a sample interval. There no bound
@@ -180,7 +179,7 @@ double cost_spectra(const SpectrumRequest *psd, size_t samples) {
 }
 
 // Memory of series and hidden columns, of the base and its refinement, matrices, impacts, spectra
-// and their document.
+// and their stored form.
 static void cost_add_bytes(const Simulation *simulation, Cost *cost) {
     const Scene *scene = &simulation->scene;
     const Output *output = &simulation->output;
@@ -199,7 +198,7 @@ static void cost_add_bytes(const Simulation *simulation, Cost *cost) {
     if (psd->channels.count == 0)
         return;
     const double values = (double)(psd->channels.count + 1) * (double)(psd->segment / 2 + 1);
-    cost->document_bytes = TEXT_BYTES * values;
+    cost->document_bytes = sizeof(double) * values;
     cost->spectra_bytes =
         (cost_prime_ratio(psd->segment) > 1 ? PRIME_BYTES : SEGMENT_BYTES) * (double)psd->segment +
         sizeof(double) * values + cost->document_bytes;

@@ -102,7 +102,7 @@ static Status simulation_check_cost(const Simulation *simulation, const Simulati
         return simulation_refuse_time(simulation, &cost, limits, problem);
     if (limits->document_bytes > 0 && !(cost.document_bytes <= limits->document_bytes))
         return problem_add(problem, STATUS_INVALID, "/output/psd",
-                           "would make a document of about %.3g MB, at most %.4g MB can be kept: "
+                           "would be about %.3g MB, at most %.4g MB can be stored: "
                            "ask for shorter segments or fewer channels",
                            1e-6 * cost.document_bytes, 1e-6 * limits->document_bytes);
     if (limits->bytes > 0 && !(cost.bytes <= limits->bytes))

@@ -50,7 +50,7 @@ typedef struct SimulationLimits {
     // SIMULATION_PATIENCE times this number if the prediction was too low.
     double steps;
     double bytes;          // predicted memory of a run
-    double document_bytes; // predicted size of the spectra as a document
+    double document_bytes; // predicted size of the spectra in a database
     size_t points;         // of a sweep; 0: the default
 } SimulationLimits;
 
@@ -138,9 +138,9 @@ bool outcome_has_force(const Outcome *outcome); // whether its contacts have a f
 typedef struct Cost {
     double steps;          // solver steps
     double cpu_seconds;    // the same as time [s]
-    double bytes;          // peak memory of the run and its documents
-    double spectra_bytes;  // the part of `bytes` for spectra and their document
-    double document_bytes; // size of that document
+    double bytes;          // peak memory of the run and its stored form
+    double spectra_bytes;  // the part of `bytes` for spectra and their stored form
+    double document_bytes; // size of that form
     double spectra;        // the part of `steps` for spectra
     double base;           // the part of `steps` for the motion of the base
     double output;         // the part of `steps` for channels

@@ -10,7 +10,9 @@
 
 typedef struct JobManager JobManager;
 
-enum { DOCUMENT_BYTES = 900000000 }; // of one document; the database takes a billion
+enum {
+    DOCUMENT_BYTES = 900000000
+}; // of one document or outcome; a value of SQLite has at most a billion
 
 typedef struct JobManagerSettings {
     size_t workers;     // threads, at least 1

@@ -155,8 +155,8 @@ TEST(spectra_are_priced_by_the_length_of_segments_and_its_prime_factors) {
 
 TEST(spectra_that_cannot_be_kept_are_refused) {
     const SimulationLimits document = {.document_bytes = 9e8}, memory = {.bytes = 1e9};
-    refuse_spectra(ALL_SPECTRA, 1 << 23, 0, &document,
-                   "a document of about 1.01e+03 MB, at most 900 MB can be kept");
+    refuse_spectra(ALL_SPECTRA, 1 << 25, 0, &document,
+                   "about 1.34e+03 MB, at most 900 MB can be stored");
     refuse_spectra(SPECTRUM, 1 << 25, 0, &memory,
                    "MB of memory, at most 1000 MB are allowed: ask for shorter segments");
 }
