@@ -100,7 +100,7 @@ static Status bundle_fill(Zip *zip, const ResultRow *row, Bytes *manifest, Table
     bytes_text(&scene, row->scene);
     bytes_text(&scene, "\n");
     TRY(bundle_put(zip, "scene.json", &scene, problem));
-    const Status status = results_put(row, &result, problem);
+    const Status status = result_put(row, &result, problem);
     if (status != STATUS_OK) {
         bytes_clear(&result);
         return status;

@@ -1,5 +1,5 @@
-// Results as documents: the summary, the manifest, and what was saved as JSON when the result was
-// made. Numbers in columns are series.c's and ledgers.c's.
+// Results as documents: the summary with everything stored as JSON, and the manifest. Their numbers
+// in columns are columns.c's.
 #include "server/api/results.h"
 
 #include <stdio.h>
@@ -31,9 +31,8 @@ void results_link_gone(const char *id, Reply *reply) {
              id, id);
 }
 
-// The scene as it was run, read back from its canonical JSON. Cleared by study_request_clear in any
-// case.
-static Status read_scene(const ResultRow *row, StudyRequest *inquiry, Problem *problem) {
+// The scene as it was run, from its canonical JSON. Cleared by study_request_clear in any case.
+static Status result_read_scene(const ResultRow *row, StudyRequest *inquiry, Problem *problem) {
     Problem *fault = malloc(sizeof *fault);
     if (fault == NULL || row->scene == NULL) {
         free(fault);
@@ -43,20 +42,20 @@ static Status read_scene(const ResultRow *row, StudyRequest *inquiry, Problem *p
     problem_clear(fault);
     const Status status =
         json_parse(row->scene, strlen(row->scene), study_request_fields, inquiry, fault);
-    // A fault here is ours, not the client's.
+    // A fault here is the server's, not the client's.
     if (status != STATUS_OK)
         problem_set(problem, STATUS_INTERNAL, "the stored scene cannot be read: %s", fault->detail);
     free(fault);
     return status == STATUS_OK ? STATUS_OK : STATUS_INTERNAL;
 }
 
-static const char *channel_unit(const char *name) {
+static const char *result_channel_unit(const char *name) {
     size_t number;
     const Channel *channel = channel_find(name, &number);
     return channel != NULL ? channel->unit : NULL;
 }
 
-static void write_units(Bytes *bytes, const Simulation *simulation) {
+static void result_put_units(Bytes *bytes, const Simulation *simulation) {
     bytes_text(bytes, "{");
     const char *separator = "";
     for (const Field *field = summary_fields; field->kind != FIELD_KIND_END; field++) {
@@ -70,37 +69,38 @@ static void write_units(Bytes *bytes, const Simulation *simulation) {
         bytes_text(bytes, separator);
         bytes_json_string(bytes, simulation->output.channels.at[i]);
         bytes_text(bytes, ": ");
-        bytes_json_string(bytes, channel_unit(simulation->output.channels.at[i]));
+        bytes_json_string(bytes, result_channel_unit(simulation->output.channels.at[i]));
         separator = ", ";
     }
     bytes_text(bytes, "}");
 }
 
 // "series" is the JSON one; the other formats are named in full.
-static void write_ways(Bytes *bytes, const char *id, const char *part, const char *formats) {
+static void result_put_formats(Bytes *bytes, const char *id, const char *part,
+                               const char *formats) {
     bytes_format(bytes, ", \"%s\": \"%s/v1/results/%s/%s.json\"", part, base_path(), id, part);
     for (size_t size; (size = strcspn(formats, " ")) > 0; formats += size + (formats[size] != '\0'))
         bytes_format(bytes, ", \"%s.%.*s\": \"%s/v1/results/%s/%s.%.*s\"", part, (int)size, formats,
                      base_path(), id, part, (int)size, formats);
 }
 
-static void write_links(Bytes *bytes, const ResultRow *row, const Simulation *simulation,
-                        const StudyAnswer *answer) {
+static void result_put_links(Bytes *bytes, const ResultRow *row, const Simulation *simulation,
+                             const StudyAnswer *answer) {
     const char *id = row->id;
     const Output *output = &simulation->output;
     bytes_format(bytes,
                  "{\"self\": \"%s/v1/results/%s\", \"manifest\": \"%s/v1/results/%s/manifest\"",
                  base_path(), id, base_path(), id);
-    write_ways(bytes, id, "series", "csv npy npz mat");
+    result_put_formats(bytes, id, "series", "csv npy npz mat");
     if (output->psd.channels.count > 0)
-        write_ways(bytes, id, "psd", "csv npy npz mat");
+        result_put_formats(bytes, id, "psd", "csv npy npz mat");
     if (output->impacts)
-        write_ways(bytes, id, "impacts", "csv npy npz mat");
+        result_put_formats(bytes, id, "impacts", "csv npy npz mat");
     // A template (RFC 6570): the impact's number in the list, from 1. Impulses have no force.
     if (output->impacts && row->impact_count > 0 && simulation_has_force(simulation))
         bytes_format(bytes, ", \"force\": \"%s/v1/results/%s/impacts/{number}/force.json\"",
                      base_path(), id);
-    write_ways(bytes, id, "energy", "csv npy npz mat");
+    result_put_formats(bytes, id, "energy", "csv npy npz mat");
     bytes_format(bytes, ", \"bundle.zip\": \"%s/v1/results/%s/bundle.zip\"", base_path(), id);
     if (answer->study != NULL) {
         // A sweep's rows are a table of their own.
@@ -115,11 +115,11 @@ static void write_links(Bytes *bytes, const ResultRow *row, const Simulation *si
     bytes_text(bytes, "}");
 }
 
-static const char *json_or(const char *json, const char *otherwise) {
+static const char *result_json(const char *json, const char *otherwise) {
     return json != NULL ? json : otherwise;
 }
 
-static void write_said(App *app, Bytes *bytes, const ReferenceRow *use) {
+static void manifest_put_material(App *app, Bytes *bytes, const ReferenceRow *use) {
     MaterialRevision material = {0};
     if (material_find(app->db, use->slug, use->revision, &material, NULL) == STATUS_OK) {
         material_write_stated(bytes, &material);
@@ -131,7 +131,7 @@ static void write_said(App *app, Bytes *bytes, const ReferenceRow *use) {
     material_revision_clear(&material);
 }
 
-static void write_link(App *app, Bytes *bytes, const ReferenceRow *use) {
+static void result_put_material(App *app, Bytes *bytes, const ReferenceRow *use) {
     (void)app;
     bytes_format(bytes,
                  "{\"slug\": \"%s\", \"revision\": %llu, \"links\": {\"revision\": "
@@ -141,9 +141,9 @@ static void write_link(App *app, Bytes *bytes, const ReferenceRow *use) {
                  use->slug, use->revision);
 }
 
-// What the scene and its study were made with, each in the words of `write`.
-static void write_materials(App *app, Bytes *bytes, const StudyRequest *inquiry,
-                            void (*write)(App *app, Bytes *bytes, const ReferenceRow *use)) {
+// The materials of the scene and its study, each by `put`.
+static void result_put_materials(App *app, Bytes *bytes, const StudyRequest *inquiry,
+                                 void (*put)(App *app, Bytes *bytes, const ReferenceRow *use)) {
     Bytes lines = {0};
     ReferenceRow use;
     const char *separator = "";
@@ -154,7 +154,7 @@ static void write_materials(App *app, Bytes *bytes, const StudyRequest *inquiry,
         if (use.revision == 0)
             continue;
         bytes_text(bytes, separator);
-        write(app, bytes, &use);
+        put(app, bytes, &use);
         separator = ", ";
     }
     bytes_text(bytes, "]");
@@ -162,21 +162,21 @@ static void write_materials(App *app, Bytes *bytes, const StudyRequest *inquiry,
     bytes_clear(&lines);
 }
 
-static void write_result(Bytes *bytes, const ResultRow *row, const StudyRequest *inquiry,
-                         const StudyAnswer *answer) {
+static void result_put_members(Bytes *bytes, const ResultRow *row, const StudyRequest *inquiry,
+                               const StudyAnswer *answer) {
     const Simulation *simulation = &inquiry->simulation;
     bytes_format(bytes, "{\"id\": \"%s\", \"engine\": ", row->id);
     bytes_json_string(bytes, row->engine);
     bytes_text(bytes, ", \"scene\": ");
-    bytes_text(bytes, json_or(row->scene, "null"));
+    bytes_text(bytes, result_json(row->scene, "null"));
     bytes_text(bytes, ", \"plan\": ");
-    bytes_text(bytes, json_or(row->plan, "null"));
+    bytes_text(bytes, result_json(row->plan, "null"));
     bytes_text(bytes, ", \"summary\": ");
-    bytes_text(bytes, json_or(row->summary, "null"));
+    bytes_text(bytes, result_json(row->summary, "null"));
     bytes_text(bytes, ", \"work\": ");
-    bytes_text(bytes, json_or(row->work, "null"));
+    bytes_text(bytes, result_json(row->work, "null"));
     bytes_text(bytes, ", \"units\": ");
-    write_units(bytes, simulation);
+    result_put_units(bytes, simulation);
     bytes_text(bytes, ", \"channels\": [");
     for (size_t i = 0; i < simulation->output.channels.count; i++) {
         bytes_text(bytes, i > 0 ? ", " : "");
@@ -187,25 +187,25 @@ static void write_result(Bytes *bytes, const ResultRow *row, const StudyRequest 
     bytes_format(bytes, ", \"count\": %llu, \"warnings\": ", (unsigned long long)row->count);
     document_join(bytes, row->warnings, row->notes);
     bytes_text(bytes, ", \"materials\": ");
-    write_materials(NULL, bytes, inquiry, write_link);
+    result_put_materials(NULL, bytes, inquiry, result_put_material);
     bytes_text(bytes, ", \"study\": ");
     if (answer->study != NULL)
         document_answer(bytes, answer->study);
     else
         bytes_text(bytes, "null");
     bytes_text(bytes, ", \"links\": ");
-    write_links(bytes, row, simulation, answer);
+    result_put_links(bytes, row, simulation, answer);
     bytes_text(bytes, "}\n");
 }
 
-Status results_put(const ResultRow *row, Bytes *bytes, Problem *problem) {
+Status result_put(const ResultRow *row, Bytes *bytes, Problem *problem) {
     StudyRequest inquiry = {0};
     StudyAnswer answer = {NULL};
-    Status status = read_scene(row, &inquiry, problem);
+    Status status = result_read_scene(row, &inquiry, problem);
     if (status == STATUS_OK && row->study != NULL)
         status = study_read(row, &answer, problem);
     if (status == STATUS_OK)
-        write_result(bytes, row, &inquiry, &answer);
+        result_put_members(bytes, row, &inquiry, &answer);
     study_request_clear(&inquiry);
     fields_clear(study_answer_fields, &answer);
     return status;
@@ -216,7 +216,7 @@ Status results_show(App *app, const Request *request, Reply *reply, Problem *pro
     Bytes bytes = {.most = app->reply_most};
     Status status = db_result_load(app->db, request->parameters[0], &row, problem);
     if (status == STATUS_OK && !reply_immutable(reply, request, row.id)) {
-        status = results_put(&row, &bytes, problem);
+        status = result_put(&row, &bytes, problem);
         if (status == STATUS_OK)
             status = reply_bytes(reply, 200, type_json, &bytes, problem);
         else
@@ -228,7 +228,7 @@ Status results_show(App *app, const Request *request, Reply *reply, Problem *pro
 
 Status manifest_put(App *app, const ResultRow *row, Bytes *bytes, Problem *problem) {
     StudyRequest inquiry = {0};
-    const Status status = read_scene(row, &inquiry, problem);
+    const Status status = result_read_scene(row, &inquiry, problem);
     if (status == STATUS_OK) {
         char created[32];
         clock_rfc3339(row->created_unix_ms, created);
@@ -240,9 +240,9 @@ Status manifest_put(App *app, const ResultRow *row, Bytes *bytes, Problem *probl
                      created, program_version);
         bytes_json_string(bytes, program_build);
         bytes_text(bytes, "}, \"scene\": ");
-        bytes_text(bytes, json_or(row->scene, "null"));
+        bytes_text(bytes, result_json(row->scene, "null"));
         bytes_text(bytes, ", \"materials\": ");
-        write_materials(app, bytes, &inquiry, write_said);
+        result_put_materials(app, bytes, &inquiry, manifest_put_material);
         bytes_format(
             bytes,
             ", \"again\": {\"method\": \"POST\", \"path\": \"%s/v1/jobs\", \"content_type\": "
@@ -250,7 +250,7 @@ Status manifest_put(App *app, const ResultRow *row, Bytes *bytes, Problem *probl
             "\"why\": \"the same "
             "scene and engine give the same id and the same bytes",
             base_path());
-        // It is measured once and then kept; elsewhere it comes out a little differently.
+        // It is measured once and stored; another run measures a little more or less.
         if (inquiry.study != NULL && study_kind(inquiry.study)->is_measured)
             bytes_text(bytes, ", but for the CPU time that a study measures and what follows of "
                               "it");
@@ -286,8 +286,8 @@ Status results_manifest(App *app, const Request *request, Reply *reply, Problem 
     return status;
 }
 
-// Its jobs' clients share it: no one of them may take it from the others.
-static Status require_own(App *app, const Request *request, Problem *problem) {
+// Clients with jobs of this result share it: none may delete it for the others.
+static Status result_check_owner(App *app, const Request *request, Problem *problem) {
     char owner[72], what[128];
     if (request->client == NULL || request->holder.is_admin)
         return STATUS_OK;
@@ -298,7 +298,7 @@ static Status require_own(App *app, const Request *request, Problem *problem) {
 }
 
 Status results_delete(App *app, const Request *request, Reply *reply, Problem *problem) {
-    TRY(require_own(app, request, problem));
+    TRY(result_check_owner(app, request, problem));
     TRY(jobs_delete(app->manager, request->parameters[0], problem));
     reply_borrow(reply, 204, NULL, NULL, 0);
     return STATUS_OK;

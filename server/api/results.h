@@ -6,7 +6,7 @@
 #include "server/util/bytes.h"
 
 // Append the documents of a result's row, as /v1/results/{id} and its manifest answer them.
-Status results_put(const ResultRow *row, Bytes *bytes, Problem *problem);
+Status result_put(const ResultRow *row, Bytes *bytes, Problem *problem);
 Status manifest_put(App *app, const ResultRow *row, Bytes *bytes, Problem *problem);
 
 // The entity tag of what may change with a material's status or the base of links, by its content

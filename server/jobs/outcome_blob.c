@@ -77,6 +77,10 @@ void series_blob_write(Bytes *bytes, const Columns *columns) {
 void outcome_blob_write(Bytes *bytes, const Outcome *outcome) {
     const Response *response = &outcome->response;
     const BlobHead head = blob_head(outcome);
+    // At once, so that no long blob is copied as it grows.
+    (void)bytes_reserve(bytes,
+                        sizeof head + head.impacts * head.impact_bytes +
+                            head.rows * sizeof(double) * (1 + outcome->spectrum.densities.count));
     bytes_put(bytes, &head, sizeof head);
     blob_put_row(bytes, energy_fields, &response->energy);
     blob_put_row(bytes, summary_fields, &outcome->summary);
