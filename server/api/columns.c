@@ -129,8 +129,12 @@ Status columns_reply(App *app, Reply *reply, const TableFormat *format, TableStr
     if (size != UINT64_MAX ? size <= WHOLE_MAX : table_stream_is_below(stream, WHOLE_MAX)) {
         Bytes bytes = {.most = app->reply_most};
         table_stream_write(stream, &bytes);
+        const Status written = table_stream_check(stream, problem);
         table_stream_free(stream);
-        return reply_bytes(reply, 200, format->content_type, &bytes, problem);
+        if (written == STATUS_OK)
+            return reply_bytes(reply, 200, format->content_type, &bytes, problem);
+        bytes_clear(&bytes);
+        return written;
     }
     reply_borrow(reply, 200, format->content_type, NULL, 0);
     reply->stream = (Stream){.next = columns_stream_next, .size = size, .cut = columns_stream_cut};

@@ -4,20 +4,17 @@
 #include <string.h>
 
 #include "server/api/app.h"
+#include "server/api/columns.h"
 #include "server/api/job_json.h"
 #include "server/api/studies.h"
 #include "server/formats/charts.h"
 #include "server/formats/study_formats.h"
 #include "server/formats/sweep.h"
-#include "server/formats/table_stream.h"
 #include "server/http/reply.h"
 #include "server/jobs/documents.h"
 #include "server/jobs/sweep.h"
 #include "server/json/encode.h"
 #include "server/util/base_path.h"
-
-// Up to so many bytes a text is made at once.
-enum { WHOLE_MAX = 4 << 20 };
 
 // A path begins with a result, or with the job that makes it.
 static bool sweep_is_of_job(const Request *request) {
@@ -40,146 +37,70 @@ static bool sweep_is_unchanged(const Request *request, Reply *reply, const Sweep
     return false;
 }
 
-// A table being sent: a text as far as it is made, or an archive of known size.
+// What a table is read from as long as it is sent.
 typedef struct SweepReply {
     SweepView view;
     SweepSource source;
     SweepDocument document;
-    SweepNext next; // NULL: an archive
-    Bytes made;
-    size_t taken; // of that
-    bool is_last;
-    TableStream *stream;
 } SweepReply;
 
 static void sweep_reply_free(void *context) {
-    SweepReply *sending = context;
-    table_stream_free(sending->stream);
-    bytes_clear(&sending->made);
-    sweep_view_clear(&sending->view);
-    free(sending);
+    SweepReply *sent = context;
+    sweep_view_clear(&sent->view);
+    free(sent);
 }
 
-static ptrdiff_t sweep_reply_text(void *context, char *target, size_t size) {
-    SweepReply *sending = context;
-    Bytes *made = &sending->made;
-    size_t sent = 0;
-    while (sent < size) {
-        if (sending->taken == made->count) {
-            if (sending->is_last)
-                break;
-            made->count = sending->taken = 0;
-            sending->is_last = !sending->next(&sending->document, made);
-            if (sending->document.is_broken || made->is_failed)
-                return STREAM_BROKEN;
-        }
-        sent += bytes_hand(made, &sending->taken, target + sent, size - sent);
-    }
-    return sent > 0 ? (ptrdiff_t)sent : STREAM_END;
-}
-
-static ptrdiff_t sweep_reply_archive(void *context, char *target, size_t size) {
-    SweepReply *sending = context;
-    const ptrdiff_t count = table_stream_next(sending->stream, target, size);
-    return sending->document.is_broken || count < 0 ? STREAM_BROKEN
-           : count > 0                              ? count
-                                                    : STREAM_END;
-}
-
-static void sweep_reply_cut(void *context, uint64_t first, uint64_t size) {
-    table_stream_cut(((SweepReply *)context)->stream, first, size);
-}
-
-static Status sweep_error_changed(Problem *problem) {
-    return problem_set(
-        problem, STATUS_BUSY,
-        "the sweep's rows were deleted or made anew while they were read; ask again");
-}
-
-// Makes the beginning: a text that ends in it can be kept and compressed.
-static Status sweep_reply_begin_text(SweepReply *sending, Problem *problem) {
-    Bytes *made = &sending->made;
-    while (!sending->is_last && made->count < WHOLE_MAX && !made->is_failed)
-        sending->is_last = !sending->next(&sending->document, made);
-    return sending->document.is_broken ? sweep_error_changed(problem)
-           : made->is_failed ? problem_set(problem, STATUS_NO_MEMORY, "no memory for the table")
-                             : STATUS_OK;
-}
-
-static Status sweep_reply_begin_archive(SweepReply *sending, const char *extension,
-                                        Problem *problem) {
-    static const TableFormat filled = {.is_binary = true};
-    sending->stream = table_stream_new(NULL);
-    if (sending->stream == NULL)
+// Takes `sent`, also when it fails.
+static Status sweep_reply_table(App *app, Reply *reply, const StudyFormat *format, SweepReply *sent,
+                                Problem *problem) {
+    const bool is_complete = sent->view.is_complete;
+    TableStream *stream = table_stream_new(NULL);
+    if (stream == NULL) {
+        sweep_reply_free(sent);
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the table");
-    const Status status =
-        sweep_lay(&sending->document, extension, &sending->stream->segments, problem);
-    if (status != STATUS_OK)
-        return status == STATUS_CONFLICT ? sweep_error_changed(problem) : status;
-    return table_stream_open(sending->stream, &filled, problem);
-}
-
-// Takes `sending` if it succeeds.
-static Status sweep_reply_send(Reply *reply, const StudyFormat *format, SweepReply *sending,
-                               Problem *problem) {
-    sending->next = sweep_text(format->extension);
-    if (sending->next != NULL)
-        TRY(sweep_reply_begin_text(sending, problem));
-    else
-        TRY(sweep_reply_begin_archive(sending, format->extension, problem));
-    if (sending->is_last) {
-        TRY(reply_bytes(reply, 200, format->content_type, &sending->made, problem));
-        sweep_reply_free(sending);
-        return STATUS_OK;
     }
-    reply_borrow(reply, 200, format->content_type, NULL, 0);
+    sent->document = (SweepDocument){
+        .sweep = sent->view.sweep, .source = &sent->source, .result = sent->view.row.result};
+    stream->table = sweep_document_table(&sent->document);
+    stream->is_broken = &sent->document.is_broken;
+    stream->release = sweep_reply_free;
+    stream->source = sent;
+    TRY(columns_reply(app, reply, sweep_format(format->extension), stream, problem));
     // As long as rows come, no part of one document fits the next.
-    reply->accepts_ranges = sending->stream != NULL && sending->view.is_complete;
-    reply->stream = sending->stream != NULL
-                        ? (Stream){.next = sweep_reply_archive,
-                                   .size = table_stream_size(sending->stream),
-                                   .cut = sweep_reply_cut}
-                        : (Stream){.next = sweep_reply_text, .size = UINT64_MAX};
-    reply->release = sweep_reply_free;
-    reply->context = sending;
+    reply->accepts_ranges = format->is_binary && is_complete;
     return STATUS_OK;
 }
 
-static Status sweep_reply_chart(App *app, Reply *reply, const StudyFormat *format,
-                                SweepReply *sending, Problem *problem) {
+static Status sweep_reply_chart(App *app, Reply *reply, const StudyFormat *format, SweepReply *sent,
+                                Problem *problem) {
     Bytes bytes = {.most = app->reply_most};
-    const Status status = charts_sweep(sending->view.sweep, &sending->source, &bytes)
-                              ? reply_bytes(reply, 200, format->content_type, &bytes, problem)
-                              : sweep_error_changed(problem);
+    const bool is_whole = charts_sweep(sent->view.sweep, &sent->source, &bytes);
+    sweep_reply_free(sent);
+    if (is_whole)
+        return reply_bytes(reply, 200, format->content_type, &bytes, problem);
     bytes_clear(&bytes);
-    if (status == STATUS_OK)
-        sweep_reply_free(sending);
-    return status;
+    return problem_set(
+        problem, STATUS_BUSY,
+        "the table's rows were deleted or made anew while they were read; ask again");
 }
 
 Status sweeps_table(App *app, const Request *request, Reply *reply, Problem *problem) {
     const StudyFormat *format;
     TRY(study_format(request, study_formats(study_sweep.answer), reply, &format, problem));
-    SweepReply *sending = calloc(1, sizeof *sending);
-    if (sending == NULL)
+    SweepReply *sent = calloc(1, sizeof *sent);
+    if (sent == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the table");
-    SweepView *view = &sending->view;
-    Status status = sweep_view_load(app->db, request->parameters[0], sweep_is_of_job(request), true,
-                                    view, problem);
-    if (status == STATUS_OK && sweep_is_unchanged(request, reply, view, format->extension)) {
-        sweep_reply_free(sending);
-        return STATUS_OK;
+    SweepView *view = &sent->view;
+    const Status status = sweep_view_load(app->db, request->parameters[0], sweep_is_of_job(request),
+                                          true, view, problem);
+    if (status != STATUS_OK || sweep_is_unchanged(request, reply, view, format->extension)) {
+        sweep_reply_free(sent);
+        return status;
     }
-    sending->source = (SweepSource){view->rows, sweep_view_read, view};
-    sending->document = (SweepDocument){
-        .sweep = view->sweep, .source = &sending->source, .result = view->row.result};
-    if (status == STATUS_OK)
-        status = strcmp(format->extension, "svg") == 0
-                     ? sweep_reply_chart(app, reply, format, sending, problem)
-                     : sweep_reply_send(reply, format, sending, problem);
-    if (status != STATUS_OK)
-        sweep_reply_free(sending);
-    return status;
+    sent->source = (SweepSource){view->rows, sweep_view_read, view};
+    return strcmp(format->extension, "svg") == 0
+               ? sweep_reply_chart(app, reply, format, sent, problem)
+               : sweep_reply_table(app, reply, format, sent, problem);
 }
 
 static Status sweep_read_index(const Request *request, uint64_t *index, Problem *problem) {

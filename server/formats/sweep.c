@@ -76,8 +76,8 @@ static const char *sweep_column_text(const SweepColumn *column, double value) {
                                                : NULL;
 }
 
-static size_t sweep_piece(const SweepDocument *document, size_t rows, size_t max) {
-    return rows - document->row < max ? rows - document->row : max;
+static size_t sweep_piece(const TextPlace *place, size_t rows, size_t max) {
+    return rows - place->row < max ? rows - place->row : max;
 }
 
 // The parts of the JSON: frame, axes, failures, columns, links.
@@ -95,21 +95,22 @@ static void sweep_json_frame(const SweepDocument *document, Bytes *bytes) {
 }
 
 // The next piece of an axis; true: that was its last.
-static bool sweep_json_axis(SweepDocument *document, size_t index, Bytes *bytes) {
+static bool sweep_json_axis(const SweepDocument *document, size_t index, TextPlace *place,
+                            Bytes *bytes) {
     const SweepAxisValues *axis = &document->sweep->axes.at[index];
-    const size_t end = document->row + sweep_piece(document, axis->values.count, SWEEP_PIECE);
-    if (document->row == 0) {
+    const size_t end = place->row + sweep_piece(place, axis->values.count, SWEEP_PIECE);
+    if (place->row == 0) {
         bytes_text(bytes, index > 0 ? ", {\"pointer\": " : "{\"pointer\": ");
         bytes_json_string(bytes, axis->pointer);
         bytes_text(bytes, ", \"unit\": ");
         bytes_json_string(bytes, axis->unit);
         bytes_text(bytes, ", \"values\": [");
     }
-    for (size_t i = document->row; i < end; i++) {
+    for (size_t i = place->row; i < end; i++) {
         bytes_text(bytes, i > 0 ? "," : "");
         bytes_text(bytes, axis->values.at[i]);
     }
-    document->row = end;
+    place->row = end;
     if (end < axis->values.count)
         return false;
     bytes_text(bytes, "]}");
@@ -132,11 +133,12 @@ static void sweep_json_failures(const Sweep *sweep, Bytes *bytes) {
 }
 
 // The next piece of a column; true: that was its last.
-static bool sweep_json_column(SweepDocument *document, size_t index, Bytes *bytes) {
+static bool sweep_json_column(SweepDocument *document, size_t index, TextPlace *place,
+                              Bytes *bytes) {
     const SweepColumn column = sweep_column(document->sweep, index);
-    const size_t rows = document->source->rows, count = sweep_piece(document, rows, SWEEP_PIECE);
+    const size_t rows = document->source->rows, count = sweep_piece(place, rows, SWEEP_PIECE);
     double values[SWEEP_PIECE];
-    if (document->row == 0) {
+    if (place->row == 0) {
         bytes_text(bytes, index > 0 ? ",\n " : "");
         bytes_json_string(bytes, column.name);
         bytes_text(bytes, ": {\"unit\": ");
@@ -145,7 +147,7 @@ static bool sweep_json_column(SweepDocument *document, size_t index, Bytes *byte
     } else {
         bytes_text(bytes, ",");
     }
-    if (!sweep_column_read(document, &column, document->row, count, values))
+    if (!sweep_column_read(document, &column, place->row, count, values))
         return true;
     const bool has_texts = sweep_column_has_texts(&column);
     const char *quote = column.values != NULL ? "" : "\"";
@@ -154,8 +156,8 @@ static bool sweep_json_column(SweepDocument *document, size_t index, Bytes *byte
     for (size_t i = 0; i < count && has_texts; i++)
         bytes_format(bytes, "%s%s%s%s", i > 0 ? "," : "", quote,
                      sweep_column_text(&column, values[i]), quote);
-    document->row += count;
-    if (document->row < rows)
+    place->row += count;
+    if (place->row < rows)
         return false;
     bytes_text(bytes, "]}");
     return true;
@@ -168,23 +170,24 @@ static void sweep_json_links(const char *result, Bytes *bytes) {
     bytes_format(bytes, ", \"scene\": \"%s/v1/results/%s/points/{index}/scene\"}", base, result);
 }
 
-static bool sweep_json_next(SweepDocument *document, Bytes *bytes) {
+static bool sweep_json_next(const Table *table, TextPlace *place, Bytes *bytes) {
+    SweepDocument *document = table->source->context;
     const Sweep *sweep = document->sweep;
     const size_t axes = sweep->axes.count, end = axes + 2 + sweep_columns(sweep);
     bool is_done = true;
-    if (document->part == 0)
+    if (place->part == 0)
         sweep_json_frame(document, bytes);
-    else if (document->part <= axes)
-        is_done = sweep_json_axis(document, document->part - 1, bytes);
-    else if (document->part == axes + 1)
+    else if (place->part <= axes)
+        is_done = sweep_json_axis(document, place->part - 1, place, bytes);
+    else if (place->part == axes + 1)
         sweep_json_failures(sweep, bytes);
     else
-        is_done = sweep_json_column(document, document->part - axes - 2, bytes);
+        is_done = sweep_json_column(document, place->part - axes - 2, place, bytes);
     if (is_done) {
-        document->part++;
-        document->row = 0;
+        place->part++;
+        place->row = 0;
     }
-    if (document->part < end)
+    if (place->part < end)
         return !document->is_broken;
     bytes_text(bytes, "}");
     if (document->result != NULL)
@@ -234,18 +237,19 @@ static void sweep_csv_names(const Sweep *sweep, Bytes *bytes) {
     bytes_text(bytes, "\n");
 }
 
-static bool sweep_csv_next(SweepDocument *document, Bytes *bytes) {
+static bool sweep_csv_next(const Table *table, TextPlace *place, Bytes *bytes) {
     enum { PIECE = 64 };
+    SweepDocument *document = table->source->context;
     const Sweep *sweep = document->sweep;
     const size_t columns = sweep_columns(sweep);
-    const size_t count = sweep_piece(document, document->source->rows, PIECE);
+    const size_t count = sweep_piece(place, document->source->rows, PIECE);
     SweepColumn column[SWEEP_COLUMNS_MAX];
     double cells[SWEEP_COLUMNS_MAX][PIECE];
-    if (document->row == 0)
+    if (place->row == 0)
         sweep_csv_names(sweep, bytes);
     for (size_t i = 0; i < columns; i++) {
         column[i] = sweep_column(sweep, i);
-        if (!sweep_column_read(document, &column[i], document->row, count, cells[i]))
+        if (!sweep_column_read(document, &column[i], place->row, count, cells[i]))
             return false;
     }
     for (size_t row = 0; row < count; row++) {
@@ -259,8 +263,8 @@ static bool sweep_csv_next(SweepDocument *document, Bytes *bytes) {
         }
         bytes_text(bytes, "\n");
     }
-    document->row += count;
-    return document->row < document->source->rows;
+    place->row += count;
+    return place->row < document->source->rows;
 }
 
 static bool sweep_is_numeric(const Texts *values) {
@@ -346,70 +350,74 @@ static Status sweep_lay_array(SweepDocument *document, Zip *zip, size_t index, P
     snprintf(file, sizeof file, "%.74s.npy", sweep_array_name(&column));
     const Status status = zip_put(zip, file, &array, problem);
     segments_clear(&array);
-    if (status == STATUS_OK && document->is_broken)
-        return problem_set(problem, STATUS_CONFLICT,
-                           "the sweep's rows were deleted or made anew while they were read");
     return status;
 }
 
-static Status sweep_lay_arrays(SweepDocument *document, Segments *layout, Problem *problem) {
+static Status sweep_lay_npz(const Table *table, Segments *layout, Problem *problem) {
+    SweepDocument *document = table->source->context;
     Zip zip = {.segments = layout};
     Status status = STATUS_OK;
+    sweep_measure(document, true);
     for (size_t i = 0; i < sweep_columns(document->sweep) && status == STATUS_OK; i++)
         status = sweep_lay_array(document, &zip, i, problem);
     const Status ended = zip_end(&zip, status == STATUS_OK ? problem : NULL);
     return status != STATUS_OK ? status : ended;
 }
 
-static Status sweep_lay_table(SweepDocument *document, const TableFormat *format, Segments *layout,
-                              Problem *problem) {
+static Status sweep_lay_numbers(const Table *table, const TableFormat *format, Segments *layout,
+                                Problem *problem) {
+    SweepDocument *document = table->source->context;
     const size_t count = sweep_columns(document->sweep);
     Column *columns = calloc(count, sizeof *columns);
     const Column *chosen[SWEEP_COLUMNS_MAX];
     if (columns == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the table");
+    sweep_measure(document, false);
     for (size_t i = 0; i < count; i++) {
         const SweepColumn column = sweep_column(document->sweep, i);
         text_fit(columns[i].name, sizeof columns[i].name, sweep_array_name(&column));
         chosen[i] = &columns[i];
     }
-    const Table table = {.count = document->source->rows,
-                         .columns = chosen,
-                         .column_count = count,
-                         .source = &document->columns};
-    const Status status = format->lay(&table, layout, problem);
+    Table numbers = *table;
+    numbers.columns = chosen;
+    const Status status = format->lay(&numbers, layout, problem);
     free(columns);
     return status;
 }
 
-Status sweep_lay(SweepDocument *document, const char *extension, Segments *layout,
-                 Problem *problem) {
-    const bool has_texts = strcmp(extension, "npz") == 0;
-    document->columns = (SegmentSource){sweep_archive_read, document};
-    sweep_measure(document, has_texts);
-    return has_texts ? sweep_lay_arrays(document, layout, problem)
-                     : sweep_lay_table(document, format_find(extension), layout, problem);
+static Status sweep_lay_npy(const Table *table, Segments *layout, Problem *problem) {
+    return sweep_lay_numbers(table, &format_npy, layout, problem);
 }
 
-SweepNext sweep_text(const char *extension) {
-    return strcmp(extension, "json") == 0  ? sweep_json_next
-           : strcmp(extension, "csv") == 0 ? sweep_csv_next
-                                           : NULL;
+static Status sweep_lay_mat(const Table *table, Segments *layout, Problem *problem) {
+    return sweep_lay_numbers(table, &format_mat, layout, problem);
+}
+
+Table sweep_document_table(SweepDocument *document) {
+    document->columns = (SegmentSource){sweep_archive_read, document};
+    return (Table){.count = document->source->rows,
+                   .column_count = sweep_columns(document->sweep),
+                   .source = &document->columns};
+}
+
+const TableFormat *sweep_format(const char *extension) {
+    static const TableFormat formats[] = {
+        {.extension = "json", .content_type = "application/json", .next = sweep_json_next},
+        {.extension = "csv", .content_type = "text/csv; charset=utf-8", .next = sweep_csv_next},
+        {"npy", "application/x-npy", true, sweep_lay_npy, NULL},
+        {"npz", "application/x-npz", true, sweep_lay_npz, NULL},
+        {"mat", "application/x-matlab-data", true, sweep_lay_mat, NULL},
+    };
+    for (size_t i = 0; i < COUNT(formats); i++)
+        if (strcmp(formats[i].extension, extension) == 0)
+            return &formats[i];
+    return NULL;
 }
 
 void sweep_write(const Sweep *sweep, const char *extension, Bytes *bytes) {
     const SweepSource source = sweep_source(sweep);
     SweepDocument document = {.sweep = sweep, .source = &source};
-    const SweepNext next = sweep_text(extension);
-    Segments layout = {0};
-    if (next != NULL) {
-        while (next(&document, bytes))
-            continue;
-        return;
-    }
-    if (sweep_lay(&document, extension, &layout, NULL) == STATUS_OK)
-        segments_write(&layout, bytes);
-    else
+    const Table table = sweep_document_table(&document);
+    if (format_write(sweep_format(extension), &table, bytes, NULL) != STATUS_OK)
         bytes->is_failed = true;
-    segments_clear(&layout);
 }

@@ -5,7 +5,7 @@
 #define SERVER_FORMATS_SWEEP_H
 
 #include "core/study/sweep.h"
-#include "server/formats/segments.h"
+#include "server/formats/format.h"
 #include "server/util/bytes.h"
 
 enum {
@@ -28,27 +28,21 @@ typedef struct SweepSource {
 
 SweepSource sweep_source(const Sweep *sweep); // the answer's own table, which is borrowed
 
-// A document in the making; all but the first three are zero at the start.
+// A table to be written. Set the first three; it is neither moved nor changed until then.
 typedef struct SweepDocument {
     const Sweep *sweep; // of its table only the failures are used
     const SweepSource *source;
     const char *result; // under which it is served, for links; NULL: it is not
     bool is_broken;     // the source was: what was written since is not the table
-    size_t part, row;   // of a text
-    // Of an archive:
     SegmentSource columns;
-    size_t widths[SWEEP_COLUMNS_MAX];  // bytes of a text; 0: numbers
+    size_t widths[SWEEP_COLUMNS_MAX];  // of an archive: bytes of a text; 0: numbers
     bool is_number[SWEEP_COLUMNS_MAX]; // an axis whose values are numbers
 } SweepDocument;
 
-// Appends the next piece of a text; false: that was the last one.
-typedef bool (*SweepNext)(SweepDocument *document, Bytes *bytes);
-SweepNext sweep_text(const char *extension); // "json", "csv"; NULL: it is an archive
-// An archive, whose bytes are read when they are needed: "npz" with texts; "npy" and "mat" hold
-// numbers alone, of a text its index among the axis's values, of a status SweepStatus. `layout`
-// borrows the document. STATUS_CONFLICT: the source was broken.
-Status sweep_lay(SweepDocument *document, const char *extension, Segments *layout,
-                 Problem *problem);
+// As a table for the format of an extension; it borrows the document. NPZ has texts; NPY and MAT
+// hold numbers alone, of a text its index among the axis's values, of a status SweepStatus.
+Table sweep_document_table(SweepDocument *document);
+const TableFormat *sweep_format(const char *extension); // NULL if there is none
 
 // The whole document of an answer that has its table.
 void sweep_write(const Sweep *sweep, const char *extension, Bytes *bytes);

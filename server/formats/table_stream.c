@@ -32,6 +32,8 @@ void table_stream_free(void *context) {
     outcome_unref(stream->outcome);
     segments_clear(&stream->segments);
     bytes_clear(&stream->piece);
+    if (stream->release != NULL)
+        stream->release(stream->source);
     free(stream);
 }
 
@@ -162,16 +164,24 @@ Status table_stream_downsample(TableStream *stream, size_t points, Problem *prob
 // --- how it is read ---
 
 // The first piece is made here, so that most faults are found before anything is sent.
+Status table_stream_check(const TableStream *stream, Problem *problem) {
+    return stream->is_broken != NULL && *stream->is_broken
+               ? problem_set(
+                     problem, STATUS_BUSY,
+                     "the table's rows were deleted or made anew while they were read; ask again")
+               : STATUS_OK;
+}
+
 Status table_stream_open(TableStream *stream, const TableFormat *format, Problem *problem) {
     stream->format = format;
-    if (format->next != NULL) {
+    if (format->next != NULL)
         stream->is_last = !format->next(&stream->table, &stream->place, &stream->piece);
-        return stream->piece.is_failed ? table_stream_no_memory(problem) : STATUS_OK;
-    }
-    if (format->lay != NULL)
+    else if (format->lay != NULL)
         TRY(format->lay(&stream->table, &stream->segments, problem));
     stream->until = stream->segments.size;
-    return stream->segments.is_failed ? table_stream_no_memory(problem) : STATUS_OK;
+    TRY(table_stream_check(stream, problem));
+    return stream->piece.is_failed || stream->segments.is_failed ? table_stream_no_memory(problem)
+                                                                 : STATUS_OK;
 }
 
 bool table_stream_is_below(const TableStream *stream, size_t bytes) {
@@ -212,7 +222,7 @@ static ptrdiff_t table_stream_next_of_text(TableStream *stream, char *target, si
                 break;
             piece->count = stream->taken = 0;
             stream->is_last = !stream->format->next(&stream->table, &stream->place, piece);
-            if (piece->is_failed)
+            if (piece->is_failed || table_stream_check(stream, NULL) != STATUS_OK)
                 return -1;
         }
         sent += bytes_hand(piece, &stream->taken, target + sent, size - sent);
@@ -227,5 +237,5 @@ ptrdiff_t table_stream_next(TableStream *stream, char *target, size_t size) {
     const size_t count = left < size ? (size_t)left : size;
     segments_read(&stream->segments, stream->at, target, count);
     stream->at += count;
-    return (ptrdiff_t)count;
+    return table_stream_check(stream, NULL) == STATUS_OK ? (ptrdiff_t)count : -1;
 }

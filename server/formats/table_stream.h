@@ -16,6 +16,10 @@ typedef struct TableStream {
     size_t *numbers;
     Bytes members, end; // JSON
     Outcome *outcome;   // one reference, or NULL
+    // Of a table whose cells are read from elsewhere; NULL: it is in memory.
+    const bool *is_broken; // the cells cannot be read any more
+    void (*release)(void *source);
+    void *source;
 
     // Since table_stream_open.
     const TableFormat *format;
@@ -55,6 +59,8 @@ Status table_stream_impacts(TableStream *stream, const TableFormat *format,
 // Smallest and largest values of the rows in at most `points` buckets of one size, except the last.
 Status table_stream_downsample(TableStream *stream, size_t points, Problem *problem);
 
+// STATUS_BUSY: the cells have changed since the document was begun.
+Status table_stream_check(const TableStream *stream, Problem *problem);
 // Makes it ready to be read. STATUS_LIMIT where the format has no room.
 Status table_stream_open(TableStream *stream, const TableFormat *format, Problem *problem);
 // Whether a text needs less than that.
