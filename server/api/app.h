@@ -53,4 +53,8 @@ Handler examples_list, examples_show, schemas_list, schemas_show, openapi_show;
 Handler health_live, health_ready, metrics_show, version_show, landing_show;
 Handler assets_show, assets_show_icon;
 
+// The job that the path names. STATUS_FORBIDDEN unless the token may read it: with the scope
+// "submit" alone only its own.
+Status job_find_visible(App *app, const Request *request, Job **job, Problem *problem);
+
 #endif

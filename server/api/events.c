@@ -150,7 +150,7 @@ static int last_id(const Request *request) {
 
 Status jobs_events(App *app, const Request *request, Reply *reply, Problem *problem) {
     Job *job = NULL;
-    TRY(jobs_find(app->manager, request->parameters[0], &job, problem));
+    TRY(job_find_visible(app, request, &job, problem));
     if (last_id(request) >= FINISHED_ID) {
         job_unref(job);
         reply_borrow(reply, 204, NULL, NULL, 0);

@@ -221,6 +221,20 @@ bool jobs_are_light(const Request *request) {
     return true;
 }
 
+Status job_find_visible(App *app, const Request *request, Job **job, Problem *problem) {
+    Problem *reported = request->is_sender_only ? NULL : problem;
+    const Status status = jobs_find(app->manager, request->parameters[0], job, reported);
+    if (!request->is_sender_only)
+        return status;
+    if (status == STATUS_OK && text_same(job_client(*job), request->client))
+        return STATUS_OK;
+    if (status == STATUS_OK)
+        job_unref(*job);
+    return problem_set(problem, STATUS_FORBIDDEN,
+                       "this needs the scope \"read\"; the token \"%s\" may read its own jobs only",
+                       request->client);
+}
+
 Status jobs_show(App *app, const Request *request, Reply *reply, Problem *problem) {
     Job *job = NULL;
     double wait;
@@ -229,7 +243,7 @@ Status jobs_show(App *app, const Request *request, Reply *reply, Problem *proble
     if (request->kept != NULL)
         job = pause_end(request->kept, reply);
     else
-        TRY(jobs_find(app->manager, request->parameters[0], &job, problem));
+        TRY(job_find_visible(app, request, &job, problem));
     if (pause_begin(request, reply, job, wait))
         return STATUS_OK;
     return reply_job(app, reply, job, 200, problem);

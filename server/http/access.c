@@ -9,12 +9,29 @@
 
 const char *const log_mode_names[] = {"off", "errors", "all", NULL};
 
+// The handlers of these routes check the sender of the job.
+static bool access_is_for_sender(const Route *route) {
+    return route != NULL && strcmp(route->method, "GET") == 0 &&
+           (strcmp(route->pattern, "/v1/jobs/{id}") == 0 ||
+            strcmp(route->pattern, "/v1/jobs/{id}/events") == 0);
+}
+
 Status access_authorize(const AccessControl *access, const char *scope, Request *request,
                         Problem *problem) {
     request->client = NULL;
+    request->is_sender_only = false;
     if (access == NULL || access->tokens == NULL || strcmp(scope, "open") == 0)
         return STATUS_OK;
-    TRY(tokens_check(access->tokens, request->authorization, scope, &request->holder, problem));
+    const Status status =
+        tokens_check(access->tokens, request->authorization, scope, &request->holder, problem);
+    if (status == STATUS_FORBIDDEN && access_is_for_sender(request->route) &&
+        tokens_check(access->tokens, request->authorization, "submit", &request->holder, NULL) ==
+            STATUS_OK) {
+        problem_clear(problem);
+        request->is_sender_only = true;
+    } else if (status != STATUS_OK) {
+        return status;
+    }
     request->client = request->holder.name[0] != '\0' ? request->holder.name : NULL;
     return STATUS_OK;
 }

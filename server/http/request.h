@@ -62,6 +62,7 @@ struct Request {
     char prefers[128];        // all Prefer headers in one: `prefer` points here
     const char *client;       // the name of the token it came with; NULL: none was asked for
     Holder holder;            // `client` points here
+    bool is_sender_only;      // the token may read its own jobs only
     char id[REQUEST_ID_SIZE]; // the client's own or ours; for the client and the log
     const Route *route;       // NULL until it is found, and where none fits
     uint64_t cache_age;       // response_cache_age when it was found

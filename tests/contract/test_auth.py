@@ -2,6 +2,7 @@
 """Tokens and scopes: who may do what, as clients meet it."""
 
 import http.client
+import json
 import os
 import re
 import socket
@@ -13,6 +14,7 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."
 import program  # noqa: E402
 from access import bearer, impactd, token, until  # noqa: E402
 from asking import endless  # noqa: E402
+from client import client  # noqa: E402
 from daemon import Daemon  # noqa: E402
 
 SCENE = program.scene("paper_free_sponge")
@@ -97,6 +99,24 @@ def test_a_job_is_cancelled_by_its_owner_or_an_admin_alone():
         assert "client" not in daemon.get(f"/v1/jobs/{nobodys['id']}", headers=names["ann"]).json()
         assert daemon.request("DELETE", f"/v1/jobs/{nobodys['id']}", headers=names["ann"]).status == 200
         assert daemon.request("DELETE", "/v1/jobs/j-none", headers=names["ann"]).status == 404
+
+
+def test_a_token_without_read_follows_its_own_jobs():
+    """Scope submit alone: its own job and the events of it, also while it waits; of others 403, as if they did not exist."""
+    with program.daemon() as daemon:
+        ann, bob = (bearer(token(daemon.data, name, "submit")) for name in ("ann", "bob"))
+        assert until(lambda: daemon.get("/v1/jobs").status == 401)
+        path = "/v1/jobs/" + daemon.submit(SCENE, headers={**ann, "Prefer": "respond-async"}).json()["id"]
+        assert daemon.get(path + "?wait=30", headers=ann).json()["status"] == "successful"
+        assert b"event: finished" in daemon.get(path + "/events", headers=ann).body
+        for target in (path, path + "/events", "/v1/jobs/j-0"):
+            reply = daemon.get(target, headers=bob)
+            assert reply.status == 403 and '"read"' in reply.json()["detail"], (target, reply)
+        for target in (path + "/scene", "/v1/jobs"):
+            assert daemon.get(target, headers=ann).status == 403, target
+        code, out, errors = client(daemon.url, "submit", "-", "--wait", "60", text=json.dumps({**SCENE, "duration": 4}),
+                                   environment={"IMPACTD_TOKEN": ann["Authorization"].split()[1]})
+        assert code == 0 and out.startswith("j-"), (code, out, errors)
 
 
 def test_a_result_that_others_share_is_not_one_clients_to_delete():
