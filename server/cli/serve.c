@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -14,8 +15,10 @@
 #include "core/study/sweep.h"
 #include "server/api/app.h"
 #include "server/cli/command.h"
-#include "server/cli/network.h"
+#include "server/cli/scene_file.h"
+#include "server/http/address.h"
 #include "server/http/server.h"
+#include "server/http/tls.h"
 #include "server/jobs/maintenance.h"
 #include "server/options.h"
 #include "server/util/clock.h"
@@ -123,6 +126,117 @@ static Status serve_check(const ServeSettings *settings, Problem *problem) {
     return status;
 }
 
+static bool is_host(const char *name, size_t size) {
+    static const char plain[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-._";
+    if (size > 2 && name[0] == '[')
+        return strcspn(name, "]") == size - 1;
+    return size > 0 && size < 200 && strspn(name, plain) >= size;
+}
+
+static Status host_add(Texts *hosts, const char *name, size_t size, Problem *problem) {
+    char text[201];
+    snprintf(text, sizeof text, "%.*s", (int)size, name);
+    for (size_t i = 0; i < hosts->count; i++)
+        if (strcmp(hosts->at[i], text) == 0)
+            return STATUS_OK;
+    return texts_append(hosts, text) == STATUS_OK
+               ? STATUS_OK
+               : problem_set(problem, STATUS_NO_MEMORY, "no memory for the names of hosts");
+}
+
+// "a.example.org, b.example.org"
+static Status hosts_add_list(Texts *hosts, const char *list, Problem *problem) {
+    Status status = STATUS_OK;
+    for (const char *at = list; *at != '\0';) {
+        const size_t size = strcspn(at, ","), from = strspn(at, " ");
+        if (from >= size || !is_host(at + from, size - from))
+            status = problem_add(problem, STATUS_USAGE, "--host",
+                                 "must be a name without port or http://, is \"%.*s\"",
+                                 (int)(size < 80 ? size : 80), at);
+        else
+            TRY(host_add(hosts, at + from, size - from, problem));
+        at += size;
+        at += *at == ',' ? 1 : 0;
+    }
+    return status;
+}
+
+// The Host names that requests may have: those of loopback, of the address, of --host and of the
+// base URL.
+static Status hosts_set(const ServeSettings *settings, const Address *address, const BaseUrl *url,
+                        Texts *hosts, Problem *problem) {
+    Status status = STATUS_OK;
+    char name[80];
+    if (address_is_any(address) || address_is_loopback(address))
+        for (size_t i = 0; gate_loopback.names[i] != NULL; i++)
+            TRY(host_add(hosts, gate_loopback.names[i], strlen(gate_loopback.names[i]), problem));
+    if (!address_is_any(address)) {
+        const bool is_v6 = strchr(address->host, ':') != NULL;
+        snprintf(name, sizeof name, "%s%s%s", is_v6 ? "[" : "", address->host, is_v6 ? "]" : "");
+        TRY(host_add(hosts, name, strlen(name), problem));
+    }
+    for (size_t i = 0; i < settings->host.count; i++) {
+        const Status added = hosts_add_list(hosts, settings->host.at[i], problem);
+        status = added != STATUS_OK ? added : status;
+    }
+    if (url->host[0] != '\0')
+        TRY(host_add(hosts, url->host, strlen(url->host), problem));
+    // AcceptedHosts ends with NULL.
+    return list_append(hosts, sizeof *hosts->at) != NULL
+               ? status
+               : problem_set(problem, STATUS_NO_MEMORY, "no memory for the names of hosts");
+}
+
+static Status pem_read(const char *option, const char *path, bool is_secret, Bytes *text,
+                       Problem *problem) {
+    enum { PEM_MAX = 1 << 20 };
+    struct stat facts;
+    errno = 0;
+    if (scene_file_read(path, text, NULL) != STATUS_OK && errno != 0)
+        return problem_add(problem, STATUS_USAGE, option, "cannot be read: %s: %s", path,
+                           strerror(errno));
+    if (is_secret && stat(path, &facts) == 0 && (facts.st_mode & S_IROTH) != 0)
+        return problem_add(problem, STATUS_USAGE, option,
+                           "can be read by everyone on this machine; chmod 600 %s", path);
+    if (text->at == NULL || text->count == 0 || text->count > PEM_MAX ||
+        strlen(text->at) != text->count)
+        return problem_add(problem, STATUS_USAGE, option,
+                           "%s is not a PEM file of at most a megabyte", path);
+    return STATUS_OK;
+}
+
+// Uses the certificate of the settings, if there is one. STATUS_USAGE: the one in use stays.
+static Status certificate_read(const ServeSettings *settings, Problem *problem) {
+    const char *cert = settings->tls_cert, *key = settings->tls_key;
+    Bytes cert_text = {0}, key_text = {0};
+    if (cert == NULL && key == NULL)
+        return STATUS_OK;
+    if (cert == NULL || key == NULL)
+        return problem_add(problem, STATUS_USAGE, cert != NULL ? "--tls-cert" : "--tls-key",
+                           "needs %s FILE beside it", cert != NULL ? "--tls-key" : "--tls-cert");
+    const Status all[] = {pem_read("--tls-cert", cert, false, &cert_text, problem),
+                          pem_read("--tls-key", key, true, &key_text, problem)};
+    Status status = status_first(all, COUNT(all));
+    if (status == STATUS_OK)
+        status = tls_use(cert_text.at, cert, key_text.at, key, problem);
+    bytes_clear(&cert_text);
+    bytes_clear(&key_text);
+    return status;
+}
+
+// STATUS_FORBIDDEN if tokens are required and none is valid.
+static Status tokens_require(const Address *address, size_t valid, Problem *problem) {
+    const bool is_loopback = address_is_loopback(address);
+    if (valid > 0)
+        return STATUS_OK;
+    return problem_set(problem, STATUS_FORBIDDEN,
+                       "does not listen on %s%s: there is no valid token. Create one with\n    "
+                       "impactd token create --name NAME --scopes read,submit\n(with the same "
+                       "--data DIR, if any)%s",
+                       address->host, is_loopback ? " with --require-tokens" : "",
+                       is_loopback ? "" : ", or listen on 127.0.0.1");
+}
+
 static void serve_greet(const Server *server, const ServeSettings *settings, const App *app) {
     const char *url = app->base_url[0] != '\0' ? app->base_url : server_url(server);
     printf("impactd %s listens on %s\n", program_version, server_url(server));
@@ -138,19 +252,19 @@ static void forget_answers(void *response_cache) {
 }
 
 // SIGHUP: reads a renewed certificate.
-static void serve_reload(const NetworkSettings *asked, Problem *problem) {
+static void serve_reload(const ServeSettings *settings, Problem *problem) {
     problem_clear(problem);
-    if (asked->tls_cert == NULL)
+    if (settings->tls_cert == NULL)
         fprintf(stderr, "impactd: SIGHUP: without TLS there is nothing to reload\n");
-    else if (network_read_tls(asked, problem) == STATUS_OK)
-        fprintf(stderr, "impactd: SIGHUP: the certificate in %s is in use\n", asked->tls_cert);
+    else if (certificate_read(settings, problem) == STATUS_OK)
+        fprintf(stderr, "impactd: SIGHUP: the certificate in %s is in use\n", settings->tls_cert);
     else
         fprintf(stderr, "impactd: SIGHUP: the certificate is unchanged: %s\n", problem->detail);
 }
 
 // Waits for a signal that ends the program and notifies the watchdog of systemd meanwhile. A
 // terminal that is closed ends the program that was started in it.
-static int serve_wait(const sigset_t *signals, const NetworkSettings *asked, Problem *problem) {
+static int serve_wait(const sigset_t *signals, const ServeSettings *settings, Problem *problem) {
     const bool has_terminal = isatty(STDIN_FILENO) != 0;
     const int64_t period_ms = systemd_watchdog_ms();
     const struct timespec period = {.tv_sec = (time_t)(period_ms / 1000),
@@ -159,7 +273,7 @@ static int serve_wait(const sigset_t *signals, const NetworkSettings *asked, Pro
         const int signal =
             period_ms > 0 ? sigtimedwait(signals, NULL, &period) : sigwaitinfo(signals, NULL);
         if (signal == SIGHUP && (!has_terminal || isatty(STDIN_FILENO) != 0))
-            serve_reload(asked, problem);
+            serve_reload(settings, problem);
         else if (signal > 0)
             return signal;
         else if (errno == EAGAIN)
@@ -176,12 +290,11 @@ static void signals_unblock(const sigset_t *signals) {
 }
 
 static void serve_until_stopped(App *app, Server *server, const ServeSettings *settings,
-                                const NetworkSettings *asked, const sigset_t *signals,
-                                Problem *problem) {
+                                const sigset_t *signals, Problem *problem) {
     atomic_store(&app->server, server);
     serve_greet(server, settings, app);
     systemd_notify("READY=1");
-    const int signal = serve_wait(signals, asked, problem);
+    const int signal = serve_wait(signals, settings, problem);
     systemd_notify("STOPPING=1");
     atomic_store(&app->is_stopping, true);
     signals_unblock(signals);
@@ -216,9 +329,10 @@ static Status serve(const ServeSettings *settings, const sigset_t *signals, Prob
                                                 .document_bytes = DOCUMENT_BYTES,
                                                 .points = settings->max_points}};
     const KeepRules keep = {settings->keep_days, settings->keep_jobs, settings->keep_bytes};
-    const NetworkSettings asked = {settings->host, settings->base_url, settings->tls_cert,
-                                   settings->tls_key, settings->require_tokens};
-    Network ready = {0};
+    Texts hosts = {NULL, 0};
+    AcceptedHosts accepted;
+    BaseUrl url = {.host = ""};
+    bool needs_tokens = false;
     RequestMetrics *request_metrics = NULL;
     Server *server = NULL;
     Maintenance *keeper = NULL;
@@ -226,18 +340,22 @@ static Status serve(const ServeSettings *settings, const sigset_t *signals, Prob
     fft_start();
     Status status = address_read(settings->listen, &door.address, problem);
     if (status == STATUS_OK) {
-        const Status together = serve_check(settings, problem);
-        status = network_read(&asked, &door.address, &ready, problem);
-        status = together != STATUS_OK ? together : status;
+        needs_tokens = settings->require_tokens || !address_is_loopback(&door.address);
+        if (settings->base_url != NULL)
+            status = base_url_read(settings->base_url, &url, problem);
+        const Status all[] = {status, serve_check(settings, problem),
+                              hosts_set(settings, &door.address, &url, &hosts, problem),
+                              certificate_read(settings, problem)};
+        status = status_first(all, COUNT(all));
     }
     if (status == STATUS_OK && (request_metrics = request_metrics_new(routes)) == NULL)
         status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the counters");
     if (status == STATUS_OK)
         status = db_open(settings->data, &app.db, problem);
     if (status == STATUS_OK)
-        status = tokens_open(app.db, ready.needs_tokens, &access.tokens, problem);
-    if (status == STATUS_OK)
-        status = network_check(&ready, &door.address, tokens_usable(access.tokens), problem);
+        status = tokens_open(app.db, needs_tokens, &access.tokens, problem);
+    if (status == STATUS_OK && needs_tokens)
+        status = tokens_require(&door.address, tokens_usable(access.tokens), problem);
     if (status == STATUS_OK)
         status = jobs_open(app.db, &work, &app.manager, problem);
     if (status == STATUS_OK)
@@ -245,17 +363,18 @@ static Status serve(const ServeSettings *settings, const sigset_t *signals, Prob
     if (status == STATUS_OK)
         status = background_open(ASIDES, &app.background_tasks, problem);
     if (status == STATUS_OK) {
-        base_path_set(ready.url.path);
-        text_fit(app.base_url, sizeof app.base_url, ready.url.text);
+        accepted = (AcceptedHosts){(const char *const *)hosts.at, address_is_any(&door.address)};
+        base_path_set(url.path);
+        text_fit(app.base_url, sizeof app.base_url, url.text);
         app.has_tls = tls_source() != NULL;
         app.request_metrics = access.request_metrics = request_metrics;
         app.response_cache = router.response_cache;
-        door.hosts = &ready.hosts;
+        door.hosts = &accepted;
         door.certificate = tls_source();
         status = server_open(&door, &server, problem);
     }
     if (status == STATUS_OK)
-        serve_until_stopped(&app, server, settings, &asked, signals, problem);
+        serve_until_stopped(&app, server, settings, signals, problem);
     server_stop(server, GRACE_MS);
     maintenance_stop(keeper);
     background_close(app.background_tasks);
@@ -266,7 +385,7 @@ static Status serve(const ServeSettings *settings, const sigset_t *signals, Prob
     tokens_close(access.tokens);
     db_close(app.db);
     request_metrics_free(request_metrics);
-    network_clear(&ready);
+    texts_clear(&hosts);
     tls_forget();
     return status;
 }
