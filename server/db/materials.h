@@ -94,7 +94,7 @@ void measurement_summaries_clear(MeasurementSummaries *briefs);
 
 typedef struct AuditEntry {
     uint64_t version;               // of the material after it; what is added gets the next
-    char *action;                   // "create", "revise" ...: schema/sql/009_materials.sql
+    char *action;                   // "create", "revise" ...: schema/sql/schema.sql
     uint64_t revision, measurement; // 0: not about one
     char *who, *why;
     int64_t created_unix_ms;

@@ -7,14 +7,14 @@
 #include <stddef.h>
 
 typedef struct EmbeddedFile {
-    const char *path;   // from the project's folder: "schema/sql/001_start.sql"
+    const char *path;   // from the project's folder: "schema/sql/schema.sql"
     const char *bytes;  // a NUL follows the last one
     size_t size;        // without that NUL
     const char *digest; // half of its SHA-256, in hexadecimal
 } EmbeddedFile;
 
 // Each table is sorted by path and ends with path == NULL.
-extern const EmbeddedFile embedded_sql[];      // schema/sql/*.sql
+extern const EmbeddedFile embedded_sql[];      // schema/sql/*.sql, the schema first
 extern const EmbeddedFile embedded_schemas[];  // schema/*.json
 extern const EmbeddedFile embedded_examples[]; // schema/examples/*.json
 extern const EmbeddedFile embedded_web[];      // web/, all that a browser loads

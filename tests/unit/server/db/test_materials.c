@@ -14,7 +14,6 @@
 #include "core/contact/contact.h"
 #include "server/db/db_private.h"
 #include "server/db/sqlite.h"
-#include "server/util/embedded.h"
 #include "tests/support/felt.h"
 #include "tests/support/scratch.h"
 
@@ -196,96 +195,12 @@ static void no_sql_changes_what_was_said(void **state) {
     sqlite_close(database);
 }
 
-// A result on "sponge@1" and a revision of somebody's, as each step has them.
-static const char data_of_before[] =
-    "INSERT INTO material_revisions (material, revision, name, restitution, contact_time, source, "
-    "created_unix_ms) VALUES (1, 2, 'Sponge, new', 0.55, NULL, 'us', 77);"
-    "INSERT INTO material_reviews (material, revision, status, reason, created_unix_ms) VALUES "
-    "(1, 2, 'approved', 'better', 78), (1, 1, 'deprecated', 'old', 79);"
-    "INSERT INTO results (id, engine, sample_rate, count, created_unix_ms, summary, plan, "
-    "warnings, impact_count, scene, outcome) VALUES ('r-1', 'e', 10, 11, 80, '{}', '{}', '[]', 0, "
-    "'{\"dampers\": [{\"left_buffer\": {\"material\": \"sponge@1\"}, \"right_buffer\": "
-    "{\"material\": \"sponge@1\"}}], \"title\": \"a@b\"}', x'00')";
-
-static void check_migrated(Db *db) {
-    MaterialRevision found;
-    assert_int_equal(db_material(db, "sponge", 0, &found, NULL), STATUS_OK);
-    assert_int_equal(found.revision, 2);
-    assert_string_equal(found.material.name, "Sponge, new");
-    assert_string_equal(found.reason, "better");
-    assert_true(found.material.restitution == 0.55 && isnan(found.material.contact_time));
-    assert_int_equal(found.version, 5);
-    material_revision_clear(&found);
-    assert_int_equal(db_material(db, "sponge", 1, &found, NULL), STATUS_OK);
-    assert_string_equal(found.status, "deprecated");
-    assert_true(found.material.restitution == 0.61 && found.material.impactor_mass == 0.11);
-    material_revision_clear(&found);
-    AuditEntries audit_entries;
-    assert_int_equal(db_audit_entries(db, "sponge", 100, 100, &audit_entries, NULL), STATUS_OK);
-    static const char *const actions[] = {"deprecate", "approve", "approve", "revise", "create"};
-    assert_int_equal(audit_entries.count, COUNT(actions));
-    for (size_t i = 0; i < COUNT(actions); i++)
-        assert_string_equal(audit_entries.at[i].action, actions[i]);
-    audit_entries_clear(&audit_entries);
-    MaterialReferences uses;
-    assert_int_equal(db_material_uses(db, "sponge", &uses, NULL), STATUS_OK);
-    assert_int_equal(uses.count, 2);
-    assert_int_equal(uses.at[0].revision, 2);
-    assert_int_equal(uses.at[0].results, 0);
-    assert_string_equal(uses.at[0].status, "approved");
-    assert_int_equal(uses.at[1].revision, 1);
-    assert_int_equal(uses.at[1].results, 1);
-    free(uses.at);
-    ResultUses results;
-    uint64_t total;
-    assert_int_equal(db_result_uses(db, "sponge@1", 10, 0, &results, &total, NULL), STATUS_OK);
-    assert_int_equal(total, 1);
-    assert_string_equal(results.at[0].id, "r-1");
-    free(results.at);
-    MaterialRevision next = felt_saying(0.5);
-    next.slug = "sponge";
-    assert_int_equal(db_material_revise(db, &next, 5, NULL), STATUS_OK);
-    assert_int_equal(next.revision, 3);
-    MaterialRevisions heads;
-    assert_int_equal(db_material_heads(db, "", 100, &heads, NULL), STATUS_OK);
-    assert_int_equal(heads.count, 5);
-    for (size_t i = 0; i < heads.count; i++)
-        assert_string_equal(heads.at[i].status, "approved");
-    material_revisions_clear(&heads);
-    Texts slugs;
-    assert_int_equal(db_material_slugs(db, &slugs, NULL), STATUS_OK);
-    assert_int_equal(slugs.count, 5);
-    assert_string_equal(slugs.at[4], "sponge");
-    material_slugs_clear(&slugs);
-}
-
-static void a_database_of_each_step_before_goes_on(void **state) {
-    (void)state;
-    enum { STEPS = 8 }; // the last one before materials had their trail
-    for (size_t steps = 1; steps <= STEPS; steps++) {
-        EmbeddedFile files[STEPS + 1] = {{0}};
-        for (size_t i = 0; i < steps; i++)
-            files[i] = embedded_sql[i];
-        scratch_make(folder);
-        Sqlite *database = open_database();
-        assert_int_equal(sqlite_migrate(database, files, NULL), STATUS_OK);
-        assert_int_equal(sqlite_execute(database, data_of_before, NULL), STATUS_OK);
-        sqlite_close(database);
-        Db *db = felt_store(folder);
-        check_migrated(db);
-        db_close(db);
-        db_close(felt_store(folder));
-        scratch_remove(folder);
-    }
-}
-
 #define IN_FOLDER(test) cmocka_unit_test_setup_teardown(test, make_folder, remove_folder)
 
 int main(void) {
     const struct CMUnitTest tests[] = {
         IN_FOLDER(a_revision_comes_back_as_it_went),
         IN_FOLDER(no_sql_changes_what_was_said),
-        cmocka_unit_test(a_database_of_each_step_before_goes_on),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

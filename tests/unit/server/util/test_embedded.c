@@ -34,10 +34,10 @@ static void every_embedded_file_equals_its_source(void **state) {
 
 static void a_file_is_found_by_its_path(void **state) {
     (void)state;
-    const EmbeddedFile *file = embedded_find(embedded_sql, "schema/sql/001_start.sql");
+    const EmbeddedFile *file = embedded_find(embedded_sql, "schema/sql/schema.sql");
     assert_non_null(file);
     assert_non_null(strstr(file->bytes, "CREATE TABLE"));
-    assert_null(embedded_find(embedded_sql, "schema/sql/001_start"));
+    assert_null(embedded_find(embedded_sql, "schema/sql/schema"));
 }
 
 int main(void) {
