@@ -1,5 +1,5 @@
-// A first Ctrl-C asks the copying to stop, which then removes what it has written; a second one, on
-// a disk that answers no more, ends the program there and then.
+// backup and restore. A first Ctrl-C asks the copying to stop, which then removes what it has
+// written; a second one, on a disk that does not answer, ends the program at once.
 #include "server/cli/command.h"
 
 #include <inttypes.h>
@@ -16,54 +16,65 @@ typedef struct BackupSettings {
 } BackupSettings;
 
 // clang-format off
+#define DATA_FIELD \
+    FIELD_TEXT(BackupSettings, data, 4000, PRESENCE_OPTIONAL, 0, "the daemon's folder ($IMPACTD_DATA, else as impactd serve has it)")
 static const Field backup_fields[] = {
-    FIELD_TEXT(BackupSettings, data, 4000, PRESENCE_OPTIONAL, 0, "the daemon's folder ($IMPACTD_DATA, else as impactd serve has it)"),
+    DATA_FIELD,
     FIELD_FLAG(BackupSettings, force, false, "replace FILE if it is there"),
+    FIELD_END,
+};
+static const Field restore_fields[] = {
+    DATA_FIELD,
+    FIELD_FLAG(BackupSettings, force, false, "replace the folder's database if it has one"),
     FIELD_END,
 };
 // clang-format on
 
 static volatile sig_atomic_t is_interrupted;
 
-static void interrupted(int number) {
+static void backup_interrupt(int number) {
     (void)number;
     is_interrupted = 1;
 }
 
-static void interrupts_catch(void) {
-    struct sigaction action = {.sa_handler = interrupted, .sa_flags = (int)SA_RESETHAND};
+static void backup_catch_signals(void) {
+    struct sigaction action = {.sa_handler = backup_interrupt, .sa_flags = (int)SA_RESETHAND};
     sigemptyset(&action.sa_mask);
     (void)sigaction(SIGINT, &action, NULL);
     (void)sigaction(SIGTERM, &action, NULL);
     (void)sigaction(SIGHUP, &action, NULL);
 }
 
-static bool advance(void *bar, double fraction) {
+static bool backup_advance(void *bar, double fraction) {
     const Progress drawn = progress_bar_watch(bar);
     (void)progress_advance(&drawn, fraction);
     return is_interrupted == 0;
 }
 
-static int backup(const Command *self, void *of, const Options *options, Problem *problem) {
-    BackupSettings *settings = of;
+typedef Status BackupCopy(const BackupRequest *request, Backup *backup, Problem *problem);
+
+static int backup_run_copy(const Command *self, BackupSettings *settings, const Options *options,
+                           const char *what, BackupCopy *copy, Problem *problem) {
     if (options->operand_count != 1)
-        (void)problem_set(problem, STATUS_USAGE, "takes one file to write, is given %zu",
+        (void)problem_set(problem, STATUS_USAGE, "takes one file to %s, is given %zu", what,
                           options->operand_count);
     else if (strcmp(options->operands[0], "-") == 0)
-        (void)problem_set(problem, STATUS_USAGE,
-                          "writes a file, not standard output: it appears whole or not at all");
+        (void)problem_set(problem, STATUS_USAGE, "needs a file to %s, not %s", what,
+                          strcmp(what, "read") == 0
+                              ? "standard input: it is checked as a whole"
+                              : "standard output: it appears whole or not at all");
     if (problem->status != STATUS_OK)
         return command_error(self->name, problem);
     const char *path = options->operands[0];
     Backup made = {0};
     ProgressBar bar;
-    const Progress watch = {&bar, advance};
-    interrupts_catch();
+    const Progress watch = {&bar, backup_advance};
+    backup_catch_signals();
     progress_bar_start(&bar);
     Status status = command_data_folder(&settings->data, problem);
     if (status == STATUS_OK) {
         const BackupRequest request = {settings->data, path, settings->force, &watch};
-        status = backup_write(&request, &made, problem);
+        status = copy(&request, &made, problem);
     }
     progress_bar_stop(&bar);
     if (status == STATUS_OK)
@@ -71,11 +82,19 @@ static int backup(const Command *self, void *of, const Options *options, Problem
                " materials\n",
                path, made.bytes, made.jobs, made.results, made.materials);
     else if (status == STATUS_CANCELLED)
-        fputs("impactd backup: interrupted; nothing is left of it\n", stderr);
+        fprintf(stderr, "impactd %s: interrupted; nothing is left of it\n", self->name);
     else
-        fprintf(stderr, "impactd backup: %s\n",
+        fprintf(stderr, "impactd %s: %s\n", self->name,
                 problem->detail[0] != '\0' ? problem->detail : status_title(status));
     return command_exit(status);
+}
+
+static int backup(const Command *self, void *of, const Options *options, Problem *problem) {
+    return backup_run_copy(self, of, options, "write", backup_write, problem);
+}
+
+static int restore(const Command *self, void *of, const Options *options, Problem *problem) {
+    return backup_run_copy(self, of, options, "read", backup_restore, problem);
 }
 
 const Command command_backup = {
@@ -87,19 +106,30 @@ const Command command_backup = {
         "  impactd backup lab.db --force                  in the place of the last one\n"
         "  impactd backup /backups/lab-$(date +%F).db --data /var/lib/impactd\n"
         "\n"
-        "Nobody is held up meanwhile. The copy is of one moment, is checked, and appears whole or "
+        "The daemon answers meanwhile. The copy is of one moment, is checked, and appears whole or "
         "not at\n"
-        "all; it holds the tokens' digests and is readable by you alone. Ctrl-C leaves nothing.\n"
+        "all; it has the tokens' digests and is readable by you alone. Ctrl-C leaves nothing.\n"
         "\n"
-        "To go back to it, stop the daemon, move its folder aside and begin a new one with the "
-        "copy:\n"
-        "\n"
-        "  mv DIR DIR.before && mkdir -m 700 DIR && cp -p lab.db DIR/impactd.db\n"
-        "\n"
-        "DIR is the folder of --data; the other files of the old one belong to the old database. "
-        "Jobs that\n"
-        "were unfinished in the copy are taken up again.\n",
+        "impactd restore FILE puts it back.\n",
     .options = backup_fields,
     .size = sizeof(BackupSettings),
     .run = backup,
+};
+
+const Command command_restore = {
+    .name = "restore",
+    .operands = "FILE",
+    .summary = "put a backup back as the daemon's database",
+    .help =
+        "  impactd restore lab.db --data DIR              into a folder without a database\n"
+        "  impactd restore lab.db --force                 in the place of the folder's database\n"
+        "\n"
+        "Stop the daemon first. FILE is copied and checked, and the folder has either the database "
+        "of before\n"
+        "or the whole of FILE, whatever happens. FILE itself stays as it is. Jobs that were "
+        "unfinished in the\n"
+        "backup are taken up again when the daemon starts.\n",
+    .options = restore_fields,
+    .size = sizeof(BackupSettings),
+    .run = restore,
 };

@@ -28,10 +28,11 @@ static const Command command_version = {
 };
 
 const Command *const commands[] = {
-    &command_serve,  &command_run,     &command_check,  &command_tradeoff,  &command_ensemble,
-    &command_study,  &command_sweep,   &command_import, &command_materials, &command_records,
-    &command_token,  &command_backup,  &command_submit, &command_watch,     &command_get,
-    &command_cancel, &command_compare, &command_help,   &command_version,   NULL,
+    &command_serve, &command_run,    &command_check,   &command_tradeoff,  &command_ensemble,
+    &command_study, &command_sweep,  &command_import,  &command_materials, &command_records,
+    &command_token, &command_backup, &command_restore, &command_submit,    &command_watch,
+    &command_get,   &command_cancel, &command_compare, &command_help,      &command_version,
+    NULL,
 };
 
 static const char overview[] =
@@ -48,6 +49,7 @@ static const char overview[] =
     "  impactd token create --name lab      create an access token\n"
     "  impactd materials list               materials of the laboratory\n"
     "  impactd backup lab.db                copy the database while the server runs\n"
+    "  impactd restore lab.db               put a backup back\n"
     "  impactd import motion.AT2            convert a ground motion file to an excitation\n"
     "  impactd submit scene.json --wait 60  run a scene on a server\n"
     "  impactd get JOB series -o out.npy    download a part of its result\n"

@@ -1,6 +1,8 @@
 // The token itself goes to standard output and nothing else does, so that a script can take it.
 #include "server/cli/command.h"
 
+#include <errno.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -41,11 +43,22 @@ static Status create(Db *db, const TokenSettings *settings, TokenRow *row, Probl
     TRY(token_make(settings->scopes != NULL ? settings->scopes : "read,submit", expires_unix_ms,
                    row, made, problem));
     TRY(db_token_add(db, row, problem));
+    // A token that nobody has seen must not exist: it would make every request need one.
+    (void)signal(SIGPIPE, SIG_IGN);
+    if (printf("%s\n", made) < 0 || fflush(stdout) != 0) {
+        const int code = errno;
+        row->revoked_unix_ms = clock_unix_ms();
+        TRY(db_token_revoke(db, row, problem));
+        TRY(db_token_forget(db, row, problem));
+        return problem_set(problem, STATUS_IO,
+                           "the token cannot be written to standard output: %s; there is no token "
+                           "\"%s\"",
+                           strerror(code), row->name);
+    }
     fprintf(stderr,
             "The token \"%s\" (%s). It is shown this once; only its digest is kept. Use it as\n"
             "  curl -H \"Authorization: Bearer $TOKEN\" ...\n",
             row->name, row->scopes);
-    printf("%s\n", made);
     return STATUS_OK;
 }
 

@@ -29,6 +29,12 @@ Status data_dir_make(const char *directory, Problem *problem) {
                                strerror(errno));
         path[i] = end;
     }
+    struct stat folder;
+    if (stat(directory, &folder) == 0 && (folder.st_mode & S_IWOTH) != 0)
+        return problem_set(problem, STATUS_FORBIDDEN,
+                           "every user may write to the folder %s, and thus replace the database; "
+                           "chmod o-w it, or choose another folder",
+                           directory);
     return STATUS_OK;
 }
 

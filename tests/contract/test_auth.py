@@ -6,6 +6,7 @@ import json
 import os
 import re
 import socket
+import subprocess
 import sys
 import tempfile
 import time
@@ -255,6 +256,24 @@ def test_token_commands_tell_what_is_wrong():
                 (("lsit",), 2, "create, list, revoke or forget")):
             done = impactd("token", *arguments, "--data", data)
             assert done.returncode == code and text in done.stderr and done.stdout == "", (arguments, done)
+
+
+def test_a_token_that_cannot_be_shown_is_not_made():
+    """Where standard output takes nothing, the command fails and there is no token, so that loopback stays open."""
+    with program.daemon() as daemon:
+        for target in ("/dev/full", None):
+            if target is not None:
+                out = os.open(target, os.O_WRONLY)
+            else:
+                gone, out = os.pipe()
+                os.close(gone)
+            made = subprocess.run([program.impactd(), "token", "create", "--name", "lab", "--data", daemon.data], stdout=out,
+                                  stderr=subprocess.PIPE, text=True, timeout=60)
+            os.close(out)
+            assert made.returncode == 1 and "cannot be written" in made.stderr, made
+            assert json.loads(program.run("token", "list", "--json", "--data", daemon.data)[1]) == {"tokens": []}
+        time.sleep(1.2)
+        assert daemon.get("/v1/jobs").status == 200
 
 
 def test_beyond_loopback_nothing_starts_without_a_token():

@@ -297,5 +297,127 @@ def test_the_daemon_is_not_held_up():
         assert json.loads(daemon.get(f"/v1/jobs/{during[-1]}").body)["status"] == "successful"
 
 
+def restore(path, data, *arguments):
+    """Runs it; the code and what it says."""
+    code, out, errors = program.run("restore", path, "--data", data, *arguments)
+    return code, out + errors
+
+
+def test_a_backup_is_restored():
+    """Into a missing folder and over a database whose log is not moved in yet; the daemon then has what the backup had, and nothing else."""
+    with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as data:
+        path = os.path.join(folder, "copy.db")
+        running = program.Daemon(program.build, data=data)
+        running.start()
+        try:
+            kept = program.finished(running, scene(1))
+            assert backup(path, data)[0] == 0
+            later = program.finished(running, scene(2))
+            os.kill(running.process.pid, signal.SIGKILL)
+            running.process.wait()
+        finally:
+            running.stop()
+        assert os.path.getsize(os.path.join(data, "impactd.db-wal")) > 0
+        code, said = restore(path, data)
+        assert code == 1 and "has a database already" in said and "--force" in said, (code, said)
+        fresh = os.path.join(folder, "new", "data")
+        for target, arguments in ((fresh, ()), (data, ("--force",))):
+            code, said = restore(path, target, *arguments)
+            assert code == 0 and said == (f"{path}: {os.path.getsize(path)} bytes, checked; "
+                                          "1 jobs, 1 results, 5 materials\n"), (code, said)
+            assert sorted(os.listdir(target)) == ["impactd.db", "impactd.lock"], os.listdir(target)
+            assert stat.S_IMODE(os.stat(os.path.join(target, "impactd.db")).st_mode) == 0o600
+            with program.daemon(data=target) as daemon:
+                assert daemon.get(f"/v1/jobs/{kept['id']}").json()["result"] == kept["result"]
+                assert daemon.get(f"/v1/jobs/{later['id']}").status == 404
+                assert daemon.get(f"/v1/results/{kept['result']}").status == 200
+        assert os.path.exists(path)
+
+
+def test_what_cannot_be_restored_leaves_the_database():
+    """A running daemon, a missing, damaged, foreign, newer and older file, the folder's own database: each is refused in words."""
+    with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as data:
+        path, bad, own = (os.path.join(folder, "copy.db"), os.path.join(folder, "bad.db"), os.path.join(data, "impactd.db"))
+        with program.daemon(data=data) as daemon:
+            job = program.finished(daemon, scene(1))
+            big(data, 4)
+            assert backup(path, data)[0] == 0
+            code, said = restore(path, data, "--force")
+            assert code == 1 and "another impactd" in said, (code, said)
+        with open(own, "rb") as file:
+            before = file.read()
+
+        def refused(words, made):
+            shutil.copy(path, bad)
+            made(bad)
+            code, said = restore(bad, data, "--force")
+            assert code in (1, 4) and words in said, (words, code, said)
+            with open(own, "rb") as file:
+                assert file.read() == before
+            assert sorted(os.listdir(data)) == ["impactd.db", "impactd.lock"], os.listdir(data)
+
+        def overwrite(target):
+            with open(target, "r+b") as file:
+                file.seek(os.path.getsize(target) // 2)
+                file.write(b"\xff" * 20000)
+
+        def execute(sql):
+            def act(target):
+                connection = sqlite3.connect(target)
+                connection.executescript(sql)
+                connection.close()
+            return act
+
+        def write(content):
+            def act(target):
+                with open(target, "wb") as file:
+                    file.write(content)
+            return act
+
+        refused("cannot be read", os.unlink)
+        refused("damaged", overwrite)
+        refused("damaged", write(os.urandom(5000)))
+        refused("holds nothing", write(b""))
+        refused("another program", execute("PRAGMA application_id = 7"))
+        refused("newer impactd", execute("PRAGMA user_version = 10"))
+        refused("must be 1 to 1", execute("PRAGMA user_version = 0"))
+        refused("must be 1 to 1", execute("PRAGMA user_version = -3"))
+        code, said = restore(own, data, "--force")
+        assert code == 1 and "own database" in said, (code, said)
+        for arguments in ((), ("-",), (path, path)):
+            assert program.run("restore", *arguments, "--data", data)[0] == 2
+        with program.daemon(data=data) as daemon:
+            assert daemon.get(f"/v1/jobs/{job['id']}").json()["result"] == job["result"]
+
+
+def test_a_restore_without_room_or_interrupted_leaves_the_database():
+    """On a full disk and after a signal the folder has its database of before, alone."""
+    with small_disk() as disk, tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as large:
+        data, path = os.path.join(disk, "data"), os.path.join(folder, "copy.db")
+        with program.daemon(data=large) as daemon:
+            big(large, 64)
+            assert backup(path, large)[0] == 0
+        with program.daemon(data=data) as daemon:
+            job = program.finished(daemon, scene(1))
+        code, said = restore(path, data, "--force")
+        assert code == 1 and "no room" in said, (code, said)
+        assert sorted(os.listdir(data)) == ["impactd.db", "impactd.lock"], os.listdir(data)
+        with program.daemon(data=data) as daemon:
+            assert daemon.get(f"/v1/jobs/{job['id']}").json()["result"] == job["result"]
+        for moment in (signal.SIGTERM, signal.SIGKILL):
+            running = subprocess.Popen([program.impactd(), "restore", path, "--force", "--data", large],
+                                       stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+            while running.poll() is None and not any("XXXX" not in name and name.startswith("impactd.db.") for name in os.listdir(large)):
+                pass
+            running.send_signal(moment)
+            running.communicate(timeout=120)
+            assert running.returncode in (0, 130, -signal.SIGKILL), running.returncode
+            assert moment == signal.SIGKILL or sorted(os.listdir(large)) == ["impactd.db", "impactd.lock"], os.listdir(large)
+            connection = sqlite3.connect(os.path.join(large, "impactd.db"))
+            assert connection.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
+            assert connection.execute("SELECT count(*) FROM ballast").fetchone() == (64,)
+            connection.close()
+
+
 if __name__ == "__main__":
     program.main(globals())
