@@ -111,25 +111,32 @@ Status db_job_load(Db *db, const char *id, JobRow *row, Problem *problem) {
 }
 
 Status db_job_scene(Db *db, const char *id, char **scene, Problem *problem) {
-    static const char sql[] =
-        "SELECT coalesce((SELECT scene FROM jobs WHERE id = :id AND scene <> ''), "
-        "(SELECT scene FROM results WHERE id = :name)) AS scene";
-    JobRow row, found = {.scene = NULL};
+    static const char sql[] = "SELECT result, scene FROM jobs WHERE id = :id";
+    JobRow row = {.scene = NULL};
+    ResultRow result;
     bool is_found;
     *scene = NULL;
-    // A job may be in memory alone as yet, its result not.
-    TRY(db_job_load(db, id, &row, problem));
-    const QueryKey key = {.id = id, .name = row.result};
-    const Status status =
-        db_first(db, sql, query_key_columns, &key, job_columns, &found, &is_found, problem);
-    job_row_clear(&row);
+    TRY(db_first(db, sql, query_key_columns, &(QueryKey){.id = id}, job_columns, &row, &is_found,
+                 problem));
+    if (!is_found)
+        return job_not_found(id, problem);
+    *scene = row.scene;
+    if (row.scene[0] != '\0')
+        return STATUS_OK;
+    free(row.scene);
+    *scene = NULL;
+    const Status status = db_result_scene(db, row.result, &result, problem);
+    if (status == STATUS_NOT_FOUND) {
+        problem_clear(problem);
+        return problem_set(problem, STATUS_GONE,
+                           "the scene of the job \"%.40s\" went with its result, which was deleted",
+                           id);
+    }
     TRY(status);
-    *scene = found.scene;
-    return *scene != NULL ? STATUS_OK
-                          : problem_set(problem, STATUS_GONE,
-                                        "the scene of the job \"%.40s\" went with its result, "
-                                        "which was deleted",
-                                        id);
+    *scene = result.scene;
+    result.scene = NULL;
+    result_row_clear(&result);
+    return STATUS_OK;
 }
 
 Status db_job_keyed(Db *db, const char *client, const char *key, JobRow *row, Problem *problem) {

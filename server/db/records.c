@@ -13,25 +13,25 @@
 // clang-format off
 static const SqlColumn record_columns[] = {
     COLUMN_READ(RecordRow, number, "number"),
-    COLUMN(RecordRow, name),
-    COLUMN(RecordRow, source),
-    COLUMN(RecordRow, processing),
-    COLUMN(RecordRow, earthquake),
-    COLUMN(RecordRow, station),
-    COLUMN(RecordRow, notes),
-    COLUMN(RecordRow, layout),
-    COLUMN(RecordRow, header),
-    COLUMN(RecordRow, unit),
-    COLUMN(RecordRow, stated_unit),
-    COLUMN(RecordRow, interval),
-    COLUMN(RecordRow, count),
-    COLUMN(RecordRow, peak),
-    COLUMN(RecordRow, peak_time),
-    COLUMN(RecordRow, peak_velocity),
-    COLUMN(RecordRow, end_velocity),
-    COLUMN(RecordRow, digest),
-    COLUMN(RecordRow, author),
-    COLUMN(RecordRow, created_unix_ms),
+    COLUMN_WITH(RecordRow, name, COLUMN_CHECKED),
+    COLUMN_WITH(RecordRow, source, COLUMN_CHECKED),
+    COLUMN_WITH(RecordRow, processing, COLUMN_CHECKED),
+    COLUMN_WITH(RecordRow, earthquake, COLUMN_CHECKED),
+    COLUMN_WITH(RecordRow, station, COLUMN_CHECKED),
+    COLUMN_WITH(RecordRow, notes, COLUMN_CHECKED),
+    COLUMN_WITH(RecordRow, layout, COLUMN_CHECKED),
+    COLUMN_WITH(RecordRow, header, COLUMN_CHECKED),
+    COLUMN_WITH(RecordRow, unit, COLUMN_CHECKED),
+    COLUMN_WITH(RecordRow, stated_unit, COLUMN_CHECKED),
+    COLUMN_WITH(RecordRow, interval, COLUMN_CHECKED),
+    COLUMN_WITH(RecordRow, count, COLUMN_CHECKED),
+    COLUMN_WITH(RecordRow, peak, COLUMN_CHECKED),
+    COLUMN_WITH(RecordRow, peak_time, COLUMN_CHECKED),
+    COLUMN_WITH(RecordRow, peak_velocity, COLUMN_CHECKED),
+    COLUMN_WITH(RecordRow, end_velocity, COLUMN_CHECKED),
+    COLUMN_WITH(RecordRow, digest, COLUMN_CHECKED),
+    COLUMN_WITH(RecordRow, author, COLUMN_CHECKED),
+    COLUMN_WITH(RecordRow, created_unix_ms, COLUMN_CHECKED),
     COLUMN_END
 };
 // clang-format on
@@ -40,8 +40,8 @@ typedef struct Samples {
     const char *name;
     StoredBytes samples;
 } Samples;
-static const SqlColumn samples_columns[] = {COLUMN(Samples, name), COLUMN(Samples, samples),
-                                            COLUMN_END};
+static const SqlColumn samples_columns[] = {
+    COLUMN(Samples, name), COLUMN_WITH(Samples, samples, COLUMN_CHECKED), COLUMN_END};
 
 static const char one_sql[] = "SELECT {columns} FROM records WHERE name = :name";
 
@@ -111,8 +111,9 @@ static Status record_apply_add(Sqlite *database, const void *work, Problem *prob
     static const char count_sql[] =
         "SELECT count(*) AS count, coalesce(sum(count), 0) AS bytes FROM records";
     static const char head_sql[] = "INSERT INTO records {insert}";
-    static const char body_sql[] = "INSERT INTO record_samples (number, samples) "
-                                   "SELECT number, :samples FROM records WHERE name = :name";
+    static const char body_sql[] =
+        "INSERT INTO record_samples (number, samples, checks) "
+        "SELECT number, :samples, :checks FROM records WHERE name = :name";
     const Adding *adding = work;
     const RecordRow *row = adding->row;
     const QueryKey key = {.name = row->name};
@@ -185,26 +186,22 @@ Status db_record_twins(Db *db, const RecordRow *row, RecordRows *rows, Problem *
 
 // A copy owned by the caller, of exactly row->count numbers.
 static Status record_read_samples(Db *db, const RecordRow *row, Reals *samples, Problem *problem) {
-    static const char sql[] = "SELECT s.samples FROM record_samples s JOIN records r USING "
-                              "(number) WHERE r.name = :name AND r.digest = :digest";
+    static const char sql[] =
+        "SELECT s.samples, s.checks FROM record_samples s JOIN records r USING "
+        "(number) WHERE r.name = :name AND r.digest = :digest";
     const QueryKey key = {.name = row->name, .digest = row->digest};
     Samples found = {0};
-    char digest[RECORD_DIGEST_SIZE] = "";
     bool is_found;
     TRY(db_first(db, sql, query_key_columns, &key, samples_columns, &found, &is_found, problem));
     if (!is_found)
         return record_not_found(row->name, problem);
+    if (found.samples.size != row->count * sizeof(double)) {
+        free(found.samples.at);
+        return problem_set(problem, STATUS_INTERNAL, "the record \"%.64s\" is not whole",
+                           row->name);
+    }
     *samples = (Reals){found.samples.at, row->count};
-    if (found.samples.size == row->count * sizeof(double))
-        record_digest(row->interval, samples, digest);
-    if (strcmp(digest, row->digest) == 0)
-        return STATUS_OK;
-    free(found.samples.at);
-    *samples = (Reals){NULL, 0};
-    return problem_set(problem, STATUS_INTERNAL,
-                       "the record \"%.64s\" is damaged: its samples have not its digest; put a "
-                       "backup in place of the database (impactd restore)",
-                       row->name);
+    return STATUS_OK;
 }
 
 Status db_record_named(Db *db, const char *name, NamedRecord **named, Problem *problem) {

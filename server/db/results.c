@@ -11,18 +11,18 @@
 static const SqlColumn result_columns[] = {
     COLUMN(ResultRow, id),
     COLUMN(ResultRow, engine),
-    COLUMN(ResultRow, sample_rate),
-    COLUMN(ResultRow, count),
+    COLUMN_WITH(ResultRow, sample_rate, COLUMN_CHECKED),
+    COLUMN_WITH(ResultRow, count, COLUMN_CHECKED),
     COLUMN(ResultRow, created_unix_ms),
-    COLUMN(ResultRow, summary),
-    COLUMN(ResultRow, plan),
-    COLUMN(ResultRow, warnings),
-    COLUMN(ResultRow, work),
-    COLUMN(ResultRow, notes),
-    COLUMN(ResultRow, impact_count),
-    COLUMN_WITH(ResultRow, scene, COLUMN_LONG),
-    COLUMN_WITH(ResultRow, outcome, COLUMN_LONG),
-    COLUMN_WITH(ResultRow, study, COLUMN_LONG),
+    COLUMN_WITH(ResultRow, summary, COLUMN_CHECKED),
+    COLUMN_WITH(ResultRow, plan, COLUMN_CHECKED),
+    COLUMN_WITH(ResultRow, warnings, COLUMN_CHECKED),
+    COLUMN_WITH(ResultRow, work, COLUMN_CHECKED),
+    COLUMN_WITH(ResultRow, notes, COLUMN_CHECKED),
+    COLUMN_WITH(ResultRow, impact_count, COLUMN_CHECKED),
+    COLUMN_WITH(ResultRow, scene, COLUMN_LONG | COLUMN_CHECKED),
+    COLUMN_WITH(ResultRow, outcome, COLUMN_LONG | COLUMN_CHECKED),
+    COLUMN_WITH(ResultRow, study, COLUMN_LONG | COLUMN_CHECKED),
     COLUMN_END
 };
 // clang-format on
@@ -102,7 +102,7 @@ Status db_result_load(Db *db, const char *id, ResultRow *row, Problem *problem) 
 }
 
 Status db_result_outcome(Db *db, const char *id, ResultRow *row, Problem *problem) {
-    static const char sql[] = "SELECT id, outcome FROM results WHERE id = :id";
+    static const char sql[] = "SELECT id, outcome, checks FROM results WHERE id = :id";
     return result_load(db, sql, id, row, problem);
 }
 
@@ -112,7 +112,7 @@ Status db_result_head(Db *db, const char *id, ResultRow *row, Problem *problem) 
 }
 
 Status db_result_scene(Db *db, const char *id, ResultRow *row, Problem *problem) {
-    static const char sql[] = "SELECT id, engine, scene FROM results WHERE id = :id";
+    static const char sql[] = "SELECT id, engine, scene, checks FROM results WHERE id = :id";
     return result_load(db, sql, id, row, problem);
 }
 
@@ -148,9 +148,9 @@ Status db_result_delete(Db *db, const char *id, Problem *problem) {
 }
 
 Status db_result_recent(Db *db, size_t most, size_t scene_max, ResultRows *rows, Problem *problem) {
-    static const char sql[] =
-        "SELECT id, engine, scene FROM (SELECT * FROM results ORDER BY number DESC LIMIT :max) "
-        "WHERE length(scene) <= :before";
+    static const char sql[] = "SELECT id, engine, scene, checks FROM (SELECT * FROM results ORDER "
+                              "BY number DESC LIMIT :max) "
+                              "WHERE length(scene) <= :before";
     const QueryKey key = {.max = most, .before = (int64_t)scene_max};
     return db_list(db, sql, query_key_columns, &key, result_columns, sizeof *rows->at, rows,
                    problem);

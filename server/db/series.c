@@ -14,8 +14,8 @@ typedef struct Blob {
     WriteDone done;
 } Blob;
 
-static const SqlColumn columns[] = {COLUMN(Blob, result), COLUMN(Blob, body), COLUMN(Blob, bytes),
-                                    COLUMN_END};
+static const SqlColumn columns[] = {COLUMN(Blob, result), COLUMN_WITH(Blob, body, COLUMN_CHECKED),
+                                    COLUMN(Blob, bytes), COLUMN_END};
 
 static const char sum_sql[] =
     "SELECT count(*) AS count, coalesce(sum(bytes), 0) AS bytes FROM series";
@@ -35,8 +35,9 @@ static Status series_apply_put(Sqlite *database, const void *work, Problem *prob
     static const char again_sql[] = "DELETE FROM series WHERE result = :result";
     static const char head_sql[] = "INSERT INTO series (result, bytes, used) VALUES (:result, "
                                    ":bytes, (SELECT coalesce(max(used), 0) + 1 FROM series))";
-    static const char body_sql[] = "INSERT INTO series_bodies (number, body) "
-                                   "SELECT number, :body FROM series WHERE result = :result";
+    static const char body_sql[] =
+        "INSERT INTO series_bodies (number, body, checks) "
+        "SELECT number, :body, :checks FROM series WHERE result = :result";
     const Blob *blob = work;
     uint64_t there;
     int changes = 1;
@@ -93,7 +94,7 @@ static void series_touch_done(void *context, Status status, const char *detail) 
 }
 
 Status db_series_load(Db *db, const char *result, char **body, size_t *size, Problem *problem) {
-    static const char sql[] = "SELECT body FROM series JOIN series_bodies USING (number) "
+    static const char sql[] = "SELECT body, checks FROM series JOIN series_bodies USING (number) "
                               "WHERE result = :result";
     Blob blob = {.bytes = 0}, *used = calloc(1, sizeof *used);
     bool is_found = false;

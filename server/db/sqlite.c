@@ -16,6 +16,7 @@
 #include "core/base/field.h"
 #include "server/util/bytes.h"
 #include "server/util/gzip.h"
+#include "server/util/log.h"
 
 enum { STATEMENTS = 192, PARAMETERS = 40, APPLICATION = 0x696D7064 }; // "impd"
 
@@ -141,7 +142,7 @@ static void sql_expand(const char *sql, const SqlColumn *keys, const SqlColumn *
     for (const char *brace; (brace = strchr(sql, '{')) != NULL; sql = strchr(brace, '}') + 1) {
         const bool is_insert = brace[1] == 'i', is_set = brace[1] == 's', is_head = brace[1] == 'h';
         const SqlColumn *table = is_insert || is_set ? keys : columns;
-        const bool has_checks = !is_set && columns_are_checked(table);
+        const bool has_checks = columns_are_checked(table);
         const char *separator = "";
         bytes_put(bytes, sql, (size_t)(brace - sql));
         if (is_insert)
@@ -162,7 +163,7 @@ static void sql_expand(const char *sql, const SqlColumn *keys, const SqlColumn *
             separator = ", ";
         }
         if (has_checks)
-            bytes_text(bytes, ", checks");
+            bytes_text(bytes, is_set ? ", checks = :checks" : ", checks");
         if (!is_insert)
             continue;
         separator = ") VALUES (:";
@@ -421,11 +422,27 @@ static void free_owned(const SqlColumn *column, void *item) {
     }
 }
 
+// Also logged: readers of parts of a page do not look into its problem.
+static Status report_damage(Statement *statement, const SqlColumn *column, Problem *problem) {
+    Problem damage = {.status = STATUS_OK};
+    Bytes line = {0};
+    (void)problem_set(&damage, STATUS_INTERNAL,
+                      "%s is damaged: a stored \"%s\" differs from its checksum; put a backup in "
+                      "its place (impactd restore)",
+                      sqlite3_db_filename(sqlite3_db_handle(statement->handle), "main"),
+                      column->name);
+    log_put(&line, "error", damage.detail, sizeof damage.detail);
+    log_write(&line);
+    bytes_clear(&line);
+    return problem_set(problem, STATUS_INTERNAL, "%s", damage.detail);
+}
+
 // Compares what was read of the row with its checks, which are those of all checked columns.
 static Status check_row(Statement *statement, int checks_index, const SqlColumn *columns,
                         const void *item, Problem *problem) {
     const char *checks = sqlite3_column_blob(statement->handle, checks_index);
     const size_t size = (size_t)sqlite3_column_bytes(statement->handle, checks_index);
+    const int count = sqlite3_column_count(statement->handle);
     size_t at = 0;
     for (const SqlColumn *column = columns; checks != NULL && column->name != NULL; column++) {
         if ((column->flags & COLUMN_CHECKED) == 0)
@@ -435,31 +452,29 @@ static Status check_row(Statement *statement, int checks_index, const SqlColumn 
             memcpy(&check, checks + at, sizeof check);
         at += sizeof check;
         bool was_read = false;
-        for (int i = 0; i < checks_index && !was_read; i++)
+        for (int i = 0; i < count && !was_read; i++)
             was_read = strcmp(sqlite3_column_name(statement->handle, i), column->name) == 0;
         if (was_read && check != column_check(column, (const char *)item + column->offset))
-            return problem_set(problem, STATUS_INTERNAL,
-                               "%s is damaged: a stored %s has not its checksum; put a backup in "
-                               "its place (impactd restore)",
-                               sqlite3_db_filename(sqlite3_db_handle(statement->handle), "main"),
-                               column->name);
+            return report_damage(statement, column, problem);
     }
     return STATUS_OK;
 }
 
 Status row_read(Statement *statement, const SqlColumn *columns, void *item, Problem *problem) {
     const int count = sqlite3_column_count(statement->handle);
+    int checks_index = -1;
     Status status = STATUS_OK;
     for (int index = 0; index < count && status == STATUS_OK; index++) {
         const char *name = sqlite3_column_name(statement->handle, index);
         const SqlColumn *column = name == NULL ? NULL : column_find(columns, name);
-        if (column == NULL) {
-            if (name != NULL && strcmp(name, "checks") == 0)
-                status = check_row(statement, index, columns, item, problem);
-        } else if (!read_column(statement->handle, index, column, (char *)item + column->offset)) {
+        if (column == NULL && name != NULL && strcmp(name, "checks") == 0)
+            checks_index = index;
+        else if (column != NULL &&
+                 !read_column(statement->handle, index, column, (char *)item + column->offset))
             status = problem_set(problem, STATUS_NO_MEMORY, "no memory for a row of the database");
-        }
     }
+    if (status == STATUS_OK && checks_index >= 0)
+        status = check_row(statement, checks_index, columns, item, problem);
     for (const SqlColumn *column = columns; status != STATUS_OK && column->name != NULL; column++)
         free_owned(column, item);
     return status;
@@ -571,7 +586,7 @@ Status sqlite_read_part(Sqlite *database, const char *table, const char *column,
 }
 
 // Page size and vacuum take effect in an empty file only, and before the journal's mode is set.
-static const char writer_settings[] = "PRAGMA page_size = 16384;"
+static const char writer_settings[] = "PRAGMA page_size = 4096;"
                                       "PRAGMA auto_vacuum = INCREMENTAL;"
                                       "PRAGMA journal_mode = WAL;";
 // What is read is mapped; the cache holds pages that are written, and grows to its size with the

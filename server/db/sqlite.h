@@ -100,7 +100,7 @@ uint64_t sqlite_rows_changed(Sqlite *database);
 // result has; the others stay as they are. Generated from the tables, which are the same each time:
 //
 //     {insert}    (a, b) VALUES (:a, :b)    all of `keys`, with their checks
-//     {set}       a = :a, b = :b            those of `keys` that are COLUMN_MUTABLE
+//     {set}       a = :a, b = :b            those that are COLUMN_MUTABLE, with the checks of all
 //     {columns}   a, b                      all of `columns`, with their checks
 //     {head}      a, b                      the same without those that are COLUMN_LONG
 

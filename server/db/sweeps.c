@@ -10,10 +10,10 @@
 static const SqlColumn sweep_columns[] = {
     COLUMN_READ(SweepRow, number, "number"),
     COLUMN(SweepRow, result),
-    COLUMN(SweepRow, scene),
-    COLUMN(SweepRow, points),
-    COLUMN(SweepRow, metrics),
-    COLUMN(SweepRow, chunks),
+    COLUMN_WITH(SweepRow, scene, COLUMN_CHECKED),
+    COLUMN_WITH(SweepRow, points, COLUMN_CHECKED),
+    COLUMN_WITH(SweepRow, metrics, COLUMN_CHECKED),
+    COLUMN_WITH(SweepRow, chunks, COLUMN_CHECKED),
     COLUMN(SweepRow, retries),
     COLUMN(SweepRow, created_unix_ms),
     COLUMN_END
@@ -23,10 +23,10 @@ static const SqlColumn chunk_columns[] = {
     COLUMN_READ(SweepChunkRow, number, "number"),
     COLUMN(SweepChunkRow, sweep),
     COLUMN(SweepChunkRow, chunk),
-    COLUMN_WITH(SweepChunkRow, failed, COLUMN_MUTABLE),
+    COLUMN_WITH(SweepChunkRow, failed, COLUMN_MUTABLE | COLUMN_CHECKED),
     COLUMN_WITH(SweepChunkRow, is_open, COLUMN_MUTABLE),
-    COLUMN_WITH(SweepChunkRow, reasons, COLUMN_MUTABLE | COLUMN_LONG),
-    COLUMN_WITH(SweepChunkRow, rows, COLUMN_MUTABLE | COLUMN_LONG),
+    COLUMN_WITH(SweepChunkRow, reasons, COLUMN_MUTABLE | COLUMN_LONG | COLUMN_CHECKED),
+    COLUMN_WITH(SweepChunkRow, rows, COLUMN_MUTABLE | COLUMN_LONG | COLUMN_CHECKED),
     COLUMN_END
 };
 // clang-format on

@@ -1,0 +1,95 @@
+#!/usr/bin/env python3
+"""A stored row whose bytes have changed is answered with 500 and a line in the log, never as if nothing had happened."""
+
+import contextlib
+import os
+import sqlite3
+import sys
+import tempfile
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
+import program  # noqa: E402
+
+
+@contextlib.contextmanager
+def changed(folder, table, column):
+    """One value of the table is another one meanwhile."""
+    connection = sqlite3.connect(os.path.join(folder, "impactd.db"), isolation_level=None)
+    before = connection.execute(f"SELECT {column} FROM {table}").fetchone()[0]
+    if isinstance(before, float):
+        after = before + 1
+    elif isinstance(before, bytes):
+        after = before[:-1] + bytes([before[-1] ^ 1])
+    else:
+        after = before.replace("1", "2", 1)
+    assert after != before, (table, column)
+    try:
+        connection.execute(f"UPDATE {table} SET {column} = ?", [after])
+        yield
+        connection.execute(f"UPDATE {table} SET {column} = ?", [before])
+    finally:
+        connection.close()
+
+
+def refused(daemon, target, **arguments):
+    reply = daemon.get(target, **arguments)
+    assert reply.status == 500 and "damaged" in reply.json()["detail"], (target, reply)
+    assert "impactd restore" in reply.json()["detail"], reply
+    assert "etag" not in reply.headers, reply
+    logged = daemon.stderr()
+    assert f'path="{target}" code=500' in logged and "is damaged: a stored" in logged, logged
+
+
+def test_a_changed_result_is_no_answer():
+    """Each stored document and number of a result, on every representation, also to who has its ETag; whole again it is served."""
+    with tempfile.TemporaryDirectory() as folder:
+        with program.daemon(data=folder) as daemon:
+            job = program.finished(daemon, program.scene("paper_free_sponge"))
+            place = f"/v1/results/{job['result']}"
+            etag = daemon.get(place).headers["etag"]
+        for column in ("summary", "plan", "scene", "outcome", "sample_rate"):
+            with changed(folder, "results", column), program.daemon(data=folder) as daemon:
+                parts = ("", "/bundle.zip") if column != "outcome" else ("/impacts.csv", "/psd.json", "/energy.csv", "/bundle.zip")
+                for part in parts:
+                    refused(daemon, place + part)
+                if column == "scene":
+                    refused(daemon, f"/v1/jobs/{job['id']}/scene")
+                assert daemon.get("/v1/jobs").status == 200
+        with program.daemon(data=folder) as daemon:
+            reply = daemon.get(place)
+            assert reply.status == 200 and reply.headers["etag"] == etag
+
+
+def test_a_changed_series_is_computed_anew():
+    """A stored series is a copy of what can be computed: where it has changed, the answer is right all the same."""
+    with tempfile.TemporaryDirectory() as folder:
+        with program.daemon(data=folder) as daemon:
+            job = program.finished(daemon, program.scene("paper_random_sponge"))
+            place = f"/v1/results/{job['result']}/series.npy"
+            before = daemon.get(place).body
+        connection = sqlite3.connect(os.path.join(folder, "impactd.db"))
+        stored = connection.execute("SELECT count(*) FROM series_bodies").fetchone()[0]
+        connection.close()
+        assert stored == 1, "the series is stored"
+        with changed(folder, "series_bodies", "body"), program.daemon(data=folder) as daemon:
+            assert daemon.get(place).body == before
+
+
+def test_a_changed_record_is_no_answer():
+    """Samples that have not their digest: neither shown nor used by a new job."""
+    with tempfile.TemporaryDirectory() as folder:
+        with program.daemon(data=folder) as daemon:
+            sent = daemon.request("POST", "/v1/records", json={"name": "quake", "interval": 0.01, "samples": [0.5, 1, -1, 0.25] * 50})
+            assert sent.status == 201, sent
+        connection = sqlite3.connect(os.path.join(folder, "impactd.db"), isolation_level=None)
+        connection.execute("DROP TRIGGER record_samples_keep")
+        connection.close()
+        with changed(folder, "record_samples", "samples"), program.daemon(data=folder) as daemon:
+            refused(daemon, "/v1/records/quake/samples.csv")
+            scene = program.scene("paper_free_sponge")
+            scene["excitation"] = {"kind": "record", "name": "quake"}
+            assert daemon.submit(scene).status == 500
+
+
+if __name__ == "__main__":
+    sys.exit(program.main(globals()))
