@@ -29,8 +29,9 @@ Status data_dir_make(const char *directory, Problem *problem) {
                                strerror(errno));
         path[i] = end;
     }
+    // In a sticky folder, as /tmp is, others cannot remove or rename the files.
     struct stat folder;
-    if (stat(directory, &folder) == 0 && (folder.st_mode & S_IWOTH) != 0)
+    if (stat(directory, &folder) == 0 && (folder.st_mode & (S_IWOTH | S_ISVTX)) == S_IWOTH)
         return problem_set(problem, STATUS_FORBIDDEN,
                            "every user may write to the folder %s, and thus replace the database; "
                            "chmod o-w it, or choose another folder",

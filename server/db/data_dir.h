@@ -5,7 +5,7 @@
 #include "core/base/status.h"
 
 // Makes `directory` and what is missing above it, for this user alone. STATUS_FORBIDDEN where every
-// user may write to it.
+// user may replace files in it.
 Status data_dir_make(const char *directory, Problem *problem);
 // The same, and locks it. *lock is to be given to data_dir_unlock. STATUS_CONFLICT if another
 // process has it.

@@ -249,6 +249,25 @@ static void hammer_store(const char *directory) {
     db_close(db);
 }
 
+static void a_folder_that_everyone_may_write_to_is_refused(void **state) {
+    (void)state;
+    Db *db;
+    static Problem problem;
+    static const struct {
+        mode_t mode;
+        Status status;
+    } cases[] = {{0777, STATUS_FORBIDDEN}, {01777, STATUS_OK}, {0770, STATUS_OK}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        assert_int_equal(chmod(folder, cases[i].mode), 0);
+        problem_clear(&problem);
+        assert_int_equal(db_open(folder, &db, &problem), cases[i].status);
+        if (cases[i].status == STATUS_OK)
+            db_close(db);
+        else
+            assert_non_null(strstr(problem.detail, "chmod o-w"));
+    }
+}
+
 static void sixteen_threads_write_and_no_failure_spoils_another(void **state) {
     (void)state;
     hammer_store(folder);
@@ -493,6 +512,7 @@ int main(void) {
         IN_FOLDER(a_result_and_its_jobs_are_saved_together_or_not_at_all),
         IN_FOLDER(a_second_daemon_is_refused_with_the_folders_name),
         IN_FOLDER(a_missing_folder_is_made_for_this_user_alone),
+        IN_FOLDER(a_folder_that_everyone_may_write_to_is_refused),
         IN_FOLDER(sixteen_threads_write_and_no_failure_spoils_another),
         IN_FOLDER(what_was_acknowledged_survives_kill_9),
         IN_FOLDER(a_full_disk_is_told_and_what_was_there_stays),
