@@ -30,8 +30,9 @@ Status data_dir_make(const char *directory, Problem *problem) {
         path[i] = end;
     }
     // In a sticky folder, as /tmp is, others cannot remove or rename the files.
+    enum { STICKY = 01000 }; // S_ISVTX, which POSIX has among its extensions
     struct stat folder;
-    if (stat(directory, &folder) == 0 && (folder.st_mode & (S_IWOTH | S_ISVTX)) == S_IWOTH)
+    if (stat(directory, &folder) == 0 && (folder.st_mode & (S_IWOTH | STICKY)) == S_IWOTH)
         return problem_set(problem, STATUS_FORBIDDEN,
                            "every user may write to the folder %s, and thus replace the database; "
                            "chmod o-w it, or choose another folder",
