@@ -1,8 +1,5 @@
-// A token is looked up by the first eight bytes of its digest and then compared whole, in constant
-// time. The order of digests tells nothing about tokens, so the look-up needs no such care.
-//
-// The thread reads the table twice a second, which finds what other processes did, and writes back
-// when tokens were last used, each at most once a minute.
+// The thread reads the table twice a second, which finds the changes of other processes, and writes
+// back when tokens were last used, each at most once a minute.
 #include "server/auth/tokens.h"
 
 #include <pthread.h>
@@ -19,30 +16,27 @@
 
 enum {
     FOLLOW_MS = 500,
-    UNKNOWN_MAX = 16, // looks in that time for tokens that are not in the table
+    UNKNOWN_MAX = 16, // reads of the table in that time for unknown tokens
     USED_MS = 60000,
 };
 
 const char *const scope_names[] = {"read", "submit", "materials", "admin", NULL};
 
 typedef struct Entry {
-    uint64_t head; // the digest's first bytes
-    unsigned char digest[DIGEST_BYTES];
-    unsigned scopes; // bit i is scope_names[i]
-    int64_t expires_unix_ms, used_unix_ms, revoked_unix_ms;
-    int64_t seen_unix_ms; // last use, not all of it written back
-    char name[TOKEN_NAME_SIZE];
+    TokenRow row;
+    unsigned scopes;      // bit i is scope_names[i]; 0: a row that this program did not write
+    int64_t seen_unix_ms; // last use, written back now and then
 } Entry;
 
 struct Tokens {
     Db *db;
     bool are_required;
-    pthread_mutex_t lock; // of entries and count, held for a look-up
+    pthread_mutex_t lock; // of entries, count and now_unix_ms
     Entry *entries;
     size_t count;
-    int64_t now_unix_ms;     // as of the last look; under the lock
-    atomic_int looks_left;   // until the thread looks next
-    pthread_mutex_t looking; // one at a time
+    int64_t now_unix_ms;     // of the last read
+    atomic_int reads_left;   // until the thread reads next
+    pthread_mutex_t reading; // one read at a time
     pthread_mutex_t ending;
     pthread_cond_t end;
     pthread_t follower;
@@ -85,104 +79,76 @@ static unsigned scope_bit(const char *scope) {
     return 1u << i;
 }
 
-static bool digest_read(const char *digits, unsigned char digest[DIGEST_BYTES]) {
-    if (strlen(digits) != 2 * (size_t)DIGEST_BYTES ||
-        strspn(digits, "0123456789abcdef") != 2 * (size_t)DIGEST_BYTES)
-        return false;
-    for (size_t i = 0; i < DIGEST_BYTES; i++) {
-        const char pair[3] = {digits[2 * i], digits[2 * i + 1], '\0'};
-        digest[i] = (unsigned char)strtoul(pair, NULL, 16);
-    }
-    return true;
-}
-
-static uint64_t head_of(const unsigned char digest[DIGEST_BYTES]) {
-    uint64_t head;
-    memcpy(&head, digest, sizeof head);
-    return head;
-}
-
-static bool is_same(const unsigned char *a, const unsigned char *b) {
-    unsigned char difference = 0;
-    for (size_t i = 0; i < DIGEST_BYTES; i++)
-        difference |= (unsigned char)(a[i] ^ b[i]);
-    return difference == 0;
-}
-
-static Entry *find(const Tokens *tokens, const unsigned char digest[DIGEST_BYTES]) {
-    const uint64_t head = head_of(digest);
+// By SHA-256 digests, of which the time of a comparison tells nothing about tokens.
+static Entry *entry_find(const Tokens *tokens, const char *digest) {
     for (size_t i = 0; i < tokens->count; i++)
-        if (tokens->entries[i].head == head && is_same(tokens->entries[i].digest, digest))
+        if (strcmp(tokens->entries[i].row.digest, digest) == 0)
             return &tokens->entries[i];
     return NULL;
 }
 
-static bool is_usable(const Entry *entry, int64_t now_unix_ms) {
-    return entry->revoked_unix_ms == 0 &&
-           (entry->expires_unix_ms == 0 || now_unix_ms < entry->expires_unix_ms);
+static bool entry_is_revoked(const Entry *entry) {
+    return entry->row.revoked_unix_ms != 0 || entry->scopes == 0;
 }
 
-static void entry_fill(const Tokens *tokens, Entry *entry, const TokenRow *row) {
-    // A row that is not as we write them lets nobody in, but stands for "there are tokens".
-    if (!digest_read(row->digest, entry->digest) || !scopes_read(row->scopes, &entry->scopes))
-        entry->revoked_unix_ms = 1;
-    else
-        entry->revoked_unix_ms = row->revoked_unix_ms;
-    entry->head = head_of(entry->digest);
-    entry->expires_unix_ms = row->expires_unix_ms;
-    entry->used_unix_ms = row->used_unix_ms;
-    text_fit(entry->name, sizeof entry->name, row->name);
-    const Entry *before = find(tokens, entry->digest);
-    entry->seen_unix_ms = before != NULL ? before->seen_unix_ms : 0;
+static bool entry_is_usable(const Entry *entry, int64_t now_unix_ms) {
+    return !entry_is_revoked(entry) &&
+           (entry->row.expires_unix_ms == 0 || now_unix_ms < entry->row.expires_unix_ms);
 }
 
-// With `looking` held. What is there stays where the database cannot be read.
-static Status look(Tokens *tokens, Problem *problem) {
+// The table in memory stays as it is where the database cannot be read.
+static Status tokens_read(Tokens *tokens, Problem *problem) {
     TokenRows rows = {0};
-    TRY(db_tokens(tokens->db, &rows, problem));
-    Entry *entries = calloc(rows.count + 1, sizeof *entries);
-    if (entries == NULL) {
-        free(rows.at);
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the tokens");
+    pthread_mutex_lock(&tokens->reading);
+    Status status = db_tokens(tokens->db, &rows, problem);
+    Entry *entries = status == STATUS_OK ? calloc(rows.count + 1, sizeof *entries) : NULL;
+    if (entries != NULL) {
+        pthread_mutex_lock(&tokens->lock);
+        tokens->now_unix_ms = clock_unix_ms();
+        for (size_t i = 0; i < rows.count; i++) {
+            const Entry *before = entry_find(tokens, rows.at[i].digest);
+            entries[i].row = rows.at[i];
+            entries[i].seen_unix_ms = before != NULL ? before->seen_unix_ms : 0;
+            if (!scopes_read(rows.at[i].scopes, &entries[i].scopes))
+                entries[i].scopes = 0;
+        }
+        free(tokens->entries);
+        tokens->entries = entries;
+        tokens->count = rows.count;
+        pthread_mutex_unlock(&tokens->lock);
+    } else if (status == STATUS_OK) {
+        status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the tokens");
     }
-    pthread_mutex_lock(&tokens->lock);
-    tokens->now_unix_ms = clock_unix_ms();
-    for (size_t i = 0; i < rows.count; i++)
-        entry_fill(tokens, &entries[i], &rows.at[i]);
-    Entry *old = tokens->entries;
-    tokens->entries = entries;
-    tokens->count = rows.count;
-    pthread_mutex_unlock(&tokens->lock);
-    free(old);
     free(rows.at);
-    return STATUS_OK;
+    pthread_mutex_unlock(&tokens->reading);
+    return status;
 }
 
-// The next that was used and is worth a note; false if there is none.
-static bool next_used(Tokens *tokens, int64_t apart_ms, TokenRow *row) {
+// The next token whose last use is to be written back; false if there is none.
+static bool tokens_next_used(Tokens *tokens, int64_t apart_ms, TokenRow *row) {
     bool is_found = false;
     pthread_mutex_lock(&tokens->lock);
     for (size_t i = 0; i < tokens->count && !is_found; i++) {
         Entry *entry = &tokens->entries[i];
-        const int64_t seen = entry->seen_unix_ms;
-        if (seen <= entry->used_unix_ms || seen - entry->used_unix_ms < apart_ms)
-            continue;
-        is_found = true;
-        // Also where it cannot be written: it is not tried again and again.
-        row->used_unix_ms = entry->used_unix_ms = seen;
-        text_fit(row->name, sizeof row->name, entry->name);
+        const int64_t unwritten_ms = entry->seen_unix_ms - entry->row.used_unix_ms;
+        is_found = unwritten_ms > 0 && unwritten_ms >= apart_ms;
+        if (is_found) {
+            // Also where it then cannot be written: it is not tried again and again.
+            entry->row.used_unix_ms = entry->seen_unix_ms;
+            *row = entry->row;
+        }
     }
     pthread_mutex_unlock(&tokens->lock);
     return is_found;
 }
 
-static void note_used(Tokens *tokens, int64_t apart_ms) {
-    TokenRow row = {0};
-    while (next_used(tokens, apart_ms, &row))
+static void tokens_write_used(Tokens *tokens, int64_t apart_ms) {
+    TokenRow row;
+    while (tokens_next_used(tokens, apart_ms, &row))
         (void)db_token_used(tokens->db, &row, NULL);
 }
 
-static void *follow(void *context) {
+static void *tokens_follow(void *context) {
     Tokens *tokens = context;
     pthread_mutex_lock(&tokens->ending);
     while (!tokens->is_ending) {
@@ -193,11 +159,9 @@ static void *follow(void *context) {
                pthread_cond_timedwait(&tokens->end, &tokens->ending, &until) == 0)
             continue;
         pthread_mutex_unlock(&tokens->ending);
-        note_used(tokens, USED_MS);
-        pthread_mutex_lock(&tokens->looking);
-        (void)look(tokens, NULL);
-        pthread_mutex_unlock(&tokens->looking);
-        atomic_store(&tokens->looks_left, UNKNOWN_MAX);
+        tokens_write_used(tokens, USED_MS);
+        (void)tokens_read(tokens, NULL);
+        atomic_store(&tokens->reads_left, UNKNOWN_MAX);
         pthread_mutex_lock(&tokens->ending);
     }
     pthread_mutex_unlock(&tokens->ending);
@@ -211,18 +175,18 @@ Status tokens_open(Db *db, bool are_required, Tokens **tokens, Problem *problem)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the tokens");
     made->db = db;
     made->are_required = are_required;
-    atomic_init(&made->looks_left, UNKNOWN_MAX);
+    atomic_init(&made->reads_left, UNKNOWN_MAX);
     pthread_condattr_t attributes;
     pthread_condattr_init(&attributes);
     pthread_condattr_setclock(&attributes, CLOCK_MONOTONIC);
     pthread_mutex_init(&made->lock, NULL);
-    pthread_mutex_init(&made->looking, NULL);
+    pthread_mutex_init(&made->reading, NULL);
     pthread_mutex_init(&made->ending, NULL);
     pthread_cond_init(&made->end, &attributes);
     pthread_condattr_destroy(&attributes);
-    Status status = look(made, problem);
+    Status status = tokens_read(made, problem);
     if (status == STATUS_OK) {
-        made->is_following = pthread_create(&made->follower, NULL, follow, made) == 0;
+        made->is_following = pthread_create(&made->follower, NULL, tokens_follow, made) == 0;
         if (!made->is_following)
             status = problem_set(problem, STATUS_INTERNAL,
                                  "the thread that follows the tokens cannot be started");
@@ -244,10 +208,10 @@ void tokens_close(Tokens *tokens) {
         pthread_cond_signal(&tokens->end);
         pthread_mutex_unlock(&tokens->ending);
         pthread_join(tokens->follower, NULL);
-        note_used(tokens, 0);
+        tokens_write_used(tokens, 0);
     }
     pthread_mutex_destroy(&tokens->lock);
-    pthread_mutex_destroy(&tokens->looking);
+    pthread_mutex_destroy(&tokens->reading);
     pthread_mutex_destroy(&tokens->ending);
     pthread_cond_destroy(&tokens->end);
     free(tokens->entries);
@@ -259,13 +223,13 @@ size_t tokens_usable(Tokens *tokens) {
     pthread_mutex_lock(&tokens->lock);
     const int64_t now = tokens->now_unix_ms;
     for (size_t i = 0; i < tokens->count; i++)
-        usable += is_usable(&tokens->entries[i], now);
+        usable += entry_is_usable(&tokens->entries[i], now);
     pthread_mutex_unlock(&tokens->lock);
     return usable;
 }
 
-// The token in "Bearer TOKEN"; NULL if the header is no such thing.
-static const char *bearer(const char *authorization, size_t *size) {
+// The token in "Bearer TOKEN"; NULL if the header is malformed.
+static const char *bearer_token(const char *authorization, size_t *size) {
     static const char scheme[] = "Bearer ";
     if (strncasecmp(authorization, scheme, sizeof scheme - 1) != 0)
         return NULL;
@@ -275,77 +239,74 @@ static const char *bearer(const char *authorization, size_t *size) {
     return token[*size + strspn(token + *size, " \t")] == '\0' && *size > 0 ? token : NULL;
 }
 
-// What the table says of a digest.
-typedef struct Judgement {
-    bool is_asked, is_known, is_expired, is_revoked;
-    unsigned scopes;
-} Judgement;
+typedef enum TokenState {
+    TOKEN_NOT_NEEDED,
+    TOKEN_UNKNOWN,
+    TOKEN_REVOKED,
+    TOKEN_EXPIRED,
+    TOKEN_GOOD,
+} TokenState;
 
-static Judgement judge(Tokens *tokens, const unsigned char *digest, Holder *holder) {
-    Judgement found = {0};
+// `digest` "": there is no token.
+static TokenState tokens_find(Tokens *tokens, const char *digest, unsigned *scopes,
+                              char name[TOKEN_NAME_SIZE]) {
     pthread_mutex_lock(&tokens->lock);
     const int64_t now = tokens->now_unix_ms;
-    found.is_asked = tokens->are_required || tokens->count > 0;
-    Entry *entry = digest != NULL ? find(tokens, digest) : NULL;
-    if (entry != NULL) {
-        found.is_known = true;
-        found.is_revoked = entry->revoked_unix_ms != 0;
-        found.is_expired = !found.is_revoked && !is_usable(entry, now);
-        found.scopes = entry->scopes;
-        memcpy(holder->name, entry->name, sizeof holder->name);
-        holder->is_admin = (entry->scopes & scope_bit("admin")) != 0;
-        if (is_usable(entry, now))
-            entry->seen_unix_ms = now;
+    Entry *entry = digest[0] != '\0' ? entry_find(tokens, digest) : NULL;
+    const TokenState state = !tokens->are_required && tokens->count == 0 ? TOKEN_NOT_NEEDED
+                             : entry == NULL                             ? TOKEN_UNKNOWN
+                             : entry_is_revoked(entry)                   ? TOKEN_REVOKED
+                             : !entry_is_usable(entry, now)              ? TOKEN_EXPIRED
+                                                                         : TOKEN_GOOD;
+    if (state == TOKEN_GOOD) {
+        entry->seen_unix_ms = now;
+        *scopes = entry->scopes;
+        memcpy(name, entry->row.name, TOKEN_NAME_SIZE);
     }
     pthread_mutex_unlock(&tokens->lock);
-    return found;
+    return state;
 }
 
-// A token may have been made a moment ago, but whoever tries many must not cost a query each.
-static bool look_again(Tokens *tokens) {
-    if (atomic_load(&tokens->looks_left) <= 0 || atomic_fetch_sub(&tokens->looks_left, 1) <= 0)
-        return false;
-    pthread_mutex_lock(&tokens->looking);
-    const bool has_looked = look(tokens, NULL) == STATUS_OK;
-    pthread_mutex_unlock(&tokens->looking);
-    return has_looked;
-}
-
-static Status refuse(const Judgement *found, const char *authorization, Problem *problem) {
-    if (authorization == NULL)
-        return problem_set(
-            problem, STATUS_UNAUTHORIZED,
-            "a token is needed, in the header \"Authorization: Bearer TOKEN\" and nowhere else; "
-            "`impactd token create` makes one");
-    return problem_set(problem, STATUS_UNAUTHORIZED, "%s",
-                       found->is_revoked   ? "this token is revoked"
-                       : found->is_expired ? "this token has expired"
-                                           : "this token is not known here; the header must read "
-                                             "\"Authorization: Bearer TOKEN\"");
+// A token may have been made a moment ago; trying many must not cost a query each.
+static bool tokens_may_read(Tokens *tokens) {
+    return atomic_load(&tokens->reads_left) > 0 && atomic_fetch_sub(&tokens->reads_left, 1) > 0;
 }
 
 Status tokens_check(Tokens *tokens, const char *authorization, const char *scope, Holder *holder,
                     Problem *problem) {
-    unsigned char digest[DIGEST_BYTES];
+    unsigned char bytes[DIGEST_BYTES];
+    char digest[65] = "";
     size_t size = 0;
-    const char *token = authorization != NULL ? bearer(authorization, &size) : NULL;
+    unsigned scopes = 0;
+    const char *token = authorization != NULL ? bearer_token(authorization, &size) : NULL;
     *holder = (Holder){.name = ""};
-    if (token != NULL)
-        sha256_sum(token, size, digest);
-    Judgement found = judge(tokens, token != NULL ? digest : NULL, holder);
-    if (token != NULL && found.is_asked && !found.is_known && look_again(tokens))
-        found = judge(tokens, digest, holder);
-    if (!found.is_asked)
-        return STATUS_OK;
-    if (!found.is_known || found.is_revoked || found.is_expired) {
-        *holder = (Holder){.name = ""};
-        return refuse(&found, authorization, problem);
+    if (token != NULL) {
+        sha256_sum(token, size, bytes);
+        sha256_hex(bytes, digest);
     }
-    if ((found.scopes & scope_bit(scope)) != 0 || holder->is_admin)
+    TokenState state = tokens_find(tokens, digest, &scopes, holder->name);
+    if (state == TOKEN_UNKNOWN && token != NULL && tokens_may_read(tokens) &&
+        tokens_read(tokens, NULL) == STATUS_OK)
+        state = tokens_find(tokens, digest, &scopes, holder->name);
+    if (state == TOKEN_NOT_NEEDED)
         return STATUS_OK;
-    return problem_set(problem, STATUS_FORBIDDEN,
-                       "this needs the scope \"%s\", which the token \"%s\" has not", scope,
-                       holder->name);
+    if (state != TOKEN_GOOD && authorization == NULL)
+        return problem_set(
+            problem, STATUS_UNAUTHORIZED,
+            "a token is needed, in the header \"Authorization: Bearer TOKEN\" and nowhere else; "
+            "`impactd token create` makes one");
+    if (state != TOKEN_GOOD)
+        return problem_set(problem, STATUS_UNAUTHORIZED, "%s",
+                           state == TOKEN_REVOKED   ? "this token is revoked"
+                           : state == TOKEN_EXPIRED ? "this token has expired"
+                                                    : "this token is not known here; the header "
+                                                      "must read \"Authorization: Bearer TOKEN\"");
+    holder->is_admin = (scopes & scope_bit("admin")) != 0;
+    return holder->is_admin || (scopes & scope_bit(scope)) != 0
+               ? STATUS_OK
+               : problem_set(problem, STATUS_FORBIDDEN,
+                             "this needs the scope \"%s\", which the token \"%s\" has not", scope,
+                             holder->name);
 }
 
 Status token_make(const char *scopes, int64_t expires_unix_ms, TokenRow *row,

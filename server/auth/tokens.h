@@ -1,6 +1,5 @@
-// Who asks, and what they may: bearer tokens and their scopes, checked against a table in memory
-// that follows the database within a second. Not HTTP's answers (http/dispatch.h) and not how much
-// anyone may ask for. Used by http/dispatch.c and the commands `serve` and `token`.
+// Bearer tokens and their scopes, checked against a table in memory that follows the database
+// within a second.
 #ifndef SERVER_AUTH_TOKENS_H
 #define SERVER_AUTH_TOKENS_H
 
@@ -10,30 +9,28 @@ typedef struct Tokens Tokens;
 
 extern const char *const scope_names[]; // "read", ..., NULL-terminated; "admin" includes the others
 
-// Reads the table and starts the thread that follows it. With `are_required` a token is asked for
-// even where the database has none; otherwise from the first one on, also if it is revoked. Borrows
-// `store`.
+// Reads the table and starts the thread that follows it. With `are_required` every request needs a
+// token; otherwise from the first token in the database on, also if it is revoked. Borrows `db`.
 Status tokens_open(Db *db, bool are_required, Tokens **tokens, Problem *problem);
 void tokens_close(Tokens *tokens);
 
 // How many could be used now.
 size_t tokens_usable(Tokens *tokens);
 
-// Whose token it is.
 typedef struct Holder {
-    char name[TOKEN_NAME_SIZE]; // the token's; "" where none is asked for
+    char name[TOKEN_NAME_SIZE]; // the token's; "" where none is needed
     bool is_admin;
 } Holder;
 
-// Whether a request with this Authorization header (NULL: none) may use what needs `scope`, and who
-// sends it. STATUS_UNAUTHORIZED, STATUS_FORBIDDEN. From any thread; no SQL unless the token is
-// unknown, and then seldom.
+// Whether a request with this Authorization header (NULL: none) may use what needs `scope`, and
+// whose token it has. STATUS_UNAUTHORIZED, STATUS_FORBIDDEN. From any thread; no SQL unless the
+// token is unknown, and then rarely.
 Status tokens_check(Tokens *tokens, const char *authorization, const char *scope, Holder *holder,
                     Problem *problem);
 
 enum { TOKEN_SIZE = 73 }; // "impactd_", 64 digits and a NUL
 // Makes a token of 256 random bits and fills the row but for its name. `scopes` is a list with
-// commas; `expires_unix_ms` 0: never. The token is told here and nowhere again.
+// commas; `expires_unix_ms` 0: never. Only the token's digest is stored.
 Status token_make(const char *scopes, int64_t expires_unix_ms, TokenRow *row,
                   char token[TOKEN_SIZE], Problem *problem);
 

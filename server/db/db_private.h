@@ -23,7 +23,11 @@ Status db_enqueue(Db *db, StoreApply *apply, const void *work, size_t size, Writ
 
 atomic_uint_fast64_t *db_evictions(Db *db); // of series
 struct MaterialMemory *db_material_memory(Db *db);
-struct RecordMemory *db_record_memory(Db *db);
+
+typedef struct RecordMemory RecordMemory; // samples of records, each once
+RecordMemory *record_memory_new(void);    // NULL without memory
+void record_memory_free(RecordMemory *memory);
+RecordMemory *db_record_memory(Db *db);
 
 // A connection for reading, to be returned soon: there are few. Waits for one.
 Sqlite *db_take(Db *db);

@@ -1,13 +1,13 @@
-// A record is two rows that are written and deleted together; triggers keep them from being
-// changed.
+// Ground-motion records: two rows each, which are added and deleted together; triggers prevent
+// changes.
 #include "server/db/records.h"
 
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "server/db/db_private.h"
-#include "server/db/record_memory.h"
 #include "server/util/sha256.h"
 
 // clang-format off
@@ -204,23 +204,124 @@ static Status record_read_samples(Db *db, const RecordRow *row, Reals *samples, 
     return STATUS_OK;
 }
 
+// The samples in memory: those of the last records named, up to `memory_max` bytes, and those that
+// jobs refer to, which cost nothing more here. (Not util/lru: an evicted record that jobs still
+// have would be read, and kept, once more by the next one that names it.)
+static const size_t memory_max = 64 << 20;
+
+typedef struct Entry {
+    struct Entry *next;
+    NamedRecord *named;
+    uint64_t catalog_version; // of the catalogue, under which the name was found to stand for it
+} Entry;
+
+struct RecordMemory {
+    pthread_mutex_t lock;
+    Entry *first; // the last used
+};
+
+RecordMemory *record_memory_new(void) {
+    RecordMemory *memory = calloc(1, sizeof *memory);
+    if (memory != NULL)
+        pthread_mutex_init(&memory->lock, NULL);
+    return memory;
+}
+
+static void entry_remove(Entry **at) {
+    Entry *entry = *at;
+    *at = entry->next;
+    refcount_unref(&entry->named->shared);
+    free(entry);
+}
+
+void record_memory_free(RecordMemory *memory) {
+    if (memory == NULL)
+        return;
+    while (memory->first != NULL)
+        entry_remove(&memory->first);
+    pthread_mutex_destroy(&memory->lock);
+    free(memory);
+}
+
+// A reference to the record of that name and digest (NULL: the one that the name stood for under
+// that version of the catalogue), or NULL. With the lock held.
+static NamedRecord *memory_find_locked(RecordMemory *memory, uint64_t catalog_version,
+                                       const char *name, const char *digest) {
+    for (Entry **at = &memory->first; *at != NULL; at = &(*at)->next) {
+        Entry *entry = *at;
+        if (strcmp(entry->named->name, name) != 0 ||
+            (digest == NULL ? entry->catalog_version != catalog_version
+                            : strcmp(entry->named->digest, digest) != 0))
+            continue;
+        if (catalog_version > entry->catalog_version)
+            entry->catalog_version = catalog_version;
+        *at = entry->next;
+        entry->next = memory->first;
+        memory->first = entry;
+        refcount_ref(&entry->named->shared);
+        return entry->named;
+    }
+    return NULL;
+}
+
+static NamedRecord *memory_find(RecordMemory *memory, uint64_t catalog_version, const char *name,
+                                const char *digest) {
+    pthread_mutex_lock(&memory->lock);
+    NamedRecord *named = memory_find_locked(memory, catalog_version, name, digest);
+    pthread_mutex_unlock(&memory->lock);
+    return named;
+}
+
+// With the lock held, without which nobody else gets a reference.
+static void memory_evict(RecordMemory *memory) {
+    size_t bytes = 0;
+    for (Entry **at = &memory->first; *at != NULL;) {
+        const NamedRecord *named = (*at)->named;
+        bytes += named->samples.count * sizeof(double);
+        if (atomic_load(&named->shared.count) > 1 || bytes <= memory_max)
+            at = &(*at)->next;
+        else
+            entry_remove(at);
+    }
+}
+
+// Adds it, or frees it where another thread has added the same; a reference to what is there.
+static NamedRecord *memory_add(RecordMemory *memory, uint64_t catalog_version, NamedRecord *named) {
+    Entry *entry = malloc(sizeof *entry);
+    pthread_mutex_lock(&memory->lock);
+    NamedRecord *there = memory_find_locked(memory, catalog_version, named->name, named->digest);
+    if (there == NULL && entry != NULL) {
+        *entry = (Entry){memory->first, named, catalog_version};
+        refcount_ref(&named->shared);
+        memory->first = entry;
+        entry = NULL;
+        memory_evict(memory);
+    }
+    pthread_mutex_unlock(&memory->lock);
+    free(entry);
+    if (there == NULL)
+        return named;
+    refcount_unref(&named->shared);
+    return there;
+}
+
 Status db_record_named(Db *db, const char *name, NamedRecord **named, Problem *problem) {
     RecordMemory *memory = db_record_memory(db);
     const uint64_t catalog_version = db_catalog_version(db);
     RecordRow row;
     Reals samples;
-    *named = record_memory_find(memory, catalog_version, name, NULL);
+    *named = memory_find(memory, catalog_version, name, NULL);
     if (*named != NULL)
         return STATUS_OK;
     Status status = db_record(db, name, &row, problem);
     if (status == STATUS_OK)
-        *named = record_memory_find(memory, catalog_version, name, row.digest);
+        *named = memory_find(memory, catalog_version, name, row.digest);
     if (status == STATUS_OK && *named == NULL) {
         status = record_read_samples(db, &row, &samples, problem);
         if (status == STATUS_OK)
             *named = named_record_new(row.name, row.digest, row.interval, &samples);
         if (*named != NULL)
-            *named = record_memory_put(memory, catalog_version, *named);
+            *named = memory_add(memory, catalog_version, *named);
         else if (status == STATUS_OK)
             status = problem_set(problem, STATUS_NO_MEMORY, "no memory for a record");
     }

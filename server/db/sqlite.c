@@ -586,7 +586,7 @@ Status sqlite_read_part(Sqlite *database, const char *table, const char *column,
 }
 
 // Page size and vacuum take effect in an empty file only, and before the journal's mode is set.
-static const char writer_settings[] = "PRAGMA page_size = 4096;"
+static const char writer_settings[] = "PRAGMA page_size = 8192;"
                                       "PRAGMA auto_vacuum = INCREMENTAL;"
                                       "PRAGMA journal_mode = WAL;";
 // What is read is mapped; the cache holds pages that are written, and grows to its size with the

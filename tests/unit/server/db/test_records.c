@@ -12,7 +12,6 @@
 
 #include <cmocka.h>
 
-#include "server/db/record_memory.h"
 #include "server/db/sqlite.h"
 #include "tests/support/scratch.h"
 
@@ -333,41 +332,27 @@ static void names_are_fit_for_paths_and_files(void **state) {
     assert_true(record_name_is_sound(longest));
 }
 
-static NamedRecord *large(const char *name) {
-    Reals samples;
-    assert_true(reals_allocate(&samples, 3 << 20)); // 24 MiB, never touched
-    return named_record_new(name, name, 1, &samples);
-}
-
-static void the_memory_forgets_what_nobody_holds_beyond_its_budget(void **state) {
+static void a_record_is_in_memory_once_and_follows_the_catalogue(void **state) {
     (void)state;
-    RecordMemory *memory = record_memory_new();
-    NamedRecord *held = record_memory_put(memory, 1, large("held")), *found;
-    static const char *const others[] = {"a", "b", "c", "d"};
-    for (size_t i = 0; i < COUNT(others); i++) {
-        found = record_memory_put(memory, 1, large(others[i]));
-        refcount_unref(&found->shared);
-    }
-    found = record_memory_find(memory, 1, "held", NULL);
-    assert_ptr_equal(found, held);
-    refcount_unref(&found->shared);
-    assert_null(record_memory_find(memory, 1, "a", NULL));
-    found = record_memory_find(memory, 1, "d", NULL);
-    assert_non_null(found);
-    refcount_unref(&found->shared);
-    // Under another catalogue the digest tells whether it is the same.
-    assert_null(record_memory_find(memory, 2, "held", NULL));
-    assert_null(record_memory_find(memory, 2, "held", "other"));
-    found = record_memory_find(memory, 2, "held", "held");
-    assert_ptr_equal(found, held);
-    refcount_unref(&found->shared);
-    // Who was slower gets what is there.
-    found = record_memory_put(memory, 2, large("held"));
-    assert_ptr_equal(found, held);
-    refcount_unref(&found->shared);
-    refcount_unref(&held->shared);
-    record_memory_free(memory);
-    record_memory_free(NULL);
+    Db *db = db_make();
+    NamedRecord *first, *again, *other;
+    RecordUses uses;
+    bool is_there;
+    assert_int_equal(add(db, "r", 1, "s", &is_there), STATUS_OK);
+    assert_int_equal(db_record_named(db, "r", &first, &problem), STATUS_OK);
+    db_catalog_changed(db);
+    assert_int_equal(db_record_named(db, "r", &again, &problem), STATUS_OK);
+    assert_ptr_equal(first, again);
+    assert_int_equal(db_record_delete(db, "r", &uses, &problem), STATUS_OK);
+    assert_int_equal(db_record_named(db, "r", &other, &problem), STATUS_NOT_FOUND);
+    assert_int_equal(add(db, "r", 3, "s", &is_there), STATUS_OK);
+    problem_clear(&problem);
+    assert_int_equal(db_record_named(db, "r", &other, &problem), STATUS_OK);
+    assert_true(other->samples.at[0] == 3 && first->samples.at[0] == 1);
+    refcount_unref(&first->shared);
+    refcount_unref(&again->shared);
+    refcount_unref(&other->shared);
+    db_end(db);
 }
 
 int main(void) {
@@ -380,7 +365,7 @@ int main(void) {
         cmocka_unit_test(there_are_only_so_many),
         cmocka_unit_test(of_two_same_uploads_at_once_one_is_kept),
         cmocka_unit_test(names_are_fit_for_paths_and_files),
-        cmocka_unit_test(the_memory_forgets_what_nobody_holds_beyond_its_budget),
+        cmocka_unit_test(a_record_is_in_memory_once_and_follows_the_catalogue),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
