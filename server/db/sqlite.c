@@ -208,14 +208,17 @@ static Status statement_find(Sqlite *database, const char *sql, const SqlColumn 
 static uint32_t column_check(const SqlColumn *column, const char *member) {
     const void *at = member;
     size_t size = column->size;
+    double real;
     if (column->kind == COLUMN_TEXT || column->kind == COLUMN_NAME) {
         at = column->kind == COLUMN_TEXT ? *(char *const *)at : member;
         size = at != NULL ? strlen(at) : 0;
     } else if (column->kind == COLUMN_BYTES) {
         size = ((const StoredBytes *)at)->size;
         at = ((const StoredBytes *)at)->at;
-    } else if (column->kind == COLUMN_REAL && isnan(*(const double *)at)) {
-        size = 0;
+    } else if (column->kind == COLUMN_REAL) {
+        real = *(const double *)at + 0.0; // SQLite stores -0 as 0
+        at = &real;
+        size = isnan(real) ? 0 : sizeof real;
     }
     return size > 0 ? gzip_crc32(0, at, size) : 0;
 }
