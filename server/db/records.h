@@ -1,6 +1,5 @@
-// Ground-motion records as they are stored: what is known of each, and its samples. They never
-// change; one goes only when nothing was made with it. Not a reader of their files (api/
-// records_upload.c). Used by api/ and by jobs/resolve_record.c.
+// Ground-motion records as they are stored: a description and the samples. They never change, and
+// are deleted only while no result and no unfinished job uses them.
 #ifndef SERVER_DB_RECORDS_H
 #define SERVER_DB_RECORDS_H
 
@@ -10,20 +9,20 @@
 enum { RECORDS_MAX = 20000, RECORD_TWINS = 4 };
 #define RECORDS_SAMPLES (UINT64_C(1) << 31) // of all records: 16 GiB
 
-// Texts are NULL where nothing was said.
+// A text that was not given is NULL.
 typedef struct RecordRow {
-    int64_t number; // the store's
+    int64_t number; // the database's
     char *name;     // record_name_is_sound
     char *source, *processing, *earthquake, *station, *notes;
-    char *layout, *header;    // as `impactd import` tells them; "json" without a header
-    char *unit, *stated_unit; // of the file: what was taken, what it tells
+    char *layout, *header;    // as `impactd import` prints them; "json" without a header
+    char *unit, *stated_unit; // of the file: the one used, the one it states
     double interval;          // [s]
     uint64_t count;           // samples
     double peak, peak_time;   // the largest magnitude [m/s^2], when [s]
     double peak_velocity;     // of the base, from rest [m/s]
     double end_velocity;      // likewise
     char *digest;             // record_digest
-    char *author;             // the token's name; NULL: nobody in particular
+    char *author;             // the token's name; NULL: the local user
     int64_t created_unix_ms;
 } RecordRow;
 typedef struct RecordRows {
@@ -35,12 +34,12 @@ void record_rows_clear(RecordRows *rows);
 
 // 1 to 64 of letters, digits, dot, underscore and dash, the first a letter or a digit.
 bool record_name_is_sound(const char *name);
-// SHA-256 of the interval and the samples as little-endian doubles, in hexadecimal digits; "" if it
-// cannot be had.
+// SHA-256 of the interval and the samples as little-endian doubles, in hexadecimal digits; ""
+// without memory.
 void record_digest(double interval, const Reals *samples, char digest[RECORD_DIGEST_SIZE]);
 
-// Writes both down in one transaction. One of the same name, samples and words is there already:
-// *is_there, and nothing is written; with others STATUS_CONFLICT. STATUS_LIMIT where there are
+// Adds both in one transaction. Where the same record exists already *is_there is set and nothing
+// is written; another one of that name is STATUS_CONFLICT. STATUS_LIMIT where there are
 // RECORDS_MAX, or where they would have more than RECORDS_SAMPLES.
 Status db_record_add(Db *db, const RecordRow *row, const Reals *samples, bool *is_there,
                      Problem *problem);
@@ -54,8 +53,7 @@ Status db_records(Db *db, const char *words, const char *after, size_t most, Rec
 // Up to RECORD_TWINS others with the same interval and samples.
 Status db_record_twins(Db *db, const RecordRow *row, RecordRows *rows, Problem *problem);
 
-// Interval and samples, shared by all who ask as long as one of them has them. A hold of the
-// caller's. STATUS_NOT_FOUND.
+// Interval and samples; all callers share one copy. The caller gets a reference. STATUS_NOT_FOUND.
 Status db_record_named(Db *db, const char *name, NamedRecord **named, Problem *problem);
 
 // Results made with it, and unfinished jobs that will be.

@@ -1,5 +1,4 @@
-// Access tokens as they are stored: names, digests, scopes, times. Not the tokens themselves, which
-// nobody keeps, and not who may do what (auth/tokens.h). Used by auth/ and the command `token`.
+// Access tokens as they are stored: names, digests, scopes, times.
 #ifndef SERVER_DB_TOKENS_H
 #define SERVER_DB_TOKENS_H
 
@@ -25,9 +24,9 @@ Status db_token_add(Db *db, const TokenRow *row, Problem *problem);
 Status db_tokens(Db *db, TokenRows *rows, Problem *problem);
 // Revokes at row->revoked_unix_ms; STATUS_NOT_FOUND, STATUS_CONFLICT if it is revoked already.
 Status db_token_revoke(Db *db, const TokenRow *row, Problem *problem);
-// Strikes it from the list; STATUS_NOT_FOUND, STATUS_CONFLICT unless it is revoked.
+// Deletes it; STATUS_NOT_FOUND, STATUS_CONFLICT unless it is revoked.
 Status db_token_forget(Db *db, const TokenRow *row, Problem *problem);
-// Notes row->used_unix_ms.
+// Stores row->used_unix_ms.
 Status db_token_used(Db *db, const TokenRow *row, Problem *problem);
 
 #endif
