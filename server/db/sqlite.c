@@ -589,7 +589,10 @@ Status sqlite_read_part(Sqlite *database, const char *table, const char *column,
 }
 
 // Page size and vacuum take effect in an empty file only, and before the journal's mode is set.
-static const char writer_settings[] = "PRAGMA page_size = 8192;"
+// Pages of 4 or 8 KiB save 10 to 20% of the CPU time of a lone small commit, and nothing with 8
+// clients; but summaries of results, about 3 KiB each, then take 4.8 KiB of the file instead
+// of 3.9.
+static const char writer_settings[] = "PRAGMA page_size = 16384;"
                                       "PRAGMA auto_vacuum = INCREMENTAL;"
                                       "PRAGMA journal_mode = WAL;";
 // What is read is mapped; the cache holds pages that are written, and grows to its size with the
