@@ -27,6 +27,9 @@ struct MaterialMemory *db_material_memory(Db *db);
 typedef struct RecordMemory RecordMemory; // samples of records, each once
 RecordMemory *record_memory_new(void);    // NULL without memory
 void record_memory_free(RecordMemory *memory);
+// Adds it, or frees it where the same record is there already; returns a reference to that.
+struct NamedRecord *record_memory_add(RecordMemory *memory, uint64_t catalog_version,
+                                      struct NamedRecord *named);
 RecordMemory *db_record_memory(Db *db);
 
 // A connection for reading, to be returned soon: there are few. Waits for one.

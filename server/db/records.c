@@ -285,8 +285,7 @@ static void memory_evict(RecordMemory *memory) {
     }
 }
 
-// Adds it, or frees it where another thread has added the same; a reference to what is there.
-static NamedRecord *memory_add(RecordMemory *memory, uint64_t catalog_version, NamedRecord *named) {
+NamedRecord *record_memory_add(RecordMemory *memory, uint64_t catalog_version, NamedRecord *named) {
     Entry *entry = malloc(sizeof *entry);
     pthread_mutex_lock(&memory->lock);
     NamedRecord *there = memory_find_locked(memory, catalog_version, named->name, named->digest);
@@ -321,7 +320,7 @@ Status db_record_named(Db *db, const char *name, NamedRecord **named, Problem *p
         if (status == STATUS_OK)
             *named = named_record_new(row.name, row.digest, row.interval, &samples);
         if (*named != NULL)
-            *named = memory_add(memory, catalog_version, *named);
+            *named = record_memory_add(memory, catalog_version, *named);
         else if (status == STATUS_OK)
             status = problem_set(problem, STATUS_NO_MEMORY, "no memory for a record");
     }

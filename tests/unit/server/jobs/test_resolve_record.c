@@ -12,7 +12,6 @@
 
 #include "core/study/sweep.h"
 #include "server/db/db_private.h"
-#include "server/db/record_memory.h"
 #include "server/db/records.h"
 #include "server/jobs/documents.h"
 #include "server/jobs/jobs.h"
@@ -156,7 +155,7 @@ static void a_sweep_holds_only_so_many_samples(void **state) {
         char name[8];
         snprintf(name, sizeof name, "large%zu", i);
         assert_true(reals_allocate(&samples, RECORD_SAMPLES)); // never written
-        large[i] = record_memory_put(db_record_memory(db), db_catalog_version(db),
+        large[i] = record_memory_add(db_record_memory(db), db_catalog_version(db),
                                      named_record_new(name, name, 1, &samples));
     }
     assert_int_equal(prepare("\"name\": \"a\"",
