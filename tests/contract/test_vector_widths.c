@@ -9,7 +9,7 @@
 #include "tests/support/test.h"
 #include "tests/support/vectors.h"
 
-enum { EXAMPLES_MAX = 200 };
+enum { EXAMPLES_MAX = 200, EVERY = IMPACTD_SANITIZED ? 4 : 1 }; // of the examples
 
 // FNV-1a
 static void digest_add(void *context, const void *bytes, size_t size) {
@@ -59,10 +59,10 @@ static uint64_t outcome_digest(const char *path) {
 static size_t digest_examples(uint64_t digests[EXAMPLES_MAX], char names[EXAMPLES_MAX][64]) {
     DIR *folder = opendir(IMPACTD_SOURCE_DIR "/schema/examples");
     assert_non_null(folder);
-    size_t count = 0;
+    size_t count = 0, seen = 0;
     for (struct dirent *entry; (entry = readdir(folder)) != NULL && count < EXAMPLES_MAX;) {
         char path[512];
-        if (strstr(entry->d_name, ".json") == NULL)
+        if (strstr(entry->d_name, ".json") == NULL || seen++ % EVERY != 0)
             continue;
         snprintf(path, sizeof path, "%s/schema/examples/%s", IMPACTD_SOURCE_DIR, entry->d_name);
         snprintf(names[count], sizeof names[count], "%.60s", entry->d_name);
@@ -82,7 +82,7 @@ TEST(examples_have_the_same_bytes_at_every_vector_width) {
         if (first == VECTORS_COUNT)
             first = vectors;
         const size_t count = digest_examples(digests[vectors], names[vectors]);
-        assert_true(count > 20);
+        assert_true(count > 20 / EVERY);
         for (size_t i = 0; i < count; i++) {
             assert_string_equal(names[vectors][i], names[first][i]);
             if (digests[vectors][i] != digests[first][i])

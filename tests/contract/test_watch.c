@@ -13,7 +13,7 @@
 enum {
     LONGER = 40,
     MAX_MS = IMPACTD_SANITIZED ? 2000 : 100,
-    RUN_MS = IMPACTD_SANITIZED ? 150 : 1500
+    RUN_MS = IMPACTD_SANITIZED ? 150 : 400
 };
 
 typedef struct Gaps {

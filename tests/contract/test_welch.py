@@ -2,6 +2,7 @@
 """Power spectral densities against scipy.signal.welch: within 1e-12 of the maximum, for every window and
 trend, odd and even segments, overlaps, short data and long. Run as: test_welch.py --build DIR"""
 import argparse
+import itertools
 import subprocess
 import sys
 import warnings
@@ -51,24 +52,25 @@ def main():
     parser.add_argument("--build", type=Path, default=Path("build"))
     tool = parser.parse_args().build / "tests" / "welch_tool"
     worst, failures, cases = 0.0, 0, 0
-    for count, segment, overlap in SHAPES:
-        for name, x in signals(count).items():
-            for window in WINDOWS:
-                for trend, scipy_trend in TRENDS.items():
-                    with warnings.catch_warnings():
-                        warnings.simplefilter("error")  # scipy must not bend the segment
-                        f, expected = signal.welch(x, RATE, window, segment, overlap, detrend=scipy_trend)
-                    frequency, density = ours(tool, x, window, trend, segment, overlap)
-                    # What a trend leaves of nothing is rounding; measure it by what was there.
-                    scale = max(expected.max(), 1e-17 * np.mean(x * x) * segment / RATE)
-                    error = np.abs(density - expected).max() / scale
-                    same_axis = np.allclose(frequency, f, rtol=1e-15, atol=0)
-                    cases += 1
-                    worst = max(worst, error)
-                    if not (error < 1e-12 and same_axis):
-                        failures += 1
-                        print(f"FAILED {name}, {count} samples, {segment}/{overlap}, {window}, {trend}: "
-                              f"{error:.2g} of the maximum, axis {same_axis}")
+    # A Latin square: every window and trend of every shape, and each pair of window and trend with every signal.
+    for row, (count, segment, overlap) in enumerate(SHAPES):
+        drawn = list(signals(count).items())
+        for column, (window, (trend, scipy_trend)) in enumerate(itertools.product(WINDOWS, TRENDS.items())):
+            name, x = drawn[(row + column) % len(drawn)]
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")  # scipy must not bend the segment
+                f, expected = signal.welch(x, RATE, window, segment, overlap, detrend=scipy_trend)
+            frequency, density = ours(tool, x, window, trend, segment, overlap)
+            # What a trend leaves of nothing is rounding; measure it by what was there.
+            scale = max(expected.max(), 1e-17 * np.mean(x * x) * segment / RATE)
+            error = np.abs(density - expected).max() / scale
+            same_axis = np.allclose(frequency, f, rtol=1e-15, atol=0)
+            cases += 1
+            worst = max(worst, error)
+            if not (error < 1e-12 and same_axis):
+                failures += 1
+                print(f"FAILED {name}, {count} samples, {segment}/{overlap}, {window}, {trend}: "
+                      f"{error:.2g} of the maximum, axis {same_axis}")
 
     # The density of one boxcar segment adds up to the mean square.
     for count in (1000, 10001, 1000000):
