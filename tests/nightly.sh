@@ -1,60 +1,181 @@
 #!/usr/bin/env bash
-# tests/run.sh and what it leaves out because it takes hours: the program and the tests as clang compiles them and under the
-# thread sanitizer, every Python test against the instrumented program, and the long campaigns of README.md. The last line
-# counts.
+# nightly.sh [--quick] [PART...]: what tests/run.sh leaves out because it takes hours; all parts, or those named. --quick
+# gives each command the least numbers, to see that it works. On a bare Debian 12 it installs what is missing. The end
+# lists each command with its time and the last line it printed, and counts.
+#
+#   commit      tests/run.sh
+#   clang       the program and its tests as clang compiles them, without a warning
+#   threads     the thread sanitizer: unit tests of jobs, db and http, requests and cancels
+#   sanitized   the other tests of the program with the address and undefined-behaviour sanitizers
+#   kills       kill -9 amid jobs and imports, full disks, 30,000 requests
+#   truth       the long campaigns of tests/truth
+#   storm       a million requests, 10,000 cancels
+#   fuzz        mutated ground motions and material files
+#   browser     the browser tests with slow computers and late answers
+#   bench       the benchmarks
 set -uo pipefail
 here=$(cd "$(dirname "$0")/.." && pwd)
 cd "$here" || exit 1
 
+all=(commit clang threads sanitized kills truth storm fuzz browser bench)
+is_quick=
+[ "${1-}" != --quick ] || { is_quick=1 && shift; }
+parts=("${@:-${all[@]}}")
+for part in "${parts[@]}"; do
+    [[ " ${all[*]} " == *" $part "* ]] || {
+        echo "usage: tests/nightly.sh [--quick] [PART...], a PART being one of: ${all[*]}" >&2
+        exit 2
+    }
+done
+
+server/packages.sh server/packages.txt tests/packages.txt || exit 1
+
 export ASAN_OPTIONS=detect_leaks=1 UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1 TSAN_OPTIONS=halt_on_error=1
 python=/usr/bin/python3
-# gcc's thread sanitizer cannot live with as much address randomisation as some kernels use.
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+# gcc's thread sanitizer needs less address randomisation than some kernels use.
 still=()
 if setarch "$(uname -m)" -R true 2>/dev/null; then still=(setarch "$(uname -m)" -R); fi
 passed=0
 failed=0
+: >"$work/figures"
 
 # COMMAND...
 check() {
-    local began=$SECONDS
-    if "$@"; then
+    local began=$SECONDS verdict=ok
+    echo "-- $*"
+    if "$@" 2>&1 | tee "$work/output"; then
         passed=$((passed + 1))
     else
         failed=$((failed + 1))
-        echo "FAIL  $*"
+        verdict=FAIL
     fi
-    echo "-- $* ($((SECONDS - began)) s)"
+    printf '%-4s %5d s  %s: %s\n' "$verdict" $((SECONDS - began)) "$*" "$(grep -v '^$' "$work/output" | tail -n 1 | cut -c1-120)" |
+        tee -a "$work/figures"
 }
 
-check tests/run.sh
+# QUICK LONG COMMAND...: checks the command with the numbers LONG, or QUICK.
+sized() {
+    local numbers=$2
+    [ -z "$is_quick" ] || numbers=$1
+    # shellcheck disable=SC2086
+    check "${@:3}" $numbers
+}
 
-check cmake --preset clang -DIMPACTD_TESTS=ON
-check cmake --build --preset clang
-check ctest --preset clang -j "$(nproc)"
+# PRESET, once.
+build() {
+    [ -f "$work/built.$1" ] || { check cmake --preset "$1" -DIMPACTD_TESTS=ON && check cmake --build --preset "$1" && touch "$work/built.$1"; }
+}
 
-check cmake --preset tsan -DIMPACTD_TESTS=ON
-check cmake --build --preset tsan
-check "${still[@]}" ctest --preset tsan -j "$(nproc)"
-mapfile -t files < <(grep -l '^THREADED = True' tests/contract/test_*.py)
-for file in "${files[@]}"; do check "${still[@]}" "$python" "$file" --build build-tsan; done
+# PRESET QUICK [COMMAND...]: the C tests of a preset; of these alone that QUICK matches, if it is quick.
+ctests() {
+    local only=()
+    [ -z "$is_quick" ] || only=(-R "$2")
+    check "${@:3}" ctest --preset "$1" -j "$(nproc)" "${only[@]}"
+}
 
-mapfile -t files < <(grep -l '^NIGHTLY = True' tests/contract/test_*.py)
-for file in "${files[@]}"; do check "$python" "$file" --build build; done
-mapfile -t files < <(grep -l '^SANITIZED = "nightly"' tests/contract/test_*.py)
-for file in "${files[@]}"; do check "$python" "$file" --build build-debug; done
+# BUILD MARK [COMMAND...]: the Python tests with this mark; the first of them, if it is quick.
+marked() {
+    local files file
+    mapfile -t files < <(grep -l "^$2" tests/contract/test_*.py)
+    [ -z "$is_quick" ] || files=("${files[0]}")
+    for file in "${files[@]}"; do check "${@:3}" "$python" "$file" --build "$1"; done
+}
 
-check build-debug/tests/fuzz_import 300
-check build-debug/tests/fuzz_exchange 300
+part_commit() {
+    if [ -n "$is_quick" ]; then check tests/run.sh --quick; else check tests/run.sh; fi
+}
 
-# The table of campaigns: "| `COMMAND` (remarks) | what it proves | time |".
-mapfile -t commands < <(sed -n '/^Longer campaigns/,/^To add/s/^| `\([^`]*\)`.*/\1/p' tests/README.md)
-for command in "${commands[@]}"; do
-    read -ra words <<<"${command%% \[*}"
-    [ "${words[0]}" != setarch ] || words=("${still[@]}" "${words[@]:2}")
-    check "${words[@]}"
-done
+part_clang() {
+    build clang
+    ctests clang ^unit/core/base
+}
+
+part_threads() {
+    build tsan
+    ctests tsan ^unit/server/http "${still[@]}"
+    marked build-tsan 'THREADED = True' "${still[@]}"
+    sized 200 10000 "${still[@]}" tests/storm/cancel_storm.py --build build-tsan
+}
+
+part_sanitized() {
+    build debug
+    marked build-debug 'SANITIZED = "nightly"'
+}
+
+part_kills() {
+    build release
+    marked build 'NIGHTLY = True'
+    check "$python" tests/contract/test_full_disk.py --build build
+    check "$python" tests/contract/test_sweep_kill.py --build build
+}
+
+# Scenes and seed first; the figures of the middle column are for --quick.
+part_truth() {
+    build release
+    # Random scenes of 3 s against quad precision: samples, starts, speeds, peaks, the same impacts. 150 s of CPU
+    sized '5 6' '700 6' build/tests/truth_test_reference_c
+    # Random frames of 1 to 10 storeys with up to 3 dampers against quad precision. 200 s
+    sized '12 7' '250 7' build/tests/truth_test_frames_c
+    # Frames of 5 to 60 storeys with fewer modes: the predicted error is exceeded in at most 3 % without dampers, 10 % with. 130 s
+    sized '40 1' '1000 1' build/tests/truth_test_modes_c
+    # Every flight, contact and rest goes on for as long as the ledger says: no impact is missed. 600 s
+    sized '200 3' '100000 3' build/tests/truth_test_missed_c
+    # Contacts under power laws against SUNDIALS, and the estimate of a tolerance. 400 s
+    sized '12 1 v' '300 1 v' build/tests/truth_test_power_c
+    # A grid of extremes and as many random scenes from the edges by all solvers: the stated error holds, or the scene is
+    # refused, failed or marked, with the reason. The last number: predicted CPU seconds of a scene, at most. 500 s
+    sized '60 13 0.04' '10500 13 0.04' build/tests/truth_test_extremes_c
+    # trust_horizon against the earliest parting of nine doubles from quad precision; scenes, seconds, seed. 25 s
+    sized '2 30 1' '40 30 1' build/tests/truth_test_trust_c
+    # The mean of an ensemble under a target against the mean of all its runs; scenes, seed, runs of each. 300 s
+    sized '2 3 100' '80 3 100' build/tests/truth_test_ensemble_c
+    # Force traces: how often the stated interval of T_c holds it, in 92 to 98 % of a cell's trials; trials, seed. 800 s
+    sized '4 1' '400 1' build/tests/truth_test_traces_c
+}
+
+part_storm() {
+    build release
+    # Each request is answered as it should be; memory and descriptors are flat after warming up. 1200 s
+    sized '--requests 20000 --clients 4' '--requests 1000000 --clients 8' "$python" tests/storm/mixed.py --build build
+    # CPU that goes on after a cancel was answered, median and most, by solver, excitation and study. 300 s
+    sized 2 20 "$python" tests/storm/cancel_cpu.py --build build
+}
+
+part_fuzz() {
+    build debug
+    sized 5 300 build-debug/tests/fuzz_import
+    sized 5 300 build-debug/tests/fuzz_exchange
+}
+
+# How many times slower a page's computer is, and the seed of how long its answers wait.
+part_browser() {
+    build release
+    local pace
+    for pace in '--slow 4 --seed 1' '--slow 4 --seed 2' '--slow 8 --seed 3'; do
+        # shellcheck disable=SC2086
+        sized test_token.mjs '' "$python" tests/browser/test_browser.py --build build $pace
+        [ -z "$is_quick" ] || break
+    done
+}
+
+part_bench() {
+    build release
+    local bench
+    for bench in exact frame power peers summary encode; do
+        if [ -z "$is_quick" ] || [ "$bench" = encode ]; then check build/tests/bench_$bench; fi
+    done
+    sized '1 5' '1 500' build/tests/bench_cost
+    sized '200 2 1' '' build/tests/bench_sweep
+    sized '/tmp 0.2 jobs' /tmp build/tests/bench_intake
+    sized 'cached' '' "$python" tests/bench/service.py --build build
+}
+
+for part in "${parts[@]}"; do "part_$part"; done
 
 echo
+cat "$work/figures"
 echo "took $SECONDS s"
 echo "$passed passed, $failed failed"
 [ "$failed" -eq 0 ]

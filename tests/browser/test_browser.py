@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
 """Runs the browser tests (run.mjs) with what they need from npm, which is fetched once.
 
-    tests/browser/test_browser.py --build build [WORD...]     only tests whose file or sentence holds a WORD"""
+    tests/browser/test_browser.py --build build [WORD...]     only tests whose file or sentence holds a WORD
+
+Other options are those of run.mjs."""
 
 import argparse
 import os
@@ -39,10 +41,10 @@ def fetch():
 parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
 parser.add_argument("--build", default=BUILD, help="folder of the build to test")
 parser.add_argument("words", nargs="*")
-arguments = parser.parse_args()
+arguments, others = parser.parse_known_args()
 for program in ("node", "npm", "chromium"):
     if shutil.which(program) is None:
         ends(f"{program} is not here (tests/packages.txt)")
 fetch()
 sys.stdout.flush()
-os.execvp("node", ["node", os.path.join(HERE, "run.mjs"), "--build", arguments.build, *arguments.words])
+os.execvp("node", ["node", os.path.join(HERE, "run.mjs"), "--build", arguments.build, *others, *arguments.words])

@@ -13,6 +13,21 @@ static struct {
     CMFixtureFunction set_up, tear_down;
 } groups[GROUPS];
 
+enum { MAINS = 128 };
+static struct {
+    const char *file;
+    int (*run)(void);
+} mains[MAINS];
+
+void test_main_add(const char *file, int (*run)(void)); // old_main.h
+void test_main_add(const char *file, int (*run)(void)) {
+    int i = 0;
+    while (mains[i].file != NULL)
+        i++;
+    mains[i].file = file;
+    mains[i].run = run;
+}
+
 void test_add(Test *test) {
     Test **at = &tests;
     while (*at != NULL) {
@@ -34,12 +49,16 @@ void test_group(const char *file, CMFixtureFunction set_up, CMFixtureFunction te
     groups[i].tear_down = tear_down;
 }
 
-// "test_flight" is the name of ".../test_flight.c".
-static bool test_is_of(const char *path, const char *name) {
+// Whether a name is that of the file ("test_flight" of ".../test_flight.c"), or there are none.
+static bool test_is_wanted(const char *path, int count, char **names) {
     const char *base = strrchr(path, '/');
     base = base != NULL ? base + 1 : path;
-    const size_t length = strlen(name);
-    return strncmp(base, name, length) == 0 && strcmp(base + length, ".c") == 0;
+    for (int i = 0; i < count; i++) {
+        const size_t length = strlen(names[i]);
+        if (strncmp(base, names[i], length) == 0 && strcmp(base + length, ".c") == 0)
+            return true;
+    }
+    return count == 0;
 }
 
 // Runs the tests of the file of `first`; whether one failed.
@@ -59,25 +78,24 @@ static bool test_run_file(const Test *first) {
 }
 
 int test_run(int count, char **files) {
-    int failed = 0;
+    int failed = 0, run = 0;
     const char *last = "";
-    bool *found = calloc((size_t)count + 1, sizeof *found);
-    for (const Test *at = tests; at != NULL && found != NULL; at = at->next) {
+    for (const Test *at = tests; at != NULL; at = at->next) {
         if (strcmp(at->file, last) == 0)
             continue;
         last = at->file;
-        bool is_wanted = count == 0;
-        for (int i = 0; i < count; i++)
-            if (test_is_of(at->file, files[i]))
-                is_wanted = found[i] = true;
-        failed += is_wanted && test_run_file(at);
-    }
-    for (int i = 0; i < count && found != NULL; i++) {
-        if (!found[i]) {
-            fprintf(stderr, "there is no file %s in this program\n", files[i]);
-            failed++;
+        if (test_is_wanted(at->file, count, files)) {
+            run++;
+            failed += test_run_file(at);
         }
     }
-    free(found);
-    return failed > 0 || tests == NULL;
+    for (int i = 0; mains[i].file != NULL; i++) {
+        if (test_is_wanted(mains[i].file, count, files)) {
+            run++;
+            failed += mains[i].run() != 0;
+        }
+    }
+    if (run < count || run == 0)
+        fprintf(stderr, "this program has not all of these files\n");
+    return failed > 0 || run < count || run == 0;
 }

@@ -1,14 +1,11 @@
 // Settings from flags, environment, file and defaults.
 #include "server/options.h"
+#include "tests/support/test.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-
-#include <cmocka.h>
 
 typedef struct Settings {
     double rate;
@@ -58,8 +55,7 @@ static int stop(void **state) {
     options_read(fields, &settings, (int)COUNT(((char *[]){__VA_ARGS__})),                         \
                  (char *[]){__VA_ARGS__}, prefix, &options, &problem)
 
-static void texts_grow_with_each_flag_and_a_stronger_source_replaces_them(void **state) {
-    (void)state;
+TEST_IN(texts_grow_with_each_flag_and_a_stronger_source_replaces_them, start, stop) {
     setenv("TEST_NAMES", "of the environment", 1);
     assert_int_equal(READ("TEST_", "--names", "a", "-n", "b", "--names=c d"), STATUS_OK);
     assert_int_equal(settings.names.count, 3);
@@ -78,8 +74,7 @@ static void texts_grow_with_each_flag_and_a_stronger_source_replaces_them(void *
     assert_string_equal(problem.faults[0].pointer, "-n");
 }
 
-static void flags_set_values_and_other_arguments_are_operands(void **state) {
-    (void)state;
+TEST_IN(flags_set_values_and_other_arguments_are_operands, start, stop) {
     assert_int_equal(READ(NULL, "one", "--rate", "2.5", "--queue-most=7", "-l", "a:1", "-q=9",
                           "--quiet", "--level", "high", "-", "--", "--rate"),
                      STATUS_OK);
@@ -95,8 +90,7 @@ static void flags_set_values_and_other_arguments_are_operands(void **state) {
     assert_int_equal(options.origins[0], OPTION_FLAG);
 }
 
-static void flags_environment_file_and_defaults_have_precedence_in_this_order(void **state) {
-    (void)state;
+TEST_IN(flags_environment_file_and_defaults_have_precedence_in_this_order, start, stop) {
     char path[] = "/tmp/impactd-options-XXXXXX";
     const int file = mkstemp(path);
     assert_true(file >= 0);
@@ -117,8 +111,7 @@ static void flags_environment_file_and_defaults_have_precedence_in_this_order(vo
     assert_int_equal(options.origins[4], OPTION_DEFAULT);
 }
 
-static void a_file_that_is_not_text_is_refused(void **state) {
-    (void)state;
+TEST_IN(a_file_that_is_not_text_is_refused, start, stop) {
     assert_int_equal(READ("TEST_", "--config", "/tmp"), STATUS_USAGE);
     assert_string_equal(problem.faults[0].pointer, "/tmp");
     problem_clear(&problem);
@@ -127,8 +120,7 @@ static void a_file_that_is_not_text_is_refused(void **state) {
     assert_int_equal(problem.count, 1);
 }
 
-static void a_file_names_no_other_file(void **state) {
-    (void)state;
+TEST_IN(a_file_names_no_other_file, start, stop) {
     char path[] = "/tmp/impactd-options-XXXXXX";
     const int file = mkstemp(path);
     assert_true(file >= 0);
@@ -143,15 +135,13 @@ static void a_file_names_no_other_file(void **state) {
     assert_string_equal(settings.config, path);
 }
 
-static void the_environment_is_not_read_without_a_prefix(void **state) {
-    (void)state;
+TEST_IN(the_environment_is_not_read_without_a_prefix, start, stop) {
     setenv("TEST_QUEUE_MOST", "none", 1);
     assert_int_equal(READ(NULL, "--rate", "2"), STATUS_OK);
     assert_int_equal(settings.queue_most, 50);
 }
 
-static void every_fault_is_at_the_name_that_was_used(void **state) {
-    (void)state;
+TEST_IN(every_fault_is_at_the_name_that_was_used, start, stop) {
     setenv("TEST_RATE", "1000", 1);
     assert_int_equal(
         READ("TEST_", "--queue-most", "-3", "--qiet", "--level=hihg", "--quiet=2", "--listen"),
@@ -168,8 +158,7 @@ static void every_fault_is_at_the_name_that_was_used(void **state) {
     assert_int_equal(problem.status, STATUS_USAGE);
 }
 
-static void texts_that_are_not_numbers_are_refused(void **state) {
-    (void)state;
+TEST_IN(texts_that_are_not_numbers_are_refused, start, stop) {
     static char *const wrong[][2] = {
         {"--rate", "ten"},       {"--rate", "nan"},
         {"--rate", "5x"},        {"--rate", ""},
@@ -185,8 +174,7 @@ static void texts_that_are_not_numbers_are_refused(void **state) {
     }
 }
 
-static void printed_settings_can_be_read_as_a_file(void **state) {
-    (void)state;
+TEST_IN(printed_settings_can_be_read_as_a_file, start, stop) {
     assert_int_equal(READ(NULL, "--rate", "2.5", "-l", "a:1", "--quiet", "--level", "high"),
                      STATUS_OK);
     char path[] = "/tmp/impactd-options-XXXXXX";
@@ -204,8 +192,7 @@ static void printed_settings_can_be_read_as_a_file(void **state) {
     assert_string_equal(settings.listen, "a:1");
 }
 
-static void help_has_its_headings_above_their_rows(void **state) {
-    (void)state;
+TEST(help_has_its_headings_above_their_rows) {
     static const OptionGroup groups[] = {{"rate", "Speed"}, {"quiet", "Manner"}, {NULL, NULL}};
     char text[2000] = "";
     FILE *file = tmpfile();
@@ -219,23 +206,4 @@ static void help_has_its_headings_above_their_rows(void **state) {
     const char *manner = strstr(text, "\nManner\n");
     assert_non_null(manner);
     assert_true(strstr(text, "--config") < manner && strstr(text, "--quiet") > manner);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(
-            texts_grow_with_each_flag_and_a_stronger_source_replaces_them, start, stop),
-        cmocka_unit_test_setup_teardown(flags_set_values_and_other_arguments_are_operands, start,
-                                        stop),
-        cmocka_unit_test_setup_teardown(
-            flags_environment_file_and_defaults_have_precedence_in_this_order, start, stop),
-        cmocka_unit_test_setup_teardown(a_file_that_is_not_text_is_refused, start, stop),
-        cmocka_unit_test_setup_teardown(a_file_names_no_other_file, start, stop),
-        cmocka_unit_test_setup_teardown(the_environment_is_not_read_without_a_prefix, start, stop),
-        cmocka_unit_test_setup_teardown(every_fault_is_at_the_name_that_was_used, start, stop),
-        cmocka_unit_test_setup_teardown(texts_that_are_not_numbers_are_refused, start, stop),
-        cmocka_unit_test_setup_teardown(printed_settings_can_be_read_as_a_file, start, stop),
-        cmocka_unit_test(help_has_its_headings_above_their_rows),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

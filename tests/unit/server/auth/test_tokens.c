@@ -1,20 +1,15 @@
 // Tokens over a database in memory and one in a folder: who comes in, who does not, what another
 // process changed.
 #include <pthread.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
 #include <unistd.h>
 
-#include <cmocka.h>
-
 #include "server/auth/tokens.h"
 #include "server/util/clock.h"
+#include "tests/support/test.h"
 
 static Status add(Db *db, const char *name, const char *scopes, int64_t expires_unix_ms,
                   char header[128]) {
@@ -50,8 +45,7 @@ static void until(Tokens *tokens, const char *authorization, Status wanted) {
     fail_msg("it never becomes %s", status_title(wanted));
 }
 
-static void without_tokens_the_door_is_open(void **state) {
-    (void)state;
+TEST(without_tokens_the_door_is_open) {
     Db *db;
     Tokens *tokens;
     char client[TOKEN_NAME_SIZE] = "x";
@@ -69,8 +63,7 @@ static void without_tokens_the_door_is_open(void **state) {
     db_close(db);
 }
 
-static void a_token_opens_what_its_scopes_say(void **state) {
-    (void)state;
+TEST(a_token_opens_what_its_scopes_say) {
     Db *db;
     Tokens *tokens;
     char reader[128], worker[128], chief[128], other[128], client[TOKEN_NAME_SIZE];
@@ -104,8 +97,7 @@ static void a_token_opens_what_its_scopes_say(void **state) {
     db_close(db);
 }
 
-static void what_is_no_token_of_ours_stays_out(void **state) {
-    (void)state;
+TEST(what_is_no_token_of_ours_stays_out) {
     Db *db;
     Tokens *tokens;
     char good[128], text[160], client[TOKEN_NAME_SIZE];
@@ -148,8 +140,7 @@ static void what_is_no_token_of_ours_stays_out(void **state) {
     db_close(db);
 }
 
-static void tokens_made_and_revoked_elsewhere_are_followed(void **state) {
-    (void)state;
+TEST(tokens_made_and_revoked_elsewhere_are_followed) {
     char folder[] = "/tmp/impactd-tokens-XXXXXX", first[128], second[128], client[TOKEN_NAME_SIZE];
     assert_non_null(mkdtemp(folder));
     Db *daemon, *beside;
@@ -194,8 +185,7 @@ static void tokens_made_and_revoked_elsewhere_are_followed(void **state) {
     assert_int_equal(rmdir(folder), 0);
 }
 
-static void the_last_revoked_token_leaves_the_door_shut(void **state) {
-    (void)state;
+TEST(the_last_revoked_token_leaves_the_door_shut) {
     Db *db;
     Tokens *tokens;
     char header[128], client[TOKEN_NAME_SIZE];
@@ -211,8 +201,7 @@ static void the_last_revoked_token_leaves_the_door_shut(void **state) {
     db_close(db);
 }
 
-static void an_expired_token_says_so(void **state) {
-    (void)state;
+TEST(an_expired_token_says_so) {
     Db *db;
     Tokens *tokens;
     char old[128], fresh[128], client[TOKEN_NAME_SIZE];
@@ -231,8 +220,7 @@ static void an_expired_token_says_so(void **state) {
     db_close(db);
 }
 
-static void scopes_are_a_list_of_known_names(void **state) {
-    (void)state;
+TEST(scopes_are_a_list_of_known_names) {
     static const char *const bad[] = {"",     ",",           "read,", ",read", "read,,submit",
                                       "Read", "read submit", "write"};
     TokenRow row;
@@ -263,8 +251,7 @@ static void *ask(void *context) {
     return NULL;
 }
 
-static void many_threads_ask_while_the_table_changes(void **state) {
-    (void)state;
+TEST(many_threads_ask_while_the_table_changes) {
     Db *db;
     Tokens *tokens;
     char header[128], other[128], name[16], client[TOKEN_NAME_SIZE];
@@ -289,18 +276,4 @@ static void many_threads_ask_while_the_table_changes(void **state) {
     }
     tokens_close(tokens);
     db_close(db);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(without_tokens_the_door_is_open),
-        cmocka_unit_test(a_token_opens_what_its_scopes_say),
-        cmocka_unit_test(what_is_no_token_of_ours_stays_out),
-        cmocka_unit_test(tokens_made_and_revoked_elsewhere_are_followed),
-        cmocka_unit_test(the_last_revoked_token_leaves_the_door_shut),
-        cmocka_unit_test(an_expired_token_says_so),
-        cmocka_unit_test(scopes_are_a_list_of_known_names),
-        cmocka_unit_test(many_threads_ask_while_the_table_changes),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

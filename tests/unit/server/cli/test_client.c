@@ -1,14 +1,9 @@
 // Addresses that a client accepts, and problem documents; exchanges are in contract/test_client.py.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "server/cli/client.h"
+#include "tests/support/test.h"
 
 static Status opened(const char *url, const char *token, bool *exposes) {
     char address[100];
@@ -24,8 +19,7 @@ static Status opened(const char *url, const char *token, bool *exposes) {
     return status;
 }
 
-static void only_plain_http_addresses_are_taken(void **state) {
-    (void)state;
+TEST(only_plain_http_addresses_are_taken) {
     bool exposes;
     static const char *const right[] = {"http://127.0.0.1:8080", "https://h.example/base/",
                                         "http://[::1]:1", "http://localhost"};
@@ -39,8 +33,7 @@ static void only_plain_http_addresses_are_taken(void **state) {
         assert_int_equal(opened(wrong[i], NULL, &exposes), STATUS_USAGE);
 }
 
-static void a_token_is_exposed_by_plain_http_to_others(void **state) {
-    (void)state;
+TEST(a_token_is_exposed_by_plain_http_to_others) {
     static const struct {
         const char *url, *token;
         bool exposes;
@@ -61,8 +54,7 @@ static HttpAnswer answer_of(int code, const char *text) {
     return answer;
 }
 
-static void a_problem_document_becomes_a_problem(void **state) {
-    (void)state;
+TEST(a_problem_document_becomes_a_problem) {
     Problem *problem = calloc(1, sizeof *problem);
     HttpAnswer answer = answer_of(
         422,
@@ -79,8 +71,7 @@ static void a_problem_document_becomes_a_problem(void **state) {
     free(problem);
 }
 
-static void every_code_has_a_status(void **state) {
-    (void)state;
+TEST(every_code_has_a_status) {
     static const struct {
         int code;
         Status status;
@@ -93,14 +84,4 @@ static void every_code_has_a_status(void **state) {
         assert_int_equal(problem_reply_read(&answer, NULL), rows[i].status);
         http_answer_clear(&answer);
     }
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(only_plain_http_addresses_are_taken),
-        cmocka_unit_test(a_token_is_exposed_by_plain_http_to_others),
-        cmocka_unit_test(a_problem_document_becomes_a_problem),
-        cmocka_unit_test(every_code_has_a_status),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,20 +3,15 @@
 #include <dirent.h>
 #include <poll.h>
 #include <pthread.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdatomic.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "server/db/backup.h"
 #include "server/db/db.h"
 #include "tests/support/scratch.h"
+#include "tests/support/test.h"
 
 static char data[SCRATCH_SIZE], target[SCRATCH_SIZE];
 static Problem problem;
@@ -82,8 +77,7 @@ static void *stream(void *of) {
     return NULL;
 }
 
-static void every_row_that_was_added_before_is_in_the_copy(void **state) {
-    (void)state;
+TEST_IN(every_row_that_was_added_before_is_in_the_copy, folders_make, folders_remove) {
     Stream rows = {.db = open_store(data)};
     pthread_t thread;
     assert_int_equal(pthread_create(&thread, NULL, stream, &rows), 0);
@@ -116,8 +110,7 @@ static bool stop_at(void *context, double fraction) {
     return (*left)-- > 0;
 }
 
-static void stopped_at_any_moment_it_leaves_nothing(void **state) {
-    (void)state;
+TEST_IN(stopped_at_any_moment_it_leaves_nothing, folders_make, folders_remove) {
     enum { TITLE = 60000, JOBS = 40 }; // some steps of copying
     Db *db = open_store(data);
     char *title = calloc(1, TITLE);
@@ -143,14 +136,4 @@ static void stopped_at_any_moment_it_leaves_nothing(void **state) {
     assert_true(moment > 5);
     assert_int_equal(files_in(target), 1);
     db_close(db);
-}
-
-#define IN_FOLDERS(test) cmocka_unit_test_setup_teardown(test, folders_make, folders_remove)
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        IN_FOLDERS(every_row_that_was_added_before_is_in_the_copy),
-        IN_FOLDERS(stopped_at_any_moment_it_leaves_nothing),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,14 +1,10 @@
 // Sweeps in the store: written down once, chunks whole and once, opened again where they failed.
 #include "server/db/db.h"
+#include "tests/support/test.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 static Db *db;
 static Problem problem;
@@ -55,8 +51,7 @@ static void assert_chunk(int64_t sweep, uint64_t number, const char *bytes) {
     sweep_chunk_row_clear(&chunk);
 }
 
-static void what_is_to_be_done_is_written_down_once(void **state) {
-    (void)state;
+TEST_IN(what_is_to_be_done_is_written_down_once, open_store, close_store) {
     SweepRow first = begun("r-1", 8), second = begun("r-1", 99);
     assert_true(first.number > 0 && first.number == second.number);
     assert_int_equal(second.chunks, 8);
@@ -65,8 +60,7 @@ static void what_is_to_be_done_is_written_down_once(void **state) {
     assert_int_equal(db_sweep_load(db, "r-2", &first, NULL), STATUS_NOT_FOUND);
 }
 
-static void a_chunk_comes_once_and_is_made_again_only_where_it_is_open(void **state) {
-    (void)state;
+TEST_IN(a_chunk_comes_once_and_is_made_again_only_where_it_is_open, open_store, close_store) {
     SweepRow row = begun("r-3", 4);
     take(row.number, 2, 1, false, "first");
     take(row.number, 2, 0, false, "second");
@@ -88,8 +82,7 @@ static void a_chunk_comes_once_and_is_made_again_only_where_it_is_open(void **st
     sweep_row_clear(&row);
 }
 
-static void parts_of_chunks_are_read_until_one_of_them_is_not_what_it_was(void **state) {
-    (void)state;
+TEST_IN(parts_of_chunks_are_read_until_one_of_them_is_not_what_it_was, open_store, close_store) {
     SweepRow row = begun("r-6", 4);
     take(row.number, 0, 0, false, "abcdefgh");
     take(row.number, 2, 1, false, "ABCDE");
@@ -114,8 +107,7 @@ static void parts_of_chunks_are_read_until_one_of_them_is_not_what_it_was(void *
     sweep_row_clear(&row);
 }
 
-static void what_nobody_waits_for_is_tidied_away_with_its_chunks(void **state) {
-    (void)state;
+TEST_IN(what_nobody_waits_for_is_tidied_away_with_its_chunks, open_store, close_store) {
     SweepRow row = begun("r-4", 4), other = begun("r-5", 4);
     take(row.number, 0, 0, false, "rows");
     JobRow job = {.scene = "{}", .warnings = "[]"};
@@ -134,18 +126,4 @@ static void what_nobody_waits_for_is_tidied_away_with_its_chunks(void **state) {
     sweep_row_clear(&found);
     sweep_row_clear(&row);
     sweep_row_clear(&other);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(what_is_to_be_done_is_written_down_once, open_store,
-                                        close_store),
-        cmocka_unit_test_setup_teardown(a_chunk_comes_once_and_is_made_again_only_where_it_is_open,
-                                        open_store, close_store),
-        cmocka_unit_test_setup_teardown(
-            parts_of_chunks_are_read_until_one_of_them_is_not_what_it_was, open_store, close_store),
-        cmocka_unit_test_setup_teardown(what_nobody_waits_for_is_tidied_away_with_its_chunks,
-                                        open_store, close_store),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,9 +1,4 @@
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 
-#include <cmocka.h>
 
 #include <math.h>
 #include <stdio.h>
@@ -12,6 +7,7 @@
 
 #include "server/formats/chart.h"
 #include "server/formats/charts.h"
+#include "tests/support/test.h"
 
 static TradeoffPoint point_make(char *name, char *solver, double cpu, double error) {
     TradeoffPoint point;
@@ -44,8 +40,7 @@ static size_t count_of(const char *text, const char *part) {
     return count;
 }
 
-static void every_measured_point_has_a_mark_and_the_others_are_told(void **state) {
-    (void)state;
+TEST(every_measured_point_has_a_mark_and_the_others_are_told) {
     TradeoffPoint points[] = {
         point_make("exact", "exact", 1e-5, 1e-13),
         point_make("rk4, step 0.001 s", "rk4", 1e-3, 1e-2),
@@ -69,8 +64,7 @@ static void every_measured_point_has_a_mark_and_the_others_are_told(void **state
     free(text);
 }
 
-static void an_error_of_0_stands_on_the_floor(void **state) {
-    (void)state;
+TEST(an_error_of_0_stands_on_the_floor) {
     TradeoffPoint points[] = {point_make("exact", "exact", 1e-5, 0),
                               point_make("rk4", "rk4", 1e-3, 3)};
     char *text = draw(points, COUNT(points), 0, COUNT_ABSENT);
@@ -81,8 +75,7 @@ static void an_error_of_0_stands_on_the_floor(void **state) {
     free(text);
 }
 
-static void there_may_be_nothing_to_draw(void **state) {
-    (void)state;
+TEST(there_may_be_nothing_to_draw) {
     char *text = draw(NULL, 0, 1e-3, COUNT_ABSENT);
     assert_int_equal(count_of(text, "class=\"mark"), 0);
     free(text);
@@ -92,8 +85,7 @@ static void there_may_be_nothing_to_draw(void **state) {
     free(text);
 }
 
-static void more_groups_than_colours_share_the_last_one(void **state) {
-    (void)state;
+TEST(more_groups_than_colours_share_the_last_one) {
     TradeoffPoint points[20];
     char names[20][8];
     for (size_t i = 0; i < COUNT(points); i++) {
@@ -123,8 +115,7 @@ static char *draw_line(const double *y, const double *high, size_t count, bool i
     return text;
 }
 
-static void a_line_is_interrupted_where_a_value_is_missing(void **state) {
-    (void)state;
+TEST(a_line_is_interrupted_where_a_value_is_missing) {
     const double y[] = {0, 1, (double)NAN, 1, 0};
     char *text = draw_line(y, NULL, COUNT(y), false);
     assert_non_null(
@@ -139,8 +130,7 @@ static void a_line_is_interrupted_where_a_value_is_missing(void **state) {
     free(text);
 }
 
-static void many_points_take_limited_room_and_peaks_remain(void **state) {
-    (void)state;
+TEST(many_points_take_limited_room_and_peaks_remain) {
     enum { POINTS = 100000 };
     double *low = calloc(POINTS, sizeof *low), *high = calloc(POINTS, sizeof *high);
     assert_true(low != NULL && high != NULL);
@@ -160,16 +150,4 @@ static void many_points_take_limited_room_and_peaks_remain(void **state) {
     free(text);
     free(low);
     free(high);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_measured_point_has_a_mark_and_the_others_are_told),
-        cmocka_unit_test(an_error_of_0_stands_on_the_floor),
-        cmocka_unit_test(there_may_be_nothing_to_draw),
-        cmocka_unit_test(more_groups_than_colours_share_the_last_one),
-        cmocka_unit_test(a_line_is_interrupted_where_a_value_is_missing),
-        cmocka_unit_test(many_points_take_limited_room_and_peaks_remain),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,15 +1,11 @@
 // Charts of evaluations at their borders: nothing to draw, one reading, no speeds, hostile texts.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "server/formats/charts.h"
 #include "tests/support/drops.h"
+#include "tests/support/test.h"
 
 static Problem problem;
 
@@ -42,8 +38,7 @@ static size_t count_of(const char *text, const char *word) {
     return count;
 }
 
-static void what_is_not_known_has_no_frame(void **state) {
-    (void)state;
+TEST(what_is_not_known_has_no_frame) {
     char *svg = draw("{\"drops\": [{\"drop_height\": 1, \"rebound_height\": 0.25}]}");
     assert_int_equal(count_of(svg, "class=\"mark s0\""), 1);
     assert_int_equal(count_of(svg, "class=\"frame\""), 1);
@@ -51,8 +46,7 @@ static void what_is_not_known_has_no_frame(void **state) {
     free(svg);
 }
 
-static void readings_without_a_speed_are_drawn(void **state) {
-    (void)state;
+TEST(readings_without_a_speed_are_drawn) {
     char *svg = draw("{\"drops\": [{\"contact_time\": 0.001}, {\"contact_time\": 0.002}]}");
     assert_int_equal(count_of(svg, "class=\"mark s0\""), 2);
     free(svg);
@@ -61,8 +55,7 @@ static void readings_without_a_speed_are_drawn(void **state) {
     free(svg);
 }
 
-static void what_does_not_count_is_a_cross_and_its_words_are_no_markup(void **state) {
-    (void)state;
+TEST(what_does_not_count_is_a_cross_and_its_words_are_no_markup) {
     char *svg = draw("{\"drops\": [{\"drop_height\": 1, \"rebound_height\": 2, "
                      "\"excluded\": \"<b>&\\\"'</b>\"}]}");
     assert_int_equal(count_of(svg, "class=\"cross\""), 1);
@@ -71,22 +64,11 @@ static void what_does_not_count_is_a_cross_and_its_words_are_no_markup(void **st
     free(svg);
 }
 
-static void a_change_with_speed_is_a_line(void **state) {
-    (void)state;
+TEST(a_change_with_speed_is_a_line) {
     char *svg = draw("{\"drops\": [{\"approach_speed\": 1, \"rebound_speed\": 0.7}, "
                      "{\"approach_speed\": 2, \"rebound_speed\": 1.3}, "
                      "{\"approach_speed\": 3, \"rebound_speed\": 1.801}, "
                      "{\"approach_speed\": 4, \"rebound_speed\": 2.2}]}");
     assert_int_equal(count_of(svg, "class=\"line s1 trend\""), 1);
     free(svg);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_is_not_known_has_no_frame),
-        cmocka_unit_test(readings_without_a_speed_are_drawn),
-        cmocka_unit_test(what_does_not_count_is_a_cross_and_its_words_are_no_markup),
-        cmocka_unit_test(a_change_with_speed_is_a_line),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,14 +1,10 @@
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 
-#include <cmocka.h>
 
 #include <string.h>
 
 #include "core/study/ensemble.h"
 #include "server/formats/study_formats.h"
+#include "tests/support/test.h"
 
 static char unstable[] = "the \"numbers\" grew";
 
@@ -18,8 +14,7 @@ static const StudyFormat *format(const StudyKind *kind, const char *extension) {
     return found;
 }
 
-static void every_study_has_its_formats_json_first(void **state) {
-    (void)state;
+TEST(every_study_has_its_formats_json_first) {
     for (size_t i = 0; studies[i] != NULL; i++) {
         const StudyFormat *formats = study_formats(studies[i]->answer);
         assert_string_equal(formats->extension, "json");
@@ -36,8 +31,7 @@ static void every_study_has_its_formats_json_first(void **state) {
     assert_string_equal(names, "json, c"); // cut, not overrun
 }
 
-static void a_run_that_failed_is_quoted_in_the_table(void **state) {
-    (void)state;
+TEST(a_run_that_failed_is_quoted_in_the_table) {
     RunRecord runs[2] = {{.number = 7, .steps = 100, .summary = {.impacts = 3}},
                          {.number = 8, .steps = (double)NAN, .why = unstable}};
     runs[0].summary.trust_horizon = (double)NAN;
@@ -56,8 +50,7 @@ static void a_run_that_failed_is_quoted_in_the_table(void **state) {
     bytes_clear(&bytes);
 }
 
-static void a_chart_of_nothing_known_is_whole(void **state) {
-    (void)state;
+TEST(a_chart_of_nothing_known_is_whole) {
     Variant *answer = variant_new(study_ensemble.answer);
     assert_non_null(answer);
     ((Ensemble *)(void *)answer)->confidence = 0.95;
@@ -70,13 +63,4 @@ static void a_chart_of_nothing_known_is_whole(void **state) {
     assert_string_equal(bytes.at + bytes.count - 7, "</svg>\n");
     bytes_clear(&bytes);
     variant_free(answer);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_study_has_its_formats_json_first),
-        cmocka_unit_test(a_run_that_failed_is_quoted_in_the_table),
-        cmocka_unit_test(a_chart_of_nothing_known_is_whole),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

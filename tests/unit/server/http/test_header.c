@@ -1,18 +1,12 @@
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "server/http/header.h"
+#include "tests/support/test.h"
 
 static const char *const types[] = {"application/json", "text/csv; charset=utf-8",
                                     "application/x-npy", NULL};
 
-static void accept_chooses_by_quality_then_by_our_order(void **state) {
-    (void)state;
+TEST(accept_chooses_by_quality_then_by_our_order) {
     assert_int_equal(header_accept(NULL, types), 0);
     assert_int_equal(header_accept("", types), 0);
     assert_int_equal(header_accept("*/*", types), 0);
@@ -28,16 +22,14 @@ static void accept_chooses_by_quality_then_by_our_order(void **state) {
     assert_int_equal(header_accept(",,;;==,", types), -1);
 }
 
-static void a_browser_prefers_html(void **state) {
-    (void)state;
+TEST(a_browser_prefers_html) {
     static const char *const pages[] = {"text/plain", "text/html", NULL};
     assert_int_equal(
         header_accept("text/html,application/xhtml+xml,application/xml;q=0.9,*/*;q=0.8", pages), 1);
     assert_int_equal(header_accept("*/*", pages), 0);
 }
 
-static void prefer_reads_wait_and_respond_async(void **state) {
-    (void)state;
+TEST(prefer_reads_wait_and_respond_async) {
     Prefer prefer = header_prefer("respond-async, wait=5");
     assert_true(prefer.responds_async && prefer.has_wait);
     assert_true(prefer.wait == 5);
@@ -54,8 +46,7 @@ static void prefer_reads_wait_and_respond_async(void **state) {
     assert_false(header_prefer("foo=\"a, wait=3\"").has_wait);
 }
 
-static void gzip_is_taken_where_it_is_named_or_all_is(void **state) {
-    (void)state;
+TEST(gzip_is_taken_where_it_is_named_or_all_is) {
     assert_true(header_accepts_gzip("gzip"));
     assert_true(header_accepts_gzip("deflate, GZIP;q=0.5, br"));
     assert_true(header_accepts_gzip("x-gzip"));
@@ -75,8 +66,7 @@ typedef struct RangeCase {
     size_t first, last;
 } RangeCase;
 
-static void ranges_of_ten_bytes(void **state) {
-    (void)state;
+TEST(ranges_of_ten_bytes) {
     static const RangeCase cases[] = {
         {"bytes=0-3", RANGE_PART, 0, 3},
         {"bytes=4-", RANGE_PART, 4, 9},
@@ -108,8 +98,7 @@ static void ranges_of_ten_bytes(void **state) {
     assert_int_equal(header_range("bytes=-1", 0, &first, &last), RANGE_UNSATISFIABLE);
 }
 
-static void etags_match_in_lists_weak_or_not(void **state) {
-    (void)state;
+TEST(etags_match_in_lists_weak_or_not) {
     assert_true(header_etag_matches("\"a\"", "\"a\""));
     assert_true(header_etag_matches("\"b,\", W/\"a\"", "\"a\""));
     assert_true(header_etag_matches("*", "\"a\""));
@@ -119,8 +108,7 @@ static void etags_match_in_lists_weak_or_not(void **state) {
     assert_false(header_etag_matches(NULL, "\"a\""));
 }
 
-static void strong_tags_of_a_list_come_one_after_the_other(void **state) {
-    (void)state;
+TEST(strong_tags_of_a_list_come_one_after_the_other) {
     static const char *const wanted[] = {"\"a\"", "*", "\"b, c\"", "\"\"", "\"*\""};
     const char *list = "\"a\" , W/\"b\",*, \"b, c\", d, \"\",, \"*\"", *tag;
     const char *rest = " ,, W/\"a\", a\"";
@@ -136,25 +124,10 @@ static void strong_tags_of_a_list_come_one_after_the_other(void **state) {
     assert_false(header_etag_next(&rest, &tag, &size));
 }
 
-static void content_types_are_compared_without_parameters(void **state) {
-    (void)state;
+TEST(content_types_are_compared_without_parameters) {
     assert_true(header_type_is("application/json", "application/json"));
     assert_true(header_type_is("Application/JSON ; charset=utf-8", "application/json"));
     assert_false(header_type_is("application/jsonx", "application/json"));
     assert_false(header_type_is("text/plain; application/json", "application/json"));
     assert_false(header_type_is(NULL, "application/json"));
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(accept_chooses_by_quality_then_by_our_order),
-        cmocka_unit_test(a_browser_prefers_html),
-        cmocka_unit_test(prefer_reads_wait_and_respond_async),
-        cmocka_unit_test(gzip_is_taken_where_it_is_named_or_all_is),
-        cmocka_unit_test(ranges_of_ten_bytes),
-        cmocka_unit_test(etags_match_in_lists_weak_or_not),
-        cmocka_unit_test(strong_tags_of_a_list_come_one_after_the_other),
-        cmocka_unit_test(content_types_are_compared_without_parameters),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,13 +1,8 @@
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "server/http/address.h"
 #include "server/http/request.h"
+#include "tests/support/test.h"
 
 static Status open_target(Request *request, const char *target) {
     Problem problem;
@@ -16,8 +11,7 @@ static Status open_target(Request *request, const char *target) {
     return request_open(request, target, &problem);
 }
 
-static void a_target_is_taken_apart_and_decoded(void **state) {
-    (void)state;
+TEST(a_target_is_taken_apart_and_decoded) {
     Request request;
     assert_int_equal(open_target(&request, "/v1/a%20b?q=soft+rubber%21&empty=&bare&&x=a=b"),
                      STATUS_OK);
@@ -32,8 +26,7 @@ static void a_target_is_taken_apart_and_decoded(void **state) {
     request_close(&request);
 }
 
-static void broken_queries_are_refused(void **state) {
-    (void)state;
+TEST(broken_queries_are_refused) {
     static const char *const targets[] = {"/?a=%",   "/?a=%4",  "/?a=%zz",
                                           "/?a=%00", "/?%g0=1", "/?a=1&a=2"};
     for (size_t i = 0; i < COUNT(targets); i++) {
@@ -43,8 +36,7 @@ static void broken_queries_are_refused(void **state) {
     }
 }
 
-static void more_queries_than_there_is_room_for_are_refused(void **state) {
-    (void)state;
+TEST(more_queries_than_there_is_room_for_are_refused) {
     char target[512] = "/?";
     for (size_t i = 0; i <= REQUEST_QUERIES; i++) {
         const char pair[] = {(char)('A' + i), '=', '1', '&', '\0'};
@@ -55,8 +47,7 @@ static void more_queries_than_there_is_room_for_are_refused(void **state) {
     request_close(&request);
 }
 
-static void numbers_in_queries_have_bounds(void **state) {
-    (void)state;
+TEST(numbers_in_queries_have_bounds) {
     Request request;
     Problem problem;
     problem_clear(&problem);
@@ -85,8 +76,7 @@ static void numbers_in_queries_have_bounds(void **state) {
     request_close(&request);
 }
 
-static void headers_are_kept_once_and_preferences_joined(void **state) {
-    (void)state;
+TEST(headers_are_kept_once_and_preferences_joined) {
     Request request = {0};
     request_header(&request, "accept", "text/csv");
     request_header(&request, "Accept", "text/html");
@@ -103,8 +93,7 @@ static void headers_are_kept_once_and_preferences_joined(void **state) {
     assert_int_equal(strlen(request.prefer), sizeof request.prefers - 1);
 }
 
-static void addresses_on_loopback_are_read(void **state) {
-    (void)state;
+TEST(addresses_on_loopback_are_read) {
     static const struct {
         const char *text, *host;
         uint16_t port;
@@ -121,8 +110,7 @@ static void addresses_on_loopback_are_read(void **state) {
     }
 }
 
-static void addresses_beyond_loopback_are_read_and_told_apart(void **state) {
-    (void)state;
+TEST(addresses_beyond_loopback_are_read_and_told_apart) {
     static const struct {
         const char *text, *host;
         bool is_loopback, is_any;
@@ -142,8 +130,7 @@ static void addresses_beyond_loopback_are_read_and_told_apart(void **state) {
     }
 }
 
-static void request_ids_are_taken_if_they_are_plain(void **state) {
-    (void)state;
+TEST(request_ids_are_taken_if_they_are_plain) {
     static const struct {
         const char *sent, *kept;
     } ids[] = {{"a-B.3_z", "a-B.3_z"},
@@ -162,8 +149,7 @@ static void request_ids_are_taken_if_they_are_plain(void **state) {
     }
 }
 
-static void what_is_no_address_is_refused_with_the_reason(void **state) {
-    (void)state;
+TEST(what_is_no_address_is_refused_with_the_reason) {
     static const struct {
         const char *text;
         Status status;
@@ -181,19 +167,4 @@ static void what_is_no_address_is_refused_with_the_reason(void **state) {
             fail_msg("\"%s\" is taken otherwise: %s", bad[i].text, problem.detail);
         assert_true(problem.detail[0] != '\0');
     }
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_target_is_taken_apart_and_decoded),
-        cmocka_unit_test(broken_queries_are_refused),
-        cmocka_unit_test(more_queries_than_there_is_room_for_are_refused),
-        cmocka_unit_test(numbers_in_queries_have_bounds),
-        cmocka_unit_test(headers_are_kept_once_and_preferences_joined),
-        cmocka_unit_test(addresses_on_loopback_are_read),
-        cmocka_unit_test(addresses_beyond_loopback_are_read_and_told_apart),
-        cmocka_unit_test(request_ids_are_taken_if_they_are_plain),
-        cmocka_unit_test(what_is_no_address_is_refused_with_the_reason),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

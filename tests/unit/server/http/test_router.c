@@ -1,15 +1,10 @@
 // The router over a small table of its own: what fits, what does not, and what the answer is.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "server/http/reply.h"
 #include "server/http/router.h"
+#include "tests/support/test.h"
 
 static char seen[256];
 
@@ -72,8 +67,7 @@ static void expect(const char *method, const char *target, int code, const char 
     reply_clear(&reply);
 }
 
-static void paths_find_their_route_and_parameters(void **state) {
-    (void)state;
+TEST(paths_find_their_route_and_parameters) {
     expect("GET", "/", 200, "-|-|-");
     expect("GET", "/v1/jobs?wait=3", 200, "-|-|3");
     expect("GET", "/v1/jobs/j-1", 200, "j-1|-|-");
@@ -84,8 +78,7 @@ static void paths_find_their_route_and_parameters(void **state) {
     expect("GET", "/v1/materials/sponge@2", 200, "sponge|2|-");
 }
 
-static void what_is_not_there_is_404_with_the_nearest_path(void **state) {
-    (void)state;
+TEST(what_is_not_there_is_404_with_the_nearest_path) {
     expect("GET", "/v1/job", 404, "/v1/jobs");
     expect("GET", "/v1/result/r-1/series", 404, "/v1/results/r-1/series");
     expect("GET", "/v1/jobs/", 404, NULL);
@@ -95,8 +88,7 @@ static void what_is_not_there_is_404_with_the_nearest_path(void **state) {
     expect("GET", "/wholly/elsewhere/and/far", 404, "/openapi.json");
 }
 
-static void a_wrong_method_is_405_with_allow(void **state) {
-    (void)state;
+TEST(a_wrong_method_is_405_with_allow) {
     Reply reply = ask("PUT", "/v1/jobs/j-1", NULL);
     assert_int_equal(reply.code, 405);
     assert_string_equal(reply.allow, "GET, HEAD, DELETE");
@@ -106,37 +98,32 @@ static void a_wrong_method_is_405_with_allow(void **state) {
     reply_clear(&reply);
 }
 
-static void unknown_queries_are_refused_with_what_was_meant(void **state) {
-    (void)state;
+TEST(unknown_queries_are_refused_with_what_was_meant) {
     expect("GET", "/v1/jobs?wai=3", 400, "did you mean \\\"wait\\\"");
     expect("GET", "/v1/jobs?zzzzz=3", 400, "wait, limit");
     expect("GET", "/?a=1", 400, "there are none here");
 }
 
-static void broken_escapes_in_the_path_are_refused(void **state) {
-    (void)state;
+TEST(broken_escapes_in_the_path_are_refused) {
     expect("GET", "/v1/jobs/%zz", 400, NULL);
     expect("GET", "/v1/jobs/%4", 400, NULL);
 }
 
-static void a_handlers_fault_becomes_a_problem_and_its_half_answer_is_dropped(void **state) {
-    (void)state;
+TEST(a_handlers_fault_becomes_a_problem_and_its_half_answer_is_dropped) {
     expect("POST", "/v1/jobs", 422, "/structure/mass");
     Reply reply = ask("POST", "/v1/jobs", NULL);
     assert_null(strstr(reply.body, "half"));
     reply_clear(&reply);
 }
 
-static void names_longer_than_any_id_are_not_found(void **state) {
-    (void)state;
+TEST(names_longer_than_any_id_are_not_found) {
     char target[1024] = "/v1/jobs/";
     memset(target + 9, 'a', 900);
     target[909] = '\0';
     expect("GET", target, 404, NULL);
 }
 
-static void parts_are_206_and_parts_outside_416(void **state) {
-    (void)state;
+TEST(parts_are_206_and_parts_outside_416) {
     Reply reply = ask("GET", "/", "bytes=2-4");
     assert_int_equal(reply.code, 206);
     assert_memory_equal(reply.body, "234", 3);
@@ -150,8 +137,7 @@ static void parts_are_206_and_parts_outside_416(void **state) {
     reply_clear(&reply);
 }
 
-static void if_range_with_another_tag_gets_the_whole(void **state) {
-    (void)state;
+TEST(if_range_with_another_tag_gets_the_whole) {
     const Router router = {NULL, table, NULL, NULL};
     Request request = {.method = "GET", .range = "bytes=0-1", .if_range = "\"other\""};
     Reply reply;
@@ -166,19 +152,4 @@ static void if_range_with_another_tag_gets_the_whole(void **state) {
     assert_int_equal(reply.code, 206);
     reply_clear(&reply);
     request_close(&request);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(paths_find_their_route_and_parameters),
-        cmocka_unit_test(what_is_not_there_is_404_with_the_nearest_path),
-        cmocka_unit_test(a_wrong_method_is_405_with_allow),
-        cmocka_unit_test(unknown_queries_are_refused_with_what_was_meant),
-        cmocka_unit_test(broken_escapes_in_the_path_are_refused),
-        cmocka_unit_test(a_handlers_fault_becomes_a_problem_and_its_half_answer_is_dropped),
-        cmocka_unit_test(names_longer_than_any_id_are_not_found),
-        cmocka_unit_test(parts_are_206_and_parts_outside_416),
-        cmocka_unit_test(if_range_with_another_tag_gets_the_whole),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

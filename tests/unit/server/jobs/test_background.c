@@ -1,13 +1,10 @@
 // Work for readers: so much at once, woken when done, stopped when the reader goes.
 #include "server/jobs/background.h"
+#include "tests/support/test.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <time.h>
-
-#include <cmocka.h>
 
 static atomic_int woken, released;
 
@@ -48,8 +45,7 @@ static Status begin(BackgroundTasks *background_tasks, bool may_end, BackgroundT
     return background_start(background_tasks, &work, &callback, background, NULL);
 }
 
-static void a_reader_is_woken_when_it_is_done(void **state) {
-    (void)state;
+TEST(a_reader_is_woken_when_it_is_done) {
     BackgroundTasks *background_tasks;
     BackgroundTask *background;
     atomic_store(&woken, 0);
@@ -66,8 +62,7 @@ static void a_reader_is_woken_when_it_is_done(void **state) {
     background_close(background_tasks);
 }
 
-static void beyond_its_room_it_refuses(void **state) {
-    (void)state;
+TEST(beyond_its_room_it_refuses) {
     BackgroundTasks *background_tasks;
     BackgroundTask *background, *other;
     atomic_store(&released, 0);
@@ -84,8 +79,7 @@ static void beyond_its_room_it_refuses(void **state) {
     background_close(background_tasks);
 }
 
-static void the_end_stops_what_runs_and_waits(void **state) {
-    (void)state;
+TEST(the_end_stops_what_runs_and_waits) {
     BackgroundTasks *background_tasks;
     BackgroundTask *background;
     atomic_store(&released, 0);
@@ -100,8 +94,7 @@ static void the_end_stops_what_runs_and_waits(void **state) {
     assert_int_equal(atomic_load(&released), 3);
 }
 
-static void many_come_and_go(void **state) {
-    (void)state;
+TEST(many_come_and_go) {
     BackgroundTasks *background_tasks;
     assert_int_equal(background_open(4, &background_tasks, NULL), STATUS_OK);
     atomic_store(&released, 0);
@@ -112,14 +105,4 @@ static void many_come_and_go(void **state) {
     }
     background_close(background_tasks);
     assert_int_equal(atomic_load(&released), 500);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_reader_is_woken_when_it_is_done),
-        cmocka_unit_test(beyond_its_room_it_refuses),
-        cmocka_unit_test(the_end_stops_what_runs_and_waits),
-        cmocka_unit_test(many_come_and_go),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

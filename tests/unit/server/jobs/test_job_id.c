@@ -1,15 +1,10 @@
 // Names of jobs are all different, rise, and tell nothing of the next one.
 #include <pthread.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "server/jobs/job_id.h"
+#include "tests/support/test.h"
 
 enum { THREADS = 4, IDS = 5000, SECRET = 16 }; // where the random digits begin
 
@@ -31,8 +26,7 @@ static int compare_secrets(const void *a, const void *b) {
     return strcmp((const char *)a + SECRET, (const char *)b + SECRET);
 }
 
-static void names_rise_and_no_two_share_their_secret(void **state) {
-    (void)state;
+TEST(names_rise_and_no_two_share_their_secret) {
     pthread_t threads[THREADS];
     for (size_t i = 0; i < THREADS; i++)
         assert_int_equal(pthread_create(&threads[i], NULL, make, ids[i * IDS]), 0);
@@ -54,9 +48,4 @@ static void names_rise_and_no_two_share_their_secret(void **state) {
     qsort(ids, (size_t)THREADS * IDS, sizeof ids[0], compare_secrets);
     for (size_t i = 1; i < (size_t)THREADS * IDS; i++)
         assert_string_not_equal(ids[i - 1] + SECRET, ids[i] + SECRET);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(names_rise_and_no_two_share_their_secret)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,13 +1,8 @@
 // Whose turn it is.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 
-#include <cmocka.h>
-
 #include "server/jobs/queue.h"
+#include "tests/support/test.h"
 
 static QueueEntry *put(Queue *queue, QueueEntry *entry, const char *name, double seconds,
                        double now) {
@@ -16,8 +11,7 @@ static QueueEntry *put(Queue *queue, QueueEntry *entry, const char *name, double
     return entry;
 }
 
-static void equal_jobs_of_one_client_go_in_the_order_of_arrival(void **state) {
-    (void)state;
+TEST(equal_jobs_of_one_client_go_in_the_order_of_arrival) {
     Queue *queue = queue_new();
     QueueEntry at[100];
     for (size_t i = 0; i < 100; i++)
@@ -30,8 +24,7 @@ static void equal_jobs_of_one_client_go_in_the_order_of_arrival(void **state) {
     queue_free(queue);
 }
 
-static void the_quick_pass_the_slow_until_these_have_waited_long_enough(void **state) {
-    (void)state;
+TEST(the_quick_pass_the_slow_until_these_have_waited_long_enough) {
     Queue *queue = queue_new();
     QueueEntry slow, soon, late;
     put(queue, &slow, "", 2, 0);
@@ -43,8 +36,7 @@ static void the_quick_pass_the_slow_until_these_have_waited_long_enough(void **s
     queue_free(queue);
 }
 
-static void clients_are_served_in_turn_however_much_one_of_them_sends(void **state) {
-    (void)state;
+TEST(clients_are_served_in_turn_however_much_one_of_them_sends) {
     Queue *queue = queue_new();
     QueueEntry many[50], few[3];
     for (size_t i = 0; i < 50; i++)
@@ -59,8 +51,7 @@ static void clients_are_served_in_turn_however_much_one_of_them_sends(void **sta
     queue_free(queue);
 }
 
-static void a_turn_is_counted_in_time_not_in_jobs(void **state) {
-    (void)state;
+TEST(a_turn_is_counted_in_time_not_in_jobs) {
     Queue *queue = queue_new();
     QueueEntry slow[2], quick[101];
     for (size_t i = 0; i < 2; i++)
@@ -73,8 +64,7 @@ static void a_turn_is_counted_in_time_not_in_jobs(void **state) {
     queue_free(queue);
 }
 
-static void turns_of_long_work_go_between_the_ordinary_jobs_of_their_client(void **state) {
-    (void)state;
+TEST(turns_of_long_work_go_between_the_ordinary_jobs_of_their_client) {
     Queue *queue = queue_new();
     QueueEntry turn = {.seconds = 0.01, .is_turn = true}, jobs[20], other;
     for (size_t i = 0; i < 20; i++)
@@ -102,8 +92,7 @@ static void turns_of_long_work_go_between_the_ordinary_jobs_of_their_client(void
     queue_free(queue);
 }
 
-static void nobody_saves_turns_up_by_being_away(void **state) {
-    (void)state;
+TEST(nobody_saves_turns_up_by_being_away) {
     Queue *queue = queue_new();
     QueueEntry at[40], back[20];
     QueueEntry first;
@@ -125,8 +114,7 @@ static void nobody_saves_turns_up_by_being_away(void **state) {
     queue_free(queue);
 }
 
-static void the_kept_worker_takes_quick_ones_alone(void **state) {
-    (void)state;
+TEST(the_kept_worker_takes_quick_ones_alone) {
     Queue *queue = queue_new();
     QueueEntry slow, quick, urgent = {.seconds = 9};
     put(queue, &slow, "a", 5, 0);
@@ -140,8 +128,7 @@ static void the_kept_worker_takes_quick_ones_alone(void **state) {
     queue_free(queue);
 }
 
-static void what_others_want_too_moves_to_whoever_waits_less(void **state) {
-    (void)state;
+TEST(what_others_want_too_moves_to_whoever_waits_less) {
     Queue *queue = queue_new();
     QueueEntry at[20];
     for (size_t i = 0; i < 20; i++)
@@ -154,8 +141,7 @@ static void what_others_want_too_moves_to_whoever_waits_less(void **state) {
     queue_free(queue);
 }
 
-static void any_order_of_coming_and_going_keeps_the_ranks(void **state) {
-    (void)state;
+TEST(any_order_of_coming_and_going_keeps_the_ranks) {
     enum { COUNT_ = 2000 };
     Queue *queue = queue_new();
     QueueEntry *at = calloc(COUNT_, sizeof *at);
@@ -182,19 +168,4 @@ static void any_order_of_coming_and_going_keeps_the_ranks(void **state) {
     assert_int_equal(waiting, 0);
     free(at);
     queue_free(queue);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(equal_jobs_of_one_client_go_in_the_order_of_arrival),
-        cmocka_unit_test(the_quick_pass_the_slow_until_these_have_waited_long_enough),
-        cmocka_unit_test(clients_are_served_in_turn_however_much_one_of_them_sends),
-        cmocka_unit_test(a_turn_is_counted_in_time_not_in_jobs),
-        cmocka_unit_test(turns_of_long_work_go_between_the_ordinary_jobs_of_their_client),
-        cmocka_unit_test(nobody_saves_turns_up_by_being_away),
-        cmocka_unit_test(the_kept_worker_takes_quick_ones_alone),
-        cmocka_unit_test(what_others_want_too_moves_to_whoever_waits_less),
-        cmocka_unit_test(any_order_of_coming_and_going_keeps_the_ranks),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,16 +1,12 @@
 // Arrays of numbers, rows of them and texts: read, written back and described.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "server/json/encode.h"
 #include "server/json/parse.h"
 #include "server/json/schema.h"
 #include "tests/support/fields.h"
+#include "tests/support/test.h"
 
 typedef struct Item {
     Rows matrix;
@@ -44,22 +40,19 @@ static void assert_written(const char *text, const char *expected) {
     fields_clear(fields, &item);
 }
 
-static void matrices_come_back_as_they_went(void **state) {
-    (void)state;
+TEST(matrices_come_back_as_they_went) {
     assert_written("{\"matrix\": [[1, -2.5], [ 1e3 ], []]}",
                    "{\"matrix\": [[1,-2.5], [1000], []]}");
     assert_written("{\"matrix\": []}", "{}");
 }
 
-static void a_lone_number_is_a_list_of_one(void **state) {
-    (void)state;
+TEST(a_lone_number_is_a_list_of_one) {
     assert_written("{\"start\": 0.5}", "{\"start\": 0.5}");
     assert_written("{\"start\": [0.5]}", "{\"start\": 0.5}");
     assert_written("{\"start\": [1, 2]}", "{\"start\": [1,2]}");
 }
 
-static void what_is_no_matrix_is_told_where_it_is_none(void **state) {
-    (void)state;
+TEST(what_is_no_matrix_is_told_where_it_is_none) {
     Item item;
     assert_int_equal(read(&item, "{\"matrix\": [[1, \"2\"], 3, [4, null]], \"start\": \"0\"}"),
                      STATUS_INVALID);
@@ -83,8 +76,7 @@ static void what_is_no_matrix_is_told_where_it_is_none(void **state) {
     fields_clear(fields, &item);
 }
 
-static void the_schema_says_all_forms(void **state) {
-    (void)state;
+TEST(the_schema_says_all_forms) {
     Bytes bytes = {0};
     schema_write(&bytes, "/x", "x", fields);
     bytes_put(&bytes, "", 1);
@@ -94,14 +86,4 @@ static void the_schema_says_all_forms(void **state) {
     assert_non_null(rows);
     assert_non_null(strstr(rows + 1, "\"items\"")); // of the rows' numbers
     bytes_clear(&bytes);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(matrices_come_back_as_they_went),
-        cmocka_unit_test(a_lone_number_is_a_list_of_one),
-        cmocka_unit_test(what_is_no_matrix_is_told_where_it_is_none),
-        cmocka_unit_test(the_schema_says_all_forms),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,19 +1,14 @@
 // What is written, and that reading it back gives an equal struct; problem documents.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include <jansson.h>
 
 #include "core/base/canonical.h"
 #include "server/json/encode.h"
 #include "server/json/parse.h"
+#include "tests/support/test.h"
 #include "tests/support/whole.h"
 
 static void read_whole(Whole *whole, const char *text) {
@@ -40,8 +35,7 @@ static const char *const documents[] = {
     " \"shape\": {\"shape\": \"square\", \"sides\": [1, 2]}, \"spare\": {\"radius\": 1.5}}",
 };
 
-static void reading_back_gives_an_equal_struct(void **state) {
-    (void)state;
+TEST(reading_back_gives_an_equal_struct) {
     for (size_t i = 0; i < COUNT(documents); i++) {
         Whole whole, again;
         Bytes text = {0}, second = {0}, canonical = {0}, expected = {0};
@@ -64,8 +58,7 @@ static void reading_back_gives_an_equal_struct(void **state) {
     }
 }
 
-static void scenes_leave_out_what_is_absent(void **state) {
-    (void)state;
+TEST(scenes_leave_out_what_is_absent) {
     Whole whole;
     Bytes text = {0};
     read_whole(&whole, "{\"mass\": 2, \"right\": \"sponge\"}");
@@ -80,8 +73,7 @@ static void scenes_leave_out_what_is_absent(void **state) {
     fields_clear(whole_fields, &whole);
 }
 
-static void reports_write_null_for_what_is_absent(void **state) {
-    (void)state;
+TEST(reports_write_null_for_what_is_absent) {
     Whole whole;
     Bytes text = {0};
     read_whole(&whole, "{\"extra\": null, \"samples\": [1, 2.5], \"spare\": {}}");
@@ -99,8 +91,7 @@ static void reports_write_null_for_what_is_absent(void **state) {
     fields_clear(whole_fields, &whole);
 }
 
-static void members_stand_beside_others(void **state) {
-    (void)state;
+TEST(members_stand_beside_others) {
     Round round = {{&shape_round}, {0.5}, 2};
     Bytes text = {0};
     assert_int_equal(encode_members(&text, shape_round.fields, &round, WRITE_SCENE), 2);
@@ -114,8 +105,7 @@ static void members_stand_beside_others(void **state) {
     bytes_clear(&text);
 }
 
-static void a_full_buffer_only_fails(void **state) {
-    (void)state;
+TEST(a_full_buffer_only_fails) {
     Whole whole;
     read_whole(&whole, documents[3]);
     for (size_t most = 1; most < 400; most += 13) {
@@ -126,8 +116,7 @@ static void a_full_buffer_only_fails(void **state) {
     fields_clear(whole_fields, &whole);
 }
 
-static void problems_are_problem_documents(void **state) {
-    (void)state;
+TEST(problems_are_problem_documents) {
     Problem problem = {0};
     const Fault mass = {.pointer = "/structure/mass",
                         .detail = "must be above 0 kg, is -1",
@@ -167,8 +156,7 @@ static void problems_are_problem_documents(void **state) {
     bytes_clear(&text);
 }
 
-static void faults_past_the_hundredth_are_counted(void **state) {
-    (void)state;
+TEST(faults_past_the_hundredth_are_counted) {
     Bytes document = {0}, text = {0};
     bytes_text(&document, "{\"samples\": [");
     for (int i = 0; i < 50; i++)
@@ -196,17 +184,4 @@ static void faults_past_the_hundredth_are_counted(void **state) {
     fields_clear(whole_fields, &whole);
     bytes_clear(&document);
     bytes_clear(&text);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(reading_back_gives_an_equal_struct),
-        cmocka_unit_test(scenes_leave_out_what_is_absent),
-        cmocka_unit_test(reports_write_null_for_what_is_absent),
-        cmocka_unit_test(members_stand_beside_others),
-        cmocka_unit_test(a_full_buffer_only_fails),
-        cmocka_unit_test(problems_are_problem_documents),
-        cmocka_unit_test(faults_past_the_hundredth_are_counted),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,15 +1,12 @@
 // Members that stay inside: there for the program, and for no walker but copy and clear.
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "core/base/canonical.h"
 #include "server/json/encode.h"
 #include "server/json/parse.h"
 #include "server/json/schema.h"
+#include "tests/support/test.h"
 
 typedef struct Part {
     double stiffness;
@@ -52,8 +49,7 @@ static void count_bytes(void *context, const void *bytes, size_t size) {
     *(size_t *)context += size;
 }
 
-static void they_are_copied_and_cleared_with_the_struct(void **state) {
-    (void)state;
+TEST(they_are_copied_and_cleared_with_the_struct) {
     Part part = make(3), copy;
     assert_int_equal(fields_copy(part_fields, &part, &copy), STATUS_OK);
     assert_true(copy.least == 0.15);
@@ -65,8 +61,7 @@ static void they_are_copied_and_cleared_with_the_struct(void **state) {
     fields_clear(part_fields, &copy);
 }
 
-static void they_are_no_part_of_what_is_written_or_stands_for_it(void **state) {
-    (void)state;
+TEST(they_are_no_part_of_what_is_written_or_stands_for_it) {
     Part with = make(3), without;
     size_t bytes_with = 0, bytes_without = 0;
     assert_int_equal(fields_default(part_fields, &without), STATUS_OK);
@@ -85,15 +80,13 @@ static void they_are_no_part_of_what_is_written_or_stands_for_it(void **state) {
     fields_clear(part_fields, &with);
 }
 
-static void an_item_with_nothing_else_is_absent(void **state) {
-    (void)state;
+TEST(an_item_with_nothing_else_is_absent) {
     Whole whole = {make((double)NAN)};
     assert_true(field_is_absent(&whole_fields[0], &whole));
     fields_clear(whole_fields, &whole);
 }
 
-static void they_are_judged_by_nobody(void **state) {
-    (void)state;
+TEST(they_are_judged_by_nobody) {
     Part part = make(3);
     part.least = (double)INFINITY;
     problem_clear(&problem);
@@ -101,8 +94,7 @@ static void they_are_judged_by_nobody(void **state) {
     fields_clear(part_fields, &part);
 }
 
-static void they_can_be_neither_read_nor_guessed(void **state) {
-    (void)state;
+TEST(they_can_be_neither_read_nor_guessed) {
     static const char text[] = "{\"least\": 1, \"origin\": \"x\", \"lest\": 2}";
     Part part;
     problem_clear(&problem);
@@ -117,8 +109,7 @@ static void they_can_be_neither_read_nor_guessed(void **state) {
     fields_clear(part_fields, &part);
 }
 
-static void a_schema_does_not_tell_of_them(void **state) {
-    (void)state;
+TEST(a_schema_does_not_tell_of_them) {
     Bytes bytes = {0};
     schema_write(&bytes, "/x", "x", part_fields);
     char *text = bytes_take(&bytes, NULL);
@@ -126,16 +117,4 @@ static void a_schema_does_not_tell_of_them(void **state) {
     assert_null(strstr(text, "least"));
     assert_null(strstr(text, "origin"));
     free(text);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(they_are_copied_and_cleared_with_the_struct),
-        cmocka_unit_test(they_are_no_part_of_what_is_written_or_stands_for_it),
-        cmocka_unit_test(an_item_with_nothing_else_is_absent),
-        cmocka_unit_test(they_are_judged_by_nobody),
-        cmocka_unit_test(they_can_be_neither_read_nor_guessed),
-        cmocka_unit_test(a_schema_does_not_tell_of_them),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,15 +1,10 @@
 // Members set in documents of people, and parts extracted from them.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "core/base/field.h"
 #include "server/json/json_edit.h"
+#include "tests/support/test.h"
 
 static Bytes of(const char *text) {
     Bytes bytes = {0};
@@ -31,8 +26,7 @@ static void becomes(const char *before, const char *name, const char *value, con
     bytes_clear(&item);
 }
 
-static void members_are_set_and_lists_grow(void **state) {
-    (void)state;
+TEST(members_are_set_and_lists_grow) {
     becomes("{\"a\": 1}", "comment", "x \" y", "{\"a\":1,\"comment\":\"x \\\" y\"}");
     becomes("\xEF\xBB\xBF{\"comment\": 0.5}", "comment", "b", "{\"comment\":\"b\"}");
     becomes("{}", "traces", "{\"force\": [1, 0.5]}", "{\"traces\":[{\"force\":[1,0.5]}]}");
@@ -43,8 +37,7 @@ static void members_are_set_and_lists_grow(void **state) {
     becomes("{\"labels\": [\"z=1\"]}", "label", "a=b", "{\"labels\":[\"z=1\",\"a=b\"]}");
 }
 
-static void what_is_no_object_stays_as_it_is(void **state) {
-    (void)state;
+TEST(what_is_no_object_stays_as_it_is) {
     static const char *const texts[] = {"", "[1]", "{", "nonsense", "{\"a\": 1, \"a\": 2}"};
     for (size_t i = 0; i < COUNT(texts); i++) {
         becomes(texts[i], "comment", "1", texts[i]);
@@ -55,8 +48,7 @@ static void what_is_no_object_stays_as_it_is(void **state) {
     becomes("{\"labels\": 5}", "label", "a=b", "{\"labels\": 5}");
 }
 
-static void labels_are_pairs_and_all_is_utf8(void **state) {
-    (void)state;
+TEST(labels_are_pairs_and_all_is_utf8) {
     static const char *const wrong[] = {"a", "", "=b", "a=\xFF"};
     Bytes text = of("{}"), value = of("\"\xFF\"");
     for (size_t i = 0; i < COUNT(wrong); i++)
@@ -68,8 +60,7 @@ static void labels_are_pairs_and_all_is_utf8(void **state) {
     bytes_clear(&value);
 }
 
-static void parts_are_extracted(void **state) {
-    (void)state;
+TEST(parts_are_extracted) {
     Bytes text = of("{\"revision\": {\"e\": 0.5, \"n\": null}, \"b\": 1}"), part = {0};
     assert_int_equal(json_edit_extract(&text, "revision", &part, NULL), STATUS_OK);
     assert_string_equal(part.at, "{\"e\":0.5,\"n\":null}");
@@ -79,21 +70,9 @@ static void parts_are_extracted(void **state) {
     bytes_clear(&text);
 }
 
-static void nulls_are_removed_at_any_depth(void **state) {
-    (void)state;
+TEST(nulls_are_removed_at_any_depth) {
     Bytes text = of("{\"a\": null, \"b\": [{\"c\": null, \"d\": 1}, {}], \"e\": {\"f\": null}}");
     assert_int_equal(json_edit_remove_nulls(&text, NULL), STATUS_OK);
     assert_string_equal(text.at, "{\"b\":[{\"d\":1},{}],\"e\":{}}");
     bytes_clear(&text);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(members_are_set_and_lists_grow),
-        cmocka_unit_test(what_is_no_object_stays_as_it_is),
-        cmocka_unit_test(labels_are_pairs_and_all_is_utf8),
-        cmocka_unit_test(parts_are_extracted),
-        cmocka_unit_test(nulls_are_removed_at_any_depth),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

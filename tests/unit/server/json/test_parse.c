@@ -1,13 +1,8 @@
 // What json_parse makes of a document: values, defaults, and every fault at its place.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "server/json/parse.h"
+#include "tests/support/test.h"
 #include "tests/support/whole.h"
 
 static Problem problem;
@@ -63,8 +58,7 @@ static void check_unreadable(const char *text, const char *pointer, const char *
     fields_clear(whole_fields, &whole);
 }
 
-static void every_kind_of_row_is_read(void **state) {
-    (void)state;
+TEST_IN(every_kind_of_row_is_read, set_up, tear_down) {
     assert_int_equal(
         read("{\"offset\": -0.5, \"mass\": 2, \"slope\": -1.5e-3, \"steps\": 1e3, \"storey\": "
              "4096.0,"
@@ -107,8 +101,7 @@ static void every_kind_of_row_is_read(void **state) {
     assert_ptr_equal(whole.spare->kind, &shape_round);
 }
 
-static void what_is_not_given_has_its_default(void **state) {
-    (void)state;
+TEST_IN(what_is_not_given_has_its_default, set_up, tear_down) {
     assert_int_equal(read("{}"), STATUS_OK);
     assert_true(whole.common.offset == 0.25);
     assert_true(isnan(whole.mass));
@@ -121,15 +114,13 @@ static void what_is_not_given_has_its_default(void **state) {
     assert_int_equal(problem.count, 0);
 }
 
-static void null_empties_what_allows_it(void **state) {
-    (void)state;
+TEST_IN(null_empties_what_allows_it, set_up, tear_down) {
     assert_int_equal(read("{\"extra\": null}"), STATUS_OK);
     assert_int_equal(whole.extra.names.count, 0);
     assert_int_equal(whole.extra.rule, CHOICE_ABSENT);
 }
 
-static void labels_may_be_pairs(void **state) {
-    (void)state;
+TEST_IN(labels_may_be_pairs, set_up, tear_down) {
     assert_int_equal(read("{\"labels\": {\"project\": \"rig\", \"x\": \"\"}}"), STATUS_OK);
     assert_int_equal(whole.labels.count, 2);
     assert_string_equal(whole.labels.at[0], "project=rig");
@@ -140,8 +131,7 @@ static void labels_may_be_pairs(void **state) {
                 "must be an array of strings, is an object");
 }
 
-static void wrong_types_are_told_at_every_row(void **state) {
-    (void)state;
+TEST_IN(wrong_types_are_told_at_every_row, set_up, tear_down) {
     check_fault("{\"offset\": \"1\"}", "/offset", "\"1\"", "must be a number [m], is a string");
     check_fault("{\"mass\": null}", "/mass", "null", "must be a number [kg], is null");
     check_fault("{\"mass\": [1]}", "/mass", "", "must be a number [kg], is an array");
@@ -171,8 +161,7 @@ static void wrong_types_are_told_at_every_row(void **state) {
                 "must be a number [N s/m], is a string");
 }
 
-static void counts_must_be_whole(void **state) {
-    (void)state;
+TEST_IN(counts_must_be_whole, set_up, tear_down) {
     check_fault("{\"storey\": -1}", "/storey", "-1", "must be a whole number of at least 1, is -1");
     check_fault("{\"storey\": 1.5}", "/storey", "1.5",
                 "must be a whole number of at least 1, is 1.5");
@@ -187,8 +176,7 @@ static void counts_must_be_whole(void **state) {
     assert_int_equal(whole.storey, 0);
 }
 
-static void unknown_names_come_with_the_nearest(void **state) {
-    (void)state;
+TEST_IN(unknown_names_come_with_the_nearest, set_up, tear_down) {
     check_fault("{\"rule\": \"zero_forse\"}", "/rule", "\"zero_forse\"",
                 "must be one of zero_penetration, zero_force, is \"zero_forse\"");
     check_fault("{\"shape\": {\"shape\": \"sqare\", \"sides\": [1], \"nonsense\": 1}}",
@@ -223,16 +211,14 @@ static void unknown_names_come_with_the_nearest(void **state) {
     }
 }
 
-static void members_of_a_misspelt_kind_are_not_said_to_be_missing(void **state) {
-    (void)state;
+TEST_IN(members_of_a_misspelt_kind_are_not_said_to_be_missing, set_up, tear_down) {
     assert_int_equal(read("{\"mass\": 1, \"shape\": {\"shape\": \"runnd\", \"radius\": 1}}"),
                      STATUS_INVALID);
     assert_int_equal(fields_validate(whole_fields, &whole, "", &problem), STATUS_OK);
     assert_int_equal(problem.count, 1);
 }
 
-static void too_long_is_a_fault(void **state) {
-    (void)state;
+TEST_IN(too_long_is_a_fault, set_up, tear_down) {
     check_fault("{\"title\": \"123456789012345678901\"}", "/title", "\"123456789012345678901\"",
                 "must have at most 20 bytes, has 21");
     check_fault("{\"left\": \"1234567890123\"}", "/left", "\"1234567890123\"",
@@ -245,8 +231,7 @@ static void too_long_is_a_fault(void **state) {
                 "", "must have at most 4 numbers, has 5");
 }
 
-static void all_faults_are_told_at_once(void **state) {
-    (void)state;
+TEST_IN(all_faults_are_told_at_once, set_up, tear_down) {
     assert_int_equal(read("{\"mass\": \"heavy\", \"slop\": 1, \"steps\": 0.5, \"storey\": 0,"
                           " \"channels\": [1, \"speed\"], \"shape\": {\"radius\": 3}}"),
                      STATUS_INVALID);
@@ -261,8 +246,7 @@ static void all_faults_are_told_at_once(void **state) {
     assert_int_equal(problem.count, 7);
 }
 
-static void a_document_that_is_no_object_is_a_fault_as_a_whole(void **state) {
-    (void)state;
+TEST_IN(a_document_that_is_no_object_is_a_fault_as_a_whole, set_up, tear_down) {
     check_fault("[]", "", "", "must be an object, is an array");
     check_fault("[{\"mass\": 1}]", "", "", "must be an object, is an array");
     check_fault(" null\n", "", "null", "must be an object, is null");
@@ -271,8 +255,7 @@ static void a_document_that_is_no_object_is_a_fault_as_a_whole(void **state) {
     check_fault("false", "", "false", "must be an object, is false");
 }
 
-static void what_is_not_json_has_line_column_and_pointer(void **state) {
-    (void)state;
+TEST_IN(what_is_not_json_has_line_column_and_pointer, set_up, tear_down) {
     check_unreadable("", "", "line 1, column 1: ");
     check_unreadable(" ", "", "line 1, column");
     check_unreadable("[] 1", "", "line 1, column 4: the document is complete");
@@ -299,8 +282,7 @@ static void what_is_not_json_has_line_column_and_pointer(void **state) {
                      STATUS_UNREADABLE);
 }
 
-static void a_byte_order_mark_at_the_beginning_is_passed_over(void **state) {
-    (void)state;
+TEST_IN(a_byte_order_mark_at_the_beginning_is_passed_over, set_up, tear_down) {
     check_fault("\xEF\xBB\xBF{\"mass\": \"x\"}", "/mass", "\"x\"",
                 "must be a number [kg], is a string");
     check_unreadable("\xEF\xBB\xBF{\n  \"mass\": 1,}", "",
@@ -311,32 +293,9 @@ static void a_byte_order_mark_at_the_beginning_is_passed_over(void **state) {
     check_unreadable(" \xEF\xBB\xBF{}", "", "line 1, column ");
 }
 
-static void the_problem_may_be_null(void **state) {
-    (void)state;
+TEST_IN(the_problem_may_be_null, set_up, tear_down) {
     const char *text = "{\"mass\": \"x\", \"y\": 1}";
     assert_int_equal(json_parse(text, strlen(text), whole_fields, &whole, NULL), STATUS_INVALID);
     fields_clear(whole_fields, &whole);
     assert_int_equal(json_parse("{", 1, whole_fields, &whole, NULL), STATUS_UNREADABLE);
-}
-
-#define TEST(name) cmocka_unit_test_setup_teardown(name, set_up, tear_down)
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        TEST(every_kind_of_row_is_read),
-        TEST(what_is_not_given_has_its_default),
-        TEST(null_empties_what_allows_it),
-        TEST(labels_may_be_pairs),
-        TEST(wrong_types_are_told_at_every_row),
-        TEST(counts_must_be_whole),
-        TEST(unknown_names_come_with_the_nearest),
-        TEST(members_of_a_misspelt_kind_are_not_said_to_be_missing),
-        TEST(too_long_is_a_fault),
-        TEST(all_faults_are_told_at_once),
-        TEST(a_document_that_is_no_object_is_a_fault_as_a_whole),
-        TEST(what_is_not_json_has_line_column_and_pointer),
-        TEST(a_byte_order_mark_at_the_beginning_is_passed_over),
-        TEST(the_problem_may_be_null),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

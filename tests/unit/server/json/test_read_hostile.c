@@ -1,13 +1,7 @@
 // Documents that mean harm, or are none: each is answered, none crashes, hangs or leaks.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include <dirent.h>
 #include <jansson.h>
@@ -16,6 +10,7 @@
 #include "server/json/encode.h"
 #include "server/json/parse.h"
 #include "server/util/clock.h"
+#include "tests/support/test.h"
 
 enum { MUTATIONS = IMPACTD_SANITIZED ? 20000 : 200000, SLOWDOWN = IMPACTD_SANITIZED ? 20 : 1 };
 
@@ -66,8 +61,7 @@ static Status survive_text(const char *text) {
 }
 
 // Nicolas Seriot's JSON parsing test suite.
-static void files_of_the_json_test_suite_are_answered(void **state) {
-    (void)state;
+TEST(files_of_the_json_test_suite_are_answered) {
     static const char folder[] = IMPACTD_SOURCE_DIR "/tests/contract/json";
     DIR *directory = opendir(folder);
     assert_non_null(directory);
@@ -91,8 +85,7 @@ static void files_of_the_json_test_suite_are_answered(void **state) {
     assert_int_equal(count, 318);
 }
 
-static void what_is_no_json_is_unreadable(void **state) {
-    (void)state;
+TEST(what_is_no_json_is_unreadable) {
     static const char *const texts[] = {
         "",
         " ",
@@ -157,8 +150,7 @@ static void what_is_no_json_is_unreadable(void **state) {
     assert_int_equal(survive("{\"a\":1}\0", 8), STATUS_UNREADABLE);
 }
 
-static void every_beginning_of_a_scene_is_answered(void **state) {
-    (void)state;
+TEST(every_beginning_of_a_scene_is_answered) {
     assert_int_equal(survive_text(scene), STATUS_OK);
     for (size_t size = 0; size < sizeof scene - 1; size++)
         assert_int_equal(survive(scene, size), STATUS_UNREADABLE);
@@ -171,8 +163,7 @@ static uint64_t next(uint64_t *seed) {
     return *seed >> 11;
 }
 
-static void mutated_scenes_are_answered(void **state) {
-    (void)state;
+TEST(mutated_scenes_are_answered) {
     static const char *const pieces[] = {
         "{",     "}",     "[",    "]",         "\"",         ",",  ":",    "null", "true",
         "-1",    "1e308", "0",    "\"kind\":", "{}",         "[]", "[[]]", "\"\"", "\\",
@@ -202,8 +193,7 @@ static void mutated_scenes_are_answered(void **state) {
     assert_true(read > MUTATIONS / 50);
 }
 
-static void nesting_is_allowed_to_32(void **state) {
-    (void)state;
+TEST(nesting_is_allowed_to_32) {
     char text[256];
     for (int depth = 2; depth <= 40; depth++) {
         size_t size = (size_t)snprintf(text, sizeof text, "{\"a\": ");
@@ -226,8 +216,7 @@ static void nesting_is_allowed_to_32(void **state) {
                      STATUS_INVALID);
 }
 
-static void deep_duplicates_are_told_by_pointer(void **state) {
-    (void)state;
+TEST(deep_duplicates_are_told_by_pointer) {
     assert_int_equal(
         survive_text("{\"a\": [1, {\"b/c\": {\"x\": [0, 1],\n \"\\u00fc\": 1, \"\xC3\xBC\": 2}}]}"),
         STATUS_UNREADABLE);
@@ -236,8 +225,7 @@ static void deep_duplicates_are_told_by_pointer(void **state) {
                         "line 2, column 17: the key stands twice in its object");
 }
 
-static void long_texts_are_cut_in_the_answer(void **state) {
-    (void)state;
+TEST(long_texts_are_cut_in_the_answer) {
     enum { LONG = 1 << 20 };
     Bytes text = {0};
     bytes_text(&text, "{\"");
@@ -267,8 +255,7 @@ static void check_time(const Bytes *text, Status expected, double seconds) {
         fail_msg("took %.2f s", taken);
 }
 
-static void many_keys_take_little_time(void **state) {
-    (void)state;
+TEST(many_keys_take_little_time) {
     Bytes text = {0};
     // As many as one object may have, in many objects.
     bytes_text(&text, "{\"dampers\": [");
@@ -285,8 +272,7 @@ static void many_keys_take_little_time(void **state) {
     bytes_clear(&text);
 }
 
-static void more_keys_than_any_object_has_are_refused_before_they_are_parsed(void **state) {
-    (void)state;
+TEST(more_keys_than_any_object_has_are_refused_before_they_are_parsed) {
     Bytes text = {0};
     bytes_text(&text, "{\"structure\": {\"mass\": 1");
     for (int i = 1; i < 4096; i++)
@@ -301,8 +287,7 @@ static void more_keys_than_any_object_has_are_refused_before_they_are_parsed(voi
     bytes_clear(&text);
 }
 
-static void many_containers_are_refused(void **state) {
-    (void)state;
+TEST(many_containers_are_refused) {
     Bytes text = {0};
     bytes_text(&text, "{\"a\": [");
     for (int i = 0; i < 5000000; i++)
@@ -313,8 +298,7 @@ static void many_containers_are_refused(void **state) {
     bytes_clear(&text);
 }
 
-static void many_wrong_elements_take_little_time(void **state) {
-    (void)state;
+TEST(many_wrong_elements_take_little_time) {
     Bytes text = {0};
     bytes_text(&text, "{\"excitation\": {\"kind\": \"record\", \"interval\": 1, \"samples\": [0");
     for (int i = 0; i < 500000; i++)
@@ -326,8 +310,7 @@ static void many_wrong_elements_take_little_time(void **state) {
     bytes_clear(&text);
 }
 
-static void four_million_numbers_are_read(void **state) {
-    (void)state;
+TEST(four_million_numbers_are_read) {
     Bytes text = {0};
     bytes_text(&text, "{\"excitation\": {\"kind\": \"record\", \"interval\": 1, \"samples\": [0");
     for (int i = 1; i < 4000000; i++)
@@ -336,22 +319,4 @@ static void four_million_numbers_are_read(void **state) {
     check_time(&text, STATUS_INVALID, 5);
     assert_int_equal(problem.count, 3);
     bytes_clear(&text);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(files_of_the_json_test_suite_are_answered),
-        cmocka_unit_test(what_is_no_json_is_unreadable),
-        cmocka_unit_test(every_beginning_of_a_scene_is_answered),
-        cmocka_unit_test(mutated_scenes_are_answered),
-        cmocka_unit_test(nesting_is_allowed_to_32),
-        cmocka_unit_test(deep_duplicates_are_told_by_pointer),
-        cmocka_unit_test(long_texts_are_cut_in_the_answer),
-        cmocka_unit_test(many_keys_take_little_time),
-        cmocka_unit_test(more_keys_than_any_object_has_are_refused_before_they_are_parsed),
-        cmocka_unit_test(many_containers_are_refused),
-        cmocka_unit_test(many_wrong_elements_take_little_time),
-        cmocka_unit_test(four_million_numbers_are_read),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,14 +1,10 @@
 // The elements of a document's array, as they stand in the text.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdio.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "core/base/status.h"
 #include "server/json/parse.h"
+#include "tests/support/test.h"
 
 // The elements with "|" behind each.
 static const char *elements(const char *text, char *target, size_t size) {
@@ -23,8 +19,7 @@ static const char *elements(const char *text, char *target, size_t size) {
     return target;
 }
 
-static void elements_are_found_where_they_stand(void **state) {
-    (void)state;
+TEST(elements_are_found_where_they_stand) {
     static const struct {
         const char *text, *elements;
     } cases[] = {
@@ -46,15 +41,13 @@ static void elements_are_found_where_they_stand(void **state) {
     }
 }
 
-static void an_array_behind_too_many_brackets_is_none(void **state) {
-    (void)state;
+TEST(an_array_behind_too_many_brackets_is_none) {
     char text[128] = "{\"all\": [", found[128];
     memset(text + strlen(text), '[', JSON_DEPTH_MAX + 1);
     assert_string_equal(elements(text, found, sizeof found), "none");
 }
 
-static void a_part_is_read_with_its_place_in_the_whole(void **state) {
-    (void)state;
+TEST(a_part_is_read_with_its_place_in_the_whole) {
     static const char text[] = "{\"all\": [\n{\"x\": 1},\n {\"x\": tru}]}";
     typedef struct One {
         double x;
@@ -77,8 +70,7 @@ static void a_part_is_read_with_its_place_in_the_whole(void **state) {
     assert_non_null(strstr(problem.faults[0].detail, "line 3, column 10"));
 }
 
-static void a_value_alone_is_read_by_its_row(void **state) {
-    (void)state;
+TEST(a_value_alone_is_read_by_its_row) {
     typedef struct One {
         char *text;
         Reals numbers;
@@ -100,14 +92,4 @@ static void a_value_alone_is_read_by_its_row(void **state) {
     assert_string_equal(problem.faults[0].pointer, "/2/text");
     assert_string_equal(problem.faults[1].pointer, "/3/numbers/0");
     fields_clear(fields, &one);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(elements_are_found_where_they_stand),
-        cmocka_unit_test(an_array_behind_too_many_brackets_is_none),
-        cmocka_unit_test(a_part_is_read_with_its_place_in_the_whole),
-        cmocka_unit_test(a_value_alone_is_read_by_its_row),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,16 +1,11 @@
 // The schema of a struct with every kind of row, member by member.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include <jansson.h>
 
 #include "server/json/schema.h"
+#include "tests/support/test.h"
 #include "tests/support/whole.h"
 
 // What the schema says at a path of member names and indices, as compact JSON.
@@ -31,8 +26,7 @@ static void check(const json_t *at, const char *path, const char *expected) {
     free(text);
 }
 
-static void every_kind_of_row_has_its_schema(void **state) {
-    (void)state;
+TEST(every_kind_of_row_has_its_schema) {
     Bytes bytes = {0};
     schema_write(&bytes, "/schemas/whole", "A whole", whole_fields);
     assert_int_equal(bytes.at[bytes.count - 1], '\n');
@@ -81,11 +75,4 @@ static void every_kind_of_row_has_its_schema(void **state) {
     assert_null(json_object_get(json_object_get(rows, "spare"), "default"));
     json_decref(schema);
     bytes_clear(&bytes);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_kind_of_row_has_its_schema),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

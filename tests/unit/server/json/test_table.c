@@ -1,14 +1,9 @@
 // Tables of text, built by hand and made of documents.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "server/json/table.h"
+#include "tests/support/test.h"
 
 typedef struct Thing {
     double speed;
@@ -18,16 +13,14 @@ static const Field thing_fields[] = {
     FIELD_END,
 };
 
-static void control_characters_are_replaced(void **state) {
-    (void)state;
+TEST(control_characters_are_replaced) {
     char text[] = "a\x1b[2J\x7f\xc2\x9bz \xc3\xa4";
     text_make_printable(text);
     assert_string_equal(text, "a?[2J???z \xc3\xa4");
     text_make_printable(NULL);
 }
 
-static void numbers_stand_to_the_right_and_unknown_cells_are_marked(void **state) {
-    (void)state;
+TEST(numbers_stand_to_the_right_and_unknown_cells_are_marked) {
     char *text = NULL;
     size_t size;
     FILE *file = open_memstream(&text, &size);
@@ -69,8 +62,7 @@ static void expect(const char *json, const char *expected) {
     free(text);
 }
 
-static void documents_are_shown_member_by_member(void **state) {
-    (void)state;
+TEST(documents_are_shown_member_by_member) {
     expect("{\"speed\": 0.5, \"none\": null, \"links\": {\"a\": 1}, \"tags\": [\"x\", 2], \"is\": "
            "true}",
            "speed  0.5 m/s\ntags   x, 2\nis     yes\n");
@@ -87,8 +79,7 @@ static void documents_are_shown_member_by_member(void **state) {
     expect("{}", "");
 }
 
-static void text_that_is_not_an_object_is_refused_and_a_long_list_is_cut(void **state) {
-    (void)state;
+TEST(text_that_is_not_an_object_is_refused_and_a_long_list_is_cut) {
     static const char *const texts[] = {"", "[1]", "{", "{\"a\": 1, \"a\": 2}"};
     char *text;
     size_t longest;
@@ -106,14 +97,4 @@ static void text_that_is_not_an_object_is_refused_and_a_long_list_is_cut(void **
     assert_int_equal(longest, 2000);
     assert_non_null(strstr(text, "... and 100 more"));
     free(text);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(control_characters_are_replaced),
-        cmocka_unit_test(numbers_stand_to_the_right_and_unknown_cells_are_marked),
-        cmocka_unit_test(documents_are_shown_member_by_member),
-        cmocka_unit_test(text_that_is_not_an_object_is_refused_and_a_long_list_is_cut),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

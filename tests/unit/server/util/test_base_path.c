@@ -1,14 +1,9 @@
 // The base path before links, and off paths that come in.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "server/util/base_path.h"
+#include "tests/support/test.h"
 
 static void expect_applied(const char *text, const char *wanted, size_t size) {
     char target[64];
@@ -17,15 +12,13 @@ static void expect_applied(const char *text, const char *wanted, size_t size) {
     assert_string_equal(target, wanted);
 }
 
-static void without_a_base_all_stays(void **state) {
-    (void)state;
+TEST(without_a_base_all_stays) {
     base_path_set("");
     expect_applied("/v1/jobs", "/v1/jobs", 64);
     assert_string_equal(base_path_strip("/v1/jobs"), "/v1/jobs");
 }
 
-static void a_base_stands_before_each_path(void **state) {
-    (void)state;
+TEST(a_base_stands_before_each_path) {
     base_path_set("/sim");
     assert_string_equal(base_path(), "/sim");
     expect_applied("", "", 64);
@@ -38,8 +31,7 @@ static void a_base_stands_before_each_path(void **state) {
     base_path_set("");
 }
 
-static void paths_come_in_with_and_without_it(void **state) {
-    (void)state;
+TEST(paths_come_in_with_and_without_it) {
     base_path_set("/sim");
     assert_string_equal(base_path_strip("/sim/v1/jobs"), "/v1/jobs");
     assert_string_equal(base_path_strip("/v1/jobs"), "/v1/jobs");
@@ -47,13 +39,4 @@ static void paths_come_in_with_and_without_it(void **state) {
     assert_string_equal(base_path_strip("/sim/"), "/");
     assert_string_equal(base_path_strip("/simulation"), "/simulation");
     base_path_set("");
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(without_a_base_all_stays),
-        cmocka_unit_test(a_base_stands_before_each_path),
-        cmocka_unit_test(paths_come_in_with_and_without_it),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

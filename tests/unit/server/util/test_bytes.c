@@ -1,21 +1,15 @@
 // The growing buffer: its limit, its failed state, and the JSON pieces built in it.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include <math.h>
 
 #include "core/base/status.h"
 #include "server/util/bytes.h"
+#include "tests/support/test.h"
 
-static void what_is_put_stands_there_with_a_nul(void **state) {
-    (void)state;
+TEST(what_is_put_stands_there_with_a_nul) {
     Bytes bytes = {0};
     char expected[40001] = "";
     for (int i = 0; i < 10000; i++) {
@@ -31,8 +25,7 @@ static void what_is_put_stands_there_with_a_nul(void **state) {
     bytes_clear(&bytes);
 }
 
-static void long_formats_are_whole(void **state) {
-    (void)state;
+TEST(long_formats_are_whole) {
     char text[3000];
     memset(text, 'x', sizeof text - 1);
     text[sizeof text - 1] = '\0';
@@ -43,8 +36,7 @@ static void long_formats_are_whole(void **state) {
     bytes_clear(&bytes);
 }
 
-static void the_limit_is_exact_and_failure_stays(void **state) {
-    (void)state;
+TEST(the_limit_is_exact_and_failure_stays) {
     Bytes bytes = {.most = 1000};
     for (int i = 0; i < 1000; i++)
         bytes_text(&bytes, "x");
@@ -71,8 +63,7 @@ static void the_limit_is_exact_and_failure_stays(void **state) {
     bytes_clear(&bytes);
 }
 
-static void sizes_that_overflow_fail(void **state) {
-    (void)state;
+TEST(sizes_that_overflow_fail) {
     Bytes bytes = {0};
     bytes_text(&bytes, "x");
     assert_false(bytes_reserve(&bytes, SIZE_MAX));
@@ -80,8 +71,7 @@ static void sizes_that_overflow_fail(void **state) {
     bytes_clear(&bytes);
 }
 
-static void taking_leaves_an_empty_buffer(void **state) {
-    (void)state;
+TEST(taking_leaves_an_empty_buffer) {
     Bytes bytes = {.most = 50};
     size_t size = 7;
     char *text = bytes_take(&bytes, &size);
@@ -97,8 +87,7 @@ static void taking_leaves_an_empty_buffer(void **state) {
     free(text);
 }
 
-static void numbers_that_are_none_are_null(void **state) {
-    (void)state;
+TEST(numbers_that_are_none_are_null) {
     Bytes bytes = {0};
     const double values[] = {0.5, NAN, INFINITY, -INFINITY, -0.0};
     for (size_t i = 0; i < COUNT(values); i++) {
@@ -109,8 +98,7 @@ static void numbers_that_are_none_are_null(void **state) {
     bytes_clear(&bytes);
 }
 
-static void strings_are_escaped_and_always_utf8(void **state) {
-    (void)state;
+TEST(strings_are_escaped_and_always_utf8) {
     static const struct {
         const char *text, *json;
     } cases[] = {
@@ -132,17 +120,4 @@ static void strings_are_escaped_and_always_utf8(void **state) {
         assert_string_equal(bytes.at, cases[i].json);
         bytes_clear(&bytes);
     }
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_is_put_stands_there_with_a_nul),
-        cmocka_unit_test(long_formats_are_whole),
-        cmocka_unit_test(the_limit_is_exact_and_failure_stays),
-        cmocka_unit_test(sizes_that_overflow_fail),
-        cmocka_unit_test(taking_leaves_an_empty_buffer),
-        cmocka_unit_test(numbers_that_are_none_are_null),
-        cmocka_unit_test(strings_are_escaped_and_always_utf8),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,17 +1,11 @@
 // Dates against known ones, and clocks that go forward.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
 
 #include "core/base/rfc3339.h"
 #include "core/base/status.h"
 #include "server/util/clock.h"
+#include "tests/support/test.h"
 
-static void dates_are_rfc_3339_in_utc(void **state) {
-    (void)state;
+TEST(dates_are_rfc_3339_in_utc) {
     static const struct {
         int64_t unix_ms;
         const char *text;
@@ -38,8 +32,7 @@ static void dates_are_rfc_3339_in_utc(void **state) {
     }
 }
 
-static void clocks_go_forward_in_their_units(void **state) {
-    (void)state;
+TEST(clocks_go_forward_in_their_units) {
     const int64_t started = clock_monotonic_ns(), cpu = clock_thread_cpu_ns();
     const int64_t day = clock_unix_ms();
     volatile double sum = 0;
@@ -51,8 +44,7 @@ static void clocks_go_forward_in_their_units(void **state) {
     assert_true(day > 1700000000000);
 }
 
-static void dates_are_read_back(void **state) {
-    (void)state;
+TEST(dates_are_read_back) {
     for (int64_t at = -30610224000000; at < 253402300800000;
          at += 86400000 * (int64_t)9973 + 12345) {
         char text[32];
@@ -61,13 +53,4 @@ static void dates_are_read_back(void **state) {
         assert_true(rfc3339_read(text, &back));
         assert_int_equal(back, at);
     }
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(dates_are_rfc_3339_in_utc),
-        cmocka_unit_test(dates_are_read_back),
-        cmocka_unit_test(clocks_go_forward_in_their_units),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

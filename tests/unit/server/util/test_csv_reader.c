@@ -1,16 +1,12 @@
 // Cells of CSV texts.
 #include "server/util/csv_reader.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "core/base/status.h"
+#include "tests/support/test.h"
 
 static void expect_row(CsvReader *scan, size_t row, size_t count, const char *const *cells) {
     assert_true(csv_reader_next(scan));
@@ -26,8 +22,7 @@ static CsvReader scan_of(const char *text) {
     return (CsvReader){.text = text, .size = strlen(text)};
 }
 
-static void csv_cells_are_parted_by_commas_and_rows_by_any_end_of_line(void **state) {
-    (void)state;
+TEST(csv_cells_are_parted_by_commas_and_rows_by_any_end_of_line) {
     static const char *const ends[] = {"\n", "\r\n", "\r"};
     for (size_t i = 0; i < COUNT(ends); i++) {
         char text[64];
@@ -43,8 +38,7 @@ static void csv_cells_are_parted_by_commas_and_rows_by_any_end_of_line(void **st
     }
 }
 
-static void quotes_hold_commas_lines_and_quotes(void **state) {
-    (void)state;
+TEST(quotes_hold_commas_lines_and_quotes) {
     CsvReader scan = scan_of("\"a,\r\nb\",\"say \"\"so\"\"\",\"\",5\" \n x ,\"y\" \n");
     expect_row(&scan, 1, 4, (const char *const[]){"a,\r\nb", "say \"so\"", "", "5\" "});
     assert_true(scan.cells[2].is_quoted);
@@ -54,8 +48,7 @@ static void quotes_hold_commas_lines_and_quotes(void **state) {
     csv_reader_clear(&scan);
 }
 
-static void what_is_no_cell_is_told(void **state) {
-    (void)state;
+TEST(what_is_no_cell_is_told) {
     CsvReader scan = scan_of("\"a\"b,c\nx,\xffy\nz,\"open,\n\n");
     assert_true(csv_reader_next(&scan));
     assert_non_null(strstr(scan.cells[0].fault, "closing quote"));
@@ -74,8 +67,7 @@ static void what_is_no_cell_is_told(void **state) {
     csv_reader_clear(&scan);
 }
 
-static void a_row_has_so_many_cells_and_no_more(void **state) {
-    (void)state;
+TEST(a_row_has_so_many_cells_and_no_more) {
     enum { CELLS = 5000 };
     char *text = malloc(CELLS + 1);
     assert_non_null(text);
@@ -88,14 +80,4 @@ static void a_row_has_so_many_cells_and_no_more(void **state) {
     assert_true(scan.count >= CSV_CELLS_MAX);
     csv_reader_clear(&scan);
     free(text);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(csv_cells_are_parted_by_commas_and_rows_by_any_end_of_line),
-        cmocka_unit_test(quotes_hold_commas_lines_and_quotes),
-        cmocka_unit_test(what_is_no_cell_is_told),
-        cmocka_unit_test(a_row_has_so_many_cells_and_no_more),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,19 +1,14 @@
 // The digits of dtoa_write: their form, and that they read back to the same bits.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include <float.h>
 #include <math.h>
 
 #include "core/base/status.h"
 #include "server/util/dtoa.h"
+#include "tests/support/test.h"
 
 enum { PATTERNS = IMPACTD_SANITIZED ? 300000 : 10000000 };
 
@@ -26,8 +21,7 @@ static const char *written(double value) {
     return text;
 }
 
-static void numbers_are_written_as_people_would(void **state) {
-    (void)state;
+TEST(numbers_are_written_as_people_would) {
     static const struct {
         double value;
         const char *text;
@@ -65,8 +59,7 @@ static void numbers_are_written_as_people_would(void **state) {
         assert_string_equal(written(cases[i].value), cases[i].text);
 }
 
-static void a_list_is_its_numbers_with_commas_between(void **state) {
-    (void)state;
+TEST(a_list_is_its_numbers_with_commas_between) {
     static const double values[] = {0.25, (double)NAN, -0.0, 1e-9, -(double)INFINITY, 60};
     char text[COUNT(values) * (SHORTEST_SIZE + 1)];
     size_t length = dtoa_list(text, values, COUNT(values));
@@ -119,8 +112,7 @@ static void check_round_trip(double value) {
         fail_msg("%a is written as %s", value, text);
 }
 
-static void any_bits_read_back_to_the_same_bits(void **state) {
-    (void)state;
+TEST(any_bits_read_back_to_the_same_bits) {
     uint64_t seed = 0x9E3779B97F4A7C15u;
     for (size_t i = 0; i < PATTERNS; i++) {
         seed ^= seed << 13;
@@ -133,8 +125,7 @@ static void any_bits_read_back_to_the_same_bits(void **state) {
     }
 }
 
-static void powers_and_their_neighbours_read_back(void **state) {
-    (void)state;
+TEST(powers_and_their_neighbours_read_back) {
     for (int e = -1074; e <= 1023; e++) {
         const double value = ldexp(1, e);
         check_round_trip(value);
@@ -153,14 +144,4 @@ static void powers_and_their_neighbours_read_back(void **state) {
         check_round_trip(i);
         check_round_trip(i / 1000.0);
     }
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(numbers_are_written_as_people_would),
-        cmocka_unit_test(a_list_is_its_numbers_with_commas_between),
-        cmocka_unit_test(any_bits_read_back_to_the_same_bits),
-        cmocka_unit_test(powers_and_their_neighbours_read_back),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,19 +1,14 @@
 #include "server/util/gzip.h"
+#include "tests/support/test.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
 #include <string.h>
 
-#include <cmocka.h>
-
-static void crc_32_has_its_check_value_and_goes_on_piece_by_piece(void **state) {
-    (void)state;
+TEST(crc_32_has_its_check_value_and_goes_on_piece_by_piece) {
     assert_int_equal(gzip_crc32(0, "123456789", 9), 0xCBF43926);
     assert_int_equal(gzip_crc32(gzip_crc32(0, "1234", 4), "56789", 5), 0xCBF43926);
 }
 
-static void gzip_is_a_member_that_tells_crc_and_size_and_is_smaller(void **state) {
-    (void)state;
+TEST(gzip_is_a_member_that_tells_crc_and_size_and_is_smaller) {
     char text[20000];
     for (size_t i = 0; i < sizeof text; i++)
         text[i] = "0123456789,"[i * i % 11];
@@ -33,18 +28,8 @@ static void gzip_is_a_member_that_tells_crc_and_size_and_is_smaller(void **state
     bytes_clear(&bytes);
 }
 
-static void a_buffer_with_a_limit_too_low_fails(void **state) {
-    (void)state;
+TEST(a_buffer_with_a_limit_too_low_fails) {
     Bytes bytes = {.most = 4};
     assert_false(gzip_compress(&bytes, "0123456789", 10));
     bytes_clear(&bytes);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(crc_32_has_its_check_value_and_goes_on_piece_by_piece),
-        cmocka_unit_test(gzip_is_a_member_that_tells_crc_and_size_and_is_smaller),
-        cmocka_unit_test(a_buffer_with_a_limit_too_low_fails),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

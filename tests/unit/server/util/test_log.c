@@ -1,13 +1,8 @@
 // What others send stays within its quotes on its line.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "server/util/log.h"
+#include "tests/support/test.h"
 
 static void expect(const char *text, size_t most, const char *wanted) {
     Bytes line = {0};
@@ -16,8 +11,7 @@ static void expect(const char *text, size_t most, const char *wanted) {
     bytes_clear(&line);
 }
 
-static void texts_of_others_are_escaped_and_cut(void **state) {
-    (void)state;
+TEST(texts_of_others_are_escaped_and_cut) {
     expect("plain /v1", 20, " a=\"plain /v1\"");
     expect("\x1b[2J\r\nx", 20, " a=\"\\x1b[2J\\x0d\\x0ax\"");
     expect("\" b=\"\\", 20, " a=\"\\x22 b=\\x22\\x5c\"");
@@ -26,11 +20,4 @@ static void texts_of_others_are_escaped_and_cut(void **state) {
     expect("0123456789x", 10, " a=\"0123456789...\"");
     expect("", 10, " a=\"\"");
     expect(NULL, 10, "");
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(texts_of_others_are_escaped_and_cut),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

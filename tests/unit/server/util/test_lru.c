@@ -1,16 +1,13 @@
 #include "server/util/lru.h"
 
 #include <pthread.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdatomic.h>
 #include <stdio.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "core/base/status.h"
 #include "server/util/thread_pool.h"
+#include "tests/support/test.h"
 
 typedef struct Item {
     LruEntry cached;
@@ -32,8 +29,7 @@ static void add(Lru *lru, Item *item, const char *key, size_t bytes) {
     lru_add(lru, &item->cached);
 }
 
-static void the_least_recently_used_entry_is_evicted_first(void **state) {
-    (void)state;
+TEST(the_least_recently_used_entry_is_evicted_first) {
     int released = 0;
     Item a, b, c, d, big;
     Lru *lru = lru_new(100, release, &released);
@@ -64,8 +60,7 @@ static void the_least_recently_used_entry_is_evicted_first(void **state) {
     assert_int_equal(released, 6);
 }
 
-static void a_map_grows_and_finds_all_its_entries(void **state) {
-    (void)state;
+TEST(a_map_grows_and_finds_all_its_entries) {
     enum { COUNT_OF = 5000 };
     static Item items[COUNT_OF];
     HashMap *map = hashmap_new();
@@ -101,8 +96,7 @@ static void run(WorkItem *item) {
     atomic_fetch_add(job->done, 1);
 }
 
-static void a_pool_runs_everything_and_can_refuse_where_no_thread_is_free(void **state) {
-    (void)state;
+TEST(a_pool_runs_everything_and_can_refuse_where_no_thread_is_free) {
     atomic_int done = 0;
     pthread_mutex_t gate = PTHREAD_MUTEX_INITIALIZER;
     Job jobs[6];
@@ -119,13 +113,4 @@ static void a_pool_runs_everything_and_can_refuse_where_no_thread_is_free(void *
     pthread_mutex_unlock(&gate);
     thread_pool_close(pool);
     assert_int_equal(atomic_load(&done), 5);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_least_recently_used_entry_is_evicted_first),
-        cmocka_unit_test(a_map_grows_and_finds_all_its_entries),
-        cmocka_unit_test(a_pool_runs_everything_and_can_refuse_where_no_thread_is_free),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,18 +1,12 @@
 // Counters and histograms, and their text.
 #include <pthread.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "core/base/status.h"
 #include "server/util/metrics.h"
+#include "tests/support/test.h"
 
-static void a_histogram_counts_each_sample_under_its_edge(void **state) {
-    (void)state;
+TEST(a_histogram_counts_each_sample_under_its_edge) {
     Histogram histogram = {0};
     histogram_add(&histogram, 0);
     histogram_add(&histogram, 100000); // on the edge: within
@@ -32,8 +26,7 @@ static void a_histogram_counts_each_sample_under_its_edge(void **state) {
     bytes_clear(&bytes);
 }
 
-static void families_are_written_as_prometheus_reads_them(void **state) {
-    (void)state;
+TEST(families_are_written_as_prometheus_reads_them) {
     Bytes bytes = {0};
     metrics_counter(&bytes, "a_total", "Counted.", UINT64_C(18446744073709551615));
     metrics_gauge(&bytes, "b", "Now.", 0.1);
@@ -49,8 +42,7 @@ static void *count(void *context) {
     return NULL;
 }
 
-static void threads_lose_no_count(void **state) {
-    (void)state;
+TEST(threads_lose_no_count) {
     Counter counter = 0;
     pthread_t threads[4];
     for (size_t i = 0; i < COUNT(threads); i++)
@@ -58,13 +50,4 @@ static void threads_lose_no_count(void **state) {
     for (size_t i = 0; i < COUNT(threads); i++)
         pthread_join(threads[i], NULL);
     assert_int_equal(counter_get(&counter), 400000);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_histogram_counts_each_sample_under_its_edge),
-        cmocka_unit_test(families_are_written_as_prometheus_reads_them),
-        cmocka_unit_test(threads_lose_no_count),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,16 +1,10 @@
 // SHA-256 against the vectors of FIPS 180-4.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "server/util/sha256.h"
+#include "tests/support/test.h"
 
-static void digests_are_those_of_the_standard(void **state) {
-    (void)state;
+TEST(digests_are_those_of_the_standard) {
     char text[65];
     sha256_end(sha256_new(), text);
     assert_string_equal(text, "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
@@ -20,8 +14,7 @@ static void digests_are_those_of_the_standard(void **state) {
     assert_string_equal(text, "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
 }
 
-static void the_pieces_do_not_matter(void **state) {
-    (void)state;
+TEST(the_pieces_do_not_matter) {
     char text[65], block[1000];
     memset(block, 'a', sizeof block);
     Sha256 *digest = sha256_new();
@@ -31,12 +24,4 @@ static void the_pieces_do_not_matter(void **state) {
     }
     sha256_end(digest, text);
     assert_string_equal(text, "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(digests_are_those_of_the_standard),
-        cmocka_unit_test(the_pieces_do_not_matter),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,16 +1,10 @@
 // Upper and lower case as one.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
 
 #include "core/base/status.h"
 #include "server/util/utf8_fold.h"
+#include "tests/support/test.h"
 
-static void upper_and_lower_case_of_any_script_are_one(void **state) {
-    (void)state;
+TEST(upper_and_lower_case_of_any_script_are_one) {
     static const char *const cases[][2] = {
         {"", ""},
         {"Sponge 7", "sponge 7"},
@@ -30,11 +24,4 @@ static void upper_and_lower_case_of_any_script_are_one(void **state) {
         assert_string_equal(bytes.at + 1, cases[i][1]);
         bytes_clear(&bytes);
     }
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(upper_and_lower_case_of_any_script_are_one),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }
