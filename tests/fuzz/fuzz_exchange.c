@@ -2,7 +2,6 @@
 // be imported or with faults that have a place, in a table a row and a column; what is judged and
 // exported again reads as the same. Meant for the instrumented build:
 // build-debug/tests/fuzz_exchange SECONDS [SEED]. What breaks the rule is printed.
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,8 +10,9 @@
 #include "server/formats/material_export.h"
 #include "server/materials/exchange_csv.h"
 #include "server/materials/exchange_json.h"
+#include "tests/support/mutate.h"
 
-enum { TEXT_MAX = 4096, MUTATIONS_MAX = 6, ROUNDS_TIMED = 64, ROUND_EACH = 200 };
+enum { ROUNDS_TIMED = 64, ROUND_EACH = 200 };
 
 static const char *const seeds[] = {
     "slug,name,restitution,contact_time [s],source\nfelt,Felt,0.5,0.02,own\ncork,\"Cork, 3 "
@@ -45,46 +45,8 @@ static const char *const pieces[] = {
     "[1,2]",   "{\"a\": 1}", "=1+1",        "\xEF\xBB\xBF",
 };
 
-static uint64_t state;
-
-// Vigna's splitmix64.
-static size_t draw(size_t count) {
-    uint64_t z = state += 0x9E3779B97F4A7C15u;
-    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
-    z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
-    return count == 0 ? 0 : (size_t)((z ^ (z >> 31)) % count);
-}
-
-static size_t put(char *text, size_t size, size_t at, const char *piece, size_t length) {
-    if (size + length > TEXT_MAX)
-        return size;
-    memmove(text + at + length, text + at, size - at);
-    memcpy(text + at, piece, length);
-    return size + length;
-}
-
-static size_t mutate(char *text, size_t size) {
-    char copy[64];
-    const size_t at = draw(size + 1);
-    size_t length = draw(sizeof copy);
-    length = length < size - at ? length : size - at;
-    switch (draw(5)) {
-    case 0: // another byte
-        if (at < size)
-            text[at] = (char)draw(256);
-        return size;
-    case 1: // something left out
-        memmove(text + at, text + at + length, size - at - length);
-        return size - length;
-    case 2: // something once more, elsewhere
-        memcpy(copy, text + at, length);
-        return put(text, size, draw(size + 1), copy, length);
-    default: { // something known
-        const char *piece = pieces[draw(COUNT(pieces))];
-        return put(text, size, at, piece, strlen(piece));
-    }
-    }
-}
+static Mutator mutator = {
+    .seeds = seeds, .pieces = pieces, .seed_count = COUNT(seeds), .piece_count = COUNT(pieces)};
 
 static const char *judge_faults(Status status, bool is_table, const Problem *problem) {
     if (status != STATUS_INVALID && status != STATUS_UNREADABLE)
@@ -163,7 +125,7 @@ static const char *judge_import(const char *text, size_t size, bool is_table, Pr
 int main(int argc, char **argv) {
     static Problem problem;
     const double seconds = argc > 1 ? atof(argv[1]) : 10;
-    state = argc > 2 ? strtoull(argv[2], NULL, 10) : 1;
+    mutator.state = argc > 2 ? strtoull(argv[2], NULL, 10) : 1;
     const time_t start = time(NULL);
     unsigned long long rounds = 0, passed = 0;
     Db *db = NULL; // of the paper's five alone
@@ -171,30 +133,22 @@ int main(int argc, char **argv) {
         return 1;
     while (difftime(time(NULL), start) < seconds)
         for (int i = 0; i < ROUNDS_TIMED; i++, rounds++) {
-            char text[TEXT_MAX];
-            const char *seed = seeds[draw(COUNT(seeds))];
-            size_t size = strlen(seed);
-            memcpy(text, seed, size);
-            for (size_t mutations = draw(MUTATIONS_MAX + 1); mutations > 0; mutations--)
-                size = mutate(text, size);
-            // Of its own size, so that a byte read behind it is seen.
-            char *own = malloc(size > 0 ? size : 1);
-            if (own == NULL)
+            size_t size;
+            char *text = mutate_text(&mutator, &size);
+            if (text == NULL)
                 return 1;
-            memcpy(own, text, size);
-            const bool is_table = seed[0] != '{';
+            const bool is_table = size == 0 || text[0] != '{';
             problem = (Problem){.count = 0};
-            const Status status = bring(db, own, size, is_table, true, &problem);
+            const Status status = bring(db, text, size, is_table, true, &problem);
             const char *wrong = status != STATUS_OK ? judge_faults(status, is_table, &problem)
                                 : passed++ % ROUND_EACH == 0
-                                    ? judge_import(own, size, is_table, &problem)
+                                    ? judge_import(text, size, is_table, &problem)
                                     : NULL;
-            free(own);
             if (wrong != NULL) {
-                fprintf(stderr, "%s: %s; the text:\n", wrong, problem.detail);
-                (void)fwrite(text, 1, size, stderr);
-                return 1;
+                fprintf(stderr, "%s: ", problem.detail);
+                return mutate_refuse(wrong, text, size);
             }
+            free(text);
         }
     printf("%llu texts, %llu of them good\n", rounds, passed);
     db_close(db);

@@ -3,7 +3,6 @@
 // the instrumented build: build-debug/tests/fuzz_import SECONDS [SEED]. What breaks the rule is
 // printed.
 #include <math.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,8 +10,9 @@
 
 #include "core/excitation/recorded_motion.h"
 #include "core/formats/ground_motion_text.h"
+#include "tests/support/mutate.h"
 
-enum { TEXT_MAX = 4096, MUTATIONS_MAX = 6, ROUNDS_TIMED = 256 };
+enum { ROUNDS_TIMED = 256 };
 
 static const char *const seeds[] = {
     "PEER STRONG MOTION DATABASE RECORD\nSOMEWHERE, 090\nACCELERATION TIME HISTORY IN UNITS OF G. "
@@ -68,53 +68,8 @@ static const char *const pieces[] = {
     "G*",
 };
 
-static uint64_t state;
-
-// Vigna's splitmix64.
-static size_t draw(size_t count) {
-    uint64_t z = state += 0x9E3779B97F4A7C15u;
-    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
-    z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
-    return count == 0 ? 0 : (size_t)((z ^ (z >> 31)) % count);
-}
-
-static size_t put(char *text, size_t size, size_t at, const char *piece, size_t length) {
-    if (size + length > TEXT_MAX)
-        return size;
-    memmove(text + at + length, text + at, size - at);
-    memcpy(text + at, piece, length);
-    return size + length;
-}
-
-static size_t mutate(char *text, size_t size) {
-    char copy[64];
-    const size_t at = draw(size + 1);
-    switch (draw(6)) {
-    case 0: // another byte
-        if (at < size)
-            text[at] = (char)draw(256);
-        return size;
-    case 1: // something known
-    case 2: {
-        const char *piece = pieces[draw(COUNT(pieces))];
-        return put(text, size, at, piece, strlen(piece));
-    }
-    case 3: { // something left out
-        size_t length = draw(40);
-        length = length < size - at ? length : size - at;
-        memmove(text + at, text + at + length, size - at - length);
-        return size - length;
-    }
-    case 4: { // something once more, elsewhere
-        size_t length = draw(sizeof copy);
-        length = length < size - at ? length : size - at;
-        memcpy(copy, text + at, length);
-        return put(text, size, draw(size + 1), copy, length);
-    }
-    default: // an end
-        return draw(8) == 0 ? at : size;
-    }
-}
+static Mutator mutator = {
+    .seeds = seeds, .pieces = pieces, .seed_count = COUNT(seeds), .piece_count = COUNT(pieces)};
 
 static const char *judge(Status status, const GroundMotionText *import, const Problem *problem) {
     if (status != STATUS_OK) {
@@ -136,35 +91,25 @@ static const char *judge(Status status, const GroundMotionText *import, const Pr
 int main(int argc, char **argv) {
     static Problem problem;
     const double seconds = argc > 1 ? atof(argv[1]) : 10;
-    state = argc > 2 ? strtoull(argv[2], NULL, 10) : 1;
+    mutator.state = argc > 2 ? strtoull(argv[2], NULL, 10) : 1;
     const time_t start = time(NULL);
     unsigned long long rounds = 0, passed = 0;
     while (difftime(time(NULL), start) < seconds)
         for (int i = 0; i < ROUNDS_TIMED; i++, rounds++) {
-            char text[TEXT_MAX];
-            const char *seed = seeds[draw(COUNT(seeds))];
-            size_t size = strlen(seed);
-            memcpy(text, seed, size);
-            for (size_t mutations = draw(MUTATIONS_MAX + 1); mutations > 0; mutations--)
-                size = mutate(text, size);
-            const GroundMotionOptions request = {draw(2) == 0 ? 0.01 : (double)NAN,
-                                                 (int)draw(4) - 1};
-            // Of its own size, so that a byte read behind it is seen.
-            char *own = malloc(size > 0 ? size : 1);
-            if (own == NULL)
+            size_t size;
+            char *text = mutate_text(&mutator, &size);
+            if (text == NULL)
                 return 1;
-            memcpy(own, text, size);
+            const GroundMotionOptions request = {mutate_draw(&mutator, 2) == 0 ? 0.01 : (double)NAN,
+                                                 (int)mutate_draw(&mutator, 4) - 1};
             GroundMotionText import;
             problem_clear(&problem);
             const Status status =
-                ground_motion_text_read(own, size, RECORD_SAMPLES, &request, &import, &problem);
-            free(own);
+                ground_motion_text_read(text, size, RECORD_SAMPLES, &request, &import, &problem);
             const char *wrong = judge(status, &import, &problem);
-            if (wrong != NULL) {
-                fprintf(stderr, "%s; the text:\n", wrong);
-                (void)fwrite(text, 1, size, stderr);
-                return 1;
-            }
+            if (wrong != NULL)
+                return mutate_refuse(wrong, text, size);
+            free(text);
             passed += status == STATUS_OK;
             ground_motion_text_clear(&import);
         }
