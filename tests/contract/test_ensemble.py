@@ -5,11 +5,8 @@ import csv
 import io
 import json
 import os
-import signal
-import subprocess
 import sys
 import tempfile
-import time
 import xml.etree.ElementTree
 
 import numpy
@@ -180,46 +177,6 @@ def test_a_target_is_kept_with_fewer_runs():
             assert error <= 0.1, (metric, error)
 
 
-def test_faults_have_their_exit_codes():
-    """2 for wrong words, 3 for a scene or study with faults, 4 for a missing file, 1 for what cannot be written."""
-    free = os.path.join(program.EXAMPLES, "paper_free_sponge.json")
-    for arguments, code, expected in [
-            (("ensemble",), 2, "takes one scene"),
-            (("ensemble", SPONGE, "-o", "out.npy"), 2, "one of .json, .csv, .svg"),
-            (("ensemble", SPONGE, "-o", ".svg"), 2, "one of .json, .csv, .svg"),
-            (("ensemble", SPONGE, "--metric", "impact"), 2, "did you mean impacts?"),
-            (("ensemble", SPONGE, "--run", "1"), 2, "did you mean --runs?"),
-            (("ensemble", SPONGE, "--runs", "1"), 3, "/study/runs: must be within [2, 10000]"),
-            (("ensemble", SPONGE, "--target", "0"), 3, "/study/target: must be above 0"),
-            (("ensemble", SPONGE, "--first-seed", "9007199254740991"), 3, "/study/first_seed: must be at most"),
-            (("ensemble", free), 3, "/excitation/kind must be random, is free"),
-            (("ensemble", SPONGE, "-o", "/nonexistent/out.svg"), 1, "cannot be written"),
-            (("ensemble", "/nonexistent.json"), 4, "cannot be read")]:
-        done, out, errors = program.run(*arguments)
-        assert done == code and expected in errors and out == "", (arguments, done, out, errors)
-    code, _, errors = program.run("run", "-", text=json.dumps(study()))
-    assert code == 3 and "impactd ensemble" in errors, (code, errors)
-    code, out, _ = program.run("check", "-", text=json.dumps(study()))
-    assert code == 0 and "Study: ensemble" in out
-
-
-def test_an_interrupt_stops_at_once():
-    """Ctrl-C ends a long ensemble within half a second, exit code 130, and leaves no file."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = os.path.join(folder, "scene.json")
-        with open(path, "w", encoding="utf-8") as file:
-            json.dump(study(duration=100, runs=10000), file)
-        process = subprocess.Popen([program.impactd(), "ensemble", path, "-o", os.path.join(folder, "out.svg")],
-                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-        time.sleep(1)
-        assert process.poll() is None, process.communicate()
-        began = time.monotonic()
-        process.send_signal(signal.SIGINT)
-        process.communicate(timeout=30)
-        assert process.returncode == 130 and time.monotonic() - began < 0.5
-        assert os.listdir(folder) == ["scene.json"]
-
-
 def test_a_job_makes_the_study():
     """POST with "study": the result has statistics, table and chart beside the scene's own series."""
     with program.daemon() as daemon:
@@ -302,63 +259,6 @@ def test_seeds_that_fail_are_rows():
     assert failure["reason"] == "limit" and failure["count"] == len(failed) and failure["first_seed"] == failed[0]
     check_statistics(answer)
     check_csv(table, answer)
-
-
-def test_progress_and_cancel():
-    """A long ensemble tells its progress and can be dismissed; the worker is free again at once."""
-    with program.daemon("--workers", "1") as daemon:
-        scene = study(duration=100, runs=5000)
-        job = daemon.submit(scene, headers={"Prefer": "respond-async"}).json()
-        seen, end = [0], time.monotonic() + 60
-        while seen[-1] <= 8:
-            assert time.monotonic() < end, seen
-            shown = daemon.get("/v1/jobs/" + job["id"]).json()
-            assert shown["status"] in ("accepted", "running"), shown
-            assert shown["progress"] >= seen[-1], (seen, shown["progress"])
-            seen.append(shown["progress"])
-            time.sleep(0.02)
-        began = time.monotonic()
-        gone = daemon.request("DELETE", "/v1/jobs/" + job["id"]).json()
-        assert gone["status"] == "dismissed" and gone["result"] is None
-        program.finished(daemon, program.scene("paper_free_sponge"))
-        assert time.monotonic() - began < 5 or program.is_sanitized()
-
-
-def test_faults_of_a_study_are_told_with_the_scenes():
-    """422 with the pointer; what is too long in all is refused before anything runs."""
-    with program.daemon("--max-cpu-seconds", "0.003") as daemon:
-        for members, pointer, expected in [
-                ({"kind": "ensembel"}, "/study/kind", "must be one of tradeoff, ensemble"),
-                ({"runs": 0}, "/study/runs", "must be within [2, 10000]"),
-                ({"seeds": [1, 2]}, "/study/seeds", "unknown key"),
-                ({"target": -1}, "/study/target", "must be above 0"),
-                ({"metric": "rms"}, "/study/metric", "must be one of peak_displacement"),
-                ({"runs": 10000}, "/study", "ask for fewer runs")]:
-            reply = daemon.submit(study(**members))
-            faults = reply.json()["errors"]
-            assert reply.status == 422 and [f["pointer"] for f in faults] == [pointer], (members, faults)
-            assert expected in faults[0]["detail"], faults
-        both = study(runs=1)
-        both["structure"]["mass"] = -1
-        assert {f["pointer"] for f in daemon.submit(both).json()["errors"]} == {"/study/runs", "/structure/mass"}
-        sine = {**program.scene("paper_sine_sponge"), "duration": 1, "study": {"kind": "ensemble"}}
-        (fault,) = daemon.submit(sine).json()["errors"]
-        assert fault["pointer"] == "/study/kind" and "must be random, is sine" in fault["detail"]
-
-
-def test_wrong_types_in_a_study():
-    """Every member of a study gets a value of every other type: 422 at its place, or a plan."""
-    with program.daemon() as daemon:
-        refused = 0
-        for name in ("kind", "runs", "first_seed", "target", "metric"):
-            for wrong in (None, True, -1, 1e308, 0.5, "x", [], {}, [[]], ["x", "x"], {"x": 1}):
-                reply = daemon.request("POST", "/v1/jobs?dry_run=1", json=study(**{name: wrong}))
-                assert reply.status in (200, 422), (name, wrong, reply)
-                if reply.status == 422:
-                    refused += 1
-                    pointers = [fault["pointer"] for fault in reply.json()["errors"]]
-                    assert all(p == "/study" or p.startswith("/study/" + name) for p in pointers), (name, wrong, pointers)
-        assert refused > 40, refused
 
 
 def test_odd_ensembles_have_odd_charts():

@@ -3,11 +3,8 @@
 
 import json
 import os
-import signal
-import subprocess
 import sys
 import tempfile
-import time
 import xml.etree.ElementTree
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
@@ -113,46 +110,6 @@ def test_settings_are_the_studys():
     assert code == 0 and "no point keeps displacement within 1e-20; the closest, exact, is at 1.7e-13" in out
 
 
-def test_faults_have_their_exit_codes():
-    """2 for wrong words, 3 for a scene or study with faults, 4 for a missing file, 1 for what cannot be written."""
-    for arguments, code, expected in [
-            (("tradeoff",), 2, "takes one scene"),
-            (("tradeoff", SPONGE, "-o", "out.csv"), 2, ".svg"),
-            (("tradeoff", SPONGE, "--metric", "pds"), 2, "did you mean psd?"),
-            (("tradeoff", SPONGE, "--eror", "1"), 2, "did you mean --error?"),
-            (("tradeoff", SPONGE, "--error", "-1"), 3, "/study/error: must be at least 0"),
-            (("tradeoff", SPONGE, "--repeats", "0"), 3, "/study/repeats: must be within [1, 1000]"),
-            (("tradeoff", SPONGE, "--solver", "rk5"), 3, 'did you mean "rk4"?'),
-            (("tradeoff", SPONGE, "-o", "/nonexistent/out.svg"), 1, "cannot be written"),
-            (("tradeoff", "/nonexistent.json"), 4, "cannot be read")]:
-        done, out, errors = program.run(*arguments)
-        assert done == code and expected in errors and out == "", (arguments, done, out, errors)
-    code, _, errors = program.run("run", "-", text=json.dumps(study()))
-    assert code == 3 and "impactd tradeoff" in errors, (code, errors)
-    code, out, _ = program.run("check", "-", text=json.dumps(study()))
-    assert code == 0 and "Study: tradeoff" in out
-    code, out, _ = program.run("tradeoff", "--help")
-    assert code == 0 and out.splitlines()[2].strip().startswith("impactd tradeoff scene.json"), out
-
-
-def test_an_interrupt_stops_at_once():
-    """Ctrl-C ends a long study within half a second, exit code 130, and leaves no file."""
-    scene = study(repeats=20, point_steps=2e7)
-    with tempfile.TemporaryDirectory() as folder:
-        path = os.path.join(folder, "scene.json")
-        with open(path, "w", encoding="utf-8") as file:
-            json.dump(scene, file)
-        process = subprocess.Popen([program.impactd(), "tradeoff", path, "-o", os.path.join(folder, "out.svg")],
-                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-        time.sleep(1)
-        assert process.poll() is None, process.communicate()
-        began = time.monotonic()
-        process.send_signal(signal.SIGINT)
-        process.communicate(timeout=30)
-        assert process.returncode == 130 and time.monotonic() - began < 0.5
-        assert os.listdir(folder) == ["scene.json"]
-
-
 def test_errors_are_the_same_each_time():
     """Two runs differ in their CPU times and in what follows of them, in nothing else."""
     tables = []
@@ -219,79 +176,6 @@ def test_a_study_outlives_the_daemon():
                 bodies.append([daemon.get(base + way).body for way in
                                ("", "/tradeoff.json", "/tradeoff.svg", "/series.csv")])
         assert bodies[0] == bodies[1]
-
-
-def test_progress_and_cancel():
-    """A long study tells its progress and can be dismissed; nothing of it is kept."""
-    with program.daemon() as daemon:
-        scene = study(repeats=25, point_steps=1e7)
-        job = daemon.submit(scene, headers={"Prefer": "respond-async"}).json()
-        seen, end = [0], time.monotonic() + 60
-        while seen[-1] <= 10:
-            assert time.monotonic() < end, seen
-            shown = daemon.get("/v1/jobs/" + job["id"]).json()
-            assert shown["status"] in ("accepted", "running"), shown
-            assert shown["progress"] >= seen[-1], (seen, shown["progress"])
-            seen.append(shown["progress"])
-            time.sleep(0.02)
-        began = time.monotonic()
-        gone = daemon.request("DELETE", "/v1/jobs/" + job["id"]).json()
-        assert gone["status"] == "dismissed" and gone["result"] is None
-        while daemon.get("/health/ready").json().get("running"):
-            assert time.monotonic() - began < 10
-            time.sleep(0.01)
-        # The one worker is free again at once.
-        program.finished(daemon, program.scene("paper_free_sponge"))
-        assert time.monotonic() - began < 5 or program.is_sanitized()
-
-
-ABSENT = object()
-
-
-def test_faults_of_a_study_are_told_with_the_scenes():
-    """422 with the pointer; what is too long in all is refused before anything runs."""
-    with program.daemon("--max-cpu-seconds", "0.03") as daemon:
-        for members, pointer, expected in [
-                ({"kind": "trade"}, "/study/kind", "must be one of tradeoff"),
-                ({"kind": 5}, "/study/kind", "must be a string"),
-                ({"kind": ABSENT}, "/study/kind", "is required, one of tradeoff, ensemble, compare, sensitivity, sweep"),
-                ({"metric": "peak"}, "/study/metric", "must be one of displacement"),
-                ({"solvers": ["exact", "rk5"]}, "/study/solvers/1", "must be one of exact"),
-                ({"eror": 1}, "/study/eror", "unknown key"),
-                ({"trial": 0}, "/study/trial", "must be at least 1"),
-                ({"repeats": 1000}, "/study", "s of CPU in all, at most 0.3 s are allowed")]:
-            scene = study(**members)
-            scene["study"] = {name: value for name, value in scene["study"].items() if value is not ABSENT}
-            reply = daemon.submit(scene)
-            faults = reply.json()["errors"]
-            assert reply.status == 422 and [f["pointer"] for f in faults] == [pointer], (members, faults)
-            assert expected in faults[0]["detail"], faults
-        both = study(metric="peak")
-        both["structure"]["mass"] = -1
-        assert {f["pointer"] for f in daemon.submit(both).json()["errors"]} == {"/study/metric", "/structure/mass"}
-        no_psd = study(metric="psd")
-        no_psd["output"] = {"psd": None}
-        assert daemon.submit(no_psd).json()["errors"][0]["pointer"] == "/study/metric"
-
-
-def test_wrong_types_in_a_study():
-    """Every member of a study gets a value of every other type: 422 at its place, or a plan."""
-    with program.daemon() as daemon:
-        refused = 0
-        for name in ("kind", "error", "metric", "repeats", "solvers", "point_steps", "trial"):
-            for wrong in (None, True, -1, 1e308, 0.5, "x", [], {}, [[]], ["x", "x"], {"x": 1}):
-                reply = daemon.request("POST", "/v1/jobs?dry_run=1", json=study(**{name: wrong}))
-                assert reply.status in (200, 422), (name, wrong, reply)
-                if reply.status == 422:
-                    refused += 1
-                    pointers = [fault["pointer"] for fault in reply.json()["errors"]]
-                    assert all(p == "/study" or p.startswith("/study/" + name) for p in pointers), (name, wrong, pointers)
-        assert refused > 50, refused
-        nothing = daemon.request("POST", "/v1/jobs?dry_run=1", json={**study(), "study": {}})
-        assert nothing.status == 422 and [f["pointer"] for f in nothing.json()["errors"]] == ["/study/kind"], nothing
-        for wrong in (None, True, 1, "tradeoff", [], [{}]):
-            reply = daemon.request("POST", "/v1/jobs?dry_run=1", json={**study(), "study": wrong})
-            assert reply.status == 422 and reply.json()["errors"][0]["pointer"] == "/study", (wrong, reply)
 
 
 if __name__ == "__main__":
