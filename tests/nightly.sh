@@ -7,7 +7,7 @@
 #   clang       the program and its tests as clang compiles them, without a warning
 #   threads     the thread sanitizer: unit tests of jobs, db and http, requests and cancels
 #   sanitized   the other tests of the program with the address and undefined-behaviour sanitizers
-#   kills       kill -9 amid jobs and imports, full disks, 30,000 requests
+#   kills       kill -9 amid jobs, sweeps and imports, full disks
 #   truth       the long campaigns of tests/truth
 #   storm       a million requests, 10,000 cancels
 #   fuzz        mutated ground motions and material files
@@ -106,12 +106,14 @@ part_sanitized() {
 
 part_kills() {
     build release
-    marked build 'NIGHTLY = True'
-    check "$python" tests/contract/test_full_disk.py --build build
-    check "$python" tests/contract/test_sweep_kill.py --build build
+    local file
+    for file in exchange_kill full_disk sweep_kill kill; do
+        check "$python" "tests/contract/test_$file.py" --build build
+        [ -z "$is_quick" ] || [ "$file" = exchange_kill ] || break
+    done
 }
 
-# Scenes and seed first; the figures of the middle column are for --quick.
+# Scenes and seed first.
 part_truth() {
     build release
     # Random scenes of 3 s against quad precision: samples, starts, speeds, peaks, the same impacts. 150 s of CPU
