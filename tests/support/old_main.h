@@ -1,4 +1,5 @@
-// Put before a test file that still has a main, which CMake renames: adds it to its program. Goes with the last such file.
+// Put before a test file that still has a main, which CMake renames: adds it to its program. Goes
+// with the last such file.
 #ifndef TESTS_SUPPORT_OLD_MAIN_H
 #define TESTS_SUPPORT_OLD_MAIN_H
 
