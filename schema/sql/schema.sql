@@ -320,6 +320,9 @@ CREATE TABLE job_uses (
     PRIMARY KEY (job, name)
 ) STRICT, WITHOUT ROWID;
 CREATE INDEX job_uses_of ON job_uses (name);
+CREATE TRIGGER job_uses_exist BEFORE INSERT ON job_uses
+WHEN NOT EXISTS (SELECT 1 FROM records WHERE name = substr(NEW.name, length('record:') + 1))
+BEGIN SELECT RAISE (ABORT, 'an unfinished job names records that exist'); END;
 CREATE TRIGGER jobs_end AFTER UPDATE OF state ON jobs WHEN OLD.state < 2 AND NEW.state >= 2
 BEGIN DELETE FROM job_uses WHERE job = OLD.number; END;
 

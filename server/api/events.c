@@ -100,7 +100,7 @@ static void look(Events *events) {
     double progress;
     // Watched before it is looked at: what happens after the look wakes this. It is forgotten with
     // each call, so it is asked again.
-    (void)job_subscribe(events->job, events->callback);
+    (void)job_subscribe(events->job, JOB_IS_FINISHED, events->callback);
     const JobState state = job_peek(events->job, &progress);
     if (job_state_is_final((int)state)) {
         tell_finished(events);

@@ -146,7 +146,6 @@ Status jobs_list(App *app, const Request *request, Reply *reply, Problem *proble
     TRY(read_search(request, &search, &state, problem));
     Bytes bytes = {.most = app->reply_most};
     char last[40];
-    db_flush(app->db); // whoever was answered finds the job here
     bytes_text(&bytes, "{\"jobs\": [");
     const Status status = list(app, search, state, &bytes, last, problem);
     if (status != STATUS_OK) {

@@ -1,6 +1,6 @@
-// Jobs: submit, look, dismiss. Waiting works the same for POST and GET: the job is watched,
-// the request put to sleep, and when it is woken or its time is up the same handler goes on where
-// it stood.
+// Jobs: submit, show, dismiss, retry. A handler that has to wait subscribes to the job and returns;
+// when it is called again it continues with the same job.
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,10 +14,13 @@
 
 static const double wait_initial = 2, wait_most = 30; // [s]
 
-enum { KEEP_WAIT_MS = 10000 }; // then it is looked at again
+enum {
+    SAVE_WAIT_MS = 10000, // then it is checked again
+    UNLISTED_MS = 250,    // after which an unfinished job is saved, so that lists have it
+};
 
-// Drops the hold on `job`. `code` 0: to its sender, 200 if it is finished, else 202 and where to
-// look.
+// Takes the reference to `job`. `code` 0: to its sender, 200 if it is finished, else 202 and its
+// location.
 static Status reply_job(App *app, Reply *reply, Job *job, int code, Problem *problem) {
     JobView show = {0};
     const Status status = job_view(job, &show);
@@ -41,67 +44,63 @@ static Status reply_job(App *app, Reply *reply, Job *job, int code, Problem *pro
     return reply_bytes(reply, code, type_json, &bytes, problem);
 }
 
-// What a sleeping request holds on to.
-typedef struct Pause {
+// What a waiting request keeps.
+typedef struct JobWait {
     Job *job;
     const Callback *callback;
-    bool is_replayed; // what the reply had said so far
-} Pause;
+    bool is_replayed; // of the reply
+} JobWait;
 
 // `reply` NULL: there will be none.
-static Job *pause_end(Pause *pause, Reply *reply) {
-    Job *job = pause->job;
+static Job *wait_end(JobWait *wait, Reply *reply) {
+    Job *job = wait->job;
     if (reply != NULL)
-        reply->is_replayed = pause->is_replayed;
-    job_unsubscribe(job, pause->callback);
-    free(pause);
+        reply->is_replayed = wait->is_replayed;
+    job_unsubscribe(job, wait->callback);
+    free(wait);
     return job;
 }
 
-static void pause_forget(void *kept) {
-    job_unref(pause_end(kept, NULL));
+static void wait_forget(void *kept) {
+    job_unref(wait_end(kept, NULL));
 }
 
-// Puts the request to sleep until the waker that `watch` leaves with the job is called. False where
-// there is no memory; the hold stays with the caller then.
-static bool sleep_until(const Request *request, Reply *reply, Job *job,
-                        bool (*watch)(Job *job, const Callback *callback), int wait_ms) {
-    Pause *pause = malloc(sizeof *pause);
-    if (pause == NULL)
-        return false;
-    *pause = (Pause){job, request->callback, reply->is_replayed};
-    if (!watch(job, request->callback)) {
-        free(pause);
-        return false;
-    }
-    reply_wait(reply, wait_ms, pause, pause_forget);
-    return true;
-}
-
-// Puts the request to sleep until the job is finished, `wait` seconds after the request came at
-// most. False if there is nothing to wait for; the hold stays with the caller then.
-static bool pause_begin(const Request *request, Reply *reply, Job *job, double wait) {
-    const double left = wait - 1e-9 * (double)(clock_monotonic_ns() - request->started_ns);
-    if (request->is_expired || left <= 0 || job_is_finished(job))
-        return false;
-    return sleep_until(request, reply, job, job_subscribe, (int)(1000 * left) + 1);
-}
-
-// The same until the store has the job: nobody is told of it before. Where that fails, the hold is
-// dropped.
-static Status pause_until_kept(const Request *request, Reply *reply, Job *job, bool *is_paused,
-                               Problem *problem) {
-    bool is_kept;
-    *is_paused = false;
-    Status status = job_is_durable(job, &is_kept, problem);
-    if (status == STATUS_OK && !is_kept) {
-        *is_paused = sleep_until(request, reply, job, job_subscribe_durable, KEEP_WAIT_MS);
-        if (!*is_paused)
-            status = problem_set(problem, STATUS_NO_MEMORY, "no memory to wait for the job");
-    }
-    if (status != STATUS_OK)
+static Status wait_begin(const Request *request, Reply *reply, Job *job, JobEvent event,
+                         int wait_ms, Problem *problem) {
+    JobWait *wait = malloc(sizeof *wait);
+    if (wait == NULL || !job_subscribe(job, event, request->callback)) {
+        free(wait);
         job_unref(job);
-    return status;
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory to wait for the job");
+    }
+    *wait = (JobWait){job, request->callback, reply->is_replayed};
+    reply_wait(reply, wait_ms, wait, wait_forget);
+    return STATUS_OK;
+}
+
+// Takes the reference to `job`. Waits for it to finish, until `seconds` after the request came, and
+// in any case until it is durable: no client is told of it before.
+static Status answer_job(App *app, const Request *request, Reply *reply, Job *job, double seconds,
+                         int code, Problem *problem) {
+    const double passed = 1e-9 * (double)(clock_monotonic_ns() - request->started_ns);
+    bool is_durable;
+    const Status status = job_is_durable(job, &is_durable, problem);
+    if (status != STATUS_OK) {
+        job_unref(job);
+        return status;
+    }
+    double left = atomic_load(&app->is_stopping) ? 0 : seconds - passed;
+    if (left > 0 && !job_is_finished(job)) {
+        if (!is_durable && passed < 1e-3 * UNLISTED_MS)
+            left = fmin(left, 1e-3 * UNLISTED_MS - passed);
+        else
+            job_save(job);
+        return wait_begin(request, reply, job, JOB_IS_FINISHED, (int)(1000 * left) + 1, problem);
+    }
+    if (is_durable)
+        return reply_job(app, reply, job, code, problem);
+    job_save(job);
+    return wait_begin(request, reply, job, JOB_IS_DURABLE, SAVE_WAIT_MS, problem);
 }
 
 Status jobs_refused(App *app, const Request *request, Reply *reply, Status status) {
@@ -155,21 +154,10 @@ static Status submit(App *app, const Request *request, const Submission *submiss
     return jobs_refused(app, request, reply, jobs_submit(app->manager, submission, job, problem));
 }
 
-// Waits as long as the client likes, and at least until nobody can lose the job. Drops the hold.
-static Status answer_job(App *app, const Request *request, Reply *reply, Job *job,
-                         Problem *problem) {
-    if (pause_begin(request, reply, job, read_wait(request, reply)))
-        return STATUS_OK;
-    bool is_paused;
-    TRY(pause_until_kept(request, reply, job, &is_paused, problem));
-    if (is_paused)
-        return STATUS_OK;
-    return reply_job(app, reply, job, 0, problem);
-}
-
 Status jobs_create(App *app, const Request *request, Reply *reply, Problem *problem) {
     if (request->kept != NULL)
-        return answer_job(app, request, reply, pause_end(request->kept, reply), problem);
+        return answer_job(app, request, reply, wait_end(request->kept, reply),
+                          read_wait(request, reply), 0, problem);
     bool is_dry = false;
     TRY(request_flag(request, "dry_run", &is_dry, problem));
     TRY(request_require_json(request, problem));
@@ -183,7 +171,7 @@ Status jobs_create(App *app, const Request *request, Reply *reply, Problem *prob
                                    .is_replayed = &reply->is_replayed};
     Job *job = NULL;
     TRY(submit(app, request, &submission, reply, &job, problem));
-    return answer_job(app, request, reply, job, problem);
+    return answer_job(app, request, reply, job, read_wait(request, reply), 0, problem);
 }
 
 // The scene of a result, once more: what another engine's version made is made by this one.
@@ -191,7 +179,8 @@ Status results_again(App *app, const Request *request, Reply *reply, Problem *pr
     Job *job = NULL;
     ResultRow row = {0};
     if (request->kept != NULL)
-        return answer_job(app, request, reply, pause_end(request->kept, reply), problem);
+        return answer_job(app, request, reply, wait_end(request->kept, reply),
+                          read_wait(request, reply), 0, problem);
     TRY(refuse_stopping(app, problem));
     Status status = db_result_scene(app->db, request->parameters[0], &row, problem);
     if (status == STATUS_OK) {
@@ -203,14 +192,15 @@ Status results_again(App *app, const Request *request, Reply *reply, Problem *pr
     }
     result_row_clear(&row);
     TRY(status);
-    return answer_job(app, request, reply, job, problem);
+    return answer_job(app, request, reply, job, read_wait(request, reply), 0, problem);
 }
 
-// Whether the scene is read, validated and planned in some ten microseconds: one structure of one
-// mass and nothing that asks for many runs. Nothing escaped, so that the words are seen.
+// Whether the scene is decoded, validated and planned in some ten microseconds without waiting for
+// the database: one structure of one mass and nothing that asks for many runs. Nothing is escaped,
+// so that the words are found.
 bool jobs_are_light(const Request *request) {
-    static const char *const heavy[] = {"\\",           "\"study\"",  "\"frame\"",
-                                        "\"matrices\"", "\"target\"", "\"reduction\""};
+    static const char *const heavy[] = {"\\",         "\"study\"",     "\"frame\"", "\"matrices\"",
+                                        "\"target\"", "\"reduction\"", "\"record\""};
     enum { LIGHT_BYTES = 8192 };
     if (request->body == NULL || request->body_size > LIGHT_BYTES || request->query_count > 0 ||
         request->idempotency_key != NULL)
@@ -241,12 +231,10 @@ Status jobs_show(App *app, const Request *request, Reply *reply, Problem *proble
     TRY(request_number(request, "wait", 0, 1e9, 0, &wait, problem));
     wait = wait < wait_most ? wait : wait_most; // as that of Prefer
     if (request->kept != NULL)
-        job = pause_end(request->kept, reply);
+        job = wait_end(request->kept, reply);
     else
         TRY(job_find_visible(app, request, &job, problem));
-    if (pause_begin(request, reply, job, wait))
-        return STATUS_OK;
-    return reply_job(app, reply, job, 200, problem);
+    return answer_job(app, request, reply, job, wait, 200, problem);
 }
 
 Status jobs_scene(App *app, const Request *request, Reply *reply, Problem *problem) {
@@ -272,24 +260,19 @@ static Status require_own(App *app, const Request *request, const char *id, Prob
 
 Status jobs_dismiss(App *app, const Request *request, Reply *reply, Problem *problem) {
     Job *job = NULL;
-    bool is_paused;
     if (request->kept != NULL) {
-        job = pause_end(request->kept, reply);
+        job = wait_end(request->kept, reply);
     } else {
         TRY(require_own(app, request, request->parameters[0], problem));
         TRY(jobs_cancel(app->manager, request->parameters[0], &job, problem));
     }
-    TRY(pause_until_kept(request, reply, job, &is_paused, problem));
-    if (is_paused)
-        return STATUS_OK;
-    return reply_job(app, reply, job, 200, problem);
+    return answer_job(app, request, reply, job, 0, 200, problem);
 }
 
 Status jobs_retry(App *app, const Request *request, Reply *reply, Problem *problem) {
     Job *job = NULL;
-    bool is_paused;
     if (request->kept != NULL) {
-        job = pause_end(request->kept, reply);
+        job = wait_end(request->kept, reply);
     } else {
         const Submission submission = {.retry_of = request->parameters[0],
                                        .client = request->client,
@@ -299,8 +282,5 @@ Status jobs_retry(App *app, const Request *request, Reply *reply, Problem *probl
         TRY(require_own(app, request, request->parameters[0], problem));
         TRY(submit(app, request, &submission, reply, &job, problem));
     }
-    TRY(pause_until_kept(request, reply, job, &is_paused, problem));
-    if (is_paused)
-        return STATUS_OK;
-    return reply_job(app, reply, job, 202, problem);
+    return answer_job(app, request, reply, job, 0, 202, problem);
 }

@@ -190,12 +190,13 @@ Status records_samples(App *app, const Request *request, Reply *reply, Problem *
 
 Status records_delete(App *app, const Request *request, Reply *reply, Problem *problem) {
     RecordRow row;
+    RecordUses uses;
     char what[96];
     TRY(db_record(app->db, request->parameters[0], &row, problem));
     snprintf(what, sizeof what, "the record %.64s", row.name);
     Status status = access_owns(request, row.author, what, problem);
     if (status == STATUS_OK)
-        status = jobs_record_delete(app->manager, row.name, problem);
+        status = db_record_delete(app->db, row.name, &uses, problem);
     record_row_clear(&row);
     if (status == STATUS_OK)
         reply_borrow(reply, 204, NULL, NULL, 0);

@@ -291,7 +291,6 @@ static Status result_check_owner(App *app, const Request *request, Problem *prob
     char owner[72], what[128];
     if (request->client == NULL || request->holder.is_admin)
         return STATUS_OK;
-    db_flush(app->db);
     TRY(db_result_sharer(app->db, request->parameters[0], request->client, owner, problem));
     snprintf(what, sizeof what, "a job with the result %.80s", request->parameters[0]);
     return access_owns(request, owner[0] != '\0' ? owner : NULL, what, problem);

@@ -379,8 +379,9 @@ static Status serve(const ServeSettings *settings, const sigset_t *signals, Prob
     maintenance_stop(keeper);
     background_close(app.background_tasks);
     if (app.manager != NULL)
-        jobs_close(app.manager);
+        jobs_stop(app.manager);
     server_free(server);
+    jobs_close(app.manager);
     response_cache_free(router.response_cache);
     tokens_close(access.tokens);
     db_close(app.db);

@@ -28,7 +28,8 @@ struct Db {
     atomic_uint_fast64_t catalog_version; // of the catalogue
     atomic_uint_fast64_t measured;        // materials
     atomic_uint_fast64_t evictions;       // of series
-    atomic_bool is_probing;               // by db_is_writable
+    PendingWrite probe;                   // of db_is_writable
+    atomic_bool is_probing;
     pthread_mutex_t lock;
     pthread_cond_t some;
     Sqlite *readers[READERS]; // of which the first `free_count` are not taken
@@ -132,10 +133,10 @@ static void db_probe_ended(void *context, Status status, const char *detail) {
 bool db_is_writable(Db *db) {
     if (!atomic_load(&db_totals(db)->is_failing))
         return true;
-    const WriteDone done = {db_probe_ended, db};
-    if (!atomic_exchange(&db->is_probing, true) &&
-        db_enqueue(db, db_apply_probe, NULL, 0, STORE_NOW, &done, NULL) != STATUS_OK)
-        atomic_store(&db->is_probing, false);
+    if (!atomic_exchange(&db->is_probing, true)) {
+        db->probe.done = (WriteDone){db_probe_ended, db};
+        db_enqueue(db, db_apply_probe, NULL, WRITE_NORMAL, &db->probe);
+    }
     return false;
 }
 
@@ -143,25 +144,13 @@ Status db_write(Db *db, StoreApply *apply, const void *work, Problem *problem) {
     return writer_do(db->writer, apply, work, problem);
 }
 
-Status db_enqueue(Db *db, StoreApply *apply, const void *work, size_t size, WritePriority turn,
-                  const WriteDone *done, PendingWrite **ticket) {
-    return writer_enqueue(db->writer, apply, work, size, turn, done, ticket);
+void db_enqueue(Db *db, StoreApply *apply, const void *work, WritePriority priority,
+                PendingWrite *write) {
+    writer_enqueue(db->writer, apply, work, priority, write);
 }
 
 atomic_uint_fast64_t *db_evictions(Db *db) {
     return &db->evictions;
-}
-
-bool db_cancel_write(Db *db, PendingWrite *ticket) {
-    return writer_cancel(db->writer, ticket);
-}
-
-void db_expedite(Db *db, PendingWrite *ticket) {
-    writer_expedite(db->writer, ticket);
-}
-
-void db_flush(Db *db) {
-    writer_flush(db->writer);
 }
 
 MaterialMemory *db_material_memory(Db *db) {

@@ -26,29 +26,27 @@ Status db_open_beside(const char *directory, Db **db, Problem *problem);
 void db_close(Db *db);
 bool db_is_private(const Db *db); // in memory, gone with the program
 
-// Writes are called "posted" where nobody waits for them. They are done in the order in which they
-// were posted, some at a time, as far as they are of the same turn. `call` comes once, from the
-// writer's thread, when the write is durable or has failed (then with the reason), and must be
-// quick; it may post.
+// A write that is not waited for. Its owner keeps it, and what it borrows, until `done` was called:
+// once, from the writer's thread, when the write is durable or has failed (then with the reason).
+// `done` must be quick; it may enqueue. Writes of normal priority are done in the order in which
+// they were enqueued, many in one transaction; those of low priority when no other is queued.
+typedef enum WritePriority { WRITE_NORMAL, WRITE_LOW } WritePriority;
 typedef struct WriteDone {
     void (*call)(void *context, Status status, const char *detail);
     void *context;
 } WriteDone;
-typedef enum WritePriority {
-    STORE_NOW,
-    STORE_SOON,  // a few milliseconds later, or with what else is written until then
-    STORE_LATER, // a quarter of a second later; until then it may be withdrawn, or hurried
-    STORE_LOW,   // when nothing else is queued, by itself
-    STORE_TURNS
-} WritePriority;
-typedef struct PendingWrite PendingWrite; // lives until `call` returns
-// True: it was not begun, will never be, and `call` will not come. Otherwise it is under way.
-bool db_cancel_write(Db *db, PendingWrite *ticket);
-// What was to come later comes now.
-void db_expedite(Db *db, PendingWrite *ticket);
-// Returns when all jobs that there are, accepted, finished or answered by what is known, are in the
-// database, or could not be written: before they are listed.
-void db_flush(Db *db);
+typedef struct Sqlite Sqlite;
+// Does one write on the writer's thread. It may be called again with the same `work` after the
+// first time was rolled back.
+typedef Status StoreApply(Sqlite *database, const void *work, Problem *problem);
+typedef struct PendingWrite {
+    WriteDone done; // the owner's; all below is the writer's
+    struct PendingWrite *next;
+    StoreApply *apply;
+    const void *work;
+    Status status;
+    char *detail;
+} PendingWrite;
 
 // Rises whenever a name in a scene may come to mean something else, or be warned of otherwise: a
 // material's head, a review, a record. Whoever writes those calls db_catalog_changed once it
@@ -89,17 +87,18 @@ typedef struct JobRow {
     char *uses;      // when added: the records it names, "record:elcentro", a line each, which
                      // then are used until it ends; NULL: none
     bool has_result; // loaded rows: its result is there
-    bool is_unsaved; // no column: the store may not have it yet, so that saving it adds it
+    // No columns:
+    bool is_unsaved;           // it may not be in the database yet, so that saving it inserts it
+    const struct JobRow *next; // saved in the same transaction
 } JobRow;
 void job_row_clear(JobRow *row);
 // `scene` and `warnings` are required. STATUS_CONFLICT where the id exists.
 Status db_job_add(Db *db, const JobRow *row, Problem *problem);
-// The same, posted; `row` is borrowed until then.
-Status db_job_post(Db *db, const JobRow *row, WritePriority turn, const WriteDone *done,
-                   PendingWrite **ticket);
+// The same without waiting; borrows `row`.
+void db_job_post(Db *db, const JobRow *row, PendingWrite *write);
 // State, is_cached, times, problem, result. STATUS_NOT_FOUND, unless it is_unsaved.
 Status db_job_update(Db *db, const JobRow *row, Problem *problem);
-Status db_job_update_post(Db *db, const JobRow *row, const WriteDone *done);
+void db_job_update_post(Db *db, const JobRow *row, PendingWrite *write);
 // All but the scene, here and in the list; the unfinished ones come with theirs. `row` may be
 // uninitialised.
 Status db_job_load(Db *db, const char *id, JobRow *row, Problem *problem);
@@ -150,13 +149,15 @@ typedef struct ResultRow {
     int64_t created_unix_ms;
 } ResultRow;
 void result_row_clear(ResultRow *row);
-// Saves the result (NULL: none) and the finished jobs in one transaction; a result already there
-// stays as it is.
-Status db_result_save(Db *db, const ResultRow *result, const JobRow *const *jobs, size_t job_count,
-                      Problem *problem);
-// The same, posted; all of it is borrowed until then.
-Status db_result_post(Db *db, const ResultRow *result, const JobRow *const *jobs, size_t job_count,
-                      WritePriority turn, const WriteDone *done);
+// The result (NULL: none) and the list of jobs that it finishes, saved in one transaction; a result
+// that is there already stays as it is.
+typedef struct ResultCommit {
+    const ResultRow *result;
+    const JobRow *jobs;
+} ResultCommit;
+Status db_result_save(Db *db, const ResultRow *result, const JobRow *jobs, Problem *problem);
+// The same without waiting; borrows all of it.
+void db_result_post(Db *db, const ResultCommit *commit, PendingWrite *write);
 // All but the outcome.
 Status db_result_load(Db *db, const char *id, ResultRow *row, Problem *problem);
 // Id and outcome alone.

@@ -7,19 +7,13 @@
 #include "server/db/db.h"
 #include "server/db/sqlite.h"
 
-// Does one write on the writer's thread. It may be called again with the same `work` after the
-// first time was rolled back.
-typedef Status StoreApply(Sqlite *database, const void *work, Problem *problem);
-
 // Runs `apply` within the next transaction and returns when that is durable, or with its error; a
 // failed apply leaves no trace.
 Status db_write(Db *db, StoreApply *apply, const void *work, Problem *problem);
 
-// The same without waiting: `done` is called. `size` bytes of `work` are copied; 0: it is borrowed
-// until then. *ticket (may be NULL) is set before `done` can be called. STATUS_NO_MEMORY: nothing
-// was queued.
-Status db_enqueue(Db *db, StoreApply *apply, const void *work, size_t size, WritePriority turn,
-                  const WriteDone *done, PendingWrite **ticket);
+// The same without waiting: write->done is set, `work` is borrowed.
+void db_enqueue(Db *db, StoreApply *apply, const void *work, WritePriority priority,
+                PendingWrite *write);
 
 atomic_uint_fast64_t *db_evictions(Db *db); // of series
 struct MaterialMemory *db_material_memory(Db *db);

@@ -71,9 +71,8 @@ Status db_job_add(Db *db, const JobRow *row, Problem *problem) {
     return db_write(db, job_apply_add, row, problem);
 }
 
-Status db_job_post(Db *db, const JobRow *row, WritePriority turn, const WriteDone *done,
-                   PendingWrite **ticket) {
-    return db_enqueue(db, job_apply_add, row, 0, turn, done, ticket);
+void db_job_post(Db *db, const JobRow *row, PendingWrite *write) {
+    db_enqueue(db, job_apply_add, row, WRITE_NORMAL, write);
 }
 
 #define JOB_UPDATE "SET {set}, scene = CASE :state WHEN 2 THEN '' ELSE scene END"
@@ -97,8 +96,8 @@ Status db_job_update(Db *db, const JobRow *row, Problem *problem) {
     return db_write(db, job_apply_save, row, problem);
 }
 
-Status db_job_update_post(Db *db, const JobRow *row, const WriteDone *done) {
-    return db_enqueue(db, job_apply_save, row, 0, STORE_NOW, done, NULL);
+void db_job_update_post(Db *db, const JobRow *row, PendingWrite *write) {
+    db_enqueue(db, job_apply_save, row, WRITE_NORMAL, write);
 }
 
 Status db_job_load(Db *db, const char *id, JobRow *row, Problem *problem) {

@@ -55,36 +55,27 @@ Status use_lines_add(Sqlite *database, const char *sql, const char *lines, Probl
     return STATUS_OK;
 }
 
-typedef struct Finish {
-    const ResultRow *result;
-    const JobRow *const *jobs;
-    size_t job_count;
-} Finish;
-
 static Status result_apply_finish(Sqlite *database, const void *work, Problem *problem) {
     static const char sql[] = "INSERT INTO results {insert} ON CONFLICT (id) DO NOTHING";
     static const char uses_sql[] = "INSERT INTO result_uses (name, result) VALUES (:name, "
                                    "last_insert_rowid()) ON CONFLICT DO NOTHING";
-    const Finish *both = work;
+    const ResultCommit *commit = work;
     int added = 0;
-    if (both->result != NULL)
-        TRY(sqlite_change(database, sql, result_columns, both->result, &added, problem));
+    if (commit->result != NULL)
+        TRY(sqlite_change(database, sql, result_columns, commit->result, &added, problem));
     if (added > 0)
-        TRY(use_lines_add(database, uses_sql, both->result->uses, problem));
-    for (size_t i = 0; i < both->job_count; i++)
-        TRY(job_row_save(database, both->jobs[i], problem));
+        TRY(use_lines_add(database, uses_sql, commit->result->uses, problem));
+    for (const JobRow *row = commit->jobs; row != NULL; row = row->next)
+        TRY(job_row_save(database, row, problem));
     return STATUS_OK;
 }
 
-Status db_result_save(Db *db, const ResultRow *result, const JobRow *const *jobs, size_t job_count,
-                      Problem *problem) {
-    return db_write(db, result_apply_finish, &(Finish){result, jobs, job_count}, problem);
+Status db_result_save(Db *db, const ResultRow *result, const JobRow *jobs, Problem *problem) {
+    return db_write(db, result_apply_finish, &(ResultCommit){result, jobs}, problem);
 }
 
-Status db_result_post(Db *db, const ResultRow *result, const JobRow *const *jobs, size_t job_count,
-                      WritePriority turn, const WriteDone *done) {
-    const Finish work = {result, jobs, job_count};
-    return db_enqueue(db, result_apply_finish, &work, sizeof work, turn, done, NULL);
+void db_result_post(Db *db, const ResultCommit *commit, PendingWrite *write) {
+    db_enqueue(db, result_apply_finish, commit, WRITE_NORMAL, write);
 }
 
 static Status result_load(Db *db, const char *sql, const char *id, ResultRow *row,
@@ -169,7 +160,6 @@ Status db_result_uses(Db *db, const char *name, size_t most, int64_t before, Res
     QueryCounts counted = {0};
     bool is_found;
     *uses = (ResultUses){NULL, 0};
-    db_flush(db); // results whose rows are queued count
     TRY(db_first(db, count_sql, query_key_columns, &key, query_counts_columns, &counted, &is_found,
                  problem));
     *total = counted.count;
@@ -185,7 +175,6 @@ Status db_material_uses(Db *db, const char *slug, MaterialReferences *uses, Prob
         "SELECT revision, status, (SELECT count(*) FROM result_uses u WHERE u.name = slug || '@' "
         "|| revision) AS results FROM material_states WHERE slug = :name ORDER BY revision DESC";
     const QueryKey key = {.name = slug};
-    db_flush(db);
     return db_list(db, sql, query_key_columns, &key, material_use_columns, sizeof *uses->at, uses,
                    problem);
 }

@@ -12,6 +12,7 @@ typedef struct Blob {
     uint64_t bytes, most;
     atomic_uint_fast64_t *evictions;
     WriteDone done;
+    PendingWrite write;
 } Blob;
 
 static const SqlColumn columns[] = {COLUMN(Blob, result), COLUMN_WITH(Blob, body, COLUMN_CHECKED),
@@ -72,13 +73,9 @@ Status db_series_post(Db *db, const char *result, char *body, size_t size, uint6
     blob->most = most;
     blob->evictions = db_evictions(db);
     blob->done = *done;
-    const WriteDone own = {series_put_done, blob};
-    const Status status = db_enqueue(db, series_apply_put, blob, 0, STORE_LOW, &own, NULL);
-    if (status != STATUS_OK) {
-        free(blob->body.at);
-        free(blob);
-    }
-    return status;
+    blob->write.done = (WriteDone){series_put_done, blob};
+    db_enqueue(db, series_apply_put, blob, WRITE_LOW, &blob->write);
+    return STATUS_OK;
 }
 
 static Status series_apply_touch(Sqlite *database, const void *work, Problem *problem) {
@@ -103,13 +100,12 @@ Status db_series_load(Db *db, const char *result, char **body, size_t *size, Pro
     *body = blob.body.at;
     *size = blob.body.size;
     if (status == STATUS_OK && is_found && used != NULL) {
-        const WriteDone done = {series_touch_done, used};
-        *used = (Blob){.bytes = 0};
+        used->write.done = (WriteDone){series_touch_done, used};
         text_fit(used->result, sizeof used->result, result);
-        if (db_enqueue(db, series_apply_touch, used, 0, STORE_LOW, &done, NULL) == STATUS_OK)
-            used = NULL;
+        db_enqueue(db, series_apply_touch, used, WRITE_LOW, &used->write);
+    } else {
+        free(used);
     }
-    free(used);
     if (status == STATUS_OK && !is_found)
         status = STATUS_NOT_FOUND;
     return status;

@@ -1,65 +1,52 @@
-// MaterialGroup commit. While one transaction is made durable the next ones queue up, and all of
-// them become the next transaction:
+// Group commit. While one transaction is made durable the next writes queue up, and all of them
+// become the next transaction:
 //
 //     BEGIN IMMEDIATE   apply...   COMMIT
 //
 // Where one fails, all is rolled back and done again with a savepoint around each, so that this one
 // alone leaves no trace. (Savepoints at once would copy every page that a write touches.) Where
-// that is lost too (a full disk, a failed commit), each is tried once more by itself, so that
-// everyone is told their own fate and no other's.
+// that fails too (a full disk, a failed commit), each is tried once more by itself, so that each
+// gets its own error.
 //
-// The next transaction is all that comes now and what is due by then, and takes along what comes
-// soon. Where there is none of these, it is one of what is low.
+// Writes of low priority are done one by one, when nothing else is queued.
 #include "server/db/writer.h"
 
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 #include "server/util/clock.h"
 
-static const int64_t delay_ms[STORE_TURNS] = {[STORE_SOON] = 5, [STORE_LATER] = 250};
-
-// Tickets in the order of their coming.
-typedef struct Line {
+typedef struct WriteQueue {
     PendingWrite *first, **last;
-} Line;
+} WriteQueue;
 
-// One write: on the stack of a caller who waits, or on the heap with a copy of its work behind it.
-struct PendingWrite {
-    PendingWrite *next, **link; // `link` points at what points here
-    Line *line;                 // NULL: it is queued no more
-    int64_t due_ns;             // 0: at once
-    StoreApply *apply;
-    const void *work;
-    WriteDone done; // `call` NULL: its caller waits
-    Status status;
+// On the stack of a caller who waits; its `done.call` is NULL.
+typedef struct WriteWaiter {
+    PendingWrite write;
     bool is_done;
-    pthread_cond_t settled;
-    char detail[sizeof((Problem){0}.detail)];
-};
+    pthread_cond_t done;
+} WriteWaiter;
 
 struct Writer {
     Sqlite *database;
     Db *shared;
     pthread_t thread;
     pthread_mutex_t lock;
-    pthread_cond_t some;
-    Line lines[STORE_TURNS];
-    int64_t wakes_ns; // when the thread wakes by itself; INT64_MAX: never, 0: it does not sleep
-    bool is_stopping, is_writing;
+    pthread_cond_t wake;
+    WriteQueue queues[WRITE_LOW + 1];
+    bool is_stopping;
     DbStats totals;
-    Problem problem; // of the write in hand; the thread's own, for it is large
+    Problem problem; // of the current write; the thread's own, for it is large
 };
 
-static void settle(PendingWrite *write, Status status, const Problem *problem) {
+static void writer_set_status(PendingWrite *write, Status status, const Problem *problem) {
+    free(write->detail);
+    write->detail = status != STATUS_OK ? strdup(problem->detail) : NULL;
     write->status = status;
-    if (status != STATUS_OK)
-        memcpy(write->detail, problem->detail, sizeof write->detail);
 }
 
-static Status apply_saved(Writer *writer, Sqlite *database, PendingWrite *write) {
+static Status writer_apply_saved(Writer *writer, Sqlite *database, PendingWrite *write) {
     static const char open[] = "SAVEPOINT one", undo[] = "ROLLBACK TO one", end[] = "RELEASE one";
     Status status = sqlite_change(database, open, NULL, NULL, NULL, &writer->problem);
     if (status == STATUS_OK) {
@@ -72,10 +59,10 @@ static Status apply_saved(Writer *writer, Sqlite *database, PendingWrite *write)
     return status;
 }
 
-// Does writes from `first` up to `end` in one transaction. False if all of it is lost;
-// writer->problem then says why. Without savepoints one failure loses all.
-static bool commit(Writer *writer, Sqlite *database, PendingWrite *first, const PendingWrite *end,
-                   bool has_savepoints) {
+// Does writes from `first` up to `end` in one transaction. False if all of it was rolled back;
+// writer->problem then has the reason. Without savepoints one failure rolls back all.
+static bool writer_commit(Writer *writer, Sqlite *database, PendingWrite *first,
+                          const PendingWrite *end, bool has_savepoints) {
     static const char begin[] = "BEGIN IMMEDIATE", commit[] = "COMMIT", undo[] = "ROLLBACK";
     const int64_t began_ns = clock_monotonic_ns();
     const uint64_t rows = sqlite_rows_changed(database);
@@ -92,7 +79,7 @@ static bool commit(Writer *writer, Sqlite *database, PendingWrite *first, const 
             writes++;
             continue;
         }
-        settle(write, apply_saved(writer, database, write), &writer->problem);
+        writer_set_status(write, writer_apply_saved(writer, database, write), &writer->problem);
         writes += write->status == STATUS_OK;
         if (!sqlite_is_in_transaction(database)) {
             counter_add(&writer->totals.errors, 1);
@@ -116,125 +103,82 @@ static bool commit(Writer *writer, Sqlite *database, PendingWrite *first, const 
     return status == STATUS_OK;
 }
 
-static void commit_alone(Writer *writer, Sqlite *database, PendingWrite *write) {
+static void writer_commit_alone(Writer *writer, Sqlite *database, PendingWrite *write) {
     write->status = STATUS_OK;
-    if (commit(writer, database, write, write->next, true) || write->status != STATUS_OK)
+    if (writer_commit(writer, database, write, write->next, true) || write->status != STATUS_OK)
         return;
     const Status status = writer->problem.status;
     atomic_store(&writer->totals.is_failing, true);
-    settle(write, status != STATUS_OK ? status : STATUS_IO, &writer->problem);
+    writer_set_status(write, status != STATUS_OK ? status : STATUS_IO, &writer->problem);
 }
 
-static void commit_all(Writer *writer, PendingWrite *first) {
+static void writer_commit_all(Writer *writer, PendingWrite *first) {
     Sqlite *database = writer->shared != NULL ? db_take(writer->shared) : writer->database;
-    if (!commit(writer, database, first, NULL, false) &&
-        (first->next == NULL || !commit(writer, database, first, NULL, true)))
+    if (!writer_commit(writer, database, first, NULL, false) &&
+        (first->next == NULL || !writer_commit(writer, database, first, NULL, true)))
         for (PendingWrite *write = first; write != NULL; write = write->next)
-            commit_alone(writer, database, write);
+            writer_commit_alone(writer, database, write);
     if (writer->shared != NULL)
         db_put(writer->shared, database);
 }
 
-// With the lock held, which is let go while others are told.
-static void tell(Writer *writer, PendingWrite *write) {
-    while (write != NULL) {
-        // Its owner may be gone as soon as the lock is free, not before.
-        PendingWrite *next = write->next;
-        if (write->done.call == NULL) {
-            write->is_done = true;
-            pthread_cond_signal(&write->settled);
-        } else {
-            pthread_mutex_unlock(&writer->lock);
-            write->done.call(write->done.context, write->status,
-                             write->status != STATUS_OK ? write->detail : "");
-            free(write);
-            pthread_mutex_lock(&writer->lock);
-        }
-        write = next;
+// Its owner may free it as soon as it was called, or the lock is free.
+static void writer_report(Writer *writer, PendingWrite *write) {
+    char *detail = write->detail;
+    if (write->done.call != NULL) {
+        const char *text = detail != NULL ? detail : "";
+        write->detail = NULL;
+        write->done.call(write->done.context, write->status, text);
+        free(detail);
+        return;
     }
+    WriteWaiter *waiter = (WriteWaiter *)(void *)write;
+    pthread_mutex_lock(&writer->lock);
+    waiter->is_done = true;
+    pthread_cond_signal(&waiter->done);
+    pthread_mutex_unlock(&writer->lock);
 }
 
-static void append(Line *line, PendingWrite *write) {
-    write->line = line;
-    write->link = line->last;
-    write->next = NULL;
-    *line->last = write;
-    line->last = &write->next;
-}
-
-static void leave(PendingWrite *write) {
-    *write->link = write->next;
-    if (write->next != NULL)
-        write->next->link = write->link;
-    else
-        write->line->last = write->link;
-    write->line = NULL;
-    write->next = NULL;
-}
-
-// With the lock held.
-static void call_up(Writer *writer, WritePriority turn, int64_t until_ns) {
-    const Line *line = &writer->lines[turn];
-    while (line->first != NULL && line->first->due_ns <= until_ns) {
-        PendingWrite *write = line->first;
-        leave(write);
-        append(&writer->lines[STORE_NOW], write);
+// With the lock held: all of the queue, or one of low priority; NULL: nothing.
+static PendingWrite *writer_take(Writer *writer) {
+    WriteQueue *queue = &writer->queues[WRITE_NORMAL], *low = &writer->queues[WRITE_LOW];
+    PendingWrite *first = queue->first;
+    if (first != NULL) {
+        *queue = (WriteQueue){NULL, &queue->first};
+    } else if ((first = low->first) != NULL) {
+        low->first = first->next;
+        if (low->first == NULL)
+            low->last = &low->first;
+        first->next = NULL;
     }
+    return first;
 }
 
-// With the lock held: all that is to be written now, else one of what is low; NULL: nothing.
-static PendingWrite *take(Writer *writer) {
-    Line *line = &writer->lines[STORE_NOW];
-    const int64_t now_ns = writer->is_stopping ? INT64_MAX : clock_monotonic_ns();
-    call_up(writer, STORE_LATER, now_ns);
-    call_up(writer, STORE_SOON, now_ns);
-    if (line->first != NULL)
-        call_up(writer, STORE_SOON, INT64_MAX);
-    PendingWrite *write = line->first != NULL ? line->first : writer->lines[STORE_LOW].first;
-    if (line->first == NULL && write != NULL)
-        leave(write);
-    for (PendingWrite *at = line->first; at != NULL; at = at->next)
-        at->line = NULL;
-    *line = (Line){NULL, &line->first};
-    return write;
-}
-
-static int64_t due_ns(const Line *line) {
-    return line->first != NULL ? line->first->due_ns : INT64_MAX;
-}
-
-// With the lock held: until there is something new, or what waits is due.
-static void wait(Writer *writer) {
-    const int64_t soon_ns = due_ns(&writer->lines[STORE_SOON]);
-    const int64_t later_ns = due_ns(&writer->lines[STORE_LATER]);
-    writer->wakes_ns = soon_ns < later_ns ? soon_ns : later_ns;
-    const struct timespec until = {(time_t)(writer->wakes_ns / 1000000000),
-                                   (long)(writer->wakes_ns % 1000000000)};
-    if (writer->wakes_ns == INT64_MAX)
-        pthread_cond_wait(&writer->some, &writer->lock);
-    else
-        pthread_cond_timedwait(&writer->some, &writer->lock, &until);
-    writer->wakes_ns = 0;
-}
-
-static void *work(void *context) {
+static void *writer_main(void *context) {
     Writer *writer = context;
-    PendingWrite *write;
+    PendingWrite *write, *next;
     pthread_mutex_lock(&writer->lock);
     for (;;) {
-        while ((write = take(writer)) == NULL && !writer->is_stopping)
-            wait(writer);
+        while ((write = writer_take(writer)) == NULL && !writer->is_stopping)
+            pthread_cond_wait(&writer->wake, &writer->lock);
         if (write == NULL)
             break;
-        writer->is_writing = true;
         pthread_mutex_unlock(&writer->lock);
-        commit_all(writer, write);
+        writer_commit_all(writer, write);
+        for (; write != NULL; write = next) {
+            next = write->next;
+            writer_report(writer, write);
+        }
         pthread_mutex_lock(&writer->lock);
-        writer->is_writing = false;
-        tell(writer, write);
     }
     pthread_mutex_unlock(&writer->lock);
     return NULL;
+}
+
+static void writer_free(Writer *writer) {
+    pthread_cond_destroy(&writer->wake);
+    pthread_mutex_destroy(&writer->lock);
+    free(writer);
 }
 
 Status writer_start(Sqlite *database, Db *shared, Writer **writer, Problem *problem) {
@@ -244,18 +188,12 @@ Status writer_start(Sqlite *database, Db *shared, Writer **writer, Problem *prob
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the database's writer");
     made->database = database;
     made->shared = shared;
-    for (size_t i = 0; i < COUNT(made->lines); i++)
-        made->lines[i].last = &made->lines[i].first;
-    pthread_condattr_t monotonic;
-    pthread_condattr_init(&monotonic);
-    pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
+    for (size_t i = 0; i < COUNT(made->queues); i++)
+        made->queues[i].last = &made->queues[i].first;
     pthread_mutex_init(&made->lock, NULL);
-    pthread_cond_init(&made->some, &monotonic);
-    pthread_condattr_destroy(&monotonic);
-    if (pthread_create(&made->thread, NULL, work, made) != 0) {
-        pthread_cond_destroy(&made->some);
-        pthread_mutex_destroy(&made->lock);
-        free(made);
+    pthread_cond_init(&made->wake, NULL);
+    if (pthread_create(&made->thread, NULL, writer_main, made) != 0) {
+        writer_free(made);
         return problem_set(problem, STATUS_INTERNAL,
                            "the database's writer thread cannot be started");
     }
@@ -268,12 +206,10 @@ void writer_stop(Writer *writer) {
         return;
     pthread_mutex_lock(&writer->lock);
     writer->is_stopping = true;
-    pthread_cond_signal(&writer->some);
+    pthread_cond_signal(&writer->wake);
     pthread_mutex_unlock(&writer->lock);
     pthread_join(writer->thread, NULL);
-    pthread_cond_destroy(&writer->some);
-    pthread_mutex_destroy(&writer->lock);
-    free(writer);
+    writer_free(writer);
 }
 
 const DbStats *writer_totals(const Writer *writer) {
@@ -281,77 +217,36 @@ const DbStats *writer_totals(const Writer *writer) {
 }
 
 // With the lock held.
-static void enqueue(Writer *writer, PendingWrite *write, WritePriority turn) {
-    write->due_ns = delay_ms[turn] > 0 ? clock_monotonic_ns() + delay_ms[turn] * 1000000 : 0;
-    append(&writer->lines[turn], write);
-    if (write->due_ns < writer->wakes_ns) {
-        writer->wakes_ns = 0; // woken once is enough
-        pthread_cond_signal(&writer->some);
-    }
+static void writer_append(Writer *writer, PendingWrite *write, WritePriority priority) {
+    WriteQueue *queue = &writer->queues[priority];
+    write->next = NULL;
+    write->detail = NULL;
+    *queue->last = write;
+    queue->last = &write->next;
+    pthread_cond_signal(&writer->wake);
 }
 
-Status writer_do(Writer *writer, StoreApply *apply, const void *work_, Problem *problem) {
-    PendingWrite write = {.apply = apply, .work = work_};
-    pthread_cond_init(&write.settled, NULL);
+Status writer_do(Writer *writer, StoreApply *apply, const void *work, Problem *problem) {
+    WriteWaiter waiter = {.write = {.apply = apply, .work = work}};
+    pthread_cond_init(&waiter.done, NULL);
     pthread_mutex_lock(&writer->lock);
-    enqueue(writer, &write, STORE_NOW);
-    while (!write.is_done)
-        pthread_cond_wait(&write.settled, &writer->lock);
+    writer_append(writer, &waiter.write, WRITE_NORMAL);
+    while (!waiter.is_done)
+        pthread_cond_wait(&waiter.done, &writer->lock);
     pthread_mutex_unlock(&writer->lock);
-    pthread_cond_destroy(&write.settled);
-    if (write.status != STATUS_OK)
-        problem_set(problem, write.status, "%s", write.detail);
-    return write.status;
+    pthread_cond_destroy(&waiter.done);
+    const Status status = waiter.write.status;
+    if (status != STATUS_OK)
+        problem_set(problem, status, "%s", waiter.write.detail != NULL ? waiter.write.detail : "");
+    free(waiter.write.detail);
+    return status;
 }
 
-Status writer_enqueue(Writer *writer, StoreApply *apply, const void *work_, size_t size,
-                      WritePriority turn, const WriteDone *done, PendingWrite **ticket) {
-    PendingWrite *write = malloc(sizeof *write + size);
-    if (write == NULL)
-        return STATUS_NO_MEMORY;
+void writer_enqueue(Writer *writer, StoreApply *apply, const void *work, WritePriority priority,
+                    PendingWrite *write) {
     write->apply = apply;
-    write->work = size > 0 ? memcpy(write + 1, work_, size) : work_;
-    write->done = *done;
-    if (ticket != NULL)
-        *ticket = write;
+    write->work = work;
     pthread_mutex_lock(&writer->lock);
-    enqueue(writer, write, turn);
+    writer_append(writer, write, priority);
     pthread_mutex_unlock(&writer->lock);
-    return STATUS_OK;
-}
-
-bool writer_cancel(Writer *writer, PendingWrite *write) {
-    pthread_mutex_lock(&writer->lock);
-    const bool is_queued = write->line != NULL;
-    if (is_queued)
-        leave(write);
-    pthread_mutex_unlock(&writer->lock);
-    if (is_queued)
-        free(write);
-    return is_queued;
-}
-
-void writer_expedite(Writer *writer, PendingWrite *write) {
-    pthread_mutex_lock(&writer->lock);
-    if (write->line == &writer->lines[STORE_LATER]) {
-        leave(write);
-        enqueue(writer, write, STORE_NOW);
-    }
-    pthread_mutex_unlock(&writer->lock);
-}
-
-static Status write_nothing(Sqlite *database, const void *work_, Problem *problem) {
-    (void)database, (void)work_, (void)problem;
-    return STATUS_OK;
-}
-
-void writer_flush(Writer *writer) {
-    pthread_mutex_lock(&writer->lock);
-    call_up(writer, STORE_LATER, INT64_MAX);
-    call_up(writer, STORE_SOON, INT64_MAX);
-    const bool is_settled = writer->lines[STORE_NOW].first == NULL && !writer->is_writing;
-    pthread_mutex_unlock(&writer->lock);
-    // Behind all of them in the same transaction.
-    if (!is_settled)
-        (void)writer_do(writer, write_nothing, NULL, NULL);
 }

@@ -4,8 +4,20 @@
 #ifndef SERVER_JOBS_CACHE_H
 #define SERVER_JOBS_CACHE_H
 
+#include <stdatomic.h>
+
 #include "server/jobs/jobs.h"
-#include "server/jobs/result_summary.h"
+
+// Plan, summary, work and notes of a result as JSON, shared by all of its jobs.
+typedef struct ResultSummary {
+    atomic_size_t refcount;
+    const char *plan, *summary, *work, *notes; // NULL: unknown
+    size_t bytes;
+} ResultSummary;
+// Copies them out of `row`. One reference; NULL without memory.
+ResultSummary *result_summary_new(const ResultRow *row);
+ResultSummary *result_summary_ref(ResultSummary *summary); // NULL is accepted here and below
+void result_summary_unref(ResultSummary *summary);
 
 typedef struct Cache Cache;
 

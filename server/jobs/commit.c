@@ -1,46 +1,70 @@
-// What has run goes to the store without anyone waiting: result and jobs in one transaction,
-// posted.
+// Every write of a job: its insertion, its last state together with its result, its cancellation.
+// None is waited for but by job_insert_now:
 //
-//     worker ---- jobs_save ----> store ---- saved ----> finished, for all who asked
-//                     ^                          |
-//                     +---- who joined since ----+
+//     worker -- task_finish --> one transaction: result and jobs -- commit_done --> finished
+//                                  ^                                  |
+//                                  +-- jobs that joined meanwhile ----+
 //
-// Only when the store has them are the jobs finished, and the result known. Until then others may
-// join the computation; they get a turn of their own. What is on the way is bounded: workers wait.
-#include <stdio.h>
+// A job is finished when the database has its last state, and a result is cached when the database
+// has it. What cannot be written for want of room waits in memory and is tried again by
+// jobs_retry_writes. Nothing is allocated on the way, so that no lack of memory loses a job. What
+// is on the way is bounded: workers wait.
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/jobs/study.h"
+#include "server/jobs/documents.h"
+#include "server/jobs/jobs_private.h"
 #include "server/json/encode.h"
 #include "server/util/bytes.h"
 #include "server/util/clock.h"
 #include "server/util/log.h"
 
-// Computations on the way to the store, and the bytes of what they came to.
+// Tasks on the way to the database, and the bytes of their results.
 enum { SAVING_MAX = 4096, SAVING_BYTES = 256 << 20 };
-
-typedef struct Saving {
-    JobManager *manager;
-    Task *task;
-    RunResult run_result;
-    ResultSummary *head; // of a successful one
-    size_t bytes;
-    bool is_saved;       // the result is in the store
-    bool is_told;        // that it could not be saved
-    struct Saving *next; // of those that wait for room
-    Job **jobs;          // held: those whose rows are on the way
-    const JobRow **rows;
-    size_t count, room;
-} Saving;
-
-static void saved(void *context, Status status, const char *detail);
 
 bool jobs_is_behind(const JobManager *manager) {
     return manager->saving >= SAVING_MAX || manager->saving_bytes >= SAVING_BYTES;
 }
 
-static char *problem_text(Status status, const char *detail) {
+bool status_is_transient(Status status) {
+    return status == STATUS_IO || status == STATUS_FULL || status == STATUS_BUSY ||
+           status == STATUS_NO_MEMORY;
+}
+
+void run_result_clear(RunResult *run_result) {
+    outcome_unref(run_result->outcome);
+    fields_clear(study_answer_fields, &run_result->answer);
+    result_row_clear(&run_result->result);
+    free(run_result->problem);
+    *run_result = (RunResult){0};
+}
+
+void run_result_fail(RunResult *run_result, Status status, const Problem *problem) {
+    Bytes bytes = {.most = 1 << 20};
+    run_result->status = status;
+    text_fit(run_result->detail, sizeof run_result->detail, problem->detail);
+    encode_problem(&bytes, problem, encode_problem_code(status), NULL);
+    free(run_result->problem);
+    run_result->problem = bytes_take(&bytes, NULL);
+}
+
+Status run_result_add_to_study(RunResult *run_result, Problem *problem) {
+    Bytes study = {.most = DOCUMENT_BYTES};
+    document_study(&study, &run_result->answer);
+    run_result->result.study = bytes_take(&study, NULL);
+    run_result->result.created_unix_ms = clock_unix_ms();
+    return run_result->result.study != NULL
+               ? STATUS_OK
+               : problem_set(problem, STATUS_NO_MEMORY, "no memory for the study's document");
+}
+
+// With the lock held.
+static void write_ended(JobManager *manager) {
+    if (--manager->writes == 0)
+        pthread_cond_broadcast(&manager->settled);
+}
+
+static char *commit_problem_text(Status status, const char *detail) {
     Problem *problem = malloc(sizeof *problem);
     if (problem == NULL)
         return NULL;
@@ -52,330 +76,395 @@ static char *problem_text(Status status, const char *detail) {
     return bytes_take(&bytes, NULL);
 }
 
-static bool make_room(Saving *saving, size_t count) {
-    if (count <= saving->room)
-        return true;
-    Job **jobs = realloc(saving->jobs, count * sizeof *jobs);
-    if (jobs == NULL)
-        return false;
-    saving->jobs = jobs;
-    const JobRow **rows = realloc(saving->rows, count * sizeof *rows);
-    if (rows == NULL)
-        return false;
-    saving->rows = rows;
-    saving->room = count;
-    return true;
+// With the lock held: the jobs that wait, in their last state. One whose insertion is under way
+// waits for the next transaction.
+static void commit_collect(Task *task) {
+    const RunResult *run = &task->run_result;
+    const int64_t now_ms = clock_unix_ms(), now_ns = clock_monotonic_ns();
+    for (Job **at = &task->jobs, *job; (job = *at) != NULL;) {
+        if (job->is_inserting) {
+            at = &job->next_shared;
+            continue;
+        }
+        *at = job->next_shared;
+        JobRow *row = &job->written;
+        *row = job->row;
+        row->is_unsaved = !job->is_durable;
+        row->state = run->status == STATUS_OK ? JOB_SUCCESSFUL : JOB_FAILED;
+        row->finished_unix_ms = now_ms;
+        row->run = 1e-9 * (double)(run->ended_ns - run->began_ns);
+        row->total = 1e-9 * (double)(now_ns - job->submitted_ns);
+        row->problem = run->problem; // borrowed
+        row->next = task->committing != NULL ? &task->committing->written : NULL;
+        job->is_ending = true;
+        job->next_shared = task->committing;
+        task->committing = job;
+    }
 }
 
-// With the lock held: the rows as they go to the store, of at most so many jobs that have none on
-// the way.
-static void close_jobs(Saving *saving, size_t most) {
-    const RunResult *run_result = &saving->run_result;
-    const int64_t now_ms = clock_unix_ms(), now_ns = clock_monotonic_ns();
-    size_t count = 0;
-    for (Job *job = saving->task->jobs; job != NULL; job = job->next_shared)
-        count += !job->is_closing && count < most;
-    saving->count = 0;
-    if (!make_room(saving, count))
-        count = saving->room; // the others get the next turn
-    for (Job *job = saving->task->jobs; job != NULL && saving->count < count;
-         job = job->next_shared) {
-        if (job->is_closing)
-            continue;
-        jobs_withdraw(job);
-        job->is_closing = true;
-        job->final_row = job->row;
-        JobRow *row = &job->final_row;
-        row->is_unsaved = !job->is_kept;
-        row->state = run_result->status == STATUS_OK ? JOB_SUCCESSFUL : JOB_FAILED;
-        row->finished_unix_ms = now_ms;
-        row->run = 1e-9 * (double)(run_result->ended_ns - run_result->began_ns);
-        row->total = 1e-9 * (double)(now_ns - job->submitted_ns);
-        row->problem = run_result->problem == NULL ? NULL : strdup(run_result->problem);
-        saving->jobs[saving->count] = job_ref(job);
-        saving->rows[saving->count++] = row;
-    }
+static void commit_done(void *context, Status status, const char *detail);
+
+// With the lock held.
+static void commit_enqueue(Task *task) {
+    const bool has_result = task->run_result.status == STATUS_OK && !task->is_saved;
+    task->commit = (ResultCommit){.result = has_result ? &task->run_result.result : NULL,
+                                  .jobs = &task->committing->written};
+    task->write.done = (WriteDone){commit_done, task};
+    task->manager->writes++;
+    db_result_post(task->manager->db, &task->commit, &task->write);
 }
 
 // With the lock held.
-static void tell_askers(const Saving *saving) {
-    JobManager *manager = saving->manager;
-    Task *task = saving->task;
-    if (task->result_waiters.count > 0 && saving->run_result.status != STATUS_OK) {
+static void commit_call_readers(Task *task) {
+    JobManager *manager = task->manager;
+    const RunResult *run = &task->run_result;
+    if (task->result_waiters.count > 0 && run->status != STATUS_OK) {
         Failure *failure = &manager->failures[manager->next_failure++ % OUTCOME_FAILURES];
         text_fit(failure->result, sizeof failure->result, task->result);
-        text_fit(failure->detail, sizeof failure->detail, saving->run_result.detail);
-        failure->status = saving->run_result.status;
+        text_fit(failure->detail, sizeof failure->detail, run->detail);
+        failure->status = run->status;
     }
-    subscribers_call(&task->result_waiters);
 }
 
-// With the lock held: nobody waits for it any more. saving_free is to follow without the lock.
-static void end(Saving *saving) {
-    JobManager *manager = saving->manager;
-    Task *task = saving->task;
-    hashmap_remove(manager->in_flight, &task->indexed);
-    tell_askers(saving);
-    while (task->jobs != NULL) {
-        Job *job = task->jobs;
-        task->jobs = job->next_shared;
-        job->task = NULL;
-        job->next_shared = NULL;
-        job_unref(job); // the computation's hold
+// With the lock held, of a task that has run: writes the end of its jobs. Where none is left it has
+// ended, and is returned to be freed without the lock.
+static Task *commit_continue(Task *task) {
+    JobManager *manager = task->manager;
+    if (task->committing != NULL || task->is_waiting)
+        return NULL;
+    commit_collect(task);
+    if (task->committing != NULL) {
+        commit_enqueue(task);
+        return NULL;
     }
-    const bool was_behind = jobs_is_behind(manager);
-    manager->saving--;
-    manager->saving_bytes -= saving->bytes;
-    if (was_behind) {
+    if (task->jobs != NULL)
+        return NULL; // when their insertion is done
+    commit_call_readers(task);
+    task_release(task);
+    if (jobs_is_behind(manager)) {
         pthread_cond_broadcast(&manager->work);
         pthread_cond_broadcast(&manager->spare_work);
     }
+    manager->saving--;
+    manager->saving_bytes -= task->saving_bytes;
+    return task;
 }
 
-static void saving_free(Saving *saving) {
-    task_free(saving->task);
-    run_result_clear(&saving->run_result);
-    result_summary_unref(saving->head);
-    free(saving->jobs);
-    free(saving->rows);
-    free(saving);
-}
-
-bool status_is_transient(Status status) {
-    return status == STATUS_IO || status == STATUS_FULL || status == STATUS_BUSY ||
-           status == STATUS_NO_MEMORY;
-}
-
-// With the lock held: the jobs are what the store says they are. If it could not be told of their
-// end, they go on running where `may_wait`; otherwise they are failed here and unfinished there:
-// the next start computes them again. If it never had them, they never were.
-static void publish(Saving *saving, Status status, const char *detail, bool may_wait) {
-    for (size_t i = 0; i < saving->count; i++) {
-        Job *job = saving->jobs[i];
-        if (status != STATUS_OK && !job->is_kept) {
-            free(job->final_row.problem);
-            job->final_row.problem = NULL;
-            jobs_refuse(job, status, detail);
-        } else if (status != STATUS_OK && may_wait) {
-            free(job->final_row.problem);
-            job->final_row.problem = NULL;
-            job->is_closing = false;
-        } else {
-            job->row = job->final_row;
-            job->row.is_unsaved = false;
-            if (status != STATUS_OK) {
-                free(job->row.problem);
-                job->row.problem = problem_text(status, detail);
-                job->row.state = JOB_FAILED;
-                jobs_release(job);
-            } else {
-                if (job->row.state == JOB_SUCCESSFUL)
-                    job->head = result_summary_ref(saving->head);
-                job->is_kept = true;
-                jobs_retire(job);
-            }
-            job_metrics_ended(&saving->manager->totals, job->row.state, false);
-            subscribers_call(&job->subscribers);
-            subscribers_call(&job->save_waiters);
+// With the lock held: one of the jobs whose end was written, or could not be.
+static void commit_end_job(Task *task, Job *job, Status status, const char *detail) {
+    JobManager *manager = task->manager;
+    const RunResult *run = &task->run_result;
+    job->is_ending = false;
+    if (status != STATUS_OK && job->is_durable &&
+        (status_is_transient(status) || manager->is_closing)) {
+        job->next_shared = task->jobs; // as it was
+        task->jobs = job;
+        return;
+    }
+    job->task = NULL;
+    job->next_shared = NULL;
+    if (status != STATUS_OK && !job->is_durable) {
+        job_refuse(job, status, detail); // it never was
+    } else {
+        job->row = job->written;
+        job->row.is_unsaved = false;
+        job->row.next = NULL;
+        job->row.problem = run->problem != NULL ? strdup(run->problem) : NULL;
+        job->is_durable = status == STATUS_OK;
+        if (status == STATUS_OK) {
+            if (job->row.state == JOB_SUCCESSFUL)
+                job->summary = result_summary_ref(task->summary);
+            job_retire(job);
+        } else { // until the next start, which computes it again
+            free(job->row.problem);
+            job->row.problem = commit_problem_text(status, detail);
+            job->row.state = JOB_FAILED;
+            job_release(job);
         }
-        job_unref(job); // close_jobs's hold
+        job_metrics_ended(&manager->totals, job->row.state, false);
+        subscribers_call(&job->subscribers);
     }
-    saving->count = 0;
+    job_unref(job); // the task's
 }
 
-// A result that can never be saved, because it is too large, makes its jobs failed ones.
-static void give_up(Saving *saving, Status status, const char *detail) {
-    RunResult *run_result = &saving->run_result;
-    free(run_result->problem);
-    run_result->problem = problem_text(status, detail);
-    run_result->status = status;
-    text_fit(run_result->detail, sizeof run_result->detail, detail);
-    for (size_t i = 0; i < saving->count; i++) {
-        JobRow *row = &saving->jobs[i]->final_row;
-        free(row->problem);
-        row->problem = run_result->problem == NULL ? NULL : strdup(run_result->problem);
-        row->state = JOB_FAILED;
-    }
-}
-
-// With the lock held: whether others will have run in a moment, to be saved together with this.
-static bool is_followed(const JobManager *manager) {
-    static const double moment = 5e-3; // [s]
-    return queue_seconds(manager->queue) < moment * (double)queue_count(manager->queue);
-}
-
-// With the lock held.
-static Status post(Saving *saving) {
-    const bool has_result = saving->run_result.status == STATUS_OK && !saving->is_saved;
-    const WriteDone done = {saved, saving};
-    const Status status = db_result_post(
-        saving->manager->db, has_result ? &saving->run_result.result : NULL, saving->rows,
-        saving->count, is_followed(saving->manager) ? STORE_SOON : STORE_NOW, &done);
-    if (status == STATUS_OK)
-        saving->manager->posted++;
-    return status;
-}
-
-// With the lock held: what waits is on the way to the store, or else this is at its end (false).
-static bool go_on(Saving *saving) {
-    for (;;) {
-        close_jobs(saving, SIZE_MAX);
-        if (saving->count == 0)
-            return false;
-        const Status status = post(saving);
-        if (status == STATUS_OK)
-            return true;
-        publish(saving, status, "no memory to save the job", false);
-    }
-}
-
-// With the lock held: whether it is tried again when there may be room.
-static bool wait_for_room(Saving *saving) {
-    JobManager *manager = saving->manager;
-    if (saving->task->jobs == NULL || manager->is_closing)
-        return false;
-    saving->next = manager->retry_commits;
-    manager->retry_commits = saving;
-    return true;
-}
-
-// The store has answered; its writer's thread.
-static void saved(void *context, Status status, const char *detail) {
-    Saving *saving = context;
-    JobManager *manager = saving->manager;
-    if (status != STATUS_OK && !saving->is_told) {
+static void commit_log(Task *task, Status status, const char *detail) {
+    if (status != STATUS_OK && !task->is_logged) {
         Bytes line = {.most = 1024};
-        bytes_format(&line, "the result %s could not be saved: %s", saving->task->result, detail);
+        bytes_format(&line, "the result %s could not be saved: %s", task->result, detail);
         log_write(&line);
         bytes_clear(&line);
     }
-    saving->is_told = status != STATUS_OK;
+    task->is_logged = status != STATUS_OK;
+}
+
+// With the lock held: a result that can never be saved, because it is too large, makes its jobs
+// failed ones.
+static void commit_fail(Task *task, Status status, const char *detail) {
+    RunResult *run = &task->run_result;
+    free(run->problem);
+    run->problem = commit_problem_text(status, detail);
+    run->status = status;
+    text_fit(run->detail, sizeof run->detail, detail);
+    for (Job *job = task->committing; job != NULL; job = job->next_shared) {
+        job->written.problem = run->problem;
+        job->written.state = JOB_FAILED;
+    }
+    commit_enqueue(task);
+}
+
+static void commit_done(void *context, Status status, const char *detail) {
+    Task *task = context, *ended = NULL;
+    JobManager *manager = task->manager;
+    RunResult *run = &task->run_result;
+    commit_log(task, status, detail);
     pthread_mutex_lock(&manager->lock);
-    bool goes_on;
-    if (status != STATUS_OK && !status_is_transient(status) &&
-        saving->run_result.status == STATUS_OK) {
-        give_up(saving, status, detail);
-        goes_on = post(saving) == STATUS_OK;
-        if (!goes_on) {
-            publish(saving, STATUS_NO_MEMORY, "no memory to save the job", false);
-            goes_on = go_on(saving);
-        }
-    } else if (status_is_transient(status)) {
-        publish(saving, status, detail, !manager->is_closing);
-        goes_on = wait_for_room(saving) || go_on(saving);
+    if (status != STATUS_OK && !status_is_transient(status) && run->status == STATUS_OK) {
+        commit_fail(task, status, detail);
     } else {
-        // What is in the cache is known, so it must be in the store.
-        if (status == STATUS_OK && saving->run_result.status == STATUS_OK) {
-            saving->is_saved = true;
-            cache_put(manager->cache, saving->task->result, saving->run_result.outcome,
-                      saving->head);
+        // What is cached must be in the database.
+        if (status == STATUS_OK && run->status == STATUS_OK) {
+            task->is_saved = true;
+            cache_put(manager->cache, task->result, run->outcome, task->summary);
         }
-        publish(saving, status, detail, false);
-        goes_on = go_on(saving);
-    }
-    if (!goes_on)
-        end(saving);
-    jobs_settle(manager);
-    pthread_mutex_unlock(&manager->lock);
-    if (!goes_on)
-        saving_free(saving);
-}
-
-void jobs_retry_sweep(JobManager *manager) {
-    Saving *ended = NULL, *next;
-    pthread_mutex_lock(&manager->lock);
-    Saving *saving = manager->retry_commits;
-    manager->retry_commits = NULL;
-    for (; saving != NULL; saving = next) {
-        next = saving->next;
-        if (go_on(saving))
-            continue;
-        end(saving);
-        saving->next = ended;
-        ended = saving;
-    }
-    jobs_retry_dismissed(manager);
-    studies_resume(manager);
-    pthread_mutex_unlock(&manager->lock);
-    for (; ended != NULL; ended = next) {
-        next = ended->next;
-        saving_free(ended);
-    }
-}
-
-void jobs_abandon_delayed(JobManager *manager) {
-    while (manager->retry_commits != NULL) {
-        Saving *saving = manager->retry_commits;
-        manager->retry_commits = saving->next;
-        for (Job *job = saving->task->jobs; job != NULL; job = job->next_shared) {
-            jobs_retire(job);
-            subscribers_call(&job->subscribers);
+        while (task->committing != NULL) {
+            Job *job = task->committing;
+            task->committing = job->next_shared;
+            commit_end_job(task, job, status, detail);
         }
-        end(saving);
-        saving_free(saving);
+        if (status == STATUS_OK || task->jobs == NULL) {
+            ended = commit_continue(task);
+        } else if (!manager->is_closing) {
+            task->is_waiting = true;
+            task->next = manager->retry_commits;
+            manager->retry_commits = task;
+        } // else jobs_stop releases it
     }
+    write_ended(manager);
+    pthread_mutex_unlock(&manager->lock);
+    task_free(ended);
 }
 
 static size_t text_bytes(const char *text) {
     return text != NULL ? strlen(text) : 0;
 }
 
-static size_t run_result_bytes(const RunResult *run_result) {
-    const ResultRow *row = &run_result->result;
-    return sizeof(Saving) + (run_result->outcome != NULL ? outcome_bytes(run_result->outcome) : 0) +
+static size_t run_result_bytes(const RunResult *run) {
+    const ResultRow *row = &run->result;
+    return sizeof(Task) + (run->outcome != NULL ? outcome_bytes(run->outcome) : 0) +
            text_bytes(row->scene) + text_bytes(row->plan) + text_bytes(row->summary) +
            row->outcome.size + text_bytes(row->study);
 }
 
-// With the lock held: without memory for a Saving its jobs are failed here, and computed again at
-// the next start.
-static void lose(JobManager *manager, Task *task, RunResult *run_result) {
-    Job *jobs[1];
-    const JobRow *rows[1];
-    Saving saving = {.manager = manager,
-                     .task = task,
-                     .run_result = *run_result,
-                     .jobs = jobs,
-                     .rows = rows,
-                     .room = 1};
-    manager->saving++;
-    for (;;) {
-        close_jobs(&saving, COUNT(jobs));
-        if (saving.count == 0)
-            break;
-        publish(&saving, STATUS_NO_MEMORY, "no memory to save the job", false);
-    }
-    end(&saving);
-}
-
-void jobs_save(JobManager *manager, Task *task, RunResult *run_result) {
-    Saving *saving = calloc(1, sizeof *saving);
-    if (saving == NULL) {
-        pthread_mutex_lock(&manager->lock);
-        lose(manager, task, run_result);
-        pthread_mutex_unlock(&manager->lock);
-        task_free(task);
-        return;
-    }
-    *saving = (Saving){.manager = manager,
-                       .task = task,
-                       .run_result = *run_result,
-                       .bytes = run_result_bytes(run_result)};
+void task_finish(JobManager *manager, Task *task, RunResult *run_result) {
+    RunResult *run = &task->run_result;
+    Outcome *outcome = run_result->outcome != NULL ? outcome_ref(run_result->outcome) : NULL;
+    const double seconds = run_result->seconds;
+    char result[sizeof task->result];
+    memcpy(result, task->result, sizeof result);
+    *run = *run_result;
     *run_result = (RunResult){0};
-    if (saving->run_result.status == STATUS_OK && !task->recompute_only)
-        saving->head = result_summary_new(&saving->run_result.result);
+    task->saving_bytes = run_result_bytes(run);
+    if (run->status == STATUS_OK && !task->recompute_only)
+        task->summary = result_summary_new(&run->result);
+    // Only the series was wanted: the result is saved already, unless it was deleted meanwhile.
+    const bool is_cached =
+        outcome != NULL && task->recompute_only && db_result_exists(manager->db, task->result);
     pthread_mutex_lock(&manager->lock);
     manager->saving++;
-    manager->saving_bytes += saving->bytes;
-    // Only the series was wanted: the result is saved already. But it may have been deleted
-    // meanwhile, and what is in the cache counts as known.
-    if (saving->run_result.outcome != NULL && task->recompute_only &&
-        db_result_exists(manager->db, task->result))
-        cache_put(manager->cache, task->result, saving->run_result.outcome, NULL);
-    const bool goes_on = go_on(saving);
-    if (!goes_on)
-        end(saving);
+    manager->saving_bytes += task->saving_bytes;
+    task->is_saving = true;
+    if (is_cached)
+        cache_put(manager->cache, task->result, outcome, NULL);
+    Task *ended = commit_continue(task);
     pthread_mutex_unlock(&manager->lock);
-    if (!goes_on)
-        saving_free(saving);
+    task_free(ended);
+    if (outcome != NULL)
+        jobs_keep_series(manager, result, outcome, seconds);
+    outcome_unref(outcome);
+}
+
+void task_abandon(JobManager *manager, Task *task) {
+    pthread_mutex_lock(&manager->lock);
+    task_release(task);
+    pthread_mutex_unlock(&manager->lock);
+    task_free(task);
+}
+
+static void cancel_done(void *context, Status status, const char *detail) {
+    Job *job = context;
+    JobManager *manager = job->manager;
+    pthread_mutex_lock(&manager->lock);
+    job->is_durable = status == STATUS_OK;
+    job->refusal = status;
+    text_fit(job->refused, sizeof job->refused, detail);
+    // Until the database has it, it is found here.
+    if (status == STATUS_OK) {
+        job_retire(job);
+    } else if (!manager->is_closing) {
+        job->next_retry = manager->retry_cancels;
+        manager->retry_cancels = job_ref(job);
+    }
+    subscribers_call(&job->subscribers);
+    write_ended(manager);
+    pthread_mutex_unlock(&manager->lock);
+    job_unref(job);
+}
+
+// With the lock held, of a cancelled job.
+static void cancel_enqueue(Job *job) {
+    job->written = job->row;
+    job->written.is_unsaved = !job->is_durable;
+    job->is_durable = false;
+    job->write.done = (WriteDone){cancel_done, job_ref(job)};
+    job->manager->writes++;
+    db_job_update_post(job->manager->db, &job->written, &job->write);
+}
+
+// With the lock held: the job as it is to be inserted.
+static void insert_begin(Job *job) {
+    job->is_inserting = true;
+    job->written = job->row;
+    if (!job_state_is_final(job->row.state))
+        job->written.state = JOB_ACCEPTED; // the database knows no running jobs
+}
+
+// With the lock held. Returns its task where that has ended, to be freed without the lock.
+static Task *insert_end(Job *job, Status status, const char *detail) {
+    Task *task = job->task != NULL && job->task->is_saving ? job->task : NULL;
+    job->is_inserting = false;
+    job->is_durable = status == STATUS_OK;
+    if (status == STATUS_OK) {
+        free(job->row.scene);
+        job->row.scene = NULL;
+    }
+    if (job->row.state == JOB_DISMISSED) {
+        cancel_enqueue(job);
+    } else if (status != STATUS_OK) {
+        job_detach(job);
+        job_refuse(job, status, detail);
+    } else {
+        subscribers_call(&job->subscribers);
+    }
+    return task != NULL ? commit_continue(task) : NULL;
+}
+
+static void insert_done(void *context, Status status, const char *detail) {
+    Job *job = context;
+    JobManager *manager = job->manager;
+    pthread_mutex_lock(&manager->lock);
+    Task *ended = insert_end(job, status, detail);
+    write_ended(manager);
+    pthread_mutex_unlock(&manager->lock);
+    task_free(ended);
+    job_unref(job);
+}
+
+void job_insert(Job *job) {
+    insert_begin(job);
+    job->write.done = (WriteDone){insert_done, job_ref(job)};
+    job->manager->writes++;
+    db_job_post(job->manager->db, &job->written, &job->write);
+}
+
+Status job_insert_now(Job *job, Problem *problem) {
+    JobManager *manager = job->manager;
+    pthread_mutex_lock(&manager->lock);
+    insert_begin(job);
+    pthread_mutex_unlock(&manager->lock);
+    const Status status = db_job_add(manager->db, &job->written, problem);
+    pthread_mutex_lock(&manager->lock);
+    task_free(insert_end(job, status, status != STATUS_OK ? problem->detail : ""));
+    pthread_mutex_unlock(&manager->lock);
+    return status;
+}
+
+void job_save(Job *job) {
+    if (job->manager == NULL)
+        return;
+    pthread_mutex_lock(&job->manager->lock);
+    if (!job->is_durable && !job->is_inserting && !job->is_ending && job->refusal == STATUS_OK &&
+        !job_state_is_final(job->row.state))
+        job_insert(job);
+    pthread_mutex_unlock(&job->manager->lock);
+}
+
+static Status cancel_refuse(const char *id, int state, Problem *problem) {
+    return problem_set(problem, STATUS_CONFLICT,
+                       "the job %.40s cannot be dismissed: it is %s already", id,
+                       job_state_names[state]);
+}
+
+// With the lock held.
+static Status cancel_live(Job *job, Problem *problem) {
+    JobRow *row = &job->row;
+    if (job->is_ending || job_state_is_final(row->state))
+        return cancel_refuse(row->id, job->is_ending ? job->written.state : row->state, problem);
+    const int64_t now_ns = clock_monotonic_ns();
+    row->state = JOB_DISMISSED;
+    row->finished_unix_ms = clock_unix_ms();
+    row->total = 1e-9 * (double)(now_ns - job->submitted_ns);
+    if (job->started_ns > 0)
+        row->run = 1e-9 * (double)(now_ns - job->started_ns);
+    else
+        row->queued = row->total;
+    job_detach(job);
+    job_release(job);
+    if (!job->is_inserting)
+        cancel_enqueue(job); // else insert_done does
+    else
+        job->is_durable = false;
+    subscribers_call(&job->subscribers);
+    job_metrics_ended(&job->manager->totals, JOB_DISMISSED, false);
+    return STATUS_OK;
+}
+
+Status jobs_cancel(JobManager *manager, const char *id, Job **cancelled, Problem *problem) {
+    Job *job;
+    Task *ended = NULL;
+    *cancelled = NULL;
+    TRY(jobs_find(manager, id, &job, problem));
+    Status status;
+    if (job->manager == NULL) {
+        status = cancel_refuse(id, job->row.state, problem);
+    } else {
+        pthread_mutex_lock(&manager->lock);
+        Task *task = job->task != NULL && job->task->is_saving ? job->task : NULL;
+        status = cancel_live(job, problem);
+        if (status == STATUS_OK && task != NULL)
+            ended = commit_continue(task);
+        pthread_mutex_unlock(&manager->lock);
+        task_free(ended);
+    }
+    if (status == STATUS_OK)
+        *cancelled = job;
+    else
+        job_unref(job);
+    return status;
+}
+
+void commit_retry(JobManager *manager) {
+    Task *ended = NULL, *next;
+    pthread_mutex_lock(&manager->lock);
+    Task *task = manager->retry_commits;
+    manager->retry_commits = NULL;
+    for (; task != NULL; task = next) {
+        next = task->next;
+        task->is_waiting = false;
+        if (commit_continue(task) != NULL) {
+            task->next = ended;
+            ended = task;
+        }
+    }
+    Job *job = manager->retry_cancels;
+    manager->retry_cancels = NULL;
+    for (Job *after; job != NULL; job = after) {
+        after = job->next_retry;
+        cancel_enqueue(job);
+        job_unref(job);
+    }
+    pthread_mutex_unlock(&manager->lock);
+    for (; ended != NULL; ended = next) {
+        next = ended->next;
+        task_free(ended);
+    }
 }

@@ -1,28 +1,21 @@
-// A request sent twice under one Idempotency-Key is done once. Not the key's place in the database.
-// Used by submit.c.
+// A request sent twice under one Idempotency-Key is done once.
 #ifndef SERVER_JOBS_IDEMPOTENCY_H
 #define SERVER_JOBS_IDEMPOTENCY_H
 
-#include "server/jobs/jobs_private.h"
+#include "server/jobs/jobs.h"
 
 enum { KEY_MAX = 255 };
 
-// Lies on the stack of whoever submits, between idempotency_begin and idempotency_end.
-typedef struct IdempotencyHold {
-    struct IdempotencyHold *next;
-    const char *client; // "" for nobody in particular
-    char key[KEY_MAX + 1];
-    char request[65]; // SHA-256 of the body
-    bool is_held;
-} IdempotencyHold;
+typedef struct IdempotencyKey {
+    const char *client;    // NULL: a client without a token
+    char key[KEY_MAX + 1]; // "": none
+    char request[65];      // SHA-256 of the body
+} IdempotencyKey;
 
-// Waits for others who submit under the same key. Then *job is the job of an earlier request, or
-// NULL and the key is this submission's until idempotency_end, which must follow in any case.
-// STATUS_USAGE for a key that is none, STATUS_REUSED.
-Status idempotency_begin(JobManager *manager, const Submission *submission, IdempotencyHold *hold,
-                         Job **job, Problem *problem);
-// The job of a new submission: found from now on, also before the store has it.
-void idempotency_remember(JobManager *manager, const IdempotencyHold *hold, Job *job);
-void idempotency_end(JobManager *manager, IdempotencyHold *hold);
+// That of the submission. STATUS_USAGE for a malformed one.
+Status idempotency_read(const Submission *submission, IdempotencyKey *key, Problem *problem);
+// *job is a reference to the job of an earlier request, or NULL. STATUS_REUSED for another body.
+Status idempotency_find(JobManager *manager, const IdempotencyKey *key, Job **job,
+                        Problem *problem);
 
 #endif

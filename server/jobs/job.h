@@ -59,15 +59,16 @@ void job_view_clear(JobView *show);
 // Its state and, in *progress, percent: what may be looked at often.
 JobState job_peek(Job *job, double *progress);
 
-// Whether the store has the job as it is now, that is accepted or in its final state: nobody may be
-// told of it before. STATUS_OK with *is_kept false while that is under way, which asking hurries;
-// otherwise why it could not be kept. A job that could not be accepted never was.
-Status job_is_durable(Job *job, bool *is_kept, Problem *problem);
+// Whether the database has the job as it is now; a client must not be told of it before. Otherwise
+// the error for which it could not be saved: a job that could not be accepted never was.
+Status job_is_durable(Job *job, bool *is_durable, Problem *problem);
+// Inserts it where that was not begun, without waiting.
+void job_save(Job *job);
 
-// Has `waker` called once when the job finishes (at once if it is finished). False without memory.
-bool job_subscribe(Job *job, const Callback *callback);
-// The same for when the store has it, or could not take it.
-bool job_subscribe_durable(Job *job, const Callback *callback);
+// Has `callback` called when the job is saved, or could not be, or finishes; at once if the event
+// was before. False without memory.
+typedef enum JobEvent { JOB_IS_DURABLE, JOB_IS_FINISHED } JobEvent;
+bool job_subscribe(Job *job, JobEvent event, const Callback *callback);
 // Takes it back; after this returns it will not be called.
 void job_unsubscribe(Job *job, const Callback *callback);
 

@@ -1,6 +1,4 @@
-// The door for work: names to numbers, check, digest, known or new, queue. Both the daemon's POST
-// and the tests come through here; `impactd run` uses jobs_prepare alone. Not HTTP and not JSON
-// replies.
+// The job manager: validates, deduplicates, queues and runs submissions, and keeps their results.
 #ifndef SERVER_JOBS_JOBS_H
 #define SERVER_JOBS_JOBS_H
 
@@ -23,7 +21,9 @@ typedef struct JobManagerSettings {
     double rate;        // jobs a minute of one client by name; 0: any number
     Callback deleted;   // called after results were deleted; `wake` may be NULL
     size_t store_bytes; // of series in the database, those that are dearer to compute than to read
-    double study_seconds; // of CPU that a study may be predicted to take; 0: any
+    double study_seconds;  // of CPU that a study may be predicted to take; 0: any
+    uint64_t memory_bytes; // that running jobs may be predicted to take together, for which they
+                           // wait; 0: any
     SimulationLimits limits;
 } JobManagerSettings;
 
@@ -47,30 +47,35 @@ Status jobs_charge(JobManager *manager, const char *client, Problem *problem);
 // "r-" and 64 hexadecimal digits: SHA-256 of the canonical form and the engine's version.
 void jobs_result_id(const StudyRequest *inquiry, char target[72]);
 
-// Opens the queue, takes up unfinished jobs of the store, starts the workers. Borrows `store`.
+// Opens the queue, resumes the unfinished jobs of the database, starts the workers. Borrows `db`.
 Status jobs_open(Db *db, const JobManagerSettings *settings, JobManager **manager,
                  Problem *problem);
-// Stops: no new jobs, running ones are interrupted and stay unfinished in the store for the next
-// start.
+// No new jobs; running ones are interrupted and stay unfinished in the database for the next start.
+// Calls all subscribers.
+void jobs_stop(JobManager *manager);
+// Stops it, where that was not done, and frees it. All jobs are unreferenced by then. NULL is
+// accepted.
 void jobs_close(JobManager *manager);
 
-// What is asked, and by whom. Texts are the caller's.
+// Texts are the caller's.
 typedef struct Submission {
     const char *text; // the scene's JSON, perhaps with a study
     size_t size;
-    const char *client;          // its token's name; NULL: nobody in particular
+    const char *client;          // its token's name; NULL: none
+    const char *address;         // of the client without a token; NULL: unknown
     const char *idempotency_key; // as it came, perhaps in quotes; NULL: none
-    bool *is_replayed;           // set where the job is an earlier request's; NULL: not told
+    bool *is_replayed;           // set where the job is an earlier request's; may be NULL
     // Instead of a text the id of a finished job: those points of its sweep that failed are made
     // again. STATUS_CONFLICT where none did or it is not finished, STATUS_GONE for another engine.
     const char *retry_of;
 } Submission;
 
-// Accepts a scene: a job of its own, on its way to the store when this returns; nobody may be told
-// of it until it is kept (job_is_durable). Known results finish it at once (cached), a scene in
-// flight shares that computation, and a key that its client used before for the same body answers
-// with that job (STATUS_REUSED for another body). STATUS_BUSY when the queue is full, STATUS_QUOTA,
-// STATUS_INVALID with the faults. The Job is a hold of the caller's.
+// Accepts a scene as a job of its own. A client must not be given its id before it is durable
+// (job_save). Cached results finish it at once, a scene that is being computed shares that task,
+// and a key that its client used before for the same body returns that job (STATUS_REUSED for
+// another body). STATUS_BUSY when the queue is full, STATUS_QUOTA, STATUS_INVALID with the faults.
+// *job is a reference. Waits for the database where the submission has a key, a study or names a
+// record.
 Status jobs_submit(JobManager *manager, const Submission *submission, Job **job, Problem *problem);
 
 // Seconds from 1 to 3600 after which a submission of `client` that was refused as `status` is worth
@@ -90,11 +95,10 @@ Status jobs_dry_run(JobManager *manager, const char *text, size_t size, DryRun *
                     Problem *problem);
 void dry_run_clear(DryRun *dry_run);
 
-// A job by its id, from memory or the store. STATUS_NOT_FOUND.
+// A job by its id, from memory or the database. STATUS_NOT_FOUND.
 Status jobs_find(JobManager *manager, const char *id, Job **job, Problem *problem);
 
-// Dismisses, for all at once and kept soon (job_is_durable); STATUS_CONFLICT if it is finished
-// already.
+// Cancels the job; it is durable soon (job_subscribe). STATUS_CONFLICT if it is finished already.
 Status jobs_cancel(JobManager *manager, const char *id, Job **job, Problem *problem);
 
 // The Outcome of a result with its series: from memory, from the database where they are stored
@@ -107,12 +111,8 @@ Status jobs_outcome(JobManager *manager, const char *result, const Callback *cal
 Status jobs_outcome_stored(JobManager *manager, const char *result, Outcome **outcome,
                            Problem *problem);
 
-// Tries again to store what could not be stored for want of room; to be called now and then.
-void jobs_retry_sweep(JobManager *manager);
-
-// Deletes a ground-motion record that no result was made with and no unfinished job names, also
-// none that is being accepted just now. STATUS_CONFLICT, STATUS_NOT_FOUND.
-Status jobs_record_delete(JobManager *manager, const char *name, Problem *problem);
+// Tries again to write what there was no room for; to be called now and then.
+void jobs_retry_writes(JobManager *manager);
 
 // Deletes a result for good; its jobs stay and say so. STATUS_CONFLICT while it is being computed,
 // STATUS_NOT_FOUND.

@@ -1,5 +1,4 @@
-// What the jobs room knows, under one lock: jobs, the computations they share, the queue, the
-// cache. Not the door (intake.h). Used by intake.c, job.c and worker.c.
+// What the files of jobs/ share, under one lock: jobs, the tasks that compute for them, the queue.
 #ifndef SERVER_JOBS_JOBS_PRIVATE_H
 #define SERVER_JOBS_JOBS_PRIVATE_H
 
@@ -9,12 +8,11 @@
 #include "server/jobs/cache.h"
 #include "server/jobs/job_metrics.h"
 #include "server/jobs/jobs.h"
-#include "server/jobs/naming.h"
 #include "server/jobs/queue.h"
-#include "server/jobs/result_summary.h"
 #include "server/util/hashmap.h"
 
 enum { OUTCOME_FAILURES = 64 };
+#define STUDY_OWN 0.05 // of the progress, the scene's own run where a study follows
 
 struct StudyRun;
 
@@ -23,50 +21,77 @@ typedef struct Subscribers {
     size_t count;
 } Subscribers;
 
-// One computation of one scene, for all jobs and readers who want it.
+// What a run ends with.
+typedef struct RunResult {
+    Status status;
+    Outcome *outcome;   // NULL unless STATUS_OK
+    StudyAnswer answer; // its study is NULL where none was asked for
+    ResultRow result;
+    char *problem; // problem+json of a failed run
+    char detail[256];
+    int64_t began_ns, ended_ns;
+    double seconds; // of CPU, of the scene's own run
+} RunResult;
+
+// The computation of one scene, for all jobs and readers that want it. It belongs to the queue,
+// then to the worker that runs it, then to the commit of its result.
 typedef struct Task {
-    HashMapEntry indexed; // in flight, by result; not once it was stopped
+    HashMapEntry indexed; // in manager->tasks, by result; not after it was stopped
+    JobManager *manager;
     char result[72];
     StudyRequest inquiry;
-    char *scene, *warnings; // documents
-    QueueEntry queued;      // also for the next turn of a study
-    bool is_running;
+    char *scene, *warnings;            // documents
+    QueueEntry queued;                 // also for the next chunk of a study
+    uint64_t bytes;                    // of memory that it takes while it runs, as estimated
+    bool has_memory;                   // these are counted in manager->memory
+    bool is_waiting, waits_for_memory; // in manager->waiting
+    bool is_running;                   // a worker began it
+    bool is_saving;                    // it has run
+    size_t workers;                    // that have a part of it now
+    struct Task *next;                 // in manager->waiting or manager->retry_commits
     int64_t began_ns;
     bool recompute_only;        // only its series is wanted: the result is saved already
-    Job *jobs;                  // those who wait for it, by next_shared
+    Job *jobs;                  // that wait for it, by next_shared; holds a reference to each
     Subscribers result_waiters; // readers of the outcome
     atomic_bool is_stopped;
     atomic_uint progress;   // in 1/10,000
-    struct StudyRun *study; // that is under way, under the lock
-    struct Task *next_stalled;
+    struct StudyRun *study; // while it runs, under the lock
+    struct SweepRun *sweep; // likewise, for the progress of its points
+    RunResult run_result;   // once is_saving
+    ResultSummary *summary;
+    size_t saving_bytes;
+    Job *committing; // of its jobs, those whose last state is being written
+    ResultCommit commit;
+    PendingWrite write;       // of `commit`
+    bool is_saved, is_logged; // the result is in the database; it was logged that it could not be
 } Task;
 
-// A job goes to the store twice: when it is accepted and when it is final. Both are posted; where
-// the second comes before the first was begun, the first is withdrawn. `row` is what others see.
+// `row` is what others see. A job is inserted when a client must be given its id, or with its
+// result.
 struct Job {
-    HashMapEntry indexed; // live, by id
+    HashMapEntry indexed; // in manager->jobs, by id
     atomic_size_t refcount;
-    JobManager *manager; // held, for its lock; NULL: read from the store, never changes
+    JobManager *manager; // for its lock; NULL: read from the database, never changes
     JobRow row;
-    JobRow insert_row, final_row; // as posted; both borrow row's texts, but for closing.problem
-    PendingWrite *ticket;         // of `opening`, until the store has answered or it was withdrawn
-    bool is_closing;              // its last state is on the way to the store
-    bool is_kept;                 // the store has it as `row` shows it
-    Status refusal;               // why not
-    char refused[256];
-    size_t scene_size;     // in bytes, counted while it is live
-    bool is_live;          // in the index, which holds it
-    bool is_counted;       // takes a place in the queue
-    ResultSummary *head;   // of the result
-    Task *task;            // NULL: not yet or no more
-    QueueClient *client;   // NULL while it was not admitted
-    Job *next_keyed;       // in intake->keyed
-    Job *next_undismissed; // in intake->undismissed
-    Job *next_shared;
+    JobRow written;         // as it is being written; borrows the texts of `row`
+    PendingWrite write;     // its insertion or cancellation
+    bool is_inserting;      // on the way to the database, as accepted
+    bool is_ending;         // on the way to the database, in its last state
+    bool is_durable;        // the database has it as `row` shows it
+    Status refusal;         // why it could not be saved
+    char refused[256];      // likewise
+    size_t scene_size;      // in bytes, counted while it is live
+    bool is_live;           // in manager->jobs, which holds a reference
+    bool is_counted;        // takes a place in the queue
+    ResultSummary *summary; // of the result
+    Task *task;             // NULL: not yet or no more
+    QueueClient *client;    // NULL while it was not admitted
+    Job *next_shared, *next_retry;
     int64_t submitted_ns, started_ns;
-    Subscribers subscribers, save_waiters; // for when it is finished; for when it is kept
+    Subscribers subscribers; // called when it is durable and when it is finished
 };
 
+// Of a task for readers; reported once.
 typedef struct Failure {
     char result[72];
     Status status;
@@ -78,116 +103,106 @@ typedef struct Worker {
     pthread_t thread;
     Task *running;          // or NULL
     struct StudyRun *study; // of which it has a turn, or NULL
-    bool is_spare;       // beyond the number asked for: takes quick work while all others are slow
-    Workspace workspace; // of its thread alone
+    bool is_spare; // beyond the number asked for: takes quick work while all others are slow
+    Workspace workspace;
 } Worker;
 
 struct JobManager {
-    atomic_size_t refcount; // the owner's and one of each Job: a job may be looked at after the
-                            // intake has closed
     Db *db;
     JobManagerSettings settings;
     pthread_mutex_t lock;
-    pthread_cond_t work;       // for a worker, or room for what it makes
+    pthread_cond_t work;       // for a worker, or room for its result
     pthread_cond_t spare_work; // for the spare worker alone
-    pthread_cond_t settled;    // nothing is posted any more
-    pthread_cond_t keys_free;  // a IdempotencyHold was given up
+    pthread_cond_t settled;    // no write is under way
     pthread_mutex_t retries;   // retries of sweeps come one by one; taken before `lock`
-    Naming naming;             // taken before `lock`
-    struct IdempotencyHold *keys;
-    Job *keyed;          // held, by next_keyed: came with a key, and the store may not have them
-    Worker *workers;     // settings.workers of them, and the spare one
-    size_t worker_count; // started
+    Worker *workers;           // settings.workers of them, and the spare one
+    size_t worker_count;       // started
     size_t slow_running;
-    double pace; // run time over what was foretold, of late
+    double estimate_bias; // run time over its estimate, averaged over the last runs
     bool is_closing;
-    HashMap *jobs;                   // not yet finished
-    HashMap *in_flight;              // computations
-    Queue *queue;                    // of computations
-    struct StudyRun *studies;        // under way
-    size_t study_count, study_bytes; // of them, and that they hold
-    Task *waiting_for_memory;        // studies that could not begin for want of room
-    size_t live;                     // jobs not yet finished
-    size_t scene_bytes;              // of them all
-    size_t posted;                   // writes that the store has yet to answer
-    size_t saving, saving_bytes;     // computations that have run and are not yet saved
-    struct Saving *retry_commits;    // of these, what waits for room in the store
-    Job *retry_cancels;              // held: dismissed, but the store could not be told
+    HashMap *jobs;   // not yet finished
+    HashMap *tasks;  // by result
+    Queue *queue;    // of tasks
+    uint64_t memory; // in bytes, of running tasks, as estimated, where it is counted
+    size_t memory_waiters;
+    Task *waiting, **waiting_last; // for memory, or for room in the database
+    struct StudyRun *studies;      // under way
+    size_t live;                   // jobs not yet finished
+    size_t scene_bytes;            // of them all
+    size_t writes;                 // under way
+    size_t saving, saving_bytes;   // tasks that have run and are not yet saved
+    Task *retry_commits;           // of these, those that wait for room in the database
+    Job *retry_cancels;            // referenced: cancelled, but it could not be written
     Cache *cache;
     CacheStats rows, stored;            // results and series found in the database
     size_t keeping_bytes;               // of series on the way there
     atomic_int large_plans;             // requests that plan large structures
-    Failure failures[OUTCOME_FAILURES]; // of computations for readers, told once
+    Failure failures[OUTCOME_FAILURES]; // of tasks for readers
     size_t next_failure;
     JobMetrics totals;
 };
 
-bool subscribers_add(Subscribers *subscribers, const Callback *callback); // false without memory
-void subscribers_remove(Subscribers *subscribers, const Callback *callback);
-void subscribers_call(Subscribers *subscribers); // calls and forgets all
-
-Job *job_new(JobManager *manager); // one hold; NULL without memory
-
-Task *task_new(const char *result);
-void task_free(Task *task);
-
-void jobs_drop(JobManager *manager); // frees what is left with the last hold
-
-// Held for the caller; NULL if no such job is in memory.
-Job *jobs_find_live(JobManager *manager, const char *id);
-
-// With the lock held: what jobs_retry_sweep does for jobs that were dismissed.
-void jobs_retry_dismissed(JobManager *manager);
-// Nobody else is there any more: what waits for room stays unfinished in the store.
-void jobs_abandon_delayed(JobManager *manager);
-
-// With the lock held.
-// Gives back its place in the queue; it can still be found.
-void jobs_release(Job *job);
-void jobs_retire(Job *job); // it is live no more; drops the index's hold
-// `client` NULL: ahead of all.
-void jobs_enqueue(JobManager *manager, Task *task, QueueClient *client);
-void jobs_call_worker(JobManager *manager); // something was put into the queue
+// task.c. With the lock held, but for the first six.
+Task *task_new(JobManager *manager, const char *result);
+void task_free(Task *task);            // its study was freed
+Job *job_new(JobManager *manager);     // one reference; NULL without memory
+bool task_is_shared(const Task *task); // its study has members, which are shared out
 Task *task_of(QueueEntry *entry);
-void jobs_admit(JobManager *manager, Job *job); // it is live, held by the index
-void jobs_attach(Job *job, Task *task);
-void jobs_detach(Job *job); // from its computation, which stops when nobody is left
-// The store has answered one of the posted writes.
-void jobs_settle(JobManager *manager);
-// It could not be kept: whoever waits is told, and it is live no more.
-void jobs_refuse(Job *job, Status status, const char *detail);
-// What was posted first need not be written if it was not begun.
-void jobs_withdraw(Job *job);
+// A Progress's advance: sets a task's progress. False once it was stopped.
+bool task_advance(void *task, double fraction);
+bool task_is_wanted(void *task, double fraction); // the same without setting it
+bool subscribers_add(Subscribers *subscribers, const Callback *callback); // false without memory
+void subscribers_call(Subscribers *subscribers);                          // calls and removes all
+// Puts it into the queue; `client` NULL: ahead of all.
+void task_enqueue(Task *task, QueueClient *client);
+void jobs_call_worker(JobManager *manager); // something was put into the queue
+// Counts its memory. False: it waits, in manager->waiting, until task_end calls it up.
+bool task_begin(Task *task);
+void task_end(Task *task);
+void task_wait(Task *task);
+void jobs_call_waiting(JobManager *manager); // all that wait try again
+void task_attach(Task *task, Job *job);
+// From its task, which stops when no job and no reader is left.
+void job_detach(Job *job);
+void job_admit(Job *job); // it is live
+// Returns its place in the queue; it can still be found.
+void job_release(Job *job);
+void job_retire(Job *job); // it is live no more
+// It could not be saved: it is live no more. Not of a task.
+void job_refuse(Job *job, Status status, const char *detail);
+// Releases all of its jobs, which stay unfinished in the database, and its readers. It is to be
+// freed.
+void task_release(Task *task);
 
-// An unfinished job of the store, from an earlier life. Takes the row. Only what concerns the whole
-// program is an error.
-Status jobs_take_up(JobManager *manager, JobRow *row, Problem *problem);
-
-// What a computation came to, as documents.
-typedef struct RunResult {
-    Status status;
-    Outcome *outcome;   // NULL unless STATUS_OK
-    StudyAnswer answer; // its study NULL where none was asked for
-    ResultRow result;
-    char *problem; // of failed jobs
-    char detail[256];
-    int64_t began_ns, ended_ns;
-    double seconds; // of CPU, of the scene's own run
-} RunResult;
-void run_result_clear(RunResult *run_result);
-
-// Without the lock. Takes the computation, which has run, and what is in `findings`: saves them
-// with the jobs that wait for them, and says that these are finished once that is durable.
-void jobs_save(JobManager *manager, Task *task, RunResult *run_result);
-// Whether what failed is worth another try: a full disk and the like pass.
+// commit.c. Status is worth another try: a full disk and the like pass.
 bool status_is_transient(Status status);
-// With the lock held: whether a worker should wait before it makes more to be saved.
+void run_result_clear(RunResult *run_result);
+void run_result_fail(RunResult *run_result, Status status, const Problem *problem);
+// The document of the study's answer, once it is complete.
+Status run_result_add_to_study(RunResult *run_result, Problem *problem);
+// Without the lock. Takes both: saves the result with the jobs, also its series where that pays.
+void task_finish(JobManager *manager, Task *task, RunResult *run_result);
+// Without the lock. Takes the task: no job waits for it any more, or the daemon ends.
+void task_abandon(JobManager *manager, Task *task);
+// With the lock held: a worker should wait before it makes more to be saved.
 bool jobs_is_behind(const JobManager *manager);
+// With the lock held: inserts it as it is, without waiting.
+void job_insert(Job *job);
+// Without the lock. The same, and waits for it. STATUS_CONFLICT: another job has its key, or a
+// record that it names does not exist.
+Status job_insert_now(Job *job, Problem *problem);
+// Without the lock: what could not be written is tried again.
+void commit_retry(JobManager *manager);
 
-// Without the lock: has the series kept by the store if it is dearer to compute than to read.
+// series.c. Without the lock: saves the series if it is dearer to compute than to read.
 void jobs_keep_series(JobManager *manager, const char *result, const Outcome *outcome,
                       double seconds);
 
+// worker.c
 void *worker_main(void *worker);
+
+// submit.c: an unfinished job of the database. Takes the row. Only what concerns the whole program
+// is an error.
+Status jobs_take_up(JobManager *manager, JobRow *row, Problem *problem);
 
 #endif

@@ -53,7 +53,7 @@ static double left_of(const JobManager *manager, Task *task) {
     const double passed = 1e-9 * (double)(clock_monotonic_ns() - task->began_ns);
     const double done = atomic_load(&task->progress) / 10000.0;
     // The first part of a run may go faster than the rest.
-    const double estimated = task->queued.seconds * manager->pace - passed;
+    const double estimated = task->queued.seconds * manager->estimate_bias - passed;
     const double seen = done > 0.02 ? passed * (1 - done) / done : 0;
     return fmax(fmax(estimated, seen), 0);
 }
@@ -78,7 +78,7 @@ int jobs_retry_after(JobManager *manager, const char *name, Status status) {
                 soonest = fmin(soonest, left_of(manager, run->task));
         // None of its jobs runs: their turn comes within what waits.
         seconds = isfinite(soonest) ? soonest
-                                    : queue_seconds(manager->queue) * manager->pace /
+                                    : queue_seconds(manager->queue) * manager->estimate_bias /
                                           (double)manager->settings.workers;
     }
     pthread_mutex_unlock(&manager->lock);

@@ -42,7 +42,7 @@ static void *work(void *context) {
     int64_t next_ns = 0; // to look for what is to go
     uint64_t pages = 0;
     do {
-        jobs_retry_sweep(keeper->manager);
+        jobs_retry_writes(keeper->manager);
         if (clock_monotonic_ns() < next_ns)
             continue;
         Removed removed;

@@ -24,7 +24,8 @@ static void kept(void *context, Status status, const char *detail) {
     (void)detail;
     pthread_mutex_lock(&manager->lock);
     manager->keeping_bytes -= keeping->size;
-    jobs_settle(manager);
+    if (--manager->writes == 0)
+        pthread_cond_broadcast(&manager->settled);
     pthread_mutex_unlock(&manager->lock);
     free(keeping);
 }
@@ -42,7 +43,7 @@ void jobs_keep_series(JobManager *manager, const char *result, const Outcome *ou
         keeping != NULL && !manager->is_closing && manager->keeping_bytes + size <= KEEPING_BYTES;
     if (has_room) {
         manager->keeping_bytes += size;
-        manager->posted++;
+        manager->writes++;
     }
     pthread_mutex_unlock(&manager->lock);
     if (!has_room) {
@@ -128,18 +129,18 @@ static Status compute_again(JobManager *manager, const char *result, const Callb
     if (status == STATUS_OK && strcmp(id, result) != 0)
         status = problem_set(problem, STATUS_INTERNAL,
                              "the stored scene no longer stands for this result");
-    if (status == STATUS_OK && (task = task_new(result)) == NULL)
+    if (status == STATUS_OK && (task = task_new(manager, result)) == NULL)
         status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the series");
     if (status == STATUS_OK) {
         task->inquiry = inquiry;
         inquiry = (StudyRequest){0};
         task->recompute_only = true;
         pthread_mutex_lock(&manager->lock);
-        Task *other = hashmap_find(manager->in_flight, result);
+        Task *other = hashmap_find(manager->tasks, result);
         const bool is_asked =
             subscribers_add(&(other != NULL ? other : task)->result_waiters, callback);
         if (other == NULL && is_asked && !manager->is_closing) {
-            jobs_enqueue(manager, task, NULL);
+            task_enqueue(task, NULL);
             task = NULL;
         }
         if (!is_asked || manager->is_closing)
@@ -161,7 +162,7 @@ Status jobs_outcome(JobManager *manager, const char *result, const Callback *cal
     Task *task = NULL;
     if (*outcome == NULL) {
         status = tell_failure(manager, result, problem);
-        task = hashmap_find(manager->in_flight, result);
+        task = hashmap_find(manager->tasks, result);
         if (status == STATUS_OK && task != NULL &&
             !subscribers_add(&task->result_waiters, callback))
             status = problem_set(problem, STATUS_NO_MEMORY, "no memory for a reader");

@@ -14,27 +14,9 @@
 #include "server/util/log.h"
 
 enum {
-    STUDIES_BYTES = 512 << 20, // held by all studies in progress
-    STUDIES_PER_WORKER = 2,    // that may begin whatever they hold
-    TURN_MS = 10,              // at least, of a turn
-    LOOK_MS = 1,               // how often a turn looks whether other work waits
+    TURN_MS = 10, // at least, of a turn
+    LOOK_MS = 1,  // how often a turn looks whether other work waits
 };
-
-bool study_is_shared(const Task *task) {
-    const Variant *study = task->inquiry.study;
-    return study != NULL && !task->recompute_only && study_has_members(study);
-}
-
-void study_estimate(Task *task, const SimulationLimits *limits) {
-    const StudyRequest *inquiry = &task->inquiry;
-    const Cost own = simulation_cost(&inquiry->simulation);
-    Cost whole = own;
-    // A series that is computed again needs no study.
-    if (!task->recompute_only && study_request_cost(inquiry, limits, &whole, NULL) != STATUS_OK)
-        whole.cpu_seconds = queue_quick; // the run will report it
-    task->queued.seconds = whole.cpu_seconds;
-    task->queued.charge = study_is_shared(task) ? own.cpu_seconds : 0;
-}
 
 // The task's progress, which never decreases. False: the task was stopped.
 static bool study_advance_task(void *context, double fraction) {
@@ -89,10 +71,8 @@ static Status study_open(Worker *worker, StudyRun *run, StudyAnswer *answer, Pro
                     problem));
     TRY(study_engine_open(&run->engine, run->work, &settings->limits, &members,
                           is_sweep ? 0 : settings->workers, problem));
-    if (!is_sweep) {
-        run->bytes = run->work->bytes + run->engine.window * run->work->part_bytes;
+    if (!is_sweep)
         return STATUS_OK;
-    }
     return sweep_run_open(worker->manager->db, run->task->result, run->task->scene, &run->engine,
                           settings->workers, &worker->workspace, &run->sweep, problem);
 }
@@ -113,37 +93,17 @@ Status study_start(Worker *worker, Task *task, RunResult *run_result, Problem *p
     }
     run->run_result = *run_result;
     *run_result = (RunResult){0};
-    run->bytes += outcome_bytes(run->run_result.outcome);
-    run->in_hand = 1;
     pthread_mutex_lock(&manager->lock);
-    task->study = run; // which frees it
+    task->study = run;
+    task->sweep = run->sweep;
     run->next = manager->studies;
     manager->studies = run;
-    manager->study_count++;
-    manager->study_bytes += run->bytes;
     study_enqueue(run);
     pthread_mutex_unlock(&manager->lock);
     return STATUS_OK;
 }
 
-bool study_must_wait(const JobManager *manager, const Task *task) {
-    return study_is_shared(task) &&
-           manager->study_count >= STUDIES_PER_WORKER * manager->settings.workers &&
-           manager->study_bytes >= STUDIES_BYTES;
-}
-
-// With the lock held.
-static void study_resume_waiting(JobManager *manager) {
-    while (manager->waiting_for_memory != NULL) {
-        Task *task = manager->waiting_for_memory;
-        manager->waiting_for_memory = task->next_stalled;
-        queue_push_front(manager->queue, &task->queued);
-        jobs_call_worker(manager);
-    }
-}
-
 void studies_resume(JobManager *manager) {
-    study_resume_waiting(manager);
     for (StudyRun *run = manager->studies; run != NULL; run = run->next)
         if (run->is_paused) {
             run->is_paused = false;
@@ -155,14 +115,12 @@ void studies_resume(JobManager *manager) {
 // list any more, and the caller ends it.
 static bool study_release(StudyRun *run) {
     JobManager *manager = run->manager;
-    if (!study_is_over(run) || run->in_hand > 1) {
-        run->in_hand--;
+    if (!study_is_over(run) || run->task->workers > 1) {
+        run->task->workers--;
         return false;
     }
     queue_remove(manager->queue, &run->task->queued);
-    manager->study_count--;
-    manager->study_bytes -= run->bytes;
-    study_resume_waiting(manager);
+    task_end(run->task);
     StudyRun **at = &manager->studies;
     while (*at != run)
         at = &(*at)->next;
@@ -172,7 +130,7 @@ static bool study_release(StudyRun *run) {
 
 bool study_take(StudyRun *run, StudyTurn *turn) {
     *turn = (StudyTurn){.run = run};
-    run->in_hand++;
+    run->task->workers++;
     if (study_is_over(run)) {
         turn->is_end = study_release(run);
         return turn->is_end;
@@ -184,16 +142,8 @@ bool study_take(StudyRun *run, StudyTurn *turn) {
         is_taken = study_engine_next(&run->engine, false, &turn->member);
     study_enqueue(run);
     if (!is_taken)
-        run->in_hand--;
+        run->task->workers--;
     return is_taken;
-}
-
-void study_stop(StudyRun *run) {
-    if (run->in_hand > 0)
-        return; // the last turn ends it
-    queue_remove(run->manager->queue, &run->task->queued);
-    queue_push_front(run->manager->queue, &run->task->queued);
-    jobs_call_worker(run->manager);
 }
 
 typedef struct TurnClock {
@@ -286,15 +236,22 @@ static void study_finish(Worker *worker, StudyRun *run, Problem *problem) {
         if (status != STATUS_OK)
             run_result_fail(&run->run_result, status, problem);
     }
-    run->run_result.ended_ns = clock_monotonic_ns();
-    if (atomic_load(&task->is_stopped)) {
-        task_abandon(manager, task); // and the run
-    } else {
-        RunResult run_result = run->run_result;
-        run->run_result = (RunResult){0};
+    RunResult run_result = run->run_result;
+    const bool has_rows = run->sweep != NULL, is_stopped = atomic_load(&task->is_stopped);
+    run_result.ended_ns = clock_monotonic_ns();
+    run->run_result = (RunResult){0};
+    pthread_mutex_lock(&manager->lock);
+    task->study = NULL;
+    task->sweep = NULL;
+    pthread_mutex_unlock(&manager->lock);
+    study_run_free(run);
+    if (is_stopped)
+        task_abandon(manager, task);
+    else
         task_finish(manager, task, &run_result);
-        run_result_clear(&run_result);
-    }
+    if (is_stopped && has_rows)
+        (void)db_sweep_tidy(manager->db, NULL);
+    run_result_clear(&run_result);
 }
 
 void study_leave(Worker *worker, StudyRun *run, Problem *problem) {

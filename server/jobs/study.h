@@ -3,9 +3,9 @@
 #ifndef SERVER_JOBS_STUDY_H
 #define SERVER_JOBS_STUDY_H
 
+#include "server/jobs/jobs_private.h"
 #include "server/jobs/study_engine.h"
 #include "server/jobs/sweep.h"
-#include "server/jobs/worker.h"
 
 typedef struct StudyRun {
     struct StudyRun *next; // in the manager's list
@@ -14,10 +14,8 @@ typedef struct StudyRun {
     StudyWork *work;
     StudyEngine engine;
     SweepRun *sweep; // its rows go to the database; NULL: the parts are folded in memory
-    size_t bytes;    // that it holds, about
     RunResult run_result;
     // Under the manager's lock:
-    size_t in_hand;        // turns that workers have
     double member_seconds; // that a member takes, about
     bool is_paused;        // until the database takes its rows
     bool is_pause_logged;
@@ -33,12 +31,6 @@ typedef struct StudyTurn {
     bool is_end;
 } StudyTurn;
 
-// Whether the task has a study whose members are shared out to the workers.
-bool study_is_shared(const Task *task);
-// Sets the estimated cost of a task, and how much of it is charged to its client when it begins:
-// the members of a study have turns of their own.
-void study_estimate(Task *task, const SimulationLimits *limits);
-
 // Begins the study of a task whose scene has run, and takes task and run_result unless it fails.
 // The caller has a turn of it then, which study_leave ends.
 Status study_start(Worker *worker, Task *task, RunResult *run_result, Problem *problem);
@@ -50,11 +42,7 @@ void study_run_free(StudyRun *run); // NULL is fine
 // With the manager's lock held:
 // Begins the turn that was taken from the queue. False: there is nothing to do in it.
 bool study_take(StudyRun *run, StudyTurn *turn);
-// Ends a study that is not wanted any more.
-void study_stop(StudyRun *run);
-// Whether the studies in progress hold so much memory that the task has to wait.
-bool study_must_wait(const JobManager *manager, const Task *task);
-// Those that wait for memory or for the database try again.
+// Those that wait for the database try again.
 void studies_resume(JobManager *manager);
 
 #endif

@@ -1,6 +1,7 @@
-// How a scene becomes a job. Its row is on the way to the store while it is computed already;
-// nobody hears of it before the store has it. Known results finish it at once, equal scenes in
-// flight share one computation, and jobs of an earlier life of the daemon come in by the same way.
+// How a scene becomes a job. Cached results finish it at once, equal scenes share one task, and
+// unfinished jobs of the database are resumed in the same way. A job with a key, of a study or of a
+// scene that names a record is inserted before it is queued: the database then arbitrates between
+// requests of one key, keeps the rows of a sweep, and does not let the record be deleted.
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,91 +17,94 @@
 #include "server/util/bytes.h"
 #include "server/util/clock.h"
 
-// With the lock held: one of this scene that is under way, to be shared. One for readers alone
-// saves nothing.
-static Task *find_shared(const JobManager *manager, const char *result) {
-    Task *task = hashmap_find(manager->in_flight, result);
+// All labels of a job, in bytes.
+enum { LABELS_MAX = 8192 };
+
+// A submission on its way to becoming a job.
+typedef struct Entry {
+    JobManager *manager;
+    Job *job;
+    StudyRequest inquiry;
+    bool is_retry; // of a sweep: whatever is cached, it is computed
+    IdempotencyKey key;
+    Job *earlier; // of the same key
+} Entry;
+
+// With the lock held: the task of this scene, to be shared. One for readers alone saves nothing.
+static Task *submit_find_task(const JobManager *manager, const char *result) {
+    Task *task = hashmap_find(manager->tasks, result);
     return task != NULL && task->recompute_only ? NULL : task;
 }
 
 // Plan, summary, work and notes of a result that is there already. STATUS_NOT_FOUND if it is not.
-static Status find_known(JobManager *manager, Job *job, Problem *problem) {
+static Status submit_find_result(JobManager *manager, Job *job, Problem *problem) {
     pthread_mutex_lock(&manager->lock);
-    job->head = cache_head(manager->cache, job->row.result);
-    // What is in flight is not there either.
-    const bool is_new = job->head == NULL && find_shared(manager, job->row.result) != NULL;
+    job->summary = cache_head(manager->cache, job->row.result);
+    const bool is_computed =
+        job->summary == NULL && submit_find_task(manager, job->row.result) != NULL;
     pthread_mutex_unlock(&manager->lock);
-    if (job->head != NULL)
+    if (job->summary != NULL)
         return STATUS_OK;
-    if (is_new)
+    if (is_computed)
         return STATUS_NOT_FOUND;
     ResultRow row = {0};
     const Status status = db_result_head(manager->db, job->row.result, &row, NULL);
     if (status == STATUS_OK)
-        job->head = result_summary_new(&row);
+        job->summary = result_summary_new(&row);
     result_row_clear(&row);
     pthread_mutex_lock(&manager->lock);
     manager->rows.hits += status == STATUS_OK;
     manager->rows.misses += status == STATUS_NOT_FOUND;
-    if (job->head != NULL)
-        cache_put(manager->cache, job->row.result, NULL, job->head);
+    if (job->summary != NULL)
+        cache_put(manager->cache, job->row.result, NULL, job->summary);
     pthread_mutex_unlock(&manager->lock);
     if (status == STATUS_OK || status == STATUS_NOT_FOUND)
         return status;
     return problem_set(problem, status, "the results could not be searched");
 }
 
-// The store has answered that it was accepted.
-static void opened(void *context, Status status, const char *detail) {
-    Job *job = context;
-    JobManager *manager = job->manager;
-    pthread_mutex_lock(&manager->lock);
-    job->ticket = NULL;
-    // What closes it saves the whole, and tells.
-    if (!job->is_closing) {
-        free(job->row.scene);
-        job->row.scene = NULL;
-    }
-    if (!job->is_closing && status != STATUS_OK)
-        jobs_refuse(job, status, detail);
-    if (status == STATUS_OK && (!job->is_closing || !job_state_is_final(job->row.state))) {
-        job->is_kept = true;
-        subscribers_call(&job->save_waiters);
-    }
-    jobs_settle(manager);
-    pthread_mutex_unlock(&manager->lock);
-    job_unref(job); // the post's hold
+static bool submit_inserts_first(const Job *job) {
+    return job->row.idempotency_key != NULL || job->row.study != NULL || job->row.uses != NULL;
 }
 
-// With the lock held.
-static Status post(JobManager *manager, Job *job, WritePriority turn, Problem *problem) {
-    const WriteDone done = {opened, job_ref(job)};
-    job->insert_row = job->row;
-    const Status status = db_job_post(manager->db, &job->insert_row, turn, &done, &job->ticket);
-    if (status == STATUS_OK) {
-        manager->posted++;
+// Inserts the job and waits. Where another request with the same key was earlier, entry->earlier is
+// its job.
+static Status submit_insert(Entry *entry, StudyRequest *inquiry, Problem *problem) {
+    const Status status = job_insert_now(entry->job, problem);
+    if (status != STATUS_CONFLICT)
+        return status;
+    problem_clear(problem);
+    TRY(idempotency_find(entry->manager, &entry->key, &entry->earlier, problem));
+    if (entry->earlier != NULL)
         return STATUS_OK;
-    }
-    job_unref(job); // the post's hold
-    return problem_set(problem, status, "no memory for a job");
+    // Otherwise a record was deleted just now.
+    TRY(resolve_records_again(entry->manager->db, inquiry, problem));
+    return problem_add(problem, STATUS_INVALID, "/excitation",
+                       "names a record that was deleted just now");
 }
 
-static Status finish_known(JobManager *manager, Job *job, Problem *problem) {
+static Status submit_finish(Entry *entry, Problem *problem) {
+    JobManager *manager = entry->manager;
+    Job *job = entry->job;
     JobRow *row = &job->row;
     row->state = JOB_SUCCESSFUL;
     row->is_cached = true;
     row->started_unix_ms = row->finished_unix_ms = clock_unix_ms();
     row->total = 1e-9 * (double)(clock_monotonic_ns() - job->submitted_ns);
-    pthread_mutex_lock(&manager->lock);
-    const Status status = post(manager, job, STORE_NOW, problem);
-    pthread_mutex_unlock(&manager->lock);
-    if (status == STATUS_OK)
+    if (row->idempotency_key != NULL)
+        TRY(submit_insert(entry, &entry->inquiry, problem));
+    else {
+        pthread_mutex_lock(&manager->lock);
+        job_insert(job);
+        pthread_mutex_unlock(&manager->lock);
+    }
+    if (entry->earlier == NULL)
         job_metrics_ended(&manager->totals, JOB_SUCCESSFUL, true);
-    return status;
+    return STATUS_OK;
 }
 
 // With the lock held: whether there is room in the queue.
-static Status find_room(const JobManager *manager, const Job *job, Problem *problem) {
+static Status submit_check_room(const JobManager *manager, const Job *job, Problem *problem) {
     if (manager->is_closing)
         return problem_set(problem, STATUS_BUSY, "the daemon is stopping");
     if (manager->live >= manager->settings.queue_most)
@@ -114,9 +118,9 @@ static Status find_room(const JobManager *manager, const Job *job, Problem *prob
     return limits_check(manager, job->client, problem);
 }
 
-// A computation of this scene, without jobs. Takes the inquiry. NULL without memory.
-static Task *begin(const JobRow *row, StudyRequest *inquiry) {
-    Task *task = task_new(row->result);
+// The task of this scene, without jobs. Takes the inquiry. NULL without memory.
+static Task *submit_make_task(JobManager *manager, const JobRow *row, StudyRequest *inquiry) {
+    Task *task = task_new(manager, row->result);
     if (task != NULL) {
         task->scene = strdup(row->scene);
         task->warnings = strdup(row->warnings);
@@ -126,50 +130,67 @@ static Task *begin(const JobRow *row, StudyRequest *inquiry) {
             return task;
     }
     task_free(task);
-    study_request_clear(inquiry);
     return NULL;
 }
 
-// Queues it, or lets it share what is under way. Takes the inquiry.
-static Status start(JobManager *manager, Job *job, StudyRequest *inquiry, bool is_retry,
-                    Problem *problem) {
-    Task *task = begin(&job->row, inquiry);
+// With the lock held, of an admitted job: queues `task`, or lets the job share another one; then
+// it returns false.
+static bool submit_start(Job *job, Task *task) {
+    JobManager *manager = job->manager;
+    Task *other = submit_find_task(manager, job->row.result);
+    if (manager->is_closing) { // until the next start
+        job_retire(job);
+        return false;
+    }
+    if (job_state_is_final(job->row.state)) // cancelled meanwhile
+        return false;
+    if (other == NULL)
+        task_enqueue(task, job->client);
+    else
+        queue_rebalance(manager->queue, &other->queued, job->client);
+    task_attach(other != NULL ? other : task, job);
+    return other == NULL;
+}
+
+// Admits it, and queues it or lets it share a task.
+static Status submit_queue(Entry *entry, Problem *problem) {
+    JobManager *manager = entry->manager;
+    Job *job = entry->job;
+    Task *task = submit_make_task(manager, &job->row, &entry->inquiry);
     if (task == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
+    const bool inserts_first = submit_inserts_first(job);
+    bool is_queued = false, is_cached = false;
     pthread_mutex_lock(&manager->lock);
-    Task *other = find_shared(manager, job->row.result);
-    // It mostly has run before anyone must be told that it was accepted, and is then written once.
-    // But a sweep's rows need their job beside them.
-    const WritePriority turn = job->row.study == NULL ? STORE_LATER : STORE_NOW;
-    // It may have become known meanwhile.
-    if (other == NULL && !is_retry &&
-        (job->head = cache_head(manager->cache, job->row.result)) != NULL) {
-        pthread_mutex_unlock(&manager->lock);
-        task_free(task);
-        return finish_known(manager, job, problem);
-    }
-    Status status = find_room(manager, job, problem);
-    if (status == STATUS_OK)
-        status = post(manager, job, turn, problem);
-    if (status == STATUS_OK) {
-        jobs_admit(manager, job);
-        if (other == NULL)
-            jobs_enqueue(manager, task, job->client);
-        else
-            queue_rebalance(manager->queue, &other->queued, job->client);
-        jobs_attach(job, other != NULL ? other : task);
+    // It may have been saved meanwhile.
+    if (!entry->is_retry && submit_find_task(manager, job->row.result) == NULL)
+        is_cached = (job->summary = cache_head(manager->cache, job->row.result)) != NULL;
+    Status status = is_cached ? STATUS_OK : submit_check_room(manager, job, problem);
+    if (status == STATUS_OK && !is_cached) {
+        job_admit(job);
+        if (!inserts_first)
+            is_queued = submit_start(job, task);
     }
     pthread_mutex_unlock(&manager->lock);
-    if (status != STATUS_OK || other != NULL)
+    if (status == STATUS_OK && is_cached) {
+        entry->inquiry = task->inquiry;
+        task->inquiry = (StudyRequest){0};
+        status = submit_finish(entry, problem);
+    } else if (status == STATUS_OK && inserts_first) {
+        status = submit_insert(entry, &task->inquiry, problem);
+        if (status == STATUS_OK && entry->earlier == NULL) {
+            pthread_mutex_lock(&manager->lock);
+            is_queued = submit_start(job, task);
+            pthread_mutex_unlock(&manager->lock);
+        }
+    }
+    if (!is_queued)
         task_free(task);
     return status;
 }
 
-// All labels of a job, in bytes.
-enum { LABELS_MAX = 8192 };
-
 // Title, labels and study, as they are shown and searched.
-static Status fill_notes(JobRow *row, const StudyRequest *inquiry, Problem *problem) {
+static Status submit_fill_notes(JobRow *row, const StudyRequest *inquiry, Problem *problem) {
     const Simulation *simulation = &inquiry->simulation;
     const Texts *labels = &simulation->labels;
     Bytes shown = {0}, words = {0};
@@ -204,20 +225,19 @@ static Status fill_notes(JobRow *row, const StudyRequest *inquiry, Problem *prob
     return is_whole ? STATUS_OK : STATUS_NO_MEMORY;
 }
 
-static Status fill_sender(Job *job, const Submission *submission, const IdempotencyHold *hold) {
-    JobRow *row = &job->row;
-    const bool has_key = hold->key[0] != '\0';
-    row->client = submission->client == NULL ? NULL : strdup(submission->client);
-    row->idempotency_key = has_key ? strdup(hold->key) : NULL;
-    row->request = has_key ? strdup(hold->request) : NULL;
-    return (row->client == NULL && submission->client != NULL) ||
+static Status submit_fill_sender(JobRow *row, const IdempotencyKey *key) {
+    const bool has_key = key->key[0] != '\0';
+    row->client = key->client == NULL ? NULL : strdup(key->client);
+    row->idempotency_key = has_key ? strdup(key->key) : NULL;
+    row->request = has_key ? strdup(key->request) : NULL;
+    return (row->client == NULL && key->client != NULL) ||
                    (has_key && (row->idempotency_key == NULL || row->request == NULL))
                ? STATUS_NO_MEMORY
                : STATUS_OK;
 }
 
-static Status fill_job(Job *job, const StudyRequest *inquiry, const Warnings *warnings,
-                       Problem *problem) {
+static Status submit_fill_job(Job *job, const StudyRequest *inquiry, const Warnings *warnings,
+                              Problem *problem) {
     JobRow *row = &job->row;
     Bytes scene = {0}, told = {0}, uses = {0};
     if (!job_id_make(row->id))
@@ -236,14 +256,14 @@ static Status fill_job(Job *job, const StudyRequest *inquiry, const Warnings *wa
         free(row->uses);
         row->uses = NULL;
     }
-    TRY(fill_notes(row, inquiry, problem));
+    TRY(submit_fill_notes(row, inquiry, problem));
     if (row->result[0] == '\0' || (has_uses && row->uses == NULL) || row->scene == NULL ||
         row->warnings == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
     return STATUS_OK;
 }
 
-static void fail_row(JobRow *row, const Problem *problem) {
+static void submit_fail_row(JobRow *row, const Problem *problem) {
     Bytes bytes = {.most = 1 << 20};
     encode_problem(&bytes, problem, encode_problem_code(problem->status), NULL);
     row->state = JOB_FAILED;
@@ -251,19 +271,10 @@ static void fail_row(JobRow *row, const Problem *problem) {
     row->finished_unix_ms = clock_unix_ms();
 }
 
-static Status submit(JobManager *manager, Job *job, StudyRequest *inquiry, bool is_retry,
-                     Problem *problem) {
-    const Status known = is_retry ? STATUS_NOT_FOUND : find_known(manager, job, problem);
-    if (known == STATUS_OK)
-        return finish_known(manager, job, problem);
-    if (known != STATUS_NOT_FOUND)
-        return known;
-    return start(manager, job, inquiry, is_retry, problem);
-}
-
-// Who asks, if it may.
-static Status enter_client(JobManager *manager, const char *name, QueueClient **client,
-                           Problem *problem) {
+// The client of the queue, if it may submit one more now. Those without a token share one quota,
+// but their jobs are queued by address.
+static Status submit_enter_client(JobManager *manager, const char *name, QueueClient **client,
+                                  Problem *problem) {
     Status status = STATUS_OK;
     pthread_mutex_lock(&manager->lock);
     *client = queue_client(manager->queue, name != NULL ? name : "");
@@ -277,61 +288,53 @@ static Status enter_client(JobManager *manager, const char *name, QueueClient **
 
 Status jobs_charge(JobManager *manager, const char *client, Problem *problem) {
     QueueClient *charged;
-    return enter_client(manager, client, &charged, problem);
+    return submit_enter_client(manager, client, &charged, problem);
 }
 
-// A record that it names may have been deleted since it was looked up under `generation`. From here
-// on none is before the store knows of the job.
-static Status submit_named(JobManager *manager, Job *job, StudyRequest *inquiry,
-                           uint64_t catalog_version, const Submission *submission,
+// *accepted is the new job or, where it was earlier, that of the same key.
+static Status submit_scene(JobManager *manager, const Submission *submission,
+                           const IdempotencyKey *key, Job **accepted, bool *is_replayed,
                            Problem *problem) {
-    Status status = STATUS_OK;
-    naming_enter(&manager->naming);
-    if (db_catalog_version(manager->db) != catalog_version)
-        status = resolve_records_again(manager->db, inquiry, problem);
-    if (status == STATUS_OK)
-        status = submit(manager, job, inquiry, submission->retry_of != NULL, problem);
-    naming_leave(&manager->naming);
-    return status;
-}
-
-static Status submit_new(JobManager *manager, const Submission *submission,
-                         const IdempotencyHold *hold, Job **accepted, Problem *problem) {
+    Entry entry = {.manager = manager, .is_retry = submission->retry_of != NULL, .key = *key};
     QueueClient *client;
-    TRY(enter_client(manager, submission->client, &client, problem));
-    Job *job = job_new(manager);
+    TRY(submit_enter_client(manager, submission->client, &client, problem));
+    Job *job = entry.job = job_new(manager);
     if (job == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
     job->submitted_ns = clock_monotonic_ns();
     job->client = client;
-    StudyRequest inquiry = {0};
     Warnings warnings = {NULL, 0};
-    const uint64_t catalog_version = db_catalog_version(manager->db);
     bool has_place;
     Status status =
         jobs_prepare_request(manager, submission->text, submission->size, &manager->settings.limits,
-                             &has_place, &inquiry, &warnings, problem);
+                             &has_place, &entry.inquiry, &warnings, problem);
     if (status == STATUS_OK)
-        status = fill_job(job, &inquiry, &warnings, problem);
-    if (status == STATUS_OK)
-        status = fill_sender(job, submission, hold);
-    if (status == STATUS_OK && job->row.uses == NULL)
-        status = submit(manager, job, &inquiry, submission->retry_of != NULL, problem);
-    else if (status == STATUS_OK)
-        status = submit_named(manager, job, &inquiry, catalog_version, submission, problem);
-    jobs_leave_place(manager, has_place);
-    study_request_clear(&inquiry);
-    warnings_clear(&warnings);
-    if (status != STATUS_OK) {
-        job_unref(job);
-        return status;
+        status = submit_fill_job(job, &entry.inquiry, &warnings, problem);
+    if (status == STATUS_OK && (status = submit_fill_sender(&job->row, key)) != STATUS_OK)
+        problem_set(problem, status, "no memory for a job");
+    if (status == STATUS_OK) {
+        const Status cached =
+            entry.is_retry ? STATUS_NOT_FOUND : submit_find_result(manager, job, problem);
+        status = cached == STATUS_OK          ? submit_finish(&entry, problem)
+                 : cached == STATUS_NOT_FOUND ? submit_queue(&entry, problem)
+                                              : cached;
     }
-    *accepted = job;
-    return STATUS_OK;
+    jobs_leave_place(manager, has_place);
+    study_request_clear(&entry.inquiry);
+    warnings_clear(&warnings);
+    *is_replayed = status == STATUS_OK && entry.earlier != NULL;
+    if (status == STATUS_OK && entry.earlier == NULL) {
+        *accepted = job;
+        return STATUS_OK;
+    }
+    job_unref(job);
+    *accepted = entry.earlier;
+    return status;
 }
 
 static Status submit_retry(JobManager *manager, const Submission *submission,
-                           const IdempotencyHold *hold, Job **accepted, Problem *problem) {
+                           const IdempotencyKey *key, Job **accepted, bool *is_replayed,
+                           Problem *problem) {
     SweepRow row;
     pthread_mutex_lock(&manager->retries);
     Status status = sweep_retry_open(manager, submission->retry_of, &row, problem);
@@ -339,7 +342,7 @@ static Status submit_retry(JobManager *manager, const Submission *submission,
         Submission scene = *submission;
         scene.text = row.scene;
         scene.size = strlen(row.scene);
-        status = submit_new(manager, &scene, hold, accepted, problem);
+        status = submit_scene(manager, &scene, key, accepted, is_replayed, problem);
     }
     pthread_mutex_unlock(&manager->retries);
     sweep_row_clear(&row);
@@ -348,33 +351,33 @@ static Status submit_retry(JobManager *manager, const Submission *submission,
 
 Status jobs_submit(JobManager *manager, const Submission *submission, Job **accepted,
                    Problem *problem) {
-    IdempotencyHold hold;
-    Status status = idempotency_begin(manager, submission, &hold, accepted, problem);
+    IdempotencyKey key;
+    bool is_replayed = false;
+    *accepted = NULL;
+    TRY(idempotency_read(submission, &key, problem));
+    TRY(idempotency_find(manager, &key, accepted, problem));
+    Status status = STATUS_OK;
+    if (*accepted != NULL)
+        is_replayed = true;
+    else if (submission->retry_of != NULL)
+        status = submit_retry(manager, submission, &key, accepted, &is_replayed, problem);
+    else
+        status = submit_scene(manager, submission, &key, accepted, &is_replayed, problem);
     if (submission->is_replayed != NULL)
-        *submission->is_replayed = *accepted != NULL;
-    if (status == STATUS_OK && *accepted == NULL) {
-        status = submission->retry_of != NULL
-                     ? submit_retry(manager, submission, &hold, accepted, problem)
-                     : submit_new(manager, submission, &hold, accepted, problem);
-        if (status == STATUS_OK)
-            idempotency_remember(manager, &hold, *accepted);
-    }
-    idempotency_end(manager, &hold);
+        *submission->is_replayed = is_replayed;
     return status;
 }
 
 // Takes the row and the inquiry.
-static Status resume(JobManager *manager, JobRow *row, StudyRequest *inquiry, Problem *problem) {
+static Status submit_resume(JobManager *manager, JobRow *row, StudyRequest *inquiry,
+                            Problem *problem) {
     Job *job = job_new(manager);
     QueueClient *client = queue_client(manager->queue, row->client != NULL ? row->client : "");
-    Task *task = NULL;
     jobs_result_id(inquiry, row->result);
-    if (job != NULL && client != NULL && row->result[0] != '\0' &&
-        (task = hashmap_find(manager->in_flight, row->result)) == NULL &&
-        (task = begin(row, inquiry)) != NULL)
-        jobs_enqueue(manager, task, client);
-    if (task == NULL) {
+    Task *task = row->result[0] != '\0' ? submit_make_task(manager, row, inquiry) : NULL;
+    if (job == NULL || client == NULL || task == NULL) {
         job_unref(job);
+        task_free(task);
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the unfinished jobs");
     }
     // Its age counts as waiting.
@@ -382,12 +385,13 @@ static Status resume(JobManager *manager, JobRow *row, StudyRequest *inquiry, Pr
     job->submitted_ns = clock_monotonic_ns() - (age_ms > 0 ? age_ms : 0) * 1000000;
     job->row = *row;
     *row = (JobRow){0};
-    job->is_kept = true;
+    job->is_durable = true;
     job->row.state = JOB_ACCEPTED;
     job->client = client;
     job->indexed.key = job->row.id;
-    jobs_admit(manager, job);
-    jobs_attach(job, task);
+    job_admit(job);
+    if (!submit_start(job, task))
+        task_free(task);
     free(job->row.scene);
     job->row.scene = NULL;
     job_unref(job);
@@ -403,10 +407,10 @@ Status jobs_take_up(JobManager *manager, JobRow *row, Problem *problem) {
     Status status = jobs_prepare(manager->db, row->scene, strlen(row->scene),
                                  &manager->settings.limits, &inquiry, &warnings, fault);
     if (status == STATUS_OK) {
-        status = resume(manager, row, &inquiry, problem);
+        status = submit_resume(manager, row, &inquiry, problem);
     } else if (status == STATUS_INVALID || status == STATUS_UNREADABLE) {
         // The limits or the program changed meanwhile: the job's owner learns why.
-        fail_row(row, fault);
+        submit_fail_row(row, fault);
         status = db_job_update(manager->db, row, problem);
     } else {
         problem_set(problem, status, "%s", fault->detail);

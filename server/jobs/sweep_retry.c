@@ -44,7 +44,7 @@ static Status judge_engine(JobManager *manager, const SweepRow *row, Problem *pr
 // With the retries' lock held, so that nobody opens chunks of a sweep that is under way.
 static Status reopen(JobManager *manager, const char *result, Problem *problem) {
     pthread_mutex_lock(&manager->lock);
-    const Task *task = hashmap_find(manager->in_flight, result);
+    const Task *task = hashmap_find(manager->tasks, result);
     const bool is_under_way = task != NULL && !task->recompute_only;
     pthread_mutex_unlock(&manager->lock);
     return is_under_way ? STATUS_OK : db_sweep_reopen(manager->db, result, problem);

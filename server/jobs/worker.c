@@ -15,27 +15,6 @@
 #include "server/util/bytes.h"
 #include "server/util/clock.h"
 
-bool task_advance(void *context, double fraction) {
-    Task *task = context;
-    const double share = fraction < 0 ? 0 : fraction > 1 ? 1 : fraction;
-    atomic_store(&task->progress, (unsigned)(share * 10000));
-    return !atomic_load(&task->is_stopped);
-}
-
-bool task_is_wanted(void *context, double fraction) {
-    const Task *task = context;
-    (void)fraction;
-    return !atomic_load(&task->is_stopped);
-}
-
-void run_result_clear(RunResult *run_result) {
-    outcome_unref(run_result->outcome);
-    fields_clear(study_answer_fields, &run_result->answer);
-    result_row_clear(&run_result->result);
-    free(run_result->problem);
-    *run_result = (RunResult){0};
-}
-
 static char *take(Bytes *bytes, Status *status) {
     char *text = bytes_take(bytes, NULL);
     if (text == NULL)
@@ -75,24 +54,6 @@ static Status describe(Task *task, RunResult *run_result) {
                : status;
 }
 
-Status run_result_add_to_study(RunResult *run_result, Problem *problem) {
-    Bytes study = {.most = DOCUMENT_BYTES};
-    Status status = STATUS_OK;
-    document_study(&study, &run_result->answer);
-    run_result->result.study = take(&study, &status);
-    run_result->result.created_unix_ms = clock_unix_ms();
-    return problem_set(problem, status, "no memory for the study's document");
-}
-
-void run_result_fail(RunResult *run_result, Status status, const Problem *problem) {
-    run_result->status = status;
-    text_fit(run_result->detail, sizeof run_result->detail, problem->detail);
-    Bytes bytes = {.most = 1 << 20};
-    encode_problem(&bytes, problem, encode_problem_code(status), NULL);
-    free(run_result->problem);
-    run_result->problem = bytes_take(&bytes, NULL);
-}
-
 static double thread_cpu(void *context) {
     (void)context;
     return 1e-9 * (double)clock_thread_cpu_ns();
@@ -114,7 +75,7 @@ static void run(Worker *worker, Task *task, RunResult *run_result, Problem *prob
     JobManager *manager = worker->manager;
     // Only the scene's own series is ever wanted again.
     const bool has_study = task->inquiry.study != NULL && !task->recompute_only;
-    const bool is_measured = has_study && !study_is_shared(task);
+    const bool is_measured = has_study && !task_is_shared(task);
     ProgressRange range = {&(Progress){task, task_advance}, 0, has_study ? STUDY_OWN : 1, 0};
     const Progress watch = progress_range_view(&range);
     // A series that is computed again was within the limits when it was computed first.
@@ -147,38 +108,6 @@ static void run(Worker *worker, Task *task, RunResult *run_result, Problem *prob
     run_result->status = status;
 }
 
-// Nobody waits for it any more, or the daemon ends and its jobs stay unfinished in the store.
-void task_abandon(JobManager *manager, Task *task) {
-    const bool has_rows = task->study != NULL && task->study->sweep != NULL;
-    pthread_mutex_lock(&manager->lock);
-    hashmap_remove(manager->in_flight, &task->indexed);
-    while (task->jobs != NULL) {
-        Job *job = task->jobs;
-        task->jobs = job->next_shared;
-        job->task = NULL;
-        job->next_shared = NULL;
-        jobs_retire(job);
-        subscribers_call(&job->subscribers);
-        job_unref(job); // the computation's hold
-    }
-    subscribers_call(&task->result_waiters);
-    pthread_mutex_unlock(&manager->lock);
-    task_free(task); // and its study
-    if (has_rows)
-        (void)db_sweep_tidy(manager->db, NULL);
-}
-
-void task_finish(JobManager *manager, Task *task, RunResult *run_result) {
-    char result[sizeof task->result];
-    const double seconds = run_result->seconds;
-    Outcome *outcome = run_result->outcome != NULL ? outcome_ref(run_result->outcome) : NULL;
-    memcpy(result, task->result, sizeof result);
-    jobs_save(manager, task, run_result);
-    if (outcome != NULL)
-        jobs_keep_series(manager, result, outcome, seconds);
-    outcome_unref(outcome);
-}
-
 static bool is_slow(const Task *task) {
     return task->queued.seconds > queue_quick;
 }
@@ -206,6 +135,7 @@ static void begin_slow(JobManager *manager) {
 static void begin_computation(Worker *worker, Task *task) {
     JobManager *manager = worker->manager;
     task->is_running = true;
+    task->workers = 1;
     worker->running = task;
     if (is_slow(task))
         begin_slow(manager);
@@ -223,13 +153,6 @@ static void begin_computation(Worker *worker, Task *task) {
 static void leave(Worker *worker, const Task *task) {
     worker->running = NULL;
     worker->manager->slow_running -= is_slow(task);
-}
-
-// It waits for room, of whatever kind, and then begins anew.
-static void stall(JobManager *manager, Task *task) {
-    resolve_records_drop(&task->inquiry);
-    task->next_stalled = manager->waiting_for_memory;
-    manager->waiting_for_memory = task;
 }
 
 static QueueEntry *wait_for_entry(Worker *worker) {
@@ -250,12 +173,9 @@ static bool next_task(Worker *worker, WorkItem *item) {
             return false;
         Task *task = task_of(entry);
         if (task->study == NULL) {
-            begin_computation(worker, task);
-            if (study_must_wait(worker->manager, task)) {
-                leave(worker, task);
-                stall(worker->manager, task);
+            if (!task_begin(task))
                 continue;
-            }
+            begin_computation(worker, task);
             item->task = task;
             return true;
         }
@@ -269,19 +189,19 @@ static bool next_task(Worker *worker, WorkItem *item) {
     }
 }
 
-// How long runs take beside what was foretold, for those who ask when to come back.
-static void keep_pace(JobManager *manager, const Task *task, const RunResult *run_result) {
+// How long runs take in relation to their estimate, for clients that ask when to retry.
+static void update_bias(JobManager *manager, const Task *task, const RunResult *run_result) {
     const double estimated = task->queued.seconds;
     const double ratio = 1e-9 * (double)(run_result->ended_ns - run_result->began_ns) / estimated;
     if (estimated > 0 && ratio > 1e-3 && ratio < 1e3)
-        manager->pace += 0.1 * (ratio - manager->pace);
+        manager->estimate_bias += 0.1 * (ratio - manager->estimate_bias);
 }
 
 static void compute(Worker *worker, Task *task, Problem *problem) {
     JobManager *manager = worker->manager;
     RunResult run_result = {0};
     run(worker, task, &run_result, problem);
-    const bool is_shared = run_result.status == STATUS_OK && study_is_shared(task);
+    const bool is_shared = run_result.status == STATUS_OK && task_is_shared(task);
     if (is_shared) {
         problem_clear(problem);
         const Status status = study_start(worker, task, &run_result, problem);
@@ -298,14 +218,19 @@ static void compute(Worker *worker, Task *task, Problem *problem) {
     pthread_mutex_lock(&manager->lock);
     leave(worker, task);
     if (status == STATUS_OK && study == NULL)
-        keep_pace(manager, task, &run_result);
-    if (is_stalled)
-        stall(manager, task);
+        update_bias(manager, task, &run_result);
+    if (study == NULL) {
+        task->workers = 0;
+        task_end(task);
+    }
+    const bool is_stopped = atomic_load(&task->is_stopped);
+    if (is_stalled && !is_stopped)
+        task_wait(task);
     pthread_mutex_unlock(&manager->lock);
-    if (status == STATUS_CANCELLED)
-        task_abandon(manager, task);
-    else if (study != NULL)
+    if (study != NULL)
         study_leave(worker, study, problem);
+    else if (is_stopped || status == STATUS_CANCELLED)
+        task_abandon(manager, task);
     else if (!is_stalled)
         task_finish(manager, task, &run_result);
     run_result_clear(&run_result);

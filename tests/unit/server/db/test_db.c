@@ -154,19 +154,20 @@ static void a_result_and_its_jobs_are_saved_together_or_not_at_all(void **state)
     JobRow first = job_row("j-1", 0), second = job_row("j-2", 0);
     assert_int_equal(db_job_add(db, &first, NULL), STATUS_OK);
     first.state = second.state = 2;
-    const JobRow *const jobs[] = {&first, &second};
+    first.next = &second;
     ResultRow result = result_row("r-1");
-    assert_int_equal(db_result_save(db, &result, jobs, 2, NULL), STATUS_NOT_FOUND);
+    assert_int_equal(db_result_save(db, &result, &first, NULL), STATUS_NOT_FOUND);
     assert_false(db_result_exists(db, "r-1"));
     JobRow loaded;
     assert_int_equal(db_job_load(db, "j-1", &loaded, NULL), STATUS_OK);
     assert_int_equal(loaded.state, 0);
     job_row_clear(&loaded);
 
-    assert_int_equal(db_result_save(db, &result, jobs, 1, NULL), STATUS_OK);
+    first.next = NULL;
+    assert_int_equal(db_result_save(db, &result, &first, NULL), STATUS_OK);
     assert_true(db_result_exists(db, "r-1"));
     result.summary = "other";
-    assert_int_equal(db_result_save(db, &result, jobs, 1, NULL), STATUS_OK);
+    assert_int_equal(db_result_save(db, &result, &first, NULL), STATUS_OK);
     ResultRow found;
     assert_int_equal(db_result_load(db, "r-1", &found, NULL), STATUS_OK);
     assert_string_equal(found.summary, "{\"a\": 1}");

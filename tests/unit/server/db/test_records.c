@@ -162,7 +162,7 @@ static void a_record_in_use_is_not_deleted(void **state) {
                         .warnings = "[]",
                         .outcome = {"x", 1},
                         .uses = "sponge@1\nrecord:elcentro\n"};
-    assert_int_equal(db_result_save(db, &result, NULL, 0, &problem), STATUS_OK);
+    assert_int_equal(db_result_save(db, &result, NULL, &problem), STATUS_OK);
     assert_int_equal(db_record_uses(db, "elcentro", &uses, &problem), STATUS_OK);
     assert_true(uses.results == 1 && uses.jobs == 1);
     assert_int_equal(db_record_delete(db, "kobe", &uses, NULL), STATUS_CONFLICT);
@@ -218,7 +218,7 @@ static void nothing_written_beside_the_daemon_changes_a_record(void **state) {
                         .warnings = "[]",
                         .outcome = {"x", 1},
                         .uses = "record:elcentro\n"};
-    assert_int_equal(db_result_save(db, &result, NULL, 0, &problem), STATUS_OK);
+    assert_int_equal(db_result_save(db, &result, NULL, &problem), STATUS_OK);
     db_close(db);
     snprintf(path, sizeof path, "%s/impactd.db", folder);
     assert_int_equal(sqlite_open(path, DATABASE_WRITER, &database, &problem), STATUS_OK);

@@ -247,7 +247,7 @@ static void an_ensemble_is_dismissed_at_any_moment_and_leaves_nothing(void **sta
     room_finish(&room, id, result);
     while (!is_idle(&room))
         room_nap(1000000);
-    assert_true(room.manager->study_bytes == 0 && room.manager->study_count == 0);
+    assert_true(room.manager->memory == 0 && room.manager->studies == NULL);
     room_end(&room);
 }
 
@@ -331,33 +331,6 @@ static void single_jobs_go_between_the_members_of_an_ensemble(void **state) {
     room_end(&room);
 }
 
-// Where much is held already, another study waits until one is at its end.
-static void studies_wait_where_much_is_held(void **state) {
-    (void)state;
-    Room room = room_make(1);
-    char text[1024], ids[3][40], result[72];
-    for (int i = 0; i < 2; i++) {
-        ensemble(text, 4000 / FEWER, 20 + i);
-        room_submit(&room, text, NULL, ids[i]);
-    }
-    while (share_of(&room, ids[0]) < 0.15 || share_of(&room, ids[1]) < 0.15)
-        room_nap(1000000);
-    pthread_mutex_lock(&room.manager->lock);
-    assert_int_equal(room.manager->study_count, 2);
-    room.manager->study_bytes += (size_t)1 << 40;
-    pthread_mutex_unlock(&room.manager->lock);
-    ensemble(text, 10, 1);
-    room_submit(&room, text, NULL, ids[2]);
-    const double before = share_of(&room, ids[0]);
-    while (share_of(&room, ids[0]) < before + 0.05)
-        room_nap(1000000);
-    assert_true(share_of(&room, ids[2]) == 0);
-    room_dismiss(&room, ids[0]);
-    room_finish(&room, ids[2], result); // there are too few under way for it to wait
-    room_dismiss(&room, ids[1]);
-    room_end(&room);
-}
-
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(parts_are_folded_in_order_within_bounded_memory),
@@ -368,7 +341,6 @@ int main(void) {
         cmocka_unit_test(an_ensemble_that_was_interrupted_begins_again),
         cmocka_unit_test(studies_of_two_clients_both_get_on),
         cmocka_unit_test(single_jobs_go_between_the_members_of_an_ensemble),
-        cmocka_unit_test(studies_wait_where_much_is_held),
     };
     fft_start();
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,0 +1,456 @@
+// Jobs and the tasks that compute for them: their references, subscribers, places in the tables of
+// the manager, and the memory that running tasks share.
+#include <math.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "server/jobs/jobs_private.h"
+#include "server/jobs/resolve_record.h"
+#include "server/jobs/sweep.h"
+#include "server/util/clock.h"
+
+const char *const job_state_names[] = {"accepted", "running",   "successful",
+                                       "failed",   "dismissed", NULL};
+
+bool job_state_is_final(int state) {
+    return state != JOB_ACCEPTED && state != JOB_RUNNING;
+}
+
+bool subscribers_add(Subscribers *subscribers, const Callback *callback) {
+    for (size_t i = 0; i < subscribers->count; i++)
+        if (subscribers->at[i].context == callback->context)
+            return true;
+    Callback *grown = realloc(subscribers->at, (subscribers->count + 1) * sizeof *grown);
+    if (grown == NULL)
+        return false;
+    subscribers->at = grown;
+    grown[subscribers->count++] = *callback;
+    return true;
+}
+
+void subscribers_call(Subscribers *subscribers) {
+    for (size_t i = 0; i < subscribers->count; i++)
+        subscribers->at[i].wake(subscribers->at[i].context);
+    free(subscribers->at);
+    *subscribers = (Subscribers){NULL, 0};
+}
+
+Job *job_new(JobManager *manager) {
+    Job *job = calloc(1, sizeof *job);
+    if (job == NULL)
+        return NULL;
+    atomic_init(&job->refcount, 1);
+    job->manager = manager;
+    return job;
+}
+
+Job *job_ref(Job *job) {
+    atomic_fetch_add(&job->refcount, 1);
+    return job;
+}
+
+void job_unref(Job *job) {
+    if (job == NULL || atomic_fetch_sub(&job->refcount, 1) != 1)
+        return;
+    job_row_clear(&job->row);
+    result_summary_unref(job->summary);
+    free(job->subscribers.at);
+    free(job);
+}
+
+static void job_lock(Job *job) {
+    if (job->manager != NULL)
+        pthread_mutex_lock(&job->manager->lock);
+}
+
+static void job_unlock(Job *job) {
+    if (job->manager != NULL)
+        pthread_mutex_unlock(&job->manager->lock);
+}
+
+bool job_is_finished(Job *job) {
+    job_lock(job);
+    const bool is_finished = job_state_is_final(job->row.state);
+    job_unlock(job);
+    return is_finished;
+}
+
+const char *job_client(const Job *job) {
+    return job->row.client; // never changes
+}
+
+static bool text_copy(char **target, const char *text) {
+    *target = text == NULL ? NULL : strdup(text);
+    return text == NULL || *target != NULL;
+}
+
+static void job_view_progress(const Job *job, JobView *view) {
+    const Task *task = job->task;
+    if (job->row.state == JOB_SUCCESSFUL) {
+        view->progress = 100;
+    } else if (task != NULL) {
+        view->progress = atomic_load(&task->progress) / 100.0;
+    }
+    if (task != NULL && task->sweep != NULL) {
+        view->points = task->sweep->row.points;
+        view->points_done = atomic_load(&task->sweep->made);
+        view->points_failed = atomic_load(&task->sweep->made_failed);
+    }
+    if (!job_state_is_final(job->row.state) && job->submitted_ns > 0) {
+        const int64_t now = clock_monotonic_ns();
+        view->total = 1e-9 * (double)(now - job->submitted_ns);
+        view->queued = job->started_ns > 0 ? job->row.queued : view->total;
+        view->run = job->started_ns > 0 ? 1e-9 * (double)(now - job->started_ns) : 0;
+    }
+}
+
+Status job_view(Job *job, JobView *view) {
+    job_lock(job);
+    const JobRow *row = &job->row;
+    *view = (JobView){.state = (JobState)row->state,
+                      .is_cached = row->is_cached,
+                      .created_unix_ms = row->created_unix_ms,
+                      .started_unix_ms = row->started_unix_ms,
+                      .finished_unix_ms = row->finished_unix_ms,
+                      .queued = row->queued,
+                      .run = row->run,
+                      .total = row->total};
+    text_fit(view->id, sizeof view->id, row->id);
+    if (row->state == JOB_SUCCESSFUL) {
+        text_fit(view->result, sizeof view->result, row->result);
+        view->is_result_deleted = job->manager == NULL && !row->has_result;
+    }
+    job_view_progress(job, view);
+    const bool is_whole =
+        text_copy(&view->problem, row->problem) && text_copy(&view->warnings, row->warnings) &&
+        text_copy(&view->title, row->title) && text_copy(&view->labels, row->labels) &&
+        text_copy(&view->study, row->study) && text_copy(&view->client, row->client);
+    view->head = result_summary_ref(job->summary);
+    job_unlock(job);
+    if (view->head != NULL) {
+        view->plan = view->head->plan;
+        view->summary = view->head->summary;
+        view->work = view->head->work;
+        view->notes = view->head->notes;
+    }
+    return is_whole ? STATUS_OK : STATUS_NO_MEMORY;
+}
+
+void job_view_clear(JobView *view) {
+    free(view->problem);
+    free(view->warnings);
+    free(view->title);
+    free(view->labels);
+    free(view->study);
+    free(view->client);
+    result_summary_unref(view->head);
+    *view = (JobView){0};
+}
+
+JobState job_peek(Job *job, double *progress) {
+    JobView view = {0};
+    job_lock(job);
+    const JobState state = (JobState)job->row.state;
+    job_view_progress(job, &view);
+    job_unlock(job);
+    *progress = view.progress;
+    return state;
+}
+
+Status job_is_durable(Job *job, bool *is_durable, Problem *problem) {
+    job_lock(job);
+    *is_durable = job->is_durable;
+    const Status status = job->is_durable ? STATUS_OK : job->refusal;
+    if (status != STATUS_OK)
+        problem_set(problem, status, "%s", job->refused);
+    job_unlock(job);
+    return status;
+}
+
+bool job_subscribe(Job *job, JobEvent event, const Callback *callback) {
+    bool is_subscribed = true;
+    job_lock(job);
+    if (event == JOB_IS_FINISHED ? job_state_is_final(job->row.state)
+                                 : job->is_durable || job->refusal != STATUS_OK)
+        callback->wake(callback->context);
+    else
+        is_subscribed = subscribers_add(&job->subscribers, callback);
+    job_unlock(job);
+    return is_subscribed;
+}
+
+void job_unsubscribe(Job *job, const Callback *callback) {
+    job_lock(job);
+    Subscribers *subscribers = &job->subscribers;
+    for (size_t i = 0; i < subscribers->count; i++)
+        if (subscribers->at[i].context == callback->context) {
+            subscribers->at[i] = subscribers->at[--subscribers->count];
+            break;
+        }
+    job_unlock(job);
+}
+
+void job_admit(Job *job) {
+    JobManager *manager = job->manager;
+    job->scene_size = strlen(job->row.scene);
+    hashmap_add(manager->jobs, &job_ref(job)->indexed);
+    job->is_live = true;
+    job->is_counted = true;
+    manager->live++;
+    job->client->live++;
+    manager->scene_bytes += job->scene_size;
+}
+
+void job_release(Job *job) {
+    if (!job->is_counted)
+        return;
+    job->is_counted = false;
+    job->manager->live--;
+    job->client->live--;
+    job->manager->scene_bytes -= job->scene_size;
+}
+
+void job_retire(Job *job) {
+    job_release(job);
+    if (!job->is_live)
+        return;
+    job->is_live = false;
+    hashmap_remove(job->manager->jobs, &job->indexed);
+    job_unref(job);
+}
+
+void job_refuse(Job *job, Status status, const char *detail) {
+    job->refusal = status;
+    text_fit(job->refused, sizeof job->refused, detail);
+    job->row.state = JOB_FAILED;
+    subscribers_call(&job->subscribers);
+    job_retire(job);
+}
+
+static Job *jobs_find_live(JobManager *manager, const char *id) {
+    pthread_mutex_lock(&manager->lock);
+    Job *job = hashmap_find(manager->jobs, id);
+    if (job != NULL)
+        job_ref(job);
+    pthread_mutex_unlock(&manager->lock);
+    return job;
+}
+
+Status jobs_find(JobManager *manager, const char *id, Job **found, Problem *problem) {
+    *found = jobs_find_live(manager, id);
+    if (*found != NULL)
+        return STATUS_OK;
+    Job *job = job_new(NULL);
+    if (job == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
+    job->is_durable = true;
+    const Status status = db_job_load(manager->db, id, &job->row, problem);
+    if (status != STATUS_OK) {
+        job_unref(job);
+        return status;
+    }
+    ResultRow result = {0};
+    if (job->row.state == JOB_SUCCESSFUL &&
+        db_result_head(manager->db, job->row.result, &result, NULL) == STATUS_OK)
+        job->summary = result_summary_new(&result);
+    result_row_clear(&result);
+    *found = job;
+    return STATUS_OK;
+}
+
+Task *task_new(JobManager *manager, const char *result) {
+    Task *task = calloc(1, sizeof *task);
+    if (task == NULL)
+        return NULL;
+    task->manager = manager;
+    text_fit(task->result, sizeof task->result, result);
+    task->indexed.key = task->result;
+    return task;
+}
+
+void task_free(Task *task) {
+    if (task == NULL)
+        return;
+    study_request_clear(&task->inquiry);
+    run_result_clear(&task->run_result);
+    result_summary_unref(task->summary);
+    free(task->scene);
+    free(task->warnings);
+    free(task->result_waiters.at);
+    free(task);
+}
+
+Task *task_of(QueueEntry *entry) {
+    return (Task *)(void *)((char *)entry - offsetof(Task, queued));
+}
+
+bool task_is_shared(const Task *task) {
+    const Variant *study = task->inquiry.study;
+    return study != NULL && !task->recompute_only && study_has_members(study);
+}
+
+// What it will take, and what of that its client is charged for when it begins: the members of a
+// study have turns of their own.
+static void task_estimate(Task *task) {
+    const StudyRequest *inquiry = &task->inquiry;
+    const Cost own = simulation_cost(&inquiry->simulation);
+    Cost whole = own;
+    // A series that is computed again needs no study.
+    if (!task->recompute_only &&
+        study_request_cost(inquiry, &task->manager->settings.limits, &whole, NULL) != STATUS_OK)
+        whole.cpu_seconds = queue_quick; // the run will report it
+    task->queued.seconds = whole.cpu_seconds;
+    task->queued.charge = task_is_shared(task) ? own.cpu_seconds : 0;
+    task->bytes = (uint64_t)fmin(whole.bytes, 1e18);
+}
+
+bool task_advance(void *context, double fraction) {
+    Task *task = context;
+    const double share = fraction < 0 ? 0 : fraction > 1 ? 1 : fraction;
+    atomic_store(&task->progress, (unsigned)(share * 10000));
+    return !atomic_load(&task->is_stopped);
+}
+
+bool task_is_wanted(void *context, double fraction) {
+    const Task *task = context;
+    (void)fraction;
+    return !atomic_load(&task->is_stopped);
+}
+
+void jobs_call_worker(JobManager *manager) {
+    pthread_cond_signal(&manager->work);
+    if (manager->slow_running >= manager->settings.workers)
+        pthread_cond_signal(&manager->spare_work);
+}
+
+void task_enqueue(Task *task, QueueClient *client) {
+    JobManager *manager = task->manager;
+    hashmap_add(manager->tasks, &task->indexed);
+    task_estimate(task);
+    resolve_records_drop(&task->inquiry); // until it begins
+    if (client == NULL)
+        queue_push_front(manager->queue, &task->queued);
+    else
+        queue_put(manager->queue, &task->queued, client, 1e-9 * (double)clock_monotonic_ns());
+    jobs_call_worker(manager);
+}
+
+// One budget for all that run. A task of no more than a worker's share of one half of it is not
+// counted: there are at most as many as workers. All others share the other half, first come first
+// served; one alone may exceed it, up to the limit of a run. A study holds its memory between its
+// chunks, so it is counted in any case.
+bool task_begin(Task *task) {
+    JobManager *manager = task->manager;
+    const uint64_t half = manager->settings.memory_bytes / 2;
+    if (half == 0 || (task->bytes <= half / manager->settings.workers && !task_is_shared(task)))
+        return true;
+    if (manager->memory_waiters > 0 ||
+        (manager->memory > 0 && manager->memory + task->bytes > half)) {
+        task_wait(task);
+        task->waits_for_memory = true;
+        manager->memory_waiters++;
+        return false;
+    }
+    manager->memory += task->bytes;
+    task->has_memory = true;
+    return true;
+}
+
+void task_wait(Task *task) {
+    JobManager *manager = task->manager;
+    resolve_records_drop(&task->inquiry);
+    task->is_running = false;
+    task->is_waiting = true;
+    task->next = NULL;
+    if (manager->waiting == NULL)
+        manager->waiting_last = &manager->waiting;
+    *manager->waiting_last = task;
+    manager->waiting_last = &task->next;
+}
+
+static void task_unwait(Task *task) {
+    JobManager *manager = task->manager;
+    Task **at = &manager->waiting;
+    while (*at != task)
+        at = &(*at)->next;
+    *at = task->next;
+    if (task->next == NULL)
+        manager->waiting_last = at;
+    manager->memory_waiters -= task->waits_for_memory;
+    task->is_waiting = task->waits_for_memory = false;
+}
+
+void jobs_call_waiting(JobManager *manager) {
+    while (manager->waiting != NULL) {
+        Task *task = manager->waiting;
+        task_unwait(task);
+        queue_push_front(manager->queue, &task->queued);
+        jobs_call_worker(manager);
+    }
+}
+
+void task_end(Task *task) {
+    JobManager *manager = task->manager;
+    if (!task->has_memory)
+        return;
+    task->has_memory = false;
+    manager->memory -= task->bytes;
+    jobs_call_waiting(manager);
+}
+
+void task_attach(Task *task, Job *job) {
+    job->task = task;
+    job->next_shared = task->jobs;
+    task->jobs = job_ref(job);
+    if (task->is_running) {
+        job->row.state = JOB_RUNNING;
+        job->row.started_unix_ms = clock_unix_ms();
+        job->started_ns = clock_monotonic_ns();
+    }
+}
+
+void job_detach(Job *job) {
+    Task *task = job->task;
+    if (task == NULL)
+        return;
+    JobManager *manager = job->manager;
+    Job **at = &task->jobs;
+    while (*at != job)
+        at = &(*at)->next_shared;
+    *at = job->next_shared;
+    job->task = NULL;
+    job->next_shared = NULL;
+    job_unref(job);
+    if (task->jobs != NULL || task->result_waiters.count > 0 || task->is_saving)
+        return;
+    // No one wants it any more. The next job of the same scene starts anew.
+    hashmap_remove(manager->tasks, &task->indexed);
+    if (!task->is_running) {
+        queue_remove(manager->queue, &task->queued);
+        if (task->is_waiting)
+            task_unwait(task);
+        task_free(task);
+        return;
+    }
+    atomic_store(&task->is_stopped, true);
+    if (task->workers == 0) { // a study between its chunks: a worker ends it
+        queue_remove(manager->queue, &task->queued);
+        queue_push_front(manager->queue, &task->queued);
+        jobs_call_worker(manager);
+    }
+}
+
+void task_release(Task *task) {
+    hashmap_remove(task->manager->tasks, &task->indexed);
+    while (task->jobs != NULL) {
+        Job *job = task->jobs;
+        task->jobs = job->next_shared;
+        job->task = NULL;
+        job->next_shared = NULL;
+        job_retire(job);
+        subscribers_call(&job->subscribers);
+        job_unref(job);
+    }
+    subscribers_call(&task->result_waiters);
+}
