@@ -131,7 +131,7 @@ static void a_sweep_waits_for_a_disk_whose_faults_pass(void **state) {
         atomic_store(&failing, 3);
         while (!job_state_is_final((int)room_state(&room, id, result))) {
             room_nap(5000000);
-            jobs_retry_sweep(room.manager);
+            jobs_retry_writes(room.manager);
         }
         assert_int_equal(atomic_load(&failing), 0);
         room_finish(&room, id, result);
