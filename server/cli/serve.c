@@ -321,6 +321,7 @@ static Status serve(const ServeSettings *settings, const sigset_t *signals, Prob
                                      .quota = settings->quota,
                                      .rate = settings->rate,
                                      .study_seconds = settings->max_study_seconds,
+                                     .memory_bytes = 2 * settings->max_run_bytes,
                                      .deleted = {router.response_cache, forget_answers},
                                      .limits = {.samples = settings->max_samples,
                                                 .impacts = settings->max_impacts,
