@@ -31,14 +31,6 @@ bool status_is_transient(Status status) {
            status == STATUS_NO_MEMORY;
 }
 
-void run_result_clear(RunResult *run_result) {
-    outcome_unref(run_result->outcome);
-    fields_clear(study_answer_fields, &run_result->answer);
-    result_row_clear(&run_result->result);
-    free(run_result->problem);
-    *run_result = (RunResult){0};
-}
-
 void run_result_fail(RunResult *run_result, Status status, const Problem *problem) {
     Bytes bytes = {.most = 1 << 20};
     run_result->status = status;

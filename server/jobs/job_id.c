@@ -7,7 +7,15 @@
 #include <string.h>
 #include <sys/random.h>
 
+#include "server/jobs/job.h"
 #include "server/util/clock.h"
+
+const char *const job_state_names[] = {"accepted", "running",   "successful",
+                                       "failed",   "dismissed", NULL};
+
+bool job_state_is_final(int state) {
+    return state != JOB_ACCEPTED && state != JOB_RUNNING;
+}
 
 static int64_t next_us(void) {
     static atomic_int_fast64_t last;

@@ -142,9 +142,10 @@ struct JobManager {
     JobMetrics totals;
 };
 
-// task.c. With the lock held, but for the first six.
+// task.c. With the lock held, but for the first seven.
 Task *task_new(JobManager *manager, const char *result);
-void task_free(Task *task);            // its study was freed
+void task_free(Task *task); // its study was freed
+void run_result_clear(RunResult *run_result);
 Job *job_new(JobManager *manager);     // one reference; NULL without memory
 bool task_is_shared(const Task *task); // its study has members, which are shared out
 Task *task_of(QueueEntry *entry);
@@ -176,7 +177,6 @@ void task_release(Task *task);
 
 // commit.c. Status is worth another try: a full disk and the like pass.
 bool status_is_transient(Status status);
-void run_result_clear(RunResult *run_result);
 void run_result_fail(RunResult *run_result, Status status, const Problem *problem);
 // The document of the study's answer, once it is complete.
 Status run_result_add_to_study(RunResult *run_result, Problem *problem);

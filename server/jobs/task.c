@@ -10,13 +10,6 @@
 #include "server/jobs/sweep.h"
 #include "server/util/clock.h"
 
-const char *const job_state_names[] = {"accepted", "running",   "successful",
-                                       "failed",   "dismissed", NULL};
-
-bool job_state_is_final(int state) {
-    return state != JOB_ACCEPTED && state != JOB_RUNNING;
-}
-
 bool subscribers_add(Subscribers *subscribers, const Callback *callback) {
     for (size_t i = 0; i < subscribers->count; i++)
         if (subscribers->at[i].context == callback->context)
@@ -257,6 +250,14 @@ Status jobs_find(JobManager *manager, const char *id, Job **found, Problem *prob
     result_row_clear(&result);
     *found = job;
     return STATUS_OK;
+}
+
+void run_result_clear(RunResult *run_result) {
+    outcome_unref(run_result->outcome);
+    fields_clear(study_answer_fields, &run_result->answer);
+    result_row_clear(&run_result->result);
+    free(run_result->problem);
+    *run_result = (RunResult){0};
 }
 
 Task *task_new(JobManager *manager, const char *result) {
