@@ -15,7 +15,7 @@ import program  # noqa: E402
 FLOORS = {
     "core": [["base", "math"], ["contact", "excitation", "result"], ["scene"], ["plan", "drop_test", "formats"], ["solve"],
              ["simulation"], ["study"]],
-    "server": [["util", "db"], ["json", "materials", "auth", "jobs"], ["formats", "http"], ["api"],
+    "server": [["util", "json", "db"], ["materials", "auth", "jobs"], ["formats", "http"], ["api"],
                ["options", "options_show", "cli", "main", "install"]],
 }
 
