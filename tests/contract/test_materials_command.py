@@ -157,7 +157,7 @@ def test_who_comes_second_is_told():
         for thread in threads:
             thread.join()
         assert sorted(end[0] for end in ends) == [0, 1, 1, 1], ends
-        assert all("somebody was faster, nothing was written" in end[2] and "materials history foam" in end[2]
+        assert all("conflict, nothing was written" in end[2] and "materials history foam" in end[2]
                    for end in ends if end[0] == 1), ends
         assert json.loads(good(daemon.url, "show", "foam", "--json"))["latest"] == 2
         code, _, errors = materials(daemon.url, "revise", "foam", path, "--comment", "x", "--from", "1")
@@ -167,18 +167,18 @@ def test_who_comes_second_is_told():
     stale = say(412, json.dumps({"detail": "foam has version 6"}).encode(), "application/problem+json")
     with fake(history, stale) as (url, seen):
         code, out, errors = materials(url, "revert", "foam", "1", "--comment", "x")
-        assert code == 1 and out == "" and "somebody was faster" in errors and "version 6" in errors, (code, errors)
+        assert code == 1 and out == "" and "conflict, nothing was written" in errors and "version 6" in errors, (code, errors)
         assert seen[1][2]["If-Match"] == '"foam@2-5"' and seen[1][:2] == ("POST", "/v1/materials/foam/revert"), seen
     # What was proposed is of the state that it was shown of, whatever has become of it since.
     proposal = say(body=b'{"revision": {"name": "Foam"}}', ETag='"foam@2-5"')
     with fake(proposal, stale) as (url, seen):
         code, _, errors = materials(url, "propose", "foam", "--confirm")
-        assert code == 1 and "somebody was faster" in errors and "version 6" in errors, (code, errors)
+        assert code == 1 and "conflict, nothing was written" in errors and "version 6" in errors, (code, errors)
         assert seen[1][2]["If-Match"] == '"foam@2-5"' and seen[1][:2] == ("POST", "/v1/materials/foam/revisions"), seen
     for answers in ((say(body=b'{"history": []}'),), (history, say(201, b"[]")), (history, say(201, b'{"slug": "x"}'))):
         with fake(*answers) as (url, _):
             code, out, errors = materials(url, "revert", "foam", "1", "--comment", "x")
-            assert code == 7 and out == "" and "no impactd" in errors, (code, errors)
+            assert code == 7 and out == "" and "really impactd" in errors, (code, errors)
     with fake(say(body=b"[]")) as (url, _):
         assert materials(url, "list")[0] == 7
     with fake(say(body=json.dumps({"name": "\x1b[31m", "x": {"\x9b": "a\nb"}}).encode())) as (url, _):
