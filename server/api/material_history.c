@@ -1,5 +1,5 @@
-// How a material came to be what it is: its revisions, what was done to it by whom and why, and in
-// what two revisions differ.
+// The history of a material: its revisions, its audit log, the differences of two revisions, and
+// the results that used it.
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -7,130 +7,75 @@
 #include "server/api/materials.h"
 #include "server/api/query.h"
 #include "server/http/reply.h"
-#include "server/json/encode.h"
 #include "server/materials/material.h"
 #include "server/util/base_path.h"
 
-// Revisions may be long, with their tables; what was done is short.
-enum { REVISIONS_MAX = 100, DEEDS_INITIAL = 100, DEEDS_MAX = 1000 };
+// Revisions may be long, with their tables; audit entries are short.
+enum { REVISIONS_MAX = 100, AUDIT_INITIAL = 100, AUDIT_MAX = 1000 };
+enum { RESULTS_INITIAL = 20, RESULTS_MAX = 1000 };
 
-// A page of a list that is numbered from 1, newest first: `limit` items before `before`.
-typedef struct Page {
-    size_t limit, before;
-} Page;
-
-static Status read_page(const Request *request, size_t initial, size_t most, Page *page,
-                        Problem *problem) {
-    const size_t beyond = (size_t)1 << 53;
-    TRY(request_count(request, "limit", 1, most, initial, &page->limit, problem));
-    return request_count(request, "before", 1, beyond, beyond, &page->before, problem);
-}
-
-// `last` is the number of the last item of a page.
-static void link_page(const Request *request, Reply *reply, uint64_t last) {
-    char number[24];
-    snprintf(number, sizeof number, "%llu", (unsigned long long)last);
-    if (last > 1)
-        query_link_next(request, reply, "before", number);
-}
-
-// True where the client has this state of the material already.
-static bool is_known(const Request *request, Reply *reply, uint64_t latest, uint64_t version) {
-    char tag[MATERIAL_TAG];
-    material_tag(request->parameters[0], latest, version, tag);
-    return reply_tagged(reply, request, tag);
-}
-
-static Status put_revisions(Bytes *bytes, MaterialRevisions *revisions, Problem *problem) {
-    for (size_t i = 0; i < revisions->count; i++) {
-        TRY(material_read_lists(&revisions->at[i], problem));
-        bytes_text(bytes, i > 0 ? ",\n " : "");
-        material_write(bytes, &revisions->at[i]);
-    }
-    return STATUS_OK;
-}
-
-// `state` was read before the revisions: what has come since is not told, so that its tag is not
-// newer than what it stands for.
-static Status list_revisions(App *app, const Request *request, const MaterialState *state,
-                             MaterialRevisions *revisions, Reply *reply, Problem *problem) {
-    if (is_known(request, reply, state->latest, state->version))
-        return STATUS_OK;
-    Bytes bytes = {.most = app->reply_most};
-    bytes_format(&bytes, "{\"slug\": \"%s\", \"latest\": %llu, \"version\": %llu, \"revisions\": [",
-                 request->parameters[0], (unsigned long long)state->latest,
-                 (unsigned long long)state->version);
-    const Status status = put_revisions(&bytes, revisions, problem);
-    if (status != STATUS_OK) {
-        bytes_clear(&bytes);
-        return status;
-    }
-    bytes_text(&bytes, "]}\n");
-    if (revisions->count > 0)
-        link_page(request, reply, revisions->at[revisions->count - 1].revision);
-    return reply_bytes(reply, 200, type_json, &bytes, problem);
-}
+// In all handlers below the state is read first, so that the tag is not newer than the reply.
 
 Status materials_revisions(App *app, const Request *request, Reply *reply, Problem *problem) {
     const char *slug = request->parameters[0];
-    MaterialRevisions revisions = {0};
+    MaterialRevisions revisions;
     MaterialState state;
-    Page page;
-    TRY(read_page(request, REVISIONS_MAX, REVISIONS_MAX, &page, problem));
+    MaterialPage page;
+    TRY(material_page_read(request, REVISIONS_MAX, REVISIONS_MAX, &page, problem));
     TRY(db_material_state(app->db, slug, &state, problem));
+    if (material_is_cached(request, reply, &state))
+        return STATUS_OK;
     if (page.before > state.latest + 1)
         page.before = state.latest + 1;
     TRY(db_material_page(app->db, slug, page.before, page.limit, &revisions, problem));
-    const Status status = list_revisions(app, request, &state, &revisions, reply, problem);
+    Bytes bytes = {.most = app->reply_most};
+    bytes_format(&bytes, "{\"slug\": \"%s\", \"latest\": %llu, \"version\": %llu, \"revisions\": [",
+                 slug, (unsigned long long)state.latest, (unsigned long long)state.version);
+    for (size_t i = 0; i < revisions.count; i++) {
+        bytes_text(&bytes, i > 0 ? ",\n " : "");
+        material_write(&bytes, &revisions.at[i]);
+    }
+    bytes_text(&bytes, "]}\n");
+    if (revisions.count > 0)
+        material_page_link(request, reply, revisions.at[revisions.count - 1].revision);
     material_revisions_clear(&revisions);
-    return status;
-}
-
-static void put_number(Bytes *bytes, const char *name, uint64_t number) {
-    if (number > 0)
-        bytes_format(bytes, ", \"%s\": %llu", name, (unsigned long long)number);
-    else
-        bytes_format(bytes, ", \"%s\": null", name);
-}
-
-static void put_deed(Bytes *bytes, const AuditEntry *deed) {
-    bytes_format(bytes, "{\"version\": %llu, \"action\": \"%s\"", (unsigned long long)deed->version,
-                 deed->action);
-    put_number(bytes, "revision", deed->revision);
-    put_number(bytes, "measurement", deed->measurement);
-    material_put_text(bytes, "who", deed->who);
-    material_put_text(bytes, "why", deed->why);
-    material_put_time(bytes, "when", deed->created_unix_ms);
-    bytes_text(bytes, "}");
+    return material_reply(reply, 200, &bytes, STATUS_OK, problem);
 }
 
 Status materials_history(App *app, const Request *request, Reply *reply, Problem *problem) {
     const char *slug = request->parameters[0];
-    AuditEntries audit_entries = {0};
+    AuditEntries entries;
     MaterialState state;
-    Page page;
-    TRY(read_page(request, DEEDS_INITIAL, DEEDS_MAX, &page, problem));
+    MaterialPage page;
+    TRY(material_page_read(request, AUDIT_INITIAL, AUDIT_MAX, &page, problem));
     TRY(db_material_state(app->db, slug, &state, problem));
+    if (material_is_cached(request, reply, &state))
+        return STATUS_OK;
     if (page.before > state.version + 1)
         page.before = state.version + 1;
-    if (is_known(request, reply, state.latest, state.version))
-        return STATUS_OK;
-    TRY(db_audit_entries(app->db, slug, page.before, page.limit, &audit_entries, problem));
+    TRY(db_audit_entries(app->db, slug, page.before, page.limit, &entries, problem));
     Bytes bytes = {.most = app->reply_most};
     bytes_format(&bytes, "{\"slug\": \"%s\", \"version\": %llu, \"history\": [", slug,
                  (unsigned long long)state.version);
-    for (size_t i = 0; i < audit_entries.count; i++) {
-        bytes_text(&bytes, i > 0 ? ",\n " : "");
-        put_deed(&bytes, &audit_entries.at[i]);
+    for (size_t i = 0; i < entries.count; i++) {
+        const AuditEntry *entry = &entries.at[i];
+        bytes_format(&bytes, "%s{\"version\": %llu, \"action\": \"%s\"", i > 0 ? ",\n " : "",
+                     (unsigned long long)entry->version, entry->action);
+        material_put_number(&bytes, "revision", entry->revision);
+        material_put_number(&bytes, "measurement", entry->measurement);
+        material_put_text(&bytes, "who", entry->who);
+        material_put_text(&bytes, "why", entry->why);
+        material_put_time(&bytes, "when", entry->created_unix_ms);
+        bytes_text(&bytes, "}");
     }
     bytes_text(&bytes, "]}\n");
-    if (audit_entries.count > 0)
-        link_page(request, reply, audit_entries.at[audit_entries.count - 1].version);
-    audit_entries_clear(&audit_entries);
-    return reply_bytes(reply, 200, type_json, &bytes, problem);
+    if (entries.count > 0)
+        material_page_link(request, reply, entries.at[entries.count - 1].version);
+    audit_entries_clear(&entries);
+    return material_reply(reply, 200, &bytes, STATUS_OK, problem);
 }
 
-static void put_side(Bytes *bytes, const char *name, const MaterialRevision *revision) {
+static void diff_put_side(Bytes *bytes, const char *name, const MaterialRevision *revision) {
     bytes_format(bytes, ", \"%s\": {\"revision\": %llu, \"status\": \"%s\"", name,
                  (unsigned long long)revision->revision, revision->status);
     material_put_text(bytes, "author", revision->author);
@@ -140,60 +85,46 @@ static void put_side(Bytes *bytes, const char *name, const MaterialRevision *rev
                  revision->slug, (unsigned long long)revision->revision);
 }
 
-// The value alone of what is written as "name": value.
-static const char *value_of(const Bytes *member) {
-    const char *colon = member->at != NULL ? strstr(member->at, ": ") : NULL;
-    return colon != NULL ? colon + 2 : "null";
-}
-
-// Member by member, a list being one: what is the same on both sides is written the same.
-static size_t put_differences(Bytes *bytes, const Material *from, const Material *to) {
+// Member by member; a list is one.
+static void diff_put(Bytes *bytes, const MaterialRevision *from, const MaterialRevision *to) {
+    Bytes ours = {.most = 0}, theirs = {.most = 0};
     size_t count = 0;
-    for (const Field *row = material_fields; row->kind != FIELD_KIND_END; row++) {
-        const Field alone[] = {*row, FIELD_END};
-        Bytes a = {0}, b = {0};
-        (void)encode_members(&a, alone, from, WRITE_REPORT);
-        (void)encode_members(&b, alone, to, WRITE_REPORT);
-        if (strcmp(value_of(&a), value_of(&b)) != 0) {
+    bytes_format(bytes, "{\"slug\": \"%s\"", from->slug);
+    diff_put_side(bytes, "from", from);
+    diff_put_side(bytes, "to", to);
+    bytes_text(bytes, ", \"differences\": [");
+    for (const Field *field = material_fields; field->kind != FIELD_KIND_END; field++) {
+        const char *a = material_member_json(&ours, field, &from->material);
+        const char *b = material_member_json(&theirs, field, &to->material);
+        if (a == NULL || b == NULL)
+            bytes->is_failed = true;
+        else if (strcmp(a, b) != 0) {
             bytes_format(bytes, "%s{\"pointer\": \"/%s\", \"from\": ", count++ > 0 ? ",\n " : "",
-                         row->name);
-            bytes_text(bytes, value_of(&a));
+                         field->name);
+            bytes_text(bytes, a);
             bytes_text(bytes, ", \"to\": ");
-            bytes_text(bytes, value_of(&b));
-            material_put_text(bytes, "unit", row->unit);
+            bytes_text(bytes, b);
+            material_put_text(bytes, "unit", field->unit);
             bytes_text(bytes, "}");
         }
-        bytes_clear(&a);
-        bytes_clear(&b);
     }
-    return count;
+    bytes_format(bytes, "], \"count\": %zu}\n", count);
+    bytes_clear(&ours);
+    bytes_clear(&theirs);
 }
 
-// What came newest is set beside what is in use; that itself beside the one before it.
-static Status read_sides(App *app, const Request *request, const MaterialState *state, size_t *from,
-                         size_t *to, Problem *problem) {
-    const char *slug = request->parameters[0];
+// By default the newest revision is compared with the one in use, and that with the one before it.
+static Status diff_read_sides(App *app, const Request *request, const MaterialState *state,
+                              size_t *from, size_t *to, Problem *problem) {
     const size_t latest = (size_t)state->latest;
     MaterialRevision head;
     TRY(request_count(request, "to", 1, latest, latest, to, problem));
     size_t before = *to > 1 ? *to - 1 : 1;
-    const Status status = db_material(app->db, slug, 0, &head, NULL);
+    const Status status = db_material(app->db, request->parameters[0], 0, &head, NULL);
     if (status == STATUS_OK && strcmp(head.status, "approved") == 0 && head.revision < *to)
         before = (size_t)head.revision;
     material_revision_clear(&head);
     return request_count(request, "from", 1, latest, before, from, problem);
-}
-
-static Status diff(App *app, const MaterialRevision *a, const MaterialRevision *b, Reply *reply,
-                   Problem *problem) {
-    Bytes bytes = {.most = app->reply_most};
-    bytes_format(&bytes, "{\"slug\": \"%s\"", a->slug);
-    put_side(&bytes, "from", a);
-    put_side(&bytes, "to", b);
-    bytes_text(&bytes, ", \"differences\": [");
-    const size_t differences = put_differences(&bytes, &a->material, &b->material);
-    bytes_format(&bytes, "], \"count\": %zu}\n", differences);
-    return reply_bytes(reply, 200, type_json, &bytes, problem);
 }
 
 Status materials_diff(App *app, const Request *request, Reply *reply, Problem *problem) {
@@ -201,17 +132,103 @@ Status materials_diff(App *app, const Request *request, Reply *reply, Problem *p
     MaterialRevision a = {0}, b = {0};
     MaterialState state;
     size_t from, to;
-    // Before all else, so that its tag is not newer than what it stands for.
+    Bytes bytes = {.most = app->reply_most};
     TRY(db_material_state(app->db, slug, &state, problem));
-    TRY(read_sides(app, request, &state, &from, &to, problem));
-    if (is_known(request, reply, state.latest, state.version))
+    TRY(diff_read_sides(app, request, &state, &from, &to, problem));
+    if (material_is_cached(request, reply, &state))
         return STATUS_OK;
-    Status status = material_find(app->db, slug, from, &a, problem);
+    Status status = db_material(app->db, slug, from, &a, problem);
     if (status == STATUS_OK)
-        status = material_find(app->db, slug, to, &b, problem);
+        status = db_material(app->db, slug, to, &b, problem);
     if (status == STATUS_OK)
-        status = diff(app, &a, &b, reply, problem);
+        diff_put(&bytes, &a, &b);
     material_revision_clear(&a);
     material_revision_clear(&b);
-    return status;
+    return material_reply(reply, 200, &bytes, status, problem);
+}
+
+// The results that used one revision.
+static Status uses_list(App *app, const Request *request, uint64_t revision, Reply *reply,
+                        Problem *problem) {
+    const char *slug = request->parameters[0], *base = base_path();
+    const unsigned long long number = revision;
+    MaterialState state;
+    size_t limit, before;
+    uint64_t total;
+    char name[96];
+    ResultUses uses;
+    TRY(request_count(request, "limit", 1, RESULTS_MAX, RESULTS_INITIAL, &limit, problem));
+    TRY(request_count(request, "before", 1, (size_t)1 << 53, 0, &before, problem));
+    TRY(db_material_state(app->db, slug, &state, problem));
+    if (revision > state.latest)
+        return problem_set(problem, STATUS_NOT_FOUND,
+                           "the material \"%.63s\" has no revision %llu, its newest is %llu", slug,
+                           number, (unsigned long long)state.latest);
+    snprintf(name, sizeof name, "%.63s@%llu", slug, number);
+    // One more than the limit shows whether there is a next page.
+    TRY(db_result_uses(app->db, name, limit + 1, (int64_t)before, &uses, &total, problem));
+    Bytes bytes = {.most = app->reply_most};
+    bytes_format(&bytes, "{\"slug\": \"%s\", \"revision\": %llu, \"total\": %llu, \"results\": [",
+                 slug, number, (unsigned long long)total);
+    for (size_t i = 0; i < uses.count && i < limit; i++) {
+        const ResultUse *use = &uses.at[i];
+        bytes_format(&bytes, "%s{\"id\": \"%s\"", i > 0 ? ",\n " : "", use->id);
+        material_put_time(&bytes, "created", use->created_unix_ms);
+        bytes_format(&bytes,
+                     ", \"links\": {\"self\": \"%s/v1/results/%s\", \"manifest\": "
+                     "\"%s/v1/results/%s/manifest\"}}",
+                     base, use->id, base, use->id);
+    }
+    bytes_text(&bytes, "]}\n");
+    if (uses.count > limit)
+        material_page_link(request, reply, (uint64_t)uses.at[limit - 1].number);
+    free(uses.at);
+    return material_reply(reply, 200, &bytes, STATUS_OK, problem);
+}
+
+// Each revision with the number of results that used it.
+static Status uses_count(App *app, const char *slug, Reply *reply, Problem *problem) {
+    const char *base = base_path();
+    MaterialState state;
+    MaterialReferences uses;
+    uint64_t total = 0;
+    Bytes bytes = {.most = app->reply_most};
+    TRY(db_material_state(app->db, slug, &state, problem));
+    TRY(db_material_uses(app->db, slug, &uses, problem));
+    bytes_format(&bytes, "{\"slug\": \"%s\", \"revisions\": [", slug);
+    for (size_t i = 0; i < uses.count; i++) {
+        const MaterialReference *use = &uses.at[i];
+        const unsigned long long number = use->revision;
+        total += use->results;
+        bytes_format(&bytes,
+                     "%s{\"revision\": %llu, \"status\": \"%s\", \"results\": %llu, \"links\": "
+                     "{\"self\": \"%s/v1/materials/%s@%llu\", \"used_by\": "
+                     "\"%s/v1/materials/%s@%llu/used-by\"}}",
+                     i > 0 ? ",\n " : "", number, use->status, (unsigned long long)use->results,
+                     base, slug, number, base, slug, number);
+    }
+    bytes_format(&bytes, "], \"total\": %llu}\n", (unsigned long long)total);
+    free(uses.at);
+    return material_reply(reply, 200, &bytes, STATUS_OK, problem);
+}
+
+Status materials_uses(App *app, const Request *request, Reply *reply, Problem *problem) {
+    const char *text = request_query(request, "revision");
+    uint64_t revision;
+    if (text == NULL &&
+        (request_query(request, "limit") != NULL || request_query(request, "before") != NULL))
+        return problem_set(problem, STATUS_USAGE,
+                           "limit and before need a revision: add revision=1, or use "
+                           "/v1/materials/%.63s@1/used-by",
+                           request->parameters[0]);
+    if (text == NULL)
+        return uses_count(app, request->parameters[0], reply, problem);
+    TRY(material_number(text, "revision", &revision, problem));
+    return uses_list(app, request, revision, reply, problem);
+}
+
+Status materials_uses_revision(App *app, const Request *request, Reply *reply, Problem *problem) {
+    uint64_t revision;
+    TRY(material_number(request->parameters[1], "revision", &revision, problem));
+    return uses_list(app, request, revision, reply, problem);
 }

@@ -1,81 +1,63 @@
-// What a material's measurements come to, and the revision that would say so: nothing is written,
-// whoever agrees sends it back as a revision, under the tag that came with it.
-#include <stdio.h>
+// What is derived from a material: the revision that its measurements propose, which nothing writes
+// until a user sends it back, and the contact parameters for one pair of masses.
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/drop_test/evaluation.h"
+#include "core/drop_test/pair_parameters.h"
 #include "server/api/materials.h"
+#include "server/api/measurements.h"
 #include "server/api/query.h"
 #include "server/formats/chart.h"
 #include "server/formats/charts.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
 #include "server/json/encode.h"
-#include "server/materials/measurement.h"
+#include "server/materials/material.h"
 #include "server/util/base_path.h"
 
-enum { TESTS_MAX = 100, FORMATS = 2 };
+enum { TESTS_MAX = 100 };
 
-static const char *const extensions[] = {"json", "svg", NULL};
+static const double mass_min = 1e-12, mass_max = 1e15; // [kg]
 
-// The measurements that are taken in, with their numbers.
-typedef struct Taken {
+// The measurements of a proposal.
+typedef struct Selection {
     StoredTest stored[TESTS_MAX];
     Measurement tests[TESTS_MAX];
     size_t count;
-} Taken;
+} Selection;
 
-static void taken_free(Taken *taken) {
-    for (size_t i = 0; taken != NULL && i < taken->count; i++)
-        stored_test_clear(&taken->stored[i]);
-    free(taken);
+static void selection_free(Selection *selection) {
+    for (size_t i = 0; selection != NULL && i < selection->count; i++)
+        stored_test_clear(&selection->stored[i]);
+    free(selection);
 }
 
-static Status take(const char *slug, const MaterialState *state, uint64_t number, Taken *taken,
-                   Problem *problem) {
-    for (size_t i = 0; i < taken->count; i++)
-        if (taken->tests[i].number == number)
+static Status selection_add(Selection *selection, const char *slug, const MaterialState *state,
+                            uint64_t number, Problem *problem) {
+    for (size_t i = 0; i < selection->count; i++)
+        if (selection->tests[i].number == number)
             return problem_set(problem, STATUS_USAGE,
-                               "the query parameter \"measurements\" names %llu twice",
+                               "the query parameter \"measurements\" has %llu twice",
                                (unsigned long long)number);
-    if (taken->count == TESTS_MAX)
+    if (selection->count == TESTS_MAX)
         return problem_set(problem, STATUS_USAGE,
-                           "at most %d measurements are taken in at a time: name them as "
+                           "a proposal takes at most %d measurements: select some, as "
                            "?measurements=1,2",
                            TESTS_MAX);
     if (number == 0 || number > state->measurements)
         return problem_set(problem, STATUS_NOT_FOUND,
-                           "there is no measurement %llu of the material \"%.63s\"",
-                           (unsigned long long)number, slug);
-    taken->tests[taken->count] = (Measurement){number, &taken->stored[taken->count].test};
-    taken->count++;
+                           "the material \"%.63s\" has no measurement %llu", slug,
+                           (unsigned long long)number);
+    selection->tests[selection->count] =
+        (Measurement){number, &selection->stored[selection->count].test};
+    selection->count++;
     return STATUS_OK;
 }
 
-static Status load(CpuBudget *budget, const char *slug, Taken *taken, Reply *reply,
-                   Problem *problem) {
-    for (size_t i = 0; i < taken->count; i++) {
-        if (!cpu_budget_lasts(budget, 0)) {
-            const Status status = cpu_budget_report(budget, problem);
-            reply->retry_after = status == STATUS_BUSY ? 10 : reply->retry_after;
-            return status;
-        }
-        TRY(stored_test_load(budget->app->db, slug, taken->tests[i].number, &taken->stored[i],
-                             problem));
-        // Before there are more of them in memory.
-        if (evaluation_sample_count(taken->tests, i + 1) > EVALUATION_SAMPLES_MAX)
-            return problem_set(problem, STATUS_LIMIT,
-                               "more than %d samples in traces: take in fewer measurements at a "
-                               "time, as ?measurements=1,2",
-                               EVALUATION_SAMPLES_MAX);
-    }
-    return STATUS_OK;
-}
-
-// "1,2,5"; all of them without it.
-static Status take_asked(const Request *request, const MaterialState *state, Taken *taken,
-                         Problem *problem) {
+// "1,2,5"; without it all of them.
+static Status selection_read(Selection *selection, const Request *request,
+                             const MaterialState *state, Problem *problem) {
     const char *slug = request->parameters[0], *list = request_query(request, "measurements");
     if (state->measurements == 0)
         return problem_set(problem, STATUS_NOT_FOUND,
@@ -83,117 +65,126 @@ static Status take_asked(const Request *request, const MaterialState *state, Tak
                            "/v1/materials/%.63s/measurements",
                            slug, slug);
     for (uint64_t i = 1; list == NULL && i <= state->measurements; i++)
-        TRY(take(slug, state, i, taken, problem));
+        TRY(selection_add(selection, slug, state, i, problem));
     for (const char *text = list; text != NULL;) {
         const size_t size = strspn(text, "0123456789");
         if (size == 0 || size > 9 || (text[size] != ',' && text[size] != '\0'))
             return problem_set(problem, STATUS_USAGE,
-                               "the query parameter \"measurements\" must be numbers with commas "
-                               "between, as 1,2, is \"%.40s\"",
+                               "the query parameter \"measurements\" must be numbers separated by "
+                               "commas, as 1,2, is \"%.40s\"",
                                list);
-        TRY(take(slug, state, strtoull(text, NULL, 10), taken, problem));
+        TRY(selection_add(selection, slug, state, strtoull(text, NULL, 10), problem));
         text = text[size] == ',' ? text + size + 1 : NULL;
     }
     return STATUS_OK;
 }
 
-// Which of the extensions.
-static Status choose_format(const Request *request, Reply *reply, int *format, Problem *problem) {
+static Status selection_load(Selection *selection, CpuBudget *budget, const char *slug,
+                             Reply *reply, Problem *problem) {
+    for (size_t i = 0; i < selection->count; i++) {
+        if (!cpu_budget_lasts(budget, 0)) {
+            const Status status = cpu_budget_report(budget, problem);
+            reply->retry_after = status == STATUS_BUSY ? 10 : reply->retry_after;
+            return status;
+        }
+        TRY(stored_test_load(budget->app->db, slug, selection->tests[i].number,
+                             &selection->stored[i], problem));
+        // Before more of them are in memory.
+        if (evaluation_sample_count(selection->tests, i + 1) > EVALUATION_SAMPLES_MAX)
+            return problem_set(problem, STATUS_LIMIT,
+                               "the traces have more than %d samples: select fewer measurements, "
+                               "as ?measurements=1,2",
+                               EVALUATION_SAMPLES_MAX);
+    }
+    return STATUS_OK;
+}
+
+static Status proposal_read_format(const Request *request, Reply *reply, bool *is_chart,
+                                   Problem *problem) {
     static const char *const types[] = {"application/json", chart_type, NULL};
     const char *extension = request->parameters[1];
     reply->varies_by_accept = extension == NULL;
-    *format = extension == NULL ? header_accept(request->accept, types) : -1;
-    for (int i = 0; extension != NULL && i < FORMATS; i++)
-        if (strcmp(extension, extensions[i]) == 0)
-            *format = i;
-    if (*format >= 0)
-        return STATUS_OK;
-    return extension == NULL
-               ? problem_set(problem, STATUS_NOT_ACCEPTABLE,
-                             "none of the formats fits Accept; there are json, svg, by extension "
-                             "too")
-               : problem_set(problem, STATUS_NOT_FOUND,
-                             "there is no format \"%.20s\"; there are json, svg", extension);
+    const int type = extension == NULL ? header_accept(request->accept, types) : 0;
+    if (type < 0)
+        return problem_set(problem, STATUS_NOT_ACCEPTABLE,
+                           "none of the formats json and svg fits Accept; an extension selects one "
+                           "too");
+    *is_chart = extension == NULL ? type == 1 : strcmp(extension, "svg") == 0;
+    if (extension != NULL && !*is_chart && strcmp(extension, "json") != 0)
+        return problem_set(problem, STATUS_NOT_FOUND,
+                           "there is no format \"%.20s\"; there are json, svg", extension);
+    return STATUS_OK;
 }
 
-// As it may be sent back.
-static void write_revision(Bytes *bytes, const Taken *taken, const Material *material) {
-    bytes_text(bytes, "{");
-    (void)encode_members(bytes, material_fields, material, WRITE_SCENE);
-    bytes_format(bytes, ", \"comment\": \"from measurement%s", taken->count > 1 ? "s" : "");
-    for (size_t i = 0; i < taken->count; i++)
-        bytes_format(bytes, "%s%llu", i > 0 ? ", " : " ",
-                     (unsigned long long)taken->tests[i].number);
-    bytes_text(bytes, "\"}");
-}
-
-static void write_links(Bytes *bytes, const Request *request) {
-    const char *base = base_path(), *slug = request->parameters[0];
+// `"name": ` and the address of the proposal, with the request's query.
+static void proposal_write_link(Bytes *bytes, const Request *request, const char *name,
+                                const char *rest) {
+    Bytes link = {.most = 8192};
     const char *query = strchr(request->target, '?');
-    bytes_text(bytes, ", \"links\": {\"self\": ");
-    Bytes self = {.most = 8192};
-    bytes_format(&self, "%s/v1/materials/%s/proposal%s", base, slug, query != NULL ? query : "");
-    bytes_json_string(bytes, self.at);
-    bytes_clear(&self);
-    bytes_format(&self, "%s/v1/materials/%s/proposal.svg%s", base, slug,
-                 query != NULL ? query : "");
-    bytes_text(bytes, ", \"chart\": ");
-    bytes_json_string(bytes, self.at);
-    bytes_clear(&self);
+    bytes_format(&link, "%s/v1/materials/%s/proposal%s%s", base_path(), request->parameters[0],
+                 rest, query != NULL ? query : "");
+    bytes_text(bytes, name);
+    bytes_json_string(bytes, link.at);
+    bytes_clear(&link);
+}
+
+static void proposal_write(Bytes *bytes, const Request *request, const Selection *selection,
+                           const Evaluation *evaluation, const MaterialProposal *proposal) {
+    const char *base = base_path(), *slug = request->parameters[0];
+    Bytes numbers = {.most = 0};
+    for (size_t i = 0; i < selection->count; i++)
+        bytes_format(&numbers, "%s%llu", i > 0 ? ", " : "",
+                     (unsigned long long)selection->tests[i].number);
+    bytes_format(bytes, "{\"slug\": \"%s\", \"measurements\": [%s], \"revision\": ", slug,
+                 numbers.at);
+    if (proposal->why == NULL) { // as POST to /revisions takes it
+        bytes_text(bytes, "{");
+        (void)encode_members(bytes, material_fields, &proposal->material, WRITE_SCENE);
+        bytes_format(bytes, ", \"comment\": \"from measurement%s %s\"}",
+                     selection->count > 1 ? "s" : "", numbers.at);
+    } else {
+        bytes_text(bytes, "null");
+    }
+    material_put_text(bytes, "why", proposal->why);
+    bytes_text(bytes, ", ");
+    evaluation_write(bytes, evaluation, true);
+    bytes_text(bytes, ", \"links\": {");
+    proposal_write_link(bytes, request, "\"self\": ", "");
+    proposal_write_link(bytes, request, ", \"chart\": ", ".svg");
     bytes_format(bytes,
                  ", \"confirm\": \"%s/v1/materials/%s/revisions\", \"material\": "
-                 "\"%s/v1/materials/%s\"}",
+                 "\"%s/v1/materials/%s\"}}\n",
                  base, slug, base, slug);
+    bytes->is_failed = bytes->is_failed || numbers.is_failed;
+    bytes_clear(&numbers);
 }
 
-static Status tell(App *app, const Request *request, const Taken *taken,
-                   const Evaluation *evaluation, const MaterialProposal *proposal, Reply *reply,
-                   Problem *problem) {
-    Bytes bytes = {.most = app->reply_most};
-    bytes_format(&bytes, "{\"slug\": \"%s\", \"measurements\": [", request->parameters[0]);
-    for (size_t i = 0; i < taken->count; i++)
-        bytes_format(&bytes, "%s%llu", i > 0 ? ", " : "",
-                     (unsigned long long)taken->tests[i].number);
-    bytes_text(&bytes, "], \"revision\": ");
-    if (proposal->why == NULL)
-        write_revision(&bytes, taken, &proposal->material);
-    else
-        bytes_text(&bytes, "null");
-    bytes_text(&bytes, ", \"why\": ");
-    bytes_json_string(&bytes, proposal->why);
-    bytes_text(&bytes, ", ");
-    evaluation_write(&bytes, evaluation);
-    write_links(&bytes, request);
-    bytes_text(&bytes, "}\n");
-    return reply_bytes(reply, 200, type_json, &bytes, problem);
-}
-
-static Status tell_chart(App *app, const Request *request, const Evaluation *evaluation,
-                         Reply *reply, Problem *problem) {
-    Bytes bytes = {.most = app->reply_most};
-    charts_evaluation(evaluation, request->parameters[0], &bytes);
-    return reply_bytes(reply, 200, chart_type, &bytes, problem);
-}
-
-static Status propose(App *app, const Request *request, const Material *before, Taken *taken,
-                      int separation, int format, Reply *reply, Problem *problem) {
+static Status proposal_run(App *app, const Request *request, const Material *before,
+                           Selection *selection, int separation, bool is_chart, Reply *reply,
+                           Problem *problem) {
+    const char *slug = request->parameters[0];
     int form;
     TRY(query_choice(request, "as", proposal_form_names, PROPOSAL_CONSTANT, &form, problem));
     Evaluation evaluation = {.separation = separation};
     MaterialProposal proposal = {.why = NULL};
     CpuBudget budget;
     cpu_budget_begin(app, &budget);
-    Status status = load(&budget, request->parameters[0], taken, reply, problem);
+    Status status = selection_load(selection, &budget, slug, reply, problem);
     if (status == STATUS_OK)
-        status = material_evaluate(&budget, taken->tests, taken->count, separation, &evaluation,
-                                   reply, problem);
+        status = measurements_evaluate(&budget, selection->tests, selection->count, separation,
+                                       &evaluation, reply, problem);
     cpu_budget_end(&budget);
     if (status == STATUS_OK)
-        status = material_proposal_run(&evaluation, taken->tests, taken->count, before,
+        status = material_proposal_run(&evaluation, selection->tests, selection->count, before,
                                        (ProposalForm)form, &proposal, problem);
-    if (status == STATUS_OK)
-        status = format == 0 ? tell(app, request, taken, &evaluation, &proposal, reply, problem)
-                             : tell_chart(app, request, &evaluation, reply, problem);
+    if (status == STATUS_OK) {
+        Bytes bytes = {.most = app->reply_most};
+        if (is_chart)
+            charts_evaluation(&evaluation, slug, &bytes);
+        else
+            proposal_write(&bytes, request, selection, &evaluation, &proposal);
+        status = reply_bytes(reply, 200, is_chart ? chart_type : type_json, &bytes, problem);
+    }
     material_proposal_clear(&proposal);
     evaluation_clear(&evaluation);
     return status;
@@ -202,22 +193,94 @@ static Status propose(App *app, const Request *request, const Material *before, 
 Status proposals_show(App *app, const Request *request, Reply *reply, Problem *problem) {
     const char *slug = request->parameters[0];
     MaterialState state;
-    int format, separation;
-    char tag[MATERIAL_TAG];
-    TRY(choose_format(request, reply, &format, problem));
-    if (format != 0)
+    MaterialRevision before;
+    bool is_chart = false;
+    int separation;
+    TRY(proposal_read_format(request, reply, &is_chart, problem));
+    if (is_chart)
         reply->policy = reply_drawing_policy;
     TRY(db_material_state(app->db, slug, &state, problem));
-    TRY(material_separation(app, request, &separation, problem));
-    material_tag(slug, state.latest, state.version, tag);
-    MaterialRevision before = {.slug = NULL};
+    TRY(measurement_separation(app, request, &separation, problem));
     TRY(material_latest(app, slug, &before, problem));
-    Taken *taken = calloc(1, sizeof *taken);
-    Status status = taken != NULL ? take_asked(request, &state, taken, problem)
-                                  : problem_set(problem, STATUS_NO_MEMORY, "no memory for it");
-    if (status == STATUS_OK && !reply_tagged(reply, request, tag))
-        status = propose(app, request, &before.material, taken, separation, format, reply, problem);
-    taken_free(taken);
+    Selection *selection = calloc(1, sizeof *selection);
+    Status status = selection != NULL
+                        ? selection_read(selection, request, &state, problem)
+                        : problem_set(problem, STATUS_NO_MEMORY, "no memory for the measurements");
+    if (status == STATUS_OK && !material_is_cached(request, reply, &state))
+        status = proposal_run(app, request, &before.material, selection, separation, is_chart,
+                              reply, problem);
+    selection_free(selection);
     material_revision_clear(&before);
     return status;
+}
+
+// What is derived for one pair of masses.
+typedef struct PairQuery {
+    double damper_mass, structure_mass; // [kg]
+    int identified_for, separation;
+} PairQuery;
+
+static Status pair_query_read(const Request *request, PairQuery *query, Problem *problem) {
+    if (request_query(request, "damper_mass") == NULL)
+        return problem_set(problem, STATUS_USAGE,
+                           "the query parameter \"damper_mass\" is required: the mass of the free "
+                           "body [kg]; structure_mass too, unless the structure does not move");
+    TRY(request_number(request, "damper_mass", mass_min, mass_max, (double)NAN, &query->damper_mass,
+                       problem));
+    TRY(request_number(request, "structure_mass", mass_min, mass_max, (double)NAN,
+                       &query->structure_mass, problem));
+    TRY(query_choice(request, "identified_for", identified_for_names, IDENTIFIED_FOR_SCENE,
+                     &query->identified_for, problem));
+    return query_choice(request, "separation", separation_names, CHOICE_ABSENT, &query->separation,
+                        problem);
+}
+
+static void pair_write(Bytes *bytes, const MaterialRevision *revision, const PairParameters *pair) {
+    const char *base = base_path(), *slug = revision->slug;
+    const unsigned long long number = revision->revision;
+    bytes_format(bytes, "{\"material\": \"%s@%llu\", \"status\": \"%s\", ", slug, number,
+                 revision->status);
+    (void)encode_members(bytes, pair_parameters_fields, pair, WRITE_REPORT);
+    bytes_text(bytes, ", \"warnings\": ");
+    encode_list(bytes, warning_fields, pair->warnings.at, pair->warnings.count,
+                sizeof *pair->warnings.at, WRITE_REPORT);
+    bytes_format(bytes,
+                 ", \"links\": {\"material\": \"%s/v1/materials/%s\", \"revision\": "
+                 "\"%s/v1/materials/%s@%llu\"}}\n",
+                 base, slug, base, slug, number);
+}
+
+static Status pair_show(App *app, const Request *request, uint64_t number, Reply *reply,
+                        Problem *problem) {
+    PairQuery query;
+    TRY(pair_query_read(request, &query, problem));
+    MaterialRevision revision;
+    PairParameters pair = {.contacts = {NULL, 0}};
+    char tag[MATERIAL_TAG];
+    Status status = db_material(app->db, request->parameters[0], number, &revision, problem);
+    problem->whose = "query";
+    if (status == STATUS_OK)
+        status = pair_parameters_run(&revision.material, query.damper_mass, query.structure_mass,
+                                     query.identified_for, query.separation, &pair, problem);
+    if (status == STATUS_OK) {
+        material_tag(revision.slug, revision.revision, revision.version, tag);
+        if (!reply_tagged(reply, request, tag)) {
+            Bytes bytes = {.most = app->reply_most};
+            pair_write(&bytes, &revision, &pair);
+            status = material_reply(reply, 200, &bytes, STATUS_OK, problem);
+        }
+    }
+    pair_parameters_clear(&pair);
+    material_revision_clear(&revision);
+    return status;
+}
+
+Status derived_show(App *app, const Request *request, Reply *reply, Problem *problem) {
+    return pair_show(app, request, 0, reply, problem);
+}
+
+Status derived_show_revision(App *app, const Request *request, Reply *reply, Problem *problem) {
+    uint64_t number;
+    TRY(material_number(request->parameters[1], "revision", &number, problem));
+    return pair_show(app, request, number, reply, problem);
 }

@@ -1,40 +1,44 @@
-// What the handlers of materials share: entity tags and the conditions that writers bring. Not
-// routes and not rows. Used by the files of api/ that show or write what a material is.
+// What the handlers of materials share: entity tags, If-Match, pages of lists and JSON replies.
 #ifndef SERVER_API_MATERIALS_H
 #define SERVER_API_MATERIALS_H
 
-#include "core/drop_test/evaluation.h"
 #include "server/api/app.h"
-#include "server/api/cpu_budget.h"
 #include "server/db/materials.h"
 #include "server/util/bytes.h"
 
 enum { MATERIAL_TAG = 110 };
 
-// "SLUG@REVISION-VERSION", without quotes. What is said of a revision may still change (a draft is
-// approved): the version tells.
+// "SLUG@REVISION-VERSION", without quotes. A review changes what is reported of a revision: the
+// version changes with it.
 void material_tag(const char *slug, uint64_t revision, uint64_t version, char tag[MATERIAL_TAG]);
+// Sets the tag of the material in the request's path. True: the client has that version already,
+// and the reply is complete.
+bool material_is_cached(const Request *request, Reply *reply, const MaterialState *state);
 
-// The state that a writer has seen, as If-Match tells it: any tag of the material of its present
-// version, or "*". *version is what the store is to find (ANY_VERSION: whatever it is); *state the
-// material's present one. STATUS_NOT_FOUND, STATUS_UNCONDITIONAL where it is required and missing,
-// STATUS_STALE.
-Status material_condition(App *app, const Request *request, const char *slug, bool is_required,
-                          uint64_t *version, MaterialState *state, Problem *problem);
+// Checks If-Match: any tag of the material's present version, or "*". *version is what the database
+// is to find (ANY_VERSION: any); *state is the present one. STATUS_NOT_FOUND, STATUS_UNCONDITIONAL:
+// it is required and missing, STATUS_STALE.
+Status material_condition(App *app, const Request *request, bool is_required, uint64_t *version,
+                          MaterialState *state, Problem *problem);
 
-// The number of a revision as a path has it. STATUS_NOT_FOUND.
-Status material_revision_number(const char *text, uint64_t *revision, Problem *problem);
+// A number from 1 as a path has it; `what` is "revision" or "measurement". STATUS_NOT_FOUND.
+Status material_number(const char *text, const char *what, uint64_t *number, Problem *problem);
 
-// The head, or of a material that has none (all are deprecated) the newest revision; lists are
-// read. STATUS_NOT_FOUND, and then it is clear.
-Status material_latest(App *app, const char *slug, MaterialRevision *revision, Problem *problem);
+// A page of a list numbered from 1, newest first: `limit` items before `before`.
+typedef struct MaterialPage {
+    size_t limit, before;
+} MaterialPage;
+Status material_page_read(const Request *request, size_t initial, size_t max, MaterialPage *page,
+                          Problem *problem);
+// Links the next page after the item numbered `last`; 0: there is no item.
+void material_page_link(const Request *request, Reply *reply, uint64_t last);
 
-// The separation rule that drop tests are to be read by: the query's, else the material's, else
-// zero penetration.
-Status material_separation(App *app, const Request *request, int *separation, Problem *problem);
+// Takes the JSON in `bytes` as the body of the reply, unless `status` is an error already.
+Status material_reply(Reply *reply, int code, Bytes *bytes, Status status, Problem *problem);
 
-// evaluation_run while patience lasts. STATUS_BUSY, STATUS_LIMIT.
-Status material_evaluate(CpuBudget *budget, const Measurement *tests, size_t count, int separation,
-                         Evaluation *evaluation, Reply *reply, Problem *problem);
+// The JSON body of a request as `fields`; faults of types and ranges are in `problem`, to which
+// more may be added. STATUS_OK: it is an object. Cleared by fields_clear in any case.
+Status material_body_read(const Request *request, const char *whose, const Field *fields,
+                          void *item, Problem *problem);
 
 #endif

@@ -121,8 +121,8 @@ static const char *result_json(const char *json, const char *otherwise) {
 
 static void manifest_put_material(App *app, Bytes *bytes, const ReferenceRow *use) {
     MaterialRevision material = {0};
-    if (material_find(app->db, use->slug, use->revision, &material, NULL) == STATUS_OK) {
-        material_write_stated(bytes, &material);
+    if (db_material(app->db, use->slug, use->revision, &material, NULL) == STATUS_OK) {
+        material_write_contents(bytes, &material);
     } else { // no longer here: its numbers stand in the scene
         bytes_text(bytes, "{\"slug\": ");
         bytes_json_string(bytes, use->slug);

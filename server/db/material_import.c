@@ -1,6 +1,7 @@
-// Material by material, in the order of slugs: its measurements, for revisions name them, then its
-// revisions with their reviews. A number that is there must say what is there; one that is not must
-// be the next. What is written before a fault is met goes with the transaction.
+// The list is sorted by slug, then kind, then number. Measurements of a material are imported
+// before its revisions, which refer to them. A number that is stored must have the same contents;
+// any other must be the next one. Rows written before a fault is found are rolled back with the
+// transaction.
 #include "server/db/material_import.h"
 
 #include <stdio.h>
@@ -8,274 +9,736 @@
 #include <string.h>
 
 #include "core/base/json_pointer.h"
-#include "server/db/db_private.h"
-#include "server/db/material_import_context.h"
+#include "server/db/material_rows.h"
+#include "server/json/material_bodies.h"
 
 enum { POINTER_SIZE = sizeof((Fault){0}.pointer) };
 
-static Status load_revision(Sqlite *database, const char *slug, uint64_t number,
+// Clocks differ, and a date alone is midnight UTC wherever it was written.
+static const int64_t time_slack_ms = 24 * 3600 * (int64_t)1000;
+
+// An import in progress, and the material that it is at.
+typedef struct ImportContext {
+    const MaterialImport *import;
+    Sqlite *database;
+    bool writes;
+    ImportTally *tally;
+    Problem *faults;
+    size_t denied;                   // rows that need may_all
+    char denied_place[POINTER_SIZE]; // the first of them
+    const char *denied_why;
+
+    const char *slug;
+    MaterialKey key;
+    const ImportRow *measurements, *revisions;
+    size_t measurement_count, revision_count;
+    uint64_t last_measurement;                // stored, or earlier in the file
+    bool numbers_unknown[IMPORT_UNKNOWN + 1]; // by kind: one could not be read, so gaps are allowed
+} ImportContext;
+
+// Adds a fault at `name` below `place`; "": at `place` itself.
+__attribute__((format(printf, 4, 5))) static Status import_fault(const ImportContext *context,
+                                                                 const char *place,
+                                                                 const char *name,
+                                                                 const char *format, ...) {
+    char pointer[POINTER_SIZE], text[sizeof((Fault){0}.detail)];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    if (name[0] != '\0')
+        json_pointer_join(pointer, sizeof pointer, place, name);
+    else
+        text_fit(pointer, sizeof pointer, place);
+    return problem_add(context->faults, STATUS_INVALID, pointer, "%s", text);
+}
+
+static void import_deny(ImportContext *context, const char *place, const char *name,
+                        const char *why) {
+    if (context->denied++ > 0)
+        return;
+    json_pointer_join(context->denied_place, sizeof context->denied_place, place, name);
+    context->denied_why = why;
+}
+
+// Whether what is new is written, not only validated.
+static bool import_writes(const ImportContext *context) {
+    return context->writes && context->faults->count == 0;
+}
+
+static const char *import_number_name(const ImportContext *context, const ImportRow *row) {
+    return context->import->number_names[row->kind];
+}
+
+// A name as the database has it: unknown is NULL.
+static const char *import_name(const char *name) {
+    return name != NULL && name[0] != '\0' ? name : NULL;
+}
+
+static const char *import_author(const ImportContext *context, const ImportRow *row) {
+    return row->author != NULL && context->import->may_all ? import_name(row->author)
+                                                           : context->import->who;
+}
+
+static const char *import_comment(const ImportRow *row) {
+    return row->comment != NULL ? row->comment : "imported";
+}
+
+static int64_t import_created(const ImportContext *context, const ImportRow *row) {
+    return row->created_unix_ms > 0 ? row->created_unix_ms : context->import->now_unix_ms;
+}
+
+// `revised_unix_ms`: when the revision of a review was written; 0: no review, or unknown.
+static void import_validate_time(const ImportContext *context, const char *place, int64_t unix_ms,
+                                 int64_t revised_unix_ms) {
+    if (unix_ms > context->import->now_unix_ms + time_slack_ms)
+        (void)import_fault(context, place, "created", "is in the future");
+    else if (unix_ms < revised_unix_ms - time_slack_ms)
+        (void)import_fault(context, place, "created",
+                           "is before the revision was written: give the revision its \"created\"");
+}
+
+// Author and time of a row that is not stored yet.
+static void import_validate_origin(ImportContext *context, const ImportRow *row) {
+    const MaterialImport *import = context->import;
+    const char *author = import_name(row->author);
+    if (!import->may_all && author != NULL && !text_same(author, import->who))
+        import_deny(context, row->place, "author", "is another user");
+    if (!import->may_all && row->created_unix_ms > 0)
+        import_deny(context, row->place, "created", "is set by the file");
+    if (row->created_unix_ms > 0)
+        import_validate_time(context, row->place, row->created_unix_ms, 0);
+}
+
+// Author, comment and time of a row that is stored already, as far as the file has them.
+static void import_compare_origin(const ImportContext *context, const ImportRow *row,
+                                  const char *author, const char *comment,
+                                  int64_t created_unix_ms) {
+    static const char sentence[] = "differs from the stored row, which never changes";
+    if (row->author != NULL && !text_same(import_name(row->author), author))
+        (void)import_fault(context, row->place, "author", sentence);
+    if (row->comment != NULL && !text_same(row->comment, comment))
+        (void)import_fault(context, row->place, "comment", sentence);
+    if (row->created_unix_ms > 0 && row->created_unix_ms != created_unix_ms)
+        (void)import_fault(context, row->place, "created", sentence);
+}
+
+// A number that is not stored must follow `last`, which it becomes. `before` is the number of the
+// row before.
+static Status import_validate_number(const ImportContext *context, const ImportRow *row,
+                                     uint64_t before, uint64_t *last) {
+    const char *name = import_number_name(context, row);
+    if (row->number == before)
+        return import_fault(context, row->place, name, "is in the file twice: %llu",
+                            (unsigned long long)row->number);
+    if (row->number <= *last)
+        return STATUS_OK;
+    const uint64_t next = *last + 1;
+    *last = row->number;
+    if (row->number == next || context->numbers_unknown[row->kind])
+        return STATUS_OK;
+    return import_fault(context, row->place, name,
+                        "must be %llu, the next number, is %llu: numbers have no gaps",
+                        (unsigned long long)next, (unsigned long long)row->number);
+}
+
+// Measurements.
+
+// One that has a document. Sorted by document, in a document those with a number first.
+typedef struct IndexEntry {
+    const ImportRow *row;
+    bool is_stored; // of the first entry of a document: the database has it
+} IndexEntry;
+typedef struct MeasurementIndex {
+    IndexEntry *at;
+    size_t count;
+} MeasurementIndex;
+
+static int index_order(const void *a, const void *b) {
+    const ImportRow *one = ((const IndexEntry *)a)->row, *other = ((const IndexEntry *)b)->row;
+    const int by_document = strcmp(one->document, other->document);
+    if (by_document != 0)
+        return by_document;
+    const bool is_numbered = one->number != COUNT_ABSENT;
+    if (is_numbered != (other->number != COUNT_ABSENT))
+        return is_numbered ? -1 : 1;
+    return one->order < other->order ? -1 : one->order > other->order;
+}
+
+// The first entry of a document; NULL: there is none.
+static IndexEntry *index_find(const MeasurementIndex *index, const char *document) {
+    size_t low = 0, high = index->count;
+    while (low < high) {
+        const size_t middle = low + (high - low) / 2;
+        if (strcmp(index->at[middle].row->document, document) < 0)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low < index->count && strcmp(index->at[low].row->document, document) == 0
+               ? &index->at[low]
+               : NULL;
+}
+
+// Finds stored measurements by their documents: one pass, whatever the size of the file.
+static Status index_read_stored(const ImportContext *context, MeasurementIndex *index,
+                                Problem *problem) {
+    static const char sql[] =
+        "SELECT t.* FROM materials m JOIN material_measurements t ON t.material = m.number "
+        "WHERE m.slug = :slug AND t.measurement > :number ORDER BY t.measurement";
+    const MaterialRowKey key = {.slug = (char *)context->slug};
+    Statement *statement;
+    bool has_row = true;
+    Status status = statement_begin(context->database, sql, material_row_key_columns, &key,
+                                    &statement, problem);
+    while (status == STATUS_OK && has_row) {
+        MaterialMeasurement stored = {0};
+        status = statement_step(statement, &has_row, problem);
+        if (status == STATUS_OK && has_row)
+            status = row_read(statement, material_measurement_columns, &stored, problem);
+        IndexEntry *entry = stored.document != NULL ? index_find(index, stored.document) : NULL;
+        if (entry != NULL)
+            entry->is_stored = true;
+        material_measurement_clear(&stored);
+    }
+    statement_end(statement);
+    return status;
+}
+
+// The same test again without a number was copied twice. Cleared by free(index->at) in any case.
+static Status index_make(const ImportContext *context, MeasurementIndex *index, Problem *problem) {
+    bool has_unnumbered = false;
+    *index = (MeasurementIndex){calloc(context->measurement_count + 1, sizeof *index->at), 0};
+    if (index->at == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the measurements");
+    for (size_t i = 0; i < context->measurement_count; i++) {
+        const ImportRow *row = &context->measurements[i];
+        if (row->document == NULL)
+            continue;
+        index->at[index->count++].row = row;
+        has_unnumbered = has_unnumbered || row->number == COUNT_ABSENT;
+    }
+    qsort(index->at, index->count, sizeof *index->at, index_order);
+    for (size_t i = 1; i < index->count; i++) {
+        const ImportRow *before = index->at[i - 1].row, *row = index->at[i].row;
+        if (row->number == COUNT_ABSENT && strcmp(before->document, row->document) == 0)
+            (void)import_fault(context, row->place, "test",
+                               "is in the file already, at %.64s: give each its number if it was "
+                               "done twice",
+                               before->place);
+    }
+    return has_unnumbered && context->key.measurements > 0
+               ? index_read_stored(context, index, problem)
+               : STATUS_OK;
+}
+
+static Status measurement_compare(ImportContext *context, const ImportRow *row, Problem *problem) {
+    static const char sql[] =
+        "SELECT t.* FROM materials m JOIN material_measurements t ON t.material = m.number "
+        "WHERE m.slug = :slug AND t.measurement = :number";
+    const MaterialRowKey key = {.slug = (char *)context->slug, .number = row->number};
+    MaterialMeasurement stored = {0};
+    bool is_found;
+    const size_t faults = context->faults->count;
+    TRY(sqlite_first(context->database, sql, material_row_key_columns, &key,
+                     material_measurement_columns, &stored, &is_found, problem));
+    import_compare_origin(context, row, stored.author, stored.comment, stored.created_unix_ms);
+    if (row->document != NULL && !text_same(row->document, stored.document))
+        (void)import_fault(context, row->place, "test",
+                           "differs from the stored measurement %llu, which never changes",
+                           (unsigned long long)row->number);
+    material_measurement_clear(&stored);
+    context->tally->measurements.same += context->faults->count == faults;
+    return STATUS_OK;
+}
+
+static Status measurement_add(ImportContext *context, const ImportRow *row, Problem *problem) {
+    import_validate_origin(context, row);
+    context->tally->measurements.added++;
+    if (!import_writes(context))
+        return STATUS_OK;
+    const MaterialMeasurement measurement = {.slug = row->slug,
+                                             .measurement = context->last_measurement,
+                                             .author = (char *)import_author(context, row),
+                                             .comment = (char *)import_comment(row),
+                                             .created_unix_ms = import_created(context, row),
+                                             .document = row->document};
+    return material_measurement_add(context->database, &measurement, problem);
+}
+
+static Status import_measurements(ImportContext *context, const MeasurementIndex *index,
+                                  Problem *problem) {
+    uint64_t before = 0;
+    context->last_measurement = context->key.measurements;
+    for (size_t i = 0; i < context->measurement_count; i++) {
+        const ImportRow *row = &context->measurements[i];
+        const bool is_numbered = row->number != COUNT_ABSENT;
+        if (row->number_unknown)
+            continue;
+        const IndexEntry *entry =
+            is_numbered || row->document == NULL ? NULL : index_find(index, row->document);
+        if (entry != NULL && entry->is_stored) {
+            context->tally->measurements.same++;
+            continue;
+        }
+        if (!is_numbered)
+            context->last_measurement++;
+        else if (import_validate_number(context, row, before, &context->last_measurement) !=
+                 STATUS_OK)
+            continue;
+        before = row->number;
+        if (is_numbered && row->number <= context->key.measurements)
+            TRY(measurement_compare(context, row, problem));
+        else
+            TRY(measurement_add(context, row, problem));
+    }
+    return STATUS_OK;
+}
+
+// Reviews.
+
+static const char *review_status(const ImportReview *review) {
+    return review->status != CHOICE_ABSENT ? material_verdicts[review->status] : "";
+}
+
+static bool review_is_same(const ImportReview *review, const MaterialReview *stored) {
+    return strcmp(review_status(review), stored->status) == 0 &&
+           text_same(review->reason, stored->reason) &&
+           (review->reviewer == NULL ||
+            text_same(import_name(review->reviewer), stored->reviewer)) &&
+           (review->created_unix_ms == 0 || review->created_unix_ms == stored->created_unix_ms);
+}
+
+// A review that is not stored yet. If its reviewer is unknown it may be the importer's own.
+static Status review_validate(const ImportContext *context, const char *place,
+                              const ImportReview *review, const char *status_before,
+                              const MaterialRevision *revision, int64_t revised_unix_ms) {
+    const char *status = review_status(review);
+    const char *named = import_name(review->reviewer);
+    const char *reviewer = named != NULL ? named : context->import->who;
+    if (strcmp(status, status_before) == 0)
+        return import_fault(context, place, "status", "the revision is %s already", status_before);
+    if (strcmp(status, "approved") == 0 && reviewer != NULL &&
+        text_same(reviewer, revision->author))
+        return named != NULL
+                   ? import_fault(context, place, "reviewer",
+                                  "is the author, %.64s, who may not approve their own revision",
+                                  named)
+                   : import_fault(context, place, "reviewer",
+                                  "is required: it defaults to the author, %.64s, who may not "
+                                  "approve their own revision",
+                                  reviewer);
+    if (review->created_unix_ms > 0)
+        import_validate_time(context, place, review->created_unix_ms, revised_unix_ms);
+    return STATUS_OK;
+}
+
+static Status review_add(ImportContext *context, const ImportRow *row, const ImportReview *review,
+                         uint64_t revision, Problem *problem) {
+    const MaterialImport *import = context->import;
+    if (!import->may_all)
+        import_deny(context, row->place, "reviews", "has reviews");
+    context->tally->reviews.added++;
+    if (!import_writes(context))
+        return STATUS_OK;
+    const MaterialReview added = {
+        .slug = row->slug,
+        .revision = revision,
+        .status = (char *)review_status(review),
+        .reason = review->reason,
+        .reviewer =
+            (char *)(review->reviewer != NULL ? import_name(review->reviewer) : import->who),
+        .created_unix_ms =
+            review->created_unix_ms > 0 ? review->created_unix_ms : import->now_unix_ms};
+    return material_review_add(context->database, &added, problem);
+}
+
+// Stored reviews come first and are the same; others follow.
+static Status reviews_match(ImportContext *context, const ImportRow *row,
+                            const MaterialRevision *revision, const MaterialReviews *stored,
+                            Problem *problem) {
+    char list[POINTER_SIZE], place[POINTER_SIZE];
+    const char *before = stored->count > 0 ? stored->at[stored->count - 1].status : "draft";
+    // Of a faulty row the time may be what could not be read.
+    const int64_t revised_unix_ms =
+        row->is_faulty && row->created_unix_ms == 0 ? 0 : revision->created_unix_ms;
+    json_pointer_join(list, sizeof list, row->place, "reviews");
+    for (size_t i = 0; i < row->reviews.count; i++) {
+        const ImportReview *review = &row->reviews.at[i];
+        json_pointer_index(place, sizeof place, list, i);
+        if (problem_concerns(context->faults, place))
+            continue; // it could not be read
+        if (i < stored->count) {
+            if (review_is_same(review, &stored->at[i]))
+                context->tally->reviews.same++;
+            else
+                (void)import_fault(context, place, "",
+                                   "differs from the stored review of %.64s@%llu, which never "
+                                   "changes",
+                                   context->slug, (unsigned long long)revision->revision);
+            continue;
+        }
+        const Status status =
+            review_validate(context, place, review, before, revision, revised_unix_ms);
+        before = review_status(review);
+        if (status == STATUS_OK)
+            TRY(review_add(context, row, review, revision->revision, problem));
+    }
+    return STATUS_OK;
+}
+
+// The reviews of the revision, which is stored or has just been added.
+static Status import_reviews(ImportContext *context, const ImportRow *row,
+                             const MaterialRevision *revision, Problem *problem) {
+    static const char sql[] =
+        "SELECT v.* FROM materials m JOIN material_reviews v ON v.material = m.number "
+        "WHERE m.slug = :slug AND v.revision = :number ORDER BY v.number";
+    const MaterialRowKey key = {.slug = (char *)context->slug, .number = revision->revision};
+    MaterialReviews stored = {0};
+    if (row->reviews.count == 0)
+        return STATUS_OK;
+    Status status = STATUS_OK;
+    if (revision->revision <= context->key.latest)
+        status = sqlite_list(context->database, sql, material_row_key_columns, &key,
+                             material_review_columns, sizeof *stored.at, &stored, problem);
+    if (status == STATUS_OK)
+        status = reviews_match(context, row, revision, &stored, problem);
+    material_reviews_clear(&stored);
+    return status;
+}
+
+// Revisions.
+
+static Status revision_load(const ImportContext *context, uint64_t number,
                             MaterialRevision *revision, Problem *problem) {
     static const char sql[] =
         "SELECT m.slug, r.* FROM materials m JOIN material_revisions r ON r.material = m.number "
         "WHERE m.slug = :slug AND r.revision = :number";
-    return import_load(database, sql, slug, number, material_revision_columns, revision, problem);
+    const MaterialRowKey key = {.slug = (char *)context->slug, .number = number};
+    bool is_found;
+    TRY(sqlite_first(context->database, sql, material_row_key_columns, &key,
+                     material_revision_columns(), revision, &is_found, problem));
+    return material_lists_read(revision, problem);
 }
 
-static void compare_revision(const ImportContext *context, const ImportRevision *ours,
-                             const MaterialRevision *there, MaterialGroup *group) {
-    const RowInfo *mark = &ours->mark;
-    const size_t faults = context->faults->count;
-    if (!context->import->is_partial)
-        (void)context->import->says_same(&ours->said, there, mark->place, context->faults);
-    const ImportOrigin is = {ours->said.author, ours->said.comment, ours->said.created_unix_ms},
-                       was = {there->author, there->comment, there->created_unix_ms};
-    import_compare_origin(context, mark, "revision", &is, &was);
-    if (ours->said.reverts != there->reverts && !(ours->said.reverts == 0 && mark->is_faulty))
-        (void)import_fault(context, mark->place, "reverts",
-                           "is not that of the revision that is there, and those never change");
-    group->revisions_done.same += context->faults->count == faults;
+static void revision_report(const ImportContext *context, const ImportRow *row, const Field *field,
+                            const char *ours, const char *stored) {
+    Fault fault = {.row = 0};
+    char detail[2 * sizeof fault.detail];
+    const bool is_list = field->kind == FIELD_KIND_TEXTS || field->kind == FIELD_KIND_REALS ||
+                         field->kind == FIELD_KIND_LIST;
+    json_pointer_join(fault.pointer, sizeof fault.pointer, row->place, field->name);
+    if (problem_concerns(context->faults, fault.pointer))
+        return; // it could not be read, which is reported
+    if (!is_list && strcmp(ours, "null") != 0 && strlen(ours) < sizeof fault.value)
+        text_fit(fault.value, sizeof fault.value, ours);
+    text_fit(fault.unit, sizeof fault.unit, field->unit != NULL ? field->unit : "");
+    snprintf(detail, sizeof detail,
+             "%.64s@%llu is stored with %.60s; revisions never change: give this one the next "
+             "number",
+             context->slug, (unsigned long long)row->number,
+             strcmp(stored, "null") == 0 ? "no value"
+             : is_list                   ? "another value"
+                                         : stored);
+    text_fit(fault.detail, sizeof fault.detail, detail);
+    (void)problem_add_fault(context->faults, STATUS_INVALID, &fault);
 }
 
-// A revision that says again what another one says.
-static Status judge_reverts(const ImportContext *context, Sqlite *database,
-                            const ImportRevision *ours, uint64_t number, const MaterialGroup *group,
-                            Problem *problem) {
-    const uint64_t again = ours->said.reverts;
-    MaterialRevision there = {0};
-    if (again == 0)
+// Whether the row has the contents of `other`, member by member as they are written. Differences
+// are faults where `reports`.
+static Status revision_compare(const ImportContext *context, const ImportRow *row,
+                               const Material *other, bool reports, bool *is_same,
+                               Problem *problem) {
+    Bytes ours = {.most = 0}, theirs = {.most = 0};
+    Status status = STATUS_OK;
+    *is_same = true;
+    for (const Field *field = material_fields; field->kind != FIELD_KIND_END; field++) {
+        const char *a = material_member_json(&ours, field, &row->material);
+        const char *b = material_member_json(&theirs, field, other);
+        if (a == NULL || b == NULL) {
+            status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the materials");
+            break;
+        }
+        if (strcmp(a, b) == 0)
+            continue;
+        *is_same = false;
+        if (!reports)
+            break;
+        revision_report(context, row, field, a, b);
+    }
+    bytes_clear(&ours);
+    bytes_clear(&theirs);
+    return status;
+}
+
+// A revision that reverts to another has its contents.
+static Status revision_validate_reverts(const ImportContext *context, const ImportRow *row,
+                                        uint64_t number, Problem *problem) {
+    const uint64_t to = row->reverts;
+    MaterialRevision stored = {0};
+    bool is_same = true;
+    if (to == COUNT_ABSENT)
         return STATUS_OK;
-    if (again >= number) {
-        (void)import_fault(context, ours->mark.place, "reverts",
+    if (to >= number) {
+        (void)import_fault(context, row->place, "reverts",
                            "must be a revision before %llu, is %llu", (unsigned long long)number,
-                           (unsigned long long)again);
+                           (unsigned long long)to);
         return STATUS_OK;
     }
-    if (again <= group->key.latest)
-        TRY(load_revision(database, group->slug, again, &there, problem));
-    const MaterialRevision *said = there.revision > 0 ? &there : NULL;
-    for (size_t i = 0; said == NULL && i < group->revision_count; i++)
-        if (group->revisions[i].said.revision == again && !group->revisions[i].mark.is_faulty)
-            said = &group->revisions[i].said;
-    if (said != NULL && !ours->mark.is_faulty &&
-        !context->import->says_same(&ours->said, said, "", NULL))
-        (void)import_fault(
-            context, ours->mark.place, "reverts",
-            "revision %llu says something else; a revision that reverts says the same",
-            (unsigned long long)again);
-    material_revision_clear(&there);
-    return STATUS_OK;
+    Status status = STATUS_OK;
+    if (to <= context->key.latest)
+        status = revision_load(context, to, &stored, problem);
+    const Material *other = stored.revision > 0 ? &stored.material : NULL;
+    for (size_t i = 0; other == NULL && i < context->revision_count; i++)
+        if (context->revisions[i].number == to && !context->revisions[i].is_faulty)
+            other = &context->revisions[i].material;
+    if (status == STATUS_OK && other != NULL && !row->is_faulty)
+        status = revision_compare(context, row, other, false, &is_same, problem);
+    if (!is_same)
+        (void)import_fault(context, row->place, "reverts",
+                           "must have the contents of revision %llu, to which it reverts",
+                           (unsigned long long)to);
+    material_revision_clear(&stored);
+    return status;
 }
 
-static void judge_measurements(const ImportContext *context, const ImportRevision *ours,
-                               const MaterialGroup *group) {
-    const Reals *named = &ours->said.material.measurements;
+static void revision_validate_measurements(const ImportContext *context, const ImportRow *row) {
+    const Reals *measurements = &row->material.measurements;
     char list[POINTER_SIZE], place[POINTER_SIZE];
-    json_pointer_join(list, sizeof list, ours->mark.place, "measurements");
-    for (size_t i = 0; i < named->count && !group->measurements_drift; i++) {
-        if (named->at[i] <= (double)group->last_measurement)
+    json_pointer_join(list, sizeof list, row->place, "measurements");
+    for (size_t i = 0; i < measurements->count && !context->numbers_unknown[IMPORT_MEASUREMENT];
+         i++) {
+        if (measurements->at[i] <= (double)context->last_measurement)
             continue;
         json_pointer_index(place, sizeof place, list, i);
         (void)import_fault(context, place, "",
-                           "there is no measurement %.0f of \"%.64s\"; it has %llu", named->at[i],
-                           group->slug, (unsigned long long)group->last_measurement);
+                           "\"%.64s\" has no measurement %.0f; its last one is %llu", context->slug,
+                           measurements->at[i], (unsigned long long)context->last_measurement);
     }
 }
 
-static Status add_revision(ImportContext *context, Sqlite *database, const ImportRevision *ours,
-                           uint64_t number, MaterialGroup *group, Problem *problem) {
-    const RowInfo *mark = &ours->mark;
-    import_validate_origin(context, mark, ours->said.author, ours->said.created_unix_ms);
-    judge_measurements(context, ours, group);
-    TRY(judge_reverts(context, database, ours, number, group, problem));
-    group->revisions_done.added++;
-    MaterialRevision said = ours->said;
-    said.revision = number;
-    said.author = (char *)import_author(context, mark, said.author);
-    said.comment = mark->has_comment ? said.comment : (char *)"imported";
-    said.created_unix_ms = mark->has_created ? said.created_unix_ms : context->import->now_unix_ms;
-    if (context->writes && context->faults->count == 0)
-        TRY(material_revision_add(database, &said, problem));
-    return import_reviews(context, database, ours, &said, group, problem);
+static Status revision_add(ImportContext *context, const ImportRow *row, uint64_t number,
+                           Problem *problem) {
+    import_validate_origin(context, row);
+    revision_validate_measurements(context, row);
+    TRY(revision_validate_reverts(context, row, number, problem));
+    context->tally->revisions.added++;
+    // Borrows from the row.
+    const MaterialRevision revision = {.slug = row->slug,
+                                       .revision = number,
+                                       .material = row->material,
+                                       .reverts = row->reverts == COUNT_ABSENT ? 0 : row->reverts,
+                                       .author = (char *)import_author(context, row),
+                                       .comment = (char *)import_comment(row),
+                                       .created_unix_ms = import_created(context, row)};
+    if (import_writes(context))
+        TRY(material_revision_add(context->database, &revision, problem));
+    return import_reviews(context, row, &revision, problem);
 }
 
-// One without a number is the next, unless the newest says the same already.
-static Status import_next(ImportContext *context, Sqlite *database, const ImportRevision *ours,
-                          MaterialGroup *group, Problem *problem) {
+// One without a number is the next, unless the newest revision has the same contents.
+static Status revision_import_next(ImportContext *context, const ImportRow *row, Problem *problem) {
     MaterialRevision newest = {0};
+    bool is_same = false;
     Status status = STATUS_OK;
-    if (group->key.latest > 0)
-        status = load_revision(database, group->slug, group->key.latest, &newest, problem);
-    if (status == STATUS_OK && newest.revision > 0 &&
-        context->import->says_same(&ours->said, &newest, "", NULL)) {
-        group->revisions_done.same++;
-        status = import_reviews(context, database, ours, &newest, group, problem);
-    } else if (status == STATUS_OK) {
-        status = add_revision(context, database, ours, group->key.latest + 1, group, problem);
+    if (context->key.latest > 0)
+        status = revision_load(context, context->key.latest, &newest, problem);
+    if (status == STATUS_OK && newest.revision > 0)
+        status = revision_compare(context, row, &newest.material, false, &is_same, problem);
+    if (status == STATUS_OK) {
+        context->tally->revisions.same += is_same;
+        status = is_same ? import_reviews(context, row, &newest, problem)
+                         : revision_add(context, row, context->key.latest + 1, problem);
     }
     material_revision_clear(&newest);
     return status;
 }
 
-static Status import_known(ImportContext *context, Sqlite *database, const ImportRevision *ours,
-                           MaterialGroup *group, Problem *problem) {
-    MaterialRevision there = {0};
-    TRY(load_revision(database, group->slug, ours->said.revision, &there, problem));
-    compare_revision(context, ours, &there, group);
-    const Status status = import_reviews(context, database, ours, &there, group, problem);
-    material_revision_clear(&there);
+static Status revision_import_stored(ImportContext *context, const ImportRow *row,
+                                     Problem *problem) {
+    MaterialRevision stored = {0};
+    bool is_same;
+    const size_t faults = context->faults->count;
+    Status status = revision_load(context, row->number, &stored, problem);
+    if (status == STATUS_OK && !context->import->is_partial)
+        status = revision_compare(context, row, &stored.material, true, &is_same, problem);
+    if (status == STATUS_OK) {
+        import_compare_origin(context, row, stored.author, stored.comment, stored.created_unix_ms);
+        const uint64_t reverts = row->reverts == COUNT_ABSENT ? 0 : row->reverts;
+        if (reverts != stored.reverts && !(reverts == 0 && row->is_faulty))
+            (void)import_fault(context, row->place, "reverts",
+                               "differs from the stored row, which never changes");
+        context->tally->revisions.same += context->faults->count == faults;
+        status = import_reviews(context, row, &stored, problem);
+    }
+    material_revision_clear(&stored);
     return status;
 }
 
-static Status import_revisions(ImportContext *context, Sqlite *database, MaterialGroup *group,
-                               Problem *problem) {
-    const char *name = context->import->revision_name;
-    uint64_t before = 0, last = group->key.latest;
-    for (size_t i = 0; i < group->revision_count; i++)
-        group->revisions_drift = group->revisions_drift || group->revisions[i].mark.is_adrift;
-    for (size_t i = 0; i < group->revision_count; i++) {
-        const ImportRevision *ours = &group->revisions[i];
-        const uint64_t number = ours->said.revision;
-        if (ours->mark.is_adrift)
+static Status import_revisions(ImportContext *context, Problem *problem) {
+    uint64_t before = 0, last = context->key.latest;
+    for (size_t i = 0; i < context->revision_count; i++) {
+        const ImportRow *row = &context->revisions[i];
+        if (row->number_unknown)
             continue;
-        if (number == 0) {
-            TRY(import_next(context, database, ours, group, problem));
+        if (row->number == COUNT_ABSENT) {
+            TRY(revision_import_next(context, row, problem));
             continue;
         }
-        if (import_validate_number(context, &ours->mark, name, number, before,
-                                   group->revisions_drift, &last) != STATUS_OK)
+        if (import_validate_number(context, row, before, &last) != STATUS_OK)
             continue;
-        before = number;
-        if (number <= group->key.latest)
-            TRY(import_known(context, database, ours, group, problem));
+        before = row->number;
+        if (row->number <= context->key.latest)
+            TRY(revision_import_stored(context, row, problem));
         else
-            TRY(add_revision(context, database, ours, number, group, problem));
+            TRY(revision_add(context, row, row->number, problem));
     }
     return STATUS_OK;
 }
 
-static Status note(const ImportContext *context, Sqlite *database, const MaterialGroup *group,
-                   Problem *problem) {
-    char why[160];
-    if (group->revisions_done.added + group->measurements_done.added + group->reviews_done.added ==
-        0)
-        return STATUS_OK;
-    snprintf(why, sizeof why, "imported revisions: %zu, measurements: %zu, reviews: %zu",
-             group->revisions_done.added, group->measurements_done.added,
-             group->reviews_done.added);
-    const AuditEntry deed = {.action = (char *)"import",
-                             .who = (char *)context->import->who,
-                             .why = why,
-                             .created_unix_ms = context->import->now_unix_ms};
-    return audit_entry_add(database, group->slug, &deed, problem);
-}
+// All of it.
 
-static void count(ImportCount *all, const ImportCount *some) {
-    all->added += some->added;
-    all->same += some->same;
-}
-
-static Status import_group(ImportContext *context, Sqlite *database, MaterialGroup *group,
+// `before` is the tally before this material.
+static Status import_audit(const ImportContext *context, const ImportTally *before,
                            Problem *problem) {
-    TRY(material_key_find(database, group->slug, 0, &group->key, problem));
-    if (group->key.number == 0 && group->revision_count == 0) {
-        (void)import_fault(context, group->measurements[0].mark.place, "slug",
-                           "there is no material \"%.64s\" to measure; bring a revision of it",
-                           group->slug);
+    const ImportTally *tally = context->tally;
+    const size_t revisions = tally->revisions.added - before->revisions.added;
+    const size_t measurements = tally->measurements.added - before->measurements.added;
+    const size_t reviews = tally->reviews.added - before->reviews.added;
+    char why[160];
+    if (revisions + measurements + reviews == 0)
         return STATUS_OK;
-    }
-    if (group->key.number == 0 && context->writes && context->faults->count == 0)
-        TRY(material_row_add(database, group->slug, problem));
-    TRY(import_measurements(context, database, group, problem));
-    TRY(import_revisions(context, database, group, problem));
-    if (context->writes && context->faults->count == 0)
-        TRY(note(context, database, group, problem));
-    count(&context->metrics->revisions, &group->revisions_done);
-    count(&context->metrics->measurements, &group->measurements_done);
-    count(&context->metrics->reviews, &group->reviews_done);
-    return STATUS_OK;
+    snprintf(why, sizeof why, "imported revisions: %zu, measurements: %zu, reviews: %zu", revisions,
+             measurements, reviews);
+    const AuditEntry entry = {.slug = (char *)context->slug,
+                              .action = (char *)"import",
+                              .who = (char *)context->import->who,
+                              .why = why,
+                              .created_unix_ms = context->import->now_unix_ms};
+    return audit_entry_add(context->database, &entry, problem);
 }
 
-static Status import_all(ImportContext *context, Sqlite *database, Problem *problem) {
+// The rows of one material.
+static Status import_material(ImportContext *context, const ImportRow *rows, size_t count,
+                              Problem *problem) {
+    const ImportTally before = *context->tally;
+    size_t of_kind[IMPORT_UNKNOWN + 1] = {0};
+    memset(context->numbers_unknown, 0, sizeof context->numbers_unknown);
+    for (size_t i = 0; i < count; i++) {
+        of_kind[rows[i].kind]++;
+        context->numbers_unknown[rows[i].kind] |= rows[i].number_unknown;
+    }
+    const size_t unknown = of_kind[IMPORT_UNKNOWN];
+    if (unknown > 0)
+        context->numbers_unknown[IMPORT_REVISION] = context->numbers_unknown[IMPORT_MEASUREMENT] =
+            true;
+    context->slug = rows->slug;
+    context->measurements = rows + unknown;
+    context->measurement_count = of_kind[IMPORT_MEASUREMENT];
+    context->revisions = context->measurements + context->measurement_count;
+    context->revision_count = of_kind[IMPORT_REVISION];
+    TRY(material_key_find(context->database, context->slug, 0, &context->key, problem));
+    MeasurementIndex index;
+    Status status = index_make(context, &index, problem);
+    const bool is_missing = context->key.number == 0 && context->measurement_count == count;
+    if (is_missing)
+        (void)import_fault(context, rows->place, "slug",
+                           "there is no material \"%.64s\": add a revision of it", context->slug);
+    else if (status == STATUS_OK && context->key.number == 0 && import_writes(context))
+        status = material_row_add(context->database, context->slug, problem);
+    if (status == STATUS_OK && !is_missing)
+        status = import_measurements(context, &index, problem);
+    free(index.at);
+    TRY(status);
+    TRY(import_revisions(context, problem));
+    return import_writes(context) ? import_audit(context, &before, problem) : STATUS_OK;
+}
+
+static Status import_run(ImportContext *context, Problem *problem) {
     const MaterialImport *import = context->import;
-    size_t r = 0, m = 0;
-    while (r < import->revision_count || m < import->measurement_count) {
-        const char *a = r < import->revision_count ? import->revisions[r].said.slug : NULL;
-        const char *b = m < import->measurement_count ? import->measurements[m].made.slug : NULL;
-        MaterialGroup group = {.slug = a == NULL || (b != NULL && strcmp(b, a) < 0) ? b : a,
-                               .revisions = &import->revisions[r],
-                               .measurements = &import->measurements[m]};
-        for (; r < import->revision_count && text_same(import->revisions[r].said.slug, group.slug);
-             r++)
-            group.revision_count++;
-        for (; m < import->measurement_count &&
-               text_same(import->measurements[m].made.slug, group.slug);
-             m++)
-            group.measurement_count++;
-        context->metrics->materials++;
-        TRY(import_group(context, database, &group, problem));
+    for (size_t i = 0, end; i < import->count; i = end) {
+        for (end = i + 1; end < import->count; end++)
+            if (strcmp(import->rows[end].slug, import->rows[i].slug) != 0)
+                break;
+        context->tally->materials++;
+        TRY(import_material(context, &import->rows[i], end - i, problem));
     }
-    return STATUS_OK;
-}
-
-static Status refuse(const ImportContext *context) {
     if (context->faults->count > 0)
         return STATUS_INVALID;
     if (context->denied == 0)
         return STATUS_OK;
     return problem_add(context->faults, STATUS_FORBIDDEN, context->denied_place,
-                       "%s (%zu more rows are like it): what is by others, times, and reviews "
-                       "may be brought by who has the scope admin; nobody approves their own by "
-                       "way of a file",
+                       "%s (and %zu more rows): importing rows of other users, times or reviews "
+                       "requires the scope admin",
                        context->denied_why, context->denied - 1);
 }
 
-// May be done again from its beginning.
-static Status write_all(Sqlite *database, const void *work, Problem *problem) {
-    ImportContext context = *(const ImportContext *)work;
+static Status import_write(Sqlite *database, const void *work, Problem *problem) {
+    ImportContext context = *(const ImportContext *)work; // it may run again
+    context.database = database;
     problem_clear(context.faults);
-    *context.metrics = (ImportTally){0};
-    TRY(import_all(&context, database, problem));
-    return refuse(&context);
+    *context.tally = (ImportTally){0};
+    return import_run(&context, problem);
 }
 
-// Within one transaction of a reader, so that all of it is of one moment.
-static Status judge_all(Db *db, ImportContext *context, Problem *problem) {
+// Within one read transaction, so that all of it sees the same state.
+static Status import_validate(Db *db, ImportContext *context, Problem *problem) {
     static const char begin[] = "BEGIN", end[] = "COMMIT";
-    Sqlite *database = db_take(db);
-    Status status = sqlite_change(database, begin, NULL, NULL, NULL, problem);
+    context->database = db_take(db);
+    Status status = sqlite_change(context->database, begin, NULL, NULL, NULL, problem);
     if (status == STATUS_OK) {
-        status = import_all(context, database, problem);
-        (void)sqlite_change(database, end, NULL, NULL, NULL, NULL);
+        status = import_run(context, problem);
+        (void)sqlite_change(context->database, end, NULL, NULL, NULL, NULL);
     }
-    db_put(db, database);
-    return status == STATUS_OK ? refuse(context) : status;
+    db_put(db, context->database);
+    return status;
 }
 
-Status db_material_import(Db *db, const MaterialImport *import, bool is_dry, ImportTally *metrics,
+static int import_order(const void *a, const void *b) {
+    const ImportRow *one = a, *other = b;
+    const int by_slug = strcmp(one->slug, other->slug);
+    if (by_slug != 0)
+        return by_slug;
+    if (one->kind != other->kind) // unknown, measurements, revisions
+        return one->kind > other->kind ? -1 : 1;
+    if (one->number != other->number) // COUNT_ABSENT is the largest
+        return one->number < other->number ? -1 : 1;
+    return one->order < other->order ? -1 : one->order > other->order;
+}
+
+// If a material has several revisions in the file, all need numbers.
+static void import_validate_unnumbered(const MaterialImport *import, Problem *problem) {
+    const char *name = import->number_names[IMPORT_REVISION];
+    for (size_t i = 1; i < import->count; i++) {
+        const ImportRow *before = &import->rows[i - 1], *row = &import->rows[i];
+        char place[POINTER_SIZE];
+        if (row->kind != IMPORT_REVISION || before->kind != IMPORT_REVISION ||
+            row->number != COUNT_ABSENT || row->number_unknown || before->number_unknown ||
+            strcmp(before->slug, row->slug) != 0)
+            continue;
+        json_pointer_join(place, sizeof place, row->place,
+                          strcmp(name, "number") == 0 ? "slug" : name);
+        (void)problem_add(problem, STATUS_INVALID, place,
+                          "\"%.64s\" has another revision in the file, at %.64s: give each its "
+                          "number",
+                          row->slug, before->place);
+    }
+}
+
+Status db_material_import(Db *db, MaterialImport *import, bool is_dry, ImportTally *tally,
                           Problem *problem) {
-    *metrics = (ImportTally){0};
-    ImportContext context = {.import = import, .metrics = metrics, .faults = problem};
+    *tally = (ImportTally){0};
+    if (import->count > 0)
+        qsort(import->rows, import->count, sizeof *import->rows, import_order);
+    import_validate_unnumbered(import, problem);
+    ImportContext context = {.import = import, .tally = tally, .faults = problem};
     if (is_dry || problem->count > 0)
-        return judge_all(db, &context, problem);
+        return import_validate(db, &context, problem);
     context.writes = true;
-    TRY(db_write(db, write_all, &context, problem));
-    if (metrics->revisions.added + metrics->reviews.added > 0)
+    TRY(db_write(db, import_write, &context, problem));
+    if (tally->revisions.added + tally->reviews.added > 0)
         db_catalog_changed(db);
-    else if (metrics->measurements.added > 0)
+    else if (tally->measurements.added > 0)
         db_material_measured(db);
     return STATUS_OK;
-}
-
-void import_revision_clear(ImportRevision *revision) {
-    for (size_t i = 0; i < revision->review_count; i++)
-        row_clear(material_review_columns, &revision->reviews[i].review,
-                  sizeof revision->reviews[i].review);
-    free(revision->reviews);
-    material_revision_clear(&revision->said);
-    *revision = (ImportRevision){.reviews = NULL};
-}
-
-void import_measurement_clear(ImportMeasurement *measurement) {
-    material_measurement_clear(&measurement->made);
-    *measurement = (ImportMeasurement){.made = {0}};
 }

@@ -1,53 +1,61 @@
-// Rows of materials that come from elsewhere: judged against what is there and written, all of them
-// or none, in one transaction. Not the reading of files (materials/exchange.h). Used by materials/.
+// Import of materials: the staging list that the rows of a file are read into, its validation
+// against the database, and its write, all of it or nothing, in one transaction.
 #ifndef SERVER_DB_MATERIAL_IMPORT_H
 #define SERVER_DB_MATERIAL_IMPORT_H
 
+#include "core/drop_test/drop_test.h"
 #include "server/db/materials.h"
 
-enum { IMPORT_PLACE_SIZE = 64 };
+enum { IMPORT_ROWS_MAX = 100000, IMPORT_PLACE_SIZE = 64 };
 
-// What a file says of a row besides its contents.
-typedef struct RowInfo {
-    char place[IMPORT_PLACE_SIZE]; // JSON Pointer
-    size_t order;                  // in the file
-    bool is_faulty; // told already: its number counts, and what could be read is compared
-    bool is_adrift; // it has a number that could not be read
-    bool has_author, has_comment, has_created; // else the importer's, a word for it, and now
-} RowInfo;
+typedef enum ImportKind {
+    IMPORT_REVISION,
+    IMPORT_MEASUREMENT,
+    IMPORT_UNKNOWN, // its kind could not be read: numbers of its material need not continue
+} ImportKind;
 
 typedef struct ImportReview {
-    MaterialReview review; // but for slug and revision
-    bool has_reviewer, has_created;
+    int status; // index into material_verdicts
+    char *reason;
+    char *reviewer;          // NULL: absent, then the importer; "": unknown
+    char *created;           // RFC 3339; NULL: now
+    int64_t created_unix_ms; // of it; 0: none
 } ImportReview;
+typedef struct ImportReviews {
+    ImportReview *at;
+    size_t count;
+} ImportReviews;
 
-typedef struct ImportRevision {
-    RowInfo mark;
-    MaterialRevision said; // revision 0: the next, unless the newest says the same
-    ImportReview *reviews; // in their order
-    size_t review_count;
-} ImportRevision;
+// A revision or a measurement.
+typedef struct ImportRow {
+    // As the file has it.
+    int kind; // ImportKind
+    char *slug;
+    uint64_t number; // of the revision or measurement; COUNT_ABSENT: the next one
+    Material material;
+    uint64_t reverts;
+    char *author; // NULL: absent, then the importer; "": unknown
+    char *comment;
+    char *created; // RFC 3339; NULL: now
+    ImportReviews reviews;
+    DropTest test;
+    // Set when it joins the list.
+    char place[IMPORT_PLACE_SIZE]; // JSON Pointer
+    size_t order;                  // in the file
+    int64_t created_unix_ms;       // of `created`; 0: none
+    char *document;                // the test as JSON; NULL if faulty
+    bool is_faulty;      // has faults already: its number counts, what is valid is compared
+    bool number_unknown; // has a number that could not be read
+} ImportRow;
 
-typedef struct ImportMeasurement {
-    RowInfo mark;
-    MaterialMeasurement made; // measurement 0: the next, unless its test is there
-} ImportMeasurement;
-
-// Both lists are by slug, then by number, those without one last, in the file's order.
 typedef struct MaterialImport {
-    ImportRevision *revisions;
-    size_t revision_count;
-    ImportMeasurement *measurements;
-    size_t measurement_count;
-    const char *revision_name, *measurement_name; // of the number below a row's place
-    bool is_partial; // columns that it needs are missing, and told: what is there is not compared
-    const char *who; // imports; NULL: the local user
-    bool may_all;    // bring what is by others, and reviews, which else is STATUS_FORBIDDEN
+    ImportRow *rows;
+    size_t count, capacity;
+    const char *number_names[2]; // of ImportRow.number in the file, by kind
+    bool is_partial;             // columns are missing: stored revisions are not compared
+    const char *who;             // the importer; NULL: the local user
+    bool may_all;                // may import rows of other authors, times and reviews
     int64_t now_unix_ms;
-    // Whether both say the same of the material. What `ours` says otherwise is told below `place`;
-    // NULL: nothing is told.
-    bool (*says_same)(const MaterialRevision *ours, const MaterialRevision *there,
-                      const char *place, Problem *problem);
 } MaterialImport;
 
 typedef struct ImportCount {
@@ -58,12 +66,9 @@ typedef struct ImportTally {
     ImportCount revisions, measurements, reviews;
 } ImportTally;
 
-// Judges all of it; adds it unless `is_dry`, or `problem` has faults already or comes to have some:
-// then nothing is written. STATUS_INVALID: the faults. Tells the catalogue's readers.
-Status db_material_import(Db *db, const MaterialImport *import, bool is_dry, ImportTally *metrics,
+// Sorts and validates the list. Writes it unless `is_dry` or `problem` has faults before or after.
+// STATUS_INVALID: the faults. STATUS_FORBIDDEN: rows that need `may_all`.
+Status db_material_import(Db *db, MaterialImport *import, bool is_dry, ImportTally *tally,
                           Problem *problem);
-
-void import_revision_clear(ImportRevision *revision);
-void import_measurement_clear(ImportMeasurement *measurement);
 
 #endif

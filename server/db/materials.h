@@ -1,27 +1,26 @@
-// The materials as they are stored: revisions, reviews, measurements and the trail of who did what.
-// Rows are added and never changed; the database itself refuses it. Not what the numbers mean
-// (core/scene/material.h) and not JSON: lists and drop tests are documents here. Used by materials/
-// and by whoever resolves names.
+// Materials in the database: revisions, reviews, measurements and the audit log. Rows are added and
+// never changed; triggers enforce it. Drop tests are JSON documents here.
 #ifndef SERVER_DB_MATERIALS_H
 #define SERVER_DB_MATERIALS_H
 
 #include "core/scene/material.h"
 #include "server/db/db.h"
+#include "server/util/bytes.h"
 
-// A revision with what its last review made of it. Texts are owned; not known: NULL, NAN.
+// A revision with its last review. Texts are owned; unknown: NULL, NAN.
 typedef struct MaterialRevision {
     char *slug;
     uint64_t revision;
-    Material material; // but for its lists
-    char *lists; // tags, table, measurements: a JSON object of material_list_fields; NULL: none
-    uint64_t reverts; // the revision that it says again; 0: none
+    Material material;
+    char *lists;      // used while a row is read or written
+    uint64_t reverts; // the revision whose contents it has again; 0: none
     char *author;     // a token's name; NULL: the local user, or the program
     char *comment;
     int64_t created_unix_ms;
-    // Of its last review; "draft" and nothing without one.
+    // Of its last review; without one "draft" and nothing else.
     char *status, *reason, *reviewer;
     int64_t reviewed_unix_ms;
-    // Of the material: its newest revision, and how much was done to it.
+    // Of the material: its newest revision, and the number of its audit entries.
     uint64_t latest, version;
 } MaterialRevision;
 typedef struct MaterialRevisions {
@@ -30,26 +29,30 @@ typedef struct MaterialRevisions {
 } MaterialRevisions;
 void material_revision_clear(MaterialRevision *revision);
 
-// How far a material has come.
+// One member of a material as JSON text, in `bytes`, which is emptied first; "null" if it is
+// absent. NULL without memory.
+const char *material_member_json(Bytes *bytes, const Field *field, const Material *material);
+
+// The newest number of each kind of row; measurements 0: none.
 typedef struct MaterialState {
-    uint64_t latest, version, measurements; // the newest of each; measurements 0: none
+    uint64_t latest, version, measurements;
 } MaterialState;
-// As it is in the database now. STATUS_NOT_FOUND.
+// STATUS_NOT_FOUND.
 Status db_material_state(Db *db, const char *slug, MaterialState *state, Problem *problem);
 
-// revision 0: the head, which is the newest approved one, else the newest draft. STATUS_NOT_FOUND,
-// also where all are deprecated.
+// Revision 0 is the head: the newest approved revision, else the newest draft. STATUS_NOT_FOUND,
+// also if all are deprecated. `material` is cleared by the caller in any case.
 Status db_material(Db *db, const char *slug, uint64_t revision, MaterialRevision *material,
                    Problem *problem);
 // The slugs of all materials, by name.
 Status db_material_slugs(Db *db, Texts *slugs, Problem *problem);
 void material_slugs_clear(Texts *slugs);
-// The heads of materials, by slug; of those that are all deprecated the newest revision. At most
-// `most` of them, those behind the slug `after` ("": from the first).
-Status db_material_heads(Db *db, const char *after, size_t most, MaterialRevisions *materials,
+// The heads of at most `max` materials, by slug, those after the slug `after` ("": from the first).
+// Of a material without a head it is the newest revision.
+Status db_material_heads(Db *db, const char *after, size_t max, MaterialRevisions *materials,
                          Problem *problem);
-// Newest first, at most `most` of one material's, those before `before`.
-Status db_material_page(Db *db, const char *slug, uint64_t before, size_t most,
+// Newest first, at most `max` revisions of one material, those before `before`.
+Status db_material_page(Db *db, const char *slug, uint64_t before, size_t max,
                         MaterialRevisions *revisions, Problem *problem);
 void material_revisions_clear(MaterialRevisions *materials);
 
@@ -71,26 +74,22 @@ typedef struct MaterialMeasurement {
     uint64_t measurement; // from 1
     char *author, *comment;
     int64_t created_unix_ms;
-    char *document; // the drop test, JSON
+    char *document; // the drop test as JSON
+    uint64_t drops, traces;
 } MaterialMeasurement;
+typedef struct MaterialMeasurements {
+    MaterialMeasurement *at;
+    size_t count;
+} MaterialMeasurements;
 // STATUS_NOT_FOUND. `measurement` may be uninitialised.
 Status db_material_measurement(Db *db, const char *slug, uint64_t number,
                                MaterialMeasurement *measurement, Problem *problem);
 void material_measurement_clear(MaterialMeasurement *measurement);
-
-// A measurement without its readings, which are counted. `document` is the drop test but for them.
-typedef struct MeasurementSummary {
-    MaterialMeasurement row;
-    uint64_t drops, traces;
-} MeasurementSummary;
-typedef struct MeasurementSummaries {
-    MeasurementSummary *at;
-    size_t count;
-} MeasurementSummaries;
-// Newest first, at most `most` of one material's, those before `before`.
-Status db_measurement_summaries(Db *db, const char *slug, uint64_t before, size_t most,
-                                MeasurementSummaries *briefs, Problem *problem);
-void measurement_summaries_clear(MeasurementSummaries *briefs);
+// Newest first, at most `max` of one material, those before `before`. Their documents are without
+// drops and traces, which are counted.
+Status db_measurement_heads(Db *db, const char *slug, uint64_t before, size_t max,
+                            MaterialMeasurements *measurements, Problem *problem);
+void material_measurements_clear(MaterialMeasurements *measurements);
 
 typedef struct AuditEntry {
     uint64_t version;               // of the material after it; what is added gets the next
@@ -98,17 +97,35 @@ typedef struct AuditEntry {
     uint64_t revision, measurement; // 0: not about one
     char *who, *why;
     int64_t created_unix_ms;
+    char *slug; // of the material, for a new entry
 } AuditEntry;
 typedef struct AuditEntries {
     AuditEntry *at;
     size_t count;
 } AuditEntries;
-// The trail of one material, newest first, at most `most` entries, those before `before`.
-Status db_audit_entries(Db *db, const char *slug, uint64_t before, size_t most,
-                        AuditEntries *audit_entries, Problem *problem);
-void audit_entries_clear(AuditEntries *audit_entries);
+// The audit log of one material, newest first, at most `max` entries, those before `before`.
+Status db_audit_entries(Db *db, const char *slug, uint64_t before, size_t max,
+                        AuditEntries *entries, Problem *problem);
+void audit_entries_clear(AuditEntries *entries);
 
-// Each revision with how many results were made with it, newest first.
+// Export reads row by row the state at one moment. Rows are only added, so that the newest number
+// of each table is a moment.
+typedef struct MaterialMoment {
+    int64_t revisions, reviews, measurements;
+} MaterialMoment;
+Status db_material_moment(Db *db, MaterialMoment *moment, Problem *problem);
+// What the functions below find is cleared by the caller in any case; *is_found is false after the
+// last one. The revision of the material after `number`; 0: the first one of the next material.
+// Its last review is not read.
+Status db_revision_after(Db *db, const MaterialMoment *moment, const char *slug, uint64_t number,
+                         MaterialRevision *revision, bool *is_found, Problem *problem);
+Status db_measurement_after(Db *db, const MaterialMoment *moment, const char *slug, uint64_t number,
+                            MaterialMeasurement *measurement, bool *is_found, Problem *problem);
+// All reviews of a revision in their order.
+Status db_reviews(Db *db, const MaterialMoment *moment, const char *slug, uint64_t revision,
+                  MaterialReviews *reviews, Problem *problem);
+
+// Each revision with the number of results that used it, newest first.
 typedef struct MaterialReference {
     uint64_t revision, results;
     char status[16];
@@ -119,10 +136,10 @@ typedef struct MaterialReferences {
 } MaterialReferences;
 Status db_material_uses(Db *db, const char *slug, MaterialReferences *uses, Problem *problem);
 
-// Results made with `name` ("sponge@1", "record:elcentro"), newest first, at most `most` of them,
-// those before the one numbered `before` (0: from the newest); *total counts all.
+// Results that used `name` ("sponge@1", "record:elcentro"), newest first, at most `max`, those
+// before the row `before` (0: from the newest); *total counts all.
 typedef struct ResultUse {
-    int64_t number; // the store's
+    int64_t number; // of the row
     char id[72];
     int64_t created_unix_ms;
 } ResultUse;
@@ -130,30 +147,29 @@ typedef struct ResultUses {
     ResultUse *at; // freed by free
     size_t count;
 } ResultUses;
-Status db_result_uses(Db *db, const char *name, size_t most, int64_t before, ResultUses *uses,
+Status db_result_uses(Db *db, const char *name, size_t max, int64_t before, ResultUses *uses,
                       uint64_t *total, Problem *problem);
 
-// What is kept is kept for good, so there is an end to it: STATUS_LIMIT from each that writes.
+// Nothing is ever deleted, so there are limits: STATUS_LIMIT from each function that writes.
 enum {
     CATALOGUE_MATERIALS = 100000,
     CATALOGUE_REVISIONS = 10000,    // of a material
     CATALOGUE_MEASUREMENTS = 10000, // of a material
 };
-#define CATALOGUE_BYTES (INT64_C(64) << 30) // of all texts, and a bit for each row
+#define CATALOGUE_BYTES (INT64_C(64) << 30) // of all texts, and some more for each row
 
-// Writing. Each is one transaction, durable when the call returns, and tells the catalogue's
-// readers. `version`: what the material's must be now (ANY_VERSION: whatever it is), else
-// STATUS_STALE, which tells the version that it has. Missing materials are STATUS_NOT_FOUND.
+// Writing. Each call is one transaction and durable when it returns. `version` is what the
+// material's must be now (ANY_VERSION: any), else STATUS_STALE with the present one.
+// STATUS_NOT_FOUND: there is no such material.
 #define ANY_VERSION UINT64_MAX
 
-// The first revision of a new material. STATUS_CONFLICT where the slug is taken. Slug, material,
-// lists, author, comment and created_unix_ms are read.
-Status db_material_add(Db *db, const MaterialRevision *first, Problem *problem);
-// Adds a revision and sets revision->revision; `reverts` is kept (0: none), the rest as above. That
-// the measurements that it names are there is for the caller to see to.
+// The first revision of a new material: slug, material, author, comment and created_unix_ms.
+// STATUS_CONFLICT: the slug is taken.
+Status db_material_add(Db *db, MaterialRevision *first, Problem *problem);
+// Adds a revision and sets revision->revision; `reverts` and the members above are stored. The
+// caller has validated its measurements.
 Status db_material_revise(Db *db, MaterialRevision *revision, uint64_t version, Problem *problem);
-// STATUS_CONFLICT where the revision has that status already; STATUS_FORBIDDEN where its author,
-// known by name, approves it.
+// STATUS_CONFLICT: the revision has that status already. STATUS_FORBIDDEN: its author approves it.
 Status db_material_review(Db *db, const MaterialReview *review, uint64_t version, Problem *problem);
 // Adds a measurement and sets its number.
 Status db_material_measure(Db *db, MaterialMeasurement *measurement, uint64_t version,

@@ -1,5 +1,4 @@
-// A name is looked up once for each buffer that has it: the store remembers the last ones. Lists
-// are read only where a table stands in place of the two numbers.
+// A name is looked up once for each buffer that has it; the database caches recent ones.
 #include "server/jobs/resolve_material.h"
 
 #include <stdio.h>
@@ -8,7 +7,7 @@
 
 #include "core/base/json_pointer.h"
 #include "core/base/spelling.h"
-#include "server/materials/material.h"
+#include "server/db/materials.h"
 
 // The first of the faults alone tell what names there are.
 enum { NAME = 160, SUGGESTED = 10 };
@@ -263,8 +262,6 @@ static Status fill(Buffer *buffer, MaterialRevision *found, const char *pointer,
                    Problem *problem) {
     char name[NAME];
     snprintf(name, sizeof name, "%s@%llu", found->slug, (unsigned long long)found->revision);
-    if (isnan(found->material.restitution) && material_read_lists(found, NULL) != STATUS_OK)
-        return problem_set(problem, STATUS_INTERNAL, "the table of %s cannot be read", name);
     TRY(fill_numbers(buffer, &found->material, pointer, name, problem));
     fill_test(&buffer->test, &found->material);
     TRY(warn_of_status(found, name, pointer, warnings));

@@ -8,40 +8,29 @@
 #include "server/util/base_path.h"
 #include "server/util/clock.h"
 
-Status material_read_lists(MaterialRevision *revision, Problem *problem) {
-    Material *material = &revision->material;
-    material->tags = (Texts){NULL, 0};
-    material->table = (MaterialRows){NULL, 0};
-    material->measurements = (Reals){NULL, 0};
-    if (revision->lists == NULL)
+Status slug_validate(const char *slug, const char *pointer, Problem *problem) {
+    Fault fault = {0};
+    const bool is_taken = strcmp(slug, "import") == 0;
+    if (material_slug_is_valid(slug) && !is_taken)
         return STATUS_OK;
-    return json_parse(revision->lists, strlen(revision->lists), material_list_fields, material,
-                      problem);
-}
-
-Status material_write_lists(MaterialRevision *revision, Problem *problem) {
-    const Material *material = &revision->material;
-    free(revision->lists);
-    revision->lists = NULL;
-    if (material->tags.count == 0 && material->table.count == 0 &&
-        material->measurements.count == 0)
-        return STATUS_OK;
-    Bytes bytes = {0};
-    encode_item(&bytes, material_list_fields, material, WRITE_SCENE);
-    revision->lists = bytes_take(&bytes, NULL);
-    return revision->lists != NULL ? STATUS_OK
-                                   : problem_set(problem, STATUS_NO_MEMORY, "no memory for it");
-}
-
-Status material_find(Db *db, const char *slug, uint64_t revision, MaterialRevision *found,
-                     Problem *problem) {
-    TRY(db_material(db, slug, revision, found, problem));
-    return material_read_lists(found, problem);
+    text_fit(fault.pointer, sizeof fault.pointer, pointer);
+    text_fit(fault.detail, sizeof fault.detail,
+             is_taken ? "cannot name a material: /v1/materials/import is the address of imports"
+                      : "must be 1 to 63 of a-z, 0-9, _ and -, as \"soft_rubber\"");
+    text_quote(fault.value, sizeof fault.value, slug);
+    return problem_add_fault(problem, STATUS_INVALID, &fault);
 }
 
 void material_put_text(Bytes *bytes, const char *name, const char *text) {
     bytes_format(bytes, ", \"%s\": ", name);
     bytes_json_string(bytes, text);
+}
+
+void material_put_number(Bytes *bytes, const char *name, uint64_t number) {
+    if (number > 0)
+        bytes_format(bytes, ", \"%s\": %llu", name, (unsigned long long)number);
+    else
+        bytes_format(bytes, ", \"%s\": null", name);
 }
 
 void material_put_time(Bytes *bytes, const char *name, int64_t unix_ms) {
@@ -51,14 +40,13 @@ void material_put_time(Bytes *bytes, const char *name, int64_t unix_ms) {
     material_put_text(bytes, name, unix_ms > 0 ? text : NULL);
 }
 
-static void write_review(Bytes *bytes, const MaterialRevision *revision) {
+static void material_write_review(Bytes *bytes, const MaterialRevision *revision) {
     if (revision->reviewed_unix_ms == 0) {
         bytes_text(bytes, ", \"review\": null");
         return;
     }
     const bool is_own = text_same(revision->reviewer, revision->author);
-    bytes_text(bytes, ", \"review\": {\"status\": ");
-    bytes_json_string(bytes, revision->status);
+    bytes_format(bytes, ", \"review\": {\"status\": \"%s\"", revision->status);
     material_put_text(bytes, "reason", revision->reason);
     material_put_text(bytes, "reviewer", revision->reviewer);
     bytes_format(bytes, ", \"self_approved\": %s",
@@ -78,12 +66,9 @@ void material_write(Bytes *bytes, const MaterialRevision *revision) {
     (void)encode_members(bytes, material_fields, &revision->material, WRITE_REPORT);
     material_put_text(bytes, "author", revision->author);
     material_put_text(bytes, "comment", revision->comment);
-    if (revision->reverts > 0)
-        bytes_format(bytes, ", \"reverts\": %llu", (unsigned long long)revision->reverts);
-    else
-        bytes_text(bytes, ", \"reverts\": null");
+    material_put_number(bytes, "reverts", revision->reverts);
     material_put_time(bytes, "created", revision->created_unix_ms);
-    write_review(bytes, revision);
+    material_write_review(bytes, revision);
     bytes_format(bytes,
                  ", \"links\": {\"self\": \"%s/v1/materials/%s\", \"revision\": "
                  "\"%s/v1/materials/%s@%llu\", \"revisions\": \"%s/v1/materials/%s/revisions\", "
@@ -92,9 +77,84 @@ void material_write(Bytes *bytes, const MaterialRevision *revision) {
                  base, slug, base, slug, number, base, slug, base, slug, base, slug, base, slug);
 }
 
-void material_write_stated(Bytes *bytes, const MaterialRevision *revision) {
+void material_write_contents(Bytes *bytes, const MaterialRevision *revision) {
     bytes_format(bytes, "{\"slug\": \"%s\", \"revision\": %llu, \"status\": \"%s\", ",
                  revision->slug, (unsigned long long)revision->revision, revision->status);
     (void)encode_members(bytes, material_fields, &revision->material, WRITE_REPORT);
     bytes_text(bytes, "}");
+}
+
+void stored_test_clear(StoredTest *stored) {
+    material_measurement_clear(&stored->row);
+    fields_clear(drop_test_fields, &stored->test);
+}
+
+// A fault is the database's, not the client's.
+static Status stored_test_read(const MaterialMeasurement *row, DropTest *test, Problem *problem) {
+    Problem *fault = calloc(1, sizeof *fault);
+    if (fault == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the measurement");
+    Status status = json_parse(row->document, strlen(row->document), drop_test_fields, test, fault);
+    if (status != STATUS_OK)
+        status = problem_set(problem, status == STATUS_NO_MEMORY ? status : STATUS_INTERNAL,
+                             "measurement %llu of \"%.63s\" cannot be read: %s",
+                             (unsigned long long)row->measurement, row->slug, fault->detail);
+    free(fault);
+    return status;
+}
+
+Status stored_test_load(Db *db, const char *slug, uint64_t number, StoredTest *stored,
+                        Problem *problem) {
+    TRY(db_material_measurement(db, slug, number, &stored->row, problem));
+    const Status status = stored_test_read(&stored->row, &stored->test, problem);
+    free(stored->row.document); // it may be as large as the test
+    stored->row.document = NULL;
+    return status;
+}
+
+void measurement_write_row(Bytes *bytes, const MaterialMeasurement *row) {
+    bytes_format(bytes, "\"slug\": \"%s\", \"measurement\": %llu", row->slug,
+                 (unsigned long long)row->measurement);
+    material_put_text(bytes, "author", row->author);
+    material_put_text(bytes, "comment", row->comment);
+    material_put_time(bytes, "created", row->created_unix_ms);
+}
+
+void measurement_write_links(Bytes *bytes, const char *slug, uint64_t number) {
+    const char *base = base_path();
+    const unsigned long long n = number;
+    bytes_format(bytes,
+                 "\"links\": {\"self\": \"%s/v1/materials/%s/measurements/%llu\", \"material\": "
+                 "\"%s/v1/materials/%s\", \"proposal\": "
+                 "\"%s/v1/materials/%s/proposal?measurements=%llu\"}",
+                 base, slug, n, base, slug, base, slug, n);
+}
+
+Status measurement_write_head(Bytes *bytes, const MaterialMeasurement *row, Problem *problem) {
+    DropTest test;
+    memset(&test, 0, sizeof test);
+    const Status status = stored_test_read(row, &test, problem);
+    if (status == STATUS_OK) {
+        bytes_text(bytes, "{");
+        measurement_write_row(bytes, row);
+        bytes_format(bytes, ", \"drops\": %llu, \"traces\": %llu, \"test\": ",
+                     (unsigned long long)row->drops, (unsigned long long)row->traces);
+        encode_item(bytes, drop_test_fields, &test, WRITE_SCENE);
+        bytes_text(bytes, ", ");
+        measurement_write_links(bytes, row->slug, row->measurement);
+        bytes_text(bytes, "}");
+    }
+    fields_clear(drop_test_fields, &test);
+    return status;
+}
+
+void evaluation_write(Bytes *bytes, const Evaluation *evaluation, bool has_evaluation) {
+    bytes_text(bytes, "\"evaluation\": ");
+    if (has_evaluation)
+        encode_item(bytes, evaluation_fields, evaluation, WRITE_REPORT);
+    else
+        bytes_text(bytes, "null");
+    bytes_text(bytes, ", \"warnings\": ");
+    encode_list(bytes, warning_fields, evaluation->warnings.at, evaluation->warnings.count,
+                sizeof *evaluation->warnings.at, WRITE_REPORT);
 }

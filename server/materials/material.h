@@ -1,29 +1,45 @@
-// Materials as the rest of the server takes them: rows of the store with their lists read, and the
-// JSON they are told in. Not the rows themselves (db/materials.h). Used by jobs/, which
-// resolves names in scenes, and by api/.
+// Materials and measurements as the rest of the server uses them: as JSON, and drop tests read.
 #ifndef SERVER_MATERIALS_MATERIAL_H
 #define SERVER_MATERIALS_MATERIAL_H
 
+#include "core/drop_test/evaluation.h"
 #include "server/db/materials.h"
 #include "server/util/bytes.h"
 
-// As db_material, with tags, table and measurements read. Cleared by material_revision_clear, in
-// any case.
-Status material_find(Db *db, const char *slug, uint64_t revision, MaterialRevision *found,
-                     Problem *problem);
+// STATUS_INVALID with a fault at `pointer`: `slug` may not name a material, because of its
+// characters, its length, or because it is part of another address.
+Status slug_validate(const char *slug, const char *pointer, Problem *problem);
 
-// Reads the lists of a row into its material; once.
-Status material_read_lists(MaterialRevision *revision, Problem *problem);
-// Sets revision->lists from its material. STATUS_NO_MEMORY.
-Status material_write_lists(MaterialRevision *revision, Problem *problem);
-
-// The revision as an object: what it says, whose it is, its review and links. Lists are read.
+// The revision as an object with author, review and links.
 void material_write(Bytes *bytes, const MaterialRevision *revision);
-// Of it slug, revision, status and what the revision says.
-void material_write_stated(Bytes *bytes, const MaterialRevision *revision);
+// Only slug, revision, status and the material itself.
+void material_write_contents(Bytes *bytes, const MaterialRevision *revision);
 
-// A text and a time as members behind others: NULL and 0 are null.
+// `, "name": ` and the value; NULL and 0 are null.
 void material_put_text(Bytes *bytes, const char *name, const char *text);
+void material_put_number(Bytes *bytes, const char *name, uint64_t number);
 void material_put_time(Bytes *bytes, const char *name, int64_t unix_ms);
+
+// A measurement with its drop test.
+typedef struct StoredTest {
+    MaterialMeasurement row; // without its document
+    DropTest test;
+} StoredTest;
+
+// STATUS_NOT_FOUND; STATUS_INTERNAL: it is damaged. `stored` is all zero before and cleared by
+// stored_test_clear in any case.
+Status stored_test_load(Db *db, const char *slug, uint64_t number, StoredTest *stored,
+                        Problem *problem);
+void stored_test_clear(StoredTest *stored);
+
+// `"slug": ..., "measurement": ...`, author, comment and time, without braces.
+void measurement_write_row(Bytes *bytes, const MaterialMeasurement *row);
+// A row of db_measurement_heads as an object.
+Status measurement_write_head(Bytes *bytes, const MaterialMeasurement *row, Problem *problem);
+// `"links": {...}`.
+void measurement_write_links(Bytes *bytes, const char *slug, uint64_t number);
+// `"evaluation": {...}, "warnings": [...]`; without `has_evaluation` it is null, and its warnings
+// say why.
+void evaluation_write(Bytes *bytes, const Evaluation *evaluation, bool has_evaluation);
 
 #endif

@@ -5,96 +5,96 @@
 #include <stdlib.h>
 #include <string.h>
 
-static bool is_end(const CsvReader *scan) {
-    return scan->at == scan->size || scan->text[scan->at] == '\n' || scan->text[scan->at] == '\r';
+static bool csv_is_line_end(const CsvReader *csv) {
+    return csv->at == csv->size || csv->text[csv->at] == '\n' || csv->text[csv->at] == '\r';
 }
 
-static void skip_end(CsvReader *scan) {
-    const size_t left = scan->size - scan->at;
-    if (left > 1 && memcmp(scan->text + scan->at, "\r\n", 2) == 0)
-        scan->at += 2;
+static void csv_skip_line_end(CsvReader *csv) {
+    const size_t left = csv->size - csv->at;
+    if (left > 1 && memcmp(csv->text + csv->at, "\r\n", 2) == 0)
+        csv->at += 2;
     else if (left > 0)
-        scan->at++;
+        csv->at++;
 }
 
-static CsvCell *add_cell(CsvReader *scan) {
-    if (scan->count == scan->room) {
-        const size_t room = scan->room > 0 ? 2 * scan->room : 64;
+static CsvCell *csv_add_cell(CsvReader *csv) {
+    if (csv->count == csv->room) {
+        const size_t room = csv->room > 0 ? 2 * csv->room : 64;
         CsvCell *grown =
-            scan->count < CSV_CELLS_MAX ? realloc(scan->cells, room * sizeof *grown) : NULL;
+            csv->count < CSV_CELLS_MAX ? realloc(csv->cells, room * sizeof *grown) : NULL;
         if (grown == NULL)
             return NULL;
-        scan->cells = grown;
-        scan->room = room;
+        csv->cells = grown;
+        csv->room = room;
     }
-    CsvCell *cell = &scan->cells[scan->count++];
-    *cell = (CsvCell){.first = scan->texts.count};
+    CsvCell *cell = &csv->cells[csv->count++];
+    *cell = (CsvCell){.first = csv->texts.count};
     return cell;
 }
 
-// Up to the quote that closes; what is behind it up to the cell's end is passed over.
-static void read_quoted(CsvReader *scan, CsvCell *cell) {
+// Up to the closing quote; the rest of the cell is skipped.
+static void csv_read_quoted(CsvReader *csv, CsvCell *cell) {
     cell->is_quoted = true;
-    scan->at++;
+    csv->at++;
     for (;;) {
-        const char *from = scan->text + scan->at;
-        const char *quote = memchr(from, '"', scan->size - scan->at);
-        const size_t length = quote != NULL ? (size_t)(quote - from) : scan->size - scan->at;
-        bytes_put(&scan->texts, from, length);
-        scan->at += length + (quote != NULL);
+        const char *from = csv->text + csv->at;
+        const char *quote = memchr(from, '"', csv->size - csv->at);
+        const size_t length = quote != NULL ? (size_t)(quote - from) : csv->size - csv->at;
+        bytes_put(&csv->texts, from, length);
+        csv->at += length + (quote != NULL);
         if (quote == NULL) {
             cell->fault = "the quote that begins this cell is never closed";
             return;
         }
-        if (scan->at == scan->size || scan->text[scan->at] != '"')
+        if (csv->at == csv->size || csv->text[csv->at] != '"')
             break;
-        bytes_put(&scan->texts, "\"", 1);
-        scan->at++;
+        bytes_put(&csv->texts, "\"", 1);
+        csv->at++;
     }
-    for (; !is_end(scan) && scan->text[scan->at] != ','; scan->at++)
-        if (scan->text[scan->at] != ' ' && scan->text[scan->at] != '\t')
-            cell->fault = "there is text behind the closing quote: a quote within quotes is "
+    for (; !csv_is_line_end(csv) && csv->text[csv->at] != ','; csv->at++)
+        if (csv->text[csv->at] != ' ' && csv->text[csv->at] != '\t')
+            cell->fault = "there is text after the closing quote: a quote within quotes is "
                           "written twice";
 }
 
-static void read_plain(CsvReader *scan) {
-    const size_t first = scan->at;
-    while (!is_end(scan) && scan->text[scan->at] != ',')
-        scan->at++;
-    bytes_put(&scan->texts, scan->text + first, scan->at - first);
+static void csv_read_plain(CsvReader *csv) {
+    const size_t first = csv->at;
+    while (!csv_is_line_end(csv) && csv->text[csv->at] != ',')
+        csv->at++;
+    bytes_put(&csv->texts, csv->text + first, csv->at - first);
 }
 
-// False where there is no room for all its cells.
-static bool read_row(CsvReader *scan) {
-    scan->count = 0;
-    scan->texts.count = 0;
+// False without memory, or with more than CSV_CELLS_MAX cells.
+static bool csv_read_row(CsvReader *csv) {
+    csv->count = 0;
+    csv->texts.count = 0;
     for (;;) {
-        CsvCell *cell = add_cell(scan);
+        CsvCell *cell = csv_add_cell(csv);
         if (cell == NULL)
             return false;
-        if (scan->at < scan->size && scan->text[scan->at] == '"')
-            read_quoted(scan, cell);
+        if (csv->at < csv->size && csv->text[csv->at] == '"')
+            csv_read_quoted(csv, cell);
         else
-            read_plain(scan);
-        bytes_put(&scan->texts, "", 1);
-        if (is_end(scan))
+            csv_read_plain(csv);
+        bytes_put(&csv->texts, "", 1);
+        if (csv_is_line_end(csv))
             break;
-        scan->at++; // the comma
+        csv->at++; // the comma
     }
-    skip_end(scan);
-    scan->row++;
-    return !scan->texts.is_failed;
+    csv_skip_line_end(csv);
+    csv->row++;
+    return !csv->texts.is_failed;
 }
 
-// The texts have come to rest. What has a NUL in it ends there.
-static bool settle(CsvReader *scan) {
+// Sets the cells' texts, which do not move any more. False: the row is empty.
+static bool csv_finish_row(CsvReader *csv) {
     bool has_any = false;
-    for (size_t i = 0; i < scan->count; i++) {
-        CsvCell *cell = &scan->cells[i];
-        const size_t end = i + 1 < scan->count ? scan->cells[i + 1].first : scan->texts.count;
-        cell->text = scan->texts.at + cell->first;
+    for (size_t i = 0; i < csv->count; i++) {
+        CsvCell *cell = &csv->cells[i];
+        const size_t end = i + 1 < csv->count ? csv->cells[i + 1].first : csv->texts.count;
+        cell->text = csv->texts.at + cell->first;
         if (strlen(cell->text) + 1 < end - cell->first)
-            cell->fault = "there is a NUL byte in it; the text must be UTF-8";
+            cell->fault = "has a NUL byte; the text must be UTF-8";
         else if (!text_is_utf8(cell->text))
             cell->fault = "is not UTF-8; save the table with the encoding UTF-8";
         has_any = has_any || cell->fault != NULL || cell->text[0] != '\0' || cell->is_quoted;
@@ -102,17 +102,17 @@ static bool settle(CsvReader *scan) {
     return has_any;
 }
 
-bool csv_reader_next(CsvReader *scan) {
-    while (scan->at < scan->size && !scan->is_failed) {
-        scan->is_failed = !read_row(scan);
-        if (!scan->is_failed && settle(scan))
+bool csv_reader_next(CsvReader *csv) {
+    while (csv->at < csv->size && !csv->is_failed) {
+        csv->is_failed = !csv_read_row(csv);
+        if (!csv->is_failed && csv_finish_row(csv))
             return true;
     }
     return false;
 }
 
-void csv_reader_clear(CsvReader *scan) {
-    free(scan->cells);
-    bytes_clear(&scan->texts);
-    *scan = (CsvReader){.text = NULL};
+void csv_reader_clear(CsvReader *csv) {
+    free(csv->cells);
+    bytes_clear(&csv->texts);
+    *csv = (CsvReader){.text = NULL};
 }

@@ -17,18 +17,18 @@ Db *felt_store(const char *directory) {
 }
 
 MaterialRevision felt_saying(double restitution) {
-    static char lists[] = "{\"tags\": [\"lab\"]}", name[] = "Felt", source[] = "us",
-                slug[] = "felt", comment[] = "why";
+    static char tag[] = "lab", *tags[] = {tag}, name[] = "Felt", source[] = "us", slug[] = "felt",
+                comment[] = "why";
     MaterialRevision revision;
     memset(&revision, 0, sizeof revision);
     fields_clear(material_fields, &revision.material); // nothing is known
     revision.slug = slug;
     revision.comment = comment;
-    revision.lists = lists;
     revision.created_unix_ms = 5000;
     revision.material.name = name;
     revision.material.source = source;
     revision.material.restitution = restitution;
+    revision.material.tags = (Texts){tags, COUNT(tags)};
     return revision;
 }
 

@@ -1,13 +1,13 @@
-// A material of a lab's for tests of the store, and how it is judged. Used by tests of store/.
+// A material for tests of the database, and its reviews.
 #ifndef TESTS_SUPPORT_FELT_H
 #define TESTS_SUPPORT_FELT_H
 
 #include "server/db/materials.h"
 
-// A store in `directory` (NULL: in memory); fails the test if it cannot be opened.
+// A database in `directory` (NULL: in memory); fails the test if it cannot be opened.
 Db *felt_store(const char *directory);
 
-// What one says of "felt" with that restitution; texts are borrowed.
+// A revision of "felt" with that restitution; texts are borrowed.
 MaterialRevision felt_saying(double restitution);
 
 // Gives a revision of it that status; `reviewer` may be NULL.

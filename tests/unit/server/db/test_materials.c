@@ -57,7 +57,7 @@ static void a_revision_comes_back_as_it_went(void **state) {
     assert_int_equal(db_material_add(db, &whole, NULL), STATUS_OK);
     assert_int_equal(db_material_add(db, &whole, NULL), STATUS_CONFLICT);
     MaterialRevision bare = felt_saying(0.4);
-    bare.lists = NULL;
+    bare.material.tags = (Texts){NULL, 0};
     assert_int_equal(db_material_revise(db, &bare, 1, NULL), STATUS_OK);
     assert_int_equal(bare.revision, 2);
     db_close(db);
@@ -71,7 +71,8 @@ static void a_revision_comes_back_as_it_went(void **state) {
     assert_true(found.material.thickness == 0.004 && found.material.base_mass == 7);
     assert_int_equal(found.material.separation, SEPARATION_ZERO_FORCE);
     assert_int_equal(found.material.base, MATERIAL_BASE_FREE);
-    assert_string_equal(found.lists, whole.lists);
+    assert_int_equal(found.material.tags.count, 1);
+    assert_string_equal(found.material.tags.at[0], said->tags.at[0]);
     assert_string_equal(found.author, "ann");
     assert_string_equal(found.status, "draft");
     assert_null(found.reason);
@@ -80,7 +81,7 @@ static void a_revision_comes_back_as_it_went(void **state) {
     assert_int_equal(found.version, 2);
     material_revision_clear(&found);
     assert_int_equal(db_material(db, "felt", 2, &found, NULL), STATUS_OK);
-    assert_null(found.lists);
+    assert_int_equal(found.material.tags.count, 0);
     assert_null(found.author);
     assert_null(found.material.kind);
     assert_true(isnan(found.material.contact_time) && isnan(found.material.base_mass));
@@ -112,7 +113,8 @@ static char *dump(Sqlite *database) {
         "created_unix_ms, document)) FROM material_measurements) || "
         "(SELECT group_concat(json_array(number, material, version, action, revision, measurement, "
         "who, why, created_unix_ms)) FROM material_trail) AS text";
-    static const RowColumn columns[] = {{.name = "text", .kind = COLUMN_TEXT}, ROW_END};
+    static const SqlColumn columns[] = {
+        {.name = "text", .kind = COLUMN_TEXT, .size = sizeof(char *)}, COLUMN_END};
     Statement *statement;
     bool has_row = false;
     char *text = NULL;
