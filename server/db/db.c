@@ -215,15 +215,6 @@ Status db_list(Db *db, const char *sql, const SqlColumn *keys, const void *key,
     return status;
 }
 
-Status db_all(Db *db, const char *sql, const SqlColumn *keys, const void *key,
-              const SqlColumn *columns, size_t size, void **at, size_t *count, Problem *problem) {
-    List list;
-    const Status status = db_list(db, sql, keys, key, columns, size, &list, problem);
-    *at = list.at;
-    *count = list.count;
-    return status;
-}
-
 const SqlColumn query_key_columns[] = {COLUMN(QueryKey, id),     COLUMN(QueryKey, name),
                                        COLUMN(QueryKey, client), COLUMN(QueryKey, digest),
                                        COLUMN(QueryKey, words),  COLUMN(QueryKey, before),

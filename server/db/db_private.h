@@ -55,14 +55,4 @@ Status job_row_save(Sqlite *database, const JobRow *row, Problem *problem);
 // Within a transaction: runs `sql` with each of the lines as :name.
 Status use_lines_add(Sqlite *database, const char *sql, const char *lines, Problem *problem);
 
-// The names that the files of the materials have for these as yet.
-typedef SqlColumn RowColumn;
-// clang-format off
-#define ROW_COLUMN(Type, member, kind_) COLUMN_OF(Type, member, #member, 0, NULL)
-#define ROW_COLUMN_AS(Type, member, name_, kind_) COLUMN_OF(Type, member, name_, 0, NULL)
-// clang-format on
-#define ROW_END COLUMN_END
-Status db_all(Db *db, const char *sql, const SqlColumn *keys, const void *key,
-              const SqlColumn *columns, size_t size, void **at, size_t *count, Problem *problem);
-
 #endif
