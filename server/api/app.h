@@ -51,6 +51,7 @@ Handler materials_revisions, materials_history, materials_diff, materials_uses,
 Handler records_create, records_list, records_show, records_samples, records_delete;
 Handler examples_list, examples_show, schemas_list, schemas_show, openapi_show;
 Handler health_live, health_ready, metrics_show, version_show, landing_show;
+Handler short_ids_redirect; // of no route: Router.not_found
 Handler assets_show, assets_show_icon;
 
 // The job that the path names. STATUS_FORBIDDEN unless the token may read it: with the scope

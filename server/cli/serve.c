@@ -28,7 +28,7 @@
 
 typedef struct ServeSettings {
     char *listen, *data, *config, *base_url, *tls_cert, *tls_key;
-    Texts host;
+    Texts host, allow_origin;
     uint64_t workers, queue, queue_bytes, max_body, max_samples, max_impacts, max_run_bytes,
         max_points, cache_bytes, store_bytes;
     uint64_t quota, keep_jobs, keep_bytes;
@@ -64,6 +64,7 @@ static const Field serve_fields[] = {
     FIELD_COUNT(ServeSettings, keep_jobs, NULL, WITHIN(0, 1e12), 0, "number of finished jobs to keep, the oldest are deleted first; 0: all"),
     FIELD_COUNT(ServeSettings, keep_bytes, "B", WITHIN(0, 1e18), 0, "size of the database beyond which the oldest finished jobs are deleted; 0: no limit"),
     FIELD_TEXTS(ServeSettings, host, NULL, NULL, 64, PRESENCE_OPTIONAL, 0, "additional accepted Host name; repeatable, or a list separated by commas"),
+    FIELD_TEXTS(ServeSettings, allow_origin, NULL, NULL, 64, PRESENCE_OPTIONAL, 0, "another site whose pages may use the API, as https://lab.example.org; may be repeated, or a list with commas"),
     FIELD_TEXT(ServeSettings, base_url, 255, PRESENCE_OPTIONAL, 0, "URL for clients behind a proxy, as https://sim.example.org/impactd; links begin with it"),
     FIELD_FLAG(ServeSettings, require_tokens, false, "require a token on loopback too, also if none exists"),
     FIELD_TEXT(ServeSettings, tls_cert, 4000, PRESENCE_OPTIONAL, 0, "PEM file of the certificate, for HTTPS"),
@@ -159,6 +160,38 @@ static Status hosts_add_list(Texts *hosts, const char *list, Problem *problem) {
         at += *at == ',' ? 1 : 0;
     }
     return status;
+}
+
+// As browsers send it: scheme and host in lower case, perhaps a port, nothing else.
+static bool is_origin(const char *text) {
+    const char *host = strstr(text, "://");
+    if (host == NULL || (strncmp(text, "http://", 7) != 0 && strncmp(text, "https://", 8) != 0))
+        return false;
+    const size_t size = strspn(host + 3, "abcdefghijklmnopqrstuvwxyz0123456789-._[]:");
+    return size > 0 && host[3 + size] == '\0';
+}
+
+// The origins of --allow-origin, each text a list; ends with NULL if there are any.
+static Status origins_set(const ServeSettings *settings, Texts *origins, Problem *problem) {
+    Status status = STATUS_OK;
+    for (size_t i = 0; i < settings->allow_origin.count; i++) {
+        const char *at = settings->allow_origin.at[i];
+        for (size_t size; *(at += strspn(at, ", ")) != '\0'; at += size) {
+            char text[256];
+            size = strcspn(at, ", ");
+            snprintf(text, sizeof text, "%.*s", (int)(size < 255 ? size : 255), at);
+            if (!is_origin(text))
+                status = problem_add(problem, STATUS_USAGE, "--allow-origin",
+                                     "must be as browsers send it, https://lab.example.org or "
+                                     "with a port, in lower case and without a path, is \"%.80s\"",
+                                     text);
+            else if (texts_append(origins, text) != STATUS_OK)
+                return problem_set(problem, STATUS_NO_MEMORY, "no memory for the origins");
+        }
+    }
+    return origins->count == 0 || list_append(origins, sizeof *origins->at) != NULL
+               ? status
+               : problem_set(problem, STATUS_NO_MEMORY, "no memory for the origins");
 }
 
 // The Host names that requests may have: those of loopback, of the address, of --host and of the
@@ -311,7 +344,8 @@ static Status serve(const ServeSettings *settings, const sigset_t *signals, Prob
     App app = {.reply_most = (size_t)1 << 30, .started_unix_ms = clock_unix_ms()};
     AccessControl access = {.journal = (LogMode)settings->journal};
     const size_t response_cache_bytes = settings->cache_bytes / HOT_SHARE;
-    const Router router = {&app, routes, response_cache_new(response_cache_bytes), &access};
+    const Router router = {&app, routes, response_cache_new(response_cache_bytes), &access,
+                           short_ids_redirect};
     ServerSettings door = {.body_most = settings->max_body, .router = &router};
     const JobManagerSettings work = {.workers = settings->workers,
                                      .queue_most = settings->queue,
@@ -330,7 +364,7 @@ static Status serve(const ServeSettings *settings, const sigset_t *signals, Prob
                                                 .document_bytes = DOCUMENT_BYTES,
                                                 .points = settings->max_points}};
     const KeepRules keep = {settings->keep_days, settings->keep_jobs, settings->keep_bytes};
-    Texts hosts = {NULL, 0};
+    Texts hosts = {NULL, 0}, origins = {NULL, 0};
     AcceptedHosts accepted;
     BaseUrl url = {.host = ""};
     bool needs_tokens = false;
@@ -346,6 +380,7 @@ static Status serve(const ServeSettings *settings, const sigset_t *signals, Prob
             status = base_url_read(settings->base_url, &url, problem);
         const Status all[] = {status, serve_check(settings, problem),
                               hosts_set(settings, &door.address, &url, &hosts, problem),
+                              origins_set(settings, &origins, problem),
                               certificate_read(settings, problem)};
         status = status_first(all, COUNT(all));
     }
@@ -364,7 +399,8 @@ static Status serve(const ServeSettings *settings, const sigset_t *signals, Prob
     if (status == STATUS_OK)
         status = background_open(ASIDES, &app.background_tasks, problem);
     if (status == STATUS_OK) {
-        accepted = (AcceptedHosts){(const char *const *)hosts.at, address_is_any(&door.address)};
+        accepted = (AcceptedHosts){(const char *const *)hosts.at, address_is_any(&door.address),
+                                   (const char *const *)origins.at};
         base_path_set(url.path);
         text_fit(app.base_url, sizeof app.base_url, url.text);
         app.has_tls = tls_source() != NULL;
@@ -388,6 +424,7 @@ static Status serve(const ServeSettings *settings, const sigset_t *signals, Prob
     db_close(app.db);
     request_metrics_free(request_metrics);
     texts_clear(&hosts);
+    texts_clear(&origins);
     tls_forget();
     return status;
 }

@@ -113,6 +113,9 @@ typedef struct JobRows {
 } JobRows;
 Status db_job_unfinished(Db *db, JobRows *rows, Problem *problem); // oldest first
 void job_rows_clear(JobRows *rows);
+// Ids that begin with `prefix`, of jobs ("j-...") or results ("r-..."), `max` at most, in order: as
+// `result` of the rows.
+Status db_ids_with_prefix(Db *db, const char *prefix, size_t max, JobRows *rows, Problem *problem);
 
 // Jobs by name, outcome and time of arrival. Texts are the caller's; NULL: any.
 typedef struct JobSearch {

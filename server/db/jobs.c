@@ -2,6 +2,7 @@
 // order of (created, number), downwards. The rarest condition chooses the index of a search; the
 // others are tested row by row. Words are searched literally: "\n" separates the lines of what is
 // searched, and no text contains one.
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -147,6 +148,18 @@ Status db_job_keyed(Db *db, const char *client, const char *key, JobRow *row, Pr
     TRY(db_first(db, sql, query_key_columns, &asked, job_columns, row, &is_found, problem));
     return is_found ? STATUS_OK
                     : problem_set(problem, STATUS_NOT_FOUND, "there is no job of that key");
+}
+
+Status db_ids_with_prefix(Db *db, const char *prefix, size_t max, JobRows *rows, Problem *problem) {
+    static const char jobs_sql[] = "SELECT id AS result FROM jobs WHERE id >= :id AND id < :name "
+                                   "ORDER BY id LIMIT :max";
+    static const char results_sql[] = "SELECT id AS result FROM results WHERE id >= :id AND "
+                                      "id < :name ORDER BY id LIMIT :max";
+    char end[80]; // behind all that go on with a digit
+    snprintf(end, sizeof end, "%.72sg", prefix);
+    const QueryKey key = {.id = prefix, .name = end, .max = max};
+    return db_list(db, prefix[0] == 'j' ? jobs_sql : results_sql, query_key_columns, &key,
+                   job_columns, sizeof *rows->at, rows, problem);
 }
 
 Status db_job_unfinished(Db *db, JobRows *rows, Problem *problem) {

@@ -125,14 +125,22 @@ static void response_add(struct MHD_Response *response, const char *name, const 
         MHD_add_response_header(response, name, value);
 }
 
-static const char *response_vary(const Reply *reply) {
+static const char *response_vary(const Reply *reply, bool has_origins, char text[48]) {
+    text[0] = '\0';
+    if (reply->varies_by_accept)
+        text_list(text, 48, "Accept");
     if (reply->varies_by_encoding)
-        return reply->varies_by_accept ? "Accept, Accept-Encoding" : "Accept-Encoding";
-    return reply->varies_by_accept ? "Accept" : NULL;
+        text_list(text, 48, "Accept-Encoding");
+    if (has_origins)
+        text_list(text, 48, "Origin");
+    return text;
 }
 
 // All headers but those of one request alone.
-static void response_add_all(struct MHD_Response *response, const Reply *reply, bool has_tls) {
+static void response_add_all(struct MHD_Response *response, const Reply *reply,
+                             const ServerSettings *settings) {
+    const AcceptedHosts *hosts = settings->hosts;
+    char varies[48];
     const bool is_events =
         reply->content_type != NULL && strcmp(reply->content_type, "text/event-stream") == 0;
     char retry_after[16] = "";
@@ -153,14 +161,34 @@ static void response_add_all(struct MHD_Response *response, const Reply *reply, 
     // A proxy that buffers an answer would delay events.
     response_add(response, "X-Accel-Buffering", is_events ? "no" : NULL);
     response_add(response, MHD_HTTP_HEADER_ACCEPT_RANGES, reply->accepts_ranges ? "bytes" : NULL);
-    response_add(response, MHD_HTTP_HEADER_VARY, response_vary(reply));
+    response_add(response, MHD_HTTP_HEADER_VARY,
+                 response_vary(reply, hosts != NULL && hosts->origins != NULL, varies));
     response_add(response, MHD_HTTP_HEADER_WWW_AUTHENTICATE, reply->authenticate);
     response_add(response, "Content-Security-Policy",
                  reply->policy != NULL ? reply->policy : reply_policy);
     response_add(response, "X-Content-Type-Options", "nosniff");
     response_add(response, "Referrer-Policy", "no-referrer");
     response_add(response, "Cross-Origin-Resource-Policy", "same-origin");
-    response_add(response, "Strict-Transport-Security", has_tls ? "max-age=31536000" : NULL);
+    response_add(response, "Strict-Transport-Security",
+                 settings->certificate != NULL ? "max-age=31536000" : NULL);
+}
+
+// `methods`: the answer to a preflight; else NULL.
+static void response_add_cors(struct MHD_Response *response, const char *origin,
+                              const char *methods) {
+    if (origin == NULL)
+        return;
+    response_add(response, "Access-Control-Allow-Origin", origin);
+    if (methods == NULL) {
+        response_add(response, "Access-Control-Expose-Headers",
+                     "ETag, Location, Link, Retry-After");
+        return;
+    }
+    response_add(response, "Access-Control-Allow-Methods", methods);
+    response_add(response, "Access-Control-Allow-Headers",
+                 "Authorization, Content-Type, Idempotency-Key, If-Match, If-None-Match, "
+                 "Last-Event-ID, Prefer, Range, X-Request-Id");
+    response_add(response, "Access-Control-Max-Age", "600");
 }
 
 // Takes what `reply` owns, also when it fails.
@@ -175,7 +203,7 @@ static struct MHD_Response *response_new(Exchange *exchange, Reply *reply) {
     if (response == NULL)
         reply_clear(reply);
     else
-        response_add_all(response, reply, exchange->shared->settings.certificate != NULL);
+        response_add_all(response, reply, &exchange->shared->settings);
     return response;
 }
 
@@ -202,15 +230,17 @@ static struct MHD_Response *response_shared(Exchange *exchange, Reply *reply) {
 // Takes what `reply` owns.
 static enum MHD_Result response_queue(Exchange *exchange, Reply *reply, bool closes) {
     enum { SMALL = 64 * 1024 };
+    const Request *request = &exchange->request;
     const int code = reply->code;
     closes = closes || timer_wheel_is_closing(exchange->loop->wheel);
-    const bool is_shared =
-        reply->shared != NULL && code == 200 && reply->body_size <= SMALL && !closes;
+    const bool is_shared = reply->shared != NULL && request->allow_origin == NULL && code == 200 &&
+                           reply->body_size <= SMALL && !closes;
     struct MHD_Response *response =
         is_shared ? response_shared(exchange, reply) : response_new(exchange, reply);
     if (response == NULL)
         return MHD_NO;
-    response_add(response, "X-Request-Id", exchange->request.id);
+    response_add(response, "X-Request-Id", request->id);
+    response_add_cors(response, request->allow_origin, reply->is_preflight ? reply->allow : NULL);
     if (closes)
         response_add(response, MHD_HTTP_HEADER_CONNECTION, "close");
     const enum MHD_Result result =
@@ -288,6 +318,7 @@ static enum MHD_Result exchange_begin(Exchange *exchange, struct MHD_Connection 
     request->body_most = shared->settings.body_most;
     exchange->validator.names = shared->settings.hosts;
     MHD_get_connection_values_n(connection, MHD_HEADER_KIND, exchange_add_header, exchange);
+    request->allow_origin = validate_allowed_origin(&exchange->validator);
     if (request->id[0] == '\0')
         exchange_write_id(request->id, shared->first_id + atomic_fetch_add(&shared->requests, 1));
     if (request->host == NULL)

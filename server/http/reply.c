@@ -8,6 +8,7 @@
 #include "server/json/encode.h"
 #include "server/util/gzip.h"
 
+#define PRETTY "-p"  // likewise of indented JSON
 #define PACKED "-gz" // behind the tag of a compressed body: other bytes, another tag
 
 const char type_json[] = "application/json";
@@ -69,7 +70,7 @@ Status reply_bytes(Reply *reply, int code, const char *content_type, Bytes *byte
 
 static bool reply_tag(Reply *reply, const Request *request, const char *text,
                       const char *cache_control) {
-    snprintf(reply->etag, sizeof reply->etag, "\"%s\"", text);
+    snprintf(reply->etag, sizeof reply->etag, "\"%s%s\"", text, request->is_pretty ? PRETTY : "");
     snprintf(reply->cache_control, sizeof reply->cache_control, "%s", cache_control);
     return reply_is_known(reply, request);
 }
@@ -95,9 +96,73 @@ bool reply_is_known(Reply *reply, const Request *request) {
     text_fit(reply->etag, sizeof reply->etag, etag);
     memcpy(reply->cache_control, cache_control, sizeof cache_control);
     reply->varies_by_encoding = true; // whether it would be compressed shows only when it is made
-    reply->varies_by_accept = varies_by_accept;
+    reply->varies_by_accept = varies_by_accept || request_is_pretty_by_accept(request);
     reply->code = 304;
     return true;
+}
+
+// Two spaces for each level; a list of plain values stays on one line.
+static void reply_indent_json(Bytes *bytes, const char *text, size_t size) {
+    static const char blanks[] = " \n\r\t";
+    size_t depth = 0;
+    bool is_flat = false; // within a list that stays on one line
+    for (size_t i = 0; i < size && !bytes->is_failed; i++) {
+        const char c = text[i];
+        if (c == '"') {
+            size_t end = i + 1;
+            while (end < size && text[end] != '"')
+                end += text[end] == '\\' ? 2 : 1;
+            bytes_put(bytes, text + i, (end < size ? end + 1 : size) - i);
+            i = end;
+        } else if (c == '{' || c == '[') {
+            const size_t next = i + 1 + strspn(text + i + 1, blanks);
+            const bool is_empty = text[next] == '}' || text[next] == ']';
+            is_flat = is_empty || (c == '[' && text[next + strcspn(text + next, "[]{")] == ']');
+            depth++;
+            bytes_put(bytes, &c, 1);
+            if (!is_flat)
+                bytes_format(bytes, "\n%*s", (int)(2 * depth), "");
+        } else if (c == '}' || c == ']') {
+            depth -= depth > 0;
+            if (!is_flat)
+                bytes_format(bytes, "\n%*s", (int)(2 * depth), "");
+            is_flat = false;
+            bytes_put(bytes, &c, 1);
+        } else if (c == ',' && !is_flat) {
+            bytes_format(bytes, ",\n%*s", (int)(2 * depth), "");
+        } else if (c == ',' || c == ':') {
+            bytes_put(bytes, (const char[]){c, ' '}, 2);
+        } else if (strchr(blanks, c) == NULL) {
+            bytes_put(bytes, &c, 1);
+        }
+    }
+    bytes_text(bytes, "\n");
+}
+
+void reply_indent(Reply *reply, const Request *request) {
+    enum { INDENT_MAX = 64 << 20 };
+    const bool is_json = reply->content_type != NULL && strstr(reply->content_type, "json") != NULL;
+    if (!is_json || reply->stream.next != NULL || reply->body_size == 0)
+        return;
+    reply->varies_by_accept = reply->varies_by_accept || request_is_pretty_by_accept(request);
+    if (!request->is_pretty || reply->body_size > INDENT_MAX)
+        return;
+    Bytes source = {0}, indented = {0}; // a body need not have a NUL behind it
+    bytes_put(&source, reply->body, reply->body_size);
+    if (source.at != NULL)
+        reply_indent_json(&indented, source.at, source.count);
+    bytes_clear(&source);
+    size_t size = 0;
+    char *body = bytes_take(&indented, &size);
+    if (body == NULL || size == 0) {
+        free(body);
+        return;
+    }
+    if (reply->release != NULL)
+        reply->release(reply->context);
+    reply->body = reply->context = body;
+    reply->body_size = size;
+    reply->release = free;
 }
 
 static bool reply_is_text(const char *type) {

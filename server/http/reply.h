@@ -28,6 +28,9 @@ bool reply_tagged(Reply *reply, const Request *request, const char *tag);
 // The same for a reply that has its tag; the rest of it is released where the client has it.
 bool reply_is_known(Reply *reply, const Request *request);
 
+// Indents JSON that is whole in memory where the request asks for it.
+void reply_indent(Reply *reply, const Request *request);
+
 // Compresses a text that is whole in memory where the client accepts gzip and it becomes smaller.
 bool reply_pack(Reply *reply, const Request *request);
 

@@ -114,7 +114,8 @@ static const struct {
             KEPT("Content-Encoding", content_encoding),
             KEPT("If-Match", if_match),
             KEPT("Idempotency-Key", idempotency_key),
-            KEPT("Last-Event-ID", last_event_id)};
+            KEPT("Last-Event-ID", last_event_id),
+            KEPT("Access-Control-Request-Method", preflight)};
 
 void request_header(Request *request, const char *name, const char *value) {
     if (strcasecmp(name, "Prefer") == 0) {
@@ -224,4 +225,9 @@ Status request_require_json(const Request *request, Problem *problem) {
 
 bool request_is_empty(const Request *request) {
     return request->body_size == 0;
+}
+
+bool request_is_pretty_by_accept(const Request *request) {
+    return !request->is_pretty_asked && strcmp(request->method, "GET") == 0 &&
+           strncmp(request->path, "/v1/", 4) == 0;
 }

@@ -71,6 +71,10 @@ struct Request {
     bool is_expired;          // ... because the time was up
     void *kept;               // what the handler kept when it asked to wait; see Reply
     const Callback *callback; // resumes this request; outlives it, so that a late call is harmless
+    const char *allow_origin; // an Origin of another site that --allow-origin names, or NULL
+    const char *preflight;    // Access-Control-Request-Method, or NULL
+    bool is_pretty;           // JSON is indented: by ?pretty=1, or where Accept prefers text/html
+    bool is_pretty_asked;     // by the query, which is removed from `queries`
     char *storage;            // what the texts above point into
     char *parameter_storage;  // part of it
 };
@@ -108,6 +112,9 @@ Status request_require_body(const Request *request, Problem *problem);
 // STATUS_TOO_LARGE: the limit, and how to raise it.
 Status request_error_large(size_t max, Problem *problem);
 
+// Whether Accept decides if JSON is indented: GET below /v1/, without ?pretty.
+bool request_is_pretty_by_accept(const Request *request);
+
 // Of Route.runs_on_loop: the request has no body.
 bool request_is_empty(const Request *request);
 
@@ -135,7 +142,7 @@ struct Reply {
     Stream stream;                  // `next` not NULL: in place of body
     void (*release)(void *context); // called once when the body was sent or given up; may be NULL
     void *context;
-    char location[192]; // "" for none; of our own pages without the base path, dispatch puts it
+    char location[512]; // "" for none; of our own pages without the base path, dispatch puts it
     char etag[112];     // with quotes, "" for none
     char cache_control[64];
     char link[2048];          // likewise
@@ -150,6 +157,7 @@ struct Reply {
     const void *shared; // not NULL: a whole answer out of the cache, the same for all who get it
     bool is_immutable;  // the same target gets it for ever
     bool accepts_ranges;
+    bool is_preflight; // of CORS: `allow` has the methods
     bool varies_by_encoding;
     bool varies_by_accept; // the same path has several representations
     int wait_ms; // > 0: not a reply yet; call the handler again when woken or after so long

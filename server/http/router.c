@@ -110,6 +110,62 @@ static bool route_nearest(const Route *table, const char *path, char target[PATH
     return target[0] != '\0';
 }
 
+// A path that a route fits without the slash at its end; the documentation's folders have theirs.
+static bool router_redirect_slash(const Router *router, const Request *request, Reply *reply) {
+    RouteMatch match;
+    char path[REQUEST_TARGET_MAX + 1];
+    const size_t size = strlen(request->path);
+    if (strcmp(request->method, "GET") != 0 || size < 2 || size >= sizeof path ||
+        request->path[size - 1] != '/' || strncmp(request->path, "/guide/", 7) == 0)
+        return false;
+    memcpy(path, request->path, size - 1);
+    path[size - 1] = '\0';
+    const char *query = strchr(request->target, '?');
+    query = query != NULL ? query : "";
+    if (route_find(router->routes, "GET", path, &match) == NULL ||
+        strlen(path) + strlen(query) >= sizeof reply->location)
+        return false;
+    memcpy(reply->location, path, size - 1);
+    memcpy(reply->location + size - 1, query, strlen(query) + 1);
+    base_path_apply(reply->location, sizeof reply->location);
+    reply_borrow(reply, 308, NULL, NULL, 0);
+    return true;
+}
+
+// CORS: whether a page of an allowed origin may send a request. The question has no token.
+static bool router_answer_preflight(const Router *router, const Request *request, Reply *reply) {
+    RouteMatch match;
+    if (request->allow_origin == NULL || request->preflight == NULL ||
+        strcmp(request->method, "OPTIONS") != 0)
+        return false;
+    (void)route_find(router->routes, "OPTIONS", request->path, &match);
+    if (match.allow[0] == '\0')
+        return false;
+    snprintf(reply->allow, sizeof reply->allow, "%s", match.allow);
+    reply->is_preflight = true;
+    reply_borrow(reply, 204, NULL, NULL, 0);
+    return true;
+}
+
+// ?pretty=1 is of every route: it is taken out before the route's own queries are checked.
+static Status router_set_pretty(Request *request, Problem *problem) {
+    static const char *const types[] = {"application/json", "text/html", NULL};
+    for (size_t i = 0; i < request->query_count; i++) {
+        if (strcmp(request->queries[i].name, "pretty") != 0)
+            continue;
+        TRY(request_flag(request, "pretty", &request->is_pretty, problem));
+        request->is_pretty_asked = true;
+        request->query_count--;
+        memmove(&request->queries[i], &request->queries[i + 1],
+                (request->query_count - i) * sizeof request->queries[0]);
+        return STATUS_OK;
+    }
+    request->is_pretty = request->accept != NULL && strstr(request->accept, "text/html") != NULL &&
+                         request_is_pretty_by_accept(request) &&
+                         header_accept(request->accept, types) == 1;
+    return STATUS_OK;
+}
+
 static Status router_refuse(const Router *router, const Request *request, const RouteMatch *match,
                             Reply *reply, Problem *problem) {
     char near[PATH_MAX_SHOWN];
@@ -181,6 +237,7 @@ static void router_close(const Router *router, const Request *request, Status st
         reply->wait_ms = 0;
         base_path_apply(reply->link, sizeof reply->link);
         reply_problem(reply, problem, reply->code == 416 ? 416 : 0, request->target, request->id);
+        reply_indent(reply, request);
     }
     if (reply->wait_ms == 0)
         access_record(router->access, request, reply);
@@ -188,7 +245,8 @@ static void router_close(const Router *router, const Request *request, Status st
 
 // Immutable responses are made once: found by their target, which saves the look-up of the route.
 static bool router_find_cached(const Router *router, Request *request, Reply *reply) {
-    if (router->response_cache == NULL || strcmp(request->method, "GET") != 0)
+    if (router->response_cache == NULL || strcmp(request->method, "GET") != 0 ||
+        (request->is_pretty && !request->is_pretty_asked))
         return false;
     const bool accepts_gzip = header_accepts_gzip(request->accept_encoding);
     const Route **route = &request->route;
@@ -217,6 +275,8 @@ static Status router_open(const Router *router, Request *request, Reply *reply, 
     RouteMatch match;
     const Route *route = route_find(router->routes, request->method, request->path, &match);
     request->route = route;
+    if (route == NULL && router_redirect_slash(router, request, reply))
+        return STATUS_OK;
     if (route == NULL)
         return router_refuse(router, request, &match, reply, problem);
     TRY(access_authorize(router->access, route->scope, request, problem));
@@ -231,10 +291,14 @@ bool router_admit(const Router *router, Request *request, Reply *reply) {
     // A Problem is large: problem_clear and encode_problem touch only what is used of it.
     Problem problem;
     problem_clear(&problem);
-    Status status;
-    if (router_find_cached(router, request, reply))
-        status = router_admit_cached(router, request, reply, &problem);
-    else if ((status = router_open(router, request, reply, &problem)) == STATUS_OK)
+    Status status = router_set_pretty(request, &problem);
+    if (status == STATUS_OK && !router_answer_preflight(router, request, reply)) {
+        if (router_find_cached(router, request, reply))
+            status = router_admit_cached(router, request, reply, &problem);
+        else
+            status = router_open(router, request, reply, &problem);
+    }
+    if (status == STATUS_OK && reply->code == 0)
         return true;
     router_close(router, request, status, &problem, reply);
     return false;
@@ -245,9 +309,13 @@ static Status router_finish(const Router *router, Request *request, Reply *reply
                             Problem *problem) {
     base_path_apply(reply->location, sizeof reply->location);
     base_path_apply(reply->link, sizeof reply->link);
+    const bool is_cacheable = router->response_cache != NULL && reply->is_immutable &&
+                              reply->code == 200 && reply->stream.next == NULL &&
+                              !reply->varies_by_accept &&
+                              (!request->is_pretty || request->is_pretty_asked);
+    reply_indent(reply, request);
     const bool is_packed = reply_pack(reply, request);
-    if (router->response_cache != NULL && reply->is_immutable && reply->code == 200 &&
-        reply->stream.next == NULL && !reply->varies_by_accept)
+    if (is_cacheable)
         response_cache_put(router->response_cache, request->cache_age, request->target, is_packed,
                            request->route, reply);
     return reply_range(reply, request, problem);
@@ -261,6 +329,8 @@ void router_answer(const Router *router, Request *request, Reply *reply) {
         status = access_authorize(router->access, request->route->scope, request, &problem);
     if (status == STATUS_OK)
         status = request->route->handle(router->app, request, reply, &problem);
+    if (status == STATUS_NOT_FOUND && router->not_found != NULL)
+        status = router->not_found(router->app, request, reply, &problem);
     if (status == STATUS_OK && reply->wait_ms == 0)
         status = router_finish(router, request, reply, &problem);
     router_close(router, request, status, &problem, reply);

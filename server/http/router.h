@@ -11,6 +11,7 @@ typedef struct Router {
     const Route *routes;           // ends with method == NULL; the first that fits counts
     ResponseCache *response_cache; // may be NULL
     const AccessControl *access;   // NULL: no tokens, nothing is counted
+    Handler *not_found;            // called where a handler found nothing: may answer; or NULL
 } Router;
 
 extern const Route routes[]; // api/routes.c

@@ -15,7 +15,7 @@ static const char *const known_methods[] = {"GET",    "HEAD",    "POST", "PUT",
                                             "DELETE", "OPTIONS", "PATCH"};
 
 static const char *const loopback[] = {"localhost", "127.0.0.1", "[::1]", NULL};
-const AcceptedHosts gate_loopback = {loopback, false};
+const AcceptedHosts gate_loopback = {loopback, false, NULL};
 
 // The size of the name in "name:port"; 0 where the port is no port. An IPv6 address has brackets.
 static size_t name_size_of(const char *host, size_t size) {
@@ -178,15 +178,25 @@ static bool gate_origin_is_ours(const RequestValidator *validator) {
     const char *const authority = mark + 3;
     if (validator->own_host != NULL && strcasecmp(authority, validator->own_host) == 0)
         return true;
-    const AcceptedHosts named = {gate_names(validator)->names, false};
+    const AcceptedHosts named = {gate_names(validator)->names, false, NULL};
     const size_t size = strlen(authority);
     return validate_host_is_ours(&named, authority, size) &&
            !validate_host_is_ours(&gate_loopback, authority, size);
 }
 
+const char *validate_allowed_origin(const RequestValidator *validator) {
+    const char *const *origin = gate_names(validator)->origins;
+    if (validator->origin == NULL || origin == NULL)
+        return NULL;
+    while (*origin != NULL && strcmp(*origin, validator->origin) != 0)
+        origin++;
+    return *origin;
+}
+
 // Another site's page may send requests with the rights of this machine (CSRF); browsers mark them.
 static bool gate_is_from_other_site(const RequestValidator *validator, const char *method) {
-    if (strcmp(method, "GET") == 0 || strcmp(method, "HEAD") == 0 || strcmp(method, "OPTIONS") == 0)
+    if (strcmp(method, "GET") == 0 || strcmp(method, "HEAD") == 0 ||
+        strcmp(method, "OPTIONS") == 0 || validate_allowed_origin(validator) != NULL)
         return false;
     return (validator->fetch_site != NULL &&
             (strcasecmp(validator->fetch_site, "cross-site") == 0 ||

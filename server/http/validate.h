@@ -12,8 +12,9 @@
 
 // The names that requests may call us by.
 typedef struct AcceptedHosts {
-    const char *const *names; // without port, "[::1]", NULL-terminated
-    bool takes_addresses;     // any numeric address as well: no other site's name leads to it
+    const char *const *names;   // without port, "[::1]", NULL-terminated
+    bool takes_addresses;       // any numeric address as well: no other site's name leads to it
+    const char *const *origins; // of other sites that may use the API, NULL-terminated; or NULL
 } AcceptedHosts;
 extern const AcceptedHosts gate_loopback; // localhost, 127.0.0.1 and [::1]
 
@@ -36,6 +37,9 @@ void validate_header(RequestValidator *validator, const char *name, size_t name_
 // in `problem`. 403: another site's page sends a request that is not GET, HEAD or OPTIONS.
 int validate_request(const RequestValidator *validator, const char *method, const char *target,
                      const char *version, Problem *problem);
+
+// The one of `origins` that the Origin header names; NULL: none.
+const char *validate_allowed_origin(const RequestValidator *validator);
 
 // Whether a Host header's value is one of the names, with any port or none.
 bool validate_host_is_ours(const AcceptedHosts *hosts, const char *host, size_t size);

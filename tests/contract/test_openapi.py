@@ -12,6 +12,12 @@ from asking import endless  # noqa: E402
 
 with open(os.path.join(program.SOURCE, "schema", "openapi.json"), encoding="utf-8") as openapi:
     DOCUMENT = json.load(openapi)
+# Answers that many operations share are defined once.
+for ITEM in DOCUMENT["paths"].values():
+    for OPERATION in ITEM.values():
+        OPERATION["responses"] = {
+            status: DOCUMENT["components"]["responses"][answer["$ref"].rsplit("/", 1)[1]] if "$ref" in answer else answer
+            for status, answer in OPERATION["responses"].items()}
 
 TYPES = {"object": dict, "array": list, "string": str, "boolean": bool, "null": type(None)}
 
@@ -306,8 +312,17 @@ def test_real_answers_have_the_promised_shapes():
             call("DELETE", "/v1/results/{id}", f"/v1/results/{gone['result']}")
         call("GET", "/v1/jobs/{id}", f"/v1/jobs/{gone['id']}")
         assert call("GET", "/v1/jobs", "/v1/jobs?limit=1") == {"Link"}
+        ids = [one["id"] for one in daemon.get("/v1/jobs?limit=100").json()["jobs"]]
+        alike = next(one[:10] for one in ids if sum(other[:10] == one[:10] for other in ids) > 1)
+        for method, path in operations():
+            if method == "GET" and path.startswith(("/v1/jobs/{id}", "/v1/results/{id}")):
+                short = job["id"][:31] if "jobs" in path else job["result"][:20]
+                target = path.format(id="{}", number=1, index=1, format="json")
+                assert call(method, path, target.format(short)) == {"Location"}, path
+                if "jobs" in path:
+                    call(method, path, target.format(alike))
     assert called == set(operations()), set(operations()) - called
-    assert statuses >= {200, 201, 202, 206, 304, 400, 404, 406, 409, 413, 415, 416, 422}, statuses
+    assert statuses >= {200, 201, 202, 206, 304, 307, 400, 404, 406, 409, 413, 415, 416, 422}, statuses
 
 
 if __name__ == "__main__":

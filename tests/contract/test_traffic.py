@@ -40,11 +40,13 @@ BASE = "/impactd"
 EVERYWHERE = {"content-type", "content-length", "date", "connection", "cache-control", "vary", "accept-ranges",
               "transfer-encoding", "content-encoding", "keep-alive", "x-request-id", "x-content-type-options",
               "content-security-policy", "referrer-policy", "cross-origin-resource-policy", "x-frame-options",
-              "cross-origin-opener-policy", "permissions-policy", "strict-transport-security", "www-authenticate"}
+              "cross-origin-opener-policy", "permissions-policy", "strict-transport-security", "www-authenticate",
+              "access-control-allow-origin", "access-control-expose-headers"}
 
 # What the document promises and no test can bring about at will: (method or None for any, patterns of paths and statuses) -> why.
 READING = r"/v1/(compare|results/\{id\}/(series|psd|impacts|bundle).*)"
 UNSEEN = {
+    ("GET", r"/v1/results/\{id\}.*", "409"): "ids of two results that begin with the same 8 digits",
     (None, READING, "503"): "series that are still being computed anew after a minute, or too many impacts looked at at once",
     (None, r"/v1/materials/\{slug\}/(measurements.*|proposal.*)", "503"): "more long force traces at once than are evaluated",
     ("POST", r"/v1/results/\{id\}/again", "202|422|429|503|507"): "it submits as POST /v1/jobs does, where they are seen",
@@ -62,7 +64,7 @@ def fits(entry, method, path, status):
 LARGE = 20000  # [B]
 
 # Answered before any handler, in the same way everywhere: seen anywhere is seen.
-CENTRAL = {"401", "403", "421"}
+CENTRAL = {"307", "401", "403", "421"}
 
 
 def exchanges():
@@ -174,6 +176,9 @@ def test_every_answer_is_declared():
         match = operation_of(one["method"], one["path"])
         kind = media(one["answer_headers"])
         if match is None:
+            # A slash too many at the end of a path, and the preflights of CORS: of all paths.
+            if one["status"] == 308 or (one["method"], one["status"]) == ("OPTIONS", 204):
+                continue
             if one["status"] < 400 or kind not in ("application/problem+json", "") or one["status"] >= 500 and \
                     one["status"] not in (501, 505):
                 found.append(f"{name}: answered, and not in the document")
@@ -253,7 +258,7 @@ def test_parameters_that_were_taken_are_declared():
         declared = {p["name"] for p in match[1].get("parameters", []) if p["in"] == "query"}
         given = urllib.parse.parse_qs(urllib.parse.urlsplit(one["path"]).query, keep_blank_values=True)
         found += [f"{one['method']} {one['path'][:100]}: the query {name} is not declared" for name in given
-                  if name not in declared]
+                  if name not in declared | {"pretty"}]
     tell(found)
 
 

@@ -46,7 +46,7 @@ static int open_house(void **state) {
         return -1;
     snprintf(house.lab, sizeof house.lab, "Bearer %s", token);
     house.access.request_metrics = request_metrics_new(table);
-    house.router = (Router){NULL, table, NULL, &house.access};
+    house.router = (Router){NULL, table, NULL, &house.access, NULL};
     *state = &house;
     return tokens_open(house.db, false, &house.access.tokens, NULL) == STATUS_OK ? 0 : -1;
 }
@@ -138,7 +138,7 @@ static void links_in_headers_begin_with_the_base(void **state) {
 
 static void without_a_doorman_everyone_comes_in(void **state) {
     (void)state;
-    House house = {.router = {NULL, table, NULL, NULL}};
+    House house = {.router = {NULL, table, NULL, NULL, NULL}};
     Reply reply;
     assert_int_equal(ask(&house, "POST", "/v1/a", NULL, &reply), 200);
 }

@@ -45,7 +45,7 @@ static const Route table[] = {
 };
 
 static Reply ask(const char *method, const char *target, const char *range) {
-    const Router router = {NULL, table, NULL, NULL};
+    const Router router = {NULL, table, NULL, NULL, NULL};
     Request request = {.method = method, .range = range};
     Reply reply;
     seen[0] = '\0';
@@ -81,11 +81,18 @@ TEST(paths_find_their_route_and_parameters) {
 TEST(what_is_not_there_is_404_with_the_nearest_path) {
     expect("GET", "/v1/job", 404, "/v1/jobs");
     expect("GET", "/v1/result/r-1/series", 404, "/v1/results/r-1/series");
-    expect("GET", "/v1/jobs/", 404, NULL);
-    expect("GET", "/v1/jobs/j-1/", 404, NULL);
+    expect("GET", "/v1/jobs//", 404, NULL);
+    expect("DELETE", "/v1/jobs/j-1/", 404, NULL);
     expect("GET", "//v1/jobs", 404, NULL);
     expect("GET", "/v1/results/r-1/series.", 404, NULL);
     expect("GET", "/wholly/elsewhere/and/far", 404, "/openapi.json");
+}
+
+TEST(a_slash_at_the_end_redirects) {
+    Reply reply = ask("GET", "/v1/jobs/j-1/?wait=3", NULL);
+    assert_int_equal(reply.code, 308);
+    assert_string_equal(reply.location, "/v1/jobs/j-1?wait=3");
+    reply_clear(&reply);
 }
 
 TEST(a_wrong_method_is_405_with_allow) {
@@ -138,7 +145,7 @@ TEST(parts_are_206_and_parts_outside_416) {
 }
 
 TEST(if_range_with_another_tag_gets_the_whole) {
-    const Router router = {NULL, table, NULL, NULL};
+    const Router router = {NULL, table, NULL, NULL, NULL};
     Request request = {.method = "GET", .range = "bytes=0-1", .if_range = "\"other\""};
     Reply reply;
     reply_default(&reply);

@@ -139,7 +139,7 @@ static void ambiguous_or_foreign_heads_are_refused(void **state) {
 static void hosts_are_those_that_were_named(void **state) {
     (void)state;
     static const char *const names[] = {"sim.example.org", "192.168.1.5", NULL};
-    const AcceptedHosts named = {names, false}, any = {names, true};
+    const AcceptedHosts named = {names, false, NULL}, any = {names, true, NULL};
     static const struct {
         const char *host;
         bool is_named, is_any;
@@ -172,7 +172,7 @@ static void hosts_are_those_that_were_named(void **state) {
 static void a_foreign_host_is_told_the_names_that_are_right(void **state) {
     (void)state;
     static const char *const names[] = {"sim.example.org", "localhost", NULL};
-    const AcceptedHosts named = {names, true};
+    const AcceptedHosts named = {names, true, NULL};
     RequestValidator validator = {.names = &named};
     Problem problem;
     problem_clear(&problem);
@@ -185,7 +185,7 @@ static void a_foreign_host_is_told_the_names_that_are_right(void **state) {
 static void a_name_given_for_a_proxy_is_no_foreign_origin(void **state) {
     (void)state;
     static const char *const names[] = {"localhost", "sim.example.org", NULL};
-    const AcceptedHosts named = {names, false};
+    const AcceptedHosts named = {names, false, NULL};
     static const struct {
         const char *origin;
         int code;

@@ -1,0 +1,119 @@
+#!/usr/bin/env python3
+"""Small features of all routes: other origins, slashes at the end, indented JSON, short ids."""
+
+import json
+import os
+import sys
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
+import program  # noqa: E402
+from asking import problem, sponge  # noqa: E402
+
+LAB = "https://lab.example.org"
+HTML = "text/html,application/xhtml+xml,application/xml;q=0.9,*/*;q=0.8"
+
+
+def test_pages_of_an_allowed_origin_may_use_the_api():
+    """--allow-origin: preflight, exposed headers and unsafe methods for that origin; all others are refused as before."""
+    with program.daemon("--allow-origin", LAB, "--allow-origin", "http://other.example.org:8000") as daemon:
+        asked = {"Origin": LAB, "Access-Control-Request-Method": "POST", "Access-Control-Request-Headers": "authorization"}
+        reply = daemon.request("OPTIONS", "/v1/jobs", headers=asked)
+        assert reply.status == 204 and reply.headers["access-control-allow-origin"] == LAB, reply.headers
+        assert "POST" in reply.headers["access-control-allow-methods"].split(", "), reply.headers
+        assert "Authorization" in reply.headers["access-control-allow-headers"].split(", "), reply.headers
+        reply = daemon.request("POST", "/v1/jobs", json=sponge(), headers={"Origin": LAB, "Sec-Fetch-Site": "cross-site"})
+        assert reply.status in (200, 202) and reply.headers["access-control-allow-origin"] == LAB, reply
+        assert set(reply.headers["access-control-expose-headers"].split(", ")) == {"ETag", "Location", "Link", "Retry-After"}
+        result = "/v1/results/" + program.finished(daemon, sponge())["result"]
+        for _ in range(3):  # from the cache as well
+            for origin in (LAB, None, "http://other.example.org:8000", "https://lab.example.org.evil.org"):
+                reply = daemon.get(result, headers={"Origin": origin} if origin else {})
+                assert reply.status == 200 and "Origin" in reply.headers["vary"].split(", "), reply.headers
+                allowed = origin if origin and "evil" not in origin else None
+                assert reply.headers.get("access-control-allow-origin") == allowed, (origin, reply.headers)
+        problem(daemon.get("/v1/results/r-0", headers={"Origin": LAB}), 404)
+        assert daemon.get("/nothing", headers={"Origin": LAB}).headers["access-control-allow-origin"] == LAB
+        for origin in ("https://evil.example.org", LAB + ":444", "null", LAB.upper()):
+            problem(daemon.request("POST", "/v1/jobs", json=sponge(), headers={"Origin": origin}), 403)
+            reply = daemon.request("OPTIONS", "/v1/jobs", headers={**asked, "Origin": origin})
+            assert reply.status == 405 and "access-control-allow-origin" not in reply.headers, reply.headers
+    for bad in ("*", "null", "lab.example.org", "https://lab.example.org/", "https://Lab.example.org"):
+        code, _, errors = program.run("serve", "--allow-origin", bad, "--listen", "127.0.0.1:0", "--data", "/nonexistent/x")
+        assert code == 2 and "--allow-origin" in errors, (code, errors)
+
+
+def test_a_slash_at_the_end_redirects():
+    """A path with a slash too many: 308 to the one without, with its query, for GET and HEAD alone; never to another server."""
+    with program.daemon() as daemon:
+        for method in ("GET", "HEAD"):
+            for path, query in (("/v1/jobs", "?limit=1"), ("/v1/results/r-0", ""), ("/schemas", ""), ("/health/live", "")):
+                reply = daemon.request(method, path + "/" + query)
+                assert reply.status == 308 and reply.headers["location"] == path + query, (method, path, reply)
+        problem(daemon.request("DELETE", "/v1/jobs/j-1/"), 404)
+        for path in ("//evil.example.org/", "/guide/", "/nothing/", "/v1/jobs//"):
+            assert daemon.get(path).status == 404, path
+    with program.daemon("--base-url", "https://sim.example.org/sim", "--host", "localhost") as daemon:
+        assert daemon.get("/sim/v1/jobs/").headers["location"] == "/sim/v1/jobs"
+
+
+def test_json_is_indented_where_it_is_asked_for():
+    """?pretty=1 or an Accept that prefers text/html: the same value with a tag of its own, on every route."""
+    with program.daemon() as daemon:
+        job = program.finished(daemon, sponge())
+        paths = ("/v1/results/" + job["result"], "/v1/jobs/" + job["id"], "/v1/materials/sponge", "/v1/examples",
+                 f"/v1/results/{job['result']}/psd.json", "/v1/materials?q=nothing")
+        for _ in range(2):
+            for path in paths:
+                plain = daemon.get(path)
+                asked = daemon.get(path + ("&" if "?" in path else "?") + "pretty=1")
+                preferred = daemon.get(path, headers={"Accept": HTML})
+                assert asked.status == preferred.status == plain.status == 200, (path, asked, preferred)
+                assert "Accept" in plain.headers["vary"].split(", "), plain.headers
+                assert "Accept" in preferred.headers["vary"].split(", "), preferred.headers
+                assert asked.body == preferred.body != plain.body, path
+                assert asked.body.startswith(b'{\n  "') and asked.body.endswith(b"}\n"), asked.body[:40]
+                if path != paths[1]:
+                    assert asked.json() == plain.json(), path
+                else:
+                    assert asked.json().keys() == plain.json().keys()
+                if "etag" in plain.headers:
+                    assert asked.headers["etag"] == preferred.headers["etag"] != plain.headers["etag"]
+                    known = daemon.get(path, headers={"Accept": HTML, "If-None-Match": preferred.headers["etag"]})
+                    assert known.status == 304 and known.headers["etag"] == preferred.headers["etag"], known.headers
+                    assert "Accept" in known.headers["vary"], known.headers
+                    assert daemon.get(path, headers={"If-None-Match": preferred.headers["etag"]}).status == 200
+        packed = daemon.get(paths[4] + "?pretty=1", headers={"Accept-Encoding": "gzip"})
+        assert packed.headers["etag"].endswith('-p-gz"'), packed.headers
+        assert daemon.get(paths[0] + "?pretty=0", headers={"Accept": HTML}).body == daemon.get(paths[0]).body
+        problem(daemon.get(paths[0] + "?pretty=x"), 400)
+        problem(daemon.get("/v1/jobs/j-0?pretty=1"), 404)
+        assert daemon.get("/v1/jobs/j-0?pretty=1").body.startswith(b'{\n  "')
+        reply = daemon.request("POST", "/v1/jobs?pretty=1", json=sponge())
+        assert reply.status == 200 and reply.body.startswith(b'{\n  "'), reply
+        assert daemon.get(f"/v1/results/{job['result']}/series.csv?pretty=1").body == daemon.get(
+            f"/v1/results/{job['result']}/series.csv").body
+
+
+def test_ids_may_be_shortened():
+    """8 or more digits of an id in GET: 307 to the full one with path and query, 409 with the candidates, 404 as before."""
+    with program.daemon() as daemon:
+        job = program.finished(daemon, sponge())
+        other = program.finished(daemon, sponge(duration=7))
+        for kind, full, rest in (("results", job["result"], ""), ("results", job["result"], "/series.csv?to=0.1"),
+                                 ("results", job["result"], "/impacts/1/force.json"), ("jobs", job["id"], "/scene")):
+            for digits in (29,) if kind == "jobs" else (8, 20, 63):
+                reply = daemon.get(f"/v1/{kind}/{full[:2 + digits]}{rest}")
+                assert reply.status == 307 and reply.headers["location"] == f"/v1/{kind}/{full}{rest}", (rest, reply, reply.headers)
+        common = len(os.path.commonprefix([job["id"], other["id"]]))
+        if common >= 10:
+            reply = daemon.get(f"/v1/jobs/{job['id'][:common]}")
+            problem(reply, 409)
+            assert job["id"] in reply.json()["detail"] and other["id"] in reply.json()["detail"], reply
+        for path in (f"/v1/results/{job['result'][:9]}", "/v1/results/r-0123456789", f"/v1/jobs/{job['id'][:9]}",
+                     "/v1/jobs/j-00000000", f"/v1/results/{job['id'][:12]}x"):
+            problem(daemon.get(path), 404)
+        problem(daemon.request("DELETE", f"/v1/results/{job['result'][:20]}"), 404)
+
+
+if __name__ == "__main__":
+    program.main(globals())
