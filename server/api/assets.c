@@ -1,7 +1,5 @@
 // The dashboard: the files under web/, as they stand there. A page is asked for again each time and
 // mostly answered by "not changed", so that it is never older than the program.
-#include "server/api/assets.h"
-
 #include <string.h>
 
 #include "server/api/app.h"
@@ -15,13 +13,6 @@ static const struct {
     {".css", "text/css; charset=utf-8"},
     {".svg", "image/svg+xml"},
 };
-
-Status assets_reply(const Request *request, Reply *reply, const EmbeddedFile *file,
-                    const char *content_type) {
-    if (!reply_tagged(reply, request, file->digest))
-        reply_borrow(reply, 200, content_type, file->bytes, file->size);
-    return STATUS_OK;
-}
 
 // NULL: not to be had by its own path, from where the page's links would lead nowhere.
 static const char *type_of(const char *path) {
@@ -39,7 +30,7 @@ Status assets_show(App *app, const Request *request, Reply *reply, Problem *prob
     if (file == NULL || type == NULL)
         return problem_set(problem, STATUS_NOT_FOUND, "the dashboard has no file \"%.120s\"", path);
     reply->policy = reply_page_policy;
-    return assets_reply(request, reply, file, type);
+    return reply_embedded(reply, request, file, type);
 }
 
 Status assets_show_icon(App *app, const Request *request, Reply *reply, Problem *problem) {
@@ -47,5 +38,5 @@ Status assets_show_icon(App *app, const Request *request, Reply *reply, Problem 
     const EmbeddedFile *file = embedded_find(embedded_web, "web/icon.svg");
     if (file == NULL)
         return problem_set(problem, STATUS_INTERNAL, "this program was built without its icon");
-    return assets_reply(request, reply, file, type_of(file->path));
+    return reply_embedded(reply, request, file, type_of(file->path));
 }

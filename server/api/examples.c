@@ -5,7 +5,6 @@
 
 #include "core/study/study.h"
 #include "server/api/app.h"
-#include "server/api/assets.h"
 #include "server/http/reply.h"
 #include "server/json/parse.h"
 #include "server/json/schema.h"
@@ -72,7 +71,7 @@ Status examples_show(App *app, const Request *request, Reply *reply, Problem *pr
     for (const EmbeddedFile *file = embedded_examples; file->path != NULL; file++)
         if (name_in_folder(file->path, examples_folder, name) &&
             strcmp(name, request->parameters[0]) == 0)
-            return assets_reply(request, reply, file, type_json);
+            return reply_embedded(reply, request, file, type_json);
     return problem_set(problem, STATUS_NOT_FOUND,
                        "there is no example \"%.60s\"; GET /v1/examples lists them",
                        request->parameters[0]);
@@ -119,7 +118,7 @@ Status openapi_show(App *app, const Request *request, Reply *reply, Problem *pro
         return problem_set(problem, STATUS_INTERNAL,
                            "this program was built without its API description");
     if (app->base_url[0] == '\0')
-        return assets_reply(request, reply, file, type_json);
+        return reply_embedded(reply, request, file, type_json);
     const char *url = servers + sizeof before - 1, *rest = strchr(url, '"');
     Bytes bytes = {.most = app->reply_most};
     bytes_put(&bytes, file->bytes, (size_t)(url - file->bytes));

@@ -4,9 +4,9 @@
 #include <string.h>
 
 #include "server/api/app.h"
-#include "server/api/assets.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
+#include "server/util/embedded.h"
 
 #define SCENE                                                                                      \
     "{\"structure\": {\"mass\": 1.35, \"stiffness\": 865, \"damping\": 1.092}, "                   \
@@ -122,7 +122,7 @@ Status landing_show(App *app, const Request *request, Reply *reply, Problem *pro
             return STATUS_OK;
         }
         reply->policy = reply_page_policy;
-        return assets_reply(request, reply, dashboard, "text/html; charset=utf-8");
+        return reply_embedded(reply, request, dashboard, "text/html; charset=utf-8");
     }
     char url[sizeof app->base_url];
     // The gate lets through no Host but ours, so it can stand in a line for the shell.

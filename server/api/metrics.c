@@ -8,7 +8,7 @@
 #include "server/util/process.h"
 
 // What is known already, by layer in the order in which they are asked.
-static void write_layers(Bytes *bytes, const JobStats *metrics, Db *db) {
+static void metrics_write_layers(Bytes *bytes, const JobStats *metrics, Db *db) {
     CacheStats stored = metrics->stored;
     uint64_t count = 0, size = 0;
     db_series_tally(db, &count, &size, &stored.evictions);
@@ -39,10 +39,10 @@ static void write_layers(Bytes *bytes, const JobStats *metrics, Db *db) {
                      (double)cache_layers[i].layer->bytes);
 }
 
-static void write_queue(Bytes *bytes, JobManager *manager, Db *db) {
+static void metrics_write_queue(Bytes *bytes, JobManager *manager, Db *db) {
     JobStats metrics = {0};
     jobs_tally(manager, &metrics);
-    write_layers(bytes, &metrics, db);
+    metrics_write_layers(bytes, &metrics, db);
     metrics_gauge(bytes, "impactd_queue_length", "Computations that wait.", (double)metrics.queued);
     metrics_gauge(bytes, "impactd_queue_limit", "Unfinished jobs at most.",
                   (double)metrics.queue_most);
@@ -57,7 +57,7 @@ static void write_queue(Bytes *bytes, JobManager *manager, Db *db) {
 }
 
 // Whole answers that are kept ready to be sent.
-static void write_hot(Bytes *bytes, ResponseCache *response_cache) {
+static void metrics_write_responses(Bytes *bytes, ResponseCache *response_cache) {
     const LruStats metrics = response_cache_stats(response_cache);
     metrics_gauge(bytes, "impactd_reply_cache_entries", "Answers kept whole.",
                   (double)metrics.count);
@@ -71,7 +71,7 @@ static void write_hot(Bytes *bytes, ResponseCache *response_cache) {
                     metrics.evictions);
 }
 
-static void write_store(Bytes *bytes, Db *db) {
+static void metrics_write_db(Bytes *bytes, Db *db) {
     const DbStats *totals = db_totals(db);
     metrics_counter(bytes, "impactd_sqlite_transactions_total", "Transactions that were committed.",
                     histogram_count(&totals->commits));
@@ -88,7 +88,7 @@ static void write_store(Bytes *bytes, Db *db) {
     metrics_histogram(bytes, commits, "", &totals->commits);
 }
 
-static void write_process(Bytes *bytes, const App *app) {
+static void metrics_write_process(Bytes *bytes, const App *app) {
     ProcessFacts facts;
     process_facts(&facts);
     metrics_gauge(bytes, "process_resident_memory_bytes", "Resident memory.",
@@ -114,10 +114,10 @@ Status metrics_show(App *app, const Request *request, Reply *reply, Problem *pro
         metrics_gauge(&bytes, "impactd_http_connections", "Clients connected.",
                       (double)server_connections(server));
     if (app->response_cache != NULL)
-        write_hot(&bytes, app->response_cache);
-    write_queue(&bytes, app->manager, app->db);
+        metrics_write_responses(&bytes, app->response_cache);
+    metrics_write_queue(&bytes, app->manager, app->db);
     job_metrics_write(jobs_totals(app->manager), &bytes);
-    write_store(&bytes, app->db);
-    write_process(&bytes, app);
+    metrics_write_db(&bytes, app->db);
+    metrics_write_process(&bytes, app);
     return reply_bytes(reply, 200, "text/plain; version=0.0.4; charset=utf-8", &bytes, problem);
 }

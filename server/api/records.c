@@ -40,7 +40,7 @@ static const Field row_fields[] = {
 // clang-format on
 
 // Without the closing brace.
-static void put_record(Bytes *bytes, const RecordRow *row) {
+static void record_put(Bytes *bytes, const RecordRow *row) {
     char created[32];
     clock_rfc3339(row->created_unix_ms, created);
     bytes_text(bytes, "{");
@@ -53,13 +53,13 @@ static void put_record(Bytes *bytes, const RecordRow *row) {
                  created, base_path(), row->name, base_path(), row->name);
 }
 
-static void put_uses(Bytes *bytes, const RecordUses *uses) {
+static void record_put_uses(Bytes *bytes, const RecordUses *uses) {
     bytes_format(bytes, ", \"used_by\": {\"results\": %llu, \"unfinished_jobs\": %llu}",
                  (unsigned long long)uses->results, (unsigned long long)uses->jobs);
 }
 
 // Others with the same samples may be meant.
-static Status warn_twins(App *app, RecordUpload *upload, Problem *problem) {
+static Status record_warn_twins(App *app, RecordUpload *upload, Problem *problem) {
     RecordRows twins;
     char list[RECORD_TWINS * (RECORD_NAME_SIZE + 2) + 8] = "";
     TRY(db_record_twins(app->db, &upload->row, &twins, problem));
@@ -74,17 +74,17 @@ static Status warn_twins(App *app, RecordUpload *upload, Problem *problem) {
     return STATUS_OK;
 }
 
-static Status answer(App *app, RecordUpload *upload, bool is_there, Reply *reply,
-                     Problem *problem) {
+static Status record_answer(App *app, RecordUpload *upload, bool is_there, Reply *reply,
+                            Problem *problem) {
     RecordRow row;
     RecordUses uses;
     Bytes bytes = {.most = app->reply_most};
-    TRY(warn_twins(app, upload, problem));
+    TRY(record_warn_twins(app, upload, problem));
     TRY(db_record(app->db, upload->row.name, &row, problem));
     const Status status = db_record_uses(app->db, row.name, &uses, problem);
     if (status == STATUS_OK) {
-        put_record(&bytes, &row);
-        put_uses(&bytes, &uses);
+        record_put(&bytes, &row);
+        record_put_uses(&bytes, &uses);
         bytes_text(&bytes, ", \"warnings\": ");
         document_warnings(&bytes, &upload->warnings);
         bytes_text(&bytes, "}\n");
@@ -106,7 +106,7 @@ Status records_create(App *app, const Request *request, Reply *reply, Problem *p
     if (status == STATUS_OK)
         status = db_record_add(app->db, &upload.row, &upload.samples, &is_there, problem);
     if (status == STATUS_OK)
-        status = answer(app, &upload, is_there, reply, problem);
+        status = record_answer(app, &upload, is_there, reply, problem);
     record_upload_clear(&upload);
     return status;
 }
@@ -124,7 +124,7 @@ Status records_list(App *app, const Request *request, Reply *reply, Problem *pro
     bytes_text(&bytes, "{\"records\": [");
     for (size_t i = 0; i < rows.count && i < limit; i++) {
         bytes_text(&bytes, i > 0 ? ",\n " : "");
-        put_record(&bytes, &rows.at[i]);
+        record_put(&bytes, &rows.at[i]);
         bytes_text(&bytes, "}");
     }
     bytes_text(&bytes, "]}\n");
@@ -149,8 +149,8 @@ Status records_show(App *app, const Request *request, Reply *reply, Problem *pro
     const bool is_known = reply_tagged(reply, request, tag);
     Bytes bytes = {.most = app->reply_most};
     if (!is_known) {
-        put_record(&bytes, &row);
-        put_uses(&bytes, &uses);
+        record_put(&bytes, &row);
+        record_put_uses(&bytes, &uses);
         bytes_text(&bytes, "}\n");
         status = reply_bytes(reply, 200, type_json, &bytes, problem);
     }
@@ -159,8 +159,8 @@ Status records_show(App *app, const Request *request, Reply *reply, Problem *pro
 }
 
 // All samples, or those asked for by time, or extremes of buckets of them.
-static Status fill(const Request *request, const NamedRecord *named, TableStream *stream,
-                   Problem *problem) {
+static Status record_fill(const Request *request, const NamedRecord *named, TableStream *stream,
+                          Problem *problem) {
     const Reals *samples = &named->samples;
     TRY(columns_allocate(&stream->made, 1, samples->count, 0, problem));
     columns_name(&stream->made, 0, "acceleration", "m/s^2");
@@ -180,7 +180,7 @@ Status records_samples(App *app, const Request *request, Reply *reply, Problem *
     TRY(db_record_named(app->db, request->parameters[0], &named, problem));
     snprintf(tag, sizeof tag, "%.64s-%.8s", named->digest, format->extension);
     TableStream *stream = table_stream_new(NULL);
-    const Status status = stream != NULL ? fill(request, named, stream, problem) : STATUS_OK;
+    const Status status = stream != NULL ? record_fill(request, named, stream, problem) : STATUS_OK;
     refcount_unref(&named->shared);
     if (status == STATUS_OK && !reply_tagged(reply, request, tag))
         return columns_reply(app, reply, format, stream, problem);

@@ -45,12 +45,12 @@ void record_upload_clear(RecordUpload *upload) {
     *upload = (RecordUpload){.samples = {NULL, 0}};
 }
 
-static Status no_memory(Problem *problem) {
+static Status upload_no_memory(Problem *problem) {
     return problem_set(problem, STATUS_NO_MEMORY, "no memory for the record");
 }
 
-static Status read_document(const Request *request, Asked *asked, RecordRow *row,
-                            Problem *problem) {
+static Status upload_read_document(const Request *request, Asked *asked, RecordRow *row,
+                                   Problem *problem) {
     if (request->query_count > 0)
         return problem_set(problem, STATUS_USAGE,
                            "beside JSON there is no query: \"%.40s\" is a member of the document",
@@ -59,24 +59,25 @@ static Status read_document(const Request *request, Asked *asked, RecordRow *row
     row->layout = strdup("json");
     if (asked->unit == CHOICE_ABSENT)
         asked->unit = ACCELERATION_METRES;
-    return row->layout != NULL ? STATUS_OK : no_memory(problem);
+    return row->layout != NULL ? STATUS_OK : upload_no_memory(problem);
 }
 
-static Status read_name(const Request *request, const char *name, char **target, Problem *problem) {
+static Status upload_read_name(const Request *request, const char *name, char **target,
+                               Problem *problem) {
     const char *text = request_query(request, name);
     if (text == NULL || *text == '\0')
         return STATUS_OK;
     *target = strdup(text);
-    return *target != NULL ? STATUS_OK : no_memory(problem);
+    return *target != NULL ? STATUS_OK : upload_no_memory(problem);
 }
 
-static Status read_queries(const Request *request, Asked *asked, Problem *problem) {
-    TRY(read_name(request, "name", &asked->name, problem));
-    TRY(read_name(request, "source", &asked->source, problem));
-    TRY(read_name(request, "processing", &asked->processing, problem));
-    TRY(read_name(request, "earthquake", &asked->earthquake, problem));
-    TRY(read_name(request, "station", &asked->station, problem));
-    TRY(read_name(request, "notes", &asked->notes, problem));
+static Status upload_read_queries(const Request *request, Asked *asked, Problem *problem) {
+    TRY(upload_read_name(request, "name", &asked->name, problem));
+    TRY(upload_read_name(request, "source", &asked->source, problem));
+    TRY(upload_read_name(request, "processing", &asked->processing, problem));
+    TRY(upload_read_name(request, "earthquake", &asked->earthquake, problem));
+    TRY(upload_read_name(request, "station", &asked->station, problem));
+    TRY(upload_read_name(request, "notes", &asked->notes, problem));
     TRY(request_number(request, "interval", INTERVAL_MIN, INTERVAL_MAX, (double)NAN,
                        &asked->interval, problem));
     const char *unit = request_query(request, "unit");
@@ -88,7 +89,7 @@ static Status read_queries(const Request *request, Asked *asked, Problem *proble
                : spelling_reject(acceleration_unit_names, unit, "/unit", problem);
 }
 
-static Status warn_file(const GroundMotionText *import, bool is_told, Warnings *warnings) {
+static Status upload_warn_file(const GroundMotionText *import, bool is_told, Warnings *warnings) {
     const char *unit = acceleration_unit_names[import->unit];
     char start[32];
     if (import->stated_unit == CHOICE_ABSENT && !is_told)
@@ -104,7 +105,8 @@ static Status warn_file(const GroundMotionText *import, bool is_told, Warnings *
 }
 
 // Takes out of the import what the record keeps.
-static Status keep(GroundMotionText *import, Asked *asked, RecordUpload *upload, Problem *problem) {
+static Status upload_keep_import(GroundMotionText *import, Asked *asked, RecordUpload *upload,
+                                 Problem *problem) {
     RecordRow *row = &upload->row;
     const bool is_told = asked->unit != CHOICE_ABSENT;
     row->layout = strdup(import->layout);
@@ -118,19 +120,19 @@ static Status keep(GroundMotionText *import, Asked *asked, RecordUpload *upload,
     const bool is_whole = row->layout != NULL &&
                           (row->header != NULL || import->header[0] == '\0') &&
                           (row->stated_unit != NULL || import->stated_unit == CHOICE_ABSENT);
-    return is_whole && warn_file(import, is_told, &upload->warnings) == STATUS_OK
+    return is_whole && upload_warn_file(import, is_told, &upload->warnings) == STATUS_OK
                ? STATUS_OK
-               : no_memory(problem);
+               : upload_no_memory(problem);
 }
 
 // `text` is the caller's.
-static Status read_table(const char *text, size_t size, Asked *asked, RecordUpload *upload,
-                         Problem *problem) {
+static Status upload_read_table(const char *text, size_t size, Asked *asked, RecordUpload *upload,
+                                Problem *problem) {
     const GroundMotionOptions wanted = {.interval = asked->interval, .unit = asked->unit};
     GroundMotionText import = {0};
     Problem *fault = calloc(1, sizeof *fault);
     if (fault == NULL)
-        return no_memory(problem);
+        return upload_no_memory(problem);
     Status status = ground_motion_text_read(text, size, RECORD_SAMPLES, &wanted, &import, fault);
     if (status != STATUS_OK && fault->count > 0) // its places are lines, no pointers
         (void)problem_add(problem, status, "", "%s: %s", fault->faults[0].pointer,
@@ -139,35 +141,36 @@ static Status read_table(const char *text, size_t size, Asked *asked, RecordUplo
         (void)problem_set(problem, status, "%s", fault->detail);
     free(fault);
     if (status == STATUS_OK) {
-        status = keep(&import, asked, upload, problem);
+        status = upload_keep_import(&import, asked, upload, problem);
         ground_motion_text_clear(&import);
     }
     return status;
 }
 
 // The file in the body, and everything else in the query.
-static Status read_text(const Request *request, Asked *asked, RecordUpload *upload,
-                        Problem *problem) {
-    const Status queries = read_queries(request, asked, problem);
+static Status upload_read_file(const Request *request, Asked *asked, RecordUpload *upload,
+                               Problem *problem) {
+    const Status queries = upload_read_queries(request, asked, problem);
     if (queries != STATUS_OK && queries != STATUS_INVALID)
         return queries;
     // In text/csv a comma parts two cells; elsewhere it might be a decimal one and is a fault.
     if (!header_type_is(request->content_type, "text/csv")) {
-        const Status status = read_table(request->body, request->body_size, asked, upload, problem);
+        const Status status =
+            upload_read_table(request->body, request->body_size, asked, upload, problem);
         return queries != STATUS_OK ? queries : status;
     }
     char *text = malloc(request->body_size + 1);
     if (text == NULL)
-        return no_memory(problem);
+        return upload_no_memory(problem);
     for (size_t i = 0; i < request->body_size; i++)
         text[i] = request->body[i] == ',' ? ' ' : request->body[i];
     text[request->body_size] = '\0';
-    const Status status = read_table(text, request->body_size, asked, upload, problem);
+    const Status status = upload_read_table(text, request->body_size, asked, upload, problem);
     free(text);
     return queries != STATUS_OK ? queries : status;
 }
 
-static Status require_type(const Request *request, bool *is_json, Problem *problem) {
+static Status upload_require_type(const Request *request, bool *is_json, Problem *problem) {
     static const char *const texts[] = {"text/plain", "application/octet-stream", "text/csv"};
     *is_json = header_type_is(request->content_type, type_json);
     bool is_known = *is_json;
@@ -183,7 +186,7 @@ static Status require_type(const Request *request, bool *is_json, Problem *probl
     return request_require_body(request, problem);
 }
 
-static Status check_name(const Asked *asked, Problem *problem) {
+static Status upload_check_name(const Asked *asked, Problem *problem) {
     if (asked->name == NULL || record_name_is_sound(asked->name) ||
         problem_concerns(problem, "/name"))
         return STATUS_OK; // or told by the rows
@@ -195,7 +198,7 @@ static Status check_name(const Asked *asked, Problem *problem) {
 }
 
 // To m/s^2, and -0 to 0, so that what means the same has one digest.
-static Status scale(Reals *samples, double size, Problem *problem) {
+static Status upload_scale(Reals *samples, double size, Problem *problem) {
     for (size_t i = 0; i < samples->count; i++) {
         char place[64];
         const double value = samples->at[i] * size + 0.0;
@@ -209,23 +212,23 @@ static Status scale(Reals *samples, double size, Problem *problem) {
     return STATUS_OK;
 }
 
-static char *take(char **text) {
+static char *upload_take(char **text) {
     char *taken = *text;
     *text = NULL;
     return taken;
 }
 
-static Status measure(Asked *asked, RecordUpload *upload, Problem *problem) {
+static Status upload_measure(Asked *asked, RecordUpload *upload, Problem *problem) {
     RecordRow *row = &upload->row;
     char digest[RECORD_DIGEST_SIZE];
     const RecordLook look = record_look(&upload->samples, asked->interval, 1);
     record_digest(asked->interval, &upload->samples, digest);
-    row->name = take(&asked->name);
-    row->source = take(&asked->source);
-    row->processing = take(&asked->processing);
-    row->earthquake = take(&asked->earthquake);
-    row->station = take(&asked->station);
-    row->notes = take(&asked->notes);
+    row->name = upload_take(&asked->name);
+    row->source = upload_take(&asked->source);
+    row->processing = upload_take(&asked->processing);
+    row->earthquake = upload_take(&asked->earthquake);
+    row->station = upload_take(&asked->station);
+    row->notes = upload_take(&asked->notes);
     row->unit = strdup(acceleration_unit_names[asked->unit]);
     row->digest = digest[0] != '\0' ? strdup(digest) : NULL;
     row->interval = asked->interval;
@@ -236,14 +239,14 @@ static Status measure(Asked *asked, RecordUpload *upload, Problem *problem) {
     row->end_velocity = look.end_velocity;
     row->created_unix_ms = clock_unix_ms();
     if (row->unit == NULL || row->digest == NULL)
-        return no_memory(problem);
+        return upload_no_memory(problem);
     if (!isfinite(look.peak_velocity) || !isfinite(row->peak_time))
         return problem_add(problem, STATUS_INVALID, "/samples",
                            "must move the base at a speed that a number can hold");
     return STATUS_OK;
 }
 
-static Status doubt(const RecordUpload *upload, Warnings *warnings) {
+static Status upload_warn(const RecordUpload *upload, Warnings *warnings) {
     const RecordRow *row = &upload->row;
     const RecordLook look = record_look(&upload->samples, row->interval, 1);
     Problem *doubts = calloc(1, sizeof *doubts);
@@ -264,11 +267,11 @@ static Status doubt(const RecordUpload *upload, Warnings *warnings) {
     return STATUS_OK;
 }
 
-static Status judge(Asked *asked, RecordUpload *upload, Problem *problem) {
+static Status upload_validate(Asked *asked, RecordUpload *upload, Problem *problem) {
     if (upload->samples.count > 0) // of a file: they are lent to the rows that judge them
         asked->samples = upload->samples;
     const Status rows = fields_validate(asked_fields, asked, "", problem);
-    const Status name = check_name(asked, problem);
+    const Status name = upload_check_name(asked, problem);
     upload->samples = asked->samples;
     asked->samples = (Reals){NULL, 0};
     TRY(rows);
@@ -281,24 +284,24 @@ Status record_upload_read(const Request *request, RecordUpload *upload, Problem 
     bool is_json;
     *upload = (RecordUpload){.samples = {NULL, 0}};
     problem->whose = "record";
-    TRY(require_type(request, &is_json, problem));
+    TRY(upload_require_type(request, &is_json, problem));
     if (fields_default(asked_fields, &asked) != STATUS_OK)
-        return no_memory(problem);
-    Status status = is_json ? read_document(request, &asked, &upload->row, problem)
-                            : read_text(request, &asked, upload, problem);
+        return upload_no_memory(problem);
+    Status status = is_json ? upload_read_document(request, &asked, &upload->row, problem)
+                            : upload_read_file(request, &asked, upload, problem);
     // A file that cannot be read has no samples that could be missing.
     if (status == STATUS_OK || (is_json && status == STATUS_INVALID)) {
-        const Status judged = judge(&asked, upload, problem);
+        const Status judged = upload_validate(&asked, upload, problem);
         status = status == STATUS_OK ? judged : status;
     }
     if (status == STATUS_OK && is_json)
-        status = scale(&upload->samples, acceleration_unit_size(asked.unit), problem);
+        status = upload_scale(&upload->samples, acceleration_unit_size(asked.unit), problem);
     else if (status == STATUS_OK)
-        status = scale(&upload->samples, 1, problem);
+        status = upload_scale(&upload->samples, 1, problem);
     if (status == STATUS_OK)
-        status = measure(&asked, upload, problem);
-    if (status == STATUS_OK && doubt(upload, &upload->warnings) != STATUS_OK)
-        status = no_memory(problem);
+        status = upload_measure(&asked, upload, problem);
+    if (status == STATUS_OK && upload_warn(upload, &upload->warnings) != STATUS_OK)
+        status = upload_no_memory(problem);
     fields_clear(asked_fields, &asked);
     return status;
 }

@@ -24,7 +24,6 @@
 #include "server/util/clock.h"
 #include "server/util/log.h"
 #include "server/util/process.h"
-#include "server/util/systemd.h"
 
 typedef struct ServeSettings {
     char *listen, *data, *config, *base_url, *tls_cert, *tls_key;
@@ -299,7 +298,7 @@ static void serve_reload(const ServeSettings *settings, Problem *problem) {
 // terminal that is closed ends the program that was started in it.
 static int serve_wait(const sigset_t *signals, const ServeSettings *settings, Problem *problem) {
     const bool has_terminal = isatty(STDIN_FILENO) != 0;
-    const int64_t period_ms = systemd_watchdog_ms();
+    const int64_t period_ms = process_watchdog_ms();
     const struct timespec period = {.tv_sec = (time_t)(period_ms / 1000),
                                     .tv_nsec = (long)(period_ms % 1000) * 1000000};
     for (;;) {
@@ -310,7 +309,7 @@ static int serve_wait(const sigset_t *signals, const ServeSettings *settings, Pr
         else if (signal > 0)
             return signal;
         else if (errno == EAGAIN)
-            systemd_notify("WATCHDOG=1");
+            process_notify_systemd("WATCHDOG=1");
     }
 }
 
@@ -326,9 +325,9 @@ static void serve_until_stopped(App *app, Server *server, const ServeSettings *s
                                 const sigset_t *signals, Problem *problem) {
     atomic_store(&app->server, server);
     serve_greet(server, settings, app);
-    systemd_notify("READY=1");
+    process_notify_systemd("READY=1");
     const int signal = serve_wait(signals, settings, problem);
-    systemd_notify("STOPPING=1");
+    process_notify_systemd("STOPPING=1");
     atomic_store(&app->is_stopping, true);
     signals_unblock(signals);
     Bytes line = {0};

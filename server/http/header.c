@@ -1,5 +1,5 @@
 // Header values are lists of items with parameters: `item;name=value;name="value", item`. Every
-// function here walks them through `item_next`, which respects quotes.
+// function here walks them through `header_item_next`, which respects quotes.
 #include "server/http/header.h"
 
 #include <stdint.h>
@@ -12,7 +12,7 @@ typedef struct Span {
     size_t size;
 } Span;
 
-static Span trimmed(const char *at, size_t size) {
+static Span span_trimmed(const char *at, size_t size) {
     while (size > 0 && (*at == ' ' || *at == '\t')) {
         at++;
         size--;
@@ -23,7 +23,7 @@ static Span trimmed(const char *at, size_t size) {
 }
 
 // The next piece up to an unquoted `separator`; *text goes on behind it. False at the end.
-static bool item_next(const char **text, const char *end, char separator, Span *item) {
+static bool header_item_next(const char **text, const char *end, char separator, Span *item) {
     if (*text >= end)
         return false;
     const char *at = *text;
@@ -34,7 +34,7 @@ static bool item_next(const char **text, const char *end, char separator, Span *
         else if (*at == '\\' && is_quoted && at + 1 < end)
             at++;
     }
-    *item = trimmed(*text, (size_t)(at - *text));
+    *item = span_trimmed(*text, (size_t)(at - *text));
     *text = at < end ? at + 1 : end;
     return true;
 }
@@ -44,20 +44,20 @@ static bool span_is(Span span, const char *text) {
 }
 
 // Splits "name=value" (quotes taken off); without '=' the value is empty.
-static void split(Span item, Span *name, Span *value) {
+static void header_split(Span item, Span *name, Span *value) {
     const char *equals = memchr(item.at, '=', item.size);
     if (equals == NULL) {
         *name = item;
         *value = (Span){item.at + item.size, 0};
         return;
     }
-    *name = trimmed(item.at, (size_t)(equals - item.at));
-    *value = trimmed(equals + 1, (size_t)(item.at + item.size - equals - 1));
+    *name = span_trimmed(item.at, (size_t)(equals - item.at));
+    *value = span_trimmed(equals + 1, (size_t)(item.at + item.size - equals - 1));
     if (value->size >= 2 && value->at[0] == '"' && value->at[value->size - 1] == '"')
         *value = (Span){value->at + 1, value->size - 2};
 }
 
-static bool number_of(Span span, double *number) {
+static bool span_number(Span span, double *number) {
     char text[32];
     if (span.size == 0 || span.size >= sizeof text)
         return false;
@@ -71,7 +71,7 @@ static bool number_of(Span span, double *number) {
 }
 
 // How well `range` ("*/*", "text/*", "text/csv") fits `type`: 0 not at all, 3 exactly.
-static int fit_of(Span range, Span type) {
+static int header_fit(Span range, Span type) {
     if (range.size == type.size && strncasecmp(range.at, type.at, type.size) == 0)
         return 3;
     if (span_is(range, "*/*"))
@@ -85,25 +85,25 @@ static int fit_of(Span range, Span type) {
 }
 
 // The quality the most specific fitting range gives to `type`; *fit says how specific it was.
-static double quality_of(const char *accept, const char *type, int *fit) {
+static double header_quality(const char *accept, const char *type, int *fit) {
     const char *end = accept + strlen(accept), *text = accept;
-    const Span bare = trimmed(type, strcspn(type, ";"));
+    const Span bare = span_trimmed(type, strcspn(type, ";"));
     double quality = 0;
     *fit = 0;
     Span item;
-    while (item_next(&text, end, ',', &item)) {
+    while (header_item_next(&text, end, ',', &item)) {
         const char *piece = item.at, *piece_end = item.at + item.size;
         Span range, parameter, name, value;
-        if (!item_next(&piece, piece_end, ';', &range))
+        if (!header_item_next(&piece, piece_end, ';', &range))
             continue;
         double q = 1;
-        while (item_next(&piece, piece_end, ';', &parameter)) {
-            split(parameter, &name, &value);
+        while (header_item_next(&piece, piece_end, ';', &parameter)) {
+            header_split(parameter, &name, &value);
             double number;
             if (span_is(name, "q"))
-                q = number_of(value, &number) ? (number > 1 ? 1 : number) : 0;
+                q = span_number(value, &number) ? (number > 1 ? 1 : number) : 0;
         }
-        const int this_fit = fit_of(range, bare);
+        const int this_fit = header_fit(range, bare);
         if (this_fit > *fit) {
             *fit = this_fit;
             quality = q;
@@ -119,7 +119,7 @@ int header_accept(const char *accept, const char *const *types) {
     double best_quality = 0;
     for (int i = 0; types[i] != NULL; i++) {
         int fit;
-        const double quality = quality_of(accept, types[i], &fit);
+        const double quality = header_quality(accept, types[i], &fit);
         if (fit > 0 && quality > best_quality) {
             best = i;
             best_quality = quality;
@@ -134,15 +134,15 @@ bool header_accepts_gzip(const char *accept_encoding) {
     const char *end = accept_encoding + strlen(accept_encoding), *text = accept_encoding;
     bool any = false, is_named = false, named = false;
     Span item, coding, name, value;
-    while (item_next(&text, end, ',', &item)) {
+    while (header_item_next(&text, end, ',', &item)) {
         const char *piece = item.at, *item_end = item.at + item.size;
         double quality = 1;
-        if (!item_next(&piece, item_end, ';', &coding))
+        if (!header_item_next(&piece, item_end, ';', &coding))
             continue;
-        while (item_next(&piece, item_end, ';', &item)) {
+        while (header_item_next(&piece, item_end, ';', &item)) {
             double number;
-            split(item, &name, &value);
-            if (span_is(name, "q") && number_of(value, &number))
+            header_split(item, &name, &value);
+            if (span_is(name, "q") && span_number(value, &number))
                 quality = number;
         }
         if (span_is(coding, "gzip") || span_is(coding, "x-gzip")) {
@@ -161,16 +161,16 @@ Prefer header_prefer(const char *prefer) {
         return result;
     const char *end = prefer + strlen(prefer), *text = prefer;
     Span item, name, value;
-    while (item_next(&text, end, ',', &item)) {
+    while (header_item_next(&text, end, ',', &item)) {
         const char *piece = item.at;
         Span first;
-        if (!item_next(&piece, item.at + item.size, ';', &first))
+        if (!header_item_next(&piece, item.at + item.size, ';', &first))
             continue;
-        split(first, &name, &value);
+        header_split(first, &name, &value);
         double number;
         if (span_is(name, "respond-async")) {
             result.responds_async = true;
-        } else if (span_is(name, "wait") && !result.has_wait && number_of(value, &number)) {
+        } else if (span_is(name, "wait") && !result.has_wait && span_number(value, &number)) {
             result.has_wait = true; // of two, the first counts
             result.wait = number;
         }
@@ -179,7 +179,7 @@ Prefer header_prefer(const char *prefer) {
 }
 
 // Digits alone; saturates.
-static bool index_of(Span span, size_t *index) {
+static bool span_index(Span span, size_t *index) {
     if (span.size == 0)
         return false;
     size_t number = 0;
@@ -196,7 +196,7 @@ static bool index_of(Span span, size_t *index) {
 RangeKind header_range(const char *range, size_t size, size_t *first, size_t *last) {
     if (range == NULL || strncasecmp(range, "bytes=", 6) != 0 || strchr(range, ',') != NULL)
         return RANGE_WHOLE;
-    const Span item = trimmed(range + 6, strlen(range + 6));
+    const Span item = span_trimmed(range + 6, strlen(range + 6));
     const char *dash = memchr(item.at, '-', item.size);
     if (dash == NULL)
         return RANGE_WHOLE;
@@ -204,7 +204,7 @@ RangeKind header_range(const char *range, size_t size, size_t *first, size_t *la
     const Span to = {dash + 1, item.size - from.size - 1};
     size_t low = 0, high = SIZE_MAX;
     if (from.size == 0) {
-        if (!index_of(to, &high))
+        if (!span_index(to, &high))
             return RANGE_WHOLE;
         if (high == 0 || size == 0)
             return RANGE_UNSATISFIABLE;
@@ -212,7 +212,7 @@ RangeKind header_range(const char *range, size_t size, size_t *first, size_t *la
         *last = size - 1;
         return RANGE_PART;
     }
-    if (!index_of(from, &low) || (to.size > 0 && (!index_of(to, &high) || high < low)))
+    if (!span_index(from, &low) || (to.size > 0 && (!span_index(to, &high) || high < low)))
         return RANGE_WHOLE;
     if (low >= size)
         return RANGE_UNSATISFIABLE;
@@ -226,7 +226,7 @@ bool header_etag_matches(const char *if_none_match, const char *etag) {
         return false;
     const char *end = if_none_match + strlen(if_none_match), *text = if_none_match;
     Span item;
-    while (item_next(&text, end, ',', &item)) {
+    while (header_item_next(&text, end, ',', &item)) {
         if (span_is(item, "*"))
             return true;
         if (item.size > 2 && strncmp(item.at, "W/", 2) == 0)
@@ -240,7 +240,7 @@ bool header_etag_matches(const char *if_none_match, const char *etag) {
 bool header_etag_next(const char **list, const char **tag, size_t *size) {
     const char *end = *list + strlen(*list);
     Span item;
-    while (item_next(list, end, ',', &item)) {
+    while (header_item_next(list, end, ',', &item)) {
         const bool is_strong = item.size >= 2 && item.at[0] == '"' && item.at[item.size - 1] == '"';
         if (!is_strong && !span_is(item, "*"))
             continue;
@@ -254,5 +254,5 @@ bool header_etag_next(const char **list, const char **tag, size_t *size) {
 bool header_type_is(const char *content_type, const char *type) {
     if (content_type == NULL)
         return false;
-    return span_is(trimmed(content_type, strcspn(content_type, ";")), type);
+    return span_is(span_trimmed(content_type, strcspn(content_type, ";")), type);
 }

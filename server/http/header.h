@@ -1,6 +1,5 @@
-// The values of the request headers that mean something here: Accept, Prefer, Range, If-Match,
-// If-None-Match, Content-Type. Not the request's safety (gate.h) and not the target (request.h).
-// Used by dispatch.c, body.c and api/.
+// The values of request headers: Accept, Accept-Encoding, Prefer, Range, If-Match, If-None-Match,
+// Content-Type.
 #ifndef SERVER_HTTP_HEADER_H
 #define SERVER_HTTP_HEADER_H
 
@@ -12,7 +11,7 @@
 // play no part.
 int header_accept(const char *accept, const char *const *types);
 
-// Whether an Accept-Encoding takes gzip. NULL or "" does not: plain is what all can read.
+// Whether an Accept-Encoding accepts gzip; NULL and "" do not.
 bool header_accepts_gzip(const char *accept_encoding);
 
 // RFC 7240.

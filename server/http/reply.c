@@ -207,6 +207,13 @@ bool reply_tagged(Reply *reply, const Request *request, const char *text) {
     return reply_tag(reply, request, text, "no-cache");
 }
 
+Status reply_embedded(Reply *reply, const Request *request, const EmbeddedFile *file,
+                      const char *content_type) {
+    if (!reply_tagged(reply, request, file->digest))
+        reply_borrow(reply, 200, content_type, file->bytes, file->size);
+    return STATUS_OK;
+}
+
 Status reply_range(Reply *reply, const Request *request, Problem *problem) {
     if (!reply->accepts_ranges || reply->code != 200 || strcmp(request->method, "GET") != 0)
         return STATUS_OK;

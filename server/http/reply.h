@@ -4,6 +4,7 @@
 
 #include "server/http/request.h"
 #include "server/util/bytes.h"
+#include "server/util/embedded.h"
 
 extern const char type_json[]; // "application/json"
 
@@ -24,6 +25,10 @@ void reply_borrow(Reply *reply, int code, const char *content_type, const void *
 bool reply_immutable(Reply *reply, const Request *request, const char *tag);
 // The same for what may change: the client asks again each time.
 bool reply_tagged(Reply *reply, const Request *request, const char *tag);
+
+// A file of the program, or that the client has it already: its digest is the tag.
+Status reply_embedded(Reply *reply, const Request *request, const EmbeddedFile *file,
+                      const char *content_type);
 
 // The same for a reply that has its tag; the rest of it is released where the client has it.
 bool reply_is_known(Reply *reply, const Request *request);

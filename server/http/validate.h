@@ -1,7 +1,6 @@
-// What is turned away before anything else looks at a request: heads that two parsers could read
-// differently, and hosts that are not ours. Plain values, no sockets. A refused request's
-// connection is closed. Not who may do what (scopes) and not which routes exist. Used by
-// listener.c.
+// Heads that are refused before anything else reads a request: those that two parsers could read
+// differently, and hosts that are not this server's. Plain values, no sockets. The connection of a
+// refused request is closed.
 #ifndef SERVER_HTTP_VALIDATE_H
 #define SERVER_HTTP_VALIDATE_H
 

@@ -32,7 +32,8 @@ void metrics_family(Bytes *bytes, const char *name, const char *type, const char
     bytes_format(bytes, "# HELP %s %s\n# TYPE %s %s\n", name, help, name, type);
 }
 
-static void put_name(Bytes *bytes, const char *name, const char *suffix, const char *labels) {
+static void metrics_put_name(Bytes *bytes, const char *name, const char *suffix,
+                             const char *labels) {
     bytes_text(bytes, name);
     bytes_text(bytes, suffix);
     if (labels[0] != '\0')
@@ -41,12 +42,12 @@ static void put_name(Bytes *bytes, const char *name, const char *suffix, const c
 }
 
 void metrics_count(Bytes *bytes, const char *name, const char *labels, uint64_t value) {
-    put_name(bytes, name, "", labels);
+    metrics_put_name(bytes, name, "", labels);
     bytes_format(bytes, "%llu\n", (unsigned long long)value);
 }
 
 void metrics_real(Bytes *bytes, const char *name, const char *labels, double value) {
-    put_name(bytes, name, "", labels);
+    metrics_put_name(bytes, name, "", labels);
     bytes_real(bytes, value);
     bytes_text(bytes, "\n");
 }
@@ -60,10 +61,10 @@ void metrics_histogram(Bytes *bytes, const char *name, const char *labels,
         bytes_format(bytes, "%s_bucket{%s%sle=\"%s\"} %llu\n", name, labels, comma,
                      i < TALLY_BUCKETS ? edges[i].edge : "+Inf", (unsigned long long)count);
     }
-    put_name(bytes, name, "_sum", labels);
+    metrics_put_name(bytes, name, "_sum", labels);
     bytes_real(bytes, 1e-9 * (double)counter_get(&histogram->sum_ns));
     bytes_text(bytes, "\n");
-    put_name(bytes, name, "_count", labels);
+    metrics_put_name(bytes, name, "_count", labels);
     bytes_format(bytes, "%llu\n", (unsigned long long)count);
 }
 

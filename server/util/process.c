@@ -2,13 +2,16 @@
 
 #include <dirent.h>
 #include <malloc.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/resource.h>
+#include <sys/socket.h>
+#include <sys/un.h>
 #include <unistd.h>
 
-static uint64_t resident(void) {
+static uint64_t process_resident(void) {
     char text[128] = "";
     FILE *file = fopen("/proc/self/statm", "r");
     if (file == NULL)
@@ -20,7 +23,7 @@ static uint64_t resident(void) {
     return second == NULL ? 0 : strtoull(second, NULL, 10) * (uint64_t)sysconf(_SC_PAGESIZE);
 }
 
-static uint64_t open_files(void) {
+static uint64_t process_open_files(void) {
     DIR *folder = opendir("/proc/self/fd");
     if (folder == NULL)
         return 0;
@@ -31,16 +34,17 @@ static uint64_t open_files(void) {
     return count - 1; // the folder's own
 }
 
-static double seconds(struct timeval time) {
+static double process_seconds(struct timeval time) {
     return (double)time.tv_sec + 1e-6 * (double)time.tv_usec;
 }
 
 void process_facts(ProcessFacts *facts) {
     struct rusage usage = {0};
     struct rlimit limit = {0};
-    *facts = (ProcessFacts){.resident_bytes = resident(), .open_files = open_files()};
+    *facts =
+        (ProcessFacts){.resident_bytes = process_resident(), .open_files = process_open_files()};
     if (getrusage(RUSAGE_SELF, &usage) == 0)
-        facts->cpu_seconds = seconds(usage.ru_utime) + seconds(usage.ru_stime);
+        facts->cpu_seconds = process_seconds(usage.ru_utime) + process_seconds(usage.ru_stime);
     if (getrlimit(RLIMIT_NOFILE, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY)
         facts->open_files_most = limit.rlim_cur;
 }
@@ -64,4 +68,33 @@ void process_trim_memory(uint64_t *taken) {
         return;
     malloc_trim(0);
     *taken = (uint64_t)usage.ru_minflt;
+}
+
+// One datagram to a socket whose name begins with "/" or, for the abstract ones of Linux, with "@".
+void process_notify_systemd(const char *state) {
+    const char *path = getenv("NOTIFY_SOCKET");
+    struct sockaddr_un name = {.sun_family = AF_UNIX};
+    if (path == NULL || (path[0] != '/' && path[0] != '@'))
+        return;
+    const size_t size = strlen(path);
+    if (size < 2 || size >= sizeof name.sun_path)
+        return;
+    memcpy(name.sun_path, path, size);
+    if (path[0] == '@')
+        name.sun_path[0] = '\0';
+    const int descriptor = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    if (descriptor < 0)
+        return;
+    const socklen_t name_size = (socklen_t)(offsetof(struct sockaddr_un, sun_path) + size);
+    (void)sendto(descriptor, state, strlen(state), MSG_NOSIGNAL, (const struct sockaddr *)&name,
+                 name_size);
+    close(descriptor);
+}
+
+int64_t process_watchdog_ms(void) {
+    const char *period = getenv("WATCHDOG_USEC"), *process = getenv("WATCHDOG_PID");
+    if (period == NULL || (process != NULL && strtol(process, NULL, 10) != (long)getpid()))
+        return 0;
+    const long long us = strtoll(period, NULL, 10);
+    return us > 0 ? (us / 2000 > 0 ? us / 2000 : 1) : 0;
 }

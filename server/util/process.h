@@ -1,6 +1,5 @@
-// What the system says of this process, and how it deals with its memory. Not what is in that
-// memory: every cache has a budget of its own. Used by api/metrics.c, cli/serve.c and the
-// keeper.
+// This process: its memory and its figures as the system has them, and systemd's protocol for a
+// service of Type=notify. Without systemd (no NOTIFY_SOCKET) the latter does nothing.
 #ifndef SERVER_UTIL_PROCESS_H
 #define SERVER_UTIL_PROCESS_H
 
@@ -10,12 +9,17 @@ typedef struct ProcessFacts {
     uint64_t resident_bytes, open_files, open_files_most;
     double cpu_seconds;
 } ProcessFacts;
-void process_facts(ProcessFacts *facts); // 0 where the system does not tell
+void process_facts(ProcessFacts *facts); // 0 where the system does not say
 
 // From here on large blocks that are freed go back to the system, whichever thread freed them.
 void process_return_memory(void);
 // Gives back whole pages between blocks in use, if enough pages were taken since the last time;
 // that is `*taken`, 0 at first.
 void process_trim_memory(uint64_t *taken);
+
+// Sends "READY=1", "STOPPING=1", "WATCHDOG=1" and the like; a datagram that is not taken is lost.
+void process_notify_systemd(const char *state);
+// How often "WATCHDOG=1" is to be sent: half of WATCHDOG_USEC. 0: not asked for.
+int64_t process_watchdog_ms(void);
 
 #endif

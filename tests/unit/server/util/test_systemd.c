@@ -12,7 +12,7 @@
 
 #include <cmocka.h>
 
-#include "server/util/systemd.h"
+#include "server/util/process.h"
 
 static int listen_at(const char *path) {
     struct sockaddr_un name = {.sun_family = AF_UNIX};
@@ -32,7 +32,7 @@ static void expect_told(const char *path) {
     char text[32] = "";
     const int door = listen_at(path);
     setenv("NOTIFY_SOCKET", path, 1);
-    systemd_notify("READY=1");
+    process_notify_systemd("READY=1");
     assert_int_equal(recv(door, text, sizeof text - 1, MSG_DONTWAIT), 7);
     assert_string_equal(text, "READY=1");
     close(door);
@@ -52,11 +52,11 @@ static void states_arrive_at_both_kinds_of_socket(void **state) {
 static void without_a_socket_nothing_happens(void **state) {
     (void)state;
     unsetenv("NOTIFY_SOCKET");
-    systemd_notify("READY=1");
+    process_notify_systemd("READY=1");
     setenv("NOTIFY_SOCKET", "vsock:1", 1);
-    systemd_notify("READY=1");
+    process_notify_systemd("READY=1");
     setenv("NOTIFY_SOCKET", "/nowhere/at/all", 1);
-    systemd_notify("READY=1");
+    process_notify_systemd("READY=1");
     unsetenv("NOTIFY_SOCKET");
 }
 
@@ -65,16 +65,16 @@ static void the_watchdog_is_fed_twice_a_period(void **state) {
     char own[32];
     unsetenv("WATCHDOG_USEC");
     unsetenv("WATCHDOG_PID");
-    assert_int_equal(systemd_watchdog_ms(), 0);
+    assert_int_equal(process_watchdog_ms(), 0);
     setenv("WATCHDOG_USEC", "30000000", 1);
-    assert_int_equal(systemd_watchdog_ms(), 15000);
+    assert_int_equal(process_watchdog_ms(), 15000);
     setenv("WATCHDOG_PID", "1", 1);
-    assert_int_equal(systemd_watchdog_ms(), 0);
+    assert_int_equal(process_watchdog_ms(), 0);
     snprintf(own, sizeof own, "%ld", (long)getpid());
     setenv("WATCHDOG_PID", own, 1);
-    assert_int_equal(systemd_watchdog_ms(), 15000);
+    assert_int_equal(process_watchdog_ms(), 15000);
     setenv("WATCHDOG_USEC", "x", 1);
-    assert_int_equal(systemd_watchdog_ms(), 0);
+    assert_int_equal(process_watchdog_ms(), 0);
     unsetenv("WATCHDOG_USEC");
     unsetenv("WATCHDOG_PID");
 }
