@@ -267,7 +267,6 @@ bool field_is_absent(const Field *field, const void *item) {
         return true;
     switch (field->kind) {
     case FIELD_KIND_FLAG:
-        return (field->flags & FIELD_RARE) != 0 && !*(const bool *)field_member(field, item);
     case FIELD_KIND_BASE:
         return false;
     case FIELD_KIND_REALS:

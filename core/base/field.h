@@ -127,13 +127,11 @@ enum {
     FIELD_LONE = 8,
     // TEXTS: an allowed text may end with a number from 1: "displacement_2".
     FIELD_NUMBERED = 16,
-    // FLAG: false is absent. A new flag thus leaves the canonical form of older scenes unchanged.
-    FIELD_RARE = 32,
     // TEXTS: each is a JSON number, string, true or false, stored as JSON text.
-    FIELD_SCALARS = 64,
+    FIELD_SCALARS = 32,
     // Internal: copied and cleared with the struct, but not read, written, described, validated or
     // found by name, and not part of the canonical form. Its presence is OPTIONAL.
-    FIELD_HIDDEN = 128,
+    FIELD_HIDDEN = 64,
 };
 
 struct Field {
@@ -195,9 +193,6 @@ struct Field {
 #define FIELD_FLAG(Type, member, default_, doc_) \
     {.name = #member, .kind = FIELD_KIND_FLAG, .offset = FIELD_AT(Type, member, bool), \
      .presence = FIELD_PRESENCE(default_), .initial = (default_), .doc = doc_}
-#define FIELD_RARE_FLAG(Type, member, doc_) \
-    {.name = #member, .kind = FIELD_KIND_FLAG, .offset = FIELD_AT(Type, member, bool), \
-     .presence = PRESENCE_DEFAULT, .flags = FIELD_RARE, .doc = doc_}
 #define FIELD_TEXT(Type, member, max_, presence_, flags_, doc_) \
     {.name = #member, .kind = FIELD_KIND_TEXT, .offset = FIELD_AT(Type, member, char *), .max = max_, \
      .presence = presence_, .flags = flags_, .doc = doc_}
@@ -257,7 +252,7 @@ void fields_clear(const Field *fields, void *item);
 Status fields_copy(const Field *fields, const void *source, void *target);
 
 // Whether the member of `item` is absent: NAN, COUNT_ABSENT, NULL or no elements. BASE, FLAG
-// (unless FIELD_RARE) and, under PRESENCE_DEFAULT, ITEM and lists are never absent. Any other ITEM
+// and, under PRESENCE_DEFAULT, ITEM and lists are never absent. Any other ITEM
 // is absent if all its members except flags are. FIELD_HIDDEN is always absent.
 bool field_is_absent(const Field *field, const void *item);
 

@@ -1,7 +1,10 @@
 // Entry points: each decides between a plain scene, an accuracy target and a comparison with the
 // scene without dampers.
 #include <math.h>
+#include <stdlib.h>
+#include <string.h>
 
+#include "core/base/canonical.h"
 #include "core/simulation/internal.h"
 
 // The scene without its dampers, run for comparison. It samples no channels, because only its
@@ -31,26 +34,122 @@ static double undamped_baseline_reduction(double with, double without) {
     return without > 0 ? 1 - with / without : (double)NAN;
 }
 
-// Runs the scene without its dampers, compares the outcome's summary with it and adds its work.
-static Status undamped_baseline_run(const Simulation *simulation, const SimulationLimits *limits,
-                                    const Progress *progress, Workspace *workspace,
-                                    Outcome *outcome, Problem *problem) {
-    UndampedBaseline undamped;
-    Outcome *other;
-    undamped_baseline_set(simulation, &undamped);
-    TRY(run_scene(&undamped.view, limits, progress, workspace, NULL, &other, problem));
-    const Summary *with = &outcome->summary, *without = &other->summary;
-    outcome->has_reduction = true;
-    outcome->reduction = (Reduction){
-        undamped_baseline_reduction(with->peak_displacement, without->peak_displacement),
-        undamped_baseline_reduction(with->rms_displacement, without->rms_displacement),
-        undamped_baseline_reduction(with->peak_acceleration, without->peak_acceleration),
-        undamped_baseline_reduction(with->rms_acceleration, without->rms_acceleration),
-    };
-    outcome->steps += other->steps;
-    work_counters_add(&outcome->work, &other->work);
-    outcome_unref(other);
+// The canonical form of a scene, as the key of its baseline.
+typedef struct BaselineKey {
+    char *at;
+    size_t size, room;
+    bool is_incomplete; // without memory, or too long
+} BaselineKey;
+
+static void baseline_key_append(void *context, const void *bytes, size_t size) {
+    enum { KEY_MAX = 1 << 20 };
+    BaselineKey *key = context;
+    if (size > KEY_MAX - key->size)
+        key->is_incomplete = true;
+    if (key->is_incomplete)
+        return;
+    if (key->size + size > key->room) {
+        const size_t room = 2 * (key->size + size);
+        char *at = realloc(key->at, room);
+        key->is_incomplete = at == NULL;
+        if (at == NULL)
+            return;
+        key->at = at;
+        key->room = room;
+    }
+    memcpy(key->at + key->size, bytes, size);
+    key->size += size;
+}
+
+static const Baseline *baseline_find(const Workspace *workspace, const BaselineKey *key) {
+    for (size_t i = 0; i < BASELINES && !key->is_incomplete; i++) {
+        const Baseline *baseline = &workspace->baselines[i];
+        if (baseline->key != NULL && baseline->key_size == key->size &&
+            memcmp(baseline->key, key->at, key->size) == 0)
+            return baseline;
+    }
+    return NULL;
+}
+
+static Status baseline_compute(const Simulation *view, const SimulationLimits *limits,
+                               const Progress *progress, Workspace *workspace, RunInputs *inputs,
+                               Baseline *baseline, Problem *problem) {
+    Outcome *outcome;
+    plan_free(inputs->plan);
+    inputs->plan = NULL;
+    TRY(run_scene(view, limits, progress, workspace, inputs, &outcome, problem));
+    *baseline = (Baseline){.peak_displacement = outcome->summary.peak_displacement,
+                           .rms_displacement = outcome->summary.rms_displacement,
+                           .peak_acceleration = outcome->summary.peak_acceleration,
+                           .rms_acceleration = outcome->summary.rms_acceleration,
+                           .steps = outcome->steps,
+                           .work = outcome->work};
+    outcome_unref(outcome);
     return STATUS_OK;
+}
+
+// A key takes about 10 us to write and compare: cheaper baselines are computed again.
+#define BASELINE_CPU_SECONDS 1e-4
+
+// The baseline of the undamped scene `view`, from the workspace if it has it. `inputs` are those of
+// the scene with dampers.
+static Status baseline_get(const Simulation *view, const SimulationLimits *limits,
+                           const Progress *progress, Workspace *workspace, RunInputs *inputs,
+                           Baseline *baseline, Problem *problem) {
+    BaselineKey key = {0};
+    if (workspace == NULL || cost_scene(view).cpu_seconds < BASELINE_CPU_SECONDS)
+        return baseline_compute(view, limits, progress, workspace, inputs, baseline, problem);
+    canonical_write(simulation_fields, view, baseline_key_append, &key);
+    const Baseline *found = baseline_find(workspace, &key);
+    Status status = STATUS_OK;
+    if (found != NULL)
+        *baseline = *found;
+    else
+        status = baseline_compute(view, limits, progress, workspace, inputs, baseline, problem);
+    if (found == NULL && status == STATUS_OK && !key.is_incomplete) {
+        Baseline *target = &workspace->baselines[workspace->next_baseline++ % BASELINES];
+        free(target->key);
+        *target = *baseline;
+        target->key = key.at;
+        target->key_size = key.size;
+        return STATUS_OK;
+    }
+    free(key.at);
+    return status;
+}
+
+// Compares the outcome's summary with that of the scene without its dampers and adds the work of
+// that run. If that run fails, the reductions are unknown, and a warning gives the reason.
+static Status outcome_add_reduction(const Simulation *simulation, const SimulationLimits *limits,
+                                    const Progress *progress, Workspace *workspace,
+                                    RunInputs *inputs, Outcome *outcome, Problem *problem) {
+    UndampedBaseline undamped;
+    Baseline without;
+    Problem own = {0};
+    undamped_baseline_set(simulation, &undamped);
+    outcome->has_reduction = true;
+    outcome->reduction = (Reduction){NAN, NAN, NAN, NAN};
+    const Status status =
+        baseline_get(&undamped.view, limits, progress, workspace, inputs, &without, &own);
+    if (status == STATUS_OK) {
+        const Summary *with = &outcome->summary;
+        outcome->reduction = (Reduction){
+            undamped_baseline_reduction(with->peak_displacement, without.peak_displacement),
+            undamped_baseline_reduction(with->rms_displacement, without.rms_displacement),
+            undamped_baseline_reduction(with->peak_acceleration, without.peak_acceleration),
+            undamped_baseline_reduction(with->rms_acceleration, without.rms_acceleration),
+        };
+        outcome->steps += without.steps;
+        work_counters_add(&outcome->work, &without.work);
+        return STATUS_OK;
+    }
+    if (status == STATUS_CANCELLED || status == STATUS_NO_MEMORY)
+        return problem_set(problem, status, "%s", own.detail);
+    return warnings_add(&outcome->warnings, "/output/reduction",
+                        "is unknown: the scene without dampers could not be run: %s",
+                        own.detail) == STATUS_OK
+               ? STATUS_OK
+               : problem_set(problem, STATUS_NO_MEMORY, "no memory for a warning");
 }
 
 static Status simulation_refuse_time(const Simulation *simulation, const Cost *cost,
@@ -133,10 +232,9 @@ Cost simulation_cost(const Simulation *simulation) {
     UndampedBaseline undamped;
     undamped_baseline_set(simulation, &undamped);
     const Cost other = cost_scene(&undamped.view);
-    cost.steps += other.steps;
-    cost.cpu_seconds += other.cpu_seconds;
-    cost.base += other.base;
-    cost.bytes += other.bytes; // the first outcome is still in memory
+    // The second run needs no more memory than the first; the motion of the base is made once.
+    cost.steps += other.steps - (simulation_has_target(simulation) ? 0 : other.base);
+    cost.cpu_seconds = cost.steps * SOLVER_STEP;
     return cost;
 }
 
@@ -147,13 +245,16 @@ Status simulation_run(const Simulation *simulation, const SimulationLimits *limi
     const double share = has_reduction ? 0.8 : 1; // of the progress, if another run follows
     const Progress own = progress_range_view(&(ProgressRange){progress, 0, share, 0});
     const Progress other = progress_range_view(&(ProgressRange){progress, share, 1 - share, 0});
+    RunInputs inputs = {0};
     *outcome = NULL;
-    TRY(simulation_has_target(simulation)
+    Status status =
+        simulation_has_target(simulation)
             ? accuracy_target_run(simulation, limits, &own, workspace, NULL, outcome, problem)
-            : run_scene(simulation, limits, &own, workspace, NULL, outcome, problem));
-    const Status status = has_reduction ? undamped_baseline_run(simulation, limits, &other,
-                                                                workspace, *outcome, problem)
-                                        : STATUS_OK;
+            : run_scene(simulation, limits, &own, workspace, &inputs, outcome, problem);
+    if (status == STATUS_OK && has_reduction)
+        status = outcome_add_reduction(simulation, limits, &other, workspace, &inputs, *outcome,
+                                       problem);
+    run_inputs_clear(&inputs);
     if (status != STATUS_OK) {
         outcome_unref(*outcome);
         *outcome = NULL;

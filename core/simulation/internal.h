@@ -74,10 +74,11 @@ double cost_spectra(const SpectrumRequest *psd, size_t samples); // predicted st
 typedef struct RunInputs {
     Plan *plan; // its report has moved to the outcome
     Base base;
+    bool has_base; // it was made
 } RunInputs;
 
 // `inputs`, if not NULL, receives the plan and base of the run, also after a failure. They are
-// cleared by run_inputs_clear.
+// cleared by run_inputs_clear. If it has a base already, the run uses that.
 Status run_scene(const Simulation *simulation, const SimulationLimits *limits,
                  const Progress *progress, Workspace *workspace, RunInputs *inputs,
                  Outcome **outcome, Problem *problem);

@@ -7,7 +7,7 @@
 
 #include "core/simulation/internal.h"
 
-const char engine_version[] = "impactd-5";
+const char engine_version[] = "impactd-6";
 
 // clang-format off
 const Field summary_fields[] = {
@@ -193,6 +193,7 @@ typedef struct RunContext {
     FftCache *transforms; // or NULL
     Plan *plan;
     Base base;
+    bool has_base;
     Columns hidden;      // channels that only a spectrum needs
     Columns transformed; // the spectrum's channels; values are borrowed from the other columns
     const char **units;  // of their densities
@@ -360,8 +361,10 @@ static Status run_all(RunContext *context, Workspace *workspace, Problem *proble
     Outcome *outcome = context->outcome;
     TRY(run_make_plan(simulation, &context->plan, problem));
     const Progress progress = progress_range_view(&(ProgressRange){context->progress, 0, 0.2, 0});
-    TRY(run_make_base(simulation, context->limits == NULL ? 0 : context->limits->samples,
-                      context->transforms, &progress, &context->base, problem));
+    if (!context->has_base)
+        TRY(run_make_base(simulation, context->limits == NULL ? 0 : context->limits->samples,
+                          context->transforms, &progress, &context->base, problem));
+    context->has_base = true;
     const Regime regime = regime_find(context->plan, &context->base);
     context->wanted =
         calloc(output->channels.count + output->psd.channels.count + 1, sizeof *context->wanted);
@@ -393,6 +396,10 @@ Status run_scene(const Simulation *simulation, const SimulationLimits *limits,
                           .progress = progress,
                           .transforms = workspace == NULL ? NULL : &workspace->transforms,
                           .outcome = outcome_new()};
+    if (inputs != NULL && inputs->has_base) {
+        context.base = inputs->base;
+        context.has_base = true;
+    }
     const Status status = context.outcome == NULL
                               ? problem_set(problem, STATUS_NO_MEMORY, "no memory for an outcome")
                               : run_all(&context, workspace, problem);
@@ -400,10 +407,11 @@ Status run_scene(const Simulation *simulation, const SimulationLimits *limits,
     free(context.units);
     free(context.wanted);
     columns_clear(&context.hidden);
+    const RunInputs made = {context.plan, context.base, context.has_base};
     if (inputs != NULL)
-        *inputs = (RunInputs){context.plan, context.base};
+        *inputs = made;
     else
-        run_inputs_clear(&(RunInputs){context.plan, context.base});
+        run_inputs_clear(&(RunInputs){made.plan, made.base, true});
     if (status == STATUS_OK)
         *outcome = context.outcome;
     else

@@ -28,7 +28,7 @@ static const Field output_fields[] = {
     FIELD_TEXTS(Output, channels, channel_requests, usual, CHANNELS, PRESENCE_DEFAULT, FIELD_NUMBERED, "channels to sample; with several storeys or dampers each name ends with its number from 1, as in displacement_2; usual: displacement, velocity, acceleration, damper_displacement and contact_force, of all storeys and dampers"),
     FIELD_ITEM_OR_NULL(Output, psd, psd_fields, PRESENCE_DEFAULT, "power spectral densities by Welch's method; null: none"),
     FIELD_FLAG(Output, impacts, true, "whether impacts are listed; false: they are counted, and their peaks and energies are summed"),
-    FIELD_RARE_FLAG(Output, reduction, "whether the summary contains the reduction of peaks and rms by the dampers; the scene without dampers is run too"),
+    FIELD_FLAG(Output, reduction, true, "whether the summary contains the reduction of peaks and rms by the dampers; the scene without dampers is run too"),
     FIELD_REAL(Output, statistics_from, "s", AT_MIN(0), 0, "start of the interval for rms and peaks"),
     FIELD_END
 };
@@ -98,6 +98,7 @@ static Status validate_output(Simulation *simulation, size_t count, Warnings *wa
                               Problem *problem) {
     const Scene *scene = &simulation->scene;
     Output *output = &simulation->output;
+    output->reduction = output->reduction && scene->dampers.count > 0;
     const Status faults[] = {
         channel_names_complete(scene, &output->channels, false, "/output/channels", problem),
         channel_names_complete(scene, &output->psd.channels, true, "/output/psd/channels", problem),

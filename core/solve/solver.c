@@ -46,5 +46,7 @@ Status run_check(const Run *run, double time, double step, bool is_finite, Probl
 void workspace_clear(Workspace *workspace) {
     fft_cache_clear(&workspace->transforms);
     free(workspace->single);
-    workspace->single = NULL;
+    for (size_t i = 0; i < BASELINES; i++)
+        free(workspace->baselines[i].key);
+    *workspace = (Workspace){0};
 }

@@ -53,11 +53,24 @@ double step_work_steps(StepWorkKind kind, size_t storeys, size_t dampers, bool i
 #define SOLVER_STOPPED                                                                             \
     "more than %.3g solver steps, about %.3g s of CPU, far more than predicted; stopped at "
 
+// Peaks and rms of a scene without its dampers, and the work of that run.
+typedef struct Baseline {
+    char *key; // canonical form of the scene; NULL: none
+    size_t key_size;
+    double peak_displacement, rms_displacement, peak_acceleration, rms_acceleration;
+    double steps;
+    WorkCounters work;
+} Baseline;
+
+enum { BASELINES = 8 };
+
 // Memory of a run that the next run can use again. It never changes a result. One per worker, used
 // by one run at a time. All zero is empty.
 typedef struct Workspace {
     FftCache transforms;
-    struct SingleMass *single; // tables of the last system of one mass
+    struct SingleMass *single;     // tables of the last system of one mass
+    Baseline baselines[BASELINES]; // the last ones that were dear to compute
+    size_t next_baseline;
 } Workspace;
 void workspace_clear(Workspace *workspace);
 

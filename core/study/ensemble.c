@@ -158,6 +158,7 @@ static Status ensemble_cost(const void *request, const Simulation *simulation,
     Simulation member = *simulation; // a borrowed view
     (void)limits;
     member.output.channels = (Texts){NULL, 0};
+    member.output.reduction = false;
     *steps = (double)study->runs * simulation_cost(&member).steps;
     return STATUS_OK;
 }

@@ -96,6 +96,7 @@ Status study_run_check_names(const Texts *given, const char *const *names, const
 Status study_run_copy(const Simulation *simulation, Simulation *target) {
     TRY(fields_copy(simulation_fields, simulation, target));
     texts_clear(&target->output.channels);
+    target->output.reduction = false;
     return STATUS_OK;
 }
 

@@ -66,7 +66,8 @@ Status study_run_check_densities(const Simulation *simulation, double densities,
 Status study_run_check_names(const Texts *given, const char *const *names, const char *member,
                              Problem *problem);
 
-// The scene without sampled channels; spectra and impacts as in the original. `target` is cleared
+// The scene without sampled channels and without its undamped run; spectra and impacts as in the
+// original. `target` is cleared
 // by simulation_clear in any case.
 Status study_run_copy(const Simulation *simulation, Simulation *target);
 

@@ -235,6 +235,7 @@ static Status sweep_grid_fill_record(const PinnedRecords *records, Simulation *t
 static Status sweep_grid_apply(const SweepGrid *grid, size_t point, Simulation *target,
                                size_t *axis, char why[JSON_POINTER_MESSAGE_MAX]) {
     TRY(fields_copy(simulation_fields, grid->simulation, target));
+    target->output.reduction = false; // unless an axis requests it
     for (size_t i = 0; i < grid->axis_count; i++) {
         const SweepValues *values = &grid->axes[i];
         if (values->field == NULL)

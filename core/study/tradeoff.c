@@ -248,6 +248,7 @@ static void candidate_apply_output(const TradeoffPoint *point, Simulation *targe
             psd->overlap = psd->segment - 1;
     }
     target->output.impacts = true; // errors are counted from them
+    target->output.reduction = false;
     const double last = floor(target->scene.duration * target->scene.sample_rate * (1 + 1e-12)) /
                         target->scene.sample_rate;
     target->output.statistics_from = fmin(target->output.statistics_from, last);

@@ -374,31 +374,35 @@ def test_the_bundle_explains_itself():
         assert "psd.csv" not in names and "impacts.csv" not in names, names
 
 
-def test_what_the_dampers_save_is_told_when_asked_for():
-    """output.reduction: the summary tells 1 - with over without dampers; without it nothing changes, not even the id."""
+def test_summary_has_the_reduction_by_the_dampers():
+    """output.reduction, by default true where there are dampers: 1 - with over without dampers; nothing else changes."""
     with program.daemon() as daemon:
         names = ("peak_displacement", "rms_displacement", "peak_acceleration", "rms_acceleration")
         scene, bare = program.scene("paper_random_sponge"), program.scene("paper_random_sponge")
         bare["dampers"] = []
         bare["output"] = {"channels": [], "psd": None}
-        plain = program.finished(daemon, scene)
-        scene["output"] = {**scene.get("output", {}), "reduction": False}
-        assert program.finished(daemon, scene)["result"] == plain["result"]
-        scene["output"]["reduction"] = True
         asked = program.finished(daemon, scene)
+        scene["output"] = {**scene.get("output", {}), "reduction": True}
+        assert program.finished(daemon, scene)["result"] == asked["result"]
+        scene["output"]["reduction"] = False
+        plain = program.finished(daemon, scene)
         assert asked["result"] != plain["result"]
         without = program.finished(daemon, bare)["summary"]
         for name in names:
-            assert name + "_reduction" not in plain["summary"]
+            assert name + "_reduction" not in plain["summary"] and name + "_reduction" not in without
             assert asked["summary"][name] == plain["summary"][name]
             assert asked["summary"][name + "_reduction"] == 1 - plain["summary"][name] / without[name], name
+        bare["output"]["reduction"] = True
+        assert program.finished(daemon, bare)["summary"] == without
+        sweep = {"kind": "sweep", "axes": [{"pointer": "/dampers/0/clearance", "values": [0.005, 0.01]}]}
+        assert program.finished(daemon, {**scene, "study": sweep})["status"] == "successful"
         result = get(daemon, "/v1/results/" + asked["result"]).json()
         assert result["scene"]["output"]["reduction"] is True and result["summary"] == asked["summary"]
         rows = npz_columns(get(daemon, f"/v1/results/{asked['result']}/impacts/100/force.npz").body)
         impact = get(daemon, f"/v1/results/{asked['result']}/impacts.json").json()["impacts"][99]
         assert abs(np.abs(rows["contact_force"]).max() / impact["peak_force"] - 1) < 1e-9
         dry = [daemon.request("POST", "/v1/jobs?dry_run=1", json=json_scene).json()["cost"]["cpu_seconds"]
-               for json_scene in (scene, program.scene("paper_random_sponge"))]
+               for json_scene in (program.scene("paper_random_sponge"), scene)]
         assert dry[0] > dry[1], dry
 
 

@@ -11,7 +11,7 @@ def sponge(**changes):
 def endless(number=0):
     """A scene that takes many seconds, another one for each number: few samples, millions of steps."""
     scene = program.scene("paper_free_sponge")
-    scene.update(duration=2500 + number / 10, sample_rate=10, output={"channels": [], "psd": None},
+    scene.update(duration=2500 + number / 10, sample_rate=10, output={"channels": [], "psd": None, "reduction": False},
                  accuracy={"solver": "rk4", "step": 1e-5})
     return scene
 

@@ -53,6 +53,7 @@ static Ensemble *make(const StudyRequest *inquiry, const SimulationLimits *limit
 
 TEST(each_row_is_the_scene_with_its_seed) {
     StudyRequest inquiry = study_request_make(4, 5);
+    inquiry.simulation.output.reduction = false; // as in the members
     complete(&inquiry);
     assert_int_equal(study_of(&inquiry)->first_seed, 5); // the scene's own
     Ensemble *answer = make(&inquiry, NULL);
