@@ -60,7 +60,7 @@ def test_the_study_sets_contact_models_side_by_side():
         assert len(entries) == 9 and list(entries)[0] == "spring_damper, zero_penetration"
         assert entries["hertz"]["status"] == "refused" and "must be 1" in entries["hertz"]["why"]
         own = answer["entries"][0]
-        assert own["summary"] == result["summary"] and own["derived"] == result["plan"]["derived"]
+        assert own["summary"].items() <= result["summary"].items() and own["derived"] == result["plan"]["derived"]
         a = series(daemon, job["result"])["displacement"]
         frequency, wanted = numpy.array(answer["frequency"]), numpy.array(own["density"])
         psd = daemon.get(base + "/psd.json").json()["channels"]["mean_acceleration"]["values"]

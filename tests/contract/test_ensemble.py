@@ -133,6 +133,7 @@ def test_every_row_can_be_run_again():
             answer = json.load(file)
         densities = []
         del scene["study"]
+        scene.setdefault("output", {})["reduction"] = False
         for row in answer["table"]:
             scene["excitation"]["seed"] = row["seed"]
             again = os.path.join(folder, "run.json")
@@ -193,7 +194,8 @@ def test_a_job_makes_the_study():
         whole = daemon.get(base + "/ensemble.json")
         answer = whole.json()
         assert answer == result["study"] and result["links"]["ensemble"] == base + "/ensemble.json"
-        assert {name: answer["table"][0][name] for name in result["summary"]} == result["summary"]
+        summary = {name: value for name, value in result["summary"].items() if not name.endswith("_reduction")}
+        assert {name: answer["table"][0][name] for name in summary} == summary
         check_statistics(answer)
         table = daemon.get(result["links"]["ensemble.csv"])
         assert table.headers["content-type"] == "text/csv; charset=utf-8"
