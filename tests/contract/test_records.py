@@ -231,7 +231,7 @@ def test_a_record_goes_only_when_nothing_uses_it():
         upload(daemon, "r")
         upload(daemon, "r2", **shake(2))
         job = program.finished(daemon, scene({"name": "r"}))
-        endless = scene({"name": "r", "scale": 3}, duration=2000, sample_rate=10, output={"channels": [], "psd": None},
+        endless = scene({"name": "r", "scale": 3}, duration=2000, sample_rate=10, output={"channels": [], "psd": None, "reduction": False},
                         accuracy={"solver": "rk4", "step": 1e-5})
         running = daemon.submit(endless, headers={"Prefer": "respond-async"}).json()["id"]
         assert "1 result and 1 unfinished job" in problem(daemon.request("DELETE", "/v1/records/r"), 409)["detail"]
