@@ -22,7 +22,7 @@ def scene(number, psd=True):
 
 def long_scene(number, duration):
     made = program.scene("paper_sine_aluminium")
-    made.update(duration=duration, sample_rate=100, output={"channels": [], "psd": None},
+    made.update(duration=duration, sample_rate=100, output={"channels": [], "psd": None, "reduction": False},
                 accuracy={"solver": "rk4", "step": 1e-5})
     made["dampers"][0]["clearance"] = 0.012 + 1e-6 * number
     return made

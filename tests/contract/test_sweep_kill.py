@@ -137,7 +137,7 @@ def test_a_sweep_that_cannot_be_written_down_begins_when_there_is_room():
     asked = {**program.scene("paper_random_sponge"), "duration": 20, "study": {"kind": "sweep", "axes": [
         {"pointer": "/dampers/0/clearance", "values": [0.01 + 1e-6 * (i + 1 / 3) for i in range(2000)]}]}}
     before = {**program.scene("paper_sine_aluminium"), "duration": 2000, "sample_rate": 100,
-              "output": {"channels": [], "psd": None}, "accuracy": {"solver": "rk4", "step": 1e-5}}
+              "output": {"channels": [], "psd": None, "reduction": False}, "accuracy": {"solver": "rk4", "step": 1e-5}}
     with program.daemon() as daemon:
         undisturbed = tables(daemon, daemon.finished(daemon.submit(asked).json()["id"]))
     with small_disk() as folder, program.Daemon(program.build, "--workers", "1", data=folder) as daemon:
