@@ -110,13 +110,15 @@ static bool route_nearest(const Route *table, const char *path, char target[PATH
     return target[0] != '\0';
 }
 
-// A path that a route fits without the slash at its end; the documentation's folders have theirs.
+// A path that a route fits without the slash at its end. Folders of the documentation and of the
+// dashboard are not meant.
 static bool router_redirect_slash(const Router *router, const Request *request, Reply *reply) {
     RouteMatch match;
     char path[REQUEST_TARGET_MAX + 1];
     const size_t size = strlen(request->path);
     if (strcmp(request->method, "GET") != 0 || size < 2 || size >= sizeof path ||
-        request->path[size - 1] != '/' || strncmp(request->path, "/guide/", 7) == 0)
+        request->path[size - 1] != '/' || strncmp(request->path, "/guide/", 7) == 0 ||
+        strncmp(request->path, "/web/", 5) == 0)
         return false;
     memcpy(path, request->path, size - 1);
     path[size - 1] = '\0';
