@@ -4,7 +4,7 @@ import { leads, says, tabTo, test, until } from "./support.mjs";
 
 // A scene of some ten seconds in fixed small steps, and a sweep of it over 400 points.
 const slow = async (daemon, changes = {}) => ({ ...(await daemon.example("paper_sine_aluminium")), title: "A slow one", duration: 400,
-  sample_rate: 100, output: { channels: [], psd: null }, accuracy: { solver: "rk4", step: 1e-5 }, ...changes });
+  sample_rate: 100, output: { channels: [], psd: null, reduction: false }, accuracy: { solver: "rk4", step: 1e-5 }, ...changes });
 const sweep = { kind: "sweep", axes: [{ pointer: "/dampers/0/clearance", from: 0.01, to: 0.02, count: 400 }] };
 const submit = (daemon, scene) => daemon.ask("POST", "/v1/jobs", scene, { Prefer: "respond-async" });
 const state = async (daemon, id) => (await daemon.get(`/v1/jobs/${id}`)).status;

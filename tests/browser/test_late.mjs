@@ -26,7 +26,7 @@ test("A run's page that is left before its answer came leads nowhere", async ({ 
 test("A run is followed though the service was lost right after its first answer", async ({ page, daemon, url, refused }) => {
   refused(0);
   const long = { ...(await daemon.example("paper_sine_aluminium")), duration: 2000, sample_rate: 100,
-    output: { channels: [], psd: null }, accuracy: { solver: "rk4", step: 1e-5 } };
+    output: { channels: [], psd: null, reduction: false }, accuracy: { solver: "rk4", step: 1e-5 } };
   const { id } = await daemon.ask("POST", "/v1/jobs", long, { Prefer: "respond-async" });
   let asked = 0;
   await page.route(new RegExp(`/v1/jobs/${id}(\\?|$)`), (route) => (++asked === 2 ? route.abort() : route.fallback()));
