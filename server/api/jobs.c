@@ -61,8 +61,11 @@ static Job *wait_end(JobWait *wait, Reply *reply) {
     return job;
 }
 
+// The client has left; its job continues, and lists have it.
 static void wait_forget(void *kept) {
-    job_unref(wait_end(kept, NULL));
+    Job *job = wait_end(kept, NULL);
+    job_save(job);
+    job_unref(job);
 }
 
 static Status wait_begin(const Request *request, Reply *reply, Job *job, JobEvent event,
