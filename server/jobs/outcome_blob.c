@@ -1,8 +1,8 @@
 // Numbers of eight bytes in the order and form of the machine, which is little-endian. Structs are
 // written by their Field rows: a REAL, COUNT or CHOICE takes eight bytes.
 //
-//     outcome   head | energy | summary | impacts | frequencies | densities
-//     columns   count | rows | names and units | values, column after column
+//     outcome   head | energy | impacts | spectrum, where there is one: head | frequencies |
+//     densities columns   count | rows | names and units | values, column after column
 #include "server/jobs/outcome_blob.h"
 
 #include <stdlib.h>
@@ -11,14 +11,17 @@
 // `layout` and the two sizes tell apart blobs of a program with other rows.
 typedef struct BlobHead {
     char layout[8];
-    uint64_t energy_bytes, impact_bytes;
-    double sample_rate;
-    uint64_t count, impacts, is_unlisted, impact_count, resting_count;
-    uint64_t segment, overlap, window, detrend, segments;
-    uint64_t rows; // of the spectra
+    uint32_t energy_bytes, impact_bytes;
+    double sample_rate, trust_horizon;
+    uint64_t count, impacts, impact_count, resting_count;
+    uint32_t is_unlisted, has_spectrum;
 } BlobHead;
 
-static const char blob_layout[8] = "outcome1";
+typedef struct BlobSpectrum {
+    uint64_t segment, overlap, window, detrend, segments, rows;
+} BlobSpectrum;
+
+static const char blob_layout[8] = "outcome2";
 
 static bool blob_has(const Field *field) {
     return field->kind == FIELD_KIND_REAL || field->kind == FIELD_KIND_COUNT ||
@@ -34,21 +37,16 @@ static uint64_t blob_row_bytes(const Field *fields) {
 
 static BlobHead blob_head(const Outcome *outcome) {
     const Response *response = &outcome->response;
-    const Spectrum *spectrum = &outcome->spectrum;
-    BlobHead head = {.energy_bytes = blob_row_bytes(energy_fields) + blob_row_bytes(summary_fields),
-                     .impact_bytes = blob_row_bytes(impact_fields),
+    BlobHead head = {.energy_bytes = (uint32_t)blob_row_bytes(energy_fields),
+                     .impact_bytes = (uint32_t)blob_row_bytes(impact_fields),
                      .sample_rate = response->sample_rate,
+                     .trust_horizon = outcome->summary.trust_horizon,
                      .count = response->count,
                      .impacts = response->impacts.count,
-                     .is_unlisted = response->is_unlisted,
                      .impact_count = response->impact_count,
                      .resting_count = response->resting_count,
-                     .segment = spectrum->settings.segment,
-                     .overlap = spectrum->settings.overlap,
-                     .window = (uint64_t)spectrum->settings.window,
-                     .detrend = (uint64_t)spectrum->settings.detrend,
-                     .segments = spectrum->segments,
-                     .rows = spectrum->densities.rows};
+                     .is_unlisted = response->is_unlisted,
+                     .has_spectrum = outcome->spectrum.densities.count > 0};
     memcpy(head.layout, blob_layout, sizeof head.layout);
     return head;
 }
@@ -76,18 +74,27 @@ void series_blob_write(Bytes *bytes, const Columns *columns) {
 
 void outcome_blob_write(Bytes *bytes, const Outcome *outcome) {
     const Response *response = &outcome->response;
+    const Spectrum *spectrum = &outcome->spectrum;
+    const size_t rows = spectrum->densities.rows;
     const BlobHead head = blob_head(outcome);
     // At once, so that no long blob is copied as it grows.
-    (void)bytes_reserve(bytes,
-                        sizeof head + head.impacts * head.impact_bytes +
-                            head.rows * sizeof(double) * (1 + outcome->spectrum.densities.count));
+    (void)bytes_reserve(bytes, sizeof head + head.impacts * head.impact_bytes +
+                                   rows * sizeof(double) * (1 + spectrum->densities.count));
     bytes_put(bytes, &head, sizeof head);
     blob_put_row(bytes, energy_fields, &response->energy);
-    blob_put_row(bytes, summary_fields, &outcome->summary);
     for (size_t i = 0; i < response->impacts.count; i++)
         blob_put_row(bytes, impact_fields, &response->impacts.at[i]);
-    bytes_put(bytes, outcome->spectrum.frequency, head.rows * sizeof(double));
-    series_blob_write(bytes, &outcome->spectrum.densities);
+    if (head.has_spectrum == 0)
+        return;
+    const BlobSpectrum settings = {.segment = spectrum->settings.segment,
+                                   .overlap = spectrum->settings.overlap,
+                                   .window = (uint64_t)spectrum->settings.window,
+                                   .detrend = (uint64_t)spectrum->settings.detrend,
+                                   .segments = spectrum->segments,
+                                   .rows = rows};
+    bytes_put(bytes, &settings, sizeof settings);
+    bytes_put(bytes, spectrum->frequency, rows * sizeof(double));
+    series_blob_write(bytes, &spectrum->densities);
 }
 
 // Once it is broken it stays so, and reads zeros.
@@ -153,21 +160,23 @@ static void blob_take_impacts(BlobReader *reader, const BlobHead *head, Impacts 
         blob_take_row(reader, impact_fields, &impacts->at[impacts->count]);
 }
 
-static void blob_take_spectrum(BlobReader *reader, const BlobHead *head, Spectrum *spectrum) {
-    spectrum->settings = (WelchSettings){.segment = head->segment,
-                                         .overlap = head->overlap,
-                                         .window = (int)head->window,
-                                         .detrend = (int)head->detrend};
-    spectrum->segments = head->segments;
-    if (head->rows > 0 && blob_allows(reader, head->rows, sizeof(double))) {
-        spectrum->frequency = malloc(head->rows * sizeof(double));
+static void blob_take_spectrum(BlobReader *reader, Spectrum *spectrum) {
+    BlobSpectrum head;
+    blob_take(reader, &head, sizeof head);
+    spectrum->settings = (WelchSettings){.segment = head.segment,
+                                         .overlap = head.overlap,
+                                         .window = (int)head.window,
+                                         .detrend = (int)head.detrend};
+    spectrum->segments = head.segments;
+    if (head.rows > 0 && blob_allows(reader, head.rows, sizeof(double))) {
+        spectrum->frequency = malloc(head.rows * sizeof(double));
         reader->is_broken = spectrum->frequency == NULL;
     }
-    if (head->rows > 0 && !reader->is_broken)
-        blob_take(reader, spectrum->frequency, head->rows * sizeof(double));
+    if (head.rows > 0 && !reader->is_broken)
+        blob_take(reader, spectrum->frequency, head.rows * sizeof(double));
     blob_take_columns(reader, &spectrum->densities);
-    reader->is_broken = reader->is_broken || spectrum->densities.rows != head->rows ||
-                        head->window > WELCH_BLACKMAN || head->detrend > WELCH_DETREND_NONE;
+    reader->is_broken = reader->is_broken || spectrum->densities.rows != head.rows ||
+                        head.window > WELCH_BLACKMAN || head.detrend > WELCH_DETREND_NONE;
 }
 
 Outcome *outcome_blob_read(const void *blob, size_t size) {
@@ -188,9 +197,10 @@ Outcome *outcome_blob_read(const void *blob, size_t size) {
     response->impact_count = head.impact_count;
     response->resting_count = head.resting_count;
     blob_take_row(&reader, energy_fields, &response->energy);
-    blob_take_row(&reader, summary_fields, &outcome->summary);
+    outcome->summary.trust_horizon = head.trust_horizon;
     blob_take_impacts(&reader, &head, &response->impacts);
-    blob_take_spectrum(&reader, &head, &outcome->spectrum);
+    if (head.has_spectrum != 0)
+        blob_take_spectrum(&reader, &outcome->spectrum);
     if (!reader.is_broken && reader.left == 0)
         return outcome;
     outcome_unref(outcome);

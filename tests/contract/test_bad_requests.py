@@ -158,7 +158,7 @@ def test_what_takes_too_long_is_refused_at_the_door():
             assert "at most 60 s are allowed" in reply.json()["errors"][0]["detail"], reply
         names = ["displacement", "velocity", "acceleration", "mean_acceleration", "damper_displacement",
                  "damper_velocity", "penetration", "contact_force", "base_acceleration"]
-        for segment, overlap, says in ((8388593, 7549733, "prime factors"), (8388608, 0, "900 MB can be kept")):
+        for segment, overlap, says in ((8388593, 7549733, "prime factors"), (33554000, 0, "900 MB can be stored")):
             psd = {"channels": names, "segment": segment, "overlap": overlap}
             reply = daemon.submit(sponge(duration=33554, output={"channels": [], "psd": psd}))
             problem(reply, 422, "/output/psd")
