@@ -1,8 +1,9 @@
 // Numbers of eight bytes in the order and form of the machine, which is little-endian. Structs are
 // written by their Field rows: a REAL, COUNT or CHOICE takes eight bytes.
 //
-//     outcome   head | energy | impacts | spectrum, where there is one: head | frequencies |
-//     densities columns   count | rows | names and units | values, column after column
+//     outcome   head | energy | summary | impacts | spectrum, where there is one: head |
+//     frequencies | densities columns   count | rows | names and units | values, column after
+//     column
 #include "server/jobs/outcome_blob.h"
 
 #include <stdlib.h>
@@ -10,10 +11,11 @@
 
 // `layout` and the two sizes tell apart blobs of a program with other rows.
 typedef struct BlobHead {
-    char layout[8];
-    uint32_t energy_bytes, impact_bytes;
-    double sample_rate, trust_horizon;
-    uint64_t count, impacts, impact_count, resting_count;
+    char layout[4];
+    uint16_t energy_bytes, impact_bytes;
+    double sample_rate;
+    uint64_t count, impact_count;
+    uint32_t impacts, resting_count;
     uint32_t is_unlisted, has_spectrum;
 } BlobHead;
 
@@ -21,7 +23,7 @@ typedef struct BlobSpectrum {
     uint64_t segment, overlap, window, detrend, segments, rows;
 } BlobSpectrum;
 
-static const char blob_layout[8] = "outcome2";
+static const char blob_layout[4] = {'o', 'u', 't', '2'};
 
 static bool blob_has(const Field *field) {
     return field->kind == FIELD_KIND_REAL || field->kind == FIELD_KIND_COUNT ||
@@ -37,14 +39,14 @@ static uint64_t blob_row_bytes(const Field *fields) {
 
 static BlobHead blob_head(const Outcome *outcome) {
     const Response *response = &outcome->response;
-    BlobHead head = {.energy_bytes = (uint32_t)blob_row_bytes(energy_fields),
-                     .impact_bytes = (uint32_t)blob_row_bytes(impact_fields),
+    BlobHead head = {.energy_bytes =
+                         (uint16_t)(blob_row_bytes(energy_fields) + blob_row_bytes(summary_fields)),
+                     .impact_bytes = (uint16_t)blob_row_bytes(impact_fields),
                      .sample_rate = response->sample_rate,
-                     .trust_horizon = outcome->summary.trust_horizon,
                      .count = response->count,
-                     .impacts = response->impacts.count,
+                     .impacts = (uint32_t)response->impacts.count,
                      .impact_count = response->impact_count,
-                     .resting_count = response->resting_count,
+                     .resting_count = (uint32_t)response->resting_count,
                      .is_unlisted = response->is_unlisted,
                      .has_spectrum = outcome->spectrum.densities.count > 0};
     memcpy(head.layout, blob_layout, sizeof head.layout);
@@ -82,6 +84,7 @@ void outcome_blob_write(Bytes *bytes, const Outcome *outcome) {
                                    rows * sizeof(double) * (1 + spectrum->densities.count));
     bytes_put(bytes, &head, sizeof head);
     blob_put_row(bytes, energy_fields, &response->energy);
+    blob_put_row(bytes, summary_fields, &outcome->summary);
     for (size_t i = 0; i < response->impacts.count; i++)
         blob_put_row(bytes, impact_fields, &response->impacts.at[i]);
     if (head.has_spectrum == 0)
@@ -197,7 +200,7 @@ Outcome *outcome_blob_read(const void *blob, size_t size) {
     response->impact_count = head.impact_count;
     response->resting_count = head.resting_count;
     blob_take_row(&reader, energy_fields, &response->energy);
-    outcome->summary.trust_horizon = head.trust_horizon;
+    blob_take_row(&reader, summary_fields, &outcome->summary);
     blob_take_impacts(&reader, &head, &response->impacts);
     if (head.has_spectrum != 0)
         blob_take_spectrum(&reader, &outcome->spectrum);

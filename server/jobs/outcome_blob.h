@@ -7,7 +7,7 @@
 #include "server/util/bytes.h"
 
 void outcome_blob_write(Bytes *bytes, const Outcome *outcome);
-// An outcome without series and of its summary the trust horizon alone, with one reference. NULL
+// An outcome without series, with one reference. NULL
 // for anything that outcome_blob_write did not write, and without memory.
 Outcome *outcome_blob_read(const void *blob, size_t size);
 
