@@ -12,7 +12,6 @@
 
 #include "server/db/data_dir.h"
 #include "server/db/db_private.h"
-#include "server/db/material_memory.h"
 #include "server/db/sqlite.h"
 #include "server/db/writer.h"
 #include "server/util/embedded.h"

@@ -16,7 +16,11 @@ void db_enqueue(Db *db, StoreApply *apply, const void *work, WritePriority prior
                 PendingWrite *write);
 
 atomic_uint_fast64_t *db_evictions(Db *db); // of series
-struct MaterialMemory *db_material_memory(Db *db);
+
+typedef struct MaterialMemory MaterialMemory; // cached revisions of materials
+MaterialMemory *material_memory_new(void);    // NULL without memory
+void material_memory_free(MaterialMemory *memory);
+MaterialMemory *db_material_memory(Db *db);
 
 typedef struct RecordMemory RecordMemory; // samples of records, each once
 RecordMemory *record_memory_new(void);    // NULL without memory

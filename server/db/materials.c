@@ -7,7 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/db/material_memory.h"
 #include "server/db/material_rows.h"
 #include "server/json/encode.h"
 #include "server/json/parse.h"

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "core/base/status.h"
-#include "server/util/hashmap.h"
+#include "server/util/lru.h"
 
 // The texts stand behind the struct, in one block.
 ResultSummary *result_summary_new(const ResultRow *row) {
@@ -44,106 +44,75 @@ void result_summary_unref(ResultSummary *summary) {
         free(summary);
 }
 
-typedef struct Entry {
-    HashMapEntry indexed; // by id
-    struct Entry *newer, *older;
-    Outcome *outcome;    // or NULL
-    ResultSummary *head; // or NULL
-    size_t series_bytes, head_bytes;
+typedef struct CachedResult {
+    LruEntry entry;         // by id
+    Outcome *outcome;       // or NULL
+    ResultSummary *summary; // or NULL
+    size_t series_bytes, summary_bytes;
     char id[72];
-} Entry;
+} CachedResult;
 
 struct Cache {
-    HashMap *index;
-    Entry *newest, *oldest;
-    size_t most_bytes;
-    CacheStats series, heads;
+    Lru *lru;
+    CacheStats series, summaries;
 };
 
-Cache *cache_new(size_t most_bytes) {
+static void cache_release(LruEntry *entry, void *owner, bool is_evicted) {
+    Cache *cache = owner;
+    CachedResult *result = (CachedResult *)(void *)entry;
+    cache->series.evictions += is_evicted && result->outcome != NULL;
+    cache->summaries.evictions += is_evicted && result->summary != NULL;
+    cache->series.count -= result->outcome != NULL;
+    cache->summaries.count -= result->summary != NULL;
+    cache->series.bytes -= result->series_bytes;
+    cache->summaries.bytes -= result->summary_bytes;
+    outcome_unref(result->outcome);
+    result_summary_unref(result->summary);
+    free(result);
+}
+
+Cache *cache_new(size_t max_bytes) {
     Cache *cache = calloc(1, sizeof *cache);
     if (cache == NULL)
         return NULL;
-    cache->most_bytes = most_bytes;
-    cache->index = hashmap_new();
-    if (cache->index == NULL) {
+    cache->lru = lru_new(max_bytes, cache_release, cache);
+    if (cache->lru == NULL) {
         free(cache);
         return NULL;
     }
     return cache;
 }
 
-static void unlink_entry(Cache *cache, Entry *entry) {
-    *(entry->newer != NULL ? &entry->newer->older : &cache->newest) = entry->older;
-    *(entry->older != NULL ? &entry->older->newer : &cache->oldest) = entry->newer;
-}
-
-static void link_newest(Cache *cache, Entry *entry) {
-    entry->newer = NULL;
-    entry->older = cache->newest;
-    *(cache->newest != NULL ? &cache->newest->newer : &cache->oldest) = entry;
-    cache->newest = entry;
-}
-
-static void evict(Cache *cache, Entry *entry) {
-    unlink_entry(cache, entry);
-    hashmap_remove(cache->index, &entry->indexed);
-    cache->series.bytes -= entry->series_bytes;
-    cache->heads.bytes -= entry->head_bytes;
-    cache->series.count -= entry->outcome != NULL;
-    cache->heads.count -= entry->head != NULL;
-    outcome_unref(entry->outcome);
-    result_summary_unref(entry->head);
-    free(entry);
-}
-
 void cache_free(Cache *cache) {
     if (cache == NULL)
         return;
-    while (cache->oldest != NULL)
-        evict(cache, cache->oldest);
-    hashmap_free(cache->index);
+    lru_free(cache->lru);
     free(cache);
 }
 
-void cache_put(Cache *cache, const char *id, Outcome *outcome, ResultSummary *head) {
-    Entry *old = hashmap_find(cache->index, id), *entry = calloc(1, sizeof *entry);
-    if (entry == NULL)
+void cache_put(Cache *cache, const char *id, Outcome *outcome, ResultSummary *summary) {
+    const CachedResult *old = lru_peek(cache->lru, id);
+    CachedResult *result = calloc(1, sizeof *result);
+    if (result == NULL)
         return;
-    text_fit(entry->id, sizeof entry->id, id);
-    Outcome *kept = outcome != NULL ? outcome : old != NULL ? old->outcome : NULL;
-    if (kept != NULL)
-        entry->outcome = outcome_ref(kept);
-    entry->head = result_summary_ref(head != NULL ? head : old != NULL ? old->head : NULL);
-    if (old != NULL)
-        evict(cache, old);
-    entry->series_bytes = kept != NULL ? outcome_bytes(kept) : 0;
-    entry->head_bytes = sizeof *entry + (entry->head != NULL ? entry->head->bytes : 0);
-    entry->indexed.key = entry->id;
-    hashmap_add(cache->index, &entry->indexed);
-    link_newest(cache, entry);
-    cache->series.bytes += entry->series_bytes;
-    cache->heads.bytes += entry->head_bytes;
-    cache->series.count += entry->outcome != NULL;
-    cache->heads.count += entry->head != NULL;
-    while (cache->series.bytes + cache->heads.bytes > cache->most_bytes && cache->oldest != entry) {
-        cache->series.evictions += cache->oldest->outcome != NULL;
-        cache->heads.evictions += cache->oldest->head != NULL;
-        evict(cache, cache->oldest);
-    }
-}
-
-static Entry *use(Cache *cache, const char *id) {
-    Entry *entry = hashmap_find(cache->index, id);
-    if (entry != NULL) {
-        unlink_entry(cache, entry);
-        link_newest(cache, entry);
-    }
-    return entry;
+    text_fit(result->id, sizeof result->id, id);
+    outcome = outcome != NULL ? outcome : old != NULL ? old->outcome : NULL;
+    summary = summary != NULL ? summary : old != NULL ? old->summary : NULL;
+    result->outcome = outcome != NULL ? outcome_ref(outcome) : NULL;
+    result->summary = result_summary_ref(summary);
+    result->series_bytes = outcome != NULL ? outcome_bytes(outcome) : 0;
+    result->summary_bytes = sizeof *result + (summary != NULL ? summary->bytes : 0);
+    result->entry.indexed.key = result->id;
+    result->entry.bytes = result->series_bytes + result->summary_bytes;
+    cache->series.bytes += result->series_bytes;
+    cache->summaries.bytes += result->summary_bytes;
+    cache->series.count += outcome != NULL;
+    cache->summaries.count += summary != NULL;
+    lru_add(cache->lru, &result->entry);
 }
 
 Outcome *cache_find(Cache *cache, const char *id) {
-    Entry *entry = use(cache, id);
+    const CachedResult *entry = lru_find(cache->lru, id);
     const bool is_hit = entry != NULL && entry->outcome != NULL;
     cache->series.hits += is_hit;
     cache->series.misses += !is_hit;
@@ -151,26 +120,26 @@ Outcome *cache_find(Cache *cache, const char *id) {
 }
 
 ResultSummary *cache_head(Cache *cache, const char *id) {
-    Entry *entry = use(cache, id);
-    const bool is_hit = entry != NULL && entry->head != NULL;
-    cache->heads.hits += is_hit;
-    cache->heads.misses += !is_hit;
-    return is_hit ? result_summary_ref(entry->head) : NULL;
+    const CachedResult *entry = lru_find(cache->lru, id);
+    const bool is_hit = entry != NULL && entry->summary != NULL;
+    cache->summaries.hits += is_hit;
+    cache->summaries.misses += !is_hit;
+    return is_hit ? result_summary_ref(entry->summary) : NULL;
 }
 
 bool cache_has(const Cache *cache, const char *id, bool with_series) {
-    const Entry *entry = hashmap_find(cache->index, id);
-    return entry != NULL && (with_series ? entry->outcome != NULL : entry->head != NULL);
+    const CachedResult *entry = lru_peek(cache->lru, id);
+    return entry != NULL && (with_series ? entry->outcome != NULL : entry->summary != NULL);
 }
 
 void cache_forget(Cache *cache, const char *id) {
-    Entry *entry = hashmap_find(cache->index, id);
+    CachedResult *entry = lru_peek(cache->lru, id);
     if (entry != NULL)
-        evict(cache, entry);
+        lru_remove(cache->lru, &entry->entry);
 }
 
-void cache_tally(const Cache *cache, CacheStats *series, CacheStats *heads) {
+void cache_tally(const Cache *cache, CacheStats *series, CacheStats *summaries) {
     *series = cache->series;
-    *heads = cache->heads;
-    series->most_bytes = heads->most_bytes = cache->most_bytes;
+    *summaries = cache->summaries;
+    series->most_bytes = summaries->most_bytes = lru_stats(cache->lru).max_bytes;
 }

@@ -1,6 +1,5 @@
-// What is known of results in memory, by their id, up to a budget of bytes: the documents that a
-// job tells of them and, where they are kept, the series; the longest unused one goes first. Not
-// locked: the intake's lock guards it. Used by the jobs room.
+// Results in memory by their id, up to a budget of bytes: their summaries and, where kept, their
+// series. The lock of the job manager guards it.
 #ifndef SERVER_JOBS_CACHE_H
 #define SERVER_JOBS_CACHE_H
 
@@ -21,18 +20,17 @@ void result_summary_unref(ResultSummary *summary);
 
 typedef struct Cache Cache;
 
-Cache *cache_new(size_t most_bytes); // NULL without memory
+Cache *cache_new(size_t max_bytes); // NULL without memory
 void cache_free(Cache *cache);
 
-// Keeps holds of its own; of `outcome` and `head` what is not NULL takes the place of what was
-// there. The newest one is kept even if it is larger than the budget, so that whoever asked for it
-// finds it. Without memory nothing is kept.
-void cache_put(Cache *cache, const char *id, Outcome *outcome, ResultSummary *head);
-Outcome *cache_find(Cache *cache, const char *id);       // a hold for the caller, or NULL
-ResultSummary *cache_head(Cache *cache, const char *id); // a hold for the caller, or NULL
-bool cache_has(const Cache *cache, const char *id, bool with_series); // is not a use of it
+// Takes references of its own; NULL for `outcome` or `summary` keeps what is cached of it. The
+// newest result is kept even if it is larger than the budget. Without memory nothing is cached.
+void cache_put(Cache *cache, const char *id, Outcome *outcome, ResultSummary *summary);
+Outcome *cache_find(Cache *cache, const char *id);                    // a reference, or NULL
+ResultSummary *cache_head(Cache *cache, const char *id);              // a reference, or NULL
+bool cache_has(const Cache *cache, const char *id, bool with_series); // not a use
 void cache_forget(Cache *cache, const char *id);
-// Of the series, and of the documents: how often asked for, and kept. Both share the budget.
-void cache_tally(const Cache *cache, CacheStats *series, CacheStats *heads);
+// Of the series and of the summaries, which share the budget.
+void cache_tally(const Cache *cache, CacheStats *series, CacheStats *summaries);
 
 #endif

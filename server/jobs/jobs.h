@@ -62,7 +62,6 @@ typedef struct Submission {
     const char *text; // the scene's JSON, perhaps with a study
     size_t size;
     const char *client;          // its token's name; NULL: none
-    const char *address;         // of the client without a token; NULL: unknown
     const char *idempotency_key; // as it came, perhaps in quotes; NULL: none
     bool *is_replayed;           // set where the job is an earlier request's; may be NULL
     // Instead of a text the id of a finished job: those points of its sweep that failed are made

@@ -12,7 +12,6 @@
 #include "server/jobs/jobs_private.h"
 #include "server/jobs/limits.h"
 #include "server/jobs/resolve_record.h"
-#include "server/jobs/sweep_retry.h"
 #include "server/json/encode.h"
 #include "server/util/bytes.h"
 #include "server/util/clock.h"
@@ -271,8 +270,7 @@ static void submit_fail_row(JobRow *row, const Problem *problem) {
     row->finished_unix_ms = clock_unix_ms();
 }
 
-// The client of the queue, if it may submit one more now. Those without a token share one quota,
-// but their jobs are queued by address.
+// The client of the queue, if it may submit one more now. Those without a token are one client.
 static Status submit_enter_client(JobManager *manager, const char *name, QueueClient **client,
                                   Problem *problem) {
     Status status = STATUS_OK;
@@ -332,12 +330,68 @@ static Status submit_scene(JobManager *manager, const Submission *submission,
     return status;
 }
 
+static Status retry_find(JobManager *manager, const char *id, SweepRow *row, Problem *problem) {
+    Job *job = NULL;
+    char result[72];
+    TRY(jobs_find(manager, id, &job, problem));
+    const bool is_finished = job_is_finished(job);
+    memcpy(result, job->row.result, sizeof result); // never changes
+    job_unref(job);
+    if (!is_finished)
+        return problem_set(problem, STATUS_CONFLICT,
+                           "the job %.40s is not finished: its failed points can be made again "
+                           "when it is",
+                           id);
+    TRY(db_sweep_load(manager->db, result, row, problem));
+    if (!db_result_exists(manager->db, result))
+        return problem_set(problem, STATUS_CONFLICT,
+                           "the sweep was not brought to an end: submit its scene again");
+    return STATUS_OK;
+}
+
+// Failed points of another engine version cannot be computed by this one.
+static Status retry_check_engine(JobManager *manager, const SweepRow *row, Problem *problem) {
+    StudyRequest inquiry = {0};
+    Warnings warnings = {NULL, 0};
+    char result[72] = "";
+    Status status = jobs_prepare(manager->db, row->scene, strlen(row->scene), NULL, &inquiry,
+                                 &warnings, problem);
+    if (status == STATUS_OK)
+        jobs_result_id(&inquiry, result);
+    if (status == STATUS_OK && strcmp(result, row->result) != 0)
+        status = problem_set(problem, STATUS_GONE,
+                             "the sweep was made by another engine version, this is %s: POST to "
+                             "/v1/results/%.72s/again, which submits its scene anew",
+                             engine_version, row->result);
+    study_request_clear(&inquiry);
+    warnings_clear(&warnings);
+    return status;
+}
+
+// With the lock of retries held, so that no chunk of a sweep under way is opened.
+static Status retry_reopen(JobManager *manager, const char *result, Problem *problem) {
+    pthread_mutex_lock(&manager->lock);
+    const Task *task = hashmap_find(manager->tasks, result);
+    const bool is_under_way = task != NULL && !task->recompute_only;
+    pthread_mutex_unlock(&manager->lock);
+    return is_under_way ? STATUS_OK : db_sweep_reopen(manager->db, result, problem);
+}
+
+// The sweep of the finished job `id` with its failed points to be made again. A retry that is under
+// way already is shared. `row` is cleared by sweep_row_clear in any case.
+static Status retry_open(JobManager *manager, const char *id, SweepRow *row, Problem *problem) {
+    memset(row, 0, sizeof *row);
+    TRY(retry_find(manager, id, row, problem));
+    TRY(retry_check_engine(manager, row, problem));
+    return retry_reopen(manager, row->result, problem);
+}
+
 static Status submit_retry(JobManager *manager, const Submission *submission,
                            const IdempotencyKey *key, Job **accepted, bool *is_replayed,
                            Problem *problem) {
     SweepRow row;
     pthread_mutex_lock(&manager->retries);
-    Status status = sweep_retry_open(manager, submission->retry_of, &row, problem);
+    Status status = retry_open(manager, submission->retry_of, &row, problem);
     if (status == STATUS_OK) {
         Submission scene = *submission;
         scene.text = row.scene;
