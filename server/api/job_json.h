@@ -10,7 +10,7 @@ enum {
     JOB_PUT_WHOLE =
         1, // with plan, summary, work and warnings, as one job is shown; without, as in a list
     JOB_PUT_LINKS = 2,  // where a server has it; without, "links" is empty
-    JOB_PUT_SENDER = 4, // who sent it, if anybody in particular; whoever sends it knows
+    JOB_PUT_SENDER = 4, // its sender, if it had a token
 };
 
 void job_json_put(Bytes *bytes, const JobView *show, int parts);

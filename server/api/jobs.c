@@ -82,7 +82,7 @@ static Status wait_begin(const Request *request, Reply *reply, Job *job, JobEven
 }
 
 // Takes the reference to `job`. Waits for it to finish, until `seconds` after the request came, and
-// in any case until it is durable: no client is told of it before.
+// in any case until it is durable: no client is given its id before.
 static Status answer_job(App *app, const Request *request, Reply *reply, Job *job, double seconds,
                          int code, Problem *problem) {
     const double passed = 1e-9 * (double)(clock_monotonic_ns() - request->started_ns);

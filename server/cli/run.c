@@ -67,7 +67,7 @@ static Status whole_write(Outcome *outcome, const Bytes *job, Bytes *bytes, Prob
     return STATUS_OK;
 }
 
-// A job of nobody's queue, finished.
+// A finished job that was in no queue.
 static Status job_write(const StudyRequest *inquiry, const Warnings *warnings,
                         const Outcome *outcome, const int64_t began_unix_ms, double took,
                         Bytes *bytes) {
@@ -162,7 +162,7 @@ static Status scene_prepare_and_run(const char *path, const Bytes *text, void *o
                         "or the daemon; `impactd tradeoff` and `impactd ensemble` print theirs");
     if (status == STATUS_OK) {
         scene_file_warn(path, &warnings);
-        // Before the run, so that a wrong folder is told now and not after it.
+        // Before the run, so that a wrong folder is reported at once.
         if (settings->output != NULL)
             status = output_open(settings->output, problem);
         if (status == STATUS_OK)

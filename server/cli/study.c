@@ -160,7 +160,7 @@ static Status study_scene(const char *path, const Bytes *text, void *of, Problem
         own.kind = study_kind(inquiry.study);
         status = study_check_outputs(&own, outputs, problem);
     }
-    // Before the runs, so that a wrong folder is told now and not after them.
+    // Before the runs, so that a wrong folder is reported at once.
     for (size_t i = 0; i < outputs->count && status == STATUS_OK; i++) {
         status = output_open(outputs->at[i], problem);
         output_drop();
@@ -432,7 +432,7 @@ static void ensemble_print(const Variant *answer) {
     if (target->why == NULL)
         return;
     if (target->predicted_runs != COUNT_ABSENT)
-        printf("After %llu runs, %llu were foretold to be enough.\n",
+        printf("After %llu runs, %llu were predicted to be enough.\n",
                (unsigned long long)target->pilot, (unsigned long long)target->predicted_runs);
     printf("Target %s: %s.\n", target->is_kept ? "kept" : "not kept", target->why);
 }

@@ -43,7 +43,7 @@ static Status create(Db *db, const TokenSettings *settings, TokenRow *row, Probl
     TRY(token_make(settings->scopes != NULL ? settings->scopes : "read,submit", expires_unix_ms,
                    row, made, problem));
     TRY(db_token_add(db, row, problem));
-    // A token that nobody has seen must not exist: it would make every request need one.
+    // A token that was not shown must not exist: it would make every request need one.
     (void)signal(SIGPIPE, SIG_IGN);
     if (printf("%s\n", made) < 0 || fflush(stdout) != 0) {
         const int code = errno;

@@ -49,7 +49,7 @@ typedef struct PendingWrite {
 } PendingWrite;
 
 // Rises whenever a name in a scene may come to mean something else, or be warned of otherwise: a
-// material's head, a review, a record. Whoever writes those calls db_catalog_changed once it
+// material's head, a review, a record. A writer of those calls db_catalog_changed once it
 // is durable.
 uint64_t db_catalog_version(Db *db);
 void db_catalog_changed(Db *db);
@@ -81,7 +81,7 @@ typedef struct JobRow {
     char *labels;          // JSON array of texts; NULL: none
     char *words;           // what is searched: job_words; NULL: nothing
     char *study;           // the kind of its study; NULL: none
-    char *client;          // who sent it; NULL: nobody in particular
+    char *client;          // its sender; NULL: none
     char *idempotency_key; // NULL: none
     char *request;         // with a key: SHA-256 of the body it came with
     char *uses;      // when added: the records it names, "record:elcentro", a line each, which
@@ -105,7 +105,7 @@ Status db_job_load(Db *db, const char *id, JobRow *row, Problem *problem);
 // The scene that it asked for, to be freed: canonical JSON. STATUS_NOT_FOUND; STATUS_GONE where it
 // went with a deleted result.
 Status db_job_scene(Db *db, const char *id, char **scene, Problem *problem);
-// The job that `client` (NULL: nobody in particular) sent under that key. STATUS_NOT_FOUND.
+// The job that `client` (NULL: none) sent under that key. STATUS_NOT_FOUND.
 Status db_job_keyed(Db *db, const char *client, const char *key, JobRow *row, Problem *problem);
 typedef struct JobRows {
     JobRow *at;

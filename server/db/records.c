@@ -272,7 +272,7 @@ static NamedRecord *memory_find(RecordMemory *memory, uint64_t catalog_version, 
     return named;
 }
 
-// With the lock held, without which nobody else gets a reference.
+// With the lock held, without which no other thread gets a reference.
 static void memory_evict(RecordMemory *memory) {
     size_t bytes = 0;
     for (Entry **at = &memory->first; *at != NULL;) {

@@ -605,7 +605,7 @@ static const char settings[] = "PRAGMA synchronous = FULL;"
                                "PRAGMA trusted_schema = OFF;"
                                "PRAGMA foreign_keys = ON;";
 
-// Of a file that is filled once and then synced by whoever has it filled.
+// For a file that is filled once and then synced by the caller.
 static const char copy_settings[] = "PRAGMA locking_mode = EXCLUSIVE;"
                                     "PRAGMA journal_mode = MEMORY;"
                                     "PRAGMA synchronous = OFF;";

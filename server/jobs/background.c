@@ -1,4 +1,4 @@
-// All under one lock of the BackgroundTasks, which nobody holds for long.
+// All under one lock of the BackgroundTasks, which is never held for long.
 #include "server/jobs/background.h"
 
 #include <pthread.h>

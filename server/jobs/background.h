@@ -11,7 +11,8 @@ typedef struct BackgroundTasks BackgroundTasks;
 typedef struct BackgroundTask BackgroundTask;
 
 Status background_open(size_t most, BackgroundTasks **background_tasks, Problem *problem);
-// Stops all that runs, waits for it and frees what is left; then nobody may hold an BackgroundTask.
+// Stops all that runs, waits for it and frees what is left; no BackgroundTask may be referenced any
+// more.
 void background_close(BackgroundTasks *background_tasks);
 
 typedef struct BackgroundWork {

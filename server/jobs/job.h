@@ -44,7 +44,7 @@ typedef struct JobView {
     struct ResultSummary *head; // holds plan, summary, work and notes; NULL: they are the maker's
     char *labels;               // JSON array; NULL: none
     char *study;                // the kind of its study; NULL: none
-    char *client;               // who sent it: a token's name; NULL: nobody in particular
+    char *client;               // who sent it: a token's name; NULL: none
     bool is_result_deleted;
     uint64_t points, points_done, points_failed; // of a sweep that is under way; 0: none is
 } JobView;

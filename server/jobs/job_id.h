@@ -12,7 +12,7 @@ enum { JOB_ID_LENGTH = 32 };
 // told the next) and 16 random ones: 64 bits. False without random numbers.
 bool job_id_make(char id[40]);
 
-// When the job of this name came; -1 where it is nobody's name.
+// When the job of this id was submitted; -1 where it is no job's id.
 int64_t job_id_unix_ms(const char *id);
 
 #endif

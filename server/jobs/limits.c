@@ -1,8 +1,8 @@
-// Jobs a minute by a bucket that fills steadily and holds a minute's worth. Whoever has no name
-// shares theirs with everybody, so only the queue's own bounds hold for them.
+// Rate limit: a bucket of jobs that fills steadily and holds those of one minute. Clients without a
+// token share one client and have no rate limit; the limits of the queue apply to them.
 //
-// When to come back: a place is free when the first of the running computations ends, which is told
-// by its progress, and by what was foretold and how far that is off of late.
+// Retry-After: a place is free when the first running computation ends, which is predicted from its
+// progress, the estimated CPU time and the recent bias of the estimates.
 #include "server/jobs/limits.h"
 
 #include <math.h>

@@ -1,5 +1,5 @@
-// Between clients: whoever was given the least CPU time goes next. Time is counted when work is
-// taken, as foretold; a client that comes back starts at what the others have reached, so that
+// Between clients: the one that was given the least CPU time goes next. Time is counted when work
+// is taken, as predicted; a client that comes back starts at what the others have reached, so that
 // neither idling nor new names save anything up. With equal jobs this is round robin.
 //
 // For one client: by rank = arrival + PATIENCE * seconds, so a job of 1 s is passed by quicker ones

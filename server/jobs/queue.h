@@ -11,7 +11,7 @@
 
 typedef struct Queue Queue;
 
-// Who sends jobs: the name of a token, "" for nobody in particular. There are as many as tokens;
+// Who sends jobs: the name of a token, "" for clients without a token. There are as many as tokens;
 // each lives as long as the queue.
 typedef struct QueueClient {
     struct QueueClient *next;
@@ -19,7 +19,7 @@ typedef struct QueueClient {
     double allowance;   // jobs it may send now, and when that was so; see quota.h
     int64_t allowed_ns; // 0: never asked
     size_t waiting;     // entries
-    double served;      // [s] of CPU foretold for what it was given
+    double served;      // predicted CPU time of what it was given [s]
     double ordinary;    // of these, since the last turn
     struct QueueEntry *lanes[3];
     char name[];
@@ -29,7 +29,7 @@ typedef struct QueueClient {
 typedef struct QueueEntry {
     struct QueueEntry *child, *next, *previous;
     QueueClient *client; // NULL: ahead of all
-    double seconds;      // of CPU foretold
+    double seconds;      // predicted CPU time
     double charge;       // of these, what its client is counted when it is taken; 0: all
     bool is_turn; // of long work that is done bit by bit: it goes between a client's ordinary work
     double rank;
@@ -56,6 +56,6 @@ void queue_remove(Queue *queue, QueueEntry *entry); // fine if it does not wait
 void queue_rebalance(Queue *queue, QueueEntry *entry, QueueClient *client);
 
 size_t queue_count(const Queue *queue);
-double queue_seconds(const Queue *queue); // of CPU foretold for all that wait
+double queue_seconds(const Queue *queue); // predicted CPU time of all that wait
 
 #endif

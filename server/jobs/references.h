@@ -1,5 +1,4 @@
-// What of the catalogue an inquiry names: the lines that are kept beside its result. Not where they
-// are kept (store/). Used by worker.c when a result is described, and by whoever lists them.
+// The materials and records that a study request names, as lines stored beside its result.
 #ifndef SERVER_JOBS_REFERENCES_H
 #define SERVER_JOBS_REFERENCES_H
 

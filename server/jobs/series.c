@@ -94,7 +94,7 @@ static Outcome *load_series(JobManager *manager, const char *result) {
     return outcome;
 }
 
-// With the lock held: a failure of an earlier computation for readers is told once.
+// With the lock held: a failure of an earlier computation for readers is reported once.
 static Status tell_failure(JobManager *manager, const char *result, Problem *problem) {
     for (size_t i = 0; i < OUTCOME_FAILURES; i++) {
         Failure *failure = &manager->failures[i];

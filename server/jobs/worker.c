@@ -1,6 +1,6 @@
 // A worker takes computations from the queue, runs them, hands what they came to to be saved, and
-// takes the next. A computation stopped because nobody wants it leaves no trace; one stopped
-// because the daemon ends leaves its jobs unfinished in the store.
+// takes the next. A computation stopped because it is not wanted any more leaves no trace; one
+// stopped because the daemon ends leaves its jobs unfinished in the store.
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,6 +1,6 @@
 // Files that stand inside the binary, written by server/embed.cmake: SQL, schemas, examples, the
 // dashboard. Not a file system: the rows are constant and nothing is read from disk. Used by store/
-// (sql) and by whoever serves the others.
+// (sql) and served by the API.
 #ifndef SERVER_UTIL_EMBEDDED_H
 #define SERVER_UTIL_EMBEDDED_H
 

@@ -20,7 +20,7 @@ void log_put(Bytes *bytes, const char *name, const char *text, size_t most) {
     bytes_text(bytes, strnlen(text, most + 1) > most ? "...\"" : "\"");
 }
 
-// A pipe that nobody empties must not hold up who writes: where there is no room the line is lost.
+// A full pipe must not block the writer: where there is no room the line is dropped.
 // The lock keeps the room that was found for the line that it was found for.
 void log_write(const Bytes *line) {
     static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
@@ -32,7 +32,7 @@ void log_write(const Bytes *line) {
     if (poll(&end, 1, 0) == 0) {
         lost++;
     } else if (lost > 0) {
-        fprintf(stderr, "impactd: %lu lines were lost, nobody took them\nimpactd: %s\n", lost,
+        fprintf(stderr, "impactd: %lu log lines dropped (stderr blocked)\nimpactd: %s\n", lost,
                 line->at);
         lost = 0;
     } else {

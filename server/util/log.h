@@ -9,7 +9,8 @@
 // `text` as name="..." with a blank before it: control characters, quotes, backslashes and bytes
 // beyond ASCII become \xNN, and what is longer than `most` bytes is cut and marked. NULL: nothing.
 void log_put(Bytes *bytes, const char *name, const char *text, size_t most);
-// "impactd: " and the line, in one write. Never waits: what nobody takes is lost, and counted.
+// "impactd: " and the line, in one write. Never waits: a line that finds no room is dropped and
+// counted.
 void log_write(const Bytes *line);
 
 #endif

@@ -60,28 +60,16 @@ Status thread_pool_open(size_t max_threads, ThreadPool **pool, Problem *problem)
     return STATUS_OK;
 }
 
-static bool thread_pool_offer(ThreadPool *pool, WorkItem *item, bool waits) {
+void thread_pool_add(ThreadPool *pool, WorkItem *item) {
     item->next = NULL;
     pthread_mutex_lock(&pool->lock);
     if (pool->unfinished >= pool->count && pool->count < pool->max_threads)
         thread_pool_start_thread(pool);
-    const bool is_taken = waits || pool->unfinished < pool->count;
-    if (is_taken) {
-        *pool->last = item;
-        pool->last = &item->next;
-        pool->unfinished++;
-        pthread_cond_signal(&pool->has_work);
-    }
+    *pool->last = item;
+    pool->last = &item->next;
+    pool->unfinished++;
+    pthread_cond_signal(&pool->has_work);
     pthread_mutex_unlock(&pool->lock);
-    return is_taken;
-}
-
-void thread_pool_add(ThreadPool *pool, WorkItem *item) {
-    (void)thread_pool_offer(pool, item, true);
-}
-
-bool thread_pool_add_if_free(ThreadPool *pool, WorkItem *item) {
-    return thread_pool_offer(pool, item, false);
 }
 
 void thread_pool_close(ThreadPool *pool) {

@@ -18,8 +18,6 @@ typedef struct WorkItem {
 
 Status thread_pool_open(size_t max_threads, ThreadPool **pool, Problem *problem);
 void thread_pool_add(ThreadPool *pool, WorkItem *item); // from any thread
-// The same if a thread is free or can be started; else false.
-bool thread_pool_add_if_free(ThreadPool *pool, WorkItem *item);
 // Runs what was added, then ends the threads; nothing may be added any more. NULL is accepted.
 void thread_pool_close(ThreadPool *pool);
 

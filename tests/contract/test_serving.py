@@ -165,7 +165,7 @@ def test_a_journal_that_nobody_reads_holds_up_nobody():
                 os.read(taken, 4096)
         os.set_blocking(taken, True)
         assert daemon.get("/version").status == 200
-        assert os.read(taken, 4096).startswith(b"impactd: 20 lines were lost")
+        assert os.read(taken, 4096).startswith(b"impactd: 20 log lines dropped")
         code, _ = daemon.stop()
         assert code == 0
 
