@@ -168,7 +168,7 @@ def test_a_target_is_kept_with_fewer_runs():
             part, out = answer("--target", "0.1", "--metric", metric)
             told = part["target"]
             assert 8 <= part["made"] < 200 and told["is_kept"] and told["estimated_error"] <= 0.1, told
-            assert told["pilot"] == 8 and f"{told['predicted_runs']} were foretold" in out
+            assert told["pilot"] == 8 and f"{told['predicted_runs']} were predicted to be enough" in out
             assert part["table"] == whole["table"][:part["made"]]
             if metric == "psd":
                 mean, all_ = (numpy.array(one["spectra"][0]["mean"]) for one in (part, whole))
