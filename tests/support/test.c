@@ -13,21 +13,6 @@ static struct {
     CMFixtureFunction set_up, tear_down;
 } groups[GROUPS];
 
-enum { MAINS = 128 };
-static struct {
-    const char *file;
-    int (*run)(void);
-} mains[MAINS];
-
-void test_main_add(const char *file, int (*run)(void)); // old_main.h
-void test_main_add(const char *file, int (*run)(void)) {
-    int i = 0;
-    while (mains[i].file != NULL)
-        i++;
-    mains[i].file = file;
-    mains[i].run = run;
-}
-
 void test_add(Test *test) {
     Test **at = &tests;
     while (*at != NULL) {
@@ -87,12 +72,6 @@ int test_run(int count, char **files) {
         if (test_is_wanted(at->file, count, files)) {
             run++;
             failed += test_run_file(at);
-        }
-    }
-    for (int i = 0; mains[i].file != NULL; i++) {
-        if (test_is_wanted(mains[i].file, count, files)) {
-            run++;
-            failed += mains[i].run() != 0;
         }
     }
     if (run < count || run == 0)

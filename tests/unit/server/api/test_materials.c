@@ -1,15 +1,11 @@
 // A write whose reply cannot be made: nothing is written, so that the client may try again.
 #include "server/api/materials.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdio.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "server/http/reply.h"
+#include "tests/support/test.h"
 
 static App app;
 static Problem problem;
@@ -46,8 +42,7 @@ static Status run(const Write *write, size_t reply_max) {
     return status;
 }
 
-static void a_write_whose_reply_cannot_be_made_writes_nothing(void **state) {
-    (void)state;
+TEST(a_write_whose_reply_cannot_be_made_writes_nothing) {
     static const char json[] = "application/json";
     static const Write writes[] = {
         {materials_create, NULL, NULL, json,
@@ -72,9 +67,4 @@ static void a_write_whose_reply_cannot_be_made_writes_nothing(void **state) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_write_whose_reply_cannot_be_made_writes_nothing),
-    };
-    return cmocka_run_group_tests(tests, open_app, close_app);
-}
+TEST_GROUP(open_app, close_app)

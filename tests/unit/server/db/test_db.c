@@ -4,10 +4,7 @@
 #include "server/db/materials.h"
 
 #include <pthread.h>
-#include <setjmp.h>
 #include <signal.h>
-#include <stdarg.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,9 +13,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <cmocka.h>
-
 #include "server/db/sqlite.h"
+#include "tests/support/test.h"
 
 static char folder[64];
 
@@ -54,8 +50,7 @@ static JobRow job_row(const char *id, int state) {
     return row;
 }
 
-static void the_papers_materials_are_there(void **state) {
-    (void)state;
+TEST(the_papers_materials_are_there) {
     Db *db = open_store(NULL);
     MaterialRevisions materials;
     assert_int_equal(db_material_heads(db, "", 100, &materials, NULL), STATUS_OK);
@@ -80,8 +75,7 @@ static void the_papers_materials_are_there(void **state) {
     db_close(db);
 }
 
-static void jobs_survive_closing_and_are_listed_newest_first(void **state) {
-    (void)state;
+TEST_IN(jobs_survive_closing_and_are_listed_newest_first, make_folder, remove_folder) {
     Db *db = open_store(folder);
     JobRow row;
     const char *const ids[] = {"j-1", "j-2", "j-3"};
@@ -148,8 +142,7 @@ static ResultRow result_row(const char *id) {
     return row;
 }
 
-static void a_result_and_its_jobs_are_saved_together_or_not_at_all(void **state) {
-    (void)state;
+TEST_IN(a_result_and_its_jobs_are_saved_together_or_not_at_all, make_folder, remove_folder) {
     Db *db = open_store(folder);
     JobRow first = job_row("j-1", 0), second = job_row("j-2", 0);
     assert_int_equal(db_job_add(db, &first, NULL), STATUS_OK);
@@ -182,8 +175,7 @@ static void a_result_and_its_jobs_are_saved_together_or_not_at_all(void **state)
     db_close(db);
 }
 
-static void a_second_daemon_is_refused_with_the_folders_name(void **state) {
-    (void)state;
+TEST_IN(a_second_daemon_is_refused_with_the_folders_name, make_folder, remove_folder) {
     Db *db = open_store(folder), *other;
     static Problem problem;
     problem_clear(&problem);
@@ -194,8 +186,7 @@ static void a_second_daemon_is_refused_with_the_folders_name(void **state) {
     db_close(open_store(folder));
 }
 
-static void a_missing_folder_is_made_for_this_user_alone(void **state) {
-    (void)state;
+TEST_IN(a_missing_folder_is_made_for_this_user_alone, make_folder, remove_folder) {
     char deep[128], file[160];
     snprintf(deep, sizeof deep, "%s/a/b", folder);
     db_close(open_store(deep));
@@ -250,8 +241,7 @@ static void hammer_store(const char *directory) {
     db_close(db);
 }
 
-static void a_folder_that_everyone_may_write_to_is_refused(void **state) {
-    (void)state;
+TEST_IN(a_folder_that_everyone_may_write_to_is_refused, make_folder, remove_folder) {
     Db *db;
     static Problem problem;
     static const struct {
@@ -269,14 +259,12 @@ static void a_folder_that_everyone_may_write_to_is_refused(void **state) {
     }
 }
 
-static void sixteen_threads_write_and_no_failure_spoils_another(void **state) {
-    (void)state;
+TEST_IN(sixteen_threads_write_and_no_failure_spoils_another, make_folder, remove_folder) {
     hammer_store(folder);
     hammer_store(NULL);
 }
 
-static void what_was_acknowledged_survives_kill_9(void **state) {
-    (void)state;
+TEST_IN(what_was_acknowledged_survives_kill_9, make_folder, remove_folder) {
     for (int round = 0; round < 3; round++) {
         int pipe_ends[2];
         assert_int_equal(pipe(pipe_ends), 0);
@@ -320,8 +308,7 @@ static void what_was_acknowledged_survives_kill_9(void **state) {
 }
 
 // A limit on file sizes stands in for a full disk: writes fail the same way, for one process alone.
-static void a_full_disk_is_told_and_what_was_there_stays(void **state) {
-    (void)state;
+TEST_IN(a_full_disk_is_told_and_what_was_there_stays, make_folder, remove_folder) {
     const pid_t child = fork();
     assert_true(child >= 0);
     if (child == 0) {
@@ -379,8 +366,7 @@ static Sqlite *open_database(const char *name) {
     return database;
 }
 
-static void a_database_is_migrated_from_each_step(void **state) {
-    (void)state;
+TEST_IN(a_database_is_migrated_from_each_step, make_folder, remove_folder) {
     Sqlite *database = open_database("m.db");
     assert_int_equal(sqlite_migrate(database, one_step, NULL), STATUS_OK);
     assert_int_equal(sqlite_migrate(database, one_step, NULL), STATUS_OK);
@@ -392,8 +378,7 @@ static void a_database_is_migrated_from_each_step(void **state) {
     sqlite_close(database);
 }
 
-static void a_newer_database_and_an_impossible_version_are_refused(void **state) {
-    (void)state;
+TEST_IN(a_newer_database_and_an_impossible_version_are_refused, make_folder, remove_folder) {
     static Problem problem;
     problem_clear(&problem);
     Sqlite *database = open_database("impactd.db");
@@ -408,8 +393,7 @@ static void a_newer_database_and_an_impossible_version_are_refused(void **state)
     sqlite_close(database);
 }
 
-static void a_database_of_another_program_is_refused_and_left_alone(void **state) {
-    (void)state;
+TEST_IN(a_database_of_another_program_is_refused_and_left_alone, make_folder, remove_folder) {
     char command[256];
     snprintf(command, sizeof command,
              "python3 -c \"import sqlite3; c = sqlite3.connect('%s/impactd.db'); c.execute('CREATE "
@@ -429,8 +413,7 @@ static void a_database_of_another_program_is_refused_and_left_alone(void **state
     assert_non_null(strstr(problem.detail, "to begin anew"));
 }
 
-static void revisions_of_materials_never_change(void **state) {
-    (void)state;
+TEST_IN(revisions_of_materials_never_change, make_folder, remove_folder) {
     db_close(open_store(folder));
     Sqlite *database = open_database("impactd.db");
     assert_int_equal(
@@ -462,15 +445,12 @@ static void revisions_of_materials_never_change(void **state) {
     db_close(db);
 }
 
-#define IN_FOLDER(test) cmocka_unit_test_setup_teardown(test, make_folder, remove_folder)
-
 static void note_done(void *context, Status status, const char *detail) {
     (void)detail;
     *(Status *)context = status;
 }
 
-static void series_are_kept_under_a_budget_and_the_longest_unused_goes(void **state) {
-    (void)state;
+TEST_IN(series_are_kept_under_a_budget_and_the_longest_unused_goes, make_folder, remove_folder) {
     Db *db = open_store(folder);
     static Status told[5];
     char *body, id[8];
@@ -504,24 +484,4 @@ static void series_are_kept_under_a_budget_and_the_longest_unused_goes(void **st
     assert_int_equal(db_series_post(db, "r-9", malloc(9000), 9000, 3500, &done), STATUS_LIMIT);
     assert_int_equal(db_series_load(db, "r-9", &body, &size, NULL), STATUS_NOT_FOUND);
     db_close(db);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_papers_materials_are_there),
-        IN_FOLDER(jobs_survive_closing_and_are_listed_newest_first),
-        IN_FOLDER(a_result_and_its_jobs_are_saved_together_or_not_at_all),
-        IN_FOLDER(a_second_daemon_is_refused_with_the_folders_name),
-        IN_FOLDER(a_missing_folder_is_made_for_this_user_alone),
-        IN_FOLDER(a_folder_that_everyone_may_write_to_is_refused),
-        IN_FOLDER(sixteen_threads_write_and_no_failure_spoils_another),
-        IN_FOLDER(what_was_acknowledged_survives_kill_9),
-        IN_FOLDER(a_full_disk_is_told_and_what_was_there_stays),
-        IN_FOLDER(a_database_is_migrated_from_each_step),
-        IN_FOLDER(a_newer_database_and_an_impossible_version_are_refused),
-        IN_FOLDER(a_database_of_another_program_is_refused_and_left_alone),
-        IN_FOLDER(revisions_of_materials_never_change),
-        IN_FOLDER(series_are_kept_under_a_budget_and_the_longest_unused_goes),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

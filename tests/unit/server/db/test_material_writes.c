@@ -1,15 +1,11 @@
 // Writing materials, as far as HTTP does not show it: limits, and the catalog's version.
 #include "server/db/materials.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdint.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "server/db/db_private.h"
 #include "tests/support/felt.h"
+#include "tests/support/test.h"
 
 static uint64_t head_of(Db *db) {
     MaterialRevision found;
@@ -19,8 +15,7 @@ static uint64_t head_of(Db *db) {
     return revision;
 }
 
-static void a_measurement_changes_the_material_but_not_the_catalog(void **state) {
-    (void)state;
+TEST(a_measurement_changes_the_material_but_not_the_catalog) {
     Db *db = felt_store(NULL);
     MaterialRevision one = felt_saying(0.5), head;
     MaterialMeasurement made = {.slug = "felt", .comment = "", .document = "{}"};
@@ -42,8 +37,7 @@ static void change(Db *db, const char *sql) {
     db_put(db, database);
 }
 
-static void materials_revisions_and_bytes_have_limits(void **state) {
-    (void)state;
+TEST(materials_revisions_and_bytes_have_limits) {
     Db *db = felt_store(NULL);
     MaterialRevision one = felt_saying(0.5), other = felt_saying(0.5);
     MaterialMeasurement made = {.slug = "felt", .comment = "", .document = "{}"};
@@ -70,12 +64,4 @@ static void materials_revisions_and_bytes_have_limits(void **state) {
     assert_int_equal(db_material_state(db, "felt", &now, NULL), STATUS_OK);
     assert_int_equal(now.measurements, 1);
     db_close(db);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_measurement_changes_the_material_but_not_the_catalog),
-        cmocka_unit_test(materials_revisions_and_bytes_have_limits),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,20 +2,16 @@
 // of before go on.
 #include "server/db/materials.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "core/contact/contact.h"
 #include "server/db/db_private.h"
 #include "server/db/sqlite.h"
 #include "tests/support/felt.h"
 #include "tests/support/scratch.h"
+#include "tests/support/test.h"
 
 static char folder[SCRATCH_SIZE];
 
@@ -31,8 +27,7 @@ static int remove_folder(void **state) {
     return 0;
 }
 
-static void a_revision_comes_back_as_it_went(void **state) {
-    (void)state;
+TEST_IN(a_revision_comes_back_as_it_went, make_folder, remove_folder) {
     Db *db = felt_store(folder);
     MaterialRevision whole = felt_saying(0.5), found;
     Material *said = &whole.material;
@@ -127,8 +122,7 @@ static char *dump(Sqlite *database) {
     return text;
 }
 
-static void no_sql_changes_what_was_said(void **state) {
-    (void)state;
+TEST_IN(no_sql_changes_what_was_said, make_folder, remove_folder) {
     static const char *const tables[] = {"materials", "material_revisions", "material_reviews",
                                          "material_measurements", "material_trail"};
     static const char *const harm[] = {
@@ -195,14 +189,4 @@ static void no_sql_changes_what_was_said(void **state) {
     free(before);
     free(after);
     sqlite_close(database);
-}
-
-#define IN_FOLDER(test) cmocka_unit_test_setup_teardown(test, make_folder, remove_folder)
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        IN_FOLDER(a_revision_comes_back_as_it_went),
-        IN_FOLDER(no_sql_changes_what_was_said),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

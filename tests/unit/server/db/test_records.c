@@ -3,17 +3,13 @@
 #include "server/db/records.h"
 
 #include <pthread.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "server/db/sqlite.h"
 #include "tests/support/scratch.h"
+#include "tests/support/test.h"
 
 static Problem problem;
 static char folder[SCRATCH_SIZE];
@@ -58,8 +54,7 @@ static void add_new(Db *db, const char *name, double first) {
     assert_false(is_there);
 }
 
-static void a_record_comes_back_to_the_bit(void **state) {
-    (void)state;
+TEST(a_record_comes_back_to_the_bit) {
     Db *db = db_make();
     const uint64_t catalog_version = db_catalog_version(db);
     NamedRecord *named, *again;
@@ -84,8 +79,7 @@ static void a_record_comes_back_to_the_bit(void **state) {
     db_end(db);
 }
 
-static void what_is_there_already_is_told_from_what_would_change_it(void **state) {
-    (void)state;
+TEST(what_is_there_already_is_told_from_what_would_change_it) {
     Db *db = db_make();
     bool is_there = false;
     add_new(db, "elcentro", 0.1);
@@ -110,8 +104,7 @@ static void what_is_there_already_is_told_from_what_would_change_it(void **state
     db_end(db);
 }
 
-static void a_list_goes_on_behind_a_name_and_searches_words(void **state) {
-    (void)state;
+TEST(a_list_goes_on_behind_a_name_and_searches_words) {
     static const char *const names[] = {"b", "a", "C", "d"};
     Db *db = db_make();
     RecordRows rows;
@@ -145,8 +138,7 @@ static JobRow job_add(Db *db, const char *id, int state, const char *uses) {
     return row;
 }
 
-static void a_record_in_use_is_not_deleted(void **state) {
-    (void)state;
+TEST(a_record_in_use_is_not_deleted) {
     Db *db = db_make();
     RecordUses uses;
     NamedRecord *named;
@@ -187,8 +179,7 @@ static void a_record_in_use_is_not_deleted(void **state) {
     db_end(db);
 }
 
-static void nothing_written_beside_the_daemon_changes_a_record(void **state) {
-    (void)state;
+TEST(nothing_written_beside_the_daemon_changes_a_record) {
     static const char *const attempts[] = {
         "UPDATE records SET peak = 0",
         "UPDATE records SET name = 'x'",
@@ -238,8 +229,7 @@ static void nothing_written_beside_the_daemon_changes_a_record(void **state) {
     db_end(db);
 }
 
-static void there_are_only_so_many(void **state) {
-    (void)state;
+TEST(there_are_only_so_many) {
     static const char many[] =
         "WITH RECURSIVE n (i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < 20000) INSERT "
         "INTO records (name, layout, unit, interval, count, peak, peak_time, peak_velocity, "
@@ -297,8 +287,7 @@ static void *race(void *of) {
     return NULL;
 }
 
-static void of_two_same_uploads_at_once_one_is_kept(void **state) {
-    (void)state;
+TEST(of_two_same_uploads_at_once_one_is_kept) {
     Db *db = db_make();
     Racer racers[8];
     size_t kept = 0;
@@ -315,8 +304,7 @@ static void of_two_same_uploads_at_once_one_is_kept(void **state) {
     db_end(db);
 }
 
-static void names_are_fit_for_paths_and_files(void **state) {
-    (void)state;
+TEST(names_are_fit_for_paths_and_files) {
     static const char *const sound[] = {"a", "7", "elcentro_NS-2.AT2", "A..b"};
     static const char *const unsound[] = {"",    ".",   "..",  ".a",       "-a", "_a",
                                           "a/b", "a b", "a\n", "\xC3\xA9", "a%"};
@@ -332,8 +320,7 @@ static void names_are_fit_for_paths_and_files(void **state) {
     assert_true(record_name_is_sound(longest));
 }
 
-static void a_record_is_in_memory_once_and_follows_the_catalogue(void **state) {
-    (void)state;
+TEST(a_record_is_in_memory_once_and_follows_the_catalogue) {
     Db *db = db_make();
     NamedRecord *first, *again, *other;
     RecordUses uses;
@@ -353,19 +340,4 @@ static void a_record_is_in_memory_once_and_follows_the_catalogue(void **state) {
     refcount_unref(&again->shared);
     refcount_unref(&other->shared);
     db_end(db);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_record_comes_back_to_the_bit),
-        cmocka_unit_test(what_is_there_already_is_told_from_what_would_change_it),
-        cmocka_unit_test(a_list_goes_on_behind_a_name_and_searches_words),
-        cmocka_unit_test(a_record_in_use_is_not_deleted),
-        cmocka_unit_test(nothing_written_beside_the_daemon_changes_a_record),
-        cmocka_unit_test(there_are_only_so_many),
-        cmocka_unit_test(of_two_same_uploads_at_once_one_is_kept),
-        cmocka_unit_test(names_are_fit_for_paths_and_files),
-        cmocka_unit_test(a_record_is_in_memory_once_and_follows_the_catalogue),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

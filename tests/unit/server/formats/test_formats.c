@@ -3,16 +3,12 @@
 #include "server/formats/table_stream.h"
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "core/base/status.h"
 #include "server/formats/downsample.h"
+#include "tests/support/test.h"
 
 enum { ROWS = 5000 };
 
@@ -58,8 +54,7 @@ static void assert_text(const char *extension, Table table, const char *expected
     bytes_clear(&bytes);
 }
 
-static void json_has_rate_start_count_and_channels(void **state) {
-    (void)state;
+TEST(json_has_rate_start_count_and_channels) {
     assert_text("json", series(50, 3),
                 "{\"sample_rate\": 1000, \"start\": 0.05, \"count\": 3, \"channels\": {"
                 "\"displacement\": {\"unit\": \"m\", \"values\": [6.25,6.375,6.5]}, "
@@ -70,8 +65,7 @@ static void json_has_rate_start_count_and_channels(void **state) {
                 "{\"sample_rate\": 1000, \"start\": 0, \"count\": 0, \"channels\": {}}\n");
 }
 
-static void json_over_an_axis_carries_the_axis(void **state) {
-    (void)state;
+TEST(json_over_an_axis_carries_the_axis) {
     Table table = over_frequency(2, 2);
     table.column_count = 1;
     assert_text("json", table,
@@ -79,8 +73,7 @@ static void json_over_an_axis_carries_the_axis(void **state) {
                 "\"channels\": {\"displacement\": {\"unit\": \"m\", \"values\": [0.25,0.375]}}}\n");
 }
 
-static void csv_has_a_header_with_units_and_short_times(void **state) {
-    (void)state;
+TEST(csv_has_a_header_with_units_and_short_times) {
     assert_text("csv", series(49, 3),
                 "time [s],displacement [m],contact_force [N]\n"
                 "0.049,6.125,-49\n"
@@ -91,8 +84,7 @@ static void csv_has_a_header_with_units_and_short_times(void **state) {
     assert_text("csv", series(0, 0), "time [s],displacement [m],contact_force [N]\n");
 }
 
-static void npy_has_its_header_and_columns_as_they_lie_in_memory(void **state) {
-    (void)state;
+TEST(npy_has_its_header_and_columns_as_they_lie_in_memory) {
     const Table table = series(50, 4500);
     Bytes bytes = {0};
     assert_int_equal(format_write(format_find("npy"), &table, &bytes, NULL), STATUS_OK);
@@ -114,8 +106,7 @@ static void npy_has_its_header_and_columns_as_they_lie_in_memory(void **state) {
     bytes_clear(&bytes);
 }
 
-static void every_part_of_a_binary_format_can_be_read_alone(void **state) {
-    (void)state;
+TEST(every_part_of_a_binary_format_can_be_read_alone) {
     static const char *const names[] = {"npy", "npz", "mat"};
     for (size_t n = 0; n < 3; n++) {
         const Table table = series(50, 4500);
@@ -148,8 +139,7 @@ static void every_part_of_a_binary_format_can_be_read_alone(void **state) {
     }
 }
 
-static void piece_by_piece_is_the_same_as_whole(void **state) {
-    (void)state;
+TEST(piece_by_piece_is_the_same_as_whole) {
     for (size_t e = 0; table_formats[e] != NULL; e++)
         for (size_t size = 1; size < 100000; size = size * 7 + 3) {
             const Table table = e % 2 == 0 ? series(7, 4990) : over_frequency(0, ROWS);
@@ -171,8 +161,7 @@ static void piece_by_piece_is_the_same_as_whole(void **state) {
         }
 }
 
-static void archives_are_the_same_each_time_and_stored(void **state) {
-    (void)state;
+TEST(archives_are_the_same_each_time_and_stored) {
     const Table table = series(0, 100);
     Bytes first = {0}, second = {0};
     assert_int_equal(format_write(format_find("npz"), &table, &first, NULL), STATUS_OK);
@@ -186,8 +175,7 @@ static void archives_are_the_same_each_time_and_stored(void **state) {
     bytes_clear(&second);
 }
 
-static void what_is_too_large_for_a_format_is_refused(void **state) {
-    (void)state;
+TEST(what_is_too_large_for_a_format_is_refused) {
     // Its length alone is looked at: nothing of it is read.
     static const struct {
         const char *extension;
@@ -208,8 +196,7 @@ static void what_is_too_large_for_a_format_is_refused(void **state) {
     }
 }
 
-static void names_become_variables(void **state) {
-    (void)state;
+TEST(names_become_variables) {
     char name[MAT_NAME_SIZE];
     mat_name("contact_force_2", name);
     assert_string_equal(name, "contact_force_2");
@@ -221,8 +208,7 @@ static void names_become_variables(void **state) {
     assert_int_equal(strlen(name), 63);
 }
 
-static void buckets_are_labelled(void **state) {
-    (void)state;
+TEST(buckets_are_labelled) {
     Columns buckets;
     assert_int_equal(downsample(both, 1, 49, 5, 2, &buckets, NULL), STATUS_OK);
     const Column *const pair[] = {&buckets.at[0], &buckets.at[1]};
@@ -240,8 +226,7 @@ static void buckets_are_labelled(void **state) {
     columns_clear(&buckets);
 }
 
-static void buckets_keep_the_extremes_of_ten_thousand_windows(void **state) {
-    (void)state;
+TEST(buckets_keep_the_extremes_of_ten_thousand_windows) {
     enum { VALUES = 20000 };
     double *values = malloc(VALUES * sizeof *values);
     uint64_t seed = 3;
@@ -275,8 +260,7 @@ static void buckets_keep_the_extremes_of_ten_thousand_windows(void **state) {
     free(values);
 }
 
-static void a_full_buffer_fails_and_stays_empty(void **state) {
-    (void)state;
+TEST(a_full_buffer_fails_and_stays_empty) {
     for (size_t e = 0; table_formats[e] != NULL; e++)
         for (size_t most = 1; most < 40000; most = most * 3 + 1) {
             const Table table = series(0, ROWS);
@@ -288,8 +272,7 @@ static void a_full_buffer_fails_and_stays_empty(void **state) {
         }
 }
 
-static void formats_are_found_by_extension_and_json_is_first(void **state) {
-    (void)state;
+TEST(formats_are_found_by_extension_and_json_is_first) {
     assert_string_equal(table_formats[0]->extension, "json");
     for (size_t i = 0; table_formats[i] != NULL; i++) {
         assert_ptr_equal(format_find(table_formats[i]->extension), table_formats[i]);
@@ -301,21 +284,4 @@ static void formats_are_found_by_extension_and_json_is_first(void **state) {
     assert_null(format_find(""));
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(json_has_rate_start_count_and_channels),
-        cmocka_unit_test(json_over_an_axis_carries_the_axis),
-        cmocka_unit_test(csv_has_a_header_with_units_and_short_times),
-        cmocka_unit_test(npy_has_its_header_and_columns_as_they_lie_in_memory),
-        cmocka_unit_test(every_part_of_a_binary_format_can_be_read_alone),
-        cmocka_unit_test(piece_by_piece_is_the_same_as_whole),
-        cmocka_unit_test(archives_are_the_same_each_time_and_stored),
-        cmocka_unit_test(what_is_too_large_for_a_format_is_refused),
-        cmocka_unit_test(names_become_variables),
-        cmocka_unit_test(buckets_are_labelled),
-        cmocka_unit_test(buckets_keep_the_extremes_of_ten_thousand_windows),
-        cmocka_unit_test(a_full_buffer_fails_and_stays_empty),
-        cmocka_unit_test(formats_are_found_by_extension_and_json_is_first),
-    };
-    return cmocka_run_group_tests(tests, fill, NULL);
-}
+TEST_GROUP(fill, NULL)

@@ -1,14 +1,10 @@
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 
-#include <cmocka.h>
 
 #include <string.h>
 
 #include "server/formats/charts.h"
 #include "server/formats/sweep.h"
+#include "tests/support/test.h"
 
 static char clearance[] = "/dampers/0/clearance", metre[] = "m", buffer[] = "/dampers/0/buffer";
 static char narrow[] = "0.01", wide[] = "0.02", soft[] = "\"soft, A\"", hard[] = "\"hard\"";
@@ -31,8 +27,7 @@ static Sweep sweep_make(void) {
                              .failures = {failures, 1}}};
 }
 
-static void rows_that_are_there_are_in_the_table_with_their_status(void **state) {
-    (void)state;
+TEST(rows_that_are_there_are_in_the_table_with_their_status) {
     const Sweep sweep = sweep_make();
     Bytes bytes = {0};
     sweep_write(&sweep, "csv", &bytes);
@@ -71,9 +66,7 @@ static size_t count_of(const char *text, const char *what) {
     return count;
 }
 
-static void
-a_chart_has_a_map_or_a_line_for_each_metric_and_no_cell_for_what_is_missing(void **state) {
-    (void)state;
+TEST(a_chart_has_a_map_or_a_line_for_each_metric_and_no_cell_for_what_is_missing) {
     Sweep sweep = sweep_make();
     Bytes bytes = {0};
     draw(&sweep, &bytes);
@@ -94,13 +87,4 @@ a_chart_has_a_map_or_a_line_for_each_metric_and_no_cell_for_what_is_missing(void
     assert_non_null(strstr(bytes.at, "not known"));
     assert_string_equal(bytes.at + bytes.count - 7, "</svg>\n");
     bytes_clear(&bytes);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(rows_that_are_there_are_in_the_table_with_their_status),
-        cmocka_unit_test(
-            a_chart_has_a_map_or_a_line_for_each_metric_and_no_cell_for_what_is_missing),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,17 +1,12 @@
 // Access over a database in memory: who is admitted, as whom, and what is counted; a refusal comes
 // before the body is read.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "server/http/reply.h"
 #include "server/http/router.h"
 #include "server/util/base_path.h"
+#include "tests/support/test.h"
 
 static Status tell(App *app, const Request *request, Reply *reply, Problem *problem) {
     (void)app;
@@ -71,7 +66,7 @@ static int ask(House *house, const char *method, const char *target, const char 
     return reply->code;
 }
 
-static void scopes_of_routes_are_asked_for(void **state) {
+TEST(scopes_of_routes_are_asked_for) {
     House *house = *state;
     Reply reply;
     assert_int_equal(ask(house, "GET", "/open", NULL, &reply), 200);
@@ -90,7 +85,7 @@ static void scopes_of_routes_are_asked_for(void **state) {
     reply_clear(&reply);
 }
 
-static void a_body_is_not_taken_for_whom_may_not_send_it(void **state) {
+TEST(a_body_is_not_taken_for_whom_may_not_send_it) {
     House *house = *state;
     Request request = {.method = "POST", .authorization = house->lab};
     Reply reply;
@@ -106,7 +101,7 @@ static void a_body_is_not_taken_for_whom_may_not_send_it(void **state) {
     request_close(&request);
 }
 
-static void answers_are_counted_where_they_belong(void **state) {
+TEST(answers_are_counted_where_they_belong) {
     House *house = *state;
     Reply reply;
     Bytes before = {0}, after = {0};
@@ -124,7 +119,7 @@ static void answers_are_counted_where_they_belong(void **state) {
     bytes_clear(&after);
 }
 
-static void links_in_headers_begin_with_the_base(void **state) {
+TEST(links_in_headers_begin_with_the_base) {
     House *house = *state;
     Reply reply;
     base_path_set("/sim");
@@ -136,20 +131,10 @@ static void links_in_headers_begin_with_the_base(void **state) {
     base_path_set("");
 }
 
-static void without_a_doorman_everyone_comes_in(void **state) {
-    (void)state;
+TEST(without_a_doorman_everyone_comes_in) {
     House house = {.router = {NULL, table, NULL, NULL, NULL}};
     Reply reply;
     assert_int_equal(ask(&house, "POST", "/v1/a", NULL, &reply), 200);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(scopes_of_routes_are_asked_for),
-        cmocka_unit_test(a_body_is_not_taken_for_whom_may_not_send_it),
-        cmocka_unit_test(answers_are_counted_where_they_belong),
-        cmocka_unit_test(links_in_headers_begin_with_the_base),
-        cmocka_unit_test(without_a_doorman_everyone_comes_in),
-    };
-    return cmocka_run_group_tests(tests, open_house, close_house);
-}
+TEST_GROUP(open_house, close_house)

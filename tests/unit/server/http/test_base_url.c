@@ -1,16 +1,10 @@
 // Base URLs taken apart, and those that are none.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "server/http/address.h"
+#include "tests/support/test.h"
 
-static void urls_are_taken_apart(void **state) {
-    (void)state;
+TEST(urls_are_taken_apart) {
     static const struct {
         const char *given, *text, *host, *path;
     } good[] = {
@@ -30,8 +24,7 @@ static void urls_are_taken_apart(void **state) {
     }
 }
 
-static void what_is_no_base_url_is_refused_with_what_would_be(void **state) {
-    (void)state;
+TEST(what_is_no_base_url_is_refused_with_what_would_be) {
     static const char *const bad[] = {
         "",
         "sim.example.org/impactd",
@@ -68,12 +61,4 @@ static void what_is_no_base_url_is_refused_with_what_would_be(void **state) {
             fail_msg("\"%s\" is taken", bad[i]);
         assert_non_null(strstr(problem.detail, "https://sim.example.org/impactd"));
     }
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(urls_are_taken_apart),
-        cmocka_unit_test(what_is_no_base_url_is_refused_with_what_would_be),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,15 +1,10 @@
 // Replies that are packed, known already, or asked for in part.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "server/http/reply.h"
+#include "tests/support/test.h"
 
 static Reply text_of(size_t size) {
     Reply reply;
@@ -22,8 +17,7 @@ static Reply text_of(size_t size) {
     return reply;
 }
 
-static void a_text_is_packed_where_it_is_taken_and_pays(void **state) {
-    (void)state;
+TEST(a_text_is_packed_where_it_is_taken_and_pays) {
     Reply reply = text_of(5000);
     const size_t size = reply.body_size;
     assert_true(reply_pack(&reply, &(Request){.accept_encoding = "gzip, br"}));
@@ -35,8 +29,7 @@ static void a_text_is_packed_where_it_is_taken_and_pays(void **state) {
     reply_clear(&reply);
 }
 
-static void whoever_does_not_take_it_gets_it_plain_and_caches_are_told(void **state) {
-    (void)state;
+TEST(whoever_does_not_take_it_gets_it_plain_and_caches_are_told) {
     Reply reply = text_of(5000);
     assert_false(reply_pack(&reply, &(Request){.accept_encoding = NULL}));
     assert_true(reply.varies_by_encoding);
@@ -54,8 +47,7 @@ static void whoever_does_not_take_it_gets_it_plain_and_caches_are_told(void **st
     reply_clear(&reply);
 }
 
-static void the_tag_of_either_form_is_known(void **state) {
-    (void)state;
+TEST(the_tag_of_either_form_is_known) {
     const char *const tags[] = {"\"r-1-series.csv\"", "\"x\", \"r-1-series.csv-gz\"", "*"};
     const char *const told[] = {"\"r-1-series.csv\"", "\"r-1-series.csv-gz\"",
                                 "\"r-1-series.csv\""};
@@ -76,13 +68,4 @@ static void the_tag_of_either_form_is_known(void **state) {
         &reply, &(Request){.method = "GET", .path = "/v1/x", .if_none_match = NULL}));
     assert_int_equal(reply.code, 200);
     reply_clear(&reply);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_text_is_packed_where_it_is_taken_and_pays),
-        cmocka_unit_test(whoever_does_not_take_it_gets_it_plain_and_caches_are_told),
-        cmocka_unit_test(the_tag_of_either_form_is_known),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

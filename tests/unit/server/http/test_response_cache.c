@@ -1,18 +1,13 @@
 // Whole answers kept: found by target and packing, evicted by age, alive as long as they are held.
 #include <pthread.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdatomic.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "server/http/reply.h"
 #include "server/http/response_cache.h"
+#include "tests/support/test.h"
 
 static const Route route = {.scope = "read"};
 
@@ -56,8 +51,7 @@ static bool finds(ResponseCache *response_cache, const char *target, bool is_pac
     return true;
 }
 
-static void an_answer_is_found_by_target_and_packing(void **state) {
-    (void)state;
+TEST(an_answer_is_found_by_target_and_packing) {
     ResponseCache *response_cache = response_cache_new(1 << 20);
     put(response_cache, "/a", false, "plain", 100);
     put(response_cache, "/a", true, "packed", 100);
@@ -72,8 +66,7 @@ static void an_answer_is_found_by_target_and_packing(void **state) {
     response_cache_free(response_cache);
 }
 
-static void the_longest_unused_goes_first_and_the_budget_holds(void **state) {
-    (void)state;
+TEST(the_longest_unused_goes_first_and_the_budget_holds) {
     ResponseCache *response_cache = response_cache_new(100000);
     put(response_cache, "/1", false, "1", 20000);
     put(response_cache, "/2", false, "2", 20000);
@@ -90,8 +83,7 @@ static void the_longest_unused_goes_first_and_the_budget_holds(void **state) {
     response_cache_free(response_cache);
 }
 
-static void what_is_held_outlives_the_cache(void **state) {
-    (void)state;
+TEST(what_is_held_outlives_the_cache) {
     atomic_store(&released, 0);
     ResponseCache *response_cache = response_cache_new(1 << 20);
     Reply reply = fresh("held", 100);
@@ -119,8 +111,7 @@ static void *ask_and_put(void *context) {
     return NULL;
 }
 
-static void many_threads_share_it(void **state) {
-    (void)state;
+TEST(many_threads_share_it) {
     ResponseCache *response_cache = response_cache_new(20000);
     pthread_t threads[4];
     for (size_t i = 0; i < COUNT(threads); i++)
@@ -129,14 +120,4 @@ static void many_threads_share_it(void **state) {
         pthread_join(threads[i], NULL);
     assert_true(response_cache_stats(response_cache).bytes <= 20000);
     response_cache_free(response_cache);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(an_answer_is_found_by_target_and_packing),
-        cmocka_unit_test(the_longest_unused_goes_first_and_the_budget_holds),
-        cmocka_unit_test(what_is_held_outlives_the_cache),
-        cmocka_unit_test(many_threads_share_it),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,19 +2,14 @@
 // and idle connections are shut down.
 #include <pthread.h>
 #include <sched.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdatomic.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <sys/socket.h>
 #include <time.h>
 #include <unistd.h>
 
-#include <cmocka.h>
-
 #include "server/http/timer.h"
 #include "server/util/clock.h"
+#include "tests/support/test.h"
 
 // Stands for a connection: counts what the TimerWheel does to it.
 typedef struct Connection {
@@ -49,8 +44,7 @@ static void run_in(TimerWheel *wheel, int64_t ms) {
     (void)timer_wheel_run(wheel, clock_monotonic_ns() + ms * 1000000);
 }
 
-static void a_wake_before_the_sleep_is_not_lost(void **state) {
-    (void)state;
+TEST(a_wake_before_the_sleep_is_not_lost) {
     Connection connection = {0};
     TimerWheel *wheel = timer_wheel_new(&calls, &changes);
     ConnectionTimer *timer = timer_take(wheel, -1);
@@ -64,8 +58,7 @@ static void a_wake_before_the_sleep_is_not_lost(void **state) {
     timer_wheel_free(wheel);
 }
 
-static void time_ends_a_sleep_and_a_wake_ends_it_sooner(void **state) {
-    (void)state;
+TEST(time_ends_a_sleep_and_a_wake_ends_it_sooner) {
     Connection connection = {0};
     changes = 0;
     TimerWheel *wheel = timer_wheel_new(&calls, &changes);
@@ -88,8 +81,7 @@ static void time_ends_a_sleep_and_a_wake_ends_it_sooner(void **state) {
     timer_wheel_free(wheel);
 }
 
-static void the_earliest_time_is_served_first_and_reported(void **state) {
-    (void)state;
+TEST(the_earliest_time_is_served_first_and_reported) {
     Connection late = {0}, early = {0};
     changes = 0;
     TimerWheel *wheel = timer_wheel_new(&calls, &changes);
@@ -111,8 +103,7 @@ static void the_earliest_time_is_served_first_and_reported(void **state) {
     timer_wheel_free(wheel);
 }
 
-static void a_late_wake_of_a_free_timer_does_no_harm(void **state) {
-    (void)state;
+TEST(a_late_wake_of_a_free_timer_does_no_harm) {
     Connection next = {0};
     TimerWheel *wheel = timer_wheel_new(&calls, &changes);
     ConnectionTimer *timer = timer_take(wheel, -1);
@@ -131,8 +122,7 @@ static void a_late_wake_of_a_free_timer_does_no_harm(void **state) {
     timer_wheel_free(wheel);
 }
 
-static void a_peer_that_is_too_slow_is_shut_down(void **state) {
-    (void)state;
+TEST(a_peer_that_is_too_slow_is_shut_down) {
     int pair[2];
     char byte;
     TimerWheel *wheel = timer_wheel_new(&calls, &changes);
@@ -149,8 +139,7 @@ static void a_peer_that_is_too_slow_is_shut_down(void **state) {
     timer_wheel_free(wheel);
 }
 
-static void the_longest_idle_connection_makes_room(void **state) {
-    (void)state;
+TEST(the_longest_idle_connection_makes_room) {
     int pairs[3][2];
     char byte;
     ConnectionTimer *timers[3];
@@ -195,8 +184,7 @@ static void *ring(void *context) {
     return NULL;
 }
 
-static void no_wake_is_lost_between_two_threads(void **state) {
-    (void)state;
+TEST(no_wake_is_lost_between_two_threads) {
     Connection connection = {0};
     pthread_t thread;
     TimerWheel *wheel = timer_wheel_new(&calls, &changes);
@@ -223,17 +211,4 @@ static void no_wake_is_lost_between_two_threads(void **state) {
     assert_int_equal(connection.suspended, slept);
     assert_int_equal(connection.resumed, slept);
     timer_wheel_free(wheel);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_wake_before_the_sleep_is_not_lost),
-        cmocka_unit_test(time_ends_a_sleep_and_a_wake_ends_it_sooner),
-        cmocka_unit_test(the_earliest_time_is_served_first_and_reported),
-        cmocka_unit_test(a_late_wake_of_a_free_timer_does_no_harm),
-        cmocka_unit_test(a_peer_that_is_too_slow_is_shut_down),
-        cmocka_unit_test(the_longest_idle_connection_makes_room),
-        cmocka_unit_test(no_wake_is_lost_between_two_threads),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,13 +1,8 @@
 // The gate: every head it must refuse, and those it must let through.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "server/http/validate.h"
+#include "tests/support/test.h"
 
 // One request head: up to four headers.
 typedef struct ResultSummary {
@@ -30,8 +25,7 @@ static int judge(const ResultSummary *head) {
     return code;
 }
 
-static void ordinary_requests_pass(void **state) {
-    (void)state;
+TEST(ordinary_requests_pass) {
     static const ResultSummary heads[] = {
         {"GET", "/", "HTTP/1.1", {{"Host", "localhost"}}, 0},
         {"GET", "/", "HTTP/1.0", {{NULL, NULL}}, 0},
@@ -61,8 +55,7 @@ static void ordinary_requests_pass(void **state) {
         assert_int_equal(judge(&heads[i]), 0);
 }
 
-static void ambiguous_or_foreign_heads_are_refused(void **state) {
-    (void)state;
+TEST(ambiguous_or_foreign_heads_are_refused) {
     static const ResultSummary heads[] = {
         {"GET", "/", "HTTP/1.2", {{"Host", "localhost"}}, 505},
         {"GET", "/", "HTTP/2.0", {{"Host", "localhost"}}, 505},
@@ -136,8 +129,7 @@ static void ambiguous_or_foreign_heads_are_refused(void **state) {
                      judge(&heads[i]), heads[i].code);
 }
 
-static void hosts_are_those_that_were_named(void **state) {
-    (void)state;
+TEST(hosts_are_those_that_were_named) {
     static const char *const names[] = {"sim.example.org", "192.168.1.5", NULL};
     const AcceptedHosts named = {names, false, NULL}, any = {names, true, NULL};
     static const struct {
@@ -169,8 +161,7 @@ static void hosts_are_those_that_were_named(void **state) {
     }
 }
 
-static void a_foreign_host_is_told_the_names_that_are_right(void **state) {
-    (void)state;
+TEST(a_foreign_host_is_told_the_names_that_are_right) {
     static const char *const names[] = {"sim.example.org", "localhost", NULL};
     const AcceptedHosts named = {names, true, NULL};
     RequestValidator validator = {.names = &named};
@@ -182,8 +173,7 @@ static void a_foreign_host_is_told_the_names_that_are_right(void **state) {
     assert_non_null(strstr(problem.detail, "\"evil\""));
 }
 
-static void a_name_given_for_a_proxy_is_no_foreign_origin(void **state) {
-    (void)state;
+TEST(a_name_given_for_a_proxy_is_no_foreign_origin) {
     static const char *const names[] = {"localhost", "sim.example.org", NULL};
     const AcceptedHosts named = {names, false, NULL};
     static const struct {
@@ -205,8 +195,7 @@ static void a_name_given_for_a_proxy_is_no_foreign_origin(void **state) {
     }
 }
 
-static void a_nul_inside_a_value_is_seen_by_its_size(void **state) {
-    (void)state;
+TEST(a_nul_inside_a_value_is_seen_by_its_size) {
     RequestValidator validator = {0};
     Problem problem;
     problem_clear(&problem);
@@ -216,8 +205,7 @@ static void a_nul_inside_a_value_is_seen_by_its_size(void **state) {
     assert_non_null(strstr(problem.detail, "X-A"));
 }
 
-static void a_target_of_4097_bytes_is_too_long(void **state) {
-    (void)state;
+TEST(a_target_of_4097_bytes_is_too_long) {
     char target[4098];
     memset(target, 'a', sizeof target - 1);
     target[0] = '/';
@@ -226,17 +214,4 @@ static void a_target_of_4097_bytes_is_too_long(void **state) {
     assert_int_equal(judge(&head), 414);
     target[4096] = '\0';
     assert_int_equal(judge(&head), 0);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(ordinary_requests_pass),
-        cmocka_unit_test(ambiguous_or_foreign_heads_are_refused),
-        cmocka_unit_test(hosts_are_those_that_were_named),
-        cmocka_unit_test(a_foreign_host_is_told_the_names_that_are_right),
-        cmocka_unit_test(a_name_given_for_a_proxy_is_no_foreign_origin),
-        cmocka_unit_test(a_nul_inside_a_value_is_seen_by_its_size),
-        cmocka_unit_test(a_target_of_4097_bytes_is_too_long),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

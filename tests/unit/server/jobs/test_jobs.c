@@ -1,25 +1,19 @@
 // The jobs room with the real engine and a real database: nothing lost, nothing twice, one state at
 // the end.
 #include <pthread.h>
-#include <setjmp.h>
 #include <signal.h>
-#include <stdarg.h>
 #include <stdatomic.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/resource.h>
 #include <time.h>
 
-#include <cmocka.h>
-
-#include "core/math/fft.h"
 #include "server/db/sqlite.h"
 #include "server/jobs/jobs.h"
 #include "server/jobs/jobs_private.h"
 #include "tests/support/scratch.h"
+#include "tests/support/test.h"
 
 typedef struct Room {
     char directory[SCRATCH_SIZE];
@@ -175,8 +169,7 @@ static void *hammer(void *context) {
     return NULL;
 }
 
-static void many_clients_at_once_leave_nothing_behind(void **state) {
-    (void)state;
+TEST(many_clients_at_once_leave_nothing_behind) {
     Room room = room_make(3);
     Hammer hammers[6];
     pthread_t threads[6];
@@ -230,8 +223,7 @@ static void wait_until_idle(Room *room) {
 // times as long.
 enum { LONG = IMPACTD_SANITIZED ? 4000 : 20000 };
 
-static void a_result_that_there_is_no_room_for_waits_for_it(void **state) {
-    (void)state;
+TEST_IN(a_result_that_there_is_no_room_for_waits_for_it, NULL, lift_limit) {
     Room room = room_make(1);
     signal(SIGXFSZ, SIG_IGN);
     Job *job = submit(&room, 0.015, LONG), *dropped = submit(&room, 0.016, LONG);
@@ -264,8 +256,7 @@ static void a_result_that_there_is_no_room_for_waits_for_it(void **state) {
     room_end(&room);
 }
 
-static void a_result_that_there_is_no_room_for_is_computed_again_after_a_restart(void **state) {
-    (void)state;
+TEST_IN(a_result_that_there_is_no_room_for_is_computed_again_after_a_restart, NULL, lift_limit) {
     Room room = room_make(1);
     signal(SIGXFSZ, SIG_IGN);
     Job *job = submit(&room, 0.015, LONG);
@@ -289,8 +280,7 @@ static void a_result_that_there_is_no_room_for_is_computed_again_after_a_restart
     room_end(&room);
 }
 
-static void a_job_that_cannot_be_kept_never_was(void **state) {
-    (void)state;
+TEST_IN(a_job_that_cannot_be_kept_never_was, NULL, lift_limit) {
     Room room = room_make(1);
     signal(SIGXFSZ, SIG_IGN);
     limit_files(1);
@@ -324,8 +314,7 @@ static void a_job_that_cannot_be_kept_never_was(void **state) {
     room_end(&room);
 }
 
-static void a_job_is_saved_when_that_is_asked_for_and_its_subscribers_are_called(void **state) {
-    (void)state;
+TEST(a_job_is_saved_when_that_is_asked_for_and_its_subscribers_are_called) {
     Room room = room_make(1);
     static atomic_int wakes;
     const Callback callback = {&wakes, note_wake};
@@ -349,8 +338,7 @@ static void *dismiss_it(void *context) {
     return status == STATUS_OK ? both : NULL;
 }
 
-static void a_dismissed_job_is_dismissed_for_all_before_the_store_has_it(void **state) {
-    (void)state;
+TEST(a_dismissed_job_is_dismissed_for_all_before_the_store_has_it) {
     Room room = room_make(1);
     Job *blocker = submit(&room, 0.001, 20000), *job = submit(&room, 0.015, 20000), *found = NULL;
     JobView now = show(job);
@@ -391,8 +379,7 @@ static size_t count_rows(Room *room) {
     return count;
 }
 
-static void a_job_is_written_once_with_its_result(void **state) {
-    (void)state;
+TEST(a_job_is_written_once_with_its_result) {
     Room room = room_make(1);
     const uint64_t before = counter_get(&db_totals(room.db)->writes);
     Job *job = submit_unkept(&room, 0.015, 1);
@@ -412,8 +399,7 @@ static void a_job_is_written_once_with_its_result(void **state) {
     room_end(&room);
 }
 
-static void running_jobs_share_one_budget_of_memory(void **state) {
-    (void)state;
+TEST(running_jobs_share_one_budget_of_memory) {
     Room room = room_make(2);
     room_close(&room);
     room.settings.memory_bytes = 1 << 20; // less than any of these takes
@@ -461,8 +447,7 @@ void *realloc(void *at, size_t size) {
                : __libc_realloc(at, size);
 }
 
-static void a_result_is_saved_without_memory_for_a_list(void **state) {
-    (void)state;
+TEST(a_result_is_saved_without_memory_for_a_list) {
     Room room = room_make(1);
     Job *job = submit(&room, 0.015, 200);
     atomic_store(&lists_fail, true);
@@ -476,22 +461,3 @@ static void a_result_is_saved_without_memory_for_a_list(void **state) {
     room_end(&room);
 }
 #endif
-
-int main(void) {
-    fft_start();
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(many_clients_at_once_leave_nothing_behind),
-        cmocka_unit_test_teardown(a_result_that_there_is_no_room_for_waits_for_it, lift_limit),
-        cmocka_unit_test_teardown(
-            a_result_that_there_is_no_room_for_is_computed_again_after_a_restart, lift_limit),
-        cmocka_unit_test_teardown(a_job_that_cannot_be_kept_never_was, lift_limit),
-        cmocka_unit_test(a_job_is_saved_when_that_is_asked_for_and_its_subscribers_are_called),
-        cmocka_unit_test(a_dismissed_job_is_dismissed_for_all_before_the_store_has_it),
-        cmocka_unit_test(a_job_is_written_once_with_its_result),
-        cmocka_unit_test(running_jobs_share_one_budget_of_memory),
-#if !IMPACTD_SANITIZED
-        cmocka_unit_test(a_result_is_saved_without_memory_for_a_list),
-#endif
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}

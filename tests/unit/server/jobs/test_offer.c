@@ -1,18 +1,13 @@
 // What the jobs room offers its clients: quotas, keys, deletion, retention, and quick jobs beside
 // slow ones.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
 
-#include <cmocka.h>
-
 #include "server/jobs/jobs.h"
 #include "tests/support/scratch.h"
+#include "tests/support/test.h"
 
 typedef struct Room {
     char directory[SCRATCH_SIZE];
@@ -97,8 +92,7 @@ static void dismiss(Room *room, Job *job) {
     job_unref(job);
 }
 
-static void a_token_has_no_more_unfinished_jobs_than_its_quota(void **state) {
-    (void)state;
+TEST(a_token_has_no_more_unfinished_jobs_than_its_quota) {
     Room room = room_make(1, 2, 0);
     Job *jobs[3], *more;
     assert_int_equal(send(&room, "ann", NULL, 0.010, endless, &jobs[0], NULL), STATUS_OK);
@@ -118,8 +112,7 @@ static void a_token_has_no_more_unfinished_jobs_than_its_quota(void **state) {
     room_end(&room);
 }
 
-static void a_quota_counts_the_jobs_of_an_earlier_life(void **state) {
-    (void)state;
+TEST(a_quota_counts_the_jobs_of_an_earlier_life) {
     Room room = room_make(1, 1, 0);
     Job *job, *more;
     bool is_kept = false;
@@ -136,8 +129,7 @@ static void a_quota_counts_the_jobs_of_an_earlier_life(void **state) {
     room_end(&room);
 }
 
-static void a_token_sends_no_more_than_its_rate(void **state) {
-    (void)state;
+TEST(a_token_sends_no_more_than_its_rate) {
     Room room = room_make(1, 0, 3);
     Job *job;
     for (size_t i = 0; i < 3; i++) {
@@ -153,8 +145,7 @@ static void a_token_sends_no_more_than_its_rate(void **state) {
     room_end(&room);
 }
 
-static void keys_are_each_clients_own(void **state) {
-    (void)state;
+TEST(keys_are_each_clients_own) {
     Room room = room_make(1, 0, 0);
     Job *ann, *again, *bob, *nobody;
     bool is_replayed = true;
@@ -181,8 +172,7 @@ static void keys_are_each_clients_own(void **state) {
     room_end(&room);
 }
 
-static void a_key_that_is_none_is_refused(void **state) {
-    (void)state;
+TEST(a_key_that_is_none_is_refused) {
     Room room = room_make(1, 0, 0);
     char longest[300];
     memset(longest, 'k', sizeof longest);
@@ -200,8 +190,7 @@ static void a_key_that_is_none_is_refused(void **state) {
     room_end(&room);
 }
 
-static void quick_jobs_go_beside_slow_ones_that_have_every_worker(void **state) {
-    (void)state;
+TEST(quick_jobs_go_beside_slow_ones_that_have_every_worker) {
     Room room = room_make(2, 0, 0);
     Job *slow[5], *quick;
     for (size_t i = 0; i < 5; i++)
@@ -219,8 +208,7 @@ static void quick_jobs_go_beside_slow_ones_that_have_every_worker(void **state) 
     room_end(&room);
 }
 
-static void a_deleted_result_is_known_no_more(void **state) {
-    (void)state;
+TEST(a_deleted_result_is_known_no_more) {
     Room room = room_make(1, 0, 0);
     Job *job, *found;
     assert_int_equal(send(&room, NULL, NULL, 0.015, 1, &job, NULL), STATUS_OK);
@@ -256,8 +244,7 @@ static size_t count_jobs(Db *db) {
     return count;
 }
 
-static void what_is_beyond_the_rules_goes_in_small_steps_and_no_more_than_that(void **state) {
-    (void)state;
+TEST(what_is_beyond_the_rules_goes_in_small_steps_and_no_more_than_that) {
     Room room = room_make(1, 0, 0);
     Job *job;
     Removed removed;
@@ -290,18 +277,4 @@ static void what_is_beyond_the_rules_goes_in_small_steps_and_no_more_than_that(v
     }
     assert_int_equal(count_jobs(room.db), 1); // what is unfinished stays
     room_end(&room);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_token_has_no_more_unfinished_jobs_than_its_quota),
-        cmocka_unit_test(a_quota_counts_the_jobs_of_an_earlier_life),
-        cmocka_unit_test(a_token_sends_no_more_than_its_rate),
-        cmocka_unit_test(keys_are_each_clients_own),
-        cmocka_unit_test(a_key_that_is_none_is_refused),
-        cmocka_unit_test(quick_jobs_go_beside_slow_ones_that_have_every_worker),
-        cmocka_unit_test(a_deleted_result_is_known_no_more),
-        cmocka_unit_test(what_is_beyond_the_rules_goes_in_small_steps_and_no_more_than_that),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,15 +1,10 @@
 // Stored numbers come back bit for bit, and what was cut or changed does not come back at all.
 #include "server/jobs/outcome_blob.h"
+#include "tests/support/test.h"
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 static Outcome *sample(void) {
     Outcome *outcome = outcome_new();
@@ -40,8 +35,7 @@ static Outcome *sample(void) {
     return outcome;
 }
 
-static void an_outcomes_numbers_come_back(void **state) {
-    (void)state;
+TEST(an_outcomes_numbers_come_back) {
     Outcome *outcome = sample();
     Bytes bytes = {.most = 1 << 20}, series = {.most = 1 << 20}, again = {.most = 1 << 20};
     outcome->summary.impacts = 2;
@@ -75,8 +69,7 @@ static void an_outcomes_numbers_come_back(void **state) {
     outcome_unref(read);
 }
 
-static void what_is_cut_or_has_wild_counts_is_not_read(void **state) {
-    (void)state;
+TEST(what_is_cut_or_has_wild_counts_is_not_read) {
     enum { IMPACTS = 32, RECORD_BYTES = 6 }; // places in the head
     Outcome *outcome = sample();
     Columns columns;
@@ -117,12 +110,4 @@ static void what_is_cut_or_has_wild_counts_is_not_read(void **state) {
     bytes_clear(&bytes);
     bytes_clear(&series);
     outcome_unref(outcome);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(an_outcomes_numbers_come_back),
-        cmocka_unit_test(what_is_cut_or_has_wild_counts_is_not_read),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,13 +1,9 @@
 // What the names of materials in a scene become: numbers or tables, rigs, spreads; and that it
 // never becomes anything else afterwards.
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "core/study/sensitivity.h"
 #include "core/study/sweep.h"
@@ -16,6 +12,7 @@
 #include "server/jobs/references.h"
 #include "server/json/parse.h"
 #include "server/materials/material.h"
+#include "tests/support/test.h"
 
 static Db *db;
 static Problem problem;
@@ -140,8 +137,7 @@ static void expect_stable(void) {
     free(second);
 }
 
-static void a_table_stands_where_its_material_was_named(void **state) {
-    (void)state;
+TEST_IN(a_table_stands_where_its_material_was_named, set_up, tear_down) {
     say("foam", SAID(TABLE_MEMBERS));
     resolve_well("\"buffer\": \"foam\"", "");
     expect_member("{\"material\": \"foam@1\", \"table\": [{\"approach_speed\": 0.1, "
@@ -156,8 +152,7 @@ static void a_table_stands_where_its_material_was_named(void **state) {
     assert_true(isnan(damper()->buffer.table.at[0].contact_time));
 }
 
-static void what_stands_beside_a_name_is_what_the_revision_says(void **state) {
-    (void)state;
+TEST_IN(what_stands_beside_a_name_is_what_the_revision_says, set_up, tear_down) {
     static const char row[] =
         "{\"approach_speed\": %g, \"restitution\": %g, \"contact_time\": 0.03}";
     static const struct {
@@ -195,8 +190,7 @@ static void what_stands_beside_a_name_is_what_the_revision_says(void **state) {
     expect_fault("/dampers/0/buffer/table", "must be left out: sponge@1 has no table");
 }
 
-static void a_name_alone_is_the_approved_head_and_never_a_deprecated_one(void **state) {
-    (void)state;
+TEST_IN(a_name_alone_is_the_approved_head_and_never_a_deprecated_one, set_up, tear_down) {
     say("foam", SAID("\"restitution\": 0.5"));
     resolve_well("\"buffer\": \"foam\"", "");
     assert_string_equal(damper()->buffer.material, "foam@1");
@@ -224,8 +218,7 @@ static void a_name_alone_is_the_approved_head_and_never_a_deprecated_one(void **
     expect_fault("/dampers/0/buffer", "has no such revision; its newest revision is foam@2");
 }
 
-static void what_is_known_of_a_test_goes_with_the_buffer(void **state) {
-    (void)state;
+TEST_IN(what_is_known_of_a_test_goes_with_the_buffer, set_up, tear_down) {
     say("foam", SAID("\"restitution\": 0.5, \"restitution_deviation\": 0.05, \"contact_time\": "
                      "0.02, \"contact_time_deviation\": 0.001, \"least_speed\": 0.2, "
                      "\"impactor_mass\": 0.3, \"base\": \"free\", \"base_mass\": 0.6"));
@@ -245,8 +238,7 @@ static void what_is_known_of_a_test_goes_with_the_buffer(void **state) {
     assert_true(isnan(buffer_test_mass(&damper()->buffer)));
 }
 
-static void a_rig_that_is_not_given_is_that_of_the_revision(void **state) {
-    (void)state;
+TEST_IN(a_rig_that_is_not_given_is_that_of_the_revision, set_up, tear_down) {
 #define MEASURED "\"restitution\": 0.5, \"contact_time\": 0.02"
     static const char rig[] = "\"identified_for\": \"rig\", ";
     static const struct {
@@ -298,8 +290,7 @@ static void a_rig_that_is_not_given_is_that_of_the_revision(void **state) {
 }
 
 // As they were before any material had more than one revision.
-static void canonical_forms_of_named_revisions_never_change(void **state) {
-    (void)state;
+TEST_IN(canonical_forms_of_named_revisions_never_change, set_up, tear_down) {
     static const struct {
         const char *damper, *rest, *form;
     } cases[] = {
@@ -362,8 +353,7 @@ static const SensitivityStudy *study(void) {
          "\"contact_time_deviation\": 0.001")
 #define SENSITIVITY(members) ", \"study\": {\"kind\": \"sensitivity\"" members "}"
 
-static void a_sensitivity_study_takes_the_recorded_spread(void **state) {
-    (void)state;
+TEST_IN(a_sensitivity_study_takes_the_recorded_spread, set_up, tear_down) {
     say("foam", SPREAD_SAID);
     resolve_well("\"buffer\": \"foam\"", SENSITIVITY(""));
     assert_int_equal(study()->runs, 200);
@@ -394,8 +384,7 @@ static void a_sensitivity_study_takes_the_recorded_spread(void **state) {
     expect_stable();
 }
 
-static void what_a_study_says_itself_wins_over_what_was_recorded(void **state) {
-    (void)state;
+TEST_IN(what_a_study_says_itself_wins_over_what_was_recorded, set_up, tear_down) {
     say("foam", SPREAD_SAID);
     resolve_well("\"buffer\": \"foam\"", SENSITIVITY(", \"restitution_deviation\": 0.3"));
     expect_member("\"restitution_deviation\": 0.3, \"spread\": [{\"damper\": 1, \"buffer\": "
@@ -439,8 +428,7 @@ static void what_a_study_says_itself_wins_over_what_was_recorded(void **state) {
     resolve_well("\"buffer\": \"wild\"", SENSITIVITY(", \"restitution_deviation\": 0.4"));
 }
 
-static void points_of_a_sweep_have_the_tables_and_rigs_of_their_materials(void **state) {
-    (void)state;
+TEST_IN(points_of_a_sweep_have_the_tables_and_rigs_of_their_materials, set_up, tear_down) {
     say("foam", SAID(TABLE_MEMBERS ", \"impactor_mass\": 0.3, \"base\": \"fixed\""));
     say("rubber", SAID("\"restitution\": 0.5, \"contact_time\": 0.01, \"impactor_mass\": 0.4, "
                        "\"base\": \"fixed\""));
@@ -479,8 +467,7 @@ static void points_of_a_sweep_have_the_tables_and_rigs_of_their_materials(void *
     sweep_grid_free(plan);
 }
 
-static void uses_are_lines_each_once(void **state) {
-    (void)state;
+TEST_IN(uses_are_lines_each_once, set_up, tear_down) {
     Bytes uses = {0};
     resolve_well("\"buffer\": {\"restitution\": 0.5}", "");
     references_write(&uses, &inquiry);
@@ -503,22 +490,4 @@ static void uses_are_lines_each_once(void **state) {
     assert_int_equal(use.revision, 0);
     assert_true(references_next(&rest, &use));
     assert_int_equal(use.revision, 12);
-}
-
-#define TEST(name) cmocka_unit_test_setup_teardown(name, set_up, tear_down)
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        TEST(a_table_stands_where_its_material_was_named),
-        TEST(what_stands_beside_a_name_is_what_the_revision_says),
-        TEST(a_name_alone_is_the_approved_head_and_never_a_deprecated_one),
-        TEST(what_is_known_of_a_test_goes_with_the_buffer),
-        TEST(a_rig_that_is_not_given_is_that_of_the_revision),
-        TEST(canonical_forms_of_named_revisions_never_change),
-        TEST(a_sensitivity_study_takes_the_recorded_spread),
-        TEST(what_a_study_says_itself_wins_over_what_was_recorded),
-        TEST(points_of_a_sweep_have_the_tables_and_rigs_of_their_materials),
-        TEST(uses_are_lines_each_once),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,13 +2,8 @@
 // used.
 #include "server/jobs/resolve_record.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "core/study/sweep.h"
 #include "server/db/db_private.h"
@@ -17,6 +12,7 @@
 #include "server/jobs/jobs.h"
 #include "server/json/encode.h"
 #include "tests/support/scratch.h"
+#include "tests/support/test.h"
 
 static Problem problem;
 static char folder[SCRATCH_SIZE];
@@ -67,8 +63,7 @@ static const ExcitationRecord *record_in(const StudyRequest *inquiry) {
     return (const ExcitationRecord *)(const void *)inquiry->simulation.scene.excitation;
 }
 
-static void scenes_share_the_samples_of_the_record_they_name(void **state) {
-    (void)state;
+TEST(scenes_share_the_samples_of_the_record_they_name) {
     StudyRequest one, two;
     char ids[2][72];
     assert_int_equal(prepare("\"name\": \"a\"", "", &one), STATUS_OK);
@@ -94,8 +89,7 @@ static void scenes_share_the_samples_of_the_record_they_name(void **state) {
     study_request_clear(&two);
 }
 
-static void a_sweep_pins_the_records_of_its_axes_once_each(void **state) {
-    (void)state;
+TEST(a_sweep_pins_the_records_of_its_axes_once_each) {
     StudyRequest inquiry;
     Bytes uses = {0};
     assert_int_equal(
@@ -114,8 +108,7 @@ static void a_sweep_pins_the_records_of_its_axes_once_each(void **state) {
     study_request_clear(&inquiry);
 }
 
-static void samples_are_let_go_of_and_had_again(void **state) {
-    (void)state;
+TEST(samples_are_let_go_of_and_had_again) {
     StudyRequest inquiry;
     RecordUses uses;
     add("gone", 5);
@@ -146,8 +139,7 @@ static void samples_are_let_go_of_and_had_again(void **state) {
     study_request_clear(&inquiry);
 }
 
-static void a_sweep_holds_only_so_many_samples(void **state) {
-    (void)state;
+TEST(a_sweep_holds_only_so_many_samples) {
     NamedRecord *large[5];
     StudyRequest inquiry;
     for (size_t i = 0; i < COUNT(large); i++) {
@@ -172,8 +164,7 @@ static void a_sweep_holds_only_so_many_samples(void **state) {
         refcount_unref(&large[i]->shared);
 }
 
-static void unknown_names_are_suggested_for_a_few_and_looked_up_for_a_hundred(void **state) {
-    (void)state;
+TEST(unknown_names_are_suggested_for_a_few_and_looked_up_for_a_hundred) {
     enum { NAMES = 300 };
     static const char *const axes[][2] = {{"/excitation/name", "record-"},
                                           {"/dampers/0/buffer", "spong"}};
@@ -206,8 +197,7 @@ static void unknown_names_are_suggested_for_a_few_and_looked_up_for_a_hundred(vo
     }
 }
 
-static void faults_stand_where_the_name_or_the_digest_does(void **state) {
-    (void)state;
+TEST(faults_stand_where_the_name_or_the_digest_does) {
     static const char axis[] =
         "{\"kind\": \"sweep\", \"axes\": [{\"pointer\": \"/excitation/name\", \"values\": %s}]%s}";
     static const struct {
@@ -241,8 +231,7 @@ static void faults_stand_where_the_name_or_the_digest_does(void **state) {
     }
 }
 
-static void without_a_daemon_there_are_no_records(void **state) {
-    (void)state;
+TEST(without_a_daemon_there_are_no_records) {
     Db *own, *kept = db;
     StudyRequest inquiry;
     assert_int_equal(db_open(NULL, &own, &problem), STATUS_OK);
@@ -266,15 +255,4 @@ static int fill(void **state) {
     return 0;
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(scenes_share_the_samples_of_the_record_they_name),
-        cmocka_unit_test(a_sweep_pins_the_records_of_its_axes_once_each),
-        cmocka_unit_test(samples_are_let_go_of_and_had_again),
-        cmocka_unit_test(a_sweep_holds_only_so_many_samples),
-        cmocka_unit_test(unknown_names_are_suggested_for_a_few_and_looked_up_for_a_hundred),
-        cmocka_unit_test(faults_stand_where_the_name_or_the_digest_does),
-        cmocka_unit_test(without_a_daemon_there_are_no_records),
-    };
-    return cmocka_run_group_tests(tests, fill, db_end);
-}
+TEST_GROUP(fill, db_end)

@@ -1,19 +1,13 @@
 // Studies in the jobs room, with the real engine and a real database: shared out to the workers,
 // the same bytes for any number of them, stopped, interrupted, and side by side.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
-#include "core/math/fft.h"
 #include "server/jobs/study.h"
 #include "server/util/clock.h"
 #include "tests/support/room.h"
+#include "tests/support/test.h"
 
 // Instrumented code takes many times the CPU.
 enum { SLOWER = IMPACTD_SANITIZED ? 20 : 1, FEWER = IMPACTD_SANITIZED ? 8 : 1 };
@@ -100,8 +94,7 @@ static size_t fold_backwards(size_t members, size_t enough, size_t part_bytes, s
     return noted.folded;
 }
 
-static void parts_are_folded_in_order_within_bounded_memory(void **state) {
-    (void)state;
+TEST(parts_are_folded_in_order_within_bounded_memory) {
     size_t most;
     assert_int_equal(fold_backwards(1000, SIZE_MAX, 8, &most), 1000);
     assert_int_equal(most, 1000);
@@ -125,8 +118,7 @@ static char *answer_of(const Room *room, const char *text) {
     return study;
 }
 
-static void an_answer_has_the_same_bytes_for_any_number_of_workers(void **state) {
-    (void)state;
+TEST(an_answer_has_the_same_bytes_for_any_number_of_workers) {
     static const size_t workers[] = {1, 2, 5};
     static const struct Case {
         const char *accuracy, *study;
@@ -177,8 +169,7 @@ static bool is_idle(const Room *room) {
     return is_idle;
 }
 
-static void all_workers_make_an_ensemble_together(void **state) {
-    (void)state;
+TEST(all_workers_make_an_ensemble_together) {
     Room room = room_make(3);
     char text[1024], id[40], result[72];
     size_t most = 0;
@@ -201,8 +192,7 @@ static int64_t process_cpu_ns(void) {
 }
 
 // Dismisses a study whose members are long, in the midst of them: the CPU that it takes afterwards.
-static void a_study_stops_within_100_ms_of_work(void **state) {
-    (void)state;
+TEST(a_study_stops_within_100_ms_of_work) {
     static const char sweep[] =
         "{\"kind\": \"sweep\", \"axes\": [{\"pointer\": \"/excitation/seed\","
         " \"from\": 1, \"to\": 50, \"count\": 50}]}";
@@ -232,8 +222,7 @@ static void a_study_stops_within_100_ms_of_work(void **state) {
     room_end(&room);
 }
 
-static void an_ensemble_is_dismissed_at_any_moment_and_leaves_nothing(void **state) {
-    (void)state;
+TEST(an_ensemble_is_dismissed_at_any_moment_and_leaves_nothing) {
     Room room = room_make(2);
     char text[1024], id[40], result[72];
     for (int i = 0; i < 20; i++) {
@@ -251,8 +240,7 @@ static void an_ensemble_is_dismissed_at_any_moment_and_leaves_nothing(void **sta
     room_end(&room);
 }
 
-static void an_ensemble_that_was_interrupted_begins_again(void **state) {
-    (void)state;
+TEST(an_ensemble_that_was_interrupted_begins_again) {
     Room room = room_make(2);
     char text[1024], id[40], result[72];
     ensemble(text, 300, 20);
@@ -303,8 +291,7 @@ static void assert_both_get_on(const char *one, const char *other) {
     room_end(&room);
 }
 
-static void studies_of_two_clients_both_get_on(void **state) {
-    (void)state;
+TEST(studies_of_two_clients_both_get_on) {
     char one[1024], other[1024];
     room_sweep(one, sizeof one, 4000 / FEWER, 20);
     room_sweep(other, sizeof other, 4000 / FEWER, 20.5);
@@ -315,8 +302,7 @@ static void studies_of_two_clients_both_get_on(void **state) {
     assert_both_get_on(other, one);
 }
 
-static void single_jobs_go_between_the_members_of_an_ensemble(void **state) {
-    (void)state;
+TEST(single_jobs_go_between_the_members_of_an_ensemble) {
     Room room = room_make(1);
     char text[1024], id[40], single[40], result[72];
     ensemble(text, 8000 / FEWER, 20);
@@ -329,19 +315,4 @@ static void single_jobs_go_between_the_members_of_an_ensemble(void **state) {
     assert_int_equal(room_state(&room, id, result), JOB_RUNNING);
     room_dismiss(&room, id);
     room_end(&room);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(parts_are_folded_in_order_within_bounded_memory),
-        cmocka_unit_test(an_answer_has_the_same_bytes_for_any_number_of_workers),
-        cmocka_unit_test(all_workers_make_an_ensemble_together),
-        cmocka_unit_test(a_study_stops_within_100_ms_of_work),
-        cmocka_unit_test(an_ensemble_is_dismissed_at_any_moment_and_leaves_nothing),
-        cmocka_unit_test(an_ensemble_that_was_interrupted_begins_again),
-        cmocka_unit_test(studies_of_two_clients_both_get_on),
-        cmocka_unit_test(single_jobs_go_between_the_members_of_an_ensemble),
-    };
-    fft_start();
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

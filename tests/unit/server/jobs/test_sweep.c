@@ -1,17 +1,11 @@
 // Sweeps in the jobs room, with the real engine and a real database: cancelled, interrupted and
 // resumed at any moment, beside other jobs.
 #include <errno.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <unistd.h>
 
-#include <cmocka.h>
-
-#include "core/math/fft.h"
 #include "server/jobs/sweep.h"
 #include "tests/support/room.h"
+#include "tests/support/test.h"
 
 // The next `failing` syncs of the database fail, after `spared` others.
 static atomic_int failing, spared;
@@ -44,8 +38,7 @@ static void assert_whole(const Room *room, const char *result, size_t points) {
     sweep_view_clear(&show);
 }
 
-static void rows_come_back_as_they_were_put(void **state) {
-    (void)state;
+TEST(rows_come_back_as_they_were_put) {
     const SweepRow row = {.points = 10, .metrics = 2, .chunks = 4};
     assert_int_equal(sweep_rows_of(&row, 0), 3);
     assert_int_equal(sweep_rows_of(&row, 1), 3);
@@ -70,8 +63,7 @@ static void rows_come_back_as_they_were_put(void **state) {
     assert_string_equal(why, "other");
 }
 
-static void a_sweep_interrupted_again_and_again_comes_to_its_end(void **state) {
-    (void)state;
+TEST(a_sweep_interrupted_again_and_again_comes_to_its_end) {
     Room room = room_make(3);
     char id[40], result[72];
     enum { POINTS = IMPACTD_SANITIZED ? 1500 : 4000 };
@@ -86,8 +78,7 @@ static void a_sweep_interrupted_again_and_again_comes_to_its_end(void **state) {
     room_end(&room);
 }
 
-static void a_sweep_is_dismissed_at_any_moment_and_leaves_nothing(void **state) {
-    (void)state;
+TEST(a_sweep_is_dismissed_at_any_moment_and_leaves_nothing) {
     Room room = room_make(2);
     char id[40], other[72];
     for (int i = 0; i < 20; i++) {
@@ -102,8 +93,7 @@ static void a_sweep_is_dismissed_at_any_moment_and_leaves_nothing(void **state) 
     room_end(&room);
 }
 
-static void two_sweeps_and_their_doubles_share_the_workers(void **state) {
-    (void)state;
+TEST(two_sweeps_and_their_doubles_share_the_workers) {
     Room room = room_make(2);
     char ids[4][40], results[4][72];
     for (int i = 0; i < 4; i++)
@@ -117,8 +107,7 @@ static void two_sweeps_and_their_doubles_share_the_workers(void **state) {
     room_end(&room);
 }
 
-static void a_sweep_waits_for_a_disk_whose_faults_pass(void **state) {
-    (void)state;
+TEST(a_sweep_waits_for_a_disk_whose_faults_pass) {
     for (int i = 0; i < 6; i++) {
         Room room = room_make(2);
         char id[40], result[72];
@@ -138,16 +127,4 @@ static void a_sweep_waits_for_a_disk_whose_faults_pass(void **state) {
         assert_whole(&room, result, 300);
         room_end(&room);
     }
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(rows_come_back_as_they_were_put),
-        cmocka_unit_test(a_sweep_interrupted_again_and_again_comes_to_its_end),
-        cmocka_unit_test(a_sweep_is_dismissed_at_any_moment_and_leaves_nothing),
-        cmocka_unit_test(two_sweeps_and_their_doubles_share_the_workers),
-        cmocka_unit_test(a_sweep_waits_for_a_disk_whose_faults_pass),
-    };
-    fft_start();
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

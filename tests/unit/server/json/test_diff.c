@@ -1,14 +1,10 @@
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 
-#include <cmocka.h>
 
 #include <stdio.h>
 #include <string.h>
 
 #include "server/json/diff.h"
+#include "tests/support/test.h"
 
 static void assert_differs(const char *a, const char *b, const char *ignored, const char *wanted) {
     static const DiffFormat format = {"a", "b", true};
@@ -19,16 +15,14 @@ static void assert_differs(const char *a, const char *b, const char *ignored, co
     bytes_clear(&bytes);
 }
 
-static void each_difference_has_its_pointer(void **state) {
-    (void)state;
+TEST(each_difference_has_its_pointer) {
     assert_differs("{\"a\": 1, \"b\": {\"c\": [1, {\"d\": 0.1}]}}",
                    "{\"b\": {\"c\": [1, {\"d\": 0.2}]}, \"a\": 1.0}", NULL,
                    "[{\"pointer\": \"/b/c/1/d\", \"a\": 0.1, \"b\": 0.2, \"detail\": null}]");
     assert_differs("{\"x\": 1}", "{\"x\": 1}", NULL, "[]");
 }
 
-static void missing_values_are_null(void **state) {
-    (void)state;
+TEST(missing_values_are_null) {
     assert_differs("{\"a\": \"t\", \"l\": [1, 2]}", "{\"b/~\": {\"q\": true}, \"l\": [1]}", NULL,
                    "[{\"pointer\": \"/a\", \"a\": \"t\", \"b\": null, \"detail\": null}, "
                    "{\"pointer\": \"/l/1\", \"a\": 2, \"b\": null, \"detail\": null}, "
@@ -36,13 +30,11 @@ static void missing_values_are_null(void **state) {
                    "\"detail\": null}]");
 }
 
-static void a_member_may_be_left_out(void **state) {
-    (void)state;
+TEST(a_member_may_be_left_out) {
     assert_differs("{\"study\": 1, \"x\": 2}", "{\"x\": 2}", "study", "[]");
 }
 
-static void long_numbers_are_one_difference(void **state) {
-    (void)state;
+TEST(long_numbers_are_one_difference) {
     char a[2048] = "{\"s\": [", b[2048] = "{\"s\": [";
     for (int i = 0; i < 300; i++) {
         snprintf(a + strlen(a), sizeof a - strlen(a), "%s%d", i > 0 ? "," : "", i);
@@ -55,8 +47,7 @@ static void long_numbers_are_one_difference(void **state) {
                    "items, the first that differs is number 251\"}]");
 }
 
-static void differences_beyond_the_limit_are_counted(void **state) {
-    (void)state;
+TEST(differences_beyond_the_limit_are_counted) {
     Bytes texts[2] = {{0}, {0}};
     for (int t = 0; t < 2; t++) {
         bytes_text(&texts[t], "{");
@@ -79,15 +70,4 @@ static void differences_beyond_the_limit_are_counted(void **state) {
     assert_string_equal(bytes.at, "[{\"pointer\": \"/x\", \"here\": 1}]");
     bytes_clear(&bytes);
     assert_int_equal(json_diff("{", "{}", NULL, &format, &bytes, &count, NULL), STATUS_INTERNAL);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(each_difference_has_its_pointer),
-        cmocka_unit_test(missing_values_are_null),
-        cmocka_unit_test(a_member_may_be_left_out),
-        cmocka_unit_test(long_numbers_are_one_difference),
-        cmocka_unit_test(differences_beyond_the_limit_are_counted),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

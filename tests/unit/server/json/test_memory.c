@@ -1,14 +1,11 @@
 // A failed allocation inside the parser is reported as such, at whichever request it happens: never
 // as a fault of the text, and without a look behind the parser's buffers.
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "server/json/memory.h"
+#include "tests/support/test.h"
 
 static size_t left; // requests until one fails
 
@@ -40,8 +37,7 @@ static void fail_each_request_of(const char *text) {
     assert_true(count > 3);
 }
 
-static void every_failed_request_is_reported(void **state) {
-    (void)state;
+TEST(every_failed_request_is_reported) {
     char text[20000];
     char run[5000];
     memset(run, 'x', sizeof run - 1);
@@ -57,9 +53,4 @@ static void every_failed_request_is_reported(void **state) {
                  run);
     strcat(text, "]");
     fail_each_request_of(text);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(every_failed_request_is_reported)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,15 +1,11 @@
 // Imports and exports of materials, as far as HTTP does not show them.
 #include "server/materials/import.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "server/materials/export.h"
+#include "tests/support/test.h"
 
 static Problem problem;
 
@@ -37,8 +33,7 @@ static char *export_all(Db *db, bool is_table) {
     return whole;
 }
 
-static void only_an_import_that_adds_a_revision_changes_the_catalog(void **state) {
-    (void)state;
+TEST(only_an_import_that_adds_a_revision_changes_the_catalog) {
     Db *db = open_database();
     ImportTally tally;
     uint64_t version = db_catalog_version(db);
@@ -70,8 +65,7 @@ static const char *const unsafe[] = {
 static const char *const plain[] = {"two\nlines",     "two\r\nlines",  "say \"so\"",
                                     "\"a\" or \"b\"", "40 \xc2\xb0Sh", "a=b"};
 
-static void a_table_has_neither_control_characters_nor_formulas_and_comes_back(void **state) {
-    (void)state;
+TEST(a_table_has_neither_control_characters_nor_formulas_and_comes_back) {
     Db *db = open_database(), *other = open_database();
     ImportTally tally;
     Bytes text = {.most = 0};
@@ -116,8 +110,7 @@ static void a_table_has_neither_control_characters_nor_formulas_and_comes_back(v
     db_close(db);
 }
 
-static void an_export_is_made_revision_by_revision(void **state) {
-    (void)state;
+TEST(an_export_is_made_revision_by_revision) {
     Db *db = open_database();
     ImportTally tally;
     Bytes rows = {.most = 0}, piece = {.most = 0};
@@ -139,13 +132,4 @@ static void an_export_is_made_revision_by_revision(void **state) {
     bytes_clear(&piece);
     free(table);
     db_close(db);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(only_an_import_that_adds_a_revision_changes_the_catalog),
-        cmocka_unit_test(a_table_has_neither_control_characters_nor_formulas_and_comes_back),
-        cmocka_unit_test(an_export_is_made_revision_by_revision),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

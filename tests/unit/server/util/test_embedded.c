@@ -1,17 +1,12 @@
 // Embedded files are byte for byte those of the tree.
 #include "server/util/embedded.h"
+#include "tests/support/test.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
-static void every_embedded_file_equals_its_source(void **state) {
-    (void)state;
+TEST(every_embedded_file_equals_its_source) {
     const EmbeddedFile *const tables[] = {embedded_sql, embedded_schemas, embedded_examples,
                                           embedded_web};
     size_t files = 0;
@@ -32,18 +27,9 @@ static void every_embedded_file_equals_its_source(void **state) {
     assert_true(files > 0);
 }
 
-static void a_file_is_found_by_its_path(void **state) {
-    (void)state;
+TEST(a_file_is_found_by_its_path) {
     const EmbeddedFile *file = embedded_find(embedded_sql, "schema/sql/schema.sql");
     assert_non_null(file);
     assert_non_null(strstr(file->bytes, "CREATE TABLE"));
     assert_null(embedded_find(embedded_sql, "schema/sql/schema"));
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_embedded_file_equals_its_source),
-        cmocka_unit_test(a_file_is_found_by_its_path),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

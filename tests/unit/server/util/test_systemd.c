@@ -1,8 +1,4 @@
 // systemd's side of the socket: what arrives, and that nothing happens without it.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,9 +6,8 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-#include <cmocka.h>
-
 #include "server/util/process.h"
+#include "tests/support/test.h"
 
 static int listen_at(const char *path) {
     struct sockaddr_un name = {.sun_family = AF_UNIX};
@@ -39,8 +34,7 @@ static void expect_told(const char *path) {
     unsetenv("NOTIFY_SOCKET");
 }
 
-static void states_arrive_at_both_kinds_of_socket(void **state) {
-    (void)state;
+TEST(states_arrive_at_both_kinds_of_socket) {
     char path[64];
     snprintf(path, sizeof path, "/tmp/impactd-notify-%ld", (long)getpid());
     expect_told(path);
@@ -49,8 +43,7 @@ static void states_arrive_at_both_kinds_of_socket(void **state) {
     expect_told(path);
 }
 
-static void without_a_socket_nothing_happens(void **state) {
-    (void)state;
+TEST(without_a_socket_nothing_happens) {
     unsetenv("NOTIFY_SOCKET");
     process_notify_systemd("READY=1");
     setenv("NOTIFY_SOCKET", "vsock:1", 1);
@@ -60,8 +53,7 @@ static void without_a_socket_nothing_happens(void **state) {
     unsetenv("NOTIFY_SOCKET");
 }
 
-static void the_watchdog_is_fed_twice_a_period(void **state) {
-    (void)state;
+TEST(the_watchdog_is_fed_twice_a_period) {
     char own[32];
     unsetenv("WATCHDOG_USEC");
     unsetenv("WATCHDOG_PID");
@@ -77,13 +69,4 @@ static void the_watchdog_is_fed_twice_a_period(void **state) {
     assert_int_equal(process_watchdog_ms(), 0);
     unsetenv("WATCHDOG_USEC");
     unsetenv("WATCHDOG_PID");
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(states_arrive_at_both_kinds_of_socket),
-        cmocka_unit_test(without_a_socket_nothing_happens),
-        cmocka_unit_test(the_watchdog_is_fed_twice_a_period),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }
