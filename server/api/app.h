@@ -34,7 +34,8 @@ Status jobs_refused(App *app, const Request *request, Reply *reply, Status statu
 
 // The handlers, by file; routes.c lists them with their patterns.
 bool jobs_are_light(const Request *request); // planned in some ten microseconds
-Handler jobs_create, jobs_list, jobs_show, jobs_dismiss, jobs_retry, jobs_scene, jobs_events;
+Handler jobs_create, jobs_list, jobs_show, jobs_change, jobs_dismiss, jobs_retry, jobs_scene,
+    jobs_events;
 Handler results_again, results_delete, results_show, results_manifest, results_series, results_psd,
     results_impacts, results_energy, results_force, results_bundle, results_tradeoff,
     results_ensemble, results_compare, results_sensitivity;

@@ -10,6 +10,7 @@
 #include "server/http/access.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
+#include "server/json/parse.h"
 #include "server/util/clock.h"
 
 static const double wait_initial = 2, wait_most = 30; // [s]
@@ -261,8 +262,39 @@ static Status require_own(App *app, const Request *request, const char *id, Prob
     return status;
 }
 
+// The body has two members of a scene, by the same rows; null removes the title.
+Status jobs_change(App *app, const Request *request, Reply *reply, Problem *problem) {
+    Field rows[] = {*fields_find(simulation_fields, "title", NULL),
+                    *fields_find(simulation_fields, "labels", NULL), FIELD_END};
+    Simulation change = {.title = NULL};
+    Job *job = NULL;
+    const char *id = request->parameters[0];
+    rows[0].flags |= FIELD_NULL_IS_EMPTY;
+    problem->whose = "change";
+    TRY(request_require_json(request, problem));
+    TRY(require_own(app, request, id, problem));
+    Status status = json_parse(request->body, request->body_size, rows, &change, problem);
+    if (status == STATUS_OK)
+        status = fields_validate(rows, &change, "", problem);
+    if (status == STATUS_OK)
+        status = jobs_annotate(app->manager, id, change.title,
+                               change.labels.at != NULL ? &change.labels : NULL, problem);
+    fields_clear(rows, &change);
+    TRY(status);
+    TRY(jobs_find(app->manager, id, &job, problem));
+    return reply_job(app, reply, job, 200, problem);
+}
+
 Status jobs_dismiss(App *app, const Request *request, Reply *reply, Problem *problem) {
     Job *job = NULL;
+    bool is_purge;
+    TRY(request_flag(request, "purge", &is_purge, problem));
+    if (is_purge) {
+        TRY(require_own(app, request, request->parameters[0], problem));
+        TRY(jobs_remove(app->manager, request->parameters[0], problem));
+        reply_borrow(reply, 204, NULL, NULL, 0);
+        return STATUS_OK;
+    }
     if (request->kept != NULL) {
         job = wait_end(request->kept, reply);
     } else {

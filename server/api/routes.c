@@ -7,6 +7,7 @@ static const char *const of_submit[] = {"dry_run", NULL};
 static const char *const of_jobs[] = {"limit",  "before", "status", "q",     "label",
                                       "result", "kind",   "since",  "until", NULL};
 static const char *const of_job[] = {"wait", NULL};
+static const char *const of_dismissal[] = {"purge", NULL};
 static const char *const of_series[] = {"channels", "from", "to", "points", NULL};
 static const char *const of_impacts[] = {"from", "to", "first", "limit", NULL};
 static const char *const of_force[] = {"points", NULL};
@@ -36,7 +37,8 @@ const Route routes[] = {
     {"GET",    "/v1/jobs",                              "read",   of_jobs,      "Jobs, newest first; ?q= searches titles and labels", jobs_list, NULL},
     {"GET",    "/v1/jobs/{id}",                         "read",   of_job,       "A job's state; ?wait=S waits until it is finished", jobs_show, NULL},
     {"GET",    "/v1/jobs/{id}/events",                  "read",   NULL,         "A job's progress as server-sent events", jobs_events, NULL},
-    {"DELETE", "/v1/jobs/{id}",                         "submit", NULL,         "Cancel a job", jobs_dismiss, NULL},
+    {"PATCH",  "/v1/jobs/{id}",                         "submit", NULL,         "Change the title and the labels of a job", jobs_change, NULL},
+    {"DELETE", "/v1/jobs/{id}",                         "submit", of_dismissal, "Cancel a job; ?purge=1 removes a finished one from the list", jobs_dismiss, NULL},
     {"GET",    "/v1/jobs/{id}/scene",                   "read",   NULL,         "The scene of a job, ready to submit", jobs_scene, NULL},
     {"POST",   "/v1/jobs/{id}/retry",                   "submit", NULL,         "Make failed points of a finished sweep again", jobs_retry, NULL},
     {"GET",    "/v1/jobs/{id}/table.{format}",          "read",   NULL,         "Rows of a job's sweep so far", sweeps_table, NULL},

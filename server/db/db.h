@@ -132,6 +132,12 @@ typedef struct JobSearch {
 JobSearch job_search_all(size_t most);
 // Newest first. STATUS_NOT_FOUND where there is no job `before`, and before_unix_ms is -1.
 Status db_job_search(Db *db, const JobSearch *search, JobRows *rows, Problem *problem);
+// The title and the labels (a JSON array) of a job, with their words. NULL: as it is; "": none.
+typedef struct JobNotes {
+    const char *id, *title, *labels, *title_words, *label_words;
+} JobNotes;
+// STATUS_NOT_FOUND.
+Status db_job_annotate(Db *db, const JobNotes *notes, Problem *problem);
 // The text that a search by words looks into: a line for the title and one for each label.
 void job_words(Bytes *bytes, const char *title, const char *const *labels, size_t label_count);
 
@@ -257,5 +263,7 @@ typedef struct Removed {
 // Removes some of what exceeds the rules, or returns some free pages to the disk where there are
 // many, in one small transaction.
 Status db_remove(Db *db, const KeepRules *rules, Removed *removed, Problem *problem);
+// Removes one finished job, and its result if that was the last job of it. STATUS_NOT_FOUND.
+Status db_job_remove(Db *db, const char *id, Removed *removed, Problem *problem);
 
 #endif

@@ -101,6 +101,35 @@ void db_job_update_post(Db *db, const JobRow *row, PendingWrite *write) {
     db_enqueue(db, job_apply_save, row, WRITE_NORMAL, write);
 }
 
+// clang-format off
+static const SqlColumn notes_columns[] = {
+    COLUMN(JobNotes, id),
+    COLUMN(JobNotes, title),
+    COLUMN(JobNotes, labels),
+    COLUMN(JobNotes, title_words),
+    COLUMN(JobNotes, label_words),
+    COLUMN_END
+};
+// clang-format on
+
+static Status job_apply_annotate(Sqlite *database, const void *work, Problem *problem) {
+    // The words are the title's line and then the labels' lines; without both there are none.
+    static const char sql[] =
+        "UPDATE jobs SET title = nullif(coalesce(:title, title), ''), "
+        "labels = nullif(coalesce(:labels, labels), ''), words = nullif("
+        "coalesce(:title_words, substr(words, 1, instr(words, char(10))), char(10)) || "
+        "coalesce(:label_words, substr(words, instr(words, char(10)) + 1), ''), char(10)) "
+        "WHERE id = :id";
+    const JobNotes *notes = work;
+    int changes;
+    TRY(sqlite_change(database, sql, notes_columns, notes, &changes, problem));
+    return changes > 0 ? STATUS_OK : job_not_found(notes->id, problem);
+}
+
+Status db_job_annotate(Db *db, const JobNotes *notes, Problem *problem) {
+    return db_write(db, job_apply_annotate, notes, problem);
+}
+
 Status db_job_load(Db *db, const char *id, JobRow *row, Problem *problem) {
     static const char sql[] = "SELECT {head} FROM jobs WHERE id = :id";
     const QueryKey key = {.id = id};

@@ -49,6 +49,7 @@ static Status has_older(Db *db, int64_t before, bool *has, Problem *problem) {
 }
 
 typedef struct Removal {
+    const char *sql; // the jobs
     QueryKey bounds;
     bool gives_back;
     Removed *removed;
@@ -69,7 +70,7 @@ static Status retention_apply(Sqlite *database, const void *work, Problem *probl
     *removed = (Removed){0};
     if (removal->gives_back)
         return sqlite_execute(database, "PRAGMA incremental_vacuum(64)", problem);
-    TRY(sqlite_list(database, victims_sql, query_key_columns, &removal->bounds, victim_columns,
+    TRY(sqlite_list(database, removal->sql, query_key_columns, &removal->bounds, victim_columns,
                     sizeof *victims.at, &victims, problem));
     Status status = STATUS_OK;
     for (size_t i = 0; i < victims.count && status == STATUS_OK; i++) {
@@ -90,7 +91,7 @@ Status db_remove(Db *db, const KeepRules *rules, Removed *removed, Problem *prob
     static const double day_ms = 86400000;
     const int64_t before = clock_unix_ms() - (int64_t)(rules->days * day_ms);
     Extent extent;
-    Removal removal = {.removed = removed};
+    Removal removal = {.sql = victims_sql, .removed = removed};
     bool is_older = false;
     *removed = (Removed){0};
     TRY(retention_measure(db, rules->jobs > 0, &extent, problem));
@@ -113,4 +114,13 @@ Status db_remove(Db *db, const KeepRules *rules, Removed *removed, Problem *prob
     TRY(db_write(db, retention_apply, &removal, problem));
     removed->is_more = removal.gives_back || removed->jobs > 0;
     return STATUS_OK;
+}
+
+Status db_job_remove(Db *db, const char *id, Removed *removed, Problem *problem) {
+    static const char sql[] = "SELECT number, result FROM jobs WHERE id = :id AND state > 1";
+    const Removal removal = {.sql = sql, .bounds = {.id = id}, .removed = removed};
+    TRY(db_write(db, retention_apply, &removal, problem));
+    return removed->jobs > 0
+               ? STATUS_OK
+               : problem_set(problem, STATUS_NOT_FOUND, "there is no finished job \"%.40s\"", id);
 }

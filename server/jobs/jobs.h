@@ -100,6 +100,14 @@ Status jobs_find(JobManager *manager, const char *id, Job **job, Problem *proble
 // Cancels the job; it is durable soon (job_subscribe). STATUS_CONFLICT if it is finished already.
 Status jobs_cancel(JobManager *manager, const char *id, Job **job, Problem *problem);
 
+// Sets the title and the labels of a job. NULL: as it is; "" and no labels: none. STATUS_NOT_FOUND.
+Status jobs_annotate(JobManager *manager, const char *id, const char *title, const Texts *labels,
+                     Problem *problem);
+
+// Removes a finished job, and its result if that was the last job of it. STATUS_CONFLICT: it is not
+// finished.
+Status jobs_remove(JobManager *manager, const char *id, Problem *problem);
+
 // The Outcome of a result with its series: from memory, from the database where they are stored
 // (its plan, work and warnings are empty then), or computed again by a worker. *outcome is NULL and
 // the return is STATUS_OK while it is being computed: `waker` is then called once when it is worth

@@ -171,6 +171,21 @@ Status jobs_delete(JobManager *manager, const char *result, Problem *problem) {
     return STATUS_OK;
 }
 
+Status jobs_remove(JobManager *manager, const char *id, Problem *problem) {
+    Job *job = NULL;
+    Removed removed;
+    TRY(jobs_find(manager, id, &job, problem));
+    const bool is_live = job->manager != NULL; // also while its last state is being written
+    job_unref(job);
+    if (is_live)
+        return problem_set(problem, STATUS_CONFLICT,
+                           "the job %.40s is not finished: dismiss it first, or wait", id);
+    TRY(db_job_remove(manager->db, id, &removed, problem));
+    if (removed.results > 0)
+        jobs_forget(manager, removed.result[0]);
+    return STATUS_OK;
+}
+
 void jobs_layers(JobManager *manager, const char *result, CacheLayers *layers) {
     pthread_mutex_lock(&manager->lock);
     *layers = (CacheLayers){.in_memory = cache_has(manager->cache, result, false),

@@ -188,40 +188,104 @@ static Status submit_queue(Entry *entry, Problem *problem) {
     return status;
 }
 
+// As a JSON array; "" if there are none.
+static char *submit_write_labels(const Texts *labels) {
+    Bytes bytes = {0};
+    for (size_t i = 0; i < labels->count; i++) {
+        bytes_text(&bytes, i > 0 ? ", " : "[");
+        bytes_json_string(&bytes, labels->at[i]);
+    }
+    bytes_text(&bytes, labels->count > 0 ? "]" : "");
+    return bytes_take(&bytes, NULL);
+}
+
+// What a search by words looks into.
+static Status submit_write_words(const char *title, const Texts *labels, char **text,
+                                 Problem *problem) {
+    Bytes words = {0};
+    job_words(&words, title, (const char *const *)labels->at, labels->count);
+    const size_t size = words.count;
+    *text = size <= LABELS_MAX ? bytes_take(&words, NULL) : NULL;
+    bytes_clear(&words);
+    if (size > LABELS_MAX)
+        return problem_add(problem, STATUS_INVALID, "/labels",
+                           "must have at most %d bytes in all, has about %zu", LABELS_MAX, size);
+    return *text != NULL ? STATUS_OK
+                         : problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
+}
+
+// NULL in place of an empty text.
+static char *submit_drop_empty(char *text) {
+    if (text != NULL && text[0] != '\0')
+        return text;
+    free(text);
+    return NULL;
+}
+
 // Title, labels and study, as they are shown and searched.
 static Status submit_fill_notes(JobRow *row, const StudyRequest *inquiry, Problem *problem) {
     const Simulation *simulation = &inquiry->simulation;
-    const Texts *labels = &simulation->labels;
-    Bytes shown = {0}, words = {0};
-    job_words(&words, simulation->title, (const char *const *)labels->at, labels->count);
-    if (words.count > LABELS_MAX) {
-        const size_t size = words.count;
-        bytes_clear(&words);
-        return problem_add(problem, STATUS_INVALID, "/labels",
-                           "must have at most %d bytes in all, has about %zu", LABELS_MAX, size);
-    }
-    for (size_t i = 0; i < labels->count; i++) {
-        bytes_text(&shown, i > 0 ? ", " : "[");
-        bytes_json_string(&shown, labels->at[i]);
-    }
-    bytes_text(&shown, labels->count > 0 ? "]" : "");
-    const bool is_named = words.count > 0;
+    TRY(submit_write_words(simulation->title, &simulation->labels, &row->words, problem));
+    row->words = submit_drop_empty(row->words);
+    row->labels = submit_drop_empty(submit_write_labels(&simulation->labels));
     row->title = simulation->title == NULL ? NULL : strdup(simulation->title);
-    row->labels = bytes_take(&shown, NULL);
-    row->words = bytes_take(&words, NULL);
     row->study = inquiry->study == NULL ? NULL : strdup(inquiry->study->kind->name);
-    const bool is_whole = (row->title != NULL || simulation->title == NULL) &&
-                          row->labels != NULL && row->words != NULL &&
-                          (row->study != NULL || inquiry->study == NULL);
-    if (labels->count == 0) {
-        free(row->labels);
-        row->labels = NULL;
+    return (row->title != NULL || simulation->title == NULL) &&
+                   (row->labels != NULL || simulation->labels.count == 0) &&
+                   (row->study != NULL || inquiry->study == NULL)
+               ? STATUS_OK
+               : STATUS_NO_MEMORY;
+}
+
+// Takes *text, "" as NULL, in place of the row's.
+static void annotate_replace(char **member, char **text) {
+    if (*text == NULL)
+        return;
+    free(*member);
+    *member = submit_drop_empty(*text);
+    *text = NULL;
+}
+
+Status jobs_annotate(JobManager *manager, const char *id, const char *title, const Texts *labels,
+                     Problem *problem) {
+    const Texts none = {NULL, 0};
+    char *title_words = NULL, *label_words = NULL, *array = NULL;
+    char *copy = title != NULL ? strdup(title) : NULL;
+    Status status = title != NULL ? submit_write_words(title[0] != '\0' ? title : NULL, &none,
+                                                       &title_words, problem)
+                                  : STATUS_OK;
+    if (status == STATUS_OK && labels != NULL) {
+        array = submit_write_labels(labels);
+        status = submit_write_words(NULL, labels, &label_words, problem);
     }
-    if (!is_named) {
-        free(row->words);
-        row->words = NULL;
+    if (status == STATUS_OK &&
+        ((title != NULL && copy == NULL) || (labels != NULL && array == NULL)))
+        status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the job");
+    // An empty title is an empty line of the words; the labels' words begin with that line.
+    const JobNotes notes = {
+        .id = id,
+        .title = copy,
+        .labels = array,
+        .title_words = title_words != NULL && title_words[0] == '\0' ? "\n" : title_words,
+        .label_words =
+            label_words != NULL && label_words[0] == '\n' ? label_words + 1 : label_words};
+    if (status == STATUS_OK)
+        status = db_job_annotate(manager->db, &notes, problem);
+    if (status == STATUS_OK) {
+        pthread_mutex_lock(&manager->lock);
+        Job *job = hashmap_find(manager->jobs, id);
+        // While it is being written the writer has its texts, and then it is read from there.
+        if (job != NULL && job->is_durable && !job->is_inserting && !job->is_ending) {
+            annotate_replace(&job->row.title, &copy);
+            annotate_replace(&job->row.labels, &array);
+        }
+        pthread_mutex_unlock(&manager->lock);
     }
-    return is_whole ? STATUS_OK : STATUS_NO_MEMORY;
+    free(copy);
+    free(array);
+    free(title_words);
+    free(label_words);
+    return status;
 }
 
 static Status submit_fill_sender(JobRow *row, const IdempotencyKey *key) {

@@ -286,8 +286,9 @@ static void decode_texts(Decoder *decoder, const json_t *value, const Field *fie
     const size_t count = is_pairs ? json_object_size(value) : json_array_size(value);
     if (!decode_fits(decoder, value, field, count, "texts", pointer))
         return;
-    Texts texts = {NULL, 0};
+    Texts texts = {calloc(1, sizeof *texts.at), 0}; // an empty array is not an absent one
     Bytes text = {0};
+    decoder->is_out_of_memory = decoder->is_out_of_memory || texts.at == NULL;
     void *member = is_pairs ? json_object_iter((json_t *)value) : NULL;
     for (size_t i = 0; i < count && !decoder->is_out_of_memory; i++) {
         const char *key = is_pairs ? json_object_iter_key(member) : NULL;

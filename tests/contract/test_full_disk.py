@@ -59,6 +59,7 @@ def test_a_full_disk_stops_writes_alone():
             assert ready.status == 503 and "database" in ready.json()["detail"], ready
             for path in (f"/v1/results/{before['result']}", f"/v1/jobs/{endless['id']}", "/v1/records/shake"):
                 assert daemon.request("DELETE", path).status == 507, path
+            assert daemon.request("PATCH", f"/v1/jobs/{before['id']}", json={"title": "x"}).status == 507
             assert daemon.request("POST", "/v1/records", json={**shake, "name": "more"}).status == 507
             felt = {"name": "Felt", "restitution": 0.3, "source": "here", "comment": "x"}
             for path, body in (("", {"slug": "felt", **felt}), ("/sponge/revisions", felt), ("/sponge/revert", {"to": 1, "comment": "x"}),

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Small features of all routes: other origins, slashes at the end, indented JSON, short ids."""
+"""Small features of all routes: other origins, slashes at the end, indented JSON, short ids; changes of jobs; previews."""
 
 import json
 import os
@@ -7,7 +7,8 @@ import sys
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
-from asking import problem, sponge  # noqa: E402
+from access import bearer, token, until  # noqa: E402
+from asking import endless, problem, sponge  # noqa: E402
 
 LAB = "https://lab.example.org"
 HTML = "text/html,application/xhtml+xml,application/xml;q=0.9,*/*;q=0.8"
@@ -113,6 +114,100 @@ def test_ids_may_be_shortened():
                      "/v1/jobs/j-00000000", f"/v1/results/{job['id'][:12]}x"):
             problem(daemon.get(path), 404)
         problem(daemon.request("DELETE", f"/v1/results/{job['result'][:20]}"), 404)
+
+
+def test_a_title_belongs_to_a_job():
+    """PATCH: title and labels of one job, also of an unfinished one, in lists, searches and after a start; its result has none."""
+    with program.daemon("--workers", "1") as daemon:
+        sent = [daemon.submit(sponge(title=f"Run {i}", labels={"lab": f"no {i}"})).json() for i in range(2)]
+        first, second = (job["links"]["self"] for job in sent)
+        assert sent[0]["result"] == sent[1]["result"] and [job["title"] for job in sent] == ["Run 0", "Run 1"], sent
+
+        def change(path, body, **options):
+            return daemon.request("PATCH", path, json=body, **options)
+
+        def found(query):
+            return [job["id"] for job in daemon.get("/v1/jobs?" + query).json()["jobs"]]
+        reply = change(first, {"title": "Überlandleitung"})
+        assert reply.status == 200 and reply.json() == {**sent[0], "title": "Überlandleitung", "cached": False}, reply
+        assert daemon.get(first).json() == reply.json() and daemon.get(second).json()["title"] == "Run 1"
+        assert found("q=ÜBERLAND".replace("Ü", "%C3%9C")) == [sent[0]["id"]] and not found("q=run%200")
+        assert found("label=lab") == [sent[1]["id"], sent[0]["id"]]
+        labelled = change(first, {"labels": ["a", "b=c"]}).json()
+        assert labelled["labels"] == ["a", "b=c"] and labelled["title"] == "Überlandleitung", labelled
+        assert found("label=b") == found("label=a") == found("q=leitung") == [sent[0]["id"]] == found("q=b%3Dc")
+        for body, title, labels in (({}, "Überlandleitung", ["a", "b=c"]), ({"title": None}, None, ["a", "b=c"]),
+                                    ({"labels": []}, None, None), ({"title": "x", "labels": {"k": "v"}}, "x", ["k=v"]),
+                                    ({"title": "", "labels": []}, None, None), ({"labels": ["only"]}, None, ["only"])):
+            shown = change(first, body).json()
+            assert (shown.get("title"), shown.get("labels")) == (title, labels), (body, shown)
+        assert found("q=only") == [sent[0]["id"]]
+        result = daemon.get(f"/v1/results/{sent[0]['result']}").json()
+        assert "title" not in result and "title" not in result["scene"], result
+        running = [daemon.submit({**endless(i), "title": "slow"}, headers={"Prefer": "respond-async"}).json() for i in range(2)]
+        for job in running:
+            assert change(job["links"]["self"], {"title": "very slow", "labels": ["x"]}).json()["title"] == "very slow", job
+        listed = daemon.get("/v1/jobs?limit=2").json()["jobs"]
+        assert [(job["title"], job["labels"]) for job in listed] == [("very slow", ["x"])] * 2, listed
+        for job in running:
+            assert daemon.request("DELETE", job["links"]["self"]).json()["title"] == "very slow"
+        problem(change(first, {"title": 1, "label": []}), 422, "/title", "/label")
+        problem(change(first, {"title": "x" * 300, "labels": ["x\ny"] * 40}), 422)
+        problem(change(first, ["title"]), 422)
+        problem(change("/v1/jobs/j-none", {"title": "x"}), 404)
+        problem(change(first + "?wait=1", {}), 400)
+        problem(daemon.request("PATCH", first, body="{", headers={"Content-Type": "application/json"}), 400)
+        problem(daemon.request("PATCH", first, body="{}", headers={"Content-Type": "text/plain"}), 415)
+        problem(daemon.request("PATCH", first, body=" " * (17 << 20), headers={"Content-Type": "application/json"}), 413)
+        daemon.stop()
+        daemon.start()
+        assert daemon.get(first).json()["labels"] == ["only"] and daemon.get(second).json()["title"] == "Run 1"
+        ann, bob = (bearer(token(daemon.data, name, "read,submit")) for name in ("ann", "bob"))
+        assert until(lambda: daemon.get("/v1/jobs").status == 401)
+        anns = daemon.submit(sponge(title="ann's"), headers=ann).json()["links"]["self"]
+        problem(change(anns, {"title": "bob's"}, headers=bob), 403)
+        assert change(anns, {"title": "mine"}, headers=ann).json()["title"] == "mine"
+        assert change(first, {"title": "ours"}, headers=bob).json()["title"] == "ours"
+
+
+def test_a_finished_job_is_removed():
+    """DELETE ?purge=1: 204 and it is in no list; its result goes with the last job that has it; 409 while it is not finished."""
+    with program.daemon("--workers", "1") as daemon:
+        jobs = [daemon.submit(sponge(title=f"Run {i}"), headers={"Idempotency-Key": f"k{i}"}).json() for i in range(2)]
+        result = f"/v1/results/{jobs[0]['result']}"
+        series = daemon.get(result + "/series.npy").body
+
+        def purge(job, query="purge=1", **options):
+            return daemon.request("DELETE", f"/v1/jobs/{job['id']}?{query}", **options)
+        for refused, status in (("purge=2", 400), ("purge=0", 409), ("forever=1", 400)):
+            problem(purge(jobs[0], refused), status)
+        assert purge(jobs[0]).status == 204
+        assert [job["id"] for job in daemon.get("/v1/jobs").json()["jobs"]] == [jobs[1]["id"]]
+        for path in ("", "/scene", "/events"):
+            problem(daemon.get(f"/v1/jobs/{jobs[0]['id']}{path}"), 404)
+        problem(purge(jobs[0]), 404)
+        assert daemon.get(result + "/series.npy").body == series
+        again = daemon.submit(sponge(), headers={"Idempotency-Key": "k0"}).json()
+        assert again["id"] != jobs[0]["id"] and again["cached"], again
+        assert purge(again).status == 204 and daemon.get(result).status == 200
+        assert purge(jobs[1]).status == 204
+        for path in ("", "/series.npy", "/impacts.json", "/manifest"):
+            problem(daemon.get(result + path), 404)
+        anew = daemon.submit(sponge()).json()
+        assert not anew["cached"] and anew["summary"] == jobs[0]["summary"], anew
+        assert daemon.get(result + "/series.npy").body == series
+        running = daemon.submit(endless(), headers={"Prefer": "respond-async"}).json()
+        problem(purge(running), 409)
+        assert daemon.request("DELETE", running["links"]["self"]).json()["status"] == "dismissed"
+        assert until(lambda: purge(running).status == 204)
+        daemon.stop()
+        daemon.start()
+        assert [job["id"] for job in daemon.get("/v1/jobs").json()["jobs"]] == [anew["id"]]
+        ann, bob = (bearer(token(daemon.data, name, "read,submit")) for name in ("ann", "bob"))
+        assert until(lambda: daemon.get("/v1/jobs").status == 401)
+        anns = daemon.submit(sponge(), headers=ann).json()
+        problem(purge(anns, headers=bob), 403)
+        assert purge(anns, headers=ann).status == 204
 
 
 if __name__ == "__main__":

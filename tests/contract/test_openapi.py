@@ -298,9 +298,13 @@ def test_real_answers_have_the_promised_shapes():
         call("GET", "/v1/jobs/{id}", f"/v1/jobs/{running}")
         call("GET", "/v1/compare", f"/v1/compare?a={running}&b={job['id']}")
         call("POST", "/v1/compare", "/v1/compare", json={**measured, "a": running})
+        gone_early = program.finished(daemon, {**scene, "title": "gone"})
         call("DELETE", "/v1/jobs/{id}", f"/v1/jobs/{running}")
         call("DELETE", "/v1/jobs/{id}", f"/v1/jobs/{running}")
         call("DELETE", "/v1/jobs/{id}", "/v1/jobs/none")
+        for body in ({"title": "x", "labels": {"a": "b"}}, {"title": 1}):
+            call("PATCH", "/v1/jobs/{id}", f"/v1/jobs/{running}", json=body)
+        call("DELETE", "/v1/jobs/{id}", f"/v1/jobs/{gone_early['id']}?purge=1")
         keyed = {"Idempotency-Key": '"one"'}
         call("POST", "/v1/jobs", "/v1/jobs", json=scene, headers=keyed)
         assert "Idempotency-Replayed" in call("POST", "/v1/jobs", "/v1/jobs", json=scene, headers=keyed)
