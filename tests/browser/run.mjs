@@ -1,4 +1,4 @@
-// Runs the browser tests: Debian's chromium without a window, one for all; a daemon for each file; two files at a time.
+// Runs the browser tests: Debian's chromium-headless-shell, one for all; a daemon for each file; two files at a time.
 // Usage in support.mjs. The last line counts.
 import { createHash } from "node:crypto";
 import fs from "node:fs";
@@ -32,7 +32,7 @@ for (const name of fs.readdirSync(here).filter((one) => /^test_.*\.mjs$/.test(on
   await import(`./${name}`);
 }
 const chosen = tests.filter(({ file, sentence }) => words.length === 0 || words.some((word) => file.includes(word) || sentence.includes(word)));
-const browser = await chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args: ["--no-sandbox"] });
+const browser = await chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium-headless-shell", args: ["--no-sandbox"] });
 
 // Slows a page down, and holds each of its requests back for a while of its own that follows from the seed: so answers come late
 // and overtake each other.

@@ -16,7 +16,7 @@ if (!folder) throw new Error("Say into which folder: node tests/browser/shots.mj
 fs.mkdirSync(folder, { recursive: true });
 const daemon = new Daemon(path.resolve(values.build));
 await daemon.start();
-const browser = await chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args: ["--no-sandbox"] });
+const browser = await chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium-headless-shell", args: ["--no-sandbox"] });
 try {
   const list = (await pages(daemon)).filter(({ name }) => words.length === 0 || words.some((word) => name.includes(word)));
   for (const width of [1280, 360])

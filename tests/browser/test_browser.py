@@ -42,7 +42,7 @@ parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.R
 parser.add_argument("--build", default=BUILD, help="folder of the build to test")
 parser.add_argument("words", nargs="*")
 arguments, others = parser.parse_known_args()
-for program in ("node", "npm", "chromium"):
+for program in ("node", "npm", "chromium-headless-shell"):
     if shutil.which(program) is None:
         ends(f"{program} is not here (tests/packages.txt)")
 fetch()
