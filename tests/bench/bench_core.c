@@ -2,7 +2,7 @@
 // and the CPU time of one [us]. SCENE is the JSON that a client would send, read once by the
 // program's own reader; every run is another scene by its seed, or by where it starts, and all that
 // a job has done by the core: judged and completed under the daemon's usual limits, its cost
-// foretold, run, summed up. For service.py to stand beside.
+// predicted, run, summed up. For service.py to stand beside.
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -149,7 +149,7 @@ def test_all_json_files_as_bodies():
 
 
 def test_what_takes_too_long_is_refused_at_the_door():
-    """--max-cpu-seconds (60) and --max-run-bytes bound what a scene may be foretold to take: 422 with the cost."""
+    """--max-cpu-seconds (60) and --max-run-bytes bound what a scene may be predicted to take: 422 with the cost."""
     with program.daemon() as daemon:
         slow = sponge(duration=1000, accuracy={"solver": "rk4", "step": 1e-7})
         for path in ("/v1/jobs", "/v1/jobs?dry_run=1"):

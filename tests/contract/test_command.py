@@ -198,8 +198,8 @@ def test_a_scene_cannot_command_the_terminal():
 
 
 def test_what_takes_too_long_is_refused_in_seconds():
-    """`run` and `check` refuse what is foretold to take more than 60 s of CPU, or --max-cpu-seconds; a run that was
-    foretold too little stops, and says so."""
+    """`run` and `check` refuse what is predicted to take more than 60 s of CPU, or --max-cpu-seconds; a run that was
+    predicted too little stops, and says so."""
     slow = {**program.scene("paper_free_sponge"), "duration": 1000, "accuracy": {"solver": "rk4", "step": 1e-7}}
     for command in ("run", "check"):
         code, _, errors = program.run(command, "-", text=json.dumps(slow))

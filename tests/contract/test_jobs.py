@@ -272,7 +272,7 @@ def test_a_short_job_overtakes_fifty_long_ones():
     """With 1, 2 and 4 workers a short job behind 50 long ones is answered while they still run."""
     for workers in ("1", "2", "4"):
         with program.daemon("--workers", workers) as daemon:
-            # Long is what is foretold to be: on a loaded machine much takes long that is not.
+            # Long is what is predicted to be: on a loaded machine much takes long that is not.
             cost = daemon.request("POST", "/v1/jobs?dry_run=1", json=slow(0, 5)).json()["cost"]["cpu_seconds"]
             duration = round(5 * 3 / cost)
             long = [daemon.submit(slow(i, duration), headers=ASYNC).json()["id"] for i in range(50)]

@@ -357,7 +357,7 @@ def test_the_same_sweep_has_the_same_bytes_for_any_number_of_workers():
     assert len(tables) == 1
 
 
-def test_a_dry_run_foretells_and_says_what_is_asked():
+def test_a_dry_run_predicts_and_says_what_is_asked():
     """Names are pinned to revisions, the cost grows with the points."""
     with Daemon(program.build) as daemon:
         few = daemon.request("POST", "/v1/jobs?dry_run=1", json=sweep(CLEARANCES)).json()

@@ -18,9 +18,9 @@ typedef enum ExtremesVerdict {
     EXTREME_SILENT = EXTREME_FIRST_DEFECT, // wrong, and did not say so
     EXTREME_NAN,
     EXTREME_MUTE,   // no result, and no reason
-    EXTREME_SLOW,   // much more CPU than was foretold or allowed
+    EXTREME_SLOW,   // much more CPU than was predicted or allowed
     EXTREME_DEAF,   // asked too rarely whether to stop
-    EXTREME_GREEDY, // more memory than was foretold
+    EXTREME_GREEDY, // more memory than was predicted
     EXTREME_HANG,
     EXTREME_CRASH,
     EXTREME_VERDICTS
@@ -44,7 +44,7 @@ typedef struct ExtremesRecord {
     double steps, samples, impacts;
     double told, found; // error of displacement, of its largest value
     double gap;         // CPU time between two looks at the progress, the longest [s]
-    double bytes;       // foretold
+    double bytes;       // predicted
     char solver[16], what[64], reason[EXTREMES_REASON];
 } ExtremesRecord;
 

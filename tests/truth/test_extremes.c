@@ -1,8 +1,8 @@
 // Scenes from the edges (extremes.h) through every solver: each run keeps the error it states,
 // judged by something closer (extremes_judge.h), or is refused, failed or marked, with the reason;
-// none crashes, hangs, leaves a NaN or takes much more than was foretold. `test_extremes COUNT SEED
-// SECONDS ROWS` runs a longer campaign under another limit on CPU time and writes a line for each
-// scene; `test_extremes show SEED NUMBER` prints one for `impactd run -`. A scene is run in a
+// none crashes, hangs, leaves a NaN or takes much more than was predicted. `test_extremes COUNT
+// SEED SECONDS ROWS` runs a longer campaign under another limit on CPU time and writes a line for
+// each scene; `test_extremes show SEED NUMBER` prints one for `impactd run -`. A scene is run in a
 // child, so that a crash or a hang ends that scene alone.
 #include <errno.h>
 #include <math.h>
@@ -70,7 +70,7 @@ static void take(const ExtremesRecord *record) {
     if (record->reason[0] != '\0')
         count_reason(record);
     if (is_defect(record->verdict))
-        printf("%s %llu: %s (told %.3g, found %.3g; %.3g s of CPU, foretold %.3g)\n",
+        printf("%s %llu: %s (told %.3g, found %.3g; %.3g s of CPU, predicted %.3g)\n",
                extremes_verdicts[record->verdict], (unsigned long long)record->number,
                record->reason, record->told, record->found, record->cpu, record->predicted);
     if (rows != NULL)

@@ -1,5 +1,5 @@
 // Random frames of 5 to 60 storeys with some of their modes left out, against the same run with all
-// of them: how often the error foretold is exceeded, and by how much it is too large.
+// of them: how often the error predicted is exceeded, and by how much it is too large.
 // `test_modes COUNT SEED [KIND]` runs a longer campaign and prints it.
 #include <math.h>
 #include <stdio.h>
@@ -223,25 +223,25 @@ static Outcome *run(Drawn *drawn, size_t modes) {
     return NULL;
 }
 
-// True errors over those foretold.
-enum { FORETOLD = 3, MOST = 100000 };
-static const char *const foretold_names[FORETOLD] = {"displacement", "mean_acceleration",
-                                                     "rms_displacement"};
+// True errors over those predicted.
+enum { PREDICTED = 3, MOST = 100000 };
+static const char *const predicted_names[PREDICTED] = {"displacement", "mean_acceleration",
+                                                       "rms_displacement"};
 typedef struct Tally {
-    double ratio[FORETOLD][MOST];
-    size_t count[FORETOLD], over[FORETOLD];
+    double ratio[PREDICTED][MOST];
+    size_t count[PREDICTED], over[PREDICTED];
     size_t estimates, short_estimates; // of the summary
 } Tally;
 static Tally tallies[2][KINDS];
 
 static const double TOLD = 1e-10; // below it rounding answers
 
-static void count_one(Tally *tally, int metric, double error, double foretold) {
+static void count_one(Tally *tally, int metric, double error, double predicted) {
     error = fmin(error, 1);
-    if (!(fmax(error, foretold) > TOLD) || tally->count[metric] == MOST)
+    if (!(fmax(error, predicted) > TOLD) || tally->count[metric] == MOST)
         return;
-    tally->over[metric] += error > foretold;
-    tally->ratio[metric][tally->count[metric]++] = error / foretold;
+    tally->over[metric] += error > predicted;
+    tally->ratio[metric][tally->count[metric]++] = error / predicted;
 }
 
 static void judge(uint64_t number, bool has_dampers) {
@@ -263,19 +263,20 @@ static void judge(uint64_t number, bool has_dampers) {
         if (outcome == NULL)
             continue;
         const Errors found = error_metrics_measure(all, outcome, true);
-        const double errors_found[FORETOLD] = {found.displacement, found.mean_acceleration,
-                                               found.rms_displacement};
+        const double errors_found[PREDICTED] = {found.displacement, found.mean_acceleration,
+                                                found.rms_displacement};
         const TruncationError *one = &errors[kept - 1];
-        const double told[FORETOLD] = {one->displacement, one->mean_acceleration,
-                                       one->rms_displacement};
-        for (int i = 0; i < FORETOLD; i++) {
+        const double told[PREDICTED] = {one->displacement, one->mean_acceleration,
+                                        one->rms_displacement};
+        for (int i = 0; i < PREDICTED; i++) {
             count_one(tally, i, errors_found[i], told[i]);
             if (is_verbose && fmin(errors_found[i], 1) > fmax(told[i], TOLD))
-                printf("  %llu %s%s: %zu of %zu modes, %zu dampers, %zu impacts: %s %.2g, foretold "
-                       "%.2g\n",
-                       (unsigned long long)number, kind_names[drawn.kind],
-                       is_classical ? "" : " coupled", kept, drawn.storeys, drawn.dampers,
-                       all->response.impacts.count, foretold_names[i], errors_found[i], told[i]);
+                printf(
+                    "  %llu %s%s: %zu of %zu modes, %zu dampers, %zu impacts: %s %.2g, predicted "
+                    "%.2g\n",
+                    (unsigned long long)number, kind_names[drawn.kind],
+                    is_classical ? "" : " coupled", kept, drawn.storeys, drawn.dampers,
+                    all->response.impacts.count, predicted_names[i], errors_found[i], told[i]);
         }
         tally->estimates++;
         tally->short_estimates += !(outcome->summary.error_estimate >= fmin(found.displacement, 1));
@@ -296,14 +297,14 @@ static void tell(bool has_dampers) {
     printf("%-12s %-18s %6s %7s %9s %9s %9s %9s\n", has_dampers ? "dampers" : "no damper", "metric",
            "runs", "over", "median", "90 %", "97 %", "most");
     for (int kind = 0; kind < KINDS; kind++)
-        for (int i = 0; i < FORETOLD; i++) {
+        for (int i = 0; i < PREDICTED; i++) {
             Tally *tally = &tallies[has_dampers][kind];
             const size_t count = tally->count[i];
             if (count == 0)
                 continue;
             qsort(tally->ratio[i], count, sizeof(double), by_size);
             printf("%-12s %-18s %6zu %6.1f%% %9.2g %9.2g %9.2g %9.2g\n", kind_names[kind],
-                   foretold_names[i], count, 100 * (double)tally->over[i] / (double)count,
+                   predicted_names[i], count, 100 * (double)tally->over[i] / (double)count,
                    tally->ratio[i][count / 2], tally->ratio[i][count * 9 / 10],
                    tally->ratio[i][count * 97 / 100], tally->ratio[i][count - 1]);
         }
@@ -329,14 +330,14 @@ static void judge_all(bool has_dampers, double most) {
         missed += (double)tallies[has_dampers][kind].short_estimates;
     }
     printf("error_estimate is short in %.1f %%\n", 100 * missed / estimates);
-    for (int i = 0; i < FORETOLD; i++) {
-        printf("%s over in %.1f %%\n", foretold_names[i], 100 * over_of(has_dampers, i));
+    for (int i = 0; i < PREDICTED; i++) {
+        printf("%s over in %.1f %%\n", predicted_names[i], 100 * over_of(has_dampers, i));
         assert_true(over_of(has_dampers, i) <= most);
     }
     assert_true(missed <= most * estimates);
 }
 
-TEST(without_dampers_the_error_foretold_is_seldom_exceeded) {
+TEST(without_dampers_the_error_predicted_is_seldom_exceeded) {
     judge_all(false, 0.03);
 }
 

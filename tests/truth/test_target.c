@@ -175,7 +175,7 @@ static Outcome *run(const char *accuracy) {
     return outcome;
 }
 
-static double foretold(const char *accuracy) {
+static double predicted(const char *accuracy) {
     Simulation simulation;
     const double steps =
         scene_make(&simulation, accuracy) ? simulation_cost(&simulation).steps : INFINITY;
@@ -206,7 +206,7 @@ typedef struct Ladder {
 } Ladder;
 
 static void ladder_try(Ladder *ladder, const Outcome *reference, int metric, const char *accuracy) {
-    if (foretold(accuracy) > 3 * reference->steps || ladder->count == COUNT(ladder->steps))
+    if (predicted(accuracy) > 3 * reference->steps || ladder->count == COUNT(ladder->steps))
         return;
     Outcome *outcome = run(accuracy);
     if (outcome != NULL && outcome->steps < reference->steps) {

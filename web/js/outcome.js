@@ -15,7 +15,7 @@ export function outcome(host, { plan: { modes, contact_model: model, solver }, c
     ["Natural frequency", each(({ frequency }) => quantity(frequency, "Hz", 3))],
     ["Damping ratio", each((mode) => `${number(mode.damping_ratio * 100, 2)} %`)],
     ["Contact, solver", `${words(model ?? "none")}, ${solver ?? "by target"}`],
-    ["Cost foretold", `${quantity(cost.cpu_seconds, "s", 2)} of CPU`],
+    ["Predicted cost", `${quantity(cost.cpu_seconds, "s", 2)} of CPU`],
   ]),
     cached && h("p", null, "Run before: ", h("a", { href: link(`results/${result}`) }, "its result"), "."),
     warnings.length > 0 && places("warn", "Before you rely on it", warnings, go));

@@ -136,7 +136,7 @@ TEST(a_damper_at_a_node_sees_nothing_of_a_mode) {
     assert_int_equal(left(members, &value), 3);
 }
 
-TEST(a_foretold_error_falls_with_the_modes_kept_to_nothing) {
+TEST(a_predicted_error_falls_with_the_modes_kept_to_nothing) {
     static const char *const excitations_of[] = {
         SINE,
         "\"excitation\": {\"displacement\": [0.1, 0, 0, -0.1]}",

@@ -26,7 +26,7 @@ static Cost cost_of(const char *members, double duration, double sample_rate) {
     return cost;
 }
 
-TEST(work_counted_is_about_what_was_foretold) {
+TEST(work_counted_is_about_what_was_predicted) {
     static const char *const scenes[] = {
         SDOF "," DAMPER "," RANDOM "," NO_PSD,
         SDOF "," DAMPER "," RANDOM "," NO_PSD ", \"accuracy\": {\"solver\": \"rk4\"}",
@@ -48,14 +48,14 @@ TEST(work_counted_is_about_what_was_foretold) {
         const Cost cost = simulation_cost(&simulation);
         const double solving = cost.steps - cost.base - cost.output;
         if (!(outcome->steps > solving / 3 && outcome->steps < 3 * solving))
-            fail_msg("%zu: %g steps, foretold %g", i, outcome->steps, solving);
+            fail_msg("%zu: %g steps, predicted %g", i, outcome->steps, solving);
         assert_true(cost.cpu_seconds == cost.steps * SOLVER_STEP);
         outcome_unref(outcome);
         simulation_clear(&simulation);
     }
 }
 
-TEST(memory_foretold_holds_series_hidden_columns_and_base) {
+TEST(memory_predicted_holds_series_hidden_columns_and_base) {
     const double samples = 1e6 * sizeof(double);
     const double five = cost_of(SDOF "," DAMPER "," NO_PSD, 1000, 1000).bytes;
     const double base = cost_of(SDOF "," DAMPER "," RANDOM "," NO_PSD, 1000, 1000).bytes;
@@ -181,7 +181,7 @@ TEST(spectra_count_against_the_steps_of_a_run) {
 }
 
 // Two masses between stops without clearance, T_c a hundred-thousandth of a sample interval.
-TEST(a_run_foretold_too_little_stops_at_a_count_of_its_own) {
+TEST(a_run_predicted_too_little_stops_at_a_count_of_its_own) {
     static const char members[] =
         "\"structure\": {\"mass\": 25695.8, \"stiffness\": 3134636.4, \"damping\": 9081.86},"
         "\"dampers\": [{\"mass\": 0.0319433, \"clearance\": 0, \"buffer\": {\"restitution\": "
@@ -209,7 +209,7 @@ TEST(a_run_foretold_too_little_stops_at_a_count_of_its_own) {
     }
 }
 
-TEST(many_dampers_on_many_storeys_are_foretold_to_take_long) {
+TEST(many_dampers_on_many_storeys_are_predicted_to_take_long) {
     enum { SIZE = 1 << 15 };
     char *text = malloc(SIZE);
     assert_non_null(text);
@@ -236,14 +236,14 @@ TEST(many_dampers_on_many_storeys_are_foretold_to_take_long) {
 }
 
 // A contact is followed with all other masses, each of which adds a little.
-TEST(a_contact_among_many_masses_is_foretold_by_their_number) {
+TEST(a_contact_among_many_masses_is_predicted_by_their_number) {
     const double one = step_work_steps(STEP_WORK_POWER, 20, 1, false);
     assert_true(step_work_steps(STEP_WORK_POWER, 20, 16, false) < 4 * one);
     assert_true(step_work_steps(STEP_WORK_POWER, 20, 64, false) < 8 * one);
 }
 
 // As measured: 200 steps a sample of 100 storeys, 4000 of 200.
-TEST(coupled_flight_is_foretold_by_the_pairs_of_modes) {
+TEST(coupled_flight_is_predicted_by_the_pairs_of_modes) {
     assert_in_range(step_work_steps(STEP_WORK_FLIGHT, 100, 0, true), 200, 600);
     assert_in_range(step_work_steps(STEP_WORK_FLIGHT, 200, 0, true), 2000, 6000);
 }

@@ -504,7 +504,7 @@ TEST(the_plan_says_which_step_and_why) {
     outcome_unref(outcome);
 }
 
-TEST(what_a_run_costs_is_foretold) {
+TEST(what_a_run_costs_is_predicted) {
     const Base sine = {.form = BASE_SINE, .amplitude = 2, .omega = 17};
     for (const Solver *const *at = solvers; *at != NULL; at++) {
         const Solver *solver = *at;
@@ -517,11 +517,11 @@ TEST(what_a_run_costs_is_foretold) {
             const double knob = solver == &solver_adaptive ? 1e-8 : 1e-4;
             const AccuracyStep step = {.step = knob};
             const AccuracyTolerance tolerance = {.tolerance = knob};
-            const double foretold = solver->cost(
+            const double predicted = solver->cost(
                 solver, solver == &solver_adaptive ? &tolerance.accuracy : &step.accuracy, 0, plan);
             Answer answer = solve(solver, knob, plan, &sine);
-            if (!(answer.steps > foretold / 2 && answer.steps < 2 * foretold))
-                fail_msg("%s: %g steps, foretold %g", solver->kind.name, answer.steps, foretold);
+            if (!(answer.steps > predicted / 2 && answer.steps < 2 * predicted))
+                fail_msg("%s: %g steps, predicted %g", solver->kind.name, answer.steps, predicted);
             answer_clear(&answer);
             plan_free(plan);
         }

@@ -31,7 +31,7 @@ TEST(skewed_runs_and_spectra_have_their_own_quantiles) {
     assert_near(stopping_rule_error(&spectra, 16, 100), 0.22040512916089305, 1e-10);
 }
 
-TEST(the_fewest_runs_that_keep_a_target_are_foretold) {
+TEST(the_fewest_runs_that_keep_a_target_are_predicted) {
     const RunSpread spread = {.count = 8, .relative = 0.2, .freedom = 1};
     assert_int_equal(stopping_rule_predict(&spread, 1000, 0.01), 728);
     assert_int_equal(stopping_rule_predict(&spread, 1000, 1e-9), 1000);
