@@ -32,6 +32,22 @@ extern const char program_build[];   // the compiler
 // Sets Retry-After where a scene was refused with STATUS_BUSY or STATUS_QUOTA; returns `status`.
 Status jobs_refused(App *app, const Request *request, Reply *reply, Status status);
 
+// A run for one request. `reply` may take what it needs of the context.
+typedef struct RequestRun {
+    void (*run)(void *context, const Progress *watch); // `watch` may be NULL
+    void (*release)(void *context);
+    Status (*reply)(App *app, const Request *request, Reply *reply, void *context,
+                    Problem *problem);
+    const char *why; // it is refused after 60 s
+} RequestRun;
+// Takes the context. At once where it is predicted to take few `seconds` of CPU, else the request
+// waits.
+Status request_run_start(App *app, const Request *request, Reply *reply, const RequestRun *run,
+                         void *context, double seconds, Problem *problem);
+// Of a request that waited.
+Status request_run_resume(App *app, const Request *request, Reply *reply, const RequestRun *run,
+                          Problem *problem);
+
 // The handlers, by file; routes.c lists them with their patterns.
 bool jobs_are_light(const Request *request); // planned in some ten microseconds
 Handler jobs_create, jobs_list, jobs_show, jobs_change, jobs_dismiss, jobs_retry, jobs_scene,
@@ -39,7 +55,7 @@ Handler jobs_create, jobs_list, jobs_show, jobs_change, jobs_dismiss, jobs_retry
 Handler results_again, results_delete, results_show, results_manifest, results_series, results_psd,
     results_impacts, results_energy, results_force, results_bundle, results_tradeoff,
     results_ensemble, results_compare, results_sensitivity;
-Handler cache_show, cache_explain;
+Handler cache_show, cache_explain, previews_create;
 Handler compare_results, compare_measured;
 Handler sweeps_table, sweeps_point, sweeps_scene;
 Handler materials_list, materials_show, materials_show_revision;

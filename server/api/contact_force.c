@@ -1,6 +1,5 @@
-// One impact at full detail. The result does not have it: the scene is run again
-// (core/simulation/impact_history.c), at once where that is predicted to be quick, else in the
-// background while the request waits.
+// Runs for one request, at once where they are predicted to be quick, else in the background while
+// the request waits; and one of them: an impact at full detail, which a result does not have.
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,6 +11,48 @@
 #include "server/util/clock.h"
 
 static const double quick_max = 0.005; // predicted CPU time of a run within the request [s]
+
+static void request_run_forget(void *background) {
+    background_unref(background);
+}
+
+// Takes the reference to the task.
+static Status request_run_wait(const Request *request, Reply *reply, const RequestRun *run,
+                               BackgroundTask *background, Problem *problem) {
+    const Status status =
+        columns_wait(request, reply, background, request_run_forget, run->why, problem);
+    if (status != STATUS_OK)
+        reply->retry_after = 30;
+    return status;
+}
+
+Status request_run_start(App *app, const Request *request, Reply *reply, const RequestRun *run,
+                         void *context, double seconds, Problem *problem) {
+    if (seconds <= quick_max) {
+        run->run(context, NULL);
+        const Status status = run->reply(app, request, reply, context, problem);
+        run->release(context);
+        return status;
+    }
+    BackgroundTask *background = NULL;
+    const BackgroundWork work = {context, run->run, run->release};
+    const Status status =
+        background_start(app->background_tasks, &work, request->callback, &background, problem);
+    if (status == STATUS_BUSY)
+        reply->retry_after = 2;
+    return status == STATUS_OK ? request_run_wait(request, reply, run, background, problem)
+                               : status;
+}
+
+Status request_run_resume(App *app, const Request *request, Reply *reply, const RequestRun *run,
+                          Problem *problem) {
+    BackgroundTask *background = request->kept;
+    if (!background_is_done(background))
+        return request_run_wait(request, reply, run, background, problem);
+    const Status status = run->reply(app, request, reply, background_context(background), problem);
+    background_unref(background);
+    return status;
+}
 
 // The run of one scene for one impact.
 typedef struct ForceRun {
@@ -74,9 +115,23 @@ static Status force_read_request(const Request *request, ForceRun *force, Proble
                          IMPACT_HISTORY_POINTS, &force->points, problem);
 }
 
-// Of a run that has ended; its columns become the stream's.
-static Status force_reply(App *app, Reply *reply, const TableFormat *format, ForceRun *force,
+// Sets the tag. True: the client has it.
+static bool force_is_cached(const Request *request, Reply *reply, const ForceRun *force,
+                            const TableFormat *format) {
+    char tag[104];
+    snprintf(tag, sizeof tag, "%.72s-%zu-force.%s", request->parameters[0], force->number,
+             format->extension);
+    return reply_immutable(reply, request, tag);
+}
+
+// The columns become the stream's.
+static Status force_reply(App *app, const Request *request, Reply *reply, void *context,
                           Problem *problem) {
+    ForceRun *force = context;
+    const TableFormat *format = NULL;
+    TRY(columns_format(request, 2, false, reply, &format, problem));
+    if (force_is_cached(request, reply, force, format))
+        return STATUS_OK;
     if (force->status != STATUS_OK)
         return problem_set(problem, force->status, "%s", force->problem.detail);
     TableStream *stream = table_stream_new(NULL);
@@ -92,68 +147,14 @@ static Status force_reply(App *app, Reply *reply, const TableFormat *format, For
     return status;
 }
 
-static void force_forget(void *background) {
-    background_unref(background);
-}
-
-// Takes the reference to the task.
-static Status force_wait(const Request *request, Reply *reply, BackgroundTask *background,
-                         Problem *problem) {
-    const Status status = columns_wait(request, reply, background, force_forget,
-                                       "to run the scene again takes longer than 60 s: submit a "
-                                       "shorter scene that holds the impact",
-                                       problem);
-    if (status != STATUS_OK)
-        reply->retry_after = 30;
-    return status;
-}
-
-// Takes the reference to the task of a request that waited.
-static Status force_resume(App *app, const Request *request, Reply *reply,
-                           const TableFormat *format, BackgroundTask *background,
-                           Problem *problem) {
-    if (!background_is_done(background))
-        return force_wait(request, reply, background, problem);
-    const Status status = force_reply(app, reply, format, background_context(background), problem);
-    background_unref(background);
-    return status;
-}
-
-static Status force_start(App *app, const Request *request, Reply *reply, const TableFormat *format,
-                          ForceRun *force, Problem *problem) {
-    if (impact_history_steps(&force->inquiry.simulation) * SOLVER_STEP <= quick_max) {
-        force_run(force, NULL);
-        const Status status = force_reply(app, reply, format, force, problem);
-        force_free(force);
-        return status;
-    }
-    BackgroundTask *background = NULL;
-    const BackgroundWork work = {force, force_run, force_free};
-    const Status status =
-        background_start(app->background_tasks, &work, request->callback, &background, problem);
-    if (status == STATUS_BUSY)
-        reply->retry_after = 2;
-    return status == STATUS_OK ? force_wait(request, reply, background, problem) : status;
-}
-
-// True: the client has it.
-static bool force_is_known(const Request *request, Reply *reply, const ForceRun *force,
-                           const TableFormat *format) {
-    char tag[104];
-    snprintf(tag, sizeof tag, "%.72s-%zu-force.%s", request->parameters[0], force->number,
-             format->extension);
-    return reply_immutable(reply, request, tag);
-}
-
 Status results_force(App *app, const Request *request, Reply *reply, Problem *problem) {
+    static const RequestRun run = {force_run, force_free, force_reply,
+                                   "to run the scene again takes longer than 60 s: submit a "
+                                   "shorter scene that holds the impact"};
     const TableFormat *format = NULL;
     TRY(columns_format(request, 2, false, reply, &format, problem));
-    if (request->kept != NULL) {
-        BackgroundTask *background = request->kept;
-        if (background_is_done(background))
-            (void)force_is_known(request, reply, background_context(background), format);
-        return force_resume(app, request, reply, format, background, problem);
-    }
+    if (request->kept != NULL)
+        return request_run_resume(app, request, reply, &run, problem);
     ForceRun *force = calloc(1, sizeof *force);
     if (force == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the impact");
@@ -161,8 +162,10 @@ Status results_force(App *app, const Request *request, Reply *reply, Problem *pr
     Status status = force_read_request(request, force, problem);
     if (status == STATUS_OK)
         status = force_read_scene(app, request->parameters[0], reply, force, problem);
-    if (status == STATUS_OK && !force_is_known(request, reply, force, format))
-        return force_start(app, request, reply, format, force, problem);
+    if (status == STATUS_OK && !force_is_cached(request, reply, force, format))
+        return request_run_start(app, request, reply, &run, force,
+                                 impact_history_steps(&force->inquiry.simulation) * SOLVER_STEP,
+                                 problem);
     force_free(force);
     return status;
 }

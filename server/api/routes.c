@@ -34,6 +34,7 @@ static const char *const of_derived[] = {"damper_mass", "structure_mass", "ident
 // clang-format off
 const Route routes[] = {
     {"POST",   "/v1/jobs",                              "submit", of_submit,    "Submit a scene; ?dry_run=1 only checks and plans it", jobs_create, jobs_are_light},
+    {"POST",   "/v1/preview",                           "submit", of_force,     "Run a short scene for this answer alone, stored nowhere", previews_create, NULL},
     {"GET",    "/v1/jobs",                              "read",   of_jobs,      "Jobs, newest first; ?q= searches titles and labels", jobs_list, NULL},
     {"GET",    "/v1/jobs/{id}",                         "read",   of_job,       "A job's state; ?wait=S waits until it is finished", jobs_show, NULL},
     {"GET",    "/v1/jobs/{id}/events",                  "read",   NULL,         "A job's progress as server-sent events", jobs_events, NULL},

@@ -210,5 +210,47 @@ def test_a_finished_job_is_removed():
         assert purge(anns, headers=ann).status == 204
 
 
+def test_a_preview_is_the_result_and_is_stored_nowhere():
+    """POST /v1/preview: plan, summary, series and impacts of the result to the bit; no job and no cache entry; 422, 429 and 503."""
+    scenes = [program.scene(name) for name in ("paper_free_sponge", "paper_sine_aluminium", "paper_random_sponge")]
+    for scene in scenes:
+        scene.update(duration=5, sample_rate=500)
+    scenes.append({**sponge(), "output": {"impacts": False, "channels": ["displacement"]}})
+    with program.daemon() as daemon:
+        def preview(scene, query="", **options):
+            return daemon.request("POST", "/v1/preview" + query, json=scene, **options)
+        before = daemon.get("/v1/cache").json()
+        for scene in scenes:
+            for query in ("", "?points=100"):
+                replies = [preview(scene, query) for _ in range(2)]
+                assert replies[0].status == 200 and replies[0].body == replies[1].body, replies
+        assert daemon.get("/v1/jobs").json()["jobs"] == [] and daemon.get("/v1/cache").json() == before
+        for scene in scenes:
+            assert not daemon.request("POST", "/v1/jobs?dry_run=1", json=scene).json()["cached"]
+            short, usual = (preview(scene, query).json() for query in ("?points=100", ""))
+            job = program.finished(daemon, scene)
+            assert not job["cached"], job
+            result = f"/v1/results/{job['result']}"
+            assert short["plan"] == usual["plan"] == job["plan"] and short["summary"] == job["summary"], short
+            assert short["series"] == daemon.get(result + "/series.json?points=100").json()
+            assert usual["series"] == daemon.get(result + "/series.json?points=2000").json()
+            impacts = daemon.get(result + "/impacts.json")
+            assert short["impacts"] == (impacts.json() if impacts.status == 200 else None), short["impacts"]
+            assert preview(scene, "?points=100").json() == short
+        problem(preview(endless()), 422)
+        problem(preview({**sponge(), "study": {"kind": "tradeoff"}}), 422, "/study")
+        faulty = {**sponge(), "duration": -1, "sample_rat": 1}
+        assert preview(faulty).json()["errors"] == daemon.request("POST", "/v1/jobs", json=faulty).json()["errors"]
+        problem(preview(sponge(), "?points=0"), 400)
+        problem(daemon.request("POST", "/v1/preview", body="{", headers={"Content-Type": "application/json"}), 400)
+        problem(daemon.request("POST", "/v1/preview", body="{}", headers={"Content-Type": "text/plain"}), 415)
+        problem(daemon.request("POST", "/v1/preview", body=" " * (17 << 20), headers={"Content-Type": "application/json"}), 413)
+    with program.daemon("--rate", "3") as daemon:
+        ann = bearer(token(daemon.data, "ann"))
+        assert until(lambda: daemon.get("/v1/jobs").status == 401)
+        replies = [daemon.request("POST", "/v1/preview", json=sponge(), headers=ann) for _ in range(4)]
+        assert [reply.status for reply in replies] == [200] * 3 + [429] and int(replies[3].headers["retry-after"]) > 0, replies
+
+
 if __name__ == "__main__":
     program.main(globals())

@@ -287,6 +287,8 @@ def test_real_answers_have_the_promised_shapes():
             "Location", "Retry-After", "Preference-Applied"}
         call("POST", "/v1/results/{id}/again", f"/v1/results/{job['result']}/again")
         call("POST", "/v1/results/{id}/again", "/v1/results/r-0/again")
+        call("POST", "/v1/preview", "/v1/preview?points=10", json=scene)
+        call("POST", "/v1/preview", "/v1/preview", json={})
         call("POST", "/v1/cache/explain", "/v1/cache/explain", json=scene)
         call("POST", "/v1/cache/explain", "/v1/cache/explain", json={**scene, "duration": 61})
         call("POST", "/v1/cache/explain", "/v1/cache/explain", json={})
