@@ -5,7 +5,7 @@
 #include "server/api/app.h"
 #include "server/http/reply.h"
 #include "server/jobs/documents.h"
-#include "server/json/diff.h"
+#include "server/json/document.h"
 
 // The scenes that are compared, and how long they may be.
 enum { RECENT_MAX = 256, SCENE_MAX = 16384 };

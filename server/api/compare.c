@@ -12,7 +12,7 @@
 #include "core/result/spectrum_distance.h"
 #include "server/api/columns.h"
 #include "server/http/reply.h"
-#include "server/json/diff.h"
+#include "server/json/document.h"
 #include "server/json/encode.h"
 #include "server/util/base_path.h"
 

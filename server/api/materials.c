@@ -11,7 +11,7 @@
 #include "server/formats/format.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
-#include "server/json/material_bodies.h"
+#include "server/json/schema.h"
 #include "server/json/parse.h"
 #include "server/materials/export.h"
 #include "server/materials/import.h"

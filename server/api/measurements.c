@@ -10,7 +10,7 @@
 #include "server/api/query.h"
 #include "server/http/reply.h"
 #include "server/json/encode.h"
-#include "server/json/material_bodies.h"
+#include "server/json/schema.h"
 #include "server/materials/material.h"
 #include "server/util/base_path.h"
 #include "server/util/clock.h"

@@ -8,7 +8,7 @@
 #include "server/cli/command.h"
 #include "server/cli/output.h"
 #include "server/cli/scene_file.h"
-#include "server/json/json_edit.h"
+#include "server/json/document.h"
 #include "server/json/parse.h"
 #include "server/json/table.h"
 #include "server/util/clock.h"

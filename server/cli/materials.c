@@ -18,7 +18,7 @@
 #include "server/cli/output.h"
 #include "server/cli/scene_file.h"
 #include "server/json/encode.h"
-#include "server/json/json_edit.h"
+#include "server/json/document.h"
 #include "server/json/parse.h"
 #include "server/json/table.h"
 

@@ -10,7 +10,7 @@
 
 #include "core/base/json_pointer.h"
 #include "server/db/material_rows.h"
-#include "server/json/material_bodies.h"
+#include "server/json/schema.h"
 
 enum { POINTER_SIZE = sizeof((Fault){0}.pointer) };
 

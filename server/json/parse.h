@@ -20,9 +20,10 @@ enum {
 // that fields_validate can add its faults to the same problem.
 Status json_parse(const char *text, size_t size, const Field *fields, void *item, Problem *problem);
 
-// The same of text[first ... first + count - 1], a document at `pointer` of the whole text.
-Status json_parse_part(const char *text, size_t size, size_t first, size_t count,
-                       const char *pointer, const Field *fields, void *item, Problem *problem);
+// The same of text[first ... first + count - 1], a document at `pointer` of the whole text, without
+// a byte order mark.
+Status json_parse_part(const char *text, size_t first, size_t count, const char *pointer,
+                       const Field *fields, void *item, Problem *problem);
 
 // Reads a text that is one value into the member of `item` under `field`; `item` has its defaults,
 // faults are at `pointer`. STATUS_INVALID also if the text is not JSON.
@@ -32,6 +33,9 @@ Status json_parse_value(const char *text, size_t size, const Field *field, void 
 // The tree of a text that is a JSON object within the limits above, else NULL. For files of json/
 // alone: it is jansson's, released by json_decref.
 struct json_t *json_parse_tree(const char *text, size_t size);
+
+// Where blocks of jansson's memory come from: malloc, except in tests.
+extern void *(*json_memory_source)(size_t size);
 
 // The size of a byte order mark at the start, which RFC 8259, section 8.1, allows to ignore.
 size_t scan_mark(const char *text, size_t size);

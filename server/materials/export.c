@@ -12,7 +12,7 @@
 #include <string.h>
 
 #include "server/json/encode.h"
-#include "server/json/material_bodies.h"
+#include "server/json/schema.h"
 #include "server/materials/import.h"
 #include "server/util/clock.h"
 

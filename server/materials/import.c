@@ -12,8 +12,8 @@
 #include "core/base/rfc3339.h"
 #include "core/base/spelling.h"
 #include "server/json/encode.h"
-#include "server/json/material_bodies.h"
 #include "server/json/parse.h"
+#include "server/json/schema.h"
 #include "server/materials/material.h"
 #include "server/util/clock.h"
 #include "server/util/csv_reader.h"
@@ -281,13 +281,13 @@ static Status document_take(MaterialImport *import, const DocumentMaterial *mate
     return STATUS_OK;
 }
 
-static Status document_read_material(MaterialImport *import, const char *text, size_t size,
-                                     const ScanList *list, size_t index, Problem *problem) {
+static Status document_read_material(MaterialImport *import, const char *text, const ScanList *list,
+                                     size_t index, Problem *problem) {
     char pointer[POINTER_SIZE];
     DocumentMaterial material;
     const size_t faults = problem->count;
     json_pointer_index(pointer, sizeof pointer, "/materials", index);
-    Status status = json_parse_part(text, size, list->first, list->count, pointer,
+    Status status = json_parse_part(text, list->first, list->count, pointer,
                                     document_material_fields, &material, problem);
     if (status == STATUS_OK || status == STATUS_INVALID) {
         if (material.revisions.count + material.measurements.count == 0 &&
@@ -310,9 +310,8 @@ static Status document_read(MaterialImport *import, const char *text, size_t siz
     import->number_names[IMPORT_REVISION] = "revision";
     import->number_names[IMPORT_MEASUREMENT] = "measurement";
     for (size_t i = 0; has_list && status == STATUS_OK && scan_element(&list); i++)
-        status = i >= IMPORT_ROWS_MAX
-                     ? import_error_rows(problem)
-                     : document_read_material(import, text, size, &list, i, problem);
+        status = i >= IMPORT_ROWS_MAX ? import_error_rows(problem)
+                                      : document_read_material(import, text, &list, i, problem);
     // Last: if the text is cut off, its last material says where.
     if (status == STATUS_OK)
         status = envelope_read(text, size, &list, has_list, problem);

@@ -3,7 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "server/json/diff.h"
+#include "server/json/document.h"
 #include "tests/support/test.h"
 
 static void assert_differs(const char *a, const char *b, const char *ignored, const char *wanted) {

@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "core/base/field.h"
-#include "server/json/json_edit.h"
+#include "server/json/document.h"
 #include "tests/support/test.h"
 
 static Bytes of(const char *text) {

@@ -320,3 +320,47 @@ TEST(four_million_numbers_are_read) {
     assert_int_equal(problem.count, 3);
     bytes_clear(&text);
 }
+
+static size_t requests_left; // until one fails
+
+static void *fail_once(size_t size) {
+    return requests_left-- == 0 ? NULL : malloc(size);
+}
+
+// At whichever request memory runs out: never a fault of the text.
+static void fail_each_request_of(const char *text) {
+    static Problem problem;
+    const Field fields[] = {FIELD_END};
+    char item;
+    const Status whole = json_parse(text, strlen(text), fields, &item, &problem);
+    assert_int_equal(whole, STATUS_INVALID);
+    Status status = STATUS_NO_MEMORY;
+    size_t count = 0;
+    json_memory_source = fail_once;
+    for (; status == STATUS_NO_MEMORY; count++) {
+        problem_clear(&problem);
+        requests_left = count;
+        status = json_parse(text, strlen(text), fields, &item, &problem);
+    }
+    json_memory_source = malloc;
+    assert_int_equal(status, whole);
+    assert_true(count > 4);
+}
+
+TEST(every_failed_request_is_reported) {
+    char text[20000];
+    char run[5000];
+    memset(run, 'x', sizeof run - 1);
+    run[sizeof run - 1] = '\0';
+    snprintf(text, sizeof text, "{\"a\": \"%s\", \"%.900s\": [1, 2.5, true, null]}", run, run);
+    fail_each_request_of(text);
+    memset(run, '7', sizeof run - 1);
+    snprintf(text, sizeof text, "[1.%s, \"b\", 1.0000000000000000000000e%.1s]", run, run);
+    fail_each_request_of(text);
+    text[0] = '\0';
+    for (int i = 0; i < 200; i++)
+        snprintf(text + strlen(text), sizeof text - strlen(text), "%c\"%.31s\"", i == 0 ? '[' : ',',
+                 run);
+    strcat(text, "]");
+    fail_each_request_of(text);
+}

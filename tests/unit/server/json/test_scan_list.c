@@ -58,14 +58,13 @@ TEST(a_part_is_read_with_its_place_in_the_whole) {
     One one;
     assert_true(scan_list(text, strlen(text), "all", &list));
     assert_true(scan_element(&list));
-    assert_int_equal(json_parse_part(text, strlen(text), list.first, list.count, "/all/0", fields,
-                                     &one, &problem),
-                     STATUS_OK);
+    assert_int_equal(
+        json_parse_part(text, list.first, list.count, "/all/0", fields, &one, &problem), STATUS_OK);
     assert_true(one.x == 1);
     assert_true(scan_element(&list));
-    assert_int_equal(json_parse_part(text, strlen(text), list.first, list.count, "/all/1", fields,
-                                     &one, &problem),
-                     STATUS_UNREADABLE);
+    assert_int_equal(
+        json_parse_part(text, list.first, list.count, "/all/1", fields, &one, &problem),
+        STATUS_UNREADABLE);
     assert_string_equal(problem.faults[0].pointer, "/all/1/x");
     assert_non_null(strstr(problem.faults[0].detail, "line 3, column 10"));
 }

@@ -1,0 +1,39 @@
+// JSON documents as text, with any members: the differences of two, and edits of one.
+#ifndef SERVER_JSON_DOCUMENT_H
+#define SERVER_JSON_DOCUMENT_H
+
+#include "core/base/status.h"
+#include "server/util/bytes.h"
+
+enum { DIFF_MAX = 200, DIFF_VALUE_MAX = 400 }; // differences written; bytes of a value
+
+typedef struct DiffFormat {
+    const char *a, *b; // names of the two values
+    bool is_full;      // with null for a value that is missing or too long, and "detail"
+} DiffFormat;
+
+// Appends [{"pointer", A, B, "detail"}, ...] with the first DIFF_MAX differences; *count has all.
+// Objects are compared member by member, arrays of more than 16 numbers as a whole, other arrays
+// element by element. The member `ignored` of the documents (NULL: none) is left out.
+// STATUS_INTERNAL: a document is not JSON; nothing is appended then.
+Status json_diff(const char *a, const char *b, const char *ignored, const DiffFormat *format,
+                 Bytes *bytes, size_t *count, Problem *problem);
+
+// Edits keep the values of numbers. A text that is not an object is left unchanged: the server that
+// receives it reports what is wrong.
+
+// Sets a member to a string. STATUS_USAGE, under "--name", if that is not UTF-8.
+Status json_edit_set(Bytes *text, const char *name, const char *value, Problem *problem);
+// Adds "key=value" to the member "labels", an object or a list. STATUS_USAGE if `label` is not of
+// that form.
+Status json_edit_label(Bytes *text, const char *label, Problem *problem);
+// Appends a JSON value to a list, which is created if it is missing. A member of another type is
+// left unchanged. STATUS_INVALID: the value is not JSON.
+Status json_edit_append(Bytes *text, const char *list, const Bytes *value, Problem *problem);
+// Removes members that are null, at any depth.
+Status json_edit_remove_nulls(Bytes *text, Problem *problem);
+
+// Appends the text of the member `name`, an object, to `part`. STATUS_NOT_FOUND.
+Status json_edit_extract(const Bytes *text, const char *name, Bytes *part, Problem *problem);
+
+#endif
