@@ -11,13 +11,13 @@
 #include "server/formats/format.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
-#include "server/json/schema.h"
 #include "server/json/parse.h"
+#include "server/json/schema.h"
 #include "server/materials/export.h"
 #include "server/materials/import.h"
 #include "server/materials/material.h"
+#include "server/util/bytes.h"
 #include "server/util/clock.h"
-#include "server/util/utf8_fold.h"
 
 enum { LIST_INITIAL = 100, LIST_MAX = 1000, HEADS_READ = 100 };
 enum { EXPORT_WHOLE_MAX = 4 << 20 }; // a longer export is sent while it is made
@@ -152,7 +152,7 @@ static Status search_read_folded(const Request *request, const char *name, Bytes
     const char *text;
     TRY(query_text(request, name, &text, problem));
     if (text != NULL)
-        utf8_fold(folded, text);
+        bytes_folded(folded, text);
     return STATUS_OK;
 }
 
@@ -175,7 +175,7 @@ static bool search_has_words(const MaterialRevision *revision, const char *words
     for (size_t i = 0; i < COUNT(texts) + material->tags.count; i++) {
         const char *text = i < COUNT(texts) ? texts[i] : material->tags.at[i - COUNT(texts)];
         if (text != NULL)
-            utf8_fold(&lines, text);
+            bytes_folded(&lines, text);
         bytes_text(&lines, "\n");
     }
     const bool is_found = lines.at != NULL && strstr(lines.at, words) != NULL;
@@ -186,7 +186,7 @@ static bool search_has_words(const MaterialRevision *revision, const char *words
 static bool search_has_kind(const Material *material, const char *kind) {
     Bytes own = {0};
     if (material->kind != NULL)
-        utf8_fold(&own, material->kind);
+        bytes_folded(&own, material->kind);
     const bool is_same = own.at != NULL && strcmp(own.at, kind) == 0;
     bytes_clear(&own);
     return is_same;

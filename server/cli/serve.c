@@ -22,7 +22,6 @@
 #include "server/jobs/maintenance.h"
 #include "server/options.h"
 #include "server/util/clock.h"
-#include "server/util/log.h"
 #include "server/util/process.h"
 
 typedef struct ServeSettings {

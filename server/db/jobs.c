@@ -8,7 +8,7 @@
 
 #include "server/db/db.h"
 #include "server/db/db_private.h"
-#include "server/util/utf8_fold.h"
+#include "server/util/bytes.h"
 
 // clang-format off
 static const SqlColumn job_columns[] = {
@@ -272,11 +272,11 @@ JobSearch job_search_all(size_t most) {
 
 void job_words(Bytes *bytes, const char *title, const char *const *labels, size_t label_count) {
     if (title != NULL)
-        utf8_fold(bytes, title);
+        bytes_folded(bytes, title);
     if (title != NULL || label_count > 0)
         bytes_text(bytes, "\n");
     for (size_t i = 0; i < label_count; i++) {
-        utf8_fold(bytes, labels[i]);
+        bytes_folded(bytes, labels[i]);
         bytes_text(bytes, "\n");
     }
 }
@@ -288,7 +288,7 @@ static Status search_fold(const char *text, const char *before, const char *afte
     if (text == NULL)
         return STATUS_OK;
     bytes_text(&bytes, before);
-    utf8_fold(&bytes, text);
+    bytes_folded(&bytes, text);
     bytes_text(&bytes, after);
     *folded = bytes_take(&bytes, NULL);
     return *folded != NULL ? STATUS_OK : STATUS_NO_MEMORY;

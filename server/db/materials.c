@@ -10,7 +10,7 @@
 #include "server/db/material_rows.h"
 #include "server/json/encode.h"
 #include "server/json/parse.h"
-#include "server/util/lru.h"
+#include "server/util/hashmap.h"
 
 // Columns. Those of a revision that are the material's are made of its Field rows; its lists are
 // one column.

@@ -205,7 +205,7 @@ static Status record_read_samples(Db *db, const RecordRow *row, Reals *samples, 
 }
 
 // The samples in memory: those of the last records named, up to `memory_max` bytes, and those that
-// jobs refer to, which cost nothing more here. (Not util/lru: an evicted record that jobs still
+// jobs refer to, which cost nothing more here. (Not util/hashmap: an evicted record that jobs still
 // have would be read, and kept, once more by the next one that names it.)
 static const size_t memory_max = 64 << 20;
 

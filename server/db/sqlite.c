@@ -16,7 +16,7 @@
 #include "core/base/field.h"
 #include "server/util/bytes.h"
 #include "server/util/gzip.h"
-#include "server/util/log.h"
+#include "server/util/process.h"
 
 enum { STATEMENTS = 192, PARAMETERS = 40, APPLICATION = 0x696D7064 }; // "impd"
 

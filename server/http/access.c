@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "server/util/clock.h"
-#include "server/util/log.h"
+#include "server/util/process.h"
 
 const char *const log_mode_names[] = {"off", "errors", "all", NULL};
 

@@ -3,7 +3,7 @@
 #define SERVER_HTTP_RESPONSE_CACHE_H
 
 #include "server/http/request.h"
-#include "server/util/lru.h"
+#include "server/util/hashmap.h"
 
 typedef struct ResponseCache ResponseCache;
 

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "core/base/status.h"
-#include "server/util/lru.h"
+#include "server/util/hashmap.h"
 
 // The texts stand behind the struct, in one block.
 ResultSummary *result_summary_new(const ResultRow *row) {

@@ -17,7 +17,7 @@
 #include "server/json/encode.h"
 #include "server/util/bytes.h"
 #include "server/util/clock.h"
-#include "server/util/log.h"
+#include "server/util/process.h"
 
 // Tasks on the way to the database, and the bytes of their results.
 enum { SAVING_MAX = 4096, SAVING_BYTES = 256 << 20 };

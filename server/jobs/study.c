@@ -11,7 +11,7 @@
 #include <stdlib.h>
 
 #include "server/util/clock.h"
-#include "server/util/log.h"
+#include "server/util/process.h"
 
 enum {
     TURN_MS = 10, // at least, of a turn

@@ -2,18 +2,21 @@
 // counted.
 #include "server/util/bytes.h"
 
+#include <locale.h>
 #include <math.h>
+#include <pthread.h>
 #include <stdarg.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <wctype.h>
 
 #include "server/util/dtoa.h"
 
 enum { FIRST_ROOM = 256, CHUNK = 4096 }; // bytes; numbers that room is made for at once
 
-static bool fail(Bytes *bytes) {
+static bool bytes_fail(Bytes *bytes) {
     free(bytes->at);
     *bytes = (Bytes){.most = bytes->most, .is_failed = true};
     return false;
@@ -29,7 +32,7 @@ bool bytes_reserve(Bytes *bytes, size_t more) {
         return false;
     const size_t most = bytes->most != 0 ? bytes->most : SIZE_MAX / 2;
     if (bytes->count > most || more > most - bytes->count)
-        return fail(bytes);
+        return bytes_fail(bytes);
     const size_t wanted = bytes->count + more + 1;
     if (wanted <= bytes->room)
         return true;
@@ -41,7 +44,7 @@ bool bytes_reserve(Bytes *bytes, size_t more) {
         room = most + 1;
     char *at = realloc(bytes->at, room);
     if (at == NULL)
-        return fail(bytes);
+        return bytes_fail(bytes);
     at[bytes->count] = '\0';
     bytes->at = at;
     bytes->room = room;
@@ -70,7 +73,7 @@ void bytes_format(Bytes *bytes, const char *format, ...) {
     const int length = vsnprintf(text, sizeof text, format, arguments);
     va_end(arguments);
     if (length < 0) {
-        fail(bytes);
+        bytes_fail(bytes);
     } else if ((size_t)length < sizeof text) {
         bytes_put(bytes, text, (size_t)length);
     } else if (bytes_reserve(bytes, (size_t)length)) {
@@ -104,7 +107,7 @@ void bytes_reals(Bytes *bytes, const double *values, size_t count) {
 
 // The length of the UTF-8 character at `text`, 0 where there is none: cut short, overlong, a
 // surrogate, too large.
-static size_t character_length(const unsigned char *text) {
+static size_t utf8_length(const unsigned char *text) {
     static const struct {
         unsigned char first, last, second_min, second_max, length;
     } forms[] = {{0xC2, 0xDF, 0x80, 0xBF, 2}, {0xE0, 0xE0, 0xA0, 0xBF, 3},
@@ -129,16 +132,16 @@ static size_t character_length(const unsigned char *text) {
 bool text_is_utf8(const char *text) {
     const unsigned char *at = (const unsigned char *)text;
     for (size_t length; *at != '\0'; at += length)
-        if ((length = character_length(at)) == 0)
+        if ((length = utf8_length(at)) == 0)
             return false;
     return true;
 }
 
-static bool is_plain(unsigned char c) {
+static bool text_is_plain(unsigned char c) {
     return c >= 0x20 && c < 0x7F && c != '"' && c != '\\';
 }
 
-static void put_escape(Bytes *bytes, unsigned char c) {
+static void bytes_escape(Bytes *bytes, unsigned char c) {
     static const char from[] = "\"\\\b\f\n\r\t", to[] = "\"\\bfnrt";
     const char *short_form = strchr(from, c);
     if (short_form != NULL)
@@ -156,22 +159,64 @@ void bytes_json_string(Bytes *bytes, const char *text) {
     const unsigned char *at = (const unsigned char *)text;
     while (*at != '\0') {
         const unsigned char *start = at;
-        while (is_plain(*at))
+        while (text_is_plain(*at))
             at++;
         bytes_put(bytes, start, (size_t)(at - start));
         if (*at == '\0')
             break;
-        const size_t length = character_length(at);
+        const size_t length = utf8_length(at);
         if (length == 0)
             bytes_put(bytes, "\xEF\xBF\xBD",
                       3); // U+FFFD: what we write is JSON whatever we were given
         else if (length == 1)
-            put_escape(bytes, *at);
+            bytes_escape(bytes, *at);
         else
             bytes_put(bytes, at, length);
         at += length > 0 ? length : 1;
     }
     bytes_put(bytes, "\"", 1);
+}
+
+static pthread_once_t locale_once = PTHREAD_ONCE_INIT;
+static locale_t locale_unicode;
+
+static void locale_open(void) {
+    locale_unicode = newlocale(LC_CTYPE_MASK, "C.UTF-8", (locale_t)0);
+}
+
+static void bytes_character(Bytes *bytes, uint32_t character) {
+    static const unsigned char marks[] = {0, 0xC0, 0xE0, 0xF0};
+    const size_t more = character < 0x80 ? 0 : character < 0x800 ? 1 : character < 0x10000 ? 2 : 3;
+    unsigned char at[4];
+    for (size_t i = more; i > 0; i--, character >>= 6)
+        at[i] = (unsigned char)(0x80 | (character & 0x3F));
+    at[0] = (unsigned char)(marks[more] | character);
+    bytes_put(bytes, at, more + 1);
+}
+
+// Lower case of single characters as the C library's UTF-8 locale has it; wchar_t is the code
+// point.
+void bytes_folded(Bytes *bytes, const char *text) {
+    pthread_once(&locale_once, locale_open);
+    for (const unsigned char *at = (const unsigned char *)text; *at != '\0';) {
+        const size_t length = utf8_length(at);
+        if (length < 2) {
+            const unsigned char c = *at++;
+            bytes_put(bytes,
+                      &(unsigned char){c < ' ' || c == 0x7F   ? ' '
+                                       : c >= 'A' && c <= 'Z' ? (unsigned char)(c + ('a' - 'A'))
+                                                              : c},
+                      1);
+            continue;
+        }
+        uint32_t character = at[0] & (0x7Fu >> length);
+        for (size_t i = 1; i < length; i++)
+            character = character << 6 | (at[i] & 0x3Fu);
+        at += length;
+        if (locale_unicode != (locale_t)0)
+            character = (uint32_t)towlower_l((wint_t)character, locale_unicode);
+        bytes_character(bytes, character);
+    }
 }
 
 void bytes_percent(Bytes *bytes, const char *text) {

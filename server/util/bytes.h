@@ -1,6 +1,5 @@
-// A growing buffer of bytes with a limit it is born with; text is built in it. Once it failed
-// (limit or memory) it stays failed and empty, so that writers need not check each call. Used by
-// everything in server/ that writes.
+// A growing buffer of bytes with a limit; text is built in it. Once it failed (limit or memory) it
+// stays failed and empty, so that writers need not check each call.
 #ifndef SERVER_UTIL_BYTES_H
 #define SERVER_UTIL_BYTES_H
 
@@ -28,6 +27,9 @@ void bytes_reals(Bytes *bytes, const double *values, size_t count);
 void bytes_json_string(Bytes *bytes, const char *text);
 // Whether all of a text is UTF-8.
 bool text_is_utf8(const char *text);
+// As it is compared where upper and lower case are one: lower case of any script, with a space for
+// each control character. What is no UTF-8 is kept.
+void bytes_folded(Bytes *bytes, const char *text);
 // As part of a URL's query: what is not a letter, a digit or one of -._~ as %XX.
 void bytes_percent(Bytes *bytes, const char *text);
 // What is left behind the first *taken bytes, as much as fits, to target[size]; *taken moves on.

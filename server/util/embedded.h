@@ -1,10 +1,9 @@
-// Files that stand inside the binary, written by server/embed.cmake: SQL, schemas, examples, the
-// dashboard. Not a file system: the rows are constant and nothing is read from disk. Used by store/
-// (sql) and served by the API.
+// Files that are embedded in the binary by server/embed.cmake: SQL, schemas, examples, web pages.
 #ifndef SERVER_UTIL_EMBEDDED_H
 #define SERVER_UTIL_EMBEDDED_H
 
 #include <stddef.h>
+#include <string.h>
 
 typedef struct EmbeddedFile {
     const char *path;   // from the project's folder: "schema/sql/schema.sql"
@@ -19,7 +18,12 @@ extern const EmbeddedFile embedded_schemas[];  // schema/*.json
 extern const EmbeddedFile embedded_examples[]; // schema/examples/*.json
 extern const EmbeddedFile embedded_web[];      // web/, all that a browser loads
 
-// The row of that path, NULL if there is none.
-const EmbeddedFile *embedded_find(const EmbeddedFile *table, const char *path);
+// The row of that path, NULL if there is none. The tables are short.
+static inline const EmbeddedFile *embedded_find(const EmbeddedFile *table, const char *path) {
+    const EmbeddedFile *file = table;
+    while (file->path != NULL && strcmp(file->path, path) != 0)
+        file++;
+    return file->path != NULL ? file : NULL;
+}
 
 #endif

@@ -1,9 +1,11 @@
-// This process: its memory and its figures as the system has them, and systemd's protocol for a
-// service of Type=notify. Without systemd (no NOTIFY_SOCKET) the latter does nothing.
+// This process: its memory and figures, its log, and systemd's protocol for a service of
+// Type=notify, which does nothing without systemd (no NOTIFY_SOCKET).
 #ifndef SERVER_UTIL_PROCESS_H
 #define SERVER_UTIL_PROCESS_H
 
 #include <stdint.h>
+
+#include "server/util/bytes.h"
 
 typedef struct ProcessFacts {
     uint64_t resident_bytes, open_files, open_files_most;
@@ -21,5 +23,14 @@ void process_trim_memory(uint64_t *taken);
 void process_notify_systemd(const char *state);
 // How often "WATCHDOG=1" is to be sent: half of WATCHDOG_USEC. 0: not asked for.
 int64_t process_watchdog_ms(void);
+
+// Log lines on standard error. Texts of clients are escaped, so that they cannot write lines of
+// their own: `text` becomes name="..." behind a blank, with control characters, quotes, backslashes
+// and bytes beyond ASCII as \\xNN; what is longer than `max` bytes is cut and marked. NULL:
+// nothing.
+void log_put(Bytes *bytes, const char *name, const char *text, size_t max);
+// "impactd: " and the line, in one write. Never waits: a line that finds no room is dropped and
+// counted.
+void log_write(const Bytes *line);
 
 #endif

@@ -329,18 +329,18 @@ static void *fail_once(size_t size) {
 
 // At whichever request memory runs out: never a fault of the text.
 static void fail_each_request_of(const char *text) {
-    static Problem problem;
+    static Problem memory_problem;
     const Field fields[] = {FIELD_END};
     char item;
-    const Status whole = json_parse(text, strlen(text), fields, &item, &problem);
+    const Status whole = json_parse(text, strlen(text), fields, &item, &memory_problem);
     assert_int_equal(whole, STATUS_INVALID);
     Status status = STATUS_NO_MEMORY;
     size_t count = 0;
     json_memory_source = fail_once;
     for (; status == STATUS_NO_MEMORY; count++) {
-        problem_clear(&problem);
+        problem_clear(&memory_problem);
         requests_left = count;
-        status = json_parse(text, strlen(text), fields, &item, &problem);
+        status = json_parse(text, strlen(text), fields, &item, &memory_problem);
     }
     json_memory_source = malloc;
     assert_int_equal(status, whole);

@@ -1,7 +1,7 @@
 // What others send stays within its quotes on its line.
 #include <string.h>
 
-#include "server/util/log.h"
+#include "server/util/process.h"
 #include "tests/support/test.h"
 
 static void expect(const char *text, size_t most, const char *wanted) {

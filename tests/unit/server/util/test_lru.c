@@ -1,4 +1,4 @@
-#include "server/util/lru.h"
+#include "server/util/hashmap.h"
 
 #include <pthread.h>
 #include <stdatomic.h>

@@ -1,7 +1,7 @@
 // Upper and lower case as one.
 
 #include "core/base/status.h"
-#include "server/util/utf8_fold.h"
+#include "server/util/bytes.h"
 #include "tests/support/test.h"
 
 TEST(upper_and_lower_case_of_any_script_are_one) {
@@ -20,7 +20,7 @@ TEST(upper_and_lower_case_of_any_script_are_one) {
     for (size_t i = 0; i < COUNT(cases); i++) {
         Bytes bytes = {0};
         bytes_text(&bytes, "|");
-        utf8_fold(&bytes, cases[i][0]);
+        bytes_folded(&bytes, cases[i][0]);
         assert_string_equal(bytes.at + 1, cases[i][1]);
         bytes_clear(&bytes);
     }

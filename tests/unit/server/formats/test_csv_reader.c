@@ -1,5 +1,5 @@
 // Cells of CSV texts.
-#include "server/util/csv_reader.h"
+#include "server/formats/csv.h"
 
 #include <stdio.h>
 #include <stdlib.h>
