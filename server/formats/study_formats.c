@@ -9,9 +9,9 @@
 #include "core/study/sensitivity.h"
 #include "server/formats/chart.h"
 #include "server/formats/charts.h"
-#include "server/formats/csv.h"
 #include "server/formats/sweep.h"
 #include "server/jobs/documents.h"
+#include "server/util/csv.h"
 
 static void json_write(const Variant *answer, const char *extension, Bytes *bytes) {
     (void)extension;

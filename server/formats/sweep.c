@@ -4,10 +4,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/formats/csv.h"
 #include "server/formats/format.h"
 #include "server/formats/zip.h"
 #include "server/util/base_path.h"
+#include "server/util/csv.h"
 
 static bool sweep_table_read(void *context, size_t cell, size_t first, size_t count,
                              double *target) {

@@ -11,12 +11,12 @@
 #include "core/base/json_pointer.h"
 #include "core/base/rfc3339.h"
 #include "core/base/spelling.h"
-#include "server/formats/csv.h"
 #include "server/json/encode.h"
 #include "server/json/parse.h"
 #include "server/json/schema.h"
 #include "server/materials/material.h"
 #include "server/util/clock.h"
+#include "server/util/csv.h"
 
 enum { NAME_MAX = 64, COMMENT_MAX = 10000, COLUMNS_MAX = 64 };
 enum { POINTER_SIZE = sizeof((Fault){0}.pointer) };

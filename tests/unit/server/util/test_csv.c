@@ -1,5 +1,5 @@
 // Cells of CSV texts.
-#include "server/formats/csv.h"
+#include "server/util/csv.h"
 
 #include <stdio.h>
 #include <stdlib.h>

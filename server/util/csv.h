@@ -1,9 +1,13 @@
-// Cells of CSV tables (RFC 4180), written and read; the CSV of a Table is format_csv.
-#ifndef SERVER_FORMATS_CSV_H
-#define SERVER_FORMATS_CSV_H
+// CSV (RFC 4180): cells that are written, and a reader.
+#ifndef SERVER_UTIL_CSV_H
+#define SERVER_UTIL_CSV_H
 
 #include "core/base/field.h"
 #include "server/util/bytes.h"
+
+// The digits of a number at `at`, which has room for SHORTEST_SIZE bytes; returns their end.
+char *csv_put_real(char *at, double value);
+void csv_put_name(Bytes *bytes, const char *name, const char *unit); // "name [unit]"
 
 // ",name [unit]" for each REAL and COUNT row.
 void csv_cells_header(Bytes *bytes, const Field *fields);
