@@ -17,8 +17,8 @@
 #include "server/cli/command.h"
 #include "server/cli/output.h"
 #include "server/cli/scene_file.h"
-#include "server/json/encode.h"
 #include "server/json/document.h"
+#include "server/json/encode.h"
 #include "server/json/parse.h"
 #include "server/json/table.h"
 
