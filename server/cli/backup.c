@@ -1,13 +1,11 @@
 // backup and restore. A first Ctrl-C asks the copying to stop, which then removes what it has
 // written; a second one, on a disk that does not answer, ends the program at once.
-#include "server/cli/command.h"
-
 #include <inttypes.h>
 #include <signal.h>
 #include <stdio.h>
 #include <string.h>
 
-#include "server/cli/output.h"
+#include "server/cli/files.h"
 #include "server/db/backup.h"
 
 typedef struct BackupSettings {

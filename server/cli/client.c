@@ -1,5 +1,5 @@
-// Whatever the server sends: headers and bodies are counted as they arrive, nothing is unpacked, no
-// redirect is followed (the token would go with it), and only http and https are used.
+// Headers and bodies are counted as they arrive, nothing is unpacked, no redirect is followed (the
+// token would go with it), and only http and https are used.
 #include "server/cli/client.h"
 
 #include <curl/curl.h>
@@ -7,6 +7,7 @@
 #include <fcntl.h>
 #include <math.h>
 #include <poll.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,23 +16,28 @@
 #include <unistd.h>
 
 #include "server/api/app.h"
-#include "server/cli/output.h"
-#include "server/cli/scene_file.h"
+#include "server/cli/files.h"
 #include "server/json/parse.h"
-#include "server/json/table.h"
 #include "server/util/clock.h"
 
+enum {
+    DOCUMENT_MAX = 64 << 20, // [B] of a body that is kept in memory
+    HEADERS_MAX = 64 << 10,  // [B] of all headers of a response
+    SILENCE = 60,            // [s] without a byte, after which a request fails
+    TOKEN_MAX = 512,
+    PATH_BYTES = 60000,
+};
 static const double forever = 1e9; // [s]
 
 // One exchange with the server.
 typedef struct Transfer {
     ApiClient *client;
-    const HttpAsk *ask;
-    HttpAnswer *answer;
+    const ApiRequest *request;
+    ApiAnswer *answer;
     Problem *problem;
-    Status status;  // not STATUS_OK: why the body was refused
-    size_t headers; // [B] so far
-    uint64_t taken; // [B] given to ask->take
+    Status status;   // not STATUS_OK: why the body was refused
+    size_t headers;  // [B] so far
+    uint64_t stored; // [B] written to the output
     uint64_t continue_from;
 } Transfer;
 
@@ -39,7 +45,6 @@ static Status client_no_memory(Problem *problem) {
     return problem_set(problem, STATUS_NO_MEMORY, "no memory");
 }
 
-enum { TOKEN_MAX = 512 };
 static const char token_characters[] =
     "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-._~+/=";
 
@@ -88,52 +93,36 @@ static Status token_read(const char *path, char **token, Problem *problem) {
     return length == 0 || *token != NULL ? STATUS_OK : client_no_memory(problem);
 }
 
-static bool host_is_loopback(const char *host) {
-    const bool is_number = strspn(host, "0123456789.") == strlen(host);
-    return strcasecmp(host, "localhost") == 0 || strcmp(host, "[::1]") == 0 ||
-           (is_number && strncmp(host, "127.", 4) == 0);
-}
-
-static bool url_has(CURLU *url, CURLUPart part) {
-    char *text = NULL;
-    const bool has = curl_url_get(url, part, &text, 0) == CURLUE_OK;
-    curl_free(text);
-    return has;
-}
-
 static Status url_check(ApiClient *client, Problem *problem) {
-    CURLU *url = curl_url();
-    char *scheme = NULL, *host = NULL;
-    const char *why = NULL;
-    if (url == NULL)
-        return client_no_memory(problem);
-    for (const char *c = client->url; *c != '\0'; c++)
+    const char *url = client->url, *why = NULL;
+    client->is_tls = strncasecmp(url, "https://", 8) == 0;
+    const bool is_plain = strncasecmp(url, "http://", 7) == 0;
+    const char *host = url + (client->is_tls ? 8 : is_plain ? 7 : 0);
+    const size_t size = host[0] == '[' ? strcspn(host, "]") + 1 : strcspn(host, ":/");
+    for (const char *c = url; *c != '\0'; c++)
         if ((unsigned char)*c <= ' ' || *c == 0x7f)
             why = "it contains a blank or a control character";
-    if (why == NULL && curl_url_set(url, CURLUPART_URL, client->url, 0) != CURLUE_OK)
-        why = "it cannot be parsed";
-    else if (why == NULL && (curl_url_get(url, CURLUPART_SCHEME, &scheme, 0) != CURLUE_OK ||
-                             (strcmp(scheme, "http") != 0 && strcmp(scheme, "https") != 0)))
+    if (why == NULL && host == url)
         why = "only http and https are supported";
-    else if (why == NULL && curl_url_get(url, CURLUPART_HOST, &host, 0) != CURLUE_OK)
-        why = "it has no host";
-    else if (why == NULL && (url_has(url, CURLUPART_USER) || url_has(url, CURLUPART_PASSWORD) ||
-                             url_has(url, CURLUPART_QUERY) || url_has(url, CURLUPART_FRAGMENT)))
+    else if (why == NULL && strpbrk(url, "@?#") != NULL)
         why = "it must not have a user, a query or a fragment; a token is read from IMPACTD_TOKEN "
               "or --token-file";
-    if (why == NULL) {
-        client->is_tls = strcmp(scheme, "https") == 0;
-        client->is_loopback = host_is_loopback(host);
+    else if (why == NULL && size == 0)
+        why = "it has no host";
+    else if (why == NULL) { // only here, as curl accepts more
+        CURLU *parsed = curl_url();
+        if (parsed == NULL || curl_url_set(parsed, CURLUPART_URL, url, 0) != CURLUE_OK)
+            why = "it cannot be parsed";
+        curl_url_cleanup(parsed);
     }
-    curl_free(scheme);
-    curl_free(host);
-    curl_url_cleanup(url);
-    return why == NULL
-               ? STATUS_OK
-               : problem_add(problem, STATUS_USAGE, "--server",
-                             "must be like http://127.0.0.1:8080 or https://HOST/PATH, is %.120s: "
-                             "%s",
-                             client->url, why);
+    client->is_loopback = (size == 9 && strncasecmp(host, "localhost", size) == 0) ||
+                          (size == 5 && strncmp(host, "[::1]", size) == 0) ||
+                          (strncmp(host, "127.", 4) == 0 && strspn(host, "0123456789.") == size);
+    return why == NULL ? STATUS_OK
+                       : problem_add(problem, STATUS_USAGE, "--server",
+                                     "must be like http://127.0.0.1:8080 or https://HOST/PATH, is "
+                                     "%.120s: %s",
+                                     url, why);
 }
 
 static const char *setting(const char *given, const char *name, const char *fallback) {
@@ -171,27 +160,59 @@ void api_client_close(ApiClient *client) {
     *client = (ApiClient){0};
 }
 
-int api_client_run(const Command *command, const ClientSettings *settings, const char *about,
-                   Status (*act)(ApiClient *client, void *context, Problem *problem), void *context,
-                   Problem *problem) {
-    ApiClient client;
-    Status status = api_client_open(settings, &client, problem);
-    client.about = about != NULL ? about : command->name;
-    if (status == STATUS_OK)
-        status = act(&client, context, problem);
-    const int code = status == STATUS_OK
-                         ? COMMAND_OK
-                         : api_client_refuse(command->name, client.about, status, problem);
-    api_client_close(&client);
-    return code;
+double api_client_left(const ApiClient *client) {
+    return fmax(0, 1e-9 * (double)(client->until_ns - clock_monotonic_ns()));
 }
 
 bool api_client_exposes_token(const ApiClient *client) {
     return client->token != NULL && !client->is_tls && !client->is_loopback;
 }
 
-double api_client_left(const ApiClient *client) {
-    return fmax(0, 1e-9 * (double)(client->until_ns - clock_monotonic_ns()));
+// Prints all faults on stderr, under `about`; returns the exit code.
+static int api_refuse(const Command *command, const char *about, Status status,
+                      const Problem *problem) {
+    const char *pointer = problem->count > 0 ? problem->faults[0].pointer : "";
+    // Faults of options and of the environment are at their names.
+    if (status == STATUS_USAGE && (pointer[0] == '-' || pointer[0] == 'I'))
+        return command_error(command->name, problem);
+    input_refuse(about, problem);
+    return command_exit(status);
+}
+
+int api_command(const Command *self, void *settings, const Options *options, Problem *problem) {
+    const ApiAction *actions = self->actions;
+    ApiCall call = {.settings = settings, .operands = options->operands};
+    size_t index = 0;
+    call.count = options->operand_count;
+    if (actions[0].name != NULL) {
+        if (command_action(options, &actions->name, sizeof *actions, &index, problem) != STATUS_OK)
+            return command_error(self->name, problem);
+        call.operands++;
+        call.count--;
+    }
+    const ApiAction *action = &actions[index];
+    if (call.count < action->min || call.count > action->max) {
+        const char *name = action->name != NULL ? action->name : "";
+        (void)problem_set(problem, STATUS_USAGE, "%s%stakes %s, is given %zu operands", name,
+                          name[0] != '\0' ? " " : "", action->takes, call.count);
+        return command_error(self->name, problem);
+    }
+    for (size_t i = 0; i < action->ids; i++)
+        if (!api_is_id(call.operands[i])) {
+            (void)problem_set(problem, STATUS_USAGE, "takes %s, is given \"%.80s\"", action->takes,
+                              call.operands[i]);
+            return command_error(self->name, problem);
+        }
+    Status status = api_client_open(settings, &call.client, problem);
+    call.client.about = call.count > 0 ? call.operands[0] : self->name;
+    if (status == STATUS_OK)
+        status = action->act(&call, problem);
+    const int code =
+        status == STATUS_OK ? COMMAND_OK : api_refuse(self, call.client.about, status, problem);
+    api_client_close(&call.client);
+    bytes_clear(&call.body);
+    api_answer_clear(&call.answer);
+    return code;
 }
 
 // The value of a header of the response, "" if it has none.
@@ -203,7 +224,7 @@ static void header_get(const Transfer *transfer, const char *name, char *value, 
 }
 
 static void headers_read(Transfer *transfer) {
-    HttpAnswer *answer = transfer->answer;
+    ApiAnswer *answer = transfer->answer;
     curl_off_t seconds = 0;
     char etag[sizeof answer->etag];
     header_get(transfer, "Content-Type", answer->content_type, sizeof answer->content_type);
@@ -219,23 +240,22 @@ static size_t header_count(char *line, size_t one, size_t count, void *context) 
     Transfer *transfer = context;
     (void)line;
     transfer->headers += one * count;
-    if (transfer->headers <= HTTP_HEADERS_MAX)
+    if (transfer->headers <= HEADERS_MAX)
         return one * count;
     transfer->status =
         problem_set(transfer->problem, STATUS_UNREACHABLE,
                     "%s sends more than %d bytes of headers; is the server really impactd?",
-                    transfer->client->url, HTTP_HEADERS_MAX);
+                    transfer->client->url, HEADERS_MAX);
     return 0;
 }
 
-// Gives a piece of the body to its reader.
-static Status body_hand_on(Transfer *transfer, const char *piece, size_t size) {
-    const HttpAsk *ask = transfer->ask;
-    if (size > ask->most - transfer->taken)
+static Status body_store(Transfer *transfer, const char *piece, size_t size) {
+    const uint64_t max = transfer->request->output_max;
+    if (size > max - transfer->stored)
         return problem_set(transfer->problem, STATUS_TOO_LARGE,
-                           "the answer is larger than %llu bytes", (unsigned long long)ask->most);
-    transfer->taken += size;
-    return ask->take(ask->context, piece, size, transfer->problem);
+                           "the answer is larger than %llu bytes", (unsigned long long)max);
+    transfer->stored += size;
+    return output_write(piece, size, transfer->problem);
 }
 
 static size_t body_read(char *piece, size_t one, size_t count, void *context) {
@@ -243,10 +263,10 @@ static size_t body_read(char *piece, size_t one, size_t count, void *context) {
     const size_t size = one * count;
     long code = 0;
     (void)curl_easy_getinfo(transfer->client->curl, CURLINFO_RESPONSE_CODE, &code);
-    if (transfer->taken == transfer->continue_from)
+    if (transfer->stored == transfer->continue_from)
         headers_read(transfer);
-    if (transfer->ask->take != NULL && (code == 200 || code == 206)) {
-        transfer->status = body_hand_on(transfer, piece, size);
+    if (transfer->request->output_max > 0 && (code == 200 || code == 206)) {
+        transfer->status = body_store(transfer, piece, size);
         return transfer->status == STATUS_OK ? size : 0;
     }
     bytes_put(&transfer->answer->body, piece, size);
@@ -256,7 +276,7 @@ static size_t body_read(char *piece, size_t one, size_t count, void *context) {
         problem_set(transfer->problem, STATUS_UNREACHABLE,
                     "%s answers with a document of more than %d bytes; is the server really "
                     "impactd?",
-                    transfer->client->url, HTTP_DOCUMENT_MAX);
+                    transfer->client->url, DOCUMENT_MAX);
     return 0;
 }
 
@@ -265,7 +285,7 @@ static Status transfer_failed(const Transfer *transfer, CURLcode code, Problem *
     const char *host = strstr(url, "://") != NULL ? strstr(url, "://") + 3 : url;
     // A TLS server closes a plain connection before it sends a byte.
     const bool may_be_tls = !transfer->client->is_tls && transfer->answer->code == 0 &&
-                            transfer->headers == 0 && transfer->taken == 0;
+                            transfer->headers == 0 && transfer->stored == 0;
     const char *hint = may_be_tls ? "; if the server speaks TLS, name it as https://" : "";
     switch (code) {
     case CURLE_COULDNT_CONNECT:
@@ -313,24 +333,25 @@ static bool header_add(struct curl_slist **list, const char *name, const char *v
 }
 
 static bool headers_add(const Transfer *transfer, struct curl_slist **list) {
-    const HttpAsk *ask = transfer->ask;
-    const char *type = ask->content_type != NULL ? ask->content_type : "application/json";
+    const ApiRequest *request = transfer->request;
+    const char *type = request->content_type != NULL ? request->content_type : "application/json";
     return header_add(list, "Expect", "") &&
-           header_add(list, "Content-Type", ask->body != NULL ? type : NULL) &&
-           header_add(list, "If-Match", ask->if_match) && header_add(list, "Prefer", ask->prefer) &&
-           header_add(list, "Idempotency-Key", ask->idempotency_key) &&
+           header_add(list, "Content-Type", request->body != NULL ? type : NULL) &&
+           header_add(list, "If-Match", request->if_match) &&
+           header_add(list, "Prefer", request->prefer) &&
+           header_add(list, "Idempotency-Key", request->idempotency_key) &&
            header_add(list, "If-Range",
                       transfer->continue_from > 0 ? transfer->answer->etag : NULL);
 }
 
 static CURLcode transfer_perform(Transfer *transfer, const char *url, struct curl_slist *headers) {
     const ApiClient *client = transfer->client;
-    const HttpAsk *ask = transfer->ask;
+    const ApiRequest *request = transfer->request;
     CURL *curl = client->curl;
-    const bool is_stream = ask->take != NULL;
+    const bool is_stream = request->output_max > 0;
     char agent[64];
     // A server that keeps a document back answers once the wait is over; more silence is a failure.
-    const double silence = fmin(api_client_left(client) + 5, HTTP_SILENCE);
+    const double silence = fmin(api_client_left(client) + 5, SILENCE);
     snprintf(agent, sizeof agent, "impactd/%s", program_version);
     curl_easy_reset(curl); // the connection stays
     curl_easy_setopt(curl, CURLOPT_URL, url);
@@ -344,24 +365,23 @@ static CURLcode transfer_perform(Transfer *transfer, const char *url, struct cur
     curl_easy_setopt(curl, CURLOPT_CONNECTTIMEOUT, 10L);
     curl_easy_setopt(curl, CURLOPT_LOW_SPEED_LIMIT, is_stream ? 1L : 100L); // [B/s]
     curl_easy_setopt(curl, CURLOPT_LOW_SPEED_TIME,
-                     client->has_patience && !is_stream ? (long)ceil(silence) : (long)HTTP_SILENCE);
+                     client->has_patience && !is_stream ? (long)ceil(silence) : (long)SILENCE);
     curl_easy_setopt(curl, CURLOPT_HTTPHEADER, headers);
     curl_easy_setopt(curl, CURLOPT_RESUME_FROM_LARGE, (curl_off_t)transfer->continue_from);
     if (client->token != NULL) {
         curl_easy_setopt(curl, CURLOPT_HTTPAUTH, (long)CURLAUTH_BEARER);
         curl_easy_setopt(curl, CURLOPT_XOAUTH2_BEARER, client->token);
     }
-    if (ask->within > 0 && ask->within < 1e6)
-        curl_easy_setopt(curl, CURLOPT_TIMEOUT_MS, (long)(1000 * ask->within) + 1);
     if (client->is_loopback) // a proxy of the environment is not for this machine
         curl_easy_setopt(curl, CURLOPT_PROXY, "");
     if (client->ca_file != NULL)
         curl_easy_setopt(curl, CURLOPT_CAINFO, client->ca_file);
-    if (ask->body != NULL) {
-        curl_easy_setopt(curl, CURLOPT_POSTFIELDS, ask->body->at != NULL ? ask->body->at : "");
-        curl_easy_setopt(curl, CURLOPT_POSTFIELDSIZE_LARGE, (curl_off_t)ask->body->count);
+    if (request->body != NULL) {
+        curl_easy_setopt(curl, CURLOPT_POSTFIELDS,
+                         request->body->at != NULL ? request->body->at : "");
+        curl_easy_setopt(curl, CURLOPT_POSTFIELDSIZE_LARGE, (curl_off_t)request->body->count);
     }
-    curl_easy_setopt(curl, CURLOPT_CUSTOMREQUEST, ask->method);
+    curl_easy_setopt(curl, CURLOPT_CUSTOMREQUEST, request->method);
     curl_easy_setopt(curl, CURLOPT_HEADERFUNCTION, header_count);
     curl_easy_setopt(curl, CURLOPT_HEADERDATA, transfer);
     curl_easy_setopt(curl, CURLOPT_WRITEFUNCTION, body_read);
@@ -373,7 +393,7 @@ static CURLcode transfer_perform(Transfer *transfer, const char *url, struct cur
 static bool transfer_can_continue(const Transfer *transfer, CURLcode code) {
     char ranges[16];
     header_get(transfer, "Accept-Ranges", ranges, sizeof ranges);
-    return transfer->status == STATUS_OK && transfer->taken > 0 && transfer->continue_from == 0 &&
+    return transfer->status == STATUS_OK && transfer->stored > 0 && transfer->continue_from == 0 &&
            transfer->answer->etag[0] != '\0' && strcasecmp(ranges, "bytes") == 0 &&
            (code == CURLE_PARTIAL_FILE || code == CURLE_RECV_ERROR || code == CURLE_GOT_NOTHING);
 }
@@ -394,7 +414,7 @@ static Status transfer_run(Transfer *transfer, const char *url, bool *is_cut) {
     headers_read(transfer);
     (void)curl_easy_getinfo(transfer->client->curl, CURLINFO_RESPONSE_CODE, &status);
     (void)curl_easy_getinfo(transfer->client->curl, CURLINFO_REDIRECT_URL, &location);
-    if (transfer->continue_from > 0 && transfer->taken == transfer->continue_from)
+    if (transfer->continue_from > 0 && transfer->stored == transfer->continue_from)
         return problem_set(transfer->problem, STATUS_UNREACHABLE,
                            "the answer was cut off after %llu bytes and cannot be continued",
                            (unsigned long long)transfer->continue_from);
@@ -407,18 +427,20 @@ static Status transfer_run(Transfer *transfer, const char *url, bool *is_cut) {
     return STATUS_OK;
 }
 
-Status http_ask(ApiClient *client, const HttpAsk *ask, HttpAnswer *answer, Problem *problem) {
-    *answer = (HttpAnswer){.body.most = HTTP_DOCUMENT_MAX};
-    Transfer transfer = {.client = client, .ask = ask, .answer = answer, .problem = problem};
-    Bytes url = {.most = 16384};
-    bytes_text(&url, client->url);
-    bytes_text(&url, ask->path);
+// One request. STATUS_OK if the server answered, with any status code.
+static Status api_exchange(ApiClient *client, const ApiRequest *request, ApiAnswer *answer,
+                           Problem *problem) {
+    *answer = (ApiAnswer){.body.most = DOCUMENT_MAX};
+    Transfer transfer = {
+        .client = client, .request = request, .answer = answer, .problem = problem};
+    Bytes url = {0};
+    bytes_format(&url, "%s%s", client->url, request->path.at);
     if (url.is_failed)
-        return problem_set(problem, STATUS_USAGE, "the address would be longer than 16384 bytes");
+        return client_no_memory(problem);
     bool is_cut = false;
     Status status = transfer_run(&transfer, url.at, &is_cut);
     if (is_cut) {
-        transfer.continue_from = transfer.taken;
+        transfer.continue_from = transfer.stored;
         transfer.headers = 0;
         status = transfer_run(&transfer, url.at, &is_cut);
     }
@@ -426,59 +448,66 @@ Status http_ask(ApiClient *client, const HttpAsk *ask, HttpAnswer *answer, Probl
     return status;
 }
 
-void http_answer_clear(HttpAnswer *answer) {
+void api_answer_clear(ApiAnswer *answer) {
     bytes_clear(&answer->body);
-    *answer = (HttpAnswer){0};
+    *answer = (ApiAnswer){0};
 }
 
-Status api_client_ask(ApiClient *client, const HttpAsk *ask, HttpAnswer *answer, Problem *problem) {
-    for (;;) {
-        TRY(http_ask(client, ask, answer, problem));
-        if (answer->code == 200 || answer->code == 201 || answer->code == 202 ||
-            answer->code == 204)
-            return STATUS_OK;
+Status api_ask(ApiClient *client, ApiRequest *request, ApiAnswer *answer, Problem *problem) {
+    Status status = STATUS_OK;
+    api_answer_clear(answer);
+    if (request->path.is_failed)
+        status = problem_set(problem, STATUS_USAGE, "asks for too much at once");
+    while (status == STATUS_OK &&
+           (status = api_exchange(client, request, answer, problem)) == STATUS_OK) {
+        const int code = answer->code;
+        if (code == 200 || code == 201 || code == 202 || code == 204)
+            break;
         const int pause = answer->retry_after > 0 ? answer->retry_after : 1;
-        const bool is_busy = answer->code == 503 || answer->code == 429;
-        if (!is_busy || pause > api_client_left(client))
-            return problem_reply_read(answer, problem);
-        http_answer_clear(answer);
-        (void)poll(NULL, 0, 1000 * pause);
+        if ((code != 503 && code != 429) || pause > api_client_left(client)) {
+            status = problem_reply_read(answer, problem);
+        } else {
+            api_answer_clear(answer);
+            (void)poll(NULL, 0, 1000 * pause);
+        }
     }
-}
-
-Status api_client_request(ApiClient *client, HttpAsk ask, Bytes *path, HttpAnswer *answer,
-                          Problem *problem) {
-    ask.path = path->at;
-    *answer = (HttpAnswer){0};
-    const Status status = path->is_failed
-                              ? problem_set(problem, STATUS_USAGE, "asks for too much at once")
-                              : api_client_ask(client, &ask, answer, problem);
-    bytes_clear(path);
+    bytes_clear(&request->path);
     return status;
 }
 
-void api_client_print(const HttpAnswer *answer) {
+Status api_download(ApiCall *call, ApiRequest *request, const char *path, Problem *problem) {
+    Status status = output_open(path, problem);
+    if (status == STATUS_OK)
+        status = api_ask(&call->client, request, &call->answer, problem);
+    if (status == STATUS_OK)
+        status = output_close(problem);
+    output_drop();
+    bytes_clear(&request->path);
+    return status;
+}
+
+void api_print(const ApiAnswer *answer) {
     (void)fwrite(answer->body.at, 1, answer->body.count, stdout);
 }
 
-bool api_client_is_id(const char *text) {
+Status api_print_tables(const ApiAnswer *answer, const PrintTableView *view, bool is_json,
+                        size_t *longest, Problem *problem) {
+    *longest = SIZE_MAX;
+    if (!is_json)
+        return print_table_print_json(answer->body.at, answer->body.count, view, stdout, longest,
+                                      problem);
+    api_print(answer);
+    return STATUS_OK;
+}
+
+bool api_is_id(const char *text) {
     const size_t length = strlen(text);
     return length > 0 && length <= 80 &&
            strspn(text, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-") ==
                length;
 }
 
-int api_client_refuse(const char *command, const char *name, Status status,
-                      const Problem *problem) {
-    const char *pointer = problem->count > 0 ? problem->faults[0].pointer : "";
-    // Faults of options and of the environment are at their names.
-    if (status == STATUS_USAGE && (pointer[0] == '-' || pointer[0] == 'I'))
-        return command_error(command, problem);
-    scene_file_refuse(name, problem);
-    return command_exit(status);
-}
-
-Status api_client_unexpected(const char *wanted, Problem *problem) {
+Status api_unexpected(const char *wanted, Problem *problem) {
     return problem_set(problem, STATUS_UNREACHABLE,
                        "the answer is not %s; is the server really impactd?", wanted);
 }
@@ -510,7 +539,7 @@ const Field problem_reply_fields[] = {
 };
 // clang-format on
 
-static void text_put(char *target, size_t size, const char *text) {
+static void text_fit_printable(char *target, size_t size, const char *text) {
     text_fit(target, size, text != NULL ? text : "");
     text_make_printable(target);
 }
@@ -524,22 +553,22 @@ void problem_reply_put(const ProblemReply *reply, Status status, Problem *proble
         // The place of a fault in a table is its cell, not that of a document.
         snprintf(place, sizeof place, "row %llu%s%.100s", (unsigned long long)one->row,
                  one->column != NULL ? ", column " : "", one->column != NULL ? one->column : "");
-        text_put(fault.pointer, sizeof fault.pointer,
-                 one->row != COUNT_ABSENT ? place : one->pointer);
-        text_put(fault.detail, sizeof fault.detail, one->detail);
-        text_put(fault.unit, sizeof fault.unit, one->unit);
-        text_put(fault.did_you_mean, sizeof fault.did_you_mean, one->did_you_mean);
+        text_fit_printable(fault.pointer, sizeof fault.pointer,
+                           one->row != COUNT_ABSENT ? place : one->pointer);
+        text_fit_printable(fault.detail, sizeof fault.detail, one->detail);
+        text_fit_printable(fault.unit, sizeof fault.unit, one->unit);
+        text_fit_printable(fault.did_you_mean, sizeof fault.did_you_mean, one->did_you_mean);
         (void)problem_add_fault(problem, status, &fault);
     }
     if (problem != NULL && reply->more < 1000000000)
         problem->count += problem->count > 0 ? reply->more : 0;
     char detail[400];
-    text_put(detail, sizeof detail, reply->detail != NULL ? reply->detail : reply->title);
+    text_fit_printable(detail, sizeof detail, reply->detail != NULL ? reply->detail : reply->title);
     (void)problem_set(problem, status, "%s", detail[0] != '\0' ? detail : "no reason is given");
 }
 
 // The status that leads to the exit code of an HTTP status code.
-static Status status_of(int code, const char *type) {
+static Status http_status(int code, const char *type) {
     switch (code) {
     case 400:
         return type != NULL && strstr(type, "unreadable") != NULL ? STATUS_UNREADABLE
@@ -568,11 +597,11 @@ static Status status_of(int code, const char *type) {
     }
 }
 
-Status problem_reply_read(const HttpAnswer *answer, Problem *problem) {
+Status problem_reply_read(const ApiAnswer *answer, Problem *problem) {
     ProblemReply reply = {0};
     // Unknown members are not faults of an answer.
     (void)json_parse(answer->body.at, answer->body.count, problem_reply_fields, &reply, NULL);
-    const Status status = status_of(answer->code, reply.type);
+    const Status status = http_status(answer->code, reply.type);
     if (reply.detail != NULL || reply.title != NULL || reply.errors.count > 0)
         problem_reply_put(&reply, status, problem);
     else
@@ -581,7 +610,18 @@ Status problem_reply_read(const HttpAnswer *answer, Problem *problem) {
     return status;
 }
 
-void http_query(Bytes *path, const char *name, const char *value) {
+Bytes api_path(const char *format, ...) {
+    char text[400];
+    Bytes path = {.most = PATH_BYTES};
+    va_list arguments;
+    va_start(arguments, format);
+    path.is_failed = (size_t)vsnprintf(text, sizeof text, format, arguments) >= sizeof text;
+    va_end(arguments);
+    bytes_text(&path, text);
+    return path;
+}
+
+void api_query(Bytes *path, const char *name, const char *value) {
     if (value == NULL)
         return;
     bytes_format(path, "%s%s=", path->at == NULL || strchr(path->at, '?') == NULL ? "?" : "&",
@@ -589,8 +629,26 @@ void http_query(Bytes *path, const char *name, const char *value) {
     bytes_percent(path, value);
 }
 
-void http_query_real(Bytes *path, const char *name, double value) {
-    char text[32];
-    if (!isnan(value))
-        http_query(path, name, text_real(text, value));
+void api_query_rows(Bytes *path, const Field *fields, const void *settings, const char *names) {
+    char name[64], text[32];
+    for (; *names != '\0'; names += strspn(names, " ")) {
+        size_t offset = 0;
+        snprintf(name, sizeof name, "%.*s", (int)strcspn(names, " "), names);
+        names += strlen(name);
+        const Field *row = fields_find(fields, name, &offset);
+        const void *at = (const char *)settings + offset + row->offset;
+        if (row->kind == FIELD_KIND_FLAG)
+            api_query(path, name, *(const bool *)at ? "1" : NULL);
+        else if (field_is_absent(row, settings))
+            continue;
+        else if (row->kind == FIELD_KIND_CHOICE)
+            api_query(path, name, row->choices[*(const int *)at]);
+        else if (row->kind == FIELD_KIND_TEXT)
+            api_query(path, name, *(char *const *)at);
+        else
+            api_query(path, name,
+                      text_real(text, row->kind == FIELD_KIND_REAL
+                                          ? *(const double *)at
+                                          : (double)*(const uint64_t *)at));
+    }
 }

@@ -31,6 +31,7 @@ struct Command {
     const char *environment;   // prefix of the variables that set options; NULL: none
     // `settings` holds the options; it is cleared by the caller. Returns the exit code.
     int (*run)(const Command *self, void *settings, const Options *options, Problem *problem);
+    const struct ApiAction *actions; // of a command that asks a server; ends with a NULL name
 };
 
 // Each is in the file of its name or of its resource: jobs.c, records.c, study.c.
@@ -49,9 +50,10 @@ int command_main(int argc, char *const *argv);
 // COMMAND_USAGE.
 int command_error(const char *name, const Problem *problem);
 
-// The index of the action that the first operand names, of `count` actions. `names` points to the
-// name of the first; those of the others follow at `stride` bytes. STATUS_USAGE lists them.
-Status command_action(const Options *options, const char *const *names, size_t count, size_t stride,
+// The index of the action that the first operand names. `names` points to the name of the first
+// action; those of the others follow at `stride` bytes, NULL after the last. STATUS_USAGE lists
+// them.
+Status command_action(const Options *options, const char *const *names, size_t stride,
                       size_t *index, Problem *problem);
 
 // Sets *folder, where it is NULL, to $IMPACTD_DATA, else to impactd under $XDG_STATE_HOME, else

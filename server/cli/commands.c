@@ -169,26 +169,26 @@ int command_exit(Status status) {
     }
 }
 
-Status command_action(const Options *options, const char *const *names, size_t count, size_t stride,
+Status command_action(const Options *options, const char *const *names, size_t stride,
                       size_t *index, Problem *problem) {
     enum { ACTIONS_MAX = 32 };
-    const char *known[ACTIONS_MAX + 1] = {NULL};
+    const char *known[ACTIONS_MAX + 1] = {names[0]}, *last = "";
     const char *given = options->operand_count > 0 ? options->operands[0] : "";
-    char all[200] = "", last[40] = "";
-    for (size_t i = 0; i < count && i < ACTIONS_MAX; i++) {
-        known[i] = *(const char *const *)(const void *)((const char *)names + i * stride);
-        *index = i;
-        if (strcmp(given, known[i]) == 0)
+    char all[200] = "";
+    for (*index = 0; known[*index] != NULL && *index < ACTIONS_MAX; (*index)++) {
+        if (strcmp(given, known[*index]) == 0)
             return STATUS_OK;
-        if (i + 1 < count)
-            text_list(all, sizeof all, known[i]);
-        else
-            snprintf(last, sizeof last, " or %s", known[i]);
+        if (*index > 0)
+            text_list(all, sizeof all, last);
+        last = known[*index];
+        names = (const char *const *)(const void *)((const char *)names + stride);
+        known[*index + 1] = *names;
     }
     const char *near = spelling_nearest(known, given);
-    return problem_set(problem, STATUS_USAGE, "the first operand must be %s%s, is \"%.60s\"%s%s%s",
-                       all, last, given, near != NULL ? " (did you mean " : "",
-                       near != NULL ? near : "", near != NULL ? "?)" : "");
+    return problem_set(problem, STATUS_USAGE,
+                       "the first operand must be %s or %s, is \"%.60s\"%s%s%s", all, last, given,
+                       near != NULL ? " (did you mean " : "", near != NULL ? near : "",
+                       near != NULL ? "?)" : "");
 }
 
 Status command_data_folder(char **folder, Problem *problem) {

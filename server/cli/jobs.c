@@ -1,19 +1,15 @@
 // The commands on jobs and results of a server: submit, watch, get, cancel, compare.
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
 #include "server/cli/client.h"
-#include "server/cli/command.h"
-#include "server/cli/output.h"
-#include "server/cli/scene_file.h"
+#include "server/cli/files.h"
 #include "server/json/document.h"
 #include "server/json/parse.h"
-#include "server/json/table.h"
 #include "server/util/clock.h"
 
-static const double bar_period = 0.5, lines_period = 2; // [s] between two requests for a job
+static const double poll_period = 0.5;                  // [s] between two requests for a job
 static const int64_t restart_ns = (int64_t)10000000000; // time that a server may take to restart
 
 // A job as the server sends it. Unknown members are skipped, missing ones are empty: the server may
@@ -35,23 +31,12 @@ static const Field job_fields[] = {
 };
 // clang-format on
 
-// A request for a job: the answer as it came, and what is read of it.
-typedef struct JobAnswer {
-    HttpAnswer http;
-    JobReply job;
-} JobAnswer;
-
-static void job_clear(JobAnswer *answer) {
-    fields_clear(job_fields, &answer->job);
-    http_answer_clear(&answer->http);
-}
-
-static Status job_read(JobAnswer *answer, Problem *problem) {
-    JobReply *job = &answer->job;
-    (void)json_parse(answer->http.body.at, answer->http.body.count, job_fields, job, NULL);
-    if (job->id == NULL || job->status == NULL || strlen(job->status) > 40 ||
-        !api_client_is_id(job->id))
-        return api_client_unexpected("a job", problem);
+// Reads the answer into `job`, cleared by fields_clear in any case.
+static Status job_read(const ApiAnswer *answer, JobReply *job, Problem *problem) {
+    fields_clear(job_fields, job);
+    (void)json_parse(answer->body.at, answer->body.count, job_fields, job, NULL);
+    if (job->id == NULL || job->status == NULL || strlen(job->status) > 40 || !api_is_id(job->id))
+        return api_unexpected("a job", problem);
     text_make_printable(job->status);
     return STATUS_OK;
 }
@@ -61,14 +46,12 @@ static bool job_is_final(const JobReply *job) {
 }
 
 // Requests a job; the server answers after `wait` seconds at the latest, or when the job ends.
-static Status job_get(ApiClient *client, const char *id, double wait, JobAnswer *answer,
-                      Problem *problem) {
-    char path[160];
-    job_clear(answer);
-    snprintf(path, sizeof path, "/v1/jobs/%s?wait=%.3f", id, fmin(wait, api_client_left(client)));
-    const HttpAsk ask = {.method = "GET", .path = path};
-    TRY(api_client_ask(client, &ask, &answer->http, problem));
-    return job_read(answer, problem);
+static Status job_get(ApiCall *call, const char *id, double wait, JobReply *job, Problem *problem) {
+    ApiRequest request = {
+        .method = "GET",
+        .path = api_path("/v1/jobs/%s?wait=%.3f", id, fmin(wait, api_client_left(&call->client)))};
+    TRY(api_ask(&call->client, &request, &call->answer, problem));
+    return job_read(&call->answer, job, problem);
 }
 
 // STATUS_OK if the job was successful; otherwise the cause is in `problem`.
@@ -84,27 +67,26 @@ static Status job_verdict(const JobReply *job, Problem *problem) {
 
 // The result of `id`: itself, or that of a job that finishes while the wait lasts. STATUS_TIMEOUT:
 // the job continues.
-static Status result_of(ApiClient *client, const char *id, char result[96], Problem *problem) {
-    JobAnswer answer = {0};
-    const JobReply *job = &answer.job;
+static Status job_result(ApiCall *call, const char *id, char result[96], Problem *problem) {
+    JobReply job = {0};
+    Status status;
     snprintf(result, 96, "%s", id);
     if (strncmp(id, "j-", 2) != 0)
         return STATUS_OK;
-    Status status;
     do
-        status = job_get(client, id, 20, &answer, problem);
-    while (status == STATUS_OK && !job_is_final(job) && api_client_left(client) > 0);
-    if (status == STATUS_OK && !job_is_final(job))
+        status = job_get(call, id, 20, &job, problem);
+    while (status == STATUS_OK && !job_is_final(&job) && api_client_left(&call->client) > 0);
+    if (status == STATUS_OK && !job_is_final(&job))
         status = problem_set(problem, STATUS_TIMEOUT,
                              "is still %s; \"impactd watch %s\" follows it, --wait S waits",
-                             job->status, id);
+                             job.status, id);
+    if (status == STATUS_OK && job.result == NULL)
+        status = job_verdict(&job, problem);
+    if (status == STATUS_OK && (job.result == NULL || !api_is_id(job.result)))
+        status = api_unexpected("a job with a result", problem);
     if (status == STATUS_OK)
-        status = job->result == NULL ? job_verdict(job, problem) : STATUS_OK;
-    if (status == STATUS_OK && (job->result == NULL || !api_client_is_id(job->result)))
-        status = api_client_unexpected("a job with a result", problem);
-    if (status == STATUS_OK)
-        snprintf(result, 96, "%s", job->result);
-    job_clear(&answer);
+        snprintf(result, 96, "%s", job.result);
+    fields_clear(job_fields, &job);
     return status;
 }
 
@@ -133,119 +115,39 @@ static void job_progress_show(JobProgress *show, const char *id, const JobReply 
     fflush(show->lines);
 }
 
-// A stream of server-sent events as it arrives. Lines that are too long for an event "progress" are
-// skipped.
-typedef struct EventStream {
-    JobProgress *show;
-    const char *id;
-    const HttpAnswer *answer;
-    bool is_progress; // the event that lines of data belong to
-    size_t length;    // of the line, also beyond its size
-    char line[1024];
-} EventStream;
-
-static void event_line_read(EventStream *events) {
-    static const char name[] = "event: ", data[] = "data: ";
-    JobReply job = {0};
-    const size_t size = events->length;
-    events->length = 0;
-    if (size >= sizeof events->line)
-        return;
-    events->line[size] = '\0';
-    if (strncmp(events->line, name, sizeof name - 1) == 0)
-        events->is_progress = strcmp(events->line + sizeof name - 1, "progress") == 0;
-    if (!events->is_progress || strncmp(events->line, data, sizeof data - 1) != 0)
-        return;
-    (void)json_parse(events->line + sizeof data - 1, size - (sizeof data - 1), job_fields, &job,
-                     NULL);
-    text_make_printable(job.status);
-    if (job.status != NULL && strlen(job.status) <= 40)
-        job_progress_show(events->show, events->id, &job);
-    fields_clear(job_fields, &job);
-}
-
-static bool is_event_stream(const HttpAnswer *answer) {
-    return strcmp(answer->content_type, "text/event-stream") == 0;
-}
-
-static Status events_take(void *context, const void *bytes, size_t size, Problem *problem) {
-    EventStream *events = context;
-    const char *text = bytes;
-    if (!is_event_stream(events->answer))
-        return problem_set(problem, STATUS_UNSUPPORTED_TYPE, "the answer is no stream of events");
-    for (size_t i = 0; i < size; i++) {
-        if (text[i] == '\n') {
-            event_line_read(events);
-        } else {
-            if (events->length < sizeof events->line)
-                events->line[events->length] = text[i];
-            events->length++;
-        }
-    }
-    return STATUS_OK;
-}
-
-// Shows the events of the job until the stream ends. False if the server has no such stream.
-static bool events_follow(ApiClient *client, const char *id, JobProgress *show) {
-    enum { EVENTS_MAX = 256 << 20 }; // [B]
-    char path[160];
-    HttpAnswer answer;
-    EventStream events = {.show = show, .id = id, .answer = &answer};
-    snprintf(path, sizeof path, "/v1/jobs/%s/events", id);
-    const HttpAsk ask = {.method = "GET",
-                         .path = path,
-                         .take = events_take,
-                         .context = &events,
-                         .most = EVENTS_MAX,
-                         .within = api_client_left(client)};
-    // The request for the job that follows reports what is wrong.
-    (void)http_ask(client, &ask, &answer, NULL);
-    const bool is_stream = is_event_stream(&answer);
-    http_answer_clear(&answer);
-    return is_stream;
-}
-
-// Requests a job that was there before: repeated while the server restarts.
-static Status job_get_again(ApiClient *client, const char *id, double wait, JobAnswer *answer,
-                            Problem *problem) {
-    const int64_t until_ns = clock_monotonic_ns() + restart_ns;
-    for (;;) {
-        const Status status = job_get(client, id, wait, answer, problem);
-        if (status != STATUS_UNREACHABLE || clock_monotonic_ns() > until_ns ||
-            api_client_left(client) < 1)
-            return status;
-        problem_clear(problem);
-        sleep(1);
-    }
-}
-
-// Follows a job to its end, by its events if the server has them, else by repeated requests.
-// STATUS_TIMEOUT when the wait is over: the job continues. The answer has the last state.
-static Status job_follow(ApiClient *client, const char *id, FILE *lines, JobAnswer *answer,
+// Follows a job to its end. STATUS_TIMEOUT when the wait is over: the job continues. The call's
+// answer and `job` have the last state. A server that has answered once may be restarted meanwhile.
+static Status job_follow(ApiCall *call, const char *id, FILE *lines, JobReply *job,
                          Problem *problem) {
     char farewell[256];
     JobProgress show = {.lines = lines};
-    const JobReply *job = &answer->job;
-    client->about = id;
+    int64_t answered_ns = INT64_MIN;
+    Status status;
     snprintf(farewell, sizeof farewell,
              "%s goes on; \"impactd cancel %s\" stops it, \"impactd watch %s\" follows it\n", id,
              id, id);
     output_farewell(farewell);
     progress_bar_start(&show.bar);
-    const double period = show.bar.is_terminal ? bar_period : lines_period;
-    bool has_events = true;
-    Status status = job_get(client, id, period, answer, problem);
-    while (status == STATUS_OK) {
+    for (;;) {
+        status = job_get(call, id, poll_period, job, problem);
+        const double left = api_client_left(&call->client);
+        const int64_t now_ns = clock_monotonic_ns();
+        if (status == STATUS_UNREACHABLE && now_ns - restart_ns < answered_ns && left >= 1) {
+            problem_clear(problem);
+            sleep(1);
+            continue;
+        }
+        if (status != STATUS_OK)
+            break;
+        answered_ns = now_ns;
         job_progress_show(&show, id, job);
         if (job_is_final(job))
             break;
-        if (api_client_left(client) <= 0) {
+        if (left <= 0) {
             status = problem_set(problem, STATUS_TIMEOUT, "is still %s after the time given; %.*s",
                                  job->status, (int)strlen(farewell) - 1, farewell);
             break;
         }
-        has_events = has_events && events_follow(client, id, &show);
-        status = job_get_again(client, id, period, answer, problem);
     }
     progress_bar_stop(&show.bar);
     output_farewell(NULL);
@@ -254,7 +156,7 @@ static Status job_follow(ApiClient *client, const char *id, FILE *lines, JobAnsw
     return status;
 }
 
-// Options and operands of all five commands; each has rows for those that it takes.
+// Options of all five commands; each has rows for those that it takes.
 typedef struct JobsSettings {
     ClientSettings client;
     bool json, dry_run;
@@ -263,136 +165,88 @@ typedef struct JobsSettings {
     char *output, *channels;
     double from, to;
     uint64_t points, max_bytes;
-    const char *operands[2];
-    Bytes scene;
-    char what[112];
 } JobsSettings;
 
-static int usage_error(const Command *self, const char *sentence, Problem *problem) {
-    (void)problem_set(problem, STATUS_USAGE, "%s", sentence);
-    return command_error(self->name, problem);
-}
-
-// Whether `count` operands were given, all of them ids; stores them.
-static bool operands_are_ids(JobsSettings *settings, const Options *options, size_t count) {
-    bool are_ids = options->operand_count == count;
-    for (size_t i = 0; i < count && are_ids; i++) {
-        settings->operands[i] = options->operands[i];
-        are_ids = api_client_is_id(options->operands[i]);
-    }
-    return are_ids;
-}
-
-static Status submit_act(ApiClient *client, void *context, Problem *problem) {
-    const JobsSettings *settings = context;
-    JobAnswer answer = {0};
-    const double wait = settings->client.wait;
-    char prefer[48], id[96];
-    snprintf(prefer, sizeof prefer, "wait=%.0f", ceil(fmin(wait, 2)));
-    const HttpAsk ask = {.method = "POST",
-                         .path = settings->dry_run ? "/v1/jobs?dry_run=1" : "/v1/jobs",
-                         .body = &settings->scene,
-                         .prefer = wait > 0 ? prefer : "respond-async",
-                         .idempotency_key = settings->idempotency_key};
-    Status status = api_client_ask(client, &ask, &answer.http, problem);
-    if (status == STATUS_OK && !settings->dry_run)
-        status = job_read(&answer, problem);
-    const bool is_accepted = status == STATUS_OK;
-    if (is_accepted && !settings->dry_run) {
-        snprintf(id, sizeof id, "%s", answer.job.id);
-        client->about = id;
-        if (!settings->json) {
-            printf("%s\n", id);
-            fflush(stdout);
-        }
-        if (wait > 0 && !job_is_final(&answer.job))
-            status = job_follow(client, id, stderr, &answer, problem);
-    }
-    if (is_accepted && (settings->json || settings->dry_run) &&
-        (status == STATUS_OK || status == STATUS_TIMEOUT))
-        api_client_print(&answer.http);
-    // A job that has ended is reported also if the end was not waited for.
-    if (status == STATUS_OK && !settings->dry_run && job_is_final(&answer.job))
-        status = job_verdict(&answer.job, problem);
-    job_clear(&answer);
-    return status;
-}
-
-static bool is_printable(const char *text) {
-    for (const char *c = text; *c != '\0'; c++)
+static bool text_is_printable(const char *text) {
+    for (const char *c = text; c != NULL && *c != '\0'; c++)
         if (*c < ' ' || *c > '~')
             return false;
     return true;
 }
 
-static int submit_run(const Command *self, void *of, const Options *options, Problem *problem) {
-    JobsSettings *settings = of;
-    if (options->operand_count != 1)
-        (void)problem_set(problem, STATUS_USAGE, "takes one scene, is given %zu",
-                          options->operand_count);
-    if (settings->idempotency_key != NULL && !is_printable(settings->idempotency_key))
-        (void)problem_add(problem, STATUS_USAGE, "--idempotency-key",
-                          "must be of printable ASCII characters");
-    if (problem->status != STATUS_OK)
-        return command_error(self->name, problem);
-    const char *path = options->operands[0];
-    Status status = scene_file_read(path, &settings->scene, problem);
-    if (status == STATUS_OK && settings->title != NULL)
-        status = json_edit_set(&settings->scene, "title", settings->title, problem);
-    for (size_t i = 0; i < settings->label.count && status == STATUS_OK; i++)
-        status = json_edit_label(&settings->scene, settings->label.at[i], problem);
-    const int code = status == STATUS_OK ? api_client_run(self, &settings->client, path, submit_act,
-                                                          settings, problem)
-                                         : api_client_refuse(self->name, path, status, problem);
-    bytes_clear(&settings->scene);
-    return code;
+// Sends the scene of the body.
+static Status submit_send(ApiCall *call, JobReply *job, Problem *problem) {
+    const JobsSettings *settings = call->settings;
+    const double wait = settings->client.wait;
+    char prefer[48];
+    snprintf(prefer, sizeof prefer, "wait=%.0f", ceil(fmin(wait, 2)));
+    ApiRequest request = {.method = "POST",
+                          .path = api_path("/v1/jobs%s", settings->dry_run ? "?dry_run=1" : ""),
+                          .body = &call->body,
+                          .prefer = wait > 0 ? prefer : "respond-async",
+                          .idempotency_key = settings->idempotency_key};
+    TRY(api_ask(&call->client, &request, &call->answer, problem));
+    if (settings->dry_run) {
+        api_print(&call->answer);
+        return STATUS_OK;
+    }
+    TRY(job_read(&call->answer, job, problem));
+    snprintf(call->id, sizeof call->id, "%s", job->id);
+    if (!settings->json) {
+        printf("%s\n", call->id);
+        fflush(stdout);
+    }
+    Status status = STATUS_OK;
+    call->client.about = call->id;
+    if (wait > 0 && !job_is_final(job))
+        status = job_follow(call, call->id, stderr, job, problem);
+    if (settings->json && (status == STATUS_OK || status == STATUS_TIMEOUT))
+        api_print(&call->answer);
+    // A job that has ended is reported also if the end was not waited for.
+    return status == STATUS_OK && job_is_final(job) ? job_verdict(job, problem) : status;
 }
 
-static Status watch_act(ApiClient *client, void *context, Problem *problem) {
-    const JobsSettings *settings = context;
-    JobAnswer answer = {0};
+static Status submit_act(ApiCall *call, Problem *problem) {
+    const JobsSettings *settings = call->settings;
+    JobReply job = {0};
+    if (!text_is_printable(settings->idempotency_key))
+        return problem_add(problem, STATUS_USAGE, "--idempotency-key",
+                           "must be of printable ASCII characters");
+    TRY(input_read(call->operands[0], &call->body, problem));
+    if (settings->title != NULL)
+        TRY(json_edit_set(&call->body, "title", settings->title, problem));
+    for (size_t i = 0; i < settings->label.count; i++)
+        TRY(json_edit_label(&call->body, settings->label.at[i], problem));
+    const Status status = submit_send(call, &job, problem);
+    fields_clear(job_fields, &job);
+    return status;
+}
+
+static Status watch_act(ApiCall *call, Problem *problem) {
+    const JobsSettings *settings = call->settings;
+    JobReply job = {0};
     Status status =
-        job_follow(client, settings->operands[0], settings->json ? NULL : stdout, &answer, problem);
+        job_follow(call, call->operands[0], settings->json ? NULL : stdout, &job, problem);
     if (status == STATUS_OK && settings->json)
-        api_client_print(&answer.http);
+        api_print(&call->answer);
     if (status == STATUS_OK)
-        status = job_verdict(&answer.job, problem);
-    job_clear(&answer);
+        status = job_verdict(&job, problem);
+    fields_clear(job_fields, &job);
     return status;
 }
 
-static int watch_run(const Command *self, void *of, const Options *options, Problem *problem) {
-    JobsSettings *settings = of;
-    return operands_are_ids(settings, options, 1)
-               ? api_client_run(self, &settings->client, settings->operands[0], watch_act, settings,
-                                problem)
-               : usage_error(self, "takes one job's id, like j-7f3a", problem);
-}
-
-static Status cancel_act(ApiClient *client, void *context, Problem *problem) {
-    const JobsSettings *settings = context;
-    JobAnswer answer = {0};
-    char path[128];
-    snprintf(path, sizeof path, "/v1/jobs/%s", settings->operands[0]);
-    const HttpAsk ask = {.method = "DELETE", .path = path};
-    Status status = api_client_ask(client, &ask, &answer.http, problem);
+static Status cancel_act(ApiCall *call, Problem *problem) {
+    JobReply job = {0};
+    ApiRequest request = {.method = "DELETE", .path = api_path("/v1/jobs/%s", call->operands[0])};
+    TRY(api_ask(&call->client, &request, &call->answer, problem));
+    const Status status = job_read(&call->answer, &job, problem);
     if (status == STATUS_OK)
-        status = job_read(&answer, problem);
-    if (status == STATUS_OK)
-        printf("%s %s\n", answer.job.id, answer.job.status);
-    job_clear(&answer);
+        printf("%s %s\n", job.id, job.status);
+    fields_clear(job_fields, &job);
     return status;
 }
 
-static int cancel_run(const Command *self, void *of, const Options *options, Problem *problem) {
-    JobsSettings *settings = of;
-    return operands_are_ids(settings, options, 1)
-               ? api_client_run(self, &settings->client, settings->operands[0], cancel_act,
-                                settings, problem)
-               : usage_error(self, "takes one job's id, like j-7f3a", problem);
-}
-
-static Status compare_act(ApiClient *client, void *context, Problem *problem) {
+static Status compare_act(ApiCall *call, Problem *problem) {
     static const PrintTableColumns columns[] = {
         {"inputs", {"pointer", "a", "b", "detail"}},
         {"metrics", {"name", "unit", "a", "b", "difference", "relative"}},
@@ -403,33 +257,22 @@ static Status compare_act(ApiClient *client, void *context, Problem *problem) {
     };
     static const char *const skipped[] = {"links", NULL}, *const sides[] = {"a", "b"};
     static const PrintTableView view = {skipped, columns, NULL};
-    const JobsSettings *settings = context;
-    HttpAnswer answer;
-    Bytes path = {.most = 1000};
+    const JobsSettings *settings = call->settings;
+    ApiRequest request = {.method = "GET", .path = api_path("/v1/compare")};
     size_t longest;
-    bytes_text(&path, "/v1/compare");
-    for (int i = 0; i < 2; i++) {
+    Status status = STATUS_OK;
+    for (int i = 0; i < 2 && status == STATUS_OK; i++) {
         char result[96];
-        client->about = settings->operands[i];
-        TRY(result_of(client, settings->operands[i], result, problem));
-        http_query(&path, sides[i], result);
+        call->client.about = call->operands[i];
+        status = job_result(call, call->operands[i], result, problem);
+        api_query(&request.path, sides[i], result);
     }
-    Status status = api_client_request(client, (HttpAsk){.method = "GET"}, &path, &answer, problem);
-    if (status == STATUS_OK && settings->json)
-        api_client_print(&answer);
-    else if (status == STATUS_OK)
-        status = print_table_print_json(answer.body.at, answer.body.count, &view, stdout, &longest,
-                                        problem);
-    http_answer_clear(&answer);
-    return status;
-}
-
-static int compare_run(const Command *self, void *of, const Options *options, Problem *problem) {
-    JobsSettings *settings = of;
-    return operands_are_ids(settings, options, 2)
-               ? api_client_run(self, &settings->client, settings->operands[0], compare_act,
-                                settings, problem)
-               : usage_error(self, "takes the ids of two results or jobs, like r-91c0", problem);
+    if (status == STATUS_OK)
+        status = api_ask(&call->client, &request, &call->answer, problem);
+    bytes_clear(&request.path);
+    return status == STATUS_OK
+               ? api_print_tables(&call->answer, &view, settings->json, &longest, problem)
+               : status;
 }
 
 static const char *const formats[] = {"json", "csv", "npy", "npz", "mat", "zip", "svg", NULL};
@@ -444,13 +287,6 @@ static bool is_among(const char *const *texts, const char *text) {
     return false;
 }
 
-// The extension of a path's last part; NULL if there is none.
-static const char *extension_of(const char *path) {
-    const char *slash = strrchr(path, '/'), *name = slash != NULL ? slash + 1 : path;
-    const char *point = strrchr(name, '.');
-    return point != NULL && point > name ? point + 1 : NULL;
-}
-
 static bool is_part(const char *what) {
     const size_t length = strlen(what);
     return length > 0 && length < 100 && what[0] != '/' && strstr(what, "..") == NULL &&
@@ -458,17 +294,18 @@ static bool is_part(const char *what) {
            strspn(what, "abcdefghijklmnopqrstuvwxyz0123456789_-./") == length;
 }
 
+enum { PART_SIZE = 112 };
 // Sets `what` to the path of a part, as "series.csv", from the operand and the output's extension.
 // Without an operand it is the result itself or, for an output that is a table, the series.
-static Status part_choose(JobsSettings *settings, const Options *options, Problem *problem) {
-    const char *output = settings->output;
-    const char *extension = output != NULL ? extension_of(output) : NULL;
+static Status part_choose(const ApiCall *call, char what[PART_SIZE], Problem *problem) {
+    const char *output = ((const JobsSettings *)call->settings)->output;
+    const char *extension = output != NULL ? path_extension(output) : NULL;
     if (output != NULL && !is_among(formats, extension))
         return problem_add(
             problem, STATUS_USAGE, "--output",
             "must end in one of .json, .csv, .npy, .npz, .mat, .zip, .svg, is %.200s", output);
     const bool is_table = extension != NULL && strcmp(extension, "json") != 0;
-    const char *typed = options->operand_count > 1      ? options->operands[1]
+    const char *typed = call->count > 1                 ? call->operands[1]
                         : !is_table                     ? "result"
                         : strcmp(extension, "zip") == 0 ? "bundle"
                                                         : "series";
@@ -483,89 +320,19 @@ static Status part_choose(JobsSettings *settings, const Options *options, Proble
                            typed);
     if (extension == NULL)
         extension = strcmp(typed, "bundle") == 0 ? "zip" : "json";
-    const bool is_complete = is_plain || extension_of(typed) != NULL;
-    snprintf(settings->what, sizeof settings->what, "%s%s%s", typed, is_complete ? "" : ".",
+    const bool is_complete = is_plain || path_extension(typed) != NULL;
+    snprintf(what, PART_SIZE, "%s%s%s", typed, is_complete ? "" : ".",
              is_complete ? "" : extension);
-    if (is_among(binary_formats, extension_of(settings->what)) && output == NULL &&
-        isatty(STDOUT_FILENO))
+    if (is_among(binary_formats, path_extension(what)) && output == NULL && isatty(STDOUT_FILENO))
         return problem_set(problem, STATUS_USAGE,
                            "does not print binary data on a terminal; use -o FILE.%s",
-                           extension_of(settings->what));
+                           path_extension(what));
     return STATUS_OK;
 }
 
-static Status stdout_take(void *context, const void *bytes, size_t size, Problem *problem) {
-    (void)context;
-    return fwrite(bytes, 1, size, stdout) == size
-               ? STATUS_OK
-               : problem_set(problem, STATUS_IO, "standard output cannot be written");
-}
-
-static Status get_act(ApiClient *client, void *context, Problem *problem) {
-    const JobsSettings *settings = context;
-    const char *what = settings->what;
-    const bool is_job = strcmp(what, "job") == 0;
-    char result[96];
-    if (is_job)
-        snprintf(result, sizeof result, "%s", settings->operands[0]);
-    else
-        TRY(result_of(client, settings->operands[0], result, problem));
-    Bytes path = {.most = 16000};
-    bytes_format(&path, "/v1/%s/%s", is_job ? "jobs" : "results", result);
-    if (!is_job && strcmp(what, "result") != 0)
-        bytes_format(&path, "/%s", what);
-    http_query(&path, "channels", settings->channels);
-    http_query_real(&path, "from", settings->from);
-    http_query_real(&path, "to", settings->to);
-    if (settings->points != COUNT_ABSENT)
-        http_query_real(&path, "points", (double)settings->points);
-    HttpAnswer answer = {0};
-    const bool has_file = settings->output != NULL;
-    Status status = has_file ? output_open(settings->output, problem) : STATUS_OK;
-    const HttpAsk ask = {
-        .method = "GET", .take = has_file ? output_take : stdout_take, .most = settings->max_bytes};
-    if (status == STATUS_OK)
-        status = api_client_request(client, ask, &path, &answer, problem);
-    if (status == STATUS_OK && has_file)
-        status = output_close(problem);
-    output_drop();
-    http_answer_clear(&answer);
-    bytes_clear(&path);
-    return status;
-}
-
-static int get_run(const Command *self, void *of, const Options *options, Problem *problem) {
-    JobsSettings *settings = of;
-    Options first = *options;
-    first.operand_count = options->operand_count == 2 ? 1 : options->operand_count;
-    if (!operands_are_ids(settings, &first, 1))
-        return usage_error(self, "takes the id of a result or a job, like r-91c0, and a part of it",
-                           problem);
-    return part_choose(settings, options, problem) == STATUS_OK
-               ? api_client_run(self, &settings->client, settings->operands[0], get_act, settings,
-                                problem)
-               : command_error(self->name, problem);
-}
-
 // clang-format off
-static const Field submit_fields[] = {
-    DAEMON_ROWS(ClientSettings),
-    FIELD_REAL(ClientSettings, wait, "s", AT_MIN(0), 0, "how long to wait for the job to finish and for a busy server (0)"),
-    FIELD_TEXT(JobsSettings, title, 0, PRESENCE_OPTIONAL, 0, "title of the job; replaces that of the scene"),
-    FIELD_TEXTS(JobsSettings, label, NULL, NULL, 64, PRESENCE_OPTIONAL, 0, "KEY=VALUE, added to the labels of the scene; repeatable"),
-    FIELD_FLAG(JobsSettings, dry_run, false, "print the plan and the estimated cost as JSON; run nothing"),
-    FIELD_TEXT(JobsSettings, idempotency_key, 255, PRESENCE_OPTIONAL, 0, "a scene that is sent again with this key is the same job"),
-    FIELD_FLAG(JobsSettings, json, false, "print the job as JSON instead of its id"),
-    FIELD_END,
-};
-static const Field watch_fields[] = {
-    DAEMON_ROWS(ClientSettings),
-    FIELD_REAL(ClientSettings, wait, "s", AT_MIN(0), 1e9, "how long to wait for the job to finish (no limit)"),
-    FIELD_FLAG(JobsSettings, json, false, "print the finished job as JSON instead of lines"),
-    FIELD_END,
-};
 static const Field get_fields[] = {
-    DAEMON_ROWS(ClientSettings),
+    CLIENT_ROWS,
     FIELD_TEXT(JobsSettings, output, 4000, PRESENCE_OPTIONAL, 0, "write to this file; its extension is the format (standard output)"),
     FIELD_TEXT(JobsSettings, channels, 4000, PRESENCE_OPTIONAL, 0, "channels of the series, separated by commas (all)"),
     FIELD_REAL(JobsSettings, from, "s", AT_MIN(0), OPTIONAL, "start of the series"),
@@ -575,17 +342,63 @@ static const Field get_fields[] = {
     FIELD_COUNT(JobsSettings, max_bytes, "B", AT_MIN(1), 17179869184.0, "refuse a larger answer"),
     FIELD_END,
 };
+// clang-format on
+
+static Status get_act(ApiCall *call, Problem *problem) {
+    const JobsSettings *settings = call->settings;
+    char what[PART_SIZE], result[96];
+    TRY(part_choose(call, what, problem));
+    const bool is_job = strcmp(what, "job") == 0;
+    if (is_job)
+        snprintf(result, sizeof result, "%s", call->operands[0]);
+    else
+        TRY(job_result(call, call->operands[0], result, problem));
+    const bool is_whole = is_job || strcmp(what, "result") == 0;
+    ApiRequest request = {.method = "GET",
+                          .path = api_path("/v1/%s/%s%s%s", is_job ? "jobs" : "results", result,
+                                           is_whole ? "" : "/", is_whole ? "" : what),
+                          .output_max = settings->max_bytes};
+    api_query_rows(&request.path, get_fields, settings, "channels from to points");
+    return api_download(call, &request, settings->output, problem);
+}
+
+// clang-format off
+static const Field submit_fields[] = {
+    CLIENT_ROWS,
+    FIELD_REAL(ClientSettings, wait, "s", AT_MIN(0), 0, "how long to wait for the job to finish and for a busy server (0)"),
+    FIELD_TEXT(JobsSettings, title, 0, PRESENCE_OPTIONAL, 0, "title of the job; replaces that of the scene"),
+    FIELD_TEXTS(JobsSettings, label, NULL, NULL, 64, PRESENCE_OPTIONAL, 0, "KEY=VALUE, added to the labels of the scene; repeatable"),
+    FIELD_FLAG(JobsSettings, dry_run, false, "print the plan and the estimated cost as JSON; run nothing"),
+    FIELD_TEXT(JobsSettings, idempotency_key, 255, PRESENCE_OPTIONAL, 0, "a scene that is sent again with this key is the same job"),
+    FIELD_FLAG(JobsSettings, json, false, "print the job as JSON instead of its id"),
+    FIELD_END,
+};
+static const Field watch_fields[] = {
+    CLIENT_ROWS,
+    FIELD_REAL(ClientSettings, wait, "s", AT_MIN(0), 1e9, "how long to wait for the job to finish (no limit)"),
+    FIELD_FLAG(JobsSettings, json, false, "print the finished job as JSON instead of lines"),
+    FIELD_END,
+};
 static const Field cancel_fields[] = {
-    DAEMON_ROWS(ClientSettings),
+    CLIENT_ROWS,
     FIELD_END,
 };
 static const Field compare_fields[] = {
-    DAEMON_ROWS(ClientSettings),
+    CLIENT_ROWS,
     FIELD_REAL(ClientSettings, wait, "s", AT_MIN(0), 60, "how long to wait for an unfinished job and a busy server"),
     FIELD_FLAG(JobsSettings, json, false, "print the answer of the server as JSON"),
     FIELD_END,
 };
 // clang-format on
+
+static const ApiAction submit_actions[] = {{NULL, "one scene", 1, 1, submit_act, 0}};
+static const ApiAction watch_actions[] = {{NULL, "one job's id, like j-7f3a", 1, 1, watch_act, 1}};
+static const ApiAction get_actions[] = {
+    {NULL, "the id of a result or a job, like r-91c0, and a part of it", 1, 2, get_act, 1}};
+static const ApiAction cancel_actions[] = {
+    {NULL, "one job's id, like j-7f3a", 1, 1, cancel_act, 1}};
+static const ApiAction compare_actions[] = {
+    {NULL, "the ids of two results or jobs, like r-91c0", 2, 2, compare_act, 2}};
 
 const Command command_submit = {
     .name = "submit",
@@ -608,7 +421,8 @@ const Command command_submit = {
         "the job has not finished after --wait.\n",
     .options = submit_fields,
     .size = sizeof(JobsSettings),
-    .run = submit_run,
+    .run = api_command,
+    .actions = submit_actions,
 };
 
 const Command command_watch = {
@@ -625,7 +439,8 @@ const Command command_watch = {
         "A restart of the server does not end it.\n",
     .options = watch_fields,
     .size = sizeof(JobsSettings),
-    .run = watch_run,
+    .run = api_command,
+    .actions = watch_actions,
 };
 
 const Command command_get = {
@@ -651,7 +466,8 @@ const Command command_get = {
         "4 if there is no such part, 8 if the job has not finished after --wait.\n",
     .options = get_fields,
     .size = sizeof(JobsSettings),
-    .run = get_run,
+    .run = api_command,
+    .actions = get_actions,
 };
 
 const Command command_cancel = {
@@ -663,7 +479,8 @@ const Command command_cancel = {
             "Exit code 1 if the job had finished before, 4 if it does not exist.\n",
     .options = cancel_fields,
     .size = sizeof(JobsSettings),
-    .run = cancel_run,
+    .run = api_command,
+    .actions = cancel_actions,
 };
 
 const Command command_compare = {
@@ -676,5 +493,6 @@ const Command command_compare = {
             "Exit code 4 if one of them does not exist.\n",
     .options = compare_fields,
     .size = sizeof(JobsSettings),
-    .run = compare_run,
+    .run = api_command,
+    .actions = compare_actions,
 };

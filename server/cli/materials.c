@@ -14,13 +14,10 @@
 #include "core/scene/damper.h"
 #include "core/scene/material.h"
 #include "server/cli/client.h"
-#include "server/cli/command.h"
-#include "server/cli/output.h"
-#include "server/cli/scene_file.h"
+#include "server/cli/files.h"
 #include "server/json/document.h"
 #include "server/json/encode.h"
 #include "server/json/parse.h"
-#include "server/json/table.h"
 
 typedef struct MaterialsSettings {
     ClientSettings client;
@@ -37,24 +34,14 @@ typedef struct MaterialsSettings {
     int identified_for;
 } MaterialsSettings;
 
-// An action in progress. Path, body and answer are those of its last request, or of its next one.
-typedef struct MaterialsCall {
-    const MaterialsSettings *settings;
-    ApiClient *client;
-    const struct MaterialsAction *action;
-    const char *const *operands; // after the action's name
-    size_t count;
-    Bytes path, body;
-    HttpAnswer answer;
-} MaterialsCall;
-
 enum { LIST_MAX = 1000, REVISION_DIGITS = 9 };
+#define LIMIT "?limit=1000"
 
 static const char *const statuses[] = {"draft", "approved", "deprecated", NULL};
 
 // clang-format off
 static const Field materials_fields[] = {
-    DAEMON_ROWS(ClientSettings),
+    CLIENT_ROWS,
     FIELD_REAL(ClientSettings, wait, "s", AT_MIN(0), 60, "how long to wait for a busy server"),
     FIELD_FLAG(MaterialsSettings, json, false, "print the server's answer, as JSON"),
     FIELD_TEXT(MaterialsSettings, q, 200, PRESENCE_OPTIONAL, 0, "words in slug, name, kind, supplier, source, tags or notes"),
@@ -109,8 +96,6 @@ static const PrintTableColumns columns[] = {
 };
 // clang-format on
 
-// Operands.
-
 static Status materials_number(const char *text, const char *what, Problem *problem) {
     const size_t size = strlen(text);
     return size > 0 && size <= REVISION_DIGITS && text[0] != '0' &&
@@ -120,7 +105,7 @@ static Status materials_number(const char *text, const char *what, Problem *prob
                              "%s must be a whole number from 1, is \"%.60s\"", what, text);
 }
 
-// The first operand: a slug, or where the action allows it SLUG@REVISION.
+// Checks an operand: a slug, or where the action allows it SLUG@REVISION.
 static Status materials_name(const char *text, bool may_have_revision, Problem *problem) {
     char slug[MATERIAL_SLUG_MAX + 1];
     const size_t length = strcspn(text, "@");
@@ -139,45 +124,15 @@ static Status materials_name(const char *text, bool may_have_revision, Problem *
     return materials_number(text + length + 1, "the revision after @", problem);
 }
 
-// Requests.
-
-// "/v1/materials/NAME" and the rest.
-static void materials_path(MaterialsCall *call, const char *name, const char *rest) {
-    bytes_clear(&call->path);
-    call->path.most = 8000;
-    bytes_format(&call->path, "/v1/materials/%s%s", name, rest);
-}
-
-static void materials_choice(MaterialsCall *call, const char *name, const char *const *names,
-                             int choice) {
-    http_query(&call->path, name, choice != CHOICE_ABSENT ? names[choice] : NULL);
-}
-
-// Sends the path, with the body if `posts`, and clears the path. `tag` (NULL: none) is the state
-// that the change is based on.
-static Status materials_ask(MaterialsCall *call, bool posts, const char *tag, Problem *problem) {
-    HttpAnswer answer;
-    const HttpAsk ask = {
-        .method = posts ? "POST" : "GET", .body = posts ? &call->body : NULL, .if_match = tag};
-    const Status status = api_client_request(call->client, ask, &call->path, &answer, problem);
-    http_answer_clear(&call->answer);
-    call->answer = answer;
-    return status;
-}
-
 // The answer as tables, or with --json as it came.
-static Status materials_print(const MaterialsCall *call, Problem *problem) {
+static Status materials_print(const ApiCall *call, Problem *problem) {
     static const char *const skipped[] = {"links", "test", NULL};
     static const Field *const fields[] = {material_fields, pair_parameters_fields,
                                           evaluation_fields, buffer_fields, NULL};
     static const PrintTableView view = {skipped, columns, fields};
-    const Bytes *body = &call->answer.body;
+    const MaterialsSettings *settings = call->settings;
     size_t longest;
-    if (call->settings->json) {
-        api_client_print(&call->answer);
-        return STATUS_OK;
-    }
-    TRY(print_table_print_json(body->at, body->count, &view, stdout, &longest, problem));
+    TRY(api_print_tables(&call->answer, &view, settings->json, &longest, problem));
     if (longest == 0)
         fputs("impactd materials: nothing fits\n", stderr);
     if (longest == LIST_MAX)
@@ -186,8 +141,19 @@ static Status materials_print(const MaterialsCall *call, Problem *problem) {
     return STATUS_OK;
 }
 
-static Status materials_get(MaterialsCall *call, Problem *problem) {
-    TRY(materials_ask(call, false, NULL, problem));
+// Requests `rest` below the material of the first operand, with options `queries` as its query.
+static Status materials_ask(ApiCall *call, bool may_have_revision, const char *rest,
+                            const char *queries, Problem *problem) {
+    TRY(materials_name(call->operands[0], may_have_revision, problem));
+    ApiRequest request = {.method = "GET",
+                          .path = api_path("/v1/materials/%s%s", call->operands[0], rest)};
+    api_query_rows(&request.path, materials_fields, call->settings, queries);
+    return api_ask(&call->client, &request, &call->answer, problem);
+}
+
+static Status materials_show_rest(ApiCall *call, bool may_have_revision, const char *rest,
+                                  const char *queries, Problem *problem) {
+    TRY(materials_ask(call, may_have_revision, rest, queries, problem));
     return materials_print(call, problem);
 }
 
@@ -215,17 +181,17 @@ static const Field revision_reply_fields[] = {
 // clang-format on
 
 // "sponge@2 draft" of an answer that is a revision.
-static Status materials_print_revision(const MaterialsCall *call, Problem *problem) {
+static Status materials_print_revision(const ApiCall *call, Problem *problem) {
     const Bytes *body = &call->answer.body;
     RevisionReply reply = {0};
     Status status = STATUS_OK;
-    if (call->settings->json) {
-        api_client_print(&call->answer);
+    if (((const MaterialsSettings *)call->settings)->json) {
+        api_print(&call->answer);
         return STATUS_OK;
     }
     (void)json_parse(body->at, body->count, revision_reply_fields, &reply, NULL);
     if (reply.slug == NULL || reply.status == NULL || reply.revision == COUNT_ABSENT) {
-        status = api_client_unexpected("a revision", problem);
+        status = api_unexpected("a revision", problem);
     } else {
         text_make_printable(reply.slug);
         text_make_printable(reply.status);
@@ -236,16 +202,19 @@ static Status materials_print_revision(const MaterialsCall *call, Problem *probl
     return status;
 }
 
-// The body from a JSON file, with --comment in it.
-static Status materials_read_body(MaterialsCall *call, const char *path, Problem *problem) {
-    call->client->about = path;
-    TRY(scene_file_read(path, &call->body, problem));
-    return call->settings->comment == NULL
+static Status materials_add_comment(ApiCall *call, Problem *problem) {
+    const MaterialsSettings *settings = call->settings;
+    return settings->comment == NULL
                ? STATUS_OK
-               : json_edit_set(&call->body, "comment", call->settings->comment, problem);
+               : json_edit_set(&call->body, "comment", settings->comment, problem);
 }
 
-// Writing.
+// The body from a JSON file, with --comment in it.
+static Status materials_read_body(ApiCall *call, const char *path, Problem *problem) {
+    call->client.about = path;
+    TRY(input_read(path, &call->body, problem));
+    return materials_add_comment(call, problem);
+}
 
 // Explains a conflict: what to do now.
 static Status materials_error_stale(const char *slug, Problem *problem) {
@@ -260,14 +229,14 @@ static Status materials_error_stale(const char *slug, Problem *problem) {
 
 // Posts the body to `rest` below `name` of the material `slug`, based on the state in `tag`, which
 // is "SLUG@REVISION-VERSION" in quotes. STATUS_STALE: another client has changed it.
-static Status materials_write(MaterialsCall *call, const char *slug, const char *name,
-                              const char *rest, const char *tag, Problem *problem) {
+static Status materials_write(ApiCall *call, const char *slug, const char *name, const char *rest,
+                              const char *tag, Problem *problem) {
     char state[sizeof call->answer.etag];
     const char *at = strrchr(tag, '@');
     const unsigned long long latest = at != NULL ? strtoull(at + 1, NULL, 10) : 0;
-    const uint64_t from = call->settings->from;
+    const uint64_t from = ((const MaterialsSettings *)call->settings)->from;
     if (tag[0] == '\0')
-        return api_client_unexpected("a material with an ETag", problem);
+        return api_unexpected("a material with an ETag", problem);
     if (from != COUNT_ABSENT && from != latest) {
         (void)problem_set(problem, STATUS_STALE,
                           "the newest revision is %.63s@%llu, not %.63s@%llu", slug, latest, slug,
@@ -275,39 +244,35 @@ static Status materials_write(MaterialsCall *call, const char *slug, const char 
         return materials_error_stale(slug, problem);
     }
     snprintf(state, sizeof state, "%s", tag); // the answer is replaced
-    materials_path(call, name, rest);
-    const Status status = materials_ask(call, true, state, problem);
+    ApiRequest request = {.method = "POST",
+                          .path = api_path("/v1/materials/%s%s", name, rest),
+                          .body = &call->body,
+                          .if_match = state};
+    const Status status = api_ask(&call->client, &request, &call->answer, problem);
     if (status == STATUS_STALE)
         return materials_error_stale(slug, problem);
     return status == STATUS_OK ? materials_print_revision(call, problem) : status;
 }
 
 // The same, based on the present state.
-static Status materials_write_now(MaterialsCall *call, const char *slug, const char *name,
+static Status materials_write_now(ApiCall *call, const char *slug, const char *name,
                                   const char *rest, Problem *problem) {
     // The history has an ETag also if all revisions are deprecated.
-    materials_path(call, slug, "/history?limit=1");
-    TRY(materials_ask(call, false, NULL, problem));
+    ApiRequest request = {.method = "GET",
+                          .path = api_path("/v1/materials/%s/history?limit=1", slug)};
+    TRY(api_ask(&call->client, &request, &call->answer, problem));
     return materials_write(call, slug, name, rest, call->answer.etag, problem);
 }
 
-// Actions. The first operand, if it is a material, is valid.
-
-static Status materials_list(MaterialsCall *call, Problem *problem) {
-    const MaterialsSettings *settings = call->settings;
-    Bytes *path = &call->path;
-    bytes_text(path, "/v1/materials");
-    http_query(path, "q", settings->q);
-    http_query(path, "kind", settings->kind);
-    materials_choice(call, "status", statuses, settings->status);
-    http_query(path, "e", settings->e);
-    http_query(path, "T_c", settings->T_c);
-    http_query_real(path, "limit", LIST_MAX);
-    return materials_get(call, problem);
+static Status materials_list(ApiCall *call, Problem *problem) {
+    ApiRequest request = {.method = "GET", .path = api_path("/v1/materials" LIMIT)};
+    api_query_rows(&request.path, materials_fields, call->settings, "q kind status e T_c");
+    TRY(api_ask(&call->client, &request, &call->answer, problem));
+    return materials_print(call, problem);
 }
 
 // The contents of a revision, one member a line, as revise takes them.
-static Status materials_print_editable(MaterialsCall *call, Problem *problem) {
+static Status materials_print_editable(ApiCall *call, Problem *problem) {
     Bytes *body = &call->answer.body, text = {0};
     Material material = {0};
     TRY(json_edit_remove_nulls(body, problem));
@@ -328,107 +293,103 @@ static Status materials_print_editable(MaterialsCall *call, Problem *problem) {
     if (is_whole)
         printf("%s\n}\n", text.at);
     bytes_clear(&text);
-    return is_whole ? STATUS_OK : api_client_unexpected("a material", problem);
+    return is_whole ? STATUS_OK : api_unexpected("a material", problem);
 }
 
-static Status materials_show(MaterialsCall *call, Problem *problem) {
-    materials_path(call, call->operands[0], "");
-    if (!call->settings->editable)
-        return materials_get(call, problem);
-    TRY(materials_ask(call, false, NULL, problem));
-    return materials_print_editable(call, problem);
+static Status materials_show(ApiCall *call, Problem *problem) {
+    const MaterialsSettings *settings = call->settings;
+    TRY(materials_ask(call, true, "", "", problem));
+    return settings->editable ? materials_print_editable(call, problem)
+                              : materials_print(call, problem);
 }
 
-static Status materials_history(MaterialsCall *call, Problem *problem) {
-    materials_path(call, call->operands[0], "/history");
-    http_query_real(&call->path, "limit", LIST_MAX);
-    return materials_get(call, problem);
+static Status materials_history(ApiCall *call, Problem *problem) {
+    return materials_show_rest(call, false, "/history" LIMIT, "", problem);
 }
 
-static Status materials_diff(MaterialsCall *call, Problem *problem) {
-    static const char *const ends[] = {"from", "to"};
-    materials_path(call, call->operands[0], "/diff");
+static Status materials_diff(ApiCall *call, Problem *problem) {
+    char rest[80] = "/diff";
     for (size_t i = 1; i < call->count; i++) {
         TRY(materials_number(call->operands[i], "a revision", problem));
-        http_query(&call->path, ends[i - 1], call->operands[i]);
+        const size_t used = strlen(rest);
+        snprintf(rest + used, sizeof rest - used, "%s%.20s",
+                 i == 1 ? "?from=" : "&to=", call->operands[i]);
     }
-    return materials_get(call, problem);
+    return materials_show_rest(call, false, rest, "", problem);
 }
 
-static Status materials_used_by(MaterialsCall *call, Problem *problem) {
-    materials_path(call, call->operands[0], "/used-by");
-    if (strchr(call->operands[0], '@') != NULL)
-        http_query_real(&call->path, "limit", LIST_MAX);
-    return materials_get(call, problem);
+static Status materials_used_by(ApiCall *call, Problem *problem) {
+    const bool is_revision = strchr(call->operands[0], '@') != NULL;
+    return materials_show_rest(call, true, is_revision ? "/used-by" LIMIT : "/used-by", "",
+                               problem);
 }
 
-static Status materials_derived(MaterialsCall *call, Problem *problem) {
+static Status materials_derived(ApiCall *call, Problem *problem) {
     const MaterialsSettings *settings = call->settings;
     if (isnan(settings->damper_mass))
         return problem_set(problem, STATUS_USAGE,
                            "needs --damper-mass M in kg, and --structure-mass M unless the "
                            "structure does not move");
-    materials_path(call, call->operands[0], "/derived");
-    http_query_real(&call->path, "damper_mass", settings->damper_mass);
-    http_query_real(&call->path, "structure_mass", settings->structure_mass);
-    materials_choice(call, "identified_for", identified_for_names, settings->identified_for);
-    materials_choice(call, "separation", separation_names, settings->separation);
-    return materials_get(call, problem);
+    return materials_show_rest(call, true, "/derived",
+                               "damper_mass structure_mass identified_for separation", problem);
 }
 
-static Status materials_add(MaterialsCall *call, Problem *problem) {
+static Status materials_add(ApiCall *call, Problem *problem) {
     TRY(materials_read_body(call, call->operands[0], problem));
-    bytes_text(&call->path, "/v1/materials");
-    TRY(materials_ask(call, true, NULL, problem));
+    ApiRequest request = {.method = "POST", .path = api_path("/v1/materials"), .body = &call->body};
+    TRY(api_ask(&call->client, &request, &call->answer, problem));
     return materials_print_revision(call, problem);
 }
 
-static Status materials_revise(MaterialsCall *call, Problem *problem) {
+static Status materials_revise(ApiCall *call, Problem *problem) {
     const char *slug = call->operands[0];
+    TRY(materials_name(slug, false, problem));
     TRY(materials_read_body(call, call->operands[1], problem));
     return materials_write_now(call, slug, slug, "/revisions", problem);
 }
 
-static Status materials_revert(MaterialsCall *call, Problem *problem) {
+static Status materials_revert(ApiCall *call, Problem *problem) {
+    const MaterialsSettings *settings = call->settings;
     const char *slug = call->operands[0], *to = call->operands[1];
+    TRY(materials_name(slug, false, problem));
     TRY(materials_number(to, "the revision to go back to", problem));
-    if (call->settings->comment == NULL)
+    if (settings->comment == NULL)
         return problem_set(problem, STATUS_USAGE, "needs --comment TEXT, the reason");
-    bytes_format(&call->body, "{\"to\": %s, \"comment\": ", to);
-    bytes_json_string(&call->body, call->settings->comment);
-    bytes_text(&call->body, "}");
+    bytes_format(&call->body, "{\"to\": %s}", to);
+    TRY(materials_add_comment(call, problem));
     return materials_write_now(call, slug, slug, "/revert", problem);
 }
 
-static Status materials_review(MaterialsCall *call, const char *verdict, Problem *problem) {
+static Status materials_review(ApiCall *call, const char *verdict, Problem *problem) {
+    const MaterialsSettings *settings = call->settings;
     const char *name = call->operands[0], *at = strchr(name, '@');
     char slug[MATERIAL_SLUG_MAX + 1];
+    TRY(materials_name(name, true, problem));
     if (at == NULL)
         return problem_set(problem, STATUS_USAGE, "takes one revision, as %.63s@1", name);
-    if (call->settings->reason == NULL)
+    if (settings->reason == NULL)
         return problem_set(problem, STATUS_USAGE, "needs --reason TEXT");
     snprintf(slug, sizeof slug, "%.*s", (int)(at - name), name);
-    bytes_format(&call->body, "{\"status\": \"%s\", \"reason\": ", verdict);
-    bytes_json_string(&call->body, call->settings->reason);
-    bytes_text(&call->body, "}");
+    bytes_format(&call->body, "{\"status\": \"%s\"}", verdict);
+    TRY(json_edit_set(&call->body, "reason", settings->reason, problem));
     return materials_write_now(call, slug, name, "/review", problem);
 }
 
-static Status materials_approve(MaterialsCall *call, Problem *problem) {
+static Status materials_approve(ApiCall *call, Problem *problem) {
     return materials_review(call, "approved", problem);
 }
 
-static Status materials_deprecate(MaterialsCall *call, Problem *problem) {
+static Status materials_deprecate(ApiCall *call, Problem *problem) {
     return materials_review(call, "deprecated", problem);
 }
 
 // Appends a file of forces to the body's traces.
-static Status materials_add_trace(MaterialsCall *call, const char *path, Problem *problem) {
+static Status materials_add_trace(ApiCall *call, const char *path, Problem *problem) {
     const char *slash = strrchr(path, '/');
     Bytes text = {0}, json = {0};
-    Trace trace = {.interval = call->settings->interval};
-    call->client->about = path;
-    Status status = scene_file_read(path, &text, problem);
+    Trace trace = {.interval = ((const MaterialsSettings *)call->settings)->interval};
+    call->client.about = path;
+    Status status = input_read(path, &text, problem);
     if (status == STATUS_OK)
         status = force_trace_text_read(text.at != NULL ? text.at : "", text.count,
                                        TRACE_SAMPLES_MAX, &trace.interval, &trace.force, problem);
@@ -447,151 +408,100 @@ static Status materials_add_trace(MaterialsCall *call, const char *path, Problem
     return status;
 }
 
-static Status materials_measure(MaterialsCall *call, Problem *problem) {
-    const MaterialsSettings *settings = call->settings;
-    TRY(materials_read_body(call, call->operands[1], problem));
-    for (size_t i = 0; i < settings->trace.count; i++)
-        TRY(materials_add_trace(call, settings->trace.at[i], problem));
-    call->client->about = call->operands[1];
-    materials_path(call, call->operands[0], "/measurements");
-    http_query(&call->path, "dry_run", settings->dry_run ? "1" : NULL);
-    TRY(materials_ask(call, true, NULL, problem));
+// Sends the body to `path`, with --dry-run, and prints the answer.
+static Status materials_send(ApiCall *call, ApiRequest *request, Problem *problem) {
+    request->method = "POST";
+    request->body = &call->body;
+    api_query_rows(&request->path, materials_fields, call->settings, "dry_run");
+    TRY(api_ask(&call->client, request, &call->answer, problem));
     return materials_print(call, problem);
 }
 
-static Status materials_measurements(MaterialsCall *call, Problem *problem) {
-    materials_path(call, call->operands[0], "/measurements");
-    http_query(&call->path, "limit", "100"); // the answer has their count
-    return materials_get(call, problem);
+static Status materials_measure(ApiCall *call, Problem *problem) {
+    const MaterialsSettings *settings = call->settings;
+    TRY(materials_name(call->operands[0], false, problem));
+    TRY(materials_read_body(call, call->operands[1], problem));
+    for (size_t i = 0; i < settings->trace.count; i++)
+        TRY(materials_add_trace(call, settings->trace.at[i], problem));
+    call->client.about = call->operands[1];
+    return materials_send(
+        call, &(ApiRequest){.path = api_path("/v1/materials/%s/measurements", call->operands[0])},
+        problem);
+}
+
+static Status materials_measurements(ApiCall *call, Problem *problem) {
+    // The answer has their count.
+    return materials_show_rest(call, false, "/measurements?limit=100", "", problem);
 }
 
 // --confirm writes the proposal that was shown, based on the state that it was shown of.
-static Status materials_propose(MaterialsCall *call, Problem *problem) {
+static Status materials_propose(ApiCall *call, Problem *problem) {
     const MaterialsSettings *settings = call->settings;
     const char *slug = call->operands[0];
-    materials_path(call, slug, "/proposal");
-    http_query(&call->path, "measurements", settings->measurements);
-    materials_choice(call, "separation", separation_names, settings->separation);
-    materials_choice(call, "as", proposal_form_names, settings->as);
-    TRY(materials_ask(call, false, NULL, problem));
-    if (!settings->confirm)
-        return materials_print(call, problem);
-    if (!settings->json)
+    TRY(materials_ask(call, false, "/proposal", "measurements separation as", problem));
+    if (!settings->json || !settings->confirm)
         TRY(materials_print(call, problem));
+    if (!settings->confirm)
+        return STATUS_OK;
     TRY(json_edit_extract(&call->answer.body, "revision", &call->body, problem));
-    if (settings->comment != NULL)
-        TRY(json_edit_set(&call->body, "comment", settings->comment, problem));
+    TRY(materials_add_comment(call, problem));
     if (!settings->json)
         putchar('\n');
     return materials_write(call, slug, slug, "/revisions", call->answer.etag, problem);
 }
 
 // Whether FILE is a table, by its name.
-static Status materials_format(MaterialsCall *call, bool *is_table, Problem *problem) {
-    const char *file = call->operands[0], *dot = strrchr(file, '.');
-    *is_table = dot != NULL && strcmp(dot, ".csv") == 0;
-    call->client->about = file;
-    return *is_table || (dot != NULL && strcmp(dot, ".json") == 0)
+static Status materials_format(ApiCall *call, bool *is_table, Problem *problem) {
+    const char *file = call->operands[0], *extension = path_extension(file);
+    *is_table = extension != NULL && strcmp(extension, "csv") == 0;
+    return *is_table || (extension != NULL && strcmp(extension, "json") == 0)
                ? STATUS_OK
                : problem_set(problem, STATUS_USAGE, "the file must end in .json or .csv, is %.200s",
                              file);
 }
 
-static Status materials_export(MaterialsCall *call, Problem *problem) {
+static Status materials_export(ApiCall *call, Problem *problem) {
+    const MaterialsSettings *settings = call->settings;
     bool is_table;
     TRY(materials_format(call, &is_table, problem));
-    if (!call->settings->force && access(call->operands[0], F_OK) == 0)
+    if (!settings->force && access(call->operands[0], F_OK) == 0)
         return problem_set(problem, STATUS_CONFLICT,
                            "exists: name another file, or replace it with --force");
-    const HttpAsk ask = {.method = "GET",
-                         .path = is_table ? "/v1/materials.csv" : "/v1/materials.json",
-                         .take = output_take,
-                         .most = UINT64_MAX};
-    Status status = output_open(call->operands[0], problem);
-    if (status == STATUS_OK)
-        status = api_client_ask(call->client, &ask, &call->answer, problem);
-    if (status == STATUS_OK)
-        status = output_close(problem);
-    output_drop();
-    return status;
+    ApiRequest request = {.method = "GET",
+                          .path = api_path("/v1/materials.%s", is_table ? "csv" : "json"),
+                          .output_max = UINT64_MAX};
+    return api_download(call, &request, call->operands[0], problem);
 }
 
-static Status materials_import(MaterialsCall *call, Problem *problem) {
+static Status materials_import(ApiCall *call, Problem *problem) {
     bool is_table;
     TRY(materials_format(call, &is_table, problem));
-    TRY(scene_file_read(call->operands[0], &call->body, problem));
-    const HttpAsk ask = {.method = "POST",
-                         .path = call->settings->dry_run ? "/v1/materials/import?dry_run=1"
-                                                         : "/v1/materials/import",
-                         .body = &call->body,
-                         .content_type = is_table ? "text/csv" : "application/json"};
-    TRY(api_client_ask(call->client, &ask, &call->answer, problem));
-    return materials_print(call, problem);
+    TRY(input_read(call->operands[0], &call->body, problem));
+    return materials_send(call,
+                          &(ApiRequest){.path = api_path("/v1/materials/import"),
+                                        .content_type = is_table ? "text/csv" : NULL},
+                          problem);
 }
 
-typedef enum FirstOperand {
-    OPERAND_NONE,
-    OPERAND_FILE,
-    OPERAND_SLUG,
-    OPERAND_REVISION
-} FirstOperand;
-
-static const struct MaterialsAction {
-    const char *name, *takes;
-    size_t min, max; // operands
-    FirstOperand first;
-    Status (*act)(MaterialsCall *call, Problem *problem);
-} actions[] = {
-    {"list", "no operands", 0, 0, OPERAND_NONE, materials_list},
-    {"show", "SLUG or SLUG@REVISION", 1, 1, OPERAND_REVISION, materials_show},
-    {"add", "FILE.json", 1, 1, OPERAND_FILE, materials_add},
-    {"revise", "SLUG FILE.json", 2, 2, OPERAND_SLUG, materials_revise},
-    {"revert", "SLUG REVISION", 2, 2, OPERAND_SLUG, materials_revert},
-    {"approve", "SLUG@REVISION", 1, 1, OPERAND_REVISION, materials_approve},
-    {"deprecate", "SLUG@REVISION", 1, 1, OPERAND_REVISION, materials_deprecate},
-    {"history", "SLUG", 1, 1, OPERAND_SLUG, materials_history},
-    {"diff", "SLUG [FROM [TO]]", 1, 3, OPERAND_SLUG, materials_diff},
-    {"used-by", "SLUG or SLUG@REVISION", 1, 1, OPERAND_REVISION, materials_used_by},
-    {"measure", "SLUG TEST.json", 2, 2, OPERAND_SLUG, materials_measure},
-    {"measurements", "SLUG", 1, 1, OPERAND_SLUG, materials_measurements},
-    {"propose", "SLUG", 1, 1, OPERAND_SLUG, materials_propose},
-    {"derived", "SLUG or SLUG@REVISION", 1, 1, OPERAND_REVISION, materials_derived},
-    {"export", "FILE.json or FILE.csv", 1, 1, OPERAND_FILE, materials_export},
-    {"import", "FILE.json or FILE.csv", 1, 1, OPERAND_FILE, materials_import},
+static const ApiAction actions[] = {
+    {"list", "no operands", 0, 0, materials_list, 0},
+    {"show", "SLUG or SLUG@REVISION", 1, 1, materials_show, 0},
+    {"add", "FILE.json", 1, 1, materials_add, 0},
+    {"revise", "SLUG FILE.json", 2, 2, materials_revise, 0},
+    {"revert", "SLUG REVISION", 2, 2, materials_revert, 0},
+    {"approve", "SLUG@REVISION", 1, 1, materials_approve, 0},
+    {"deprecate", "SLUG@REVISION", 1, 1, materials_deprecate, 0},
+    {"history", "SLUG", 1, 1, materials_history, 0},
+    {"diff", "SLUG [FROM [TO]]", 1, 3, materials_diff, 0},
+    {"used-by", "SLUG or SLUG@REVISION", 1, 1, materials_used_by, 0},
+    {"measure", "SLUG TEST.json", 2, 2, materials_measure, 0},
+    {"measurements", "SLUG", 1, 1, materials_measurements, 0},
+    {"propose", "SLUG", 1, 1, materials_propose, 0},
+    {"derived", "SLUG or SLUG@REVISION", 1, 1, materials_derived, 0},
+    {"export", "FILE.json or FILE.csv", 1, 1, materials_export, 0},
+    {"import", "FILE.json or FILE.csv", 1, 1, materials_import, 0},
+    {.name = NULL},
 };
-
-static Status materials_act(ApiClient *client, void *context, Problem *problem) {
-    MaterialsCall *call = context;
-    const struct MaterialsAction *action = call->action;
-    call->client = client;
-    if (action->first == OPERAND_SLUG || action->first == OPERAND_REVISION)
-        TRY(materials_name(call->operands[0], action->first == OPERAND_REVISION, problem));
-    return action->act(call, problem);
-}
-
-static int materials(const Command *self, void *of, const Options *options, Problem *problem) {
-    const MaterialsSettings *settings = of;
-    size_t index;
-    if (command_action(options, &actions->name, COUNT(actions), sizeof *actions, &index, problem) !=
-        STATUS_OK)
-        return command_error(self->name, problem);
-    MaterialsCall call = {.settings = settings,
-                          .action = &actions[index],
-                          .operands = options->operands + 1,
-                          .count = options->operand_count - 1};
-    if (call.count < call.action->min || call.count > call.action->max) {
-        (void)problem_set(problem, STATUS_USAGE, "%s takes %s, is given %zu operands",
-                          call.action->name, call.action->takes, call.count);
-        return command_error(self->name, problem);
-    }
-    const int code =
-        api_client_run(self, &settings->client, call.count > 0 ? call.operands[0] : "materials",
-                       materials_act, &call, problem);
-    bytes_clear(&call.path);
-    bytes_clear(&call.body);
-    http_answer_clear(&call.answer);
-    return code;
-}
 
 const Command command_materials = {
     .name = "materials",
@@ -634,5 +544,6 @@ const Command command_materials = {
     .options = materials_fields,
     .groups = groups,
     .size = sizeof(MaterialsSettings),
-    .run = materials,
+    .run = api_command,
+    .actions = actions,
 };

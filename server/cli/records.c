@@ -2,18 +2,14 @@
 // a server, which reads and checks them.
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "core/excitation/recorded_motion.h"
 #include "core/formats/ground_motion_text.h"
 #include "server/cli/client.h"
-#include "server/cli/command.h"
-#include "server/cli/output.h"
-#include "server/cli/scene_file.h"
+#include "server/cli/files.h"
 #include "server/json/encode.h"
 #include "server/json/parse.h"
-#include "server/json/table.h"
 
 #define G 9.80665 // [m/s^2]
 
@@ -58,11 +54,9 @@ static Status excitation_write(const ExcitationRecord *record, const char *outpu
     bytes_text(&bytes, "{\"kind\": \"record\", ");
     (void)encode_members(&bytes, excitation_record.kind.fields, record, WRITE_SCENE);
     bytes_text(&bytes, "}\n");
-    Status status = bytes.is_failed  ? problem_set(problem, STATUS_NO_MEMORY, "no memory for it")
-                    : output != NULL ? output_file(output, &bytes, problem)
-                                     : STATUS_OK;
-    if (status == STATUS_OK && output == NULL && fwrite(bytes.at, 1, bytes.count, stdout) == 0)
-        status = problem_set(problem, STATUS_IO, "standard output cannot be written");
+    const Status status = bytes.is_failed
+                              ? problem_set(problem, STATUS_NO_MEMORY, "no memory for it")
+                              : output_put(output, &bytes, problem);
     bytes_clear(&bytes);
     return status;
 }
@@ -74,7 +68,7 @@ static Status import_act(const char *path, const Bytes *text, void *of, Problem 
     TRY(ground_motion_text_read(text->at != NULL ? text->at : "", text->count, RECORD_SAMPLES,
                                 &options, &import, problem));
     char source[1000], named[2000];
-    const char *name = scene_file_name(path), *slash = strrchr(path, '/');
+    const char *name = input_name(path), *slash = strrchr(path, '/');
     snprintf(named, sizeof named, "%.200s%s%s", slash != NULL ? slash + 1 : name,
              import.header[0] != '\0' ? ": " : "", import.header);
     text_fit(source, sizeof source, named);
@@ -99,7 +93,7 @@ static Status import_act(const char *path, const Bytes *text, void *of, Problem 
 
 static int import_run(const Command *self, void *settings, const Options *options,
                       Problem *problem) {
-    return scene_file_command(self, "file", options, settings, import_act, problem);
+    return input_command(self, "file", options, settings, import_act, problem);
 }
 
 enum { PAGE = 500 }; // records of a request, the most that the API allows
@@ -110,8 +104,6 @@ typedef struct RecordsSettings {
     double interval;
     int unit;
     bool json;
-    const char *operand; // of the action; NULL: none
-    Status (*act)(ApiClient *client, const struct RecordsSettings *settings, Problem *problem);
 } RecordsSettings;
 
 // A record as the server sends it; missing members are NULL, NAN or COUNT_ABSENT.
@@ -151,11 +143,26 @@ static const Field records_reply_fields[] = {
      .fields = record_reply_fields, .size = sizeof(RecordReply), .presence = PRESENCE_OPTIONAL, .doc = "records"},
     FIELD_END,
 };
+static const Field records_fields[] = {
+    CLIENT_ROWS,
+    FIELD_TEXT(RecordsSettings, name, RECORD_NAME_SIZE - 1, PRESENCE_OPTIONAL, 0, "add: name for scenes (name of the file without its extension)"),
+    FIELD_REAL(RecordsSettings, interval, "s", ABOVE(0), OPTIONAL, "add: time between samples, if the file does not state it"),
+    FIELD_CHOICE(RecordsSettings, unit, acceleration_unit_names, OPTIONAL, "add: g, m/s^2 or cm/s^2; overrides the file"),
+    FIELD_TEXT(RecordsSettings, source, 1000, PRESENCE_OPTIONAL, 0, "add: origin of the file"),
+    FIELD_TEXT(RecordsSettings, processing, 1000, PRESENCE_OPTIONAL, 0, "add: processing, such as filters and baseline correction"),
+    FIELD_TEXT(RecordsSettings, earthquake, 200, PRESENCE_OPTIONAL, 0, "add: earthquake"),
+    FIELD_TEXT(RecordsSettings, station, 200, PRESENCE_OPTIONAL, 0, "add: station and direction"),
+    FIELD_TEXT(RecordsSettings, notes, 4000, PRESENCE_OPTIONAL, 0, "add: remarks"),
+    FIELD_TEXT(RecordsSettings, q, 200, PRESENCE_OPTIONAL, 0, "list: only records with this text"),
+    FIELD_FLAG(RecordsSettings, json, false, "list and add: print the answer of the server as JSON"),
+    FIELD_REAL(ClientSettings, wait, "s", AT_MIN(0), 0, "how long to wait for a busy server (0)"),
+    FIELD_END,
+};
 // clang-format on
 
 // Prints a page of the list. `after` becomes the name that the next page starts behind, "" at the
 // end.
-static Status records_print(const HttpAnswer *answer, bool is_json, char after[RECORD_NAME_SIZE],
+static Status records_print(const ApiAnswer *answer, bool is_json, char after[RECORD_NAME_SIZE],
                             Problem *problem) {
     static const char *const skipped[] = {"links", NULL};
     static const PrintTableColumns columns[] = {
@@ -172,29 +179,21 @@ static Status records_print(const HttpAnswer *answer, bool is_json, char after[R
     if (count >= PAGE && strcmp(name, after) <= 0)
         status = problem_set(problem, STATUS_UNREACHABLE, "the list of records has no end");
     text_fit(after, RECORD_NAME_SIZE, count >= PAGE ? name : "");
-    if (status == STATUS_OK && is_json)
-        api_client_print(answer);
-    else if (status == STATUS_OK)
-        status = print_table_print_json(answer->body.at, answer->body.count, &view, stdout,
-                                        &longest, problem);
+    if (status == STATUS_OK)
+        status = api_print_tables(answer, &view, is_json, &longest, problem);
     fields_clear(records_reply_fields, &reply);
     return status;
 }
 
-static Status records_list(ApiClient *client, const RecordsSettings *settings, Problem *problem) {
+static Status records_list(ApiCall *call, Problem *problem) {
+    const RecordsSettings *settings = call->settings;
     char after[RECORD_NAME_SIZE] = "";
     do {
-        Bytes path = {.most = 4000};
-        HttpAnswer answer;
-        bytes_format(&path, "/v1/records?limit=%d", PAGE);
-        http_query(&path, "q", settings->q);
-        http_query(&path, "after", after[0] != '\0' ? after : NULL);
-        Status status =
-            api_client_request(client, (HttpAsk){.method = "GET"}, &path, &answer, problem);
-        if (status == STATUS_OK)
-            status = records_print(&answer, settings->json, after, problem);
-        http_answer_clear(&answer);
-        TRY(status);
+        ApiRequest request = {.method = "GET", .path = api_path("/v1/records?limit=%d", PAGE)};
+        api_query(&request.path, "q", settings->q);
+        api_query(&request.path, "after", after[0] != '\0' ? after : NULL);
+        TRY(api_ask(&call->client, &request, &call->answer, problem));
+        TRY(records_print(&call->answer, settings->json, after, problem));
     } while (after[0] != '\0');
     return STATUS_OK;
 }
@@ -228,109 +227,63 @@ static void record_report(const char *path, RecordReply *record, bool is_new) {
     }
 }
 
-static Status record_send(ApiClient *client, const RecordsSettings *settings, const Bytes *text,
-                          Problem *problem) {
+static Status records_add(ApiCall *call, Problem *problem) {
+    const RecordsSettings *settings = call->settings;
+    const char *path = call->operands[0];
     char name[RECORD_NAME_SIZE];
-    Bytes target = {.most = 60000};
-    HttpAnswer answer = {0};
     RecordReply record = {0};
-    record_name(settings->operand, name);
-    bytes_text(&target, "/v1/records");
-    http_query(&target, "name", settings->name != NULL ? settings->name : name);
-    http_query(&target, "unit",
-               settings->unit == CHOICE_ABSENT ? NULL : acceleration_unit_names[settings->unit]);
-    http_query(&target, "source", settings->source);
-    http_query(&target, "processing", settings->processing);
-    http_query(&target, "earthquake", settings->earthquake);
-    http_query(&target, "station", settings->station);
-    http_query(&target, "notes", settings->notes);
-    http_query_real(&target, "interval", settings->interval);
-    const HttpAsk ask = {.method = "POST", .body = text, .content_type = "text/plain"};
-    Status status = api_client_request(client, ask, &target, &answer, problem);
-    if (status == STATUS_OK)
-        (void)json_parse(answer.body.at, answer.body.count, record_reply_fields, &record, NULL);
-    if (status == STATUS_OK && record.name == NULL)
-        status = api_client_unexpected("a record", problem);
-    if (status == STATUS_OK && settings->json) {
-        api_client_print(&answer);
-    } else if (status == STATUS_OK) {
-        record_report(scene_file_name(settings->operand), &record, answer.code == 201);
+    TRY(input_read(path, &call->body, problem));
+    record_name(path, name);
+    ApiRequest request = {.method = "POST",
+                          .path = api_path("/v1/records"),
+                          .body = &call->body,
+                          .content_type = "text/plain"};
+    api_query(&request.path, "name", settings->name != NULL ? settings->name : name);
+    api_query_rows(&request.path, records_fields, settings,
+                   "unit source processing earthquake station notes interval");
+    TRY(api_ask(&call->client, &request, &call->answer, problem));
+    (void)json_parse(call->answer.body.at, call->answer.body.count, record_reply_fields, &record,
+                     NULL);
+    const bool is_record = record.name != NULL;
+    if (is_record && settings->json) {
+        api_print(&call->answer);
+    } else if (is_record) {
+        record_report(input_name(path), &record, call->answer.code == 201);
         text_make_printable(record.name);
         printf("%s\n", record.name);
     }
     fields_clear(record_reply_fields, &record);
-    http_answer_clear(&answer);
-    return status;
+    return is_record ? STATUS_OK : api_unexpected("a record", problem);
 }
 
-static Status records_add(ApiClient *client, const RecordsSettings *settings, Problem *problem) {
-    Bytes text;
-    Status status = scene_file_read(settings->operand, &text, problem);
-    if (status == STATUS_OK)
-        status = record_send(client, settings, &text, problem);
-    bytes_clear(&text);
-    return status;
+static Status record_ask(ApiCall *call, const char *method, Problem *problem) {
+    const char *name = call->operands[0];
+    ApiRequest request = {.method = method, .path = api_path("/v1/records/")};
+    if (name[0] == '\0' || strcmp(name, "..") == 0)
+        return problem_set(problem, STATUS_USAGE, "must be the name of a record");
+    bytes_percent(&request.path, name);
+    return api_ask(&call->client, &request, &call->answer, problem);
 }
 
-static Status record_ask(ApiClient *client, const char *method, const char *name,
-                         Problem *problem) {
-    Bytes path = {.most = 4000};
-    HttpAnswer answer = {0};
-    bytes_text(&path, "/v1/records/");
-    bytes_percent(&path, name);
-    const Status status =
-        api_client_request(client, (HttpAsk){.method = method}, &path, &answer, problem);
-    if (status == STATUS_OK && answer.body.count > 0)
-        api_client_print(&answer);
-    http_answer_clear(&answer);
-    return status;
-}
-
-static Status records_show(ApiClient *client, const RecordsSettings *settings, Problem *problem) {
-    return record_ask(client, "GET", settings->operand, problem);
-}
-
-static Status records_delete(ApiClient *client, const RecordsSettings *settings, Problem *problem) {
-    TRY(record_ask(client, "DELETE", settings->operand, problem));
-    fprintf(stderr, "The record \"%s\" is deleted.\n", settings->operand);
+static Status records_show(ApiCall *call, Problem *problem) {
+    TRY(record_ask(call, "GET", problem));
+    api_print(&call->answer);
     return STATUS_OK;
 }
 
-static const struct Action {
-    const char *name, *operand; // NULL: takes none
-    Status (*act)(ApiClient *client, const RecordsSettings *settings, Problem *problem);
-} actions[] = {
-    {"list", NULL, records_list},
-    {"add", "a file", records_add},
-    {"show", "the name of a record", records_show},
-    {"delete", "the name of a record", records_delete},
+static Status records_delete(ApiCall *call, Problem *problem) {
+    TRY(record_ask(call, "DELETE", problem));
+    fprintf(stderr, "The record \"%s\" is deleted.\n", call->operands[0]);
+    return STATUS_OK;
+}
+
+static const ApiAction actions[] = {
+    {"list", "no operand", 0, 0, records_list, 0},
+    {"add", "a file", 1, 1, records_add, 0},
+    {"show", "the name of a record", 1, 1, records_show, 0},
+    {"delete", "the name of a record", 1, 1, records_delete, 0},
+    {.name = NULL},
 };
-
-static Status records_act(ApiClient *client, void *context, Problem *problem) {
-    const RecordsSettings *settings = context;
-    return settings->act(client, settings, problem);
-}
-
-static int records_run(const Command *self, void *of, const Options *options, Problem *problem) {
-    RecordsSettings *settings = of;
-    size_t index;
-    if (command_action(options, &actions->name, COUNT(actions), sizeof *actions, &index, problem) !=
-        STATUS_OK)
-        return command_error(self->name, problem);
-    const struct Action *action = &actions[index];
-    const size_t takes = action->operand != NULL ? 2 : 1;
-    settings->act = action->act;
-    settings->operand = takes == 2 && options->operand_count == 2 ? options->operands[1] : NULL;
-    const bool is_name = settings->operand == NULL ||
-                         (settings->operand[0] != '\0' && strcmp(settings->operand, "..") != 0);
-    if (options->operand_count != takes || !is_name) {
-        (void)problem_set(problem, STATUS_USAGE, "%s takes %s", action->name,
-                          takes == 2 ? action->operand : "no operand");
-        return command_error(self->name, problem);
-    }
-    return api_client_run(self, &settings->client, settings->operand, records_act, settings,
-                          problem);
-}
 
 // clang-format off
 static const Field import_fields[] = {
@@ -338,21 +291,6 @@ static const Field import_fields[] = {
     FIELD_CHOICE(ImportSettings, unit, acceleration_unit_names, OPTIONAL, "g, m/s^2 or cm/s^2; overrides the file"),
     FIELD_REAL(ImportSettings, scale, NULL, ANY, 1, "factor on the samples"),
     FIELD_TEXT(ImportSettings, output, 4000, PRESENCE_OPTIONAL, 0, "write to this file"),
-    FIELD_END,
-};
-static const Field records_fields[] = {
-    DAEMON_ROWS(ClientSettings),
-    FIELD_TEXT(RecordsSettings, name, RECORD_NAME_SIZE - 1, PRESENCE_OPTIONAL, 0, "add: name for scenes (name of the file without its extension)"),
-    FIELD_REAL(RecordsSettings, interval, "s", ABOVE(0), OPTIONAL, "add: time between samples, if the file does not state it"),
-    FIELD_CHOICE(RecordsSettings, unit, acceleration_unit_names, OPTIONAL, "add: g, m/s^2 or cm/s^2; overrides the file"),
-    FIELD_TEXT(RecordsSettings, source, 1000, PRESENCE_OPTIONAL, 0, "add: origin of the file"),
-    FIELD_TEXT(RecordsSettings, processing, 1000, PRESENCE_OPTIONAL, 0, "add: processing, such as filters and baseline correction"),
-    FIELD_TEXT(RecordsSettings, earthquake, 200, PRESENCE_OPTIONAL, 0, "add: earthquake"),
-    FIELD_TEXT(RecordsSettings, station, 200, PRESENCE_OPTIONAL, 0, "add: station and direction"),
-    FIELD_TEXT(RecordsSettings, notes, 4000, PRESENCE_OPTIONAL, 0, "add: remarks"),
-    FIELD_TEXT(RecordsSettings, q, 200, PRESENCE_OPTIONAL, 0, "list: only records with this text"),
-    FIELD_FLAG(RecordsSettings, json, false, "list and add: print the answer of the server as JSON"),
-    FIELD_REAL(ClientSettings, wait, "s", AT_MIN(0), 0, "how long to wait for a busy server (0)"),
     FIELD_END,
 };
 // clang-format on
@@ -394,5 +332,6 @@ const Command command_records = {
         "use or its name is taken.\n",
     .options = records_fields,
     .size = sizeof(RecordsSettings),
-    .run = records_run,
+    .run = api_command,
+    .actions = actions,
 };

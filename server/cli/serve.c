@@ -14,8 +14,7 @@
 #include "core/math/fft.h"
 #include "core/study/sweep.h"
 #include "server/api/app.h"
-#include "server/cli/command.h"
-#include "server/cli/scene_file.h"
+#include "server/cli/files.h"
 #include "server/http/address.h"
 #include "server/http/server.h"
 #include "server/http/tls.h"
@@ -223,7 +222,7 @@ static Status pem_read(const char *option, const char *path, bool is_secret, Byt
     enum { PEM_MAX = 1 << 20 };
     struct stat facts;
     errno = 0;
-    if (scene_file_read(path, text, NULL) != STATUS_OK && errno != 0)
+    if (input_read(path, text, NULL) != STATUS_OK && errno != 0)
         return problem_add(problem, STATUS_USAGE, option, "cannot be read: %s: %s", path,
                            strerror(errno));
     if (is_secret && stat(path, &facts) == 0 && (facts.st_mode & S_IROTH) != 0)

@@ -1,5 +1,5 @@
 // The token itself goes to standard output and nothing else does, so that a script can take it.
-#include "server/cli/command.h"
+#include "server/cli/files.h"
 
 #include <errno.h>
 #include <signal.h>
@@ -28,7 +28,7 @@ static const Field token_fields[] = {
 };
 // clang-format on
 
-static Status create(Db *db, const TokenSettings *settings, TokenRow *row, Problem *problem) {
+static Status token_create(Db *db, const TokenSettings *settings, TokenRow *row, Problem *problem) {
     static const double day_ms = 24 * 3600 * 1000.0;
     static const double days_most = 36500;
     char made[TOKEN_SIZE];
@@ -62,58 +62,55 @@ static Status create(Db *db, const TokenSettings *settings, TokenRow *row, Probl
     return STATUS_OK;
 }
 
-static const char *time_text(int64_t unix_ms, char text[32]) {
+static const char *token_time(int64_t unix_ms, char text[32]) {
     if (unix_ms > 0)
         clock_rfc3339(unix_ms, text);
     return unix_ms > 0 ? text : NULL;
 }
 
-static Status list(Db *db, const TokenSettings *settings, TokenRow *row, Problem *problem) {
-    static const char *const heads[] = {"name", "scopes", "created", "used", "expires", "state"};
+static Status token_list(Db *db, const TokenSettings *settings, TokenRow *row, Problem *problem) {
+    static const PrintTableView view = {NULL, NULL, NULL};
     TokenRows rows = {0};
+    Bytes json = {0};
+    size_t longest;
     (void)row;
     TRY(db_tokens(db, &rows, problem));
     const int64_t now = clock_unix_ms();
-    PrintTable listing = {.columns = COUNT(heads), .has_heads = true};
-    Bytes json = {0};
-    for (size_t i = 0; i < COUNT(heads); i++)
-        print_table_add(&listing, "%s", heads[i]);
     bytes_text(&json, "{\"tokens\": [");
     for (size_t i = 0; i < rows.count; i++) {
         const TokenRow *one = &rows.at[i];
         const bool has_ended = one->expires_unix_ms > 0 && one->expires_unix_ms <= now;
-        char created[32], used[32], expires[32];
-        const char *const cells[COUNT(heads)] = {one->name,
-                                                 one->scopes,
-                                                 time_text(one->created_unix_ms, created),
-                                                 time_text(one->used_unix_ms, used),
-                                                 time_text(one->expires_unix_ms, expires),
-                                                 one->revoked_unix_ms > 0 ? "revoked"
-                                                 : has_ended              ? "expired"
-                                                                          : "good"};
-        for (size_t k = 0; k < COUNT(cells); k++) {
-            print_table_add(&listing, "%s", cells[k] != NULL ? cells[k] : "never");
-            bytes_format(&json, "%s\"%s\": ", k > 0 ? ", " : i > 0 ? ", {" : "{", heads[k]);
-            if (cells[k] != NULL)
-                bytes_json_string(&json, cells[k]);
-            else
-                bytes_text(&json, "null");
+        char times[3][32];
+        const struct {
+            const char *name, *value;
+        } members[] = {{"name", one->name},
+                       {"scopes", one->scopes},
+                       {"created", token_time(one->created_unix_ms, times[0])},
+                       {"used", token_time(one->used_unix_ms, times[1])},
+                       {"expires", token_time(one->expires_unix_ms, times[2])},
+                       {"state", one->revoked_unix_ms > 0 ? "revoked"
+                                 : has_ended              ? "expired"
+                                                          : "good"}};
+        for (size_t k = 0; k < COUNT(members); k++) {
+            bytes_format(&json, "%s\"%s\": ", k > 0 ? ", " : i > 0 ? ", {" : "{", members[k].name);
+            // NULL is null, in a table "never".
+            bytes_json_string(
+                &json, members[k].value == NULL && !settings->json ? "never" : members[k].value);
         }
         bytes_text(&json, "}");
     }
     bytes_text(&json, "]}\n");
-    if (settings->json && !json.is_failed)
-        fputs(json.at, stdout);
-    if (settings->json)
-        print_table_clear(&listing);
-    else
-        print_table_print(&listing, stdout);
-    bytes_clear(&json);
     free(rows.at);
-    return STATUS_OK;
+    Status status =
+        json.is_failed ? problem_set(problem, STATUS_NO_MEMORY, "no memory for the list")
+        : settings->json
+            ? output_put(NULL, &json, problem)
+            : print_table_print_json(json.at, json.count, &view, stdout, &longest, problem);
+    bytes_clear(&json);
+    return status;
 }
 
-static Status revoke(Db *db, const TokenSettings *settings, TokenRow *row, Problem *problem) {
+static Status token_revoke(Db *db, const TokenSettings *settings, TokenRow *row, Problem *problem) {
     (void)settings;
     row->revoked_unix_ms = clock_unix_ms();
     TRY(db_token_revoke(db, row, problem));
@@ -122,7 +119,7 @@ static Status revoke(Db *db, const TokenSettings *settings, TokenRow *row, Probl
     return STATUS_OK;
 }
 
-static Status forget(Db *db, const TokenSettings *settings, TokenRow *row, Problem *problem) {
+static Status token_forget(Db *db, const TokenSettings *settings, TokenRow *row, Problem *problem) {
     (void)settings;
     TRY(db_token_forget(db, row, problem));
     fprintf(stderr, "The token \"%s\" is forgotten.\n", row->name);
@@ -134,14 +131,12 @@ static const struct Action {
     bool needs_name;
     Status (*act)(Db *db, const TokenSettings *settings, TokenRow *row, Problem *problem);
 } actions[] = {
-    {"create", true, create},
-    {"list", false, list},
-    {"revoke", true, revoke},
-    {"forget", true, forget},
+    {"create", true, token_create}, {"list", false, token_list}, {"revoke", true, token_revoke},
+    {"forget", true, token_forget}, {NULL, false, NULL},
 };
 
-static Status read_name(const TokenSettings *settings, const Options *options, bool is_needed,
-                        TokenRow *row, Problem *problem) {
+static Status token_read_name(const TokenSettings *settings, const Options *options, bool is_needed,
+                              TokenRow *row, Problem *problem) {
     static const char allowed[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
                                   "0123456789._-";
     const char *name = settings->name;
@@ -164,15 +159,15 @@ static Status read_name(const TokenSettings *settings, const Options *options, b
     return STATUS_OK;
 }
 
-static Status act(TokenSettings *settings, const Options *options, Problem *problem) {
+static Status token_act(TokenSettings *settings, const Options *options, Problem *problem) {
     size_t index;
     TokenRow row = {0};
-    TRY(command_action(options, &actions->name, COUNT(actions), sizeof *actions, &index, problem));
+    TRY(command_action(options, &actions->name, sizeof *actions, &index, problem));
     const struct Action *action = &actions[index];
     if (options->operand_count > 2)
         return problem_set(problem, STATUS_USAGE, "\"%.60s\" is one operand too many",
                            options->operands[2]);
-    TRY(read_name(settings, options, action->needs_name, &row, problem));
+    TRY(token_read_name(settings, options, action->needs_name, &row, problem));
     TRY(command_data_folder(&settings->data, problem));
     Db *db = NULL;
     TRY(db_open_beside(settings->data, &db, problem));
@@ -182,7 +177,7 @@ static Status act(TokenSettings *settings, const Options *options, Problem *prob
 }
 
 static int token(const Command *self, void *settings, const Options *options, Problem *problem) {
-    const Status status = act(settings, options, problem);
+    const Status status = token_act(settings, options, problem);
     if (status == STATUS_OK)
         return COMMAND_OK;
     if (status == STATUS_USAGE)

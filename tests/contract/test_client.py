@@ -175,27 +175,14 @@ def test_watch_draws_a_bar_on_a_terminal():
     assert percents == sorted(percents) and percents[-1] <= 100, shown
 
 
-def test_watch_shows_what_the_events_tell():
-    """Progress comes from the stream of events; what is odd in it is passed over; a server without it is asked again."""
+def test_watch_shows_the_progress_of_the_job():
+    """watch requests the job again until it has finished; lines show new states and every ten percent."""
     def job(status, progress):
         return say(body=json.dumps({"id": "j-1", "status": status, "progress": progress, "result": None}).encode())
-
-    def tell(*lines, kind="text/event-stream"):
-        return say(body="".join(line + "\n" for line in lines).encode(), kind=kind)
-    stream = tell("retry: 2000", "", "event: progress", 'data: {"status": "running", "progress": 20}', "",
-                  "event: progress", "data: {", "", "event: progress", "data: [1]", "", "event: progress", "data: " + "x" * 5000, "",
-                  ": still here", "", "event: other", 'data: {"status": "running", "progress": 99}', "",
-                  "event: progress", 'data: {"status": "run\\u001bning", "progress": 45.5}', "",
-                  "event: finished", 'data: {"id": "j-1", "status": "successful"}', "")
-    with fake(job("accepted", 0), stream, job("successful", 100)) as (url, seen):
+    with fake(job("accepted", 0), job("running", 20), job("running", 25), job("running", 45.5), job("successful", 100)) as (url, seen):
         code, out, errors = client(url, "watch", "j-1")
-        assert code == 0 and out.splitlines() == ["j-1 accepted 0 %", "j-1 running 20 %", "j-1 run?ning 46 %", "j-1 successful 100 %"], (out, errors)
-        assert [path.partition("?")[0] for _, path, _ in seen] == ["/v1/jobs/j-1", "/v1/jobs/j-1/events", "/v1/jobs/j-1"], seen
-    for none in (say(404, body=b"{}"), tell("{}", kind="application/json"), say(204, body=b"")):
-        with fake(job("accepted", 0), none, job("running", 30), job("running", 60), job("successful", 100)) as (url, seen):
-            code, out, errors = client(url, "watch", "j-1")
-            assert code == 0 and out.splitlines()[1:3] == ["j-1 running 30 %", "j-1 running 60 %"], (out, errors)
-            assert sum(path.endswith("/events") for _, path, _ in seen) == 1, seen
+        assert code == 0 and out.splitlines() == ["j-1 accepted 0 %", "j-1 running 20 %", "j-1 running 46 %", "j-1 successful 100 %"], (out, errors)
+        assert {path.partition("?")[0] for _, path, _ in seen} == {"/v1/jobs/j-1"} and len(seen) == 5, seen
     with program.daemon() as daemon:
         scene = endless()
         slow = client(daemon.url, "submit", "-", text=json.dumps(scene))[1].strip()
@@ -311,7 +298,7 @@ def test_a_silent_server_ends_the_wait():
     def silent(handler):
         handler.rfile.read(1)  # until the client closes
     done = say(body=b'{"id": "j-1", "status": "running"}')
-    for arguments, plan in ((("submit", SPONGE), (silent,)), (("watch", "j-1"), (done, say(404), silent))):
+    for arguments, plan in ((("submit", SPONGE), (silent,)), (("watch", "j-1"), (done, silent))):
         with fake(*plan) as (url, _):
             began = time.monotonic()
             code, _, errors = client(url, *arguments, "--wait", "1")

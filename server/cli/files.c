@@ -1,6 +1,6 @@
 // Ctrl-C must end the program at once, also within a transform or a write. The only thing it owns
 // outside its memory is the temporary file, so the signal handler removes that and exits.
-#include "server/cli/output.h"
+#include "server/cli/files.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -11,8 +11,81 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "server/cli/command.h"
+#include "server/json/table.h"
 #include "server/util/clock.h"
+
+const char *input_name(const char *path) {
+    return strcmp(path, "-") == 0 ? "standard input" : path;
+}
+
+Status input_read(const char *path, Bytes *text, Problem *problem) {
+    *text = (Bytes){.most = INPUT_BYTES};
+    const bool is_input = strcmp(path, "-") == 0;
+    FILE *file = is_input ? stdin : fopen(path, "rb");
+    if (file == NULL)
+        return problem_set(problem,
+                           errno == ENOENT   ? STATUS_NOT_FOUND
+                           : errno == EACCES ? STATUS_FORBIDDEN
+                                             : STATUS_IO,
+                           "cannot be read: %s", strerror(errno));
+    char piece[65536];
+    size_t count = 0;
+    while (!text->is_failed && (count = fread(piece, 1, sizeof piece, file)) > 0)
+        bytes_put(text, piece, count);
+    const int error = ferror(file) ? errno : 0;
+    if (!is_input)
+        fclose(file);
+    if (error != 0)
+        return problem_set(problem, STATUS_IO, "cannot be read: %s", strerror(error));
+    return text->is_failed
+               ? problem_set(problem, STATUS_TOO_LARGE, "is larger than %d bytes", INPUT_BYTES)
+               : STATUS_OK;
+}
+
+int input_command(const Command *self, const char *what, const Options *options, void *settings,
+                  Status (*run)(const char *path, const Bytes *text, void *settings,
+                                Problem *problem),
+                  Problem *problem) {
+    if (options->operand_count != 1) {
+        (void)problem_set(problem, STATUS_USAGE, "takes one %s, is given %zu", what,
+                          options->operand_count);
+        return command_error(self->name, problem);
+    }
+    const char *path = options->operands[0];
+    Bytes text;
+    output_guard();
+    Status status = input_read(path, &text, problem);
+    if (status == STATUS_OK)
+        status = run(path, &text, settings, problem);
+    bytes_clear(&text);
+    if (status != STATUS_OK)
+        input_refuse(path, problem);
+    return command_exit(status);
+}
+
+void input_refuse(const char *path, const Problem *problem) {
+    const char *name = input_name(path);
+    for (size_t i = 0; i < problem->count && i < PROBLEM_FAULTS; i++) {
+        Fault fault = problem->faults[i];
+        text_make_printable(fault.pointer);
+        text_make_printable(fault.detail);
+        fprintf(stderr, "%s: %s%s%s", name, fault.pointer, fault.pointer[0] != '\0' ? ": " : "",
+                fault.detail);
+        if (fault.did_you_mean[0] != '\0')
+            fprintf(stderr, " (did you mean \"%s\"?)", fault.did_you_mean);
+        fputc('\n', stderr);
+    }
+    if (problem->count > PROBLEM_FAULTS)
+        fprintf(stderr, "%s: and %zu more faults\n", name, problem->count - PROBLEM_FAULTS);
+    if (problem->count == 0)
+        fprintf(stderr, "%s: %s\n", name, problem->detail);
+}
+
+const char *path_extension(const char *path) {
+    const char *slash = strrchr(path, '/'), *name = slash != NULL ? slash + 1 : path;
+    const char *point = strrchr(name, '.');
+    return point != NULL && point > name ? point + 1 : NULL;
+}
 
 enum { PATH_SIZE = 4096 };
 
@@ -57,6 +130,8 @@ void output_farewell(const char *text) {
 }
 
 Status output_open(const char *path, Problem *problem) {
+    if (path == NULL)
+        return STATUS_OK;
     if (strlen(path) + sizeof ".XXXXXX" > PATH_SIZE)
         return problem_set(problem, STATUS_IO, "%.200s...: the name is too long", path);
     struct stat what;
@@ -78,7 +153,9 @@ Status output_open(const char *path, Problem *problem) {
 
 Status output_write(const void *bytes, size_t size, Problem *problem) {
     const char *at = bytes;
-    while (size > 0) {
+    if (part < 0 && fwrite(bytes, 1, size, stdout) < size)
+        return problem_set(problem, STATUS_IO, "standard output cannot be written");
+    while (part >= 0 && size > 0) {
         const ssize_t done = write(part, at, size);
         if (done < 0 && errno == EINTR)
             continue;
@@ -91,12 +168,9 @@ Status output_write(const void *bytes, size_t size, Problem *problem) {
     return STATUS_OK;
 }
 
-Status output_take(void *context, const void *bytes, size_t size, Problem *problem) {
-    (void)context;
-    return output_write(bytes, size, problem);
-}
-
 Status output_close(Problem *problem) {
+    if (part < 0)
+        return STATUS_OK;
     // mkstemp gives 0600; the file gets what any new file would get.
     const mode_t mask = umask(0);
     (void)umask(mask);
@@ -129,12 +203,18 @@ void output_drop(void) {
     (void)sigprocmask(SIG_SETMASK, &before, NULL);
 }
 
-Status output_file(const char *path, const Bytes *bytes, Problem *problem) {
+Status output_put(const char *path, const Bytes *bytes, Problem *problem) {
     Status status = output_open(path, problem);
     if (status == STATUS_OK)
         status = output_write(bytes->at, bytes->count, problem);
     if (status == STATUS_OK)
         status = output_close(problem);
+    output_drop();
+    return status;
+}
+
+Status output_check(const char *path, Problem *problem) {
+    const Status status = output_open(path, problem);
     output_drop();
     return status;
 }
