@@ -48,15 +48,15 @@ TEST(a_token_is_exposed_by_plain_http_to_others) {
     }
 }
 
-static HttpAnswer answer_of(int code, const char *text) {
-    HttpAnswer answer = {.code = code};
+static ApiAnswer answer_of(int code, const char *text) {
+    ApiAnswer answer = {.code = code};
     bytes_text(&answer.body, text);
     return answer;
 }
 
 TEST(a_problem_document_becomes_a_problem) {
     Problem *problem = calloc(1, sizeof *problem);
-    HttpAnswer answer = answer_of(
+    ApiAnswer answer = answer_of(
         422,
         "{\"type\": \"/problems/invalid-scene\", \"detail\": \"two\", \"errors\": ["
         "{\"pointer\": \"/a\", \"detail\": \"bad \\u001b[31m\", \"value\": {\"x\": 1}, "
@@ -67,7 +67,7 @@ TEST(a_problem_document_becomes_a_problem) {
     assert_string_equal(problem->faults[0].detail, "bad ?[31m");
     assert_string_equal(problem->faults[0].did_you_mean, "b");
     assert_string_equal(problem->faults[1].detail, "worse");
-    http_answer_clear(&answer);
+    api_answer_clear(&answer);
     free(problem);
 }
 
@@ -80,8 +80,8 @@ TEST(every_code_has_a_status) {
                 {429, STATUS_UNREACHABLE}, {500, STATUS_INTERNAL},  {503, STATUS_UNREACHABLE},
                 {299, STATUS_INTERNAL}};
     for (size_t i = 0; i < COUNT(rows); i++) {
-        HttpAnswer answer = answer_of(rows[i].code, "<html>");
+        ApiAnswer answer = answer_of(rows[i].code, "<html>");
         assert_int_equal(problem_reply_read(&answer, NULL), rows[i].status);
-        http_answer_clear(&answer);
+        api_answer_clear(&answer);
     }
 }
