@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/cli/scene_file.h"
+#include "server/cli/files.h"
 #include "server/jobs/jobs.h"
 #include "tests/support/test.h"
 
@@ -29,7 +29,7 @@ static void open_example(const char *name, StudyRequest *inquiry) {
     char path[512];
     Bytes text;
     snprintf(path, sizeof path, "%s/schema/examples/%s.json", IMPACTD_SOURCE_DIR, name);
-    assert_int_equal(scene_file_read(path, &text, NULL), STATUS_OK);
+    assert_int_equal(input_read(path, &text, NULL), STATUS_OK);
     read_scene(text.at, text.count, inquiry);
     bytes_clear(&text);
 }
