@@ -347,7 +347,7 @@ def storm(daemon, requests, clients, seed=1, rounds=10, told_of=None):
             worker.start()
         for _ in workers:
             word = told.get(timeout=1800)
-            assert word[0] == "done", word
+            assert word[0] == "done", (word, f"the daemon: {daemon.process.poll()}, {daemon.stderr()[-1500:]}")
             for key, count in word[1].items():
                 codes[key] = codes.get(key, 0) + count
         for worker in workers:
