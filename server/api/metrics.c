@@ -72,7 +72,7 @@ static void metrics_write_responses(Bytes *bytes, ResponseCache *response_cache)
 }
 
 static void metrics_write_db(Bytes *bytes, Db *db) {
-    const DbStats *totals = db_totals(db);
+    const DbStats *totals = db_stats(db);
     metrics_counter(bytes, "impactd_sqlite_transactions_total", "Transactions that were committed.",
                     histogram_count(&totals->commits));
     metrics_counter(bytes, "impactd_sqlite_writes_total",

@@ -12,7 +12,7 @@
 #include <sys/statvfs.h>
 #include <unistd.h>
 
-#include "server/db/data_dir.h"
+#include "server/db/db_private.h"
 #include "server/db/sqlite.h"
 #include "server/util/embedded.h"
 

@@ -1,7 +1,6 @@
-// The lock is flock's on the folder itself: it ends with the process however that ends. The file
-// impactd.lock has the holder's number, for the message alone, and may stay behind or be removed.
-#include "server/db/data_dir.h"
-
+// The folder of a daemon's data, and the lock that keeps a second daemon out of it. The lock is
+// flock's on the folder itself: it ends with the process however that ends. The file impactd.lock
+// has the holder's number, for the message alone, and may stay behind or be removed.
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
@@ -10,6 +9,8 @@
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
+
+#include "server/db/db_private.h"
 
 Status data_dir_make(const char *directory, Problem *problem) {
     char path[PATH_MAX];

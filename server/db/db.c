@@ -1,41 +1,257 @@
-// Who may touch which connection: the writer thread has one of its own, readers take theirs from a
-// small pool and put it back. A database in memory has a single connection, which is the whole pool
-// then; the writer takes it like anyone.
+// The writer thread has a connection of its own, readers take theirs from a small pool and put it
+// back. A database in memory has a single connection, which is the whole pool then; the writer
+// takes it too.
+//
+// Group commit. While one transaction is made durable the next writes queue up, and all of them
+// become the next transaction:
+//
+//     BEGIN IMMEDIATE   apply...   COMMIT
+//
+// Where one fails, all is rolled back and done again with a savepoint around each, so that this one
+// alone leaves no trace. (Savepoints at once would copy every page that a write touches.) Where
+// that fails too (a full disk, a failed commit), each is tried once more by itself, so that each
+// gets its own error. Writes of low priority are done one by one, when nothing else is queued.
 #include "server/db/db.h"
 
 #include <limits.h>
 #include <pthread.h>
+#include <stdarg.h>
 #include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/db/data_dir.h"
 #include "server/db/db_private.h"
-#include "server/db/sqlite.h"
-#include "server/db/writer.h"
+#include "server/util/clock.h"
 #include "server/util/embedded.h"
 
 enum { READERS = 4 };
 
+typedef struct WriteQueue {
+    PendingWrite *first, **last;
+} WriteQueue;
+
+// On the stack of a caller who waits; its `done.call` is NULL.
+typedef struct WriteWaiter {
+    PendingWrite write;
+    bool is_done;
+    pthread_cond_t done;
+} WriteWaiter;
+
 struct Db {
     int lock_file;
-    Sqlite *own; // the writer's; NULL where it shares the pool's
-    Writer *writer;
-    MaterialMemory *materials;
     RecordMemory *records;
-    atomic_uint_fast64_t catalog_version; // of the catalogue
-    atomic_uint_fast64_t measured;        // materials
-    atomic_uint_fast64_t evictions;       // of series
-    PendingWrite probe;                   // of db_is_writable
+    atomic_uint_fast64_t evictions; // of series
+    PendingWrite probe;             // of db_is_writable
     atomic_bool is_probing;
-    pthread_mutex_t lock;
+
+    pthread_mutex_t lock; // of the readers
     pthread_cond_t some;
     Sqlite *readers[READERS]; // of which the first `free_count` are not taken
     size_t free_count;
+
+    Sqlite *own; // the writer's; NULL where it shares the pool's
+    pthread_t writer;
+    pthread_mutex_t queue_lock;
+    pthread_cond_t wake;
+    WriteQueue queues[WRITE_LOW + 1];
+    bool is_writing, is_stopping; // the thread runs; it is to end
+    DbStats stats;
+    Problem problem; // of the current write; the writer's own, for it is large
 };
 
-static Status open_files(Db *db, const char *directory, bool is_beside, Problem *problem) {
+static Sqlite *reader_take(Db *db) {
+    pthread_mutex_lock(&db->lock);
+    while (db->free_count == 0)
+        pthread_cond_wait(&db->some, &db->lock);
+    Sqlite *database = db->readers[--db->free_count];
+    pthread_mutex_unlock(&db->lock);
+    return database;
+}
+
+static void reader_put(Db *db, Sqlite *database) {
+    pthread_mutex_lock(&db->lock);
+    db->readers[db->free_count++] = database;
+    pthread_cond_signal(&db->some);
+    pthread_mutex_unlock(&db->lock);
+}
+
+// The writer.
+
+static void writer_set_status(PendingWrite *write, Status status, const Problem *problem) {
+    free(write->detail);
+    write->detail = status != STATUS_OK ? strdup(problem->detail) : NULL;
+    write->status = status;
+}
+
+static Status writer_apply_saved(Db *db, Sqlite *database, PendingWrite *write) {
+    static const char open[] = "SAVEPOINT one", undo[] = "ROLLBACK TO one", end[] = "RELEASE one";
+    Status status = sqlite_change(database, open, NULL, NULL, NULL, &db->problem);
+    if (status == STATUS_OK) {
+        status = write->apply(database, write->work, &db->problem);
+        if (status != STATUS_OK && sqlite_is_in_transaction(database))
+            (void)sqlite_change(database, undo, NULL, NULL, NULL, NULL);
+        if (sqlite_is_in_transaction(database))
+            (void)sqlite_change(database, end, NULL, NULL, NULL, NULL);
+    }
+    return status;
+}
+
+// Does writes from `first` up to `end` in one transaction. False if all of it was rolled back;
+// db->problem then has the reason. Without savepoints one failure rolls back all.
+static bool writer_commit(Db *db, Sqlite *database, PendingWrite *first, const PendingWrite *end,
+                          bool has_savepoints) {
+    static const char begin[] = "BEGIN IMMEDIATE", commit[] = "COMMIT", undo[] = "ROLLBACK";
+    const int64_t began_ns = clock_monotonic_ns();
+    const uint64_t rows = sqlite_rows_changed(database);
+    uint64_t writes = 0;
+    problem_clear(&db->problem);
+    Status status = sqlite_change(database, begin, NULL, NULL, NULL, &db->problem);
+    if (status == STATUS_OK)
+        status = sqlite_check_place(database, &db->problem);
+    for (PendingWrite *write = first; status == STATUS_OK && write != end; write = write->next) {
+        problem_clear(&db->problem);
+        if (!has_savepoints) {
+            status = write->apply(database, write->work, &db->problem);
+            write->status = STATUS_OK;
+            writes++;
+            continue;
+        }
+        writer_set_status(write, writer_apply_saved(db, database, write), &db->problem);
+        writes += write->status == STATUS_OK;
+        if (!sqlite_is_in_transaction(database)) {
+            counter_add(&db->stats.errors, 1);
+            return false;
+        }
+    }
+    if (status == STATUS_OK) {
+        problem_clear(&db->problem);
+        status = sqlite_change(database, commit, NULL, NULL, NULL, &db->problem);
+    }
+    if (status != STATUS_OK && sqlite_is_in_transaction(database))
+        (void)sqlite_change(database, undo, NULL, NULL, NULL, NULL);
+    if (status == STATUS_OK) {
+        atomic_store(&db->stats.is_failing, false);
+        histogram_add(&db->stats.commits, clock_monotonic_ns() - began_ns);
+        counter_add(&db->stats.writes, writes);
+        counter_add(&db->stats.rows, sqlite_rows_changed(database) - rows);
+    } else {
+        counter_add(&db->stats.errors, 1);
+    }
+    return status == STATUS_OK;
+}
+
+static void writer_commit_alone(Db *db, Sqlite *database, PendingWrite *write) {
+    write->status = STATUS_OK;
+    if (writer_commit(db, database, write, write->next, true) || write->status != STATUS_OK)
+        return;
+    const Status status = db->problem.status;
+    atomic_store(&db->stats.is_failing, true);
+    writer_set_status(write, status != STATUS_OK ? status : STATUS_IO, &db->problem);
+}
+
+static void writer_commit_all(Db *db, PendingWrite *first) {
+    Sqlite *database = db->own != NULL ? db->own : reader_take(db);
+    if (!writer_commit(db, database, first, NULL, false) &&
+        (first->next == NULL || !writer_commit(db, database, first, NULL, true)))
+        for (PendingWrite *write = first; write != NULL; write = write->next)
+            writer_commit_alone(db, database, write);
+    if (database != db->own)
+        reader_put(db, database);
+}
+
+// Its owner may free it as soon as it was called, or the lock is free.
+static void writer_report(Db *db, PendingWrite *write) {
+    char *detail = write->detail;
+    if (write->done.call != NULL) {
+        const char *text = detail != NULL ? detail : "";
+        write->detail = NULL;
+        write->done.call(write->done.context, write->status, text);
+        free(detail);
+        return;
+    }
+    WriteWaiter *waiter = (WriteWaiter *)(void *)write;
+    pthread_mutex_lock(&db->queue_lock);
+    waiter->is_done = true;
+    pthread_cond_signal(&waiter->done);
+    pthread_mutex_unlock(&db->queue_lock);
+}
+
+// With the lock held: all of the queue, or one of low priority; NULL: nothing.
+static PendingWrite *writer_take(Db *db) {
+    WriteQueue *queue = &db->queues[WRITE_NORMAL], *low = &db->queues[WRITE_LOW];
+    PendingWrite *first = queue->first;
+    if (first != NULL) {
+        *queue = (WriteQueue){NULL, &queue->first};
+    } else if ((first = low->first) != NULL) {
+        low->first = first->next;
+        if (low->first == NULL)
+            low->last = &low->first;
+        first->next = NULL;
+    }
+    return first;
+}
+
+static void *writer_main(void *context) {
+    Db *db = context;
+    PendingWrite *write, *next;
+    pthread_mutex_lock(&db->queue_lock);
+    for (;;) {
+        while ((write = writer_take(db)) == NULL && !db->is_stopping)
+            pthread_cond_wait(&db->wake, &db->queue_lock);
+        if (write == NULL)
+            break;
+        pthread_mutex_unlock(&db->queue_lock);
+        writer_commit_all(db, write);
+        for (; write != NULL; write = next) {
+            next = write->next;
+            writer_report(db, write);
+        }
+        pthread_mutex_lock(&db->queue_lock);
+    }
+    pthread_mutex_unlock(&db->queue_lock);
+    return NULL;
+}
+
+// With the lock held.
+static void writer_append(Db *db, DbApply *apply, const void *work, WritePriority priority,
+                          PendingWrite *write) {
+    WriteQueue *queue = &db->queues[priority];
+    write->apply = apply;
+    write->work = work;
+    write->next = NULL;
+    write->detail = NULL;
+    *queue->last = write;
+    queue->last = &write->next;
+    pthread_cond_signal(&db->wake);
+}
+
+Status db_write(Db *db, DbApply *apply, const void *work, Problem *problem) {
+    WriteWaiter waiter = {.is_done = false};
+    pthread_cond_init(&waiter.done, NULL);
+    pthread_mutex_lock(&db->queue_lock);
+    writer_append(db, apply, work, WRITE_NORMAL, &waiter.write);
+    while (!waiter.is_done)
+        pthread_cond_wait(&waiter.done, &db->queue_lock);
+    pthread_mutex_unlock(&db->queue_lock);
+    pthread_cond_destroy(&waiter.done);
+    const Status status = waiter.write.status;
+    if (status != STATUS_OK)
+        problem_set(problem, status, "%s", waiter.write.detail != NULL ? waiter.write.detail : "");
+    free(waiter.write.detail);
+    return status;
+}
+
+void db_enqueue(Db *db, DbApply *apply, const void *work, WritePriority priority,
+                PendingWrite *write) {
+    pthread_mutex_lock(&db->queue_lock);
+    writer_append(db, apply, work, priority, write);
+    pthread_mutex_unlock(&db->queue_lock);
+}
+
+// Opening and reading.
+
+static Status db_open_files(Db *db, const char *directory, bool is_beside, Problem *problem) {
     char path[PATH_MAX];
     bool is_current = false;
     if (!is_beside)
@@ -59,28 +275,34 @@ static Status open_files(Db *db, const char *directory, bool is_beside, Problem 
     return STATUS_OK;
 }
 
-static Status open_memory(Db *db, Problem *problem) {
+static Status db_open_memory(Db *db, Problem *problem) {
     TRY(sqlite_open(NULL, DATABASE_WRITER, &db->readers[0], problem));
     db->free_count = 1;
     return sqlite_migrate(db->readers[0], embedded_sql, problem);
 }
 
-static Status open_store(const char *directory, bool is_beside, Db **db, Problem *problem) {
+static Status db_open_at(const char *directory, bool is_beside, Db **db, Problem *problem) {
     *db = NULL;
     Db *made = calloc(1, sizeof *made);
     if (made == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the store");
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the database");
     made->lock_file = -1;
+    for (size_t i = 0; i < COUNT(made->queues); i++)
+        made->queues[i].last = &made->queues[i].first;
     pthread_mutex_init(&made->lock, NULL);
     pthread_cond_init(&made->some, NULL);
-    made->materials = material_memory_new();
+    pthread_mutex_init(&made->queue_lock, NULL);
+    pthread_cond_init(&made->wake, NULL);
     made->records = record_memory_new();
-    Status status = made->materials == NULL || made->records == NULL
-                        ? problem_set(problem, STATUS_NO_MEMORY, "no memory for the store")
-                    : directory != NULL ? open_files(made, directory, is_beside, problem)
-                                        : open_memory(made, problem);
+    Status status = made->records == NULL
+                        ? problem_set(problem, STATUS_NO_MEMORY, "no memory for the database")
+                    : directory != NULL ? db_open_files(made, directory, is_beside, problem)
+                                        : db_open_memory(made, problem);
     if (status == STATUS_OK)
-        status = writer_start(made->own, made->own == NULL ? made : NULL, &made->writer, problem);
+        made->is_writing = pthread_create(&made->writer, NULL, writer_main, made) == 0;
+    if (status == STATUS_OK && !made->is_writing)
+        status =
+            problem_set(problem, STATUS_INTERNAL, "the database's writer thread cannot be started");
     if (status != STATUS_OK) {
         db_close(made);
         return status;
@@ -90,31 +312,38 @@ static Status open_store(const char *directory, bool is_beside, Db **db, Problem
 }
 
 Status db_open(const char *directory, Db **db, Problem *problem) {
-    return open_store(directory, false, db, problem);
+    return db_open_at(directory, false, db, problem);
 }
 
 Status db_open_beside(const char *directory, Db **db, Problem *problem) {
-    return open_store(directory, true, db, problem);
+    return db_open_at(directory, true, db, problem);
 }
 
 void db_close(Db *db) {
     if (db == NULL)
         return;
-    writer_stop(db->writer);
+    if (db->is_writing) {
+        pthread_mutex_lock(&db->queue_lock);
+        db->is_stopping = true;
+        pthread_cond_signal(&db->wake);
+        pthread_mutex_unlock(&db->queue_lock);
+        pthread_join(db->writer, NULL);
+    }
     for (size_t i = 0; i < db->free_count; i++)
         sqlite_close(db->readers[i]);
     // The last one to close moves the journal into the database.
     sqlite_close(db->own);
     data_dir_unlock(db->lock_file);
-    material_memory_free(db->materials);
     record_memory_free(db->records);
+    pthread_cond_destroy(&db->wake);
+    pthread_mutex_destroy(&db->queue_lock);
     pthread_cond_destroy(&db->some);
     pthread_mutex_destroy(&db->lock);
     free(db);
 }
 
-const DbStats *db_totals(const Db *db) {
-    return writer_totals(db->writer);
+const DbStats *db_stats(const Db *db) {
+    return &db->stats;
 }
 
 // Writes the database's first page as it is.
@@ -130,7 +359,7 @@ static void db_probe_ended(void *context, Status status, const char *detail) {
 }
 
 bool db_is_writable(Db *db) {
-    if (!atomic_load(&db_totals(db)->is_failing))
+    if (!atomic_load(&db->stats.is_failing))
         return true;
     if (!atomic_exchange(&db->is_probing, true)) {
         db->probe.done = (WriteDone){db_probe_ended, db};
@@ -139,21 +368,8 @@ bool db_is_writable(Db *db) {
     return false;
 }
 
-Status db_write(Db *db, StoreApply *apply, const void *work, Problem *problem) {
-    return writer_do(db->writer, apply, work, problem);
-}
-
-void db_enqueue(Db *db, StoreApply *apply, const void *work, WritePriority priority,
-                PendingWrite *write) {
-    writer_enqueue(db->writer, apply, work, priority, write);
-}
-
 atomic_uint_fast64_t *db_evictions(Db *db) {
     return &db->evictions;
-}
-
-MaterialMemory *db_material_memory(Db *db) {
-    return db->materials;
 }
 
 RecordMemory *db_record_memory(Db *db) {
@@ -164,60 +380,72 @@ bool db_is_private(const Db *db) {
     return db->own == NULL;
 }
 
-uint64_t db_catalog_version(Db *db) {
-    return atomic_load(&db->catalog_version);
-}
-
-void db_catalog_changed(Db *db) {
-    atomic_fetch_add(&db->catalog_version, 1);
-}
-
-// Both only rise: their sum is the same only while both are.
-uint64_t db_audit_version(Db *db) {
-    return atomic_load(&db->catalog_version) + atomic_load(&db->measured);
-}
-
-void db_material_measured(Db *db) {
-    atomic_fetch_add(&db->measured, 1);
-}
-
-Sqlite *db_take(Db *db) {
-    pthread_mutex_lock(&db->lock);
-    while (db->free_count == 0)
-        pthread_cond_wait(&db->some, &db->lock);
-    Sqlite *database = db->readers[--db->free_count];
-    pthread_mutex_unlock(&db->lock);
-    return database;
-}
-
-void db_put(Db *db, Sqlite *database) {
-    pthread_mutex_lock(&db->lock);
-    db->readers[db->free_count++] = database;
-    pthread_cond_signal(&db->some);
-    pthread_mutex_unlock(&db->lock);
+Status db_read(Db *db, DbApply *apply, const void *work, Problem *problem) {
+    Sqlite *database = reader_take(db);
+    Status status = sqlite_execute(database, "BEGIN", problem);
+    if (status == STATUS_OK) {
+        status = apply(database, work, problem);
+        const Status ended = sqlite_execute(database, "COMMIT", NULL);
+        status = status == STATUS_OK ? ended : status;
+    }
+    reader_put(db, database);
+    return status;
 }
 
 Status db_first(Db *db, const char *sql, const SqlColumn *keys, const void *key,
                 const SqlColumn *columns, void *target, bool *is_found, Problem *problem) {
-    Sqlite *database = db_take(db);
+    Sqlite *database = reader_take(db);
     const Status status =
         sqlite_first(database, sql, keys, key, columns, target, is_found, problem);
-    db_put(db, database);
+    reader_put(db, database);
     return status;
+}
+
+Status db_get(Db *db, const char *sql, const QueryKey *key, const SqlColumn *columns, void *row,
+              size_t size, Problem *problem, const char *format, ...) {
+    bool is_found;
+    char missing[240];
+    va_list arguments;
+    memset(row, 0, size);
+    TRY(db_first(db, sql, query_key_columns, key, columns, row, &is_found, problem));
+    if (is_found)
+        return STATUS_OK;
+    va_start(arguments, format);
+    vsnprintf(missing, sizeof missing, format, arguments);
+    va_end(arguments);
+    return problem_set(problem, STATUS_NOT_FOUND, "%s", missing);
 }
 
 Status db_list(Db *db, const char *sql, const SqlColumn *keys, const void *key,
                const SqlColumn *columns, size_t size, void *list, Problem *problem) {
-    Sqlite *database = db_take(db);
+    Sqlite *database = reader_take(db);
     const Status status = sqlite_list(database, sql, keys, key, columns, size, list, problem);
-    db_put(db, database);
+    reader_put(db, database);
     return status;
 }
 
-const SqlColumn query_key_columns[] = {COLUMN(QueryKey, id),     COLUMN(QueryKey, name),
-                                       COLUMN(QueryKey, client), COLUMN(QueryKey, digest),
-                                       COLUMN(QueryKey, words),  COLUMN(QueryKey, before),
-                                       COLUMN(QueryKey, max),    COLUMN_END};
-const SqlColumn query_counts_columns[] = {COLUMN(QueryCounts, count), COLUMN(QueryCounts, bytes),
-                                          COLUMN(QueryCounts, results), COLUMN(QueryCounts, jobs),
-                                          COLUMN_END};
+// clang-format off
+const SqlColumn query_key_columns[] = {
+    COLUMN(QueryKey, id),
+    COLUMN(QueryKey, name),
+    COLUMN(QueryKey, slug),
+    COLUMN(QueryKey, client),
+    COLUMN(QueryKey, digest),
+    COLUMN(QueryKey, words),
+    COLUMN(QueryKey, before),
+    COLUMN(QueryKey, number),
+    COLUMN(QueryKey, max),
+    COLUMN(QueryKey, revisions),
+    COLUMN(QueryKey, reviews),
+    COLUMN(QueryKey, measurements),
+    COLUMN_END
+};
+
+const SqlColumn query_counts_columns[] = {
+    COLUMN(QueryCounts, count),
+    COLUMN(QueryCounts, bytes),
+    COLUMN(QueryCounts, results),
+    COLUMN(QueryCounts, jobs),
+    COLUMN_END
+};
+// clang-format on

@@ -38,25 +38,15 @@ typedef struct WriteDone {
 typedef struct Sqlite Sqlite;
 // Does one write on the writer's thread. It may be called again with the same `work` after the
 // first time was rolled back.
-typedef Status StoreApply(Sqlite *database, const void *work, Problem *problem);
+typedef Status DbApply(Sqlite *database, const void *work, Problem *problem);
 typedef struct PendingWrite {
     WriteDone done; // the owner's; all below is the writer's
     struct PendingWrite *next;
-    StoreApply *apply;
+    DbApply *apply;
     const void *work;
     Status status;
     char *detail;
 } PendingWrite;
-
-// Rises whenever a name in a scene may come to mean something else, or be warned of otherwise: a
-// material's head, a review, a record. A writer of those calls db_catalog_changed once it
-// is durable.
-uint64_t db_catalog_version(Db *db);
-void db_catalog_changed(Db *db);
-// Rises with that, and when a material was measured: its version is another one then, what its name
-// means is not.
-uint64_t db_audit_version(Db *db);
-void db_material_measured(Db *db);
 
 // What was written since the start; counted on.
 typedef struct DbStats {
@@ -64,7 +54,7 @@ typedef struct DbStats {
     Histogram commits;      // transactions, from their beginning until they are durable
     atomic_bool is_failing; // the last transaction could not be made durable
 } DbStats;
-const DbStats *db_totals(const Db *db);
+const DbStats *db_stats(const Db *db);
 // Whether the last transaction was made durable; if not, another one is tried meanwhile, so that a
 // later call knows whether the cause has gone. Does not wait.
 bool db_is_writable(Db *db);

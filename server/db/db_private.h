@@ -1,38 +1,31 @@
-// What the files of the tables need of the database: its one writer and its readers.
+// What the files of the tables share: the one writer, the readers, and rows within a transaction.
 #ifndef SERVER_DB_DB_PRIVATE_H
 #define SERVER_DB_DB_PRIVATE_H
 
 #include <stdatomic.h>
 
 #include "server/db/db.h"
+#include "server/db/materials.h"
 #include "server/db/sqlite.h"
+
+// Makes `directory` and what is missing above it, for this user alone. STATUS_FORBIDDEN where every
+// user may replace files in it.
+Status data_dir_make(const char *directory, Problem *problem);
+// The same, and locks it. *lock is to be given to data_dir_unlock. STATUS_CONFLICT if another
+// process has it.
+Status data_dir_lock(const char *directory, int *lock, Problem *problem);
+void data_dir_unlock(int lock); // below 0: nothing
+// Makes new names in `directory` durable.
+Status data_dir_sync(const char *directory, Problem *problem);
 
 // Runs `apply` within the next transaction and returns when that is durable, or with its error; a
 // failed apply leaves no trace.
-Status db_write(Db *db, StoreApply *apply, const void *work, Problem *problem);
-
+Status db_write(Db *db, DbApply *apply, const void *work, Problem *problem);
 // The same without waiting: write->done is set, `work` is borrowed.
-void db_enqueue(Db *db, StoreApply *apply, const void *work, WritePriority priority,
+void db_enqueue(Db *db, DbApply *apply, const void *work, WritePriority priority,
                 PendingWrite *write);
-
-atomic_uint_fast64_t *db_evictions(Db *db); // of series
-
-typedef struct MaterialMemory MaterialMemory; // cached revisions of materials
-MaterialMemory *material_memory_new(void);    // NULL without memory
-void material_memory_free(MaterialMemory *memory);
-MaterialMemory *db_material_memory(Db *db);
-
-typedef struct RecordMemory RecordMemory; // samples of records, each once
-RecordMemory *record_memory_new(void);    // NULL without memory
-void record_memory_free(RecordMemory *memory);
-// Adds it, or frees it where the same record is there already; returns a reference to that.
-struct NamedRecord *record_memory_add(RecordMemory *memory, uint64_t catalog_version,
-                                      struct NamedRecord *named);
-RecordMemory *db_record_memory(Db *db);
-
-// A connection for reading, to be returned soon: there are few. Waits for one.
-Sqlite *db_take(Db *db);
-void db_put(Db *db, Sqlite *database);
+// Runs `apply` within a transaction of a reader, so that all it reads is of one moment.
+Status db_read(Db *db, DbApply *apply, const void *work, Problem *problem);
 
 // sqlite_first and sqlite_list on a reader's connection.
 Status db_first(Db *db, const char *sql, const SqlColumn *keys, const void *key,
@@ -42,9 +35,10 @@ Status db_list(Db *db, const char *sql, const SqlColumn *keys, const void *key,
 
 // What queries are asked by; each uses the members that its text names.
 typedef struct QueryKey {
-    const char *id, *name, *client, *digest, *words;
+    const char *id, *name, *slug, *client, *digest, *words;
     int64_t before;
-    uint64_t max;
+    uint64_t number, max;
+    int64_t revisions, reviews, measurements; // MaterialMoment
 } QueryKey;
 extern const SqlColumn query_key_columns[];
 // And numbers that come back.
@@ -52,11 +46,51 @@ typedef struct QueryCounts {
     uint64_t count, bytes, results, jobs;
 } QueryCounts;
 extern const SqlColumn query_counts_columns[];
+// The first row of a query into `row` of `size` bytes, which is zeroed before. Without one
+// STATUS_NOT_FOUND, of which the format says what is missing.
+__attribute__((format(printf, 8, 9))) Status db_get(Db *db, const char *sql, const QueryKey *key,
+                                                    const SqlColumn *columns, void *row,
+                                                    size_t size, Problem *problem,
+                                                    const char *format, ...);
 
-// Within a transaction: all that changes of a job, or the whole of it where it is_unsaved.
-// STATUS_NOT_FOUND.
+atomic_uint_fast64_t *db_evictions(Db *db); // of series
+
+typedef struct RecordMemory RecordMemory; // samples of records, each once
+RecordMemory *record_memory_new(void);    // NULL without memory
+void record_memory_free(RecordMemory *memory);
+RecordMemory *db_record_memory(Db *db);
+// Adds it, or frees it where the same record is there already; returns a reference to that.
+struct NamedRecord *record_memory_add(RecordMemory *memory, struct NamedRecord *named);
+
+// Within a transaction:
+
+// All that changes of a job, or the whole of it where it is_unsaved. STATUS_NOT_FOUND.
 Status job_row_save(Sqlite *database, const JobRow *row, Problem *problem);
-// Within a transaction: runs `sql` with each of the lines as :name.
+// Runs `sql` with each of the lines as :name.
 Status use_lines_add(Sqlite *database, const char *sql, const char *lines, Problem *problem);
+
+const SqlColumn *material_revision_columns(void);
+extern const SqlColumn material_review_columns[], material_measurement_columns[];
+
+// A material; all zero if it does not exist.
+typedef struct MaterialKey {
+    int64_t number;
+    uint64_t latest, version, measurements;
+    char status[16], author[72]; // of the revision asked for; "": there is none, or unknown
+} MaterialKey;
+Status material_key_find(Sqlite *database, const char *slug, uint64_t revision, MaterialKey *key,
+                         Problem *problem);
+
+// Each adds a row without validation and without an audit entry. The material exists, except for
+// the first. STATUS_LIMIT.
+Status material_row_add(Sqlite *database, const char *slug, Problem *problem);
+Status material_revision_add(Sqlite *database, const MaterialRevision *revision, Problem *problem);
+Status material_review_add(Sqlite *database, const MaterialReview *review, Problem *problem);
+Status material_measurement_add(Sqlite *database, const MaterialMeasurement *measurement,
+                                Problem *problem);
+Status audit_entry_add(Sqlite *database, const AuditEntry *entry, Problem *problem);
+
+// Reads revision->lists into the lists of its material. STATUS_INTERNAL: it is damaged.
+Status material_lists_read(MaterialRevision *revision, Problem *problem);
 
 #endif

@@ -6,7 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/db/db.h"
 #include "server/db/db_private.h"
 #include "server/util/bytes.h"
 
@@ -46,9 +45,7 @@ void job_rows_clear(JobRows *rows) {
     rows_clear(job_columns, sizeof *rows->at, rows);
 }
 
-static Status job_not_found(const char *id, Problem *problem) {
-    return problem_set(problem, STATUS_NOT_FOUND, "there is no job \"%.40s\"", id);
-}
+static const char no_job[] = "there is no job \"%.40s\"";
 
 static const char insert_sql[] = "INSERT INTO jobs {insert}";
 
@@ -86,7 +83,7 @@ Status job_row_save(Sqlite *database, const JobRow *row, Problem *problem) {
     if (row->is_unsaved)
         return job_insert(database, upsert_sql, row, problem);
     TRY(sqlite_change(database, update_sql, job_columns, row, &changes, problem));
-    return changes > 0 ? STATUS_OK : job_not_found(row->id, problem);
+    return changes > 0 ? STATUS_OK : problem_set(problem, STATUS_NOT_FOUND, no_job, row->id);
 }
 
 static Status job_apply_save(Sqlite *database, const void *work, Problem *problem) {
@@ -123,7 +120,7 @@ static Status job_apply_annotate(Sqlite *database, const void *work, Problem *pr
     const JobNotes *notes = work;
     int changes;
     TRY(sqlite_change(database, sql, notes_columns, notes, &changes, problem));
-    return changes > 0 ? STATUS_OK : job_not_found(notes->id, problem);
+    return changes > 0 ? STATUS_OK : problem_set(problem, STATUS_NOT_FOUND, no_job, notes->id);
 }
 
 Status db_job_annotate(Db *db, const JobNotes *notes, Problem *problem) {
@@ -132,28 +129,21 @@ Status db_job_annotate(Db *db, const JobNotes *notes, Problem *problem) {
 
 Status db_job_load(Db *db, const char *id, JobRow *row, Problem *problem) {
     static const char sql[] = "SELECT {head} FROM jobs WHERE id = :id";
-    const QueryKey key = {.id = id};
-    bool is_found;
-    memset(row, 0, sizeof *row);
-    TRY(db_first(db, sql, query_key_columns, &key, job_columns, row, &is_found, problem));
-    return is_found ? STATUS_OK : job_not_found(id, problem);
+    return db_get(db, sql, &(QueryKey){.id = id}, job_columns, row, sizeof *row, problem, no_job,
+                  id);
 }
 
 Status db_job_scene(Db *db, const char *id, char **scene, Problem *problem) {
     static const char sql[] = "SELECT result, scene FROM jobs WHERE id = :id";
-    JobRow row = {.scene = NULL};
+    JobRow row;
     ResultRow result;
-    bool is_found;
     *scene = NULL;
-    TRY(db_first(db, sql, query_key_columns, &(QueryKey){.id = id}, job_columns, &row, &is_found,
-                 problem));
-    if (!is_found)
-        return job_not_found(id, problem);
-    *scene = row.scene;
-    if (row.scene[0] != '\0')
+    TRY(db_get(db, sql, &(QueryKey){.id = id}, job_columns, &row, sizeof row, problem, no_job, id));
+    if (row.scene[0] != '\0') {
+        *scene = row.scene;
         return STATUS_OK;
+    }
     free(row.scene);
-    *scene = NULL;
     const Status status = db_result_scene(db, row.result, &result, problem);
     if (status == STATUS_NOT_FOUND) {
         problem_clear(problem);
@@ -172,11 +162,8 @@ Status db_job_keyed(Db *db, const char *client, const char *key, JobRow *row, Pr
     static const char sql[] = "SELECT {head}, request FROM jobs "
                               "WHERE idempotency_key = :name AND coalesce(client, '') = :client";
     const QueryKey asked = {.client = client != NULL ? client : "", .name = key};
-    bool is_found;
-    memset(row, 0, sizeof *row);
-    TRY(db_first(db, sql, query_key_columns, &asked, job_columns, row, &is_found, problem));
-    return is_found ? STATUS_OK
-                    : problem_set(problem, STATUS_NOT_FOUND, "there is no job of that key");
+    return db_get(db, sql, &asked, job_columns, row, sizeof *row, problem,
+                  "there is no job of that key");
 }
 
 Status db_ids_with_prefix(Db *db, const char *prefix, size_t max, JobRows *rows, Problem *problem) {
@@ -305,7 +292,7 @@ static Status search_find_place(Db *db, const JobSearch *search, Asked *asked, P
     if (is_found)
         return STATUS_OK;
     if (search->before_unix_ms < 0)
-        return job_not_found(search->before, problem);
+        return problem_set(problem, STATUS_NOT_FOUND, no_job, search->before);
     // It was deleted between two pages: its place is its time of arrival.
     asked->before_ms = search->before_unix_ms;
     asked->before_number = 0;

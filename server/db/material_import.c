@@ -9,7 +9,7 @@
 #include <string.h>
 
 #include "core/base/json_pointer.h"
-#include "server/db/material_rows.h"
+#include "server/db/db_private.h"
 #include "server/json/schema.h"
 
 enum { POINTER_SIZE = sizeof((Fault){0}.pointer) };
@@ -144,6 +144,16 @@ static Status import_validate_number(const ImportContext *context, const ImportR
 
 // Measurements.
 
+static Status measurement_load(const ImportContext *context, uint64_t number,
+                               MaterialMeasurement *stored, Problem *problem) {
+    static const char sql[] =
+        "SELECT t.* FROM materials m JOIN material_measurements t ON t.material = m.number "
+        "WHERE m.slug = :slug AND t.measurement = :number";
+    const QueryKey key = {.slug = context->slug, .number = number};
+    return sqlite_first(context->database, sql, query_key_columns, &key,
+                        material_measurement_columns, stored, NULL, problem);
+}
+
 // One that has a document. Sorted by document, in a document those with a number first.
 typedef struct IndexEntry {
     const ImportRow *row;
@@ -183,26 +193,15 @@ static IndexEntry *index_find(const MeasurementIndex *index, const char *documen
 // Finds stored measurements by their documents: one pass, whatever the size of the file.
 static Status index_read_stored(const ImportContext *context, MeasurementIndex *index,
                                 Problem *problem) {
-    static const char sql[] =
-        "SELECT t.* FROM materials m JOIN material_measurements t ON t.material = m.number "
-        "WHERE m.slug = :slug AND t.measurement > :number ORDER BY t.measurement";
-    const MaterialRowKey key = {.slug = (char *)context->slug};
-    Statement *statement;
-    bool has_row = true;
-    Status status = statement_begin(context->database, sql, material_row_key_columns, &key,
-                                    &statement, problem);
-    while (status == STATUS_OK && has_row) {
+    for (uint64_t number = 1; number <= context->key.measurements; number++) {
         MaterialMeasurement stored = {0};
-        status = statement_step(statement, &has_row, problem);
-        if (status == STATUS_OK && has_row)
-            status = row_read(statement, material_measurement_columns, &stored, problem);
+        TRY(measurement_load(context, number, &stored, problem));
         IndexEntry *entry = stored.document != NULL ? index_find(index, stored.document) : NULL;
         if (entry != NULL)
             entry->is_stored = true;
         material_measurement_clear(&stored);
     }
-    statement_end(statement);
-    return status;
+    return STATUS_OK;
 }
 
 // The same test again without a number was copied twice. Cleared by free(index->at) in any case.
@@ -233,15 +232,9 @@ static Status index_make(const ImportContext *context, MeasurementIndex *index, 
 }
 
 static Status measurement_compare(ImportContext *context, const ImportRow *row, Problem *problem) {
-    static const char sql[] =
-        "SELECT t.* FROM materials m JOIN material_measurements t ON t.material = m.number "
-        "WHERE m.slug = :slug AND t.measurement = :number";
-    const MaterialRowKey key = {.slug = (char *)context->slug, .number = row->number};
     MaterialMeasurement stored = {0};
-    bool is_found;
     const size_t faults = context->faults->count;
-    TRY(sqlite_first(context->database, sql, material_row_key_columns, &key,
-                     material_measurement_columns, &stored, &is_found, problem));
+    TRY(measurement_load(context, row->number, &stored, problem));
     import_compare_origin(context, row, stored.author, stored.comment, stored.created_unix_ms);
     if (row->document != NULL && !text_same(row->document, stored.document))
         (void)import_fault(context, row->place, "test",
@@ -393,13 +386,13 @@ static Status import_reviews(ImportContext *context, const ImportRow *row,
     static const char sql[] =
         "SELECT v.* FROM materials m JOIN material_reviews v ON v.material = m.number "
         "WHERE m.slug = :slug AND v.revision = :number ORDER BY v.number";
-    const MaterialRowKey key = {.slug = (char *)context->slug, .number = revision->revision};
+    const QueryKey key = {.slug = context->slug, .number = revision->revision};
     MaterialReviews stored = {0};
     if (row->reviews.count == 0)
         return STATUS_OK;
     Status status = STATUS_OK;
     if (revision->revision <= context->key.latest)
-        status = sqlite_list(context->database, sql, material_row_key_columns, &key,
+        status = sqlite_list(context->database, sql, query_key_columns, &key,
                              material_review_columns, sizeof *stored.at, &stored, problem);
     if (status == STATUS_OK)
         status = reviews_match(context, row, revision, &stored, problem);
@@ -414,10 +407,10 @@ static Status revision_load(const ImportContext *context, uint64_t number,
     static const char sql[] =
         "SELECT m.slug, r.* FROM materials m JOIN material_revisions r ON r.material = m.number "
         "WHERE m.slug = :slug AND r.revision = :number";
-    const MaterialRowKey key = {.slug = (char *)context->slug, .number = number};
+    const QueryKey key = {.slug = context->slug, .number = number};
     bool is_found;
-    TRY(sqlite_first(context->database, sql, material_row_key_columns, &key,
-                     material_revision_columns(), revision, &is_found, problem));
+    TRY(sqlite_first(context->database, sql, query_key_columns, &key, material_revision_columns(),
+                     revision, &is_found, problem));
     return material_lists_read(revision, problem);
 }
 
@@ -673,25 +666,13 @@ static Status import_run(ImportContext *context, Problem *problem) {
                        context->denied_why, context->denied - 1);
 }
 
-static Status import_write(Sqlite *database, const void *work, Problem *problem) {
+static Status import_apply(Sqlite *database, const void *work, Problem *problem) {
     ImportContext context = *(const ImportContext *)work; // it may run again
     context.database = database;
-    problem_clear(context.faults);
+    if (context.writes)
+        problem_clear(context.faults);
     *context.tally = (ImportTally){0};
     return import_run(&context, problem);
-}
-
-// Within one read transaction, so that all of it sees the same state.
-static Status import_validate(Db *db, ImportContext *context, Problem *problem) {
-    static const char begin[] = "BEGIN", end[] = "COMMIT";
-    context->database = db_take(db);
-    Status status = sqlite_change(context->database, begin, NULL, NULL, NULL, problem);
-    if (status == STATUS_OK) {
-        status = import_run(context, problem);
-        (void)sqlite_change(context->database, end, NULL, NULL, NULL, NULL);
-    }
-    db_put(db, context->database);
-    return status;
 }
 
 static int import_order(const void *a, const void *b) {
@@ -733,12 +714,7 @@ Status db_material_import(Db *db, MaterialImport *import, bool is_dry, ImportTal
     import_validate_unnumbered(import, problem);
     ImportContext context = {.import = import, .tally = tally, .faults = problem};
     if (is_dry || problem->count > 0)
-        return import_validate(db, &context, problem);
+        return db_read(db, import_apply, &context, problem);
     context.writes = true;
-    TRY(db_write(db, import_write, &context, problem));
-    if (tally->revisions.added + tally->reviews.added > 0)
-        db_catalog_changed(db);
-    else if (tally->measurements.added > 0)
-        db_material_measured(db);
-    return STATUS_OK;
+    return db_write(db, import_apply, &context, problem);
 }

@@ -3,44 +3,47 @@
 #include "server/db/materials.h"
 
 #include <pthread.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/db/material_rows.h"
+#include "server/db/db_private.h"
 #include "server/json/encode.h"
 #include "server/json/parse.h"
-#include "server/util/hashmap.h"
 
 // Columns. Those of a revision that are the material's are made of its Field rows; its lists are
 // one column.
 
 // clang-format off
+#define OF_SLUG COLUMN_WRITE("material", "(SELECT number FROM materials WHERE slug = :slug)")
+#define CHECKED(Type, member) COLUMN_WITH(Type, member, COLUMN_CHECKED)
+#define NUMBER_OR_NULL(Type, member, flags_) {.name = #member, .kind = COLUMN_COUNT, .flags = flags_, \
+    .offset = offsetof(Type, member), .size = sizeof(uint64_t), .write = "nullif(:" #member ", 0)"}
+
 static const SqlColumn revision_own_columns[] = {
-    COLUMN(MaterialRevision, slug),
-    COLUMN(MaterialRevision, revision),
-    COLUMN(MaterialRevision, lists),
-    COLUMN(MaterialRevision, reverts),
-    COLUMN(MaterialRevision, author),
-    COLUMN(MaterialRevision, comment),
-    COLUMN(MaterialRevision, created_unix_ms),
-    COLUMN(MaterialRevision, status),
-    COLUMN(MaterialRevision, reason),
-    COLUMN(MaterialRevision, reviewer),
-    COLUMN(MaterialRevision, reviewed_unix_ms),
-    COLUMN(MaterialRevision, latest),
-    COLUMN(MaterialRevision, version),
+    OF_SLUG,
+    COLUMN_READ(MaterialRevision, slug, "slug"),
+    CHECKED(MaterialRevision, revision),
+    CHECKED(MaterialRevision, lists),
+    NUMBER_OR_NULL(MaterialRevision, reverts, COLUMN_CHECKED),
+    CHECKED(MaterialRevision, author),
+    CHECKED(MaterialRevision, comment),
+    CHECKED(MaterialRevision, created_unix_ms),
+    COLUMN_READ(MaterialRevision, status, "status"),
+    COLUMN_READ(MaterialRevision, reason, "reason"),
+    COLUMN_READ(MaterialRevision, reviewer, "reviewer"),
+    COLUMN_READ(MaterialRevision, reviewed_unix_ms, "reviewed_unix_ms"),
+    COLUMN_READ(MaterialRevision, latest, "latest"),
+    COLUMN_READ(MaterialRevision, version, "version"),
     COLUMN_END
 };
 // clang-format on
 static SqlColumn revision_columns[40];
-static char revision_insert[1600];
 
 static void revision_columns_make(void) {
-    char names[600] = "", values[600] = "", value[64];
     SqlColumn *column = revision_columns;
     for (const Field *field = material_fields; field->kind != FIELD_KIND_END; field++) {
         *column = (SqlColumn){.name = field->name,
+                              .flags = COLUMN_CHECKED,
                               .offset = offsetof(MaterialRevision, material) + field->offset};
         if (field->kind == FIELD_KIND_TEXT) {
             column->kind = COLUMN_TEXT;
@@ -54,17 +57,9 @@ static void revision_columns_make(void) {
         } else {
             continue;
         }
-        snprintf(value, sizeof value, ":%s", field->name);
-        text_list(names, sizeof names, field->name);
-        text_list(values, sizeof values, value);
         column++;
     }
     memcpy(column, revision_own_columns, sizeof revision_own_columns);
-    snprintf(revision_insert, sizeof revision_insert,
-             "INSERT INTO material_revisions (material, revision, lists, reverts, author, comment, "
-             "created_unix_ms, %s) SELECT number, :revision, :lists, nullif(:reverts, 0), :author, "
-             ":comment, :created_unix_ms, %s FROM materials WHERE slug = :slug",
-             names, values);
 }
 
 const SqlColumn *material_revision_columns(void) {
@@ -75,7 +70,8 @@ const SqlColumn *material_revision_columns(void) {
 
 // clang-format off
 const SqlColumn material_review_columns[] = {
-    COLUMN(MaterialReview, slug),
+    OF_SLUG,
+    COLUMN_READ(MaterialReview, slug, "slug"),
     COLUMN(MaterialReview, revision),
     COLUMN(MaterialReview, status),
     COLUMN(MaterialReview, reason),
@@ -85,23 +81,30 @@ const SqlColumn material_review_columns[] = {
 };
 
 const SqlColumn material_measurement_columns[] = {
-    COLUMN(MaterialMeasurement, slug),
-    COLUMN(MaterialMeasurement, measurement),
-    COLUMN(MaterialMeasurement, author),
-    COLUMN(MaterialMeasurement, comment),
-    COLUMN(MaterialMeasurement, created_unix_ms),
-    COLUMN(MaterialMeasurement, document),
-    COLUMN(MaterialMeasurement, drops),
-    COLUMN(MaterialMeasurement, traces),
+    OF_SLUG,
+    COLUMN_READ(MaterialMeasurement, slug, "slug"),
+    CHECKED(MaterialMeasurement, measurement),
+    CHECKED(MaterialMeasurement, author),
+    CHECKED(MaterialMeasurement, comment),
+    CHECKED(MaterialMeasurement, created_unix_ms),
+    CHECKED(MaterialMeasurement, document),
+    {.name = "drops", .kind = COLUMN_COUNT, .offset = offsetof(MaterialMeasurement, drops),
+     .write = "coalesce(json_array_length(:document, '$.drops'), 0)"},
+    {.name = "traces", .kind = COLUMN_COUNT, .offset = offsetof(MaterialMeasurement, traces),
+     .write = "coalesce(json_array_length(:document, '$.traces'), 0)"},
+    COLUMN_WRITE("head", "json_remove(:document, '$.drops', '$.traces')"),
     COLUMN_END
 };
 
 static const SqlColumn audit_columns[] = {
-    COLUMN(AuditEntry, slug),
-    COLUMN(AuditEntry, version),
+    OF_SLUG,
+    COLUMN_READ(AuditEntry, slug, "slug"),
+    {.name = "version", .kind = COLUMN_COUNT, .offset = offsetof(AuditEntry, version),
+     .write = "1 + (SELECT coalesce(max(t.version), 0) FROM material_trail t JOIN materials m ON "
+              "m.number = t.material WHERE m.slug = :slug)"},
     COLUMN(AuditEntry, action),
-    COLUMN(AuditEntry, revision),
-    COLUMN(AuditEntry, measurement),
+    NUMBER_OR_NULL(AuditEntry, revision, 0),
+    NUMBER_OR_NULL(AuditEntry, measurement, 0),
     COLUMN(AuditEntry, who),
     COLUMN(AuditEntry, why),
     COLUMN(AuditEntry, created_unix_ms),
@@ -127,16 +130,6 @@ static const SqlColumn material_key_columns[] = {
     COLUMN(MaterialKey, author),
     COLUMN_END
 };
-
-const SqlColumn material_row_key_columns[] = {
-    COLUMN(MaterialRowKey, slug),
-    COLUMN(MaterialRowKey, number),
-    COLUMN(MaterialRowKey, max),
-    COLUMN_OF(MaterialRowKey, moment.revisions, "revisions", 0, NULL),
-    COLUMN_OF(MaterialRowKey, moment.reviews, "reviews", 0, NULL),
-    COLUMN_OF(MaterialRowKey, moment.measurements, "measurements", 0, NULL),
-    COLUMN_END
-};
 // clang-format on
 
 // SQLite's integers have a sign; no number is beyond them.
@@ -144,9 +137,8 @@ static uint64_t integer_max(uint64_t number) {
     return number > INT64_MAX ? INT64_MAX : number;
 }
 
-static MaterialRowKey key_of(const char *slug, uint64_t number, size_t max) {
-    return (MaterialRowKey){
-        .slug = (char *)slug, .number = integer_max(number), .max = integer_max(max)};
+static QueryKey key_of(const char *slug, uint64_t number, size_t max) {
+    return (QueryKey){.slug = slug, .number = integer_max(number), .max = integer_max(max)};
 }
 
 void material_revision_clear(MaterialRevision *revision) {
@@ -213,106 +205,32 @@ Status material_lists_read(MaterialRevision *revision, Problem *problem) {
     return status;
 }
 
-// Cache of the revisions that scenes name, as long as the catalog does not change: 2 us instead of
-// 27 us, and of a material with thousands of revisions milliseconds. Lists are texts in it.
-
-enum { CACHE_BYTES = 256 << 10 };
-
-struct MaterialMemory {
-    pthread_mutex_t lock;
-    uint64_t version; // of the audit log
-    Lru *lru;
-};
-
-typedef struct CachedRevision {
-    LruEntry entry;
-    char key[96]; // "SLUG@REVISION"; the head is revision 0
-    MaterialRevision revision;
-} CachedRevision;
-
-static void cached_revision_free(LruEntry *entry, void *owner, bool is_evicted) {
-    CachedRevision *cached = (CachedRevision *)entry;
-    (void)owner;
-    (void)is_evicted;
-    material_revision_clear(&cached->revision);
-    free(cached);
-}
-
-MaterialMemory *material_memory_new(void) {
-    MaterialMemory *memory = calloc(1, sizeof *memory);
-    if (memory == NULL)
-        return NULL;
-    pthread_mutex_init(&memory->lock, NULL);
-    memory->lru = lru_new(CACHE_BYTES, cached_revision_free, NULL);
-    if (memory->lru != NULL)
-        return memory;
-    material_memory_free(memory);
-    return NULL;
-}
-
-void material_memory_free(MaterialMemory *memory) {
-    if (memory == NULL)
-        return;
-    lru_free(memory->lru);
-    pthread_mutex_destroy(&memory->lock);
-    free(memory);
-}
-
-// A copy, of the same version.
-static bool material_memory_find(MaterialMemory *memory, uint64_t version, const char *key,
-                                 MaterialRevision *revision) {
-    pthread_mutex_lock(&memory->lock);
-    const CachedRevision *cached = version == memory->version ? lru_find(memory->lru, key) : NULL;
-    const bool is_found = cached != NULL && row_copy(material_revision_columns(), &cached->revision,
-                                                     revision, sizeof *revision);
-    pthread_mutex_unlock(&memory->lock);
-    return is_found;
-}
-
-// Adds a copy; `version` was read before the revision.
-static void material_memory_add(MaterialMemory *memory, uint64_t version, const char *key,
-                                const MaterialRevision *revision) {
-    CachedRevision *cached = calloc(1, sizeof *cached);
-    if (cached == NULL)
-        return;
-    snprintf(cached->key, sizeof cached->key, "%s", key);
-    cached->entry.indexed.key = cached->key;
-    cached->entry.bytes =
-        sizeof *cached + (revision->lists != NULL ? strlen(revision->lists) : 0) + 1000;
-    pthread_mutex_lock(&memory->lock);
-    if (version > memory->version) {
-        lru_clear(memory->lru);
-        memory->version = version;
-    }
-    if (version == memory->version &&
-        row_copy(material_revision_columns(), revision, &cached->revision, sizeof cached->revision))
-        lru_add(memory->lru, &cached->entry);
-    else
-        free(cached);
-    pthread_mutex_unlock(&memory->lock);
-}
-
 // Reading.
 
-static const char head_sql[] =
-    "SELECT * FROM material_states WHERE slug = :slug AND status <> 'deprecated' "
-    "ORDER BY status = 'approved' DESC, revision DESC LIMIT 1";
-static const char revision_sql[] =
-    "SELECT * FROM material_states WHERE slug = :slug AND revision = :number";
+// Not by the view: SQLite would make all its rows for the join.
+static const char key_sql[] =
+    "SELECT m.number, "
+    "(SELECT coalesce(max(revision), 0) FROM material_revisions r WHERE r.material = m.number) "
+    "AS latest, "
+    "(SELECT coalesce(max(version), 0) FROM material_trail t WHERE t.material = m.number) AS "
+    "version, "
+    "(SELECT coalesce(max(measurement), 0) FROM material_measurements t WHERE t.material = "
+    "m.number) AS measurements, "
+    "coalesce((SELECT coalesce((SELECT status FROM material_reviews v WHERE v.material = "
+    "m.number AND v.revision = :number ORDER BY v.number DESC LIMIT 1), 'draft') FROM "
+    "material_revisions r WHERE r.material = m.number AND r.revision = :number), '') AS "
+    "status, "
+    "coalesce((SELECT author FROM material_revisions r WHERE r.material = m.number AND "
+    "r.revision = :number), '') AS author "
+    "FROM materials m WHERE m.slug = :slug";
 
-static Status error_no_material(const char *slug, Problem *problem) {
-    return problem_set(problem, STATUS_NOT_FOUND, "there is no material \"%.64s\"", slug);
-}
+static const char no_material[] = "there is no material \"%.64s\"";
 
 Status db_material_state(Db *db, const char *slug, MaterialState *state, Problem *problem) {
     MaterialKey key;
     *state = (MaterialState){0};
-    Sqlite *database = db_take(db);
-    const Status status = material_key_find(database, slug, 0, &key, problem);
-    db_put(db, database);
-    TRY(status);
-    if (key.number == 0)
-        return error_no_material(slug, problem);
+    TRY(db_get(db, key_sql, &(QueryKey){.slug = slug}, material_key_columns, &key, sizeof key,
+               problem, no_material, slug));
     *state = (MaterialState){key.latest, key.version, key.measurements};
     return STATUS_OK;
 }
@@ -332,21 +250,21 @@ static Status error_no_revision(Db *db, const char *slug, uint64_t revision, Pro
 
 Status db_material(Db *db, const char *slug, uint64_t revision, MaterialRevision *material,
                    Problem *problem) {
-    const MaterialRowKey key = key_of(slug, revision, 0);
-    MaterialMemory *memory = db_material_memory(db);
-    const uint64_t version = db_audit_version(db);
-    char name[96];
+    // Two walks down the revisions, which end at the first that is found.
+    static const char head_sql[] =
+        "SELECT * FROM material_states WHERE slug = :slug AND revision = coalesce((SELECT revision "
+        "FROM material_states WHERE slug = :slug AND status = 'approved' ORDER BY revision DESC "
+        "LIMIT 1), (SELECT revision FROM material_states WHERE slug = :slug AND status = 'draft' "
+        "ORDER BY revision DESC LIMIT 1))";
+    static const char revision_sql[] =
+        "SELECT * FROM material_states WHERE slug = :slug AND revision = :number";
+    const QueryKey key = key_of(slug, revision, 0);
     bool is_found;
     memset(material, 0, sizeof *material);
-    snprintf(name, sizeof name, "%.64s@%llu", slug, (unsigned long long)revision);
-    if (!material_memory_find(memory, version, name, material)) {
-        TRY(db_first(db, revision == 0 ? head_sql : revision_sql, material_row_key_columns, &key,
-                     material_revision_columns(), material, &is_found, problem));
-        if (!is_found)
-            return error_no_revision(db, slug, revision, problem);
-        material_memory_add(memory, version, name, material);
-    }
-    return material_lists_read(material, problem);
+    TRY(db_first(db, revision == 0 ? head_sql : revision_sql, query_key_columns, &key,
+                 material_revision_columns(), material, &is_found, problem));
+    return is_found ? material_lists_read(material, problem)
+                    : error_no_revision(db, slug, revision, problem);
 }
 
 Status db_material_slugs(Db *db, Texts *slugs, Problem *problem) {
@@ -354,9 +272,9 @@ Status db_material_slugs(Db *db, Texts *slugs, Problem *problem) {
     return db_list(db, sql, NULL, NULL, slug_columns, sizeof *slugs->at, slugs, problem);
 }
 
-static Status db_revisions(Db *db, const char *sql, const MaterialRowKey *key,
+static Status db_revisions(Db *db, const char *sql, const QueryKey *key,
                            MaterialRevisions *revisions, Problem *problem) {
-    Status status = db_list(db, sql, material_row_key_columns, key, material_revision_columns(),
+    Status status = db_list(db, sql, query_key_columns, key, material_revision_columns(),
                             sizeof *revisions->at, revisions, problem);
     for (size_t i = 0; i < revisions->count && status == STATUS_OK; i++)
         status = material_lists_read(&revisions->at[i], problem);
@@ -372,7 +290,7 @@ Status db_material_heads(Db *db, const char *after, size_t max, MaterialRevision
         "s.revision = (SELECT h.revision FROM material_states h WHERE h.material = m.number ORDER "
         "BY h.status = 'approved' DESC, h.status = 'draft' DESC, h.revision DESC LIMIT 1) WHERE "
         "m.slug > :slug ORDER BY m.slug LIMIT :max";
-    const MaterialRowKey key = key_of(after, 0, max);
+    const QueryKey key = key_of(after, 0, max);
     return db_revisions(db, sql, &key, materials, problem);
 }
 
@@ -380,7 +298,7 @@ Status db_material_page(Db *db, const char *slug, uint64_t before, size_t max,
                         MaterialRevisions *revisions, Problem *problem) {
     static const char sql[] = "SELECT * FROM material_states WHERE slug = :slug AND revision < "
                               ":number ORDER BY revision DESC LIMIT :max";
-    const MaterialRowKey key = key_of(slug, before, max);
+    const QueryKey key = key_of(slug, before, max);
     return db_revisions(db, sql, &key, revisions, problem);
 }
 
@@ -389,15 +307,10 @@ Status db_material_measurement(Db *db, const char *slug, uint64_t number,
     static const char sql[] =
         "SELECT m.slug, t.* FROM material_measurements t JOIN materials m ON m.number = t.material "
         "WHERE m.slug = :slug AND t.measurement = :number";
-    const MaterialRowKey key = key_of(slug, number, 0);
-    bool is_found;
-    memset(measurement, 0, sizeof *measurement);
-    TRY(db_first(db, sql, material_row_key_columns, &key, material_measurement_columns, measurement,
-                 &is_found, problem));
-    return is_found ? STATUS_OK
-                    : problem_set(problem, STATUS_NOT_FOUND,
-                                  "the material \"%.64s\" has no measurement %llu", slug,
-                                  (unsigned long long)number);
+    const QueryKey key = key_of(slug, number, 0);
+    return db_get(db, sql, &key, material_measurement_columns, measurement, sizeof *measurement,
+                  problem, "the material \"%.64s\" has no measurement %llu", slug,
+                  (unsigned long long)number);
 }
 
 Status db_measurement_heads(Db *db, const char *slug, uint64_t before, size_t max,
@@ -406,8 +319,8 @@ Status db_measurement_heads(Db *db, const char *slug, uint64_t before, size_t ma
         "SELECT m.slug, t.measurement, t.author, t.comment, t.created_unix_ms, t.head AS document, "
         "t.drops, t.traces FROM material_measurements t JOIN materials m ON m.number = t.material "
         "WHERE m.slug = :slug AND t.measurement < :number ORDER BY t.measurement DESC LIMIT :max";
-    const MaterialRowKey key = key_of(slug, before, max);
-    return db_list(db, sql, material_row_key_columns, &key, material_measurement_columns,
+    const QueryKey key = key_of(slug, before, max);
+    return db_list(db, sql, query_key_columns, &key, material_measurement_columns,
                    sizeof *measurements->at, measurements, problem);
 }
 
@@ -416,9 +329,9 @@ Status db_audit_entries(Db *db, const char *slug, uint64_t before, size_t max,
     static const char sql[] =
         "SELECT t.* FROM material_trail t JOIN materials m ON m.number = t.material WHERE m.slug = "
         ":slug AND t.version < :number ORDER BY t.version DESC LIMIT :max";
-    const MaterialRowKey key = key_of(slug, before, max);
-    return db_list(db, sql, material_row_key_columns, &key, audit_columns, sizeof *entries->at,
-                   entries, problem);
+    const QueryKey key = key_of(slug, before, max);
+    return db_list(db, sql, query_key_columns, &key, audit_columns, sizeof *entries->at, entries,
+                   problem);
 }
 
 // Export.
@@ -428,9 +341,7 @@ Status db_material_moment(Db *db, MaterialMoment *moment, Problem *problem) {
         "SELECT (SELECT coalesce(max(number), 0) FROM material_revisions) AS revisions, "
         "(SELECT coalesce(max(number), 0) FROM material_reviews) AS reviews, "
         "(SELECT coalesce(max(number), 0) FROM material_measurements) AS measurements";
-    bool is_found;
-    *moment = (MaterialMoment){0, 0, 0};
-    return db_first(db, sql, NULL, NULL, moment_columns, moment, &is_found, problem);
+    return db_first(db, sql, NULL, NULL, moment_columns, moment, NULL, problem);
 }
 
 Status db_revision_after(Db *db, const MaterialMoment *moment, const char *slug, uint64_t number,
@@ -444,9 +355,13 @@ Status db_revision_after(Db *db, const MaterialMoment *moment, const char *slug,
         "SELECT m.slug, r.* FROM materials m CROSS JOIN material_revisions r ON r.material = "
         "m.number WHERE m.slug > :slug AND +r.number <= :revisions ORDER BY m.slug, r.revision "
         "LIMIT 1";
-    const MaterialRowKey key = {.slug = (char *)slug, .number = number, .moment = *moment};
+    const QueryKey key = {.slug = slug,
+                          .number = number,
+                          .revisions = moment->revisions,
+                          .reviews = moment->reviews,
+                          .measurements = moment->measurements};
     memset(revision, 0, sizeof *revision);
-    TRY(db_first(db, number > 0 ? of_material : of_next, material_row_key_columns, &key,
+    TRY(db_first(db, number > 0 ? of_material : of_next, query_key_columns, &key,
                  material_revision_columns(), revision, is_found, problem));
     return *is_found ? material_lists_read(revision, problem) : STATUS_OK;
 }
@@ -457,10 +372,14 @@ Status db_measurement_after(Db *db, const MaterialMoment *moment, const char *sl
         "SELECT m.slug, t.* FROM materials m JOIN material_measurements t ON t.material = m.number "
         "WHERE m.slug = :slug AND t.measurement > :number AND t.number <= :measurements "
         "ORDER BY t.measurement LIMIT 1";
-    const MaterialRowKey key = {.slug = (char *)slug, .number = number, .moment = *moment};
+    const QueryKey key = {.slug = slug,
+                          .number = number,
+                          .revisions = moment->revisions,
+                          .reviews = moment->reviews,
+                          .measurements = moment->measurements};
     memset(measurement, 0, sizeof *measurement);
-    return db_first(db, sql, material_row_key_columns, &key, material_measurement_columns,
-                    measurement, is_found, problem);
+    return db_first(db, sql, query_key_columns, &key, material_measurement_columns, measurement,
+                    is_found, problem);
 }
 
 Status db_reviews(Db *db, const MaterialMoment *moment, const char *slug, uint64_t revision,
@@ -468,50 +387,19 @@ Status db_reviews(Db *db, const MaterialMoment *moment, const char *slug, uint64
     static const char sql[] =
         "SELECT m.slug, v.* FROM materials m JOIN material_reviews v ON v.material = m.number "
         "WHERE m.slug = :slug AND v.revision = :number AND v.number <= :reviews ORDER BY v.number";
-    const MaterialRowKey key = {.slug = (char *)slug, .number = revision, .moment = *moment};
-    return db_list(db, sql, material_row_key_columns, &key, material_review_columns,
-                   sizeof *reviews->at, reviews, problem);
+    const QueryKey key = {.slug = slug, .number = revision, .reviews = moment->reviews};
+    return db_list(db, sql, query_key_columns, &key, material_review_columns, sizeof *reviews->at,
+                   reviews, problem);
 }
 
 // Writing.
 
 Status material_key_find(Sqlite *database, const char *slug, uint64_t revision, MaterialKey *key,
                          Problem *problem) {
-    // Not by the view: SQLite would make all its rows for the join.
-    static const char sql[] =
-        "SELECT m.number, "
-        "(SELECT coalesce(max(revision), 0) FROM material_revisions r WHERE r.material = m.number) "
-        "AS latest, "
-        "(SELECT coalesce(max(version), 0) FROM material_trail t WHERE t.material = m.number) AS "
-        "version, "
-        "(SELECT coalesce(max(measurement), 0) FROM material_measurements t WHERE t.material = "
-        "m.number) AS measurements, "
-        "coalesce((SELECT coalesce((SELECT status FROM material_reviews v WHERE v.material = "
-        "m.number AND v.revision = :number ORDER BY v.number DESC LIMIT 1), 'draft') FROM "
-        "material_revisions r WHERE r.material = m.number AND r.revision = :number), '') AS "
-        "status, "
-        "coalesce((SELECT author FROM material_revisions r WHERE r.material = m.number AND "
-        "r.revision = :number), '') AS author "
-        "FROM materials m WHERE m.slug = :slug";
-    const MaterialRowKey asked = key_of(slug, revision, 0);
-    bool is_found;
+    const QueryKey asked = key_of(slug, revision, 0);
     *key = (MaterialKey){0};
-    return sqlite_first(database, sql, material_row_key_columns, &asked, material_key_columns, key,
-                        &is_found, problem);
-}
-
-// A material that exists, at the version that the writer saw.
-static Status material_require(Sqlite *database, const char *slug, uint64_t revision,
-                               uint64_t version, MaterialKey *key, Problem *problem) {
-    TRY(material_key_find(database, slug, revision, key, problem));
-    if (key->number == 0)
-        return error_no_material(slug, problem);
-    if (version != ANY_VERSION && version != key->version)
-        return problem_set(problem, STATUS_STALE,
-                           "the material \"%.64s\" has changed: it is at version %llu, you read "
-                           "version %llu; read it again",
-                           slug, (unsigned long long)key->version, (unsigned long long)version);
-    return STATUS_OK;
+    return sqlite_first(database, key_sql, query_key_columns, &asked, material_key_columns, key,
+                        NULL, problem);
 }
 
 typedef struct Room {
@@ -551,10 +439,10 @@ Status material_row_add(Sqlite *database, const char *slug, Problem *problem) {
     // None is ever deleted: the highest number is their count.
     static const char sql[] = "INSERT INTO materials (slug) SELECT :slug WHERE (SELECT "
                               "coalesce(max(number), 0) FROM materials) < :max";
-    const MaterialRowKey key = {.slug = (char *)slug, .max = CATALOGUE_MATERIALS};
+    const QueryKey key = {.slug = slug, .max = CATALOGUE_MATERIALS};
     int changes = 0;
     TRY(room_reserve(database, length(slug), problem));
-    TRY(sqlite_change(database, sql, material_row_key_columns, &key, &changes, problem));
+    TRY(sqlite_change(database, sql, query_key_columns, &key, &changes, problem));
     return changes > 0 ? STATUS_OK
                        : problem_set(problem, STATUS_LIMIT,
                                      "there are %d materials, which is the limit: revise one of "
@@ -563,12 +451,12 @@ Status material_row_add(Sqlite *database, const char *slug, Problem *problem) {
 }
 
 Status material_revision_add(Sqlite *database, const MaterialRevision *revision, Problem *problem) {
+    static const char sql[] = "INSERT INTO material_revisions {insert}";
     const Material *material = &revision->material;
     MaterialRevision stored = *revision; // borrows
     Bytes lists = {.most = 0};
     TRY(require_number(revision->revision, CATALOGUE_REVISIONS, revision->slug, "revisions",
                        problem));
-    const SqlColumn *columns = material_revision_columns();
     if (material->tags.count + material->table.count + material->measurements.count > 0) {
         encode_item(&lists, material_list_fields, material, WRITE_SCENE);
         if (lists.is_failed) {
@@ -583,28 +471,20 @@ Status material_revision_add(Sqlite *database, const MaterialRevision *revision,
             bytes += length(*(char *const *)((const char *)material + field->offset));
     Status status = room_reserve(database, bytes, problem);
     if (status == STATUS_OK)
-        status = sqlite_change(database, revision_insert, columns, &stored, NULL, problem);
+        status = sqlite_change(database, sql, material_revision_columns(), &stored, NULL, problem);
     bytes_clear(&lists);
     return status;
 }
 
 Status material_review_add(Sqlite *database, const MaterialReview *review, Problem *problem) {
-    static const char sql[] =
-        "INSERT INTO material_reviews (material, revision, status, reason, reviewer, "
-        "created_unix_ms) SELECT number, :revision, :status, :reason, :reviewer, :created_unix_ms "
-        "FROM materials WHERE slug = :slug";
+    static const char sql[] = "INSERT INTO material_reviews {insert}";
     TRY(room_reserve(database, length(review->reason), problem));
     return sqlite_change(database, sql, material_review_columns, review, NULL, problem);
 }
 
 Status material_measurement_add(Sqlite *database, const MaterialMeasurement *measurement,
                                 Problem *problem) {
-    static const char sql[] =
-        "INSERT INTO material_measurements (material, measurement, author, comment, "
-        "created_unix_ms, drops, traces, head, document) SELECT number, :measurement, :author, "
-        ":comment, :created_unix_ms, coalesce(json_array_length(:document, '$.drops'), 0), "
-        "coalesce(json_array_length(:document, '$.traces'), 0), json_remove(:document, '$.drops', "
-        "'$.traces'), :document FROM materials WHERE slug = :slug";
+    static const char sql[] = "INSERT INTO material_measurements {insert}";
     TRY(require_number(measurement->measurement, CATALOGUE_MEASUREMENTS, measurement->slug,
                        "measurements", problem));
     TRY(room_reserve(database, length(measurement->comment) + length(measurement->document),
@@ -613,131 +493,112 @@ Status material_measurement_add(Sqlite *database, const MaterialMeasurement *mea
 }
 
 Status audit_entry_add(Sqlite *database, const AuditEntry *entry, Problem *problem) {
-    static const char sql[] =
-        "INSERT INTO material_trail (material, version, action, revision, measurement, who, why, "
-        "created_unix_ms) SELECT number, 1 + (SELECT coalesce(max(version), 0) FROM "
-        "material_trail t WHERE t.material = m.number), :action, nullif(:revision, 0), "
-        "nullif(:measurement, 0), :who, :why, :created_unix_ms FROM materials m WHERE slug = :slug";
+    static const char sql[] = "INSERT INTO material_trail {insert}";
     TRY(room_reserve(database, length(entry->why), problem));
     return sqlite_change(database, sql, audit_columns, entry, NULL, problem);
 }
 
-// What one of the four writes below gets and has as its result.
+// What one of the four writes below adds: the first of these that is there.
 typedef struct MaterialWrite {
     MaterialRevision *revision;
     const MaterialReview *review;
     MaterialMeasurement *measurement;
+    bool is_first; // the revision, of a new material
     uint64_t version;
 } MaterialWrite;
 
-static Status revision_write(Sqlite *database, const MaterialRevision *revision, const char *action,
-                             Problem *problem) {
-    const AuditEntry entry = {.slug = revision->slug,
-                              .action = (char *)action,
-                              .revision = revision->revision,
-                              .who = revision->author,
-                              .why = revision->comment,
-                              .created_unix_ms = revision->created_unix_ms};
-    TRY(material_revision_add(database, revision, problem));
-    return audit_entry_add(database, &entry, problem);
-}
-
-static Status material_write_first(Sqlite *database, const void *work, Problem *problem) {
-    const MaterialWrite *write = work;
-    MaterialRevision *first = write->revision;
-    MaterialKey key;
-    TRY(material_key_find(database, first->slug, 0, &key, problem));
-    if (key.number != 0)
-        return problem_set(problem, STATUS_CONFLICT,
-                           "there is a material \"%.64s\" already: add a revision to it, or "
-                           "choose another slug",
-                           first->slug);
-    first->revision = 1;
-    TRY(material_row_add(database, first->slug, problem));
-    return revision_write(database, first, "create", problem);
-}
-
-static Status material_write_revision(Sqlite *database, const void *work, Problem *problem) {
-    const MaterialWrite *write = work;
-    MaterialRevision *revision = write->revision;
-    MaterialKey key;
-    TRY(material_require(database, revision->slug, 0, write->version, &key, problem));
-    revision->revision = key.latest + 1;
-    return revision_write(database, revision, revision->reverts > 0 ? "revert" : "revise", problem);
-}
-
-static Status material_write_review(Sqlite *database, const void *work, Problem *problem) {
-    const MaterialWrite *write = work;
-    const MaterialReview *review = write->review;
-    const bool approves = strcmp(review->status, "approved") == 0;
-    MaterialKey key;
-    TRY(material_require(database, review->slug, review->revision, write->version, &key, problem));
-    if (key.status[0] == '\0')
+static Status review_validate(const MaterialReview *review, const MaterialKey *key,
+                              Problem *problem) {
+    const unsigned long long revision = review->revision;
+    if (key->status[0] == '\0')
         return problem_set(problem, STATUS_NOT_FOUND,
                            "the material \"%.64s\" has no revision %llu, its newest is %llu",
-                           review->slug, (unsigned long long)review->revision,
-                           (unsigned long long)key.latest);
-    if (strcmp(key.status, review->status) == 0)
+                           review->slug, revision, (unsigned long long)key->latest);
+    if (strcmp(key->status, review->status) == 0)
         return problem_set(problem, STATUS_CONFLICT, "%.64s@%llu is %s already", review->slug,
-                           (unsigned long long)review->revision, key.status);
-    if (approves && review->reviewer != NULL && strcmp(key.author, review->reviewer) == 0)
+                           revision, key->status);
+    if (strcmp(review->status, "approved") == 0 && review->reviewer != NULL &&
+        strcmp(key->author, review->reviewer) == 0)
         return problem_set(problem, STATUS_FORBIDDEN,
                            "%.64s is the author of %.64s@%llu and may not approve their own "
                            "revision: another user has to review it",
-                           key.author, review->slug, (unsigned long long)review->revision);
-    const AuditEntry entry = {.slug = review->slug,
-                              .action = approves ? "approve" : "deprecate",
-                              .revision = review->revision,
-                              .who = review->reviewer,
-                              .why = review->reason,
-                              .created_unix_ms = review->created_unix_ms};
-    TRY(material_review_add(database, review, problem));
-    return audit_entry_add(database, &entry, problem);
-}
-
-static Status material_write_measurement(Sqlite *database, const void *work, Problem *problem) {
-    const MaterialWrite *write = work;
-    MaterialMeasurement *measurement = write->measurement;
-    MaterialKey key;
-    TRY(material_require(database, measurement->slug, 0, write->version, &key, problem));
-    measurement->measurement = key.measurements + 1;
-    const AuditEntry entry = {.slug = measurement->slug,
-                              .action = "measure",
-                              .measurement = measurement->measurement,
-                              .who = measurement->author,
-                              .why = measurement->comment,
-                              .created_unix_ms = measurement->created_unix_ms};
-    TRY(material_measurement_add(database, measurement, problem));
-    return audit_entry_add(database, &entry, problem);
-}
-
-// A write that changes what scenes may refer to.
-static Status db_catalog_write(Db *db, StoreApply *apply, const MaterialWrite *write,
-                               Problem *problem) {
-    TRY(db_write(db, apply, write, problem));
-    db_catalog_changed(db);
+                           key->author, review->slug, revision);
     return STATUS_OK;
 }
 
+// Adds the row with its audit entry.
+static Status material_apply(Sqlite *database, const void *work, Problem *problem) {
+    const MaterialWrite *write = work;
+    MaterialRevision *revision = write->revision;
+    const MaterialReview *review = write->review;
+    MaterialMeasurement *measurement = write->measurement;
+    AuditEntry entry = {.slug = revision != NULL ? revision->slug
+                                : review != NULL ? review->slug
+                                                 : measurement->slug};
+    const char *slug = entry.slug;
+    MaterialKey key;
+    TRY(material_key_find(database, slug, review != NULL ? review->revision : 0, &key, problem));
+    if (write->is_first && key.number != 0)
+        return problem_set(problem, STATUS_CONFLICT,
+                           "there is a material \"%.64s\" already: add a revision to it, or "
+                           "choose another slug",
+                           slug);
+    if (write->is_first)
+        TRY(material_row_add(database, slug, problem));
+    else if (key.number == 0)
+        return problem_set(problem, STATUS_NOT_FOUND, no_material, slug);
+    else if (write->version != ANY_VERSION && write->version != key.version)
+        return problem_set(problem, STATUS_STALE,
+                           "the material \"%.64s\" has changed: it is at version %llu, you read "
+                           "version %llu; read it again",
+                           slug, (unsigned long long)key.version,
+                           (unsigned long long)write->version);
+    if (revision != NULL) {
+        revision->revision = key.latest + 1;
+        entry.action = write->is_first ? "create" : revision->reverts > 0 ? "revert" : "revise";
+        entry.revision = revision->revision;
+        entry.who = revision->author;
+        entry.why = revision->comment;
+        entry.created_unix_ms = revision->created_unix_ms;
+        TRY(material_revision_add(database, revision, problem));
+    } else if (review != NULL) {
+        TRY(review_validate(review, &key, problem));
+        entry.action = strcmp(review->status, "approved") == 0 ? "approve" : "deprecate";
+        entry.revision = review->revision;
+        entry.who = review->reviewer;
+        entry.why = review->reason;
+        entry.created_unix_ms = review->created_unix_ms;
+        TRY(material_review_add(database, review, problem));
+    } else {
+        measurement->measurement = key.measurements + 1;
+        entry.action = "measure";
+        entry.measurement = measurement->measurement;
+        entry.who = measurement->author;
+        entry.why = measurement->comment;
+        entry.created_unix_ms = measurement->created_unix_ms;
+        TRY(material_measurement_add(database, measurement, problem));
+    }
+    return audit_entry_add(database, &entry, problem);
+}
+
 Status db_material_add(Db *db, MaterialRevision *first, Problem *problem) {
-    return db_catalog_write(db, material_write_first, &(MaterialWrite){.revision = first}, problem);
+    return db_write(db, material_apply, &(MaterialWrite){.revision = first, .is_first = true},
+                    problem);
 }
 
 Status db_material_revise(Db *db, MaterialRevision *revision, uint64_t version, Problem *problem) {
-    return db_catalog_write(db, material_write_revision,
-                            &(MaterialWrite){.revision = revision, .version = version}, problem);
+    return db_write(db, material_apply, &(MaterialWrite){.revision = revision, .version = version},
+                    problem);
 }
 
 Status db_material_review(Db *db, const MaterialReview *review, uint64_t version,
                           Problem *problem) {
-    return db_catalog_write(db, material_write_review,
-                            &(MaterialWrite){.review = review, .version = version}, problem);
+    return db_write(db, material_apply, &(MaterialWrite){.review = review, .version = version},
+                    problem);
 }
 
 Status db_material_measure(Db *db, MaterialMeasurement *measurement, uint64_t version,
                            Problem *problem) {
-    const MaterialWrite write = {.measurement = measurement, .version = version};
-    TRY(db_write(db, material_write_measurement, &write, problem));
-    db_material_measured(db);
-    return STATUS_OK;
+    return db_write(db, material_apply,
+                    &(MaterialWrite){.measurement = measurement, .version = version}, problem);
 }

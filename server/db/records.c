@@ -74,11 +74,9 @@ void record_digest(double interval, const Reals *samples, char digest[RECORD_DIG
     sha256_end(taking, digest);
 }
 
-static Status record_not_found(const char *name, Problem *problem) {
-    return problem_set(problem, STATUS_NOT_FOUND, "there is no record \"%.64s\"", name);
-}
+static const char no_record[] = "there is no record \"%.64s\"";
 
-// In what a record that is there differs from one that is to be; NULL: in nothing.
+// What differs between a stored record and a new one; NULL: nothing.
 static const char *record_difference(const RecordRow *there, const RecordRow *row) {
     if (!text_same(there->digest, row->digest))
         return "samples or another interval";
@@ -119,7 +117,6 @@ static Status record_apply_add(Sqlite *database, const void *work, Problem *prob
     const QueryKey key = {.name = row->name};
     QueryCounts counted = {0};
     RecordRow there = {0};
-    bool is_found;
     TRY(sqlite_first(database, one_sql, query_key_columns, &key, record_columns, &there,
                      adding->is_there, problem));
     if (*adding->is_there) {
@@ -131,7 +128,7 @@ static Status record_apply_add(Sqlite *database, const void *work, Problem *prob
                                            "records never change; choose another name",
                                            row->name, other);
     }
-    TRY(sqlite_first(database, count_sql, NULL, NULL, query_counts_columns, &counted, &is_found,
+    TRY(sqlite_first(database, count_sql, NULL, NULL, query_counts_columns, &counted, NULL,
                      problem));
     if (counted.count >= RECORDS_MAX)
         return problem_set(problem, STATUS_LIMIT,
@@ -150,18 +147,12 @@ static Status record_apply_add(Sqlite *database, const void *work, Problem *prob
 
 Status db_record_add(Db *db, const RecordRow *row, const Reals *samples, bool *is_there,
                      Problem *problem) {
-    TRY(db_write(db, record_apply_add, &(Adding){row, samples, is_there}, problem));
-    if (!*is_there)
-        db_catalog_changed(db);
-    return STATUS_OK;
+    return db_write(db, record_apply_add, &(Adding){row, samples, is_there}, problem);
 }
 
 Status db_record(Db *db, const char *name, RecordRow *row, Problem *problem) {
-    const QueryKey key = {.name = name};
-    bool is_found;
-    memset(row, 0, sizeof *row);
-    TRY(db_first(db, one_sql, query_key_columns, &key, record_columns, row, &is_found, problem));
-    return is_found ? STATUS_OK : record_not_found(name, problem);
+    return db_get(db, one_sql, &(QueryKey){.name = name}, record_columns, row, sizeof *row, problem,
+                  no_record, name);
 }
 
 Status db_records(Db *db, const char *words, const char *after, size_t most, RecordRows *rows,
@@ -190,18 +181,15 @@ static Status record_read_samples(Db *db, const RecordRow *row, Reals *samples, 
         "SELECT s.samples, s.checks FROM record_samples s JOIN records r USING "
         "(number) WHERE r.name = :name AND r.digest = :digest";
     const QueryKey key = {.name = row->name, .digest = row->digest};
-    Samples found = {0};
-    bool is_found;
-    TRY(db_first(db, sql, query_key_columns, &key, samples_columns, &found, &is_found, problem));
-    if (!is_found)
-        return record_not_found(row->name, problem);
-    if (found.samples.size != row->count * sizeof(double)) {
-        free(found.samples.at);
-        return problem_set(problem, STATUS_INTERNAL, "the record \"%.64s\" is not whole",
-                           row->name);
-    }
+    Samples found;
+    TRY(db_get(db, sql, &key, samples_columns, &found, sizeof found, problem, no_record,
+               row->name));
     *samples = (Reals){found.samples.at, row->count};
-    return STATUS_OK;
+    if (found.samples.size == row->count * sizeof(double))
+        return STATUS_OK;
+    free(samples->at);
+    *samples = (Reals){NULL, 0};
+    return problem_set(problem, STATUS_INTERNAL, "the record \"%.64s\" is not whole", row->name);
 }
 
 // The samples in memory: those of the last records named, up to `memory_max` bytes, and those that
@@ -212,7 +200,6 @@ static const size_t memory_max = 64 << 20;
 typedef struct Entry {
     struct Entry *next;
     NamedRecord *named;
-    uint64_t catalog_version; // of the catalogue, under which the name was found to stand for it
 } Entry;
 
 struct RecordMemory {
@@ -243,18 +230,13 @@ void record_memory_free(RecordMemory *memory) {
     free(memory);
 }
 
-// A reference to the record of that name and digest (NULL: the one that the name stood for under
-// that version of the catalogue), or NULL. With the lock held.
-static NamedRecord *memory_find_locked(RecordMemory *memory, uint64_t catalog_version,
-                                       const char *name, const char *digest) {
+// A reference to the record of that name and digest, which becomes the first, or NULL. With the
+// lock held.
+static NamedRecord *memory_find(RecordMemory *memory, const char *name, const char *digest) {
     for (Entry **at = &memory->first; *at != NULL; at = &(*at)->next) {
         Entry *entry = *at;
-        if (strcmp(entry->named->name, name) != 0 ||
-            (digest == NULL ? entry->catalog_version != catalog_version
-                            : strcmp(entry->named->digest, digest) != 0))
+        if (strcmp(entry->named->name, name) != 0 || strcmp(entry->named->digest, digest) != 0)
             continue;
-        if (catalog_version > entry->catalog_version)
-            entry->catalog_version = catalog_version;
         *at = entry->next;
         entry->next = memory->first;
         memory->first = entry;
@@ -262,14 +244,6 @@ static NamedRecord *memory_find_locked(RecordMemory *memory, uint64_t catalog_ve
         return entry->named;
     }
     return NULL;
-}
-
-static NamedRecord *memory_find(RecordMemory *memory, uint64_t catalog_version, const char *name,
-                                const char *digest) {
-    pthread_mutex_lock(&memory->lock);
-    NamedRecord *named = memory_find_locked(memory, catalog_version, name, digest);
-    pthread_mutex_unlock(&memory->lock);
-    return named;
 }
 
 // With the lock held, without which no other thread gets a reference.
@@ -285,12 +259,12 @@ static void memory_evict(RecordMemory *memory) {
     }
 }
 
-NamedRecord *record_memory_add(RecordMemory *memory, uint64_t catalog_version, NamedRecord *named) {
+NamedRecord *record_memory_add(RecordMemory *memory, NamedRecord *named) {
     Entry *entry = malloc(sizeof *entry);
     pthread_mutex_lock(&memory->lock);
-    NamedRecord *there = memory_find_locked(memory, catalog_version, named->name, named->digest);
+    NamedRecord *there = memory_find(memory, named->name, named->digest);
     if (there == NULL && entry != NULL) {
-        *entry = (Entry){memory->first, named, catalog_version};
+        *entry = (Entry){memory->first, named};
         refcount_ref(&named->shared);
         memory->first = entry;
         entry = NULL;
@@ -306,21 +280,21 @@ NamedRecord *record_memory_add(RecordMemory *memory, uint64_t catalog_version, N
 
 Status db_record_named(Db *db, const char *name, NamedRecord **named, Problem *problem) {
     RecordMemory *memory = db_record_memory(db);
-    const uint64_t catalog_version = db_catalog_version(db);
     RecordRow row;
     Reals samples;
-    *named = memory_find(memory, catalog_version, name, NULL);
-    if (*named != NULL)
-        return STATUS_OK;
+    *named = NULL;
     Status status = db_record(db, name, &row, problem);
-    if (status == STATUS_OK)
-        *named = memory_find(memory, catalog_version, name, row.digest);
+    if (status == STATUS_OK) {
+        pthread_mutex_lock(&memory->lock);
+        *named = memory_find(memory, name, row.digest);
+        pthread_mutex_unlock(&memory->lock);
+    }
     if (status == STATUS_OK && *named == NULL) {
         status = record_read_samples(db, &row, &samples, problem);
         if (status == STATUS_OK)
             *named = named_record_new(row.name, row.digest, row.interval, &samples);
         if (*named != NULL)
-            *named = record_memory_add(memory, catalog_version, *named);
+            *named = record_memory_add(memory, *named);
         else if (status == STATUS_OK)
             status = problem_set(problem, STATUS_NO_MEMORY, "no memory for a record");
     }
@@ -332,19 +306,18 @@ void record_use_name(const char *name, char target[RECORD_NAME_SIZE + 8]) {
     snprintf(target, RECORD_NAME_SIZE + 8, "record:%.64s", name);
 }
 
+// Results made with it and unfinished jobs.
 static const char uses_sql[] =
     "SELECT (SELECT count(*) FROM result_uses WHERE name = :name) AS results, "
     "(SELECT count(*) FROM job_uses WHERE name = :name) AS jobs";
+static const SqlColumn uses_columns[] = {COLUMN(RecordUses, results), COLUMN(RecordUses, jobs),
+                                         COLUMN_END};
 
 Status db_record_uses(Db *db, const char *name, RecordUses *uses, Problem *problem) {
     char use[RECORD_NAME_SIZE + 8];
     record_use_name(name, use);
-    QueryCounts found = {0};
-    bool is_found;
-    TRY(db_first(db, uses_sql, query_key_columns, &(QueryKey){.name = use}, query_counts_columns,
-                 &found, &is_found, problem));
-    *uses = (RecordUses){found.results, found.jobs};
-    return STATUS_OK;
+    return db_first(db, uses_sql, query_key_columns, &(QueryKey){.name = use}, uses_columns, uses,
+                    NULL, problem);
 }
 
 typedef struct Deleting {
@@ -355,29 +328,26 @@ typedef struct Deleting {
 static Status record_apply_delete(Sqlite *database, const void *work, Problem *problem) {
     static const char sql[] = "DELETE FROM records WHERE name = :name";
     const Deleting *deleting = work;
+    RecordUses *uses = deleting->uses;
     char use[RECORD_NAME_SIZE + 8];
-    QueryCounts found = {0};
-    bool is_found;
     int changes;
     record_use_name(deleting->name, use);
-    TRY(sqlite_first(database, uses_sql, query_key_columns, &(QueryKey){.name = use},
-                     query_counts_columns, &found, &is_found, problem));
-    *deleting->uses = (RecordUses){found.results, found.jobs};
-    if (found.results + found.jobs > 0)
+    TRY(sqlite_first(database, uses_sql, query_key_columns, &(QueryKey){.name = use}, uses_columns,
+                     uses, NULL, problem));
+    if (uses->results + uses->jobs > 0)
         return problem_set(problem, STATUS_CONFLICT,
                            "the record \"%.64s\" is used by %llu result%s and %llu unfinished "
                            "job%s: it can be deleted when none is left",
-                           deleting->name, (unsigned long long)found.results,
-                           found.results == 1 ? "" : "s", (unsigned long long)found.jobs,
-                           found.jobs == 1 ? "" : "s");
+                           deleting->name, (unsigned long long)uses->results,
+                           uses->results == 1 ? "" : "s", (unsigned long long)uses->jobs,
+                           uses->jobs == 1 ? "" : "s");
     TRY(sqlite_change(database, sql, query_key_columns, &(QueryKey){.name = deleting->name},
                       &changes, problem));
-    return changes > 0 ? STATUS_OK : record_not_found(deleting->name, problem);
+    return changes > 0 ? STATUS_OK
+                       : problem_set(problem, STATUS_NOT_FOUND, no_record, deleting->name);
 }
 
 Status db_record_delete(Db *db, const char *name, RecordUses *uses, Problem *problem) {
     *uses = (RecordUses){0, 0};
-    TRY(db_write(db, record_apply_delete, &(Deleting){name, uses}, problem));
-    db_catalog_changed(db);
-    return STATUS_OK;
+    return db_write(db, record_apply_delete, &(Deleting){name, uses}, problem);
 }

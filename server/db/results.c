@@ -3,7 +3,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/db/db.h"
 #include "server/db/db_private.h"
 #include "server/db/materials.h"
 
@@ -36,9 +35,7 @@ void result_rows_clear(ResultRows *rows) {
     rows_clear(result_columns, sizeof *rows->at, rows);
 }
 
-static Status result_not_found(const char *id, Problem *problem) {
-    return problem_set(problem, STATUS_NOT_FOUND, "there is no result \"%.72s\"", id);
-}
+static const char no_result[] = "there is no result \"%.72s\"";
 
 Status use_lines_add(Sqlite *database, const char *sql, const char *lines, Problem *problem) {
     while (lines != NULL && *lines != '\0') {
@@ -80,11 +77,8 @@ void db_result_post(Db *db, const ResultCommit *commit, PendingWrite *write) {
 
 static Status result_load(Db *db, const char *sql, const char *id, ResultRow *row,
                           Problem *problem) {
-    const QueryKey key = {.id = id};
-    bool is_found;
-    memset(row, 0, sizeof *row);
-    TRY(db_first(db, sql, query_key_columns, &key, result_columns, row, &is_found, problem));
-    return is_found ? STATUS_OK : result_not_found(id, problem);
+    return db_get(db, sql, &(QueryKey){.id = id}, result_columns, row, sizeof *row, problem,
+                  no_result, id);
 }
 
 Status db_result_load(Db *db, const char *id, ResultRow *row, Problem *problem) {
@@ -120,8 +114,7 @@ Status db_result_sharer(Db *db, const char *id, const char *client, char sharer[
         "AND result = :id AND state = 2 AND client <> :client LIMIT 1";
     const QueryKey key = {.id = id, .client = client};
     ResultRow found = {.id = ""};
-    bool is_found;
-    TRY(db_first(db, sql, query_key_columns, &key, result_columns, &found, &is_found, problem));
+    TRY(db_first(db, sql, query_key_columns, &key, result_columns, &found, NULL, problem));
     text_fit(sharer, sizeof found.id, found.id);
     return STATUS_OK;
 }
@@ -131,7 +124,7 @@ static Status result_apply_delete(Sqlite *database, const void *work, Problem *p
     const QueryKey *key = work;
     int changes;
     TRY(sqlite_change(database, sql, query_key_columns, key, &changes, problem));
-    return changes > 0 ? STATUS_OK : result_not_found(key->id, problem);
+    return changes > 0 ? STATUS_OK : problem_set(problem, STATUS_NOT_FOUND, no_result, key->id);
 }
 
 Status db_result_delete(Db *db, const char *id, Problem *problem) {
@@ -158,9 +151,8 @@ Status db_result_uses(Db *db, const char *name, size_t most, int64_t before, Res
         "u.result WHERE u.name = :name AND u.result < :before ORDER BY u.result DESC LIMIT :max";
     const QueryKey key = {.name = name, .max = most, .before = before == 0 ? INT64_MAX : before};
     QueryCounts counted = {0};
-    bool is_found;
     *uses = (ResultUses){NULL, 0};
-    TRY(db_first(db, count_sql, query_key_columns, &key, query_counts_columns, &counted, &is_found,
+    TRY(db_first(db, count_sql, query_key_columns, &key, query_counts_columns, &counted, NULL,
                  problem));
     *total = counted.count;
     return db_list(db, sql, query_key_columns, &key, use_columns, sizeof *uses->at, uses, problem);

@@ -3,7 +3,6 @@
 // eighth of the file is free are some returned to the disk.
 #include <string.h>
 
-#include "server/db/db.h"
 #include "server/db/db_private.h"
 #include "server/util/clock.h"
 
@@ -30,12 +29,10 @@ static Status retention_measure(Db *db, bool counts_jobs, Extent *extent, Proble
     static const char counts[] = "SELECT count(*) AS jobs, (SELECT count(*) FROM jobs "
                                  "INDEXED BY jobs_unfinished WHERE state < 2) AS unfinished "
                                  "FROM jobs";
-    bool is_found;
     *extent = (Extent){0};
-    TRY(db_first(db, sizes, NULL, NULL, extent_columns, extent, &is_found, problem));
-    if (counts_jobs)
-        TRY(db_first(db, counts, NULL, NULL, extent_columns, extent, &is_found, problem));
-    return STATUS_OK;
+    TRY(db_first(db, sizes, NULL, NULL, extent_columns, extent, NULL, problem));
+    return counts_jobs ? db_first(db, counts, NULL, NULL, extent_columns, extent, NULL, problem)
+                       : STATUS_OK;
 }
 
 static const char victims_sql[] =

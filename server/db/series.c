@@ -3,7 +3,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/db/db.h"
 #include "server/db/db_private.h"
 
 typedef struct Blob {
@@ -23,9 +22,7 @@ static const char sum_sql[] =
 
 static Status series_sum(Sqlite *database, uint64_t *bytes, Problem *problem) {
     QueryCounts sum = {0};
-    bool is_found;
-    TRY(sqlite_first(database, sum_sql, NULL, NULL, query_counts_columns, &sum, &is_found,
-                     problem));
+    TRY(sqlite_first(database, sum_sql, NULL, NULL, query_counts_columns, &sum, NULL, problem));
     *bytes = sum.bytes;
     return STATUS_OK;
 }
@@ -122,8 +119,7 @@ bool db_series_exists(Db *db, const char *result) {
 
 void db_series_tally(Db *db, uint64_t *count, uint64_t *bytes, uint64_t *evictions) {
     QueryCounts sum = {0};
-    bool is_found;
-    (void)db_first(db, sum_sql, NULL, NULL, query_counts_columns, &sum, &is_found, NULL);
+    (void)db_first(db, sum_sql, NULL, NULL, query_counts_columns, &sum, NULL, NULL);
     *count = sum.count;
     *bytes = sum.bytes;
     *evictions = atomic_load(db_evictions(db));

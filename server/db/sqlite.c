@@ -6,6 +6,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/statvfs.h>
@@ -18,15 +19,16 @@
 #include "server/util/gzip.h"
 #include "server/util/process.h"
 
-enum { STATEMENTS = 192, PARAMETERS = 40, APPLICATION = 0x696D7064 }; // "impd"
+enum { STATEMENTS = 192, PARAMETERS = 48, APPLICATION = 0x696D7064 }; // "impd"
 
-struct Statement {
+typedef struct Statement {
     const char *sql;
     sqlite3_stmt *handle;
-    const SqlColumn *keys; // whose members the parameters were found to be
-    int parameter_count;
     const SqlColumn *parameters[PARAMETERS]; // NULL: the checks
-};
+    const SqlColumn *results[PARAMETERS];    // NULL: not read
+    int parameter_count, result_count;
+    int checks; // index of the result that has the checks; -1: none
+} Statement;
 
 struct Sqlite {
     sqlite3 *connection;
@@ -142,39 +144,66 @@ static void sql_expand(const char *sql, const SqlColumn *keys, const SqlColumn *
     for (const char *brace; (brace = strchr(sql, '{')) != NULL; sql = strchr(brace, '}') + 1) {
         const bool is_insert = brace[1] == 'i', is_set = brace[1] == 's', is_head = brace[1] == 'h';
         const SqlColumn *table = is_insert || is_set ? keys : columns;
-        const bool has_checks = columns_are_checked(table);
         const char *separator = "";
+        Bytes values = {0};
         bytes_put(bytes, sql, (size_t)(brace - sql));
-        if (is_insert)
-            bytes_text(bytes, "(");
+        bytes_text(bytes, is_insert ? "(" : "");
         for (const SqlColumn *column = table; column->name != NULL; column++) {
-            if (is_insert ? column->sql != NULL
+            if (is_insert ? column->read != NULL
                 : is_set  ? (column->flags & COLUMN_MUTABLE) == 0
                 : is_head ? (column->flags & COLUMN_LONG) != 0
                           : false)
                 continue;
-            bytes_text(bytes, separator);
             if (is_set)
-                bytes_format(bytes, "%s = :%s", column->name, column->name);
-            else if (column->sql != NULL)
-                bytes_format(bytes, "%s AS %s", column->sql, column->name);
+                bytes_format(bytes, "%s%s = :%s", separator, column->name, column->name);
+            else if (column->read != NULL)
+                bytes_format(bytes, "%s%s AS %s", separator, column->read, column->name);
             else
-                bytes_text(bytes, column->name);
+                bytes_format(bytes, "%s%s", separator, column->name);
+            if (column->write != NULL)
+                bytes_format(&values, "%s%s", separator, column->write);
+            else
+                bytes_format(&values, "%s:%s", separator, column->name);
             separator = ", ";
         }
-        if (has_checks)
+        if (columns_are_checked(table)) {
             bytes_text(bytes, is_set ? ", checks = :checks" : ", checks");
-        if (!is_insert)
-            continue;
-        separator = ") VALUES (:";
-        for (const SqlColumn *column = table; column->name != NULL; column++)
-            if (column->sql == NULL) {
-                bytes_format(bytes, "%s%s", separator, column->name);
-                separator = ", :";
-            }
-        bytes_text(bytes, has_checks ? ", :checks)" : ")");
+            bytes_text(&values, ", :checks");
+        }
+        if (is_insert && !values.is_failed) {
+            bytes_text(bytes, ") VALUES (");
+            bytes_text(bytes, values.at);
+            bytes_text(bytes, ")");
+        }
+        bytes->is_failed = bytes->is_failed || values.is_failed;
+        bytes_clear(&values);
     }
     bytes_text(bytes, sql);
+}
+
+// Finds the members of the parameters and of the results.
+static Status statement_resolve(Statement *statement, const SqlColumn *keys,
+                                const SqlColumn *columns, Problem *problem) {
+    statement->parameter_count = sqlite3_bind_parameter_count(statement->handle);
+    statement->result_count = sqlite3_column_count(statement->handle);
+    statement->checks = -1;
+    if (statement->parameter_count > PARAMETERS || statement->result_count > PARAMETERS)
+        return problem_set(problem, STATUS_INTERNAL, "more than %d parameters of a statement",
+                           PARAMETERS);
+    for (int i = 0; i < statement->parameter_count; i++) {
+        const char *name = sqlite3_bind_parameter_name(statement->handle, i + 1);
+        statement->parameters[i] = name != NULL ? column_find(keys, name + 1) : NULL;
+        if (statement->parameters[i] == NULL && (name == NULL || strcmp(name, ":checks") != 0))
+            return problem_set(problem, STATUS_INTERNAL, "no member for the parameter %s",
+                               name != NULL ? name : "?");
+    }
+    for (int i = 0; i < statement->result_count; i++) {
+        const char *name = sqlite3_column_name(statement->handle, i);
+        statement->results[i] = name != NULL ? column_find(columns, name) : NULL;
+        if (name != NULL && strcmp(name, "checks") == 0)
+            statement->checks = i;
+    }
+    return STATUS_OK;
 }
 
 static Status statement_find(Sqlite *database, const char *sql, const SqlColumn *keys,
@@ -189,18 +218,22 @@ static Status statement_find(Sqlite *database, const char *sql, const SqlColumn 
     Bytes text = {0};
     sql_expand(sql, keys, columns, &text);
     Statement *made = text.is_failed ? NULL : calloc(1, sizeof *made);
-    if (made == NULL) {
-        bytes_clear(&text);
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a statement");
+    Status status = made != NULL
+                        ? STATUS_OK
+                        : problem_set(problem, STATUS_NO_MEMORY, "no memory for a statement");
+    if (status == STATUS_OK &&
+        sqlite3_prepare_v3(database->connection, text.at, -1, SQLITE_PREPARE_PERSISTENT,
+                           &made->handle, NULL) != SQLITE_OK)
+        status = report(database->connection, "preparing a statement", problem);
+    if (status == STATUS_OK)
+        status = statement_resolve(made, keys, columns, problem);
+    bytes_clear(&text);
+    if (status != STATUS_OK) {
+        sqlite3_finalize(made != NULL ? made->handle : NULL);
+        free(made);
+        return status;
     }
     made->sql = sql;
-    const int code = sqlite3_prepare_v3(database->connection, text.at, -1,
-                                        SQLITE_PREPARE_PERSISTENT, &made->handle, NULL);
-    bytes_clear(&text);
-    if (code != SQLITE_OK) {
-        free(made);
-        return report(database->connection, "preparing a statement", problem);
-    }
     *statement = database->statements[database->statement_count++] = made;
     return STATUS_OK;
 }
@@ -223,193 +256,133 @@ static uint32_t column_check(const SqlColumn *column, const char *member) {
     return size > 0 ? gzip_crc32(0, at, size) : 0;
 }
 
-static int bind_checks(Statement *statement, int index, const SqlColumn *columns,
+static int bind_checks(sqlite3_stmt *statement, int index, const SqlColumn *columns,
                        const char *item) {
     uint32_t checks[PARAMETERS];
     int count = 0;
     for (; columns->name != NULL && count < PARAMETERS; columns++)
         if ((columns->flags & COLUMN_CHECKED) != 0)
             checks[count++] = column_check(columns, item + columns->offset);
-    return sqlite3_bind_blob(statement->handle, index, checks, 4 * count, SQLITE_TRANSIENT);
+    return sqlite3_bind_blob(statement, index, checks, 4 * count, SQLITE_TRANSIENT);
 }
 
-static int bind(sqlite3_stmt *statement, int index, const SqlColumn *column, const char *member) {
+static int bind_column(sqlite3_stmt *statement, int index, const SqlColumn *column,
+                       const void *member) {
+    const StoredBytes *bytes = member;
+    const char *text = column->kind == COLUMN_TEXT ? *(char *const *)member : member;
+    const double real = column->kind == COLUMN_REAL ? *(const double *)member : 0;
     switch (column->kind) {
-    case COLUMN_TEXT: {
-        const char *text = *(char *const *)(const void *)member;
-        // The length is given: SQLite would count in an int.
-        return text == NULL ? sqlite3_bind_null(statement, index)
-                            : sqlite3_bind_text64(statement, index, text, strlen(text),
-                                                  SQLITE_STATIC, SQLITE_UTF8);
-    }
-    case COLUMN_NAME:
-        return sqlite3_bind_text(statement, index, member, -1, SQLITE_STATIC);
-    case COLUMN_REAL: {
-        const double value = *(const double *)(const void *)member;
-        return isnan(value) ? sqlite3_bind_null(statement, index)
-                            : sqlite3_bind_double(statement, index, value);
-    }
+    case COLUMN_TEXT:
+    case COLUMN_NAME: // The length is given: SQLite would count in an int.
+        return sqlite3_bind_text64(statement, index, text, text != NULL ? strlen(text) : 0,
+                                   SQLITE_STATIC, SQLITE_UTF8);
+    case COLUMN_REAL: // NAN is NULL to SQLite
+        return sqlite3_bind_double(statement, index, real);
     case COLUMN_INTEGER:
-        return sqlite3_bind_int64(statement, index, *(const int64_t *)(const void *)member);
     case COLUMN_COUNT:
-        return sqlite3_bind_int64(statement, index,
-                                  (int64_t) * (const uint64_t *)(const void *)member);
+        return sqlite3_bind_int64(statement, index, *(const int64_t *)member);
     case COLUMN_CHOICE:
-        return *(const int *)(const void *)member < 0
-                   ? sqlite3_bind_null(statement, index)
-                   : sqlite3_bind_int(statement, index, *(const int *)(const void *)member);
+        return *(const int *)member < 0 ? sqlite3_bind_null(statement, index)
+                                        : sqlite3_bind_int(statement, index, *(const int *)member);
     case COLUMN_FLAG:
-        return sqlite3_bind_int(statement, index, *(const bool *)(const void *)member);
-    case COLUMN_BYTES: {
-        const StoredBytes *bytes = (const StoredBytes *)(const void *)member;
-        return bytes->at == NULL
-                   ? sqlite3_bind_null(statement, index)
-                   : sqlite3_bind_blob64(statement, index, bytes->at, bytes->size, SQLITE_STATIC);
-    }
+        return sqlite3_bind_int(statement, index, *(const bool *)member);
+    case COLUMN_BYTES:
+        return sqlite3_bind_blob64(statement, index, bytes->at, bytes->size, SQLITE_STATIC);
+    case COLUMN_NONE:
+        break;
     }
     return SQLITE_MISUSE;
 }
 
-static Status find_parameters(Statement *statement, const SqlColumn *keys, Problem *problem) {
-    statement->keys = NULL;
-    statement->parameter_count = sqlite3_bind_parameter_count(statement->handle);
-    if (statement->parameter_count > PARAMETERS)
-        return problem_set(problem, STATUS_INTERNAL, "more than %d parameters of a statement",
-                           PARAMETERS);
-    for (int i = 0; i < statement->parameter_count; i++) {
-        const char *name = sqlite3_bind_parameter_name(statement->handle, i + 1);
-        statement->parameters[i] = name != NULL ? column_find(keys, name + 1) : NULL;
-        if (statement->parameters[i] == NULL && (name == NULL || strcmp(name, ":checks") != 0))
-            return problem_set(problem, STATUS_INTERNAL, "no member for the parameter %s",
-                               name != NULL ? name : "?");
-    }
-    statement->keys = keys;
-    return STATUS_OK;
-}
-
-static Status bind_all(Statement *statement, const SqlColumn *keys, const void *item,
-                       Problem *problem) {
-    if (statement->keys == NULL || statement->keys != keys)
-        TRY(find_parameters(statement, keys, problem));
-    for (int i = 0; i < statement->parameter_count; i++) {
-        const SqlColumn *key = statement->parameters[i];
-        const int code =
-            key == NULL ? bind_checks(statement, i + 1, keys, item)
-                        : bind(statement->handle, i + 1, key, (const char *)item + key->offset);
-        if (code == SQLITE_TOOBIG)
-            return problem_set(problem, STATUS_TOO_LARGE,
-                               "%s is too long to be stored, a billion bytes at most", key->name);
-        if (code != SQLITE_OK)
-            return problem_set(problem, code == SQLITE_NOMEM ? STATUS_NO_MEMORY : STATUS_INTERNAL,
-                               "binding %s: %s", key != NULL ? key->name : "checks",
-                               sqlite3_errstr(code));
-    }
-    return STATUS_OK;
-}
-
-static Status begin(Sqlite *database, const char *sql, const SqlColumn *keys, const void *item,
-                    const SqlColumn *columns, Statement **statement, Problem *problem) {
-    Statement *found = NULL;
-    *statement = NULL;
-    TRY(statement_find(database, sql, keys, columns, &found, problem));
-    const Status status = bind_all(found, keys, item, problem);
-    if (status != STATUS_OK)
-        statement_end(found);
-    else
-        *statement = found;
-    return status;
-}
-
-Status statement_begin(Sqlite *database, const char *sql, const SqlColumn *keys, const void *item,
-                       Statement **statement, Problem *problem) {
-    return begin(database, sql, keys, item, NULL, statement, problem);
-}
-
-Status statement_step(Statement *statement, bool *has_row, Problem *problem) {
+static Status statement_step(Statement *statement, bool *has_row, Problem *problem) {
     const int code = sqlite3_step(statement->handle);
     *has_row = code == SQLITE_ROW;
     if (code == SQLITE_ROW || code == SQLITE_DONE)
         return STATUS_OK;
     return report(sqlite3_db_handle(statement->handle),
-                  sqlite3_column_count(statement->handle) > 0 ? "reading the database"
-                                                              : "writing to the database",
+                  statement->result_count > 0 ? "reading the database" : "writing to the database",
                   problem);
 }
 
-void statement_end(Statement *statement) {
-    if (statement == NULL)
-        return;
+static void statement_end(Statement *statement) {
     sqlite3_reset(statement->handle);
     sqlite3_clear_bindings(statement->handle);
 }
 
-static bool read_text(sqlite3_stmt *statement, int index, char **text) {
-    if (sqlite3_column_type(statement, index) == SQLITE_NULL)
-        return true;
-    const unsigned char *bytes = sqlite3_column_text(statement, index);
-    const size_t size = (size_t)sqlite3_column_bytes(statement, index);
-    *text = bytes == NULL ? NULL : malloc(size + 1);
-    if (*text == NULL)
-        return false;
-    memcpy(*text, bytes, size);
-    (*text)[size] = '\0';
-    return true;
-}
-
-static bool read_bytes(sqlite3_stmt *statement, int index, StoredBytes *bytes) {
-    if (sqlite3_column_type(statement, index) == SQLITE_NULL)
-        return true;
-    const void *blob = sqlite3_column_blob(statement, index);
-    bytes->size = (size_t)sqlite3_column_bytes(statement, index);
-    bytes->at = malloc(bytes->size + 1);
-    if (bytes->at == NULL || (blob == NULL && bytes->size > 0)) {
-        bytes->size = 0;
-        return false;
+static Status statement_begin(Sqlite *database, const char *sql, const SqlColumn *keys,
+                              const void *item, const SqlColumn *columns, Statement **statement,
+                              Problem *problem) {
+    TRY(statement_find(database, sql, keys, columns, statement, problem));
+    for (int i = 0; i < (*statement)->parameter_count; i++) {
+        const SqlColumn *key = (*statement)->parameters[i];
+        sqlite3_stmt *handle = (*statement)->handle;
+        const char *name = key != NULL ? key->name : "checks";
+        const int code = key == NULL
+                             ? bind_checks(handle, i + 1, keys, item)
+                             : bind_column(handle, i + 1, key, (const char *)item + key->offset);
+        if (code == SQLITE_OK)
+            continue;
+        statement_end(*statement);
+        return code == SQLITE_TOOBIG
+                   ? problem_set(problem, STATUS_TOO_LARGE,
+                                 "%s is too long to be stored; must be at most a billion bytes",
+                                 name)
+                   : problem_set(problem, code == SQLITE_NOMEM ? STATUS_NO_MEMORY : STATUS_INTERNAL,
+                                 "binding %s: %s", name, sqlite3_errstr(code));
     }
-    if (bytes->size > 0)
-        memcpy(bytes->at, blob, bytes->size);
-    return true;
+    return STATUS_OK;
 }
 
-// A text that does not fit cannot be one of ours; it is cut.
-static void read_name(sqlite3_stmt *statement, int index, char *name, size_t size) {
-    const unsigned char *text = sqlite3_column_text(statement, index);
-    const size_t length = text == NULL ? 0 : strlen((const char *)text);
-    const size_t kept = length < size ? length : size - 1;
-    if (kept > 0)
-        memcpy(name, text, kept);
-    name[kept] = '\0';
+// A text, or a blob of *size bytes, as the caller's own; false without memory.
+static bool read_owned(sqlite3_stmt *statement, int index, bool is_text, char **at, size_t *size) {
+    if (sqlite3_column_type(statement, index) == SQLITE_NULL)
+        return true;
+    const void *bytes = is_text ? (const void *)sqlite3_column_text(statement, index)
+                                : sqlite3_column_blob(statement, index);
+    const size_t count = (size_t)sqlite3_column_bytes(statement, index);
+    *at = bytes == NULL && (is_text || count > 0) ? NULL : malloc(count + 1);
+    if (*at == NULL)
+        return false;
+    if (count > 0)
+        memcpy(*at, bytes, count);
+    (*at)[count] = '\0';
+    *size = count;
+    return true;
 }
 
 // False without memory.
-static bool read_column(sqlite3_stmt *statement, int index, const SqlColumn *column, char *member) {
+static bool read_column(sqlite3_stmt *statement, int index, const SqlColumn *column, void *member) {
+    const bool is_null = sqlite3_column_type(statement, index) == SQLITE_NULL;
+    const char *text;
+    size_t size = 0;
+    char *at = NULL;
     switch (column->kind) {
     case COLUMN_TEXT:
-        return read_text(statement, index, (char **)(void *)member);
-    case COLUMN_NAME:
-        read_name(statement, index, member, column->size);
+        return read_owned(statement, index, true, member, &size);
+    case COLUMN_BYTES:
+        if (!read_owned(statement, index, false, &at, &size))
+            return false;
+        *(StoredBytes *)member = (StoredBytes){at, size};
         return true;
+    case COLUMN_NAME: // A text that does not fit was not written by this program; it is cut.
+        text = (const char *)sqlite3_column_text(statement, index);
+        snprintf(member, column->size, "%s", text != NULL ? text : "");
+        return text != NULL || is_null;
     case COLUMN_REAL:
-        *(double *)(void *)member = sqlite3_column_type(statement, index) == SQLITE_NULL
-                                        ? (double)NAN
-                                        : sqlite3_column_double(statement, index);
+        *(double *)member = is_null ? (double)NAN : sqlite3_column_double(statement, index);
         return true;
     case COLUMN_INTEGER:
-        *(int64_t *)(void *)member = sqlite3_column_int64(statement, index);
-        return true;
     case COLUMN_COUNT:
-        *(uint64_t *)(void *)member = (uint64_t)sqlite3_column_int64(statement, index);
+        *(int64_t *)member = sqlite3_column_int64(statement, index);
         return true;
     case COLUMN_CHOICE:
-        *(int *)(void *)member = sqlite3_column_type(statement, index) == SQLITE_NULL
-                                     ? -1
-                                     : sqlite3_column_int(statement, index);
+        *(int *)member = is_null ? -1 : sqlite3_column_int(statement, index);
         return true;
     case COLUMN_FLAG:
-        *(bool *)(void *)member = sqlite3_column_int(statement, index) != 0;
+        *(bool *)member = sqlite3_column_int(statement, index) != 0;
         return true;
-    case COLUMN_BYTES:
-        return read_bytes(statement, index, (StoredBytes *)(void *)member);
+    case COLUMN_NONE:
+        break;
     }
     return true;
 }
@@ -441,11 +414,10 @@ static Status report_damage(Statement *statement, const SqlColumn *column, Probl
 }
 
 // Compares what was read of the row with its checks, which are those of all checked columns.
-static Status check_row(Statement *statement, int checks_index, const SqlColumn *columns,
-                        const void *item, Problem *problem) {
-    const char *checks = sqlite3_column_blob(statement->handle, checks_index);
-    const size_t size = (size_t)sqlite3_column_bytes(statement->handle, checks_index);
-    const int count = sqlite3_column_count(statement->handle);
+static Status row_check(Statement *statement, const SqlColumn *columns, const void *item,
+                        Problem *problem) {
+    const char *checks = sqlite3_column_blob(statement->handle, statement->checks);
+    const size_t size = (size_t)sqlite3_column_bytes(statement->handle, statement->checks);
     size_t at = 0;
     for (const SqlColumn *column = columns; checks != NULL && column->name != NULL; column++) {
         if ((column->flags & COLUMN_CHECKED) == 0)
@@ -454,30 +426,26 @@ static Status check_row(Statement *statement, int checks_index, const SqlColumn 
         if (at + sizeof check <= size)
             memcpy(&check, checks + at, sizeof check);
         at += sizeof check;
-        bool was_read = false;
-        for (int i = 0; i < count && !was_read; i++)
-            was_read = strcmp(sqlite3_column_name(statement->handle, i), column->name) == 0;
-        if (was_read && check != column_check(column, (const char *)item + column->offset))
-            return report_damage(statement, column, problem);
+        for (int i = 0; i < statement->result_count; i++)
+            if (statement->results[i] == column &&
+                check != column_check(column, (const char *)item + column->offset))
+                return report_damage(statement, column, problem);
     }
     return STATUS_OK;
 }
 
-Status row_read(Statement *statement, const SqlColumn *columns, void *item, Problem *problem) {
-    const int count = sqlite3_column_count(statement->handle);
-    int checks_index = -1;
+// The present row. `item` owns nothing before; on failure what the columns own of it is freed.
+static Status row_read(Statement *statement, const SqlColumn *columns, void *item,
+                       Problem *problem) {
     Status status = STATUS_OK;
-    for (int index = 0; index < count && status == STATUS_OK; index++) {
-        const char *name = sqlite3_column_name(statement->handle, index);
-        const SqlColumn *column = name == NULL ? NULL : column_find(columns, name);
-        if (column == NULL && name != NULL && strcmp(name, "checks") == 0)
-            checks_index = index;
-        else if (column != NULL &&
-                 !read_column(statement->handle, index, column, (char *)item + column->offset))
+    for (int i = 0; i < statement->result_count && status == STATUS_OK; i++) {
+        const SqlColumn *column = statement->results[i];
+        if (column != NULL &&
+            !read_column(statement->handle, i, column, (char *)item + column->offset))
             status = problem_set(problem, STATUS_NO_MEMORY, "no memory for a row of the database");
     }
-    if (status == STATUS_OK && checks_index >= 0)
-        status = check_row(statement, checks_index, columns, item, problem);
+    if (status == STATUS_OK && statement->checks >= 0)
+        status = row_check(statement, columns, item, problem);
     for (const SqlColumn *column = columns; status != STATUS_OK && column->name != NULL; column++)
         free_owned(column, item);
     return status;
@@ -497,39 +465,11 @@ void rows_clear(const SqlColumn *columns, size_t size, void *list) {
     *rows = (List){NULL, 0};
 }
 
-bool row_copy(const SqlColumn *columns, const void *item, void *copy, size_t size) {
-    memset(copy, 0, size);
-    for (const SqlColumn *column = columns; column->name != NULL; column++) {
-        const void *from = (const char *)item + column->offset;
-        void *to = (char *)copy + column->offset;
-        if (column->kind != COLUMN_TEXT && column->kind != COLUMN_BYTES) {
-            memcpy(to, from, column->size);
-            continue;
-        }
-        const bool is_text = column->kind == COLUMN_TEXT;
-        const StoredBytes *bytes = from;
-        const char *text = is_text ? *(char *const *)from : bytes->at;
-        const size_t length = text == NULL ? 0 : is_text ? strlen(text) + 1 : bytes->size;
-        char *own = text == NULL ? NULL : malloc(length + 1);
-        if (own != NULL)
-            memcpy(own, text, length);
-        if (is_text)
-            *(char **)to = own;
-        else
-            *(StoredBytes *)to = (StoredBytes){own, length};
-        if (own == NULL && text != NULL) {
-            row_clear(columns, copy, size);
-            return false;
-        }
-    }
-    return true;
-}
-
 Status sqlite_change(Sqlite *database, const char *sql, const SqlColumn *keys, const void *item,
                      int *changes, Problem *problem) {
     Statement *statement;
     bool has_row;
-    TRY(begin(database, sql, keys, item, NULL, &statement, problem));
+    TRY(statement_begin(database, sql, keys, item, NULL, &statement, problem));
     const Status status = statement_step(statement, &has_row, problem);
     if (changes != NULL)
         *changes = status == STATUS_OK ? sqlite3_changes(database->connection) : 0;
@@ -540,35 +480,34 @@ Status sqlite_change(Sqlite *database, const char *sql, const SqlColumn *keys, c
 Status sqlite_first(Sqlite *database, const char *sql, const SqlColumn *keys, const void *item,
                     const SqlColumn *columns, void *target, bool *is_found, Problem *problem) {
     Statement *statement;
-    *is_found = false;
-    TRY(begin(database, sql, keys, item, columns, &statement, problem));
-    Status status = statement_step(statement, is_found, problem);
-    if (status == STATUS_OK && *is_found)
+    bool has_row = false;
+    if (is_found != NULL)
+        *is_found = false;
+    TRY(statement_begin(database, sql, keys, item, columns, &statement, problem));
+    Status status = statement_step(statement, &has_row, problem);
+    if (status == STATUS_OK && has_row)
         status = row_read(statement, columns, target, problem);
     statement_end(statement);
+    if (is_found != NULL)
+        *is_found = has_row;
     return status;
-}
-
-static Status read_all(Statement *statement, const SqlColumn *columns, size_t size, List *list,
-                       Problem *problem) {
-    for (;;) {
-        bool has_row;
-        TRY(statement_step(statement, &has_row, problem));
-        if (!has_row)
-            return STATUS_OK;
-        void *item = list_grow(list, size);
-        if (item == NULL)
-            return problem_set(problem, STATUS_NO_MEMORY, "no memory for the rows of the database");
-        TRY(row_read(statement, columns, item, problem));
-    }
 }
 
 Status sqlite_list(Sqlite *database, const char *sql, const SqlColumn *keys, const void *item,
                    const SqlColumn *columns, size_t size, void *list, Problem *problem) {
     Statement *statement;
+    bool has_row = true;
     *(List *)list = (List){NULL, 0};
-    TRY(begin(database, sql, keys, item, columns, &statement, problem));
-    const Status status = read_all(statement, columns, size, list, problem);
+    TRY(statement_begin(database, sql, keys, item, columns, &statement, problem));
+    Status status = statement_step(statement, &has_row, problem);
+    while (status == STATUS_OK && has_row) {
+        void *row = list_grow(list, size);
+        status = row != NULL ? row_read(statement, columns, row, problem)
+                             : problem_set(problem, STATUS_NO_MEMORY,
+                                           "no memory for the rows of the database");
+        if (status == STATUS_OK)
+            status = statement_step(statement, &has_row, problem);
+    }
     statement_end(statement);
     if (status != STATUS_OK)
         rows_clear(columns, size, list);

@@ -12,7 +12,6 @@
 #include "server/util/embedded.h"
 
 typedef struct Sqlite Sqlite;
-typedef struct Statement Statement;
 
 typedef struct StoredBytes {
     void *at;
@@ -28,6 +27,7 @@ typedef enum ColumnKind {
     COLUMN_CHOICE,  // int; negative is NULL
     COLUMN_FLAG,    // bool
     COLUMN_BYTES,   // StoredBytes, owned
+    COLUMN_NONE,    // no member: written by an expression, not read
 } ColumnKind;
 
 enum {
@@ -43,7 +43,8 @@ typedef struct SqlColumn {
     ColumnKind kind;
     int flags;
     size_t offset, size;
-    const char *sql; // the expression that it is read by; it is never written. NULL: a column
+    const char *read;  // the expression that it is read by; it is never written. NULL: a column
+    const char *write; // the expression that {insert} writes; NULL: the member
 } SqlColumn;
 
 // The kind follows from the member's type; a type that is none of these does not compile: the array
@@ -53,13 +54,14 @@ typedef struct SqlColumn {
     char **: COLUMN_TEXT, const char **: COLUMN_TEXT, double *: COLUMN_REAL, int64_t *: COLUMN_INTEGER, \
     uint64_t *: COLUMN_COUNT, int *: COLUMN_CHOICE, bool *: COLUMN_FLAG, StoredBytes *: COLUMN_BYTES, \
     default: _Generic(((Type *)0)->member, char *: COLUMN_NAME, default: -1))
-#define COLUMN_OF(Type, member, name_, flags_, sql_) \
+#define COLUMN_OF(Type, member, name_, flags_, read_) \
     {.name = name_, .kind = COLUMN_KIND(Type, member), .flags = flags_, \
      .offset = offsetof(Type, member) + 0 * sizeof(char[COLUMN_KIND(Type, member) >= 0 ? 1 : -1]), \
-     .size = sizeof(((Type *)0)->member), .sql = sql_}
+     .size = sizeof(((Type *)0)->member), .read = read_}
 #define COLUMN(Type, member) COLUMN_OF(Type, member, #member, 0, NULL)
 #define COLUMN_WITH(Type, member, flags) COLUMN_OF(Type, member, #member, flags, NULL)
-#define COLUMN_READ(Type, member, sql) COLUMN_OF(Type, member, #member, 0, sql)
+#define COLUMN_READ(Type, member, read) COLUMN_OF(Type, member, #member, 0, read)
+#define COLUMN_WRITE(name_, write_) {.name = name_, .kind = COLUMN_NONE, .write = write_}
 #define COLUMN_END {.name = NULL}
 // clang-format on
 
@@ -94,12 +96,13 @@ Status sqlite_check_place(Sqlite *database, Problem *problem);
 // How many rows this connection has changed since it was opened.
 uint64_t sqlite_rows_changed(Sqlite *database);
 
-// In the functions below `sql` is a constant text, which is prepared once per connection and known
-// by its address. Every parameter ":name" is bound to the member of `item` that `keys` calls so;
-// `keys` may be NULL where there are none. Rows are read into the members of the `columns` that the
-// result has; the others stay as they are. Generated from the tables, which are the same each time:
+// In the functions below `sql` is a constant text, which is prepared once per connection, found by
+// its address and always used with the same tables. Every parameter ":name" is bound to the member
+// of `item` that `keys` calls so; `keys` may be NULL where there are none. Rows are read into the
+// members of the `columns` that the result has; the others stay as they are. Generated from the
+// tables, which are the same each time:
 //
-//     {insert}    (a, b) VALUES (:a, :b)    all of `keys`, with their checks
+//     {insert}    (a, b) VALUES (:a, :b)    all of `keys` but those with `read`, with their checks
 //     {set}       a = :a, b = :b            those that are COLUMN_MUTABLE, with the checks of all
 //     {columns}   a, b                      all of `columns`, with their checks
 //     {head}      a, b                      the same without those that are COLUMN_LONG
@@ -107,25 +110,13 @@ uint64_t sqlite_rows_changed(Sqlite *database);
 // Runs one statement without rows. *changes (may be NULL): rows changed.
 Status sqlite_change(Sqlite *database, const char *sql, const SqlColumn *keys, const void *item,
                      int *changes, Problem *problem);
-// The first row of a query into `target`; *is_found whether there is one.
+// The first row of a query into `target`; *is_found (may be NULL): whether there is one.
 Status sqlite_first(Sqlite *database, const char *sql, const SqlColumn *keys, const void *item,
                     const SqlColumn *columns, void *target, bool *is_found, Problem *problem);
 // All rows as a typed list of items of `size` bytes; on failure it is empty.
 Status sqlite_list(Sqlite *database, const char *sql, const SqlColumn *keys, const void *item,
                    const SqlColumn *columns, size_t size, void *list, Problem *problem);
 
-// A query to be stepped through, to be ended before the next one of the same text.
-Status statement_begin(Sqlite *database, const char *sql, const SqlColumn *keys, const void *item,
-                       Statement **statement, Problem *problem);
-// *has_row is false at the end.
-Status statement_step(Statement *statement, bool *has_row, Problem *problem);
-// The current row. `item` owns nothing before; on failure what the columns own of it is freed.
-Status row_read(Statement *statement, const SqlColumn *columns, void *item, Problem *problem);
-void statement_end(Statement *statement); // NULL is allowed
-
-// A deep copy of the members that the columns name; the rest of `copy`, of `size` bytes, is zero.
-// False without memory, and then it is all zero.
-bool row_copy(const SqlColumn *columns, const void *item, void *copy, size_t size);
 // Frees what the columns own and sets all of `item`, of `size` bytes, to zero.
 void row_clear(const SqlColumn *columns, void *item, size_t size);
 void rows_clear(const SqlColumn *columns, size_t size, void *list);

@@ -3,7 +3,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/db/db.h"
 #include "server/db/db_private.h"
 
 // clang-format off
@@ -58,25 +57,16 @@ Status db_sweep_begin(Db *db, SweepRow *row, Problem *problem) {
 
 Status db_sweep_load(Db *db, const char *result, SweepRow *row, Problem *problem) {
     static const char sql[] = "SELECT {columns} FROM sweeps WHERE result = :id";
-    const QueryKey key = {.id = result};
-    bool is_found;
-    memset(row, 0, sizeof *row);
-    TRY(db_first(db, sql, query_key_columns, &key, sweep_columns, row, &is_found, problem));
-    return is_found ? STATUS_OK
-                    : problem_set(problem, STATUS_NOT_FOUND,
-                                  "there is no table of \"%.72s\": either no such result, or its "
-                                  "scene asked for no sweep",
-                                  result);
+    return db_get(db, sql, &(QueryKey){.id = result}, sweep_columns, row, sizeof *row, problem,
+                  "there is no table of \"%.72s\": either no such result, or its scene asked for "
+                  "no sweep",
+                  result);
 }
 
 Status db_sweep_asked(Db *db, const char *job, SweepRow *row, Problem *problem) {
     static const char sql[] = "SELECT result, scene FROM jobs WHERE id = :id AND scene <> ''";
-    const QueryKey key = {.id = job};
-    bool is_found;
-    memset(row, 0, sizeof *row);
-    TRY(db_first(db, sql, query_key_columns, &key, sweep_columns, row, &is_found, problem));
-    return is_found ? STATUS_OK
-                    : problem_set(problem, STATUS_NOT_FOUND, "there is no job \"%.40s\"", job);
+    return db_get(db, sql, &(QueryKey){.id = job}, sweep_columns, row, sizeof *row, problem,
+                  "there is no job \"%.40s\"", job);
 }
 
 static Status sweep_apply_take(Sqlite *database, const void *work, Problem *problem) {
@@ -119,35 +109,34 @@ static Status sweep_check_row(Sqlite *database, const char *sql, const SqlColumn
                              "the sweep's rows were deleted or made anew while they were read");
 }
 
-static Status sweep_read_parts(Sqlite *database, const SweepRow *sweep,
-                               const SweepChunkRows *chunks, size_t offset, size_t size,
-                               unsigned char *target, Problem *problem) {
+typedef struct SweepRead {
+    const SweepRow *sweep;
+    const SweepChunkRows *chunks;
+    size_t offset, size;
+    unsigned char *target;
+} SweepRead;
+
+static Status sweep_apply_read(Sqlite *database, const void *work, Problem *problem) {
     static const char sweep_sql[] = "SELECT 1 FROM sweeps WHERE number = :number AND result = "
                                     ":result AND created_unix_ms = :created_unix_ms";
     static const char chunk_sql[] =
         "SELECT 1 FROM sweep_chunks WHERE number = :number AND sweep = :sweep AND chunk = :chunk "
         "AND failed = :failed AND is_open = :is_open";
-    TRY(sweep_check_row(database, sweep_sql, sweep_columns, sweep, problem));
-    for (size_t i = 0; i < chunks->count; i++) {
-        TRY(sweep_check_row(database, chunk_sql, chunk_columns, &chunks->at[i], problem));
-        TRY(sqlite_read_part(database, "sweep_chunks", "rows", chunks->at[i].number, offset, size,
-                             target + i * size, problem));
+    const SweepRead *read = work;
+    TRY(sweep_check_row(database, sweep_sql, sweep_columns, read->sweep, problem));
+    for (size_t i = 0; i < read->chunks->count; i++) {
+        const SweepChunkRow *chunk = &read->chunks->at[i];
+        TRY(sweep_check_row(database, chunk_sql, chunk_columns, chunk, problem));
+        TRY(sqlite_read_part(database, "sweep_chunks", "rows", chunk->number, read->offset,
+                             read->size, read->target + i * read->size, problem));
     }
     return STATUS_OK;
 }
 
 Status db_sweep_read(Db *db, const SweepRow *sweep, const SweepChunkRows *chunks, size_t offset,
                      size_t size, unsigned char *target, Problem *problem) {
-    Sqlite *database = db_take(db);
-    // One transaction: what was found to be the same stays so while it is read.
-    Status status = sqlite_execute(database, "BEGIN", problem);
-    if (status == STATUS_OK) {
-        status = sweep_read_parts(database, sweep, chunks, offset, size, target, problem);
-        const Status ended = sqlite_execute(database, "COMMIT", NULL);
-        status = status == STATUS_OK ? ended : status;
-    }
-    db_put(db, database);
-    return status;
+    return db_read(db, sweep_apply_read, &(SweepRead){sweep, chunks, offset, size, target},
+                   problem);
 }
 
 static Status sweep_apply_reopen(Sqlite *database, const void *work, Problem *problem) {

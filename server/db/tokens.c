@@ -48,7 +48,7 @@ static Status token_apply_add(Sqlite *database, const void *work, Problem *probl
         return problem_set(problem, STATUS_CONFLICT,
                            "there is a token \"%.64s\" already%s; choose another name", row->name,
                            found.revoked_unix_ms > 0 ? ", revoked" : "");
-    TRY(sqlite_first(database, count_sql, NULL, NULL, query_counts_columns, &counted, &is_found,
+    TRY(sqlite_first(database, count_sql, NULL, NULL, query_counts_columns, &counted, NULL,
                      problem));
     if (counted.count >= TOKENS_MAX)
         return problem_set(problem, STATUS_LIMIT,

@@ -16,10 +16,12 @@ os.environ.pop("IMPACTD_RECORD", None)
 
 @contextlib.contextmanager
 def changed(folder, table, column):
-    """One value of the table is another one meanwhile."""
+    """One value of the table's newest row is another one meanwhile."""
     connection = sqlite3.connect(os.path.join(folder, "impactd.db"), isolation_level=None)
-    before = connection.execute(f"SELECT {column} FROM {table}").fetchone()[0]
+    number, before = connection.execute(f"SELECT number, {column} FROM {table} ORDER BY number DESC").fetchone()
     if isinstance(before, float):
+        after = before * 1.5
+    elif isinstance(before, int):
         after = before + 1
     elif isinstance(before, bytes):
         after = before[:-1] + bytes([before[-1] ^ 1])
@@ -27,9 +29,9 @@ def changed(folder, table, column):
         after = before.replace("1", "2", 1)
     assert after != before, (table, column)
     try:
-        connection.execute(f"UPDATE {table} SET {column} = ?", [after])
+        connection.execute(f"UPDATE {table} SET {column} = ? WHERE number = ?", [after, number])
         yield
-        connection.execute(f"UPDATE {table} SET {column} = ?", [before])
+        connection.execute(f"UPDATE {table} SET {column} = ? WHERE number = ?", [before, number])
     finally:
         connection.close()
 
@@ -92,6 +94,42 @@ def test_a_changed_record_is_no_answer():
             scene = program.scene("paper_free_sponge")
             scene["excitation"] = {"kind": "record", "name": "quake"}
             assert daemon.submit(scene).status == 500
+
+
+def test_a_changed_material_is_no_answer():
+    """A revision and a measurement that differ from their checksums: neither shown, imported over nor used by a new job."""
+    felt = {"slug": "felt", "name": "Felt 1", "source": "lab 1", "restitution": 0.5, "contact_time": 0.02, "separation": "zero_penetration",
+            "tags": ["lab1"], "comment": "1st"}
+    with tempfile.TemporaryDirectory() as folder:
+        with program.daemon(data=folder) as daemon:
+            assert daemon.request("POST", "/v1/materials", json=felt).status == 201
+            etag = daemon.get("/v1/materials/felt").headers["etag"]
+            test = {"drops": [{"contact_time": 0.01}], "notes": "1"}
+            sent = daemon.request("POST", "/v1/materials/felt/measurements", json={**test, "comment": "1"}, headers={"if-match": etag})
+            assert sent.status == 201, sent
+            etag = daemon.get("/v1/materials/felt").headers["etag"]
+            whole = daemon.get("/v1/materials.json").json()
+        connection = sqlite3.connect(os.path.join(folder, "impactd.db"), isolation_level=None)
+        connection.execute("DROP TRIGGER material_revisions_keep")
+        connection.execute("DROP TRIGGER material_measurements_keep")
+        connection.close()
+        for column in ("restitution", "name", "lists", "comment", "separation", "created_unix_ms"):
+            with changed(folder, "material_revisions", column), program.daemon(data=folder) as daemon:
+                for target in ("/v1/materials/felt", "/v1/materials/felt@1", "/v1/materials", "/v1/materials/felt/revisions"):
+                    refused(daemon, target)
+                again = daemon.request("POST", "/v1/materials/import", json=whole)
+                assert again.status == 500, again
+                scene = program.scene("paper_free_sponge")
+                scene["dampers"][0]["buffer"] = "felt"
+                reply = daemon.submit(scene)
+                assert reply.status == 500 and "could not be looked up" in reply.json()["detail"], (column, reply)
+                assert daemon.get("/v1/materials/sponge").status == 200
+        for column in ("document", "comment"):
+            with changed(folder, "material_measurements", column), program.daemon(data=folder) as daemon:
+                refused(daemon, "/v1/materials/felt/measurements/1")
+        with program.daemon(data=folder) as daemon:
+            reply = daemon.get("/v1/materials/felt")
+            assert reply.status == 200 and reply.headers["etag"] == etag
 
 
 if __name__ == "__main__":

@@ -1,5 +1,4 @@
-// Materials in the database: what is added comes back, nobody changes what was said, and databases
-// of before go on.
+// Materials in the database: what is added comes back, no SQL changes it, and there are limits.
 #include "server/db/materials.h"
 
 #include <stdio.h>
@@ -110,14 +109,9 @@ static char *dump(Sqlite *database) {
         "who, why, created_unix_ms)) FROM material_trail) AS text";
     static const SqlColumn columns[] = {
         {.name = "text", .kind = COLUMN_TEXT, .size = sizeof(char *)}, COLUMN_END};
-    Statement *statement;
-    bool has_row = false;
     char *text = NULL;
-    assert_int_equal(statement_begin(database, sql, NULL, NULL, &statement, NULL), STATUS_OK);
-    assert_int_equal(statement_step(statement, &has_row, NULL), STATUS_OK);
-    assert_true(has_row);
-    assert_int_equal(row_read(statement, columns, &text, NULL), STATUS_OK);
-    statement_end(statement);
+    assert_int_equal(sqlite_first(database, sql, NULL, NULL, columns, &text, NULL, NULL),
+                     STATUS_OK);
     assert_non_null(text);
     return text;
 }
@@ -189,4 +183,45 @@ TEST_IN(no_sql_changes_what_was_said, make_folder, remove_folder) {
     free(before);
     free(after);
     sqlite_close(database);
+}
+
+static Status apply_sql(Sqlite *database, const void *sql, Problem *problem) {
+    return sqlite_execute(database, sql, problem);
+}
+
+TEST(materials_revisions_and_bytes_have_limits) {
+    Db *db = felt_store(NULL);
+    MaterialRevision one = felt_saying(0.5), other = felt_saying(0.5);
+    MaterialMeasurement made = {.slug = "felt", .comment = "", .document = "{}"};
+    Problem problem;
+    problem_clear(&problem);
+    assert_int_equal(db_material_add(db, &one, NULL), STATUS_OK);
+    assert_int_equal(db_write(db, apply_sql,
+                              "INSERT INTO materials (number, slug) VALUES (100000, 'last')", NULL),
+                     STATUS_OK);
+    other.slug = "wood";
+    assert_int_equal(db_material_add(db, &other, &problem), STATUS_LIMIT);
+    assert_non_null(strstr(problem.detail, "100000 materials"));
+    assert_int_equal(
+        db_write(db, apply_sql,
+                 "INSERT INTO material_revisions (material, revision, name, restitution, source, "
+                 "comment, created_unix_ms) SELECT number, 10000, 'F', 0.5, 's', '', 1 FROM "
+                 "materials WHERE slug = 'felt'",
+                 NULL),
+        STATUS_OK);
+    problem_clear(&problem);
+    assert_int_equal(db_material_revise(db, &one, ANY_VERSION, &problem), STATUS_LIMIT);
+    assert_non_null(strstr(problem.detail, "10000 revisions"));
+    assert_int_equal(db_material_measure(db, &made, ANY_VERSION, NULL), STATUS_OK);
+    assert_int_equal(
+        db_write(db, apply_sql, "UPDATE material_room SET bytes = (64 << 30) - 300", NULL),
+        STATUS_OK);
+    problem_clear(&problem);
+    assert_int_equal(db_material_measure(db, &made, ANY_VERSION, &problem), STATUS_LIMIT);
+    assert_non_null(strstr(problem.detail, "64 GiB"));
+    assert_int_equal(felt_review(db, 1, "approved", NULL, ANY_VERSION), STATUS_LIMIT);
+    MaterialState now;
+    assert_int_equal(db_material_state(db, "felt", &now, NULL), STATUS_OK);
+    assert_int_equal(now.measurements, 1);
+    db_close(db);
 }

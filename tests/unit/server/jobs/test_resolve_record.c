@@ -147,8 +147,8 @@ TEST(a_sweep_holds_only_so_many_samples) {
         char name[8];
         snprintf(name, sizeof name, "large%zu", i);
         assert_true(reals_allocate(&samples, RECORD_SAMPLES)); // never written
-        large[i] = record_memory_add(db_record_memory(db), db_catalog_version(db),
-                                     named_record_new(name, name, 1, &samples));
+        large[i] =
+            record_memory_add(db_record_memory(db), named_record_new(name, name, 1, &samples));
     }
     assert_int_equal(prepare("\"name\": \"a\"",
                              "{\"kind\": \"sweep\", \"axes\": [{\"pointer\": "

@@ -33,29 +33,6 @@ static char *export_all(Db *db, bool is_table) {
     return whole;
 }
 
-TEST(only_an_import_that_adds_a_revision_changes_the_catalog) {
-    Db *db = open_database();
-    ImportTally tally;
-    uint64_t version = db_catalog_version(db);
-    assert_int_equal(import_text(db, "slug,name,source,restitution\nx,X,s,1.5\n", &tally),
-                     STATUS_INVALID);
-    assert_true(db_catalog_version(db) == version);
-    static const char good[] = "slug,name,source,restitution\nx,X,s,0.5\n";
-    assert_int_equal(import_text(db, good, &tally), STATUS_OK);
-    assert_true(db_catalog_version(db) > version);
-    version = db_catalog_version(db);
-    assert_int_equal(import_text(db, good, &tally), STATUS_OK);
-    assert_int_equal(
-        import_text(db,
-                    "slug,row,test\nx,measurement,\"{\"\"drops\"\": [{\"\"contact_time\"\": "
-                    "1}]}\"\n",
-                    &tally),
-        STATUS_OK);
-    assert_int_equal(tally.measurements.added, 1);
-    assert_true(db_catalog_version(db) == version);
-    db_close(db);
-}
-
 // ESC, BEL, DEL, CSI as one character, a lone CR, formulas, and texts that look like JSON.
 static const char *const unsafe[] = {
     "red \x1b[31m", "\x07", "a\x7f", "\xc2\x9b 2J", "over\rwritten", "=cmd()",    "+1",
