@@ -139,16 +139,27 @@ TEST(samples_are_let_go_of_and_had_again) {
     study_request_clear(&inquiry);
 }
 
+static Status apply_sql(Sqlite *database, const void *sql, Problem *fault) {
+    return sqlite_execute(database, sql, fault);
+}
+
 TEST(a_sweep_holds_only_so_many_samples) {
     NamedRecord *large[5];
     StudyRequest inquiry;
     for (size_t i = 0; i < COUNT(large); i++) {
         Reals samples;
-        char name[8];
+        char name[8], digest[RECORD_DIGEST_SIZE], sql[400];
         snprintf(name, sizeof name, "large%zu", i);
+        snprintf(digest, sizeof digest, "%064zu", i);
+        snprintf(sql, sizeof sql,
+                 "INSERT INTO records (name, layout, unit, interval, count, peak, peak_time, "
+                 "peak_velocity, end_velocity, digest, created_unix_ms) VALUES ('%s', 'json', 'g', "
+                 "1, %d, 0, 0, 0, 0, '%s', 0)",
+                 name, RECORD_SAMPLES, digest);
+        assert_int_equal(db_write(db, apply_sql, sql, &problem), STATUS_OK);
         assert_true(reals_allocate(&samples, RECORD_SAMPLES)); // never written
         large[i] =
-            record_memory_add(db_record_memory(db), named_record_new(name, name, 1, &samples));
+            record_memory_add(db_record_memory(db), named_record_new(name, digest, 1, &samples));
     }
     assert_int_equal(prepare("\"name\": \"a\"",
                              "{\"kind\": \"sweep\", \"axes\": [{\"pointer\": "
