@@ -119,12 +119,10 @@ Status cache_explain(App *app, const Request *request, Reply *reply, Problem *pr
     Warnings warnings = {NULL, 0};
     Bytes bytes = {.most = app->reply_most};
     TRY(request_require_json(request, problem));
-    bool has_place = false;
     Status status = jobs_charge(app->manager, request->client, problem);
     if (status == STATUS_OK)
         status = jobs_prepare_request(app->manager, request->body, request->body_size, NULL,
-                                      &has_place, &inquiry, &warnings, problem);
-    jobs_leave_place(app->manager, has_place);
+                                      &inquiry, &warnings, problem);
     if (status == STATUS_OK)
         status = explain(app, &inquiry, &bytes, problem);
     if (status == STATUS_OK)

@@ -12,7 +12,6 @@
 #include "server/http/access.h"
 #include "server/http/reply.h"
 #include "server/jobs/documents.h"
-#include "server/jobs/references.h"
 #include "server/json/encode.h"
 #include "server/json/parse.h"
 #include "server/materials/material.h"
@@ -147,7 +146,7 @@ static void result_put_materials(App *app, Bytes *bytes, const StudyRequest *inq
     Bytes lines = {0};
     ReferenceRow use;
     const char *separator = "";
-    references_write(&lines, inquiry);
+    references_write(&lines, inquiry, true);
     const char *rest = lines.at;
     bytes_text(bytes, "[");
     while (references_next(&rest, &use)) {

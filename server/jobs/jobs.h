@@ -27,25 +27,34 @@ typedef struct JobManagerSettings {
     SimulationLimits limits;
 } JobManagerSettings;
 
-// Reads a scene's JSON, perhaps with a study, resolves its materials, judges and completes it, all
-// faults at once. `inquiry` is cleared by study_request_clear in any case, `warnings` by
+// Reads a scene's JSON, perhaps with a study, resolves its names, validates and completes it, all
+// faults at once. `request` is cleared by study_request_clear in any case, `warnings` by
 // warnings_clear.
 Status jobs_prepare(Db *db, const char *text, size_t size, const SimulationLimits *limits,
-                    StudyRequest *inquiry, Warnings *warnings, Problem *problem);
+                    StudyRequest *request, Warnings *warnings, Problem *problem);
 
-// The same for a request. Its study must be within study_seconds where there are limits, and only
-// so many requests may plan large structures at once: STATUS_BUSY beyond. *has_place is for
-// jobs_leave_place, once the request plans no more; also on failure.
+// The same for a client. Its study must be within study_seconds where there are limits, and only so
+// many requests may plan large structures at once: STATUS_BUSY beyond.
 Status jobs_prepare_request(JobManager *manager, const char *text, size_t size,
-                            const SimulationLimits *limits, bool *has_place, StudyRequest *inquiry,
+                            const SimulationLimits *limits, StudyRequest *request,
                             Warnings *warnings, Problem *problem);
-void jobs_leave_place(JobManager *manager, bool has_place);
 // Counts one submission of `client` (NULL: a client without a token) against its jobs a minute:
 // STATUS_QUOTA.
 Status jobs_charge(JobManager *manager, const char *client, Problem *problem);
 
 // "r-" and 64 hexadecimal digits: SHA-256 of the canonical form and the engine's version.
-void jobs_result_id(const StudyRequest *inquiry, char target[72]);
+void jobs_result_id(const StudyRequest *request, char target[72]);
+
+// Adds a line for each revision of a material, "sponge@1\n", unless has_materials is false, and
+// each record, "record:elcentro\n", that the prepared scene or its sweep names.
+void references_write(Bytes *lines, const StudyRequest *request, bool has_materials);
+// One of those lines.
+typedef struct ReferenceRow {
+    char slug[128];
+    unsigned long long revision; // 0: it is of no material
+} ReferenceRow;
+// Takes the next line off `*lines`; false at their end.
+bool references_next(const char **lines, ReferenceRow *row);
 
 // Opens the queue, resumes the unfinished jobs of the database, starts the workers. Borrows `db`.
 Status jobs_open(Db *db, const JobManagerSettings *settings, JobManager **manager,

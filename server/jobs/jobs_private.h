@@ -194,6 +194,11 @@ Status job_insert_now(Job *job, Problem *problem);
 // Without the lock: what could not be written is tried again.
 void commit_retry(JobManager *manager);
 
+// resolve.c. Of a prepared request: drops the samples of its records for as long as it waits, and
+// loads them again, with a fault for each that is no longer there.
+void request_drop_records(StudyRequest *request);
+Status request_load_records(Db *db, StudyRequest *request, Problem *problem);
+
 // series.c. Without the lock: saves the series if it is dearer to compute than to read.
 void jobs_keep_series(JobManager *manager, const char *result, const Outcome *outcome,
                       double seconds);

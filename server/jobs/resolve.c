@@ -1,28 +1,662 @@
 // A scene's text made ready: read, its names of materials and records resolved, validated and
 // completed, and its id; and the same for a dry run.
+//
+// A material's name becomes that of a revision, with its values; a record's name stays, with the
+// digest of its samples beside it, so that the same scene always means the same samples, also when
+// a record of that name was deleted and another one uploaded. A sweep keeps the values of every
+// material and the samples of every record that it names: its points are made without a database.
+#include <math.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/base/canonical.h"
 #include "core/base/json_pointer.h"
-#include "core/simulation/simulation.h"
+#include "core/base/spelling.h"
 #include "core/study/sweep.h"
+#include "server/db/materials.h"
+#include "server/db/records.h"
 #include "server/jobs/jobs_private.h"
-#include "server/jobs/resolve_material.h"
-#include "server/jobs/resolve_record.h"
 #include "server/json/parse.h"
-#include "server/util/bytes.h"
 #include "server/util/sha256.h"
 
-// Planning takes storeys^3 operations and more, and nothing stops it: from LARGE_STOREYS on (some
-// milliseconds) a request needs a place, so that others are answered meanwhile.
-enum { LARGE_STOREYS = 40, LARGE_PLACES = 4 };
+enum {
+    // Planning takes storeys^3 operations and more, and nothing stops it: from LARGE_STOREYS on
+    // (some milliseconds) a request needs a place, so that others are answered meanwhile.
+    LARGE_STOREYS = 40,
+    LARGE_PLACES = 4,
+    SUGGESTED = 10,         // faults that list the names there are
+    RECORDS_LISTED = 1000,  // names among which the nearest one is searched
+    SWEEP_SAMPLES = 1 << 24 // of all records that one sweep names, in memory as long as it runs
+};
 
-static Status resolve_place(JobManager *manager, const StudyRequest *inquiry, bool *has_place,
-                            Problem *problem) {
-    const Scene *scene = &inquiry->simulation.scene;
-    if (scene->structure == NULL || structure_storeys(scene_structure(scene)) < LARGE_STOREYS)
+// Keeps the first fault of the scene; false for what ends the walk.
+static bool resolve_continues(Status one, Status *status) {
+    const bool continues = one == STATUS_OK || one == STATUS_INVALID;
+    if (*status == STATUS_OK || !continues)
+        *status = one;
+    return continues;
+}
+
+static Fault resolve_fault(const char *pointer, const char *value) {
+    Fault fault = {.detail = ""};
+    text_fit(fault.pointer, sizeof fault.pointer, pointer);
+    text_quote(fault.value, sizeof fault.value, value);
+    return fault;
+}
+
+// Lists the names there are, one in each element of `at`, and suggests the nearest one to `name`.
+static void resolve_suggest(Fault *fault, const char *name, const void *at, size_t count,
+                            size_t element_size, size_t name_offset, char *list, size_t size) {
+    const char **names = calloc(count + 1, sizeof *names); // NULL behind the last one
+    for (size_t i = 0; names != NULL && i < count; i++) {
+        const char *place = (const char *)at + i * element_size + name_offset;
+        names[i] = *(const char *const *)(const void *)place;
+        text_list(list, size, names[i]);
+    }
+    const char *nearest = names == NULL ? NULL : spelling_nearest(names, name);
+    if (nearest != NULL)
+        text_fit(fault->did_you_mean, sizeof fault->did_you_mean, nearest);
+    free(names);
+}
+
+static Status material_refuse_unknown(Db *db, const char *name, const char *slug,
+                                      const char *pointer, Problem *problem) {
+    Fault fault = resolve_fault(pointer, name);
+    Texts slugs;
+    char short_name[80], list[200] = "";
+    text_fit(short_name, sizeof short_name, name);
+    if (problem->count < SUGGESTED && db_material_slugs(db, &slugs, NULL) == STATUS_OK) {
+        resolve_suggest(&fault, slug, slugs.at, slugs.count, sizeof *slugs.at, 0, list,
+                        sizeof list);
+        material_slugs_clear(&slugs);
+    }
+    snprintf(fault.detail, sizeof fault.detail, "no material is called \"%s\"%s%s", short_name,
+             list[0] != '\0' ? "; there are " : "", list);
+    return problem_add_fault(problem, STATUS_INVALID, &fault);
+}
+
+// Why a name stands for no revision: it is no material's, or the material has none of that number,
+// or, where the name has none, all of them are deprecated.
+static Status material_refuse(Db *db, const char *name, const char *slug, uint64_t revision,
+                              const char *pointer, Problem *problem) {
+    MaterialRevision found = {0};
+    if (problem->count >= PROBLEM_FAULTS) // is counted alone
+        return problem_add(problem, STATUS_INVALID, pointer, "is not there");
+    Status status = db_material(db, slug, 0, &found, NULL);
+    const bool has_head = status == STATUS_OK;
+    if (status == STATUS_NOT_FOUND)
+        status = db_material(db, slug, 1, &found, NULL);
+    if (status == STATUS_OK) {
+        Fault fault = resolve_fault(pointer, name);
+        snprintf(fault.did_you_mean, sizeof fault.did_you_mean, "%.40s@%llu", found.slug,
+                 (unsigned long long)(has_head ? found.revision : found.latest));
+        if (has_head || revision > 0)
+            snprintf(fault.detail, sizeof fault.detail,
+                     "the material %.64s has no such revision; its %s is %s", found.slug,
+                     has_head ? "head" : "newest revision", fault.did_you_mean);
+        else
+            snprintf(fault.detail, sizeof fault.detail,
+                     "every revision of the material %.64s is deprecated: name one, %s, to use it "
+                     "all the same",
+                     found.slug, fault.did_you_mean);
+        status = problem_add_fault(problem, STATUS_INVALID, &fault);
+    } else if (status == STATUS_NOT_FOUND) {
+        status = material_refuse_unknown(db, name, slug, pointer, problem);
+    }
+    material_revision_clear(&found);
+    return status;
+}
+
+static Status material_add_fault(const char *pointer, const char *member, const char *detail,
+                                 const char *name, Problem *problem) {
+    char place[sizeof((Fault){0}.pointer)];
+    json_pointer_join(place, sizeof place, pointer, member);
+    return problem_add(problem, STATUS_INVALID, place, detail, name);
+}
+
+// A value that came beside the name, and the revision's.
+typedef struct MaterialValue {
+    const char *member, *unit;
+    double *given, stored;
+} MaterialValue;
+
+// They must be the same; one that was not given becomes the revision's.
+static Status material_match(const MaterialValue *values, size_t count, const char *pointer,
+                             const char *name, Problem *problem) {
+    Status status = STATUS_OK;
+    for (size_t i = 0; i < count; i++) {
+        const MaterialValue *value = &values[i];
+        char place[sizeof((Fault){0}.pointer)];
+        if (isnan(*value->given) || *value->given == value->stored) {
+            *value->given = value->stored;
+            continue;
+        }
+        json_pointer_join(place, sizeof place, pointer, value->member);
+        status = problem_add_real(problem, STATUS_INVALID, place, *value->given, value->unit,
+                                  "is %s, but %s has %s: leave one of them out",
+                                  real_text(*value->given).at, name,
+                                  isnan(value->stored) ? "none" : real_text(value->stored).at);
+    }
+    return status;
+}
+
+// A table that came beside the name: row by row the revision's.
+static Status material_match_table(ContactRows *given, const MaterialRows *stored,
+                                   const char *pointer, const char *name, Problem *problem) {
+    char table[sizeof((Fault){0}.pointer)], place[sizeof table];
+    Status status = STATUS_OK;
+    if (given->count != stored->count)
+        return material_add_fault(pointer, "table",
+                                  "is not that of %s, which has another number of rows: leave one "
+                                  "of them out",
+                                  name, problem);
+    json_pointer_join(table, sizeof table, pointer, "table");
+    for (size_t i = 0; i < stored->count; i++) {
+        ContactRow *row = &given->at[i];
+        const MaterialRow *wanted = &stored->at[i];
+        json_pointer_index(place, sizeof place, table, i);
+        const MaterialValue values[] = {
+            {"approach_speed", "m/s", &row->approach_speed, wanted->approach_speed},
+            {"restitution", NULL, &row->restitution, wanted->restitution},
+            {"contact_time", "s", &row->contact_time, wanted->contact_time}};
+        (void)resolve_continues(material_match(values, COUNT(values), place, name, problem),
+                                &status);
+    }
+    return status;
+}
+
+static Status material_copy_table(const MaterialRows *stored, ContactRows *rows) {
+    rows->at = calloc(stored->count, sizeof *rows->at);
+    if (rows->at == NULL)
+        return STATUS_NO_MEMORY;
+    for (; rows->count < stored->count; rows->count++) {
+        const MaterialRow *row = &stored->at[rows->count];
+        rows->at[rows->count] =
+            (ContactRow){row->approach_speed, row->restitution, row->contact_time};
+    }
+    return STATUS_OK;
+}
+
+// Numbers, or a table in their place. Under impulse a canonical scene has no contact time:
+// completion leaves it out again.
+static Status material_fill_values(Buffer *buffer, const Material *material, const char *pointer,
+                                   const char *name, Problem *problem) {
+    const MaterialValue values[] = {
+        {"restitution", NULL, &buffer->restitution, material->restitution},
+        {"contact_time", "s", &buffer->contact_time, material->contact_time}};
+    TRY(material_match(values, COUNT(values), pointer, name, problem));
+    if (material->table.count == 0 && buffer->table.count > 0)
+        return material_add_fault(pointer, "table",
+                                  "must be left out: %s has no table, its restitution and contact "
+                                  "time hold for every approach speed",
+                                  name, problem);
+    if (material->table.count == 0)
+        return STATUS_OK;
+    return buffer->table.count == 0
+               ? material_copy_table(&material->table, &buffer->table)
+               : material_match_table(&buffer->table, &material->table, pointer, name, problem);
+}
+
+// Relative; NAN: unknown.
+static double material_deviation(double deviation, double value) {
+    return value > 0 ? deviation / value : (double)NAN;
+}
+
+// The same of a table: the root mean square of the rows where it is known.
+static double material_table_deviation(const MaterialRows *rows, bool is_contact_time) {
+    double sum = 0;
+    size_t count = 0;
+    for (size_t i = 0; i < rows->count; i++) {
+        const MaterialRow *row = &rows->at[i];
+        const double part = is_contact_time
+                                ? material_deviation(row->contact_time_deviation, row->contact_time)
+                                : material_deviation(row->restitution_deviation, row->restitution);
+        sum += isnan(part) ? 0 : part * part;
+        count += isnan(part) ? 0 : 1;
+    }
+    return count > 0 ? sqrt(sum / (double)count) : (double)NAN;
+}
+
+static void material_fill_test(BufferTest *test, const Material *material) {
+    const bool has_table = material->table.count > 0;
+    material_speed_range(material, &test->least_speed, &test->most_speed);
+    test->impactor_mass = material->impactor_mass;
+    test->base_mass = material->base == MATERIAL_BASE_FIXED  ? (double)INFINITY
+                      : material->base == MATERIAL_BASE_FREE ? material->base_mass
+                                                             : (double)NAN;
+    test->restitution_deviation =
+        has_table ? material_table_deviation(&material->table, false)
+                  : material_deviation(material->restitution_deviation, material->restitution);
+    test->contact_time_deviation =
+        has_table ? material_table_deviation(&material->table, true)
+                  : material_deviation(material->contact_time_deviation, material->contact_time);
+}
+
+static Status material_warn(const MaterialRevision *found, const char *name, const char *pointer,
+                            Warnings *warnings) {
+    if (strcmp(found->status, "draft") == 0)
+        return warnings_add(warnings, pointer, "%s is a draft that nobody has approved", name);
+    if (strcmp(found->status, "deprecated") != 0)
+        return STATUS_OK;
+    char reason[200] = "";
+    if (found->reason != NULL)
+        text_fit(reason, sizeof reason, found->reason);
+    return warnings_add(warnings, pointer, "%s is deprecated%s%s", name,
+                        reason[0] != '\0' ? ": " : "", reason);
+}
+
+static Status material_fill(Buffer *buffer, const MaterialRevision *found, const char *pointer,
+                            Warnings *warnings, Problem *problem) {
+    char name[160];
+    snprintf(name, sizeof name, "%s@%llu", found->slug, (unsigned long long)found->revision);
+    TRY(material_fill_values(buffer, &found->material, pointer, name, problem));
+    material_fill_test(&buffer->test, &found->material);
+    TRY(material_warn(found, name, pointer, warnings));
+    char *text = strdup(name);
+    if (text == NULL)
+        return STATUS_NO_MEMORY;
+    free(buffer->material);
+    buffer->material = text;
+    return STATUS_OK;
+}
+
+// "slug" or "slug@revision"; false if what stands behind @ is no revision.
+static bool material_split_name(const char *name, char slug[128], uint64_t *revision) {
+    const char *at = strchr(name, '@');
+    const size_t length = at == NULL ? strlen(name) : (size_t)(at - name);
+    *revision = 0;
+    if (length == 0 || length >= 128)
+        return false;
+    memcpy(slug, name, length);
+    slug[length] = '\0';
+    if (at == NULL)
+        return true;
+    if (at[1] < '1' || at[1] > '9' || strlen(at + 1) > 9)
+        return false;
+    char *end;
+    *revision = strtoull(at + 1, &end, 10);
+    return *end == '\0';
+}
+
+// A buffer that names a material gets "slug@revision", its values and the test they are from.
+static Status resolve_buffer(Db *db, Buffer *buffer, const char *pointer, Warnings *warnings,
+                             Problem *problem) {
+    char slug[128];
+    uint64_t revision;
+    MaterialRevision found = {0};
+    if (buffer->material == NULL)
+        return STATUS_OK;
+    if (!material_split_name(buffer->material, slug, &revision))
+        return material_refuse_unknown(db, buffer->material, buffer->material, pointer, problem);
+    Status status = db_material(db, slug, revision, &found, NULL);
+    if (status == STATUS_OK)
+        status = material_fill(buffer, &found, pointer, warnings, problem);
+    else if (status == STATUS_NOT_FOUND)
+        status = material_refuse(db, buffer->material, slug, revision, pointer, problem);
+    material_revision_clear(&found);
+    if (status != STATUS_OK && status != STATUS_INVALID)
+        problem_set(problem, status, "the material \"%.80s\" could not be looked up", slug);
+    return status;
+}
+
+// The buffers of a damper: of both stops, of the left one, of the right one.
+static Buffer *dampers_buffer(const Dampers *dampers, size_t index) {
+    Damper *damper = &dampers->at[index / 3];
+    return index % 3 == 0   ? &damper->buffer
+           : index % 3 == 1 ? &damper->left_buffer
+                            : &damper->right_buffer;
+}
+
+static Status resolve_materials(Db *db, const Dampers *dampers, Warnings *warnings,
+                                Problem *problem) {
+    static const char *const names[] = {"buffer", "left_buffer", "right_buffer"};
+    Status status = STATUS_OK;
+    for (size_t i = 0; i < 3 * dampers->count; i++) {
+        char pointer[64];
+        snprintf(pointer, sizeof pointer, "/dampers/%zu/%s", i / 3, names[i % 3]);
+        if (!resolve_continues(
+                resolve_buffer(db, dampers_buffer(dampers, i), pointer, warnings, problem),
+                &status))
+            break;
+    }
+    return status;
+}
+
+static Status record_refuse_unknown(Db *db, const char *name, const char *pointer,
+                                    Problem *problem) {
+    Fault fault = resolve_fault(pointer, name);
+    RecordRows records = {NULL, 0};
+    char short_name[80], list[160] = "";
+    text_fit(short_name, sizeof short_name, name);
+    if (db_is_private(db)) {
+        snprintf(fault.detail, sizeof fault.detail,
+                 "\"%s\" is a record of a daemon, and there is none here: put the samples into the "
+                 "scene (impactd import FILE), or send it to the daemon (impactd submit)",
+                 short_name);
+        return problem_add_fault(problem, STATUS_INVALID, &fault);
+    }
+    const bool is_listed = problem->count < SUGGESTED;
+    if (is_listed && db_records(db, NULL, "", RECORDS_LISTED, &records, NULL) == STATUS_OK)
+        resolve_suggest(&fault, name, records.at, records.count, sizeof *records.at,
+                        offsetof(RecordRow, name), list, sizeof list);
+    snprintf(fault.detail, sizeof fault.detail, "no record is called \"%s\"%s%s", short_name,
+             !is_listed          ? ""
+             : records.count > 0 ? "; there are "
+                                 : "; there are none: POST one to /v1/records",
+             list);
+    record_rows_clear(&records);
+    return problem_add_fault(problem, STATUS_INVALID, &fault);
+}
+
+// `pointer` is where the name stands, `place` where a digest would. *named is a reference.
+static Status record_find(Db *db, const char *name, const char *digest, const char *pointer,
+                          const char *place, NamedRecord **named, Problem *problem) {
+    *named = NULL;
+    const Status status =
+        record_name_is_sound(name) ? db_record_named(db, name, named, NULL) : STATUS_NOT_FOUND;
+    if (status == STATUS_NOT_FOUND)
+        return record_refuse_unknown(db, name, pointer, problem);
+    if (status != STATUS_OK)
+        return problem_set(problem, status, "the record \"%.64s\" could not be looked up", name);
+    if (digest == NULL || strcmp(digest, (*named)->digest) == 0)
+        return STATUS_OK;
+    Fault fault = resolve_fault(place, digest);
+    snprintf(fault.detail, sizeof fault.detail,
+             "is not that of the record \"%s\", which is %.16s...: the one that the scene was made "
+             "with has been deleted; without a digest this one is taken",
+             (*named)->name, (*named)->digest);
+    refcount_unref(&(*named)->shared);
+    *named = NULL;
+    return problem_add_fault(problem, STATUS_INVALID, &fault);
+}
+
+static ExcitationRecord *request_record(const StudyRequest *request) {
+    Excitation *excitation = (Excitation *)(void *)request->simulation.scene.excitation;
+    if (excitation == NULL || excitation_kind(excitation) != &excitation_record)
+        return NULL;
+    ExcitationRecord *record = (ExcitationRecord *)(void *)excitation;
+    return record->name != NULL ? record : NULL;
+}
+
+static SweepStudy *request_sweep(const StudyRequest *request) {
+    return request->study != NULL && study_kind(request->study) == &study_sweep
+               ? (SweepStudy *)(void *)request->study
+               : NULL;
+}
+
+// The scene's record, whose digest is set if it is not there.
+static Status resolve_record(Db *db, const StudyRequest *request, Problem *problem) {
+    ExcitationRecord *record = request_record(request);
+    NamedRecord *named;
+    if (record == NULL || record->named != NULL)
+        return STATUS_OK;
+    TRY(record_find(db, record->name, record->digest, "/excitation/name", "/excitation/digest",
+                    &named, problem));
+    const bool is_resolved = record_resolve(record, named);
+    refcount_unref(&named->shared);
+    return is_resolved ? STATUS_OK
+                       : problem_set(problem, STATUS_NO_MEMORY, "no memory for a scene");
+}
+
+// A record that the sweep keeps; likewise.
+static Status resolve_kept_record(Db *db, PinnedRecord *kept, size_t index, Problem *problem) {
+    char name[64], digest[64];
+    NamedRecord *named;
+    if (kept->name == NULL || kept->named != NULL)
+        return STATUS_OK; // a missing name is a fault already
+    snprintf(name, sizeof name, "/study/records/%zu/name", index);
+    snprintf(digest, sizeof digest, "/study/records/%zu/digest", index);
+    TRY(record_find(db, kept->name, kept->digest, name, digest, &named, problem));
+    kept->named = &named->shared;
+    return kept->digest != NULL || (kept->digest = strdup(named->digest)) != NULL
+               ? STATUS_OK
+               : STATUS_NO_MEMORY;
+}
+
+// What a sweep names: the materials and records that came with it, those of its scene, and those on
+// its axes.
+typedef struct SweepNames {
+    Db *db;
+    SweepStudy *study;
+    size_t samples; // of its records
+    Warnings *warnings;
+    Problem *problem;
+} SweepNames;
+
+// Keeps the values of a material.
+static Status sweep_keep_material(SweepNames *names, const Buffer *buffer) {
+    Buffers *materials = &names->study->materials;
+    for (size_t i = 0; i < materials->count; i++)
+        if (text_same(materials->at[i].material, buffer->material))
+            return STATUS_OK;
+    Buffer *at = realloc(materials->at, (materials->count + 1) * sizeof *at);
+    if (at == NULL)
+        return STATUS_NO_MEMORY;
+    materials->at = at;
+    Buffer *kept = &at[materials->count];
+    TRY(fields_copy(buffer_fields, buffer, kept));
+    materials->count++;
+    // Other members of the scene's buffer are not the material's.
+    kept->stiffness = kept->damping = kept->exponent = (double)NAN;
+    return STATUS_OK;
+}
+
+// A name on an axis becomes that of a revision.
+static Status sweep_resolve_material(SweepNames *names, const char *name, char **value,
+                                     const char *place) {
+    Buffer buffer;
+    Bytes text = {0};
+    TRY(fields_default(buffer_fields, &buffer));
+    Status status = status_made((buffer.material = strdup(name)) != NULL);
+    if (status == STATUS_OK)
+        status = resolve_buffer(names->db, &buffer, place, names->warnings, names->problem);
+    if (status == STATUS_OK)
+        status = sweep_keep_material(names, &buffer);
+    if (status == STATUS_OK) {
+        bytes_json_string(&text, buffer.material);
+        free(*value);
+        status = status_made((*value = bytes_take(&text, NULL)) != NULL);
+    }
+    fields_clear(buffer_fields, &buffer);
+    return status;
+}
+
+static Status sweep_add_samples(SweepNames *names, const Refcount *named, const char *place) {
+    names->samples += ((const NamedRecord *)(const void *)named)->samples.count;
+    if (names->samples <= SWEEP_SAMPLES)
+        return STATUS_OK;
+    (void)problem_add(names->problem, STATUS_INVALID, place,
+                      "names one more record than a sweep can hold: all of its records may have "
+                      "%d samples, with this one they have %zu; sweep over fewer at a time",
+                      SWEEP_SAMPLES, names->samples);
+    return STATUS_LIMIT;
+}
+
+static Status sweep_resolve_record(SweepNames *names, const char *name, const char *place) {
+    PinnedRecords *records = &names->study->records;
+    NamedRecord *named;
+    for (size_t i = 0; i < records->count; i++)
+        if (text_same(records->at[i].name, name))
+            return STATUS_OK;
+    TRY(record_find(names->db, name, NULL, place, place, &named, names->problem));
+    PinnedRecord *at = realloc(records->at, (records->count + 1) * sizeof *at);
+    if (at == NULL) {
+        refcount_unref(&named->shared);
+        return STATUS_NO_MEMORY;
+    }
+    records->at = at;
+    PinnedRecord *kept = &at[records->count++]; // cleared with the study, also after a failure
+    *kept = (PinnedRecord){strdup(named->name), strdup(named->digest), &named->shared};
+    if (kept->name == NULL || kept->digest == NULL)
+        return STATUS_NO_MEMORY;
+    return sweep_add_samples(names, kept->named, place);
+}
+
+// The values of an axis that name materials or records. What is no text is for the axis to refuse.
+static Status sweep_resolve_axis(SweepNames *names, size_t index) {
+    static const char *const materials[] = {"buffer", "left_buffer", "right_buffer", "material"};
+    const SweepAxis *axis = &names->study->axes.at[index];
+    const char *last = axis->pointer == NULL ? NULL : strrchr(axis->pointer, '/');
+    const bool has_records = text_same(axis->pointer, "/excitation/name");
+    bool has_materials = false;
+    for (size_t i = 0; last != NULL && i < COUNT(materials); i++)
+        has_materials = has_materials || strcmp(last + 1, materials[i]) == 0;
+    Status status = STATUS_OK, one;
+    for (size_t k = 0; k < axis->values.count && (has_records || has_materials); k++) {
+        char place[96], **value = &axis->values.at[k], *text = malloc(strlen(*value) + 1);
+        JsonScalar scalar;
+        if (text == NULL)
+            return STATUS_NO_MEMORY;
+        snprintf(place, sizeof place, "/study/axes/%zu/values/%zu", index, k);
+        if (names->problem->count >= PROBLEM_FAULTS) // no more are reported
+            one = STATUS_LIMIT;
+        else if (!json_scalar_read(*value, &scalar, text) || scalar.kind != JSON_SCALAR_TEXT)
+            one = STATUS_OK;
+        else
+            one = has_records ? sweep_resolve_record(names, text, place)
+                              : sweep_resolve_material(names, text, value, place);
+        free(text);
+        if (!resolve_continues(one, &status))
+            break;
+    }
+    return status;
+}
+
+// Adds all faults. STATUS_LIMIT, with a fault: not all names were looked up.
+static Status sweep_resolve_names(SweepNames *names, const Dampers *dampers) {
+    SweepStudy *study = names->study;
+    Status status = STATUS_OK;
+    char place[64];
+    for (size_t i = 0; i < study->materials.count; i++) {
+        snprintf(place, sizeof place, "/study/materials/%zu", i);
+        if (!resolve_continues(resolve_buffer(names->db, &study->materials.at[i], place,
+                                              names->warnings, names->problem),
+                               &status))
+            return status;
+    }
+    for (size_t i = 0; i < 3 * dampers->count; i++)
+        if (dampers_buffer(dampers, i)->material != NULL)
+            TRY(sweep_keep_material(names, dampers_buffer(dampers, i)));
+    for (size_t i = 0; i < study->records.count; i++) {
+        PinnedRecord *kept = &study->records.at[i];
+        snprintf(place, sizeof place, "/study/records/%zu", i);
+        Status one = resolve_kept_record(names->db, kept, i, names->problem);
+        if (one == STATUS_OK && kept->named != NULL)
+            one = sweep_add_samples(names, kept->named, place);
+        if (!resolve_continues(one, &status))
+            return status;
+    }
+    for (size_t i = 0; i < study->axes.count; i++)
+        if (!resolve_continues(sweep_resolve_axis(names, i), &status))
+            return status;
+    return status;
+}
+
+// In place of study_request_complete for a sweep. The fault of an unknown name on an axis is
+// reported beside those of the other values, and replaces what the same name leads to there.
+static Status sweep_resolve(Db *db, StudyRequest *request, const SimulationLimits *limits,
+                            Warnings *warnings, Problem *problem) {
+    SweepNames names = {db, request_sweep(request), 0, warnings, problem};
+    // If the scene has faults of its own, the axes are validated with it.
+    const bool has_own = problem->count > 0;
+    const Status resolved = sweep_resolve_names(&names, &request->simulation.scene.dampers);
+    if (resolved == STATUS_LIMIT || problem->count >= PROBLEM_FAULTS)
+        return STATUS_INVALID; // names that were not looked up are not validated further
+    if (resolved != STATUS_OK && resolved != STATUS_INVALID)
+        return problem_set(problem, resolved, "no memory for a scene");
+    Problem *rest = calloc(1, sizeof *rest);
+    if (rest == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a scene");
+    const Status status =
+        study_request_complete(request, limits, warnings, has_own ? problem : rest);
+    for (size_t i = 0; i < rest->count && i < PROBLEM_FAULTS; i++)
+        problem_add_fault(problem, rest->status, &rest->faults[i]);
+    if (rest->count > PROBLEM_FAULTS) // those are counted only
+        problem->count += rest->count - PROBLEM_FAULTS;
+    if (status != STATUS_OK && problem->count == 0)
+        problem_set(problem, status, "%s", rest->detail);
+    free(rest);
+    return resolved != STATUS_OK ? resolved : status;
+}
+
+void request_drop_records(StudyRequest *request) {
+    ExcitationRecord *record = request_record(request);
+    SweepStudy *study = request_sweep(request);
+    if (record != NULL) {
+        refcount_unref(record->named);
+        record->named = NULL;
+    }
+    for (size_t i = 0; study != NULL && i < study->records.count; i++) {
+        refcount_unref(study->records.at[i].named);
+        study->records.at[i].named = NULL;
+    }
+}
+
+Status request_load_records(Db *db, StudyRequest *request, Problem *problem) {
+    const SweepStudy *study = request_sweep(request);
+    Status status = resolve_record(db, request, problem);
+    for (size_t i = 0; study != NULL && i < study->records.count; i++)
+        (void)resolve_continues(resolve_kept_record(db, &study->records.at[i], i, problem),
+                                &status);
+    return status;
+}
+
+static void references_add(Bytes *lines, const char *name) {
+    const size_t length = name == NULL ? 0 : strlen(name);
+    for (size_t at = 0; at < lines->count;) {
+        const char *line = lines->at + at;
+        const size_t size = (size_t)((const char *)memchr(line, '\n', lines->count - at) - line);
+        if (size == length && memcmp(line, name, length) == 0)
+            return;
+        at += size + 1;
+    }
+    if (length > 0)
+        bytes_format(lines, "%s\n", name);
+}
+
+static void references_add_record(Bytes *lines, const char *name) {
+    char use[RECORD_NAME_SIZE + 8];
+    record_use_name(name, use);
+    references_add(lines, use);
+}
+
+void references_write(Bytes *lines, const StudyRequest *request, bool has_materials) {
+    const Dampers *dampers = &request->simulation.scene.dampers;
+    const ExcitationRecord *record = request_record(request);
+    const SweepStudy *study = request_sweep(request);
+    for (size_t i = 0; has_materials && i < 3 * dampers->count; i++)
+        references_add(lines, dampers_buffer(dampers, i)->material);
+    if (record != NULL)
+        references_add_record(lines, record->name);
+    for (size_t i = 0; study != NULL && i < study->records.count; i++)
+        references_add_record(lines, study->records.at[i].name);
+    for (size_t i = 0; has_materials && study != NULL && i < study->materials.count; i++)
+        references_add(lines, study->materials.at[i].material);
+}
+
+bool references_next(const char **lines, ReferenceRow *row) {
+    const size_t size = *lines == NULL ? 0 : strcspn(*lines, "\n");
+    const size_t length = size == 0 ? 0 : strcspn(*lines, "@\n");
+    *row = (ReferenceRow){.slug = ""};
+    if (size == 0)
+        return false;
+    if (length < size && length < sizeof row->slug) {
+        memcpy(row->slug, *lines, length);
+        row->revision = strtoull(*lines + length + 1, NULL, 10);
+    }
+    *lines += size + ((*lines)[size] == '\n');
+    return true;
+}
+
+// *has_place is given back by request_leave_place.
+static Status request_enter_place(JobManager *manager, const StudyRequest *request, bool *has_place,
+                                  Problem *problem) {
+    const Scene *scene = &request->simulation.scene;
+    *has_place = false;
+    if (manager == NULL || scene->structure == NULL ||
+        structure_storeys(scene_structure(scene)) < LARGE_STOREYS)
         return STATUS_OK;
     *has_place = atomic_fetch_add(&manager->large_plans, 1) < LARGE_PLACES;
     if (*has_place)
@@ -34,220 +668,75 @@ static Status resolve_place(JobManager *manager, const StudyRequest *inquiry, bo
                        LARGE_PLACES, LARGE_STOREYS);
 }
 
-void jobs_leave_place(JobManager *manager, bool has_place) {
+static void request_leave_place(JobManager *manager, bool has_place) {
     if (has_place)
         atomic_fetch_sub(&manager->large_plans, 1);
 }
 
-// Keeps the numbers of a material in the sweep: its points are made without a database.
-static Status sweep_pin(Buffers *materials, const Buffer *buffer) {
-    for (size_t i = 0; i < materials->count; i++)
-        if (materials->at[i].material != NULL &&
-            strcmp(materials->at[i].material, buffer->material) == 0)
-            return STATUS_OK;
-    Buffer *at = realloc(materials->at, (materials->count + 1) * sizeof *at);
-    if (at == NULL)
-        return STATUS_NO_MEMORY;
-    materials->at = at;
-    Buffer *pinned = &at[materials->count];
-    if (fields_copy(buffer_fields, buffer, pinned) != STATUS_OK)
-        return STATUS_NO_MEMORY;
-    materials->count++;
-    // Other members of the scene's buffer are not the material's.
-    pinned->stiffness = pinned->damping = pinned->exponent = (double)NAN;
-    return STATUS_OK;
+static Status request_resolve(Db *db, const SimulationLimits *limits, StudyRequest *request,
+                              Warnings *warnings, Problem *problem) {
+    Status status = resolve_materials(db, &request->simulation.scene.dampers, warnings, problem);
+    if (status == STATUS_OK || status == STATUS_INVALID)
+        (void)resolve_continues(resolve_record(db, request, problem), &status);
+    if (status != STATUS_OK && status != STATUS_INVALID)
+        return status;
+    const Status completed = request_sweep(request) != NULL
+                                 ? sweep_resolve(db, request, limits, warnings, problem)
+                                 : study_request_complete(request, limits, warnings, problem);
+    return completed != STATUS_OK ? completed : status;
 }
 
-static bool sweep_takes_materials(const char *pointer) {
-    static const char *const names[] = {"buffer", "left_buffer", "right_buffer", "material"};
-    const char *last = pointer == NULL ? NULL : strrchr(pointer, '/');
-    for (size_t i = 0; last != NULL && i < COUNT(names); i++)
-        if (strcmp(last + 1, names[i]) == 0)
-            return true;
-    return false;
-}
-
-// A name on an axis becomes that of a revision; the axis refuses what is no text.
-static Status sweep_resolve_value(Db *db, char **value, Buffers *materials, const char *place,
-                                  Warnings *warnings, Problem *problem) {
-    Buffer buffer;
-    JsonScalar scalar;
-    char *room = malloc(strlen(*value) + 1);
-    if (room == NULL || fields_default(buffer_fields, &buffer) != STATUS_OK) {
-        free(room);
-        return STATUS_NO_MEMORY;
-    }
-    Status status = STATUS_OK;
-    if (json_scalar_read(*value, &scalar, room) && scalar.kind == JSON_SCALAR_TEXT) {
-        buffer.material = room;
-        room = NULL;
-        status = resolve_buffer(db, &buffer, place, warnings, problem);
-        if (status == STATUS_OK)
-            status = sweep_pin(materials, &buffer);
-        Bytes name = {0};
-        if (status == STATUS_OK) {
-            bytes_json_string(&name, buffer.material);
-            free(*value);
-            *value = bytes_take(&name, NULL);
-            status = *value != NULL ? STATUS_OK : STATUS_NO_MEMORY;
-        }
-    }
-    free(room);
-    fields_clear(buffer_fields, &buffer);
-    return status;
-}
-
-static Status sweep_resolve_axes(Db *db, SweepStudy *study, Warnings *warnings, Problem *problem) {
-    Status status = STATUS_OK;
-    for (size_t i = 0; i < study->axes.count; i++) {
-        const SweepAxis *axis = &study->axes.at[i];
-        for (size_t k = 0; k < axis->values.count && sweep_takes_materials(axis->pointer); k++) {
-            char place[96];
-            if (problem->count >= PROBLEM_FAULTS) // no more are reported
-                return STATUS_INVALID;
-            snprintf(place, sizeof place, "/study/axes/%zu/values/%zu", i, k);
-            const Status one = sweep_resolve_value(db, &axis->values.at[k], &study->materials,
-                                                   place, warnings, problem);
-            if (one != STATUS_OK && one != STATUS_INVALID)
-                return one;
-            status = status == STATUS_OK ? one : status;
-        }
-    }
-    return status;
-}
-
-// The materials that came with the sweep are validated, those of the scene and of the axes are
-// resolved once and kept; then the records.
-static Status sweep_resolve_names(Db *db, StudyRequest *inquiry, Warnings *warnings,
-                                  Problem *problem) {
-    SweepStudy *study = (SweepStudy *)(void *)inquiry->study;
-    Status status = STATUS_OK;
-    for (size_t i = 0; i < study->materials.count && problem->count < PROBLEM_FAULTS; i++) {
-        char place[64];
-        snprintf(place, sizeof place, "/study/materials/%zu", i);
-        const Status one = resolve_buffer(db, &study->materials.at[i], place, warnings, problem);
-        if (one != STATUS_OK && one != STATUS_INVALID)
-            return one;
-        status = status == STATUS_OK ? one : status;
-    }
-    for (size_t i = 0; i < 3 * inquiry->simulation.scene.dampers.count; i++) {
-        const Damper *damper = &inquiry->simulation.scene.dampers.at[i / 3];
-        const Buffer *const sides[] = {&damper->buffer, &damper->left_buffer,
-                                       &damper->right_buffer};
-        if (sides[i % 3]->material != NULL)
-            TRY(sweep_pin(&study->materials, sides[i % 3]));
-    }
-    const Status axes = sweep_resolve_axes(db, study, warnings, problem);
-    if (axes != STATUS_OK && axes != STATUS_INVALID)
-        return axes;
-    const Status records = resolve_sweep_records(db, inquiry, problem);
-    if (records != STATUS_OK && records != STATUS_INVALID)
-        return records;
-    return status != STATUS_OK ? status : axes != STATUS_OK ? axes : records;
-}
-
-// In place of study_request_complete for a sweep. The fault of an unknown name on an axis is
-// reported beside those of the other values, and replaces what the same name leads to there.
-static Status sweep_resolve(Db *db, StudyRequest *inquiry, const SimulationLimits *limits,
-                            Warnings *warnings, Problem *problem) {
-    Problem *names = calloc(1, sizeof *names), *rest = calloc(1, sizeof *rest);
-    Status status = STATUS_NO_MEMORY;
-    if (names != NULL && rest != NULL) {
-        status = sweep_resolve_names(db, inquiry, warnings, names);
-        // If the scene has faults of its own, the axes are validated with it.
-        const bool has_own = problem->count > 0;
-        if (status == STATUS_LIMIT || names->count >= PROBLEM_FAULTS) {
-            status = STATUS_INVALID; // names that were not looked up are not validated further
-        } else if (status == STATUS_OK || status == STATUS_INVALID) {
-            const Status resolved = status;
-            status = study_request_complete(inquiry, limits, warnings, has_own ? problem : rest);
-            status = resolved != STATUS_OK ? resolved : status;
-        }
-        for (size_t i = 0; i < names->count && i < PROBLEM_FAULTS; i++)
-            problem_add_fault(problem, STATUS_INVALID, &names->faults[i]);
-        for (size_t i = 0; i < rest->count && i < PROBLEM_FAULTS; i++)
-            problem_add_fault(problem, rest->status, &rest->faults[i]);
-        if (status != STATUS_OK && problem->count == 0)
-            problem_set(problem, status, "%s",
-                        names->status != STATUS_OK ? names->detail : rest->detail);
-        if (names->count + rest->count > problem->count && problem->count >= PROBLEM_FAULTS)
-            problem->count = names->count + rest->count;
-    }
-    free(names);
-    free(rest);
-    return status;
-}
-
-// `has_place` NULL: not for a request.
-static Status prepare(Db *db, JobManager *manager, const char *text, size_t size,
-                      const SimulationLimits *limits, bool *has_place, StudyRequest *inquiry,
-                      Warnings *warnings, Problem *problem) {
-    // All three add to one problem: what could not be read is judged no further, the rest is.
-    Problem *own = NULL;
-    if (problem == NULL && (problem = own = calloc(1, sizeof *own)) == NULL)
-        return STATUS_NO_MEMORY;
-    Status status = json_parse(text, size, study_request_fields, inquiry, problem);
+// `manager` NULL: not for a client.
+static Status request_prepare(Db *db, JobManager *manager, const char *text, size_t size,
+                              const SimulationLimits *limits, StudyRequest *request,
+                              Warnings *warnings, Problem *problem) {
+    // All add to one problem: what could not be read is not validated, the rest is.
+    Status status = json_parse(text, size, study_request_fields, request, problem);
     const bool is_object = problem->count == 0 || problem->faults[0].pointer[0] != '\0';
-    const bool is_read = is_object && (status == STATUS_OK || status == STATUS_INVALID);
-    const Status place = is_read && has_place != NULL
-                             ? resolve_place(manager, inquiry, has_place, problem)
-                             : STATUS_OK;
-    if (place != STATUS_OK) {
-        status = place;
-    } else if (is_read) {
-        Status resolved = resolve_materials(db, &inquiry->simulation, warnings, problem);
-        const Status record = resolve_record_motion(db, &inquiry->simulation, problem);
-        if (resolved == STATUS_OK || (record != STATUS_OK && record != STATUS_INVALID))
-            resolved = record;
-        if (resolved != STATUS_OK && resolved != STATUS_INVALID)
-            status = resolved;
-        else if (inquiry->study != NULL && study_kind(inquiry->study) == &study_sweep)
-            status = sweep_resolve(db, inquiry, limits, warnings, problem);
-        else
-            status = study_request_complete(inquiry, limits, warnings, problem);
-        if (status == STATUS_OK)
-            status = resolved;
-    }
-    free(own);
-    return status;
+    bool has_place;
+    if (!is_object || (status != STATUS_OK && status != STATUS_INVALID))
+        return status;
+    TRY(request_enter_place(manager, request, &has_place, problem));
+    const Status resolved = request_resolve(db, limits, request, warnings, problem);
+    request_leave_place(manager, has_place);
+    return resolved != STATUS_OK ? resolved : status;
 }
 
 Status jobs_prepare(Db *db, const char *text, size_t size, const SimulationLimits *limits,
-                    StudyRequest *inquiry, Warnings *warnings, Problem *problem) {
-    return prepare(db, NULL, text, size, limits, NULL, inquiry, warnings, problem);
+                    StudyRequest *request, Warnings *warnings, Problem *problem) {
+    return request_prepare(db, NULL, text, size, limits, request, warnings, problem);
 }
 
-static Status resolve_limit_study(const JobManager *manager, const StudyRequest *inquiry,
+static Status request_limit_study(const JobManager *manager, const StudyRequest *request,
                                   Problem *problem) {
-    const double most = manager->settings.study_seconds;
+    const double max = manager->settings.study_seconds;
     Cost cost;
-    if (inquiry->study == NULL || most == 0)
+    if (request->study == NULL || max == 0)
         return STATUS_OK;
-    TRY(study_request_cost(inquiry, &manager->settings.limits, &cost, problem));
-    if (cost.cpu_seconds <= most)
+    TRY(study_request_cost(request, &manager->settings.limits, &cost, problem));
+    if (cost.cpu_seconds <= max)
         return STATUS_OK;
     return problem_add(problem, STATUS_INVALID, "/study",
                        "would take about %.3g s of CPU, at most %g s are allowed: take fewer runs "
                        "or a shorter duration, or raise --max-study-seconds of the daemon",
-                       cost.cpu_seconds, most);
+                       cost.cpu_seconds, max);
 }
 
 Status jobs_prepare_request(JobManager *manager, const char *text, size_t size,
-                            const SimulationLimits *limits, bool *has_place, StudyRequest *inquiry,
+                            const SimulationLimits *limits, StudyRequest *request,
                             Warnings *warnings, Problem *problem) {
-    *has_place = false;
-    TRY(prepare(manager->db, manager, text, size, limits, has_place, inquiry, warnings, problem));
-    return limits != NULL ? resolve_limit_study(manager, inquiry, problem) : STATUS_OK;
+    TRY(request_prepare(manager->db, manager, text, size, limits, request, warnings, problem));
+    return limits != NULL ? request_limit_study(manager, request, problem) : STATUS_OK;
 }
 
-void jobs_result_id(const StudyRequest *inquiry, char target[72]) {
+void jobs_result_id(const StudyRequest *request, char target[72]) {
     char hex[65];
     Sha256 *digest = sha256_new();
     target[0] = '\0';
     if (digest == NULL)
         return;
     sha256_add(digest, engine_version, strlen(engine_version) + 1);
-    canonical_write(study_request_fields, inquiry, sha256_add, digest);
+    canonical_write(study_request_fields, request, sha256_add, digest);
     sha256_end(digest, hex);
     snprintf(target, 72, "r-%s", hex);
 }
@@ -258,25 +747,22 @@ void dry_run_clear(DryRun *dry_run) {
     fields_clear(plan_report_fields, &dry_run->plan);
 }
 
-static Status resolve_dry_run(JobManager *manager, const char *text, size_t size, bool *has_place,
-                              DryRun *dry_run, Problem *problem) {
-    TRY(jobs_prepare_request(manager, text, size, &manager->settings.limits, has_place,
-                             &dry_run->inquiry, &dry_run->warnings, problem));
-    jobs_result_id(&dry_run->inquiry, dry_run->result);
-    TRY(simulation_plan(&dry_run->inquiry.simulation, &dry_run->plan, problem));
-    if (scene_warnings_of_pairs(&dry_run->inquiry.simulation.scene, &dry_run->plan.derived,
-                                &dry_run->warnings) != STATUS_OK)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a warning");
-    TRY(study_request_cost(&dry_run->inquiry, &manager->settings.limits, &dry_run->cost, problem));
-    dry_run->is_cached = db_result_exists(manager->db, dry_run->result);
-    return STATUS_OK;
-}
-
 Status jobs_dry_run(JobManager *manager, const char *text, size_t size, DryRun *dry_run,
                     Problem *problem) {
-    memset(dry_run, 0, sizeof *dry_run);
+    StudyRequest *request = &dry_run->inquiry;
     bool has_place;
-    const Status status = resolve_dry_run(manager, text, size, &has_place, dry_run, problem);
-    jobs_leave_place(manager, has_place);
-    return status;
+    memset(dry_run, 0, sizeof *dry_run);
+    TRY(jobs_prepare_request(manager, text, size, &manager->settings.limits, request,
+                             &dry_run->warnings, problem));
+    jobs_result_id(request, dry_run->result);
+    TRY(request_enter_place(manager, request, &has_place, problem));
+    const Status status = simulation_plan(&request->simulation, &dry_run->plan, problem);
+    request_leave_place(manager, has_place);
+    TRY(status);
+    if (scene_warnings_of_pairs(&request->simulation.scene, &dry_run->plan.derived,
+                                &dry_run->warnings) != STATUS_OK)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a warning");
+    TRY(study_request_cost(request, &manager->settings.limits, &dry_run->cost, problem));
+    dry_run->is_cached = db_result_exists(manager->db, dry_run->result);
+    return STATUS_OK;
 }

@@ -11,7 +11,6 @@
 #include "server/jobs/job_id.h"
 #include "server/jobs/jobs_private.h"
 #include "server/jobs/limits.h"
-#include "server/jobs/resolve_record.h"
 #include "server/json/encode.h"
 #include "server/util/bytes.h"
 #include "server/util/clock.h"
@@ -77,7 +76,8 @@ static Status submit_insert(Entry *entry, StudyRequest *inquiry, Problem *proble
     if (entry->earlier != NULL)
         return STATUS_OK;
     // Otherwise a record was deleted just now.
-    TRY(resolve_records_again(entry->manager->db, inquiry, problem));
+    request_drop_records(inquiry);
+    TRY(request_load_records(entry->manager->db, inquiry, problem));
     return problem_add(problem, STATUS_INVALID, "/excitation",
                        "names a record that was deleted just now");
 }
@@ -312,7 +312,7 @@ static Status submit_fill_job(Job *job, const StudyRequest *inquiry, const Warni
     document_warnings(&told, warnings);
     row->scene = bytes_take(&scene, NULL);
     row->warnings = bytes_take(&told, NULL);
-    resolve_record_uses(inquiry, &uses);
+    references_write(&uses, inquiry, false);
     const bool has_uses = uses.count > 0;
     row->uses = bytes_take(&uses, NULL);
     if (row->uses != NULL && !has_uses) {
@@ -366,10 +366,9 @@ static Status submit_scene(JobManager *manager, const Submission *submission,
     job->submitted_ns = clock_monotonic_ns();
     job->client = client;
     Warnings warnings = {NULL, 0};
-    bool has_place;
     Status status =
         jobs_prepare_request(manager, submission->text, submission->size, &manager->settings.limits,
-                             &has_place, &entry.inquiry, &warnings, problem);
+                             &entry.inquiry, &warnings, problem);
     if (status == STATUS_OK)
         status = submit_fill_job(job, &entry.inquiry, &warnings, problem);
     if (status == STATUS_OK && (status = submit_fill_sender(&job->row, key)) != STATUS_OK)
@@ -381,7 +380,6 @@ static Status submit_scene(JobManager *manager, const Submission *submission,
                  : cached == STATUS_NOT_FOUND ? submit_queue(&entry, problem)
                                               : cached;
     }
-    jobs_leave_place(manager, has_place);
     study_request_clear(&entry.inquiry);
     warnings_clear(&warnings);
     *is_replayed = status == STATUS_OK && entry.earlier != NULL;

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "server/jobs/job.h"
-#include "server/jobs/resolve_record.h"
+#include "server/jobs/jobs_private.h"
 #include "server/json/parse.h"
 #include "server/util/clock.h"
 
@@ -305,10 +305,8 @@ static Status sweep_view_read_scene(SweepView *view, Problem *problem) {
     if (status != STATUS_OK)
         problem_set(problem, STATUS_INTERNAL, "the stored scene cannot be read: %s", fault->detail);
     // The scenes of points take their records from here; they report a record that is gone.
-    if (status == STATUS_OK) {
-        (void)resolve_record_motion(view->db, &view->inquiry.simulation, fault);
-        (void)resolve_sweep_records(view->db, &view->inquiry, fault);
-    }
+    if (status == STATUS_OK)
+        (void)request_load_records(view->db, &view->inquiry, fault);
     free(fault);
     if (status != STATUS_OK)
         return STATUS_INTERNAL;

@@ -6,7 +6,6 @@
 #include <string.h>
 
 #include "server/jobs/jobs_private.h"
-#include "server/jobs/resolve_record.h"
 #include "server/jobs/sweep.h"
 #include "server/util/clock.h"
 
@@ -329,7 +328,7 @@ void task_enqueue(Task *task, QueueClient *client) {
     JobManager *manager = task->manager;
     hashmap_add(manager->tasks, &task->indexed);
     task_estimate(task);
-    resolve_records_drop(&task->inquiry); // until it begins
+    request_drop_records(&task->inquiry); // until it begins
     if (client == NULL)
         queue_push_front(manager->queue, &task->queued);
     else
@@ -360,7 +359,7 @@ bool task_begin(Task *task) {
 
 void task_wait(Task *task) {
     JobManager *manager = task->manager;
-    resolve_records_drop(&task->inquiry);
+    request_drop_records(&task->inquiry);
     task->is_running = false;
     task->is_waiting = true;
     task->next = NULL;

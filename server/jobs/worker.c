@@ -8,8 +8,6 @@
 
 #include "server/jobs/documents.h"
 #include "server/jobs/outcome_blob.h"
-#include "server/jobs/references.h"
-#include "server/jobs/resolve_record.h"
 #include "server/jobs/study.h"
 #include "server/json/encode.h"
 #include "server/util/bytes.h"
@@ -33,7 +31,7 @@ static Status describe(Task *task, RunResult *run_result) {
     document_work(&work, &outcome->work);
     document_warnings(&notes, &outcome->warnings);
     outcome_blob_write(&blob, outcome);
-    references_write(&uses, &task->inquiry);
+    references_write(&uses, &task->inquiry, true);
     text_fit(row->id, sizeof row->id, task->result);
     row->engine = strdup(engine_version);
     row->scene = strdup(task->scene);
@@ -83,7 +81,7 @@ static void run(Worker *worker, Task *task, RunResult *run_result, Problem *prob
     problem_clear(problem);
     run_result->began_ns = clock_monotonic_ns();
     const int64_t run_ns = clock_thread_cpu_ns();
-    Status status = resolve_records_again(manager->db, &task->inquiry, problem);
+    Status status = request_load_records(manager->db, &task->inquiry, problem);
     if (status == STATUS_OK)
         status = simulation_run(&task->inquiry.simulation, limits, &watch, &worker->workspace,
                                 &run_result->outcome, problem);

@@ -9,7 +9,6 @@
 #include "core/study/sweep.h"
 #include "server/jobs/documents.h"
 #include "server/jobs/jobs.h"
-#include "server/jobs/references.h"
 #include "server/json/parse.h"
 #include "server/materials/material.h"
 #include "tests/support/test.h"
@@ -450,7 +449,7 @@ TEST_IN(points_of_a_sweep_have_the_tables_and_rigs_of_their_materials, set_up, t
         simulation_clear(&points[i]);
     sweep_grid_free(plan);
     Bytes uses = {0};
-    references_write(&uses, &inquiry);
+    references_write(&uses, &inquiry, true);
     assert_string_equal(uses.at, "rubber@1\nfoam@1\n");
     bytes_clear(&uses);
     expect_stable();
@@ -470,11 +469,11 @@ TEST_IN(points_of_a_sweep_have_the_tables_and_rigs_of_their_materials, set_up, t
 TEST_IN(uses_are_lines_each_once, set_up, tear_down) {
     Bytes uses = {0};
     resolve_well("\"buffer\": {\"restitution\": 0.5}", "");
-    references_write(&uses, &inquiry);
+    references_write(&uses, &inquiry, true);
     assert_int_equal(uses.count, 0);
     resolve_well("\"left_buffer\": \"sponge\", \"right_buffer\": \"aluminium\"", "");
-    references_write(&uses, &inquiry);
-    references_write(&uses, &inquiry);
+    references_write(&uses, &inquiry, true);
+    references_write(&uses, &inquiry, true);
     assert_string_equal(uses.at, "sponge@1\naluminium@1\n");
     const char *rest = uses.at;
     ReferenceRow use;

@@ -1,7 +1,5 @@
 // Records that scenes and sweeps name: found, pinned, guarded by their digests, and counted as
 // used.
-#include "server/jobs/resolve_record.h"
-
 #include <stdio.h>
 #include <string.h>
 
@@ -9,7 +7,7 @@
 #include "server/db/db_private.h"
 #include "server/db/records.h"
 #include "server/jobs/documents.h"
-#include "server/jobs/jobs.h"
+#include "server/jobs/jobs_private.h"
 #include "server/json/encode.h"
 #include "tests/support/scratch.h"
 #include "tests/support/test.h"
@@ -102,8 +100,8 @@ TEST(a_sweep_pins_the_records_of_its_axes_once_each) {
     assert_int_equal(study->records.count, 2);
     assert_string_equal(study->records.at[0].name, "b");
     assert_string_equal(study->records.at[1].digest, record_in(&inquiry)->digest);
-    resolve_record_uses(&inquiry, &uses);
-    assert_string_equal(uses.at, "record:a\nrecord:b\nrecord:a\n");
+    references_write(&uses, &inquiry, false);
+    assert_string_equal(uses.at, "record:a\nrecord:b\n");
     bytes_clear(&uses);
     study_request_clear(&inquiry);
 }
@@ -120,20 +118,19 @@ TEST(samples_are_let_go_of_and_had_again) {
         STATUS_OK);
     const PinnedRecords *pinned = &((const SweepStudy *)(const void *)inquiry.study)->records;
     const Refcount *samples = record_in(&inquiry)->named;
-    resolve_records_drop(&inquiry);
+    request_drop_records(&inquiry);
     assert_true(record_in(&inquiry)->named == NULL && pinned->at[1].named == NULL);
-    resolve_records_drop(&inquiry); // does nothing
-    assert_int_equal(resolve_records_again(db, &inquiry, &problem), STATUS_OK);
+    request_drop_records(&inquiry); // does nothing
+    assert_int_equal(request_load_records(db, &inquiry, &problem), STATUS_OK);
     assert_ptr_equal(record_in(&inquiry)->named, samples);
     assert_non_null(pinned->at[1].named);
-    // What was found stays, but it must be there still, with the same samples.
-    assert_int_equal(resolve_records_again(db, &inquiry, &problem), STATUS_OK);
+    request_drop_records(&inquiry);
     assert_int_equal(db_record_delete(db, "gone", &uses, &problem), STATUS_OK);
-    assert_int_equal(resolve_records_again(db, &inquiry, &problem), STATUS_INVALID);
+    assert_int_equal(request_load_records(db, &inquiry, &problem), STATUS_INVALID);
     assert_string_equal(problem.faults[0].pointer, "/study/records/1/name");
     add("gone", 6);
     problem_clear(&problem);
-    assert_int_equal(resolve_records_again(db, &inquiry, &problem), STATUS_INVALID);
+    assert_int_equal(request_load_records(db, &inquiry, &problem), STATUS_INVALID);
     assert_string_equal(problem.faults[0].pointer, "/study/records/1/digest");
     assert_int_equal(db_record_delete(db, "gone", &uses, &problem), STATUS_OK);
     study_request_clear(&inquiry);
