@@ -1,148 +1,136 @@
-// All under one lock of the BackgroundTasks, which is never held for long.
 #include "server/jobs/background.h"
 
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 
+#include "server/util/thread_pool.h"
+
 struct BackgroundTask {
+    WorkItem item;
     BackgroundTasks *all;
     BackgroundTask *next; // of those that run
     BackgroundWork work;
     Callback callback;
     atomic_bool is_stopped;
-    bool is_done, is_dropped;
+    bool is_done, is_left;
 };
 
+// All under one lock, which is never held for long.
 struct BackgroundTasks {
     pthread_mutex_t lock;
-    pthread_cond_t idle;
+    ThreadPool *pool;
     BackgroundTask *running;
-    size_t count, most;
+    size_t count, max_tasks;
 };
 
-static void aside_free(BackgroundTask *background) {
-    background->work.release(background->work.context);
-    free(background);
+static void background_free(BackgroundTask *task) {
+    task->work.release(task->work.context);
+    free(task);
 }
 
-static bool go_on(void *context, double fraction) {
+static bool background_continues(void *context, double fraction) {
     (void)fraction;
     return !atomic_load(&((BackgroundTask *)context)->is_stopped);
 }
 
-static void *aside_main(void *context) {
-    BackgroundTask *background = context;
-    BackgroundTasks *all = background->all;
-    const Progress watch = {background, go_on};
-    background->work.run(background->work.context, &watch);
-    pthread_mutex_lock(&all->lock);
-    BackgroundTask **at = &all->running;
-    while (*at != background)
+static void background_run(WorkItem *item) {
+    BackgroundTask *task = (BackgroundTask *)(void *)item;
+    BackgroundTasks *tasks = task->all;
+    const Progress watch = {task, background_continues};
+    task->work.run(task->work.context, &watch);
+    pthread_mutex_lock(&tasks->lock);
+    BackgroundTask **at = &tasks->running;
+    while (*at != task)
         at = &(*at)->next;
-    *at = background->next;
-    background->is_done = true;
-    const bool is_dropped = background->is_dropped;
+    *at = task->next;
+    tasks->count--;
+    task->is_done = true;
+    const bool is_left = task->is_left;
     // A reader that is there cannot go before the lock is free.
-    if (!is_dropped)
-        background->callback.wake(background->callback.context);
-    pthread_mutex_unlock(&all->lock);
-    if (is_dropped)
-        aside_free(background);
-    pthread_mutex_lock(&all->lock);
-    all->count--;
-    pthread_cond_signal(&all->idle);
-    pthread_mutex_unlock(&all->lock);
-    return NULL;
+    if (!is_left)
+        task->callback.wake(task->callback.context);
+    pthread_mutex_unlock(&tasks->lock);
+    if (is_left)
+        background_free(task);
 }
 
-Status background_open(size_t most, BackgroundTasks **background_tasks, Problem *problem) {
-    *background_tasks = calloc(1, sizeof **background_tasks);
-    if (*background_tasks == NULL)
+Status background_open(size_t max_tasks, BackgroundTasks **opened, Problem *problem) {
+    BackgroundTasks *tasks = calloc(1, sizeof *tasks);
+    *opened = NULL;
+    if (tasks == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for readers' work");
-    pthread_mutex_init(&(*background_tasks)->lock, NULL);
-    pthread_cond_init(&(*background_tasks)->idle, NULL);
-    (*background_tasks)->most = most;
-    return STATUS_OK;
-}
-
-void background_close(BackgroundTasks *background_tasks) {
-    if (background_tasks == NULL)
-        return;
-    pthread_mutex_lock(&background_tasks->lock);
-    for (BackgroundTask *background = background_tasks->running; background != NULL;
-         background = background->next)
-        atomic_store(&background->is_stopped, true);
-    while (background_tasks->count > 0)
-        pthread_cond_wait(&background_tasks->idle, &background_tasks->lock);
-    pthread_mutex_unlock(&background_tasks->lock);
-    pthread_cond_destroy(&background_tasks->idle);
-    pthread_mutex_destroy(&background_tasks->lock);
-    free(background_tasks);
-}
-
-// With the lock held.
-static Status start(BackgroundTasks *background_tasks, BackgroundTask *made, Problem *problem) {
-    if (background_tasks->count >= background_tasks->most)
-        return problem_set(problem, STATUS_BUSY,
-                           "as much is being computed for readers as may be at once; ask again a "
-                           "little later");
-    pthread_attr_t attributes;
-    pthread_t thread;
-    pthread_attr_init(&attributes);
-    pthread_attr_setdetachstate(&attributes, PTHREAD_CREATE_DETACHED);
-    const int error = pthread_create(&thread, &attributes, aside_main, made);
-    pthread_attr_destroy(&attributes);
-    if (error != 0)
-        return problem_set(problem, STATUS_BUSY, "no thread can be started now");
-    made->next = background_tasks->running;
-    background_tasks->running = made;
-    background_tasks->count++;
-    return STATUS_OK;
-}
-
-Status background_start(BackgroundTasks *background_tasks, const BackgroundWork *work,
-                        const Callback *callback, BackgroundTask **background, Problem *problem) {
-    *background = NULL;
-    BackgroundTask *made = calloc(1, sizeof *made);
-    if (made == NULL) {
-        work->release(work->context);
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a reader's work");
-    }
-    made->all = background_tasks;
-    made->work = *work;
-    made->callback = *callback;
-    atomic_init(&made->is_stopped, false);
-    pthread_mutex_lock(&background_tasks->lock);
-    const Status status = start(background_tasks, made, problem);
-    pthread_mutex_unlock(&background_tasks->lock);
+    pthread_mutex_init(&tasks->lock, NULL);
+    tasks->max_tasks = max_tasks;
+    const Status status = thread_pool_open(max_tasks, &tasks->pool, problem);
     if (status == STATUS_OK)
-        *background = made;
+        *opened = tasks;
     else
-        aside_free(made);
+        background_close(tasks);
     return status;
 }
 
-bool background_is_done(BackgroundTask *background) {
-    pthread_mutex_lock(&background->all->lock);
-    const bool is_done = background->is_done;
-    pthread_mutex_unlock(&background->all->lock);
+void background_close(BackgroundTasks *tasks) {
+    if (tasks == NULL)
+        return;
+    pthread_mutex_lock(&tasks->lock);
+    for (BackgroundTask *task = tasks->running; task != NULL; task = task->next)
+        atomic_store(&task->is_stopped, true);
+    pthread_mutex_unlock(&tasks->lock);
+    thread_pool_close(tasks->pool);
+    pthread_mutex_destroy(&tasks->lock);
+    free(tasks);
+}
+
+Status background_start(BackgroundTasks *tasks, const BackgroundWork *work,
+                        const Callback *callback, BackgroundTask **started, Problem *problem) {
+    BackgroundTask *task = calloc(1, sizeof *task);
+    *started = NULL;
+    if (task == NULL) {
+        work->release(work->context);
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a reader's work");
+    }
+    task->item.run = background_run;
+    task->all = tasks;
+    task->work = *work;
+    task->callback = *callback;
+    pthread_mutex_lock(&tasks->lock);
+    const bool has_room = tasks->count < tasks->max_tasks;
+    if (has_room) {
+        task->next = tasks->running;
+        tasks->running = task;
+        tasks->count++;
+    }
+    pthread_mutex_unlock(&tasks->lock);
+    if (has_room) {
+        *started = task;
+        thread_pool_add(tasks->pool, &task->item);
+        return STATUS_OK;
+    }
+    background_free(task);
+    return problem_set(problem, STATUS_BUSY,
+                       "as much is being computed for readers as may be at once; ask again a "
+                       "little later");
+}
+
+bool background_is_done(BackgroundTask *task) {
+    pthread_mutex_lock(&task->all->lock);
+    const bool is_done = task->is_done;
+    pthread_mutex_unlock(&task->all->lock);
     return is_done;
 }
 
-void *background_context(BackgroundTask *background) {
-    return background->work.context;
+void *background_context(BackgroundTask *task) {
+    return task->work.context;
 }
 
-void background_unref(BackgroundTask *background) {
-    if (background == NULL)
-        return;
-    BackgroundTasks *all = background->all;
-    pthread_mutex_lock(&all->lock);
-    const bool is_done = background->is_done;
-    background->is_dropped = true;
-    atomic_store(&background->is_stopped, true);
-    pthread_mutex_unlock(&all->lock);
+void background_unref(BackgroundTask *task) {
+    BackgroundTasks *tasks = task->all;
+    pthread_mutex_lock(&tasks->lock);
+    const bool is_done = task->is_done;
+    task->is_left = true;
+    atomic_store(&task->is_stopped, true);
+    pthread_mutex_unlock(&tasks->lock);
     if (is_done)
-        aside_free(background);
+        background_free(task);
 }

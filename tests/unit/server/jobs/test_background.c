@@ -1,4 +1,4 @@
-// Work for readers: so much at once, woken when done, stopped when the reader goes.
+// Work for readers: a limited number at once, woken when done, stopped when the reader has left.
 #include "server/jobs/background.h"
 #include "tests/support/test.h"
 
@@ -15,94 +15,68 @@ static void wake(void *context) {
 
 static const Callback callback = {NULL, wake};
 
-typedef struct WorkItem {
+typedef struct Work {
     atomic_bool may_end;
     bool was_stopped;
-} WorkItem;
+} Work;
 
 static void rest(void) {
     const struct timespec pause = {.tv_nsec = 1000000};
     nanosleep(&pause, NULL);
 }
 
-static void task_run(void *context, const Progress *watch) {
-    WorkItem *task = context;
-    while (!atomic_load(&task->may_end) && !task->was_stopped) {
-        task->was_stopped = !watch->advance(watch->context, 0);
+static void work_run(void *context, const Progress *watch) {
+    Work *work = context;
+    while (!atomic_load(&work->may_end) && !work->was_stopped) {
+        work->was_stopped = !watch->advance(watch->context, 0);
         rest();
     }
 }
 
-static void task_free(void *context) {
+static void work_release(void *context) {
     atomic_fetch_add(&released, 1);
     free(context);
 }
 
-static Status begin(BackgroundTasks *background_tasks, bool may_end, BackgroundTask **background) {
-    WorkItem *task = calloc(1, sizeof *task);
-    atomic_init(&task->may_end, may_end);
-    const BackgroundWork work = {task, task_run, task_free};
-    return background_start(background_tasks, &work, &callback, background, NULL);
+static Status begin(BackgroundTasks *tasks, bool may_end, BackgroundTask **task) {
+    Work *work = calloc(1, sizeof *work);
+    atomic_init(&work->may_end, may_end);
+    return background_start(tasks, &(BackgroundWork){work, work_run, work_release}, &callback, task,
+                            NULL);
 }
 
-TEST(a_reader_is_woken_when_it_is_done) {
-    BackgroundTasks *background_tasks;
-    BackgroundTask *background;
-    atomic_store(&woken, 0);
-    atomic_store(&released, 0);
-    assert_int_equal(background_open(1, &background_tasks, NULL), STATUS_OK);
-    assert_int_equal(begin(background_tasks, true, &background), STATUS_OK);
+TEST(a_reader_is_woken_when_it_is_done_and_beyond_the_limit_it_is_refused) {
+    BackgroundTasks *tasks;
+    BackgroundTask *task, *other;
+    assert_int_equal(background_open(1, &tasks, NULL), STATUS_OK);
+    assert_int_equal(begin(tasks, true, &task), STATUS_OK);
     while (atomic_load(&woken) == 0)
         rest();
-    assert_true(background_is_done(background));
-    assert_false(((WorkItem *)background_context(background))->was_stopped);
+    assert_true(background_is_done(task));
+    assert_false(((Work *)background_context(task))->was_stopped);
     assert_int_equal(atomic_load(&released), 0);
-    background_unref(background);
+    background_unref(task);
     assert_int_equal(atomic_load(&released), 1);
-    background_close(background_tasks);
-}
-
-TEST(beyond_its_room_it_refuses) {
-    BackgroundTasks *background_tasks;
-    BackgroundTask *background, *other;
-    atomic_store(&released, 0);
-    assert_int_equal(background_open(1, &background_tasks, NULL), STATUS_OK);
-    assert_int_equal(begin(background_tasks, false, &background), STATUS_OK);
-    assert_int_equal(begin(background_tasks, false, &other), STATUS_BUSY);
-    assert_null(other);
-    assert_int_equal(atomic_load(&released), 1);
-    assert_false(background_is_done(background));
-    background_unref(background); // stops it
-    while (begin(background_tasks, true, &other) != STATUS_OK)
+    assert_int_equal(begin(tasks, false, &task), STATUS_OK);
+    assert_int_equal(begin(tasks, false, &other), STATUS_BUSY);
+    assert_int_equal(atomic_load(&released), 2);
+    assert_false(background_is_done(task));
+    background_unref(task); // stops it
+    while (begin(tasks, true, &other) != STATUS_OK)
         rest();
     background_unref(other);
-    background_close(background_tasks);
+    background_close(tasks);
 }
 
-TEST(the_end_stops_what_runs_and_waits) {
-    BackgroundTasks *background_tasks;
-    BackgroundTask *background;
-    atomic_store(&released, 0);
-    assert_int_equal(background_open(3, &background_tasks, NULL), STATUS_OK);
-    for (size_t i = 0; i < 3; i++) {
-        assert_int_equal(begin(background_tasks, false, &background), STATUS_OK);
-        if (i < 2)
-            background_unref(background);
-    }
-    background_unref(background);
-    background_close(background_tasks);
-    assert_int_equal(atomic_load(&released), 3);
-}
-
-TEST(many_come_and_go) {
-    BackgroundTasks *background_tasks;
-    assert_int_equal(background_open(4, &background_tasks, NULL), STATUS_OK);
+TEST(many_come_and_go_and_the_end_stops_what_runs) {
+    BackgroundTasks *tasks;
+    assert_int_equal(background_open(4, &tasks, NULL), STATUS_OK);
     atomic_store(&released, 0);
     for (int i = 0; i < 500; i++) {
-        BackgroundTask *background;
-        if (begin(background_tasks, i % 2 == 0, &background) == STATUS_OK)
-            background_unref(background);
+        BackgroundTask *task;
+        if (begin(tasks, i % 2 == 0, &task) == STATUS_OK)
+            background_unref(task);
     }
-    background_close(background_tasks);
+    background_close(tasks);
     assert_int_equal(atomic_load(&released), 500);
 }
