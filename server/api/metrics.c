@@ -4,7 +4,6 @@
 #include "server/http/reply.h"
 #include "server/http/response_cache.h"
 #include "server/http/server.h"
-#include "server/jobs/job_metrics.h"
 #include "server/util/process.h"
 
 // What is known already, by layer in the order in which they are asked.
@@ -116,7 +115,7 @@ Status metrics_show(App *app, const Request *request, Reply *reply, Problem *pro
     if (app->response_cache != NULL)
         metrics_write_responses(&bytes, app->response_cache);
     metrics_write_queue(&bytes, app->manager, app->db);
-    job_metrics_write(jobs_totals(app->manager), &bytes);
+    jobs_write_metrics(app->manager, &bytes);
     metrics_write_db(&bytes, app->db);
     metrics_write_process(&bytes, app);
     return reply_bytes(reply, 200, "text/plain; version=0.0.4; charset=utf-8", &bytes, problem);

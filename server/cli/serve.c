@@ -18,7 +18,6 @@
 #include "server/http/address.h"
 #include "server/http/server.h"
 #include "server/http/tls.h"
-#include "server/jobs/maintenance.h"
 #include "server/options.h"
 #include "server/util/clock.h"
 #include "server/util/process.h"
@@ -344,30 +343,31 @@ static Status serve(const ServeSettings *settings, const sigset_t *signals, Prob
     const Router router = {&app, routes, response_cache_new(response_cache_bytes), &access,
                            short_ids_redirect};
     ServerSettings door = {.body_most = settings->max_body, .router = &router};
-    const JobManagerSettings work = {.workers = settings->workers,
-                                     .queue_most = settings->queue,
-                                     .queue_bytes = settings->queue_bytes,
-                                     .cache_bytes = settings->cache_bytes - response_cache_bytes,
-                                     .store_bytes = settings->store_bytes,
-                                     .quota = settings->quota,
-                                     .rate = settings->rate,
-                                     .study_seconds = settings->max_study_seconds,
-                                     .memory_bytes = 2 * settings->max_run_bytes,
-                                     .deleted = {router.response_cache, forget_answers},
-                                     .limits = {.samples = settings->max_samples,
-                                                .impacts = settings->max_impacts,
-                                                .steps = settings->max_cpu_seconds / SOLVER_STEP,
-                                                .bytes = (double)settings->max_run_bytes,
-                                                .document_bytes = DOCUMENT_BYTES,
-                                                .points = settings->max_points}};
-    const KeepRules keep = {settings->keep_days, settings->keep_jobs, settings->keep_bytes};
+    const JobManagerSettings work = {
+        .workers = settings->workers,
+        .queue_most = settings->queue,
+        .queue_bytes = settings->queue_bytes,
+        .cache_bytes = settings->cache_bytes - response_cache_bytes,
+        .store_bytes = settings->store_bytes,
+        .quota = settings->quota,
+        .rate = settings->rate,
+        .study_seconds = settings->max_study_seconds,
+        .memory_bytes = 2 * settings->max_run_bytes,
+        .deleted = {router.response_cache, forget_answers},
+        .limits = {.samples = settings->max_samples,
+                   .impacts = settings->max_impacts,
+                   .steps = settings->max_cpu_seconds / SOLVER_STEP,
+                   .bytes = (double)settings->max_run_bytes,
+                   .document_bytes = DOCUMENT_BYTES,
+                   .points = settings->max_points},
+        .has_maintenance = true,
+        .keep = {settings->keep_days, settings->keep_jobs, settings->keep_bytes}};
     Texts hosts = {NULL, 0}, origins = {NULL, 0};
     AcceptedHosts accepted;
     BaseUrl url = {.host = ""};
     bool needs_tokens = false;
     RequestMetrics *request_metrics = NULL;
     Server *server = NULL;
-    Maintenance *keeper = NULL;
     process_return_memory();
     fft_start();
     Status status = address_read(settings->listen, &door.address, problem);
@@ -392,8 +392,6 @@ static Status serve(const ServeSettings *settings, const sigset_t *signals, Prob
     if (status == STATUS_OK)
         status = jobs_open(app.db, &work, &app.manager, problem);
     if (status == STATUS_OK)
-        status = maintenance_start(app.db, app.manager, &keep, &keeper, problem);
-    if (status == STATUS_OK)
         status = background_open(ASIDES, &app.background_tasks, problem);
     if (status == STATUS_OK) {
         accepted = (AcceptedHosts){(const char *const *)hosts.at, address_is_any(&door.address),
@@ -410,7 +408,6 @@ static Status serve(const ServeSettings *settings, const sigset_t *signals, Prob
     if (status == STATUS_OK)
         serve_until_stopped(&app, server, settings, signals, problem);
     server_stop(server, GRACE_MS);
-    maintenance_stop(keeper);
     background_close(app.background_tasks);
     if (app.manager != NULL)
         jobs_stop(app.manager);

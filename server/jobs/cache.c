@@ -1,10 +1,10 @@
-#include "server/jobs/cache.h"
-
+// Results in memory, and outcomes for readers of series: from memory, from the database where
+// computing it was expensive, else computed again, ahead of ordinary jobs and once for all readers.
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/base/status.h"
-#include "server/util/hashmap.h"
+#include "server/jobs/jobs_private.h"
+#include "server/jobs/outcome_blob.h"
 
 // The texts stand behind the struct, in one block.
 ResultSummary *result_summary_new(const ResultRow *row) {
@@ -142,4 +142,182 @@ void cache_tally(const Cache *cache, CacheStats *series, CacheStats *summaries) 
     *series = cache->series;
     *summaries = cache->summaries;
     series->most_bytes = summaries->most_bytes = lru_stats(cache->lru).max_bytes;
+}
+
+// What reading a series is taken to cost, and the writing of it that comes before.
+static const double read_rate = 2e8, read_once = 5e-4; // [B/s], [s]
+
+enum { KEEPING_BYTES = 64 << 20 }; // on the way to the database; more are not kept
+
+// A series on its way, of so many bytes.
+typedef struct Keeping {
+    JobManager *manager;
+    size_t size;
+} Keeping;
+
+static void kept(void *context, Status status, const char *detail) {
+    Keeping *keeping = context;
+    JobManager *manager = keeping->manager;
+    (void)status; // it is computed again then
+    (void)detail;
+    pthread_mutex_lock(&manager->lock);
+    manager->keeping_bytes -= keeping->size;
+    if (--manager->writes == 0)
+        pthread_cond_broadcast(&manager->settled);
+    pthread_mutex_unlock(&manager->lock);
+    free(keeping);
+}
+
+void jobs_keep_series(JobManager *manager, const char *result, const Outcome *outcome,
+                      double seconds) {
+    const size_t size = outcome_bytes(outcome);
+    if (outcome->response.series.count == 0 || size > manager->settings.store_bytes ||
+        seconds <= read_once + (double)size / read_rate)
+        return;
+    Keeping *keeping = malloc(sizeof *keeping);
+    Bytes bytes = {.most = KEEPING_BYTES};
+    pthread_mutex_lock(&manager->lock);
+    const bool has_room =
+        keeping != NULL && !manager->is_closing && manager->keeping_bytes + size <= KEEPING_BYTES;
+    if (has_room) {
+        manager->keeping_bytes += size;
+        manager->writes++;
+    }
+    pthread_mutex_unlock(&manager->lock);
+    if (!has_room) {
+        free(keeping);
+        return;
+    }
+    *keeping = (Keeping){manager, size};
+    series_blob_write(&bytes, &outcome->response.series);
+    const WriteDone done = {kept, keeping};
+    size_t count = 0;
+    char *body = bytes_take(&bytes, &count);
+    if (body == NULL || db_series_post(manager->db, result, body, count,
+                                       manager->settings.store_bytes, &done) != STATUS_OK)
+        kept(keeping, STATUS_NO_MEMORY, "");
+}
+
+// Without series.
+static Status outcome_load(JobManager *manager, const char *result, Outcome **outcome,
+                           Problem *problem) {
+    ResultRow row = {0};
+    *outcome = NULL;
+    TRY(db_result_outcome(manager->db, result, &row, problem));
+    *outcome = outcome_blob_read(row.outcome.at, row.outcome.size);
+    result_row_clear(&row);
+    return *outcome != NULL
+               ? STATUS_OK
+               : problem_set(problem, STATUS_INTERNAL, "the stored result cannot be read");
+}
+
+// From the database, and then in memory; NULL where it is not there.
+static Outcome *load_series(JobManager *manager, const char *result) {
+    char *body = NULL;
+    size_t size = 0;
+    Outcome *outcome = NULL;
+    if (db_series_load(manager->db, result, &body, &size, NULL) == STATUS_OK &&
+        outcome_load(manager, result, &outcome, NULL) == STATUS_OK &&
+        !series_blob_read(body, size, &outcome->response.series)) {
+        outcome_unref(outcome);
+        outcome = NULL;
+    }
+    free(body);
+    pthread_mutex_lock(&manager->lock);
+    manager->stored.hits += outcome != NULL;
+    manager->stored.misses += outcome == NULL;
+    if (outcome != NULL)
+        cache_put(manager->cache, result, outcome, NULL);
+    pthread_mutex_unlock(&manager->lock);
+    return outcome;
+}
+
+// With the lock held: a failure of an earlier computation for readers is reported once.
+static Status tell_failure(JobManager *manager, const char *result, Problem *problem) {
+    for (size_t i = 0; i < OUTCOME_FAILURES; i++) {
+        Failure *failure = &manager->failures[i];
+        if (failure->status != STATUS_OK && strcmp(failure->result, result) == 0) {
+            const Status status = failure->status;
+            failure->status = STATUS_OK;
+            return problem_set(problem, status, "%s", failure->detail);
+        }
+    }
+    return STATUS_OK;
+}
+
+static Status compute_again(JobManager *manager, const char *result, const Callback *callback,
+                            Problem *problem) {
+    ResultRow row = {0};
+    StudyRequest inquiry = {0};
+    Warnings warnings = {NULL, 0};
+    Task *task = NULL;
+    Status status = db_result_scene(manager->db, result, &row, problem);
+    if (status == STATUS_OK && strcmp(row.engine, engine_version) != 0)
+        status = problem_set(problem, STATUS_GONE,
+                             "the series was made by %s, this is %s: to have it again, POST to "
+                             "/v1/results/%.72s/again, which submits the scene anew",
+                             row.engine, engine_version, result);
+    // The scene was judged when it came; today's limits are no reason to refuse it now.
+    if (status == STATUS_OK)
+        status = jobs_prepare(manager->db, row.scene, strlen(row.scene), NULL, &inquiry, &warnings,
+                              problem);
+    char id[72] = "";
+    if (status == STATUS_OK)
+        jobs_result_id(&inquiry, id);
+    if (status == STATUS_OK && strcmp(id, result) != 0)
+        status = problem_set(problem, STATUS_INTERNAL,
+                             "the stored scene no longer stands for this result");
+    if (status == STATUS_OK && (task = task_new(manager, result)) == NULL)
+        status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the series");
+    if (status == STATUS_OK) {
+        task->inquiry = inquiry;
+        inquiry = (StudyRequest){0};
+        task->recompute_only = true;
+        pthread_mutex_lock(&manager->lock);
+        Task *other = hashmap_find(manager->tasks, result);
+        const bool is_asked =
+            subscribers_add(&(other != NULL ? other : task)->result_waiters, callback);
+        if (other == NULL && is_asked && !manager->is_closing) {
+            task_enqueue(task, NULL);
+            task = NULL;
+        }
+        if (!is_asked || manager->is_closing)
+            status = problem_set(problem, STATUS_BUSY, "the series cannot be computed now");
+        pthread_mutex_unlock(&manager->lock);
+    }
+    task_free(task);
+    study_request_clear(&inquiry);
+    warnings_clear(&warnings);
+    result_row_clear(&row);
+    return status;
+}
+
+Status jobs_outcome(JobManager *manager, const char *result, const Callback *callback,
+                    Outcome **outcome, Problem *problem) {
+    pthread_mutex_lock(&manager->lock);
+    Status status = STATUS_OK;
+    *outcome = cache_find(manager->cache, result);
+    Task *task = NULL;
+    if (*outcome == NULL) {
+        status = tell_failure(manager, result, problem);
+        task = hashmap_find(manager->tasks, result);
+        if (status == STATUS_OK && task != NULL &&
+            !subscribers_add(&task->result_waiters, callback))
+            status = problem_set(problem, STATUS_NO_MEMORY, "no memory for a reader");
+    }
+    pthread_mutex_unlock(&manager->lock);
+    if (status != STATUS_OK || *outcome != NULL || task != NULL)
+        return status;
+    *outcome = load_series(manager, result);
+    if (*outcome != NULL)
+        return STATUS_OK;
+    return compute_again(manager, result, callback, problem);
+}
+
+Status jobs_outcome_stored(JobManager *manager, const char *result, Outcome **outcome,
+                           Problem *problem) {
+    pthread_mutex_lock(&manager->lock);
+    *outcome = cache_has(manager->cache, result, true) ? cache_find(manager->cache, result) : NULL;
+    pthread_mutex_unlock(&manager->lock);
+    return *outcome != NULL ? STATUS_OK : outcome_load(manager, result, outcome, problem);
 }

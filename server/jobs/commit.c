@@ -173,7 +173,7 @@ static void commit_end_job(Task *task, Job *job, Status status, const char *deta
             job->row.state = JOB_FAILED;
             job_release(job);
         }
-        job_metrics_ended(&manager->totals, job->row.state, false);
+        job_metrics_ended(&manager->metrics, job->row.state, false);
         subscribers_call(&job->subscribers);
     }
     job_unref(job); // the task's
@@ -406,7 +406,7 @@ static Status cancel_live(Job *job, Problem *problem) {
     else
         job->is_durable = false;
     subscribers_call(&job->subscribers);
-    job_metrics_ended(&job->manager->totals, JOB_DISMISSED, false);
+    job_metrics_ended(&job->manager->metrics, JOB_DISMISSED, false);
     return STATUS_OK;
 }
 

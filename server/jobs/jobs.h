@@ -25,6 +25,9 @@ typedef struct JobManagerSettings {
     uint64_t memory_bytes; // that running jobs may be predicted to take together, for which they
                            // wait; 0: any
     SimulationLimits limits;
+    // A thread deletes what exceeds `keep`, and tries again to write what there was no room for.
+    bool has_maintenance;
+    KeepRules keep;
 } JobManagerSettings;
 
 // Reads a scene's JSON, perhaps with a study, resolves its names, validates and completes it, all
@@ -127,14 +130,9 @@ Status jobs_outcome(JobManager *manager, const char *result, const Callback *cal
 Status jobs_outcome_stored(JobManager *manager, const char *result, Outcome **outcome,
                            Problem *problem);
 
-// Tries again to write what there was no room for; to be called now and then.
-void jobs_retry_writes(JobManager *manager);
-
 // Deletes a result for good; its jobs stay and say so. STATUS_CONFLICT while it is being computed,
 // STATUS_NOT_FOUND.
 Status jobs_delete(JobManager *manager, const char *result, Problem *problem);
-// A result was deleted: nothing is answered from it any more.
-void jobs_forget(JobManager *manager, const char *result);
 
 // One layer of what is known.
 typedef struct CacheStats {
@@ -157,8 +155,7 @@ typedef struct JobStats {
     CacheStats stored; // series in the database
 } JobStats;
 void jobs_tally(JobManager *manager, JobStats *metrics);
-// What was done since the start; counted on.
-struct JobMetrics;
-const struct JobMetrics *jobs_totals(const JobManager *manager);
+// What was done since the start, in the Prometheus text format.
+void jobs_write_metrics(const JobManager *manager, Bytes *bytes);
 
 #endif

@@ -5,14 +5,59 @@
 #include <pthread.h>
 #include <stdatomic.h>
 
-#include "server/jobs/cache.h"
-#include "server/jobs/job_metrics.h"
 #include "server/jobs/jobs.h"
 #include "server/jobs/queue.h"
 #include "server/util/hashmap.h"
+#include "server/util/metrics.h"
 
 enum { OUTCOME_FAILURES = 64 };
 #define STUDY_OWN 0.05 // of the progress, the scene's own run where a study follows
+
+// Plan, summary, work and notes of a result as JSON, shared by all of its jobs.
+typedef struct ResultSummary {
+    atomic_size_t refcount;
+    const char *plan, *summary, *work, *notes; // NULL: unknown
+    size_t bytes;
+} ResultSummary;
+// Copies them out of `row`. One reference; NULL without memory.
+ResultSummary *result_summary_new(const ResultRow *row);
+ResultSummary *result_summary_ref(ResultSummary *summary); // NULL is accepted here and below
+void result_summary_unref(ResultSummary *summary);
+
+typedef struct Cache Cache;
+// Results by their id, up to a budget of bytes: summaries and, where kept, series. Guarded by the
+// manager's lock.
+Cache *cache_new(size_t max_bytes); // NULL without memory
+void cache_free(Cache *cache);
+
+// Takes references of its own; NULL for `outcome` or `summary` keeps what is cached of it. The
+// newest result is kept even if it is larger than the budget. Without memory nothing is cached.
+void cache_put(Cache *cache, const char *id, Outcome *outcome, ResultSummary *summary);
+Outcome *cache_find(Cache *cache, const char *id);                    // a reference, or NULL
+ResultSummary *cache_head(Cache *cache, const char *id);              // a reference, or NULL
+bool cache_has(const Cache *cache, const char *id, bool with_series); // not a use
+void cache_forget(Cache *cache, const char *id);
+// Of the series and of the summaries, which share the budget.
+void cache_tally(const Cache *cache, CacheStats *series, CacheStats *summaries);
+
+enum { METRICS_SOLVERS = 16, METRICS_WORK = 32, METRICS_STATES = JOB_DISMISSED + 1 };
+
+typedef struct SolverMetrics {
+    Counter runs, cpu_ns;
+    Counter work[METRICS_WORK]; // by row of work_counters_fields
+} SolverMetrics;
+
+// What was done since the start.
+typedef struct JobMetrics {
+    Counter ended[METRICS_STATES];          // by final JobState
+    Counter cached;                         // of those, answered without computing
+    Histogram waited;                       // in the queue, of jobs that were computed
+    SolverMetrics solvers[METRICS_SOLVERS]; // in the order of `solvers`
+    Counter study_runs, study_cpu_ns;       // the scenes' studies, with all that ran in them
+} JobMetrics;
+void job_metrics_ended(JobMetrics *metrics, int state, bool is_cached);
+void job_metrics_run(JobMetrics *metrics, const Outcome *outcome, int64_t cpu_ns);
+void job_metrics_study(JobMetrics *metrics, bool is_begun, int64_t cpu_ns);
 
 struct StudyRun;
 
@@ -114,9 +159,12 @@ struct JobManager {
     pthread_cond_t work;       // for a worker, or room for its result
     pthread_cond_t spare_work; // for the spare worker alone
     pthread_cond_t settled;    // no write is under way
-    pthread_mutex_t retries;   // retries of sweeps come one by one; taken before `lock`
-    Worker *workers;           // settings.workers of them, and the spare one
-    size_t worker_count;       // started
+    pthread_cond_t stopping;   // is_closing was set
+    pthread_t maintenance;
+    bool is_maintained;      // by that thread
+    pthread_mutex_t retries; // retries of sweeps come one by one; taken before `lock`
+    Worker *workers;         // settings.workers of them, and the spare one
+    size_t worker_count;     // started
     size_t slow_running;
     double estimate_bias; // run time over its estimate, averaged over the last runs
     bool is_closing;
@@ -139,7 +187,7 @@ struct JobManager {
     atomic_int large_plans;             // requests that plan large structures
     Failure failures[OUTCOME_FAILURES]; // of tasks for readers
     size_t next_failure;
-    JobMetrics totals;
+    JobMetrics metrics;
 };
 
 // task.c. With the lock held, but for the first seven.
@@ -199,7 +247,10 @@ void commit_retry(JobManager *manager);
 void request_drop_records(StudyRequest *request);
 Status request_load_records(Db *db, StudyRequest *request, Problem *problem);
 
-// series.c. Without the lock: saves the series if it is dearer to compute than to read.
+// manager.c. Tries again to write what there was no room for.
+void jobs_retry_writes(JobManager *manager);
+
+// cache.c. Without the lock: saves the series if it is dearer to compute than to read.
 void jobs_keep_series(JobManager *manager, const char *result, const Outcome *outcome,
                       double seconds);
 

@@ -1,11 +1,72 @@
-// Opens and closes the job manager: its tables, its workers, the unfinished jobs of the database.
+// The job manager: its tables, its workers, the unfinished jobs of the database, its maintenance
+// and metrics.
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
+
+#include "core/solve/solver.h"
 
 #include "server/jobs/jobs_private.h"
 #include "server/jobs/study.h"
+#include "server/util/clock.h"
+#include "server/util/process.h"
 
 static const size_t queue_bytes_default = (size_t)256 << 20; // of scenes
+
+enum { RETENTION_MS = 5000, RETENTION_PAUSE_MS = 10, RETRY_MS = 1000 };
+
+void jobs_retry_writes(JobManager *manager) {
+    commit_retry(manager);
+    pthread_mutex_lock(&manager->lock);
+    jobs_call_waiting(manager);
+    studies_resume(manager);
+    pthread_mutex_unlock(&manager->lock);
+}
+
+static void manager_forget(JobManager *manager, const char *result) {
+    pthread_mutex_lock(&manager->lock);
+    cache_forget(manager->cache, result);
+    pthread_mutex_unlock(&manager->lock);
+    if (manager->settings.deleted.wake != NULL)
+        manager->settings.deleted.wake(manager->settings.deleted.context);
+}
+
+// Waits until then, a second at most. False once the manager stops.
+static bool maintenance_wait(JobManager *manager, int64_t until_ns) {
+    const int64_t retry_ns = clock_monotonic_ns() + RETRY_MS * 1000000LL;
+    const int64_t end_ns = until_ns < retry_ns ? until_ns : retry_ns;
+    const struct timespec end = {(time_t)(end_ns / 1000000000), (long)(end_ns % 1000000000)};
+    pthread_mutex_lock(&manager->lock);
+    while (!manager->is_closing &&
+           pthread_cond_timedwait(&manager->stopping, &manager->lock, &end) == 0) {
+    }
+    const bool continues = !manager->is_closing;
+    pthread_mutex_unlock(&manager->lock);
+    return continues;
+}
+
+// Every second it tries again to write what there was no room for. Every few seconds it deletes
+// what exceeds the rules of retention: in small steps, with a pause between them in which others
+// write. What cannot be deleted now is tried again the next time.
+static void *maintenance_main(void *context) {
+    JobManager *manager = context;
+    int64_t next_ns = 0; // of retention
+    uint64_t pages = 0;
+    do {
+        jobs_retry_writes(manager);
+        if (clock_monotonic_ns() < next_ns)
+            continue;
+        Removed removed;
+        const Status status = db_remove(manager->db, &manager->settings.keep, &removed, NULL);
+        for (size_t i = 0; status == STATUS_OK && i < removed.results; i++)
+            manager_forget(manager, removed.result[i]);
+        const bool is_more = status == STATUS_OK && removed.is_more;
+        process_trim_memory(&pages);
+        next_ns = clock_monotonic_ns() + (is_more ? RETENTION_PAUSE_MS : RETENTION_MS) * 1000000LL;
+    } while (maintenance_wait(manager, next_ns));
+    return NULL;
+}
 
 static Status manager_take_up_all(JobManager *manager, Problem *problem) {
     JobRows rows = {NULL, 0};
@@ -31,7 +92,12 @@ static Status manager_start_workers(JobManager *manager, Problem *problem) {
             manager->worker_count++;
     }
     pthread_mutex_unlock(&manager->lock);
-    return status;
+    if (status != STATUS_OK || !manager->settings.has_maintenance)
+        return status;
+    if (pthread_create(&manager->maintenance, NULL, maintenance_main, manager) != 0)
+        return problem_set(problem, STATUS_INTERNAL, "the maintenance thread cannot be started");
+    manager->is_maintained = true;
+    return STATUS_OK;
 }
 
 Status jobs_open(Db *db, const JobManagerSettings *settings, JobManager **opened,
@@ -49,6 +115,11 @@ Status jobs_open(Db *db, const JobManagerSettings *settings, JobManager **opened
     pthread_cond_init(&manager->work, NULL);
     pthread_cond_init(&manager->spare_work, NULL);
     pthread_cond_init(&manager->settled, NULL);
+    pthread_condattr_t monotonic; // a clock that is set back makes no wait longer
+    pthread_condattr_init(&monotonic);
+    pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
+    pthread_cond_init(&manager->stopping, &monotonic);
+    pthread_condattr_destroy(&monotonic);
     manager->estimate_bias = 1;
     manager->queue = queue_new();
     manager->jobs = hashmap_new();
@@ -114,9 +185,12 @@ void jobs_stop(JobManager *manager) {
         atomic_store(&run->task->is_stopped, true);
     pthread_cond_broadcast(&manager->work);
     pthread_cond_broadcast(&manager->spare_work);
+    pthread_cond_broadcast(&manager->stopping);
     pthread_mutex_unlock(&manager->lock);
     if (is_stopped)
         return;
+    if (manager->is_maintained)
+        pthread_join(manager->maintenance, NULL);
     for (size_t i = 0; i < manager->worker_count; i++)
         pthread_join(manager->workers[i].thread, NULL);
     manager_wait_for_writes(manager);
@@ -138,25 +212,10 @@ void jobs_close(JobManager *manager) {
     pthread_cond_destroy(&manager->work);
     pthread_cond_destroy(&manager->spare_work);
     pthread_cond_destroy(&manager->settled);
+    pthread_cond_destroy(&manager->stopping);
     pthread_mutex_destroy(&manager->retries);
     pthread_mutex_destroy(&manager->lock);
     free(manager);
-}
-
-void jobs_retry_writes(JobManager *manager) {
-    commit_retry(manager);
-    pthread_mutex_lock(&manager->lock);
-    jobs_call_waiting(manager);
-    studies_resume(manager);
-    pthread_mutex_unlock(&manager->lock);
-}
-
-void jobs_forget(JobManager *manager, const char *result) {
-    pthread_mutex_lock(&manager->lock);
-    cache_forget(manager->cache, result);
-    pthread_mutex_unlock(&manager->lock);
-    if (manager->settings.deleted.wake != NULL)
-        manager->settings.deleted.wake(manager->settings.deleted.context);
 }
 
 Status jobs_delete(JobManager *manager, const char *result, Problem *problem) {
@@ -167,7 +226,7 @@ Status jobs_delete(JobManager *manager, const char *result, Problem *problem) {
         return problem_set(problem, STATUS_CONFLICT,
                            "the result is being computed; dismiss its job first, or wait");
     TRY(db_result_delete(manager->db, result, problem));
-    jobs_forget(manager, result);
+    manager_forget(manager, result);
     return STATUS_OK;
 }
 
@@ -182,7 +241,7 @@ Status jobs_remove(JobManager *manager, const char *id, Problem *problem) {
                            "the job %.40s is not finished: dismiss it first, or wait", id);
     TRY(db_job_remove(manager->db, id, &removed, problem));
     if (removed.results > 0)
-        jobs_forget(manager, removed.result[0]);
+        manager_forget(manager, removed.result[0]);
     return STATUS_OK;
 }
 
@@ -193,10 +252,6 @@ void jobs_layers(JobManager *manager, const char *result, CacheLayers *layers) {
     pthread_mutex_unlock(&manager->lock);
     layers->in_database = db_result_exists(manager->db, result);
     layers->series_in_database = db_series_exists(manager->db, result);
-}
-
-const JobMetrics *jobs_totals(const JobManager *manager) {
-    return &manager->totals;
 }
 
 void jobs_tally(JobManager *manager, JobStats *stats) {
@@ -214,4 +269,90 @@ void jobs_tally(JobManager *manager, JobStats *stats) {
         stats->running += manager->workers[i].running != NULL || manager->workers[i].study != NULL;
     pthread_mutex_unlock(&manager->lock);
     stats->stored.most_bytes = manager->settings.store_bytes;
+}
+
+void job_metrics_ended(JobMetrics *metrics, int state, bool is_cached) {
+    counter_add(&metrics->ended[state], 1);
+    if (is_cached)
+        counter_add(&metrics->cached, 1);
+}
+
+void job_metrics_run(JobMetrics *metrics, const Outcome *outcome, int64_t cpu_ns) {
+    size_t i = 0;
+    while (solvers[i] != NULL && (outcome->plan.solver == NULL ||
+                                  strcmp(solvers[i]->kind.name, outcome->plan.solver) != 0))
+        i++;
+    if (solvers[i] == NULL || i >= METRICS_SOLVERS)
+        return;
+    SolverMetrics *solver = &metrics->solvers[i];
+    counter_add(&solver->runs, 1);
+    counter_add(&solver->cpu_ns, cpu_ns > 0 ? (uint64_t)cpu_ns : 0);
+    const char *work = (const char *)&outcome->work;
+    for (size_t k = 0; work_counters_fields[k].kind == FIELD_KIND_COUNT && k < METRICS_WORK; k++)
+        counter_add(&solver->work[k],
+                    *(const uint64_t *)(const void *)(work + work_counters_fields[k].offset));
+}
+
+void job_metrics_study(JobMetrics *metrics, bool is_begun, int64_t cpu_ns) {
+    counter_add(&metrics->study_runs, is_begun ? 1 : 0);
+    counter_add(&metrics->study_cpu_ns, cpu_ns > 0 ? (uint64_t)cpu_ns : 0);
+}
+
+static void metrics_write_jobs(const JobMetrics *metrics, Bytes *bytes) {
+    static const char jobs[] = "impactd_jobs_total", waited[] = "impactd_queue_wait_seconds";
+    char labels[64];
+    metrics_family(bytes, jobs, "counter", "Jobs that ended, by their final state.");
+    for (int state = 0; state < METRICS_STATES; state++)
+        if (job_state_is_final(state)) {
+            snprintf(labels, sizeof labels, "state=\"%s\"", job_state_names[state]);
+            metrics_count(bytes, jobs, labels, counter_get(&metrics->ended[state]));
+        }
+    metrics_counter(bytes, "impactd_jobs_known_total",
+                    "Jobs that were answered from known results, without computing.",
+                    counter_get(&metrics->cached));
+    metrics_family(bytes, waited, "histogram", "Time in the queue, of jobs that were computed.");
+    metrics_histogram(bytes, waited, "", &metrics->waited);
+}
+
+// Only solvers that ran.
+static void metrics_write_solvers(const JobMetrics *metrics, Bytes *bytes) {
+    static const char runs[] = "impactd_engine_runs_total", work[] = "impactd_engine_work_total";
+    static const char cpu[] = "impactd_engine_cpu_seconds_total";
+    Bytes of_cpu = {.most = 1 << 16}, of_work = {.most = 1 << 16};
+    char labels[128];
+    metrics_family(bytes, runs, "counter",
+                   "Scenes simulated, by solver; a study's runs are apart.");
+    metrics_family(&of_cpu, cpu, "counter", "CPU time of these simulations, by solver.");
+    metrics_family(&of_work, work, "counter",
+                   "What the engine did in these simulations, by solver and kind: steps, contacts, "
+                   "bounces and others.");
+    for (size_t i = 0; solvers[i] != NULL && i < METRICS_SOLVERS; i++) {
+        const SolverMetrics *solver = &metrics->solvers[i];
+        if (counter_get(&solver->runs) == 0)
+            continue;
+        snprintf(labels, sizeof labels, "solver=\"%s\"", solvers[i]->kind.name);
+        metrics_count(bytes, runs, labels, counter_get(&solver->runs));
+        metrics_real(&of_cpu, cpu, labels, 1e-9 * (double)counter_get(&solver->cpu_ns));
+        const Field *field = work_counters_fields;
+        for (size_t k = 0; field[k].kind == FIELD_KIND_COUNT && k < METRICS_WORK; k++) {
+            snprintf(labels, sizeof labels, "solver=\"%s\",kind=\"%s\"", solvers[i]->kind.name,
+                     field[k].name);
+            metrics_count(&of_work, work, labels, counter_get(&solver->work[k]));
+        }
+    }
+    bytes_put(bytes, of_cpu.at, of_cpu.count);
+    bytes_put(bytes, of_work.at, of_work.count);
+    bytes_clear(&of_cpu);
+    bytes_clear(&of_work);
+}
+
+void jobs_write_metrics(const JobManager *manager, Bytes *bytes) {
+    const JobMetrics *metrics = &manager->metrics;
+    metrics_write_jobs(metrics, bytes);
+    metrics_write_solvers(metrics, bytes);
+    metrics_counter(bytes, "impactd_study_runs_total", "Studies that were run.",
+                    counter_get(&metrics->study_runs));
+    metrics_family(bytes, "impactd_study_cpu_seconds_total", "counter", "CPU time of studies.");
+    metrics_real(bytes, "impactd_study_cpu_seconds_total", "",
+                 1e-9 * (double)counter_get(&metrics->study_cpu_ns));
 }

@@ -86,7 +86,7 @@ Status study_start(Worker *worker, Task *task, RunResult *run_result, Problem *p
     run->manager = manager;
     run->task = task;
     const Status status = study_open(worker, run, &run_result->answer, problem);
-    job_metrics_study(&manager->totals, clock_thread_cpu_ns() - began_ns);
+    job_metrics_study(&manager->metrics, true, clock_thread_cpu_ns() - began_ns);
     if (status != STATUS_OK) {
         study_run_free(run);
         return status;
@@ -232,7 +232,7 @@ static void study_finish(Worker *worker, StudyRun *run, Problem *problem) {
     if (!run->is_failed && !atomic_load(&task->is_stopped)) {
         const int64_t began_ns = clock_thread_cpu_ns();
         const Status status = study_complete(worker, run, problem);
-        job_metrics_study_part(&manager->totals, clock_thread_cpu_ns() - began_ns);
+        job_metrics_study(&manager->metrics, false, clock_thread_cpu_ns() - began_ns);
         if (status != STATUS_OK)
             run_result_fail(&run->run_result, status, problem);
     }
@@ -276,7 +276,7 @@ void study_work(Worker *worker, const StudyTurn *turn, Problem *problem) {
     const Status status = turn->chunk != NULL ? study_make_rows(worker, turn, &clock, problem)
                                               : study_make_members(worker, turn, &clock, problem);
     const double seconds = 1e-9 * (double)(clock_monotonic_ns() - began_ns);
-    job_metrics_study_part(&manager->totals, clock_thread_cpu_ns() - began_cpu_ns);
+    job_metrics_study(&manager->metrics, false, clock_thread_cpu_ns() - began_cpu_ns);
     pthread_mutex_lock(&manager->lock);
     worker->study = NULL;
     manager->slow_running--;

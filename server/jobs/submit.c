@@ -98,7 +98,7 @@ static Status submit_finish(Entry *entry, Problem *problem) {
         pthread_mutex_unlock(&manager->lock);
     }
     if (entry->earlier == NULL)
-        job_metrics_ended(&manager->totals, JOB_SUCCESSFUL, true);
+        job_metrics_ended(&manager->metrics, JOB_SUCCESSFUL, true);
     return STATUS_OK;
 }
 

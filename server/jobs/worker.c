@@ -88,10 +88,10 @@ static void run(Worker *worker, Task *task, RunResult *run_result, Problem *prob
     const int64_t study_ns = clock_thread_cpu_ns();
     run_result->seconds = 1e-9 * (double)(study_ns - run_ns);
     if (status == STATUS_OK)
-        job_metrics_run(&manager->totals, run_result->outcome, study_ns - run_ns);
+        job_metrics_run(&manager->metrics, run_result->outcome, study_ns - run_ns);
     if (status == STATUS_OK && is_measured) {
         status = run_study(worker, task, run_result, problem);
-        job_metrics_study(&manager->totals, clock_thread_cpu_ns() - study_ns);
+        job_metrics_study(&manager->metrics, true, clock_thread_cpu_ns() - study_ns);
     }
     run_result->ended_ns = clock_monotonic_ns();
     if (status == STATUS_OK && !task->recompute_only) {
@@ -144,7 +144,7 @@ static void begin_computation(Worker *worker, Task *task) {
         job->row.started_unix_ms = now_ms;
         job->started_ns = now_ns;
         job->row.queued = 1e-9 * (double)(now_ns - job->submitted_ns);
-        histogram_add(&manager->totals.waited, now_ns - job->submitted_ns);
+        histogram_add(&manager->metrics.waited, now_ns - job->submitted_ns);
     }
 }
 

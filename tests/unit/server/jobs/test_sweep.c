@@ -3,6 +3,7 @@
 #include <errno.h>
 #include <unistd.h>
 
+#include "server/jobs/jobs_private.h"
 #include "server/jobs/sweep.h"
 #include "tests/support/room.h"
 #include "tests/support/test.h"
