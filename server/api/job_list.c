@@ -11,7 +11,7 @@
 #include "server/api/job_json.h"
 #include "server/api/query.h"
 #include "server/http/reply.h"
-#include "server/jobs/job_id.h"
+#include "server/jobs/job.h"
 
 enum { LIST_INITIAL = 20, LIST_MAX = 100 };
 

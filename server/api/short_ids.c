@@ -5,7 +5,7 @@
 
 #include "server/api/app.h"
 #include "server/http/reply.h"
-#include "server/jobs/job_id.h"
+#include "server/jobs/job.h"
 
 enum { DIGITS_MIN = 8, CANDIDATES_MAX = 10 };
 

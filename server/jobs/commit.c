@@ -31,13 +31,26 @@ bool status_is_transient(Status status) {
            status == STATUS_NO_MEMORY;
 }
 
-void run_result_fail(RunResult *run_result, Status status, const Problem *problem) {
+char *problem_document(const Problem *problem) {
     Bytes bytes = {.most = 1 << 20};
+    encode_problem(&bytes, problem, encode_problem_code(problem->status), NULL);
+    return bytes_take(&bytes, NULL);
+}
+
+// The same of one sentence.
+static char *commit_problem_document(Status status, const char *detail) {
+    Problem problem; // large, but the writer's stack is larger
+    problem_clear(&problem);
+    problem_set(&problem, status, "%s", detail);
+    return problem_document(&problem);
+}
+
+void run_result_fail(RunResult *run_result, Status status, Problem *problem) {
+    problem_set(problem, status, "%s", status_title(status)); // where there is none
     run_result->status = status;
     text_fit(run_result->detail, sizeof run_result->detail, problem->detail);
-    encode_problem(&bytes, problem, encode_problem_code(status), NULL);
     free(run_result->problem);
-    run_result->problem = bytes_take(&bytes, NULL);
+    run_result->problem = problem_document(problem);
 }
 
 Status run_result_add_to_study(RunResult *run_result, Problem *problem) {
@@ -54,18 +67,6 @@ Status run_result_add_to_study(RunResult *run_result, Problem *problem) {
 static void write_ended(JobManager *manager) {
     if (--manager->writes == 0)
         pthread_cond_broadcast(&manager->settled);
-}
-
-static char *commit_problem_text(Status status, const char *detail) {
-    Problem *problem = malloc(sizeof *problem);
-    if (problem == NULL)
-        return NULL;
-    Bytes bytes = {.most = 1 << 20};
-    problem_clear(problem);
-    problem_set(problem, status, "%s", detail);
-    encode_problem(&bytes, problem, encode_problem_code(status), NULL);
-    free(problem);
-    return bytes_take(&bytes, NULL);
 }
 
 // With the lock held: the jobs that wait, in their last state. One whose insertion is under way
@@ -106,22 +107,11 @@ static void commit_enqueue(Task *task) {
     db_result_post(task->manager->db, &task->commit, &task->write);
 }
 
-// With the lock held.
-static void commit_call_readers(Task *task) {
-    JobManager *manager = task->manager;
-    const RunResult *run = &task->run_result;
-    if (task->result_waiters.count > 0 && run->status != STATUS_OK) {
-        Failure *failure = &manager->failures[manager->next_failure++ % OUTCOME_FAILURES];
-        text_fit(failure->result, sizeof failure->result, task->result);
-        text_fit(failure->detail, sizeof failure->detail, run->detail);
-        failure->status = run->status;
-    }
-}
-
 // With the lock held, of a task that has run: writes the end of its jobs. Where none is left it has
 // ended, and is returned to be freed without the lock.
 static Task *commit_continue(Task *task) {
     JobManager *manager = task->manager;
+    const RunResult *run = &task->run_result;
     if (task->committing != NULL || task->is_waiting)
         return NULL;
     commit_collect(task);
@@ -131,7 +121,12 @@ static Task *commit_continue(Task *task) {
     }
     if (task->jobs != NULL)
         return NULL; // when their insertion is done
-    commit_call_readers(task);
+    if (task->result_waiters.count > 0 && run->status != STATUS_OK) {
+        Failure *failure = &manager->failures[manager->next_failure++ % OUTCOME_FAILURES];
+        text_fit(failure->result, sizeof failure->result, task->result);
+        text_fit(failure->detail, sizeof failure->detail, run->detail);
+        failure->status = run->status;
+    }
     task_release(task);
     if (jobs_is_behind(manager)) {
         pthread_cond_broadcast(&manager->work);
@@ -169,7 +164,7 @@ static void commit_end_job(Task *task, Job *job, Status status, const char *deta
             job_retire(job);
         } else { // until the next start, which computes it again
             free(job->row.problem);
-            job->row.problem = commit_problem_text(status, detail);
+            job->row.problem = commit_problem_document(status, detail);
             job->row.state = JOB_FAILED;
             job_release(job);
         }
@@ -194,7 +189,7 @@ static void commit_log(Task *task, Status status, const char *detail) {
 static void commit_fail(Task *task, Status status, const char *detail) {
     RunResult *run = &task->run_result;
     free(run->problem);
-    run->problem = commit_problem_text(status, detail);
+    run->problem = commit_problem_document(status, detail);
     run->status = status;
     text_fit(run->detail, sizeof run->detail, detail);
     for (Job *job = task->committing; job != NULL; job = job->next_shared) {
@@ -236,15 +231,15 @@ static void commit_done(void *context, Status status, const char *detail) {
     task_free(ended);
 }
 
-static size_t text_bytes(const char *text) {
-    return text != NULL ? strlen(text) : 0;
-}
-
+// Of memory, about.
 static size_t run_result_bytes(const RunResult *run) {
     const ResultRow *row = &run->result;
-    return sizeof(Task) + (run->outcome != NULL ? outcome_bytes(run->outcome) : 0) +
-           text_bytes(row->scene) + text_bytes(row->plan) + text_bytes(row->summary) +
-           row->outcome.size + text_bytes(row->study);
+    const char *const texts[] = {row->scene, row->plan, row->summary, row->study};
+    size_t bytes =
+        sizeof(Task) + row->outcome.size + (run->outcome != NULL ? outcome_bytes(run->outcome) : 0);
+    for (size_t i = 0; i < COUNT(texts); i++)
+        bytes += texts[i] != NULL ? strlen(texts[i]) : 0;
+    return bytes;
 }
 
 void task_finish(JobManager *manager, Task *task, RunResult *run_result) {
@@ -435,28 +430,20 @@ Status jobs_cancel(JobManager *manager, const char *id, Job **cancelled, Problem
 }
 
 void commit_retry(JobManager *manager) {
-    Task *ended = NULL, *next;
     pthread_mutex_lock(&manager->lock);
-    Task *task = manager->retry_commits;
+    Task *task = manager->retry_commits, *next;
+    Job *job = manager->retry_cancels, *after;
     manager->retry_commits = NULL;
+    manager->retry_cancels = NULL;
     for (; task != NULL; task = next) {
         next = task->next;
         task->is_waiting = false;
-        if (commit_continue(task) != NULL) {
-            task->next = ended;
-            ended = task;
-        }
+        task_free(commit_continue(task));
     }
-    Job *job = manager->retry_cancels;
-    manager->retry_cancels = NULL;
-    for (Job *after; job != NULL; job = after) {
+    for (; job != NULL; job = after) {
         after = job->next_retry;
         cancel_enqueue(job);
         job_unref(job);
     }
     pthread_mutex_unlock(&manager->lock);
-    for (; ended != NULL; ended = next) {
-        next = ended->next;
-        task_free(ended);
-    }
 }

@@ -1,4 +1,4 @@
-// One run asked for: state, progress, cancel. Counted and locked; read it through job_view.
+// One requested run: state, progress, cancel. Reference counted and locked; read through job_view.
 #ifndef SERVER_JOBS_JOB_H
 #define SERVER_JOBS_JOB_H
 
@@ -19,13 +19,20 @@ typedef enum JobState {
 extern const char *const job_state_names[];
 bool job_state_is_final(int state); // nothing changes it any more
 
-// Called once, from any thread, when something a waiter waits for has happened. Must be quick.
+enum { JOB_ID_LENGTH = 32 };
+// An id: "j-", 14 hexadecimal digits of microseconds since 1970, so that the database appends it to
+// its index, and 16 random ones. False without random numbers.
+bool job_id_make(char id[40]);
+// When the job of this id was submitted; -1 where it is no job's id.
+int64_t job_id_unix_ms(const char *id);
+
+// Called once, from any thread, when the event that a waiter waits for has happened. Must be quick.
 typedef struct Callback {
     void *context;
     void (*wake)(void *context);
 } Callback;
 
-// A copy of what a job is now. Texts are owned by the show (job_view_clear).
+// A copy of the present state of a job. It owns its texts (job_view_clear).
 typedef struct JobView {
     char id[40];
     JobState state;
@@ -41,10 +48,10 @@ typedef struct JobView {
     char *warnings;             // JSON array, of the scene
     const char *notes;          // JSON array, of the run; NULL: none
     char *title;                // NULL if none
-    struct ResultSummary *head; // holds plan, summary, work and notes; NULL: they are the maker's
+    struct ResultSummary *head; // owns plan, summary, work and notes; NULL: the caller does
     char *labels;               // JSON array; NULL: none
     char *study;                // the kind of its study; NULL: none
-    char *client;               // who sent it: a token's name; NULL: none
+    char *client;               // its sender's token; NULL: none
     bool is_result_deleted;
     uint64_t points, points_done, points_failed; // of a sweep that is under way; 0: none is
 } JobView;
@@ -52,15 +59,15 @@ typedef struct JobView {
 Job *job_ref(Job *job);
 void job_unref(Job *job);
 bool job_is_finished(Job *job);
-// Who sent it, as JobView has it; lives as long as the job.
+// Its sender, as in JobView; lives as long as the job.
 const char *job_client(const Job *job);
-Status job_view(Job *job, JobView *show);
-void job_view_clear(JobView *show);
-// Its state and, in *progress, percent: what may be looked at often.
+Status job_view(Job *job, JobView *view);
+void job_view_clear(JobView *view);
+// Its state and, in *progress, percent: cheap enough to be called often.
 JobState job_peek(Job *job, double *progress);
 
-// Whether the database has the job as it is now; a client must not be told of it before. Otherwise
-// the error for which it could not be saved: a job that could not be accepted never was.
+// Whether the database has the job as it is now; a client must not learn of it before. Otherwise
+// the error for which it could not be saved: a job that could not be accepted does not exist.
 Status job_is_durable(Job *job, bool *is_durable, Problem *problem);
 // Inserts it where that was not begun, without waiting.
 void job_save(Job *job);
@@ -69,7 +76,7 @@ void job_save(Job *job);
 // was before. False without memory.
 typedef enum JobEvent { JOB_IS_DURABLE, JOB_IS_FINISHED } JobEvent;
 bool job_subscribe(Job *job, JobEvent event, const Callback *callback);
-// Takes it back; after this returns it will not be called.
+// After this returns, it will not be called.
 void job_unsubscribe(Job *job, const Callback *callback);
 
 #endif

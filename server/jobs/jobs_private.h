@@ -225,7 +225,8 @@ void task_release(Task *task);
 
 // commit.c. Status is worth another try: a full disk and the like pass.
 bool status_is_transient(Status status);
-void run_result_fail(RunResult *run_result, Status status, const Problem *problem);
+char *problem_document(const Problem *problem); // NULL without memory
+void run_result_fail(RunResult *run_result, Status status, Problem *problem);
 // The document of the study's answer, once it is complete.
 Status run_result_add_to_study(RunResult *run_result, Problem *problem);
 // Without the lock. Takes both: saves the result with the jobs, also its series where that pays.
@@ -259,6 +260,6 @@ void *worker_main(void *worker);
 
 // submit.c: an unfinished job of the database. Takes the row. Only what concerns the whole program
 // is an error.
-Status jobs_take_up(JobManager *manager, JobRow *row, Problem *problem);
+Status jobs_resume(JobManager *manager, JobRow *row, Problem *problem);
 
 #endif

@@ -68,11 +68,11 @@ static void *maintenance_main(void *context) {
     return NULL;
 }
 
-static Status manager_take_up_all(JobManager *manager, Problem *problem) {
+static Status manager_resume_all(JobManager *manager, Problem *problem) {
     JobRows rows = {NULL, 0};
     Status status = db_job_unfinished(manager->db, &rows, problem);
     for (size_t i = 0; i < rows.count && status == STATUS_OK; i++)
-        status = jobs_take_up(manager, &rows.at[i], problem);
+        status = jobs_resume(manager, &rows.at[i], problem);
     job_rows_clear(&rows);
     return status;
 }
@@ -133,7 +133,7 @@ Status jobs_open(Db *db, const JobManagerSettings *settings, JobManager **opened
     if (status == STATUS_OK)
         status = db_sweep_tidy(db, problem);
     if (status == STATUS_OK)
-        status = manager_take_up_all(manager, problem);
+        status = manager_resume_all(manager, problem);
     if (status == STATUS_OK)
         status = manager_start_workers(manager, problem);
     if (status != STATUS_OK) {

@@ -194,7 +194,7 @@ static Status study_make_rows(Worker *worker, const StudyTurn *turn, TurnClock *
 }
 
 // With the lock held.
-static void study_fail(StudyRun *run, Status status, const Problem *problem) {
+static void study_fail(StudyRun *run, Status status, Problem *problem) {
     if (run->is_failed)
         return;
     run->is_failed = true;

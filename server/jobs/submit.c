@@ -2,31 +2,189 @@
 // unfinished jobs of the database are resumed in the same way. A job with a key, of a study or of a
 // scene that names a record is inserted before it is queued: the database then arbitrates between
 // requests of one key, keeps the rows of a sweep, and does not let the record be deleted.
+//
+// Idempotency-Key (draft-ietf-httpapi-idempotency-key-header): a quoted string, "8e03...", but many
+// clients send it bare. It is in the job's row, unique for its client, so it lasts as long as the
+// job: of two requests at once the second one's insertion fails, and it finds the job of the first.
+//
+// Rate limit: a bucket of jobs that fills steadily and holds those of one minute. Clients without a
+// token have no rate limit and no quota; the limits of the queue apply to them.
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "server/jobs/documents.h"
-#include "server/jobs/idempotency.h"
-#include "server/jobs/job_id.h"
 #include "server/jobs/jobs_private.h"
-#include "server/jobs/limits.h"
-#include "server/json/encode.h"
-#include "server/util/bytes.h"
+#include "server/jobs/study.h"
 #include "server/util/clock.h"
+#include "server/util/sha256.h"
 
-// All labels of a job, in bytes.
-enum { LABELS_MAX = 8192 };
+enum { KEY_MAX = 255, LABELS_MAX = 8192 }; // bytes of a key, of all labels of a job
 
 // A submission on its way to becoming a job.
 typedef struct Entry {
     JobManager *manager;
+    const Submission *submission;
+    char key[KEY_MAX + 1]; // "": none
+    char digest[65];       // with a key: SHA-256 of the body
     Job *job;
-    StudyRequest inquiry;
-    bool is_retry; // of a sweep: whatever is cached, it is computed
-    IdempotencyKey key;
-    Job *earlier; // of the same key
+    StudyRequest request;
+    Job *earlier; // of the same key; a reference
 } Entry;
+
+static Status submit_no_memory(Problem *problem) {
+    return problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
+}
+
+static Status key_read(const Submission *submission, Entry *entry, Problem *problem) {
+    const char *text = submission->idempotency_key;
+    if (text == NULL)
+        return STATUS_OK;
+    size_t size = strlen(text);
+    if (size >= 2 && text[0] == '"' && text[size - 1] == '"') {
+        text++;
+        size -= 2;
+    }
+    bool is_valid = size >= 1 && size <= KEY_MAX;
+    for (size_t i = 0; i < size && is_valid; i++)
+        is_valid = text[i] >= ' ' && text[i] <= '~' && text[i] != '"' && text[i] != '\\';
+    if (!is_valid)
+        return problem_set(problem, STATUS_USAGE,
+                           "Idempotency-Key must be 1 to %d printable ASCII characters without "
+                           "\" and \\, best a UUID in quotes; it has %zu",
+                           KEY_MAX, size);
+    memcpy(entry->key, text, size);
+    Sha256 *digest = sha256_new();
+    if (digest == NULL)
+        return submit_no_memory(problem);
+    if (submission->retry_of != NULL) {
+        sha256_add(digest, "retry ", 6);
+        sha256_add(digest, submission->retry_of, strlen(submission->retry_of));
+    } else {
+        sha256_add(digest, submission->text, submission->size);
+    }
+    sha256_end(digest, entry->digest);
+    return STATUS_OK;
+}
+
+// Sets entry->earlier to the job of an earlier request with this key, if there is one.
+static Status key_find(Entry *entry, Problem *problem) {
+    JobRow row;
+    if (entry->key[0] == '\0')
+        return STATUS_OK;
+    Status status =
+        db_job_keyed(entry->manager->db, entry->submission->client, entry->key, &row, problem);
+    if (status == STATUS_NOT_FOUND) {
+        problem_clear(problem);
+        return STATUS_OK;
+    }
+    TRY(status);
+    if (text_same(row.request, entry->digest))
+        status = jobs_find(entry->manager, row.id, &entry->earlier, problem);
+    else
+        status = problem_set(problem, STATUS_REUSED,
+                             "the Idempotency-Key \"%.80s\" was used with another body, for the "
+                             "job %.40s; take a new key for a new request",
+                             entry->key, row.id);
+    job_row_clear(&row);
+    return status;
+}
+
+static double client_allowance(const JobManager *manager, const QueueClient *client) {
+    const double max = manager->settings.rate;
+    if (client->allowed_ns == 0)
+        return max;
+    const double passed = 1e-9 * (double)(clock_monotonic_ns() - client->allowed_ns);
+    return fmin(max, client->allowance + passed * max / 60);
+}
+
+// The client of the queue, if it may submit one more now.
+static Status client_enter(JobManager *manager, const char *name, QueueClient **entered,
+                           Problem *problem) {
+    Status status = STATUS_OK;
+    pthread_mutex_lock(&manager->lock);
+    QueueClient *client = *entered = queue_client(manager->queue, name != NULL ? name : "");
+    if (client == NULL) {
+        status = submit_no_memory(problem);
+    } else if (manager->settings.rate > 0 && name != NULL) {
+        const double left = client_allowance(manager, client);
+        if (left < 1) {
+            status = problem_set(problem, STATUS_QUOTA,
+                                 "the token \"%.60s\" may send %.6g jobs a minute and has sent "
+                                 "them",
+                                 name, manager->settings.rate);
+        } else {
+            client->allowance = left - 1;
+            client->allowed_ns = clock_monotonic_ns();
+        }
+    }
+    pthread_mutex_unlock(&manager->lock);
+    return status;
+}
+
+Status jobs_charge(JobManager *manager, const char *client, Problem *problem) {
+    QueueClient *charged;
+    return client_enter(manager, client, &charged, problem);
+}
+
+// With the lock held: whether it may have one more unfinished job.
+static Status client_check_quota(const JobManager *manager, const QueueClient *client,
+                                 Problem *problem) {
+    const size_t max = manager->settings.quota;
+    if (max == 0 || client->name[0] == '\0' || client->live < max)
+        return STATUS_OK;
+    return problem_set(problem, STATUS_QUOTA,
+                       "the token \"%.60s\" has %zu unfinished jobs, %zu are allowed; wait for "
+                       "them or dismiss some",
+                       client->name, client->live, max);
+}
+
+// Until a running task will have ended [s], by its progress, the estimate of its CPU time and the
+// recent bias of estimates.
+static double task_left(const JobManager *manager, Task *task) {
+    const double passed = 1e-9 * (double)(clock_monotonic_ns() - task->began_ns);
+    const double done = atomic_load(&task->progress) / 10000.0;
+    // The first part of a run may go faster than the rest.
+    const double estimated = task->queued.seconds * manager->estimate_bias - passed;
+    const double seen = done > 0.02 ? passed * (1 - done) / done : 0;
+    return fmax(fmax(estimated, seen), 0);
+}
+
+// The sooner of `soonest` and the end of the task, if it is one of `client` (NULL: of any).
+static double task_soonest(const JobManager *manager, Task *task, const QueueClient *client,
+                           double soonest) {
+    for (const Job *job = task->jobs; client != NULL; job = job->next_shared) {
+        if (job == NULL)
+            return soonest;
+        if (job->client == client)
+            break;
+    }
+    return fmin(soonest, task_left(manager, task));
+}
+
+int jobs_retry_after(JobManager *manager, const char *name, Status status) {
+    double seconds = INFINITY;
+    pthread_mutex_lock(&manager->lock);
+    const QueueClient *client =
+        status == STATUS_QUOTA ? queue_client(manager->queue, name != NULL ? name : "") : NULL;
+    if (client != NULL && manager->settings.rate > 0 &&
+        client_check_quota(manager, client, NULL) == STATUS_OK) {
+        seconds = (1 - client_allowance(manager, client)) * 60 / manager->settings.rate;
+    } else {
+        // A place is free when the first running task ends.
+        for (size_t i = 0; i < manager->worker_count; i++)
+            if (manager->workers[i].running != NULL)
+                seconds = task_soonest(manager, manager->workers[i].running, client, seconds);
+        for (const StudyRun *run = manager->studies; run != NULL; run = run->next)
+            seconds = task_soonest(manager, run->task, client, seconds);
+    }
+    if (!isfinite(seconds)) // none of its jobs runs: their turn comes within what waits
+        seconds = queue_seconds(manager->queue) * manager->estimate_bias /
+                  (double)manager->settings.workers;
+    pthread_mutex_unlock(&manager->lock);
+    return seconds < 1 ? 1 : seconds > 3600 ? 3600 : (int)ceil(seconds);
+}
 
 // With the lock held: the task of this scene, to be shared. One for readers alone saves nothing.
 static Task *submit_find_task(const JobManager *manager, const char *result) {
@@ -34,7 +192,7 @@ static Task *submit_find_task(const JobManager *manager, const char *result) {
     return task != NULL && task->recompute_only ? NULL : task;
 }
 
-// Plan, summary, work and notes of a result that is there already. STATUS_NOT_FOUND if it is not.
+// Sets job->summary where the result is there already. STATUS_NOT_FOUND if it is not.
 static Status submit_find_result(JobManager *manager, Job *job, Problem *problem) {
     pthread_mutex_lock(&manager->lock);
     job->summary = cache_head(manager->cache, job->row.result);
@@ -56,32 +214,29 @@ static Status submit_find_result(JobManager *manager, Job *job, Problem *problem
     if (job->summary != NULL)
         cache_put(manager->cache, job->row.result, NULL, job->summary);
     pthread_mutex_unlock(&manager->lock);
-    if (status == STATUS_OK || status == STATUS_NOT_FOUND)
-        return status;
-    return problem_set(problem, status, "the results could not be searched");
-}
-
-static bool submit_inserts_first(const Job *job) {
-    return job->row.idempotency_key != NULL || job->row.study != NULL || job->row.uses != NULL;
+    return status == STATUS_OK || status == STATUS_NOT_FOUND
+               ? status
+               : problem_set(problem, status, "the results could not be searched");
 }
 
 // Inserts the job and waits. Where another request with the same key was earlier, entry->earlier is
 // its job.
-static Status submit_insert(Entry *entry, StudyRequest *inquiry, Problem *problem) {
+static Status submit_insert(Entry *entry, StudyRequest *request, Problem *problem) {
     const Status status = job_insert_now(entry->job, problem);
     if (status != STATUS_CONFLICT)
         return status;
     problem_clear(problem);
-    TRY(idempotency_find(entry->manager, &entry->key, &entry->earlier, problem));
+    TRY(key_find(entry, problem));
     if (entry->earlier != NULL)
         return STATUS_OK;
     // Otherwise a record was deleted just now.
-    request_drop_records(inquiry);
-    TRY(request_load_records(entry->manager->db, inquiry, problem));
+    request_drop_records(request);
+    TRY(request_load_records(entry->manager->db, request, problem));
     return problem_add(problem, STATUS_INVALID, "/excitation",
                        "names a record that was deleted just now");
 }
 
+// A job whose result is there already.
 static Status submit_finish(Entry *entry, Problem *problem) {
     JobManager *manager = entry->manager;
     Job *job = entry->job;
@@ -90,9 +245,9 @@ static Status submit_finish(Entry *entry, Problem *problem) {
     row->is_cached = true;
     row->started_unix_ms = row->finished_unix_ms = clock_unix_ms();
     row->total = 1e-9 * (double)(clock_monotonic_ns() - job->submitted_ns);
-    if (row->idempotency_key != NULL)
-        TRY(submit_insert(entry, &entry->inquiry, problem));
-    else {
+    if (row->idempotency_key != NULL) {
+        TRY(submit_insert(entry, &entry->request, problem));
+    } else {
         pthread_mutex_lock(&manager->lock);
         job_insert(job);
         pthread_mutex_unlock(&manager->lock);
@@ -114,20 +269,20 @@ static Status submit_check_room(const JobManager *manager, const Job *job, Probl
         return problem_set(problem, STATUS_BUSY,
                            "the queue is full: %zu bytes of scenes wait, %zu are allowed",
                            manager->scene_bytes, manager->settings.queue_bytes);
-    return limits_check(manager, job->client, problem);
+    return client_check_quota(manager, job->client, problem);
 }
 
-// The task of this scene, without jobs. Takes the inquiry. NULL without memory.
-static Task *submit_make_task(JobManager *manager, const JobRow *row, StudyRequest *inquiry) {
+// The task of this scene, without jobs. Takes the request. NULL without memory.
+static Task *submit_make_task(JobManager *manager, const JobRow *row, StudyRequest *request) {
     Task *task = task_new(manager, row->result);
-    if (task != NULL) {
-        task->scene = strdup(row->scene);
-        task->warnings = strdup(row->warnings);
-        task->inquiry = *inquiry;
-        *inquiry = (StudyRequest){0};
-        if (task->scene != NULL && task->warnings != NULL)
-            return task;
-    }
+    if (task == NULL)
+        return NULL;
+    task->scene = strdup(row->scene);
+    task->warnings = strdup(row->warnings);
+    task->inquiry = *request;
+    *request = (StudyRequest){0};
+    if (task->scene != NULL && task->warnings != NULL)
+        return task;
     task_free(task);
     return NULL;
 }
@@ -155,14 +310,16 @@ static bool submit_start(Job *job, Task *task) {
 static Status submit_queue(Entry *entry, Problem *problem) {
     JobManager *manager = entry->manager;
     Job *job = entry->job;
-    Task *task = submit_make_task(manager, &job->row, &entry->inquiry);
+    const bool inserts_first =
+        job->row.idempotency_key != NULL || job->row.study != NULL || job->row.uses != NULL;
+    const bool is_retry = entry->submission->retry_of != NULL; // computed even if it is cached
+    Task *task = submit_make_task(manager, &job->row, &entry->request);
     if (task == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
-    const bool inserts_first = submit_inserts_first(job);
+        return submit_no_memory(problem);
     bool is_queued = false, is_cached = false;
     pthread_mutex_lock(&manager->lock);
     // It may have been saved meanwhile.
-    if (!entry->is_retry && submit_find_task(manager, job->row.result) == NULL)
+    if (!is_retry && submit_find_task(manager, job->row.result) == NULL)
         is_cached = (job->summary = cache_head(manager->cache, job->row.result)) != NULL;
     Status status = is_cached ? STATUS_OK : submit_check_room(manager, job, problem);
     if (status == STATUS_OK && !is_cached) {
@@ -172,7 +329,7 @@ static Status submit_queue(Entry *entry, Problem *problem) {
     }
     pthread_mutex_unlock(&manager->lock);
     if (status == STATUS_OK && is_cached) {
-        entry->inquiry = task->inquiry;
+        entry->request = task->inquiry;
         task->inquiry = (StudyRequest){0};
         status = submit_finish(entry, problem);
     } else if (status == STATUS_OK && inserts_first) {
@@ -188,87 +345,102 @@ static Status submit_queue(Entry *entry, Problem *problem) {
     return status;
 }
 
-// As a JSON array; "" if there are none.
-static char *submit_write_labels(const Texts *labels) {
-    Bytes bytes = {0};
-    for (size_t i = 0; i < labels->count; i++) {
-        bytes_text(&bytes, i > 0 ? ", " : "[");
-        bytes_json_string(&bytes, labels->at[i]);
+// Takes the text out; none is NULL.
+static Status submit_take(Bytes *bytes, char **target) {
+    if (bytes->count == 0 && !bytes->is_failed) {
+        bytes_clear(bytes);
+        *target = NULL;
+        return STATUS_OK;
     }
-    bytes_text(&bytes, labels->count > 0 ? "]" : "");
-    return bytes_take(&bytes, NULL);
+    return status_made((*target = bytes_take(bytes, NULL)) != NULL);
 }
 
-// What a search by words looks into.
-static Status submit_write_words(const char *title, const Texts *labels, char **text,
+// The labels as a JSON array.
+static void submit_write_labels(Bytes *bytes, const Texts *labels) {
+    for (size_t i = 0; i < labels->count; i++) {
+        bytes_text(bytes, i > 0 ? ", " : "[");
+        bytes_json_string(bytes, labels->at[i]);
+    }
+    bytes_text(bytes, labels->count > 0 ? "]" : "");
+}
+
+// The text that a search by words looks into.
+static Status submit_write_words(Bytes *words, const char *title, const Texts *labels,
                                  Problem *problem) {
-    Bytes words = {0};
-    job_words(&words, title, (const char *const *)labels->at, labels->count);
-    const size_t size = words.count;
-    *text = size <= LABELS_MAX ? bytes_take(&words, NULL) : NULL;
-    bytes_clear(&words);
-    if (size > LABELS_MAX)
-        return problem_add(problem, STATUS_INVALID, "/labels",
-                           "must have at most %d bytes in all, has about %zu", LABELS_MAX, size);
-    return *text != NULL ? STATUS_OK
-                         : problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
+    job_words(words, title, (const char *const *)labels->at, labels->count);
+    const size_t size = words->count;
+    if (size <= LABELS_MAX)
+        return STATUS_OK;
+    bytes_clear(words);
+    return problem_add(problem, STATUS_INVALID, "/labels",
+                       "must have at most %d bytes in all, has about %zu", LABELS_MAX, size);
 }
 
-// NULL in place of an empty text.
-static char *submit_drop_empty(char *text) {
-    if (text != NULL && text[0] != '\0')
-        return text;
-    free(text);
-    return NULL;
+// The row of the job: its scene, its sender, and what of it is shown and searched.
+static Status submit_fill(const Entry *entry, const Warnings *warnings, Problem *problem) {
+    JobRow *row = &entry->job->row;
+    const StudyRequest *request = &entry->request;
+    const Simulation *simulation = &request->simulation;
+    const Texts *labels = &simulation->labels;
+    const bool has_key = entry->key[0] != '\0';
+    Bytes scene = {0}, told = {0}, uses = {0}, shown = {0}, words = {0};
+    TRY(submit_write_words(&words, simulation->title, labels, problem));
+    if (!job_id_make(row->id))
+        return problem_set(problem, STATUS_INTERNAL, "no random numbers for a job's id");
+    entry->job->indexed.key = row->id;
+    row->created_unix_ms = clock_unix_ms();
+    jobs_result_id(request, row->result);
+    document_scene(&scene, request);
+    document_warnings(&told, warnings);
+    references_write(&uses, request, false);
+    submit_write_labels(&shown, labels);
+    const Status all[] = {
+        submit_take(&scene, &row->scene),
+        submit_take(&told, &row->warnings),
+        submit_take(&uses, &row->uses),
+        submit_take(&shown, &row->labels),
+        submit_take(&words, &row->words),
+        study_copy_text(simulation->title, &row->title),
+        study_copy_text(request->study == NULL ? NULL : request->study->kind->name, &row->study),
+        study_copy_text(entry->submission->client, &row->client),
+        study_copy_text(has_key ? entry->key : NULL, &row->idempotency_key),
+        study_copy_text(has_key ? entry->digest : NULL, &row->request),
+        status_made(row->result[0] != '\0')};
+    return status_first(all, COUNT(all)) == STATUS_OK ? STATUS_OK : submit_no_memory(problem);
 }
 
-// Title, labels and study, as they are shown and searched.
-static Status submit_fill_notes(JobRow *row, const StudyRequest *inquiry, Problem *problem) {
-    const Simulation *simulation = &inquiry->simulation;
-    TRY(submit_write_words(simulation->title, &simulation->labels, &row->words, problem));
-    row->words = submit_drop_empty(row->words);
-    row->labels = submit_drop_empty(submit_write_labels(&simulation->labels));
-    row->title = simulation->title == NULL ? NULL : strdup(simulation->title);
-    row->study = inquiry->study == NULL ? NULL : strdup(inquiry->study->kind->name);
-    return (row->title != NULL || simulation->title == NULL) &&
-                   (row->labels != NULL || simulation->labels.count == 0) &&
-                   (row->study != NULL || inquiry->study == NULL)
-               ? STATUS_OK
-               : STATUS_NO_MEMORY;
-}
-
-// Takes *text, "" as NULL, in place of the row's.
-static void annotate_replace(char **member, char **text) {
-    if (*text == NULL)
-        return;
+// Takes the text, "" as NULL, in place of the row's.
+static void annotate_replace(char **member, Bytes *text) {
     free(*member);
-    *member = submit_drop_empty(*text);
-    *text = NULL;
+    (void)submit_take(text, member);
 }
 
 Status jobs_annotate(JobManager *manager, const char *id, const char *title, const Texts *labels,
                      Problem *problem) {
     const Texts none = {NULL, 0};
-    char *title_words = NULL, *label_words = NULL, *array = NULL;
-    char *copy = title != NULL ? strdup(title) : NULL;
-    Status status = title != NULL ? submit_write_words(title[0] != '\0' ? title : NULL, &none,
-                                                       &title_words, problem)
-                                  : STATUS_OK;
+    Bytes shown = {0}, array = {0}, title_words = {0}, label_words = {0};
+    Status status = STATUS_OK;
+    bytes_text(&shown, title != NULL ? title : "");
+    if (title != NULL && title[0] != '\0')
+        status = submit_write_words(&title_words, title, &none, problem);
+    if (title_words.count == 0)
+        bytes_text(&title_words, "\n"); // an empty title is an empty line of the words
     if (status == STATUS_OK && labels != NULL) {
-        array = submit_write_labels(labels);
-        status = submit_write_words(NULL, labels, &label_words, problem);
+        submit_write_labels(&array, labels);
+        bytes_text(&label_words, ""); // none is not NULL
+        status = submit_write_words(&label_words, NULL, labels, problem);
     }
     if (status == STATUS_OK &&
-        ((title != NULL && copy == NULL) || (labels != NULL && array == NULL)))
-        status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the job");
-    // An empty title is an empty line of the words; the labels' words begin with that line.
-    const JobNotes notes = {
-        .id = id,
-        .title = copy,
-        .labels = array,
-        .title_words = title_words != NULL && title_words[0] == '\0' ? "\n" : title_words,
-        .label_words =
-            label_words != NULL && label_words[0] == '\n' ? label_words + 1 : label_words};
+        (shown.is_failed || array.is_failed || title_words.is_failed || label_words.is_failed))
+        status = submit_no_memory(problem);
+    // The labels' words begin with the line of the title.
+    const JobNotes notes = {.id = id,
+                            .title = title,
+                            .labels = labels == NULL ? NULL : array.at,
+                            .title_words = title == NULL ? NULL : title_words.at,
+                            .label_words = labels == NULL || label_words.count == 0
+                                               ? label_words.at
+                                               : label_words.at + (label_words.at[0] == '\n')};
     if (status == STATUS_OK)
         status = db_job_annotate(manager->db, &notes, problem);
     if (status == STATUS_OK) {
@@ -276,125 +448,56 @@ Status jobs_annotate(JobManager *manager, const char *id, const char *title, con
         Job *job = hashmap_find(manager->jobs, id);
         // While it is being written the writer has its texts, and then it is read from there.
         if (job != NULL && job->is_durable && !job->is_inserting && !job->is_ending) {
-            annotate_replace(&job->row.title, &copy);
-            annotate_replace(&job->row.labels, &array);
+            if (title != NULL)
+                annotate_replace(&job->row.title, &shown);
+            if (labels != NULL)
+                annotate_replace(&job->row.labels, &array);
         }
         pthread_mutex_unlock(&manager->lock);
     }
-    free(copy);
-    free(array);
-    free(title_words);
-    free(label_words);
+    bytes_clear(&shown);
+    bytes_clear(&array);
+    bytes_clear(&title_words);
+    bytes_clear(&label_words);
     return status;
-}
-
-static Status submit_fill_sender(JobRow *row, const IdempotencyKey *key) {
-    const bool has_key = key->key[0] != '\0';
-    row->client = key->client == NULL ? NULL : strdup(key->client);
-    row->idempotency_key = has_key ? strdup(key->key) : NULL;
-    row->request = has_key ? strdup(key->request) : NULL;
-    return (row->client == NULL && key->client != NULL) ||
-                   (has_key && (row->idempotency_key == NULL || row->request == NULL))
-               ? STATUS_NO_MEMORY
-               : STATUS_OK;
-}
-
-static Status submit_fill_job(Job *job, const StudyRequest *inquiry, const Warnings *warnings,
-                              Problem *problem) {
-    JobRow *row = &job->row;
-    Bytes scene = {0}, told = {0}, uses = {0};
-    if (!job_id_make(row->id))
-        return problem_set(problem, STATUS_INTERNAL, "no random numbers for a job's id");
-    job->indexed.key = row->id;
-    row->created_unix_ms = clock_unix_ms();
-    jobs_result_id(inquiry, row->result);
-    document_scene(&scene, inquiry);
-    document_warnings(&told, warnings);
-    row->scene = bytes_take(&scene, NULL);
-    row->warnings = bytes_take(&told, NULL);
-    references_write(&uses, inquiry, false);
-    const bool has_uses = uses.count > 0;
-    row->uses = bytes_take(&uses, NULL);
-    if (row->uses != NULL && !has_uses) {
-        free(row->uses);
-        row->uses = NULL;
-    }
-    TRY(submit_fill_notes(row, inquiry, problem));
-    if (row->result[0] == '\0' || (has_uses && row->uses == NULL) || row->scene == NULL ||
-        row->warnings == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
-    return STATUS_OK;
-}
-
-static void submit_fail_row(JobRow *row, const Problem *problem) {
-    Bytes bytes = {.most = 1 << 20};
-    encode_problem(&bytes, problem, encode_problem_code(problem->status), NULL);
-    row->state = JOB_FAILED;
-    row->problem = bytes_take(&bytes, NULL);
-    row->finished_unix_ms = clock_unix_ms();
-}
-
-// The client of the queue, if it may submit one more now. Those without a token are one client.
-static Status submit_enter_client(JobManager *manager, const char *name, QueueClient **client,
-                                  Problem *problem) {
-    Status status = STATUS_OK;
-    pthread_mutex_lock(&manager->lock);
-    *client = queue_client(manager->queue, name != NULL ? name : "");
-    if (*client == NULL)
-        status = problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
-    else
-        status = limits_add(manager, *client, problem);
-    pthread_mutex_unlock(&manager->lock);
-    return status;
-}
-
-Status jobs_charge(JobManager *manager, const char *client, Problem *problem) {
-    QueueClient *charged;
-    return submit_enter_client(manager, client, &charged, problem);
 }
 
 // *accepted is the new job or, where it was earlier, that of the same key.
-static Status submit_scene(JobManager *manager, const Submission *submission,
-                           const IdempotencyKey *key, Job **accepted, bool *is_replayed,
-                           Problem *problem) {
-    Entry entry = {.manager = manager, .is_retry = submission->retry_of != NULL, .key = *key};
+static Status submit_scene(Entry *entry, const char *text, size_t size, Problem *problem) {
+    JobManager *manager = entry->manager;
     QueueClient *client;
-    TRY(submit_enter_client(manager, submission->client, &client, problem));
-    Job *job = entry.job = job_new(manager);
+    TRY(client_enter(manager, entry->submission->client, &client, problem));
+    Job *job = entry->job = job_new(manager);
     if (job == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
+        return submit_no_memory(problem);
     job->submitted_ns = clock_monotonic_ns();
     job->client = client;
     Warnings warnings = {NULL, 0};
-    Status status =
-        jobs_prepare_request(manager, submission->text, submission->size, &manager->settings.limits,
-                             &entry.inquiry, &warnings, problem);
+    Status status = jobs_prepare_request(manager, text, size, &manager->settings.limits,
+                                         &entry->request, &warnings, problem);
     if (status == STATUS_OK)
-        status = submit_fill_job(job, &entry.inquiry, &warnings, problem);
-    if (status == STATUS_OK && (status = submit_fill_sender(&job->row, key)) != STATUS_OK)
-        problem_set(problem, status, "no memory for a job");
+        status = submit_fill(entry, &warnings, problem);
     if (status == STATUS_OK) {
-        const Status cached =
-            entry.is_retry ? STATUS_NOT_FOUND : submit_find_result(manager, job, problem);
-        status = cached == STATUS_OK          ? submit_finish(&entry, problem)
-                 : cached == STATUS_NOT_FOUND ? submit_queue(&entry, problem)
+        const Status cached = entry->submission->retry_of != NULL
+                                  ? STATUS_NOT_FOUND
+                                  : submit_find_result(manager, job, problem);
+        status = cached == STATUS_OK          ? submit_finish(entry, problem)
+                 : cached == STATUS_NOT_FOUND ? submit_queue(entry, problem)
                                               : cached;
     }
-    study_request_clear(&entry.inquiry);
+    study_request_clear(&entry->request);
     warnings_clear(&warnings);
-    *is_replayed = status == STATUS_OK && entry.earlier != NULL;
-    if (status == STATUS_OK && entry.earlier == NULL) {
-        *accepted = job;
-        return STATUS_OK;
-    }
-    job_unref(job);
-    *accepted = entry.earlier;
     return status;
 }
 
+// The sweep of a finished job, in this engine's version: failed points of another one cannot be
+// computed. `row` is cleared by sweep_row_clear in any case.
 static Status retry_find(JobManager *manager, const char *id, SweepRow *row, Problem *problem) {
     Job *job = NULL;
-    char result[72];
+    StudyRequest request = {0};
+    Warnings warnings = {NULL, 0};
+    char result[72], present[72] = "";
+    memset(row, 0, sizeof *row);
     TRY(jobs_find(manager, id, &job, problem));
     const bool is_finished = job_is_finished(job);
     memcpy(result, job->row.result, sizeof result); // never changes
@@ -408,58 +511,36 @@ static Status retry_find(JobManager *manager, const char *id, SweepRow *row, Pro
     if (!db_result_exists(manager->db, result))
         return problem_set(problem, STATUS_CONFLICT,
                            "the sweep was not brought to an end: submit its scene again");
-    return STATUS_OK;
-}
-
-// Failed points of another engine version cannot be computed by this one.
-static Status retry_check_engine(JobManager *manager, const SweepRow *row, Problem *problem) {
-    StudyRequest inquiry = {0};
-    Warnings warnings = {NULL, 0};
-    char result[72] = "";
-    Status status = jobs_prepare(manager->db, row->scene, strlen(row->scene), NULL, &inquiry,
+    Status status = jobs_prepare(manager->db, row->scene, strlen(row->scene), NULL, &request,
                                  &warnings, problem);
     if (status == STATUS_OK)
-        jobs_result_id(&inquiry, result);
-    if (status == STATUS_OK && strcmp(result, row->result) != 0)
+        jobs_result_id(&request, present);
+    if (status == STATUS_OK && strcmp(present, row->result) != 0)
         status = problem_set(problem, STATUS_GONE,
                              "the sweep was made by another engine version, this is %s: POST to "
                              "/v1/results/%.72s/again, which submits its scene anew",
                              engine_version, row->result);
-    study_request_clear(&inquiry);
+    study_request_clear(&request);
     warnings_clear(&warnings);
     return status;
 }
 
-// With the lock of retries held, so that no chunk of a sweep under way is opened.
-static Status retry_reopen(JobManager *manager, const char *result, Problem *problem) {
-    pthread_mutex_lock(&manager->lock);
-    const Task *task = hashmap_find(manager->tasks, result);
-    const bool is_under_way = task != NULL && !task->recompute_only;
-    pthread_mutex_unlock(&manager->lock);
-    return is_under_way ? STATUS_OK : db_sweep_reopen(manager->db, result, problem);
-}
-
-// The sweep of the finished job `id` with its failed points to be made again. A retry that is under
-// way already is shared. `row` is cleared by sweep_row_clear in any case.
-static Status retry_open(JobManager *manager, const char *id, SweepRow *row, Problem *problem) {
-    memset(row, 0, sizeof *row);
-    TRY(retry_find(manager, id, row, problem));
-    TRY(retry_check_engine(manager, row, problem));
-    return retry_reopen(manager, row->result, problem);
-}
-
-static Status submit_retry(JobManager *manager, const Submission *submission,
-                           const IdempotencyKey *key, Job **accepted, bool *is_replayed,
-                           Problem *problem) {
+// Submits the scene of a sweep whose failed points are opened again. A retry that is under way
+// already is shared: no chunk of a sweep under way is opened.
+static Status submit_retry(Entry *entry, Problem *problem) {
+    JobManager *manager = entry->manager;
     SweepRow row;
     pthread_mutex_lock(&manager->retries);
-    Status status = retry_open(manager, submission->retry_of, &row, problem);
+    Status status = retry_find(manager, entry->submission->retry_of, &row, problem);
     if (status == STATUS_OK) {
-        Submission scene = *submission;
-        scene.text = row.scene;
-        scene.size = strlen(row.scene);
-        status = submit_scene(manager, &scene, key, accepted, is_replayed, problem);
+        pthread_mutex_lock(&manager->lock);
+        const bool is_under_way = submit_find_task(manager, row.result) != NULL;
+        pthread_mutex_unlock(&manager->lock);
+        if (!is_under_way)
+            status = db_sweep_reopen(manager->db, row.result, problem);
     }
+    if (status == STATUS_OK)
+        status = submit_scene(entry, row.scene, strlen(row.scene), problem);
     pthread_mutex_unlock(&manager->retries);
     sweep_row_clear(&row);
     return status;
@@ -467,30 +548,30 @@ static Status submit_retry(JobManager *manager, const Submission *submission,
 
 Status jobs_submit(JobManager *manager, const Submission *submission, Job **accepted,
                    Problem *problem) {
-    IdempotencyKey key;
-    bool is_replayed = false;
+    Entry entry = {.manager = manager, .submission = submission};
     *accepted = NULL;
-    TRY(idempotency_read(submission, &key, problem));
-    TRY(idempotency_find(manager, &key, accepted, problem));
-    Status status = STATUS_OK;
-    if (*accepted != NULL)
-        is_replayed = true;
-    else if (submission->retry_of != NULL)
-        status = submit_retry(manager, submission, &key, accepted, &is_replayed, problem);
-    else
-        status = submit_scene(manager, submission, &key, accepted, &is_replayed, problem);
+    TRY(key_read(submission, &entry, problem));
+    Status status = key_find(&entry, problem);
+    if (status == STATUS_OK && entry.earlier == NULL)
+        status = submission->retry_of != NULL
+                     ? submit_retry(&entry, problem)
+                     : submit_scene(&entry, submission->text, submission->size, problem);
+    const bool is_new = status == STATUS_OK && entry.earlier == NULL;
+    *accepted = is_new ? entry.job : entry.earlier;
+    if (!is_new)
+        job_unref(entry.job);
     if (submission->is_replayed != NULL)
-        *submission->is_replayed = is_replayed;
+        *submission->is_replayed = status == STATUS_OK && !is_new;
     return status;
 }
 
-// Takes the row and the inquiry.
-static Status submit_resume(JobManager *manager, JobRow *row, StudyRequest *inquiry,
+// Takes the row and the request.
+static Status submit_resume(JobManager *manager, JobRow *row, StudyRequest *request,
                             Problem *problem) {
     Job *job = job_new(manager);
     QueueClient *client = queue_client(manager->queue, row->client != NULL ? row->client : "");
-    jobs_result_id(inquiry, row->result);
-    Task *task = row->result[0] != '\0' ? submit_make_task(manager, row, inquiry) : NULL;
+    jobs_result_id(request, row->result);
+    Task *task = row->result[0] != '\0' ? submit_make_task(manager, row, request) : NULL;
     if (job == NULL || client == NULL || task == NULL) {
         job_unref(job);
         task_free(task);
@@ -514,25 +595,25 @@ static Status submit_resume(JobManager *manager, JobRow *row, StudyRequest *inqu
     return STATUS_OK;
 }
 
-Status jobs_take_up(JobManager *manager, JobRow *row, Problem *problem) {
-    Problem *fault = calloc(1, sizeof *fault);
-    StudyRequest inquiry = {0};
+Status jobs_resume(JobManager *manager, JobRow *row, Problem *problem) {
+    StudyRequest request = {0};
     Warnings warnings = {NULL, 0};
-    if (fault == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the unfinished jobs");
+    Problem fault; // large, but the thread's stack is larger
+    problem_clear(&fault);
     Status status = jobs_prepare(manager->db, row->scene, strlen(row->scene),
-                                 &manager->settings.limits, &inquiry, &warnings, fault);
+                                 &manager->settings.limits, &request, &warnings, &fault);
     if (status == STATUS_OK) {
-        status = submit_resume(manager, row, &inquiry, problem);
+        status = submit_resume(manager, row, &request, problem);
     } else if (status == STATUS_INVALID || status == STATUS_UNREADABLE) {
         // The limits or the program changed meanwhile: the job's owner learns why.
-        submit_fail_row(row, fault);
+        row->state = JOB_FAILED;
+        row->problem = problem_document(&fault);
+        row->finished_unix_ms = clock_unix_ms();
         status = db_job_update(manager->db, row, problem);
     } else {
-        problem_set(problem, status, "%s", fault->detail);
+        problem_set(problem, status, "%s", fault.detail);
     }
-    study_request_clear(&inquiry);
+    study_request_clear(&request);
     warnings_clear(&warnings);
-    free(fault);
     return status;
 }

@@ -1,13 +1,71 @@
-// Jobs and the tasks that compute for them: their references, subscribers, places in the tables of
+// Jobs and the tasks that compute for them: ids, references, subscribers, places in the tables of
 // the manager, and the memory that running tasks share.
 #include <math.h>
 #include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/random.h>
 
 #include "server/jobs/jobs_private.h"
 #include "server/jobs/sweep.h"
 #include "server/util/clock.h"
+
+const char *const job_state_names[] = {"accepted", "running",   "successful",
+                                       "failed",   "dismissed", NULL};
+
+bool job_state_is_final(int state) {
+    return state != JOB_ACCEPTED && state != JOB_RUNNING;
+}
+
+// Of two ids in one microsecond the second gets the next.
+static int64_t job_id_us(void) {
+    static atomic_int_fast64_t last;
+    const int64_t now = clock_unix_us();
+    int64_t before = atomic_load(&last), next;
+    do {
+        next = now > before ? now : before + 1;
+    } while (!atomic_compare_exchange_weak(&last, &before, next));
+    return next;
+}
+
+// Each thread draws for many ids at once; a number is used once.
+static bool job_id_draw(uint64_t *secret) {
+    enum { DRAWN = 32 }; // 256 bytes come whole
+    static _Thread_local uint64_t drawn[DRAWN];
+    static _Thread_local size_t left;
+    if (left == 0) {
+        if (getrandom(drawn, sizeof drawn, 0) != (ssize_t)sizeof drawn)
+            return false;
+        left = DRAWN;
+    }
+    *secret = drawn[--left];
+    return true;
+}
+
+bool job_id_make(char id[40]) {
+    static const char digits[] = "0123456789abcdef";
+    uint64_t secret;
+    if (!job_id_draw(&secret))
+        return false;
+    uint64_t time = (uint64_t)job_id_us();
+    id[0] = 'j';
+    id[1] = '-';
+    for (int i = 15; i >= 2; i--, time >>= 4)
+        id[i] = digits[time & 15];
+    for (int i = 31; i >= 16; i--, secret >>= 4)
+        id[i] = digits[secret & 15];
+    id[JOB_ID_LENGTH] = '\0';
+    return true;
+}
+
+int64_t job_id_unix_ms(const char *id) {
+    if (strncmp(id, "j-", 2) != 0 || strlen(id) != JOB_ID_LENGTH ||
+        strspn(id + 2, "0123456789abcdef") != JOB_ID_LENGTH - 2)
+        return -1;
+    char time[15] = "";
+    memcpy(time, id + 2, 14);
+    return strtoll(time, NULL, 16) / 1000;
+}
 
 bool subscribers_add(Subscribers *subscribers, const Callback *callback) {
     for (size_t i = 0; i < subscribers->count; i++)
@@ -72,11 +130,6 @@ const char *job_client(const Job *job) {
     return job->row.client; // never changes
 }
 
-static bool text_copy(char **target, const char *text) {
-    *target = text == NULL ? NULL : strdup(text);
-    return text == NULL || *target != NULL;
-}
-
 static void job_view_progress(const Job *job, JobView *view) {
     const Task *task = job->task;
     if (job->row.state == JOB_SUCCESSFUL) {
@@ -114,10 +167,12 @@ Status job_view(Job *job, JobView *view) {
         view->is_result_deleted = job->manager == NULL && !row->has_result;
     }
     job_view_progress(job, view);
-    const bool is_whole =
-        text_copy(&view->problem, row->problem) && text_copy(&view->warnings, row->warnings) &&
-        text_copy(&view->title, row->title) && text_copy(&view->labels, row->labels) &&
-        text_copy(&view->study, row->study) && text_copy(&view->client, row->client);
+    const Status all[] = {study_copy_text(row->problem, &view->problem),
+                          study_copy_text(row->warnings, &view->warnings),
+                          study_copy_text(row->title, &view->title),
+                          study_copy_text(row->labels, &view->labels),
+                          study_copy_text(row->study, &view->study),
+                          study_copy_text(row->client, &view->client)};
     view->head = result_summary_ref(job->summary);
     job_unlock(job);
     if (view->head != NULL) {
@@ -126,7 +181,7 @@ Status job_view(Job *job, JobView *view) {
         view->work = view->head->work;
         view->notes = view->head->notes;
     }
-    return is_whole ? STATUS_OK : STATUS_NO_MEMORY;
+    return status_first(all, COUNT(all));
 }
 
 void job_view_clear(JobView *view) {
@@ -220,17 +275,12 @@ void job_refuse(Job *job, Status status, const char *detail) {
     job_retire(job);
 }
 
-static Job *jobs_find_live(JobManager *manager, const char *id) {
-    pthread_mutex_lock(&manager->lock);
-    Job *job = hashmap_find(manager->jobs, id);
-    if (job != NULL)
-        job_ref(job);
-    pthread_mutex_unlock(&manager->lock);
-    return job;
-}
-
 Status jobs_find(JobManager *manager, const char *id, Job **found, Problem *problem) {
-    *found = jobs_find_live(manager, id);
+    pthread_mutex_lock(&manager->lock);
+    *found = hashmap_find(manager->jobs, id);
+    if (*found != NULL)
+        job_ref(*found);
+    pthread_mutex_unlock(&manager->lock);
     if (*found != NULL)
         return STATUS_OK;
     Job *job = job_new(NULL);
