@@ -4,7 +4,6 @@
 
 #include "server/api/columns.h"
 #include "server/api/results.h"
-#include "server/formats/zip.h"
 #include "server/http/reply.h"
 
 static const char about[] =

@@ -8,8 +8,7 @@
 #include "server/api/materials.h"
 #include "server/api/measurements.h"
 #include "server/api/query.h"
-#include "server/formats/chart.h"
-#include "server/formats/charts.h"
+#include "server/formats/study_formats.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
 #include "server/json/encode.h"
@@ -180,7 +179,7 @@ static Status proposal_run(App *app, const Request *request, const Material *bef
     if (status == STATUS_OK) {
         Bytes bytes = {.most = app->reply_most};
         if (is_chart)
-            charts_evaluation(&evaluation, slug, &bytes);
+            chart_evaluation(&evaluation, slug, &bytes);
         else
             proposal_write(&bytes, request, selection, &evaluation, &proposal);
         status = reply_bytes(reply, 200, is_chart ? chart_type : type_json, &bytes, problem);

@@ -7,7 +7,6 @@
 #include <string.h>
 
 #include "server/api/app.h"
-#include "server/formats/chart.h"
 #include "server/formats/study_formats.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
@@ -88,7 +87,7 @@ static Status show(App *app, const Request *request, const StudyKind *kind, Repl
     if (status == STATUS_OK) {
         snprintf(tag, sizeof tag, "%.72s-%s.%s", row.id, kind->kind.name, format->extension);
         if (!reply_immutable(reply, request, tag)) {
-            format->write(answer.study, format->extension, &bytes);
+            study_format_write(format, answer.study, &bytes);
             status = reply_bytes(reply, 200, format->content_type, &bytes, problem);
         }
     }

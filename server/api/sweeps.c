@@ -7,7 +7,6 @@
 #include "server/api/columns.h"
 #include "server/api/job_json.h"
 #include "server/api/studies.h"
-#include "server/formats/charts.h"
 #include "server/formats/study_formats.h"
 #include "server/formats/sweep.h"
 #include "server/http/reply.h"
@@ -74,7 +73,7 @@ static Status sweep_reply_table(App *app, Reply *reply, const StudyFormat *forma
 static Status sweep_reply_chart(App *app, Reply *reply, const StudyFormat *format, SweepReply *sent,
                                 Problem *problem) {
     Bytes bytes = {.most = app->reply_most};
-    const bool is_whole = charts_sweep(sent->view.sweep, &sent->source, &bytes);
+    const bool is_whole = chart_sweep(sent->view.sweep, &sent->source, &bytes);
     sweep_reply_free(sent);
     if (is_whole)
         return reply_bytes(reply, 200, format->content_type, &bytes, problem);

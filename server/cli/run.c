@@ -367,7 +367,7 @@ static Status study_check_outputs(const StudyKind *kind, const Texts *outputs, P
 static Status study_write(const StudyFormat *format, const char *path, const Variant *answer,
                           Problem *problem) {
     Bytes bytes = {0};
-    format->write(answer, format->extension, &bytes);
+    study_format_write(format, answer, &bytes);
     const Status status = bytes.is_failed
                               ? problem_set(problem, STATUS_NO_MEMORY, "no memory for the answer")
                               : output_put(path, &bytes, problem);

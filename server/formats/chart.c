@@ -12,8 +12,6 @@
 
 #include "core/base/status.h"
 
-const char chart_type[] = "image/svg+xml";
-
 // The palette of Okabe and Ito, which most people can distinguish, and further colours; lighter
 // ones on a dark page.
 static const char *const chart_light[CHART_COLOURS] = {"#0072b2", "#d55e00", "#009e73", "#a8509a",
@@ -38,64 +36,115 @@ static const char *const chart_shapes[CHART_COLOURS] = {"M-5 0a5 5 0 1 0 10 0a5 
 
 enum { TICKS_MAX = 12, DECADES_LABELLED = 8, MAP_STEPS = 24, LEGEND_LINE = 20 };
 
-void *chart_allocate(Chart *chart, size_t count, size_t size) {
-    size_t i = 0;
-    while (i < CHART_BLOCKS && chart->blocks[i] != NULL)
-        i++;
-    if (i < CHART_BLOCKS)
-        chart->blocks[i] = calloc(count + 1, size);
-    chart->is_failed = chart->is_failed || i == CHART_BLOCKS || chart->blocks[i] == NULL;
-    return i < CHART_BLOCKS ? chart->blocks[i] : NULL;
+struct ChartBlock {
+    struct ChartBlock *next;
+    double at[];
+};
+
+void *chart_new(Chart *chart, size_t count, size_t size) {
+    struct ChartBlock *block = calloc(1, sizeof *block + (count + 1) * size);
+    if (block == NULL) {
+        chart->is_failed = true;
+        return NULL;
+    }
+    block->next = chart->blocks;
+    chart->blocks = block;
+    return block->at;
 }
 
-ChartPanel *chart_panel(Chart *chart, double left, double right, double top, double bottom) {
+const char *chart_text(Chart *chart, const char *format, ...) {
+    char *text = chart_new(chart, CHART_TEXT, 1);
+    va_list arguments;
+    va_start(arguments, format);
+    if (text != NULL)
+        text_fit_format(text, CHART_TEXT, format, arguments);
+    va_end(arguments);
+    return text != NULL ? text : "";
+}
+
+const char *chart_quantity(Chart *chart, const char *name, const char *unit) {
+    const bool has_unit = unit != NULL && *unit != '\0';
+    return chart_text(chart, "%.120s%s%.24s%s", name != NULL ? name : "", has_unit ? " [" : "",
+                      has_unit ? unit : "", has_unit ? "]" : "");
+}
+
+ChartPanel *chart_panel(Chart *chart, const char *heading, double left, double right, double top,
+                        double bottom) {
     ChartPanel *panel = &chart->panels[chart->count < CHART_PANELS ? chart->count++ : 0];
-    *panel = (ChartPanel){.left = left, .right = right, .top = top, .bottom = bottom};
+    *panel = (ChartPanel){.heading = heading, .left = left, .right = right, .top = top};
+    panel->bottom = bottom;
     return panel;
 }
 
-ChartPanel *chart_spectra(Chart *chart, double left, double right, double top, double bottom) {
-    ChartPanel *panel = chart_panel(chart, left, right, top, bottom);
+ChartPanel *chart_spectra(Chart *chart, const char *heading, double left, double right, double top,
+                          double bottom) {
+    ChartPanel *panel = chart_panel(chart, heading, left, right, top, bottom);
     panel->x.is_logarithmic = panel->y.is_logarithmic = true;
     panel->y.max_decades = CHART_DECADES;
-    text_fit(panel->x.title, CHART_TEXT, "frequency [Hz]");
+    panel->x.title = "frequency [Hz]";
     return panel;
 }
 
-ChartSeries *chart_series(ChartPanel *panel, ChartKind kind, const double *x, const double *y,
-                          const double *high, size_t count) {
+static ChartSeries *chart_add(ChartPanel *panel, ChartKind kind, const double *x, const double *y,
+                              const double *high, size_t count, size_t colour) {
     ChartSeries *series = &panel->series[panel->count < CHART_SERIES ? panel->count++ : 0];
     *series = (ChartSeries){.kind = kind, .x = x, .y = y, .high = high, .count = count};
+    series->colour = colour;
     return series;
 }
 
-void chart_format(char *target, size_t size, const char *format, ...) {
-    va_list arguments;
-    va_start(arguments, format);
-    text_fit_format(target, size, format, arguments);
-    va_end(arguments);
+ChartSeries *chart_line(ChartPanel *panel, const double *x, const double *y, const double *high,
+                        size_t count, size_t colour, const char *name, const char *legend) {
+    ChartSeries *line = chart_add(panel, CHART_LINE, x, y, high, count, colour);
+    line->name = name;
+    line->legend = legend;
+    return line;
+}
+
+void chart_band(ChartPanel *panel, const double *x, const double *low, const double *high,
+                size_t count, size_t colour) {
+    (void)chart_add(panel, CHART_BAND, x, low, high, count, colour);
+}
+
+ChartSeries *chart_markers(ChartPanel *panel, const double *x, const double *y, size_t count,
+                           ChartShape shape, size_t colour, const char *legend) {
+    ChartSeries *markers = chart_add(panel, CHART_MARKERS, x, y, NULL, count, colour);
+    markers->shape = shape;
+    markers->legend = legend;
+    return markers;
+}
+
+void chart_map(ChartPanel *panel, const double *values, size_t count, size_t columns) {
+    chart_add(panel, CHART_MAP, NULL, values, NULL, count, 0)->columns = columns;
+}
+
+void chart_note(Chart *chart, const char *before, const char *text) {
+    if (text == NULL)
+        return;
+    bytes_text(&chart->description, before);
+    chart_escape(&chart->description, text);
+    bytes_text(&chart->description, ".");
 }
 
 // --- text ---
 
-void chart_text(Bytes *bytes, const char *text) {
+void chart_escape(Bytes *bytes, const char *text) {
+    static const char marks[] = "&<>\"";
+    static const char *const entities[] = {"&amp;", "&lt;", "&gt;", "&quot;"};
     for (const char *c = text; *c != '\0'; c++) {
-        if (*c == '&')
-            bytes_text(bytes, "&amp;");
-        else if (*c == '<')
-            bytes_text(bytes, "&lt;");
-        else if (*c == '>')
-            bytes_text(bytes, "&gt;");
-        else if (*c == '"')
-            bytes_text(bytes, "&quot;");
+        const char *mark = strchr(marks, *c);
+        if (mark != NULL)
+            bytes_text(bytes, entities[mark - marks]);
         else
             bytes_put(bytes, (unsigned char)*c < ' ' ? " " : c, 1);
     }
 }
 
-// `style`: a class, or NULL; `anchor`: the side of the text that is at x.
+// `style`: a class, or NULL; `anchor`: the side of the text that is at x; `text`: NULL: none.
 static void chart_put_text(Bytes *bytes, double x, double y, const char *anchor, const char *style,
                            const char *text) {
+    if (text == NULL)
+        return;
     bytes_text(bytes, "<text");
     if (style != NULL)
         bytes_format(bytes, " class=\"%s\"", style);
@@ -103,13 +152,13 @@ static void chart_put_text(Bytes *bytes, double x, double y, const char *anchor,
     if (strcmp(anchor, "start") != 0)
         bytes_format(bytes, " text-anchor=\"%s\"", anchor);
     bytes_text(bytes, ">");
-    chart_text(bytes, text);
+    chart_escape(bytes, text);
     bytes_text(bytes, "</text>\n");
 }
 
 static void chart_put_title(Bytes *bytes, const char *text) {
     bytes_text(bytes, "<title>");
-    chart_text(bytes, text);
+    chart_escape(bytes, text);
     bytes_text(bytes, "</title>");
 }
 
@@ -141,20 +190,6 @@ static void chart_put_style(Bytes *bytes) {
                ".ring, .cross { stroke-width: 1.5; } .cross, .all { stroke: #888888; }\n"
                ".half { fill: #888888; fill-opacity: 0.35; } .mean { stroke-width: 2; }\n"
                ".bad { fill: #9a9a9a; }\n</style>\n");
-}
-
-void chart_quantity(char *target, const char *name, const char *unit) {
-    const bool has_unit = unit != NULL && *unit != '\0';
-    chart_format(target, CHART_TEXT, "%.120s%s%.24s%s", name != NULL ? name : "",
-                 has_unit ? " [" : "", has_unit ? unit : "", has_unit ? "]" : "");
-}
-
-void chart_note(Chart *chart, const char *before, const char *text) {
-    if (text == NULL)
-        return;
-    bytes_text(&chart->description, before);
-    chart_text(&chart->description, text);
-    bytes_text(&chart->description, ".");
 }
 
 // --- axes ---
@@ -262,7 +297,7 @@ static void panel_put_tick(const ChartPanel *panel, bool is_x, double share, con
                  is_x ? panel->bottom + (panel->is_small ? 16 : 18) : y + 4,
                  is_x ? "middle" : "end");
     if (*text != '\0')
-        chart_text(bytes, text);
+        chart_escape(bytes, text);
     else if (decade >= -1 && decade <= 3)
         bytes_format(bytes, "%g", pow(10, decade));
     else
@@ -410,7 +445,7 @@ static void series_put_line(const ChartPanel *panel, const ChartSeries *series, 
         series_put_means(panel, series, series->y, false, bytes);
     }
     bytes_text(bytes, "\"");
-    if (series->name[0] != '\0') {
+    if (series->name != NULL) {
         bytes_text(bytes, ">");
         chart_put_title(bytes, series->name);
         bytes_text(bytes, "</path>\n");
@@ -517,11 +552,11 @@ static void panel_put_series(const ChartPanel *panel, const ChartSeries *series,
 static void panel_put_legend(const ChartPanel *panel, Bytes *bytes) {
     double y = panel->top + (panel->has_side_legend ? 10 : 18), count = 0;
     for (size_t i = 0; i < panel->count; i++)
-        count += panel->series[i].legend[0] != '\0';
+        count += panel->series[i].legend != NULL;
     const double step = fmin(LEGEND_LINE, (panel->bottom - panel->top) / count);
     for (size_t i = 0; i < panel->count; i++) {
         const ChartSeries *series = &panel->series[i];
-        if (series->legend[0] == '\0')
+        if (series->legend == NULL)
             continue;
         const double x = panel->has_side_legend ? panel->right + 10 : panel->right - 30;
         if (series->kind == CHART_MARKERS) {
@@ -541,9 +576,8 @@ static void panel_put_legend(const ChartPanel *panel, Bytes *bytes) {
 static void panel_write(ChartPanel *panel, Bytes *bytes) {
     const bool is_map = panel->count > 0 && panel->series[0].kind == CHART_MAP;
     const bool has_values = chart_fit(panel);
-    if (panel->heading[0] != '\0')
-        chart_put_text(bytes, panel->left, panel->top - (panel->is_small ? 7 : 18), "start",
-                       panel->is_small ? "name" : "heading", panel->heading);
+    chart_put_text(bytes, panel->left, panel->top - (panel->is_small ? 7 : 18), "start",
+                   panel->is_small ? "name" : "heading", panel->heading);
     if (!has_values && panel->empty == NULL)
         return;
     if (has_values && !is_map) {
@@ -562,7 +596,7 @@ static void panel_write(ChartPanel *panel, Bytes *bytes) {
     if (!has_values)
         chart_put_text(bytes, middle, (panel->top + panel->bottom) / 2, "middle", "small",
                        panel->empty);
-    if (panel->x.title[0] != '\0' && !panel->x.is_unlabelled)
+    if (!panel->x.is_unlabelled)
         chart_put_text(bytes, middle, panel->bottom + 36, "middle", NULL, panel->x.title);
     panel_put_legend(panel, bytes);
 }
@@ -601,12 +635,12 @@ static void table_write(const ChartTable *table, Bytes *bytes) {
             min = fmin(min, fmin(interval->minimum, interval->low));
             max = fmax(max, fmax(interval->maximum, interval->high));
         }
-    if (table->heading != NULL)
-        chart_put_text(bytes, 20, table->top - 24, "start", "heading", table->heading);
+    chart_put_text(bytes, 20, table->top - 24, "start", "heading", table->heading);
     for (size_t i = 0; i < table->rows_count; i++) {
         const ChartRow *row = &table->rows[i];
         const double y = table->top + table->row_height * ((double)i + 0.5);
-        chart_put_text(bytes, table->label_right, y + 4, "end", NULL, row->label);
+        chart_put_text(bytes, table->label_right, y + 4, "end", NULL,
+                       row->label != NULL ? row->label : "");
         if (row->has_interval)
             table_put_interval(table, &row->interval, y, min, max, bytes);
         for (size_t k = 0; k < table->columns_count; k++)
@@ -614,16 +648,18 @@ static void table_write(const ChartTable *table, Bytes *bytes) {
                            table->label_right + table->interval_width +
                                table->column_width * (double)(k + !has_intervals),
                            y + 4, has_intervals ? "start" : "end",
-                           row->cells[k].is_faint ? "faint" : NULL, row->cells[k].text);
+                           row->cells[k].is_faint ? "faint" : NULL,
+                           row->cells[k].text != NULL ? row->cells[k].text : "");
     }
-    if (table->note != NULL)
-        chart_put_text(bytes, 20, table->top + table->row_height * ((double)table->rows_count + 1),
-                       "start", "faint", table->note);
+    chart_put_text(bytes, 20, table->top + table->row_height * ((double)table->rows_count + 1),
+                   "start", "faint", table->note);
 }
 
 static void chart_clear(Chart *chart) {
-    for (size_t i = 0; i < CHART_BLOCKS; i++)
-        free(chart->blocks[i]);
+    for (struct ChartBlock *block = chart->blocks, *next; block != NULL; block = next) {
+        next = block->next;
+        free(block);
+    }
     bytes_clear(&chart->description);
     *chart = (Chart){.width = 0};
 }
@@ -646,11 +682,9 @@ void chart_write(Chart *chart, Bytes *bytes) {
     chart_put_style(bytes);
     bytes_format(bytes, "<rect class=\"page\" width=\"%.0f\" height=\"%.0f\"/>\n", chart->width,
                  chart->height);
-    if (chart->heading[0] != '\0')
-        chart_put_text(bytes, chart->left, 26, "start", "heading", chart->heading);
+    chart_put_text(bytes, chart->left, 26, "start", "heading", chart->heading);
     for (size_t i = 0; i < COUNT(chart->notes); i++)
-        if (chart->notes[i][0] != '\0')
-            chart_put_text(bytes, chart->left, 50 + 17 * (double)i, "start", NULL, chart->notes[i]);
+        chart_put_text(bytes, chart->left, 50 + 17 * (double)i, "start", NULL, chart->notes[i]);
     for (size_t i = 0; i < chart->count; i++)
         panel_write(&chart->panels[i], bytes);
     table_write(&chart->table, bytes);

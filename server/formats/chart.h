@@ -1,6 +1,7 @@
-// A chart as an SVG document of its own, in the reader's light or dark colours: panels of series
-// over two axes, and a table with intervals, all from one description. The same description gives
-// the same bytes. Values are borrowed until the document is written.
+// A chart as an SVG document, in the reader's light or dark colours: panels of series over two
+// axes, and a table with intervals, all from one description. The same description gives the same
+// bytes. Values and texts are borrowed until the document is written; chart_new and chart_text make
+// some that live as long.
 #ifndef SERVER_FORMATS_CHART_H
 #define SERVER_FORMATS_CHART_H
 
@@ -14,21 +15,18 @@ enum {
     CHART_TICKS = 6,
     CHART_ROWS = 8,
     CHART_CELLS = 8,
-    CHART_BLOCKS = 24,
     CHART_DECADES = 8,
     CHART_TEXT = 160,
     CHART_LABEL = 48,
 };
 
-extern const char chart_type[]; // "image/svg+xml"
-
 typedef struct ChartTick {
     double value;
-    char text[CHART_LABEL];
+    const char *text; // ""
 } ChartTick;
 
 typedef struct ChartAxis {
-    char title[CHART_TEXT];
+    const char *title; // NULL: none
     bool is_logarithmic;
     bool is_whole;      // logarithmic: begins and ends with a decade; the vertical axis always does
     bool has_zero;      // logarithmic: one decade more stands for 0, if there is a 0
@@ -51,27 +49,27 @@ typedef enum ChartShape { CHART_SHAPE, CHART_DOT, CHART_CROSS, CHART_RING } Char
 
 typedef struct ChartSeries {
     ChartKind kind;
-    // Infinite coordinates are at the edges of the panel. A point without x is passed over; one
+    // Infinite coordinates are at the edges of the panel. A point without x is left out; one
     // without y interrupts the line.
     const double *x, *y;
     // Line: each point extends from `y` to `high`, and all are drawn; without it points of the same
     // pixel are drawn as their mean.
     const double *high;
     size_t count;
-    size_t columns;          // of a map
-    size_t colour;           // one of CHART_COLOURS, or CHART_STRONG
-    ChartShape shape;        // CHART_SHAPE: that of the colour
-    bool is_joined;          // markers: by a line
-    const char *look;        // a further class of the style sheet; NULL: none
-    char name[CHART_TEXT];   // tooltip of a line; "": none
-    char legend[CHART_TEXT]; // "": none
-    // Appends a marker's tooltip, escaped by chart_text; NULL: none.
+    size_t columns;     // of a map
+    size_t colour;      // one of CHART_COLOURS, or CHART_STRONG
+    ChartShape shape;   // CHART_SHAPE: that of the colour
+    bool is_joined;     // markers: by a line
+    const char *look;   // a further class of the style sheet; NULL: none
+    const char *name;   // tooltip of a line; NULL: none
+    const char *legend; // NULL: none
+    // Appends a marker's tooltip, escaped by chart_escape; NULL: none.
     void (*describe)(const void *context, size_t index, Bytes *bytes);
     const void *context;
 } ChartSeries;
 
 typedef struct ChartPanel {
-    char heading[CHART_TEXT];
+    const char *heading;             // NULL: none
     double left, right, top, bottom; // of the frame [px]
     bool is_small;                   // one of many: smaller texts
     bool has_side_legend;            // to the right of the frame, not in it
@@ -87,11 +85,11 @@ typedef struct ChartInterval {
 } ChartInterval;
 
 typedef struct ChartRow {
-    char label[CHART_LABEL];
+    const char *label; // NULL: none
     bool has_interval;
     ChartInterval interval;
     struct {
-        char text[CHART_LABEL];
+        const char *text; // NULL: none
         bool is_faint;
     } cells[CHART_CELLS];
 } ChartRow;
@@ -106,42 +104,45 @@ typedef struct ChartTable {
 
 typedef struct Chart {
     double width, height;
-    char title[CHART_TEXT]; // of the document
-    Bytes description;      // of the document, escaped
-    double left;            // of the heading and the notes
-    char heading[CHART_TEXT], notes[2][CHART_TEXT];
+    const char *title;              // of the document
+    Bytes description;              // of the document, escaped
+    double left;                    // of the heading and the notes
+    const char *heading, *notes[2]; // NULL: none
     ChartPanel panels[CHART_PANELS];
     size_t count;
     ChartTable table;
-    void *blocks[CHART_BLOCKS]; // of chart_allocate
-    bool is_failed;             // no memory
+    struct ChartBlock *blocks; // of chart_new
+    bool is_failed;            // no memory
 } Chart;
 
 // Zeroed memory that is freed by chart_write. NULL without memory; the document fails then.
-void *chart_allocate(Chart *chart, size_t count, size_t size);
-// Adds an empty panel; there is room for CHART_PANELS.
-ChartPanel *chart_panel(Chart *chart, double left, double right, double top, double bottom);
-// Adds a series; there is room for CHART_SERIES.
-ChartSeries *chart_series(ChartPanel *panel, ChartKind kind, const double *x, const double *y,
-                          const double *high, size_t count);
-// Formats a text of a chart; one that is too long ends with "...".
-void chart_format(char *target, size_t size, const char *format, ...)
-    __attribute__((format(printf, 3, 4)));
-
-// Adds a panel for spectra over frequency, both logarithmic; not more than CHART_DECADES are shown.
-ChartPanel *chart_spectra(Chart *chart, double left, double right, double top, double bottom);
-// "NAME [UNIT]" in target[CHART_TEXT].
-void chart_quantity(char *target, const char *name, const char *unit);
+void *chart_new(Chart *chart, size_t count, size_t size);
+// A text in such memory, of CHART_TEXT at most: a longer one ends with "..."; "" without memory.
+const char *chart_text(Chart *chart, const char *format, ...) __attribute__((format(printf, 2, 3)));
+// "NAME [UNIT]"; both may be NULL.
+const char *chart_quantity(Chart *chart, const char *name, const char *unit);
+// Adds a panel within that frame; there is room for CHART_PANELS.
+ChartPanel *chart_panel(Chart *chart, const char *heading, double left, double right, double top,
+                        double bottom);
+// The same for spectra over frequency, both logarithmic; at most CHART_DECADES are shown.
+ChartPanel *chart_spectra(Chart *chart, const char *heading, double left, double right, double top,
+                          double bottom);
+// Add a series; there is room for CHART_SERIES.
+ChartSeries *chart_line(ChartPanel *panel, const double *x, const double *y, const double *high,
+                        size_t count, size_t colour, const char *name, const char *legend);
+void chart_band(ChartPanel *panel, const double *x, const double *low, const double *high,
+                size_t count, size_t colour);
+ChartSeries *chart_markers(ChartPanel *panel, const double *x, const double *y, size_t count,
+                           ChartShape shape, size_t colour, const char *legend);
+void chart_map(ChartPanel *panel, const double *values, size_t count, size_t columns);
 // Appends "BEFORE TEXT." to the description, TEXT escaped; nothing where `text` is NULL.
 void chart_note(Chart *chart, const char *before, const char *text);
 
 // Sets the ranges of both axes. False: there is no value to be drawn.
 bool chart_fit(ChartPanel *panel);
-
 // Appends the document and clears the chart.
 void chart_write(Chart *chart, Bytes *bytes);
-
 // Appends `text` as the content of an element.
-void chart_text(Bytes *bytes, const char *text);
+void chart_escape(Bytes *bytes, const char *text);
 
 #endif

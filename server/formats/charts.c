@@ -1,46 +1,46 @@
-#include "server/formats/charts.h"
-
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/study/ensemble.h"
+#include "core/study/model_comparison.h"
+#include "core/study/sensitivity.h"
+#include "core/study/tradeoff.h"
 #include "server/formats/chart.h"
+#include "server/formats/format.h"
+#include "server/formats/study_formats.h"
 
 enum { SPECTRA_DRAWN = 4, VARIANTS_DRAWN = 8, READINGS_DRAWN = 5000 };
+
+const char chart_type[] = "image/svg+xml";
 
 static const double charts_edges[] = {-(double)INFINITY, (double)INFINITY};
 
 // A name with spaces for its underscores.
-static void charts_words(char *target, size_t size, const char *name) {
-    text_fit(target, size, name);
-    for (char *c = target; *c != '\0'; c++)
-        if (*c == '_')
-            *c = ' ';
+static const char *charts_words(Chart *chart, const char *name) {
+    char words[CHART_LABEL];
+    text_fit(words, sizeof words, name);
+    for (char *c = words; *c != '\0'; c++)
+        *c = *c == '_' ? ' ' : *c;
+    return chart_text(chart, "%s", words);
 }
 
 // Appends "Not drawn: NAME", and why.
 static void charts_add_undrawn(Chart *chart, const char *name, const char *before,
                                const char *why) {
     bytes_text(&chart->description, " Not drawn: ");
-    chart_text(&chart->description, name);
+    chart_escape(&chart->description, name);
     chart_note(chart, before, why);
 }
 
-// Two values that are kept with the chart.
+// Two values that live as long as the chart.
 static const double *charts_pair(Chart *chart, double first, double second) {
-    double *pair = chart_allocate(chart, 2, sizeof *pair);
+    double *pair = chart_new(chart, 2, sizeof *pair);
     if (pair != NULL) {
         pair[0] = first;
         pair[1] = second;
     }
     return pair;
-}
-
-// A line across the panel; with `high` a band up to that.
-static ChartSeries *charts_add_level(Chart *chart, ChartPanel *panel, double value, double high) {
-    return chart_series(panel, isnan(high) ? CHART_LINE : CHART_BAND, charts_edges,
-                        charts_pair(chart, value, value),
-                        isnan(high) ? NULL : charts_pair(chart, high, high), 2);
 }
 
 static size_t charts_shorter(const Reals *a, const Reals *b) {
@@ -57,14 +57,12 @@ static void charts_add_bands(Chart *chart, ChartPanel *panel, const Reals *frequ
         const Reals *value = has_mean ? &spectrum->mean : &spectrum->value;
         const Reals *low = has_mean ? &spectrum->low : &spectrum->q05;
         const Reals *high = has_mean ? &spectrum->high : &spectrum->q95;
-        ChartSeries *line = chart_series(panel, CHART_LINE, frequency->at, value->at, NULL,
-                                         charts_shorter(frequency, value));
-        line->colour = i;
-        text_fit(line->name, CHART_TEXT, spectrum->channel != NULL ? spectrum->channel : "");
-        chart_quantity(line->legend, spectrum->channel, spectrum->unit);
+        (void)chart_line(panel, frequency->at, value->at, NULL, charts_shorter(frequency, value), i,
+                         spectrum->channel,
+                         chart_quantity(chart, spectrum->channel, spectrum->unit));
         const size_t count = charts_shorter(low, high);
         if (count > 0 && count <= frequency->count)
-            chart_series(panel, CHART_BAND, frequency->at, low->at, high->at, count)->colour = i;
+            chart_band(panel, frequency->at, low->at, high->at, count, i);
     }
 }
 
@@ -89,7 +87,7 @@ static const char *tradeoff_group(const TradeoffPoint *point) {
 
 static void tradeoff_describe(const void *context, size_t index, Bytes *bytes) {
     const TradeoffMark *mark = (const TradeoffMark *)context + index;
-    chart_text(bytes, mark->point->name);
+    chart_escape(bytes, mark->point->name);
     bytes_format(bytes, ": %.2g%s in %.3g s%s", mark->error, metric_units[mark->metric],
                  mark->point->cpu_minimum,
                  mark->point->is_best ? ", none is cheaper and closer" : "");
@@ -130,8 +128,8 @@ static size_t tradeoff_list(Chart *chart, const Tradeoff *tradeoff, TradeoffMark
 // From each point that none is cheaper and closer than along its error to the next one.
 static void tradeoff_add_best(Chart *chart, ChartPanel *panel, const TradeoffMark *marks,
                               size_t count) {
-    double *x = chart_allocate(chart, 2 * count + 1, sizeof *x);
-    double *y = chart_allocate(chart, 2 * count + 1, sizeof *y);
+    double *x = chart_new(chart, 2 * count + 1, sizeof *x);
+    double *y = chart_new(chart, 2 * count + 1, sizeof *y);
     size_t steps = 0;
     for (size_t i = 0; i < count && !chart->is_failed; i++)
         if (marks[i].point->is_best) {
@@ -145,18 +143,15 @@ static void tradeoff_add_best(Chart *chart, ChartPanel *panel, const TradeoffMar
         y[steps] = y[steps - 1];
         steps++;
     }
-    ChartSeries *best = chart_series(panel, CHART_LINE, x, y, y, steps);
-    best->colour = CHART_STRONG;
-    best->look = "best";
-    text_fit(best->legend, CHART_TEXT, "best of all");
+    chart_line(panel, x, y, y, steps, CHART_STRONG, NULL, "best of all")->look = "best";
 }
 
 // The errors are those of all points; each series has the CPU times of its own.
 static void tradeoff_fill(Chart *chart, ChartPanel *panel, const Tradeoff *tradeoff) {
     enum { CHOICE = CHART_COLOURS, LISTS };
-    TradeoffMark *marks = chart_allocate(chart, tradeoff->points.count, sizeof *marks);
-    double *x = chart_allocate(chart, LISTS * tradeoff->points.count, sizeof *x);
-    double *y = chart_allocate(chart, tradeoff->points.count, sizeof *y);
+    TradeoffMark *marks = chart_new(chart, tradeoff->points.count, sizeof *marks);
+    double *x = chart_new(chart, LISTS * tradeoff->points.count, sizeof *x);
+    double *y = chart_new(chart, tradeoff->points.count, sizeof *y);
     const char *groups[CHART_COLOURS] = {NULL};
     if (chart->is_failed)
         return;
@@ -172,74 +167,67 @@ static void tradeoff_fill(Chart *chart, ChartPanel *panel, const Tradeoff *trade
                     : (double)NAN;
     }
     for (size_t group = 0; group < CHART_COLOURS && groups[group] != NULL; group++) {
-        ChartSeries *series = chart_series(panel, CHART_MARKERS, x + group * count, y, NULL, count);
-        series->colour = group;
+        ChartSeries *series =
+            chart_markers(panel, x + group * count, y, count, CHART_SHAPE, group, groups[group]);
         series->is_joined = true;
         series->describe = tradeoff_describe;
         series->context = marks;
-        text_fit(series->legend, CHART_TEXT, groups[group]);
     }
     tradeoff_add_best(chart, panel, marks, count);
-    if (tradeoff->error > 0) {
-        ChartSeries *wanted = charts_add_level(chart, panel, tradeoff->error, (double)NAN);
-        wanted->colour = CHART_STRONG;
-        wanted->look = "wanted";
-        chart_format(wanted->legend, CHART_TEXT, "wanted: %.3g%s", tradeoff->error,
-                     metric_units[tradeoff->metric]);
-    }
-    ChartSeries *choice = chart_series(panel, CHART_MARKERS, x + CHOICE * count, y, NULL, count);
-    choice->colour = CHART_STRONG;
-    choice->shape = CHART_RING;
-    choice->look = "ring";
-    text_fit(choice->legend, CHART_TEXT, "to take");
+    if (tradeoff->error > 0)
+        chart_line(
+            panel, charts_edges, charts_pair(chart, tradeoff->error, tradeoff->error), NULL, 2,
+            CHART_STRONG, NULL,
+            chart_text(chart, "wanted: %.3g%s", tradeoff->error, metric_units[tradeoff->metric]))
+            ->look = "wanted";
+    chart_markers(panel, x + CHOICE * count, y, count, CHART_RING, CHART_STRONG, "to take")->look =
+        "ring";
 }
 
-void charts_tradeoff(const Tradeoff *tradeoff, Bytes *bytes) {
+void chart_tradeoff(const Variant *answer, Bytes *bytes) {
+    const Tradeoff *tradeoff = (const Tradeoff *)(const void *)answer;
     Chart chart = {.width = 640, .height = 430, .left = 62};
-    char metric[CHART_LABEL];
-    charts_words(metric, sizeof metric, metric_names[tradeoff->metric]);
-    chart_format(chart.title, CHART_TEXT, "Error of %s against CPU time", metric);
-    chart_format(chart.heading, CHART_TEXT, "Error of %s%s", metric,
-                 tradeoff->metric == METRIC_PSD ? " [dB]" : "");
+    const char *metric = charts_words(&chart, metric_names[tradeoff->metric]);
+    chart.title = chart_text(&chart, "Error of %s against CPU time", metric);
+    chart.heading =
+        chart_text(&chart, "Error of %s%s", metric, tradeoff->metric == METRIC_PSD ? " [dB]" : "");
     chart_note(&chart, "", tradeoff->recommendation.why);
-    ChartPanel *panel = chart_panel(&chart, 62, 486, 44, 376);
+    ChartPanel *panel = chart_panel(&chart, NULL, 62, 486, 44, 376);
     panel->has_side_legend = true;
     panel->x.is_logarithmic = panel->y.is_logarithmic = panel->x.is_whole = true;
     panel->y.has_zero = true;
-    text_fit(panel->x.title, CHART_TEXT, "CPU time of a run [s]");
+    panel->x.title = "CPU time of a run [s]";
     tradeoff_fill(&chart, panel, tradeoff);
     chart_write(&chart, bytes);
 }
 
 // --- ensemble ---
 
-static void ensemble_fill_row(ChartRow *row, int metric, const RunStatistic *statistic) {
+static ChartRow ensemble_row(Chart *chart, int metric, const RunStatistic *statistic) {
     const double mean = statistic->mean;
-    charts_words(row->label, sizeof row->label, statistics_metric_names[metric]);
-    row->has_interval = mean > 0 && isfinite(mean) && statistic->count > 1;
-    if (row->has_interval) // in units of the mean
-        row->interval = (ChartInterval){
+    const bool has_unit = statistic->unit != NULL && strcmp(statistic->unit, "1") != 0;
+    ChartRow row = {.label = charts_words(chart, statistics_metric_names[metric]),
+                    .has_interval = mean > 0 && isfinite(mean) && statistic->count > 1};
+    if (row.has_interval) // in units of the mean
+        row.interval = (ChartInterval){
             statistic->minimum / mean, statistic->q25 / mean, statistic->low / mean,    1,
             statistic->high / mean,    statistic->q75 / mean, statistic->maximum / mean};
-    char *text = row->cells[0].text, half[CHART_LABEL] = "";
-    const size_t size = sizeof row->cells[0].text;
-    const bool has_unit = statistic->unit != NULL && strcmp(statistic->unit, "1") != 0;
-    if (!isnan(statistic->high))
-        chart_format(half, sizeof half, " \u00b1 %.2g", statistic->high - mean);
-    if (isnan(mean))
-        text_fit(text, size, "not known");
-    else
-        chart_format(text, size, "%.4g%s%s%s", mean, half, has_unit ? " " : "",
-                     has_unit ? statistic->unit : "");
+    const char *half =
+        isnan(statistic->high) ? "" : chart_text(chart, " \u00b1 %.2g", statistic->high - mean);
+    row.cells[0].text = isnan(mean)
+                            ? "not known"
+                            : chart_text(chart, "%.4g%s%s%s", mean, half, has_unit ? " " : "",
+                                         has_unit ? statistic->unit : "");
+    return row;
 }
 
-void charts_ensemble(const Ensemble *ensemble, Bytes *bytes) {
+void chart_ensemble(const Variant *answer, Bytes *bytes) {
+    const Ensemble *ensemble = (const Ensemble *)(const void *)answer;
     Chart chart = {.width = 640, .left = 62};
     const unsigned long long runs = ensemble->made - ensemble->failed;
-    ChartTable *table = &chart.table;
-    chart_format(chart.title, CHART_TEXT, "Mean of %llu runs", runs);
-    chart_format(chart.heading, CHART_TEXT, "Mean of %llu runs, with its %g %% interval", runs,
-                 100 * ensemble->confidence);
+    chart.title = chart_text(&chart, "Mean of %llu runs", runs);
+    chart.heading = chart_text(&chart, "Mean of %llu runs, with its %g %% interval", runs,
+                               100 * ensemble->confidence);
     bytes_format(&chart.description, "%llu runs of %llu, seeds from %llu; %llu failed.",
                  (unsigned long long)ensemble->made, (unsigned long long)ensemble->runs,
                  (unsigned long long)ensemble->first_seed, (unsigned long long)ensemble->failed);
@@ -248,16 +236,17 @@ void charts_ensemble(const Ensemble *ensemble, Bytes *bytes) {
                  " Bands and whiskers: %g %% intervals of the mean over all seeds; boxes: half of "
                  "the runs; grey lines: all of them.",
                  100 * ensemble->confidence);
-    ChartPanel *panel = chart_spectra(&chart, 62, 626, 44, 300);
+    ChartPanel *panel = chart_spectra(&chart, NULL, 62, 626, 44, 300);
     charts_add_bands(&chart, panel, &ensemble->frequency, &ensemble->spectra, true);
+    ChartTable *table = &chart.table;
     table->top = chart_fit(panel) ? 362 : 56;
     table->label_right = 190;
     table->interval_width = 280;
     table->row_height = 24;
+    table->rows_count = STATISTICS_METRICS;
     table->columns_count = 1;
     for (int metric = 0; metric < STATISTICS_METRICS; metric++)
-        ensemble_fill_row(&table->rows[table->rows_count++], metric,
-                          &ensemble->statistics.of[metric]);
+        table->rows[metric] = ensemble_row(&chart, metric, &ensemble->statistics.of[metric]);
     chart.height = table->top + table->row_height * STATISTICS_METRICS + 12;
     chart_write(&chart, bytes);
 }
@@ -267,24 +256,22 @@ void charts_ensemble(const Ensemble *ensemble, Bytes *bytes) {
 static void compare_add_trace(Chart *chart, ChartPanel *panel, const Comparison *comparison,
                               const CompareEntry *entry, size_t colour) {
     const size_t count = charts_shorter(&entry->trace.minimum, &entry->trace.maximum);
-    double *time = chart_allocate(chart, count, sizeof *time);
+    double *time = chart_new(chart, count, sizeof *time);
     for (size_t i = 0; i < count && time != NULL; i++)
         time[i] = (double)i / comparison->trace_rate;
-    ChartSeries *series = chart_series(panel, CHART_LINE, time, entry->trace.minimum.at,
-                                       entry->trace.maximum.at, time != NULL ? count : 0);
-    series->colour = colour;
-    text_fit(series->name, CHART_TEXT, entry->name);
+    (void)chart_line(panel, time, entry->trace.minimum.at, entry->trace.maximum.at,
+                     time != NULL ? count : 0, colour, entry->name, NULL);
 }
 
-void charts_compare(const Comparison *comparison, Bytes *bytes) {
+void chart_compare(const Variant *answer, Bytes *bytes) {
+    const Comparison *comparison = (const Comparison *)(const void *)answer;
     Chart chart = {.width = 960, .height = 690, .left = 70, .title = "Contact models compared"};
     bytes_text(&chart.description, "The first is the reference, the scene as it is.");
-    ChartPanel *spectra = chart_spectra(&chart, 70, 630, 44, 330);
-    ChartPanel *traces = chart_panel(&chart, 70, 630, 404, 644);
+    ChartPanel *spectra = chart_spectra(
+        &chart, chart_quantity(&chart, comparison->channel, comparison->unit), 70, 630, 44, 330);
+    ChartPanel *traces = chart_panel(&chart, "displacement [m]", 70, 630, 404, 644);
     spectra->has_side_legend = true;
-    chart_quantity(spectra->heading, comparison->channel, comparison->unit);
-    text_fit(traces->heading, CHART_TEXT, "displacement [m]");
-    text_fit(traces->x.title, CHART_TEXT, "time [s]");
+    traces->x.title = "time [s]";
     size_t drawn = 0;
     for (size_t i = 0; i < comparison->entries.count; i++) {
         const CompareEntry *entry = &comparison->entries.at[i];
@@ -293,16 +280,12 @@ void charts_compare(const Comparison *comparison, Bytes *bytes) {
                                entry->why != NULL ? entry->why : "");
             continue;
         }
-        ChartSeries *line =
-            chart_series(spectra, CHART_LINE, comparison->frequency.at, entry->density.at, NULL,
-                         charts_shorter(&comparison->frequency, &entry->density));
-        line->colour = drawn;
-        text_fit(line->name, CHART_TEXT, entry->name);
-        if (drawn == 0 || isnan(entry->psd.level))
-            text_fit(line->legend, CHART_TEXT, entry->name);
-        else
-            chart_format(line->legend, CHART_TEXT, "%s: %.2g dB off", entry->name,
-                         entry->psd.level);
+        const bool has_level = drawn > 0 && !isnan(entry->psd.level);
+        (void)chart_line(
+            spectra, comparison->frequency.at, entry->density.at, NULL,
+            charts_shorter(&comparison->frequency, &entry->density), drawn, entry->name,
+            has_level ? chart_text(&chart, "%s: %.2g dB off", entry->name, entry->psd.level)
+                      : entry->name);
         compare_add_trace(&chart, traces, comparison, entry, drawn++);
     }
     chart_write(&chart, bytes);
@@ -311,39 +294,43 @@ void charts_compare(const Comparison *comparison, Bytes *bytes) {
 // --- sensitivity ---
 
 // "DERIVATIVE", or in grey "DERIVATIVE (SPREAD)" where it does not settle.
-static void sensitivity_fill_cell(ChartRow *row, size_t column, const SensitivitySlope *slope) {
-    char *text = row->cells[column].text, spread[CHART_LABEL] = "";
-    row->cells[column].is_faint = !slope->is_settled;
+static const char *sensitivity_cell(Chart *chart, const SensitivitySlope *slope) {
+    const char *spread = "";
     if (!slope->is_settled && !isnan(slope->spread))
-        chart_format(spread, sizeof spread, slope->spread < 10 ? " (%.1g)" : " (%.4g)",
-                     slope->spread < 10 ? slope->spread : rint(slope->spread));
-    if (isnan(slope->derivative))
-        chart_format(text, sizeof row->cells[column].text, "not known%s", spread);
-    else
-        chart_format(text, sizeof row->cells[column].text, "%.2g%s", slope->derivative, spread);
+        spread = slope->spread < 10 ? chart_text(chart, " (%.1g)", slope->spread)
+                                    : chart_text(chart, " (%.4g)", rint(slope->spread));
+    return isnan(slope->derivative) ? chart_text(chart, "not known%s", spread)
+                                    : chart_text(chart, "%.2g%s", slope->derivative, spread);
 }
 
-static void sensitivity_fill_table(ChartTable *table, const Sensitivity *sensitivity) {
+// The first row has the parameters.
+static void sensitivity_fill_table(Chart *chart, const Sensitivity *sensitivity, double top) {
+    ChartTable *table = &chart->table;
     table->heading = "Relative change of the statistic over that of the parameter";
     table->note = "grey: does not settle, its spread in brackets";
+    table->top = top;
     table->label_right = 160;
     table->column_width = 98;
     table->row_height = 22;
-    table->rows_count = STATISTICS_METRICS + 1; // the first one has the parameters
+    table->rows_count = STATISTICS_METRICS + 1;
     for (int metric = 0; metric < STATISTICS_METRICS; metric++)
-        charts_words(table->rows[metric + 1].label, CHART_LABEL, statistics_metric_names[metric]);
+        table->rows[metric + 1].label = charts_words(chart, statistics_metric_names[metric]);
     for (size_t i = 0; i < sensitivity->response.count && i < CHART_CELLS; i++) {
         const SensitivityRow *row = &sensitivity->response.at[i];
-        charts_words(table->rows[0].cells[i].text, CHART_LABEL,
-                     sensitivity_parameter_names[row->parameter]);
-        for (size_t k = 0; k < row->slopes.count; k++)
-            sensitivity_fill_cell(&table->rows[row->slopes.at[k].metric + 1], i,
-                                  &row->slopes.at[k]);
+        table->rows[0].cells[i].text =
+            charts_words(chart, sensitivity_parameter_names[row->parameter]);
+        for (size_t k = 0; k < row->slopes.count; k++) {
+            const SensitivitySlope *slope = &row->slopes.at[k];
+            ChartRow *of = &table->rows[slope->metric + 1];
+            of->cells[i].text = sensitivity_cell(chart, slope);
+            of->cells[i].is_faint = !slope->is_settled;
+        }
         table->columns_count++;
     }
 }
 
-void charts_sensitivity(const Sensitivity *sensitivity, Bytes *bytes) {
+void chart_sensitivity(const Variant *answer, Bytes *bytes) {
+    const Sensitivity *sensitivity = (const Sensitivity *)(const void *)answer;
     Chart chart = {.width = 760, .left = 70, .title = "Sensitivity"};
     bytes_format(&chart.description,
                  "Relative change of each statistic over the relative change of each parameter; "
@@ -351,13 +338,11 @@ void charts_sensitivity(const Sensitivity *sensitivity, Bytes *bytes) {
                  "drawn runs.",
                  (unsigned long long)(sensitivity->made - sensitivity->failed));
     chart_note(&chart, " ", sensitivity->why);
-    ChartPanel *panel = chart_spectra(&chart, 70, 746, 44, 330);
+    ChartPanel *panel = chart_spectra(&chart, NULL, 70, 746, 44, 330);
     charts_add_bands(&chart, panel, &sensitivity->frequency, &sensitivity->spectra, false);
     const bool has_spectra = chart_fit(panel);
-    if (has_spectra)
-        text_fit(panel->heading, CHART_TEXT, "Spectra, with 5 to 95 % of the drawn runs");
-    sensitivity_fill_table(&chart.table, sensitivity);
-    chart.table.top = has_spectra ? 416 : 50;
+    panel->heading = has_spectra ? "Spectra, with 5 to 95 % of the drawn runs" : NULL;
+    sensitivity_fill_table(&chart, sensitivity, has_spectra ? 416 : 50);
     chart.height = chart.table.top + 22 * (STATISTICS_METRICS + 2) + 14;
     chart_write(&chart, bytes);
 }
@@ -434,24 +419,25 @@ static bool sweep_is_number(const char *json) {
 }
 
 // A tick at a scalar of an axis: without quotes, short.
-static void sweep_add_tick(ChartAxis *axis, double value, const char *json) {
-    ChartTick *tick = &axis->ticks[axis->tick_count++];
-    tick->value = value;
-    if (sweep_is_number(json))
-        chart_format(tick->text, sizeof tick->text, "%.4g", strtod(json, NULL));
-    else if (*json == '"')
-        chart_format(tick->text, 18, "%.*s", (int)strlen(json) - 2, json + 1);
-    else
-        text_fit(tick->text, 18, json);
+static void sweep_add_tick(Chart *chart, ChartAxis *axis, double value, const char *json) {
+    char text[18];
+    if (*json == '"')
+        json = chart_text(chart, "%.*s", (int)strlen(json) - 2, json + 1);
+    else if (sweep_is_number(json))
+        json = chart_text(chart, "%.4g", strtod(json, NULL));
+    text_fit(text, sizeof text, json);
+    axis->ticks[axis->tick_count++] = (ChartTick){value, chart_text(chart, "%s", text)};
 }
 
-static void sweep_add_end_ticks(ChartAxis *axis, const Texts *values) {
-    sweep_add_tick(axis, 0, values->at[0]);
-    sweep_add_tick(axis, 1, values->at[values->count - 1]);
+static ChartAxis sweep_end_ticks(Chart *chart, const Texts *values) {
+    ChartAxis axis = {.tick_count = 0};
+    sweep_add_tick(chart, &axis, 0, values->at[0]);
+    sweep_add_tick(chart, &axis, 1, values->at[values->count - 1]);
+    return axis;
 }
 
 // The places of the cells along the axis: to scale where all values are numbers, else evenly.
-static bool sweep_places(const SweepCells *cells, double *x, ChartAxis *axis) {
+static bool sweep_places(Chart *chart, const SweepCells *cells, double *x, ChartAxis *axis) {
     const Texts *values = &cells->x->values;
     double least = (double)INFINITY, most = -least;
     bool is_numeric = true;
@@ -468,16 +454,15 @@ static bool sweep_places(const SweepCells *cells, double *x, ChartAxis *axis) {
     const size_t ticks = values->count < CHART_TICKS ? values->count : CHART_TICKS;
     for (size_t i = 0; i < ticks && !is_numeric; i++) {
         const size_t index = sweep_cells_index(i, ticks, values->count);
-        sweep_add_tick(axis, (double)index, values->at[index]);
+        sweep_add_tick(chart, axis, (double)index, values->at[index]);
     }
-    chart_quantity(axis->title, cells->x->pointer, cells->x->unit);
+    axis->title = chart_quantity(chart, cells->x->pointer, cells->x->unit);
     return is_numeric;
 }
 
 static void sweep_add_notes(Chart *chart, const Sweep *sweep, const SweepSource *source,
                             size_t metrics, bool is_map) {
     const unsigned long long points = sweep->points, failed = sweep->table.failed;
-    char done[CHART_LABEL] = "", failures[CHART_LABEL] = "";
     bytes_format(&chart->description,
                  "%zu of %llu points, %llu failed. Gaps and grey cells: not there.", source->rows,
                  points, failed);
@@ -485,12 +470,11 @@ static void sweep_add_notes(Chart *chart, const Sweep *sweep, const SweepSource 
         chart_note(chart, " Drawn at the first value of ", sweep->axes.at[i].pointer);
     for (size_t i = metrics; i < sweep->metrics.count; i++)
         chart_note(chart, " Not drawn: ", sweep->metrics.at[i]);
-    if (source->rows < sweep->points)
-        chart_format(done, sizeof done, "%zu of ", source->rows);
-    if (failed > 0)
-        chart_format(failures, sizeof failures, ", %llu failed", failed);
-    chart_format(chart->title, CHART_TEXT, "A sweep of %llu points", points);
-    chart_format(chart->heading, CHART_TEXT, "%s%llu points%s", done, points, failures);
+    chart->title = chart_text(chart, "A sweep of %llu points", points);
+    chart->heading =
+        chart_text(chart, "%s%llu points%s",
+                   source->rows < sweep->points ? chart_text(chart, "%zu of ", source->rows) : "",
+                   points, failed > 0 ? chart_text(chart, ", %llu failed", failed) : "");
 }
 
 // Panels of all metrics: one below the other, or maps in two columns.
@@ -498,46 +482,44 @@ static void sweep_add_panels(Chart *chart, const Sweep *sweep, const SweepCells 
                              size_t metrics, double *x) {
     ChartAxis axis = {.is_logarithmic = false};
     const size_t count = cells->columns * cells->rows;
-    const bool is_map = cells->y != NULL, is_numeric = !is_map && sweep_places(cells, x, &axis);
+    const bool is_map = cells->y != NULL;
+    const bool is_numeric = !is_map && sweep_places(chart, cells, x, &axis);
+    const bool has_markers = count <= SWEEP_DOTS || !is_numeric;
     for (size_t i = 0; i < metrics; i++) {
         const double *low = cells->low + i * count;
         const double left = is_map ? 88 + 306 * (double)(i % 2) : 66;
         const double top = is_map ? 102 + 244 * (double)(i / 2) : 62 + 144 * (double)i;
         ChartPanel *panel =
-            chart_panel(chart, left, is_map ? left + 208 : 622, top, top + (is_map ? 168 : 110));
-        char name[CHART_LABEL];
-        charts_words(name, sizeof name, sweep->metrics.at[i]);
-        chart_quantity(panel->heading, name, sweep_metric_unit(sweep->metrics.at[i]));
+            chart_panel(chart,
+                        chart_quantity(chart, charts_words(chart, sweep->metrics.at[i]),
+                                       sweep_metric_unit(sweep->metrics.at[i])),
+                        left, is_map ? left + 208 : 622, top, top + (is_map ? 168 : 110));
         panel->is_small = true;
+        panel->x = axis;
+        panel->x.is_unlabelled = !is_map && i + 1 < metrics;
+        panel->empty = is_map ? NULL : "not known";
         if (is_map) {
-            chart_series(panel, CHART_MAP, NULL, low, NULL, count)->columns = cells->columns;
-            sweep_add_end_ticks(&panel->x, &cells->x->values);
-            sweep_add_end_ticks(&panel->y, &cells->y->values);
+            panel->x = sweep_end_ticks(chart, &cells->x->values);
+            panel->y = sweep_end_ticks(chart, &cells->y->values);
+            chart_map(panel, low, count, cells->columns);
         } else {
-            panel->x = axis;
-            panel->x.is_unlabelled = i + 1 < metrics;
-            panel->empty = "not known";
-            const bool has_markers = count <= SWEEP_DOTS || !is_numeric;
-            ChartSeries *series =
-                chart_series(panel, has_markers ? CHART_MARKERS : CHART_LINE, x, low,
-                             has_markers ? NULL : cells->high + i * count, count);
-            series->shape = CHART_DOT;
-            series->is_joined = is_numeric;
-            chart_series(panel, CHART_MARKERS, x, cells->failed + i * count, NULL, count)->shape =
-                CHART_CROSS;
+            if (has_markers)
+                chart_markers(panel, x, low, count, CHART_DOT, 0, NULL)->is_joined = is_numeric;
+            else
+                (void)chart_line(panel, x, low, cells->high + i * count, count, 0, NULL, NULL);
+            (void)chart_markers(panel, x, cells->failed + i * count, count, CHART_CROSS, 0, NULL);
         }
         chart->height = panel->bottom + (is_map ? 60 : 52);
     }
     if (!is_map)
         return;
-    char name[CHART_TEXT];
-    chart_quantity(name, cells->x->pointer, cells->x->unit);
-    chart_format(chart->notes[0], CHART_TEXT, "across: %s", name);
-    chart_quantity(name, cells->y->pointer, cells->y->unit);
-    chart_format(chart->notes[1], CHART_TEXT, "upwards: %s", name);
+    chart->notes[0] =
+        chart_text(chart, "across: %s", chart_quantity(chart, cells->x->pointer, cells->x->unit));
+    chart->notes[1] =
+        chart_text(chart, "upwards: %s", chart_quantity(chart, cells->y->pointer, cells->y->unit));
 }
 
-bool charts_sweep(const Sweep *sweep, const SweepSource *source, Bytes *bytes) {
+bool chart_sweep(const Sweep *sweep, const SweepSource *source, Bytes *bytes) {
     const bool is_map = sweep->axes.count > 1 && sweep->mode == SWEEP_GRID;
     const size_t metrics =
         sweep->metrics.count < CHART_PANELS ? sweep->metrics.count : CHART_PANELS;
@@ -556,10 +538,10 @@ bool charts_sweep(const Sweep *sweep, const SweepSource *source, Bytes *bytes) {
     }
     Chart chart = {.width = 640, .left = is_map ? 88 : 66};
     const size_t count = cells.columns * cells.rows;
-    cells.low = chart_allocate(&chart, count * metrics, sizeof *cells.low);
-    cells.high = chart_allocate(&chart, count * metrics, sizeof *cells.high);
-    cells.failed = chart_allocate(&chart, count * metrics, sizeof *cells.failed);
-    double *x = chart_allocate(&chart, count, sizeof *x);
+    cells.low = chart_new(&chart, count * metrics, sizeof *cells.low);
+    cells.high = chart_new(&chart, count * metrics, sizeof *cells.high);
+    cells.failed = chart_new(&chart, count * metrics, sizeof *cells.failed);
+    double *x = chart_new(&chart, count, sizeof *x);
     const bool is_read = chart.is_failed || sweep_cells_read(&cells, source, metrics);
     sweep_add_notes(&chart, sweep, source, metrics, is_map);
     if (!chart.is_failed)
@@ -594,12 +576,12 @@ static void quantity_describe(const void *context, size_t index, Bytes *bytes) {
     const QuantityValue value = quantity_value(quantity, row);
     if (row->measurement != COUNT_ABSENT)
         bytes_format(bytes, "measurement %llu, ", (unsigned long long)row->measurement);
-    chart_text(bytes, row->from);
+    chart_escape(bytes, row->from);
     bytes_format(bytes, ": %.4g%s", value.value,
                  value.is_outlier ? ", an outlier that counts" : "");
     if (row->excluded != NULL) {
         bytes_text(bytes, ", excluded: ");
-        chart_text(bytes, row->excluded);
+        chart_escape(bytes, row->excluded);
     }
 }
 
@@ -608,7 +590,7 @@ static void quantity_add_readings(Chart *chart, ChartPanel *panel, const Quantit
     static const ChartShape shapes[] = {CHART_DOT, CHART_CROSS, CHART_RING};
     const EvaluationRows *rows = &quantity->evaluation->rows;
     const size_t count = rows->count < READINGS_DRAWN ? rows->count : READINGS_DRAWN;
-    double *x = chart_allocate(chart, 4 * count, sizeof *x);
+    double *x = chart_new(chart, 4 * count, sizeof *x);
     for (size_t i = 0; i < count && x != NULL; i++) {
         const QuantityValue value = quantity_value(quantity, &rows->at[i]);
         const double speed = rows->at[i].approach_speed;
@@ -618,11 +600,10 @@ static void quantity_add_readings(Chart *chart, ChartPanel *panel, const Quantit
         x[3 * count + i] = value.is_outlier ? value.value : (double)NAN;
     }
     for (size_t i = 0; i < COUNT(shapes) && x != NULL; i++) {
+        const bool is_ring = shapes[i] == CHART_RING;
         ChartSeries *series =
-            chart_series(panel, CHART_MARKERS, x, x + (i + 1) * count, NULL, count);
-        series->shape = shapes[i];
-        series->colour = shapes[i] == CHART_RING ? 3 : 0;
-        series->look = shapes[i] == CHART_RING ? "ring" : NULL;
+            chart_markers(panel, x, x + (i + 1) * count, count, shapes[i], is_ring ? 3 : 0, NULL);
+        series->look = is_ring ? "ring" : NULL;
         series->describe = quantity_describe;
         series->context = quantity;
     }
@@ -630,43 +611,41 @@ static void quantity_add_readings(Chart *chart, ChartPanel *panel, const Quantit
 
 static void evaluation_add_mean(Chart *chart, ChartPanel *panel, const Statistic *statistic) {
     const Trend *trend = &statistic->trend;
+    const double from = trend->least_speed, to = trend->most_speed, mean = statistic->mean;
+    const double low = statistic->low, high = statistic->high;
     if (trend->verdict == TREND_NOT_CONSTANT) {
-        const double from = trend->least_speed, to = trend->most_speed;
         const double *y =
             charts_pair(chart, trend->mean_value + trend->slope * (from - trend->mean_speed),
                         trend->mean_value + trend->slope * (to - trend->mean_speed));
-        ChartSeries *line =
-            chart_series(panel, CHART_LINE, charts_pair(chart, from, to), y, NULL, 2);
-        line->colour = 1;
-        line->look = "trend";
-        chart_format(line->name, CHART_TEXT, "%.3g per m/s", trend->slope);
+        chart_line(panel, charts_pair(chart, from, to), y, NULL, 2, 1,
+                   chart_text(chart, "%.3g per m/s", trend->slope), NULL)
+            ->look = "trend";
     }
-    if (isnan(statistic->mean))
+    if (isnan(mean))
         return;
-    ChartSeries *mean = charts_add_level(chart, panel, statistic->mean, (double)NAN);
-    chart_format(mean->name, CHART_TEXT, "mean %.4g", statistic->mean);
-    if (!isnan(statistic->low))
-        charts_add_level(chart, panel, statistic->low, statistic->high);
+    (void)chart_line(panel, charts_edges, charts_pair(chart, mean, mean), NULL, 2, 0,
+                     chart_text(chart, "mean %.4g", mean), NULL);
+    if (!isnan(low))
+        chart_band(panel, charts_edges, charts_pair(chart, low, low),
+                   charts_pair(chart, high, high), 2, 0);
 }
 
 static void evaluation_add_panel(Chart *chart, const Evaluation *evaluation, bool is_time) {
     const Statistic *statistic = is_time ? &evaluation->contact_time : &evaluation->restitution;
     const char *name = is_time ? "Contact time T_c" : "Restitution e", *unit = is_time ? " s" : "";
     const double top = is_time ? 356 : 44;
-    ChartPanel *panel = chart_panel(chart, 78, 664, top, top + 230);
-    Quantity *quantity = chart_allocate(chart, 1, sizeof *quantity);
-    char interval[CHART_LABEL + 16] = "";
-    text_fit(panel->x.title, CHART_TEXT, "approach speed [m/s]");
+    Quantity *quantity = chart_new(chart, 1, sizeof *quantity);
+    const char *interval = isnan(statistic->low) ? ""
+                                                 : chart_text(chart, ", 95 %% within %.4g to %.4g",
+                                                              statistic->low, statistic->high);
+    const char *heading = statistic->count == 0 ? chart_text(chart, "%s: not known", name)
+                                                : chart_text(chart, "%s: %.4g%s%s, %llu reading%s",
+                                                             name, statistic->mean, unit, interval,
+                                                             (unsigned long long)statistic->count,
+                                                             statistic->count == 1 ? "" : "s");
+    ChartPanel *panel = chart_panel(chart, heading, 78, 664, top, top + 230);
+    panel->x.title = "approach speed [m/s]";
     panel->x.padding = 0.06;
-    if (!isnan(statistic->low))
-        chart_format(interval, sizeof interval, ", 95 %% within %.4g to %.4g", statistic->low,
-                     statistic->high);
-    if (statistic->count == 0)
-        chart_format(panel->heading, CHART_TEXT, "%s: not known", name);
-    else
-        chart_format(panel->heading, CHART_TEXT, "%s: %.4g%s%s, %llu reading%s", name,
-                     statistic->mean, unit, interval, (unsigned long long)statistic->count,
-                     statistic->count == 1 ? "" : "s");
     if (quantity == NULL)
         return;
     *quantity = (Quantity){.evaluation = evaluation, .is_time = is_time};
@@ -674,9 +653,9 @@ static void evaluation_add_panel(Chart *chart, const Evaluation *evaluation, boo
     evaluation_add_mean(chart, panel, statistic);
 }
 
-void charts_evaluation(const Evaluation *evaluation, const char *slug, Bytes *bytes) {
+void chart_evaluation(const Evaluation *evaluation, const char *slug, Bytes *bytes) {
     Chart chart = {.width = 680, .height = 640, .left = 78};
-    chart_format(chart.title, CHART_TEXT, "Drop tests of %.63s", slug);
+    chart.title = chart_text(&chart, "Drop tests of %.63s", slug);
     bytes_text(&chart.description,
                "Dots: readings that count; rings: outliers, which count; crosses: readings that do "
                "not. Band: 95 % interval of the mean.");
@@ -686,3 +665,131 @@ void charts_evaluation(const Evaluation *evaluation, const char *slug, Bytes *by
     evaluation_add_panel(&chart, evaluation, true);
     chart_write(&chart, bytes);
 }
+
+// --- series and spectra ---
+
+enum { SVG_POINTS = 800 }; // of a line over time
+
+// The columns of one line: the same one twice, or the least and the largest values of buckets.
+static const Column *svg_column(const Table *table, size_t line, bool is_high) {
+    return table->columns[table->bucket > 0 ? 2 * line + is_high : line];
+}
+
+// The panel with that unit that has room, or a new one; NULL: none.
+static ChartPanel *svg_find_panel(Chart *chart, const char *units[CHART_PANELS], const char *unit) {
+    size_t i = 0;
+    while (i < chart->count && strcmp(units[i], unit) != 0)
+        i++;
+    if (i == CHART_PANELS || (i < chart->count && chart->panels[i].count == CHART_COLOURS))
+        return NULL;
+    units[i] = unit;
+    return i < chart->count ? &chart->panels[i] : chart_panel(chart, NULL, 70, 946, 0, 0);
+}
+
+// The least and the largest value of each part of the rows, so that no peak is lost.
+static void svg_thin(const Table *table, size_t line, size_t part, double *low, double *high) {
+    const double *least = table_values(table, svg_column(table, line, false)->values);
+    const double *most = table_values(table, svg_column(table, line, true)->values);
+    double other;
+    for (size_t i = 0; i * part < table->count; i++) {
+        const size_t left = table->count - i * part, count = left < part ? left : part;
+        downsample_extremes(least + i * part, count, &low[i], &other);
+        downsample_extremes(most + i * part, count, &other, &high[i]);
+    }
+}
+
+// Panels below each other over one axis of time.
+static void svg_place_panels(Chart *chart, const Table *table, const char *const *units) {
+    const double height = chart->count > 1 ? 150 : 300;
+    const char *axis =
+        chart_text(chart, "%s [%s]", table->axis_name != NULL ? table->axis_name : "row",
+                   table->axis_name != NULL ? table->axis_unit : "1");
+    bool has_legend = false;
+    chart->height = 60;
+    for (size_t i = 0; i < chart->count; i++)
+        has_legend = has_legend || chart->panels[i].count > 1;
+    for (size_t i = 0; i < chart->count; i++) {
+        ChartPanel *panel = &chart->panels[i];
+        char names[100] = "";
+        panel->has_side_legend = true;
+        panel->empty = "not known";
+        panel->right = has_legend ? 750 : 946;
+        panel->top = 40 + (height + 40) * (double)i;
+        panel->bottom = panel->top + height;
+        panel->x.is_unlabelled = i + 1 < chart->count;
+        panel->x.title = axis;
+        for (size_t k = 0; k < panel->count; k++) {
+            text_list(names, sizeof names, panel->series[k].name);
+            panel->series[k].legend = panel->count > 1 ? panel->series[k].name : NULL;
+        }
+        panel->heading = units[i][0] != '\0' ? chart_text(chart, "%s [%s]", names, units[i])
+                                             : chart_text(chart, "%s", names);
+        chart->height = panel->bottom + 46;
+    }
+}
+
+static void svg_add_series(Chart *chart, const Table *table) {
+    const char *units[CHART_PANELS];
+    const size_t part = (table->count + SVG_POINTS - 1) / SVG_POINTS + (table->count == 0);
+    const size_t points = (table->count + part - 1) / part;
+    const size_t lines = table->bucket > 0 ? table->column_count / 2 : table->column_count;
+    const size_t drawn =
+        lines < CHART_PANELS * CHART_COLOURS ? lines : CHART_PANELS * CHART_COLOURS;
+    double *x = chart_new(chart, (1 + 2 * drawn) * points, sizeof *x);
+    if (x == NULL)
+        return;
+    for (size_t i = 0; i < points; i++)
+        x[i] = table->axis != NULL ? table_values(table, table->axis)[i * part]
+                                   : table_time(table, i * part);
+    double *next = x + points;
+    for (size_t i = 0; i < lines; i++) {
+        const Column *column = svg_column(table, i, false);
+        ChartPanel *panel = svg_find_panel(chart, units, column->unit);
+        const size_t length = strlen(column->name) - (table->bucket > 0 ? strlen("_min") : 0);
+        const char *name = chart_text(chart, "%.*s", (int)length, column->name);
+        if (panel == NULL) {
+            chart_note(chart, " Not drawn: ", name);
+            continue;
+        }
+        svg_thin(table, i, part, next, next + points);
+        (void)chart_line(panel, x, next, next + points, points, panel->count, name, NULL);
+        next += 2 * points;
+    }
+    svg_place_panels(chart, table, units);
+}
+
+static void svg_add_spectra(Chart *chart, const Table *table) {
+    ChartPanel *panel = chart_spectra(chart, NULL, 70, 946, 44, 424);
+    panel->empty = "not known";
+    chart->height = 476;
+    for (size_t i = 0; i < table->column_count; i++) {
+        const Column *column = table->columns[i];
+        if (i >= CHART_COLOURS)
+            chart_note(chart, " Not drawn: ", column->name);
+        else
+            (void)chart_line(panel, table_values(table, table->axis),
+                             table_values(table, column->values), NULL, table->count, i,
+                             column->name, chart_quantity(chart, column->name, column->unit));
+    }
+}
+
+// In one piece: its size is limited.
+static bool svg_next(const Table *table, TextPlace *place, Bytes *bytes) {
+    Chart chart = {.width = 960, .left = 70};
+    const bool is_spectra = table->axis_name != NULL && strcmp(table->axis_name, "frequency") == 0;
+    (void)place;
+    chart.title = is_spectra ? "Power spectral densities" : "Time series";
+    if (is_spectra)
+        svg_add_spectra(&chart, table);
+    else
+        svg_add_series(&chart, table);
+    chart_write(&chart, bytes);
+    return false;
+}
+
+const TableFormat format_svg = {
+    .extension = "svg",
+    .content_type = chart_type,
+    .is_binary = false,
+    .next = svg_next,
+};

@@ -1,11 +1,58 @@
-// A table of numbers, and the formats that can be written of one. stream.h sends it.
+// A table of numbers, and the formats that can be written of one; table_stream.h sends it.
 #ifndef SERVER_FORMATS_FORMAT_H
 #define SERVER_FORMATS_FORMAT_H
 
+#include <stdint.h>
+
 #include "core/base/columns.h"
 #include "core/base/field.h"
-#include "server/formats/segments.h"
 #include "server/util/bytes.h"
+
+// Bytes that are elsewhere: `read` copies `size` of them from `offset` of column `column` on, and
+// remembers itself where it cannot.
+typedef struct SegmentSource {
+    void (*read)(void *context, size_t column, uint64_t offset, void *target, size_t size);
+    void *context;
+} SegmentSource;
+
+typedef struct Segment {
+    uint64_t start, size;        // in the document
+    const double *values;        // borrowed; NULL: text, or counted
+    size_t text;                 // where it begins in `text` of Segments
+    double first, step, rate;    // counted: number i is (first + i step) / rate; else rate 0
+    const SegmentSource *source; // borrowed; NULL: not from there
+    size_t column;               // of the source
+} Segment;
+
+// A document as a list of segments: headers, and numbers as they lie in memory or are counted up.
+// Its size is known, and any part of it can be read alone, without a copy of the whole. All zero is
+// empty. Once it failed (memory) it stays so, like Bytes.
+typedef struct Segments {
+    Segment *at;
+    size_t count, room;
+    uint64_t size;
+    Bytes text;
+    bool is_failed;
+} Segments;
+
+void segments_clear(Segments *segments);
+void segments_put(Segments *segments, const void *data, size_t size); // copied
+void segments_text(Segments *segments, Bytes *text);                  // copied, and cleared
+void segments_number(Segments *segments, uint64_t value,
+                     size_t size); // its `size` lowest bytes, lowest first
+void segments_fill(Segments *segments, char with, size_t count);
+void segments_values(Segments *segments, const double *values, size_t count); // borrowed
+// (first + i step) / rate for i = 0 ... count - 1.
+void segments_counted(Segments *segments, size_t first, size_t step, double rate, size_t count);
+// All `size` bytes of a column of `source`, which is borrowed.
+void segments_source(Segments *segments, const SegmentSource *source, size_t column, uint64_t size);
+void segments_join(Segments *segments,
+                   const Segments *other); // behind; borrows what `other` borrows
+
+// Copies `size` bytes from `start` on; both within the document.
+void segments_read(const Segments *segments, uint64_t start, void *target, size_t size);
+void segments_write(const Segments *segments, Bytes *bytes); // appends the whole
+uint32_t segments_crc32(const Segments *segments);           // of the whole
 
 // Columns over an axis: a time series over time, or a spectrum over frequency; or without one. All
 // of it is borrowed.
@@ -88,5 +135,28 @@ void npy_put_header(Segments *segments, const char *type, size_t rows, size_t co
 enum { MAT_NAME_SIZE = 64 }; // 63 characters, MATLAB's longest, and a NUL
 // A variable's name for MATLAB: letters, digits and underscores, a letter first.
 void mat_name(const char *name, char target[MAT_NAME_SIZE]);
+
+enum { ZIP_NAME_MAX = 79 };
+
+// A ZIP archive being written to `segments`, of members that are stored as they are: no times, no
+// compression. No ZIP64: what would need it is refused. All zero but that is empty.
+typedef struct Zip {
+    Segments *segments;
+    Segments directory; // the end of the archive
+    size_t count;
+} Zip;
+
+// Appends a member; borrows what `content` borrows. STATUS_LIMIT from 4 GiB on.
+Status zip_put(Zip *zip, const char *name, const Segments *content, Problem *problem);
+// Appends the directory and clears `zip`, also when it fails.
+Status zip_end(Zip *zip, Problem *problem);
+
+// The least and the largest of `count` values, at least one, all of them finite.
+void downsample_extremes(const double *values, size_t count, double *least, double *most);
+
+// Values first ... first + count - 1 of each column in buckets of `bucket`, the last one perhaps
+// shorter: two columns for each, "NAME_min" and "NAME_max". Cleared by columns_clear.
+Status downsample(const Column *const *columns, size_t column_count, size_t first, size_t count,
+                  size_t bucket, Columns *buckets, Problem *problem);
 
 #endif

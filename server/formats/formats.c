@@ -1,3 +1,4 @@
+#include <stdio.h>
 #include <string.h>
 
 #include "server/formats/format.h"
@@ -71,6 +72,64 @@ Status table_records(const Field *fields, const void *records, size_t count, siz
         for (size_t i = 0; i < count; i++)
             columns->at[c].values[i] = table_number(field, (const char *)records + i * size);
         c++;
+    }
+    return STATUS_OK;
+}
+
+// --- downsampling ---
+
+enum { LANES = 8 }; // side by side, so that they become vectors
+
+static inline double downsample_lesser(double a, double b) {
+    return a < b ? a : b;
+}
+
+static inline double downsample_larger(double a, double b) {
+    return a > b ? a : b;
+}
+
+void downsample_extremes(const double *values, size_t count, double *least, double *most) {
+    double low = values[0], high = values[0];
+    size_t i = 0;
+    if (count >= LANES) {
+        double lows[LANES], highs[LANES];
+        for (size_t k = 0; k < LANES; k++)
+            lows[k] = highs[k] = values[k];
+        for (i = LANES; i + LANES <= count; i += LANES)
+            for (size_t k = 0; k < LANES; k++) {
+                lows[k] = downsample_lesser(values[i + k], lows[k]);
+                highs[k] = downsample_larger(values[i + k], highs[k]);
+            }
+        for (size_t k = 0; k < LANES; k++) {
+            low = downsample_lesser(lows[k], low);
+            high = downsample_larger(highs[k], high);
+        }
+    }
+    for (; i < count; i++) {
+        low = downsample_lesser(values[i], low);
+        high = downsample_larger(values[i], high);
+    }
+    *least = low;
+    *most = high;
+}
+
+Status downsample(const Column *const *columns, size_t column_count, size_t first, size_t count,
+                  size_t bucket, Columns *buckets, Problem *problem) {
+    const size_t rows = (count + bucket - 1) / bucket;
+    TRY(columns_allocate(buckets, 2 * column_count, rows, 0, problem));
+    for (size_t c = 0; c < column_count; c++) {
+        char name[sizeof columns[c]->name];
+        const double *values = columns[c]->values + first;
+        Column *pair = &buckets->at[2 * c];
+        snprintf(name, sizeof name, "%.43s_min", columns[c]->name);
+        columns_name(buckets, 2 * c, name, columns[c]->unit);
+        snprintf(name, sizeof name, "%.43s_max", columns[c]->name);
+        columns_name(buckets, 2 * c + 1, name, columns[c]->unit);
+        for (size_t i = 0; i < rows; i++) {
+            const size_t from = i * bucket, left = count - from;
+            downsample_extremes(values + from, left < bucket ? left : bucket, &pair[0].values[i],
+                                &pair[1].values[i]);
+        }
     }
     return STATUS_OK;
 }

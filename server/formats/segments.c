@@ -1,4 +1,4 @@
-#include "server/formats/segments.h"
+#include "server/formats/format.h"
 
 #include <stdlib.h>
 #include <string.h>

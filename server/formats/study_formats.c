@@ -7,22 +7,17 @@
 #include "core/study/ensemble.h"
 #include "core/study/model_comparison.h"
 #include "core/study/sensitivity.h"
-#include "server/formats/chart.h"
-#include "server/formats/charts.h"
-#include "server/formats/sweep.h"
 #include "server/jobs/documents.h"
 #include "server/util/csv.h"
 
-static void json_write(const Variant *answer, const char *extension, Bytes *bytes) {
-    (void)extension;
+static void json_write(const Variant *answer, Bytes *bytes) {
     document_answer(bytes, answer);
     bytes_text(bytes, "\n");
 }
 
 // A row for each seed.
-static void ensemble_csv(const Variant *answer, const char *extension, Bytes *bytes) {
+static void ensemble_csv(const Variant *answer, Bytes *bytes) {
     const Ensemble *ensemble = (const Ensemble *)(const void *)answer;
-    (void)extension;
     bytes_text(bytes, "seed,steps");
     csv_cells_header(bytes, summary_fields);
     bytes_text(bytes, ",why\n");
@@ -38,9 +33,8 @@ static void ensemble_csv(const Variant *answer, const char *extension, Bytes *by
 }
 
 // A row for each variant, with k_b and c_b of its first stop.
-static void compare_csv(const Variant *answer, const char *extension, Bytes *bytes) {
+static void compare_csv(const Variant *answer, Bytes *bytes) {
     const Comparison *comparison = (const Comparison *)(const void *)answer;
-    (void)extension;
     bytes_text(bytes, "model,separation,status,stiffness,damping [N s/m],steps");
     csv_cells_header(bytes, summary_fields);
     csv_cells_header_of(bytes, "contacts", compare_contacts_fields);
@@ -108,9 +102,8 @@ static void sensitivity_csv_stop(Bytes *bytes, const SensitivityStop *stop) {
 }
 
 // A row for each parameter and statistic, stops first. The drawn runs are in the JSON alone.
-static void sensitivity_csv(const Variant *answer, const char *extension, Bytes *bytes) {
+static void sensitivity_csv(const Variant *answer, Bytes *bytes) {
     const Sensitivity *sensitivity = (const Sensitivity *)(const void *)answer;
-    (void)extension;
     bytes_text(bytes, "parameter,statistic,value,derivative,spread,is_settled\n");
     for (size_t i = 0; i < sensitivity->contact.count; i++)
         if (sensitivity->contact.at[i].why == NULL)
@@ -126,35 +119,10 @@ static void sensitivity_csv(const Variant *answer, const char *extension, Bytes 
     }
 }
 
-static void tradeoff_chart(const Variant *answer, const char *extension, Bytes *bytes) {
-    (void)extension;
-    charts_tradeoff((const Tradeoff *)(const void *)answer, bytes);
-}
-
-static void ensemble_chart(const Variant *answer, const char *extension, Bytes *bytes) {
-    (void)extension;
-    charts_ensemble((const Ensemble *)(const void *)answer, bytes);
-}
-
-static void compare_chart(const Variant *answer, const char *extension, Bytes *bytes) {
-    (void)extension;
-    charts_compare((const Comparison *)(const void *)answer, bytes);
-}
-
-static void sensitivity_chart(const Variant *answer, const char *extension, Bytes *bytes) {
-    (void)extension;
-    charts_sensitivity((const Sensitivity *)(const void *)answer, bytes);
-}
-
-static void sweep_chart(const Variant *answer, const char *extension, Bytes *bytes) {
+static void sweep_chart(const Variant *answer, Bytes *bytes) {
     const Sweep *sweep = (const Sweep *)(const void *)answer;
     const SweepSource source = sweep_source(sweep);
-    (void)extension;
-    (void)charts_sweep(sweep, &source, bytes);
-}
-
-static void sweep_table(const Variant *answer, const char *extension, Bytes *bytes) {
-    sweep_write((const Sweep *)(const void *)answer, extension, bytes);
+    (void)chart_sweep(sweep, &source, bytes);
 }
 
 static const char csv_type[] = "text/csv; charset=utf-8";
@@ -164,26 +132,26 @@ static const struct {
     StudyFormat formats[STUDY_FORMATS_MAX]; // ended by one without extension
 } all[] = {
     {&study_tradeoff,
-     {{"json", "application/json", false, json_write}, {"svg", chart_type, false, tradeoff_chart}}},
+     {{"json", "application/json", false, json_write}, {"svg", chart_type, false, chart_tradeoff}}},
     {&study_ensemble,
      {{"json", "application/json", false, json_write},
       {"csv", csv_type, false, ensemble_csv},
-      {"svg", chart_type, false, ensemble_chart}}},
+      {"svg", chart_type, false, chart_ensemble}}},
     {&study_sweep,
-     {{"json", "application/json", false, sweep_table},
-      {"csv", csv_type, false, sweep_table},
-      {"npy", "application/x-npy", true, sweep_table},
-      {"npz", "application/x-npz", true, sweep_table},
-      {"mat", "application/x-matlab-data", true, sweep_table},
+     {{"json", "application/json", false, NULL},
+      {"csv", csv_type, false, NULL},
+      {"npy", "application/x-npy", true, NULL},
+      {"npz", "application/x-npz", true, NULL},
+      {"mat", "application/x-matlab-data", true, NULL},
       {"svg", chart_type, false, sweep_chart}}},
     {&study_compare,
      {{"json", "application/json", false, json_write},
       {"csv", csv_type, false, compare_csv},
-      {"svg", chart_type, false, compare_chart}}},
+      {"svg", chart_type, false, chart_compare}}},
     {&study_sensitivity,
      {{"json", "application/json", false, json_write},
       {"csv", csv_type, false, sensitivity_csv},
-      {"svg", chart_type, false, sensitivity_chart}}},
+      {"svg", chart_type, false, chart_sensitivity}}},
 };
 
 static const StudyFormat none[] = {{"json", "application/json", false, json_write},
@@ -200,6 +168,13 @@ const StudyFormat *study_format_find(const StudyFormat *formats, const char *ext
     while (formats->extension != NULL && strcmp(formats->extension, extension) != 0)
         formats++;
     return formats->extension != NULL ? formats : NULL;
+}
+
+void study_format_write(const StudyFormat *format, const Variant *answer, Bytes *bytes) {
+    if (format->write != NULL)
+        format->write(answer, bytes);
+    else
+        sweep_write((const Sweep *)(const void *)answer, format->extension, bytes);
 }
 
 void study_formats_names(const StudyFormat *formats, const char *before, char *target,

@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "server/formats/format.h"
-#include "server/formats/zip.h"
 #include "server/util/base_path.h"
 #include "server/util/csv.h"
 

@@ -3,7 +3,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/formats/downsample.h"
 #include "server/util/dtoa.h"
 
 static Status table_stream_no_memory(Problem *problem) {

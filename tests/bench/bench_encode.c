@@ -8,7 +8,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/formats/downsample.h"
 #include "server/formats/format.h"
 #include "server/util/clock.h"
 

@@ -5,8 +5,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/study/tradeoff.h"
 #include "server/formats/chart.h"
-#include "server/formats/charts.h"
+#include "server/formats/study_formats.h"
 #include "tests/support/test.h"
 
 static TradeoffPoint point_make(char *name, char *solver, double cpu, double error) {
@@ -25,7 +26,7 @@ static char *draw(TradeoffPoint *points, size_t count, double error, uint64_t ch
                                .points = {points, count},
                                .recommendation = {choice, "because a < b & c"}};
     Bytes bytes = {0};
-    charts_tradeoff(&tradeoff, &bytes);
+    chart_tradeoff((const Variant *)(const void *)&tradeoff, &bytes);
     char *text = bytes_take(&bytes, NULL);
     assert_non_null(text);
     assert_null(strstr(text, "nan"));
@@ -100,13 +101,13 @@ TEST(more_groups_than_colours_share_the_last_one) {
 // A panel of 100 by 100 pixels with one line over 0, 1, 2 and so on.
 static char *draw_line(const double *y, const double *high, size_t count, bool is_logarithmic) {
     Chart chart = {.width = 120, .height = 120, .title = "a < b"};
-    ChartPanel *panel = chart_panel(&chart, 10, 110, 10, 110);
-    double *x = chart_allocate(&chart, count, sizeof *x);
+    ChartPanel *panel = chart_panel(&chart, NULL, 10, 110, 10, 110);
+    double *x = chart_new(&chart, count, sizeof *x);
     assert_non_null(x);
     for (size_t i = 0; i < count; i++)
         x[i] = (double)i;
     panel->y.is_logarithmic = is_logarithmic;
-    (void)chart_series(panel, CHART_LINE, x, y, high, count);
+    (void)chart_line(panel, x, y, high, count, 0, NULL, NULL);
     Bytes bytes = {0};
     chart_write(&chart, &bytes);
     char *text = bytes_take(&bytes, NULL);

@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/formats/charts.h"
+#include "server/formats/study_formats.h"
 #include "tests/support/drops.h"
 #include "tests/support/test.h"
 
@@ -20,7 +20,7 @@ static char *draw(const char *text) {
         evaluation_run(&one, 1, SEPARATION_ZERO_PENETRATION, NULL, &evaluation, &problem),
         STATUS_OK);
     Bytes bytes = {.most = 1 << 20};
-    charts_evaluation(&evaluation, "felt", &bytes);
+    chart_evaluation(&evaluation, "felt", &bytes);
     evaluation_clear(&evaluation);
     fields_clear(drop_test_fields, &test);
     char *svg = bytes_take(&bytes, NULL);

@@ -7,7 +7,6 @@
 #include <string.h>
 
 #include "core/base/status.h"
-#include "server/formats/downsample.h"
 #include "tests/support/test.h"
 
 enum { ROWS = 5000 };

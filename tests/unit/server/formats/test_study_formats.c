@@ -39,7 +39,7 @@ TEST(a_run_that_failed_is_quoted_in_the_table) {
     assert_int_equal(fields_default(summary_fields, &runs[1].summary), STATUS_OK);
     const Ensemble ensemble = {.table = {runs, 2}};
     Bytes bytes = {0};
-    format(&study_ensemble, "csv")->write(&ensemble.variant, "csv", &bytes);
+    format(&study_ensemble, "csv")->write(&ensemble.variant, &bytes);
     assert_string_equal(
         bytes.at,
         "seed,steps,peak_displacement [m],rms_displacement [m],peak_acceleration [m/s^2],"
@@ -55,7 +55,7 @@ TEST(a_chart_of_nothing_known_is_whole) {
     assert_non_null(answer);
     ((Ensemble *)(void *)answer)->confidence = 0.95;
     Bytes bytes = {0};
-    format(&study_ensemble, "svg")->write(answer, "svg", &bytes);
+    format(&study_ensemble, "svg")->write(answer, &bytes);
     assert_false(bytes.is_failed);
     assert_null(strstr(bytes.at, "nan"));
     assert_null(strstr(bytes.at, "inf"));

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#include "server/formats/charts.h"
+#include "server/formats/study_formats.h"
 #include "server/formats/sweep.h"
 #include "tests/support/test.h"
 
@@ -54,7 +54,7 @@ TEST(rows_that_are_there_are_in_the_table_with_their_status) {
 
 static void draw(const Sweep *sweep, Bytes *bytes) {
     const SweepSource source = sweep_source(sweep);
-    assert_true(charts_sweep(sweep, &source, bytes));
+    assert_true(chart_sweep(sweep, &source, bytes));
 }
 
 static size_t count_of(const char *text, const char *what) {
