@@ -24,17 +24,19 @@ typedef struct ImportContext {
     bool writes;
     ImportTally *tally;
     Problem *faults;
-    size_t denied;                   // rows that need may_all
-    char denied_place[POINTER_SIZE]; // the first of them
-    const char *denied_why;
+    size_t denied; // rows that need may_all; the first of them, its member and what it is:
+    const ImportRow *denied_row;
+    const char *denied_name, *denied_why;
 
     const char *slug;
     MaterialKey key;
-    const ImportRow *measurements, *revisions;
-    size_t measurement_count, revision_count;
+    const ImportRow *revisions; // of the file
+    size_t revision_count;
     uint64_t last_measurement;                // stored, or earlier in the file
     bool numbers_unknown[IMPORT_UNKNOWN + 1]; // by kind: one could not be read, so gaps are allowed
 } ImportContext;
+
+static const char never_changes[] = "differs from the stored row, which never changes";
 
 // Adds a fault at `name` below `place`; "": at `place` itself.
 __attribute__((format(printf, 4, 5))) static Status import_fault(const ImportContext *context,
@@ -53,11 +55,12 @@ __attribute__((format(printf, 4, 5))) static Status import_fault(const ImportCon
     return problem_add(context->faults, STATUS_INVALID, pointer, "%s", text);
 }
 
-static void import_deny(ImportContext *context, const char *place, const char *name,
+static void import_deny(ImportContext *context, const ImportRow *row, const char *name,
                         const char *why) {
     if (context->denied++ > 0)
         return;
-    json_pointer_join(context->denied_place, sizeof context->denied_place, place, name);
+    context->denied_row = row;
+    context->denied_name = name;
     context->denied_why = why;
 }
 
@@ -66,26 +69,22 @@ static bool import_writes(const ImportContext *context) {
     return context->writes && context->faults->count == 0;
 }
 
-static const char *import_number_name(const ImportContext *context, const ImportRow *row) {
-    return context->import->number_names[row->kind];
-}
-
 // A name as the database has it: unknown is NULL.
-static const char *import_name(const char *name) {
+static char *import_name(char *name) {
     return name != NULL && name[0] != '\0' ? name : NULL;
 }
 
-static const char *import_author(const ImportContext *context, const ImportRow *row) {
+static char *import_author(const ImportContext *context, const ImportRow *row) {
     return row->author != NULL && context->import->may_all ? import_name(row->author)
-                                                           : context->import->who;
+                                                           : (char *)context->import->who;
 }
 
-static const char *import_comment(const ImportRow *row) {
-    return row->comment != NULL ? row->comment : "imported";
+static char *import_comment(const ImportRow *row) {
+    return row->comment != NULL ? row->comment : (char *)"imported";
 }
 
-static int64_t import_created(const ImportContext *context, const ImportRow *row) {
-    return row->created_unix_ms > 0 ? row->created_unix_ms : context->import->now_unix_ms;
+static int64_t import_created(const ImportContext *context, int64_t unix_ms) {
+    return unix_ms > 0 ? unix_ms : context->import->now_unix_ms;
 }
 
 // `revised_unix_ms`: when the revision of a review was written; 0: no review, or unknown.
@@ -103,9 +102,9 @@ static void import_validate_origin(ImportContext *context, const ImportRow *row)
     const MaterialImport *import = context->import;
     const char *author = import_name(row->author);
     if (!import->may_all && author != NULL && !text_same(author, import->who))
-        import_deny(context, row->place, "author", "is another user");
+        import_deny(context, row, "author", "is another user");
     if (!import->may_all && row->created_unix_ms > 0)
-        import_deny(context, row->place, "created", "is set by the file");
+        import_deny(context, row, "created", "is set by the file");
     if (row->created_unix_ms > 0)
         import_validate_time(context, row->place, row->created_unix_ms, 0);
 }
@@ -114,20 +113,19 @@ static void import_validate_origin(ImportContext *context, const ImportRow *row)
 static void import_compare_origin(const ImportContext *context, const ImportRow *row,
                                   const char *author, const char *comment,
                                   int64_t created_unix_ms) {
-    static const char sentence[] = "differs from the stored row, which never changes";
     if (row->author != NULL && !text_same(import_name(row->author), author))
-        (void)import_fault(context, row->place, "author", sentence);
+        (void)import_fault(context, row->place, "author", never_changes);
     if (row->comment != NULL && !text_same(row->comment, comment))
-        (void)import_fault(context, row->place, "comment", sentence);
+        (void)import_fault(context, row->place, "comment", never_changes);
     if (row->created_unix_ms > 0 && row->created_unix_ms != created_unix_ms)
-        (void)import_fault(context, row->place, "created", sentence);
+        (void)import_fault(context, row->place, "created", never_changes);
 }
 
 // A number that is not stored must follow `last`, which it becomes. `before` is the number of the
 // row before.
 static Status import_validate_number(const ImportContext *context, const ImportRow *row,
                                      uint64_t before, uint64_t *last) {
-    const char *name = import_number_name(context, row);
+    const char *name = context->import->number_names[row->kind];
     if (row->number == before)
         return import_fault(context, row->place, name, "is in the file twice: %llu",
                             (unsigned long long)row->number);
@@ -154,81 +152,43 @@ static Status measurement_load(const ImportContext *context, uint64_t number,
                         material_measurement_columns, stored, NULL, problem);
 }
 
-// One that has a document. Sorted by document, in a document those with a number first.
-typedef struct IndexEntry {
-    const ImportRow *row;
-    bool is_stored; // of the first entry of a document: the database has it
-} IndexEntry;
-typedef struct MeasurementIndex {
-    IndexEntry *at;
-    size_t count;
-} MeasurementIndex;
-
-static int index_order(const void *a, const void *b) {
-    const ImportRow *one = ((const IndexEntry *)a)->row, *other = ((const IndexEntry *)b)->row;
-    const int by_document = strcmp(one->document, other->document);
-    if (by_document != 0)
-        return by_document;
-    const bool is_numbered = one->number != COUNT_ABSENT;
-    if (is_numbered != (other->number != COUNT_ABSENT))
-        return is_numbered ? -1 : 1;
-    return one->order < other->order ? -1 : one->order > other->order;
-}
-
-// The first entry of a document; NULL: there is none.
-static IndexEntry *index_find(const MeasurementIndex *index, const char *document) {
-    size_t low = 0, high = index->count;
-    while (low < high) {
-        const size_t middle = low + (high - low) / 2;
-        if (strcmp(index->at[middle].row->document, document) < 0)
-            low = middle + 1;
-        else
-            high = middle;
-    }
-    return low < index->count && strcmp(index->at[low].row->document, document) == 0
-               ? &index->at[low]
-               : NULL;
-}
-
-// Finds stored measurements by their documents: one pass, whatever the size of the file.
-static Status index_read_stored(const ImportContext *context, MeasurementIndex *index,
-                                Problem *problem) {
-    for (uint64_t number = 1; number <= context->key.measurements; number++) {
-        MaterialMeasurement stored = {0};
-        TRY(measurement_load(context, number, &stored, problem));
-        IndexEntry *entry = stored.document != NULL ? index_find(index, stored.document) : NULL;
-        if (entry != NULL)
-            entry->is_stored = true;
-        material_measurement_clear(&stored);
-    }
-    return STATUS_OK;
-}
-
-// The same test again without a number was copied twice. Cleared by free(index->at) in any case.
-static Status index_make(const ImportContext *context, MeasurementIndex *index, Problem *problem) {
-    bool has_unnumbered = false;
-    *index = (MeasurementIndex){calloc(context->measurement_count + 1, sizeof *index->at), 0};
-    if (index->at == NULL)
+// Finds rows without a number whose test is stored already, in one pass over the stored ones. The
+// same test again in the file without a number was copied twice.
+static Status measurements_index(const ImportContext *context, ImportRow *rows, size_t count,
+                                 Problem *problem) {
+    HashMap *map = hashmap_new();
+    Status status = STATUS_OK;
+    uint64_t stored_count = 0; // of those to look at
+    if (map == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the measurements");
-    for (size_t i = 0; i < context->measurement_count; i++) {
-        const ImportRow *row = &context->measurements[i];
+    for (size_t i = 0; i < count; i++) { // those with a number come first
+        ImportRow *row = &rows[i];
+        row->is_stored = false;
         if (row->document == NULL)
             continue;
-        index->at[index->count++].row = row;
-        has_unnumbered = has_unnumbered || row->number == COUNT_ABSENT;
-    }
-    qsort(index->at, index->count, sizeof *index->at, index_order);
-    for (size_t i = 1; i < index->count; i++) {
-        const ImportRow *before = index->at[i - 1].row, *row = index->at[i].row;
-        if (row->number == COUNT_ABSENT && strcmp(before->document, row->document) == 0)
+        const ImportRow *before = hashmap_find(map, row->document);
+        row->indexed.key = row->document;
+        if (before == NULL)
+            hashmap_add(map, &row->indexed);
+        if (row->number != COUNT_ABSENT)
+            continue;
+        stored_count = context->key.measurements;
+        if (before != NULL)
             (void)import_fault(context, row->place, "test",
                                "is in the file already, at %.64s: give each its number if it was "
                                "done twice",
                                before->place);
     }
-    return has_unnumbered && context->key.measurements > 0
-               ? index_read_stored(context, index, problem)
-               : STATUS_OK;
+    for (uint64_t number = 1; status == STATUS_OK && number <= stored_count; number++) {
+        MaterialMeasurement stored = {0};
+        status = measurement_load(context, number, &stored, problem);
+        ImportRow *row = stored.document != NULL ? hashmap_find(map, stored.document) : NULL;
+        if (row != NULL)
+            row->is_stored = true;
+        material_measurement_clear(&stored);
+    }
+    hashmap_free(map);
+    return status;
 }
 
 static Status measurement_compare(ImportContext *context, const ImportRow *row, Problem *problem) {
@@ -246,31 +206,29 @@ static Status measurement_compare(ImportContext *context, const ImportRow *row, 
 }
 
 static Status measurement_add(ImportContext *context, const ImportRow *row, Problem *problem) {
+    const MaterialMeasurement added = {.slug = row->slug,
+                                       .measurement = context->last_measurement,
+                                       .author = import_author(context, row),
+                                       .comment = import_comment(row),
+                                       .created_unix_ms =
+                                           import_created(context, row->created_unix_ms),
+                                       .document = row->document};
     import_validate_origin(context, row);
     context->tally->measurements.added++;
-    if (!import_writes(context))
-        return STATUS_OK;
-    const MaterialMeasurement measurement = {.slug = row->slug,
-                                             .measurement = context->last_measurement,
-                                             .author = (char *)import_author(context, row),
-                                             .comment = (char *)import_comment(row),
-                                             .created_unix_ms = import_created(context, row),
-                                             .document = row->document};
-    return material_measurement_add(context->database, &measurement, problem);
+    return import_writes(context) ? material_measurement_add(context->database, &added, problem)
+                                  : STATUS_OK;
 }
 
-static Status import_measurements(ImportContext *context, const MeasurementIndex *index,
+static Status import_measurements(ImportContext *context, ImportRow *rows, size_t count,
                                   Problem *problem) {
     uint64_t before = 0;
     context->last_measurement = context->key.measurements;
-    for (size_t i = 0; i < context->measurement_count; i++) {
-        const ImportRow *row = &context->measurements[i];
+    TRY(measurements_index(context, rows, count, problem));
+    for (const ImportRow *row = rows; row < rows + count; row++) {
         const bool is_numbered = row->number != COUNT_ABSENT;
         if (row->number_unknown)
             continue;
-        const IndexEntry *entry =
-            is_numbered || row->document == NULL ? NULL : index_find(index, row->document);
-        if (entry != NULL && entry->is_stored) {
+        if (!is_numbered && row->is_stored) {
             context->tally->measurements.same++;
             continue;
         }
@@ -280,10 +238,9 @@ static Status import_measurements(ImportContext *context, const MeasurementIndex
                  STATUS_OK)
             continue;
         before = row->number;
-        if (is_numbered && row->number <= context->key.measurements)
-            TRY(measurement_compare(context, row, problem));
-        else
-            TRY(measurement_add(context, row, problem));
+        TRY(is_numbered && row->number <= context->key.measurements
+                ? measurement_compare(context, row, problem)
+                : measurement_add(context, row, problem));
     }
     return STATUS_OK;
 }
@@ -329,21 +286,18 @@ static Status review_validate(const ImportContext *context, const char *place,
 static Status review_add(ImportContext *context, const ImportRow *row, const ImportReview *review,
                          uint64_t revision, Problem *problem) {
     const MaterialImport *import = context->import;
-    if (!import->may_all)
-        import_deny(context, row->place, "reviews", "has reviews");
-    context->tally->reviews.added++;
-    if (!import_writes(context))
-        return STATUS_OK;
     const MaterialReview added = {
         .slug = row->slug,
         .revision = revision,
         .status = (char *)review_status(review),
         .reason = review->reason,
-        .reviewer =
-            (char *)(review->reviewer != NULL ? import_name(review->reviewer) : import->who),
-        .created_unix_ms =
-            review->created_unix_ms > 0 ? review->created_unix_ms : import->now_unix_ms};
-    return material_review_add(context->database, &added, problem);
+        .reviewer = review->reviewer != NULL ? import_name(review->reviewer) : (char *)import->who,
+        .created_unix_ms = import_created(context, review->created_unix_ms)};
+    if (!import->may_all)
+        import_deny(context, row, "reviews", "has reviews");
+    context->tally->reviews.added++;
+    return import_writes(context) ? material_review_add(context->database, &added, problem)
+                                  : STATUS_OK;
 }
 
 // Stored reviews come first and are the same; others follow.
@@ -512,79 +466,67 @@ static void revision_validate_measurements(const ImportContext *context, const I
 
 static Status revision_add(ImportContext *context, const ImportRow *row, uint64_t number,
                            Problem *problem) {
-    import_validate_origin(context, row);
-    revision_validate_measurements(context, row);
-    TRY(revision_validate_reverts(context, row, number, problem));
-    context->tally->revisions.added++;
     // Borrows from the row.
     const MaterialRevision revision = {.slug = row->slug,
                                        .revision = number,
                                        .material = row->material,
                                        .reverts = row->reverts == COUNT_ABSENT ? 0 : row->reverts,
-                                       .author = (char *)import_author(context, row),
-                                       .comment = (char *)import_comment(row),
-                                       .created_unix_ms = import_created(context, row)};
+                                       .author = import_author(context, row),
+                                       .comment = import_comment(row),
+                                       .created_unix_ms =
+                                           import_created(context, row->created_unix_ms)};
+    import_validate_origin(context, row);
+    revision_validate_measurements(context, row);
+    TRY(revision_validate_reverts(context, row, number, problem));
+    context->tally->revisions.added++;
     if (import_writes(context))
         TRY(material_revision_add(context->database, &revision, problem));
     return import_reviews(context, row, &revision, problem);
 }
 
-// One without a number is the next, unless the newest revision has the same contents.
-static Status revision_import_next(ImportContext *context, const ImportRow *row, Problem *problem) {
-    MaterialRevision newest = {0};
-    bool is_same = false;
-    Status status = STATUS_OK;
-    if (context->key.latest > 0)
-        status = revision_load(context, context->key.latest, &newest, problem);
-    if (status == STATUS_OK && newest.revision > 0)
-        status = revision_compare(context, row, &newest.material, false, &is_same, problem);
-    if (status == STATUS_OK) {
-        context->tally->revisions.same += is_same;
-        status = is_same ? import_reviews(context, row, &newest, problem)
-                         : revision_add(context, row, context->key.latest + 1, problem);
-    }
-    material_revision_clear(&newest);
-    return status;
-}
-
-static Status revision_import_stored(ImportContext *context, const ImportRow *row,
-                                     Problem *problem) {
-    MaterialRevision stored = {0};
-    bool is_same;
+// `stored` has the row's number; the newest revision if it has none, of which the row is a copy if
+// it has the same contents. *is_new: the row is another revision.
+static Status revision_compare_stored(ImportContext *context, const ImportRow *row,
+                                      const MaterialRevision *stored, bool *is_new,
+                                      Problem *problem) {
     const size_t faults = context->faults->count;
-    Status status = revision_load(context, row->number, &stored, problem);
-    if (status == STATUS_OK && !context->import->is_partial)
-        status = revision_compare(context, row, &stored.material, true, &is_same, problem);
-    if (status == STATUS_OK) {
-        import_compare_origin(context, row, stored.author, stored.comment, stored.created_unix_ms);
-        const uint64_t reverts = row->reverts == COUNT_ABSENT ? 0 : row->reverts;
-        if (reverts != stored.reverts && !(reverts == 0 && row->is_faulty))
-            (void)import_fault(context, row->place, "reverts",
-                               "differs from the stored row, which never changes");
-        context->tally->revisions.same += context->faults->count == faults;
-        status = import_reviews(context, row, &stored, problem);
+    const uint64_t reverts = row->reverts == COUNT_ABSENT ? 0 : row->reverts;
+    const bool is_numbered = row->number != COUNT_ABSENT;
+    bool is_same = true;
+    if (!is_numbered || !context->import->is_partial)
+        TRY(revision_compare(context, row, &stored->material, is_numbered, &is_same, problem));
+    *is_new = !is_numbered && !is_same;
+    if (is_numbered) {
+        import_compare_origin(context, row, stored->author, stored->comment,
+                              stored->created_unix_ms);
+        if (reverts != stored->reverts && !(reverts == 0 && row->is_faulty))
+            (void)import_fault(context, row->place, "reverts", never_changes);
     }
-    material_revision_clear(&stored);
-    return status;
+    context->tally->revisions.same += !*is_new && context->faults->count == faults;
+    return *is_new ? STATUS_OK : import_reviews(context, row, stored, problem);
 }
 
 static Status import_revisions(ImportContext *context, Problem *problem) {
-    uint64_t before = 0, last = context->key.latest;
+    const uint64_t latest = context->key.latest;
+    uint64_t before = 0, last = latest;
     for (size_t i = 0; i < context->revision_count; i++) {
         const ImportRow *row = &context->revisions[i];
-        if (row->number_unknown)
-            continue;
-        if (row->number == COUNT_ABSENT) {
-            TRY(revision_import_next(context, row, problem));
-            continue;
-        }
-        if (import_validate_number(context, row, before, &last) != STATUS_OK)
+        const bool is_numbered = row->number != COUNT_ABSENT;
+        MaterialRevision stored = {0};
+        bool is_new = latest == 0 || (is_numbered && row->number > latest);
+        if (row->number_unknown ||
+            (is_numbered && import_validate_number(context, row, before, &last) != STATUS_OK))
             continue;
         before = row->number;
-        if (row->number <= context->key.latest)
-            TRY(revision_import_stored(context, row, problem));
-        else
-            TRY(revision_add(context, row, row->number, problem));
+        Status status =
+            is_new ? STATUS_OK
+                   : revision_load(context, is_numbered ? row->number : latest, &stored, problem);
+        if (status == STATUS_OK && !is_new)
+            status = revision_compare_stored(context, row, &stored, &is_new, problem);
+        if (status == STATUS_OK && is_new)
+            status = revision_add(context, row, is_numbered ? row->number : latest + 1, problem);
+        material_revision_clear(&stored);
+        TRY(status);
     }
     return STATUS_OK;
 }
@@ -612,7 +554,7 @@ static Status import_audit(const ImportContext *context, const ImportTally *befo
 }
 
 // The rows of one material.
-static Status import_material(ImportContext *context, const ImportRow *rows, size_t count,
+static Status import_material(ImportContext *context, ImportRow *rows, size_t count,
                               Problem *problem) {
     const ImportTally before = *context->tally;
     size_t of_kind[IMPORT_UNKNOWN + 1] = {0};
@@ -621,28 +563,23 @@ static Status import_material(ImportContext *context, const ImportRow *rows, siz
         of_kind[rows[i].kind]++;
         context->numbers_unknown[rows[i].kind] |= rows[i].number_unknown;
     }
-    const size_t unknown = of_kind[IMPORT_UNKNOWN];
+    const size_t unknown = of_kind[IMPORT_UNKNOWN], measured = of_kind[IMPORT_MEASUREMENT];
     if (unknown > 0)
         context->numbers_unknown[IMPORT_REVISION] = context->numbers_unknown[IMPORT_MEASUREMENT] =
             true;
     context->slug = rows->slug;
-    context->measurements = rows + unknown;
-    context->measurement_count = of_kind[IMPORT_MEASUREMENT];
-    context->revisions = context->measurements + context->measurement_count;
+    context->revisions = rows + unknown + measured;
     context->revision_count = of_kind[IMPORT_REVISION];
     TRY(material_key_find(context->database, context->slug, 0, &context->key, problem));
-    MeasurementIndex index;
-    Status status = index_make(context, &index, problem);
-    const bool is_missing = context->key.number == 0 && context->measurement_count == count;
-    if (is_missing)
+    if (context->key.number == 0 && measured == count) {
+        const Status status = measurements_index(context, rows, count, problem); // has faults too
         (void)import_fault(context, rows->place, "slug",
                            "there is no material \"%.64s\": add a revision of it", context->slug);
-    else if (status == STATUS_OK && context->key.number == 0 && import_writes(context))
-        status = material_row_add(context->database, context->slug, problem);
-    if (status == STATUS_OK && !is_missing)
-        status = import_measurements(context, &index, problem);
-    free(index.at);
-    TRY(status);
+        return status;
+    }
+    if (context->key.number == 0 && import_writes(context))
+        TRY(material_row_add(context->database, context->slug, problem));
+    TRY(import_measurements(context, rows + unknown, measured, problem));
     TRY(import_revisions(context, problem));
     return import_writes(context) ? import_audit(context, &before, problem) : STATUS_OK;
 }
@@ -660,7 +597,9 @@ static Status import_run(ImportContext *context, Problem *problem) {
         return STATUS_INVALID;
     if (context->denied == 0)
         return STATUS_OK;
-    return problem_add(context->faults, STATUS_FORBIDDEN, context->denied_place,
+    char place[POINTER_SIZE];
+    json_pointer_join(place, sizeof place, context->denied_row->place, context->denied_name);
+    return problem_add(context->faults, STATUS_FORBIDDEN, place,
                        "%s (and %zu more rows): importing rows of other users, times or reviews "
                        "requires the scope admin",
                        context->denied_why, context->denied - 1);

@@ -5,6 +5,7 @@
 
 #include "core/drop_test/drop_test.h"
 #include "server/db/materials.h"
+#include "server/util/hashmap.h"
 
 enum { IMPORT_ROWS_MAX = 100000, IMPORT_PLACE_SIZE = 64 };
 
@@ -28,6 +29,7 @@ typedef struct ImportReviews {
 
 // A revision or a measurement.
 typedef struct ImportRow {
+    HashMapEntry indexed; // by its document
     // As the file has it.
     int kind; // ImportKind
     char *slug;
@@ -45,6 +47,7 @@ typedef struct ImportRow {
     int64_t created_unix_ms;       // of `created`; 0: none
     char *document;                // the test as JSON; NULL if faulty
     bool is_faulty;      // has faults already: its number counts, what is valid is compared
+    bool is_stored;      // a measurement without a number whose test the database has
     bool number_unknown; // has a number that could not be read
 } ImportRow;
 
