@@ -6,15 +6,15 @@
 //     {"revision": 1, ...}],
 //     "measurements": [
 //     {"measurement": 1, ..., "test": {...}}]}]}
-#include "server/materials/export.h"
+#include "server/materials/exchange.h"
 
 #include <stdlib.h>
 #include <string.h>
 
 #include "server/json/encode.h"
 #include "server/json/schema.h"
-#include "server/materials/import.h"
 #include "server/util/clock.h"
+#include "server/util/csv.h"
 
 static Status export_no_memory(Problem *problem) {
     return problem_set(problem, STATUS_NO_MEMORY, "no memory for the materials");
@@ -45,90 +45,72 @@ static bool text_is_unsafe(const char *text) {
     return false;
 }
 
-static void export_cell(Bytes *bytes, const char *text) {
-    const bool is_quoted =
-        text[0] == '\0' || strpbrk(text, ",\"\r\n") != NULL || text[0] == ' ' || text[0] == '\t';
-    bytes_text(bytes, is_quoted ? "\"" : "");
-    for (; *text != '\0'; text++)
-        bytes_put(bytes, *text == '"' ? "\"\"" : text, *text == '"' ? 2 : 1);
-    bytes_text(bytes, is_quoted ? "\"" : "");
-}
-
-// JSON in a cell. DEL and C1, which JSON allows within strings, are escaped.
-static void export_json_cell(Bytes *bytes, const char *json) {
-    Bytes safe = {.most = 0};
-    for (size_t size; *json != '\0'; json += size) {
-        const size_t control = control_size(json);
+// Of JSON, DEL and C1, which it allows within strings, are escaped.
+static void export_cell(Bytes *bytes, const char *text, bool is_json) {
+    Bytes json = {.most = 0}, safe = {.most = 0};
+    if (!is_json && (text_is_unsafe(text) || import_is_json_text(text))) {
+        bytes_json_string(&json, text);
+        text = json.at != NULL ? json.at : "";
+        is_json = true;
+    }
+    for (size_t size; is_json && *text != '\0'; text += size) {
+        const size_t control = control_size(text);
         size = control > 0 ? control : 1;
         if (control > 0)
-            bytes_format(&safe, "\\u00%02x", (unsigned char)json[control - 1]);
+            bytes_format(&safe, "\\u00%02x", (unsigned char)text[control - 1]);
         else
-            bytes_put(&safe, json, 1);
+            bytes_put(&safe, text, 1);
     }
-    if (safe.at != NULL)
-        export_cell(bytes, safe.at);
-    bytes->is_failed = bytes->is_failed || safe.is_failed;
+    if (is_json)
+        text = safe.at != NULL ? safe.at : "";
+    if (text[0] == '\0' || strpbrk(text, ",\"\r\n") != NULL || text[0] == ' ' || text[0] == '\t')
+        csv_cells_text(bytes, text);
+    else
+        bytes_text(bytes, text);
+    bytes->is_failed = bytes->is_failed || json.is_failed || safe.is_failed;
+    bytes_clear(&json);
     bytes_clear(&safe);
 }
 
-static void export_text_cell(Bytes *bytes, const char *text) {
-    if (!text_is_unsafe(text) && !import_is_json_text(text)) {
-        export_cell(bytes, text);
-        return;
-    }
-    Bytes json = {.most = 0};
-    bytes_json_string(&json, text);
-    if (json.at != NULL)
-        export_json_cell(bytes, json.at);
-    bytes->is_failed = bytes->is_failed || json.is_failed;
-    bytes_clear(&json);
-}
-
-static void export_list_cell(Bytes *bytes, const Field *field, const void *item) {
-    Bytes json = {.most = 0};
+// The value of a member as a cell. An empty cell is an unknown name; quotes make it an empty text.
+static void export_member(Bytes *bytes, const Field *field, const void *item) {
+    const void *member = (const char *)item + field->offset;
     const Field alone[] = {*field, FIELD_END};
-    (void)encode_members(&json, alone, item, WRITE_SCENE);
-    const char *colon = json.is_failed ? NULL : strstr(json.at, ": ");
-    if (colon != NULL)
-        export_json_cell(bytes, colon + 2);
-    bytes->is_failed = bytes->is_failed || json.is_failed;
-    bytes_clear(&json);
+    Bytes json = {.most = 0};
+    if (field_is_absent(field, item))
+        return;
+    if (field->kind == FIELD_KIND_TEXT) {
+        const char *text = *(char *const *)member;
+        if (text[0] != '\0' || (field->flags & FIELD_NULL_IS_EMPTY) == 0)
+            export_cell(bytes, text, false);
+    } else if (field->kind == FIELD_KIND_CHOICE) {
+        bytes_text(bytes, field->choices[*(const int *)member]);
+    } else {
+        (void)encode_members(&json, alone, item, WRITE_SCENE);
+        const char *colon = json.at != NULL ? strstr(json.at, ": ") : NULL;
+        if (colon != NULL)
+            export_cell(bytes, colon + 2, true);
+        bytes->is_failed = bytes->is_failed || json.is_failed;
+        bytes_clear(&json);
+    }
 }
 
 // The cells of a row; `row` NULL: the header.
 static void export_cells(Bytes *bytes, const Field *fields, const void *row, const char *document,
                          size_t *count) {
     for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
-        const char *member = row != NULL ? (const char *)row + field->offset : NULL;
         if (field->kind == FIELD_KIND_BASE) {
-            export_cells(bytes, field->fields, member, document, count);
+            const char *base = row != NULL ? (const char *)row + field->offset : NULL;
+            export_cells(bytes, field->fields, base, document, count);
             continue;
         }
         bytes_text(bytes, (*count)++ > 0 ? "," : "");
-        if (row == NULL) {
-            bytes_text(bytes, field->name);
-            if (field->unit != NULL)
-                bytes_format(bytes, " [%s]", field->unit);
-        } else if (field->kind == FIELD_KIND_ITEM) {
-            if (document != NULL)
-                export_json_cell(bytes, document);
-        } else if (field_is_absent(field, row)) {
-            continue;
-        } else if (field->kind == FIELD_KIND_TEXT) {
-            const char *text = *(char *const *)(const void *)member;
-            // An empty cell is an unknown name; quotes make it an empty text.
-            if (text[0] != '\0' || (field->flags & FIELD_NULL_IS_EMPTY) == 0)
-                export_text_cell(bytes, text);
-        } else if (field->kind == FIELD_KIND_REAL) {
-            bytes_real(bytes, *(const double *)(const void *)member);
-        } else if (field->kind == FIELD_KIND_COUNT) {
-            bytes_format(bytes, "%llu",
-                         (unsigned long long)*(const uint64_t *)(const void *)member);
-        } else if (field->kind == FIELD_KIND_CHOICE) {
-            bytes_text(bytes, field->choices[*(const int *)(const void *)member]);
-        } else {
-            export_list_cell(bytes, field, row);
-        }
+        if (row == NULL)
+            csv_put_name(bytes, field->name, field->unit);
+        else if (field->kind != FIELD_KIND_ITEM)
+            export_member(bytes, field, row);
+        else if (document != NULL)
+            export_cell(bytes, document, true);
     }
 }
 
@@ -154,17 +136,15 @@ typedef struct CreatedText {
     char at[32];
 } CreatedText;
 
-static Status export_revision(MaterialExport *export, Bytes *bytes, MaterialRevision *revision,
-                              Problem *problem) {
+static Status export_revision(const MaterialExport *export, Bytes *bytes,
+                              const MaterialRevision *revision, Problem *problem) {
     MaterialReviews reviews;
     TRY(db_reviews(export->db, &export->moment, revision->slug, revision->revision, &reviews,
                    problem));
-    char created[32];
-    ImportRow row;
+    CreatedText created, *times = calloc(reviews.count + 1, sizeof *times);
     ImportReview *shown = calloc(reviews.count + 1, sizeof *shown);
-    CreatedText *times = calloc(reviews.count + 1, sizeof *times);
     Status status = STATUS_OK;
-    if (shown == NULL || times == NULL || fields_default(import_row_fields, &row) != STATUS_OK)
+    if (shown == NULL || times == NULL)
         status = export_no_memory(problem);
     for (size_t i = 0; status == STATUS_OK && i < reviews.count; i++) {
         const MaterialReview *review = &reviews.at[i];
@@ -175,17 +155,16 @@ static Status export_revision(MaterialExport *export, Bytes *bytes, MaterialRevi
                                   .created = times[i].at};
     }
     if (status == STATUS_OK) {
-        clock_rfc3339(revision->created_unix_ms, created);
-        row.kind = IMPORT_REVISION;
-        row.slug = revision->slug;
-        row.number = export->number = revision->revision;
-        row.material = revision->material;
-        row.reverts = revision->reverts > 0 ? revision->reverts : COUNT_ABSENT;
-        row.author = export_name(revision->author);
-        row.comment = revision->comment;
-        row.created = created;
-        row.reviews = (ImportReviews){shown, reviews.count};
-        row.document = NULL;
+        clock_rfc3339(revision->created_unix_ms, created.at);
+        const ImportRow row = {.kind = IMPORT_REVISION,
+                               .slug = revision->slug,
+                               .number = revision->revision,
+                               .material = revision->material,
+                               .reverts = revision->reverts > 0 ? revision->reverts : COUNT_ABSENT,
+                               .author = export_name(revision->author),
+                               .comment = revision->comment,
+                               .created = created.at,
+                               .reviews = {shown, reviews.count}};
         export_row(export, bytes, &row);
     }
     free(times);
@@ -194,22 +173,20 @@ static Status export_revision(MaterialExport *export, Bytes *bytes, MaterialRevi
     return status;
 }
 
-static Status export_measurement(MaterialExport *export, Bytes *bytes,
+static Status export_measurement(const MaterialExport *export, Bytes *bytes,
                                  const MaterialMeasurement *measurement, Problem *problem) {
     ImportRow row;
-    char created[32];
+    CreatedText created;
     if (fields_default(import_row_fields, &row) != STATUS_OK)
         return export_no_memory(problem);
-    clock_rfc3339(measurement->created_unix_ms, created);
+    clock_rfc3339(measurement->created_unix_ms, created.at);
     row.kind = IMPORT_MEASUREMENT;
     row.slug = measurement->slug;
-    row.number = export->number = measurement->measurement;
+    row.number = measurement->measurement;
     row.author = export_name(measurement->author);
     row.comment = measurement->comment;
-    row.created = created;
+    row.created = created.at;
     row.document = measurement->document;
-    if (!export->is_table)
-        bytes_text(bytes, export->measurements++ > 0 ? ",\n" : ", \"measurements\": [\n");
     export_row(export, bytes, &row);
     return STATUS_OK;
 }
@@ -241,6 +218,7 @@ static Status export_next_revision(MaterialExport *export, Bytes *bytes, bool *i
         else if (!export->is_table)
             bytes_text(bytes, ",\n");
         text_fit(export->slug, sizeof export->slug, revision.slug);
+        export->number = revision.revision;
         status = export_revision(export, bytes, &revision, problem);
     } else if (status == STATUS_OK) {
         *is_last = is_first;
@@ -259,6 +237,9 @@ static Status export_next_measurement(MaterialExport *export, Bytes *bytes, Prob
     Status status = db_measurement_after(export->db, &export->moment, export->slug, export->number,
                                          &measurement, &is_found, problem);
     if (status == STATUS_OK && is_found) {
+        if (!export->is_table)
+            bytes_text(bytes, export->measurements++ > 0 ? ",\n" : ", \"measurements\": [\n");
+        export->number = measurement.measurement;
         status = export_measurement(export, bytes, &measurement, problem);
     } else if (status == STATUS_OK) {
         if (!export->is_table)

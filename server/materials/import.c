@@ -1,7 +1,7 @@
 // Both kinds of files fill one staging list. A document is read material by material, so that there
 // is never a tree of all of it. A cell of a table becomes the JSON value that its column's Field
 // row takes, and is read and validated as in a document.
-#include "server/materials/import.h"
+#include "server/materials/exchange.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -7,8 +7,7 @@
 #include <string.h>
 #include <time.h>
 
-#include "server/materials/export.h"
-#include "server/materials/import.h"
+#include "server/materials/exchange.h"
 #include "tests/support/mutate.h"
 
 enum { ROUNDS_TIMED = 64, ROUND_EACH = 200 };

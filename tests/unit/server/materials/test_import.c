@@ -1,10 +1,9 @@
 // Imports and exports of materials, as far as HTTP does not show them.
-#include "server/materials/import.h"
+#include "server/materials/exchange.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/materials/export.h"
 #include "tests/support/test.h"
 
 static Problem problem;
