@@ -15,9 +15,7 @@
 #include "core/study/sweep.h"
 #include "server/api/app.h"
 #include "server/cli/files.h"
-#include "server/http/address.h"
 #include "server/http/server.h"
-#include "server/http/tls.h"
 #include "server/options.h"
 #include "server/util/clock.h"
 #include "server/util/process.h"
@@ -197,8 +195,8 @@ static Status hosts_set(const ServeSettings *settings, const Address *address, c
     Status status = STATUS_OK;
     char name[80];
     if (address_is_any(address) || address_is_loopback(address))
-        for (size_t i = 0; gate_loopback.names[i] != NULL; i++)
-            TRY(host_add(hosts, gate_loopback.names[i], strlen(gate_loopback.names[i]), problem));
+        for (size_t i = 0; loopback_hosts.names[i] != NULL; i++)
+            TRY(host_add(hosts, loopback_hosts.names[i], strlen(loopback_hosts.names[i]), problem));
     if (!address_is_any(address)) {
         const bool is_v6 = strchr(address->host, ':') != NULL;
         snprintf(name, sizeof name, "%s%s%s", is_v6 ? "[" : "", address->host, is_v6 ? "]" : "");

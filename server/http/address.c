@@ -1,6 +1,6 @@
 // The socket is opened here and not by libmicrohttpd: a port in use differs from other faults, and
 // the number chosen for port 0 can be read.
-#include "server/http/address.h"
+#include "server/http/server.h"
 
 #include <arpa/inet.h>
 #include <errno.h>

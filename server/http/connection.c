@@ -19,8 +19,6 @@
 #include <unistd.h>
 
 #include "server/http/reply.h"
-#include "server/http/tls.h"
-#include "server/http/validate.h"
 #include "server/json/encode.h"
 #include "server/util/clock.h"
 
@@ -42,7 +40,6 @@ typedef struct Exchange {
     ConnectionTimer *timer;
     struct Exchange *next_reader, **reader_link; // in the loop's list while the body is read
     Request request;
-    RequestValidator validator;
     Bytes body;
     size_t received, checked_received;
     int stalled_checks;
@@ -139,7 +136,6 @@ static const char *response_vary(const Reply *reply, bool has_origins, char text
 // All headers but those of one request alone.
 static void response_add_all(struct MHD_Response *response, const Reply *reply,
                              const ServerSettings *settings) {
-    const AcceptedHosts *hosts = settings->hosts;
     char varies[48];
     const bool is_events =
         reply->content_type != NULL && strcmp(reply->content_type, "text/event-stream") == 0;
@@ -162,7 +158,7 @@ static void response_add_all(struct MHD_Response *response, const Reply *reply,
     response_add(response, "X-Accel-Buffering", is_events ? "no" : NULL);
     response_add(response, MHD_HTTP_HEADER_ACCEPT_RANGES, reply->accepts_ranges ? "bytes" : NULL);
     response_add(response, MHD_HTTP_HEADER_VARY,
-                 response_vary(reply, hosts != NULL && hosts->origins != NULL, varies));
+                 response_vary(reply, settings->hosts->origins != NULL, varies));
     response_add(response, MHD_HTTP_HEADER_WWW_AUTHENTICATE, reply->authenticate);
     response_add(response, "Content-Security-Policy",
                  reply->policy != NULL ? reply->policy : reply_policy);
@@ -260,9 +256,7 @@ static enum MHD_Result exchange_add_header(void *context, enum MHD_ValueKind kin
                                            size_t name_size, const char *value, size_t value_size) {
     (void)kind;
     Exchange *exchange = context;
-    validate_header(&exchange->validator, name, name_size, value, value_size);
-    if (value != NULL)
-        request_header(&exchange->request, name, value);
+    request_header(&exchange->request, name, name_size, value, value_size);
     return MHD_YES;
 }
 
@@ -316,21 +310,20 @@ static enum MHD_Result exchange_begin(Exchange *exchange, struct MHD_Connection 
     request->started_ns = clock_monotonic_ns();
     request->callback = timer_callback(exchange->timer);
     request->body_most = shared->settings.body_most;
-    exchange->validator.names = shared->settings.hosts;
+    const AcceptedHosts *hosts = shared->settings.hosts;
     MHD_get_connection_values_n(connection, MHD_HEADER_KIND, exchange_add_header, exchange);
-    request->allow_origin = validate_allowed_origin(&exchange->validator);
+    request->allow_origin = request_allowed_origin(request, hosts);
     if (request->id[0] == '\0')
         exchange_write_id(request->id, shared->first_id + atomic_fetch_add(&shared->requests, 1));
-    if (request->host == NULL)
-        request->host = strstr(shared->url, "://") + 3;
-
     Problem problem;
     problem_clear(&problem);
-    int code = validate_request(&exchange->validator, method, exchange->target, version, &problem);
+    int code = request_validate(request, hosts, exchange->target, version, &problem);
+    if (request->host == NULL)
+        request->host = strstr(shared->url, "://") + 3;
     const bool is_framed = code == 0; // it is certain where the body ends
     if (code == 0 && request_open(request, exchange->target, &problem) != STATUS_OK)
         code = encode_problem_code(problem.status);
-    const unsigned long long body_size = exchange->validator.length;
+    const uint64_t body_size = request->length;
     const size_t most = request->body_most;
     const bool waits_for_leave =
         request->expect != NULL && strcasecmp(request->expect, "100-continue") == 0;
@@ -342,7 +335,7 @@ static enum MHD_Result exchange_begin(Exchange *exchange, struct MHD_Connection 
         code = 413;
         request_error_large(most, &problem);
     }
-    const bool has_body = body_size > 0 || exchange->validator.is_chunked;
+    const bool has_body = body_size > 0 || request->is_chunked;
     const bool drains =
         is_framed && has_body && request->expect == NULL && body_size <= DRAINED * most;
     Reply reply;
@@ -516,25 +509,7 @@ void connection_notify(void *context, struct MHD_Connection *connection, void **
     atomic_fetch_sub(&loop->connections, 1);
 }
 
-// A few are kept for later requests: they are too large for the allocator's fast paths.
-static Exchange *exchange_new(EventLoop *loop) {
-    if (loop->free_count == 0)
-        return calloc(1, sizeof(Exchange));
-    Exchange *exchange = loop->free_list[--loop->free_count];
-    memset(exchange, 0, sizeof *exchange);
-    return exchange;
-}
-
-static void exchange_free(EventLoop *loop, Exchange *exchange) {
-    if (loop->free_count < EXCHANGES_KEPT)
-        loop->free_list[loop->free_count++] = exchange;
-    else
-        free(exchange);
-}
-
 void connection_clear_kept(EventLoop *loop) {
-    while (loop->free_count > 0)
-        free(loop->free_list[--loop->free_count]);
     for (size_t i = 0; i < SHARED_RESPONSES; i++)
         if (loop->shared_responses[i].response != NULL)
             MHD_destroy_response(loop->shared_responses[i].response);
@@ -546,12 +521,12 @@ void *exchange_open(void *context, const char *target, struct MHD_Connection *co
     const union MHD_ConnectionInfo *info =
         MHD_get_connection_info(connection, MHD_CONNECTION_INFO_SOCKET_CONTEXT);
     ConnectionTimer *timer = info != NULL ? info->socket_context : NULL;
-    Exchange *exchange = timer != NULL ? exchange_new(loop) : NULL;
+    Exchange *exchange = timer != NULL ? calloc(1, sizeof *exchange) : NULL;
     if (exchange == NULL)
         return NULL;
     exchange->target = strdup(target);
     if (exchange->target == NULL) {
-        exchange_free(loop, exchange);
+        free(exchange);
         return NULL;
     }
     exchange->loop = loop;
@@ -602,7 +577,7 @@ void exchange_close(void *context, struct MHD_Connection *connection, void **sta
     const bool is_complete = code == MHD_REQUEST_TERMINATED_COMPLETED_OK;
     timer_limit(exchange->timer, is_complete ? IDLE_MS : 1, is_complete);
     free(exchange->target);
-    exchange_free(loop, exchange);
+    free(exchange);
     atomic_fetch_sub(&loop->shared->exchanges, 1);
 }
 
@@ -628,7 +603,7 @@ void connection_close_stalled(EventLoop *loop, int64_t now_ns) {
     for (Exchange *exchange = loop->readers; exchange != NULL; exchange = exchange->next_reader) {
         const union MHD_ConnectionInfo *info =
             MHD_get_connection_info(exchange->connection, MHD_CONNECTION_INFO_CONNECTION_FD);
-        if (!exchange->validator.is_chunked || info == NULL)
+        if (!exchange->request.is_chunked || info == NULL)
             continue;
         const bool is_stalled = exchange->received == exchange->checked_received &&
                                 exchange_has_unread(exchange, info->connect_fd);

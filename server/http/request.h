@@ -1,5 +1,5 @@
-// One HTTP request, its route and its reply as plain values; what every handler requires of a
-// request.
+// One HTTP request, its route and its reply as plain values; the validation of its head; what every
+// handler requires of a request.
 #ifndef SERVER_HTTP_REQUEST_H
 #define SERVER_HTTP_REQUEST_H
 
@@ -58,7 +58,11 @@ struct Request {
     const char *content_type, *accept, *prefer, *if_none_match, *if_range,
         *range; // NULL if absent
     const char *expect, *authorization, *accept_encoding, *content_encoding, *if_match,
-        *idempotency_key, *last_event_id;
+        *idempotency_key, *last_event_id, *content_length, *transfer_encoding, *origin, *fetch_site;
+    const char *repeated;     // the name of a header that may be there only once, or NULL
+    char faulty[40];          // the name of a header with a character that is not allowed, or ""
+    uint64_t length;          // of the body, from Content-Length
+    bool is_chunked;          // the body has no Content-Length
     char prefers[128];        // all Prefer headers in one: `prefer` points here
     const char *client;       // the name of the token it came with; NULL: none was asked for
     Holder holder;            // `client` points here
@@ -85,9 +89,29 @@ struct Request {
 Status request_open(Request *request, const char *target, Problem *problem);
 void request_close(Request *request);
 
-// Keeps the headers named above, the first of each kind; `value` must outlive the request. An
-// X-Request-Id becomes `id` if it is 1 to 64 of [A-Za-z0-9._-].
-void request_header(Request *request, const char *name, const char *value);
+// Keeps the headers named above, the first of each kind; `value` (NULL: none) must outlive the
+// request. An X-Request-Id becomes `id` if it is 1 to 64 of [A-Za-z0-9._-].
+void request_header(Request *request, const char *name, size_t name_size, const char *value,
+                    size_t value_size);
+
+// The names that requests may call us by.
+typedef struct AcceptedHosts {
+    const char *const *names;   // without port, "[::1]", NULL-terminated
+    bool takes_addresses;       // any numeric address as well: no other site's name leads to it
+    const char *const *origins; // of other sites that may use the API, NULL-terminated; or NULL
+} AcceptedHosts;
+extern const AcceptedHosts loopback_hosts; // localhost, 127.0.0.1 and [::1]
+
+// Refuses heads that two parsers could read differently and hosts that are not this server's: the
+// connection is to be closed. `target` is as sent; request->target may be unset. 0 if the request
+// may go on, else the HTTP status (400, 403, 414, 421, 501, 505), with the reason in `problem`.
+// 403: another site's page sends a request that is not GET, HEAD or OPTIONS.
+int request_validate(Request *request, const AcceptedHosts *hosts, const char *target,
+                     const char *version, Problem *problem);
+// The one of the origins that the Origin header names; NULL: none.
+const char *request_allowed_origin(const Request *request, const AcceptedHosts *hosts);
+// Whether a Host header's value is one of the names, with any port or none.
+bool host_is_ours(const AcceptedHosts *hosts, const char *host);
 
 const char *request_query(const Request *request, const char *name); // NULL if absent
 

@@ -1,6 +1,6 @@
 // One certificate is in use at a time. Those before it are kept to the end: a handshake may still
 // use one, and they are a few kilobytes each.
-#include "server/http/tls.h"
+#include "server/http/server.h"
 
 #include <stdatomic.h>
 #include <stdlib.h>

@@ -1,7 +1,7 @@
 // Base URLs taken apart, and those that are none.
 #include <string.h>
 
-#include "server/http/address.h"
+#include "server/http/server.h"
 #include "tests/support/test.h"
 
 TEST(urls_are_taken_apart) {

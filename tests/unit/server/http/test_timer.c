@@ -7,7 +7,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "server/http/timer.h"
+#include "server/http/connection.h"
 #include "server/util/clock.h"
 #include "tests/support/test.h"
 
