@@ -84,29 +84,35 @@ static int header_fit(Span range, Span type) {
     return 0;
 }
 
-// The quality the most specific fitting range gives to `type`; *fit says how specific it was.
-static double header_quality(const char *accept, const char *type, int *fit) {
-    const char *end = accept + strlen(accept), *text = accept;
-    const Span bare = span_trimmed(type, strcspn(type, ";"));
-    double quality = 0;
-    *fit = 0;
-    Span item;
-    while (header_item_next(&text, end, ',', &item)) {
-        const char *piece = item.at, *piece_end = item.at + item.size;
-        Span range, parameter, name, value;
-        if (!header_item_next(&piece, piece_end, ';', &range))
+// The next item of a list with weights, "item;q=0.5, item". False at the end.
+static bool header_weighted_next(const char **text, Span *item, double *weight) {
+    Span whole, parameter, name, value;
+    while (header_item_next(text, *text + strlen(*text), ',', &whole)) {
+        const char *piece = whole.at, *end = whole.at + whole.size;
+        if (!header_item_next(&piece, end, ';', item))
             continue;
-        double q = 1;
-        while (header_item_next(&piece, piece_end, ';', &parameter)) {
+        *weight = 1;
+        while (header_item_next(&piece, end, ';', &parameter)) {
             header_split(parameter, &name, &value);
-            double number;
-            if (span_is(name, "q"))
-                q = span_number(value, &number) ? (number > 1 ? 1 : number) : 0;
+            if (span_is(name, "q") && !span_number(value, weight))
+                *weight = 0;
         }
+        return true;
+    }
+    return false;
+}
+
+// The weight that the most specific fitting range gives to `type`; *fit says how specific it was.
+static double header_quality(const char *accept, const char *type, int *fit) {
+    const Span bare = span_trimmed(type, strcspn(type, ";"));
+    double quality = 0, q;
+    Span range;
+    *fit = 0;
+    while (header_weighted_next(&accept, &range, &q)) {
         const int this_fit = header_fit(range, bare);
         if (this_fit > *fit) {
             *fit = this_fit;
-            quality = q;
+            quality = q > 1 ? 1 : q;
         }
     }
     return quality;
@@ -129,30 +135,15 @@ int header_accept(const char *accept, const char *const *types) {
 }
 
 bool header_accepts_gzip(const char *accept_encoding) {
-    if (accept_encoding == NULL)
-        return false;
-    const char *end = accept_encoding + strlen(accept_encoding), *text = accept_encoding;
-    bool any = false, is_named = false, named = false;
-    Span item, coding, name, value;
-    while (header_item_next(&text, end, ',', &item)) {
-        const char *piece = item.at, *item_end = item.at + item.size;
-        double quality = 1;
-        if (!header_item_next(&piece, item_end, ';', &coding))
-            continue;
-        while (header_item_next(&piece, item_end, ';', &item)) {
-            double number;
-            header_split(item, &name, &value);
-            if (span_is(name, "q") && span_number(value, &number))
-                quality = number;
-        }
-        if (span_is(coding, "gzip") || span_is(coding, "x-gzip")) {
-            is_named = true;
-            named = quality > 0;
-        } else if (span_is(coding, "*")) {
-            any = quality > 0;
-        }
+    double any = 0, named = -1, q;
+    Span coding;
+    while (accept_encoding != NULL && header_weighted_next(&accept_encoding, &coding, &q)) {
+        if (span_is(coding, "gzip") || span_is(coding, "x-gzip"))
+            named = q;
+        else if (span_is(coding, "*"))
+            any = q;
     }
-    return is_named ? named : any;
+    return (named >= 0 ? named : any) > 0;
 }
 
 Prefer header_prefer(const char *prefer) {

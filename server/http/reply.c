@@ -68,6 +68,14 @@ Status reply_bytes(Reply *reply, int code, const char *content_type, Bytes *byte
     return STATUS_OK;
 }
 
+// Puts `bytes`, which are whole, in the place of the body.
+static void reply_replace_body(Reply *reply, Bytes *bytes) {
+    if (reply->release != NULL)
+        reply->release(reply->context);
+    reply->body = reply->context = bytes_take(bytes, &reply->body_size);
+    reply->release = free;
+}
+
 static bool reply_tag(Reply *reply, const Request *request, const char *text,
                       const char *cache_control) {
     snprintf(reply->etag, sizeof reply->etag, "\"%s%s\"", text, request->is_pretty ? PRETTY : "");
@@ -152,17 +160,9 @@ void reply_indent(Reply *reply, const Request *request) {
     if (source.at != NULL)
         reply_indent_json(&indented, source.at, source.count);
     bytes_clear(&source);
-    size_t size = 0;
-    char *body = bytes_take(&indented, &size);
-    if (body == NULL || size == 0) {
-        free(body);
-        return;
-    }
-    if (reply->release != NULL)
-        reply->release(reply->context);
-    reply->body = reply->context = body;
-    reply->body_size = size;
-    reply->release = free;
+    if (indented.count > 0)
+        reply_replace_body(reply, &indented);
+    bytes_clear(&indented);
 }
 
 static bool reply_is_text(const char *type) {
@@ -184,13 +184,7 @@ bool reply_pack(Reply *reply, const Request *request) {
         bytes_clear(&packed);
         return false;
     }
-    if (reply->release != NULL)
-        reply->release(reply->context);
-    size_t size = 0;
-    char *body = bytes_take(&packed, &size);
-    reply->body = reply->context = body;
-    reply->body_size = size;
-    reply->release = free;
+    reply_replace_body(reply, &packed);
     reply->content_encoding = "gzip";
     const size_t length = strlen(reply->etag);
     if (length > 0 && length + sizeof PACKED <= sizeof reply->etag)
