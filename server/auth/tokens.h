@@ -3,7 +3,7 @@
 #ifndef SERVER_AUTH_TOKENS_H
 #define SERVER_AUTH_TOKENS_H
 
-#include "server/db/tokens.h"
+#include "server/db/db.h"
 
 typedef struct Tokens Tokens;
 

@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "server/cli/files.h"
-#include "server/db/backup.h"
+#include "server/db/db.h"
 
 typedef struct BackupSettings {
     char *data;

@@ -1,8 +1,6 @@
 // A copy is of one moment, whatever a daemon writes meanwhile, and is whole or not there:
 //
 //     source --> TARGET.xxxxxx --> check --> sync --> TARGET
-#include "server/db/backup.h"
-
 #include <errno.h>
 #include <limits.h>
 #include <stdio.h>
@@ -16,14 +14,14 @@
 #include "server/db/sqlite.h"
 #include "server/util/embedded.h"
 
-// The daemon's own, and the log of an earlier one; a copy under one of these names would be used as
-// a part of its database.
+// The daemon's own, and the log of earlier versions; a copy under one of these names would be used
+// as a part of its database.
 static const char *const own_names[] = {"impactd.db",
                                         "impactd.db-wal",
                                         "impactd.db-shm",
-                                        "impactd.late",
                                         "impactd.lock",
                                         "impactd.db-journal",
+                                        "impactd.late",
                                         NULL};
 
 static const double copy_share = 0.8; // of the time; the check takes the rest
@@ -76,11 +74,10 @@ static Status check_target(const Copying *copying, Problem *problem) {
 static Status open_source(Copying *copying, Sqlite **source, Problem *problem) {
     static const char sql[] =
         "SELECT count(*) AS jobs FROM sqlite_schema WHERE name IN ('jobs', 'results', 'materials')";
-    bool is_found, is_current;
+    bool is_current;
     TRY(sqlite_open(copying->source, DATABASE_READER, source, problem));
     TRY(sqlite_is_current(*source, embedded_sql, &is_current, problem));
-    TRY(sqlite_first(*source, sql, NULL, NULL, backup_columns, &copying->backup, &is_found,
-                     problem));
+    TRY(sqlite_first(*source, sql, NULL, NULL, backup_columns, &copying->backup, NULL, problem));
     if (copying->backup.jobs != 3)
         return problem_set(problem, STATUS_NOT_FOUND,
                            "%s holds nothing yet: no daemon has begun there", copying->source);
@@ -104,13 +101,12 @@ static Status check_copy(Copying *copying, Problem *problem) {
     static const char sql[] = "SELECT (SELECT count(*) FROM jobs) AS jobs, "
                               "(SELECT count(*) FROM results) AS results, "
                               "(SELECT count(*) FROM materials) AS materials";
-    bool is_found;
     Problem found = {0};
     const Status status = sqlite_check(copying->copy, &found);
     if (status != STATUS_OK)
         return problem_set(problem, status, "%s: %s; nothing was copied, keep the other backups",
                            copying->source, found.detail);
-    return sqlite_first(copying->copy, sql, NULL, NULL, backup_columns, &copying->backup, &is_found,
+    return sqlite_first(copying->copy, sql, NULL, NULL, backup_columns, &copying->backup, NULL,
                         problem);
 }
 
@@ -178,55 +174,6 @@ static void remove_beside(const char *path, bool removes_path) {
     }
 }
 
-static Status backup_begin(const BackupRequest *request, Copying **copying, Problem *problem) {
-    *copying = calloc(1, sizeof **copying);
-    if (*copying == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a backup");
-    (*copying)->request = request;
-    (*copying)->file = -1;
-    return STATUS_OK;
-}
-
-static Status backup_end(Copying *copying, Status status, Backup *backup, Problem *problem) {
-    sqlite_close(copying->copy);
-    if (copying->part[0] != '\0')
-        remove_beside(copying->part, true);
-    if (copying->file >= 0)
-        close(copying->file);
-    if (status == STATUS_FULL)
-        status = report_full(copying, problem);
-    *backup = status == STATUS_OK ? copying->backup : (Backup){0};
-    free(copying);
-    return status;
-}
-
-Status backup_write(const BackupRequest *request, Backup *backup, Problem *problem) {
-    Copying *copying;
-    TRY(backup_begin(request, &copying, problem));
-    const char *slash = strrchr(request->path, '/');
-    snprintf(copying->source, sizeof copying->source, "%.4000s/impactd.db", request->directory);
-    snprintf(copying->target, sizeof copying->target, "%s", request->path);
-    snprintf(copying->folder, sizeof copying->folder, "%.*s",
-             slash == NULL || slash == request->path ? 1 : (int)(slash - request->path),
-             slash == NULL ? "." : request->path);
-    Status status = check_target(copying, problem);
-    if (status == STATUS_OK && access(copying->source, F_OK) != 0 && errno != EACCES)
-        status = problem_set(problem, STATUS_NOT_FOUND,
-                             "there is no database in %s; --data DIR names the daemon's folder",
-                             request->directory);
-    if (status == STATUS_OK)
-        status = fill_part(copying, problem);
-    sqlite_close(copying->copy);
-    copying->copy = NULL;
-    if (status == STATUS_OK)
-        status = sync_part(copying, problem);
-    if (status == STATUS_OK)
-        status = check_target(copying, problem);
-    if (status == STATUS_OK)
-        status = rename_part(copying, request->replaces, problem);
-    return backup_end(copying, status, backup, problem);
-}
-
 static Status check_restore(const Copying *copying, Problem *problem) {
     const char *directory = copying->request->directory, *path = copying->source;
     struct stat source, target;
@@ -257,28 +204,61 @@ static void finish_replaced(const char *path) {
     remove_beside(path, false);
 }
 
+static Status backup_copy(const BackupRequest *request, bool is_restore, Backup *backup,
+                          Problem *problem) {
+    Copying *copying = calloc(1, sizeof *copying);
+    *backup = (Backup){0};
+    if (copying == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a backup");
+    copying->request = request;
+    copying->file = -1;
+    char *own = is_restore ? copying->target : copying->source;
+    char *other = is_restore ? copying->source : copying->target;
+    const char *slash = strrchr(request->path, '/');
+    snprintf(own, PATH_MAX, "%.4000s/impactd.db", request->directory);
+    snprintf(other, PATH_MAX, "%s", request->path);
+    if (is_restore)
+        snprintf(copying->folder, sizeof copying->folder, "%.4000s", request->directory);
+    else
+        snprintf(copying->folder, sizeof copying->folder, "%.*s",
+                 slash == NULL || slash == request->path ? 1 : (int)(slash - request->path),
+                 slash == NULL ? "." : request->path);
+    Status status = is_restore ? check_restore(copying, problem) : check_target(copying, problem);
+    if (status == STATUS_OK && !is_restore && access(own, F_OK) != 0 && errno != EACCES)
+        status = problem_set(problem, STATUS_NOT_FOUND,
+                             "there is no database in %s; --data DIR names the daemon's folder",
+                             request->directory);
+    if (status == STATUS_OK)
+        status = fill_part(copying, problem);
+    sqlite_close(copying->copy);
+    if (status == STATUS_OK)
+        status = sync_part(copying, problem);
+    if (status == STATUS_OK && is_restore)
+        finish_replaced(copying->target);
+    else if (status == STATUS_OK)
+        status = check_target(copying, problem);
+    if (status == STATUS_OK)
+        status = rename_part(copying, is_restore || request->replaces, problem);
+    if (copying->part[0] != '\0')
+        remove_beside(copying->part, true);
+    if (copying->file >= 0)
+        close(copying->file);
+    if (status == STATUS_FULL)
+        status = report_full(copying, problem);
+    if (status == STATUS_OK)
+        *backup = copying->backup;
+    free(copying);
+    return status;
+}
+
+Status backup_write(const BackupRequest *request, Backup *backup, Problem *problem) {
+    return backup_copy(request, false, backup, problem);
+}
+
 Status backup_restore(const BackupRequest *request, Backup *backup, Problem *problem) {
-    Copying *copying;
     int lock;
     TRY(data_dir_lock(request->directory, &lock, problem));
-    Status status = backup_begin(request, &copying, problem);
-    if (status == STATUS_OK) {
-        snprintf(copying->source, sizeof copying->source, "%s", request->path);
-        snprintf(copying->folder, sizeof copying->folder, "%.4000s", request->directory);
-        snprintf(copying->target, sizeof copying->target, "%.4000s/impactd.db", request->directory);
-        status = check_restore(copying, problem);
-        if (status == STATUS_OK)
-            status = fill_part(copying, problem);
-        sqlite_close(copying->copy);
-        copying->copy = NULL;
-        if (status == STATUS_OK)
-            status = sync_part(copying, problem);
-        if (status == STATUS_OK) {
-            finish_replaced(copying->target);
-            status = rename_part(copying, true, problem);
-        }
-        status = backup_end(copying, status, backup, problem);
-    }
+    const Status status = backup_copy(request, true, backup, problem);
     data_dir_unlock(lock);
     return status;
 }

@@ -9,6 +9,7 @@
 #include <stdint.h>
 
 #include "core/base/field.h"
+#include "core/base/progress.h"
 #include "core/base/status.h"
 #include "server/db/sqlite.h"
 #include "server/util/bytes.h"
@@ -255,5 +256,54 @@ typedef struct Removed {
 Status db_remove(Db *db, const KeepRules *rules, Removed *removed, Problem *problem);
 // Removes one finished job, and its result if that was the last job of it. STATUS_NOT_FOUND.
 Status db_job_remove(Db *db, const char *id, Removed *removed, Problem *problem);
+
+// Access tokens as they are stored: names, digests, scopes, times.
+enum { TOKEN_NAME_SIZE = 65, TOKENS_MAX = 1000 };
+
+// Times in milliseconds since 1970; 0: never.
+typedef struct TokenRow {
+    char name[TOKEN_NAME_SIZE]; // [A-Za-z0-9._-]{1,64}
+    char digest[65];            // SHA-256, in hexadecimal digits
+    char scopes[64];            // "read,submit"
+    int64_t created_unix_ms, used_unix_ms, expires_unix_ms, revoked_unix_ms;
+} TokenRow;
+typedef struct TokenRows {
+    TokenRow *at; // freed by free
+    size_t count;
+} TokenRows;
+
+// STATUS_CONFLICT where the name is taken, STATUS_LIMIT where there are TOKENS_MAX.
+Status db_token_add(Db *db, const TokenRow *row, Problem *problem);
+// All, by name.
+Status db_tokens(Db *db, TokenRows *rows, Problem *problem);
+// Revokes at row->revoked_unix_ms; STATUS_NOT_FOUND, STATUS_CONFLICT if it is revoked already.
+Status db_token_revoke(Db *db, const TokenRow *row, Problem *problem);
+// Deletes it; STATUS_NOT_FOUND, STATUS_CONFLICT unless it is revoked.
+Status db_token_forget(Db *db, const TokenRow *row, Problem *problem);
+// Stores row->used_unix_ms.
+Status db_token_used(Db *db, const TokenRow *row, Problem *problem);
+
+// A database as one file: a copy of the daemon's, made beside it while it runs or without it, and
+// the way back.
+typedef struct BackupRequest {
+    const char *directory; // the daemon's
+    const char *path;      // of the copy
+    bool replaces;         // the file that is written may exist
+    const Progress *watch; // NULL: none
+} BackupRequest;
+
+// What a copy contains.
+typedef struct Backup {
+    uint64_t bytes, jobs, results, materials;
+} Backup;
+
+// Copies all that was acknowledged before it began to `path`, and checks it. The file appears whole
+// and durable, or nothing is left: STATUS_CANCELLED when the watch stops, STATUS_FULL,
+// STATUS_NOT_FOUND without a database, STATUS_CONFLICT where `path` is taken.
+Status backup_write(const BackupRequest *request, Backup *backup, Problem *problem);
+
+// Copies `path` to the folder's database, likewise. STATUS_CONFLICT where a daemon has the folder,
+// where it has a database and that may not be replaced, and where the schema is not this program's.
+Status backup_restore(const BackupRequest *request, Backup *backup, Problem *problem);
 
 #endif

@@ -1,9 +1,4 @@
 // Tokens are few and change seldom: every look is at all of them.
-#include "server/db/tokens.h"
-
-#include <stdlib.h>
-#include <string.h>
-
 #include "server/db/db_private.h"
 
 // clang-format off

@@ -8,7 +8,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/db/backup.h"
 #include "server/db/db.h"
 #include "tests/support/scratch.h"
 #include "tests/support/test.h"
