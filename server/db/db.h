@@ -155,8 +155,7 @@ typedef struct ResultCommit {
     const ResultRow *result;
     const JobRow *jobs;
 } ResultCommit;
-Status db_result_save(Db *db, const ResultRow *result, const JobRow *jobs, Problem *problem);
-// The same without waiting; borrows all of it.
+// Saved without waiting; all of it is borrowed.
 void db_result_post(Db *db, const ResultCommit *commit, PendingWrite *write);
 // All but the outcome.
 Status db_result_load(Db *db, const char *id, ResultRow *row, Problem *problem);

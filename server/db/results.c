@@ -68,10 +68,6 @@ static Status result_apply_finish(Sqlite *database, const void *work, Problem *p
     return STATUS_OK;
 }
 
-Status db_result_save(Db *db, const ResultRow *result, const JobRow *jobs, Problem *problem) {
-    return db_write(db, result_apply_finish, &(ResultCommit){result, jobs}, problem);
-}
-
 void db_result_post(Db *db, const ResultCommit *commit, PendingWrite *write) {
     db_enqueue(db, result_apply_finish, commit, WRITE_NORMAL, write);
 }

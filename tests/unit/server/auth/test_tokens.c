@@ -63,83 +63,6 @@ TEST(without_tokens_the_door_is_open) {
     db_close(db);
 }
 
-TEST(a_token_opens_what_its_scopes_say) {
-    Db *db;
-    Tokens *tokens;
-    char reader[128], worker[128], chief[128], other[128], client[TOKEN_NAME_SIZE];
-    assert_int_equal(db_open(NULL, &db, NULL), STATUS_OK);
-    assert_int_equal(add(db, "reader", "read", 0, reader), STATUS_OK);
-    assert_int_equal(add(db, "worker", "submit,materials", 0, worker), STATUS_OK);
-    assert_int_equal(add(db, "chief", "admin", 0, chief), STATUS_OK);
-    assert_int_equal(add(db, "chief", "admin", 0, other), STATUS_CONFLICT);
-    assert_int_equal(tokens_open(db, false, &tokens, NULL), STATUS_OK);
-    assert_int_equal(tokens_usable(tokens), 3);
-    assert_int_equal(check(tokens, reader, "read", client), STATUS_OK);
-    assert_string_equal(client, "reader");
-    assert_int_equal(check(tokens, reader, "submit", client), STATUS_FORBIDDEN);
-    assert_int_equal(check(tokens, worker, "submit", client), STATUS_OK);
-    assert_int_equal(check(tokens, worker, "materials", client), STATUS_OK);
-    assert_int_equal(check(tokens, worker, "read", client), STATUS_FORBIDDEN);
-    for (size_t i = 0; scope_names[i] != NULL; i++)
-        assert_int_equal(check(tokens, chief, scope_names[i], client), STATUS_OK);
-    assert_string_equal(client, "chief");
-
-    Problem problem;
-    Holder holder;
-    problem_clear(&problem);
-    assert_int_equal(tokens_check(tokens, chief, "read", &holder, NULL), STATUS_OK);
-    assert_true(holder.is_admin);
-    assert_int_equal(tokens_check(tokens, worker, "submit", &holder, NULL), STATUS_OK);
-    assert_false(holder.is_admin);
-    assert_int_equal(tokens_check(tokens, reader, "admin", &holder, &problem), STATUS_FORBIDDEN);
-    assert_non_null(strstr(problem.detail, "\"admin\""));
-    tokens_close(tokens);
-    db_close(db);
-}
-
-TEST(what_is_no_token_of_ours_stays_out) {
-    Db *db;
-    Tokens *tokens;
-    char good[128], text[160], client[TOKEN_NAME_SIZE];
-    assert_int_equal(db_open(NULL, &db, NULL), STATUS_OK);
-    assert_int_equal(add(db, "a", "read", 0, good), STATUS_OK);
-    assert_int_equal(tokens_open(db, false, &tokens, NULL), STATUS_OK);
-    const char *token = good + strlen("Bearer ");
-    assert_int_equal(strlen(token), TOKEN_SIZE - 1);
-    static const char *const wrong[] = {"%s",        "Basic %s",   "Bearer%s",     "Bearer",
-                                        "Bearer ",   "Bearer x%s", "Bearer %sx",   "Bearer %s %s",
-                                        "Token: %s", "",           "Bearer\t%.10s"};
-    for (size_t i = 0; i < COUNT(wrong); i++) {
-        char spelt[400];
-        // Each holds the token at most twice.
-        const char *at = wrong[i];
-        size_t used = 0;
-        for (; *at != '\0' && used + 100 < sizeof spelt; at++) {
-            if (*at != '%') {
-                spelt[used++] = *at;
-                continue;
-            }
-            const int digits = at[1] == '.' ? 10 : 100;
-            used += (size_t)snprintf(spelt + used, sizeof spelt - used, "%.*s", digits, token);
-            at = strchr(at, 's');
-        }
-        spelt[used] = '\0';
-        if (check(tokens, spelt, "read", client) != STATUS_UNAUTHORIZED)
-            fail_msg("\"%s\" lets in", spelt);
-        assert_string_equal(client, "");
-    }
-    // Another last digit.
-    snprintf(text, sizeof text, "%s", good);
-    char *last = text + strlen(text) - 1;
-    *last = *last == '0' ? '1' : '0';
-    assert_int_equal(check(tokens, text, "read", client), STATUS_UNAUTHORIZED);
-    snprintf(text, sizeof text, "bEARER   %s  ", token);
-    assert_int_equal(check(tokens, text, "read", client), STATUS_OK);
-    assert_int_equal(check(tokens, NULL, "read", client), STATUS_UNAUTHORIZED);
-    tokens_close(tokens);
-    db_close(db);
-}
-
 TEST(tokens_made_and_revoked_elsewhere_are_followed) {
     char folder[] = "/tmp/impactd-tokens-XXXXXX", first[128], second[128], client[TOKEN_NAME_SIZE];
     assert_non_null(mkdtemp(folder));
@@ -183,22 +106,6 @@ TEST(tokens_made_and_revoked_elsewhere_are_followed) {
         (void)unlink(command);
     }
     assert_int_equal(rmdir(folder), 0);
-}
-
-TEST(the_last_revoked_token_leaves_the_door_shut) {
-    Db *db;
-    Tokens *tokens;
-    char header[128], client[TOKEN_NAME_SIZE];
-    assert_int_equal(db_open(NULL, &db, NULL), STATUS_OK);
-    assert_int_equal(add(db, "a", "read", 0, header), STATUS_OK);
-    TokenRow row = {.name = "a", .revoked_unix_ms = 1};
-    assert_int_equal(db_token_revoke(db, &row, NULL), STATUS_OK);
-    assert_int_equal(tokens_open(db, false, &tokens, NULL), STATUS_OK);
-    assert_int_equal(tokens_usable(tokens), 0);
-    assert_int_equal(check(tokens, NULL, "read", client), STATUS_UNAUTHORIZED);
-    assert_int_equal(check(tokens, header, "read", client), STATUS_UNAUTHORIZED);
-    tokens_close(tokens);
-    db_close(db);
 }
 
 TEST(an_expired_token_says_so) {

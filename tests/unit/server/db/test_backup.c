@@ -1,9 +1,5 @@
-// A copy of the database from inside: under a writer in the same process, and stopped at every
-// moment.
+// A copy of the database, stopped at every moment.
 #include <dirent.h>
-#include <poll.h>
-#include <pthread.h>
-#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -57,50 +53,6 @@ static size_t files_in(const char *folder) {
         count += one->d_name[0] != '.';
     closedir(opened);
     return count;
-}
-
-typedef struct Stream {
-    Db *db;
-    atomic_ulong added; // rows that are acknowledged
-    atomic_bool is_over;
-} Stream;
-
-static void *stream(void *of) {
-    Stream *rows = of;
-    for (unsigned long number = 0; !atomic_load(&rows->is_over); number++) {
-        const JobRow row = job_row(number);
-        if (db_job_add(rows->db, &row, NULL) != STATUS_OK)
-            break;
-        atomic_store(&rows->added, number + 1);
-    }
-    return NULL;
-}
-
-TEST_IN(every_row_that_was_added_before_is_in_the_copy, folders_make, folders_remove) {
-    Stream rows = {.db = open_store(data)};
-    pthread_t thread;
-    assert_int_equal(pthread_create(&thread, NULL, stream, &rows), 0);
-    unsigned long last = 0;
-    for (int round = 0; round < 6; round++) {
-        Backup backup;
-        while (atomic_load(&rows.added) < last + 200)
-            (void)poll(NULL, 0, 1);
-        last = atomic_load(&rows.added);
-        if (copy(NULL, &backup) != STATUS_OK)
-            fail_msg("%s", problem.detail);
-        assert_true(backup.jobs >= last);
-        Db *db = open_store(target);
-        for (unsigned long number = last > 300 ? last - 300 : 0; number < last; number++) {
-            const JobRow row = job_row(number);
-            JobRow loaded;
-            assert_int_equal(db_job_load(db, row.id, &loaded, NULL), STATUS_OK);
-            job_row_clear(&loaded);
-        }
-        db_close(db);
-    }
-    atomic_store(&rows.is_over, true);
-    pthread_join(thread, NULL);
-    db_close(rows.db);
 }
 
 static bool stop_at(void *context, double fraction) {

@@ -26,64 +26,6 @@ static int remove_folder(void **state) {
     return 0;
 }
 
-TEST_IN(a_revision_comes_back_as_it_went, make_folder, remove_folder) {
-    Db *db = felt_store(folder);
-    MaterialRevision whole = felt_saying(0.5), found;
-    Material *said = &whole.material;
-    said->kind = "foam";
-    said->hardness = "Shore A 40";
-    said->supplier = "Acme";
-    said->notes = "a\nb\t\"c\"";
-    said->impactor = "steel ball";
-    said->thickness = 0.004;
-    said->restitution_deviation = 0.01;
-    said->contact_time = 0.02;
-    said->contact_time_deviation = 0.001;
-    said->separation = SEPARATION_ZERO_FORCE;
-    said->least_speed = 0.1;
-    said->most_speed = 1.0 / 3;
-    said->least_temperature = -5;
-    said->most_temperature = 20;
-    said->impactor_mass = 0.11;
-    said->base = MATERIAL_BASE_FREE;
-    said->base_mass = 7;
-    whole.author = "ann";
-    assert_int_equal(db_material_add(db, &whole, NULL), STATUS_OK);
-    assert_int_equal(db_material_add(db, &whole, NULL), STATUS_CONFLICT);
-    MaterialRevision bare = felt_saying(0.4);
-    bare.material.tags = (Texts){NULL, 0};
-    assert_int_equal(db_material_revise(db, &bare, 1, NULL), STATUS_OK);
-    assert_int_equal(bare.revision, 2);
-    db_close(db);
-
-    db = felt_store(folder);
-    assert_int_equal(db_material(db, "felt", 1, &found, NULL), STATUS_OK);
-    assert_string_equal(found.material.notes, said->notes);
-    assert_string_equal(found.material.hardness, said->hardness);
-    assert_string_equal(found.material.impactor, said->impactor);
-    assert_true(found.material.most_speed == 1.0 / 3 && found.material.least_temperature == -5);
-    assert_true(found.material.thickness == 0.004 && found.material.base_mass == 7);
-    assert_int_equal(found.material.separation, SEPARATION_ZERO_FORCE);
-    assert_int_equal(found.material.base, MATERIAL_BASE_FREE);
-    assert_int_equal(found.material.tags.count, 1);
-    assert_string_equal(found.material.tags.at[0], said->tags.at[0]);
-    assert_string_equal(found.author, "ann");
-    assert_string_equal(found.status, "draft");
-    assert_null(found.reason);
-    assert_int_equal(found.created_unix_ms, 5000);
-    assert_int_equal(found.latest, 2);
-    assert_int_equal(found.version, 2);
-    material_revision_clear(&found);
-    assert_int_equal(db_material(db, "felt", 2, &found, NULL), STATUS_OK);
-    assert_int_equal(found.material.tags.count, 0);
-    assert_null(found.author);
-    assert_null(found.material.kind);
-    assert_true(isnan(found.material.contact_time) && isnan(found.material.base_mass));
-    assert_int_equal(found.material.base, CHOICE_ABSENT);
-    material_revision_clear(&found);
-    db_close(db);
-}
-
 static Sqlite *open_database(void) {
     char path[128];
     Sqlite *database;

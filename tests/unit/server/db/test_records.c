@@ -2,7 +2,6 @@
 // used.
 #include "server/db/records.h"
 
-#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -54,129 +53,6 @@ static void add_new(Db *db, const char *name, double first) {
     assert_false(is_there);
 }
 
-TEST(a_record_comes_back_to_the_bit) {
-    Db *db = db_make();
-    NamedRecord *named, *again;
-    RecordRow row;
-    add_new(db, "elcentro", 0.1);
-    assert_int_equal(db_record(db, "elcentro", &row, &problem), STATUS_OK);
-    assert_true(row.count == 3 && row.interval == 0.02 && row.peak == 2);
-    assert_null(row.author);
-    record_row_clear(&row);
-    assert_int_equal(db_record_named(db, "elcentro", &named, &problem), STATUS_OK);
-    assert_true(named->samples.count == 3 && named->interval == 0.02);
-    assert_true(named->samples.at[0] == 0.1 && named->samples.at[2] == 0.5);
-    // Others share them, also when something else came in between.
-    add_new(db, "other", 0.2);
-    assert_int_equal(db_record_named(db, "elcentro", &again, &problem), STATUS_OK);
-    assert_ptr_equal(named, again);
-    refcount_unref(&named->shared);
-    refcount_unref(&again->shared);
-    assert_int_equal(db_record_named(db, "elcentr", &named, &problem), STATUS_NOT_FOUND);
-    assert_null(named);
-    db_end(db);
-}
-
-TEST(what_is_there_already_is_told_from_what_would_change_it) {
-    Db *db = db_make();
-    bool is_there = false;
-    add_new(db, "elcentro", 0.1);
-    assert_int_equal(add(db, "elcentro", 0.1, NULL, &is_there), STATUS_OK);
-    assert_true(is_there);
-    assert_int_equal(add(db, "elcentro", 0.2, NULL, &is_there), STATUS_CONFLICT);
-    assert_non_null(strstr(problem.detail, "samples"));
-    assert_int_equal(add(db, "elcentro", 0.1, "PEER", &is_there), STATUS_CONFLICT);
-    assert_non_null(strstr(problem.detail, "another source"));
-    RecordRow row;
-    assert_int_equal(db_record(db, "elcentro", &row, &problem), STATUS_OK);
-    assert_null(row.source);
-    RecordRows twins;
-    assert_int_equal(db_record_twins(db, &row, &twins, &problem), STATUS_OK);
-    assert_int_equal(twins.count, 0);
-    add_new(db, "same", 0.1);
-    assert_int_equal(db_record_twins(db, &row, &twins, &problem), STATUS_OK);
-    assert_int_equal(twins.count, 1);
-    assert_string_equal(twins.at[0].name, "same");
-    record_rows_clear(&twins);
-    record_row_clear(&row);
-    db_end(db);
-}
-
-TEST(a_list_goes_on_behind_a_name_and_searches_words) {
-    static const char *const names[] = {"b", "a", "C", "d"};
-    Db *db = db_make();
-    RecordRows rows;
-    bool is_there;
-    for (size_t i = 0; i < COUNT(names); i++)
-        assert_int_equal(
-            add(db, names[i], (double)i, i == 3 ? "The Imperial Valley" : NULL, &is_there),
-            STATUS_OK);
-    assert_int_equal(db_records(db, NULL, "", 2, &rows, &problem), STATUS_OK);
-    assert_int_equal(rows.count, 2);
-    assert_string_equal(rows.at[0].name, "C");
-    assert_string_equal(rows.at[1].name, "a");
-    record_rows_clear(&rows);
-    assert_int_equal(db_records(db, NULL, "a", 9, &rows, &problem), STATUS_OK);
-    assert_int_equal(rows.count, 2);
-    record_rows_clear(&rows);
-    assert_int_equal(db_records(db, "imperial", "", 9, &rows, &problem), STATUS_OK);
-    assert_int_equal(rows.count, 1);
-    assert_string_equal(rows.at[0].name, "d");
-    record_rows_clear(&rows);
-    assert_int_equal(db_records(db, "%", "", 9, &rows, &problem), STATUS_OK);
-    assert_int_equal(rows.count, 0);
-    record_rows_clear(&rows);
-    db_end(db);
-}
-
-static JobRow job_add(Db *db, const char *id, int state, const char *uses) {
-    JobRow row = {.state = state, .scene = "{}", .warnings = "[]", .uses = (char *)uses};
-    snprintf(row.id, sizeof row.id, "%s", id);
-    assert_int_equal(db_job_add(db, &row, &problem), STATUS_OK);
-    return row;
-}
-
-TEST(a_record_in_use_is_not_deleted) {
-    Db *db = db_make();
-    RecordUses uses;
-    NamedRecord *named;
-    add_new(db, "elcentro", 0.1);
-    add_new(db, "kobe", 0.3);
-    JobRow job = job_add(db, "j-1", 0, "record:elcentro\nrecord:kobe\nrecord:elcentro\n");
-    job_add(db, "j-2", 2, "record:elcentro\n");
-    ResultRow result = {.id = "r-1",
-                        .engine = "e",
-                        .scene = "{}",
-                        .plan = "{}",
-                        .summary = "{}",
-                        .warnings = "[]",
-                        .outcome = {"x", 1},
-                        .uses = "sponge@1\nrecord:elcentro\n"};
-    assert_int_equal(db_result_save(db, &result, NULL, &problem), STATUS_OK);
-    assert_int_equal(db_record_uses(db, "elcentro", &uses, &problem), STATUS_OK);
-    assert_true(uses.results == 1 && uses.jobs == 1);
-    assert_int_equal(db_record_delete(db, "kobe", &uses, NULL), STATUS_CONFLICT);
-    assert_true(uses.results == 0 && uses.jobs == 1);
-    problem_clear(&problem);
-    assert_int_equal(db_record_delete(db, "elcentro", &uses, &problem), STATUS_CONFLICT);
-    assert_true(uses.results == 1 && uses.jobs == 1);
-    assert_non_null(strstr(problem.detail, "1 result and 1 unfinished job:"));
-    // A job that has ended uses nothing any more.
-    job.state = 3;
-    assert_int_equal(db_job_update(db, &job, &problem), STATUS_OK);
-    assert_int_equal(db_record_uses(db, "elcentro", &uses, &problem), STATUS_OK);
-    assert_true(uses.results == 1 && uses.jobs == 0);
-    assert_int_equal(db_record_delete(db, "kobe", &uses, &problem), STATUS_OK);
-    assert_int_equal(db_record_named(db, "kobe", &named, NULL), STATUS_NOT_FOUND);
-    assert_int_equal(db_record_delete(db, "kobe", &uses, NULL), STATUS_NOT_FOUND);
-    // The name is free, and means the new samples at once.
-    add_new(db, "kobe", 0.7);
-    assert_int_equal(db_record_named(db, "kobe", &named, &problem), STATUS_OK);
-    assert_true(named->samples.at[0] == 0.7);
-    refcount_unref(&named->shared);
-    db_end(db);
-}
-
 TEST(nothing_written_beside_the_daemon_changes_a_record) {
     static const char *const attempts[] = {
         "UPDATE records SET peak = 0",
@@ -194,23 +70,19 @@ TEST(nothing_written_beside_the_daemon_changes_a_record) {
         "0",
         "DELETE FROM records",
     };
+    static const char used[] =
+        "INSERT INTO results (number, id, engine, sample_rate, count, created_unix_ms, summary, "
+        "plan, warnings, impact_count, scene, outcome) VALUES (1, 'r-1', 'e', 1, 1, 0, '{}', '{}', "
+        "'[]', 0, '{}', x'00'); INSERT INTO result_uses VALUES ('record:elcentro', 1)";
     Db *db = db_make();
     char path[SCRATCH_SIZE + 16];
     Sqlite *database;
     NamedRecord *named;
     add_new(db, "elcentro", 0.1);
-    ResultRow result = {.id = "r-1",
-                        .engine = "e",
-                        .scene = "{}",
-                        .plan = "{}",
-                        .summary = "{}",
-                        .warnings = "[]",
-                        .outcome = {"x", 1},
-                        .uses = "record:elcentro\n"};
-    assert_int_equal(db_result_save(db, &result, NULL, &problem), STATUS_OK);
     db_close(db);
     snprintf(path, sizeof path, "%s/impactd.db", folder);
     assert_int_equal(sqlite_open(path, DATABASE_WRITER, &database, &problem), STATUS_OK);
+    assert_int_equal(sqlite_execute(database, used, &problem), STATUS_OK);
     for (size_t i = 0; i < COUNT(attempts); i++) {
         problem_clear(&problem);
         if (sqlite_execute(database, attempts[i], &problem) == STATUS_OK)
@@ -259,46 +131,6 @@ TEST(there_are_only_so_many) {
     assert_int_equal(add(db, "three_more", 2, NULL, &is_there), STATUS_LIMIT);
     assert_non_null(strstr(problem.detail, "2147483648"));
     sqlite_close(database);
-    db_end(db);
-}
-
-typedef struct Racer {
-    Db *db;
-    pthread_t thread;
-    Status status;
-    bool is_there;
-} Racer;
-
-static void *race(void *of) {
-    Racer *racer = of;
-    double values[] = {0.1, -2, 0.5};
-    const Reals samples = {values, 3};
-    char digest[RECORD_DIGEST_SIZE];
-    record_digest(0.02, &samples, digest);
-    const RecordRow row = {.name = "same",
-                           .layout = "json",
-                           .unit = "m/s^2",
-                           .interval = 0.02,
-                           .count = 3,
-                           .digest = digest};
-    racer->status = db_record_add(racer->db, &row, &samples, &racer->is_there, NULL);
-    return NULL;
-}
-
-TEST(of_two_same_uploads_at_once_one_is_kept) {
-    Db *db = db_make();
-    Racer racers[8];
-    size_t kept = 0;
-    for (size_t i = 0; i < COUNT(racers); i++) {
-        racers[i] = (Racer){.db = db};
-        assert_int_equal(pthread_create(&racers[i].thread, NULL, race, &racers[i]), 0);
-    }
-    for (size_t i = 0; i < COUNT(racers); i++) {
-        pthread_join(racers[i].thread, NULL);
-        assert_int_equal(racers[i].status, STATUS_OK);
-        kept += !racers[i].is_there;
-    }
-    assert_int_equal(kept, 1);
     db_end(db);
 }
 
