@@ -2,8 +2,6 @@
 // with a comma in front of each member; schema_lay_out drops the first commas and indents.
 #include "server/json/schema.h"
 
-#include <stdio.h>
-
 #include "core/study/study.h"
 
 enum { COMMENT_MAX = 2000 };
@@ -328,23 +326,17 @@ static void schema_lay_out(Bytes *bytes, const char *text) {
     bytes_text(bytes, "\n");
 }
 
-void schema_write(Bytes *bytes, const char *id, const char *title, const Field *fields) {
+void schema_write_document(Bytes *bytes, const SchemaDocument *document) {
     Bytes text = {0};
     bytes_text(&text, "{");
     schema_text(&text, "$schema", "https://json-schema.org/draft/2020-12/schema");
-    schema_text(&text, "$id", id);
-    schema_text(&text, "title", title);
-    schema_object(&text, fields, NULL, NULL);
+    bytes_format(&text, ",\"$id\":\"/schemas/%s\"", document->name);
+    schema_text(&text, "title", document->title);
+    schema_object(&text, document->fields, NULL, NULL);
     bytes_text(&text, "}");
     if (text.is_failed)
         bytes->is_failed = true;
     else
         schema_lay_out(bytes, text.at);
     bytes_clear(&text);
-}
-
-void schema_write_document(Bytes *bytes, const SchemaDocument *document) {
-    char id[64];
-    snprintf(id, sizeof id, "/schemas/%s", document->name);
-    schema_write(bytes, id, document->title, document->fields);
 }

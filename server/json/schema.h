@@ -34,9 +34,6 @@ typedef struct MeasurementBody {
 } MeasurementBody;
 extern const Field measurement_body_fields[];
 
-// A whole schema document, indented, ending in a newline. Units stand under "x-unit".
-void schema_write(Bytes *bytes, const char *id, const char *title, const Field *fields);
-
 // The documents that have a schema: "scene", "material" ...
 typedef struct SchemaDocument {
     const char *name, *title;
@@ -44,7 +41,8 @@ typedef struct SchemaDocument {
 } SchemaDocument;
 extern const SchemaDocument schema_documents[]; // ends with name == NULL
 
-// The schema of the document with the $id "/schemas/NAME": schema/NAME.schema.json.
+// Appends the schema of the document, schema/NAME.schema.json: indented, with the $id
+// "/schemas/NAME", units under "x-unit".
 void schema_write_document(Bytes *bytes, const SchemaDocument *document);
 
 #endif

@@ -1,5 +1,4 @@
-
-
+// Charts at their borders: nothing to draw, gaps, many points.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -8,6 +7,7 @@
 #include "core/study/tradeoff.h"
 #include "server/formats/chart.h"
 #include "server/formats/study_formats.h"
+#include "tests/support/drops.h"
 #include "tests/support/test.h"
 
 static TradeoffPoint point_make(char *name, char *solver, double cpu, double error) {
@@ -39,30 +39,6 @@ static size_t count_of(const char *text, const char *part) {
     for (const char *at = text; (at = strstr(at, part)) != NULL; at++)
         count++;
     return count;
-}
-
-TEST(every_measured_point_has_a_mark_and_the_others_are_told) {
-    TradeoffPoint points[] = {
-        point_make("exact", "exact", 1e-5, 1e-13),
-        point_make("rk4, step 0.001 s", "rk4", 1e-3, 1e-2),
-        point_make("rk4, step 0.0001 s", "rk4", 1e-2, 1e-6),
-        point_make("rk4, step 1e-05 s", "rk4", (double)NAN, (double)NAN),
-        point_make("exact, shorter", "exact", 1e-6, (double)NAN),
-    };
-    points[0].is_best = true;
-    points[3].status = TRADEOFF_REFUSED;
-    points[3].why = "1e9 steps > 1e7";
-    char *text = draw(points, COUNT(points), 1e-3, 1);
-    assert_int_equal(count_of(text, "<title>"), 1 + 3);
-    assert_int_equal(count_of(text, "<title>rk4, step 0.001 s: 0.01 in 0.001 s"), 1);
-    assert_int_equal(count_of(text, "class=\"line s1\""), 1);
-    assert_int_equal(count_of(text, "Not drawn: "), 2);
-    assert_non_null(strstr(text, "Not drawn: rk4, step 1e-05 s, because: 1e9 steps &gt; 1e7."));
-    assert_non_null(strstr(text, "because a &lt; b &amp; c"));
-    assert_int_equal(count_of(text, "class=\"strong ring\""), 2); // its own and the legend's
-    assert_non_null(strstr(text, ">wanted: 0.001"));
-    assert_non_null(strstr(text, "prefers-color-scheme: dark"));
-    free(text);
 }
 
 TEST(an_error_of_0_stands_on_the_floor) {
@@ -151,4 +127,57 @@ TEST(many_points_take_limited_room_and_peaks_remain) {
     free(text);
     free(low);
     free(high);
+}
+
+// --- evaluations ---
+
+static Problem problem;
+
+// Of the test in that text; freed by the caller.
+static char *draw_evaluation(const char *text) {
+    DropTest test;
+    if (drops_read(text, &test, &problem) != STATUS_OK)
+        fail_msg("%s", problem.detail);
+    const Measurement one = {COUNT_ABSENT, &test};
+    Evaluation evaluation;
+    assert_int_equal(
+        evaluation_run(&one, 1, SEPARATION_ZERO_PENETRATION, NULL, &evaluation, &problem),
+        STATUS_OK);
+    Bytes bytes = {.most = 1 << 20};
+    chart_evaluation(&evaluation, "felt", &bytes);
+    evaluation_clear(&evaluation);
+    fields_clear(drop_test_fields, &test);
+    char *svg = bytes_take(&bytes, NULL);
+    assert_non_null(svg);
+    assert_null(strstr(svg, "nan"));
+    assert_null(strstr(svg, "inf\""));
+    assert_non_null(strstr(svg, "</svg>"));
+    return svg;
+}
+
+TEST(what_is_not_known_has_no_frame) {
+    char *svg = draw_evaluation("{\"drops\": [{\"drop_height\": 1, \"rebound_height\": 0.25}]}");
+    assert_int_equal(count_of(svg, "class=\"mark s0\""), 1);
+    assert_int_equal(count_of(svg, "class=\"frame\""), 1);
+    assert_non_null(strstr(svg, "Contact time T_c: not known"));
+    free(svg);
+}
+
+TEST(readings_without_a_speed_are_drawn) {
+    char *svg =
+        draw_evaluation("{\"drops\": [{\"contact_time\": 0.001}, {\"contact_time\": 0.002}]}");
+    assert_int_equal(count_of(svg, "class=\"mark s0\""), 2);
+    free(svg);
+    svg = draw_evaluation("{\"drops\": [{\"contact_time\": 0.001}, {\"contact_time\": 0.001}]}");
+    assert_int_equal(count_of(svg, "class=\"mark s0\""), 2);
+    free(svg);
+}
+
+TEST(a_change_with_speed_is_a_line) {
+    char *svg = draw_evaluation("{\"drops\": [{\"approach_speed\": 1, \"rebound_speed\": 0.7}, "
+                                "{\"approach_speed\": 2, \"rebound_speed\": 1.3}, "
+                                "{\"approach_speed\": 3, \"rebound_speed\": 1.801}, "
+                                "{\"approach_speed\": 4, \"rebound_speed\": 2.2}]}");
+    assert_int_equal(count_of(svg, "class=\"line s1 trend\""), 1);
+    free(svg);
 }

@@ -83,28 +83,6 @@ TEST(csv_has_a_header_with_units_and_short_times) {
     assert_text("csv", series(0, 0), "time [s],displacement [m],contact_force [N]\n");
 }
 
-TEST(npy_has_its_header_and_columns_as_they_lie_in_memory) {
-    const Table table = series(50, 4500);
-    Bytes bytes = {0};
-    assert_int_equal(format_write(format_find("npy"), &table, &bytes, NULL), STATUS_OK);
-    const size_t header = 128;
-    assert_int_equal(bytes.count, header + 4500 * 3 * 8);
-    assert_memory_equal(bytes.at, "\x93NUMPY\x01\x00\x76\x00", 10);
-    const char *text = "{'descr': '<f8', 'fortran_order': True, 'shape': (4500, 3), }";
-    assert_memory_equal(bytes.at + 10, text, strlen(text));
-    for (size_t i = 10 + strlen(text); i + 1 < header; i++)
-        assert_int_equal(bytes.at[i], ' ');
-    assert_int_equal(bytes.at[header - 1], '\n');
-    double time;
-    memcpy(&time, bytes.at + header, sizeof time);
-    assert_true(time == 0.05);
-    memcpy(&time, bytes.at + header + 4499 * 8, sizeof time);
-    assert_true(time == 4549 / 1000.0);
-    assert_memory_equal(bytes.at + header + 4500 * 8, displacement + 50, 4500 * 8);
-    assert_memory_equal(bytes.at + header + 9000 * 8, force + 50, 4500 * 8);
-    bytes_clear(&bytes);
-}
-
 TEST(every_part_of_a_binary_format_can_be_read_alone) {
     static const char *const names[] = {"npy", "npz", "mat"};
     for (size_t n = 0; n < 3; n++) {
@@ -160,20 +138,6 @@ TEST(piece_by_piece_is_the_same_as_whole) {
         }
 }
 
-TEST(archives_are_the_same_each_time_and_stored) {
-    const Table table = series(0, 100);
-    Bytes first = {0}, second = {0};
-    assert_int_equal(format_write(format_find("npz"), &table, &first, NULL), STATUS_OK);
-    assert_int_equal(format_write(format_find("npz"), &table, &second, NULL), STATUS_OK);
-    assert_int_equal(first.count, second.count);
-    assert_memory_equal(first.at, second.at, first.count);
-    assert_memory_equal(first.at, "PK\3\4\x14\0\0\0\0\0\0\0\x21\0", 14);
-    assert_memory_equal(first.at + 30, "time.npy\x93NUMPY", 14);
-    assert_memory_equal(first.at + first.count - 22, "PK\5\6\0\0\0\0\3\0\3\0", 12);
-    bytes_clear(&first);
-    bytes_clear(&second);
-}
-
 TEST(what_is_too_large_for_a_format_is_refused) {
     // Its length alone is looked at: nothing of it is read.
     static const struct {
@@ -207,58 +171,6 @@ TEST(names_become_variables) {
     assert_int_equal(strlen(name), 63);
 }
 
-TEST(buckets_are_labelled) {
-    Columns buckets;
-    assert_int_equal(downsample(both, 1, 49, 5, 2, &buckets, NULL), STATUS_OK);
-    const Column *const pair[] = {&buckets.at[0], &buckets.at[1]};
-    Table table = series(49, 3);
-    table.bucket = 2;
-    table.samples = 5;
-    table.columns = pair;
-    assert_text("json", table,
-                "{\"sample_rate\": 1000, \"start\": 0.049, \"count\": 3, \"bucket\": 2, "
-                "\"samples\": 5, \"channels\": {\"displacement\": {\"unit\": \"m\", \"min\": "
-                "[6.125,6.375,6.625], \"max\": [6.25,6.5,6.625]}}}\n");
-    assert_text("csv", table,
-                "time [s],displacement_min [m],displacement_max [m]\n"
-                "0.049,6.125,6.25\n0.051,6.375,6.5\n0.053,6.625,6.625\n");
-    columns_clear(&buckets);
-}
-
-TEST(buckets_keep_the_extremes_of_ten_thousand_windows) {
-    enum { VALUES = 20000 };
-    double *values = malloc(VALUES * sizeof *values);
-    uint64_t seed = 3;
-    for (size_t i = 0; i < VALUES; i++) {
-        seed = seed * 6364136223846793005u + 1442695040888963407u;
-        values[i] = (double)(int64_t)seed / 9e18 * (i % 1000 == 0 ? 50 : 1);
-    }
-    const Column one = {"x", "m", values};
-    const Column *const columns[] = {&one};
-    for (size_t w = 0; w < 10000; w++) {
-        seed = seed * 6364136223846793005u + 1442695040888963407u;
-        const size_t first = (size_t)(seed >> 33) % VALUES;
-        seed = seed * 6364136223846793005u + 1442695040888963407u;
-        const size_t count =
-            1 + (size_t)(seed >> 33) % (w % 2 == 0 ? 50 : VALUES - first) % (VALUES - first);
-        seed = seed * 6364136223846793005u + 1442695040888963407u;
-        const size_t bucket = 1 + (size_t)(seed >> 33) % (w % 3 == 0 ? 5 : count);
-        Columns buckets;
-        assert_int_equal(downsample(columns, 1, first, count, bucket, &buckets, NULL), STATUS_OK);
-        assert_int_equal(buckets.rows, (count + bucket - 1) / bucket);
-        for (size_t i = 0; i < buckets.rows; i++) {
-            double least = INFINITY, most = -INFINITY;
-            for (size_t k = i * bucket; k < count && k < (i + 1) * bucket; k++) {
-                least = fmin(least, values[first + k]);
-                most = fmax(most, values[first + k]);
-            }
-            assert_true(buckets.at[0].values[i] == least && buckets.at[1].values[i] == most);
-        }
-        columns_clear(&buckets);
-    }
-    free(values);
-}
-
 TEST(a_full_buffer_fails_and_stays_empty) {
     for (size_t e = 0; table_formats[e] != NULL; e++)
         for (size_t most = 1; most < 40000; most = most * 3 + 1) {
@@ -269,18 +181,6 @@ TEST(a_full_buffer_fails_and_stays_empty) {
             assert_int_equal(bytes.count, 0);
             bytes_clear(&bytes);
         }
-}
-
-TEST(formats_are_found_by_extension_and_json_is_first) {
-    assert_string_equal(table_formats[0]->extension, "json");
-    for (size_t i = 0; table_formats[i] != NULL; i++) {
-        assert_ptr_equal(format_find(table_formats[i]->extension), table_formats[i]);
-        assert_non_null(strchr(table_formats[i]->content_type, '/'));
-    }
-    assert_true(format_find("npy")->is_binary);
-    assert_false(format_find("csv")->is_binary);
-    assert_null(format_find("xml"));
-    assert_null(format_find(""));
 }
 
 TEST_GROUP(fill, NULL)

@@ -14,23 +14,6 @@ static const StudyFormat *format(const StudyKind *kind, const char *extension) {
     return found;
 }
 
-TEST(every_study_has_its_formats_json_first) {
-    for (size_t i = 0; studies[i] != NULL; i++) {
-        const StudyFormat *formats = study_formats(studies[i]->answer);
-        assert_string_equal(formats->extension, "json");
-        size_t count = 0;
-        while (formats[count].extension != NULL)
-            count++;
-        assert_true(count < STUDY_FORMATS_MAX);
-    }
-    char names[64];
-    study_formats_names(study_formats(study_ensemble.answer), ".", names, sizeof names);
-    assert_string_equal(names, ".json, .csv, .svg");
-    assert_null(study_format_find(study_formats(study_tradeoff.answer), "csv"));
-    study_formats_names(study_formats(study_ensemble.answer), "", names, 8);
-    assert_string_equal(names, "json, c"); // cut, not overrun
-}
-
 TEST(a_run_that_failed_is_quoted_in_the_table) {
     RunRecord runs[2] = {{.number = 7, .steps = 100, .summary = {.impacts = 3}},
                          {.number = 8, .steps = (double)NAN, .why = unstable}};

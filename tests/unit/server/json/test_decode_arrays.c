@@ -75,15 +75,3 @@ TEST(what_is_no_matrix_is_told_where_it_is_none) {
     assert_string_equal(detail_at(&problem, "/matrix/1"), "must have at most 3 numbers, has 4");
     fields_clear(fields, &item);
 }
-
-TEST(the_schema_says_all_forms) {
-    Bytes bytes = {0};
-    schema_write(&bytes, "/x", "x", fields);
-    bytes_put(&bytes, "", 1);
-    assert_non_null(strstr(bytes.at, "\"pattern\": \"^(velocity)(_[1-9][0-9]*)?$\""));
-    assert_non_null(strstr(bytes.at, "\"anyOf\": [\n        {\n          \"type\": \"number\""));
-    const char *rows = strstr(bytes.at, "\"items\"");
-    assert_non_null(rows);
-    assert_non_null(strstr(rows + 1, "\"items\"")); // of the rows' numbers
-    bytes_clear(&bytes);
-}

@@ -108,13 +108,3 @@ TEST(they_can_be_neither_read_nor_guessed) {
     assert_true(isnan(part.least));
     fields_clear(part_fields, &part);
 }
-
-TEST(a_schema_does_not_tell_of_them) {
-    Bytes bytes = {0};
-    schema_write(&bytes, "/x", "x", part_fields);
-    char *text = bytes_take(&bytes, NULL);
-    assert_non_null(strstr(text, "stiffness"));
-    assert_null(strstr(text, "least"));
-    assert_null(strstr(text, "origin"));
-    free(text);
-}

@@ -54,31 +54,6 @@ static Status printed(const char *json, char **text, size_t *longest) {
     return status;
 }
 
-static void expect(const char *json, const char *expected) {
-    char *text;
-    size_t longest;
-    assert_int_equal(printed(json, &text, &longest), STATUS_OK);
-    assert_string_equal(text, expected);
-    free(text);
-}
-
-TEST(documents_are_shown_member_by_member) {
-    expect("{\"speed\": 0.5, \"none\": null, \"links\": {\"a\": 1}, \"tags\": [\"x\", 2], \"is\": "
-           "true}",
-           "speed  0.5 m/s\ntags   x, 2\nis     yes\n");
-    expect("{\"rows\": [{\"a\": 1, \"b\": \"x\", \"d\": 3}, {\"a\": 12}]}",
-           "b   a\nx   1\n-  12\n");
-    expect("{\"n\": 1, \"of\": [{\"speed\": 2}, {\"speed\": 3, \"no\": false}]}",
-           "n  1\n\nof\nspeed [m/s]\n          2\n          3\n");
-    expect("{\"p\": {\"u\": 1, \"v\": null}, \"q\": {\"u\": 2, \"v\": null}, \"r\": {\"x\": "
-           "{\"y\": 4}}}",
-           "   u\np  1\nq  2\n\nr x\ny  4\n");
-    expect("{\"a\": {\"t\": {\"v\": 1}}, \"b\": {\"t\": {\"v\": 2}}}", "v  1\n\nb t\nv  2\n");
-    expect("{\"each\": [{\"n\": 1, \"in\": {\"k\": 5}}, {\"n\": 2, \"in\": {\"k\": 6}}]}",
-           "n  1\n\neach 1 in\nk  5\n\neach 2\nn  2\n\neach 2 in\nk  6\n");
-    expect("{}", "");
-}
-
 TEST(text_that_is_not_an_object_is_refused_and_a_long_list_is_cut) {
     static const char *const texts[] = {"", "[1]", "{", "{\"a\": 1, \"a\": 2}"};
     char *text;

@@ -1,5 +1,4 @@
 // Counters and histograms, and their text.
-#include <pthread.h>
 #include <string.h>
 
 #include "core/base/status.h"
@@ -24,30 +23,4 @@ TEST(a_histogram_counts_each_sample_under_its_edge) {
     assert_non_null(strstr(bytes.at, "x_seconds_count{a=\"b\"} 6\n"));
     assert_non_null(strstr(bytes.at, "x_seconds_sum{a=\"b\"} 120.000"));
     bytes_clear(&bytes);
-}
-
-TEST(families_are_written_as_prometheus_reads_them) {
-    Bytes bytes = {0};
-    metrics_counter(&bytes, "a_total", "Counted.", UINT64_C(18446744073709551615));
-    metrics_gauge(&bytes, "b", "Now.", 0.1);
-    assert_string_equal(bytes.at, "# HELP a_total Counted.\n# TYPE a_total counter\n"
-                                  "a_total 18446744073709551615\n"
-                                  "# HELP b Now.\n# TYPE b gauge\nb 0.1\n");
-    bytes_clear(&bytes);
-}
-
-static void *count(void *context) {
-    for (int i = 0; i < 100000; i++)
-        counter_add(context, 1);
-    return NULL;
-}
-
-TEST(threads_lose_no_count) {
-    Counter counter = 0;
-    pthread_t threads[4];
-    for (size_t i = 0; i < COUNT(threads); i++)
-        assert_int_equal(pthread_create(&threads[i], NULL, count, &counter), 0);
-    for (size_t i = 0; i < COUNT(threads); i++)
-        pthread_join(threads[i], NULL);
-    assert_int_equal(counter_get(&counter), 400000);
 }
