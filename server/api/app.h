@@ -1,20 +1,23 @@
-// What handlers work with: the rooms of the running daemon, and the few facts replies tell about
-// it. Not the rooms' settings. Filled by cli/serve.c, used by every handler in api/.
+// What handlers work with: the modules of the running daemon, and the functions that handlers of
+// several resources share. Filled by cli/serve.c.
 #ifndef SERVER_API_APP_H
 #define SERVER_API_APP_H
 
 #include <stdatomic.h>
 #include <stdint.h>
 
+#include "core/formats/ground_motion_text.h"
 #include "server/db/db.h"
-#include "server/http/request.h"
+#include "server/formats/study_formats.h"
+#include "server/formats/table_stream.h"
+#include "server/http/reply.h"
 #include "server/jobs/background.h"
 #include "server/jobs/jobs.h"
 
 struct App {
     Db *db;
     JobManager *manager;
-    BackgroundTasks *background_tasks; // for readers of what takes a run
+    BackgroundTasks *background_tasks; // runs for one request
     const struct RequestMetrics *request_metrics;
     struct ResponseCache *response_cache;
     _Atomic(struct Server *) server; // NULL until it is open
@@ -29,10 +32,118 @@ struct App {
 extern const char program_version[]; // "0.1.0"
 extern const char program_build[];   // the compiler
 
+// The handlers, by file; routes.c lists them with their patterns.
+bool jobs_are_light(const Request *request); // planned in some ten microseconds
+Handler jobs_create, jobs_list, jobs_show, jobs_change, jobs_dismiss, jobs_retry, jobs_scene,
+    jobs_events;
+Handler results_again, results_delete, results_show, results_manifest, results_part, results_force,
+    results_bundle, results_study, sweeps_table, sweeps_point;
+Handler cache_show, cache_explain, previews_create, compare_results, compare_measured;
+Handler materials_list, materials_show, materials_export, materials_import, materials_create,
+    materials_revise, materials_revert, materials_review, materials_revisions, materials_history,
+    materials_diff, materials_uses;
+Handler measurements_list, measurements_create, measurements_show, proposals_show, derived_show;
+Handler records_create, records_list, records_show, records_samples, records_delete;
+Handler examples_list, examples_show, schemas_list, schemas_show, openapi_show;
+Handler health_live, health_ready, metrics_show, version_show, landing_show;
+Handler short_ids_redirect; // of no route: Router.not_found
+Handler assets_show, assets_show_icon;
+
+// Takes the JSON in `bytes` as the body of the reply, unless `status` is an error already.
+Status reply_json(Reply *reply, int code, Bytes *bytes, Status status, Problem *problem);
+
+// --- queries of lists, query.c ---
+
+enum { QUERY_TEXT_MAX = 200 };
+
+// The query's text, NULL where it is absent or empty; at most QUERY_TEXT_MAX bytes.
+Status query_text(const Request *request, const char *name, const char **text, Problem *problem);
+// Which of `names` (NULL-terminated) it is; `initial` where it is absent.
+Status query_choice(const Request *request, const char *name, const char *const *names, int initial,
+                    int *choice, Problem *problem);
+// "0.4..0.7", "0.4..", "..0.7" or "0.4", both ends included; without it everything, also NAN.
+typedef struct QueryRange {
+    double least, most;
+    bool is_asked;
+} QueryRange;
+Status query_range(const Request *request, const char *name, QueryRange *range, Problem *problem);
+bool query_range_has(const QueryRange *range, double value);
+// A copy of the text, NULL where it is absent or empty. The caller frees it.
+Status query_copy(const Request *request, const char *name, char **target, Problem *problem);
+// As query_choice for a member of a document that is sent as queries: STATUS_INVALID at `pointer`,
+// with the spelling that may be meant. *choice stays where it is absent.
+Status query_spelled(const Request *request, const char *name, const char *pointer,
+                     const char *const *names, int *choice, Problem *problem);
+// Whether the body is JSON or one of `texts` (NULL-terminated). STATUS_UNSUPPORTED_TYPE with what
+// is wanted and a hint, STATUS_TOO_LARGE, STATUS_UNREADABLE.
+Status query_body_type(const Request *request, const char *const *texts, const char *wanted,
+                       const char *hint, bool *is_json, Problem *problem);
+// The JSON body of a request without queries, which are for other types.
+Status query_read_document(const Request *request, const Field *fields, void *item,
+                           Problem *problem);
+// The table of a ground motion in the body, records.c. Cleared by ground_motion_text_clear.
+Status query_read_motion(const Request *request, const GroundMotionOptions *options,
+                         GroundMotionText *motion, Problem *problem);
+// Links the next page: the same queries, with `name` now `value`.
+void query_link_next(const Request *request, Reply *reply, const char *name, const char *value);
+// The format of the extension in the path's `parameter`, else by Accept, out of `count`.
+// STATUS_NOT_FOUND, STATUS_NOT_ACCEPTABLE.
+typedef struct QueryFormat {
+    const char *extension, *content_type;
+} QueryFormat;
+enum { QUERY_FORMATS_MAX = 16 };
+Status query_format(const Request *request, size_t parameter, const QueryFormat *at, size_t count,
+                    Reply *reply, size_t *choice, Problem *problem);
+
+// --- jobs, jobs.c ---
+
+// The job that the path names. STATUS_FORBIDDEN unless the token may read it: with the scope
+// "submit" alone only its own.
+Status job_find_visible(App *app, const Request *request, Job **job, Problem *problem);
 // Sets Retry-After where a scene was refused with STATUS_BUSY or STATUS_QUOTA; returns `status`.
 Status jobs_refused(App *app, const Request *request, Reply *reply, Status status);
 
-// A run for one request. `reply` may take what it needs of the context.
+// --- results, results.c ---
+
+// Append the documents of a result's row, as /v1/results/{id} and its manifest answer them.
+Status result_put(const ResultRow *row, Bytes *bytes, Problem *problem);
+Status manifest_put(App *app, const ResultRow *row, Bytes *bytes, Problem *problem);
+// The entity tag of what may change with a material's status or the base of links, by its content
+// (or by another that changes with it). True if the client has it.
+bool results_tagged(const Request *request, Reply *reply, const ResultRow *row, const char *what,
+                    const Bytes *content);
+// The links of a 410: how to have the result made by this engine, and what it is.
+void results_link_gone(const char *id, Reply *reply);
+extern const char no_impacts[]; // why a result has no list of impacts
+
+// The answer of the study of a row that has one. Cleared by fields_clear(study_answer_fields, ...)
+// in any case.
+Status study_read(const ResultRow *row, StudyAnswer *answer, Problem *problem);
+
+// --- tables of numbers, columns.c ---
+
+// The format of the extension in the path's `parameter`, else by Accept. `has_chart`: SVG is one of
+// the formats.
+Status columns_format(const Request *request, size_t parameter, bool has_chart, Reply *reply,
+                      const TableFormat **format, Problem *problem);
+// "?from=&to=" [s]: which of `count` samples, at least one, are written. "?points=n": smallest and
+// largest values in at most n buckets. STATUS_USAGE: not numbers, or no sample is there.
+Status columns_window(const Request *request, size_t count, TableStream *stream, Problem *problem);
+// The outcome with series of the result in the request's first parameter. *outcome is a reference,
+// or NULL where the request waits until it is computed.
+Status columns_outcome(App *app, const Request *request, Reply *reply, Outcome **outcome,
+                       Problem *problem);
+// Lets the request wait for its callback until 60 s after its start; `kept` comes back as
+// request->kept and is freed by `forget`, here too where the time is over: STATUS_BUSY with `why`.
+Status columns_wait(const Request *request, Reply *reply, void *kept, void (*forget)(void *kept),
+                    const char *why, Problem *problem);
+// Takes `stream`, also when it fails; NULL is STATUS_NO_MEMORY.
+Status columns_reply(App *app, Reply *reply, const TableFormat *format, TableStream *stream,
+                     Problem *problem);
+
+// --- runs for one request, contact_force.c ---
+
+// `reply` may take what it needs of the context.
 typedef struct RequestRun {
     void (*run)(void *context, const Progress *watch); // `watch` may be NULL
     void (*release)(void *context);
@@ -47,32 +158,5 @@ Status request_run_start(App *app, const Request *request, Reply *reply, const R
 // Of a request that waited.
 Status request_run_resume(App *app, const Request *request, Reply *reply, const RequestRun *run,
                           Problem *problem);
-
-// The handlers, by file; routes.c lists them with their patterns.
-bool jobs_are_light(const Request *request); // planned in some ten microseconds
-Handler jobs_create, jobs_list, jobs_show, jobs_change, jobs_dismiss, jobs_retry, jobs_scene,
-    jobs_events;
-Handler results_again, results_delete, results_show, results_manifest, results_series, results_psd,
-    results_impacts, results_energy, results_force, results_bundle, results_tradeoff,
-    results_ensemble, results_compare, results_sensitivity;
-Handler cache_show, cache_explain, previews_create;
-Handler compare_results, compare_measured;
-Handler sweeps_table, sweeps_point, sweeps_scene;
-Handler materials_list, materials_show, materials_show_revision;
-Handler materials_export, materials_import;
-Handler measurements_list, measurements_create, measurements_show, proposals_show;
-Handler derived_show, derived_show_revision;
-Handler materials_create, materials_revise, materials_revert, materials_review;
-Handler materials_revisions, materials_history, materials_diff, materials_uses,
-    materials_uses_revision;
-Handler records_create, records_list, records_show, records_samples, records_delete;
-Handler examples_list, examples_show, schemas_list, schemas_show, openapi_show;
-Handler health_live, health_ready, metrics_show, version_show, landing_show;
-Handler short_ids_redirect; // of no route: Router.not_found
-Handler assets_show, assets_show_icon;
-
-// The job that the path names. STATUS_FORBIDDEN unless the token may read it: with the scope
-// "submit" alone only its own.
-Status job_find_visible(App *app, const Request *request, Job **job, Problem *problem);
 
 #endif

@@ -2,9 +2,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "server/api/columns.h"
-#include "server/api/results.h"
-#include "server/http/reply.h"
+#include "server/api/app.h"
 
 static const char about[] =
     "A simulation of an impact damper, as impactd made it.\n"

@@ -1,20 +1,21 @@
-// What is known already: how often that helped, and why a scene is known or not.
+// The caches: how often they were used, and whether a scene is cached and in what it differs from
+// the most similar cached one.
 #include <stdlib.h>
 #include <string.h>
 
 #include "server/api/app.h"
-#include "server/http/reply.h"
 #include "server/jobs/documents.h"
 #include "server/json/document.h"
 
 // The scenes that are compared, and how long they may be.
 enum { RECENT_MAX = 256, SCENE_MAX = 16384 };
 
-static void put_layer(Bytes *bytes, const char *name, const CacheStats *layer, bool has_budget) {
-    bytes_format(bytes, "\"%s\": {\"hits\": %llu, \"misses\": %llu", name,
-                 (unsigned long long)layer->hits, (unsigned long long)layer->misses);
+static void cache_put_layer(Bytes *bytes, const char *name, const CacheStats *layer,
+                            bool has_budget) {
+    bytes_json(bytes, "%p\"%s\": {\"hits\": %llu, \"misses\": %llu", bytes->count > 1 ? ", " : "",
+               name, (unsigned long long)layer->hits, (unsigned long long)layer->misses);
     if (has_budget)
-        bytes_format(
+        bytes_json(
             bytes, ", \"evictions\": %llu, \"count\": %zu, \"bytes\": %zu, \"most_bytes\": %zu",
             (unsigned long long)layer->evictions, layer->count, layer->bytes, layer->most_bytes);
     bytes_text(bytes, "}");
@@ -22,43 +23,33 @@ static void put_layer(Bytes *bytes, const char *name, const CacheStats *layer, b
 
 Status cache_show(App *app, const Request *request, Reply *reply, Problem *problem) {
     (void)request;
-    JobStats metrics;
+    JobStats stats;
     Bytes bytes = {.most = app->reply_most};
-    jobs_tally(app->manager, &metrics);
-    bytes_text(&bytes, "{");
-    put_layer(&bytes, "documents", &metrics.heads, true);
-    bytes_text(&bytes, ", ");
-    put_layer(&bytes, "series", &metrics.series, true);
-    bytes_text(&bytes, ", ");
-    put_layer(&bytes, "results", &metrics.rows, false);
     uint64_t count, size;
-    db_series_tally(app->db, &count, &size, &metrics.stored.evictions);
-    metrics.stored.count = count;
-    metrics.stored.bytes = size;
-    bytes_text(&bytes, ", ");
-    put_layer(&bytes, "stored_series", &metrics.stored, true);
+    jobs_tally(app->manager, &stats);
+    db_series_tally(app->db, &count, &size, &stats.stored.evictions);
+    stats.stored.count = count;
+    stats.stored.bytes = size;
+    bytes_text(&bytes, "{");
+    cache_put_layer(&bytes, "documents", &stats.heads, true);
+    cache_put_layer(&bytes, "series", &stats.series, true);
+    cache_put_layer(&bytes, "results", &stats.rows, false);
+    cache_put_layer(&bytes, "stored_series", &stats.stored, true);
     bytes_text(&bytes, "}\n");
     return reply_bytes(reply, 200, type_json, &bytes, problem);
 }
 
-static const char *flag(bool is_so) {
-    return is_so ? "true" : "false";
-}
-
-static void put_nearest(Bytes *bytes, const ResultRow *row, const Bytes *differences,
-                        size_t count) {
-    const bool is_other = strcmp(row->engine, engine_version) != 0;
-    bytes_format(bytes, "{\"result\": \"%s\", \"engine\": ", row->id);
-    bytes_json_string(bytes, row->engine);
-    bytes_format(bytes,
-                 ", \"engine_differs\": %s, \"count\": %zu, \"differences\": ", flag(is_other),
-                 count);
-    bytes_put(bytes, differences->at, differences->count);
-    bytes_text(bytes, "}");
+static void cache_put_nearest(Bytes *bytes, const ResultRow *row, const Bytes *differences,
+                              size_t count) {
+    bytes_json(bytes,
+               "{\"result\": %s, \"engine\": %s, \"engine_differs\": %p, \"count\": %zu, "
+               "\"differences\": %p}",
+               row->id, row->engine, json_flag(strcmp(row->engine, engine_version) != 0), count,
+               differences->at);
 }
 
 // The cached scene with the fewest differences, or null.
-static Status find_nearest(App *app, const char *scene, Bytes *bytes, Problem *problem) {
+static Status cache_find_nearest(App *app, const char *scene, Bytes *bytes, Problem *problem) {
     static const DiffFormat format = {"here", "there", false};
     ResultRows rows = {NULL, 0};
     Bytes best = {0};
@@ -79,7 +70,7 @@ static Status find_nearest(App *app, const char *scene, Bytes *bytes, Problem *p
         }
     }
     if (nearest != NULL)
-        put_nearest(bytes, nearest, &best, best_count);
+        cache_put_nearest(bytes, nearest, &best, best_count);
     else
         bytes_text(bytes, "null");
     bytes_clear(&best);
@@ -87,28 +78,28 @@ static Status find_nearest(App *app, const char *scene, Bytes *bytes, Problem *p
     return STATUS_OK;
 }
 
-static Status explain(App *app, const StudyRequest *inquiry, Bytes *bytes, Problem *problem) {
+static Status cache_put_explained(App *app, const StudyRequest *inquiry, Bytes *bytes,
+                                  Problem *problem) {
     char result[72];
-    CacheLayers cache_layers;
-    Bytes scene = {.most = app->reply_most};
+    CacheLayers layers;
     jobs_result_id(inquiry, result);
-    jobs_layers(app->manager, result, &cache_layers);
-    const bool is_known = cache_layers.in_memory || cache_layers.in_database;
-    bytes_format(bytes, "{\"result\": \"%s\", \"engine\": ", result);
-    bytes_json_string(bytes, engine_version);
-    bytes_format(bytes,
-                 ", \"cached\": %s, \"layers\": {\"memory\": %s, \"database\": %s, "
-                 "\"series_memory\": %s, \"series_database\": %s}, \"nearest\": ",
-                 flag(is_known), flag(cache_layers.in_memory), flag(cache_layers.in_database),
-                 flag(cache_layers.series_in_memory), flag(cache_layers.series_in_database));
+    jobs_layers(app->manager, result, &layers);
+    const bool is_cached = layers.in_memory || layers.in_database;
+    bytes_json(bytes,
+               "{\"result\": %s, \"engine\": %s, \"cached\": %p, \"layers\": {\"memory\": %p, "
+               "\"database\": %p, \"series_memory\": %p, \"series_database\": %p}, \"nearest\": ",
+               result, engine_version, json_flag(is_cached), json_flag(layers.in_memory),
+               json_flag(layers.in_database), json_flag(layers.series_in_memory),
+               json_flag(layers.series_in_database));
     Status status = STATUS_OK;
-    if (is_known) {
+    if (is_cached) {
         bytes_text(bytes, "null");
     } else {
+        Bytes scene = {.most = app->reply_most};
         document_scene(&scene, inquiry);
-        char *text = bytes_take(&scene, NULL);
-        status = text == NULL ? STATUS_NO_MEMORY : find_nearest(app, text, bytes, problem);
-        free(text);
+        status = scene.is_failed ? problem_set(problem, STATUS_NO_MEMORY, "no memory for the scene")
+                                 : cache_find_nearest(app, scene.at, bytes, problem);
+        bytes_clear(&scene);
     }
     bytes_text(bytes, "}\n");
     return status;
@@ -124,12 +115,8 @@ Status cache_explain(App *app, const Request *request, Reply *reply, Problem *pr
         status = jobs_prepare_request(app->manager, request->body, request->body_size, NULL,
                                       &inquiry, &warnings, problem);
     if (status == STATUS_OK)
-        status = explain(app, &inquiry, &bytes, problem);
-    if (status == STATUS_OK)
-        status = reply_bytes(reply, 200, type_json, &bytes, problem);
-    else
-        bytes_clear(&bytes);
+        status = cache_put_explained(app, &inquiry, &bytes, problem);
     study_request_clear(&inquiry);
     warnings_clear(&warnings);
-    return jobs_refused(app, request, reply, status);
+    return jobs_refused(app, request, reply, reply_json(reply, 200, &bytes, status, problem));
 }

@@ -1,14 +1,10 @@
 // Series, spectra, impacts and energies of a result, each in every format.
-#include "server/api/columns.h"
-
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/api/results.h"
-#include "server/http/header.h"
-#include "server/http/reply.h"
+#include "server/api/app.h"
 #include "server/jobs/documents.h"
 #include "server/util/clock.h"
 
@@ -21,35 +17,18 @@ static const double wait_max = 60; // [s]
 
 Status columns_format(const Request *request, size_t parameter, bool has_chart, Reply *reply,
                       const TableFormat **format, Problem *problem) {
-    const char *extension = request->parameters[parameter];
-    char names[96] = "";
-    const char *types[16] = {NULL};
-    const TableFormat *offered[16];
-    size_t count = 0;
-    int choice = -1;
-    for (size_t i = 0; table_formats[i] != NULL && count + 1 < COUNT(types); i++) {
+    const TableFormat *offered[QUERY_FORMATS_MAX];
+    QueryFormat formats[QUERY_FORMATS_MAX];
+    size_t count = 0, choice;
+    for (size_t i = 0; table_formats[i] != NULL && count < QUERY_FORMATS_MAX; i++) {
         if (table_formats[i] == &format_svg && !has_chart)
             continue;
-        text_list(names, sizeof names, table_formats[i]->extension);
-        if (extension != NULL && strcmp(extension, table_formats[i]->extension) == 0)
-            choice = (int)count;
         offered[count] = table_formats[i];
-        types[count++] = table_formats[i]->content_type;
+        formats[count++] =
+            (QueryFormat){table_formats[i]->extension, table_formats[i]->content_type};
     }
-    if (extension == NULL) {
-        reply->varies_by_accept = true;
-        choice = header_accept(request->accept, types);
-    }
-    if (choice < 0)
-        return extension != NULL
-                   ? problem_set(problem, STATUS_NOT_FOUND,
-                                 "there is no format \"%.20s\"; there are %s", extension, names)
-                   : problem_set(problem, STATUS_NOT_ACCEPTABLE,
-                                 "none of the formats fits Accept; there are %s, by extension too",
-                                 names);
+    TRY(query_format(request, parameter, formats, count, reply, &choice, problem));
     *format = offered[choice];
-    if (*format == &format_svg)
-        reply->policy = reply_drawing_policy;
     return STATUS_OK;
 }
 
@@ -249,20 +228,24 @@ typedef struct ResultPart {
                    Problem *problem);
 } ResultPart;
 
-static const ResultPart part_series = {"series", true, series_fill};
-static const ResultPart part_psd = {"psd", true, psd_fill};
-static const ResultPart part_impacts = {"impacts", false, impacts_fill};
-static const ResultPart part_energy = {"energy", false, energy_fill};
+static const ResultPart parts[] = {{"series", true, series_fill},
+                                   {"psd", true, psd_fill},
+                                   {"impacts", false, impacts_fill},
+                                   {"energy", false, energy_fill}};
 
-static Status results_part(App *app, const Request *request, Reply *reply, const ResultPart *part,
-                           Problem *problem) {
-    const char *id = request->parameters[0];
+// The path ends with the part's name. Series alone may have to be computed again.
+Status results_part(App *app, const Request *request, Reply *reply, Problem *problem) {
+    const char *id = request->parameters[0], *name = strrchr(request->route->pattern, '/') + 1;
+    const ResultPart *part = parts;
     const TableFormat *format = NULL;
     Outcome *outcome = NULL;
     char tag[104];
+    while (strncmp(part->name, name, strlen(part->name)) != 0)
+        part++;
+    const bool is_series = part == &parts[0];
     TRY(columns_format(request, 1, part->has_chart, reply, &format, problem));
     snprintf(tag, sizeof tag, "%.72s-%s.%s", id, part->name, format->extension);
-    if (part == &part_series) {
+    if (is_series) {
         // Nothing is computed again for a client that has it.
         if (request->if_none_match != NULL && !db_result_exists(app->db, id))
             return problem_set(problem, STATUS_NOT_FOUND, "there is no result %.80s", id);
@@ -278,24 +261,8 @@ static Status results_part(App *app, const Request *request, Reply *reply, const
     const Status status = stream != NULL
                               ? part->fill(request, &format, stream, problem)
                               : problem_set(problem, STATUS_NO_MEMORY, "no memory for the answer");
-    if (status == STATUS_OK && (part == &part_series || !reply_immutable(reply, request, tag)))
+    if (status == STATUS_OK && (is_series || !reply_immutable(reply, request, tag)))
         return columns_reply(app, reply, format, stream, problem);
     table_stream_free(stream);
     return status;
-}
-
-Status results_series(App *app, const Request *request, Reply *reply, Problem *problem) {
-    return results_part(app, request, reply, &part_series, problem);
-}
-
-Status results_psd(App *app, const Request *request, Reply *reply, Problem *problem) {
-    return results_part(app, request, reply, &part_psd, problem);
-}
-
-Status results_impacts(App *app, const Request *request, Reply *reply, Problem *problem) {
-    return results_part(app, request, reply, &part_impacts, problem);
-}
-
-Status results_energy(App *app, const Request *request, Reply *reply, Problem *problem) {
-    return results_part(app, request, reply, &part_energy, problem);
 }

@@ -5,9 +5,7 @@
 #include <string.h>
 
 #include "core/simulation/simulation.h"
-#include "server/api/columns.h"
-#include "server/api/results.h"
-#include "server/http/reply.h"
+#include "server/api/app.h"
 #include "server/util/clock.h"
 
 static const double quick_max = 0.005; // predicted CPU time of a run within the request [s]

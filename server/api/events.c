@@ -14,11 +14,10 @@
 
 #include "server/api/app.h"
 #include "server/api/job_json.h"
-#include "server/http/reply.h"
 #include "server/util/clock.h"
 
 enum {
-    LOOK_MS = 250,        // between looks at the progress of a job
+    POLL_MS = 250,        // between two reads of the progress of a job
     HEARTBEAT_MS = 15000, // of silence at most
     RETRY_MS = 2000,
     FINISHED_ID = 20000,
@@ -32,7 +31,7 @@ typedef struct Events {
     size_t sent;
     int last_id;
     int64_t spoke_ns;
-    bool is_told; // all there is to tell
+    bool is_complete; // `text` has the last event
 } Events;
 
 static const char no_memory[] = ": no memory\n\n";
@@ -46,7 +45,7 @@ static void events_release(void *context) {
 }
 
 // A document in one event: each of its lines is a line of data.
-static void put_data(Bytes *text, const char *document) {
+static void events_put_data(Bytes *text, const char *document) {
     for (;;) {
         const size_t length = strcspn(document, "\n");
         bytes_text(text, "data: ");
@@ -59,58 +58,50 @@ static void put_data(Bytes *text, const char *document) {
     bytes_text(text, "\n");
 }
 
-static void tell_finished(Events *events) {
+static void events_put_finished(Events *events) {
     JobView show = {0};
     Bytes document = {.most = events->app->reply_most};
     if (job_view(events->job, &show) == STATUS_OK)
         job_json_put(&document, &show, JOB_PUT_WHOLE | JOB_PUT_LINKS | JOB_PUT_SENDER);
     job_view_clear(&show);
-    char *told = bytes_take(&document, NULL);
+    char *job = bytes_take(&document, NULL);
     bytes_format(&events->text, "event: finished\nid: %d\n", FINISHED_ID);
-    put_data(&events->text, told != NULL ? told : "{}");
-    free(told);
+    events_put_data(&events->text, job != NULL ? job : "{}");
+    free(job);
     events->last_id = FINISHED_ID;
-    events->is_told = true;
+    events->is_complete = true;
 }
 
-static void tell_progress(Events *events, JobState state, double progress) {
+static void events_put_progress(Events *events, JobState state, double progress) {
     const int id = 1 + (state == JOB_RUNNING) + (int)(100 * progress);
     if (id <= events->last_id)
         return;
     JobView show = {0};
-    if (job_view(events->job, &show) == STATUS_OK) {
-        bytes_format(&events->text, "event: progress\nid: %d\ndata: {\"status\": \"%s\", ", id,
-                     job_state_names[state]);
-        bytes_text(&events->text, "\"progress\": ");
-        bytes_real(&events->text, progress);
-        bytes_text(&events->text, ", \"timing\": {\"queued\": ");
-        bytes_real(&events->text, show.queued);
-        bytes_text(&events->text, ", \"run\": ");
-        bytes_real(&events->text, show.run);
-        bytes_text(&events->text, ", \"total\": ");
-        bytes_real(&events->text, show.total);
-        bytes_text(&events->text, "}}\n\n");
-    }
+    if (job_view(events->job, &show) == STATUS_OK)
+        bytes_json(&events->text,
+                   "event: progress\nid: %d\ndata: {\"status\": %s, \"progress\": %g, \"timing\": "
+                   "{\"queued\": %g, \"run\": %g, \"total\": %g}}\n\n",
+                   id, job_state_names[state], progress, show.queued, show.run, show.total);
     job_view_clear(&show);
     events->last_id = id;
 }
 
-// Adds what is new.
-static void look(Events *events) {
+// Appends the events that are new.
+static void events_poll(Events *events) {
     double progress;
-    // Watched before it is looked at: what happens after the look wakes this. It is forgotten with
-    // each call, so it is asked again.
+    // Before the state is read, so that no change is missed; a subscription ends with its call.
     (void)job_subscribe(events->job, JOB_IS_FINISHED, events->callback);
     const JobState state = job_peek(events->job, &progress);
     if (job_state_is_final((int)state)) {
-        tell_finished(events);
+        events_put_finished(events);
     } else if (atomic_load(&events->app->is_stopping)) {
         bytes_text(&events->text, "event: stopping\n");
-        put_data(&events->text, "{\"detail\": \"the daemon stops; the job goes on when it is "
-                                "started again\"}");
-        events->is_told = true;
+        events_put_data(&events->text,
+                        "{\"detail\": \"the daemon stops; the job goes on when it is "
+                        "started again\"}");
+        events->is_complete = true;
     } else {
-        tell_progress(events, state, progress);
+        events_put_progress(events, state, progress);
     }
 }
 
@@ -118,21 +109,21 @@ static ptrdiff_t events_next(void *context, char *target, size_t size) {
     Events *events = context;
     Bytes *text = &events->text;
     const int64_t now = clock_monotonic_ns();
-    if (events->sent == text->count && !events->is_told) {
+    if (events->sent == text->count && !events->is_complete) {
         bytes_clear(text);
         events->sent = 0;
-        look(events);
+        events_poll(events);
         if (text->count == 0 && now - events->spoke_ns > (int64_t)HEARTBEAT_MS * 1000000)
             bytes_text(text, ": still here\n\n");
         if (text->is_failed) {
             bytes_clear(text);
             bytes_text(text, no_memory);
-            events->is_told = true;
+            events->is_complete = true;
         }
     }
     const size_t left = text->count - events->sent;
     if (left == 0)
-        return events->is_told ? STREAM_END : STREAM_WAIT;
+        return events->is_complete ? STREAM_END : STREAM_WAIT;
     const size_t count = left < size ? left : size;
     memcpy(target, text->at + events->sent, count);
     events->sent += count;
@@ -140,8 +131,8 @@ static ptrdiff_t events_next(void *context, char *target, size_t size) {
     return (ptrdiff_t)count;
 }
 
-// 0 for none, and for one that is none of ours.
-static int last_id(const Request *request) {
+// 0: none, or not an id of this stream.
+static int events_read_last_id(const Request *request) {
     const char *text = request->last_event_id;
     if (text == NULL || *text == '\0' || strlen(text) > 6 || text[strspn(text, "0123456789")])
         return 0;
@@ -151,7 +142,7 @@ static int last_id(const Request *request) {
 Status jobs_events(App *app, const Request *request, Reply *reply, Problem *problem) {
     Job *job = NULL;
     TRY(job_find_visible(app, request, &job, problem));
-    if (last_id(request) >= FINISHED_ID) {
+    if (events_read_last_id(request) >= FINISHED_ID) {
         job_unref(job);
         reply_borrow(reply, 204, NULL, NULL, 0);
         return STATUS_OK;
@@ -164,12 +155,12 @@ Status jobs_events(App *app, const Request *request, Reply *reply, Problem *prob
     *events = (Events){.app = app,
                        .job = job,
                        .callback = request->callback,
-                       .last_id = last_id(request),
+                       .last_id = events_read_last_id(request),
                        .spoke_ns = clock_monotonic_ns()};
     bytes_format(&events->text, "retry: %d\n\n", RETRY_MS);
     reply->code = 200;
     reply->content_type = "text/event-stream";
-    reply->stream = (Stream){.next = events_next, .size = UINT64_MAX, .wait_ms = LOOK_MS};
+    reply->stream = (Stream){.next = events_next, .size = UINT64_MAX, .wait_ms = POLL_MS};
     reply->release = events_release;
     reply->context = events;
     return STATUS_OK;

@@ -5,12 +5,10 @@
 
 #include "core/study/study.h"
 #include "server/api/app.h"
-#include "server/http/reply.h"
 #include "server/json/parse.h"
 #include "server/json/schema.h"
 #include "server/util/base_path.h"
 #include "server/util/clock.h"
-#include "server/util/embedded.h"
 
 const char program_version[] = "0.1.0"; // as in CMakeLists.txt; a test compares
 #ifdef __clang__
@@ -22,7 +20,7 @@ const char program_build[] = "gcc " __VERSION__;
 static const char examples_folder[] = "schema/examples/";
 
 // The file's name without folder and ".json"; false if it is not directly in the folder.
-static bool name_in_folder(const char *path, const char *folder, char name[64]) {
+static bool examples_name(const char *path, const char *folder, char name[64]) {
     const size_t size = strlen(folder);
     if (strncmp(path, folder, size) != 0 || strchr(path + size, '/') != NULL)
         return false;
@@ -33,16 +31,14 @@ static bool name_in_folder(const char *path, const char *folder, char name[64]) 
     return true;
 }
 
-static void write_example(Bytes *bytes, const EmbeddedFile *file, const char *name) {
+static void examples_put(Bytes *bytes, const EmbeddedFile *file, const char *name) {
     StudyRequest inquiry;
     const bool is_read =
         json_parse(file->bytes, file->size, study_request_fields, &inquiry, NULL) == STATUS_OK;
-    bytes_text(bytes, "{\"name\": ");
-    bytes_json_string(bytes, name);
-    bytes_text(bytes, ", \"title\": ");
-    bytes_json_string(bytes, is_read ? inquiry.simulation.title : NULL);
-    bytes_format(bytes, ", \"links\": {\"self\": \"%s/v1/examples/%s\"}, \"scene\": ", base_path(),
-                 name);
+    bytes_json(bytes,
+               "{\"name\": %s, \"title\": %s, \"links\": {\"self\": \"%s/v1/examples/%s\"}, "
+               "\"scene\": ",
+               name, is_read ? inquiry.simulation.title : NULL, base_path(), name);
     bytes_put(bytes, file->bytes, file->size);
     bytes_text(bytes, "}");
     study_request_clear(&inquiry);
@@ -55,10 +51,10 @@ Status examples_list(App *app, const Request *request, Reply *reply, Problem *pr
     bytes_text(&bytes, "{\"examples\": [");
     bool is_first = true;
     for (const EmbeddedFile *file = embedded_examples; file->path != NULL; file++) {
-        if (!name_in_folder(file->path, examples_folder, name))
+        if (!examples_name(file->path, examples_folder, name))
             continue;
         bytes_text(&bytes, is_first ? "\n" : ",\n");
-        write_example(&bytes, file, name);
+        examples_put(&bytes, file, name);
         is_first = false;
     }
     bytes_text(&bytes, "]}\n");
@@ -69,7 +65,7 @@ Status examples_show(App *app, const Request *request, Reply *reply, Problem *pr
     (void)app;
     char name[64];
     for (const EmbeddedFile *file = embedded_examples; file->path != NULL; file++)
-        if (name_in_folder(file->path, examples_folder, name) &&
+        if (examples_name(file->path, examples_folder, name) &&
             strcmp(name, request->parameters[0]) == 0)
             return reply_embedded(reply, request, file, type_json);
     return problem_set(problem, STATUS_NOT_FOUND,
@@ -82,12 +78,10 @@ Status schemas_list(App *app, const Request *request, Reply *reply, Problem *pro
     Bytes bytes = {.most = app->reply_most};
     bytes_text(&bytes, "{\"schemas\": [");
     for (const SchemaDocument *document = schema_documents; document->name != NULL; document++) {
-        bytes_format(&bytes,
-                     "%s{\"name\": \"%s\", \"title\": ", document == schema_documents ? "" : ", ",
-                     document->name);
-        bytes_json_string(&bytes, document->title);
-        bytes_format(&bytes, ", \"links\": {\"self\": \"%s/schemas/%s\"}}", base_path(),
-                     document->name);
+        bytes_json(&bytes,
+                   "%p{\"name\": %s, \"title\": %s, \"links\": {\"self\": \"%s/schemas/%s\"}}",
+                   document == schema_documents ? "" : ", ", document->name, document->title,
+                   base_path(), document->name);
     }
     bytes_text(&bytes, "]}\n");
     return reply_bytes(reply, 200, type_json, &bytes, problem);
@@ -164,11 +158,9 @@ Status version_show(App *app, const Request *request, Reply *reply, Problem *pro
     char started[32];
     clock_rfc3339(app->started_unix_ms, started);
     Bytes bytes = {.most = app->reply_most};
-    bytes_format(&bytes,
-                 "{\"program\": \"impactd\", \"version\": \"%s\", \"engine\": ", program_version);
-    bytes_json_string(&bytes, engine_version);
-    bytes_text(&bytes, ", \"build\": ");
-    bytes_json_string(&bytes, program_build);
-    bytes_format(&bytes, ", \"started\": \"%s\"}\n", started);
+    bytes_json(&bytes,
+               "{\"program\": \"impactd\", \"version\": %s, \"engine\": %s, \"build\": %s, "
+               "\"started\": %s}\n",
+               program_version, engine_version, program_build, started);
     return reply_bytes(reply, 200, type_json, &bytes, problem);
 }

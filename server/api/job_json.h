@@ -1,5 +1,4 @@
-// The documents that tell of a job: as it stands, and as a dry run foresees it.
-// Knows no HTTP. Used by jobs.c and by the commands, which print the same.
+// A job and a dry run as JSON documents, which commands print too.
 #ifndef SERVER_API_JOB_JSON_H
 #define SERVER_API_JOB_JSON_H
 

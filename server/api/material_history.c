@@ -5,10 +5,9 @@
 #include <string.h>
 
 #include "server/api/materials.h"
-#include "server/api/query.h"
-#include "server/http/reply.h"
 #include "server/materials/material.h"
 #include "server/util/base_path.h"
+#include "server/util/clock.h"
 
 // Revisions may be long, with their tables; audit entries are short.
 enum { REVISIONS_MAX = 100, AUDIT_INITIAL = 100, AUDIT_MAX = 1000 };
@@ -39,7 +38,7 @@ Status materials_revisions(App *app, const Request *request, Reply *reply, Probl
     if (revisions.count > 0)
         material_page_link(request, reply, revisions.at[revisions.count - 1].revision);
     material_revisions_clear(&revisions);
-    return material_reply(reply, 200, &bytes, STATUS_OK, problem);
+    return reply_json(reply, 200, &bytes, STATUS_OK, problem);
 }
 
 Status materials_history(App *app, const Request *request, Reply *reply, Problem *problem) {
@@ -55,12 +54,12 @@ Status materials_history(App *app, const Request *request, Reply *reply, Problem
         page.before = state.version + 1;
     TRY(db_audit_entries(app->db, slug, page.before, page.limit, &entries, problem));
     Bytes bytes = {.most = app->reply_most};
-    bytes_format(&bytes, "{\"slug\": \"%s\", \"version\": %llu, \"history\": [", slug,
-                 (unsigned long long)state.version);
+    bytes_json(&bytes, "{\"slug\": %s, \"version\": %llu, \"history\": [", slug,
+               (unsigned long long)state.version);
     for (size_t i = 0; i < entries.count; i++) {
         const AuditEntry *entry = &entries.at[i];
-        bytes_format(&bytes, "%s{\"version\": %llu, \"action\": \"%s\"", i > 0 ? ",\n " : "",
-                     (unsigned long long)entry->version, entry->action);
+        bytes_json(&bytes, "%p{\"version\": %llu, \"action\": %s", i > 0 ? ",\n " : "",
+                   (unsigned long long)entry->version, entry->action);
         material_put_number(&bytes, "revision", entry->revision);
         material_put_number(&bytes, "measurement", entry->measurement);
         material_put_text(&bytes, "who", entry->who);
@@ -72,17 +71,18 @@ Status materials_history(App *app, const Request *request, Reply *reply, Problem
     if (entries.count > 0)
         material_page_link(request, reply, entries.at[entries.count - 1].version);
     audit_entries_clear(&entries);
-    return material_reply(reply, 200, &bytes, STATUS_OK, problem);
+    return reply_bytes(reply, 200, type_json, &bytes, problem);
 }
 
 static void diff_put_side(Bytes *bytes, const char *name, const MaterialRevision *revision) {
-    bytes_format(bytes, ", \"%s\": {\"revision\": %llu, \"status\": \"%s\"", name,
-                 (unsigned long long)revision->revision, revision->status);
-    material_put_text(bytes, "author", revision->author);
-    material_put_text(bytes, "comment", revision->comment);
-    material_put_time(bytes, "created", revision->created_unix_ms);
-    bytes_format(bytes, ", \"links\": {\"self\": \"%s/v1/materials/%s@%llu\"}}", base_path(),
-                 revision->slug, (unsigned long long)revision->revision);
+    const unsigned long long number = revision->revision;
+    char created[32];
+    clock_rfc3339(revision->created_unix_ms, created);
+    bytes_json(bytes,
+               ", \"%s\": {\"revision\": %llu, \"status\": %s, \"author\": %s, \"comment\": %s, "
+               "\"created\": %s, \"links\": {\"self\": \"%s/v1/materials/%s@%llu\"}}",
+               name, number, revision->status, revision->author, revision->comment, created,
+               base_path(), revision->slug, number);
 }
 
 // Member by member; a list is one.
@@ -99,13 +99,8 @@ static void diff_put(Bytes *bytes, const MaterialRevision *from, const MaterialR
         if (a == NULL || b == NULL)
             bytes->is_failed = true;
         else if (strcmp(a, b) != 0) {
-            bytes_format(bytes, "%s{\"pointer\": \"/%s\", \"from\": ", count++ > 0 ? ",\n " : "",
-                         field->name);
-            bytes_text(bytes, a);
-            bytes_text(bytes, ", \"to\": ");
-            bytes_text(bytes, b);
-            material_put_text(bytes, "unit", field->unit);
-            bytes_text(bytes, "}");
+            bytes_json(bytes, "%p{\"pointer\": \"/%s\", \"from\": %p, \"to\": %p, \"unit\": %s}",
+                       count++ > 0 ? ",\n " : "", field->name, a, b, field->unit);
         }
     }
     bytes_format(bytes, "], \"count\": %zu}\n", count);
@@ -144,7 +139,7 @@ Status materials_diff(App *app, const Request *request, Reply *reply, Problem *p
         diff_put(&bytes, &a, &b);
     material_revision_clear(&a);
     material_revision_clear(&b);
-    return material_reply(reply, 200, &bytes, status, problem);
+    return reply_json(reply, 200, &bytes, status, problem);
 }
 
 // The results that used one revision.
@@ -172,18 +167,18 @@ static Status uses_list(App *app, const Request *request, uint64_t revision, Rep
                  slug, number, (unsigned long long)total);
     for (size_t i = 0; i < uses.count && i < limit; i++) {
         const ResultUse *use = &uses.at[i];
-        bytes_format(&bytes, "%s{\"id\": \"%s\"", i > 0 ? ",\n " : "", use->id);
-        material_put_time(&bytes, "created", use->created_unix_ms);
-        bytes_format(&bytes,
-                     ", \"links\": {\"self\": \"%s/v1/results/%s\", \"manifest\": "
-                     "\"%s/v1/results/%s/manifest\"}}",
-                     base, use->id, base, use->id);
+        char created[32];
+        clock_rfc3339(use->created_unix_ms, created);
+        bytes_json(&bytes,
+                   "%p{\"id\": %s, \"created\": %s, \"links\": {\"self\": \"%s/v1/results/%s\", "
+                   "\"manifest\": \"%s/v1/results/%s/manifest\"}}",
+                   i > 0 ? ",\n " : "", use->id, created, base, use->id, base, use->id);
     }
     bytes_text(&bytes, "]}\n");
     if (uses.count > limit)
         material_page_link(request, reply, (uint64_t)uses.at[limit - 1].number);
     free(uses.at);
-    return material_reply(reply, 200, &bytes, STATUS_OK, problem);
+    return reply_json(reply, 200, &bytes, STATUS_OK, problem);
 }
 
 // Each revision with the number of results that used it.
@@ -209,26 +204,22 @@ static Status uses_count(App *app, const char *slug, Reply *reply, Problem *prob
     }
     bytes_format(&bytes, "], \"total\": %llu}\n", (unsigned long long)total);
     free(uses.at);
-    return material_reply(reply, 200, &bytes, STATUS_OK, problem);
+    return reply_json(reply, 200, &bytes, STATUS_OK, problem);
 }
 
+// Of the revision in the path or the query, or of all.
 Status materials_uses(App *app, const Request *request, Reply *reply, Problem *problem) {
-    const char *text = request_query(request, "revision");
+    const char *text = request->parameters[1];
     uint64_t revision;
+    if (text == NULL)
+        text = request_query(request, "revision");
     if (text == NULL &&
         (request_query(request, "limit") != NULL || request_query(request, "before") != NULL))
         return problem_set(problem, STATUS_USAGE,
                            "limit and before need a revision: add revision=1, or use "
                            "/v1/materials/%.63s@1/used-by",
                            request->parameters[0]);
-    if (text == NULL)
-        return uses_count(app, request->parameters[0], reply, problem);
     TRY(material_number(text, "revision", &revision, problem));
-    return uses_list(app, request, revision, reply, problem);
-}
-
-Status materials_uses_revision(App *app, const Request *request, Reply *reply, Problem *problem) {
-    uint64_t revision;
-    TRY(material_number(request->parameters[1], "revision", &revision, problem));
-    return uses_list(app, request, revision, reply, problem);
+    return revision == 0 ? uses_count(app, request->parameters[0], reply, problem)
+                         : uses_list(app, request, revision, reply, problem);
 }

@@ -6,11 +6,8 @@
 
 #include "core/drop_test/pair_parameters.h"
 #include "server/api/materials.h"
-#include "server/api/measurements.h"
-#include "server/api/query.h"
 #include "server/formats/study_formats.h"
-#include "server/http/header.h"
-#include "server/http/reply.h"
+#include "server/jobs/documents.h"
 #include "server/json/encode.h"
 #include "server/materials/material.h"
 #include "server/util/base_path.h"
@@ -78,16 +75,10 @@ static Status selection_read(Selection *selection, const Request *request,
     return STATUS_OK;
 }
 
-static Status selection_load(Selection *selection, CpuBudget *budget, const char *slug,
-                             Reply *reply, Problem *problem) {
+static Status selection_load(App *app, Selection *selection, const char *slug, Problem *problem) {
     for (size_t i = 0; i < selection->count; i++) {
-        if (!cpu_budget_lasts(budget, 0)) {
-            const Status status = cpu_budget_report(budget, problem);
-            reply->retry_after = status == STATUS_BUSY ? 10 : reply->retry_after;
-            return status;
-        }
-        TRY(stored_test_load(budget->app->db, slug, selection->tests[i].number,
-                             &selection->stored[i], problem));
+        TRY(stored_test_load(app->db, slug, selection->tests[i].number, &selection->stored[i],
+                             problem));
         // Before more of them are in memory.
         if (evaluation_sample_count(selection->tests, i + 1) > EVALUATION_SAMPLES_MAX)
             return problem_set(problem, STATUS_LIMIT,
@@ -95,23 +86,6 @@ static Status selection_load(Selection *selection, CpuBudget *budget, const char
                                "as ?measurements=1,2",
                                EVALUATION_SAMPLES_MAX);
     }
-    return STATUS_OK;
-}
-
-static Status proposal_read_format(const Request *request, Reply *reply, bool *is_chart,
-                                   Problem *problem) {
-    static const char *const types[] = {"application/json", chart_type, NULL};
-    const char *extension = request->parameters[1];
-    reply->varies_by_accept = extension == NULL;
-    const int type = extension == NULL ? header_accept(request->accept, types) : 0;
-    if (type < 0)
-        return problem_set(problem, STATUS_NOT_ACCEPTABLE,
-                           "none of the formats json and svg fits Accept; an extension selects one "
-                           "too");
-    *is_chart = extension == NULL ? type == 1 : strcmp(extension, "svg") == 0;
-    if (extension != NULL && !*is_chart && strcmp(extension, "json") != 0)
-        return problem_set(problem, STATUS_NOT_FOUND,
-                           "there is no format \"%.20s\"; there are json, svg", extension);
     return STATUS_OK;
 }
 
@@ -166,13 +140,10 @@ static Status proposal_run(App *app, const Request *request, const Material *bef
     TRY(query_choice(request, "as", proposal_form_names, PROPOSAL_CONSTANT, &form, problem));
     Evaluation evaluation = {.separation = separation};
     MaterialProposal proposal = {.why = NULL};
-    CpuBudget budget;
-    cpu_budget_begin(app, &budget);
-    Status status = selection_load(selection, &budget, slug, reply, problem);
+    Status status = selection_load(app, selection, slug, problem);
     if (status == STATUS_OK)
-        status = measurements_evaluate(&budget, selection->tests, selection->count, separation,
+        status = measurements_evaluate(app, selection->tests, selection->count, separation,
                                        &evaluation, reply, problem);
-    cpu_budget_end(&budget);
     if (status == STATUS_OK)
         status = material_proposal_run(&evaluation, selection->tests, selection->count, before,
                                        (ProposalForm)form, &proposal, problem);
@@ -193,11 +164,10 @@ Status proposals_show(App *app, const Request *request, Reply *reply, Problem *p
     const char *slug = request->parameters[0];
     MaterialState state;
     MaterialRevision before;
-    bool is_chart = false;
+    static const QueryFormat formats[] = {{"json", "application/json"}, {"svg", chart_type}};
+    size_t format;
     int separation;
-    TRY(proposal_read_format(request, reply, &is_chart, problem));
-    if (is_chart)
-        reply->policy = reply_drawing_policy;
+    TRY(query_format(request, 1, formats, COUNT(formats), reply, &format, problem));
     TRY(db_material_state(app->db, slug, &state, problem));
     TRY(measurement_separation(app, request, &separation, problem));
     TRY(material_latest(app, slug, &before, problem));
@@ -206,7 +176,7 @@ Status proposals_show(App *app, const Request *request, Reply *reply, Problem *p
                         ? selection_read(selection, request, &state, problem)
                         : problem_set(problem, STATUS_NO_MEMORY, "no memory for the measurements");
     if (status == STATUS_OK && !material_is_cached(request, reply, &state))
-        status = proposal_run(app, request, &before.material, selection, separation, is_chart,
+        status = proposal_run(app, request, &before.material, selection, separation, format == 1,
                               reply, problem);
     selection_free(selection);
     material_revision_clear(&before);
@@ -237,21 +207,21 @@ static Status pair_query_read(const Request *request, PairQuery *query, Problem 
 static void pair_write(Bytes *bytes, const MaterialRevision *revision, const PairParameters *pair) {
     const char *base = base_path(), *slug = revision->slug;
     const unsigned long long number = revision->revision;
-    bytes_format(bytes, "{\"material\": \"%s@%llu\", \"status\": \"%s\", ", slug, number,
-                 revision->status);
+    bytes_json(bytes, "{\"material\": \"%s@%llu\", \"status\": %s, ", slug, number,
+               revision->status);
     (void)encode_members(bytes, pair_parameters_fields, pair, WRITE_REPORT);
     bytes_text(bytes, ", \"warnings\": ");
-    encode_list(bytes, warning_fields, pair->warnings.at, pair->warnings.count,
-                sizeof *pair->warnings.at, WRITE_REPORT);
-    bytes_format(bytes,
-                 ", \"links\": {\"material\": \"%s/v1/materials/%s\", \"revision\": "
-                 "\"%s/v1/materials/%s@%llu\"}}\n",
-                 base, slug, base, slug, number);
+    document_warnings(bytes, &pair->warnings);
+    bytes_json(bytes,
+               ", \"links\": {\"material\": \"%s/v1/materials/%s\", \"revision\": "
+               "\"%s/v1/materials/%s@%llu\"}}\n",
+               base, slug, base, slug, number);
 }
 
-static Status pair_show(App *app, const Request *request, uint64_t number, Reply *reply,
-                        Problem *problem) {
+Status derived_show(App *app, const Request *request, Reply *reply, Problem *problem) {
     PairQuery query;
+    uint64_t number;
+    TRY(material_number(request->parameters[1], "revision", &number, problem));
     TRY(pair_query_read(request, &query, problem));
     MaterialRevision revision;
     PairParameters pair = {.contacts = {NULL, 0}};
@@ -266,20 +236,10 @@ static Status pair_show(App *app, const Request *request, uint64_t number, Reply
         if (!reply_tagged(reply, request, tag)) {
             Bytes bytes = {.most = app->reply_most};
             pair_write(&bytes, &revision, &pair);
-            status = material_reply(reply, 200, &bytes, STATUS_OK, problem);
+            status = reply_bytes(reply, 200, type_json, &bytes, problem);
         }
     }
     pair_parameters_clear(&pair);
     material_revision_clear(&revision);
     return status;
-}
-
-Status derived_show(App *app, const Request *request, Reply *reply, Problem *problem) {
-    return pair_show(app, request, 0, reply, problem);
-}
-
-Status derived_show_revision(App *app, const Request *request, Reply *reply, Problem *problem) {
-    uint64_t number;
-    TRY(material_number(request->parameters[1], "revision", &number, problem));
-    return pair_show(app, request, number, reply, problem);
 }

@@ -1,16 +1,12 @@
 // Materials: list, heads and revisions, new revisions, reviews, export and import. Each write adds
 // rows and an audit entry. A writer names the version that it saw (If-Match); of two writers who
 // saw the same version one is refused.
-#include "server/api/materials.h"
-
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/api/query.h"
-#include "server/formats/format.h"
+#include "server/api/materials.h"
 #include "server/http/header.h"
-#include "server/http/reply.h"
 #include "server/json/parse.h"
 #include "server/json/schema.h"
 #include "server/materials/exchange.h"
@@ -35,8 +31,10 @@ bool material_is_cached(const Request *request, Reply *reply, const MaterialStat
 }
 
 Status material_number(const char *text, const char *what, uint64_t *number, Problem *problem) {
-    const size_t size = strlen(text);
     *number = 0;
+    if (text == NULL) // the head
+        return STATUS_OK;
+    const size_t size = strlen(text);
     if (size <= 9 && strspn(text, "0123456789") == size)
         *number = strtoull(text, NULL, 10);
     return *number > 0 ? STATUS_OK
@@ -56,13 +54,6 @@ void material_page_link(const Request *request, Reply *reply, uint64_t last) {
     snprintf(number, sizeof number, "%llu", (unsigned long long)last);
     if (last > 1)
         query_link_next(request, reply, "before", number);
-}
-
-Status material_reply(Reply *reply, int code, Bytes *bytes, Status status, Problem *problem) {
-    if (status == STATUS_OK)
-        return reply_bytes(reply, code, type_json, bytes, problem);
-    bytes_clear(bytes);
-    return status;
 }
 
 Status material_body_read(const Request *request, const char *whose, const Field *fields,
@@ -155,11 +146,12 @@ static Status search_read_folded(const Request *request, const char *name, Bytes
     return STATUS_OK;
 }
 
+static const char *const search_statuses[] = {"draft", "approved", "deprecated", NULL};
+
 static Status search_read(const Request *request, MaterialSearch *search, Problem *problem) {
-    static const char *const statuses[] = {"draft", "approved", "deprecated", NULL};
     TRY(search_read_folded(request, "q", &search->words, problem));
     TRY(search_read_folded(request, "kind", &search->kind, problem));
-    TRY(query_choice(request, "status", statuses, CHOICE_ABSENT, &search->status, problem));
+    TRY(query_choice(request, "status", search_statuses, CHOICE_ABSENT, &search->status, problem));
     TRY(query_range(request, "e", &search->restitution, problem));
     TRY(query_range(request, "T_c", &search->contact_time, problem));
     TRY(query_text(request, "after", &search->after, problem));
@@ -203,10 +195,9 @@ static bool search_in_ranges(const MaterialSearch *search, const Material *mater
 }
 
 static bool search_matches(const MaterialSearch *search, const MaterialRevision *revision) {
-    static const char *const statuses[] = {"draft", "approved", "deprecated"};
     const Material *material = &revision->material;
     return (search->status == CHOICE_ABSENT ||
-            strcmp(revision->status, statuses[search->status]) == 0) &&
+            strcmp(revision->status, search_statuses[search->status]) == 0) &&
            (search->kind.at == NULL || search_has_kind(material, search->kind.at)) &&
            search_in_ranges(search, material) &&
            (search->words.at == NULL || search_has_words(revision, search->words.at));
@@ -226,8 +217,7 @@ static Status search_run(Db *db, const MaterialSearch *search, Bytes *bytes,
             const MaterialRevision *head = &heads.at[i];
             if (!search_matches(search, head))
                 continue;
-            *is_more = count == search->limit;
-            if (*is_more)
+            if ((*is_more = count == search->limit))
                 break;
             bytes_text(bytes, count++ > 0 ? ",\n " : "");
             material_write(bytes, head);
@@ -255,40 +245,33 @@ Status materials_list(App *app, const Request *request, Reply *reply, Problem *p
     bytes_clear(&search.words);
     bytes_clear(&search.kind);
     bytes_text(&bytes, "]}\n");
-    return material_reply(reply, 200, &bytes, status, problem);
+    return reply_json(reply, 200, &bytes, status, problem);
 }
 
 // One revision.
 
-static Status revision_show(App *app, const Request *request, uint64_t number, Reply *reply,
-                            Problem *problem) {
-    MaterialRevision revision;
+static Bytes revision_body(const App *app, const MaterialRevision *revision) {
     Bytes bytes = {.most = app->reply_most};
-    char tag[MATERIAL_TAG];
-    const Status status = db_material(app->db, request->parameters[0], number, &revision, problem);
-    bool is_cached = false;
-    if (status == STATUS_OK) {
-        material_tag(revision.slug, revision.revision, revision.version, tag);
-        is_cached = reply_tagged(reply, request, tag);
-        if (!is_cached)
-            material_write(&bytes, &revision);
-        bytes_text(&bytes, "\n");
-    }
-    material_revision_clear(&revision);
-    if (!is_cached)
-        return material_reply(reply, 200, &bytes, status, problem);
-    bytes_clear(&bytes);
-    return STATUS_OK;
+    material_write(&bytes, revision);
+    bytes_text(&bytes, "\n");
+    return bytes;
 }
 
 Status materials_show(App *app, const Request *request, Reply *reply, Problem *problem) {
-    return revision_show(app, request, 0, reply, problem);
-}
-
-Status materials_show_revision(App *app, const Request *request, Reply *reply, Problem *problem) {
-    uint64_t revision;
-    TRY(material_number(request->parameters[1], "revision", &revision, problem));
-    return revision_show(app, request, revision, reply, problem);
+    MaterialRevision revision;
+    uint64_t number;
+    TRY(material_number(request->parameters[1], "revision", &number, problem));
+    Status status = db_material(app->db, request->parameters[0], number, &revision, problem);
+    if (status == STATUS_OK) {
+        char tag[MATERIAL_TAG];
+        material_tag(revision.slug, revision.revision, revision.version, tag);
+        if (!reply_tagged(reply, request, tag)) {
+            Bytes bytes = revision_body(app, &revision);
+            status = reply_bytes(reply, 200, type_json, &bytes, problem);
+        }
+    }
+    material_revision_clear(&revision);
+    return status;
 }
 
 // Writing.
@@ -313,13 +296,6 @@ static void validate_measurements(const Material *material, uint64_t count, Prob
     }
 }
 
-static Bytes revision_body(const App *app, const MaterialRevision *revision) {
-    Bytes bytes = {.most = app->reply_most};
-    material_write(&bytes, revision);
-    bytes_text(&bytes, "\n");
-    return bytes;
-}
-
 // The reply of a write, whose body was made before it. The tag is that of the client's own write,
 // even if another has followed: the client's next write is then refused.
 static Status revision_reply(const MaterialRevision *revision, int code, Bytes *body, Reply *reply,
@@ -331,7 +307,7 @@ static Status revision_reply(const MaterialRevision *revision, int code, Bytes *
     if (code == 201)
         snprintf(reply->location, sizeof reply->location, "/v1/materials/%.63s@%llu",
                  revision->slug, (unsigned long long)revision->revision);
-    return material_reply(reply, code, body, STATUS_OK, problem);
+    return reply_json(reply, code, body, STATUS_OK, problem);
 }
 
 // The same with the revision as it is in the database, for a client that named no version.
@@ -364,7 +340,7 @@ static Status revision_save(App *app, const Request *request, MaterialRevision *
     revision->revision = revision->latest = state->latest + 1;
     revision->version = state->version + 1;
     Bytes body = revision_body(app, revision);
-    Status status = body.is_failed        ? material_reply(reply, 201, &body, STATUS_OK, problem)
+    Status status = body.is_failed        ? reply_json(reply, 201, &body, STATUS_OK, problem)
                     : state->version == 0 ? db_material_add(app->db, revision, problem)
                                           : db_material_revise(app->db, revision, seen, problem);
     if (status == STATUS_OK && seen != ANY_VERSION)
@@ -467,7 +443,7 @@ static Status review_save(App *app, const MaterialReview *review, uint64_t seen,
     shown.version = seen + 1;
     if (status == STATUS_OK) {
         body = revision_body(app, &shown);
-        status = body.is_failed ? material_reply(reply, 200, &body, STATUS_OK, problem)
+        status = body.is_failed ? reply_json(reply, 200, &body, STATUS_OK, problem)
                                 : db_material_review(app->db, review, seen, problem);
     }
     const bool has_reply = status == STATUS_OK && seen != ANY_VERSION;
@@ -567,24 +543,21 @@ Status materials_export(App *app, const Request *request, Reply *reply, Problem 
 }
 
 static void import_put_count(Bytes *bytes, const char *name, const ImportCount *count) {
-    bytes_format(bytes, ", \"%s\": {\"added\": %zu, \"same\": %zu}", name, count->added,
-                 count->same);
+    bytes_json(bytes, ", \"%s\": {\"added\": %zu, \"same\": %zu}", name, count->added, count->same);
 }
 
 Status materials_import(App *app, const Request *request, Reply *reply, Problem *problem) {
-    ImportOptions options = {.is_table = header_type_is(request->content_type, "text/csv"),
-                             .who = request->client,
+    static const char *const texts[] = {"text/csv", NULL};
+    bool is_json;
+    ImportOptions options = {.who = request->client,
                              .may_all = request->client == NULL || request->holder.is_admin};
     ImportTally tally;
     Bytes bytes = {.most = app->reply_most};
     TRY(request_flag(request, "dry_run", &options.is_dry, problem));
-    if (!options.is_table && !header_type_is(request->content_type, type_json))
-        return problem_set(problem, STATUS_UNSUPPORTED_TYPE,
-                           "the body must be application/json or text/csv, is %.60s; with curl use "
-                           "-H 'Content-Type: text/csv' --data-binary @materials.csv",
-                           request->content_type != NULL ? request->content_type
-                                                         : "of no given type");
-    TRY(request_require_body(request, problem));
+    TRY(query_body_type(request, texts, "application/json or text/csv",
+                        "; with curl use -H 'Content-Type: text/csv' --data-binary @materials.csv",
+                        &is_json, problem));
+    options.is_table = !is_json;
     // First, so that the memory of a reply this short is there before anything is written.
     bytes_format(&bytes, "{\"dry_run\": %s", options.is_dry ? "true" : "false");
     Status status = bytes.is_failed ? STATUS_OK
@@ -597,5 +570,5 @@ Status materials_import(App *app, const Request *request, Reply *reply, Problem 
         import_put_count(&bytes, "reviews", &tally.reviews);
         bytes_text(&bytes, "}\n");
     }
-    return material_reply(reply, 200, &bytes, status, problem);
+    return reply_json(reply, 200, &bytes, status, problem);
 }

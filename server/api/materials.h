@@ -1,10 +1,11 @@
-// What the handlers of materials share: entity tags, If-Match, pages of lists and JSON replies.
+// What the handlers of materials and of their measurements share: entity tags, If-Match, pages of
+// lists, and the evaluation of drop tests.
 #ifndef SERVER_API_MATERIALS_H
 #define SERVER_API_MATERIALS_H
 
+#include "core/drop_test/evaluation.h"
 #include "server/api/app.h"
 #include "server/db/materials.h"
-#include "server/util/bytes.h"
 
 enum { MATERIAL_TAG = 110 };
 
@@ -21,7 +22,8 @@ bool material_is_cached(const Request *request, Reply *reply, const MaterialStat
 Status material_condition(App *app, const Request *request, bool is_required, uint64_t *version,
                           MaterialState *state, Problem *problem);
 
-// A number from 1 as a path has it; `what` is "revision" or "measurement". STATUS_NOT_FOUND.
+// A number from 1 as a path has it, 0 for NULL; `what` is "revision" or "measurement".
+// STATUS_NOT_FOUND.
 Status material_number(const char *text, const char *what, uint64_t *number, Problem *problem);
 
 // A page of a list numbered from 1, newest first: `limit` items before `before`.
@@ -33,12 +35,21 @@ Status material_page_read(const Request *request, size_t initial, size_t max, Ma
 // Links the next page after the item numbered `last`; 0: there is no item.
 void material_page_link(const Request *request, Reply *reply, uint64_t last);
 
-// Takes the JSON in `bytes` as the body of the reply, unless `status` is an error already.
-Status material_reply(Reply *reply, int code, Bytes *bytes, Status status, Problem *problem);
-
 // The JSON body of a request as `fields`; faults of types and ranges are in `problem`, to which
 // more may be added. STATUS_OK: it is an object. Cleared by fields_clear in any case.
 Status material_body_read(const Request *request, const char *whose, const Field *fields,
                           void *item, Problem *problem);
+
+// The head, or the newest revision if all are deprecated. STATUS_NOT_FOUND, and then it is empty.
+Status material_latest(App *app, const char *slug, MaterialRevision *revision, Problem *problem);
+
+// The separation rule of an evaluation: the query's, else the material's, else zero penetration.
+Status measurement_separation(App *app, const Request *request, int *separation, Problem *problem);
+
+// evaluation_run within the CPU time that a request may take, so that a loaded machine answers the
+// same: a quick one runs at once, of longer ones some at a time. STATUS_BUSY while others take long
+// or the daemon stops, STATUS_LIMIT.
+Status measurements_evaluate(App *app, const Measurement *tests, size_t count, int separation,
+                             Evaluation *evaluation, Reply *reply, Problem *problem);
 
 #endif

@@ -1,14 +1,10 @@
 // Drop tests of a material: stored as they were done, each shown with its evaluation. A dry run
 // shows what would be stored.
-#include "server/api/measurements.h"
-
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "server/api/materials.h"
-#include "server/api/query.h"
-#include "server/http/reply.h"
 #include "server/json/encode.h"
 #include "server/json/schema.h"
 #include "server/materials/material.h"
@@ -16,6 +12,8 @@
 #include "server/util/clock.h"
 
 enum { LIST_INITIAL = 20, LIST_MAX = 100 };
+enum { LONG_MAX = 4 };                             // evaluations at once that take longer
+static const double cpu_quick = 0.5, cpu_max = 30; // [s]
 
 Status measurement_separation(App *app, const Request *request, int *separation, Problem *problem) {
     MaterialRevision latest;
@@ -43,22 +41,53 @@ Status material_latest(App *app, const char *slug, MaterialRevision *revision, P
     return problem_set(problem, status, "the material \"%.63s\" cannot be read", slug);
 }
 
-Status measurements_evaluate(CpuBudget *budget, const Measurement *tests, size_t count,
-                             int separation, Evaluation *evaluation, Reply *reply,
-                             Problem *problem) {
-    const Progress watch = {budget, cpu_budget_lasts};
-    Status status =
+typedef struct CpuBudget {
+    App *app;
+    int64_t from_ns; // of this thread's CPU time
+    bool has_place;  // among those that take long
+    bool is_crowded; // there was none
+} CpuBudget;
+
+// Of a Progress. False: stop.
+static bool cpu_budget_lasts(void *context, double fraction) {
+    CpuBudget *budget = context;
+    App *app = budget->app;
+    const double spent = 1e-9 * (double)(clock_thread_cpu_ns() - budget->from_ns);
+    (void)fraction;
+    if (spent > cpu_quick && !budget->has_place) {
+        budget->has_place = atomic_fetch_add(&app->evaluations, 1) < LONG_MAX;
+        budget->is_crowded = !budget->has_place;
+        if (budget->is_crowded)
+            atomic_fetch_sub(&app->evaluations, 1);
+    }
+    return !budget->is_crowded && spent < cpu_max && !atomic_load(&app->is_stopping);
+}
+
+Status measurements_evaluate(App *app, const Measurement *tests, size_t count, int separation,
+                             Evaluation *evaluation, Reply *reply, Problem *problem) {
+    CpuBudget budget = {.app = app, .from_ns = clock_thread_cpu_ns()};
+    const Progress watch = {&budget, cpu_budget_lasts};
+    const Status status =
         evaluation_run(tests, count, (Separation)separation, &watch, evaluation, problem);
-    if (status == STATUS_CANCELLED)
-        status = cpu_budget_report(budget, problem);
-    if (status == STATUS_BUSY)
-        reply->retry_after = 10;
-    return status;
+    if (budget.has_place)
+        atomic_fetch_sub(&app->evaluations, 1);
+    if (status != STATUS_CANCELLED)
+        return status;
+    const bool is_stopping = atomic_load(&app->is_stopping);
+    if (!is_stopping && !budget.is_crowded)
+        return problem_set(problem, STATUS_LIMIT,
+                           "to evaluate this takes more than %g s: cut the traces, or take in "
+                           "fewer measurements at a time",
+                           cpu_max);
+    reply->retry_after = 10;
+    return problem_set(problem, STATUS_BUSY, "%s",
+                       is_stopping ? "the daemon is stopping"
+                                   : "other long measurements are being evaluated: ask again");
 }
 
 // Evaluates a test that is stored whatever comes of it: on failure the evaluation is empty, and its
 // warnings say why.
-static Status evaluate_stored(CpuBudget *budget, const Measurement *test, int separation,
+static Status evaluate_stored(App *app, const Measurement *test, int separation,
                               Evaluation *evaluation, bool *has_evaluation, Reply *reply,
                               Problem *problem) {
     Problem *why = calloc(1, sizeof *why);
@@ -66,7 +95,7 @@ static Status evaluate_stored(CpuBudget *budget, const Measurement *test, int se
     *has_evaluation = false;
     if (why == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the evaluation");
-    Status status = measurements_evaluate(budget, test, 1, separation, evaluation, reply, why);
+    Status status = measurements_evaluate(app, test, 1, separation, evaluation, reply, why);
     *has_evaluation = status == STATUS_OK;
     if (status == STATUS_NO_MEMORY) {
         (void)problem_set(problem, status, "%s", why->detail);
@@ -111,7 +140,7 @@ static Status measurement_reply_dry(App *app, const char *slug, const DropTest *
                  "\"links\": {\"material\": \"%s/v1/materials/%s\", \"measurements\": "
                  "\"%s/v1/materials/%s/measurements\"}}\n",
                  base_path(), slug, base_path(), slug);
-    return material_reply(reply, 200, &bytes, STATUS_OK, problem);
+    return reply_json(reply, 200, &bytes, STATUS_OK, problem);
 }
 
 // The body of the reply is made first: if that fails nothing is written. The tag is that of the
@@ -131,7 +160,7 @@ static Status measurement_save(App *app, const Request *request, const Measureme
     Bytes bytes = measurement_body(app, &row, &body->test, evaluation, has_evaluation);
     encode_item(&document, drop_test_fields, &body->test, WRITE_SCENE);
     row.document = document.at;
-    Status status = bytes.is_failed ? material_reply(reply, 201, &bytes, STATUS_OK, problem)
+    Status status = bytes.is_failed ? reply_json(reply, 201, &bytes, STATUS_OK, problem)
                     : document.is_failed
                         ? problem_set(problem, STATUS_NO_MEMORY, "no memory for the measurement")
                         : db_material_measure(app->db, &row, seen, problem);
@@ -147,7 +176,7 @@ static Status measurement_save(App *app, const Request *request, const Measureme
         snprintf(reply->location, sizeof reply->location, "/v1/materials/%.63s/measurements/%llu",
                  row.slug, (unsigned long long)row.measurement);
     }
-    return material_reply(reply, 201, &bytes, status, problem);
+    return reply_json(reply, 201, &bytes, status, problem);
 }
 
 static Status measurement_create(App *app, const Request *request, const MeasurementBody *body,
@@ -159,13 +188,10 @@ static Status measurement_create(App *app, const Request *request, const Measure
     TRY(measurement_separation(app, request, &separation, problem));
     const Measurement test = {COUNT_ABSENT, &body->test};
     Evaluation evaluation;
-    CpuBudget budget;
-    cpu_budget_begin(app, &budget);
     Status status =
-        is_dry ? measurements_evaluate(&budget, &test, 1, separation, &evaluation, reply, problem)
-               : evaluate_stored(&budget, &test, separation, &evaluation, &has_evaluation, reply,
-                                 problem);
-    cpu_budget_end(&budget);
+        is_dry
+            ? measurements_evaluate(app, &test, 1, separation, &evaluation, reply, problem)
+            : evaluate_stored(app, &test, separation, &evaluation, &has_evaluation, reply, problem);
     if (status == STATUS_OK)
         status = is_dry ? measurement_reply_dry(app, request->parameters[0], &body->test,
                                                 &evaluation, reply, problem)
@@ -216,7 +242,7 @@ Status measurements_list(App *app, const Request *request, Reply *reply, Problem
     if (status == STATUS_OK && heads.count > 0)
         material_page_link(request, reply, heads.at[heads.count - 1].measurement);
     material_measurements_clear(&heads);
-    return material_reply(reply, 200, &bytes, status, problem);
+    return reply_json(reply, 200, &bytes, status, problem);
 }
 
 Status measurements_show(App *app, const Request *request, Reply *reply, Problem *problem) {
@@ -234,25 +260,22 @@ Status measurements_show(App *app, const Request *request, Reply *reply, Problem
     if (number <= state.measurements && reply_tagged(reply, request, tag))
         return STATUS_OK;
     StoredTest stored = {.row = {.slug = NULL}};
-    CpuBudget budget;
-    cpu_budget_begin(app, &budget);
     Status status = stored_test_load(app->db, slug, number, &stored, problem);
     if (status == STATUS_OK) {
         const Measurement test = {COUNT_ABSENT, &stored.test};
         Evaluation evaluation;
         bool has_evaluation;
-        status = evaluate_stored(&budget, &test, separation, &evaluation, &has_evaluation, reply,
-                                 problem);
+        status =
+            evaluate_stored(app, &test, separation, &evaluation, &has_evaluation, reply, problem);
         if (!has_evaluation) // the next request may succeed
             reply->etag[0] = '\0';
         if (status == STATUS_OK) {
             Bytes bytes =
                 measurement_body(app, &stored.row, &stored.test, &evaluation, has_evaluation);
-            status = material_reply(reply, 200, &bytes, STATUS_OK, problem);
+            status = reply_json(reply, 200, &bytes, STATUS_OK, problem);
         }
         evaluation_clear(&evaluation);
     }
-    cpu_budget_end(&budget);
     stored_test_clear(&stored);
     return status;
 }

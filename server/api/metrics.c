@@ -1,7 +1,6 @@
 // GET /metrics: counters and gauges of all rooms in the Prometheus text format, version 0.0.4.
 #include "server/api/app.h"
 #include "server/http/access.h"
-#include "server/http/reply.h"
 #include "server/http/response_cache.h"
 #include "server/http/server.h"
 #include "server/util/process.h"

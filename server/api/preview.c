@@ -3,8 +3,6 @@
 #include <stdlib.h>
 
 #include "server/api/app.h"
-#include "server/formats/table_stream.h"
-#include "server/http/reply.h"
 #include "server/jobs/documents.h"
 
 static const double cpu_max = 0.05; // predicted [s]

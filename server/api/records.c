@@ -1,22 +1,258 @@
-// Ground-motion records: upload, list, one with what uses it, its samples, deletion.
+// Ground-motion records: upload, list, one with what uses it, its samples, deletion. An upload is a
+// file as it is published, with the rest in the query, or all of it as JSON; both fill one struct,
+// whose rows validate it.
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/api/columns.h"
-#include "server/api/query.h"
-#include "server/api/records_upload.h"
+#include "core/base/json_pointer.h"
+#include "core/base/spelling.h"
+#include "core/excitation/recorded_motion.h"
+#include "core/formats/ground_motion_text.h"
+#include "server/api/app.h"
+#include "server/db/records.h"
 #include "server/http/access.h"
-#include "server/http/reply.h"
+#include "server/http/header.h"
 #include "server/jobs/documents.h"
 #include "server/json/encode.h"
+#include "server/json/parse.h"
 #include "server/util/base_path.h"
 #include "server/util/clock.h"
+
+typedef struct RecordUpload {
+    RecordRow row;
+    int unit;          // of the samples as they came
+    Reals samples;     // [m/s^2], once it is read
+    Warnings warnings; // what is allowed but unlikely to be meant
+} RecordUpload;
+
+#define INTERVAL_MIN 1e-9
+#define INTERVAL_MAX 1e6
+
+// clang-format off
+static const Field upload_row_fields[] = {
+    FIELD_TEXT(RecordRow, name, RECORD_NAME_SIZE - 1, PRESENCE_REQUIRED, 0, "what scenes call it: letters, digits, dot, underscore and dash"),
+    FIELD_TEXT(RecordRow, source, 1000, PRESENCE_OPTIONAL, 0, "where the file comes from"),
+    FIELD_TEXT(RecordRow, processing, 1000, PRESENCE_OPTIONAL, 0, "what was done to it: filters, baseline"),
+    FIELD_TEXT(RecordRow, earthquake, 200, PRESENCE_OPTIONAL, 0, "which one"),
+    FIELD_TEXT(RecordRow, station, 200, PRESENCE_OPTIONAL, 0, "where it was measured, and in which direction"),
+    FIELD_TEXT(RecordRow, notes, 4000, PRESENCE_OPTIONAL, 0, "what else one should know"),
+    FIELD_REAL(RecordRow, interval, "s", WITHIN(INTERVAL_MIN, INTERVAL_MAX), REQUIRED, "time between samples"),
+    FIELD_END
+};
+
+static const Field upload_fields[] = {
+    FIELD_BASE(RecordUpload, row, upload_row_fields),
+    FIELD_CHOICE(RecordUpload, unit, acceleration_unit_names, OPTIONAL, "of the samples: g, m/s^2 (if absent) or cm/s^2"),
+    FIELD_REALS(RecordUpload, samples, NULL, ANY, RECORD_SAMPLES, PRESENCE_REQUIRED, "base acceleration from the start on"),
+    FIELD_END
+};
+// clang-format on
+
+static void upload_clear(RecordUpload *upload) {
+    record_row_clear(&upload->row);
+    free(upload->samples.at);
+    warnings_clear(&upload->warnings);
+}
+
+static Status upload_no_memory(Problem *problem) {
+    return problem_set(problem, STATUS_NO_MEMORY, "no memory for the record");
+}
+
+static Status upload_copy(char **target, const char *text, Problem *problem) {
+    *target = strdup(text);
+    return *target != NULL ? STATUS_OK : upload_no_memory(problem);
+}
+
+static Status upload_read_document(const Request *request, RecordUpload *upload, Problem *problem) {
+    TRY(query_read_document(request, upload_fields, upload, problem));
+    if (upload->unit == CHOICE_ABSENT)
+        upload->unit = ACCELERATION_METRES;
+    return upload_copy(&upload->row.layout, "json", problem);
+}
+
+static Status upload_read_queries(const Request *request, RecordUpload *upload, Problem *problem) {
+    RecordRow *row = &upload->row;
+    TRY(query_copy(request, "name", &row->name, problem));
+    TRY(query_copy(request, "source", &row->source, problem));
+    TRY(query_copy(request, "processing", &row->processing, problem));
+    TRY(query_copy(request, "earthquake", &row->earthquake, problem));
+    TRY(query_copy(request, "station", &row->station, problem));
+    TRY(query_copy(request, "notes", &row->notes, problem));
+    TRY(request_number(request, "interval", INTERVAL_MIN, INTERVAL_MAX, (double)NAN, &row->interval,
+                       problem));
+    return query_spelled(request, "unit", "/unit", acceleration_unit_names, &upload->unit, problem);
+}
+
+static Status upload_warn_file(const GroundMotionText *file, bool has_unit, Warnings *warnings) {
+    const char *unit = acceleration_unit_names[file->unit];
+    char start[32];
+    if (file->stated_unit == CHOICE_ABSENT && !has_unit)
+        TRY(warnings_add(warnings, "/unit", "the file tells no unit, %s is taken", unit));
+    if (file->stated_unit != CHOICE_ABSENT && file->stated_unit != file->unit)
+        TRY(warnings_add(warnings, "/unit", "the file tells %s, %s is taken",
+                         acceleration_unit_names[file->stated_unit], unit));
+    if (file->start != 0)
+        TRY(warnings_add(warnings, "/samples",
+                         "begin at %s s in the file; the record begins at 0 s",
+                         text_real(start, file->start)));
+    return STATUS_OK;
+}
+
+// Takes out of the file what the record keeps.
+static Status upload_take_file(GroundMotionText *file, RecordUpload *upload, Problem *problem) {
+    RecordRow *row = &upload->row;
+    const bool has_unit = upload->unit != CHOICE_ABSENT;
+    upload->unit = file->unit;
+    row->interval = file->interval;
+    upload->samples = file->samples;
+    file->samples = (Reals){NULL, 0};
+    TRY(upload_copy(&row->layout, file->layout, problem));
+    if (file->header[0] != '\0')
+        TRY(upload_copy(&row->header, file->header, problem));
+    if (file->stated_unit != CHOICE_ABSENT)
+        TRY(upload_copy(&row->stated_unit, acceleration_unit_names[file->stated_unit], problem));
+    return upload_warn_file(file, has_unit, &upload->warnings) == STATUS_OK
+               ? STATUS_OK
+               : upload_no_memory(problem);
+}
+
+Status query_read_motion(const Request *request, const GroundMotionOptions *options,
+                         GroundMotionText *motion, Problem *problem) {
+    char *text = malloc(request->body_size + 1);
+    Problem *fault = calloc(1, sizeof *fault);
+    Status status = STATUS_NO_MEMORY;
+    if (text != NULL && fault != NULL) {
+        memcpy(text, request->body, request->body_size + 1);
+        // In text/csv a comma parts two cells; elsewhere it might be a decimal one and is a fault.
+        if (header_type_is(request->content_type, "text/csv"))
+            for (char *at = text;
+                 (at = memchr(at, ',', request->body_size - (size_t)(at - text))) != NULL;)
+                *at = ' ';
+        status = ground_motion_text_read(text, request->body_size, RECORD_SAMPLES, options, motion,
+                                         fault);
+        if (status != STATUS_OK && fault->count > 0) // its places are lines, no pointers
+            (void)problem_add(problem, status, "", "%s: %s", fault->faults[0].pointer,
+                              fault->faults[0].detail);
+        else if (status != STATUS_OK)
+            (void)problem_set(problem, status, "%s", fault->detail);
+    } else {
+        (void)problem_set(problem, status, "no memory for the file");
+    }
+    free(text);
+    free(fault);
+    return status;
+}
+
+// The file in the body, and everything else in the query; faults of both are reported.
+static Status upload_read_file(const Request *request, RecordUpload *upload, Problem *problem) {
+    const Status queries = upload_read_queries(request, upload, problem);
+    if (queries != STATUS_OK && queries != STATUS_INVALID)
+        return queries;
+    const GroundMotionOptions options = {.interval = upload->row.interval, .unit = upload->unit};
+    GroundMotionText file = {0};
+    Status status = query_read_motion(request, &options, &file, problem);
+    if (status == STATUS_OK)
+        status = upload_take_file(&file, upload, problem);
+    ground_motion_text_clear(&file);
+    return queries != STATUS_OK ? queries : status;
+}
+
+static Status upload_check_name(const char *name, Problem *problem) {
+    if (name == NULL || record_name_is_sound(name) || problem_concerns(problem, "/name"))
+        return STATUS_OK; // or reported by the rows
+    Fault fault = {.pointer = "/name",
+                   .detail = "must be 1 to 64 letters, digits, dots, underscores and dashes, the "
+                             "first a letter or a digit"};
+    text_quote(fault.value, sizeof fault.value, name);
+    return problem_add_fault(problem, STATUS_INVALID, &fault);
+}
+
+// To m/s^2, and -0 to 0, so that what means the same has one digest.
+static Status upload_scale(Reals *samples, double size, Problem *problem) {
+    for (size_t i = 0; i < samples->count; i++) {
+        char place[64];
+        const double value = samples->at[i] * size + 0.0;
+        if (!isfinite(value)) {
+            json_pointer_index(place, sizeof place, "/samples", i);
+            return problem_add_real(problem, STATUS_INVALID, place, samples->at[i], NULL,
+                                    "is too large to be an acceleration in m/s^2");
+        }
+        samples->at[i] = value;
+    }
+    return STATUS_OK;
+}
+
+static Status upload_warn(const RecordLook *look, const RecordRow *row, Warnings *warnings) {
+    Problem *doubts = calloc(1, sizeof *doubts);
+    if (doubts == NULL)
+        return STATUS_NO_MEMORY;
+    record_look_doubt(look, "", "/samples", doubts);
+    Status status = STATUS_OK;
+    for (size_t i = 0; i < doubts->count && status == STATUS_OK; i++)
+        status = warnings_add(warnings, doubts->faults[i].pointer, "%s", doubts->faults[i].detail);
+    free(doubts);
+    if (status == STATUS_OK && row->source == NULL)
+        status = warnings_add(warnings, "/source", "is not told: say where the file comes from");
+    if (status == STATUS_OK && row->processing == NULL)
+        status = warnings_add(warnings, "/processing",
+                              "is not told: the same earthquake with another filter or baseline is "
+                              "another record");
+    return status;
+}
+
+static Status upload_measure(RecordUpload *upload, Problem *problem) {
+    RecordRow *row = &upload->row;
+    char digest[RECORD_DIGEST_SIZE];
+    const RecordLook look = record_look(&upload->samples, row->interval, 1);
+    record_digest(row->interval, &upload->samples, digest);
+    row->count = upload->samples.count;
+    row->peak = fmax(look.highest, -look.lowest);
+    row->peak_time = (double)look.peak_at / (1 / row->interval);
+    row->peak_velocity = look.peak_velocity;
+    row->end_velocity = look.end_velocity;
+    row->created_unix_ms = clock_unix_ms();
+    TRY(upload_copy(&row->unit, acceleration_unit_names[upload->unit], problem));
+    if (digest[0] == '\0')
+        return upload_no_memory(problem);
+    TRY(upload_copy(&row->digest, digest, problem));
+    if (!isfinite(look.peak_velocity) || !isfinite(row->peak_time))
+        return problem_add(problem, STATUS_INVALID, "/samples",
+                           "must move the base at a speed that a number can hold");
+    return upload_warn(&look, row, &upload->warnings) == STATUS_OK ? STATUS_OK
+                                                                   : upload_no_memory(problem);
+}
+
+// Cleared by upload_clear in any case.
+static Status upload_read(const Request *request, RecordUpload *upload, Problem *problem) {
+    bool is_json;
+    problem->whose = "record";
+    static const char *const texts[] = {"text/plain", "application/octet-stream", "text/csv", NULL};
+    TRY(query_body_type(request, texts,
+                        "a ground motion's file as text/plain with ?name=NAME, or "
+                        "application/json",
+                        "; with curl use -H 'Content-Type: text/plain' --data-binary @motion.AT2",
+                        &is_json, problem));
+    if (fields_default(upload_fields, upload) != STATUS_OK)
+        return upload_no_memory(problem);
+    Status status = is_json ? upload_read_document(request, upload, problem)
+                            : upload_read_file(request, upload, problem);
+    // A file that cannot be read has no samples that could be missing.
+    if (status == STATUS_OK || (is_json && status == STATUS_INVALID)) {
+        const Status rows = fields_validate(upload_fields, upload, "", problem);
+        const Status name = upload_check_name(upload->row.name, problem);
+        status = status != STATUS_OK ? status : rows != STATUS_OK ? rows : name;
+    }
+    TRY(status);
+    TRY(upload_scale(&upload->samples, is_json ? acceleration_unit_size(upload->unit) : 1,
+                     problem));
+    return upload_measure(upload, problem);
+}
 
 enum { LIST_INITIAL = 50, LIST_MAX = 500 };
 
 // clang-format off
-static const Field row_fields[] = {
+static const Field record_fields[] = {
     FIELD_TEXT(RecordRow, name, 0, PRESENCE_OPTIONAL, 0, "what scenes call it"),
     FIELD_TEXT(RecordRow, earthquake, 0, PRESENCE_OPTIONAL, 0, "which one"),
     FIELD_TEXT(RecordRow, station, 0, PRESENCE_OPTIONAL, 0, "where it was measured"),
@@ -26,7 +262,7 @@ static const Field row_fields[] = {
     FIELD_TEXT(RecordRow, layout, 0, PRESENCE_OPTIONAL, 0, "of the file"),
     FIELD_TEXT(RecordRow, header, 0, PRESENCE_OPTIONAL, 0, "what stands before its numbers"),
     FIELD_TEXT(RecordRow, unit, 0, PRESENCE_OPTIONAL, 0, "of the file's numbers, as it was taken"),
-    FIELD_TEXT(RecordRow, stated_unit, 0, PRESENCE_OPTIONAL, 0, "as the file tells it"),
+    FIELD_TEXT(RecordRow, stated_unit, 0, PRESENCE_OPTIONAL, 0, "as the file states it"),
     FIELD_REAL(RecordRow, interval, "s", ANY, OPTIONAL, "time between samples"),
     FIELD_COUNT(RecordRow, count, NULL, AT_MIN(1), OPTIONAL, "samples"),
     FIELD_REAL(RecordRow, peak, "m/s^2", ANY, OPTIONAL, "the largest magnitude"),
@@ -34,7 +270,7 @@ static const Field row_fields[] = {
     FIELD_REAL(RecordRow, peak_velocity, "m/s", ANY, OPTIONAL, "of the base, from rest"),
     FIELD_REAL(RecordRow, end_velocity, "m/s", ANY, OPTIONAL, "likewise, at the end"),
     FIELD_TEXT(RecordRow, digest, 0, PRESENCE_OPTIONAL, 0, "SHA-256 of interval and samples"),
-    FIELD_TEXT(RecordRow, author, 0, PRESENCE_OPTIONAL, 0, "the token's name it came with"),
+    FIELD_TEXT(RecordRow, author, 0, PRESENCE_OPTIONAL, 0, "name of the token that sent it"),
     FIELD_END
 };
 // clang-format on
@@ -44,13 +280,12 @@ static void record_put(Bytes *bytes, const RecordRow *row) {
     char created[32];
     clock_rfc3339(row->created_unix_ms, created);
     bytes_text(bytes, "{");
-    (void)encode_members(bytes, row_fields, row, WRITE_REPORT);
-    bytes_text(bytes, ", \"duration\": ");
-    bytes_real(bytes, (double)(row->count - 1) / (1 / row->interval));
-    bytes_format(bytes,
-                 ", \"created\": \"%s\", \"links\": {\"self\": \"%s/v1/records/%s\", \"samples\": "
-                 "\"%s/v1/records/%s/samples\"}",
-                 created, base_path(), row->name, base_path(), row->name);
+    (void)encode_members(bytes, record_fields, row, WRITE_REPORT);
+    bytes_json(bytes,
+               ", \"duration\": %g, \"created\": %s, \"links\": {\"self\": \"%s/v1/records/%s\", "
+               "\"samples\": \"%s/v1/records/%s/samples\"}",
+               (double)(row->count - 1) / (1 / row->interval), created, base_path(), row->name,
+               base_path(), row->name);
 }
 
 static void record_put_uses(Bytes *bytes, const RecordUses *uses) {
@@ -97,9 +332,9 @@ static Status record_answer(App *app, RecordUpload *upload, bool is_there, Reply
 }
 
 Status records_create(App *app, const Request *request, Reply *reply, Problem *problem) {
-    RecordUpload upload;
+    RecordUpload upload = {.unit = CHOICE_ABSENT};
     bool is_there = false;
-    Status status = record_upload_read(request, &upload, problem);
+    Status status = upload_read(request, &upload, problem);
     if (status == STATUS_OK && request->client != NULL &&
         (upload.row.author = strdup(request->client)) == NULL)
         status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the record");
@@ -107,7 +342,7 @@ Status records_create(App *app, const Request *request, Reply *reply, Problem *p
         status = db_record_add(app->db, &upload.row, &upload.samples, &is_there, problem);
     if (status == STATUS_OK)
         status = record_answer(app, &upload, is_there, reply, problem);
-    record_upload_clear(&upload);
+    upload_clear(&upload);
     return status;
 }
 
@@ -140,19 +375,16 @@ Status records_show(App *app, const Request *request, Reply *reply, Problem *pro
     char tag[112];
     TRY(db_record(app->db, request->parameters[0], &row, problem));
     Status status = db_record_uses(app->db, row.name, &uses, problem);
-    if (status != STATUS_OK) {
-        record_row_clear(&row);
-        return status;
-    }
-    snprintf(tag, sizeof tag, "%.32s-%lld-%llu-%llu", row.digest, (long long)row.number,
-             (unsigned long long)uses.results, (unsigned long long)uses.jobs);
-    const bool is_known = reply_tagged(reply, request, tag);
-    Bytes bytes = {.most = app->reply_most};
-    if (!is_known) {
-        record_put(&bytes, &row);
-        record_put_uses(&bytes, &uses);
-        bytes_text(&bytes, "}\n");
-        status = reply_bytes(reply, 200, type_json, &bytes, problem);
+    if (status == STATUS_OK) {
+        snprintf(tag, sizeof tag, "%.32s-%lld-%llu-%llu", row.digest, (long long)row.number,
+                 (unsigned long long)uses.results, (unsigned long long)uses.jobs);
+        if (!reply_tagged(reply, request, tag)) {
+            Bytes bytes = {.most = app->reply_most};
+            record_put(&bytes, &row);
+            record_put_uses(&bytes, &uses);
+            bytes_text(&bytes, "}\n");
+            status = reply_bytes(reply, 200, type_json, &bytes, problem);
+        }
     }
     record_row_clear(&row);
     return status;

@@ -1,16 +1,11 @@
 // Results as documents: the summary with everything stored as JSON, and the manifest. Their numbers
 // in columns are columns.c's.
-#include "server/api/results.h"
-
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "server/api/app.h"
-#include "server/api/studies.h"
-#include "server/formats/study_formats.h"
 #include "server/http/access.h"
-#include "server/http/reply.h"
 #include "server/jobs/documents.h"
 #include "server/json/encode.h"
 #include "server/json/parse.h"
@@ -30,114 +25,109 @@ void results_link_gone(const char *id, Reply *reply) {
              id, id);
 }
 
-// The scene as it was run, from its canonical JSON. Cleared by study_request_clear in any case.
-static Status result_read_scene(const ResultRow *row, StudyRequest *inquiry, Problem *problem) {
-    Problem *fault = malloc(sizeof *fault);
-    if (fault == NULL || row->scene == NULL) {
+static Status result_read(const char *document, const char *what, const Field *fields, void *item,
+                          Problem *problem) {
+    Problem *fault = calloc(1, sizeof *fault);
+    if (fault == NULL || document == NULL) {
         free(fault);
-        memset(inquiry, 0, sizeof *inquiry);
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the result's scene");
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the result's %s", what);
     }
-    problem_clear(fault);
-    const Status status =
-        json_parse(row->scene, strlen(row->scene), study_request_fields, inquiry, fault);
+    const Status status = json_parse(document, strlen(document), fields, item, fault);
     // A fault here is the server's, not the client's.
     if (status != STATUS_OK)
-        problem_set(problem, STATUS_INTERNAL, "the stored scene cannot be read: %s", fault->detail);
+        problem_set(problem, STATUS_INTERNAL, "the stored %s cannot be read: %s", what,
+                    fault->detail);
     free(fault);
     return status == STATUS_OK ? STATUS_OK : STATUS_INTERNAL;
 }
 
-static const char *result_channel_unit(const char *name) {
-    size_t number;
-    const Channel *channel = channel_find(name, &number);
-    return channel != NULL ? channel->unit : NULL;
+// The scene as it was run, from its canonical JSON. Cleared by study_request_clear in any case.
+static Status result_read_scene(const ResultRow *row, StudyRequest *inquiry, Problem *problem) {
+    *inquiry = (StudyRequest){0};
+    return result_read(row->scene, "scene", study_request_fields, inquiry, problem);
 }
 
-static void result_put_units(Bytes *bytes, const Simulation *simulation) {
-    bytes_text(bytes, "{");
+Status study_read(const ResultRow *row, StudyAnswer *answer, Problem *problem) {
+    *answer = (StudyAnswer){NULL};
+    return result_read(row->study, "study", study_answer_fields, answer, problem);
+}
+
+static void result_put_units(Bytes *bytes, const Texts *names) {
     const char *separator = "";
-    for (const Field *field = summary_fields; field->kind != FIELD_KIND_END; field++) {
-        if (field->unit == NULL)
-            continue;
-        bytes_format(bytes, "%s\"%s\": ", separator, field->name);
-        bytes_json_string(bytes, field->unit);
+    size_t number;
+    for (const Field *field = summary_fields; field->kind != FIELD_KIND_END; field++)
+        if (field->unit != NULL) {
+            bytes_json(bytes, "%p%s: %s", separator, field->name, field->unit);
+            separator = ", ";
+        }
+    for (size_t i = 0; i < names->count; i++) {
+        const Channel *channel = channel_find(names->at[i], &number);
+        bytes_json(bytes, "%p%s: %s", separator, names->at[i],
+                   channel != NULL ? channel->unit : NULL);
         separator = ", ";
     }
-    for (size_t i = 0; i < simulation->output.channels.count; i++) {
-        bytes_text(bytes, separator);
-        bytes_json_string(bytes, simulation->output.channels.at[i]);
-        bytes_text(bytes, ": ");
-        bytes_json_string(bytes, result_channel_unit(simulation->output.channels.at[i]));
-        separator = ", ";
-    }
-    bytes_text(bytes, "}");
 }
 
-// "series" is the JSON one; the other formats are named in full.
-static void result_put_formats(Bytes *bytes, const char *id, const char *part,
+// Under `name` the JSON, and under "name.csv" and so on the other formats, "csv, svg".
+static void result_put_formats(Bytes *bytes, const char *id, const char *name,
                                const char *formats) {
-    bytes_format(bytes, ", \"%s\": \"%s/v1/results/%s/%s.json\"", part, base_path(), id, part);
-    for (size_t size; (size = strcspn(formats, " ")) > 0; formats += size + (formats[size] != '\0'))
-        bytes_format(bytes, ", \"%s.%.*s\": \"%s/v1/results/%s/%s.%.*s\"", part, (int)size, formats,
-                     base_path(), id, part, (int)size, formats);
+    const char *base = base_path();
+    char extension[8];
+    bytes_json(bytes, ", \"%s\": \"%s/v1/results/%s/%s.json\"", name, base, id, name);
+    for (size_t size; (size = strcspn(formats, ", ")) > 0;
+         formats += size + strspn(formats + size, ", ")) {
+        snprintf(extension, sizeof extension, "%.*s", (int)size, formats);
+        bytes_json(bytes, ", \"%s.%s\": \"%s/v1/results/%s/%s.%s\"", name, extension, base, id,
+                   name, extension);
+    }
 }
 
 static void result_put_links(Bytes *bytes, const ResultRow *row, const Simulation *simulation,
                              const StudyAnswer *answer) {
-    const char *id = row->id;
+    static const char tables[] = "csv, npy, npz, mat";
+    const char *id = row->id, *base = base_path();
     const Output *output = &simulation->output;
-    bytes_format(bytes,
-                 "{\"self\": \"%s/v1/results/%s\", \"manifest\": \"%s/v1/results/%s/manifest\"",
-                 base_path(), id, base_path(), id);
-    result_put_formats(bytes, id, "series", "csv npy npz mat");
+    bytes_json(bytes,
+               "{\"self\": \"%s/v1/results/%s\", \"manifest\": \"%s/v1/results/%s/manifest\"", base,
+               id, base, id);
+    result_put_formats(bytes, id, "series", tables);
     if (output->psd.channels.count > 0)
-        result_put_formats(bytes, id, "psd", "csv npy npz mat");
+        result_put_formats(bytes, id, "psd", tables);
     if (output->impacts)
-        result_put_formats(bytes, id, "impacts", "csv npy npz mat");
+        result_put_formats(bytes, id, "impacts", tables);
     // A template (RFC 6570): the impact's number in the list, from 1. Impulses have no force.
     if (output->impacts && row->impact_count > 0 && simulation_has_force(simulation))
-        bytes_format(bytes, ", \"force\": \"%s/v1/results/%s/impacts/{number}/force.json\"",
-                     base_path(), id);
-    result_put_formats(bytes, id, "energy", "csv npy npz mat");
-    bytes_format(bytes, ", \"bundle.zip\": \"%s/v1/results/%s/bundle.zip\"", base_path(), id);
+        bytes_json(bytes, ", \"force\": \"%s/v1/results/%s/impacts/{number}/force.json\"", base,
+                   id);
+    result_put_formats(bytes, id, "energy", tables);
+    bytes_json(bytes, ", \"bundle.zip\": \"%s/v1/results/%s/bundle.zip\"", base, id);
     if (answer->study != NULL) {
         // A sweep's rows are a table of their own.
-        const bool is_table = answer->study->kind == study_sweep.answer;
-        const char *name = is_table ? "table" : answer->study->kind->name;
-        const StudyFormat *format = study_formats(answer->study->kind);
-        bytes_format(bytes, ", \"%s\": \"%s/v1/results/%s/%s.json\"", name, base_path(), id, name);
-        while ((++format)->extension != NULL)
-            bytes_format(bytes, ", \"%s.%s\": \"%s/v1/results/%s/%s.%s\"", name, format->extension,
-                         base_path(), id, name, format->extension);
+        const Kind *kind = answer->study->kind;
+        char others[64];
+        study_formats_names(study_formats(kind) + 1, "", others, sizeof others);
+        result_put_formats(bytes, id, kind == study_sweep.answer ? "table" : kind->name, others);
     }
     bytes_text(bytes, "}");
 }
 
-static const char *result_json(const char *json, const char *otherwise) {
-    return json != NULL ? json : otherwise;
-}
-
 static void manifest_put_material(App *app, Bytes *bytes, const ReferenceRow *use) {
     MaterialRevision material = {0};
-    if (db_material(app->db, use->slug, use->revision, &material, NULL) == STATUS_OK) {
+    if (db_material(app->db, use->slug, use->revision, &material, NULL) == STATUS_OK)
         material_write_contents(bytes, &material);
-    } else { // no longer here: its numbers stand in the scene
-        bytes_text(bytes, "{\"slug\": ");
-        bytes_json_string(bytes, use->slug);
-        bytes_format(bytes, ", \"revision\": %llu}", use->revision);
-    }
+    else // no longer here: its numbers stand in the scene
+        bytes_json(bytes, "{\"slug\": %s, \"revision\": %llu}", use->slug, use->revision);
     material_revision_clear(&material);
 }
 
 static void result_put_material(App *app, Bytes *bytes, const ReferenceRow *use) {
+    const char *base = base_path();
     (void)app;
-    bytes_format(bytes,
-                 "{\"slug\": \"%s\", \"revision\": %llu, \"links\": {\"revision\": "
-                 "\"%s/v1/materials/%s@%llu\", \"used_by\": "
-                 "\"%s/v1/materials/%s@%llu/used-by\"}}",
-                 use->slug, use->revision, base_path(), use->slug, use->revision, base_path(),
-                 use->slug, use->revision);
+    bytes_json(bytes,
+               "{\"slug\": %s, \"revision\": %llu, \"links\": {\"revision\": "
+               "\"%s/v1/materials/%s@%llu\", \"used_by\": \"%s/v1/materials/%s@%llu/used-by\"}}",
+               use->slug, use->revision, base, use->slug, use->revision, base, use->slug,
+               use->revision);
 }
 
 // The materials of the scene and its study, each by `put`.
@@ -164,26 +154,17 @@ static void result_put_materials(App *app, Bytes *bytes, const StudyRequest *inq
 static void result_put_members(Bytes *bytes, const ResultRow *row, const StudyRequest *inquiry,
                                const StudyAnswer *answer) {
     const Simulation *simulation = &inquiry->simulation;
-    bytes_format(bytes, "{\"id\": \"%s\", \"engine\": ", row->id);
-    bytes_json_string(bytes, row->engine);
-    bytes_text(bytes, ", \"scene\": ");
-    bytes_text(bytes, result_json(row->scene, "null"));
-    bytes_text(bytes, ", \"plan\": ");
-    bytes_text(bytes, result_json(row->plan, "null"));
-    bytes_text(bytes, ", \"summary\": ");
-    bytes_text(bytes, result_json(row->summary, "null"));
-    bytes_text(bytes, ", \"work\": ");
-    bytes_text(bytes, result_json(row->work, "null"));
-    bytes_text(bytes, ", \"units\": ");
-    result_put_units(bytes, simulation);
-    bytes_text(bytes, ", \"channels\": [");
-    for (size_t i = 0; i < simulation->output.channels.count; i++) {
-        bytes_text(bytes, i > 0 ? ", " : "");
-        bytes_json_string(bytes, simulation->output.channels.at[i]);
-    }
-    bytes_text(bytes, "], \"sample_rate\": ");
-    bytes_real(bytes, row->sample_rate);
-    bytes_format(bytes, ", \"count\": %llu, \"warnings\": ", (unsigned long long)row->count);
+    const Texts *names = &simulation->output.channels;
+    bytes_json(bytes,
+               "{\"id\": %s, \"engine\": %s, \"scene\": %p, \"plan\": %p, \"summary\": %p, "
+               "\"work\": %p, \"units\": {",
+               row->id, row->engine, row->scene, row->plan, row->summary, row->work);
+    result_put_units(bytes, names);
+    bytes_text(bytes, "}, \"channels\": [");
+    for (size_t i = 0; i < names->count; i++)
+        bytes_json(bytes, "%p%s", i > 0 ? ", " : "", names->at[i]);
+    bytes_json(bytes, "], \"sample_rate\": %g, \"count\": %llu, \"warnings\": ", row->sample_rate,
+               (unsigned long long)row->count);
     document_join(bytes, row->warnings, row->notes);
     bytes_text(bytes, ", \"materials\": ");
     result_put_materials(NULL, bytes, inquiry, result_put_material);
@@ -214,13 +195,8 @@ Status results_show(App *app, const Request *request, Reply *reply, Problem *pro
     ResultRow row = {0};
     Bytes bytes = {.most = app->reply_most};
     Status status = db_result_load(app->db, request->parameters[0], &row, problem);
-    if (status == STATUS_OK && !reply_immutable(reply, request, row.id)) {
-        status = result_put(&row, &bytes, problem);
-        if (status == STATUS_OK)
-            status = reply_bytes(reply, 200, type_json, &bytes, problem);
-        else
-            bytes_clear(&bytes);
-    }
+    if (status == STATUS_OK && !reply_immutable(reply, request, row.id))
+        status = reply_json(reply, 200, &bytes, result_put(&row, &bytes, problem), problem);
     result_row_clear(&row);
     return status;
 }
@@ -231,29 +207,22 @@ Status manifest_put(App *app, const ResultRow *row, Bytes *bytes, Problem *probl
     if (status == STATUS_OK) {
         char created[32];
         clock_rfc3339(row->created_unix_ms, created);
-        bytes_format(bytes, "{\"id\": \"%s\", \"engine\": ", row->id);
-        bytes_json_string(bytes, row->engine);
-        bytes_format(bytes,
-                     ", \"created\": \"%s\", \"program\": {\"name\": \"impactd\", \"version\": "
-                     "\"%s\", \"build\": ",
-                     created, program_version);
-        bytes_json_string(bytes, program_build);
-        bytes_text(bytes, "}, \"scene\": ");
-        bytes_text(bytes, result_json(row->scene, "null"));
-        bytes_text(bytes, ", \"materials\": ");
+        bytes_json(bytes,
+                   "{\"id\": %s, \"engine\": %s, \"created\": %s, \"program\": {\"name\": "
+                   "\"impactd\", \"version\": %s, \"build\": %s}, \"scene\": %p, \"materials\": ",
+                   row->id, row->engine, created, program_version, program_build, row->scene);
         result_put_materials(app, bytes, &inquiry, manifest_put_material);
-        bytes_format(
-            bytes,
-            ", \"again\": {\"method\": \"POST\", \"path\": \"%s/v1/jobs\", \"content_type\": "
-            "\"application/json\", \"body\": \"the member scene of this document\", "
-            "\"why\": \"the same "
-            "scene and engine give the same id and the same bytes",
-            base_path());
-        // It is measured once and stored; another run measures a little more or less.
-        if (inquiry.study != NULL && study_kind(inquiry.study)->is_measured)
-            bytes_text(bytes, ", but for the CPU time that a study measures and what follows of "
-                              "it");
-        bytes_text(bytes, "\"}}\n");
+        // The CPU time of a study is measured once and stored; another run measures another one.
+        const bool is_measured = inquiry.study != NULL && study_kind(inquiry.study)->is_measured;
+        bytes_json(bytes,
+                   ", \"again\": {\"method\": \"POST\", \"path\": \"%s/v1/jobs\", "
+                   "\"content_type\": \"application/json\", \"body\": \"the member scene of this "
+                   "document\", \"why\": \"the same scene and engine give the same id and the same "
+                   "bytes%s\"}}\n",
+                   base_path(),
+                   is_measured ? ", but for the CPU time that a study measures and what follows of "
+                                 "it"
+                               : "");
     }
     study_request_clear(&inquiry);
     return status;
@@ -277,10 +246,10 @@ Status results_manifest(App *app, const Request *request, Reply *reply, Problem 
     Status status = db_result_load(app->db, request->parameters[0], &row, problem);
     if (status == STATUS_OK)
         status = manifest_put(app, &row, &bytes, problem);
-    if (status == STATUS_OK && !results_tagged(request, reply, &row, "manifest", &bytes))
-        status = reply_bytes(reply, 200, type_json, &bytes, problem);
-    else
+    if (status == STATUS_OK && results_tagged(request, reply, &row, "manifest", &bytes))
         bytes_clear(&bytes);
+    else
+        status = reply_json(reply, 200, &bytes, status, problem);
     result_row_clear(&row);
     return status;
 }

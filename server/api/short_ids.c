@@ -4,7 +4,6 @@
 #include <string.h>
 
 #include "server/api/app.h"
-#include "server/http/reply.h"
 #include "server/jobs/job.h"
 
 enum { DIGITS_MIN = 8, CANDIDATES_MAX = 10 };

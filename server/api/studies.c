@@ -1,80 +1,54 @@
-// Studies: the answer as JSON, as a chart and what other formats it has. All are made of what was
-// kept when the study was, so that they never change.
-#include "server/api/studies.h"
-
+// Studies of a result: the answer as JSON, as a chart and in other formats, made of what was
+// stored, so that they never change; of sweeps the table of rows, also while they are made, and one
+// point.
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "server/api/app.h"
-#include "server/formats/study_formats.h"
-#include "server/http/header.h"
-#include "server/http/reply.h"
-#include "server/json/parse.h"
+#include "server/formats/sweep.h"
+#include "server/jobs/documents.h"
+#include "server/jobs/sweep.h"
+#include "server/util/base_path.h"
 
-Status study_read(const ResultRow *row, StudyAnswer *answer, Problem *problem) {
-    Problem *fault = calloc(1, sizeof *fault);
-    *answer = (StudyAnswer){NULL};
-    if (fault == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the study");
-    const Status status =
-        json_parse(row->study, strlen(row->study), study_answer_fields, answer, fault);
-    // A fault here is ours, not the client's.
-    if (status != STATUS_OK)
-        problem_set(problem, STATUS_INTERNAL, "the stored study cannot be read: %s", fault->detail);
-    free(fault);
-    return status == STATUS_OK ? STATUS_OK : STATUS_INTERNAL;
-}
-
-static Status refuse_other(const StudyKind *kind, Problem *problem) {
+static Status study_error_kind(const StudyKind *kind, Problem *problem) {
     return problem_set(problem, STATUS_NOT_FOUND,
                        "the scene asked for no study \"%s\": submit it with a member study",
                        kind->kind.name);
 }
 
-static Status answer_read(const ResultRow *row, const StudyKind *kind, StudyAnswer *answer,
-                          Problem *problem) {
+static Status study_read_kind(const ResultRow *row, const StudyKind *kind, StudyAnswer *answer,
+                              Problem *problem) {
     *answer = (StudyAnswer){NULL};
     if (row->study == NULL)
-        return refuse_other(kind, problem);
+        return study_error_kind(kind, problem);
     TRY(study_read(row, answer, problem));
-    return answer->study->kind == kind->answer ? STATUS_OK : refuse_other(kind, problem);
+    return answer->study->kind == kind->answer ? STATUS_OK : study_error_kind(kind, problem);
 }
 
-static Status choose_format(const Request *request, const StudyFormat *formats, Reply *reply,
-                            const StudyFormat **format, Problem *problem) {
-    const char *extension = request->parameters[1], *types[STUDY_FORMATS_MAX] = {NULL};
-    char names[64];
-    study_formats_names(formats, "", names, sizeof names);
-    reply->varies_by_accept = extension == NULL;
-    if (extension != NULL) {
-        *format = study_format_find(formats, extension);
-        return *format != NULL
-                   ? STATUS_OK
-                   : problem_set(problem, STATUS_NOT_FOUND,
-                                 "there is no format \"%.20s\"; there are %s", extension, names);
-    }
-    for (size_t i = 0; formats[i].extension != NULL; i++)
-        types[i] = formats[i].content_type;
-    const int choice = header_accept(request->accept, types);
-    if (choice < 0)
-        return problem_set(problem, STATUS_NOT_ACCEPTABLE,
-                           "none of the formats fits Accept; there are %s, by extension too",
-                           names);
-    *format = &formats[choice];
+// The format by the extension in the request's second parameter, else by Accept.
+static Status study_format(const Request *request, const StudyFormat *offered, Reply *reply,
+                           const StudyFormat **format, Problem *problem) {
+    QueryFormat formats[STUDY_FORMATS_MAX];
+    size_t count = 0, choice;
+    for (; offered[count].extension != NULL; count++)
+        formats[count] = (QueryFormat){offered[count].extension, offered[count].content_type};
+    TRY(query_format(request, 1, formats, count, reply, &choice, problem));
+    *format = &offered[choice];
     return STATUS_OK;
 }
 
-Status study_format(const Request *request, const StudyFormat *formats, Reply *reply,
-                    const StudyFormat **format, Problem *problem) {
-    TRY(choose_format(request, formats, reply, format, problem));
-    if ((*format)->content_type == chart_type)
-        reply->policy = reply_drawing_policy;
-    return STATUS_OK;
+// The path ends with the kind's name.
+static const StudyKind *study_of_route(const Request *request) {
+    const char *name = strrchr(request->route->pattern, '/') + 1;
+    size_t i = 0;
+    while (strncmp(studies[i]->kind.name, name, strcspn(name, ".")) != 0)
+        i++;
+    return studies[i];
 }
 
-static Status show(App *app, const Request *request, const StudyKind *kind, Reply *reply,
-                   Problem *problem) {
+Status results_study(App *app, const Request *request, Reply *reply, Problem *problem) {
+    const StudyKind *kind = study_of_route(request);
     const StudyFormat *format;
     TRY(study_format(request, study_formats(kind->answer), reply, &format, problem));
     ResultRow row = {0};
@@ -83,7 +57,7 @@ static Status show(App *app, const Request *request, const StudyKind *kind, Repl
     char tag[128];
     Status status = db_result_load(app->db, request->parameters[0], &row, problem);
     if (status == STATUS_OK)
-        status = answer_read(&row, kind, &answer, problem);
+        status = study_read_kind(&row, kind, &answer, problem);
     if (status == STATUS_OK) {
         snprintf(tag, sizeof tag, "%.72s-%s.%s", row.id, kind->kind.name, format->extension);
         if (!reply_immutable(reply, request, tag)) {
@@ -97,18 +71,147 @@ static Status show(App *app, const Request *request, const StudyKind *kind, Repl
     return status;
 }
 
-Status results_tradeoff(App *app, const Request *request, Reply *reply, Problem *problem) {
-    return show(app, request, &study_tradeoff, reply, problem);
+// A path begins with a result, or with the job that makes it.
+static bool sweep_is_of_job(const Request *request) {
+    static const char jobs[] = "/v1/jobs/";
+    return strncmp(base_path_strip(request->path), jobs, sizeof jobs - 1) == 0;
 }
 
-Status results_ensemble(App *app, const Request *request, Reply *reply, Problem *problem) {
-    return show(app, request, &study_ensemble, reply, problem);
+// Rows come, and failed ones may be made again: only a table without either never changes. True:
+// the client has it.
+static bool sweep_is_unchanged(const Request *request, Reply *reply, const SweepView *view,
+                               const char *extension) {
+    char tag[112];
+    snprintf(tag, sizeof tag, "%.72s-t%zu-%llu.%.5s", view->row.result, view->chunks.count,
+             (unsigned long long)view->row.retries, extension);
+    if (view->is_complete && view->sweep->table.failed == 0)
+        return reply_immutable(reply, request, tag);
+    if (view->is_complete)
+        return reply_tagged(reply, request, tag);
+    snprintf(reply->cache_control, sizeof reply->cache_control, "no-store");
+    return false;
 }
 
-Status results_compare(App *app, const Request *request, Reply *reply, Problem *problem) {
-    return show(app, request, &study_compare, reply, problem);
+// What a table is read from as long as it is sent.
+typedef struct SweepReply {
+    SweepView view;
+    SweepSource source;
+    SweepDocument document;
+} SweepReply;
+
+static void sweep_reply_free(void *context) {
+    SweepReply *sent = context;
+    sweep_view_clear(&sent->view);
+    free(sent);
 }
 
-Status results_sensitivity(App *app, const Request *request, Reply *reply, Problem *problem) {
-    return show(app, request, &study_sensitivity, reply, problem);
+// Takes `sent`, also when it fails.
+static Status sweep_reply_table(App *app, Reply *reply, const StudyFormat *format, SweepReply *sent,
+                                Problem *problem) {
+    const bool is_complete = sent->view.is_complete;
+    TableStream *stream = table_stream_new(NULL);
+    if (stream == NULL) {
+        sweep_reply_free(sent);
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the table");
+    }
+    sent->document = (SweepDocument){
+        .sweep = sent->view.sweep, .source = &sent->source, .result = sent->view.row.result};
+    stream->table = sweep_document_table(&sent->document);
+    stream->is_broken = &sent->document.is_broken;
+    stream->release = sweep_reply_free;
+    stream->source = sent;
+    TRY(columns_reply(app, reply, sweep_format(format->extension), stream, problem));
+    // As long as rows come, no part of one document fits the next.
+    reply->accepts_ranges = format->is_binary && is_complete;
+    return STATUS_OK;
+}
+
+static Status sweep_reply_chart(App *app, Reply *reply, const StudyFormat *format, SweepReply *sent,
+                                Problem *problem) {
+    Bytes bytes = {.most = app->reply_most};
+    const bool is_whole = chart_sweep(sent->view.sweep, &sent->source, &bytes);
+    sweep_reply_free(sent);
+    if (is_whole)
+        return reply_bytes(reply, 200, format->content_type, &bytes, problem);
+    bytes_clear(&bytes);
+    return problem_set(
+        problem, STATUS_BUSY,
+        "the table's rows were deleted or made anew while they were read; ask again");
+}
+
+Status sweeps_table(App *app, const Request *request, Reply *reply, Problem *problem) {
+    const StudyFormat *format;
+    TRY(study_format(request, study_formats(study_sweep.answer), reply, &format, problem));
+    SweepReply *sent = calloc(1, sizeof *sent);
+    if (sent == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the table");
+    SweepView *view = &sent->view;
+    const Status status = sweep_view_load(app->db, request->parameters[0], sweep_is_of_job(request),
+                                          true, view, problem);
+    if (status != STATUS_OK || sweep_is_unchanged(request, reply, view, format->extension)) {
+        sweep_reply_free(sent);
+        return status;
+    }
+    sent->source = (SweepSource){view->rows, sweep_view_read, view};
+    return strcmp(format->extension, "svg") == 0
+               ? sweep_reply_chart(app, reply, format, sent, problem)
+               : sweep_reply_table(app, reply, format, sent, problem);
+}
+
+static Status sweep_read_index(const Request *request, uint64_t *index, Problem *problem) {
+    const char *text = request->parameters[1];
+    const size_t length = strlen(text);
+    if (length == 0 || length > 15 || strspn(text, "0123456789") != length)
+        return problem_set(problem, STATUS_NOT_FOUND,
+                           "a point is a whole number from 0, \"%.40s\" is none", text);
+    *index = strtoull(text, NULL, 10);
+    return STATUS_OK;
+}
+
+static void sweep_put_point(Bytes *bytes, const SweepView *view, uint64_t index,
+                            const SweepPoint *point) {
+    const Sweep *sweep = view->sweep;
+    const char *base = base_path(), *id = view->row.result;
+    const unsigned long long number = index;
+    bytes_json(
+        bytes, "{\"index\": %llu, \"result\": %s, \"status\": %s, \"why\": %s, \"values\": {",
+        number, id, sweep_status_names[point->status], point->why[0] != '\0' ? point->why : NULL);
+    for (size_t i = 0; i < sweep->axes.count; i++)
+        bytes_json(bytes, "%p%s: %p", i > 0 ? ", " : "", sweep->axes.at[i].pointer,
+                   sweep->axes.at[i].values.at[sweep_value_index(sweep, i, (size_t)index)]);
+    bytes_text(bytes, "}, \"metrics\": {");
+    for (size_t i = 0; i < sweep->metrics.count; i++)
+        bytes_json(bytes, "%p%s: %g", i > 0 ? ", " : "", sweep->metrics.at[i], point->values[i]);
+    bytes_text(bytes, "}, \"scene\": ");
+    document_scene(bytes, &point->scene);
+    bytes_json(bytes,
+               ", \"links\": {\"self\": \"%s/v1/results/%s/points/%llu\", \"scene\": "
+               "\"%s/v1/results/%s/points/%llu/scene\", \"table\": "
+               "\"%s/v1/results/%s/table.json\"}}\n",
+               base, id, number, base, id, number, base, id);
+}
+
+// Also its scene alone, where the path ends so.
+Status sweeps_point(App *app, const Request *request, Reply *reply, Problem *problem) {
+    const bool is_scene = strcmp(strrchr(request->route->pattern, '/'), "/scene") == 0;
+    uint64_t index = 0;
+    SweepView view = {.sweep = NULL};
+    SweepPoint point = {.status = SWEEP_PENDING};
+    TRY(sweep_read_index(request, &index, problem));
+    Status status = sweep_view_load(app->db, request->parameters[0], false, false, &view, problem);
+    if (status == STATUS_OK)
+        status = sweep_point_load(&view, index, &point, problem);
+    if (status == STATUS_OK) {
+        Bytes bytes = {.most = app->reply_most};
+        if (is_scene) {
+            document_scene(&bytes, &point.scene);
+            bytes_text(&bytes, "\n");
+        } else {
+            sweep_put_point(&bytes, &view, index, &point);
+        }
+        status = reply_bytes(reply, 200, type_json, &bytes, problem);
+    }
+    study_request_clear(&point.scene);
+    sweep_view_clear(&view);
+    return status;
 }

@@ -2,6 +2,7 @@
 // counted.
 #include "server/util/bytes.h"
 
+#include <assert.h>
 #include <locale.h>
 #include <math.h>
 #include <pthread.h>
@@ -175,6 +176,53 @@ void bytes_json_string(Bytes *bytes, const char *text) {
         at += length > 0 ? length : 1;
     }
     bytes_put(bytes, "\"", 1);
+}
+
+const char *json_flag(bool flag) {
+    return flag ? "true" : "false";
+}
+
+void bytes_json(Bytes *bytes, const char *format, ...) {
+    bool is_quoted = false;
+    const char *text;
+    va_list arguments;
+    va_start(arguments, format);
+    for (const char *at = format; *at != '\0';) {
+        const size_t plain = strcspn(at, "%\"");
+        bytes_put(bytes, at, plain);
+        at += plain;
+        if (*at == '"') {
+            is_quoted = !is_quoted;
+            bytes_put(bytes, at++, 1);
+        } else if (strncmp(at, "%s", 2) == 0) {
+            text = va_arg(arguments, const char *);
+            if (is_quoted)
+                bytes_text(bytes, text);
+            else
+                bytes_json_string(bytes, text);
+            at += 2;
+        } else if (strncmp(at, "%p", 2) == 0) {
+            text = va_arg(arguments, const char *);
+            bytes_text(bytes, text != NULL ? text : "null");
+            at += 2;
+        } else if (strncmp(at, "%g", 2) == 0) {
+            bytes_real(bytes, va_arg(arguments, double));
+            at += 2;
+        } else if (strncmp(at, "%d", 2) == 0) {
+            bytes_format(bytes, "%d", va_arg(arguments, int));
+            at += 2;
+        } else if (strncmp(at, "%zu", 3) == 0) {
+            bytes_format(bytes, "%zu", va_arg(arguments, size_t));
+            at += 3;
+        } else if (strncmp(at, "%llu", 4) == 0) {
+            bytes_format(bytes, "%llu", va_arg(arguments, unsigned long long));
+            at += 4;
+        } else if (*at != '\0') {
+            assert(!"a conversion that bytes_json does not have");
+            break;
+        }
+    }
+    va_end(arguments);
 }
 
 static pthread_once_t locale_once = PTHREAD_ONCE_INIT;

@@ -25,6 +25,11 @@ void bytes_real(Bytes *bytes, double value);
 void bytes_reals(Bytes *bytes, const double *values, size_t count);
 // Quoted and escaped; NULL is null, bad UTF-8 becomes U+FFFD.
 void bytes_json_string(Bytes *bytes, const char *text);
+// JSON by a format of printf, whose conversions mean: %s a string, quoted and escaped, NULL is
+// null, or within quotes of the format the text as it is; %g a number as by bytes_real; %p JSON
+// text, NULL is null; %d, %zu and %llu whole numbers. There are no others.
+void bytes_json(Bytes *bytes, const char *format, ...) __attribute__((format(printf, 2, 3)));
+const char *json_flag(bool flag); // "true" or "false"
 // Whether all of a text is UTF-8.
 bool text_is_utf8(const char *text);
 // As it is compared where upper and lower case are one: lower case of any script, with a space for

@@ -398,7 +398,7 @@ def test_what_is_not_there_is_told_apart():
         problem(daemon.request("DELETE", "/v1/results/r-1"), 404)
         for method, path, allow in (("PUT", "/v1/jobs", {"GET", "HEAD", "POST"}), ("POST", "/version", {"GET", "HEAD"}),
                                     ("DELETE", "/v1/results/r-1/psd.csv", {"GET", "HEAD"}), ("OPTIONS", "/", {"GET", "HEAD"}),
-                                    ("PATCH", "/v1/jobs/j-1", {"GET", "HEAD", "DELETE"})):
+                                    ("PUT", "/v1/jobs/j-1", {"GET", "HEAD", "PATCH", "DELETE"})):
             reply = daemon.request(method, path)
             problem(reply, 405)
             assert set(reply.headers["allow"].split(", ")) == allow, reply.headers
