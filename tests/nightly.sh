@@ -96,7 +96,7 @@ part_threads() {
     build tsan
     ctests tsan ^unit/server/http "${still[@]}"
     marked build-tsan 'THREADED = True' "${still[@]}"
-    sized 200 10000 "${still[@]}" tests/storm/cancel_storm.py --build build-tsan
+    sized 200 10000 "${still[@]}" "$python" tests/storm/cancel_storm.py --build build-tsan
 }
 
 part_sanitized() {
