@@ -14,7 +14,6 @@
 #include "server/formats/table_stream.h"
 #include "server/jobs/documents.h"
 #include "server/jobs/jobs.h"
-#include "server/jobs/study_engine.h"
 #include "server/json/table.h"
 #include "server/util/clock.h"
 
@@ -385,7 +384,7 @@ static Status study_make(const StudyRequest *request, const StudySettings *setti
     progress_bar_start(&bar);
     const Progress watch = progress_bar_watch(&bar);
     Status status =
-        study_engine_run(request->study, &request->simulation, limits, &watch, &answer, problem);
+        jobs_run_study(request->study, &request->simulation, limits, &watch, &answer, problem);
     progress_bar_stop(&bar);
     // The first format of every study is JSON. The document's own study prints nothing where it is
     // written to files.

@@ -7,7 +7,7 @@
 #include <sys/random.h>
 
 #include "server/jobs/jobs_private.h"
-#include "server/jobs/sweep.h"
+#include "server/jobs/study.h"
 #include "server/util/clock.h"
 
 const char *const job_state_names[] = {"accepted", "running",   "successful",
@@ -137,10 +137,10 @@ static void job_view_progress(const Job *job, JobView *view) {
     } else if (task != NULL) {
         view->progress = atomic_load(&task->progress) / 100.0;
     }
-    if (task != NULL && task->sweep != NULL) {
-        view->points = task->sweep->row.points;
-        view->points_done = atomic_load(&task->sweep->made);
-        view->points_failed = atomic_load(&task->sweep->made_failed);
+    if (task != NULL && task->study != NULL && task->study->is_sweep) {
+        view->points = task->study->sweep.points;
+        view->points_done = atomic_load(&task->study->rows_made);
+        view->points_failed = atomic_load(&task->study->rows_failed);
     }
     if (!job_state_is_final(job->row.state) && job->submitted_ns > 0) {
         const int64_t now = clock_monotonic_ns();

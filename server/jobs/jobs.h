@@ -45,6 +45,12 @@ Status jobs_prepare_request(JobManager *manager, const char *text, size_t size,
 // STATUS_QUOTA.
 Status jobs_charge(JobManager *manager, const char *client, Problem *problem);
 
+// study_run with as many threads as there are processors, in no queue. `watch` may be NULL and is
+// called by one thread at a time.
+Status jobs_run_study(const Variant *study, const Simulation *simulation,
+                      const SimulationLimits *limits, const Progress *watch, Variant **answer,
+                      Problem *problem);
+
 // "r-" and 64 hexadecimal digits: SHA-256 of the canonical form and the engine's version.
 void jobs_result_id(const StudyRequest *request, char target[72]);
 

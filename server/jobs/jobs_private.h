@@ -101,7 +101,6 @@ typedef struct Task {
     atomic_bool is_stopped;
     atomic_uint progress;   // in 1/10,000
     struct StudyRun *study; // while it runs, under the lock
-    struct SweepRun *sweep; // likewise, for the progress of its points
     RunResult run_result;   // once is_saving
     ResultSummary *summary;
     size_t saving_bytes;

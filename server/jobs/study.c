@@ -1,3 +1,6 @@
+// Studies, made by several threads. Members are folded in their order, so that the answer has the
+// same bytes for any number of threads. In the daemon:
+//
 //     a worker:    runs the scene, begins the study (a sweep's chunks are written down)
 //     any worker:  takes a turn: makes members until the turn is over and other work waits
 //     the last:    ends it: result and jobs, as of any task
@@ -9,14 +12,175 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
 
 #include "server/util/clock.h"
 #include "server/util/process.h"
 
 enum {
-    TURN_MS = 10, // at least, of a turn
-    LOOK_MS = 1,  // how often a turn looks whether other work waits
+    WINDOW_BYTES = 32 << 20,
+    WINDOW_PER_SLOT = 8,
+    THREADS_MAX = 256,
+    MILLION = 1000000,
+    TURN_MS = 10,      // at least, of a turn
+    LOOK_MS = 1,       // how often a turn looks whether other work waits
+    PILOT_POINTS = 16, // whose cost decides how many chunks there are
+    CHUNKS_MAX = 4096, // unless one would have more rows than
+    CHUNK_ROWS = 1 << 16,
+    CHUNKS_PER_SLOT = 4, // at least
+    REASONS = 1000,      // kept of the failed rows of a chunk
+    REASON_BYTES = 160,
 };
+static const double pilot_seconds = 0.2; // that the pilot takes about
+// Short chunks let rows appear soon, and little is lost when the daemon is killed.
+static const double chunk_seconds = 0.25;
+
+static Status study_no_memory(Problem *problem) {
+    return problem_set(problem, STATUS_NO_MEMORY, "no memory for the study");
+}
+
+Status study_engine_open(StudyEngine *engine, StudyWork *work, const SimulationLimits *limits,
+                         const Progress *progress, size_t slots, Problem *problem) {
+    const size_t by_bytes = WINDOW_BYTES / (work->part_bytes + 1);
+    const size_t by_slots = WINDOW_PER_SLOT * slots;
+    const size_t window = by_bytes > by_slots ? by_bytes : by_slots;
+    *engine = (StudyEngine){.work = work,
+                            .limits = limits,
+                            .progress = *progress,
+                            .window = window < work->members ? window : work->members + 1,
+                            .wanted = work->wanted};
+    atomic_store(&engine->expected, work->expected);
+    atomic_store(&engine->is_over, work->wanted == 0);
+    pthread_mutex_init(&engine->lock, NULL);
+    pthread_cond_init(&engine->changed, NULL);
+    if (slots == 0)
+        return STATUS_OK;
+    engine->parts = calloc(engine->window, sizeof *engine->parts);
+    return engine->parts != NULL ? STATUS_OK : study_no_memory(problem);
+}
+
+void study_engine_close(StudyEngine *engine) {
+    if (engine->work == NULL)
+        return;
+    for (size_t i = 0; engine->parts != NULL && i < engine->window; i++)
+        study_part_free(engine->work, engine->parts[i]);
+    free(engine->parts);
+    pthread_cond_destroy(&engine->changed);
+    pthread_mutex_destroy(&engine->lock);
+}
+
+// With the lock held.
+static bool study_engine_is_open(const StudyEngine *engine) {
+    const size_t room = engine->folded + engine->window;
+    return !atomic_load(&engine->is_over) &&
+           engine->begun < (engine->wanted < room ? engine->wanted : room);
+}
+
+bool study_engine_has_next(StudyEngine *engine) {
+    pthread_mutex_lock(&engine->lock);
+    const bool is_open = study_engine_is_open(engine);
+    pthread_mutex_unlock(&engine->lock);
+    return is_open;
+}
+
+bool study_engine_next(StudyEngine *engine, bool may_wait, size_t *member) {
+    pthread_mutex_lock(&engine->lock);
+    while (may_wait && !study_engine_is_open(engine) && !atomic_load(&engine->is_over))
+        pthread_cond_wait(&engine->changed, &engine->lock);
+    const bool is_open = study_engine_is_open(engine);
+    *member = engine->begun;
+    engine->begun += is_open;
+    pthread_mutex_unlock(&engine->lock);
+    return is_open;
+}
+
+static void study_engine_stop(StudyEngine *engine) {
+    pthread_mutex_lock(&engine->lock);
+    atomic_store(&engine->is_over, true);
+    pthread_cond_broadcast(&engine->changed);
+    pthread_mutex_unlock(&engine->lock);
+}
+
+// Reports progress; false: the study is over or its progress requests a stop.
+static bool study_engine_continues(StudyEngine *engine) {
+    const double expected = MILLION * (double)atomic_load(&engine->expected);
+    const double share = fmin((double)atomic_load(&engine->millionths) / fmax(expected, 1), 1);
+    return progress_advance(&engine->progress, share) && !atomic_load(&engine->is_over);
+}
+
+// A member that is being made.
+typedef struct MemberProgress {
+    StudyEngine *engine;
+    uint_fast64_t counted; // millionths of it
+} MemberProgress;
+
+static bool study_engine_advance(void *context, double fraction) {
+    MemberProgress *member = context;
+    const uint_fast64_t done = (uint_fast64_t)(MILLION * fmax(0, fmin(fraction, 1)));
+    if (done > member->counted) {
+        atomic_fetch_add(&member->engine->millionths, done - member->counted);
+        member->counted = done;
+    }
+    return study_engine_continues(member->engine);
+}
+
+// Makes a member. The part is freed by study_part_free in any case.
+static Status study_engine_part(StudyEngine *engine, size_t member, Workspace *workspace,
+                                StudyPart **part, Problem *problem) {
+    MemberProgress made = {engine, 0};
+    const Progress watch = {&made, study_engine_advance};
+    const StudyTools tools = {.limits = engine->limits, .progress = &watch, .workspace = workspace};
+    TRY(study_part_make(engine->work, member, &tools, part, problem));
+    (void)study_engine_advance(&made, 1);
+    return STATUS_OK;
+}
+
+// With the lock held, which is released while a part is folded: no other thread folds meanwhile.
+static Status study_engine_fold_all(StudyEngine *engine, Problem *problem) {
+    Status status = STATUS_OK;
+    engine->is_folding = true;
+    while (status == STATUS_OK && engine->folded < engine->wanted) {
+        StudyPart **place = &engine->parts[engine->folded % engine->window], *part = *place;
+        if (part == NULL)
+            break;
+        *place = NULL;
+        pthread_mutex_unlock(&engine->lock);
+        status = study_part_fold(engine->work, engine->folded, part, problem);
+        study_part_free(engine->work, part);
+        pthread_mutex_lock(&engine->lock);
+        engine->folded++;
+        // The fold may have changed what is wanted.
+        engine->wanted = engine->work->wanted;
+        atomic_store(&engine->expected, engine->work->expected);
+        if (engine->folded >= engine->wanted)
+            atomic_store(&engine->is_over, true);
+        pthread_cond_broadcast(&engine->changed);
+    }
+    engine->is_folding = false;
+    return status;
+}
+
+Status study_engine_fold(StudyEngine *engine, size_t member, StudyPart *part, Problem *problem) {
+    Status status = STATUS_OK;
+    pthread_mutex_lock(&engine->lock);
+    engine->parts[member % engine->window] = part;
+    if (!engine->is_folding && member == engine->folded)
+        status = study_engine_fold_all(engine, problem);
+    pthread_mutex_unlock(&engine->lock);
+    return status;
+}
+
+// Makes a member and folds it. An error ends the study: the caller stops it.
+static Status study_engine_make(StudyEngine *engine, size_t member, Workspace *workspace,
+                                Problem *problem) {
+    StudyPart *part = NULL;
+    const Status status = study_engine_part(engine, member, workspace, &part, problem);
+    if (status == STATUS_OK)
+        return study_engine_fold(engine, member, part, problem);
+    study_part_free(engine->work, part);
+    return status;
+}
 
 // The task's progress, which never decreases. False: the task was stopped.
 static bool study_advance_task(void *context, double fraction) {
@@ -33,10 +197,192 @@ static bool study_is_over(StudyRun *run) {
     return atomic_load(&run->engine.is_over) || atomic_load(&run->task->is_stopped);
 }
 
+// Estimates the CPU time of a point by some of them [s].
+static Status sweep_pilot(StudyEngine *engine, Workspace *workspace, double *seconds,
+                          Problem *problem) {
+    const size_t points = engine->work->members;
+    const size_t max = points < PILOT_POINTS ? points : PILOT_POINTS;
+    const StudyTools tools = {
+        .limits = engine->limits, .progress = &engine->progress, .workspace = workspace};
+    const int64_t began_ns = clock_thread_cpu_ns();
+    for (size_t made = 0; made < max && *seconds * (double)made <= pilot_seconds;) {
+        StudyPart *part = NULL;
+        const Status status = study_part_make(
+            engine->work, (points - 1) * made / (max > 1 ? max - 1 : 1), &tools, &part, problem);
+        study_part_free(engine->work, part);
+        TRY(status);
+        made++;
+        *seconds = 1e-9 * (double)(clock_thread_cpu_ns() - began_ns) / (double)made;
+    }
+    return STATUS_OK;
+}
+
+static size_t sweep_count_chunks(size_t points, size_t slots, double seconds) {
+    const double all = (double)points;
+    double chunks = fmin(ceil(seconds * all / chunk_seconds), CHUNKS_MAX);
+    chunks = fmax(chunks, ceil(all / CHUNK_ROWS));
+    chunks = fmax(chunks, (double)(CHUNKS_PER_SLOT * slots));
+    return (size_t)fmin(chunks, all);
+}
+
+// What is to be done is durable before anything runs; what was written down before stays.
+static Status sweep_begin(StudyRun *run, size_t slots, Workspace *workspace, Problem *problem) {
+    const StudyWork *work = run->work;
+    const char *result = run->task->result;
+    SweepRow *row = &run->sweep;
+    Db *db = run->manager->db;
+    const uint64_t points = work->members;
+    const uint64_t metrics = ((const SweepStudy *)work->study)->metrics.count;
+    const Status found = db_sweep_load(db, result, row, NULL);
+    if (found != STATUS_OK && found != STATUS_NOT_FOUND)
+        return problem_set(problem, found, "the sweeps could not be searched");
+    if (found == STATUS_NOT_FOUND) {
+        double seconds = 0;
+        TRY(sweep_pilot(&run->engine, workspace, &seconds, problem));
+        text_fit(row->result, sizeof row->result, result);
+        row->scene = strdup(run->task->scene);
+        if (row->scene == NULL)
+            return study_no_memory(problem);
+        row->metrics = metrics;
+        row->points = points;
+        row->chunks = sweep_count_chunks((size_t)points, slots, seconds);
+        row->created_unix_ms = clock_unix_ms();
+    }
+    // Also a row that is there: it may be about to be deleted with the last job before this one.
+    TRY(db_sweep_begin(db, row, problem));
+    if (row->points != points || row->metrics != metrics)
+        return problem_set(problem, STATUS_INTERNAL,
+                           "the stored sweep no longer stands for this scene");
+    return STATUS_OK;
+}
+
+// The chunks that the database does not have, or that are open.
+static Status sweep_list(StudyRun *run, const SweepChunkRows *saved, Problem *problem) {
+    size_t next = saved->count;
+    for (size_t i = run->sweep.chunks; i-- > 0;) {
+        const SweepChunkRow *row =
+            next > 0 && saved->at[next - 1].chunk == i ? &saved->at[--next] : NULL;
+        const size_t count = sweep_rows_of(&run->sweep, i);
+        if (row != NULL) {
+            const size_t made = row->is_open ? count - (size_t)row->failed : count;
+            run->rows_made += made;
+            run->rows_failed += row->is_open ? 0 : (size_t)row->failed;
+            atomic_fetch_add(&run->engine.millionths, (uint_fast64_t)made * MILLION);
+        }
+        if (row != NULL && !row->is_open)
+            continue;
+        SweepChunk *chunk = calloc(1, sizeof *chunk);
+        if (chunk == NULL)
+            return study_no_memory(problem);
+        chunk->count = count;
+        chunk->row.sweep = run->sweep.number;
+        chunk->row.chunk = i;
+        chunk->next = run->chunks;
+        run->chunks = chunk;
+        run->chunks_left++;
+    }
+    if (run->chunks_left == 0)
+        study_engine_stop(&run->engine);
+    return STATUS_OK;
+}
+
+// The sweep as it was begun before, or cut into chunks by the cost of some points. What is to be
+// done is in the database before any of it runs, and what the database has is done.
+static Status sweep_open(StudyRun *run, size_t slots, Workspace *workspace, Problem *problem) {
+    SweepChunkRows saved = {NULL, 0};
+    TRY(sweep_begin(run, slots, workspace, problem));
+    TRY(db_sweep_chunks(run->manager->db, run->sweep.number, &saved, problem));
+    const Status status = sweep_list(run, &saved, problem);
+    sweep_chunk_rows_clear(&saved);
+    return status;
+}
+
+static void sweep_chunk_free(SweepChunk *chunk) {
+    sweep_chunk_row_clear(&chunk->row);
+    bytes_clear(&chunk->reasons);
+    free(chunk);
+}
+
+static Status sweep_chunk_load(StudyRun *run, SweepChunk *chunk, Problem *problem) {
+    const size_t size = chunk->count * sweep_row_size(&run->sweep);
+    SweepChunkRow saved = {0};
+    if (chunk->is_loaded)
+        return STATUS_OK;
+    if (run->sweep.retries > 0) {
+        const Status found =
+            db_sweep_chunk(run->manager->db, run->sweep.number, chunk->row.chunk, &saved, problem);
+        if (found != STATUS_OK && found != STATUS_NOT_FOUND)
+            return found;
+        problem_clear(problem);
+    }
+    chunk->is_retry = saved.rows.at != NULL && saved.rows.size == size;
+    if (!chunk->is_retry) {
+        sweep_chunk_row_clear(&saved);
+        saved.rows = (StoredBytes){calloc(1, size), size};
+        if (saved.rows.at == NULL)
+            return study_no_memory(problem);
+    }
+    chunk->row.rows = saved.rows;
+    saved.rows = (StoredBytes){NULL, 0};
+    sweep_chunk_row_clear(&saved);
+    chunk->is_loaded = true;
+    return STATUS_OK;
+}
+
+static void sweep_chunk_add_reason(SweepChunk *chunk, const char *why) {
+    char line[REASON_BYTES];
+    if (chunk->row.failed++ >= REASONS)
+        return;
+    text_fit(line, sizeof line, why);
+    for (char *c = line; *c != '\0'; c++)
+        if (*c == '\n')
+            *c = ' ';
+    bytes_format(&chunk->reasons, "%zu %s\n", chunk->done, line);
+}
+
+static Status sweep_chunk_make(StudyRun *run, SweepChunk *chunk, Workspace *workspace,
+                               Problem *problem) {
+    const StudyWork *work = run->work;
+    double values[SWEEP_METRICS];
+    StudyPart *part = NULL;
+    if (chunk->is_retry &&
+        sweep_row_get(&run->sweep, &chunk->row, chunk->done, values) == SWEEP_MADE)
+        return STATUS_OK;
+    const size_t point = (size_t)(chunk->row.chunk + chunk->done * run->sweep.chunks);
+    const Status status = study_engine_part(&run->engine, point, workspace, &part, problem);
+    if (status == STATUS_OK) {
+        sweep_values(&((const SweepStudy *)work->study)->metrics, &part->run, values);
+        sweep_row_put(&run->sweep, &chunk->row, chunk->done, sweep_status(part->run.status),
+                      values);
+        if (part->run.why != NULL) {
+            sweep_chunk_add_reason(chunk, part->run.why);
+            run->rows_failed++;
+        }
+        run->rows_made++;
+    }
+    study_part_free(work, part);
+    return status;
+}
+
+static Status sweep_chunk_save(StudyRun *run, SweepChunk *chunk, Problem *problem) {
+    if (chunk->reasons.count > 0 &&
+        (chunk->row.reasons = bytes_take(&chunk->reasons, NULL)) == NULL)
+        return study_no_memory(problem);
+    TRY(db_sweep_take(run->manager->db, &chunk->row, problem));
+    chunk->is_saved = true;
+    if (atomic_fetch_sub(&run->chunks_left, 1) == 1)
+        study_engine_stop(&run->engine);
+    return STATUS_OK;
+}
+
 void study_run_free(StudyRun *run) {
     if (run == NULL)
         return;
-    sweep_run_free(run->sweep);
+    for (SweepChunk *chunk; (chunk = run->chunks) != NULL;) {
+        run->chunks = chunk->next;
+        sweep_chunk_free(chunk);
+    }
+    sweep_row_clear(&run->sweep);
     study_engine_close(&run->engine);
     study_free(run->work);
     run_result_clear(&run->run_result);
@@ -46,8 +392,7 @@ void study_run_free(StudyRun *run) {
 // With the lock held: the next turn is in the queue if there is something to do.
 static void study_enqueue(StudyRun *run) {
     QueueEntry *entry = &run->task->queued;
-    const bool has_work =
-        run->sweep != NULL ? sweep_run_has_chunk(run->sweep) : study_engine_has_next(&run->engine);
+    const bool has_work = run->is_sweep ? run->chunks != NULL : study_engine_has_next(&run->engine);
     if (entry->number != 0 || !has_work || run->is_paused)
         return;
     entry->is_turn = true;
@@ -66,22 +411,20 @@ static Status study_open(Worker *worker, StudyRun *run, StudyAnswer *answer, Pro
     const Progress members = {run->task, study_advance_task};
     const StudyTools tools = {
         .limits = &settings->limits, .progress = &begin, .workspace = &worker->workspace};
-    const bool is_sweep = study_kind(inquiry->study) == &study_sweep;
+    run->is_sweep = study_kind(inquiry->study) == &study_sweep;
     TRY(study_begin(inquiry->study, &inquiry->simulation, &tools, &answer->study, &run->work,
                     problem));
     TRY(study_engine_open(&run->engine, run->work, &settings->limits, &members,
-                          is_sweep ? 0 : settings->workers, problem));
-    if (!is_sweep)
-        return STATUS_OK;
-    return sweep_run_open(worker->manager->db, run->task->result, run->task->scene, &run->engine,
-                          settings->workers, &worker->workspace, &run->sweep, problem);
+                          run->is_sweep ? 0 : settings->workers, problem));
+    return run->is_sweep ? sweep_open(run, settings->workers, &worker->workspace, problem)
+                         : STATUS_OK;
 }
 
 Status study_start(Worker *worker, Task *task, RunResult *run_result, Problem *problem) {
     JobManager *manager = worker->manager;
     StudyRun *run = calloc(1, sizeof *run);
     if (run == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the study");
+        return study_no_memory(problem);
     const int64_t began_ns = clock_thread_cpu_ns();
     run->manager = manager;
     run->task = task;
@@ -95,7 +438,6 @@ Status study_start(Worker *worker, Task *task, RunResult *run_result, Problem *p
     *run_result = (RunResult){0};
     pthread_mutex_lock(&manager->lock);
     task->study = run;
-    task->sweep = run->sweep;
     run->next = manager->studies;
     manager->studies = run;
     study_enqueue(run);
@@ -136,10 +478,12 @@ bool study_take(StudyRun *run, StudyTurn *turn) {
         return turn->is_end;
     }
     bool is_taken;
-    if (run->sweep != NULL)
-        is_taken = (turn->chunk = sweep_run_take(run->sweep)) != NULL;
-    else
+    if (run->is_sweep) {
+        is_taken = (turn->chunk = run->chunks) != NULL;
+        run->chunks = is_taken ? turn->chunk->next : NULL;
+    } else {
         is_taken = study_engine_next(&run->engine, false, &turn->member);
+    }
     study_enqueue(run);
     if (!is_taken)
         run->task->workers--;
@@ -182,15 +526,15 @@ static Status study_make_rows(Worker *worker, const StudyTurn *turn, TurnClock *
                               Problem *problem) {
     StudyRun *run = turn->run;
     SweepChunk *chunk = turn->chunk;
-    TRY(sweep_chunk_load(run->sweep, chunk, problem));
+    TRY(sweep_chunk_load(run, chunk, problem));
     for (; chunk->done < chunk->count; chunk->done++, clock->made++) {
         if (clock->made > 0 && study_must_yield(run, clock))
             return STATUS_OK;
         if (!study_engine_continues(&run->engine))
             return STATUS_CANCELLED;
-        TRY(sweep_chunk_make(run->sweep, chunk, &worker->workspace, problem));
+        TRY(sweep_chunk_make(run, chunk, &worker->workspace, problem));
     }
-    return sweep_chunk_save(run->sweep, chunk, problem);
+    return sweep_chunk_save(run, chunk, problem);
 }
 
 // With the lock held.
@@ -220,7 +564,7 @@ static Status study_complete(Worker *worker, StudyRun *run, Problem *problem) {
                               .progress = &watch,
                               .workspace = &worker->workspace};
     problem_clear(problem);
-    if (run->sweep == NULL)
+    if (!run->is_sweep)
         TRY(study_end(run->work, &tools, problem));
     return run_result_add_to_study(&run->run_result, problem);
 }
@@ -237,12 +581,11 @@ static void study_finish(Worker *worker, StudyRun *run, Problem *problem) {
             run_result_fail(&run->run_result, status, problem);
     }
     RunResult run_result = run->run_result;
-    const bool has_rows = run->sweep != NULL, is_stopped = atomic_load(&task->is_stopped);
+    const bool has_rows = run->is_sweep, is_stopped = atomic_load(&task->is_stopped);
     run_result.ended_ns = clock_monotonic_ns();
     run->run_result = (RunResult){0};
     pthread_mutex_lock(&manager->lock);
     task->study = NULL;
-    task->sweep = NULL;
     pthread_mutex_unlock(&manager->lock);
     study_run_free(run);
     if (is_stopped)
@@ -284,15 +627,118 @@ void study_work(Worker *worker, const StudyTurn *turn, Problem *problem) {
         run->member_seconds = seconds / (double)clock.made;
     if (status == STATUS_OK)
         run->is_pause_logged = false;
-    else if (run->sweep != NULL && status_is_transient(status))
+    else if (run->is_sweep && status_is_transient(status))
         study_pause(run, problem);
     else if (status != STATUS_CANCELLED)
         study_fail(run, status, problem);
-    if (run->sweep != NULL)
-        sweep_run_return(run->sweep, turn->chunk);
+    if (turn->chunk != NULL && turn->chunk->is_saved) {
+        sweep_chunk_free(turn->chunk);
+    } else if (turn->chunk != NULL) {
+        turn->chunk->next = run->chunks;
+        run->chunks = turn->chunk;
+    }
     study_enqueue(run);
     const bool is_end = study_release(run);
     pthread_mutex_unlock(&manager->lock);
     if (is_end)
         study_finish(worker, run, problem);
+}
+
+// A study on threads of this process alone.
+typedef struct StudyThreads {
+    StudyEngine engine;
+    const Progress *watch;
+    pthread_mutex_t lock; // of what follows, and of calls of `watch`
+    Status status;        // of the first thread that failed, with its problem
+    Problem *problem;
+} StudyThreads;
+
+static void study_threads_fail(StudyThreads *threads, Status status, const char *detail) {
+    pthread_mutex_lock(&threads->lock);
+    if (threads->status == STATUS_OK)
+        threads->status = problem_set(threads->problem, status, "%s", detail);
+    pthread_mutex_unlock(&threads->lock);
+    study_engine_stop(&threads->engine);
+}
+
+static bool study_threads_advance(void *context, double fraction) {
+    StudyThreads *threads = context;
+    pthread_mutex_lock(&threads->lock);
+    const bool continues =
+        progress_advance(threads->watch, STUDY_BEGUN + (1 - STUDY_BEGUN) * fraction);
+    pthread_mutex_unlock(&threads->lock);
+    if (!continues)
+        study_threads_fail(threads, STATUS_CANCELLED, "the study was stopped");
+    return continues;
+}
+
+static void *study_threads_main(void *context) {
+    StudyThreads *threads = context;
+    StudyEngine *engine = &threads->engine;
+    Workspace workspace = {0};
+    Problem problem; // large, but a thread's stack is larger
+    size_t member;
+    while (study_engine_next(engine, true, &member)) {
+        problem_clear(&problem);
+        const Status status = study_engine_make(engine, member, &workspace, &problem);
+        // A stop that was requested is noted already; the end of the study stops members beyond it.
+        if (status != STATUS_OK && status != STATUS_CANCELLED)
+            study_threads_fail(threads, status, problem.detail);
+    }
+    workspace_clear(&workspace);
+    return NULL;
+}
+
+static Status study_threads_run(StudyWork *work, const StudyTools *tools, Problem *problem) {
+    StudyThreads threads = {.watch = tools->progress, .problem = problem};
+    const Progress progress = {&threads, study_threads_advance};
+    const long processors = sysconf(_SC_NPROCESSORS_ONLN);
+    const size_t count = processors < 1             ? 1
+                         : processors > THREADS_MAX ? THREADS_MAX
+                                                    : (size_t)processors;
+    pthread_t others[THREADS_MAX];
+    size_t started = 0;
+    pthread_mutex_init(&threads.lock, NULL);
+    Status status =
+        study_engine_open(&threads.engine, work, tools->limits, &progress, count, problem);
+    if (status == STATUS_OK) {
+        // Fewer threads than there could be do as well.
+        while (started + 1 < count &&
+               pthread_create(&others[started], NULL, study_threads_main, &threads) == 0)
+            started++;
+        (void)study_threads_main(&threads);
+        for (size_t i = 0; i < started; i++)
+            pthread_join(others[i], NULL);
+        status = threads.status;
+    }
+    study_engine_close(&threads.engine);
+    pthread_mutex_destroy(&threads.lock);
+    return status;
+}
+
+static double study_engine_cpu(void *context) {
+    (void)context;
+    return 1e-9 * (double)clock_thread_cpu_ns();
+}
+
+Status jobs_run_study(const Variant *study, const Simulation *simulation,
+                      const SimulationLimits *limits, const Progress *watch, Variant **answer,
+                      Problem *problem) {
+    Workspace workspace = {0};
+    StudyWork *work;
+    const StudyTools tools = {
+        .limits = limits, .progress = watch, .workspace = &workspace, .cpu = study_engine_cpu};
+    // A study without members is made by this thread in study_begin.
+    Status status = study_begin(study, simulation, &tools, answer, &work, problem);
+    if (status == STATUS_OK && study_has_members(study))
+        status = study_threads_run(work, &tools, problem);
+    if (status == STATUS_OK)
+        status = study_end(work, &tools, problem);
+    study_free(work);
+    workspace_clear(&workspace);
+    if (status != STATUS_OK) {
+        variant_free(*answer);
+        *answer = NULL;
+    }
+    return status;
 }

@@ -4,9 +4,9 @@
 #ifndef SERVER_JOBS_SWEEP_H
 #define SERVER_JOBS_SWEEP_H
 
+#include "core/study/study.h"
 #include "core/study/sweep.h"
 #include "server/db/db.h"
-#include "server/jobs/study_engine.h"
 #include "server/util/bytes.h"
 
 // A row is a byte of status and then its metrics, little-endian.
@@ -19,45 +19,6 @@ void sweep_row_put(const SweepRow *row, SweepChunkRow *chunk, size_t place, Swee
                    const double *values);
 // Why the row at `place` failed; "" if that was not kept.
 void sweep_row_reason(const SweepChunkRow *chunk, size_t place, char *why, size_t size);
-
-// A chunk that waits or is being made.
-typedef struct SweepChunk {
-    struct SweepChunk *next;
-    size_t count, done; // rows
-    bool is_loaded;     // there is room for the rows
-    bool is_retry;      // rows that failed are made again, the others are there
-    bool is_saved;
-    SweepChunkRow row;
-    Bytes reasons;
-} SweepChunk;
-
-// A sweep in progress: what is to be done is in the database before any of it runs, and what the
-// database has is done.
-typedef struct SweepRun {
-    Db *db;
-    StudyEngine *engine; // over when every chunk is saved
-    SweepRow row;
-    SweepChunk *waiting;             // under the lock of its user
-    atomic_size_t left;              // chunks that are not saved
-    atomic_size_t made, made_failed; // rows; the failed ones are made too
-} SweepRun;
-
-// The sweep as it was begun before, or cut into chunks by the cost of some points. `run` is freed
-// by sweep_run_free also after a failure.
-Status sweep_run_open(Db *db, const char *result, const char *scene, StudyEngine *engine,
-                      size_t slots, Workspace *workspace, SweepRun **run, Problem *problem);
-void sweep_run_free(SweepRun *run); // NULL is fine
-// Under the lock of its user: takes a chunk to work on, or NULL; and gives it back, to be freed if
-// it is saved.
-bool sweep_run_has_chunk(const SweepRun *run);
-SweepChunk *sweep_run_take(SweepRun *run);
-void sweep_run_return(SweepRun *run, SweepChunk *chunk);
-
-// Without it: makes ready, makes the next row, and saves the whole. Any of them may be repeated
-// after a failure that passes.
-Status sweep_chunk_load(SweepRun *run, SweepChunk *chunk, Problem *problem);
-Status sweep_chunk_make(SweepRun *run, SweepChunk *chunk, Workspace *workspace, Problem *problem);
-Status sweep_chunk_save(SweepRun *run, SweepChunk *chunk, Problem *problem);
 
 // A sweep read back. All zero is empty.
 typedef struct SweepView {
