@@ -68,12 +68,17 @@ static Status preview_reply(App *app, const Request *request, Reply *reply, void
     (void)request;
     if (preview->status != STATUS_OK)
         return problem_set(problem, preview->status, "%s", preview->problem.detail);
-    bytes_text(&bytes, "{\"plan\": ");
-    document_plan(&bytes, &preview->outcome->plan);
-    bytes_text(&bytes, ", \"summary\": ");
-    document_summary(&bytes, preview->outcome);
-    bytes_text(&bytes, ",\n\"series\": ");
-    Status status = preview_put_series(&bytes, preview, problem);
+    ResultRow row = {.count = 0};
+    Status status = document_outcome(preview->outcome, &row);
+    if (status == STATUS_OK) {
+        bytes_text(&bytes, "{\"plan\": ");
+        bytes_text(&bytes, row.plan);
+        bytes_text(&bytes, ", \"summary\": ");
+        bytes_text(&bytes, row.summary);
+        bytes_text(&bytes, ",\n\"series\": ");
+        status = preview_put_series(&bytes, preview, problem);
+    }
+    result_row_clear(&row);
     bytes_text(&bytes, ", \"impacts\": ");
     if (preview->outcome->response.is_unlisted)
         bytes_text(&bytes, "null");

@@ -106,12 +106,10 @@ static Status whole_write(Outcome *outcome, const Bytes *job, Bytes *bytes, Prob
 static Status job_write(const StudyRequest *request, const Warnings *warnings,
                         const Outcome *outcome, const int64_t began_unix_ms, double took,
                         Bytes *bytes) {
-    Bytes plan = {0}, summary = {0}, work = {0}, warned = {0}, notes = {0};
-    document_plan(&plan, &outcome->plan);
-    document_summary(&summary, outcome);
-    document_work(&work, &outcome->work);
+    ResultRow row = {.count = 0};
+    Bytes warned = {0};
+    Status status = document_outcome(outcome, &row);
     document_warnings(&warned, warnings);
-    document_warnings(&notes, &outcome->warnings);
     JobView show = {.id = "j-local",
                     .state = JOB_SUCCESSFUL,
                     .progress = 100,
@@ -120,23 +118,20 @@ static Status job_write(const StudyRequest *request, const Warnings *warnings,
                     .finished_unix_ms = clock_unix_ms(),
                     .run = took,
                     .total = took,
-                    .plan = plan.at,
-                    .summary = summary.at,
-                    .work = work.at,
+                    .plan = row.plan,
+                    .summary = row.summary,
+                    .work = row.work,
                     .warnings = warned.at,
-                    .notes = notes.at,
+                    .notes = row.notes,
                     .title = request->simulation.title};
     jobs_result_id(request, show.result);
-    const bool is_failed = plan.is_failed || summary.is_failed || work.is_failed ||
-                           warned.is_failed || notes.is_failed;
-    if (!is_failed)
+    if (warned.is_failed)
+        status = STATUS_NO_MEMORY;
+    if (status == STATUS_OK)
         job_json_put(bytes, &show, JOB_PUT_WHOLE);
-    bytes_clear(&plan);
-    bytes_clear(&summary);
-    bytes_clear(&work);
     bytes_clear(&warned);
-    bytes_clear(&notes);
-    return is_failed || bytes->is_failed ? STATUS_NO_MEMORY : STATUS_OK;
+    result_row_clear(&row);
+    return bytes->is_failed ? STATUS_NO_MEMORY : status;
 }
 
 // Runs and prints or writes.

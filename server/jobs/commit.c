@@ -12,7 +12,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/jobs/documents.h"
 #include "server/jobs/jobs_private.h"
 #include "server/json/encode.h"
 #include "server/util/bytes.h"
@@ -55,7 +54,8 @@ void run_result_fail(RunResult *run_result, Status status, Problem *problem) {
 
 Status run_result_add_to_study(RunResult *run_result, Problem *problem) {
     Bytes study = {.most = DOCUMENT_BYTES};
-    document_study(&study, &run_result->answer);
+    // What is unknown is left out, so that it can be read again.
+    encode_item(&study, study_answer_fields, &run_result->answer, WRITE_SCENE);
     run_result->result.study = bytes_take(&study, NULL);
     run_result->result.created_unix_ms = clock_unix_ms();
     return run_result->result.study != NULL

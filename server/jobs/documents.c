@@ -4,42 +4,43 @@
 
 #include "server/json/encode.h"
 
-void document_plan(Bytes *bytes, const PlanReport *plan) {
-    encode_item(bytes, plan_report_fields, plan, WRITE_REPORT);
-}
-
-void document_summary(Bytes *bytes, const Outcome *outcome) {
-    bytes_text(bytes, "{");
-    (void)encode_members(bytes, summary_fields, &outcome->summary, WRITE_REPORT);
-    if (outcome->has_reduction) {
-        bytes_text(bytes, ", ");
-        (void)encode_members(bytes, reduction_fields, &outcome->reduction, WRITE_REPORT);
-    }
-    bytes_text(bytes, "}");
-}
-
-void document_work(Bytes *bytes, const WorkCounters *work) {
-    encode_item(bytes, work_counters_fields, work, WRITE_REPORT);
-}
-
 void document_warnings(Bytes *bytes, const Warnings *warnings) {
     encode_list(bytes, warning_fields, warnings->at, warnings->count, sizeof *warnings->at,
                 WRITE_REPORT);
 }
 
+static Status document_take(Bytes *bytes, char **target) {
+    return status_made((*target = bytes_take(bytes, NULL)) != NULL);
+}
+
+Status document_outcome(const Outcome *outcome, ResultRow *row) {
+    Bytes plan = {0}, summary = {0}, work = {0}, notes = {0};
+    encode_item(&plan, plan_report_fields, &outcome->plan, WRITE_REPORT);
+    bytes_text(&summary, "{");
+    (void)encode_members(&summary, summary_fields, &outcome->summary, WRITE_REPORT);
+    if (outcome->has_reduction) {
+        bytes_text(&summary, ", ");
+        (void)encode_members(&summary, reduction_fields, &outcome->reduction, WRITE_REPORT);
+    }
+    bytes_text(&summary, "}");
+    encode_item(&work, work_counters_fields, &outcome->work, WRITE_REPORT);
+    document_warnings(&notes, &outcome->warnings);
+    const Status all[] = {document_take(&plan, &row->plan), document_take(&summary, &row->summary),
+                          document_take(&work, &row->work), document_take(&notes, &row->notes)};
+    return status_first(all, COUNT(all));
+}
+
 void document_join(Bytes *bytes, const char *first, const char *second) {
     static const char empty[] = "[]";
-    if (first == NULL || strcmp(first, empty) == 0) {
-        bytes_text(bytes, second != NULL ? second : empty);
-        return;
+    const bool has_first = first != NULL && strcmp(first, empty) != 0;
+    const bool has_second = second != NULL && strcmp(second, empty) != 0;
+    if (has_first && has_second) {
+        bytes_put(bytes, first, strlen(first) - 1);
+        bytes_text(bytes, ", ");
+        bytes_text(bytes, second + 1);
+    } else {
+        bytes_text(bytes, has_first ? first : has_second ? second : empty);
     }
-    if (second == NULL || strcmp(second, empty) == 0) {
-        bytes_text(bytes, first);
-        return;
-    }
-    bytes_put(bytes, first, strlen(first) - 1);
-    bytes_text(bytes, ", ");
-    bytes_text(bytes, second + 1);
 }
 
 void document_energy(Bytes *bytes, const Energy *energy) {
@@ -53,10 +54,6 @@ void document_scene(Bytes *bytes, const StudyRequest *inquiry) {
     plain.simulation.title = NULL;
     plain.simulation.labels = (Texts){NULL, 0};
     encode_item(bytes, study_request_fields, &plain, WRITE_SCENE);
-}
-
-void document_study(Bytes *bytes, const StudyAnswer *answer) {
-    encode_item(bytes, study_answer_fields, answer, WRITE_SCENE);
 }
 
 void document_answer(Bytes *bytes, const Variant *answer) {
