@@ -4,7 +4,6 @@
 #include <string.h>
 
 #include "server/jobs/jobs_private.h"
-#include "server/jobs/outcome_blob.h"
 
 // The texts stand behind the struct, in one block.
 ResultSummary *result_summary_new(const ResultRow *row) {

@@ -250,6 +250,18 @@ Status request_load_records(Db *db, StudyRequest *request, Problem *problem);
 // manager.c. Tries again to write what there was no room for.
 void jobs_retry_writes(JobManager *manager);
 
+// outcome_blob.c. Binary form of an Outcome for the database: spectra, impacts, energies and
+// summary in one blob, the series in another. Plan, work and warnings are JSON documents of the
+// result.
+void outcome_blob_write(Bytes *bytes, const Outcome *outcome);
+// An outcome without series, with one reference. NULL for anything that outcome_blob_write did not
+// write, and without memory.
+Outcome *outcome_blob_read(const void *blob, size_t size);
+
+void series_blob_write(Bytes *bytes, const Columns *series);
+// `series` is cleared by columns_clear; false, and empty, as above.
+bool series_blob_read(const void *blob, size_t size, Columns *series);
+
 // cache.c. Without the lock: saves the series if it is dearer to compute than to read.
 void jobs_keep_series(JobManager *manager, const char *result, const Outcome *outcome,
                       double seconds);

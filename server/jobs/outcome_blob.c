@@ -4,7 +4,7 @@
 //     outcome   head | energy | summary | impacts | spectrum, where there is one: head |
 //     frequencies | densities columns   count | rows | names and units | values, column after
 //     column
-#include "server/jobs/outcome_blob.h"
+#include "server/jobs/jobs_private.h"
 
 #include <stdlib.h>
 #include <string.h>

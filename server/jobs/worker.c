@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "server/jobs/documents.h"
-#include "server/jobs/outcome_blob.h"
 #include "server/jobs/study.h"
 #include "server/util/clock.h"
 

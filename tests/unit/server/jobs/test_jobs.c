@@ -254,30 +254,6 @@ TEST_IN(a_result_that_there_is_no_room_for_waits_for_it, NULL, lift_limit) {
     room_end(&room);
 }
 
-TEST_IN(a_result_that_there_is_no_room_for_is_computed_again_after_a_restart, NULL, lift_limit) {
-    Room room = room_make(1);
-    signal(SIGXFSZ, SIG_IGN);
-    Job *job = submit(&room, 0.015, LONG);
-    limit_files(1);
-    wait_until_idle(&room);
-    JobView waits = show(job);
-    assert_int_equal(waits.state, JOB_RUNNING);
-    job_unref(job);
-    jobs_close(room.manager);
-    room.manager = NULL;
-    limit_files(RLIM_INFINITY);
-    room_close(&room);
-    room_open(&room);
-    assert_int_equal(jobs_find(room.manager, waits.id, &job, &problem), STATUS_OK);
-    wait_for(job);
-    JobView now = show(job);
-    assert_int_equal(now.state, JOB_SUCCESSFUL);
-    job_view_clear(&waits);
-    job_view_clear(&now);
-    job_unref(job);
-    room_end(&room);
-}
-
 TEST_IN(a_job_that_cannot_be_kept_never_was, NULL, lift_limit) {
     Room room = room_make(1);
     signal(SIGXFSZ, SIG_IGN);
@@ -394,6 +370,23 @@ TEST(a_job_is_written_once_with_its_result) {
     room_close_jobs(&room, job);
     room_open(&room);
     assert_int_equal(count_rows(&room), 1);
+    room_end(&room);
+}
+
+TEST(quick_jobs_go_beside_slow_ones_that_have_every_worker) {
+    Room room = room_make(2);
+    Job *slow[5];
+    for (size_t i = 0; i < COUNT(slow); i++)
+        slow[i] = submit(&room, 0.001 * (double)(i + 1), 1e5);
+    Job *quick = submit(&room, 0.02, 1);
+    wait_for(quick);
+    size_t unfinished = 0;
+    for (size_t i = 0; i < COUNT(slow); i++) {
+        unfinished += !job_is_finished(slow[i]);
+        job_unref(slow[i]);
+    }
+    assert_true(unfinished >= 2);
+    job_unref(quick);
     room_end(&room);
 }
 

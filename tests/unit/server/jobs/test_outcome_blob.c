@@ -1,5 +1,5 @@
 // Stored numbers come back bit for bit, and what was cut or changed does not come back at all.
-#include "server/jobs/outcome_blob.h"
+#include "server/jobs/jobs_private.h"
 #include "tests/support/test.h"
 
 #include <math.h>

@@ -5,7 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/study/sensitivity.h"
 #include "core/study/sweep.h"
 #include "server/jobs/documents.h"
 #include "server/jobs/jobs.h"
@@ -217,26 +216,6 @@ TEST_IN(a_name_alone_is_the_approved_head_and_never_a_deprecated_one, set_up, te
     expect_fault("/dampers/0/buffer", "has no such revision; its newest revision is foam@2");
 }
 
-TEST_IN(what_is_known_of_a_test_goes_with_the_buffer, set_up, tear_down) {
-    say("foam", SAID("\"restitution\": 0.5, \"restitution_deviation\": 0.05, \"contact_time\": "
-                     "0.02, \"contact_time_deviation\": 0.001, \"least_speed\": 0.2, "
-                     "\"impactor_mass\": 0.3, \"base\": \"free\", \"base_mass\": 0.6"));
-    resolve_well("\"buffer\": \"foam\"", "");
-    const BufferTest *test = &damper()->buffer.test;
-    assert_true(test->least_speed == 0.2 && isnan(test->most_speed));
-    assert_true(fabs(buffer_test_mass(&damper()->buffer) - 0.2) < 1e-15);
-    assert_true(fabs(test->restitution_deviation - 0.1) < 1e-15);
-    assert_true(fabs(test->contact_time_deviation - 0.05) < 1e-15);
-    // A table has its own ends, and its deviations together.
-    say("rubber", SAID(TABLE_MEMBERS));
-    resolve_well("\"buffer\": \"rubber\"", "");
-    test = &damper()->buffer.test;
-    assert_true(test->least_speed == 0.1 && test->most_speed == 0.8);
-    assert_true(fabs(test->restitution_deviation - sqrt((0.01 + 0.04) / 2)) < 1e-15);
-    assert_true(fabs(test->contact_time_deviation - 0.1) < 1e-15);
-    assert_true(isnan(buffer_test_mass(&damper()->buffer)));
-}
-
 TEST_IN(a_rig_that_is_not_given_is_that_of_the_revision, set_up, tear_down) {
 #define MEASURED "\"restitution\": 0.5, \"contact_time\": 0.02"
     static const char rig[] = "\"identified_for\": \"rig\", ";
@@ -343,90 +322,6 @@ TEST_IN(canonical_forms_of_named_revisions_never_change, set_up, tear_down) {
     assert_string_equal(damper()->buffer.material, "sponge@92");
 }
 
-static const SensitivityStudy *study(void) {
-    return (const SensitivityStudy *)(const void *)inquiry.study;
-}
-
-#define SPREAD_SAID                                                                                \
-    SAID("\"restitution\": 0.5, \"restitution_deviation\": 0.05, \"contact_time\": 0.02, "         \
-         "\"contact_time_deviation\": 0.001")
-#define SENSITIVITY(members) ", \"study\": {\"kind\": \"sensitivity\"" members "}"
-
-TEST_IN(a_sensitivity_study_takes_the_recorded_spread, set_up, tear_down) {
-    say("foam", SPREAD_SAID);
-    resolve_well("\"buffer\": \"foam\"", SENSITIVITY(""));
-    assert_int_equal(study()->runs, 200);
-    assert_int_equal(study()->uncertainty.spread.count, 1);
-    assert_string_equal(study()->uncertainty.spread.at[0].source, "foam@1");
-    expect_member("\"spread\": [{\"damper\": 1, \"buffer\": \"buffer\", \"source\": \"foam@1\", "
-                  "\"restitution\": 0.1, \"contact_time\": 0.05}], \"runs\": 200");
-    char id[72], again[72];
-    jobs_result_id(&inquiry, id);
-    char *text = canonical();
-    // It stays what it was, whatever is said later.
-    say("foam", SAID("\"restitution\": 0.5, \"restitution_deviation\": 0.2"));
-    review("foam", 2, "approved");
-    assert_int_equal(resolve_text(text), STATUS_OK);
-    jobs_result_id(&inquiry, again);
-    assert_string_equal(id, again);
-    free(text);
-    // Left and right for themselves; where nothing was recorded it is sure.
-    resolve_well("\"left_buffer\": \"foam@1\", \"right_buffer\": \"sponge\"", SENSITIVITY(""));
-    expect_member(
-        "\"spread\": [{\"damper\": 1, \"buffer\": \"left_buffer\", \"source\": \"foam@1\"");
-    expect_stable();
-    // What a model does not use is not drawn.
-    resolve_well("\"buffer\": \"foam@1\"",
-                 ", \"contact\": {\"model\": \"impulse\"}" SENSITIVITY(""));
-    expect_member("\"contact_time_deviation\": 0, \"spread\": [{\"damper\": 1, \"buffer\": "
-                  "\"buffer\", \"source\": \"foam@1\", \"restitution\": 0.1}]");
-    expect_stable();
-}
-
-TEST_IN(what_a_study_says_itself_wins_over_what_was_recorded, set_up, tear_down) {
-    say("foam", SPREAD_SAID);
-    resolve_well("\"buffer\": \"foam\"", SENSITIVITY(", \"restitution_deviation\": 0.3"));
-    expect_member("\"restitution_deviation\": 0.3, \"spread\": [{\"damper\": 1, \"buffer\": "
-                  "\"buffer\", \"source\": \"foam@1\", \"contact_time\": 0.05}]");
-    expect_stable();
-    resolve_well("\"buffer\": \"foam\"", SENSITIVITY(", \"restitution_deviation\": 0, "
-                                                     "\"contact_time_deviation\": 0"));
-    assert_int_equal(study()->uncertainty.spread.count, 0);
-    assert_int_equal(study()->runs, 0);
-    resolve_well("\"buffer\": \"foam\"",
-                 SENSITIVITY(", \"spread\": [{\"damper\": 1, \"restitution\": 0.02}]"));
-    expect_member("\"contact_time_deviation\": 0, \"spread\": [{\"damper\": 1, \"buffer\": "
-                  "\"buffer\", \"restitution\": 0.02}]");
-    expect_stable();
-    static const struct {
-        const char *members, *pointer, *detail;
-    } cases[] = {
-        {", \"spread\": [{\"damper\": 2, \"restitution\": 0.02}]", "/study/spread/0/damper",
-         "must be the number of a damper"},
-        {", \"spread\": [{\"damper\": 1, \"buffer\": \"left_buffer\"}]", "/study/spread/0/buffer",
-         "is not given: if both"},
-        {", \"spread\": [{\"damper\": 1}, {\"damper\": 1}]", "/study/spread/1", "give one each"},
-        {", \"spread\": [{\"damper\": 1, \"source\": \"sponge@1\", \"restitution\": 0.1}]",
-         "/study/spread/0/source", "is not the material of that buffer"},
-        {", \"spread\": [{\"damper\": 1, \"source\": \"foam@1\", \"restitution\": 0.2}]",
-         "/study/spread/0/restitution", "is 0.2, but foam@1 records 0.1"},
-        {", \"restitution_deviation\": 0.1, \"spread\": [{\"damper\": 1, \"restitution\": 0.1}]",
-         "/study/spread/0/restitution", "must be left out: restitution_deviation gives it"},
-        {", \"spread\": [{\"damper\": 1, \"restitution\": 1.5}]", "/study/spread/0/restitution",
-         "must be within [0, 1]"},
-    };
-    for (size_t i = 0; i < COUNT(cases); i++) {
-        char rest[256];
-        snprintf(rest, sizeof rest, SENSITIVITY("%s"), cases[i].members);
-        assert_int_equal(prepare("\"buffer\": \"foam\"", rest), STATUS_INVALID);
-        expect_fault(cases[i].pointer, cases[i].detail);
-    }
-    say("wild", SAID("\"restitution\": 0.1, \"restitution_deviation\": 0.2"));
-    assert_int_equal(prepare("\"buffer\": \"wild\"", SENSITIVITY("")), STATUS_INVALID);
-    expect_fault("/study/spread/0/restitution", "is 2 of its value, as wild@1 records");
-    resolve_well("\"buffer\": \"wild\"", SENSITIVITY(", \"restitution_deviation\": 0.4"));
-}
-
 TEST_IN(points_of_a_sweep_have_the_tables_and_rigs_of_their_materials, set_up, tear_down) {
     say("foam", SAID(TABLE_MEMBERS ", \"impactor_mass\": 0.3, \"base\": \"fixed\""));
     say("rubber", SAID("\"restitution\": 0.5, \"contact_time\": 0.01, \"impactor_mass\": 0.4, "
@@ -453,17 +348,6 @@ TEST_IN(points_of_a_sweep_have_the_tables_and_rigs_of_their_materials, set_up, t
     assert_string_equal(uses.at, "rubber@1\nfoam@1\n");
     bytes_clear(&uses);
     expect_stable();
-    // A rig that somebody gave stays for all.
-    resolve_well("\"buffer\": \"rubber\", \"identified_for\": \"rig\", \"rig\": "
-                 "{\"impactor_mass\": 7}",
-                 ", \"study\": {\"kind\": \"sweep\", \"axes\": [{\"pointer\": "
-                 "\"/dampers/0/buffer\", \"values\": [\"rubber\", \"foam\"]}]}");
-    sweep = (const SweepStudy *)(const void *)inquiry.study;
-    assert_int_equal(sweep_grid_new(sweep, &inquiry.simulation, NULL, &plan, &problem), STATUS_OK);
-    assert_int_equal(sweep_grid_scene(plan, 1, true, NULL, &points[1], &problem), STATUS_OK);
-    assert_true(points[1].scene.dampers.at[0].rig.impactor_mass == 7);
-    simulation_clear(&points[1]);
-    sweep_grid_free(plan);
 }
 
 TEST_IN(uses_are_lines_each_once, set_up, tear_down) {

@@ -169,22 +169,6 @@ static bool is_idle(const Room *room) {
     return is_idle;
 }
 
-TEST(all_workers_make_an_ensemble_together) {
-    Room room = room_make(3);
-    char text[1024], id[40], result[72];
-    size_t most = 0;
-    ensemble(text, 4000 / FEWER, 20);
-    room_submit(&room, text, NULL, id);
-    while (most < 3) {
-        const size_t now = busy(&room);
-        most = now > most ? now : most;
-        if (job_state_is_final((int)room_state(&room, id, result)))
-            fail_msg("%zu of 3 workers had a part in it", most);
-    }
-    room_dismiss(&room, id);
-    room_end(&room);
-}
-
 static int64_t process_cpu_ns(void) {
     struct timespec now;
     clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
@@ -300,19 +284,4 @@ TEST(studies_of_two_clients_both_get_on) {
     ensemble(other, 1000 / FEWER, 20.5);
     assert_both_get_on(one, other);
     assert_both_get_on(other, one);
-}
-
-TEST(single_jobs_go_between_the_members_of_an_ensemble) {
-    Room room = room_make(1);
-    char text[1024], id[40], single[40], result[72];
-    ensemble(text, 8000 / FEWER, 20);
-    room_submit(&room, text, NULL, id);
-    while (busy(&room) == 0)
-        room_nap(100000);
-    scene(text, 1, usual, NULL);
-    room_submit(&room, text, NULL, single);
-    room_finish(&room, single, result);
-    assert_int_equal(room_state(&room, id, result), JOB_RUNNING);
-    room_dismiss(&room, id);
-    room_end(&room);
 }

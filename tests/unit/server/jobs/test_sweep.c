@@ -39,31 +39,6 @@ static void assert_whole(const Room *room, const char *result, size_t points) {
     sweep_view_clear(&show);
 }
 
-TEST(rows_come_back_as_they_were_put) {
-    const SweepRow row = {.points = 10, .metrics = 2, .chunks = 4};
-    assert_int_equal(sweep_rows_of(&row, 0), 3);
-    assert_int_equal(sweep_rows_of(&row, 1), 3);
-    assert_int_equal(sweep_rows_of(&row, 2), 2);
-    assert_int_equal(sweep_rows_of(&row, 3), 2);
-    unsigned char bytes[2 * 17];
-    char reasons[] = "0 too fast\n12 other\n";
-    SweepChunkRow chunk = {.rows = {bytes, sizeof bytes}, .reasons = reasons};
-    const double values[] = {-0.1, (double)NAN};
-    double read[2];
-    sweep_row_put(&row, &chunk, 1, SWEEP_UNSTABLE, values);
-    assert_int_equal(sweep_row_get(&row, &chunk, 1, read), SWEEP_UNSTABLE);
-    assert_true(read[0] == -0.1 && isnan(read[1]));
-    assert_int_equal(sweep_row_get(&row, &chunk, 2, read), SWEEP_PENDING);
-    assert_true(isnan(read[0]));
-    char why[8];
-    sweep_row_reason(&chunk, 0, why, sizeof why);
-    assert_string_equal(why, "too fas");
-    sweep_row_reason(&chunk, 1, why, sizeof why);
-    assert_string_equal(why, "");
-    sweep_row_reason(&chunk, 12, why, sizeof why);
-    assert_string_equal(why, "other");
-}
-
 TEST(a_sweep_interrupted_again_and_again_comes_to_its_end) {
     Room room = room_make(3);
     char id[40], result[72];
