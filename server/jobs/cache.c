@@ -51,46 +51,22 @@ typedef struct CachedResult {
     char id[72];
 } CachedResult;
 
-struct Cache {
-    Lru *lru;
-    CacheStats series, summaries;
-};
-
-static void cache_release(LruEntry *entry, void *owner, bool is_evicted) {
-    Cache *cache = owner;
+void cache_release(LruEntry *entry, void *owner, bool is_evicted) {
+    JobManager *manager = owner;
     CachedResult *result = (CachedResult *)(void *)entry;
-    cache->series.evictions += is_evicted && result->outcome != NULL;
-    cache->summaries.evictions += is_evicted && result->summary != NULL;
-    cache->series.count -= result->outcome != NULL;
-    cache->summaries.count -= result->summary != NULL;
-    cache->series.bytes -= result->series_bytes;
-    cache->summaries.bytes -= result->summary_bytes;
+    manager->series.evictions += is_evicted && result->outcome != NULL;
+    manager->summaries.evictions += is_evicted && result->summary != NULL;
+    manager->series.count -= result->outcome != NULL;
+    manager->summaries.count -= result->summary != NULL;
+    manager->series.bytes -= result->series_bytes;
+    manager->summaries.bytes -= result->summary_bytes;
     outcome_unref(result->outcome);
     result_summary_unref(result->summary);
     free(result);
 }
 
-Cache *cache_new(size_t max_bytes) {
-    Cache *cache = calloc(1, sizeof *cache);
-    if (cache == NULL)
-        return NULL;
-    cache->lru = lru_new(max_bytes, cache_release, cache);
-    if (cache->lru == NULL) {
-        free(cache);
-        return NULL;
-    }
-    return cache;
-}
-
-void cache_free(Cache *cache) {
-    if (cache == NULL)
-        return;
-    lru_free(cache->lru);
-    free(cache);
-}
-
-void cache_put(Cache *cache, const char *id, Outcome *outcome, ResultSummary *summary) {
-    const CachedResult *old = lru_peek(cache->lru, id);
+void cache_put(JobManager *manager, const char *id, Outcome *outcome, ResultSummary *summary) {
+    const CachedResult *old = lru_peek(manager->cache, id);
     CachedResult *result = calloc(1, sizeof *result);
     if (result == NULL)
         return;
@@ -103,44 +79,32 @@ void cache_put(Cache *cache, const char *id, Outcome *outcome, ResultSummary *su
     result->summary_bytes = sizeof *result + (summary != NULL ? summary->bytes : 0);
     result->entry.indexed.key = result->id;
     result->entry.bytes = result->series_bytes + result->summary_bytes;
-    cache->series.bytes += result->series_bytes;
-    cache->summaries.bytes += result->summary_bytes;
-    cache->series.count += outcome != NULL;
-    cache->summaries.count += summary != NULL;
-    lru_add(cache->lru, &result->entry);
+    manager->series.bytes += result->series_bytes;
+    manager->summaries.bytes += result->summary_bytes;
+    manager->series.count += outcome != NULL;
+    manager->summaries.count += summary != NULL;
+    lru_add(manager->cache, &result->entry);
 }
 
-Outcome *cache_find(Cache *cache, const char *id) {
-    const CachedResult *entry = lru_find(cache->lru, id);
+static Outcome *cache_find(JobManager *manager, const char *id) {
+    const CachedResult *entry = lru_find(manager->cache, id);
     const bool is_hit = entry != NULL && entry->outcome != NULL;
-    cache->series.hits += is_hit;
-    cache->series.misses += !is_hit;
+    manager->series.hits += is_hit;
+    manager->series.misses += !is_hit;
     return is_hit ? outcome_ref(entry->outcome) : NULL;
 }
 
-ResultSummary *cache_head(Cache *cache, const char *id) {
-    const CachedResult *entry = lru_find(cache->lru, id);
+ResultSummary *cache_head(JobManager *manager, const char *id) {
+    const CachedResult *entry = lru_find(manager->cache, id);
     const bool is_hit = entry != NULL && entry->summary != NULL;
-    cache->summaries.hits += is_hit;
-    cache->summaries.misses += !is_hit;
+    manager->summaries.hits += is_hit;
+    manager->summaries.misses += !is_hit;
     return is_hit ? result_summary_ref(entry->summary) : NULL;
 }
 
-bool cache_has(const Cache *cache, const char *id, bool with_series) {
-    const CachedResult *entry = lru_peek(cache->lru, id);
+bool cache_has(const JobManager *manager, const char *id, bool with_series) {
+    const CachedResult *entry = lru_peek(manager->cache, id);
     return entry != NULL && (with_series ? entry->outcome != NULL : entry->summary != NULL);
-}
-
-void cache_forget(Cache *cache, const char *id) {
-    CachedResult *entry = lru_peek(cache->lru, id);
-    if (entry != NULL)
-        lru_remove(cache->lru, &entry->entry);
-}
-
-void cache_tally(const Cache *cache, CacheStats *series, CacheStats *summaries) {
-    *series = cache->series;
-    *summaries = cache->summaries;
-    series->most_bytes = summaries->most_bytes = lru_stats(cache->lru).max_bytes;
 }
 
 // What reading a series is taken to cost, and the writing of it that comes before.
@@ -226,7 +190,7 @@ static Outcome *load_series(JobManager *manager, const char *result) {
     manager->stored.hits += outcome != NULL;
     manager->stored.misses += outcome == NULL;
     if (outcome != NULL)
-        cache_put(manager->cache, result, outcome, NULL);
+        cache_put(manager, result, outcome, NULL);
     pthread_mutex_unlock(&manager->lock);
     return outcome;
 }
@@ -295,7 +259,7 @@ Status jobs_outcome(JobManager *manager, const char *result, const Callback *cal
                     Outcome **outcome, Problem *problem) {
     pthread_mutex_lock(&manager->lock);
     Status status = STATUS_OK;
-    *outcome = cache_find(manager->cache, result);
+    *outcome = cache_find(manager, result);
     Task *task = NULL;
     if (*outcome == NULL) {
         status = tell_failure(manager, result, problem);
@@ -316,7 +280,7 @@ Status jobs_outcome(JobManager *manager, const char *result, const Callback *cal
 Status jobs_outcome_stored(JobManager *manager, const char *result, Outcome **outcome,
                            Problem *problem) {
     pthread_mutex_lock(&manager->lock);
-    *outcome = cache_has(manager->cache, result, true) ? cache_find(manager->cache, result) : NULL;
+    *outcome = cache_has(manager, result, true) ? cache_find(manager, result) : NULL;
     pthread_mutex_unlock(&manager->lock);
     return *outcome != NULL ? STATUS_OK : outcome_load(manager, result, outcome, problem);
 }

@@ -211,7 +211,7 @@ static void commit_done(void *context, Status status, const char *detail) {
         // What is cached must be in the database.
         if (status == STATUS_OK && run->status == STATUS_OK) {
             task->is_saved = true;
-            cache_put(manager->cache, task->result, run->outcome, task->summary);
+            cache_put(manager, task->result, run->outcome, task->summary);
         }
         while (task->committing != NULL) {
             Job *job = task->committing;
@@ -261,7 +261,7 @@ void task_finish(JobManager *manager, Task *task, RunResult *run_result) {
     manager->saving_bytes += task->saving_bytes;
     task->is_saving = true;
     if (is_cached)
-        cache_put(manager->cache, task->result, outcome, NULL);
+        cache_put(manager, task->result, outcome, NULL);
     Task *ended = commit_continue(task);
     pthread_mutex_unlock(&manager->lock);
     task_free(ended);

@@ -24,22 +24,6 @@ ResultSummary *result_summary_new(const ResultRow *row);
 ResultSummary *result_summary_ref(ResultSummary *summary); // NULL is accepted here and below
 void result_summary_unref(ResultSummary *summary);
 
-typedef struct Cache Cache;
-// Results by their id, up to a budget of bytes: summaries and, where kept, series. Guarded by the
-// manager's lock.
-Cache *cache_new(size_t max_bytes); // NULL without memory
-void cache_free(Cache *cache);
-
-// Takes references of its own; NULL for `outcome` or `summary` keeps what is cached of it. The
-// newest result is kept even if it is larger than the budget. Without memory nothing is cached.
-void cache_put(Cache *cache, const char *id, Outcome *outcome, ResultSummary *summary);
-Outcome *cache_find(Cache *cache, const char *id);                    // a reference, or NULL
-ResultSummary *cache_head(Cache *cache, const char *id);              // a reference, or NULL
-bool cache_has(const Cache *cache, const char *id, bool with_series); // not a use
-void cache_forget(Cache *cache, const char *id);
-// Of the series and of the summaries, which share the budget.
-void cache_tally(const Cache *cache, CacheStats *series, CacheStats *summaries);
-
 enum { METRICS_SOLVERS = 16, METRICS_WORK = 32, METRICS_STATES = JOB_DISMISSED + 1 };
 
 typedef struct SolverMetrics {
@@ -165,22 +149,22 @@ struct JobManager {
     Worker *workers;         // settings.workers of them, and the spare one
     size_t worker_count;     // started
     size_t slow_running;
-    double estimate_bias; // run time over its estimate, averaged over the last runs
     bool is_closing;
     HashMap *jobs;   // not yet finished
     HashMap *tasks;  // by result
     Queue *queue;    // of tasks
     uint64_t memory; // in bytes, of running tasks, as estimated, where it is counted
     size_t memory_waiters;
-    Task *waiting, **waiting_last; // for memory, or for room in the database
-    struct StudyRun *studies;      // under way
-    size_t live;                   // jobs not yet finished
-    size_t scene_bytes;            // of them all
-    size_t writes;                 // under way
-    size_t saving, saving_bytes;   // tasks that have run and are not yet saved
-    Task *retry_commits;           // of these, those that wait for room in the database
-    Job *retry_cancels;            // referenced: cancelled, but it could not be written
-    Cache *cache;
+    Task *waiting, **waiting_last;      // for memory, or for room in the database
+    struct StudyRun *studies;           // under way
+    size_t live;                        // jobs not yet finished
+    size_t scene_bytes;                 // of them all
+    size_t writes;                      // under way
+    size_t saving, saving_bytes;        // tasks that have run and are not yet saved
+    Task *retry_commits;                // of these, those that wait for room in the database
+    Job *retry_cancels;                 // referenced: cancelled, but it could not be written
+    Lru *cache;                         // of results by id: summaries and, where kept, series
+    CacheStats series, summaries;       // there, which share the budget
     CacheStats rows, stored;            // results and series found in the database
     size_t keeping_bytes;               // of series on the way there
     atomic_int large_plans;             // requests that plan large structures
@@ -262,7 +246,14 @@ void series_blob_write(Bytes *bytes, const Columns *series);
 // `series` is cleared by columns_clear; false, and empty, as above.
 bool series_blob_read(const void *blob, size_t size, Columns *series);
 
-// cache.c. Without the lock: saves the series if it is dearer to compute than to read.
+// cache.c. With the lock held. Takes references of its own; NULL for `outcome` or `summary` keeps
+// what is cached of it. The newest result is kept even if it is larger than the budget. Without
+// memory nothing is cached.
+void cache_put(JobManager *manager, const char *id, Outcome *outcome, ResultSummary *summary);
+ResultSummary *cache_head(JobManager *manager, const char *id);              // a reference, or NULL
+bool cache_has(const JobManager *manager, const char *id, bool with_series); // not a use
+void cache_release(LruEntry *entry, void *manager, bool is_evicted);
+// Without the lock: saves the series if it is dearer to compute than to read.
 void jobs_keep_series(JobManager *manager, const char *result, const Outcome *outcome,
                       double seconds);
 

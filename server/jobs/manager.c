@@ -26,7 +26,9 @@ void jobs_retry_writes(JobManager *manager) {
 
 static void manager_forget(JobManager *manager, const char *result) {
     pthread_mutex_lock(&manager->lock);
-    cache_forget(manager->cache, result);
+    LruEntry *entry = lru_peek(manager->cache, result);
+    if (entry != NULL)
+        lru_remove(manager->cache, entry);
     pthread_mutex_unlock(&manager->lock);
     if (manager->settings.deleted.wake != NULL)
         manager->settings.deleted.wake(manager->settings.deleted.context);
@@ -120,11 +122,10 @@ Status jobs_open(Db *db, const JobManagerSettings *settings, JobManager **opened
     pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
     pthread_cond_init(&manager->stopping, &monotonic);
     pthread_condattr_destroy(&monotonic);
-    manager->estimate_bias = 1;
     manager->queue = queue_new();
     manager->jobs = hashmap_new();
     manager->tasks = hashmap_new();
-    manager->cache = cache_new(settings->cache_bytes);
+    manager->cache = lru_new(settings->cache_bytes, cache_release, manager);
     manager->workers = calloc(settings->workers + 1, sizeof *manager->workers);
     Status status = STATUS_OK;
     if (manager->jobs == NULL || manager->tasks == NULL || manager->cache == NULL ||
@@ -204,7 +205,7 @@ void jobs_close(JobManager *manager) {
         return;
     jobs_stop(manager);
     manager_wait_for_writes(manager); // of requests that were answered meanwhile
-    cache_free(manager->cache);
+    lru_free(manager->cache);
     queue_free(manager->queue);
     hashmap_free(manager->jobs);
     hashmap_free(manager->tasks);
@@ -247,8 +248,8 @@ Status jobs_remove(JobManager *manager, const char *id, Problem *problem) {
 
 void jobs_layers(JobManager *manager, const char *result, CacheLayers *layers) {
     pthread_mutex_lock(&manager->lock);
-    *layers = (CacheLayers){.in_memory = cache_has(manager->cache, result, false),
-                            .series_in_memory = cache_has(manager->cache, result, true)};
+    *layers = (CacheLayers){.in_memory = cache_has(manager, result, false),
+                            .series_in_memory = cache_has(manager, result, true)};
     pthread_mutex_unlock(&manager->lock);
     layers->in_database = db_result_exists(manager->db, result);
     layers->series_in_database = db_series_exists(manager->db, result);
@@ -260,9 +261,11 @@ void jobs_tally(JobManager *manager, JobStats *stats) {
                         .workers = manager->settings.workers,
                         .queue_most = manager->settings.queue_most,
                         .saving = manager->saving,
+                        .heads = manager->summaries,
+                        .series = manager->series,
                         .rows = manager->rows,
                         .stored = manager->stored};
-    cache_tally(manager->cache, &stats->series, &stats->heads);
+    stats->series.most_bytes = stats->heads.most_bytes = manager->settings.cache_bytes;
     stats->cached_outcomes = stats->series.count;
     stats->cached_bytes = stats->series.bytes + stats->heads.bytes;
     for (size_t i = 0; i < manager->worker_count; i++)

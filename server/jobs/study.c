@@ -25,14 +25,12 @@ enum {
     MILLION = 1000000,
     TURN_MS = 10,      // at least, of a turn
     LOOK_MS = 1,       // how often a turn looks whether other work waits
-    PILOT_POINTS = 16, // whose cost decides how many chunks there are
     CHUNKS_MAX = 4096, // unless one would have more rows than
     CHUNK_ROWS = 1 << 16,
     CHUNKS_PER_SLOT = 4, // at least
     REASONS = 1000,      // kept of the failed rows of a chunk
     REASON_BYTES = 160,
 };
-static const double pilot_seconds = 0.2; // that the pilot takes about
 // Short chunks let rows appear soon, and little is lost when the daemon is killed.
 static const double chunk_seconds = 0.25;
 
@@ -197,36 +195,16 @@ static bool study_is_over(StudyRun *run) {
     return atomic_load(&run->engine.is_over) || atomic_load(&run->task->is_stopped);
 }
 
-// Estimates the CPU time of a point by some of them [s].
-static Status sweep_pilot(StudyEngine *engine, Workspace *workspace, double *seconds,
-                          Problem *problem) {
-    const size_t points = engine->work->members;
-    const size_t max = points < PILOT_POINTS ? points : PILOT_POINTS;
-    const StudyTools tools = {
-        .limits = engine->limits, .progress = &engine->progress, .workspace = workspace};
-    const int64_t began_ns = clock_thread_cpu_ns();
-    for (size_t made = 0; made < max && *seconds * (double)made <= pilot_seconds;) {
-        StudyPart *part = NULL;
-        const Status status = study_part_make(
-            engine->work, (points - 1) * made / (max > 1 ? max - 1 : 1), &tools, &part, problem);
-        study_part_free(engine->work, part);
-        TRY(status);
-        made++;
-        *seconds = 1e-9 * (double)(clock_thread_cpu_ns() - began_ns) / (double)made;
-    }
-    return STATUS_OK;
-}
-
 static size_t sweep_count_chunks(size_t points, size_t slots, double seconds) {
     const double all = (double)points;
-    double chunks = fmin(ceil(seconds * all / chunk_seconds), CHUNKS_MAX);
+    double chunks = fmin(ceil(seconds / chunk_seconds), CHUNKS_MAX);
     chunks = fmax(chunks, ceil(all / CHUNK_ROWS));
     chunks = fmax(chunks, (double)(CHUNKS_PER_SLOT * slots));
     return (size_t)fmin(chunks, all);
 }
 
 // What is to be done is durable before anything runs; what was written down before stays.
-static Status sweep_begin(StudyRun *run, size_t slots, Workspace *workspace, Problem *problem) {
+static Status sweep_begin(StudyRun *run, size_t slots, Problem *problem) {
     const StudyWork *work = run->work;
     const char *result = run->task->result;
     SweepRow *row = &run->sweep;
@@ -237,15 +215,13 @@ static Status sweep_begin(StudyRun *run, size_t slots, Workspace *workspace, Pro
     if (found != STATUS_OK && found != STATUS_NOT_FOUND)
         return problem_set(problem, found, "the sweeps could not be searched");
     if (found == STATUS_NOT_FOUND) {
-        double seconds = 0;
-        TRY(sweep_pilot(&run->engine, workspace, &seconds, problem));
         text_fit(row->result, sizeof row->result, result);
         row->scene = strdup(run->task->scene);
         if (row->scene == NULL)
             return study_no_memory(problem);
         row->metrics = metrics;
         row->points = points;
-        row->chunks = sweep_count_chunks((size_t)points, slots, seconds);
+        row->chunks = sweep_count_chunks((size_t)points, slots, run->task->queued.seconds);
         row->created_unix_ms = clock_unix_ms();
     }
     // Also a row that is there: it may be about to be deleted with the last job before this one.
@@ -286,11 +262,11 @@ static Status sweep_list(StudyRun *run, const SweepChunkRows *saved, Problem *pr
     return STATUS_OK;
 }
 
-// The sweep as it was begun before, or cut into chunks by the cost of some points. What is to be
+// The sweep as it was begun before, or cut into chunks by its predicted cost. What is to be
 // done is in the database before any of it runs, and what the database has is done.
-static Status sweep_open(StudyRun *run, size_t slots, Workspace *workspace, Problem *problem) {
+static Status sweep_open(StudyRun *run, size_t slots, Problem *problem) {
     SweepChunkRows saved = {NULL, 0};
-    TRY(sweep_begin(run, slots, workspace, problem));
+    TRY(sweep_begin(run, slots, problem));
     TRY(db_sweep_chunks(run->manager->db, run->sweep.number, &saved, problem));
     const Status status = sweep_list(run, &saved, problem);
     sweep_chunk_rows_clear(&saved);
@@ -416,8 +392,7 @@ static Status study_open(Worker *worker, StudyRun *run, StudyAnswer *answer, Pro
                     problem));
     TRY(study_engine_open(&run->engine, run->work, &settings->limits, &members,
                           run->is_sweep ? 0 : settings->workers, problem));
-    return run->is_sweep ? sweep_open(run, settings->workers, &worker->workspace, problem)
-                         : STATUS_OK;
+    return run->is_sweep ? sweep_open(run, settings->workers, problem) : STATUS_OK;
 }
 
 Status study_start(Worker *worker, Task *task, RunResult *run_result, Problem *problem) {

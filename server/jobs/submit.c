@@ -140,27 +140,25 @@ static Status client_check_quota(const JobManager *manager, const QueueClient *c
                        client->name, client->live, max);
 }
 
-// Until a running task will have ended [s], by its progress, the estimate of its CPU time and the
-// recent bias of estimates.
-static double task_left(const JobManager *manager, Task *task) {
+// Until a running task will have ended [s], by its progress and the estimate of its CPU time.
+static double task_left(Task *task) {
     const double passed = 1e-9 * (double)(clock_monotonic_ns() - task->began_ns);
     const double done = atomic_load(&task->progress) / 10000.0;
     // The first part of a run may go faster than the rest.
-    const double estimated = task->queued.seconds * manager->estimate_bias - passed;
+    const double estimated = task->queued.seconds - passed;
     const double seen = done > 0.02 ? passed * (1 - done) / done : 0;
     return fmax(fmax(estimated, seen), 0);
 }
 
 // The sooner of `soonest` and the end of the task, if it is one of `client` (NULL: of any).
-static double task_soonest(const JobManager *manager, Task *task, const QueueClient *client,
-                           double soonest) {
+static double task_soonest(Task *task, const QueueClient *client, double soonest) {
     for (const Job *job = task->jobs; client != NULL; job = job->next_shared) {
         if (job == NULL)
             return soonest;
         if (job->client == client)
             break;
     }
-    return fmin(soonest, task_left(manager, task));
+    return fmin(soonest, task_left(task));
 }
 
 int jobs_retry_after(JobManager *manager, const char *name, Status status) {
@@ -175,13 +173,12 @@ int jobs_retry_after(JobManager *manager, const char *name, Status status) {
         // A place is free when the first running task ends.
         for (size_t i = 0; i < manager->worker_count; i++)
             if (manager->workers[i].running != NULL)
-                seconds = task_soonest(manager, manager->workers[i].running, client, seconds);
+                seconds = task_soonest(manager->workers[i].running, client, seconds);
         for (const StudyRun *run = manager->studies; run != NULL; run = run->next)
-            seconds = task_soonest(manager, run->task, client, seconds);
+            seconds = task_soonest(run->task, client, seconds);
     }
     if (!isfinite(seconds)) // none of its jobs runs: their turn comes within what waits
-        seconds = queue_seconds(manager->queue) * manager->estimate_bias /
-                  (double)manager->settings.workers;
+        seconds = queue_seconds(manager->queue) / (double)manager->settings.workers;
     pthread_mutex_unlock(&manager->lock);
     return seconds < 1 ? 1 : seconds > 3600 ? 3600 : (int)ceil(seconds);
 }
@@ -195,7 +192,7 @@ static Task *submit_find_task(const JobManager *manager, const char *result) {
 // Sets job->summary where the result is there already. STATUS_NOT_FOUND if it is not.
 static Status submit_find_result(JobManager *manager, Job *job, Problem *problem) {
     pthread_mutex_lock(&manager->lock);
-    job->summary = cache_head(manager->cache, job->row.result);
+    job->summary = cache_head(manager, job->row.result);
     const bool is_computed =
         job->summary == NULL && submit_find_task(manager, job->row.result) != NULL;
     pthread_mutex_unlock(&manager->lock);
@@ -212,7 +209,7 @@ static Status submit_find_result(JobManager *manager, Job *job, Problem *problem
     manager->rows.hits += status == STATUS_OK;
     manager->rows.misses += status == STATUS_NOT_FOUND;
     if (job->summary != NULL)
-        cache_put(manager->cache, job->row.result, NULL, job->summary);
+        cache_put(manager, job->row.result, NULL, job->summary);
     pthread_mutex_unlock(&manager->lock);
     return status == STATUS_OK || status == STATUS_NOT_FOUND
                ? status
@@ -320,7 +317,7 @@ static Status submit_queue(Entry *entry, Problem *problem) {
     pthread_mutex_lock(&manager->lock);
     // It may have been saved meanwhile.
     if (!is_retry && submit_find_task(manager, job->row.result) == NULL)
-        is_cached = (job->summary = cache_head(manager->cache, job->row.result)) != NULL;
+        is_cached = (job->summary = cache_head(manager, job->row.result)) != NULL;
     Status status = is_cached ? STATUS_OK : submit_check_room(manager, job, problem);
     if (status == STATUS_OK && !is_cached) {
         job_admit(job);

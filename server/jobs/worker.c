@@ -161,14 +161,6 @@ static bool worker_next(Worker *worker, WorkerItem *item) {
     }
 }
 
-// How long runs take in relation to their estimate, for clients that ask when to retry.
-static void worker_update_bias(JobManager *manager, const Task *task, const RunResult *run_result) {
-    const double estimated = task->queued.seconds;
-    const double ratio = 1e-9 * (double)(run_result->ended_ns - run_result->began_ns) / estimated;
-    if (estimated > 0 && ratio > 1e-3 && ratio < 1e3)
-        manager->estimate_bias += 0.1 * (ratio - manager->estimate_bias);
-}
-
 static void worker_compute(Worker *worker, Task *task, Problem *problem) {
     JobManager *manager = worker->manager;
     RunResult run_result = {0};
@@ -190,8 +182,6 @@ static void worker_compute(Worker *worker, Task *task, Problem *problem) {
     pthread_mutex_lock(&manager->lock);
     worker->running = NULL;
     manager->slow_running -= task_is_slow(task);
-    if (status == STATUS_OK && study == NULL)
-        worker_update_bias(manager, task, &run_result);
     if (study == NULL) {
         task->workers = 0;
         task_end(task);

@@ -377,7 +377,7 @@ TEST(quick_jobs_go_beside_slow_ones_that_have_every_worker) {
     Room room = room_make(2);
     Job *slow[5];
     for (size_t i = 0; i < COUNT(slow); i++)
-        slow[i] = submit(&room, 0.001 * (double)(i + 1), 1e5);
+        slow[i] = submit(&room, 0.001 * (double)(i + 1), 30000);
     Job *quick = submit(&room, 0.02, 1);
     wait_for(quick);
     size_t unfinished = 0;
