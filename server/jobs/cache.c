@@ -107,7 +107,7 @@ bool cache_has(const JobManager *manager, const char *id, bool with_series) {
     return entry != NULL && (with_series ? entry->outcome != NULL : entry->summary != NULL);
 }
 
-// What reading a series is taken to cost, and the writing of it that comes before.
+// Assumed cost of reading a series, with that of writing it before.
 static const double read_rate = 2e8, read_once = 5e-4; // [B/s], [s]
 
 enum { KEEPING_BYTES = 64 << 20 }; // on the way to the database; more are not kept
@@ -118,15 +118,14 @@ typedef struct Keeping {
     size_t size;
 } Keeping;
 
-static void kept(void *context, Status status, const char *detail) {
+static void series_kept(void *context, Status status, const char *detail) {
     Keeping *keeping = context;
     JobManager *manager = keeping->manager;
     (void)status; // it is computed again then
     (void)detail;
     pthread_mutex_lock(&manager->lock);
     manager->keeping_bytes -= keeping->size;
-    if (--manager->writes == 0)
-        pthread_cond_broadcast(&manager->settled);
+    jobs_end_write(manager);
     pthread_mutex_unlock(&manager->lock);
     free(keeping);
 }
@@ -153,12 +152,12 @@ void jobs_keep_series(JobManager *manager, const char *result, const Outcome *ou
     }
     *keeping = (Keeping){manager, size};
     series_blob_write(&bytes, &outcome->response.series);
-    const WriteDone done = {kept, keeping};
+    const WriteDone done = {series_kept, keeping};
     size_t count = 0;
     char *body = bytes_take(&bytes, &count);
     if (body == NULL || db_series_post(manager->db, result, body, count,
                                        manager->settings.store_bytes, &done) != STATUS_OK)
-        kept(keeping, STATUS_NO_MEMORY, "");
+        series_kept(keeping, STATUS_NO_MEMORY, "");
 }
 
 // Without series.
@@ -175,7 +174,7 @@ static Status outcome_load(JobManager *manager, const char *result, Outcome **ou
 }
 
 // From the database, and then in memory; NULL where it is not there.
-static Outcome *load_series(JobManager *manager, const char *result) {
+static Outcome *series_load(JobManager *manager, const char *result) {
     char *body = NULL;
     size_t size = 0;
     Outcome *outcome = NULL;
@@ -196,7 +195,7 @@ static Outcome *load_series(JobManager *manager, const char *result) {
 }
 
 // With the lock held: a failure of an earlier computation for readers is reported once.
-static Status tell_failure(JobManager *manager, const char *result, Problem *problem) {
+static Status series_report_failure(JobManager *manager, const char *result, Problem *problem) {
     for (size_t i = 0; i < OUTCOME_FAILURES; i++) {
         Failure *failure = &manager->failures[i];
         if (failure->status != STATUS_OK && strcmp(failure->result, result) == 0) {
@@ -208,50 +207,47 @@ static Status tell_failure(JobManager *manager, const char *result, Problem *pro
     return STATUS_OK;
 }
 
-static Status compute_again(JobManager *manager, const char *result, const Callback *callback,
-                            Problem *problem) {
+// The scene was validated when it was submitted: the present limits are no reason to refuse it.
+static Status series_prepare(JobManager *manager, Task *task, Problem *problem) {
     ResultRow row = {0};
-    StudyRequest inquiry = {0};
-    Warnings warnings = {NULL, 0};
-    Task *task = NULL;
-    Status status = db_result_scene(manager->db, result, &row, problem);
+    bool is_same = true;
+    Status status = db_result_scene(manager->db, task->result, &row, problem);
     if (status == STATUS_OK && strcmp(row.engine, engine_version) != 0)
         status = problem_set(problem, STATUS_GONE,
                              "the series was made by %s, this is %s: to have it again, POST to "
                              "/v1/results/%.72s/again, which submits the scene anew",
-                             row.engine, engine_version, result);
-    // The scene was judged when it came; today's limits are no reason to refuse it now.
+                             row.engine, engine_version, task->result);
     if (status == STATUS_OK)
-        status = jobs_prepare(manager->db, row.scene, strlen(row.scene), NULL, &inquiry, &warnings,
-                              problem);
-    char id[72] = "";
-    if (status == STATUS_OK)
-        jobs_result_id(&inquiry, id);
-    if (status == STATUS_OK && strcmp(id, result) != 0)
+        status = jobs_prepare_stored(manager->db, row.scene, task->result, &task->inquiry, &is_same,
+                                     problem);
+    if (status == STATUS_OK && !is_same)
         status = problem_set(problem, STATUS_INTERNAL,
                              "the stored scene no longer stands for this result");
-    if (status == STATUS_OK && (task = task_new(manager, result)) == NULL)
-        status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the series");
+    result_row_clear(&row);
+    return status;
+}
+
+static Status series_compute(JobManager *manager, const char *result, const Callback *callback,
+                             Problem *problem) {
+    Task *task = task_new(manager, result);
+    if (task == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the series");
+    task->recompute_only = true;
+    Status status = series_prepare(manager, task, problem);
     if (status == STATUS_OK) {
-        task->inquiry = inquiry;
-        inquiry = (StudyRequest){0};
-        task->recompute_only = true;
         pthread_mutex_lock(&manager->lock);
         Task *other = hashmap_find(manager->tasks, result);
         const bool is_asked =
             subscribers_add(&(other != NULL ? other : task)->result_waiters, callback);
-        if (other == NULL && is_asked && !manager->is_closing) {
+        if (!is_asked || manager->is_closing) {
+            status = problem_set(problem, STATUS_BUSY, "the series cannot be computed now");
+        } else if (other == NULL) {
             task_enqueue(task, NULL);
             task = NULL;
         }
-        if (!is_asked || manager->is_closing)
-            status = problem_set(problem, STATUS_BUSY, "the series cannot be computed now");
         pthread_mutex_unlock(&manager->lock);
     }
     task_free(task);
-    study_request_clear(&inquiry);
-    warnings_clear(&warnings);
-    result_row_clear(&row);
     return status;
 }
 
@@ -262,7 +258,7 @@ Status jobs_outcome(JobManager *manager, const char *result, const Callback *cal
     *outcome = cache_find(manager, result);
     Task *task = NULL;
     if (*outcome == NULL) {
-        status = tell_failure(manager, result, problem);
+        status = series_report_failure(manager, result, problem);
         task = hashmap_find(manager->tasks, result);
         if (status == STATUS_OK && task != NULL &&
             !subscribers_add(&task->result_waiters, callback))
@@ -271,10 +267,8 @@ Status jobs_outcome(JobManager *manager, const char *result, const Callback *cal
     pthread_mutex_unlock(&manager->lock);
     if (status != STATUS_OK || *outcome != NULL || task != NULL)
         return status;
-    *outcome = load_series(manager, result);
-    if (*outcome != NULL)
-        return STATUS_OK;
-    return compute_again(manager, result, callback, problem);
+    *outcome = series_load(manager, result);
+    return *outcome != NULL ? STATUS_OK : series_compute(manager, result, callback, problem);
 }
 
 Status jobs_outcome_stored(JobManager *manager, const char *result, Outcome **outcome,

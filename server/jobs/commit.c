@@ -63,8 +63,7 @@ Status run_result_add_to_study(RunResult *run_result, Problem *problem) {
                : problem_set(problem, STATUS_NO_MEMORY, "no memory for the study's document");
 }
 
-// With the lock held.
-static void write_ended(JobManager *manager) {
+void jobs_end_write(JobManager *manager) {
     if (--manager->writes == 0)
         pthread_cond_broadcast(&manager->settled);
 }
@@ -226,7 +225,7 @@ static void commit_done(void *context, Status status, const char *detail) {
             manager->retry_commits = task;
         } // else jobs_stop releases it
     }
-    write_ended(manager);
+    jobs_end_write(manager);
     pthread_mutex_unlock(&manager->lock);
     task_free(ended);
 }
@@ -292,7 +291,7 @@ static void cancel_done(void *context, Status status, const char *detail) {
         manager->retry_cancels = job_ref(job);
     }
     subscribers_call(&job->subscribers);
-    write_ended(manager);
+    jobs_end_write(manager);
     pthread_mutex_unlock(&manager->lock);
     job_unref(job);
 }
@@ -340,7 +339,7 @@ static void insert_done(void *context, Status status, const char *detail) {
     JobManager *manager = job->manager;
     pthread_mutex_lock(&manager->lock);
     Task *ended = insert_end(job, status, detail);
-    write_ended(manager);
+    jobs_end_write(manager);
     pthread_mutex_unlock(&manager->lock);
     task_free(ended);
     job_unref(job);

@@ -1,4 +1,4 @@
-// The job manager: validates, deduplicates, queues and runs submissions, and keeps their results.
+// The job manager: validates, deduplicates, queues and runs submissions, and stores their results.
 #ifndef SERVER_JOBS_JOBS_H
 #define SERVER_JOBS_JOBS_H
 
@@ -13,15 +13,15 @@ enum {
 }; // of one document or outcome; a value of SQLite has at most a billion
 
 typedef struct JobManagerSettings {
-    size_t workers;     // threads, at least 1
-    size_t queue_most;  // unfinished jobs at most
-    size_t queue_bytes; // of their scenes at most; 0: 256 MiB
-    size_t cache_bytes; // in memory, of finished outcomes
-    size_t quota;       // unfinished jobs of one client by name; 0: as many as the queue takes
-    double rate;        // jobs a minute of one client by name; 0: any number
-    Callback deleted;   // called after results were deleted; `wake` may be NULL
-    size_t store_bytes; // of series in the database, those that are dearer to compute than to read
-    double study_seconds;  // of CPU that a study may be predicted to take; 0: any
+    size_t workers;       // threads, at least 1
+    size_t queue_most;    // unfinished jobs at most
+    size_t queue_bytes;   // of their scenes at most; 0: 256 MiB
+    size_t cache_bytes;   // in memory, of finished outcomes
+    size_t quota;         // unfinished jobs of one client by name; 0: as many as the queue takes
+    double rate;          // jobs a minute of one client by name; 0: any number
+    Callback deleted;     // called after results were deleted; `wake` may be NULL
+    size_t store_bytes;   // of series in the database, those that cost more to compute than to read
+    double study_seconds; // of CPU that a study may be predicted to take; 0: any
     uint64_t memory_bytes; // that running jobs may be predicted to take together, for which they
                            // wait; 0: any
     SimulationLimits limits;
@@ -88,15 +88,15 @@ typedef struct Submission {
 } Submission;
 
 // Accepts a scene as a job of its own. A client must not be given its id before it is durable
-// (job_save). Cached results finish it at once, a scene that is being computed shares that task,
+// (job_save). A cached result finishes it at once, a scene that is being computed shares that task,
 // and a key that its client used before for the same body returns that job (STATUS_REUSED for
 // another body). STATUS_BUSY when the queue is full, STATUS_QUOTA, STATUS_INVALID with the faults.
 // *job is a reference. Waits for the database where the submission has a key, a study or names a
 // record.
 Status jobs_submit(JobManager *manager, const Submission *submission, Job **job, Problem *problem);
 
-// Seconds from 1 to 3600 after which a submission of `client` that was refused as `status` is worth
-// another try, as far as can be told.
+// Estimate of the seconds, from 1 to 3600, after which a submission of `client` that was refused as
+// `status` may be accepted.
 int jobs_retry_after(JobManager *manager, const char *client, Status status);
 
 // The same without running: everything a dry run answers.
@@ -128,8 +128,8 @@ Status jobs_remove(JobManager *manager, const char *id, Problem *problem);
 
 // The Outcome of a result with its series: from memory, from the database where they are stored
 // (its plan, work and warnings are empty then), or computed again by a worker. *outcome is NULL and
-// the return is STATUS_OK while it is being computed: `waker` is then called once when it is worth
-// asking again. STATUS_NOT_FOUND, STATUS_GONE for another engine version.
+// the return is STATUS_OK while it is being computed: `callback` is then called once, after which
+// the caller asks again. STATUS_NOT_FOUND, STATUS_GONE for another engine version.
 Status jobs_outcome(JobManager *manager, const char *result, const Callback *callback,
                     Outcome **outcome, Problem *problem);
 // The same without waiting for the series, which may be missing; for any engine version.
@@ -140,13 +140,13 @@ Status jobs_outcome_stored(JobManager *manager, const char *result, Outcome **ou
 // STATUS_NOT_FOUND.
 Status jobs_delete(JobManager *manager, const char *result, Problem *problem);
 
-// One layer of what is known.
+// One layer of the caches.
 typedef struct CacheStats {
     uint64_t hits, misses, evictions;
     size_t count, bytes, most_bytes;
 } CacheStats;
 
-// Where a result is known.
+// The layers that have a result.
 typedef struct CacheLayers {
     bool in_memory, in_database, series_in_memory, series_in_database;
 } CacheLayers;

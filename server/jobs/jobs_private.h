@@ -173,12 +173,12 @@ struct JobManager {
     JobMetrics metrics;
 };
 
-// task.c. With the lock held, but for the first seven.
+// job.c. With the lock held, but for the first seven.
 Task *task_new(JobManager *manager, const char *result);
 void task_free(Task *task); // its study was freed
 void run_result_clear(RunResult *run_result);
 Job *job_new(JobManager *manager);     // one reference; NULL without memory
-bool task_is_shared(const Task *task); // its study has members, which are shared out
+bool task_is_shared(const Task *task); // its study has members, which all workers make
 Task *task_of(QueueEntry *entry);
 // A Progress's advance: sets a task's progress. False once it was stopped.
 bool task_advance(void *task, double fraction);
@@ -188,7 +188,7 @@ void subscribers_call(Subscribers *subscribers);                          // cal
 // Puts it into the queue; `client` NULL: ahead of all.
 void task_enqueue(Task *task, QueueClient *client);
 void jobs_call_worker(JobManager *manager); // something was put into the queue
-// Counts its memory. False: it waits, in manager->waiting, until task_end calls it up.
+// Counts its memory. False: it waits, in manager->waiting, until task_end puts it into the queue.
 bool task_begin(Task *task);
 void task_end(Task *task);
 void task_wait(Task *task);
@@ -202,11 +202,11 @@ void job_release(Job *job);
 void job_retire(Job *job); // it is live no more
 // It could not be saved: it is live no more. Not of a task.
 void job_refuse(Job *job, Status status, const char *detail);
-// Releases all of its jobs, which stay unfinished in the database, and its readers. It is to be
-// freed.
+// Releases all of its jobs, which stay unfinished in the database, and its readers. The caller
+// frees it.
 void task_release(Task *task);
 
-// commit.c. Status is worth another try: a full disk and the like pass.
+// commit.c. Whether the cause may pass, as that of a full disk does.
 bool status_is_transient(Status status);
 char *problem_document(const Problem *problem); // NULL without memory
 void run_result_fail(RunResult *run_result, Status status, Problem *problem);
@@ -216,8 +216,9 @@ Status run_result_add_to_study(RunResult *run_result, Problem *problem);
 void task_finish(JobManager *manager, Task *task, RunResult *run_result);
 // Without the lock. Takes the task: no job waits for it any more, or the daemon ends.
 void task_abandon(JobManager *manager, Task *task);
-// With the lock held: a worker should wait before it makes more to be saved.
+// With the lock held: so much waits to be saved that workers should not make more.
 bool jobs_is_behind(const JobManager *manager);
+void jobs_end_write(JobManager *manager); // likewise; one less is under way
 // With the lock held: inserts it as it is, without waiting.
 void job_insert(Job *job);
 // Without the lock. The same, and waits for it. STATUS_CONFLICT: another job has its key, or a
@@ -230,6 +231,9 @@ void commit_retry(JobManager *manager);
 // loads them again, with a fault for each that is no longer there.
 void request_drop_records(StudyRequest *request);
 Status request_load_records(Db *db, StudyRequest *request, Problem *problem);
+// A stored scene read again, without limits; *is_same: this engine gives it the id `result`.
+Status jobs_prepare_stored(Db *db, const char *scene, const char *result, StudyRequest *request,
+                           bool *is_same, Problem *problem);
 
 // manager.c. Tries again to write what there was no room for.
 void jobs_retry_writes(JobManager *manager);
@@ -253,15 +257,15 @@ void cache_put(JobManager *manager, const char *id, Outcome *outcome, ResultSumm
 ResultSummary *cache_head(JobManager *manager, const char *id);              // a reference, or NULL
 bool cache_has(const JobManager *manager, const char *id, bool with_series); // not a use
 void cache_release(LruEntry *entry, void *manager, bool is_evicted);
-// Without the lock: saves the series if it is dearer to compute than to read.
+// Without the lock: saves the series if it is more expensive to compute than to read.
 void jobs_keep_series(JobManager *manager, const char *result, const Outcome *outcome,
                       double seconds);
 
 // worker.c
 void *worker_main(void *worker);
 
-// submit.c: an unfinished job of the database. Takes the row. Only what concerns the whole program
-// is an error.
+// submit.c. Resumes an unfinished job of the database. Takes the row. Faults of the job make it a
+// failed one and are no error.
 Status jobs_resume(JobManager *manager, JobRow *row, Problem *problem);
 
 #endif

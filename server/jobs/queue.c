@@ -2,13 +2,13 @@
 // is taken, as predicted; a client that comes back starts at what the others have reached, so that
 // neither idling nor new names save anything up. With equal jobs this is round robin.
 //
-// For one client: by rank = arrival + PATIENCE * seconds, so a job of 1 s is passed by quicker ones
-// for PATIENCE seconds and by none after that: nothing waits for ever. Equal ranks go by arrival.
+// For one client: by rank = arrival + patience * seconds, so a job of 1 s is passed by quicker ones
+// for `patience` seconds and by none after that: nothing waits for ever. Equal ranks go by arrival.
 //
 // Each client has two lanes, quick and slow, each a pairing heap by rank: workers take the first of
-// both, the one that is kept for quick jobs looks into the quick ones alone. A third lane holds the
-// turns of work that is done bit by bit, such as sweeps; they go when nothing else of their client
-// waits, and once in turn_after seconds of what does.
+// both, the spare worker takes from the quick lane only. A third lane holds the turns of long work,
+// such as sweeps; they go when nothing else of their client waits, and once in turn_after seconds
+// of what does.
 #include "server/jobs/queue.h"
 
 #include <stdlib.h>
@@ -16,9 +16,9 @@
 
 const double queue_quick = 0.1;
 
-static const double budget = 10;       // [s] for each second
-static const double least = 1e-5;      // [s] that any job counts as
-static const double turn_after = 0.05; // [s]
+static const double patience = 10;      // [s] for each second
+static const double seconds_min = 1e-5; // [s] that any job counts as
+static const double turn_after = 0.05;  // [s]
 
 enum { QUICK, SLOW, TURNS };
 
@@ -63,15 +63,15 @@ QueueClient *queue_client(Queue *queue, const char *name) {
     return client;
 }
 
-static bool is_before(const QueueEntry *a, const QueueEntry *b) {
+static bool queue_is_before(const QueueEntry *a, const QueueEntry *b) {
     return a->rank < b->rank || (a->rank == b->rank && a->number < b->number);
 }
 
 // Two heaps as one. `previous` is the left neighbour, or the parent of a first child.
-static QueueEntry *merge(QueueEntry *a, QueueEntry *b) {
+static QueueEntry *queue_merge(QueueEntry *a, QueueEntry *b) {
     if (a == NULL || b == NULL)
         return a != NULL ? a : b;
-    if (is_before(b, a)) {
+    if (queue_is_before(b, a)) {
         QueueEntry *other = a;
         a = b;
         b = other;
@@ -85,7 +85,7 @@ static QueueEntry *merge(QueueEntry *a, QueueEntry *b) {
     return a;
 }
 
-static QueueEntry *merge_all(QueueEntry *first) {
+static QueueEntry *queue_merge_all(QueueEntry *first) {
     QueueEntry *pairs = NULL, *root = NULL;
     while (first != NULL) {
         QueueEntry *a = first, *b = a->next;
@@ -93,31 +93,31 @@ static QueueEntry *merge_all(QueueEntry *first) {
         a->next = a->previous = NULL;
         if (b != NULL)
             b->next = b->previous = NULL;
-        a = merge(a, b);
+        a = queue_merge(a, b);
         a->next = pairs;
         pairs = a;
     }
     while (pairs != NULL) {
         QueueEntry *next = pairs->next;
         pairs->next = NULL;
-        root = merge(root, pairs);
+        root = queue_merge(root, pairs);
         pairs = next;
     }
     return root;
 }
 
-static QueueEntry **lane_of(QueueClient *client, const QueueEntry *entry) {
+static QueueEntry **queue_lane_of(QueueClient *client, const QueueEntry *entry) {
     return &client->lanes[entry->is_turn ? TURNS : entry->seconds <= queue_quick ? QUICK : SLOW];
 }
 
-static void count_in(Queue *queue, QueueEntry *entry) {
+static void queue_count_in(Queue *queue, QueueEntry *entry) {
     entry->child = entry->next = entry->previous = NULL;
     entry->number = ++queue->arrivals;
     queue->count++;
     queue->seconds += entry->seconds;
 }
 
-static void count_out(Queue *queue, QueueEntry *entry) {
+static void queue_count_out(Queue *queue, QueueEntry *entry) {
     entry->child = entry->next = entry->previous = NULL;
     entry->number = 0;
     queue->count--;
@@ -125,32 +125,32 @@ static void count_out(Queue *queue, QueueEntry *entry) {
     queue->seconds = queue->count > 0 ? queue->seconds - entry->seconds : 0;
 }
 
-static void join(Queue *queue, QueueEntry *entry, QueueClient *client) {
+static void queue_join(Queue *queue, QueueEntry *entry, QueueClient *client) {
     if (client->waiting++ == 0 && client->served < queue->reached)
         client->served = queue->reached;
     entry->client = client;
-    QueueEntry **lane = lane_of(client, entry);
-    *lane = merge(*lane, entry);
+    QueueEntry **lane = queue_lane_of(client, entry);
+    *lane = queue_merge(*lane, entry);
 }
 
 void queue_put(Queue *queue, QueueEntry *entry, QueueClient *client, double now) {
-    count_in(queue, entry);
-    entry->rank = now + budget * entry->seconds;
-    join(queue, entry, client);
+    queue_count_in(queue, entry);
+    entry->rank = now + patience * entry->seconds;
+    queue_join(queue, entry, client);
 }
 
 void queue_push_front(Queue *queue, QueueEntry *entry) {
-    count_in(queue, entry);
+    queue_count_in(queue, entry);
     entry->client = NULL;
     entry->previous = queue->urgent_last;
     *(queue->urgent_last != NULL ? &queue->urgent_last->next : &queue->urgent) = entry;
     queue->urgent_last = entry;
 }
 
-static void leave(QueueEntry *entry) {
+static void queue_leave(QueueEntry *entry) {
     QueueClient *client = entry->client;
-    QueueEntry **lane = lane_of(client, entry);
-    QueueEntry *children = merge_all(entry->child);
+    QueueEntry **lane = queue_lane_of(client, entry);
+    QueueEntry *children = queue_merge_all(entry->child);
     client->waiting--;
     if (*lane == entry) {
         *lane = children;
@@ -160,35 +160,35 @@ static void leave(QueueEntry *entry) {
         entry->next;
     if (entry->next != NULL)
         entry->next->previous = entry->previous;
-    *lane = merge(*lane, children);
+    *lane = queue_merge(*lane, children);
 }
 
 void queue_remove(Queue *queue, QueueEntry *entry) {
     if (entry->number == 0)
         return;
     if (entry->client != NULL) {
-        leave(entry);
+        queue_leave(entry);
     } else {
         *(entry->previous != NULL ? &entry->previous->next : &queue->urgent) = entry->next;
         *(entry->next != NULL ? &entry->next->previous : &queue->urgent_last) = entry->previous;
     }
-    count_out(queue, entry);
+    queue_count_out(queue, entry);
 }
 
 void queue_rebalance(Queue *queue, QueueEntry *entry, QueueClient *client) {
     if (entry->number == 0 || entry->client == NULL || entry->client == client ||
         entry->client->waiting <= client->waiting + 1)
         return;
-    leave(entry);
+    queue_leave(entry);
     entry->child = entry->next = entry->previous = NULL;
-    join(queue, entry, client);
+    queue_join(queue, entry, client);
 }
 
-static QueueEntry *first_of(const QueueClient *client, bool only_quick) {
+static QueueEntry *queue_first_of(const QueueClient *client, bool only_quick) {
     QueueEntry *first = client->lanes[QUICK], *slow = client->lanes[SLOW];
     if (only_quick)
         return first;
-    if (first == NULL || (slow != NULL && is_before(slow, first)))
+    if (first == NULL || (slow != NULL && queue_is_before(slow, first)))
         first = slow;
     QueueEntry *turn = client->lanes[TURNS];
     return first == NULL || (turn != NULL && client->ordinary >= turn_after) ? turn : first;
@@ -202,16 +202,17 @@ QueueEntry *queue_take(Queue *queue, bool only_quick) {
         return entry;
     }
     for (QueueClient *client = queue->first; client != NULL; client = client->next)
-        if (first_of(client, only_quick) != NULL && (next == NULL || client->served < next->served))
+        if (queue_first_of(client, only_quick) != NULL &&
+            (next == NULL || client->served < next->served))
             next = client;
     if (next == NULL)
         return NULL;
-    QueueEntry *entry = first_of(next, only_quick);
+    QueueEntry *entry = queue_first_of(next, only_quick);
     queue_remove(queue, entry);
     if (next->served > queue->reached)
         queue->reached = next->served;
     const double given = entry->charge > 0 ? entry->charge : entry->seconds;
-    const double seconds = given > least ? given : least;
+    const double seconds = given > seconds_min ? given : seconds_min;
     next->served += seconds;
     next->ordinary = entry->is_turn ? 0 : next->ordinary + seconds;
     return entry;

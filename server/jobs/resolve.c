@@ -415,8 +415,8 @@ static Status resolve_kept_record(Db *db, PinnedRecord *kept, size_t index, Prob
                : STATUS_NO_MEMORY;
 }
 
-// What a sweep names: the materials and records that came with it, those of its scene, and those on
-// its axes.
+// The names in a sweep: of the materials and records that came with it, those of its scene, and
+// those on its axes.
 typedef struct SweepNames {
     Db *db;
     SweepStudy *study;
@@ -739,6 +739,18 @@ void jobs_result_id(const StudyRequest *request, char target[72]) {
     canonical_write(study_request_fields, request, sha256_add, digest);
     sha256_end(digest, hex);
     snprintf(target, 72, "r-%s", hex);
+}
+
+Status jobs_prepare_stored(Db *db, const char *scene, const char *result, StudyRequest *request,
+                           bool *is_same, Problem *problem) {
+    Warnings warnings = {NULL, 0};
+    char id[72] = "";
+    const Status status = jobs_prepare(db, scene, strlen(scene), NULL, request, &warnings, problem);
+    if (status == STATUS_OK)
+        jobs_result_id(request, id);
+    *is_same = strcmp(id, result) == 0;
+    warnings_clear(&warnings);
+    return status;
 }
 
 void dry_run_clear(DryRun *dry_run) {

@@ -492,8 +492,8 @@ static Status submit_scene(Entry *entry, const char *text, size_t size, Problem 
 static Status retry_find(JobManager *manager, const char *id, SweepRow *row, Problem *problem) {
     Job *job = NULL;
     StudyRequest request = {0};
-    Warnings warnings = {NULL, 0};
-    char result[72], present[72] = "";
+    bool is_same;
+    char result[72];
     memset(row, 0, sizeof *row);
     TRY(jobs_find(manager, id, &job, problem));
     const bool is_finished = job_is_finished(job);
@@ -508,17 +508,14 @@ static Status retry_find(JobManager *manager, const char *id, SweepRow *row, Pro
     if (!db_result_exists(manager->db, result))
         return problem_set(problem, STATUS_CONFLICT,
                            "the sweep was not brought to an end: submit its scene again");
-    Status status = jobs_prepare(manager->db, row->scene, strlen(row->scene), NULL, &request,
-                                 &warnings, problem);
-    if (status == STATUS_OK)
-        jobs_result_id(&request, present);
-    if (status == STATUS_OK && strcmp(present, row->result) != 0)
+    Status status =
+        jobs_prepare_stored(manager->db, row->scene, row->result, &request, &is_same, problem);
+    if (status == STATUS_OK && !is_same)
         status = problem_set(problem, STATUS_GONE,
                              "the sweep was made by another engine version, this is %s: POST to "
                              "/v1/results/%.72s/again, which submits its scene anew",
                              engine_version, row->result);
     study_request_clear(&request);
-    warnings_clear(&warnings);
     return status;
 }
 

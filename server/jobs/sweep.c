@@ -4,10 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/jobs/job.h"
 #include "server/jobs/jobs_private.h"
 #include "server/json/parse.h"
-#include "server/util/clock.h"
 
 enum { WINDOW_BYTES = 4 << 20 }; // of rows read at once, more only if one row of each chunk is
 
@@ -29,11 +27,8 @@ static SweepStatus sweep_bytes_status(const unsigned char *row) {
 }
 
 static double sweep_bytes_metric(const unsigned char *row, size_t metric) {
-    uint64_t bits = 0;
     double value;
-    for (size_t k = 0; k < sizeof bits; k++)
-        bits |= (uint64_t)row[1 + sizeof bits * metric + k] << (8 * k);
-    memcpy(&value, &bits, sizeof value);
+    memcpy(&value, row + 1 + sizeof value * metric, sizeof value);
     return value;
 }
 
@@ -53,16 +48,14 @@ void sweep_row_put(const SweepRow *row, SweepChunkRow *chunk, size_t place, Swee
     unsigned char *at = (unsigned char *)chunk->rows.at + place * sweep_row_size(row);
     *at++ = (unsigned char)status;
     for (size_t i = 0; i < row->metrics; i++) {
-        uint64_t bits;
         // One bit pattern for every NAN.
         const double value = isnan(values[i]) ? (double)NAN : values[i];
-        memcpy(&bits, &value, sizeof bits);
-        for (size_t k = 0; k < sizeof bits; k++)
-            *at++ = (unsigned char)(bits >> (8 * k));
+        memcpy(at + i * sizeof value, &value, sizeof value);
     }
 }
 
-void sweep_row_reason(const SweepChunkRow *chunk, size_t place, char *why, size_t size) {
+// Why the row at `place` failed; "" if that was not kept.
+static void sweep_row_reason(const SweepChunkRow *chunk, size_t place, char *why, size_t size) {
     why[0] = '\0';
     for (const char *line = chunk->reasons; line != NULL && *line != '\0';) {
         char *text;

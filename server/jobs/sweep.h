@@ -9,7 +9,8 @@
 #include "server/db/db.h"
 #include "server/util/bytes.h"
 
-// A row is a byte of status and then its metrics, little-endian.
+// A row is a byte of status and then its metrics, in the order of the machine, which is
+// little-endian.
 size_t sweep_rows_of(const SweepRow *row, size_t chunk);
 size_t sweep_row_size(const SweepRow *row);
 // Status and metrics of the row at `place`; SWEEP_PENDING and NAN if it is not there.
@@ -17,8 +18,6 @@ SweepStatus sweep_row_get(const SweepRow *row, const SweepChunkRow *chunk, size_
                           double *values);
 void sweep_row_put(const SweepRow *row, SweepChunkRow *chunk, size_t place, SweepStatus status,
                    const double *values);
-// Why the row at `place` failed; "" if that was not kept.
-void sweep_row_reason(const SweepChunkRow *chunk, size_t place, char *why, size_t size);
 
 // A sweep read back. All zero is empty.
 typedef struct SweepView {
