@@ -120,7 +120,7 @@ static Status sweep_reply_table(App *app, Reply *reply, const StudyFormat *forma
     stream->is_broken = &sent->document.is_broken;
     stream->release = sweep_reply_free;
     stream->source = sent;
-    TRY(columns_reply(app, reply, sweep_format(format->extension), stream, problem));
+    TRY(columns_reply(app, reply, format_find(format->extension), stream, problem));
     // As long as rows come, no part of one document fits the next.
     reply->accepts_ranges = format->is_binary && is_complete;
     return STATUS_OK;

@@ -87,7 +87,7 @@ Status zip_end(Zip *zip, Problem *problem) {
 // document.
 enum { NPY_PREAMBLE = 10, NPY_ALIGNMENT = 64 };
 
-void npy_put_header(Segments *segments, const char *type, size_t rows, size_t columns) {
+static void npy_put_header(Segments *segments, const char *type, size_t rows, size_t columns) {
     char header[2 * NPY_ALIGNMENT], shape[48];
     if (columns > 0)
         snprintf(shape, sizeof shape, "%zu, %zu", rows, columns);
@@ -113,28 +113,47 @@ static Status npy_lay(const Table *table, Segments *segments, Problem *problem) 
     if (has_axis)
         table_lay_axis(table, segments);
     for (size_t c = 0; c < table->column_count; c++)
-        table_lay_column(table, c, segments);
+        table_lay_column(table, c, 0, segments);
     return STATUS_OK;
 }
 
-// The axis is number 0.
+// Bytes of the longest text; 0: a column of numbers.
+static size_t npz_width(const TableColumn *column) {
+    size_t width = 0, length;
+    if (table_column_is_numeric(column))
+        return 0;
+    for (size_t i = 0; i < column->text_count; i++) {
+        (void)table_bare(column, (double)i, &length);
+        width = length > width ? length : width;
+    }
+    return width;
+}
+
+// The array of a column, or of the axis.
+static Status npz_put(Zip *zip, const Table *table, bool is_axis, size_t c, Problem *problem) {
+    Segments array = {0};
+    char file[ZIP_NAME_MAX + 1], type[32] = "<f8";
+    const TableColumn column =
+        is_axis ? (TableColumn){.name = table->axis_name} : table_column(table, c);
+    const size_t width = npz_width(&column);
+    if (width > 0)
+        snprintf(type, sizeof type, "|S%zu", width);
+    npy_put_header(&array, type, table->count, 0);
+    if (is_axis)
+        table_lay_axis(table, &array);
+    else
+        table_lay_column(table, c, width, &array);
+    snprintf(file, sizeof file, "%.74s.npy", column.name + (*column.name == '/'));
+    const Status status = zip_put(zip, file, &array, problem);
+    segments_clear(&array);
+    return status;
+}
+
 static Status npz_lay(const Table *table, Segments *segments, Problem *problem) {
     Zip zip = {.segments = segments};
-    Status status = STATUS_OK;
-    for (size_t c = table->axis_name != NULL ? 0 : 1;
-         c <= table->column_count && status == STATUS_OK; c++) {
-        Segments array = {0};
-        char name[ZIP_NAME_MAX + 1];
-        snprintf(name, sizeof name, "%.74s.npy",
-                 c == 0 ? table->axis_name : table->columns[c - 1]->name);
-        npy_put_header(&array, "<f8", table->count, 0);
-        if (c == 0)
-            table_lay_axis(table, &array);
-        else
-            table_lay_column(table, c - 1, &array);
-        status = zip_put(&zip, name, &array, problem);
-        segments_clear(&array);
-    }
+    Status status = table->axis_name != NULL ? npz_put(&zip, table, true, 0, problem) : STATUS_OK;
+    for (size_t c = 0; c < table->column_count && status == STATUS_OK; c++)
+        status = npz_put(&zip, table, false, c, problem);
     const Status ended = zip_end(&zip, status == STATUS_OK ? problem : NULL);
     return status != STATUS_OK ? status : ended;
 }
@@ -232,8 +251,9 @@ static Status mat_lay(const Table *table, Segments *segments, Problem *problem) 
         table_lay_axis(table, segments);
     }
     for (size_t c = 0; c < table->column_count; c++) {
-        TRY(mat_open_variable(segments, table->columns[c]->name, table->count, problem));
-        table_lay_column(table, c, segments);
+        const char *name = table_column(table, c).name;
+        TRY(mat_open_variable(segments, name + (*name == '/'), table->count, problem));
+        table_lay_column(table, c, 0, segments);
     }
     return STATUS_OK;
 }

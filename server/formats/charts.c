@@ -384,13 +384,13 @@ static size_t sweep_cell(const SweepCells *cells, double number) {
 
 // Reads all rows once; memory is that of the cells. False: the rows cannot be read.
 static bool sweep_cells_read(SweepCells *cells, const SweepSource *source, size_t metrics) {
-    double numbers[SWEEP_PIECE], values[SWEEP_PIECE];
-    size_t places[SWEEP_PIECE], piece;
+    double numbers[TABLE_PIECE], values[TABLE_PIECE];
+    size_t places[TABLE_PIECE], piece;
     const size_t count = cells->columns * cells->rows;
     for (size_t i = 0; i < count * metrics; i++)
         cells->low[i] = cells->high[i] = cells->failed[i] = (double)NAN;
     for (size_t row = 0; row < source->rows; row += piece) {
-        piece = source->rows - row < SWEEP_PIECE ? source->rows - row : SWEEP_PIECE;
+        piece = source->rows - row < TABLE_PIECE ? source->rows - row : TABLE_PIECE;
         if (!source->read(source->context, SWEEP_CELL_POINT, row, piece, numbers))
             return false;
         if (numbers[0] >= (double)cells->points) // the other axes leave their first values

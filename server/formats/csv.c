@@ -1,15 +1,37 @@
 // Numbers have the shortest digits that read back to the same double. Names and units are the
 // program's own and hold neither comma nor quote.
 #include "server/util/csv.h"
+#include <stdio.h>
+#include <string.h>
+
 #include "server/formats/format.h"
 #include "server/util/dtoa.h"
+
+// A cell, quoted if it must be.
+static void csv_put_text(Bytes *bytes, const char *text, size_t length) {
+    char cell[256];
+    snprintf(cell, sizeof cell, "%.*s", (int)length, text);
+    if (strpbrk(cell, ",\"\n\r") == NULL)
+        bytes_put(bytes, text, length);
+    else
+        csv_cells_text(bytes, cell);
+}
+
+static void csv_put_title(Bytes *bytes, const char *name, const char *unit) {
+    char title[256];
+    const bool has_unit = unit != NULL && *unit != '\0';
+    snprintf(title, sizeof title, "%.220s%s%.23s%s", name, has_unit ? " [" : "",
+             has_unit ? unit : "", has_unit ? "]" : "");
+    csv_put_text(bytes, title, strlen(title));
+}
 
 static void csv_put_header(const Table *table, Bytes *bytes) {
     if (table->axis_name != NULL)
         csv_put_name(bytes, table->axis_name, table->axis_unit);
     for (size_t c = 0; c < table->column_count; c++) {
         bytes_text(bytes, c > 0 || table->axis_name != NULL ? "," : "");
-        csv_put_name(bytes, table->columns[c]->name, table->columns[c]->unit);
+        const TableColumn column = table_column(table, c);
+        csv_put_title(bytes, column.name, column.unit);
     }
     for (const Field *field = table->fields; field != NULL && field->kind != FIELD_KIND_END;
          field++) {
@@ -57,14 +79,47 @@ static void csv_put_rows(const Table *table, size_t from, size_t end, Bytes *byt
     bytes->count = (size_t)(at - bytes->at);
 }
 
+enum { CSV_SOURCE_ROWS = 64 };
+
+// Rows of a source; false: it cannot be read any more.
+static bool csv_put_cells(const Table *table, size_t from, size_t end, Bytes *bytes) {
+    const TableSource *source = table->source;
+    double cells[TABLE_SOURCE_COLUMNS][CSV_SOURCE_ROWS];
+    TableColumn columns[TABLE_SOURCE_COLUMNS];
+    for (size_t c = 0; c < table->column_count; c++) {
+        columns[c] = table_column(table, c);
+        if (!source->read(source->context, c, from, end - from, cells[c]))
+            return false;
+    }
+    for (size_t row = 0; row < end - from; row++) {
+        for (size_t c = 0; c < table->column_count; c++) {
+            size_t length;
+            bytes_text(bytes, c > 0 ? "," : "");
+            if (columns[c].texts == NULL) {
+                csv_cells_real(bytes, cells[c][row]);
+                continue;
+            }
+            const char *text = table_bare(&columns[c], cells[c][row], &length);
+            csv_put_text(bytes, text, length);
+        }
+        bytes_text(bytes, "\n");
+    }
+    return true;
+}
+
 static bool csv_next(const Table *table, TextPlace *place, Bytes *bytes) {
     if (place->part++ == 0) {
         csv_put_header(table, bytes);
         return table->count > 0;
     }
-    const size_t rows = FORMAT_PIECE_NUMBERS / (1 + table->column_count) + 1;
+    const size_t rows = table->source != NULL
+                            ? CSV_SOURCE_ROWS
+                            : FORMAT_PIECE_NUMBERS / (1 + table->column_count) + 1;
     const size_t end = table->count - place->row < rows ? table->count : place->row + rows;
-    if (table->fields == NULL)
+    if (table->source != NULL) {
+        if (!csv_put_cells(table, place->row, end, bytes))
+            return false;
+    } else if (table->fields == NULL)
         csv_put_rows(table, place->row, end, bytes);
     else
         for (size_t i = place->row; i < end; i++)

@@ -8,20 +8,33 @@
 #include "core/base/field.h"
 #include "server/util/bytes.h"
 
-// Bytes that are elsewhere: `read` copies `size` of them from `offset` of column `column` on, and
-// remembers itself where it cannot.
-typedef struct SegmentSource {
-    void (*read)(void *context, size_t column, uint64_t offset, void *target, size_t size);
+typedef struct TableColumn {
+    const char *name, *unit;
+    // Texts that the numbers of the column are indices of; NULL: the column has numbers.
+    const char *const *texts;
+    size_t text_count;
+    bool is_json; // the texts are JSON scalars, else bare words
+} TableColumn;
+
+// Columns whose numbers are not in memory.
+typedef struct TableSource {
     void *context;
-} SegmentSource;
+    TableColumn (*column)(const void *context, size_t column);
+    // Rows first ... first + count - 1 of a column. False: they cannot be read any more.
+    bool (*read)(void *context, size_t column, size_t first, size_t count, double *target);
+    // JSON: the members before the first column and behind the last one.
+    void (*put_head)(const void *context, Bytes *bytes);
+    void (*put_end)(const void *context, Bytes *bytes);
+} TableSource;
 
 typedef struct Segment {
-    uint64_t start, size;        // in the document
-    const double *values;        // borrowed; NULL: text, or counted
-    size_t text;                 // where it begins in `text` of Segments
-    double first, step, rate;    // counted: number i is (first + i step) / rate; else rate 0
-    const SegmentSource *source; // borrowed; NULL: not from there
-    size_t column;               // of the source
+    uint64_t start, size;      // in the document
+    const double *values;      // borrowed; NULL: text, or counted
+    size_t text;               // where it begins in `text` of Segments
+    double first, step, rate;  // counted: number i is (first + i step) / rate; else rate 0
+    const TableSource *source; // borrowed; NULL: not from there
+    size_t column, width;      // of the source; bytes of a text, 0: numbers
+    bool is_numeric;           // the column's texts are numbers
 } Segment;
 
 // A document as a list of segments: headers, and numbers as they lie in memory or are counted up.
@@ -44,8 +57,10 @@ void segments_fill(Segments *segments, char with, size_t count);
 void segments_values(Segments *segments, const double *values, size_t count); // borrowed
 // (first + i step) / rate for i = 0 ... count - 1.
 void segments_counted(Segments *segments, size_t first, size_t step, double rate, size_t count);
-// All `size` bytes of a column of `source`, which is borrowed.
-void segments_source(Segments *segments, const SegmentSource *source, size_t column, uint64_t size);
+// Rows of a column of `source`, which is borrowed: texts of `width` bytes, filled up with zeros; or
+// with width 0 numbers: those that all texts are, else the indices of texts.
+void segments_cells(Segments *segments, const TableSource *source, size_t column, size_t width,
+                    size_t rows);
 void segments_join(Segments *segments,
                    const Segments *other); // behind; borrows what `other` borrows
 
@@ -67,9 +82,7 @@ typedef struct Table {
     // `samples`) from number `first` on: it lies at (first + i bucket) / axis_rate and is row i of
     // the columns, which come in pairs, "NAME_min" and "NAME_max".
     size_t bucket, samples;
-    // Columns whose numbers are elsewhere, by their place in `columns`; NULL: in memory. For binary
-    // formats.
-    const SegmentSource *source;
+    const TableSource *source; // in place of `columns`, which are NULL then; NULL: in memory
     // In text formats a row may be a struct in place of columns; texts of choices are words.
     const Field *fields; // NULL: columns
     const void *records;
@@ -90,8 +103,15 @@ static inline double table_time(const Table *table, size_t row) {
     return (double)(table->first + row * step) / table->axis_rate;
 }
 
-// Appends the numbers of a column, or of the axis, which there is.
-void table_lay_column(const Table *table, size_t column, Segments *segments);
+TableColumn table_column(const Table *table, size_t column);
+// Whether a column has texts, and all of them are numbers.
+bool table_column_is_numeric(const TableColumn *column);
+// A text without the quotes of a JSON string; those of columns have none inside.
+const char *table_bare(const TableColumn *column, double value, size_t *length);
+
+// Appends the numbers of a column, its texts in `width` bytes each (0: as numbers), or the axis,
+// which there is.
+void table_lay_column(const Table *table, size_t column, size_t width, Segments *segments);
 void table_lay_axis(const Table *table, Segments *segments);
 
 // Structs as columns by their Field rows, a row for each of `count` structs of `size` bytes. A
@@ -116,7 +136,11 @@ typedef struct TableFormat {
     bool (*next)(const Table *table, TextPlace *place, Bytes *bytes);
 } TableFormat;
 
-enum { FORMAT_PIECE_NUMBERS = 2048 }; // of a text's piece, about
+enum {
+    FORMAT_PIECE_NUMBERS = 2048, // of a text's piece, about
+    TABLE_PIECE = 256,           // rows that are read from a source at once, at most
+    TABLE_SOURCE_COLUMNS = 96,   // of a source, at most
+};
 
 // JSON: {"sample_rate", "start", "count", "channels"}. CSV: a header with units, a row per sample.
 // NPY: float64 of shape (rows, axis and columns). NPZ: an NPY for each. MAT: MATLAB's level 5, a
@@ -128,9 +152,6 @@ const TableFormat *format_find(const char *extension); // NULL if there is none
 // Appends the whole document. STATUS_LIMIT where the format has no room for it; `bytes` reports
 // itself what it has no room for.
 Status format_write(const TableFormat *format, const Table *table, Bytes *bytes, Problem *problem);
-
-// The header of an NPY file of `type` ("<f8", "|S7"); `columns` 0: of one dimension.
-void npy_put_header(Segments *segments, const char *type, size_t rows, size_t columns);
 
 enum { MAT_NAME_SIZE = 64 }; // 63 characters, MATLAB's longest, and a NUL
 // A variable's name for MATLAB: letters, digits and underscores, a letter first.

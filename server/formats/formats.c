@@ -29,9 +29,30 @@ Status format_write(const TableFormat *format, const Table *table, Bytes *bytes,
     return status;
 }
 
-void table_lay_column(const Table *table, size_t column, Segments *segments) {
+TableColumn table_column(const Table *table, size_t column) {
     if (table->source != NULL)
-        segments_source(segments, table->source, column, sizeof(double) * (uint64_t)table->count);
+        return table->source->column(table->source->context, column);
+    return (TableColumn){.name = table->columns[column]->name,
+                         .unit = table->columns[column]->unit};
+}
+
+bool table_column_is_numeric(const TableColumn *column) {
+    for (size_t i = 0; i < column->text_count; i++)
+        if (!column->is_json || strchr("-0123456789", column->texts[i][0]) == NULL)
+            return false;
+    return column->texts != NULL;
+}
+
+const char *table_bare(const TableColumn *column, double value, size_t *length) {
+    const char *text = column->texts[(size_t)value];
+    const bool is_quoted = column->is_json && *text == '"';
+    *length = strlen(text) - (is_quoted ? 2 : 0);
+    return text + is_quoted;
+}
+
+void table_lay_column(const Table *table, size_t column, size_t width, Segments *segments) {
+    if (table->source != NULL)
+        segments_cells(segments, table->source, column, width, table->count);
     else
         segments_values(segments, table_values(table, table->columns[column]->values),
                         table->count);

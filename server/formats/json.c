@@ -8,6 +8,10 @@
 
 static void json_put_head(const Table *table, Bytes *bytes) {
     bytes_text(bytes, "{");
+    if (table->source != NULL) {
+        table->source->put_head(table->source->context, bytes);
+        return;
+    }
     if (table->members != NULL) {
         bytes_text(bytes, table->members);
         return;
@@ -37,6 +41,12 @@ static void json_open_column(const Table *table, size_t c, bool is_axis, Bytes *
         json_open_list(bytes, table->axis_name, table->axis_unit, "values");
         return;
     }
+    if (table->source != NULL) {
+        const TableColumn described = table_column(table, c);
+        bytes_text(bytes, c > 0 ? ",\n " : "\"columns\": {\n ");
+        json_open_list(bytes, described.name, described.unit, "values");
+        return;
+    }
     const Column *column = table->columns[c];
     char name[sizeof column->name];
     if (table->bucket > 0 && c % 2 == 1) {
@@ -50,21 +60,53 @@ static void json_open_column(const Table *table, size_t c, bool is_axis, Bytes *
     json_open_list(bytes, name, column->unit, table->bucket > 0 ? "min" : "values");
 }
 
+// Rows of a column; false: the source cannot be read any more.
+static bool json_put_values(const Table *table, const double *values, size_t c, size_t first,
+                            size_t count, Bytes *bytes) {
+    const TableSource *source = table->source;
+    if (source == NULL) {
+        bytes_reals(bytes, table_values(table, values) + first, count);
+        return true;
+    }
+    double numbers[TABLE_PIECE];
+    const TableColumn column = table_column(table, c);
+    if (!source->read(source->context, c, first, count, numbers))
+        return false;
+    if (column.texts == NULL)
+        bytes_reals(bytes, numbers, count);
+    for (size_t i = 0; i < count && column.texts != NULL; i++) {
+        const char *text = column.texts[(size_t)numbers[i]];
+        bytes_text(bytes, i > 0 ? "," : "");
+        if (column.is_json)
+            bytes_text(bytes, text);
+        else
+            bytes_json_string(bytes, text);
+    }
+    return true;
+}
+
 static bool json_next_values(const Table *table, TextPlace *place, Bytes *bytes) {
     const size_t axes = table->axis != NULL ? 1 : 0, list = place->part - 1;
     const bool is_axis = list < axes;
     if (list == axes + table->column_count) {
-        bytes_text(bytes, table->column_count == 0 ? "\"channels\": {}}\n" : "}}\n");
+        bytes_text(bytes, table->column_count == 0 ? "\"channels\": {}" : "}");
+        if (table->source != NULL)
+            table->source->put_end(table->source->context, bytes);
+        bytes_text(bytes, "}\n");
         return false;
     }
     const size_t c = list - axes, left = table->count - place->row;
-    const size_t count = left < FORMAT_PIECE_NUMBERS ? left : FORMAT_PIECE_NUMBERS;
-    const double *values = is_axis ? table->axis : table->columns[c]->values;
+    const size_t max = table->source != NULL ? TABLE_PIECE : FORMAT_PIECE_NUMBERS;
+    const size_t count = left < max ? left : max;
+    const double *values = is_axis                 ? table->axis
+                           : table->source != NULL ? NULL
+                                                   : table->columns[c]->values;
     if (place->row == 0)
         json_open_column(table, c, is_axis, bytes);
     else
         bytes_text(bytes, ",");
-    bytes_reals(bytes, table_values(table, values) + place->row, count);
+    if (!json_put_values(table, values, c, place->row, count, bytes))
+        return false;
     place->row += count;
     if (place->row == table->count) {
         const bool has_max = table->bucket > 0 && !is_axis && c % 2 == 0;

@@ -94,13 +94,17 @@ void segments_counted(Segments *segments, size_t first, size_t step, double rate
     segment->rate = rate;
 }
 
-void segments_source(Segments *segments, const SegmentSource *source, size_t column,
-                     uint64_t size) {
-    Segment *segment = segments_add(segments, size);
+void segments_cells(Segments *segments, const TableSource *source, size_t column, size_t width,
+                    size_t rows) {
+    const TableColumn described = source->column(source->context, column);
+    Segment *segment =
+        segments_add(segments, (uint64_t)rows * (width > 0 ? width : sizeof(double)));
     if (segment == NULL)
         return;
     segment->source = source;
     segment->column = column;
+    segment->width = width;
+    segment->is_numeric = width == 0 && table_column_is_numeric(&described);
 }
 
 void segments_join(Segments *segments, const Segments *other) {
@@ -133,6 +137,47 @@ static void segment_count_up(const Segment *segment, size_t from, size_t count, 
         target[i] = next / rate;
 }
 
+// Bytes skip ... skip + size - 1 of a cell.
+static void segment_copy_cell(const Segment *segment, const TableColumn *column, double value,
+                              size_t skip, char *target, size_t size) {
+    if (segment->width == 0) {
+        if (segment->is_numeric)
+            value = strtod(column->texts[(size_t)value], NULL);
+        memcpy(target, (const char *)&value + skip, size);
+        return;
+    }
+    size_t length;
+    const char *text = table_bare(column, value, &length);
+    const size_t left = length > skip ? length - skip : 0, kept = left < size ? left : size;
+    memcpy(target, text + skip, kept);
+    memset(target + kept, 0, size - kept);
+}
+
+// Zeros where the source cannot be read any more.
+static void segment_read_cells(const Segment *segment, uint64_t offset, char *at, size_t size) {
+    const TableSource *source = segment->source;
+    const TableColumn column = source->column(source->context, segment->column);
+    const size_t width = segment->width > 0 ? segment->width : sizeof(double);
+    size_t row = (size_t)(offset / width), skip = (size_t)(offset % width);
+    char *const end = at + size;
+    double values[TABLE_PIECE];
+    while (at < end) {
+        const size_t rows = (skip + (size_t)(end - at) + width - 1) / width;
+        const size_t count = rows < TABLE_PIECE ? rows : TABLE_PIECE;
+        if (!source->read(source->context, segment->column, row, count, values)) {
+            memset(at, 0, (size_t)(end - at));
+            return;
+        }
+        for (size_t i = 0; i < count; i++, skip = 0) {
+            const size_t left = (size_t)(end - at), whole = width - skip;
+            const size_t some = whole < left ? whole : left;
+            segment_copy_cell(segment, &column, values[i], skip, at, some);
+            at += some;
+        }
+        row += count;
+    }
+}
+
 static void segment_read(const Segments *segments, const Segment *segment, uint64_t offset,
                          char *target, size_t size) {
     const char *memory = segment_memory(segments, segment);
@@ -140,7 +185,7 @@ static void segment_read(const Segments *segments, const Segment *segment, uint6
     if (memory != NULL)
         memcpy(target, memory + offset, size);
     else if (segment->source != NULL)
-        segment->source->read(segment->source->context, segment->column, offset, target, size);
+        segment_read_cells(segment, offset, target, size);
     while (segment->rate != 0 && size > 0) {
         const size_t number = (size_t)(offset / sizeof *numbers), skip = offset % sizeof *numbers;
         const size_t max = sizeof numbers - skip, some = size < max ? size : max;

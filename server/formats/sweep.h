@@ -13,10 +13,6 @@ enum {
     SWEEP_CELL_STATUS, // SweepStatus
     SWEEP_CELL_METRIC, // the first of them
 };
-enum {
-    SWEEP_PIECE = 256,                                  // rows that are read at once, at most
-    SWEEP_COLUMNS_MAX = 2 + SWEEP_AXES + SWEEP_METRICS, // at most
-};
 
 // Rows of doubles.
 typedef struct SweepSource {
@@ -32,17 +28,14 @@ SweepSource sweep_source(const Sweep *sweep); // the answer's own table, which i
 typedef struct SweepDocument {
     const Sweep *sweep; // of its table only the failures are used
     const SweepSource *source;
-    const char *result; // under which it is served, for links; NULL: it is not
-    bool is_broken;     // the source was: what was written since is not the table
-    SegmentSource columns;
-    size_t widths[SWEEP_COLUMNS_MAX];  // of an archive: bytes of a text; 0: numbers
-    bool is_number[SWEEP_COLUMNS_MAX]; // an axis whose values are numbers
+    const char *result;  // under which it is served, for links; NULL: it is not
+    bool is_broken;      // the source was: what was written since is not the table
+    TableSource columns; // by sweep_document_table
 } SweepDocument;
 
-// As a table for the format of an extension; it borrows the document. NPZ has texts; NPY and MAT
-// hold numbers alone, of a text its index among the axis's values, of a status SweepStatus.
+// As a table for the formats but SVG; it borrows the document. NPZ has texts; NPY and MAT hold
+// numbers alone, of a text its index among the axis's values, of a status SweepStatus.
 Table sweep_document_table(SweepDocument *document);
-const TableFormat *sweep_format(const char *extension); // NULL if there is none
 
 // The whole document of an answer that has its table.
 void sweep_write(const Sweep *sweep, const char *extension, Bytes *bytes);

@@ -41,7 +41,7 @@ TEST(rows_that_are_there_are_in_the_table_with_their_status) {
     const SweepSource source = sweep_source(&sweep);
     SweepDocument document = {.sweep = &sweep, .source = &source, .result = "r-1"};
     const Table table = sweep_document_table(&document);
-    assert_int_equal(format_write(sweep_format("json"), &table, &bytes, NULL), STATUS_OK);
+    assert_int_equal(format_write(format_find("json"), &table, &bytes, NULL), STATUS_OK);
     assert_non_null(strstr(bytes.at,
                            "\"status\": \"partial\", \"points\": 4, \"done\": 3, \"failed\""
                            ": 1"));
