@@ -8,9 +8,7 @@
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__ && sizeof(double) == 8,
                "numbers are written as they lie in memory, and the formats say little-endian");
 
-enum { FIRST_SEGMENTS = 16, CHUNK = 1024, LANES = 8 }; // numbers that are counted up at once
-
-static const double offsets[LANES] = {0, 1, 2, 3, 4, 5, 6, 7};
+enum { FIRST_SEGMENTS = 16, CHUNK = 1024 }; // numbers that are counted up at once
 
 void segments_clear(Segments *segments) {
     free(segments->at);
@@ -125,16 +123,11 @@ void segments_join(Segments *segments, const Segments *other) {
 }
 
 // Whole numbers below 2^53, so that each sum is exact and each quotient that of the text formats.
-// The loop over eight becomes vectors.
+// The loop becomes vectors.
 static void segment_count_up(const Segment *segment, size_t from, size_t count, double *target) {
-    const double step = segment->step, rate = segment->rate;
-    double next = segment->first + (double)from * step;
-    size_t i = 0;
-    for (; i + LANES <= count; i += LANES, next += LANES * step)
-        for (size_t k = 0; k < LANES; k++)
-            target[i + k] = (next + offsets[k] * step) / rate;
-    for (; i < count; i++, next += step)
-        target[i] = next / rate;
+    const double first = segment->first + (double)from * segment->step, step = segment->step;
+    for (int i = 0; i < (int)count; i++)
+        target[i] = (first + i * step) / segment->rate;
 }
 
 // Bytes skip ... skip + size - 1 of a cell.

@@ -23,8 +23,8 @@ static void ensemble_csv(const Variant *answer, Bytes *bytes) {
     bytes_text(bytes, ",why\n");
     for (size_t i = 0; i < ensemble->table.count; i++) {
         const RunRecord *run = &ensemble->table.at[i];
-        bytes_format(bytes, "%llu,", (unsigned long long)run->number);
-        csv_cells_real(bytes, run->steps);
+        bytes_format(bytes, "%llu", (unsigned long long)run->number);
+        csv_cells_reals(bytes, &run->steps, 1);
         csv_cells_members(bytes, summary_fields, &run->summary);
         bytes_text(bytes, ",");
         csv_cells_text(bytes, run->why);
@@ -51,17 +51,13 @@ static void compare_csv(const Variant *answer, Bytes *bytes) {
         bytes_format(bytes, "%s,%s,%s", entry->contact_model,
                      entry->separation != CHOICE_ABSENT ? separation_names[entry->separation] : "",
                      compare_status_names[entry->status]);
-        for (size_t k = 0; k < COUNT(numbers); k++) {
-            bytes_text(bytes, ",");
-            csv_cells_real(bytes, numbers[k]);
-        }
+        csv_cells_reals(bytes, numbers, COUNT(numbers));
         csv_cells_members(bytes, summary_fields, &entry->summary);
         csv_cells_members(bytes, compare_contacts_fields, &entry->contacts);
         csv_cells_members(bytes, compare_differences_fields, &entry->differences);
         csv_cells_members(bytes, spectrum_distance_fields, &entry->psd);
         csv_cells_members(bytes, signal_comparison_fields, &entry->displacement);
-        bytes_text(bytes, ",");
-        csv_cells_real(bytes, entry->divergence.time);
+        csv_cells_reals(bytes, &entry->divergence.time, 1);
         bytes_text(bytes, ",");
         csv_cells_text(bytes, entry->why);
         bytes_text(bytes, "\n");
@@ -70,12 +66,9 @@ static void compare_csv(const Variant *answer, Bytes *bytes) {
 
 static void sensitivity_csv_row(Bytes *bytes, const char *parameter, const char *statistic,
                                 double value, double derivative, double spread, bool is_settled) {
-    bytes_format(bytes, "%s,%s,", parameter, statistic);
-    csv_cells_real(bytes, value);
-    bytes_text(bytes, ",");
-    csv_cells_real(bytes, derivative);
-    bytes_text(bytes, ",");
-    csv_cells_real(bytes, spread);
+    const double numbers[] = {value, derivative, spread};
+    bytes_format(bytes, "%s,%s", parameter, statistic);
+    csv_cells_reals(bytes, numbers, COUNT(numbers));
     bytes_format(bytes, ",%s\n", is_settled ? "true" : "false");
 }
 

@@ -175,9 +175,15 @@ static const char *decode_wrong_name(Decoder *decoder, const char *pointer, cons
     return meant;
 }
 
-// Whether an array is within the limit of its row.
-static bool decode_fits(Decoder *decoder, const json_t *value, const Field *field, size_t count,
-                        const char *what, const char *pointer) {
+// Whether `value` is an array (or `is_lone`) within the limit of its row, of `count` `what`.
+static bool decode_array(Decoder *decoder, const json_t *value, const Field *field, bool is_lone,
+                         const char *wanted, size_t count, const char *what, const char *pointer) {
+    if (!json_is_array(value) && !is_lone) {
+        decode_wrong_type(decoder, pointer, value, field, wanted);
+        return false;
+    }
+    if (is_lone && json_is_number(value))
+        return true;
     if (field->max == 0 || count <= field->max)
         return true;
     decode_fault(decoder, pointer, value, NULL, NULL, "must have at most %zu %s, has %zu",
@@ -262,14 +268,11 @@ static void decode_reals(Decoder *decoder, const json_t *value, const Field *fie
                          const char *pointer) {
     const bool takes_number = (field->flags & FIELD_LONE) != 0;
     const bool is_number = takes_number && json_is_number(value);
-    if (!json_is_array(value) && !is_number) {
-        decode_wrong_type(decoder, pointer, value, field,
-                          takes_number ? "a number or an array of numbers" : "an array of numbers");
-        return;
-    }
     const size_t count = is_number ? 1 : json_array_size(value);
     Reals reals = {NULL, 0};
-    if (!is_number && !decode_fits(decoder, value, field, count, "numbers", pointer))
+    if (!decode_array(decoder, value, field, is_number,
+                      takes_number ? "a number or an array of numbers" : "an array of numbers",
+                      count, "numbers", pointer))
         return;
     if (count > 0 && !reals_allocate(&reals, count)) {
         decoder->is_out_of_memory = true;
@@ -292,12 +295,9 @@ static void decode_reals(Decoder *decoder, const json_t *value, const Field *fie
 
 static void decode_rows(Decoder *decoder, const json_t *value, const Field *field, Rows *target,
                         const char *pointer) {
-    if (!json_is_array(value)) {
-        decode_wrong_type(decoder, pointer, value, field, "an array of rows of numbers");
-        return;
-    }
     const size_t count = json_array_size(value);
-    if (!decode_fits(decoder, value, field, count, "rows", pointer))
+    if (!decode_array(decoder, value, field, false, "an array of rows of numbers", count, "rows",
+                      pointer))
         return;
     Reals *rows = count > 0 ? calloc(count, sizeof *rows) : NULL;
     if (rows == NULL && count > 0) {
@@ -349,13 +349,10 @@ static void decode_texts(Decoder *decoder, const json_t *value, const Field *fie
                          const char *pointer) {
     const bool takes_pairs = (field->flags & FIELD_PAIRS) != 0;
     const bool is_pairs = takes_pairs && json_is_object(value);
-    if (!json_is_array(value) && !is_pairs) {
-        decode_wrong_type(decoder, pointer, value, field,
-                          takes_pairs ? "an array or an object of strings" : "an array of strings");
-        return;
-    }
     const size_t count = is_pairs ? json_object_size(value) : json_array_size(value);
-    if (!decode_fits(decoder, value, field, count, "texts", pointer))
+    if (!decode_array(decoder, value, field, is_pairs,
+                      takes_pairs ? "an array or an object of strings" : "an array of strings",
+                      count, "texts", pointer))
         return;
     Texts texts = {calloc(1, sizeof *texts.at), 0}; // an empty array is not an absent one
     Bytes text = {0};
@@ -391,12 +388,10 @@ static void decode_root(Decoder *decoder, const json_t *root, const Field *field
 
 static void decode_list(Decoder *decoder, const json_t *value, const Field *field, void *target,
                         const char *pointer) {
-    if (!json_is_array(value)) {
-        decode_wrong_type(decoder, pointer, value, field, "an array of objects");
-        return;
-    }
     const size_t count = json_array_size(value);
-    if (count == 0 || !decode_fits(decoder, value, field, count, "elements", pointer))
+    if (!decode_array(decoder, value, field, false, "an array of objects", count, "elements",
+                      pointer) ||
+        count == 0)
         return;
     List list = {calloc(count, field->size), 0};
     decoder->is_out_of_memory = decoder->is_out_of_memory || list.at == NULL;

@@ -43,6 +43,13 @@ void csv_cells_real(Bytes *bytes, double value) {
     bytes_put(bytes, digits, (size_t)(csv_put_real(digits, value) - digits));
 }
 
+void csv_cells_reals(Bytes *bytes, const double *values, size_t count) {
+    for (size_t i = 0; i < count; i++) {
+        bytes_text(bytes, ",");
+        csv_cells_real(bytes, values[i]);
+    }
+}
+
 void csv_cells_members(Bytes *bytes, const Field *fields, const void *item) {
     for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
         const void *member = (const char *)item + field->offset;
