@@ -31,35 +31,35 @@ typedef struct Entry {
 struct Tokens {
     Db *db;
     bool are_required;
-    pthread_mutex_t lock; // of entries, count and now_unix_ms
+    pthread_mutex_t lock; // of all but reads_left
     Entry *entries;
     size_t count;
     int64_t now_unix_ms;     // of the last read
     atomic_int reads_left;   // until the thread reads next
     pthread_mutex_t reading; // one read at a time
-    pthread_mutex_t ending;
     pthread_cond_t end;
     pthread_t follower;
     bool is_following, is_ending;
 };
 
-static bool scopes_read(const char *text, unsigned *scopes) {
-    *scopes = 0;
-    while (*text != '\0') {
+// The bit of the scope that is text[size]; 0: there is none.
+static unsigned scope_bit(const char *text, size_t size) {
+    for (size_t i = 0; scope_names[i] != NULL; i++)
+        if (strlen(scope_names[i]) == size && strncmp(scope_names[i], text, size) == 0)
+            return 1u << i;
+    return 0;
+}
+
+// 0: it is not a list of scopes with commas between.
+static unsigned scopes_read(const char *text) {
+    for (unsigned scopes = 0;; text++) {
         const size_t size = strcspn(text, ",");
-        size_t i = 0;
-        while (scope_names[i] != NULL &&
-               (strlen(scope_names[i]) != size || strncmp(scope_names[i], text, size) != 0))
-            i++;
-        if (scope_names[i] == NULL)
-            return false;
-        *scopes |= 1u << i;
+        const unsigned bit = scope_bit(text, size);
+        scopes |= bit;
         text += size;
-        text += *text == ',' && text[1] != '\0' ? 1 : 0;
-        if (*text == ',')
-            return false;
+        if (bit == 0 || *text == '\0')
+            return bit != 0 ? scopes : 0;
     }
-    return *scopes != 0;
 }
 
 // Each once, in the order of their names.
@@ -70,13 +70,6 @@ static void scopes_write(unsigned scopes, char *target, size_t size) {
             const size_t used = strlen(target);
             snprintf(target + used, size - used, "%s%s", used > 0 ? "," : "", scope_names[i]);
         }
-}
-
-static unsigned scope_bit(const char *scope) {
-    unsigned i = 0;
-    while (scope_names[i] != NULL && strcmp(scope_names[i], scope) != 0)
-        i++;
-    return 1u << i;
 }
 
 // By SHA-256 digests, of which the time of a comparison tells nothing about tokens.
@@ -109,8 +102,7 @@ static Status tokens_read(Tokens *tokens, Problem *problem) {
             const Entry *before = entry_find(tokens, rows.at[i].digest);
             entries[i].row = rows.at[i];
             entries[i].seen_unix_ms = before != NULL ? before->seen_unix_ms : 0;
-            if (!scopes_read(rows.at[i].scopes, &entries[i].scopes))
-                entries[i].scopes = 0;
+            entries[i].scopes = scopes_read(rows.at[i].scopes);
         }
         free(tokens->entries);
         tokens->entries = entries;
@@ -124,48 +116,45 @@ static Status tokens_read(Tokens *tokens, Problem *problem) {
     return status;
 }
 
-// The next token whose last use is to be written back; false if there is none.
-static bool tokens_next_used(Tokens *tokens, int64_t apart_ms, TokenRow *row) {
-    bool is_found = false;
-    pthread_mutex_lock(&tokens->lock);
-    for (size_t i = 0; i < tokens->count && !is_found; i++) {
-        Entry *entry = &tokens->entries[i];
-        const int64_t unwritten_ms = entry->seen_unix_ms - entry->row.used_unix_ms;
-        is_found = unwritten_ms > 0 && unwritten_ms >= apart_ms;
-        if (is_found) {
+// Writes back the last use of tokens that were used `apart_ms` after what is written.
+static void tokens_write_used(Tokens *tokens, int64_t apart_ms) {
+    for (size_t i = 0;; i++) {
+        TokenRow row = {.name = ""};
+        pthread_mutex_lock(&tokens->lock);
+        const bool is_end = i >= tokens->count;
+        Entry *entry = is_end ? NULL : &tokens->entries[i];
+        const int64_t unwritten_ms = is_end ? 0 : entry->seen_unix_ms - entry->row.used_unix_ms;
+        if (unwritten_ms > 0 && unwritten_ms >= apart_ms) {
             // Also where it then cannot be written: it is not tried again and again.
             entry->row.used_unix_ms = entry->seen_unix_ms;
-            *row = entry->row;
+            row = entry->row;
         }
+        pthread_mutex_unlock(&tokens->lock);
+        if (is_end)
+            return;
+        if (row.name[0] != '\0')
+            (void)db_token_used(tokens->db, &row, NULL);
     }
-    pthread_mutex_unlock(&tokens->lock);
-    return is_found;
-}
-
-static void tokens_write_used(Tokens *tokens, int64_t apart_ms) {
-    TokenRow row;
-    while (tokens_next_used(tokens, apart_ms, &row))
-        (void)db_token_used(tokens->db, &row, NULL);
 }
 
 static void *tokens_follow(void *context) {
     Tokens *tokens = context;
-    pthread_mutex_lock(&tokens->ending);
-    while (!tokens->is_ending) {
+    for (;;) {
         const int64_t until_ns = clock_monotonic_ns() + (int64_t)FOLLOW_MS * 1000000;
         const struct timespec until = {.tv_sec = (time_t)(until_ns / 1000000000),
                                        .tv_nsec = (long)(until_ns % 1000000000)};
+        pthread_mutex_lock(&tokens->lock);
         while (!tokens->is_ending &&
-               pthread_cond_timedwait(&tokens->end, &tokens->ending, &until) == 0)
+               pthread_cond_timedwait(&tokens->end, &tokens->lock, &until) == 0)
             continue;
-        pthread_mutex_unlock(&tokens->ending);
-        tokens_write_used(tokens, USED_MS);
+        const bool is_ending = tokens->is_ending;
+        pthread_mutex_unlock(&tokens->lock);
+        tokens_write_used(tokens, is_ending ? 0 : USED_MS);
+        if (is_ending)
+            return NULL;
         (void)tokens_read(tokens, NULL);
         atomic_store(&tokens->reads_left, UNKNOWN_MAX);
-        pthread_mutex_lock(&tokens->ending);
     }
-    pthread_mutex_unlock(&tokens->ending);
-    return NULL;
 }
 
 Status tokens_open(Db *db, bool are_required, Tokens **tokens, Problem *problem) {
@@ -181,7 +170,6 @@ Status tokens_open(Db *db, bool are_required, Tokens **tokens, Problem *problem)
     pthread_condattr_setclock(&attributes, CLOCK_MONOTONIC);
     pthread_mutex_init(&made->lock, NULL);
     pthread_mutex_init(&made->reading, NULL);
-    pthread_mutex_init(&made->ending, NULL);
     pthread_cond_init(&made->end, &attributes);
     pthread_condattr_destroy(&attributes);
     Status status = tokens_read(made, problem);
@@ -203,16 +191,14 @@ void tokens_close(Tokens *tokens) {
     if (tokens == NULL)
         return;
     if (tokens->is_following) {
-        pthread_mutex_lock(&tokens->ending);
+        pthread_mutex_lock(&tokens->lock);
         tokens->is_ending = true;
         pthread_cond_signal(&tokens->end);
-        pthread_mutex_unlock(&tokens->ending);
+        pthread_mutex_unlock(&tokens->lock);
         pthread_join(tokens->follower, NULL);
-        tokens_write_used(tokens, 0);
     }
     pthread_mutex_destroy(&tokens->lock);
     pthread_mutex_destroy(&tokens->reading);
-    pthread_mutex_destroy(&tokens->ending);
     pthread_cond_destroy(&tokens->end);
     free(tokens->entries);
     free(tokens);
@@ -248,8 +234,7 @@ typedef enum TokenState {
 } TokenState;
 
 // `digest` "": there is no token.
-static TokenState tokens_find(Tokens *tokens, const char *digest, unsigned *scopes,
-                              char name[TOKEN_NAME_SIZE]) {
+static TokenState tokens_find(Tokens *tokens, const char *digest, unsigned *scopes, char *name) {
     pthread_mutex_lock(&tokens->lock);
     const int64_t now = tokens->now_unix_ms;
     Entry *entry = digest[0] != '\0' ? entry_find(tokens, digest) : NULL;
@@ -301,8 +286,8 @@ Status tokens_check(Tokens *tokens, const char *authorization, const char *scope
                            : state == TOKEN_EXPIRED ? "this token has expired"
                                                     : "this token is not known here; the header "
                                                       "must read \"Authorization: Bearer TOKEN\"");
-    holder->is_admin = (scopes & scope_bit("admin")) != 0;
-    return holder->is_admin || (scopes & scope_bit(scope)) != 0
+    holder->is_admin = (scopes & scope_bit("admin", strlen("admin"))) != 0;
+    return holder->is_admin || (scopes & scope_bit(scope, strlen(scope))) != 0
                ? STATUS_OK
                : problem_set(problem, STATUS_FORBIDDEN,
                              "this needs the scope \"%s\", which the token \"%s\" has not", scope,
@@ -312,8 +297,8 @@ Status tokens_check(Tokens *tokens, const char *authorization, const char *scope
 Status token_make(const char *scopes, int64_t expires_unix_ms, TokenRow *row,
                   char token[TOKEN_SIZE], Problem *problem) {
     unsigned char secret[DIGEST_BYTES], digest[DIGEST_BYTES];
-    unsigned asked;
-    if (!scopes_read(scopes, &asked))
+    const unsigned asked = scopes_read(scopes);
+    if (asked == 0)
         return problem_set(problem, STATUS_USAGE,
                            "the scopes must be one or more of read, submit, materials and admin, "
                            "with commas between, are \"%.60s\"",

@@ -1,4 +1,4 @@
-// Tokens are few and change seldom: every look is at all of them.
+// Tokens are few and change seldom: each read is of all of them.
 #include "server/db/db_private.h"
 
 // clang-format off
@@ -19,16 +19,6 @@ static Status token_find(Sqlite *database, const TokenRow *row, TokenRow *found,
     static const char sql[] = "SELECT {columns} FROM tokens WHERE name = :name";
     *found = (TokenRow){.name = ""};
     return sqlite_first(database, sql, token_columns, row, token_columns, found, is_found, problem);
-}
-
-static Status token_require(Sqlite *database, const TokenRow *row, TokenRow *found,
-                            Problem *problem) {
-    bool is_found;
-    TRY(token_find(database, row, found, &is_found, problem));
-    return is_found ? STATUS_OK
-                    : problem_set(problem, STATUS_NOT_FOUND,
-                                  "there is no token \"%.64s\"; `impactd token list` shows them",
-                                  row->name);
 }
 
 static Status token_apply_add(Sqlite *database, const void *work, Problem *problem) {
@@ -61,35 +51,40 @@ Status db_tokens(Db *db, TokenRows *rows, Problem *problem) {
     return db_list(db, sql, NULL, NULL, token_columns, sizeof *rows->at, rows, problem);
 }
 
-static Status token_apply_revoke(Sqlite *database, const void *work, Problem *problem) {
-    static const char sql[] =
-        "UPDATE tokens SET revoked_unix_ms = :revoked_unix_ms WHERE name = :name";
-    const TokenRow *row = work;
+// A change of a token that must be revoked, or must not be.
+typedef struct TokenChange {
+    const TokenRow *row;
+    const char *sql;
+    bool is_revoked;
+    const char *conflict; // what is wrong if it is not so
+} TokenChange;
+
+static Status token_apply_change(Sqlite *database, const void *work, Problem *problem) {
+    const TokenChange *change = work;
     TokenRow found;
-    TRY(token_require(database, row, &found, problem));
-    if (found.revoked_unix_ms > 0)
-        return problem_set(problem, STATUS_CONFLICT, "the token \"%.64s\" is revoked already",
-                           row->name);
-    return sqlite_change(database, sql, token_columns, row, NULL, problem);
+    bool is_found;
+    TRY(token_find(database, change->row, &found, &is_found, problem));
+    if (!is_found)
+        return problem_set(problem, STATUS_NOT_FOUND,
+                           "there is no token \"%.64s\"; `impactd token list` shows them",
+                           change->row->name);
+    if ((found.revoked_unix_ms > 0) != change->is_revoked)
+        return problem_set(problem, STATUS_CONFLICT, "the token \"%.64s\" is %s", change->row->name,
+                           change->conflict);
+    return sqlite_change(database, change->sql, token_columns, change->row, NULL, problem);
 }
 
 Status db_token_revoke(Db *db, const TokenRow *row, Problem *problem) {
-    return db_write(db, token_apply_revoke, row, problem);
-}
-
-static Status token_apply_forget(Sqlite *database, const void *work, Problem *problem) {
-    static const char sql[] = "DELETE FROM tokens WHERE name = :name";
-    const TokenRow *row = work;
-    TokenRow found;
-    TRY(token_require(database, row, &found, problem));
-    if (found.revoked_unix_ms == 0)
-        return problem_set(problem, STATUS_CONFLICT,
-                           "the token \"%.64s\" is in use; revoke it first", row->name);
-    return sqlite_change(database, sql, token_columns, row, NULL, problem);
+    static const char sql[] =
+        "UPDATE tokens SET revoked_unix_ms = :revoked_unix_ms WHERE name = :name";
+    return db_write(db, token_apply_change, &(TokenChange){row, sql, false, "revoked already"},
+                    problem);
 }
 
 Status db_token_forget(Db *db, const TokenRow *row, Problem *problem) {
-    return db_write(db, token_apply_forget, row, problem);
+    static const char sql[] = "DELETE FROM tokens WHERE name = :name";
+    return db_write(db, token_apply_change,
+                    &(TokenChange){row, sql, true, "in use; revoke it first"}, problem);
 }
 
 static Status token_apply_used(Sqlite *database, const void *work, Problem *problem) {
