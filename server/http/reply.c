@@ -48,19 +48,19 @@ void reply_borrow(Reply *reply, int code, const char *content_type, const void *
 
 Status reply_bytes(Reply *reply, int code, const char *content_type, Bytes *bytes,
                    Problem *problem) {
-    const bool is_failed = bytes->is_failed;
+    const bool is_failed = bytes->is_failed, is_over = bytes->is_over;
     const size_t most = bytes->most;
     size_t size = 0;
     char *body = bytes_take(bytes, &size);
     if (is_failed || body == NULL) {
         free(body);
-        if (most > 0)
-            return problem_set(
-                problem, STATUS_LIMIT,
-                "the answer would be larger than %zu bytes, or memory ran out; ask for fewer "
-                "channels or a shorter time",
-                most);
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the answer");
+        if (is_over)
+            return problem_set(problem, STATUS_LIMIT,
+                               "the answer would be larger than %zu bytes; ask for fewer "
+                               "channels or a shorter time",
+                               most);
+        return problem_set(problem, STATUS_NO_MEMORY,
+                           "no memory for the answer; what it reports may have been stored");
     }
     reply_borrow(reply, code, content_type, body, size);
     reply->release = free;

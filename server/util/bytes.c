@@ -32,8 +32,11 @@ bool bytes_reserve(Bytes *bytes, size_t more) {
     if (bytes->is_failed)
         return false;
     const size_t most = bytes->most != 0 ? bytes->most : SIZE_MAX / 2;
-    if (bytes->count > most || more > most - bytes->count)
-        return bytes_fail(bytes);
+    if (bytes->count > most || more > most - bytes->count) {
+        bytes_fail(bytes);
+        bytes->is_over = bytes->most != 0;
+        return false;
+    }
     const size_t wanted = bytes->count + more + 1;
     if (wanted <= bytes->room)
         return true;

@@ -12,6 +12,7 @@ typedef struct Bytes {
     size_t room;
     size_t most; // of count; 0: no limit
     bool is_failed;
+    bool is_over; // failed because of the limit, not for want of memory
 } Bytes;
 
 void bytes_clear(Bytes *bytes); // empty and sound again, under the same limit

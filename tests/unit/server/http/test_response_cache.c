@@ -121,3 +121,16 @@ TEST(many_threads_share_it) {
     assert_true(response_cache_stats(response_cache).bytes <= 20000);
     response_cache_free(response_cache);
 }
+
+TEST(an_answer_that_is_too_large_is_told_from_one_for_which_memory_ran_out) {
+    Reply reply = {.code = 0};
+    Problem problem;
+    Bytes bytes = {.most = 10};
+    bytes_text(&bytes, "eleven bytes");
+    problem_clear(&problem);
+    assert_int_equal(reply_bytes(&reply, 200, "text/plain", &bytes, &problem), STATUS_LIMIT);
+    bytes = (Bytes){.most = 10, .is_failed = true}; // as after a failed malloc
+    problem_clear(&problem);
+    assert_int_equal(reply_bytes(&reply, 201, "text/plain", &bytes, &problem), STATUS_NO_MEMORY);
+    assert_non_null(strstr(problem.detail, "may have been stored"));
+}
