@@ -6,7 +6,6 @@
 #include <string.h>
 
 #include "server/api/app.h"
-#include "server/formats/sweep.h"
 #include "server/jobs/documents.h"
 #include "server/jobs/sweep.h"
 #include "server/util/base_path.h"
@@ -95,7 +94,6 @@ static bool sweep_is_unchanged(const Request *request, Reply *reply, const Sweep
 // What a table is read from as long as it is sent.
 typedef struct SweepReply {
     SweepView view;
-    SweepSource source;
     SweepDocument document;
 } SweepReply;
 
@@ -114,8 +112,6 @@ static Status sweep_reply_table(App *app, Reply *reply, const StudyFormat *forma
         sweep_reply_free(sent);
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the table");
     }
-    sent->document = (SweepDocument){
-        .sweep = sent->view.sweep, .source = &sent->source, .result = sent->view.row.result};
     stream->table = sweep_document_table(&sent->document);
     stream->is_broken = &sent->document.is_broken;
     stream->release = sweep_reply_free;
@@ -129,7 +125,7 @@ static Status sweep_reply_table(App *app, Reply *reply, const StudyFormat *forma
 static Status sweep_reply_chart(App *app, Reply *reply, const StudyFormat *format, SweepReply *sent,
                                 Problem *problem) {
     Bytes bytes = {.most = app->reply_most};
-    const bool is_whole = chart_sweep(sent->view.sweep, &sent->source, &bytes);
+    const bool is_whole = chart_sweep(&sent->document, &bytes);
     sweep_reply_free(sent);
     if (is_whole)
         return reply_bytes(reply, 200, format->content_type, &bytes, problem);
@@ -152,7 +148,11 @@ Status sweeps_table(App *app, const Request *request, Reply *reply, Problem *pro
         sweep_reply_free(sent);
         return status;
     }
-    sent->source = (SweepSource){view->rows, sweep_view_read, view};
+    sent->document = (SweepDocument){.sweep = view->sweep,
+                                     .result = view->row.result,
+                                     .rows = view->rows,
+                                     .read = sweep_view_read,
+                                     .context = view};
     return strcmp(format->extension, "svg") == 0
                ? sweep_reply_chart(app, reply, format, sent, problem)
                : sweep_reply_table(app, reply, format, sent, problem);

@@ -383,7 +383,7 @@ static size_t sweep_cell(const SweepCells *cells, double number) {
 }
 
 // Reads all rows once; memory is that of the cells. False: the rows cannot be read.
-static bool sweep_cells_read(SweepCells *cells, const SweepSource *source, size_t metrics) {
+static bool sweep_cells_read(SweepCells *cells, const SweepDocument *source, size_t metrics) {
     double numbers[TABLE_PIECE], values[TABLE_PIECE];
     size_t places[TABLE_PIECE], piece;
     const size_t count = cells->columns * cells->rows;
@@ -460,8 +460,9 @@ static bool sweep_places(Chart *chart, const SweepCells *cells, double *x, Chart
     return is_numeric;
 }
 
-static void sweep_add_notes(Chart *chart, const Sweep *sweep, const SweepSource *source,
-                            size_t metrics, bool is_map) {
+static void sweep_add_notes(Chart *chart, const SweepDocument *source, size_t metrics,
+                            bool is_map) {
+    const Sweep *sweep = source->sweep;
     const unsigned long long points = sweep->points, failed = sweep->table.failed;
     bytes_format(&chart->description,
                  "%zu of %llu points, %llu failed. Gaps and grey cells: not there.", source->rows,
@@ -519,7 +520,8 @@ static void sweep_add_panels(Chart *chart, const Sweep *sweep, const SweepCells 
         chart_text(chart, "upwards: %s", chart_quantity(chart, cells->y->pointer, cells->y->unit));
 }
 
-bool chart_sweep(const Sweep *sweep, const SweepSource *source, Bytes *bytes) {
+bool chart_sweep(const SweepDocument *source, Bytes *bytes) {
+    const Sweep *sweep = source->sweep;
     const bool is_map = sweep->axes.count > 1 && sweep->mode == SWEEP_GRID;
     const size_t metrics =
         sweep->metrics.count < CHART_PANELS ? sweep->metrics.count : CHART_PANELS;
@@ -543,7 +545,7 @@ bool chart_sweep(const Sweep *sweep, const SweepSource *source, Bytes *bytes) {
     cells.failed = chart_new(&chart, count * metrics, sizeof *cells.failed);
     double *x = chart_new(&chart, count, sizeof *x);
     const bool is_read = chart.is_failed || sweep_cells_read(&cells, source, metrics);
-    sweep_add_notes(&chart, sweep, source, metrics, is_map);
+    sweep_add_notes(&chart, source, metrics, is_map);
     if (!chart.is_failed)
         sweep_add_panels(&chart, sweep, &cells, metrics, x);
     chart_write(&chart, bytes);

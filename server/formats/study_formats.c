@@ -114,8 +114,8 @@ static void sensitivity_csv(const Variant *answer, Bytes *bytes) {
 
 static void sweep_chart(const Variant *answer, Bytes *bytes) {
     const Sweep *sweep = (const Sweep *)(const void *)answer;
-    const SweepSource source = sweep_source(sweep);
-    (void)chart_sweep(sweep, &source, bytes);
+    const SweepDocument document = sweep_document(sweep);
+    (void)chart_sweep(&document, bytes);
 }
 
 static const char csv_type[] = "text/csv; charset=utf-8";
@@ -164,10 +164,14 @@ const StudyFormat *study_format_find(const StudyFormat *formats, const char *ext
 }
 
 void study_format_write(const StudyFormat *format, const Variant *answer, Bytes *bytes) {
-    if (format->write != NULL)
+    if (format->write != NULL) {
         format->write(answer, bytes);
-    else
-        sweep_write((const Sweep *)(const void *)answer, format->extension, bytes);
+        return;
+    }
+    SweepDocument document = sweep_document((const Sweep *)(const void *)answer);
+    const Table table = sweep_document_table(&document);
+    if (format_write(format_find(format->extension), &table, bytes, NULL) != STATUS_OK)
+        bytes->is_failed = true;
 }
 
 void study_formats_names(const StudyFormat *formats, const char *before, char *target,

@@ -4,7 +4,8 @@
 
 #include "core/drop_test/evaluation.h"
 #include "core/study/study.h"
-#include "server/formats/sweep.h"
+#include "core/study/sweep.h"
+#include "server/formats/format.h"
 
 enum { STUDY_FORMATS_MAX = 7 }; // at most, with the end
 
@@ -25,7 +26,37 @@ void study_format_write(const StudyFormat *format, const Variant *answer, Bytes 
 // "json, svg", each behind `before`.
 void study_formats_names(const StudyFormat *formats, const char *before, char *target, size_t size);
 
-// Charts append an SVG document. What a chart does not show is named in its description.
+// --- tables of sweeps ---
+
+enum {
+    SWEEP_CELL_POINT,  // its number, rising
+    SWEEP_CELL_STATUS, // SweepStatus
+    SWEEP_CELL_METRIC, // the first of them
+};
+
+// The table of a sweep: a row for each point that is made, with its number, the value of each axis,
+// the metrics and a status. Its rows are those of an answer, or read from a database piece by
+// piece.
+typedef struct SweepDocument {
+    const Sweep *sweep; // borrowed; of its own table only the failures are used
+    const char *result; // under which it is served, for links; NULL: it is not
+    size_t rows;        // that are there
+    // Cell `cell` of rows first ... first + count - 1. False: they cannot be read any more.
+    bool (*read)(void *context, size_t cell, size_t first, size_t count, double *target);
+    void *context;
+    bool is_broken;      // a read has failed: what was written since is not the table
+    TableSource columns; // by sweep_document_table
+} SweepDocument;
+
+SweepDocument sweep_document(const Sweep *sweep); // of the answer's own rows
+
+// As a table for the formats except SVG; it borrows the document, which is neither moved nor
+// changed as long. NPZ has texts; NPY and MAT have numbers alone, of a text its index among the
+// axis's values, of a status SweepStatus.
+Table sweep_document_table(SweepDocument *document);
+
+// --- charts: SVG documents, appended; what a chart does not show is named in its description ---
+
 extern const char chart_type[]; // "image/svg+xml"
 // Error against CPU time, both logarithmic (a work-precision chart).
 void chart_tradeoff(const Variant *answer, Bytes *bytes);
@@ -37,7 +68,7 @@ void chart_compare(const Variant *answer, Bytes *bytes);
 void chart_sensitivity(const Variant *answer, Bytes *bytes);
 // Each metric of a sweep: a line over one axis, or a map over two. Size and memory are limited for
 // any number of points. False: the rows could not be read to their end.
-bool chart_sweep(const Sweep *sweep, const SweepSource *source, Bytes *bytes);
+bool chart_sweep(const SweepDocument *document, Bytes *bytes);
 // Every reading over approach speed; those without a speed are at the left edge.
 void chart_evaluation(const Evaluation *evaluation, const char *slug, Bytes *bytes);
 

@@ -1,4 +1,4 @@
-#include "server/formats/sweep.h"
+#include "server/formats/study_formats.h"
 
 #include "server/util/base_path.h"
 
@@ -16,8 +16,11 @@ static bool sweep_table_read(void *context, size_t cell, size_t first, size_t co
     return true;
 }
 
-SweepSource sweep_source(const Sweep *sweep) {
-    return (SweepSource){sweep->table.points.count, sweep_table_read, (void *)(uintptr_t)sweep};
+SweepDocument sweep_document(const Sweep *sweep) {
+    return (SweepDocument){.sweep = sweep,
+                           .rows = sweep->table.points.count,
+                           .read = sweep_table_read,
+                           .context = (void *)(uintptr_t)sweep};
 }
 
 // The columns: the points' numbers, the axes, the metrics, the statuses.
@@ -42,12 +45,11 @@ static TableColumn sweep_column(const void *context, size_t index) {
 // Of an axis the indices of its values.
 static bool sweep_read(void *context, size_t index, size_t first, size_t count, double *target) {
     SweepDocument *document = context;
-    const SweepSource *source = document->source;
     const size_t axes = document->sweep->axes.count, metrics = document->sweep->metrics.count;
     const size_t cell = index <= axes             ? SWEEP_CELL_POINT
                         : index <= axes + metrics ? SWEEP_CELL_METRIC + index - 1 - axes
                                                   : SWEEP_CELL_STATUS;
-    if (document->is_broken || !source->read(source->context, cell, first, count, target)) {
+    if (document->is_broken || !document->read(document->context, cell, first, count, target)) {
         document->is_broken = true;
         return false;
     }
@@ -88,7 +90,7 @@ static void sweep_put_failures(const Sweep *sweep, Bytes *bytes) {
 static void sweep_put_head(const void *context, Bytes *bytes) {
     const SweepDocument *document = context;
     const Sweep *sweep = document->sweep;
-    const size_t rows = document->source->rows;
+    const size_t rows = document->rows;
     bytes_text(bytes, "\"kind\": \"sweep\", ");
     if (document->result != NULL)
         bytes_format(bytes, "\"result\": \"%s\", ", document->result);
@@ -115,15 +117,7 @@ Table sweep_document_table(SweepDocument *document) {
     const Sweep *sweep = document->sweep;
     document->columns =
         (TableSource){document, sweep_column, sweep_read, sweep_put_head, sweep_put_links};
-    return (Table){.count = document->source->rows,
+    return (Table){.count = document->rows,
                    .column_count = 2 + sweep->axes.count + sweep->metrics.count,
                    .source = &document->columns};
-}
-
-void sweep_write(const Sweep *sweep, const char *extension, Bytes *bytes) {
-    const SweepSource source = sweep_source(sweep);
-    SweepDocument document = {.sweep = sweep, .source = &source};
-    const Table table = sweep_document_table(&document);
-    if (format_write(format_find(extension), &table, bytes, NULL) != STATUS_OK)
-        bytes->is_failed = true;
 }

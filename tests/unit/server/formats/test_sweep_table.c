@@ -3,7 +3,6 @@
 #include <string.h>
 
 #include "server/formats/study_formats.h"
-#include "server/formats/sweep.h"
 #include "tests/support/test.h"
 
 static char clearance[] = "/dampers/0/clearance", metre[] = "m", buffer[] = "/dampers/0/buffer";
@@ -30,7 +29,8 @@ static Sweep sweep_make(void) {
 TEST(rows_that_are_there_are_in_the_table_with_their_status) {
     const Sweep sweep = sweep_make();
     Bytes bytes = {0};
-    sweep_write(&sweep, "csv", &bytes);
+    study_format_write(study_format_find(study_formats(study_sweep.answer), "csv"),
+                       (const Variant *)(const void *)&sweep, &bytes);
     assert_string_equal(bytes.at,
                         "index,/dampers/0/clearance [m],/dampers/0/buffer,rms_displacement "
                         "[m],impacts,status\n"
@@ -38,8 +38,8 @@ TEST(rows_that_are_there_are_in_the_table_with_their_status) {
                         "2,0.02,\"soft, A\",nan,nan,unstable\n"
                         "3,0.02,hard,0.3,9,made\n");
     bytes_clear(&bytes);
-    const SweepSource source = sweep_source(&sweep);
-    SweepDocument document = {.sweep = &sweep, .source = &source, .result = "r-1"};
+    SweepDocument document = sweep_document(&sweep);
+    document.result = "r-1";
     const Table table = sweep_document_table(&document);
     assert_int_equal(format_write(format_find("json"), &table, &bytes, NULL), STATUS_OK);
     assert_non_null(strstr(bytes.at,
@@ -53,8 +53,8 @@ TEST(rows_that_are_there_are_in_the_table_with_their_status) {
 }
 
 static void draw(const Sweep *sweep, Bytes *bytes) {
-    const SweepSource source = sweep_source(sweep);
-    assert_true(chart_sweep(sweep, &source, bytes));
+    const SweepDocument document = sweep_document(sweep);
+    assert_true(chart_sweep(&document, bytes));
 }
 
 static size_t count_of(const char *text, const char *what) {
