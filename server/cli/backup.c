@@ -99,16 +99,15 @@ const Command command_backup = {
     .name = "backup",
     .operands = "FILE",
     .summary = "copy the database, while the daemon runs or without it",
-    .help =
-        "  impactd backup lab.db                          everything that was answered before\n"
-        "  impactd backup lab.db --force                  in the place of the last one\n"
-        "  impactd backup /backups/lab-$(date +%F).db --data /var/lib/impactd\n"
-        "\n"
-        "The daemon answers meanwhile. The copy is of one moment, is checked, and appears whole or "
-        "not at\n"
-        "all; it has the tokens' digests and is readable by you alone. Ctrl-C leaves nothing.\n"
-        "\n"
-        "impactd restore FILE puts it back.\n",
+    .help = "  impactd backup lab.db                          everything that was answered before\n"
+            "  impactd backup lab.db --force                  in the place of the last one\n"
+            "  impactd backup /backups/lab-$(date +%F).db --data /var/lib/impactd\n"
+            "\n"
+            "The daemon answers meanwhile. The copy is of one moment, is checked, and appears\n"
+            "whole or not at all; it has the tokens' digests and is readable by you alone.\n"
+            "Ctrl-C leaves nothing.\n"
+            "\n"
+            "impactd restore FILE puts it back.\n",
     .options = backup_fields,
     .size = sizeof(BackupSettings),
     .run = backup,
@@ -122,11 +121,10 @@ const Command command_restore = {
         "  impactd restore lab.db --data DIR              into a folder without a database\n"
         "  impactd restore lab.db --force                 in the place of the folder's database\n"
         "\n"
-        "Stop the daemon first. FILE is copied and checked, and the folder has either the database "
-        "of before\n"
-        "or the whole of FILE, whatever happens. FILE itself stays as it is. Jobs that were "
-        "unfinished in the\n"
-        "backup are taken up again when the daemon starts.\n",
+        "Stop the daemon first. FILE is copied and checked, and the folder has either the\n"
+        "database of before or the whole of FILE, whatever happens. FILE itself stays as\n"
+        "it is. Jobs that were unfinished in the backup are taken up again when the\n"
+        "daemon starts.\n",
     .options = restore_fields,
     .size = sizeof(BackupSettings),
     .run = restore,

@@ -569,32 +569,20 @@ void problem_reply_put(const ProblemReply *reply, Status status, Problem *proble
 
 // The status that leads to the exit code of an HTTP status code.
 static Status http_status(int code, const char *type) {
-    switch (code) {
-    case 400:
-        return type != NULL && strstr(type, "unreadable") != NULL ? STATUS_UNREADABLE
-                                                                  : STATUS_USAGE;
-    case 401:
-    case 403:
-        return STATUS_FORBIDDEN;
-    case 404:
-    case 410:
-        return STATUS_NOT_FOUND;
-    case 413:
-    case 415:
-    case 422:
-        return STATUS_INVALID;
-    case 429:
-    case 502:
-    case 503:
-    case 504:
-        return STATUS_UNREACHABLE;
-    case 409:
-        return STATUS_CONFLICT;
-    case 412:
-        return STATUS_STALE;
-    default:
-        return STATUS_INTERNAL;
-    }
+    static const struct {
+        int code;
+        Status status;
+    } rows[] = {{400, STATUS_USAGE},       {401, STATUS_FORBIDDEN},   {403, STATUS_FORBIDDEN},
+                {404, STATUS_NOT_FOUND},   {409, STATUS_CONFLICT},    {410, STATUS_NOT_FOUND},
+                {412, STATUS_STALE},       {413, STATUS_INVALID},     {415, STATUS_INVALID},
+                {422, STATUS_INVALID},     {429, STATUS_UNREACHABLE}, {502, STATUS_UNREACHABLE},
+                {503, STATUS_UNREACHABLE}, {504, STATUS_UNREACHABLE}};
+    if (code == 400 && type != NULL && strstr(type, "unreadable") != NULL)
+        return STATUS_UNREADABLE;
+    for (size_t i = 0; i < COUNT(rows); i++)
+        if (rows[i].code == code)
+            return rows[i].status;
+    return STATUS_INTERNAL;
 }
 
 Status problem_reply_read(const ApiAnswer *answer, Problem *problem) {

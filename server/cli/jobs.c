@@ -412,13 +412,11 @@ const Command command_submit = {
         "  impactd submit scene.json --title 'sponge, 15 mm' --label batch=7\n"
         "  impactd submit - --server https://sim.example < scene.json\n"
         "\n"
-        "If an answer was lost, send the scene again with the same --idempotency-key: both are "
-        "one\n"
-        "job. A busy server is asked again, as its Retry-After says, while --wait lasts. Ctrl-C\n"
-        "ends the waiting only: the job continues, \"impactd cancel\" stops it. Exit code 3 if "
-        "the\n"
-        "scene has faults, 1 if the job failed, 7 if the server does not answer or is busy, 8 if\n"
-        "the job has not finished after --wait.\n",
+        "If an answer was lost, send the scene again with the same --idempotency-key:\n"
+        "both are one job. A busy server is asked again, as its Retry-After says, while\n"
+        "--wait lasts. Ctrl-C ends the waiting only: the job continues, \"impactd cancel\"\n"
+        "stops it. Exit code 3 if the scene has faults, 1 if the job failed, 7 if the\n"
+        "server does not answer or is busy, 8 if the job has not finished after --wait.\n",
     .options = submit_fields,
     .size = sizeof(JobsSettings),
     .run = api_command,
@@ -429,14 +427,13 @@ const Command command_watch = {
     .name = "watch",
     .operands = "JOB",
     .summary = "follow a job of a server until it has finished",
-    .help =
-        "  impactd watch j-7f3a                            a bar on a terminal, else lines\n"
-        "  impactd watch j-7f3a --json > job.json          the finished job\n"
-        "  impactd watch $(impactd submit scene.json) && impactd get ...\n"
-        "\n"
-        "Exit code 0 if the job was successful, 1 if it failed or was dismissed, 4 if it does\n"
-        "not exist, 8 if it has not finished after --wait. Ctrl-C ends the watching only (130).\n"
-        "A restart of the server does not end it.\n",
+    .help = "  impactd watch j-7f3a                            a bar on a terminal, else lines\n"
+            "  impactd watch j-7f3a --json > job.json          the finished job\n"
+            "  impactd watch $(impactd submit scene.json) && impactd get ...\n"
+            "\n"
+            "Exit code 0 if the job was successful, 1 if it failed or was dismissed, 4 if it\n"
+            "does not exist, 8 if it has not finished after --wait. Ctrl-C ends the watching\n"
+            "only (130). A restart of the server does not end it.\n",
     .options = watch_fields,
     .size = sizeof(JobsSettings),
     .run = api_command,
@@ -447,23 +444,22 @@ const Command command_get = {
     .name = "get",
     .operands = "RESULT-or-JOB [WHAT]",
     .summary = "download a result, its series, spectra or impacts",
-    .help =
-        "  impactd get r-91c0                              summary, plan and units\n"
-        "  impactd get r-91c0 series -o motion.npy         time series, for numpy.load\n"
-        "  impactd get r-91c0 psd -o psd.svg               spectra as a chart\n"
-        "  impactd get r-91c0 series -o motion.csv --channels displacement --from 1 --to 2\n"
-        "  impactd get r-91c0 series --points 500          minimum and maximum of 500 buckets\n"
-        "  impactd get r-91c0 psd -o psd.csv               spectra\n"
-        "  impactd get r-91c0 impacts.csv                  all impacts, on standard output\n"
-        "  impactd get r-91c0 impacts/3/force -o one.csv   contact force of one impact\n"
-        "  impactd get j-7f3a --wait 60 -o motion.mat      of a job, when it has finished\n"
-        "  impactd get r-91c0 bundle -o all.zip            everything in one archive\n"
-        "\n"
-        "WHAT: result (default), series, psd, impacts, energy, manifest, bundle, job; of studies\n"
-        "tradeoff, ensemble, compare, sensitivity, table. Formats: json, csv, npy, npz, mat, zip,\n"
-        "svg, as far as the server has them. A file is written completely or not at all. Exit "
-        "code\n"
-        "4 if there is no such part, 8 if the job has not finished after --wait.\n",
+    .help = "  impactd get r-91c0                              summary, plan and units\n"
+            "  impactd get r-91c0 series -o motion.npy         time series, for numpy.load\n"
+            "  impactd get r-91c0 psd -o psd.svg               spectra as a chart\n"
+            "  impactd get r-91c0 series -o motion.csv --channels displacement --from 1 --to 2\n"
+            "  impactd get r-91c0 series --points 500          minimum and maximum of 500 buckets\n"
+            "  impactd get r-91c0 psd -o psd.csv               spectra\n"
+            "  impactd get r-91c0 impacts.csv                  all impacts, on standard output\n"
+            "  impactd get r-91c0 impacts/3/force -o one.csv   contact force of one impact\n"
+            "  impactd get j-7f3a --wait 60 -o motion.mat      of a job, when it has finished\n"
+            "  impactd get r-91c0 bundle -o all.zip            everything in one archive\n"
+            "\n"
+            "WHAT: result (default), series, psd, impacts, energy, manifest, bundle, job; of\n"
+            "studies tradeoff, ensemble, compare, sensitivity, table. Formats: json, csv,\n"
+            "npy, npz, mat, zip, svg, as far as the server has them. A file is written\n"
+            "completely or not at all. Exit code 4 if there is no such part, 8 if the job has\n"
+            "not finished after --wait.\n",
     .options = get_fields,
     .size = sizeof(JobsSettings),
     .run = api_command,

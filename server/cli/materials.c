@@ -532,15 +532,11 @@ const Command command_materials = {
         ".json\n"
         "  impactd materials import lab.csv --dry-run             validate a file; write nothing\n"
         "\n"
-        "FILE.json of add: {\"slug\": \"foam\", \"name\": \"Foam, 12 mm\", \"restitution\": 0.55, "
-        "\"contact_time\":\n"
-        "0.02, \"source\": \"drop test of 12 May\"}; /schemas/material has all members. A revision "
-        "never "
-        "changes;\n"
-        "a correction is a new revision. Exit codes: 3 faults in a file (all are reported), 4 no "
-        "such "
-        "material,\n"
-        "5 permission denied, 1 conflict (another client has changed it first).\n",
+        "FILE.json of add: {\"slug\": \"foam\", \"name\": \"Foam, 12 mm\", \"restitution\": 0.55,\n"
+        "\"contact_time\": 0.02, \"source\": \"drop test of 12 May\"}; /schemas/material has\n"
+        "all members. A revision never changes; a correction is a new revision. Exit\n"
+        "codes: 3 faults in a file (all are reported), 4 no such material, 5 permission\n"
+        "denied, 1 conflict (another client has changed it first).\n",
     .options = materials_fields,
     .groups = groups,
     .size = sizeof(MaterialsSettings),

@@ -299,16 +299,15 @@ const Command command_import = {
     .name = "import",
     .operands = "FILE",
     .summary = "convert a ground motion file to an excitation",
-    .help =
-        "  impactd import motion.AT2                        print an excitation for a scene\n"
-        "  impactd import motion.AT2 -o motion.json         write it to a file\n"
-        "  impactd import column.txt --interval 0.02 --unit g   if the file states neither\n"
-        "  impactd import motion.AT2 --scale 2              double the acceleration\n"
-        "  impactd import - < motion.AT2                    from standard input\n"
-        "\n"
-        "Formats: PEER AT2, old and new; a count and an interval before one column; times and\n"
-        "accelerations in two columns; bare columns. A summary is printed on stderr. Exit code 3\n"
-        "if the file has faults.\n",
+    .help = "  impactd import motion.AT2                        print an excitation for a scene\n"
+            "  impactd import motion.AT2 -o motion.json         write it to a file\n"
+            "  impactd import column.txt --interval 0.02 --unit g   if the file states neither\n"
+            "  impactd import motion.AT2 --scale 2              double the acceleration\n"
+            "  impactd import - < motion.AT2                    from standard input\n"
+            "\n"
+            "Formats: PEER AT2, old and new; a count and an interval before one column; times\n"
+            "and accelerations in two columns; bare columns. A summary is printed on stderr.\n"
+            "Exit code 3 if the file has faults.\n",
     .options = import_fields,
     .size = sizeof(ImportSettings),
     .run = import_run,
@@ -325,11 +324,10 @@ const Command command_records = {
         "  impactd records show I-ELC180                   all about it, as JSON\n"
         "  impactd records delete I-ELC180                 if no result uses it\n"
         "\n"
-        "In a scene: \"excitation\": {\"kind\": \"record\", \"name\": \"I-ELC180\"}. The formats "
-        "are\n"
-        "those of \"impactd help import\". A record never changes: other processing makes another\n"
-        "record. Exit code 3 if the file has faults, 4 if there is no such record, 1 if it is in\n"
-        "use or its name is taken.\n",
+        "In a scene: \"excitation\": {\"kind\": \"record\", \"name\": \"I-ELC180\"}. The formats\n"
+        "are those of \"impactd help import\". A record never changes: other processing\n"
+        "makes another record. Exit code 3 if the file has faults, 4 if there is no such\n"
+        "record, 1 if it is in use or its name is taken.\n",
     .options = records_fields,
     .size = sizeof(RecordsSettings),
     .run = api_command,

@@ -468,11 +468,9 @@ const Command command_study = {
         "  impactd study scene.json -o out.svg -o out.csv the chart, and the table\n"
         "  impactd study - < scene.json                   from standard input\n"
         "\n"
-        "The scene's member \"study\" says what is wanted, like {\"kind\": \"compare\"} for all "
-        "contact\n"
-        "models side by side. Ctrl-C stops at once. Exit code 3 if the scene has faults or no "
-        "study,\n"
-        "1 if its run failed.\n",
+        "The scene's member \"study\" says what is wanted, like {\"kind\": \"compare\"} for all\n"
+        "contact models side by side. Ctrl-C stops at once. Exit code 3 if the scene has\n"
+        "faults or no study, 1 if its run failed.\n",
     .options = study_fields,
     .size = sizeof(StudySettings),
     .run = study_command_run,
@@ -580,11 +578,11 @@ const Command command_tradeoff = {
         "  impactd tradeoff scene.json --solver exact --solver rk4\n"
         "  impactd tradeoff - < scene.json                      from standard input\n"
         "\n"
-        "Every solver is run at steps or tolerances a decade or two apart, and the exact one also\n"
-        "with less: impulses for contacts, fewer modes or samples, shorter segments. Errors are "
-        "the\n"
-        "same each time; CPU times are measured and differ a little. Ctrl-C stops at once.\n"
-        "Exit code 3 if the scene has faults, 1 if its exact run failed.\n",
+        "Every solver is run at steps or tolerances a decade or two apart, and the exact\n"
+        "one also with less: impulses for contacts, fewer modes or samples, shorter\n"
+        "segments. Errors are the same each time; CPU times are measured and differ a\n"
+        "little. Ctrl-C stops at once. Exit code 3 if the scene has faults, 1 if its\n"
+        "exact run failed.\n",
     .options = tradeoff_fields,
     .size = sizeof(StudySettings),
     .run = study_command_run,
@@ -692,15 +690,14 @@ const Command command_ensemble = {
         "  impactd ensemble scene.json --runs 1000 -o out.csv   each run's numbers, by its seed\n"
         "  impactd ensemble scene.json -o out.svg -o out.json   the chart, and all of it\n"
         "  impactd ensemble scene.json --runs 1000 --target 0.01\n"
-        "                        no more of the 1000 than tell their mean rms displacement to 1 %\n"
+        "                        no more of the 1000 than give the mean rms displacement to 1 %\n"
         "  impactd ensemble scene.json --runs 1000 --target 0.05 --metric psd\n"
         "  impactd ensemble - < scene.json                      from standard input\n"
         "\n"
-        "The scene's excitation must be random. A run is the scene with one seed, from "
-        "--first-seed\n"
-        "on; any of them can be run again alone. One that fails is reported and left out. The "
-        "same\n"
-        "study gives the same bytes. Ctrl-C stops at once. Exit code 3 if the scene has faults.\n",
+        "The scene's excitation must be random. A run is the scene with one seed, from\n"
+        "--first-seed on; any of them can be run again alone. One that fails is reported\n"
+        "and left out. The same study gives the same bytes. Ctrl-C stops at once. Exit\n"
+        "code 3 if the scene has faults.\n",
     .options = ensemble_fields,
     .size = sizeof(StudySettings),
     .run = study_command_run,
@@ -762,21 +759,21 @@ const Command command_sweep = {
     .name = "sweep",
     .operands = "SCENE.json",
     .summary = "the scene at many points: a grid or a list of values of its members",
-    .help =
-        "  impactd sweep scene.json                             smallest and largest of each "
-        "metric\n"
-        "  impactd sweep scene.json -o out.csv -o out.svg       every point, and the chart\n"
-        "  impactd sweep - < scene.json                         from standard input\n"
-        "\n"
-        "The scene says what varies, by JSON Pointers into itself:\n"
-        "\n"
-        "  \"study\": {\"kind\": \"sweep\", \"axes\": [\n"
-        "    {\"pointer\": \"/dampers/0/clearance\", \"from\": 0.005, \"to\": 0.03, \"count\": "
-        "26},\n"
-        "    {\"pointer\": \"/dampers/0/buffer\", \"values\": [\"sponge\", \"aluminium\"]}]}\n"
-        "\n"
-        "Every point is judged before the first runs. The same sweep gives the same bytes, here\n"
-        "and by the daemon, which uses all its workers. Exit code 3 if the scene has faults.\n",
+    .help = "  impactd sweep scene.json                             smallest and largest of each "
+            "metric\n"
+            "  impactd sweep scene.json -o out.csv -o out.svg       every point, and the chart\n"
+            "  impactd sweep - < scene.json                         from standard input\n"
+            "\n"
+            "The scene says what varies, by JSON Pointers into itself:\n"
+            "\n"
+            "  \"study\": {\"kind\": \"sweep\", \"axes\": [\n"
+            "    {\"pointer\": \"/dampers/0/clearance\", \"from\": 0.005, \"to\": 0.03, \"count\": "
+            "26},\n"
+            "    {\"pointer\": \"/dampers/0/buffer\", \"values\": [\"sponge\", \"aluminium\"]}]}\n"
+            "\n"
+            "Every point is validated before the first runs. The same sweep gives the same\n"
+            "bytes, here and by the daemon, which uses all its workers. Exit code 3 if the\n"
+            "scene has faults.\n",
     .options = sweep_fields,
     .size = sizeof(StudySettings),
     .run = study_command_run,

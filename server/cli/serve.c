@@ -121,39 +121,11 @@ static Status serve_check(const ServeSettings *settings, Problem *problem) {
     return status;
 }
 
-static bool is_host(const char *name, size_t size) {
+static bool is_host(const char *name) {
     static const char plain[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-._";
-    if (size > 2 && name[0] == '[')
-        return strcspn(name, "]") == size - 1;
-    return size > 0 && size < 200 && strspn(name, plain) >= size;
-}
-
-static Status host_add(Texts *hosts, const char *name, size_t size, Problem *problem) {
-    char text[201];
-    snprintf(text, sizeof text, "%.*s", (int)size, name);
-    for (size_t i = 0; i < hosts->count; i++)
-        if (strcmp(hosts->at[i], text) == 0)
-            return STATUS_OK;
-    return texts_append(hosts, text) == STATUS_OK
-               ? STATUS_OK
-               : problem_set(problem, STATUS_NO_MEMORY, "no memory for the names of hosts");
-}
-
-// "a.example.org, b.example.org"
-static Status hosts_add_list(Texts *hosts, const char *list, Problem *problem) {
-    Status status = STATUS_OK;
-    for (const char *at = list; *at != '\0';) {
-        const size_t size = strcspn(at, ","), from = strspn(at, " ");
-        if (from >= size || !is_host(at + from, size - from))
-            status = problem_add(problem, STATUS_USAGE, "--host",
-                                 "must be a name without port or http://, is \"%.*s\"",
-                                 (int)(size < 80 ? size : 80), at);
-        else
-            TRY(host_add(hosts, at + from, size - from, problem));
-        at += size;
-        at += *at == ',' ? 1 : 0;
-    }
-    return status;
+    const size_t size = strlen(name);
+    return name[0] == '[' ? size > 2 && strcspn(name, "]") == size - 1
+                          : size < 200 && strspn(name, plain) == size;
 }
 
 // As browsers send it: scheme and host in lower case, perhaps a port, nothing else.
@@ -165,53 +137,54 @@ static bool is_origin(const char *text) {
     return size > 0 && host[3 + size] == '\0';
 }
 
-// The origins of --allow-origin, each text a list; ends with NULL if there are any.
-static Status origins_set(const ServeSettings *settings, Texts *origins, Problem *problem) {
+// Adds each item of "a.example.org, b.example.org" once.
+static Status serve_add_list(Texts *texts, const char *list, bool (*is_valid)(const char *text),
+                             Problem *problem) {
     Status status = STATUS_OK;
-    for (size_t i = 0; i < settings->allow_origin.count; i++) {
-        const char *at = settings->allow_origin.at[i];
-        for (size_t size; *(at += strspn(at, ", ")) != '\0'; at += size) {
-            char text[256];
-            size = strcspn(at, ", ");
-            snprintf(text, sizeof text, "%.*s", (int)(size < 255 ? size : 255), at);
-            if (!is_origin(text))
-                status = problem_add(problem, STATUS_USAGE, "--allow-origin",
-                                     "must be as browsers send it, https://lab.example.org or "
-                                     "with a port, in lower case and without a path, is \"%.80s\"",
-                                     text);
-            else if (texts_append(origins, text) != STATUS_OK)
-                return problem_set(problem, STATUS_NO_MEMORY, "no memory for the origins");
-        }
+    for (size_t size; *(list += strspn(list, ", ")) != '\0'; list += size) {
+        char text[256];
+        size_t i = 0;
+        size = strcspn(list, ", ");
+        snprintf(text, sizeof text, "%.*s", (int)(size < 255 ? size : 255), list);
+        while (i < texts->count && strcmp(texts->at[i], text) != 0)
+            i++;
+        if (!is_valid(text))
+            status = problem_add(
+                problem, STATUS_USAGE, is_valid == is_host ? "--host" : "--allow-origin",
+                is_valid == is_host
+                    ? "must be a name without port or http://, is \"%.80s\""
+                    : "must be as browsers send it, https://lab.example.org or with a port, in "
+                      "lower case and without a path, is \"%.80s\"",
+                text);
+        else if (i == texts->count && texts_append(texts, text) != STATUS_OK)
+            return problem_set(problem, STATUS_NO_MEMORY, "no memory for names of hosts");
     }
-    return origins->count == 0 || list_append(origins, sizeof *origins->at) != NULL
-               ? status
-               : problem_set(problem, STATUS_NO_MEMORY, "no memory for the origins");
+    return status;
 }
 
-// The Host names that requests may have: those of loopback, of the address, of --host and of the
-// base URL.
+// The origins of --allow-origin, and the Host names that requests may have: those of loopback, of
+// the address, of --host and of the base URL. Both end with NULL.
 static Status hosts_set(const ServeSettings *settings, const Address *address, const BaseUrl *url,
-                        Texts *hosts, Problem *problem) {
+                        Texts *hosts, Texts *origins, Problem *problem) {
     Status status = STATUS_OK;
     char name[80];
-    if (address_is_any(address) || address_is_loopback(address))
+    const bool is_any = address_is_any(address), is_v6 = strchr(address->host, ':') != NULL;
+    snprintf(name, sizeof name, "%s%s%s", is_v6 ? "[" : "", address->host, is_v6 ? "]" : "");
+    if (is_any || address_is_loopback(address))
         for (size_t i = 0; loopback_hosts.names[i] != NULL; i++)
-            TRY(host_add(hosts, loopback_hosts.names[i], strlen(loopback_hosts.names[i]), problem));
-    if (!address_is_any(address)) {
-        const bool is_v6 = strchr(address->host, ':') != NULL;
-        snprintf(name, sizeof name, "%s%s%s", is_v6 ? "[" : "", address->host, is_v6 ? "]" : "");
-        TRY(host_add(hosts, name, strlen(name), problem));
-    }
-    for (size_t i = 0; i < settings->host.count; i++) {
-        const Status added = hosts_add_list(hosts, settings->host.at[i], problem);
-        status = added != STATUS_OK ? added : status;
-    }
-    if (url->host[0] != '\0')
-        TRY(host_add(hosts, url->host, strlen(url->host), problem));
-    // AcceptedHosts ends with NULL.
-    return list_append(hosts, sizeof *hosts->at) != NULL
+            TRY(serve_add_list(hosts, loopback_hosts.names[i], is_host, problem));
+    TRY(serve_add_list(hosts, is_any ? "" : name, is_host, problem));
+    for (size_t i = 0; i < settings->host.count; i++)
+        if (serve_add_list(hosts, settings->host.at[i], is_host, problem) != STATUS_OK)
+            status = problem->status;
+    for (size_t i = 0; i < settings->allow_origin.count; i++)
+        if (serve_add_list(origins, settings->allow_origin.at[i], is_origin, problem) != STATUS_OK)
+            status = problem->status;
+    TRY(serve_add_list(hosts, url->host, is_host, problem));
+    return list_append(hosts, sizeof *hosts->at) != NULL &&
+                   list_append(origins, sizeof *origins->at) != NULL
                ? status
-               : problem_set(problem, STATUS_NO_MEMORY, "no memory for the names of hosts");
+               : problem_set(problem, STATUS_NO_MEMORY, "no memory for names of hosts");
 }
 
 static Status pem_read(const char *option, const char *path, bool is_secret, Bytes *text,
@@ -374,8 +347,7 @@ static Status serve(const ServeSettings *settings, const sigset_t *signals, Prob
         if (settings->base_url != NULL)
             status = base_url_read(settings->base_url, &url, problem);
         const Status all[] = {status, serve_check(settings, problem),
-                              hosts_set(settings, &door.address, &url, &hosts, problem),
-                              origins_set(settings, &origins, problem),
+                              hosts_set(settings, &door.address, &url, &hosts, &origins, problem),
                               certificate_read(settings, problem)};
         status = status_first(all, COUNT(all));
     }
@@ -393,7 +365,7 @@ static Status serve(const ServeSettings *settings, const sigset_t *signals, Prob
         status = background_open(ASIDES, &app.background_tasks, problem);
     if (status == STATUS_OK) {
         accepted = (AcceptedHosts){(const char *const *)hosts.at, address_is_any(&door.address),
-                                   (const char *const *)origins.at};
+                                   origins.count > 1 ? (const char *const *)origins.at : NULL};
         base_path_set(url.path);
         text_fit(app.base_url, sizeof app.base_url, url.text);
         app.has_tls = tls_source() != NULL;
@@ -460,17 +432,16 @@ static int serve_run(const Command *self, void *of, const Options *options, Prob
 const Command command_serve = {
     .name = "serve",
     .summary = "run the server: jobs and results over HTTP",
-    .help =
-        "  impactd serve\n"
-        "  impactd serve --listen 127.0.0.1:0 --data /tmp/trial\n"
-        "  impactd serve --print-config\n"
-        "  impactd token create --name lab; impactd serve --listen 0.0.0.0:8443 --tls-cert c.pem "
-        "--tls-key k.pem\n"
-        "\n"
-        "Prints its URL and a curl command. SIGTERM or Ctrl-C ends it within 5 seconds; "
-        "unfinished\n"
-        "jobs continue at the next start. SIGHUP reloads the certificate and its key; if they are\n"
-        "faulty the present ones stay in use. GET / of the URL shows the API.\n",
+    .help = "  impactd serve\n"
+            "  impactd serve --listen 127.0.0.1:0 --data /tmp/trial\n"
+            "  impactd serve --print-config\n"
+            "  impactd token create --name lab; impactd serve --listen 0.0.0.0:8443 --tls-cert "
+            "c.pem --tls-key k.pem\n"
+            "\n"
+            "Prints its URL and a curl command. SIGTERM or Ctrl-C ends it within 5 seconds;\n"
+            "unfinished jobs continue at the next start. SIGHUP reloads the certificate and\n"
+            "its key; if they are faulty the present ones stay in use. GET / of the URL shows\n"
+            "the API.\n",
     .options = serve_fields,
     .groups = serve_groups,
     .size = sizeof(ServeSettings),

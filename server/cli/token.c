@@ -196,11 +196,10 @@ const Command command_token = {
             "  impactd token list\n"
             "  impactd token revoke lab\n"
             "\n"
-            "Works beside a running daemon, which follows within a second, and without one. From "
-            "the first token\n"
-            "on, also if it is revoked, every request needs one; once all are forgotten (forget "
-            "strikes a revoked\n"
-            "one from the list) loopback is open again.\n",
+            "Works beside a running daemon, which follows within a second, and without one.\n"
+            "From the first token on, also if it is revoked, every request needs one; once\n"
+            "all are forgotten (forget strikes a revoked one from the list) loopback is open\n"
+            "again.\n",
     .options = token_fields,
     .size = sizeof(TokenSettings),
     .run = token,

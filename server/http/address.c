@@ -114,16 +114,8 @@ void address_url(const Address *address, bool has_tls, char target[96]) {
              address->host, is_v6 ? "]" : "", (unsigned)address->port);
 }
 
-static const char name_characters[] =
-    "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-.";
-static Status base_url_error(const char *text, const char *why, Problem *problem) {
-    return problem_set(problem, STATUS_USAGE,
-                       "--base-url %s, is \"%.100s\"; write it as https://sim.example.org/impactd",
-                       why, text);
-}
-
 // The size of "host" or "[::1]" at the beginning of `text`; 0 if there is none.
-static size_t base_url_host_size(const char *text) {
+static size_t base_url_host_size(const char *text, const char *name_characters) {
     if (text[0] != '[')
         return strspn(text, name_characters);
     const size_t inner = strspn(text + 1, "0123456789abcdefABCDEF:.");
@@ -131,39 +123,40 @@ static size_t base_url_host_size(const char *text) {
 }
 
 Status base_url_read(const char *text, BaseUrl *url, Problem *problem) {
-    const size_t scheme = strncmp(text, "http://", 7) == 0    ? 7
-                          : strncmp(text, "https://", 8) == 0 ? 8
-                                                              : 0;
-    if (scheme == 0)
-        return base_url_error(text, "must begin with http:// or https://", problem);
-    const char *host = text + scheme;
-    const size_t size = base_url_host_size(host);
-    if (size == 0 || size >= sizeof url->host)
-        return base_url_error(text, "must name a host", problem);
-    const char *path = host + size;
-    if (*path == ':') {
-        const size_t size_of_port = strspn(path + 1, "0123456789");
-        const long port = size_of_port <= 5 ? strtol(path + 1, NULL, 10) : 0;
-        if (port < 1 || port > 65535)
-            return base_url_error(text, "must have a port from 1 to 65535, or none", problem);
-        path += 1 + size_of_port;
-    }
+    // Those of a path; the characters of a host are behind the first three.
+    static const char characters[] =
+        "/_~abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-.";
+    const char *why = NULL, *host = strstr(text, "://"), *path = "";
+    const bool has_scheme = strncmp(text, "http://", 7) == 0 || strncmp(text, "https://", 8) == 0;
+    host = host != NULL ? host + 3 : text;
+    const size_t size = base_url_host_size(host, characters + 3);
+    const size_t digits = host[size] == ':' ? strspn(host + size + 1, "0123456789") : 0;
+    const long port = digits <= 5 ? strtol(host + size + (digits > 0), NULL, 10) : 0;
+    path = host + size + (host[size] == ':' ? 1 + digits : 0);
     size_t path_size = strlen(path);
     while (path_size > 0 && path[path_size - 1] == '/')
         path_size--;
-    for (size_t i = 0; i < path_size; i++)
-        if (strchr(name_characters, path[i]) == NULL && strchr("/_~", path[i]) == NULL)
-            return base_url_error(text, "may hold letters, digits, - . _ ~ and / behind the host",
-                                  problem);
-    if (path_size > 0 &&
-        (path[0] != '/' || strstr(path, "//") != NULL || strstr(path, "/.") != NULL))
-        return base_url_error(text, "must have a plain path behind the host", problem);
-    if (path_size >= sizeof url->path || strlen(text) >= sizeof url->text)
-        return base_url_error(text, "is too long: 255 bytes at most, and 63 of its path", problem);
+    if (!has_scheme)
+        why = "must begin with http:// or https://";
+    else if (size == 0 || size >= sizeof url->host)
+        why = "must name a host";
+    else if (host[size] == ':' && (port < 1 || port > 65535))
+        why = "must have a port from 1 to 65535, or none";
+    else if (strspn(path, characters) < path_size)
+        why = "may hold letters, digits, - . _ ~ and / behind the host";
+    else if (path_size > 0 &&
+             (path[0] != '/' || strstr(path, "//") != NULL || strstr(path, "/.") != NULL))
+        why = "must have a plain path behind the host";
+    else if (path_size >= sizeof url->path || strlen(text) >= sizeof url->text)
+        why = "is too long: 255 bytes at most, and 63 of its path";
     // Requests may have the base path or not: it must not look like a path of the API.
-    if (strncmp(path, "/v1", 3) == 0 && (path_size == 3 || path[3] == '/'))
-        return base_url_error(text, "must not have a path that begins with /v1, which is ours",
-                              problem);
+    else if (strncmp(path, "/v1", 3) == 0 && (path_size == 3 || path[3] == '/'))
+        why = "must not have a path that begins with /v1, which is ours";
+    if (why != NULL)
+        return problem_set(problem, STATUS_USAGE,
+                           "--base-url %s, is \"%.100s\"; write it as "
+                           "https://sim.example.org/impactd",
+                           why, text);
     snprintf(url->text, sizeof url->text, "%.*s", (int)(path + path_size - text), text);
     snprintf(url->host, sizeof url->host, "%.*s", (int)size, host);
     snprintf(url->path, sizeof url->path, "%.*s", (int)path_size, path);
