@@ -203,36 +203,12 @@ static struct MHD_Response *response_new(Exchange *exchange, Reply *reply) {
     return response;
 }
 
-// The same for a small reply from the cache; the response stays the loop's.
-static struct MHD_Response *response_shared(Exchange *exchange, Reply *reply) {
-    const size_t place = (uintptr_t)reply->shared / 64 % SHARED_RESPONSES;
-    SharedResponse *one = &exchange->loop->shared_responses[place];
-    if (one->shared == reply->shared) {
-        // The response has its own reference to the shared body.
-        reply->release(reply->context);
-        MHD_del_response_header(one->response, "X-Request-Id",
-                                MHD_get_response_header(one->response, "X-Request-Id"));
-        return one->response;
-    }
-    struct MHD_Response *response = response_new(exchange, reply);
-    if (response == NULL)
-        return NULL;
-    if (one->response != NULL)
-        MHD_destroy_response(one->response);
-    *one = (SharedResponse){reply->shared, response};
-    return response;
-}
-
 // Takes what `reply` owns.
 static enum MHD_Result response_queue(Exchange *exchange, Reply *reply, bool closes) {
-    enum { SMALL = 64 * 1024 };
     const Request *request = &exchange->request;
     const int code = reply->code;
     closes = closes || timer_wheel_is_closing(exchange->loop->wheel);
-    const bool is_shared = reply->shared != NULL && request->allow_origin == NULL && code == 200 &&
-                           reply->body_size <= SMALL && !closes;
-    struct MHD_Response *response =
-        is_shared ? response_shared(exchange, reply) : response_new(exchange, reply);
+    struct MHD_Response *response = response_new(exchange, reply);
     if (response == NULL)
         return MHD_NO;
     response_add(response, "X-Request-Id", request->id);
@@ -241,8 +217,7 @@ static enum MHD_Result response_queue(Exchange *exchange, Reply *reply, bool clo
         response_add(response, MHD_HTTP_HEADER_CONNECTION, "close");
     const enum MHD_Result result =
         MHD_queue_response(exchange->connection, (unsigned)code, response);
-    if (!is_shared)
-        MHD_destroy_response(response);
+    MHD_destroy_response(response);
     return result;
 }
 
@@ -507,12 +482,6 @@ void connection_notify(void *context, struct MHD_Connection *connection, void **
         timer_leave(*timer);
     *timer = NULL;
     atomic_fetch_sub(&loop->connections, 1);
-}
-
-void connection_clear_kept(EventLoop *loop) {
-    for (size_t i = 0; i < SHARED_RESPONSES; i++)
-        if (loop->shared_responses[i].response != NULL)
-            MHD_destroy_response(loop->shared_responses[i].response);
 }
 
 // The request line is complete; `target` is as sent.

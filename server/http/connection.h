@@ -73,15 +73,6 @@ typedef struct ServerShared {
     atomic_size_t body_bytes; // of bodies in memory
 } ServerShared;
 
-enum { SHARED_RESPONSES = 64 };
-
-// A small cached reply, made into a response once for each loop: making one costs as much as
-// sending it.
-typedef struct SharedResponse {
-    const void *shared; // the Reply's
-    struct MHD_Response *response;
-} SharedResponse;
-
 // Belongs to its thread, except the atomic members and the wheel's waits.
 typedef struct EventLoop {
     ServerShared *shared;
@@ -97,7 +88,6 @@ typedef struct EventLoop {
     int64_t accept_ns; // not before
     atomic_bool is_stopping;
     atomic_size_t connections;
-    SharedResponse shared_responses[SHARED_RESPONSES];
 } EventLoop;
 
 extern const TimerCallbacks connection_timer_calls;
@@ -118,7 +108,5 @@ void exchange_close(void *loop, struct MHD_Connection *connection, void **exchan
 // Shuts down connections on which the library waits for ever; see connection.c. Cheap if called
 // more often than needed.
 void connection_close_stalled(EventLoop *loop, int64_t now_ns);
-// Frees what the loop keeps for later requests.
-void connection_clear_kept(EventLoop *loop);
 
 #endif

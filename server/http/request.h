@@ -178,8 +178,7 @@ struct Reply {
     bool is_replayed;             // an earlier request's answer, under the same Idempotency-Key
     int retry_after;              // seconds, -1 for none
     const char *content_encoding; // "gzip", or NULL
-    const void *shared; // not NULL: a whole answer out of the cache, the same for all who get it
-    bool is_immutable;  // the same target gets it for ever
+    bool is_immutable;            // the same target gets it for ever
     bool accepts_ranges;
     bool is_preflight; // of CORS: `allow` has the methods
     bool varies_by_encoding;

@@ -44,7 +44,6 @@ static void cached_response_lend(CachedResponse *entry, Reply *reply) {
     *reply = entry->reply;
     reply->release = cached_response_unref;
     reply->context = entry;
-    reply->shared = entry;
 }
 
 static void cached_response_key(char *key, const char *target, size_t size, bool is_packed) {

@@ -199,7 +199,7 @@ static void loop_stop(EventLoop *loop) {
 
 static void loop_close(EventLoop *loop) {
     MHD_stop_daemon(loop->daemon);
-    connection_clear_kept(loop);
+
     close(loop->wakeup);
     loop->wakeup = -1;
 }
