@@ -14,23 +14,16 @@
 // Text as source of man(7), in which a backslash, and a point or quote at the start of a line, are
 // special.
 static void escaped(FILE *file, const char *text, bool is_line_start) {
-    if (is_line_start && (*text == '.' || *text == '\''))
-        fputs("\\&", file);
+    static const char special[] = "\\-'^~";
+    static const char *const escapes[] = {"\\e", "\\-", "\\(aq", "\\(ha", "\\(ti"};
     for (const char *c = text; *c != '\0'; c++) {
-        if (*c == '\\')
-            fputs("\\e", file);
-        else if (*c == '-')
-            fputs("\\-", file);
-        else if (*c == '\'')
-            fputs("\\(aq", file);
-        else if (*c == '^')
-            fputs("\\(ha", file);
-        else if (*c == '~')
-            fputs("\\(ti", file);
+        const char *found = strchr(special, *c);
+        if ((*c == '.' || *c == '\'') && (c > text ? c[-1] == '\n' : is_line_start))
+            fputs("\\&", file);
+        if (found != NULL)
+            fputs(escapes[found - special], file);
         else
             fputc(*c, file);
-        if (*c == '\n' && (c[1] == '.' || c[1] == '\''))
-            fputs("\\&", file);
     }
 }
 
@@ -78,21 +71,17 @@ static void option_print(FILE *file, const Field *fields, const Field *row) {
 // The lines before the first empty one are examples, the others are text.
 static void help_print(FILE *file, const char *help) {
     fputs(".PP\n.EX\n", file);
-    char line[512];
     bool is_example = true;
-    for (const char *at = help; *at != '\0';) {
-        const size_t length = strcspn(at, "\n");
-        snprintf(line, sizeof line, "%.*s", (int)length, at);
-        at += length + (at[length] != '\0');
-        if (length == 0) {
-            if (is_example)
-                fputs(".EE\n", file);
-            fputs(*at != '\0' ? ".PP\n" : "", file);
+    for (; *help != '\0'; help += strcspn(help, "\n") + 1) {
+        char line[512];
+        snprintf(line, sizeof line, "%.*s", (int)strcspn(help, "\n"), help);
+        if (line[0] == '\0') {
+            fputs(is_example ? ".EE\n.PP\n" : ".PP\n", file);
             is_example = false;
-            continue;
+        } else {
+            escaped(file, line, true);
+            fputc('\n', file);
         }
-        escaped(file, line, true);
-        fputc('\n', file);
     }
     if (is_example)
         fputs(".EE\n", file);
@@ -275,19 +264,55 @@ static void names_print(FILE *file) {
         fprintf(file, "%s%s", i > 0 ? " " : "", commands[i]->name);
 }
 
-static void choices_print(FILE *file, const Field *row) {
-    for (size_t i = 0; row->choices[i] != NULL; i++)
-        fprintf(file, "%s%s", i > 0 ? " " : "", row->choices[i]);
-}
-
-// A case "run:--output | run:-o" of a row. Returns the number of cases so far.
-static size_t cases_print(FILE *file, const Command *command, const Field *row, size_t before) {
+// A pattern "run:--output | run:-o" of a row, after others if there are any.
+static void pattern_print(FILE *file, const Command *command, const Field *row, bool is_first) {
     char name[OPTION_NAME];
     const char letter = option_spell(command->options, row, name);
-    fprintf(file, "%s%s:%s", before > 0 ? " | " : "", command->name, name);
+    fprintf(file, "%s%s:%s", is_first ? "    " : " | ", command->name, name);
     if (letter != '\0')
         fprintf(file, " | %s:-%c", command->name, letter);
-    return before + 1;
+}
+
+// What may follow an option: one of its choices, or something that is not known here.
+static void completion_values(FILE *file, const Command *command) {
+    bool is_first = true;
+    for (const Field *row = command->options; row != NULL && row->kind != FIELD_KIND_END; row++)
+        if (row->kind == FIELD_KIND_CHOICE) {
+            pattern_print(file, command, row, true);
+            fputs(") mapfile -t COMPREPLY < <(compgen -W '", file);
+            for (size_t i = 0; row->choices[i] != NULL; i++)
+                fprintf(file, "%s%s", i > 0 ? " " : "", row->choices[i]);
+            fputs("' -- \"$cur\") && return ;;\n", file);
+        }
+    for (const Field *row = command->options; row != NULL && row->kind != FIELD_KIND_END; row++)
+        if (row->kind != FIELD_KIND_CHOICE && row->kind != FIELD_KIND_FLAG) {
+            pattern_print(file, command, row, is_first);
+            is_first = false;
+        }
+    fputs(is_first ? "" : ") return ;;\n", file);
+}
+
+// The options and the operands of a command.
+static void completion_words(FILE *file, const Command *command) {
+    static const char words[] = "mapfile -t COMPREPLY < <(compgen -W '";
+    char name[OPTION_NAME], actions[ACTIONS_SIZE];
+    fprintf(file, "    %s:-*) %s--help", command->name, words);
+    for (const Field *row = command->options; row != NULL && row->kind != FIELD_KIND_END; row++) {
+        (void)option_spell(command->options, row, name);
+        fprintf(file, " %s", name);
+    }
+    fputs("' -- \"$cur\") ;;\n", file);
+    if (has_operand(command, "COMMAND")) {
+        fprintf(file, "    %s:*) %s", command->name, words);
+        names_print(file);
+    } else if (has_operand(command, "WHAT")) {
+        fprintf(file, "    %s:*) [ \"$COMP_CWORD\" -lt 3 ] || %s%s", command->name, words, parts);
+    } else if (actions_of(command, actions)) {
+        fprintf(file, "    %s:*) [ \"$COMP_CWORD\" -ne 2 ] || %s%s", command->name, words, actions);
+    } else {
+        return;
+    }
+    fputs("' -- \"$cur\") ;;\n", file);
 }
 
 static void completion_bash(FILE *file) {
@@ -305,51 +330,10 @@ static void completion_bash(FILE *file) {
           "    case ${COMP_WORDS[1]}:$prev in\n",
           file);
     for (size_t i = 0; commands[i] != NULL; i++)
-        for (const Field *row = commands[i]->options; row != NULL && row->kind != FIELD_KIND_END;
-             row++)
-            if (row->kind == FIELD_KIND_CHOICE) {
-                fputs("    ", file);
-                (void)cases_print(file, commands[i], row, 0);
-                fputs(") mapfile -t COMPREPLY < <(compgen -W '", file);
-                choices_print(file, row);
-                fputs("' -- \"$cur\") && return ;;\n", file);
-            }
-    for (size_t i = 0; commands[i] != NULL; i++) {
-        size_t count = 0;
-        for (const Field *row = commands[i]->options; row != NULL && row->kind != FIELD_KIND_END;
-             row++)
-            if (row->kind != FIELD_KIND_CHOICE && row->kind != FIELD_KIND_FLAG) {
-                fputs(count == 0 ? "    " : "", file);
-                count = cases_print(file, commands[i], row, count);
-            }
-        fputs(count > 0 ? ") return ;;\n" : "", file);
-    }
+        completion_values(file, commands[i]);
     fputs("    esac\n    case ${COMP_WORDS[1]}:$cur in\n", file);
-    for (size_t i = 0; commands[i] != NULL; i++) {
-        char name[OPTION_NAME], actions[ACTIONS_SIZE];
-        fprintf(file, "    %s:-*) mapfile -t COMPREPLY < <(compgen -W '--help", commands[i]->name);
-        for (const Field *row = commands[i]->options; row != NULL && row->kind != FIELD_KIND_END;
-             row++) {
-            (void)option_spell(commands[i]->options, row, name);
-            fprintf(file, " %s", name);
-        }
-        fputs("' -- \"$cur\") ;;\n", file);
-        if (has_operand(commands[i], "COMMAND")) {
-            fprintf(file, "    %s:*) mapfile -t COMPREPLY < <(compgen -W '", commands[i]->name);
-            names_print(file);
-            fputs("' -- \"$cur\") ;;\n", file);
-        } else if (has_operand(commands[i], "WHAT")) {
-            fprintf(file,
-                    "    %s:*) [ \"$COMP_CWORD\" -lt 3 ] || mapfile -t COMPREPLY < <(compgen -W "
-                    "'%s' -- \"$cur\") ;;\n",
-                    commands[i]->name, parts);
-        } else if (actions_of(commands[i], actions)) {
-            fprintf(file,
-                    "    %s:*) [ \"$COMP_CWORD\" -ne 2 ] || mapfile -t COMPREPLY < <(compgen -W "
-                    "'%s' -- \"$cur\") ;;\n",
-                    commands[i]->name, actions);
-        }
-    }
+    for (size_t i = 0; commands[i] != NULL; i++)
+        completion_words(file, commands[i]);
     fputs("    esac\n"
           "}\n"
           "complete -o default -F _impactd impactd\n",
