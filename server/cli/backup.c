@@ -79,12 +79,11 @@ static int backup_run_copy(const Command *self, BackupSettings *settings, const 
         printf("%s: %" PRIu64 " bytes, checked; %" PRIu64 " jobs, %" PRIu64 " results, %" PRIu64
                " materials\n",
                path, made.bytes, made.jobs, made.results, made.materials);
-    else if (status == STATUS_CANCELLED)
-        fprintf(stderr, "impactd %s: interrupted; nothing is left of it\n", self->name);
-    else
-        fprintf(stderr, "impactd %s: %s\n", self->name,
-                problem->detail[0] != '\0' ? problem->detail : status_title(status));
-    return command_exit(status);
+    if (status == STATUS_CANCELLED) {
+        problem_clear(problem);
+        (void)problem_set(problem, status, "interrupted; nothing is left of it");
+    }
+    return command_end(self, status, problem);
 }
 
 static int backup(const Command *self, void *of, const Options *options, Problem *problem) {

@@ -50,6 +50,9 @@ int command_main(int argc, char *const *argv);
 // COMMAND_USAGE.
 int command_error(const char *name, const Problem *problem);
 
+// The end of a command: prints the reason of a failure on stderr; returns the exit code.
+int command_end(const Command *self, Status status, const Problem *problem);
+
 // The index of the action that the first operand names. `names` points to the name of the first
 // action; those of the others follow at `stride` bytes, NULL after the last. STATUS_USAGE lists
 // them.

@@ -133,29 +133,33 @@ int command_error(const char *name, const Problem *problem) {
 }
 
 int command_exit(Status status) {
-    switch (status) {
-    case STATUS_OK:
-        return COMMAND_OK;
-    case STATUS_UNREADABLE:
-    case STATUS_INVALID:
-    case STATUS_TOO_LARGE:
-        return COMMAND_BAD_SCENE;
-    case STATUS_USAGE:
-        return COMMAND_USAGE;
-    case STATUS_NOT_FOUND:
-        return COMMAND_NOT_FOUND;
-    case STATUS_UNAUTHORIZED:
-    case STATUS_FORBIDDEN:
-        return COMMAND_NOT_ALLOWED;
-    case STATUS_UNREACHABLE:
-        return COMMAND_UNREACHABLE;
-    case STATUS_TIMEOUT:
-        return COMMAND_TIMED_OUT;
-    case STATUS_CANCELLED:
-        return COMMAND_INTERRUPTED;
-    default:
-        return COMMAND_FAILED;
-    }
+    static const struct {
+        Status status;
+        CommandExit code;
+    } rows[] = {{STATUS_OK, COMMAND_OK},
+                {STATUS_UNREADABLE, COMMAND_BAD_SCENE},
+                {STATUS_INVALID, COMMAND_BAD_SCENE},
+                {STATUS_TOO_LARGE, COMMAND_BAD_SCENE},
+                {STATUS_USAGE, COMMAND_USAGE},
+                {STATUS_NOT_FOUND, COMMAND_NOT_FOUND},
+                {STATUS_UNAUTHORIZED, COMMAND_NOT_ALLOWED},
+                {STATUS_FORBIDDEN, COMMAND_NOT_ALLOWED},
+                {STATUS_UNREACHABLE, COMMAND_UNREACHABLE},
+                {STATUS_TIMEOUT, COMMAND_TIMED_OUT},
+                {STATUS_CANCELLED, COMMAND_INTERRUPTED}};
+    for (size_t i = 0; i < COUNT(rows); i++)
+        if (rows[i].status == status)
+            return (int)rows[i].code;
+    return COMMAND_FAILED;
+}
+
+int command_end(const Command *self, Status status, const Problem *problem) {
+    if (status == STATUS_USAGE)
+        return command_error(self->name, problem);
+    if (status != STATUS_OK)
+        fprintf(stderr, "impactd %s: %s\n", self->name,
+                problem->detail[0] != '\0' ? problem->detail : status_title(status));
+    return command_exit(status);
 }
 
 Status command_action(const Options *options, const char *const *names, size_t stride,

@@ -420,13 +420,7 @@ static int serve_run(const Command *self, void *of, const Options *options, Prob
         signals_block(&signals);
         status = serve(settings, &signals, problem);
     }
-    if (status == STATUS_OK)
-        return COMMAND_OK;
-    if (problem->status == STATUS_USAGE)
-        return command_error(self->name, problem);
-    fprintf(stderr, "impactd serve: %s\n",
-            problem->detail[0] != '\0' ? problem->detail : status_title(status));
-    return command_exit(status);
+    return command_end(self, problem->status == STATUS_USAGE ? STATUS_USAGE : status, problem);
 }
 
 const Command command_serve = {

@@ -135,41 +135,32 @@ static const struct Action {
     {"forget", true, token_forget}, {NULL, false, NULL},
 };
 
-static Status token_read_name(const TokenSettings *settings, const Options *options, bool is_needed,
-                              TokenRow *row, Problem *problem) {
+static Status token_act(TokenSettings *settings, const Options *options, Problem *problem) {
     static const char allowed[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
                                   "0123456789._-";
-    const char *name = settings->name;
-    if (options->operand_count > 1 && name == NULL && is_needed)
-        name = options->operands[1];
-    else if (options->operand_count > 1)
+    size_t index;
+    TokenRow row = {0};
+    Db *db = NULL;
+    TRY(command_action(options, &actions->name, sizeof *actions, &index, problem));
+    const struct Action *action = &actions[index];
+    const bool is_operand = action->needs_name && settings->name == NULL;
+    const size_t max = is_operand ? 2 : 1;
+    if (options->operand_count > max)
         return problem_set(problem, STATUS_USAGE, "\"%.60s\" is one operand too many",
-                           options->operands[1]);
-    if (name == NULL && !is_needed)
-        return STATUS_OK;
-    if (name == NULL)
+                           options->operands[max]);
+    const char *name = !is_operand                  ? settings->name
+                       : options->operand_count > 1 ? options->operands[1]
+                                                    : NULL;
+    const size_t size = name != NULL ? strlen(name) : 0;
+    if (name == NULL && action->needs_name)
         return problem_set(problem, STATUS_USAGE, "which token? Say --name NAME");
-    const size_t size = strlen(name);
-    if (size == 0 || size >= sizeof row->name || strspn(name, allowed) != size)
+    if (name != NULL && (size == 0 || size >= sizeof row.name || strspn(name, allowed) != size))
         return problem_set(problem, STATUS_USAGE,
                            "a token's name must be 1 to 64 letters, digits, dots, underscores and "
                            "dashes, is \"%.80s\"",
                            name);
-    snprintf(row->name, sizeof row->name, "%s", name);
-    return STATUS_OK;
-}
-
-static Status token_act(TokenSettings *settings, const Options *options, Problem *problem) {
-    size_t index;
-    TokenRow row = {0};
-    TRY(command_action(options, &actions->name, sizeof *actions, &index, problem));
-    const struct Action *action = &actions[index];
-    if (options->operand_count > 2)
-        return problem_set(problem, STATUS_USAGE, "\"%.60s\" is one operand too many",
-                           options->operands[2]);
-    TRY(token_read_name(settings, options, action->needs_name, &row, problem));
+    text_fit(row.name, sizeof row.name, name != NULL ? name : "");
     TRY(command_data_folder(&settings->data, problem));
-    Db *db = NULL;
     TRY(db_open_beside(settings->data, &db, problem));
     const Status status = action->act(db, settings, &row, problem);
     db_close(db);
@@ -177,14 +168,7 @@ static Status token_act(TokenSettings *settings, const Options *options, Problem
 }
 
 static int token(const Command *self, void *settings, const Options *options, Problem *problem) {
-    const Status status = token_act(settings, options, problem);
-    if (status == STATUS_OK)
-        return COMMAND_OK;
-    if (status == STATUS_USAGE)
-        return command_error(self->name, problem);
-    fprintf(stderr, "impactd token: %s\n",
-            problem->detail[0] != '\0' ? problem->detail : status_title(status));
-    return command_exit(status);
+    return command_end(self, token_act(settings, options, problem), problem);
 }
 
 const Command command_token = {
