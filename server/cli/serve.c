@@ -420,7 +420,10 @@ static int serve_run(const Command *self, void *of, const Options *options, Prob
         signals_block(&signals);
         status = serve(settings, &signals, problem);
     }
-    return command_end(self, problem->status == STATUS_USAGE ? STATUS_USAGE : status, problem);
+    // Of several faults the last one may have another status.
+    if (status != STATUS_OK && problem->status == STATUS_USAGE)
+        status = STATUS_USAGE;
+    return command_end(self, status, problem);
 }
 
 const Command command_serve = {
