@@ -107,19 +107,17 @@ static void commit_enqueue(Task *task) {
 }
 
 // With the lock held, of a task that has run: writes the end of its jobs. Where none is left it has
-// ended, and is returned to be freed without the lock.
-static Task *commit_continue(Task *task) {
+// ended, and is freed.
+static void commit_continue(Task *task) {
     JobManager *manager = task->manager;
     const RunResult *run = &task->run_result;
     if (task->committing != NULL || task->is_waiting)
-        return NULL;
+        return;
     commit_collect(task);
-    if (task->committing != NULL) {
+    if (task->committing != NULL)
         commit_enqueue(task);
-        return NULL;
-    }
-    if (task->jobs != NULL)
-        return NULL; // when their insertion is done
+    if (task->committing != NULL || task->jobs != NULL)
+        return; // when these are written, or the others inserted
     if (task->result_waiters.count > 0 && run->status != STATUS_OK) {
         Failure *failure = &manager->failures[manager->next_failure++ % OUTCOME_FAILURES];
         text_fit(failure->result, sizeof failure->result, task->result);
@@ -133,7 +131,7 @@ static Task *commit_continue(Task *task) {
     }
     manager->saving--;
     manager->saving_bytes -= task->saving_bytes;
-    return task;
+    task_free(task);
 }
 
 // With the lock held: one of the jobs whose end was written, or could not be.
@@ -199,7 +197,7 @@ static void commit_fail(Task *task, Status status, const char *detail) {
 }
 
 static void commit_done(void *context, Status status, const char *detail) {
-    Task *task = context, *ended = NULL;
+    Task *task = context;
     JobManager *manager = task->manager;
     RunResult *run = &task->run_result;
     commit_log(task, status, detail);
@@ -218,7 +216,7 @@ static void commit_done(void *context, Status status, const char *detail) {
             commit_end_job(task, job, status, detail);
         }
         if (status == STATUS_OK || task->jobs == NULL) {
-            ended = commit_continue(task);
+            commit_continue(task);
         } else if (!manager->is_closing) {
             task->is_waiting = true;
             task->next = manager->retry_commits;
@@ -227,7 +225,6 @@ static void commit_done(void *context, Status status, const char *detail) {
     }
     jobs_end_write(manager);
     pthread_mutex_unlock(&manager->lock);
-    task_free(ended);
 }
 
 // Of memory, about.
@@ -261,9 +258,8 @@ void task_finish(JobManager *manager, Task *task, RunResult *run_result) {
     task->is_saving = true;
     if (is_cached)
         cache_put(manager, task->result, outcome, NULL);
-    Task *ended = commit_continue(task);
+    commit_continue(task);
     pthread_mutex_unlock(&manager->lock);
-    task_free(ended);
     if (outcome != NULL)
         jobs_keep_series(manager, result, outcome, seconds);
     outcome_unref(outcome);
@@ -314,8 +310,8 @@ static void insert_begin(Job *job) {
         job->written.state = JOB_ACCEPTED; // the database knows no running jobs
 }
 
-// With the lock held. Returns its task where that has ended, to be freed without the lock.
-static Task *insert_end(Job *job, Status status, const char *detail) {
+// With the lock held.
+static void insert_end(Job *job, Status status, const char *detail) {
     Task *task = job->task != NULL && job->task->is_saving ? job->task : NULL;
     job->is_inserting = false;
     job->is_durable = status == STATUS_OK;
@@ -331,17 +327,17 @@ static Task *insert_end(Job *job, Status status, const char *detail) {
     } else {
         subscribers_call(&job->subscribers);
     }
-    return task != NULL ? commit_continue(task) : NULL;
+    if (task != NULL)
+        commit_continue(task);
 }
 
 static void insert_done(void *context, Status status, const char *detail) {
     Job *job = context;
     JobManager *manager = job->manager;
     pthread_mutex_lock(&manager->lock);
-    Task *ended = insert_end(job, status, detail);
+    insert_end(job, status, detail);
     jobs_end_write(manager);
     pthread_mutex_unlock(&manager->lock);
-    task_free(ended);
     job_unref(job);
 }
 
@@ -359,7 +355,7 @@ Status job_insert_now(Job *job, Problem *problem) {
     pthread_mutex_unlock(&manager->lock);
     const Status status = db_job_add(manager->db, &job->written, problem);
     pthread_mutex_lock(&manager->lock);
-    task_free(insert_end(job, status, status != STATUS_OK ? problem->detail : ""));
+    insert_end(job, status, status != STATUS_OK ? problem->detail : "");
     pthread_mutex_unlock(&manager->lock);
     return status;
 }
@@ -406,7 +402,6 @@ static Status cancel_live(Job *job, Problem *problem) {
 
 Status jobs_cancel(JobManager *manager, const char *id, Job **cancelled, Problem *problem) {
     Job *job;
-    Task *ended = NULL;
     *cancelled = NULL;
     TRY(jobs_find(manager, id, &job, problem));
     Status status;
@@ -417,9 +412,8 @@ Status jobs_cancel(JobManager *manager, const char *id, Job **cancelled, Problem
         Task *task = job->task != NULL && job->task->is_saving ? job->task : NULL;
         status = cancel_live(job, problem);
         if (status == STATUS_OK && task != NULL)
-            ended = commit_continue(task);
+            commit_continue(task);
         pthread_mutex_unlock(&manager->lock);
-        task_free(ended);
     }
     if (status == STATUS_OK)
         *cancelled = job;
@@ -437,7 +431,7 @@ void commit_retry(JobManager *manager) {
     for (; task != NULL; task = next) {
         next = task->next;
         task->is_waiting = false;
-        task_free(commit_continue(task));
+        commit_continue(task);
     }
     for (; job != NULL; job = after) {
         after = job->next_retry;
