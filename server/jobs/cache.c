@@ -32,6 +32,14 @@ ResultSummary *result_summary_new(const ResultRow *row) {
     return summary;
 }
 
+Status result_summary_load(Db *db, const char *result, ResultSummary **summary) {
+    ResultRow row = {0};
+    const Status status = db_result_head(db, result, &row, NULL);
+    *summary = status == STATUS_OK ? result_summary_new(&row) : NULL;
+    result_row_clear(&row);
+    return status;
+}
+
 ResultSummary *result_summary_ref(ResultSummary *summary) {
     if (summary != NULL)
         atomic_fetch_add(&summary->refcount, 1);

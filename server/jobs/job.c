@@ -292,11 +292,8 @@ Status jobs_find(JobManager *manager, const char *id, Job **found, Problem *prob
         job_unref(job);
         return status;
     }
-    ResultRow result = {0};
-    if (job->row.state == JOB_SUCCESSFUL &&
-        db_result_head(manager->db, job->row.result, &result, NULL) == STATUS_OK)
-        job->summary = result_summary_new(&result);
-    result_row_clear(&result);
+    if (job->row.state == JOB_SUCCESSFUL)
+        (void)result_summary_load(manager->db, job->row.result, &job->summary);
     *found = job;
     return STATUS_OK;
 }

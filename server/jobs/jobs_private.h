@@ -21,6 +21,8 @@ typedef struct ResultSummary {
 } ResultSummary;
 // Copies them out of `row`. One reference; NULL without memory.
 ResultSummary *result_summary_new(const ResultRow *row);
+// Of a stored result; NULL also without memory. STATUS_NOT_FOUND.
+Status result_summary_load(Db *db, const char *result, ResultSummary **summary);
 ResultSummary *result_summary_ref(ResultSummary *summary); // NULL is accepted here and below
 void result_summary_unref(ResultSummary *summary);
 

@@ -200,11 +200,7 @@ static Status submit_find_result(JobManager *manager, Job *job, Problem *problem
         return STATUS_OK;
     if (is_computed)
         return STATUS_NOT_FOUND;
-    ResultRow row = {0};
-    const Status status = db_result_head(manager->db, job->row.result, &row, NULL);
-    if (status == STATUS_OK)
-        job->summary = result_summary_new(&row);
-    result_row_clear(&row);
+    const Status status = result_summary_load(manager->db, job->row.result, &job->summary);
     pthread_mutex_lock(&manager->lock);
     manager->rows.hits += status == STATUS_OK;
     manager->rows.misses += status == STATUS_NOT_FOUND;
