@@ -6,7 +6,7 @@
 //                                  +-- jobs that joined meanwhile ----+
 //
 // A job is finished when the database has its last state, and a result is cached when the database
-// has it. What cannot be written for want of room waits in memory and is tried again by
+// has it. What cannot be written for want of space waits in memory and is retried by
 // jobs_retry_writes. Nothing is allocated on the way, so that no lack of memory loses a job. What
 // is on the way is bounded: workers wait.
 #include <stdlib.h>

@@ -471,7 +471,7 @@ void job_detach(Job *job) {
     job_unref(job);
     if (task->jobs != NULL || task->result_waiters.count > 0 || task->is_saving)
         return;
-    // No one wants it any more. The next job of the same scene starts anew.
+    // It has neither jobs nor readers. The next job of the same scene starts anew.
     hashmap_remove(manager->tasks, &task->indexed);
     if (!task->is_running) {
         queue_remove(manager->queue, &task->queued);

@@ -25,7 +25,7 @@ typedef struct JobManagerSettings {
     uint64_t memory_bytes; // that running jobs may be predicted to take together, for which they
                            // wait; 0: any
     SimulationLimits limits;
-    // A thread deletes what exceeds `keep`, and tries again to write what there was no room for.
+    // A thread deletes what exceeds `keep`, and retries writes that failed for want of space.
     bool has_maintenance;
     KeepRules keep;
 } JobManagerSettings;

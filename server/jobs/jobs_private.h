@@ -141,7 +141,7 @@ struct JobManager {
     Db *db;
     JobManagerSettings settings;
     pthread_mutex_t lock;
-    pthread_cond_t work;       // for a worker, or room for its result
+    pthread_cond_t work;       // for a worker, or space for its result
     pthread_cond_t spare_work; // for the spare worker alone
     pthread_cond_t settled;    // no write is under way
     pthread_cond_t stopping;   // is_closing was set
@@ -237,7 +237,7 @@ Status request_load_records(Db *db, StudyRequest *request, Problem *problem);
 Status jobs_prepare_stored(Db *db, const char *scene, const char *result, StudyRequest *request,
                            bool *is_same, Problem *problem);
 
-// manager.c. Tries again to write what there was no room for.
+// manager.c. Retries writes that failed for want of space.
 void jobs_retry_writes(JobManager *manager);
 
 // outcome_blob.c. Binary form of an Outcome for the database: spectra, impacts, energies and

@@ -48,7 +48,7 @@ static bool maintenance_wait(JobManager *manager, int64_t until_ns) {
     return continues;
 }
 
-// Every second it tries again to write what there was no room for. Every few seconds it deletes
+// Every second it retries writes that failed for want of space. Every few seconds it deletes
 // what exceeds the rules of retention: in small steps, with a pause between them in which others
 // write. What cannot be deleted now is tried again the next time.
 static void *maintenance_main(void *context) {

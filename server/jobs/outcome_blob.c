@@ -12,7 +12,7 @@
 
 #include "server/jobs/jobs_private.h"
 
-// `layout` and the two sizes tell apart blobs of a program with other rows.
+// `layout` and the two sizes distinguish blobs of a program with other rows.
 typedef struct BlobHead {
     char layout[4];
     uint16_t energy_bytes, impact_bytes;

@@ -43,7 +43,7 @@ Status study_engine_fold(StudyEngine *engine, size_t member, StudyPart *part, Pr
 typedef struct SweepChunk {
     struct SweepChunk *next;
     size_t count, done; // rows
-    bool is_loaded;     // there is room for the rows
+    bool is_loaded;     // its rows are allocated
     bool is_retry;      // rows that failed are made again, the others are there
     bool is_saved;
     SweepChunkRow row;

@@ -376,7 +376,7 @@ static Status submit_fill(const Entry *entry, const Warnings *warnings, Problem 
     const Simulation *simulation = &request->simulation;
     const Texts *labels = &simulation->labels;
     const bool has_key = entry->key[0] != '\0';
-    Bytes scene = {0}, told = {0}, uses = {0}, shown = {0}, words = {0};
+    Bytes scene = {0}, warned = {0}, uses = {0}, shown = {0}, words = {0};
     TRY(submit_write_words(&words, simulation->title, labels, problem));
     if (!job_id_make(row->id))
         return problem_set(problem, STATUS_INTERNAL, "no random numbers for a job's id");
@@ -384,12 +384,12 @@ static Status submit_fill(const Entry *entry, const Warnings *warnings, Problem 
     row->created_unix_ms = clock_unix_ms();
     jobs_result_id(request, row->result);
     document_scene(&scene, request);
-    document_warnings(&told, warnings);
+    document_warnings(&warned, warnings);
     references_write(&uses, request, false);
     submit_write_labels(&shown, labels);
     const Status all[] = {
         submit_take(&scene, &row->scene),
-        submit_take(&told, &row->warnings),
+        submit_take(&warned, &row->warnings),
         submit_take(&uses, &row->uses),
         submit_take(&shown, &row->labels),
         submit_take(&words, &row->words),
