@@ -216,57 +216,6 @@ TEST_IN(a_name_alone_is_the_approved_head_and_never_a_deprecated_one, set_up, te
     expect_fault("/dampers/0/buffer", "has no such revision; its newest revision is foam@2");
 }
 
-TEST_IN(a_rig_that_is_not_given_is_that_of_the_revision, set_up, tear_down) {
-#define MEASURED "\"restitution\": 0.5, \"contact_time\": 0.02"
-    static const char rig[] = "\"identified_for\": \"rig\", ";
-    static const struct {
-        const char *slug, *said, *rig, *fault;
-    } cases[] = {
-        {"fixed", SAID(MEASURED ", \"impactor_mass\": 0.3, \"base\": \"fixed\""),
-         "\"rig\": {\"impactor_mass\": 0.3}", NULL},
-        {"free", SAID(MEASURED ", \"impactor_mass\": 0.3, \"base\": \"free\", \"base_mass\": 2"),
-         "\"rig\": {\"impactor_mass\": 0.3, \"base_mass\": 2}", NULL},
-        {"table", SAID(TABLE_MEMBERS ", \"impactor_mass\": 0.3, \"base\": \"fixed\""),
-         "\"rig\": {\"impactor_mass\": 0.3}", NULL},
-        {"no_base", SAID(MEASURED ", \"impactor_mass\": 0.3"), NULL,
-         "no_base@1 does not state the base that it lay on"},
-        {"no_mass", SAID(MEASURED ", \"base\": \"fixed\""), NULL,
-         "no_mass@1 does not state the mass of the impactor"},
-        {"nothing", SAID(MEASURED), NULL,
-         "nothing@1 does not state the masses that it was tested with"},
-    };
-    char text[512];
-    for (size_t i = 0; i < COUNT(cases); i++) {
-        say(cases[i].slug, cases[i].said);
-        snprintf(text, sizeof text, "%s\"buffer\": \"%s\"", rig, cases[i].slug);
-        assert_int_equal(prepare(text, ""), cases[i].fault == NULL ? STATUS_OK : STATUS_INVALID);
-        if (cases[i].fault != NULL) {
-            expect_fault("/dampers/0/rig", cases[i].fault);
-            assert_int_equal(problem.count, 1);
-            continue;
-        }
-        expect_member(cases[i].rig);
-        expect_stable();
-        // Impulses have no use for it.
-        resolve_well(text, ", \"contact\": {\"model\": \"impulse\"}");
-        assert_true(isnan(damper()->rig.impactor_mass));
-    }
-    // One that is given wins.
-    snprintf(text, sizeof text, "%s\"buffer\": \"fixed\", \"rig\": {\"impactor_mass\": 7}", rig);
-    resolve_well(text, "");
-    expect_member("\"rig\": {\"impactor_mass\": 7}");
-    // A damper has one: both sides' tests must be alike, and numbers alone tell none.
-    snprintf(text, sizeof text, "%s\"left_buffer\": \"fixed\", \"right_buffer\": \"table\"", rig);
-    resolve_well(text, "");
-    snprintf(text, sizeof text, "%s\"left_buffer\": \"fixed\", \"right_buffer\": \"free\"", rig);
-    assert_int_equal(prepare(text, ""), STATUS_INVALID);
-    expect_fault("/dampers/0/rig", "fixed@1 and free@1 were measured with other masses");
-    snprintf(text, sizeof text, "%s\"left_buffer\": \"fixed\", \"right_buffer\": {%s}", rig,
-             MEASURED);
-    assert_int_equal(prepare(text, ""), STATUS_INVALID);
-    expect_fault("/dampers/0/rig", "the impactor_mass [kg] and, unless it was fixed");
-}
-
 // As they were before any material had more than one revision.
 TEST_IN(canonical_forms_of_named_revisions_never_change, set_up, tear_down) {
     static const struct {
@@ -348,29 +297,4 @@ TEST_IN(points_of_a_sweep_have_the_tables_and_rigs_of_their_materials, set_up, t
     assert_string_equal(uses.at, "rubber@1\nfoam@1\n");
     bytes_clear(&uses);
     expect_stable();
-}
-
-TEST_IN(uses_are_lines_each_once, set_up, tear_down) {
-    Bytes uses = {0};
-    resolve_well("\"buffer\": {\"restitution\": 0.5}", "");
-    references_write(&uses, &inquiry, true);
-    assert_int_equal(uses.count, 0);
-    resolve_well("\"left_buffer\": \"sponge\", \"right_buffer\": \"aluminium\"", "");
-    references_write(&uses, &inquiry, true);
-    references_write(&uses, &inquiry, true);
-    assert_string_equal(uses.at, "sponge@1\naluminium@1\n");
-    const char *rest = uses.at;
-    ReferenceRow use;
-    assert_true(references_next(&rest, &use));
-    assert_string_equal(use.slug, "sponge");
-    assert_int_equal(use.revision, 1);
-    assert_true(references_next(&rest, &use));
-    assert_string_equal(use.slug, "aluminium");
-    assert_false(references_next(&rest, &use));
-    bytes_clear(&uses);
-    rest = "record:elcentro\nsponge@12\n";
-    assert_true(references_next(&rest, &use));
-    assert_int_equal(use.revision, 0);
-    assert_true(references_next(&rest, &use));
-    assert_int_equal(use.revision, 12);
 }

@@ -118,37 +118,6 @@ static char *answer_of(const Room *room, const char *text) {
     return study;
 }
 
-TEST(an_answer_has_the_same_bytes_for_any_number_of_workers) {
-    static const size_t workers[] = {1, 2, 5};
-    static const struct Case {
-        const char *accuracy, *study;
-    } cases[] = {
-        {usual, "{\"kind\": \"ensemble\", \"runs\": 120}"},
-        {usual, "{\"kind\": \"ensemble\", \"runs\": 400, \"target\": 0.05}"},
-        {usual, "{\"kind\": \"ensemble\", \"runs\": 200, \"target\": 0.1, \"metric\": \"psd\"}"},
-        {usual, "{\"kind\": \"sensitivity\", \"contact_time_deviation\": 0.1, \"runs\": 40}"},
-        {"{\"solver\": \"rk4\", \"step\": 0.002}",
-         "{\"kind\": \"sensitivity\", \"contact_time_deviation\": 0.3, \"runs\": 40}"},
-        {usual, "{\"kind\": \"compare\"}"},
-    };
-    for (size_t i = 0; i < COUNT(cases); i++) {
-        char *first = NULL, text[1024];
-        scene(text, 4, cases[i].accuracy, cases[i].study);
-        for (size_t k = 0; k < COUNT(workers); k++) {
-            Room room = room_make(workers[k]);
-            char *answer = answer_of(&room, text);
-            room_end(&room);
-            if (first == NULL) {
-                first = answer;
-                continue;
-            }
-            assert_string_equal(answer, first);
-            free(answer);
-        }
-        free(first);
-    }
-}
-
 // How many workers have chunks in hand.
 static size_t busy(const Room *room) {
     size_t count = 0;

@@ -69,20 +69,6 @@ TEST(a_sweep_is_dismissed_at_any_moment_and_leaves_nothing) {
     room_end(&room);
 }
 
-TEST(two_sweeps_and_their_doubles_share_the_workers) {
-    Room room = room_make(2);
-    char ids[4][40], results[4][72];
-    for (int i = 0; i < 4; i++)
-        submit(&room, i % 2 == 0 ? 300 : 200, 10, ids[i]);
-    for (int i = 0; i < 4; i++) {
-        room_finish(&room, ids[i], results[i]);
-        assert_whole(&room, results[i], i % 2 == 0 ? 300 : 200);
-    }
-    assert_string_equal(results[0], results[2]);
-    assert_string_equal(results[1], results[3]);
-    room_end(&room);
-}
-
 TEST(a_sweep_waits_for_a_disk_whose_faults_pass) {
     for (int i = 0; i < 6; i++) {
         Room room = room_make(2);
