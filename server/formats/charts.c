@@ -439,17 +439,17 @@ static ChartAxis sweep_end_ticks(Chart *chart, const Texts *values) {
 // The places of the cells along the axis: to scale where all values are numbers, else evenly.
 static bool sweep_places(Chart *chart, const SweepCells *cells, double *x, ChartAxis *axis) {
     const Texts *values = &cells->x->values;
-    double least = (double)INFINITY, most = -least;
+    double min = (double)INFINITY, max = -min;
     bool is_numeric = true;
     for (size_t i = 0; i < values->count && is_numeric; i++) {
         const double value = strtod(values->at[i], NULL);
         is_numeric = sweep_is_number(values->at[i]);
-        least = fmin(least, value);
-        most = fmax(most, value);
+        min = fmin(min, value);
+        max = fmax(max, value);
     }
     for (size_t i = 0; i < cells->columns; i++)
         x[i] = is_numeric ? strtod(values->at[i * cells->group], NULL) : (double)(i * cells->group);
-    axis->is_logarithmic = is_numeric && least > 0 && most > 30 * least;
+    axis->is_logarithmic = is_numeric && min > 0 && max > 30 * min;
     axis->padding = is_numeric ? 0.015 : 0.08; // room for half a word
     const size_t ticks = values->count < CHART_TICKS ? values->count : CHART_TICKS;
     for (size_t i = 0; i < ticks && !is_numeric; i++) {
@@ -672,7 +672,7 @@ void chart_evaluation(const Evaluation *evaluation, const char *slug, Bytes *byt
 
 enum { SVG_POINTS = 800 }; // of a line over time
 
-// The columns of one line: the same one twice, or the least and the largest values of buckets.
+// The columns of one line: the same one twice, or the minima and the maxima of buckets.
 static const Column *svg_column(const Table *table, size_t line, bool is_high) {
     return table->columns[table->bucket > 0 ? 2 * line + is_high : line];
 }
@@ -688,15 +688,15 @@ static ChartPanel *svg_find_panel(Chart *chart, const char *units[CHART_PANELS],
     return i < chart->count ? &chart->panels[i] : chart_panel(chart, NULL, 70, 946, 0, 0);
 }
 
-// The least and the largest value of each part of the rows, so that no peak is lost.
+// The minimum and the maximum of each part of the rows, so that no peak is lost.
 static void svg_thin(const Table *table, size_t line, size_t part, double *low, double *high) {
-    const double *least = table_values(table, svg_column(table, line, false)->values);
-    const double *most = table_values(table, svg_column(table, line, true)->values);
+    const double *minima = table_values(table, svg_column(table, line, false)->values);
+    const double *maxima = table_values(table, svg_column(table, line, true)->values);
     double other;
     for (size_t i = 0; i * part < table->count; i++) {
         const size_t left = table->count - i * part, count = left < part ? left : part;
-        downsample_extremes(least + i * part, count, &low[i], &other);
-        downsample_extremes(most + i * part, count, &other, &high[i]);
+        downsample_extremes(minima + i * part, count, &low[i], &other);
+        downsample_extremes(maxima + i * part, count, &other, &high[i]);
     }
 }
 

@@ -149,8 +149,8 @@ extern const TableFormat format_json, format_csv, format_npy, format_npz, format
 extern const TableFormat *const table_formats[];       // NULL-terminated; json first
 const TableFormat *format_find(const char *extension); // NULL if there is none
 
-// Appends the whole document. STATUS_LIMIT where the format has no room for it; `bytes` reports
-// itself what it has no room for.
+// Appends the whole document. STATUS_LIMIT where the format cannot hold it; a limit of `bytes` is
+// reported by is_failed.
 Status format_write(const TableFormat *format, const Table *table, Bytes *bytes, Problem *problem);
 
 enum { MAT_NAME_SIZE = 64 }; // 63 characters, MATLAB's longest, and a NUL
@@ -172,8 +172,8 @@ Status zip_put(Zip *zip, const char *name, const Segments *content, Problem *pro
 // Appends the directory and clears `zip`, also when it fails.
 Status zip_end(Zip *zip, Problem *problem);
 
-// The least and the largest of `count` values, at least one, all of them finite.
-void downsample_extremes(const double *values, size_t count, double *least, double *most);
+// The minimum and the maximum of `count` values, at least one, all of them finite.
+void downsample_extremes(const double *values, size_t count, double *min, double *max);
 
 // Values first ... first + count - 1 of each column in buckets of `bucket`, the last one perhaps
 // shorter: two columns for each, "NAME_min" and "NAME_max". Cleared by columns_clear.

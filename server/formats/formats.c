@@ -109,7 +109,7 @@ static inline double downsample_larger(double a, double b) {
     return a > b ? a : b;
 }
 
-void downsample_extremes(const double *values, size_t count, double *least, double *most) {
+void downsample_extremes(const double *values, size_t count, double *min, double *max) {
     double low = values[0], high = values[0];
     size_t i = 0;
     if (count >= LANES) {
@@ -130,8 +130,8 @@ void downsample_extremes(const double *values, size_t count, double *least, doub
         low = downsample_lesser(values[i], low);
         high = downsample_larger(values[i], high);
     }
-    *least = low;
-    *most = high;
+    *min = low;
+    *max = high;
 }
 
 Status downsample(const Column *const *columns, size_t column_count, size_t first, size_t count,

@@ -10,9 +10,9 @@ enum { COMMENT_MAX = 2000 };
 const char *const material_verdicts[] = {"approved", "deprecated", NULL};
 
 const Field new_material_fields[] = {
-    FIELD_TEXT(MaterialBody, slug, MATERIAL_SLUG_MAX, PRESENCE_REQUIRED, 0, "what scenes name it by: [a-z0-9_-]+, for good"),
+    FIELD_TEXT(MaterialBody, slug, MATERIAL_SLUG_MAX, PRESENCE_REQUIRED, 0, "its name in scenes, [a-z0-9_-]+; it cannot be changed later"),
     FIELD_BASE(MaterialBody, material, material_fields),
-    FIELD_TEXT(MaterialBody, comment, COMMENT_MAX, PRESENCE_OPTIONAL, 0, "why it was added; \"new material\" without"),
+    FIELD_TEXT(MaterialBody, comment, COMMENT_MAX, PRESENCE_OPTIONAL, 0, "why it was added; \"new material\" by default"),
     FIELD_END
 };
 
@@ -23,31 +23,31 @@ const Field material_revision_fields[] = {
 };
 
 const Field material_revert_fields[] = {
-    FIELD_COUNT(MaterialRevertBody, to, NULL, WITHIN(1, 9007199254740992.0), REQUIRED, "the revision that the new one says again"),
-    FIELD_TEXT(MaterialRevertBody, comment, COMMENT_MAX, PRESENCE_REQUIRED, 0, "why what came after is undone"),
+    FIELD_COUNT(MaterialRevertBody, to, NULL, WITHIN(1, 9007199254740992.0), REQUIRED, "revision whose contents the new one repeats"),
+    FIELD_TEXT(MaterialRevertBody, comment, COMMENT_MAX, PRESENCE_REQUIRED, 0, "why the later revisions are undone"),
     FIELD_END
 };
 
 const Field material_review_fields[] = {
-    FIELD_CHOICE(MaterialReviewBody, status, material_verdicts, REQUIRED, "what becomes of the revision"),
-    FIELD_TEXT(MaterialReviewBody, reason, COMMENT_MAX, PRESENCE_REQUIRED, 0, "why"),
+    FIELD_CHOICE(MaterialReviewBody, status, material_verdicts, REQUIRED, "verdict on the revision"),
+    FIELD_TEXT(MaterialReviewBody, reason, COMMENT_MAX, PRESENCE_REQUIRED, 0, "reason of the verdict"),
     FIELD_END
 };
 
 const Field measurement_body_fields[] = {
     FIELD_BASE(MeasurementBody, test, drop_test_fields),
-    FIELD_TEXT(MeasurementBody, comment, COMMENT_MAX, PRESENCE_OPTIONAL, 0, "why it was made; \"drop test\" without"),
+    FIELD_TEXT(MeasurementBody, comment, COMMENT_MAX, PRESENCE_OPTIONAL, 0, "purpose of the test; \"drop test\" by default"),
     FIELD_END
 };
 
 const SchemaDocument schema_documents[] = {
-    {"scene", "A scene: what impactd is asked to simulate", study_request_fields},
-    {"material", "A buffer material: what one revision of it says", material_fields},
+    {"scene", "A scene: the simulation that a job requests", study_request_fields},
+    {"material", "A buffer material: the contents of one revision", material_fields},
     {"new_material", "A new material: its first revision", new_material_fields},
-    {"material_revision", "A new revision of a material: all that it says, and why", material_revision_fields},
-    {"material_revert", "A revision to say again", material_revert_fields},
-    {"material_review", "What becomes of a revision", material_review_fields},
-    {"measurement", "A drop test as it was done: raw data", measurement_body_fields},
+    {"material_revision", "A new revision of a material: its whole contents, and why", material_revision_fields},
+    {"material_revert", "A revision to repeat", material_revert_fields},
+    {"material_review", "A review of a revision", material_review_fields},
+    {"measurement", "A drop test: its raw data", measurement_body_fields},
     {NULL, NULL, NULL},
 };
 // clang-format on
@@ -173,7 +173,7 @@ static void schema_variant(Bytes *bytes, const Field *field) {
 
 static void schema_value(Bytes *bytes, const Field *field) {
     const bool has_default = field->presence == PRESENCE_DEFAULT;
-    // A count is never negative, whatever its row says.
+    // A count is never negative, also where its row allows it.
     const Range counts = {fmax(field->range.min, 0), field->range.max,
                           field->range.is_open_below && field->range.min >= 0};
     switch (field->kind) {

@@ -1,4 +1,4 @@
-// The documents that clients send besides scenes, and Field rows printed as JSON Schema 2020-12:
+// The documents that clients send other than scenes, and Field rows printed as JSON Schema 2020-12:
 // types, units, ranges, defaults, descriptions.
 #ifndef SERVER_JSON_SCHEMA_H
 #define SERVER_JSON_SCHEMA_H
@@ -10,7 +10,7 @@
 // A new material, or a new revision of one: then the slug is the address's.
 typedef struct MaterialBody {
     char *slug;    // new_material_fields alone
-    char *comment; // why; NULL: a new material says nothing
+    char *comment; // why; NULL: none, of a new material
     Material material;
 } MaterialBody;
 extern const Field new_material_fields[], material_revision_fields[];

@@ -1,6 +1,5 @@
-// Addresses of our own as answers tell them: "/v1/jobs/..." behind the path that a proxy may put
-// before it. The one place that knows that path; set once, before there are threads. Not routes.
-// Used by everything that writes links.
+// The path that a reverse proxy puts before "/v1/jobs/..." in links. Set once, before threads
+// start.
 #ifndef SERVER_UTIL_BASE_PATH_H
 #define SERVER_UTIL_BASE_PATH_H
 

@@ -1,4 +1,4 @@
-// Wall clock and stop watch; the only room that reads a clock.
+// Wall clock, monotonic clock and CPU time.
 #ifndef SERVER_UTIL_CLOCK_H
 #define SERVER_UTIL_CLOCK_H
 

@@ -1,5 +1,4 @@
-// The shortest digits that read back to the same double, by dragonbox. The one door to its C++.
-// Used by bytes.c and the encoders.
+// The shortest digits that read back to the same double, by dragonbox. C interface of its C++.
 #ifndef SERVER_UTIL_DTOA_H
 #define SERVER_UTIL_DTOA_H
 

@@ -1,6 +1,5 @@
 // Counters and histograms that any thread may add to, cheap enough for every request, and how they
-// are written in the Prometheus text format. Not what is counted. Used by http/, jobs/, store/ and
-// api/metrics.c.
+// are written in the Prometheus text format.
 #ifndef SERVER_UTIL_METRICS_H
 #define SERVER_UTIL_METRICS_H
 

@@ -1,4 +1,3 @@
-// A GnuTLS handle under our name. The hash is made when the digest is and freed when it ends.
 #include "server/util/sha256.h"
 
 #include <stdlib.h>

@@ -1,4 +1,4 @@
-// SHA-256; GnuTLS's hashing lives here alone.
+// SHA-256 by GnuTLS.
 #ifndef SERVER_UTIL_SHA256_H
 #define SERVER_UTIL_SHA256_H
 
