@@ -112,6 +112,7 @@ Status db_ids_with_prefix(Db *db, const char *prefix, size_t max, JobRows *rows,
 typedef struct JobSearch {
     const char *before;          // an id: only those that follow it in the list
     int64_t before_unix_ms;      // of its arrival, where it may be deleted; -1: it must exist
+    int64_t before_number;       // set by the search
     int least_state, most_state; // JobState
     const char *words;           // within the title or a label, ignoring case
     const char *label;           // one whole label, or "key" of a label "key=value"; likewise

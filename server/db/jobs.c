@@ -184,40 +184,33 @@ Status db_job_unfinished(Db *db, JobRows *rows, Problem *problem) {
     return db_list(db, sql, NULL, NULL, job_columns, sizeof *rows->at, rows, problem);
 }
 
-typedef struct Asked {
-    const char *id, *result, *study;
-    char *words, *label, *key;
-    int64_t since, until, before_ms, before_number;
-    int least_state, most_state;
-    uint64_t most;
-} Asked;
-
 // clang-format off
-static const SqlColumn asked_columns[] = {
-    COLUMN(Asked, id),
-    COLUMN(Asked, words),
-    COLUMN(Asked, label),
-    COLUMN(Asked, key),
-    COLUMN(Asked, result),
-    COLUMN(Asked, study),
-    COLUMN(Asked, since),
-    COLUMN(Asked, until),
-    COLUMN(Asked, before_ms),
-    COLUMN(Asked, before_number),
-    COLUMN(Asked, least_state),
-    COLUMN(Asked, most_state),
-    COLUMN(Asked, most),
+static const SqlColumn search_columns[] = {
+    COLUMN(JobSearch, before),
+    COLUMN(JobSearch, before_unix_ms),
+    COLUMN(JobSearch, before_number),
+    COLUMN(JobSearch, words),
+    COLUMN(JobSearch, label),
+    COLUMN(JobSearch, result),
+    COLUMN(JobSearch, study),
+    COLUMN(JobSearch, since_unix_ms),
+    COLUMN(JobSearch, until_unix_ms),
+    COLUMN(JobSearch, least_state),
+    COLUMN(JobSearch, most_state),
+    COLUMN(JobSearch, most),
     COLUMN_END
 };
 // clang-format on
 
-// created_unix_ms <= :before_ms says nothing new, but lets an index begin there.
+// created_unix_ms <= :before_unix_ms says nothing new, but lets an index begin there.
 #define PLACE                                                                                      \
-    "created_unix_ms <= :before_ms AND created_unix_ms >= :since AND created_unix_ms <= :until "   \
-    "AND (created_unix_ms < :before_ms OR number < :before_number) "
+    "created_unix_ms <= :before_unix_ms AND created_unix_ms >= :since_unix_ms AND "                \
+    "created_unix_ms <= :until_unix_ms AND (created_unix_ms < :before_unix_ms OR number < "        \
+    ":before_number) "
 #define WORDS                                                                                      \
     "AND (:words IS NULL OR instr(words, :words) > 0) "                                            \
-    "AND (:label IS NULL OR instr(words, :label) > 0 OR instr(words, :key) > 0) "
+    "AND (:label IS NULL OR instr(words, char(10) || :label || char(10)) > 0 OR "                  \
+    "instr(words, char(10) || :label || '=') > 0) "
 #define KIND                                                                                       \
     "AND state BETWEEN :least_state AND :most_state "                                              \
     "AND (:result IS NULL OR result = :result) "                                                   \
@@ -269,60 +262,43 @@ void job_words(Bytes *bytes, const char *title, const char *const *labels, size_
     }
 }
 
-// `before` and `after` fence the folded text.
-static Status search_fold(const char *text, const char *before, const char *after, char **folded) {
+// *text becomes the folded one, to be freed.
+static bool search_fold(const char **text) {
     Bytes bytes = {0};
-    *folded = NULL;
-    if (text == NULL)
-        return STATUS_OK;
-    bytes_text(&bytes, before);
-    bytes_folded(&bytes, text);
-    bytes_text(&bytes, after);
-    *folded = bytes_take(&bytes, NULL);
-    return *folded != NULL ? STATUS_OK : STATUS_NO_MEMORY;
+    if (*text != NULL) {
+        bytes_folded(&bytes, *text);
+        *text = bytes_take(&bytes, NULL);
+        return *text != NULL;
+    }
+    return true;
 }
 
-static Status search_find_place(Db *db, const JobSearch *search, Asked *asked, Problem *problem) {
-    static const char sql[] = "SELECT created_unix_ms AS before_ms, number AS before_number "
-                              "FROM jobs WHERE id = :id";
+// The place in the list from which the search continues.
+static Status search_find_place(Db *db, JobSearch *search, Problem *problem) {
+    static const char sql[] = "SELECT created_unix_ms AS before_unix_ms, number AS before_number "
+                              "FROM jobs WHERE id = :before";
     bool is_found = true;
-    asked->before_ms = asked->before_number = INT64_MAX;
-    if (search->before != NULL)
-        TRY(db_first(db, sql, asked_columns, &(Asked){.id = search->before}, asked_columns, asked,
-                     &is_found, problem));
-    if (is_found)
-        return STATUS_OK;
-    if (search->before_unix_ms < 0)
-        return problem_set(problem, STATUS_NOT_FOUND, no_job, search->before);
-    // It was deleted between two pages: its place is its time of arrival.
-    asked->before_ms = search->before_unix_ms;
-    asked->before_number = 0;
-    return STATUS_OK;
+    search->before_number = 0; // of a job deleted between two pages the place is its arrival
+    if (search->before == NULL)
+        search->before_unix_ms = search->before_number = INT64_MAX;
+    else
+        TRY(db_first(db, sql, search_columns, search, search_columns, search, &is_found, problem));
+    return is_found || search->before_unix_ms >= 0
+               ? STATUS_OK
+               : problem_set(problem, STATUS_NOT_FOUND, no_job, search->before);
 }
 
 Status db_job_search(Db *db, const JobSearch *search, JobRows *rows, Problem *problem) {
-    Asked asked = {.result = search->result,
-                   .study = search->study,
-                   .since = search->since_unix_ms,
-                   .until = search->until_unix_ms,
-                   .least_state = search->least_state,
-                   .most_state = search->most_state,
-                   .most = search->most};
+    JobSearch folded = *search;
     *rows = (JobRows){0};
-    TRY(search_find_place(db, search, &asked, problem));
-    Status status = search_fold(search->words, "", "", &asked.words);
-    if (status == STATUS_OK)
-        status = search_fold(search->label, "\n", "\n", &asked.label);
-    if (status == STATUS_OK)
-        status = search_fold(search->label, "\n", "=", &asked.key);
-    if (status == STATUS_OK)
-        status = db_list(db, search_choose(search), asked_columns, &asked, job_columns,
-                         sizeof *rows->at, rows, problem);
-    else
-        (void)problem_set(problem, status, "no memory for a search");
-    free(asked.words);
-    free(asked.label);
-    free(asked.key);
+    TRY(search_find_place(db, &folded, problem));
+    const bool has_words = search_fold(&folded.words), has_label = search_fold(&folded.label);
+    const Status status = has_words && has_label
+                              ? db_list(db, search_choose(search), search_columns, &folded,
+                                        job_columns, sizeof *rows->at, rows, problem)
+                              : problem_set(problem, STATUS_NO_MEMORY, "no memory for a search");
+    free((char *)folded.words);
+    free((char *)folded.label);
     return status;
 }
 

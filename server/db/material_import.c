@@ -626,31 +626,11 @@ static int import_order(const void *a, const void *b) {
     return one->order < other->order ? -1 : one->order > other->order;
 }
 
-// If a material has several revisions in the file, all need numbers.
-static void import_validate_unnumbered(const MaterialImport *import, Problem *problem) {
-    const char *name = import->number_names[IMPORT_REVISION];
-    for (size_t i = 1; i < import->count; i++) {
-        const ImportRow *before = &import->rows[i - 1], *row = &import->rows[i];
-        char place[POINTER_SIZE];
-        if (row->kind != IMPORT_REVISION || before->kind != IMPORT_REVISION ||
-            row->number != COUNT_ABSENT || row->number_unknown || before->number_unknown ||
-            strcmp(before->slug, row->slug) != 0)
-            continue;
-        json_pointer_join(place, sizeof place, row->place,
-                          strcmp(name, "number") == 0 ? "slug" : name);
-        (void)problem_add(problem, STATUS_INVALID, place,
-                          "\"%.64s\" has another revision in the file, at %.64s: give each its "
-                          "number",
-                          row->slug, before->place);
-    }
-}
-
 Status db_material_import(Db *db, MaterialImport *import, bool is_dry, ImportTally *tally,
                           Problem *problem) {
     *tally = (ImportTally){0};
     if (import->count > 0)
         qsort(import->rows, import->count, sizeof *import->rows, import_order);
-    import_validate_unnumbered(import, problem);
     ImportContext context = {.import = import, .tally = tally, .faults = problem};
     if (is_dry || problem->count > 0)
         return db_read(db, import_apply, &context, problem);

@@ -77,25 +77,19 @@ void record_digest(double interval, const Reals *samples, char digest[RECORD_DIG
 static const char no_record[] = "there is no record \"%.64s\"";
 
 // What differs between a stored record and a new one; NULL: nothing.
-static const char *record_difference(const RecordRow *there, const RecordRow *row) {
-    if (!text_same(there->digest, row->digest))
+static const char *record_difference(const RecordRow *stored, const RecordRow *row) {
+    static const char own[] = " name author digest ";
+    if (!text_same(stored->digest, row->digest))
         return "samples or another interval";
-    const struct {
-        const char *what, *there, *given;
-    } words[] = {
-        {"source", there->source, row->source},
-        {"processing", there->processing, row->processing},
-        {"earthquake", there->earthquake, row->earthquake},
-        {"station", there->station, row->station},
-        {"notes", there->notes, row->notes},
-        {"layout", there->layout, row->layout},
-        {"header", there->header, row->header},
-        {"unit", there->unit, row->unit},
-        {"stated unit", there->stated_unit, row->stated_unit},
-    };
-    for (size_t i = 0; i < COUNT(words); i++)
-        if (!text_same(words[i].there, words[i].given))
-            return words[i].what;
+    for (const SqlColumn *column = record_columns; column->name != NULL; column++) {
+        const char *a = (const char *)stored + column->offset,
+                   *b = (const char *)row + column->offset;
+        char word[32];
+        snprintf(word, sizeof word, " %s ", column->name);
+        if (column->kind == COLUMN_TEXT && strstr(own, word) == NULL &&
+            !text_same(*(char *const *)(const void *)a, *(char *const *)(const void *)b))
+            return strcmp(column->name, "stated_unit") == 0 ? "stated unit" : column->name;
+    }
     return NULL;
 }
 

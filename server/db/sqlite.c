@@ -36,12 +36,6 @@ struct Sqlite {
     size_t statement_count;
 };
 
-// A quota, or a limit on a file's size, is to SQLite an error of writing; it does not say which.
-static bool is_full(sqlite3 *connection) {
-    return (sqlite3_errcode(connection) & 0xFF) == SQLITE_FULL ||
-           sqlite3_extended_errcode(connection) == SQLITE_IOERR_WRITE;
-}
-
 static Status report_full(const char *path, Problem *problem) {
     struct statvfs disk;
     const char *slash = path != NULL ? strrchr(path, '/') : NULL;
@@ -59,36 +53,25 @@ static Status report_full(const char *path, Problem *problem) {
 
 // What SQLite says, in words and as a status.
 static Status report(sqlite3 *connection, const char *doing, Problem *problem) {
-    Status status = STATUS_IO;
-    switch (sqlite3_errcode(connection) & 0xFF) {
-    case SQLITE_CONSTRAINT:
-        status = STATUS_CONFLICT;
-        break;
-    case SQLITE_NOMEM:
-        status = STATUS_NO_MEMORY;
-        break;
-    case SQLITE_TOOBIG:
-        status = STATUS_TOO_LARGE;
-        break;
-    case SQLITE_BUSY:
-    case SQLITE_LOCKED:
-        status = STATUS_BUSY;
-        break;
-    case SQLITE_INTERRUPT:
-        return problem_set(problem, STATUS_CANCELLED, "%s was interrupted", doing);
-    case SQLITE_ERROR:
-    case SQLITE_MISUSE:
-    case SQLITE_RANGE:
-        status = STATUS_INTERNAL;
-        break;
-    default:
-        break;
-    }
+    static const struct {
+        int code;
+        Status status;
+    } known[] = {{SQLITE_CONSTRAINT, STATUS_CONFLICT}, {SQLITE_NOMEM, STATUS_NO_MEMORY},
+                 {SQLITE_TOOBIG, STATUS_TOO_LARGE},    {SQLITE_BUSY, STATUS_BUSY},
+                 {SQLITE_LOCKED, STATUS_BUSY},         {SQLITE_ERROR, STATUS_INTERNAL},
+                 {SQLITE_MISUSE, STATUS_INTERNAL},     {SQLITE_RANGE, STATUS_INTERNAL}};
     const char *path = sqlite3_db_filename(connection, "main");
-    if (is_full(connection))
-        return report_full(path, problem);
     const bool has_path = path != NULL && path[0] != '\0';
     const int code = sqlite3_errcode(connection) & 0xFF;
+    Status status = STATUS_IO;
+    for (size_t i = 0; i < COUNT(known); i++)
+        if (known[i].code == code)
+            status = known[i].status;
+    if (code == SQLITE_INTERRUPT)
+        return problem_set(problem, STATUS_CANCELLED, "%s was interrupted", doing);
+    // A quota, or a limit on a file's size, is to SQLite an error of writing.
+    if (code == SQLITE_FULL || sqlite3_extended_errcode(connection) == SQLITE_IOERR_WRITE)
+        return report_full(path, problem);
     if (has_path && (code == SQLITE_NOTADB || code == SQLITE_CORRUPT))
         return problem_set(
             problem, status,
