@@ -72,7 +72,7 @@ static void scopes_write(unsigned scopes, char *target, size_t size) {
         }
 }
 
-// By SHA-256 digests, of which the time of a comparison tells nothing about tokens.
+// By SHA-256 digests: the time of a comparison reveals nothing about tokens.
 static Entry *entry_find(const Tokens *tokens, const char *digest) {
     for (size_t i = 0; i < tokens->count; i++)
         if (strcmp(tokens->entries[i].row.digest, digest) == 0)

@@ -138,7 +138,7 @@ static Status sync_part(Copying *copying, Problem *problem) {
 }
 
 // Where the target may not be replaced it is not, also if it was made a moment ago; a file system
-// without links cannot tell.
+// without links does not notice.
 static Status rename_part(Copying *copying, bool replaces, Problem *problem) {
     const bool is_linked = !replaces && link(copying->part, copying->target) == 0;
     if (!is_linked && !replaces && errno == EEXIST)

@@ -188,12 +188,12 @@ Status db_series_load(Db *db, const char *result, char **body, size_t *size, Pro
 bool db_series_exists(Db *db, const char *result);
 void db_series_tally(Db *db, uint64_t *count, uint64_t *bytes, uint64_t *evictions);
 
-// A sweep: what is to be done, written before any of it runs.
+// A sweep, stored before any of it runs.
 typedef struct SweepRow {
     int64_t number; // the store's
     char result[72];
     char *scene;                      // canonical JSON, with the study
-    uint64_t points, metrics, chunks; // scene i stands in chunk i mod chunks
+    uint64_t points, metrics, chunks; // scene i is in chunk i mod chunks
     uint64_t retries;
     int64_t created_unix_ms;
 } SweepRow;
@@ -214,11 +214,11 @@ typedef struct SweepChunkRows {
 } SweepChunkRows;
 void sweep_chunk_rows_clear(SweepChunkRows *rows);
 
-// Writes the sweep down; one that is there already stays as it is, and `row` becomes that one.
+// Stores the sweep. A stored one stays as it is and is loaded into `row`.
 Status db_sweep_begin(Db *db, SweepRow *row, Problem *problem);
 // STATUS_NOT_FOUND. `row` may be uninitialised.
 Status db_sweep_load(Db *db, const char *result, SweepRow *row, Problem *problem);
-// What a job asked for, of which nothing may be written down yet: result and scene alone.
+// The sweep that a job requests, which may not be stored yet: result and scene alone.
 // STATUS_NOT_FOUND.
 Status db_sweep_asked(Db *db, const char *job, SweepRow *row, Problem *problem);
 // Adds a chunk, in one transaction. One that is there already and not open stays as it is.
@@ -236,7 +236,7 @@ Status db_sweep_read(Db *db, const SweepRow *sweep, const SweepChunkRows *chunks
                      size_t size, unsigned char *target, Problem *problem);
 // Opens every chunk that has failures. STATUS_CONFLICT where none has.
 Status db_sweep_reopen(Db *db, const char *result, Problem *problem);
-// Forgets all sweeps that have neither a result nor an unfinished job.
+// Deletes all sweeps that have neither a result nor an unfinished job.
 Status db_sweep_tidy(Db *db, Problem *problem);
 
 // What is kept: the oldest finished jobs are deleted first, and with the last job of a result the

@@ -41,7 +41,7 @@ typedef struct QueryKey {
     int64_t revisions, reviews, measurements; // MaterialMoment
 } QueryKey;
 extern const SqlColumn query_key_columns[];
-// And numbers that come back.
+// Numbers that queries have as their result.
 typedef struct QueryCounts {
     uint64_t count, bytes, results, jobs;
 } QueryCounts;

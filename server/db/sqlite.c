@@ -46,7 +46,7 @@ static Status report_full(const char *path, Problem *problem) {
         (unsigned long long)disk.f_bavail * (unsigned long long)disk.f_frsize;
     return problem_set(problem, STATUS_FULL,
                        "there is no room left in %.*s: %llu bytes are free on its disk%s; what is "
-                       "stored can be read, and writing goes on when there is room",
+                       "stored can be read, and writing continues when there is room",
                        size, path, left,
                        left > (1 << 26) ? ", so a quota or a limit on files is reached" : "");
 }

@@ -84,7 +84,7 @@ static void *hammer(void *context) {
         snprintf(id, sizeof id, "j-%d-%d", own->number, i);
         JobRow row = job_row(id, 0);
         own->failures += db_job_add(own->db, &row, NULL) != STATUS_OK;
-        // Every other caller does something that must fail, and nobody else may notice.
+        // Every other caller does something that must fail, without effect on the others.
         if (own->number % 2 == 0)
             own->failures += db_job_add(own->db, &row, NULL) != STATUS_CONFLICT;
         own->failures += db_job_load(own->db, id, &row, NULL) != STATUS_OK;
@@ -211,11 +211,11 @@ static void note_done(void *context, Status status, const char *detail) {
 
 TEST_IN(series_are_kept_under_a_budget_and_the_longest_unused_goes, make_folder, remove_folder) {
     Db *db = open_store(folder);
-    static Status told[5];
+    static Status statuses[5];
     char *body, id[8];
     size_t size;
     for (size_t i = 0; i < 4; i++) {
-        const WriteDone done = {note_done, &told[i]};
+        const WriteDone done = {note_done, &statuses[i]};
         body = malloc(1000);
         assert_non_null(body);
         memset(body, 'a' + (int)i, 1000);
@@ -239,7 +239,7 @@ TEST_IN(series_are_kept_under_a_budget_and_the_longest_unused_goes, make_folder,
     assert_int_equal(count, 3);
     assert_int_equal(bytes, 3000);
     assert_int_equal(evictions, 1);
-    const WriteDone done = {note_done, &told[4]};
+    const WriteDone done = {note_done, &statuses[4]};
     assert_int_equal(db_series_post(db, "r-9", malloc(9000), 9000, 3500, &done), STATUS_LIMIT);
     assert_int_equal(db_series_load(db, "r-9", &body, &size, NULL), STATUS_NOT_FOUND);
     db_close(db);

@@ -1,4 +1,4 @@
-// Materials in the database: what is added comes back, no SQL changes it, and there are limits.
+// Materials in the database: no SQL changes it, and there are limits.
 #include "server/db/materials.h"
 
 #include <stdio.h>
@@ -58,7 +58,7 @@ static char *dump(Sqlite *database) {
     return text;
 }
 
-TEST_IN(no_sql_changes_what_was_said, make_folder, remove_folder) {
+TEST_IN(no_sql_changes_a_stored_row, make_folder, remove_folder) {
     static const char *const tables[] = {"materials", "material_revisions", "material_reviews",
                                          "material_measurements", "material_trail"};
     static const char *const harm[] = {

@@ -1,4 +1,4 @@
-// Sweeps in the store: written down once, chunks whole and once, opened again where they failed.
+// Sweeps in the database: stored once, chunks whole and once, opened again where they failed.
 #include "server/db/db.h"
 #include "tests/support/test.h"
 
