@@ -435,9 +435,9 @@ const SqlColumn query_key_columns[] = {
     COLUMN(QueryKey, before),
     COLUMN(QueryKey, number),
     COLUMN(QueryKey, max),
-    COLUMN(QueryKey, revisions),
-    COLUMN(QueryKey, reviews),
-    COLUMN(QueryKey, measurements),
+    COLUMN_OF(QueryKey, moment.revisions, "revisions", 0, NULL),
+    COLUMN_OF(QueryKey, moment.reviews, "reviews", 0, NULL),
+    COLUMN_OF(QueryKey, moment.measurements, "measurements", 0, NULL),
     COLUMN_END
 };
 

@@ -38,7 +38,7 @@ typedef struct QueryKey {
     const char *id, *name, *slug, *client, *digest, *words;
     int64_t before;
     uint64_t number, max;
-    int64_t revisions, reviews, measurements; // MaterialMoment
+    MaterialMoment moment;
 } QueryKey;
 extern const SqlColumn query_key_columns[];
 // Numbers that queries have as their result.

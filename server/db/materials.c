@@ -355,11 +355,7 @@ Status db_revision_after(Db *db, const MaterialMoment *moment, const char *slug,
         "SELECT m.slug, r.* FROM materials m CROSS JOIN material_revisions r ON r.material = "
         "m.number WHERE m.slug > :slug AND +r.number <= :revisions ORDER BY m.slug, r.revision "
         "LIMIT 1";
-    const QueryKey key = {.slug = slug,
-                          .number = number,
-                          .revisions = moment->revisions,
-                          .reviews = moment->reviews,
-                          .measurements = moment->measurements};
+    const QueryKey key = {.slug = slug, .number = number, .moment = *moment};
     memset(revision, 0, sizeof *revision);
     TRY(db_first(db, number > 0 ? of_material : of_next, query_key_columns, &key,
                  material_revision_columns(), revision, is_found, problem));
@@ -372,11 +368,7 @@ Status db_measurement_after(Db *db, const MaterialMoment *moment, const char *sl
         "SELECT m.slug, t.* FROM materials m JOIN material_measurements t ON t.material = m.number "
         "WHERE m.slug = :slug AND t.measurement > :number AND t.number <= :measurements "
         "ORDER BY t.measurement LIMIT 1";
-    const QueryKey key = {.slug = slug,
-                          .number = number,
-                          .revisions = moment->revisions,
-                          .reviews = moment->reviews,
-                          .measurements = moment->measurements};
+    const QueryKey key = {.slug = slug, .number = number, .moment = *moment};
     memset(measurement, 0, sizeof *measurement);
     return db_first(db, sql, query_key_columns, &key, material_measurement_columns, measurement,
                     is_found, problem);
@@ -387,7 +379,7 @@ Status db_reviews(Db *db, const MaterialMoment *moment, const char *slug, uint64
     static const char sql[] =
         "SELECT m.slug, v.* FROM materials m JOIN material_reviews v ON v.material = m.number "
         "WHERE m.slug = :slug AND v.revision = :number AND v.number <= :reviews ORDER BY v.number";
-    const QueryKey key = {.slug = slug, .number = revision, .reviews = moment->reviews};
+    const QueryKey key = {.slug = slug, .number = revision, .moment = *moment};
     return db_list(db, sql, query_key_columns, &key, material_review_columns, sizeof *reviews->at,
                    reviews, problem);
 }
