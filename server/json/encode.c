@@ -5,17 +5,17 @@
 #include <stdio.h>
 #include <string.h>
 
-static void put_members(Bytes *bytes, const Field *fields, const void *item, EncodeStyle style,
-                        size_t *count);
+static void encode_put_members(Bytes *bytes, const Field *fields, const void *item,
+                               EncodeStyle style, size_t *count);
 
-static void put_name(Bytes *bytes, const char *name, size_t *count) {
+static void encode_put_name(Bytes *bytes, const char *name, size_t *count) {
     if ((*count)++ > 0)
         bytes_text(bytes, ", ");
     bytes_json_string(bytes, name);
     bytes_text(bytes, ": ");
 }
 
-static void put_reals(Bytes *bytes, const Reals *reals) {
+static void encode_put_reals(Bytes *bytes, const Reals *reals) {
     bytes_text(bytes, "[");
     for (size_t i = 0; i < reals->count; i++) {
         if (i > 0)
@@ -25,17 +25,17 @@ static void put_reals(Bytes *bytes, const Reals *reals) {
     bytes_text(bytes, "]");
 }
 
-static void put_rows(Bytes *bytes, const Rows *rows) {
+static void encode_put_rows(Bytes *bytes, const Rows *rows) {
     bytes_text(bytes, "[");
     for (size_t i = 0; i < rows->count; i++) {
         if (i > 0)
             bytes_text(bytes, ", ");
-        put_reals(bytes, &rows->at[i]);
+        encode_put_reals(bytes, &rows->at[i]);
     }
     bytes_text(bytes, "]");
 }
 
-static void put_texts(Bytes *bytes, const Texts *texts, bool is_json) {
+static void encode_put_texts(Bytes *bytes, const Texts *texts, bool is_json) {
     bytes_text(bytes, "[");
     for (size_t i = 0; i < texts->count; i++) {
         if (i > 0)
@@ -48,17 +48,18 @@ static void put_texts(Bytes *bytes, const Texts *texts, bool is_json) {
     bytes_text(bytes, "]");
 }
 
-static void put_variant(Bytes *bytes, const KindTable *kinds, const Variant *variant,
-                        EncodeStyle style) {
+static void encode_put_variant(Bytes *bytes, const KindTable *kinds, const Variant *variant,
+                               EncodeStyle style) {
     size_t count = 0;
     bytes_text(bytes, "{");
-    put_name(bytes, kinds->tag, &count);
+    encode_put_name(bytes, kinds->tag, &count);
     bytes_json_string(bytes, variant->kind->name);
-    put_members(bytes, variant->kind->fields, variant, style, &count);
+    encode_put_members(bytes, variant->kind->fields, variant, style, &count);
     bytes_text(bytes, "}");
 }
 
-static void put_value(Bytes *bytes, const Field *field, const void *member, EncodeStyle style) {
+static void encode_put_value(Bytes *bytes, const Field *field, const void *member,
+                             EncodeStyle style) {
     switch (field->kind) {
     case FIELD_KIND_REAL:
         bytes_real(bytes, *(const double *)member);
@@ -80,14 +81,14 @@ static void put_value(Bytes *bytes, const Field *field, const void *member, Enco
         if ((field->flags & FIELD_LONE) != 0 && reals->count == 1)
             bytes_real(bytes, reals->at[0]);
         else
-            put_reals(bytes, reals);
+            encode_put_reals(bytes, reals);
         break;
     }
     case FIELD_KIND_ROWS:
-        put_rows(bytes, member);
+        encode_put_rows(bytes, member);
         break;
     case FIELD_KIND_TEXTS:
-        put_texts(bytes, member, (field->flags & FIELD_SCALARS) != 0);
+        encode_put_texts(bytes, member, (field->flags & FIELD_SCALARS) != 0);
         break;
     case FIELD_KIND_ITEM:
         encode_item(bytes, field->fields, member, style);
@@ -99,7 +100,7 @@ static void put_value(Bytes *bytes, const Field *field, const void *member, Enco
         break;
     }
     case FIELD_KIND_VARIANT:
-        put_variant(bytes, field->kinds, *(Variant *const *)member, style);
+        encode_put_variant(bytes, field->kinds, *(Variant *const *)member, style);
         break;
     case FIELD_KIND_BASE:
     case FIELD_KIND_REFCOUNT:
@@ -109,7 +110,7 @@ static void put_value(Bytes *bytes, const Field *field, const void *member, Enco
 }
 
 // Whether the member is empty and null says so: left out it would be read back with its defaults.
-static bool is_emptied(const Field *field, const void *item) {
+static bool encode_is_emptied(const Field *field, const void *item) {
     if (field->kind == FIELD_KIND_TEXT && (field->flags & FIELD_NULL_IS_EMPTY) != 0) {
         const char *text = *(char *const *)(const void *)((const char *)item + field->offset);
         return text != NULL && text[0] == '\0';
@@ -120,33 +121,33 @@ static bool is_emptied(const Field *field, const void *item) {
            field->presence == PRESENCE_DEFAULT && field_is_absent(&optional, item);
 }
 
-static bool is_array(const Field *field) {
+static bool encode_is_array(const Field *field) {
     return field->kind == FIELD_KIND_REALS || field->kind == FIELD_KIND_ROWS ||
            field->kind == FIELD_KIND_TEXTS || field->kind == FIELD_KIND_LIST;
 }
 
-static void put_members(Bytes *bytes, const Field *fields, const void *item, EncodeStyle style,
-                        size_t *count) {
+static void encode_put_members(Bytes *bytes, const Field *fields, const void *item,
+                               EncodeStyle style, size_t *count) {
     for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
         const void *member = (const char *)item + field->offset;
         if (field->kind == FIELD_KIND_BASE) {
-            put_members(bytes, field->fields, member, style, count);
+            encode_put_members(bytes, field->fields, member, style, count);
             continue;
         }
         const bool is_absent = field_is_absent(field, item);
         if (is_absent && (style == WRITE_SCENE || (field->flags & FIELD_HIDDEN) != 0))
             continue;
-        put_name(bytes, field->name, count);
-        if ((is_absent && !is_array(field)) || is_emptied(field, item))
+        encode_put_name(bytes, field->name, count);
+        if ((is_absent && !encode_is_array(field)) || encode_is_emptied(field, item))
             bytes_text(bytes, "null");
         else
-            put_value(bytes, field, member, style);
+            encode_put_value(bytes, field, member, style);
     }
 }
 
 size_t encode_members(Bytes *bytes, const Field *fields, const void *item, EncodeStyle style) {
     size_t count = 0;
-    put_members(bytes, fields, item, style, &count);
+    encode_put_members(bytes, fields, item, style, &count);
     return count;
 }
 
@@ -167,26 +168,26 @@ void encode_list(Bytes *bytes, const Field *fields, const void *at, size_t count
     bytes_text(bytes, "]");
 }
 
-static void put_text_member(Bytes *bytes, const char *name, const char *text, size_t *count) {
-    put_name(bytes, name, count);
+// `, "NAME": TEXT`; nothing where there is no text.
+static void encode_put_text_member(Bytes *bytes, const char *name, const char *text) {
+    if (text == NULL || *text == '\0')
+        return;
+    bytes_format(bytes, ", \"%s\": ", name);
     bytes_json_string(bytes, text);
 }
 
-static void put_fault(Bytes *bytes, const Fault *fault) {
-    size_t count = 0;
-    bytes_text(bytes, "{");
-    put_text_member(bytes, "pointer", fault->pointer, &count);
-    put_name(bytes, "value", &count);
+static void encode_put_fault(Bytes *bytes, const Fault *fault) {
+    bytes_text(bytes, "{\"pointer\": ");
+    bytes_json_string(bytes, fault->pointer);
+    bytes_text(bytes, ", \"value\": ");
     bytes_text(bytes, fault->value[0] != '\0' ? fault->value : "null");
-    put_text_member(bytes, "detail", fault->detail, &count);
-    if (fault->unit[0] != '\0')
-        put_text_member(bytes, "unit", fault->unit, &count);
-    if (fault->did_you_mean[0] != '\0')
-        put_text_member(bytes, "did_you_mean", fault->did_you_mean, &count);
+    bytes_text(bytes, ", \"detail\": ");
+    bytes_json_string(bytes, fault->detail);
+    encode_put_text_member(bytes, "unit", fault->unit);
+    encode_put_text_member(bytes, "did_you_mean", fault->did_you_mean);
     if (fault->row > 0) {
-        put_name(bytes, "row", &count);
-        bytes_format(bytes, "%zu", fault->row);
-        put_text_member(bytes, "column", fault->column, &count);
+        bytes_format(bytes, ", \"row\": %zu, \"column\": ", fault->row);
+        bytes_json_string(bytes, fault->column);
     }
     bytes_text(bytes, "}");
 }
@@ -209,37 +210,25 @@ int encode_problem_code(Status status) {
 }
 
 void encode_problem(Bytes *bytes, const Problem *problem, int status_code, const char *instance) {
-    size_t count = 0;
-    bytes_text(bytes, "{");
-    put_name(bytes, "type", &count);
-    bytes_format(bytes, "\"/problems/%s\"", status_slug(problem->status));
-    put_name(bytes, "title", &count);
+    bytes_format(bytes, "{\"type\": \"/problems/%s\", \"title\": ", status_slug(problem->status));
     if (problem->status == STATUS_INVALID && problem->count > 0)
         bytes_format(bytes, "\"The %s has %zu fault%s\"",
                      problem->whose != NULL ? problem->whose : "scene", problem->count,
                      problem->count == 1 ? "" : "s");
     else
         bytes_json_string(bytes, status_title(problem->status));
-    put_name(bytes, "status", &count);
-    bytes_format(bytes, "%d", status_code);
     const char *detail = problem->detail;
     if (detail[0] == '\0')
         detail = problem->count > 0 ? problem->faults[0].detail : status_title(problem->status);
-    put_text_member(bytes, "detail", detail, &count);
-    if (instance != NULL)
-        put_text_member(bytes, "instance", instance, &count);
-    if (problem->count > 0) {
-        put_name(bytes, "errors", &count);
-        bytes_text(bytes, "[");
-        for (size_t i = 0; i < problem->count && i < PROBLEM_FAULTS; i++) {
-            bytes_text(bytes, i > 0 ? ", " : "");
-            put_fault(bytes, &problem->faults[i]);
-        }
-        bytes_text(bytes, "]");
+    bytes_format(bytes, ", \"status\": %d, \"detail\": ", status_code);
+    bytes_json_string(bytes, detail);
+    encode_put_text_member(bytes, "instance", instance);
+    for (size_t i = 0; i < problem->count && i < PROBLEM_FAULTS; i++) {
+        bytes_text(bytes, i > 0 ? ", " : ", \"errors\": [");
+        encode_put_fault(bytes, &problem->faults[i]);
     }
-    if (problem->count > PROBLEM_FAULTS) {
-        put_name(bytes, "more", &count);
-        bytes_format(bytes, "%zu", problem->count - PROBLEM_FAULTS);
-    }
+    bytes_text(bytes, problem->count > 0 ? "]" : "");
+    if (problem->count > PROBLEM_FAULTS)
+        bytes_format(bytes, ", \"more\": %zu", problem->count - PROBLEM_FAULTS);
     bytes_text(bytes, "}");
 }
