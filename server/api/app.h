@@ -103,6 +103,9 @@ Status job_find_visible(App *app, const Request *request, Job **job, Problem *pr
 // Sets Retry-After where a scene was refused with STATUS_BUSY or STATUS_QUOTA; returns `status`.
 Status jobs_refused(App *app, const Request *request, Reply *reply, Status status);
 
+// jobs_tally, with the series in the database. cache.c.
+void cache_tally_all(App *app, JobStats *stats);
+
 // --- results, results.c ---
 
 // Append the documents of a result's row, as /v1/results/{id} and its manifest answer them.

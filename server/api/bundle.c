@@ -1,39 +1,17 @@
 // All of a result in one archive that explains itself.
-#include <stdio.h>
 #include <string.h>
 
 #include "server/api/app.h"
 
-static const char about[] =
-    "A simulation of an impact damper, as impactd made it.\n"
-    "\n"
-    "Result   %s\n"
-    "Engine   %s\n"
-    "\n"
-    "FILES\n"
-    "scene.json      what was simulated, all defaults filled: submit it to have the same result\n"
-    "result.json     the numbers asked for first (summary), the plan with its reasons, warnings,\n"
-    "                and the unit of every quantity (units)\n"
-    "manifest.json   engine, program and materials: what it takes to do it again\n"
-    "series.npz      time series: one array of float64 for each channel, and time\n"
-    "psd.json        power spectral densities and how they were estimated (if asked for)\n"
-    "psd.csv         the same numbers as a table\n"
-    "impacts.csv     every impact, a row for each (unless the scene asked for none)\n"
-    "\n"
-    "UNITS\n"
-    "SI throughout: m, kg, s, N, J; frequencies in Hz; spectra one-sided, per Hz. Displacements\n"
-    "and velocities are relative to the base, accelerations absolute. CSV columns carry their\n"
-    "unit in the header; in an NPZ the unit of a channel is that in result.json.\n"
-    "\n"
-    "READING\n"
-    "Python:  series = numpy.load('series.npz'); series['time'], series['displacement']\n"
-    "         (with several storeys or dampers: displacement_1, ...)\n"
-    "\n"
-    "HOW TO CITE\n"
-    "The model: K. Li and A. P. Darby, Modelling a buffered impact damper system using a\n"
-    "spring-damper model of impact, Structural Control and Health Monitoring 16 (2009) 287-302,\n"
-    "doi:10.1002/stc.238.\n"
-    "The numbers: impactd, engine %s, result %s.\n";
+// web/bundle.txt, in which "@result" and "@engine" stand for those.
+static void bundle_put_readme(Bytes *bytes, const ResultRow *row) {
+    const char *at = embedded_find(embedded_web, "web/bundle.txt")->bytes;
+    for (const char *next; (next = strchr(at, '@')) != NULL; at = next + sizeof "@result" - 1) {
+        bytes_put(bytes, at, (size_t)(next - at));
+        bytes_text(bytes, next[1] == 'r' ? row->id : row->engine);
+    }
+    bytes_text(bytes, at);
+}
 
 static const TableFormat bundle_format = {
     .extension = "zip", .content_type = "application/zip", .is_binary = true};
@@ -92,7 +70,7 @@ static Status bundle_put_lists(Zip *zip, Outcome *outcome, Problem *problem) {
 static Status bundle_fill(Zip *zip, const ResultRow *row, Bytes *manifest, TableStream *stream,
                           Problem *problem) {
     Bytes readme = {.most = 0}, scene = {.most = 0}, result = {.most = 0};
-    bytes_format(&readme, about, row->id, row->engine, row->engine, row->id);
+    bundle_put_readme(&readme, row);
     TRY(bundle_put(zip, "README.txt", &readme, problem));
     bytes_text(&scene, row->scene);
     bytes_text(&scene, "\n");

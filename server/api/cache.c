@@ -21,15 +21,19 @@ static void cache_put_layer(Bytes *bytes, const char *name, const CacheStats *la
     bytes_text(bytes, "}");
 }
 
+void cache_tally_all(App *app, JobStats *stats) {
+    uint64_t count, size;
+    jobs_tally(app->manager, stats);
+    db_series_tally(app->db, &count, &size, &stats->stored.evictions);
+    stats->stored.count = count;
+    stats->stored.bytes = size;
+}
+
 Status cache_show(App *app, const Request *request, Reply *reply, Problem *problem) {
     (void)request;
     JobStats stats;
     Bytes bytes = {.most = app->reply_most};
-    uint64_t count, size;
-    jobs_tally(app->manager, &stats);
-    db_series_tally(app->db, &count, &size, &stats.stored.evictions);
-    stats.stored.count = count;
-    stats.stored.bytes = size;
+    cache_tally_all(app, &stats);
     bytes_text(&bytes, "{");
     cache_put_layer(&bytes, "documents", &stats.heads, true);
     cache_put_layer(&bytes, "series", &stats.series, true);

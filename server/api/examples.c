@@ -19,26 +19,16 @@ const char program_build[] = "gcc " __VERSION__;
 
 static const char examples_folder[] = "schema/examples/";
 
-// The file's name without folder and ".json"; false if it is not directly in the folder.
-static bool examples_name(const char *path, const char *folder, char name[64]) {
-    const size_t size = strlen(folder);
-    if (strncmp(path, folder, size) != 0 || strchr(path + size, '/') != NULL)
-        return false;
-    const char *from = path + size, *end = strstr(from, ".json");
-    if (end == NULL || end - from >= 64)
-        return false;
-    snprintf(name, 64, "%.*s", (int)(end - from), from);
-    return true;
-}
-
-static void examples_put(Bytes *bytes, const EmbeddedFile *file, const char *name) {
-    StudyRequest inquiry;
-    const bool is_read =
-        json_parse(file->bytes, file->size, study_request_fields, &inquiry, NULL) == STATUS_OK;
+static void examples_put(Bytes *bytes, const EmbeddedFile *file) {
+    StudyRequest inquiry = {0};
+    char name[64];
+    (void)json_parse(file->bytes, file->size, study_request_fields, &inquiry, NULL);
+    const char *from = file->path + strlen(examples_folder);
+    snprintf(name, sizeof name, "%.*s", (int)strcspn(from, "."), from);
     bytes_json(bytes,
                "{\"name\": %s, \"title\": %s, \"links\": {\"self\": \"%s/v1/examples/%s\"}, "
                "\"scene\": ",
-               name, is_read ? inquiry.simulation.title : NULL, base_path(), name);
+               name, inquiry.simulation.title, base_path(), name);
     bytes_put(bytes, file->bytes, file->size);
     bytes_text(bytes, "}");
     study_request_clear(&inquiry);
@@ -47,27 +37,22 @@ static void examples_put(Bytes *bytes, const EmbeddedFile *file, const char *nam
 Status examples_list(App *app, const Request *request, Reply *reply, Problem *problem) {
     (void)request;
     Bytes bytes = {.most = app->reply_most};
-    char name[64];
     bytes_text(&bytes, "{\"examples\": [");
-    bool is_first = true;
     for (const EmbeddedFile *file = embedded_examples; file->path != NULL; file++) {
-        if (!examples_name(file->path, examples_folder, name))
-            continue;
-        bytes_text(&bytes, is_first ? "\n" : ",\n");
-        examples_put(&bytes, file, name);
-        is_first = false;
+        bytes_text(&bytes, file == embedded_examples ? "\n" : ",\n");
+        examples_put(&bytes, file);
     }
     bytes_text(&bytes, "]}\n");
     return reply_bytes(reply, 200, type_json, &bytes, problem);
 }
 
 Status examples_show(App *app, const Request *request, Reply *reply, Problem *problem) {
+    char path[128];
     (void)app;
-    char name[64];
-    for (const EmbeddedFile *file = embedded_examples; file->path != NULL; file++)
-        if (examples_name(file->path, examples_folder, name) &&
-            strcmp(name, request->parameters[0]) == 0)
-            return reply_embedded(reply, request, file, type_json);
+    snprintf(path, sizeof path, "%s%.60s.json", examples_folder, request->parameters[0]);
+    const EmbeddedFile *file = embedded_find(embedded_examples, path);
+    if (file != NULL)
+        return reply_embedded(reply, request, file, type_json);
     return problem_set(problem, STATUS_NOT_FOUND,
                        "there is no example \"%.60s\"; GET /v1/examples lists them",
                        request->parameters[0]);

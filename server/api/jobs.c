@@ -328,9 +328,10 @@ enum { LIST_INITIAL = 20, LIST_MAX = 100 };
 // Unfinished jobs whose state is asked for are looked at one by one, this many at a time.
 enum { LOOKED_AT = 256 };
 
-// A row knows no progress: of an unfinished job the queue is asked. False where the job is not in
-// the state that was asked for (-1: any).
-static bool list_row(App *app, Bytes *bytes, const JobRow *row, int state, const char *separator) {
+// A row has no progress: an unfinished job is read from the manager. False where the job is not in
+// the wanted state (-1: any).
+static bool jobs_list_row(App *app, Bytes *bytes, const JobRow *row, int state,
+                          const char *separator) {
     JobView show = {0};
     Job *job = NULL;
     const bool is_unfinished = !job_state_is_final(row->state);
@@ -370,8 +371,8 @@ static bool list_row(App *app, Bytes *bytes, const JobRow *row, int state, const
     return true;
 }
 
-static Status read_time(const Request *request, const char *name, bool is_end, int64_t *unix_ms,
-                        Problem *problem) {
+static Status search_read_time(const Request *request, const char *name, bool is_end,
+                               int64_t *unix_ms, Problem *problem) {
     const char *text;
     TRY(query_text(request, name, &text, problem));
     if (text == NULL)
@@ -386,7 +387,7 @@ static Status read_time(const Request *request, const char *name, bool is_end, i
     return STATUS_OK;
 }
 
-static Status read_search(const Request *request, JobSearch *search, int *state, Problem *problem) {
+static Status search_read(const Request *request, JobSearch *search, int *state, Problem *problem) {
     const char *kinds[32] = {"none"};
     size_t count = 1;
     for (size_t i = 0; studies[i] != NULL && count + 1 < COUNT(kinds); i++)
@@ -403,11 +404,11 @@ static Status read_search(const Request *request, JobSearch *search, int *state,
     TRY(query_text(request, "q", &search->words, problem));
     TRY(query_text(request, "label", &search->label, problem));
     TRY(query_text(request, "result", &search->result, problem));
-    TRY(read_time(request, "since", false, &search->since_unix_ms, problem));
-    TRY(read_time(request, "until", true, &search->until_unix_ms, problem));
+    TRY(search_read_time(request, "since", false, &search->since_unix_ms, problem));
+    TRY(search_read_time(request, "until", true, &search->until_unix_ms, problem));
     if (kind >= 0) // the names are the studies' own, and outlive this
         search->study = kinds[kind];
-    // The store knows an unfinished job only as accepted.
+    // In the database an unfinished job is accepted, whether it runs or not.
     if (*state == JOB_ACCEPTED || *state == JOB_RUNNING)
         search->most_state = JOB_RUNNING;
     else if (*state >= 0)
@@ -416,14 +417,14 @@ static Status read_search(const Request *request, JobSearch *search, int *state,
 }
 
 // Up to `most` jobs into `bytes`. `last` gets the last one's id where more may follow, else "".
-static Status list(App *app, JobSearch search, int state, Bytes *bytes, char last[40],
-                   Problem *problem) {
+static Status jobs_list_page(App *app, JobSearch search, int state, Bytes *bytes, char last[40],
+                             Problem *problem) {
     const size_t most = search.most;
     const bool is_live = state == JOB_ACCEPTED || state == JOB_RUNNING;
     char before[40];
     size_t count = 0;
     last[0] = '\0';
-    // One more than asked for tells whether there is a next page.
+    // One more than the limit shows whether there is a next page.
     search.most = is_live ? LOOKED_AT : most + 1;
     for (;;) {
         JobRows rows = {0};
@@ -431,7 +432,8 @@ static Status list(App *app, JobSearch search, int state, Bytes *bytes, char las
         bool is_full = false;
         for (size_t i = 0; i < rows.count && !is_full; i++) {
             is_full = count == most;
-            if (!is_full && list_row(app, bytes, &rows.at[i], state, count > 0 ? ",\n " : "")) {
+            if (!is_full &&
+                jobs_list_row(app, bytes, &rows.at[i], state, count > 0 ? ",\n " : "")) {
                 count++;
                 text_fit(last, 40, rows.at[i].id);
             }
@@ -453,11 +455,11 @@ static Status list(App *app, JobSearch search, int state, Bytes *bytes, char las
 Status jobs_list(App *app, const Request *request, Reply *reply, Problem *problem) {
     JobSearch search;
     int state;
-    TRY(read_search(request, &search, &state, problem));
+    TRY(search_read(request, &search, &state, problem));
     Bytes bytes = {.most = app->reply_most};
     char last[40];
     bytes_text(&bytes, "{\"jobs\": [");
-    const Status status = list(app, search, state, &bytes, last, problem);
+    const Status status = jobs_list_page(app, search, state, &bytes, last, problem);
     if (status != STATUS_OK) {
         bytes_clear(&bytes);
         return status;

@@ -5,42 +5,34 @@
 #include "server/http/server.h"
 #include "server/util/process.h"
 
-// What is known already, by layer in the order in which they are asked.
-static void metrics_write_layers(Bytes *bytes, const JobStats *metrics, Db *db) {
-    CacheStats stored = metrics->stored;
-    uint64_t count = 0, size = 0;
-    db_series_tally(db, &count, &size, &stored.evictions);
-    stored.count = count;
-    stored.bytes = size;
+// Caches, in the order in which they are asked.
+static void metrics_write_layers(Bytes *bytes, const JobStats *stats) {
     const struct {
         const char *label;
         const CacheStats *layer;
-    } cache_layers[] = {{"layer=\"documents\"", &metrics->heads},
-                        {"layer=\"series\"", &metrics->series},
-                        {"layer=\"results\"", &metrics->rows},
-                        {"layer=\"stored_series\"", &stored}};
-    static const char hits[] = "impactd_cache_hits_total", misses[] = "impactd_cache_misses_total",
-                      evictions[] = "impactd_cache_evictions_total",
-                      bytes_kept[] = "impactd_cache_layer_bytes";
-    metrics_family(bytes, hits, "counter", "Looks that found what was known, by layer.");
-    for (size_t i = 0; i < COUNT(cache_layers); i++)
-        metrics_count(bytes, hits, cache_layers[i].label, cache_layers[i].layer->hits);
-    metrics_family(bytes, misses, "counter", "Looks that did not, by layer.");
-    for (size_t i = 0; i < COUNT(cache_layers); i++)
-        metrics_count(bytes, misses, cache_layers[i].label, cache_layers[i].layer->misses);
-    metrics_family(bytes, evictions, "counter", "What made room for others, by layer.");
-    for (size_t i = 0; i < COUNT(cache_layers); i++)
-        metrics_count(bytes, evictions, cache_layers[i].label, cache_layers[i].layer->evictions);
-    metrics_family(bytes, bytes_kept, "gauge", "What a layer takes, in memory or on disk.");
-    for (size_t i = 0; i < COUNT(cache_layers); i++)
-        metrics_real(bytes, bytes_kept, cache_layers[i].label,
-                     (double)cache_layers[i].layer->bytes);
+    } layers[] = {{"layer=\"documents\"", &stats->heads},
+                  {"layer=\"series\"", &stats->series},
+                  {"layer=\"results\"", &stats->rows},
+                  {"layer=\"stored_series\"", &stats->stored}};
+    static const char *const families[][3] = {
+        {"impactd_cache_hits_total", "counter", "Looks that found what was known, by layer."},
+        {"impactd_cache_misses_total", "counter", "Looks that did not, by layer."},
+        {"impactd_cache_evictions_total", "counter", "What made room for others, by layer."},
+        {"impactd_cache_layer_bytes", "gauge", "What a layer takes, in memory or on disk."}};
+    for (size_t k = 0; k < COUNT(families); k++) {
+        metrics_family(bytes, families[k][0], families[k][1], families[k][2]);
+        for (size_t i = 0; i < COUNT(layers); i++) {
+            const CacheStats *layer = layers[i].layer;
+            const uint64_t values[] = {layer->hits, layer->misses, layer->evictions, layer->bytes};
+            metrics_count(bytes, families[k][0], layers[i].label, values[k]);
+        }
+    }
 }
 
-static void metrics_write_queue(Bytes *bytes, JobManager *manager, Db *db) {
-    JobStats metrics = {0};
-    jobs_tally(manager, &metrics);
-    metrics_write_layers(bytes, &metrics, db);
+static void metrics_write_queue(Bytes *bytes, App *app) {
+    JobStats metrics;
+    cache_tally_all(app, &metrics);
+    metrics_write_layers(bytes, &metrics);
     metrics_gauge(bytes, "impactd_queue_length", "Computations that wait.", (double)metrics.queued);
     metrics_gauge(bytes, "impactd_queue_limit", "Unfinished jobs at most.",
                   (double)metrics.queue_most);
@@ -113,7 +105,7 @@ Status metrics_show(App *app, const Request *request, Reply *reply, Problem *pro
                       (double)server_connections(server));
     if (app->response_cache != NULL)
         metrics_write_responses(&bytes, app->response_cache);
-    metrics_write_queue(&bytes, app->manager, app->db);
+    metrics_write_queue(&bytes, app);
     jobs_write_metrics(app->manager, &bytes);
     metrics_write_db(&bytes, app->db);
     metrics_write_process(&bytes, app);

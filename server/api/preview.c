@@ -31,34 +31,24 @@ static void preview_run(void *context, const Progress *watch) {
                                      &preview->outcome, &preview->problem);
 }
 
-// `fill` has chosen what the stream has; takes the stream.
-static Status preview_put(Bytes *bytes, TableStream *stream, Status status, Problem *problem) {
+// As series.json with points, or impacts.json, without the line's end.
+static Status preview_put_table(Bytes *bytes, const Preview *preview, bool is_series,
+                                Problem *problem) {
+    TableStream *stream = table_stream_new(outcome_ref(preview->outcome));
+    if (stream == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a preview");
+    Status status = is_series ? table_stream_series(stream, problem)
+                              : table_stream_impacts(stream, &format_json, NULL, problem);
+    if (status == STATUS_OK && is_series && stream->table.count > 0)
+        status = table_stream_downsample(stream, preview->points, problem);
     if (status == STATUS_OK)
         status = table_stream_open(stream, &format_json, problem);
     if (status == STATUS_OK)
         table_stream_write(stream, bytes);
-    if (bytes->count > 0) // the line's end
+    if (bytes->count > 0)
         bytes->at[--bytes->count] = '\0';
     table_stream_free(stream);
     return status;
-}
-
-static Status preview_put_series(Bytes *bytes, const Preview *preview, Problem *problem) {
-    TableStream *stream = table_stream_new(outcome_ref(preview->outcome));
-    if (stream == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the series");
-    Status status = table_stream_series(stream, problem);
-    if (status == STATUS_OK && stream->table.count > 0)
-        status = table_stream_downsample(stream, preview->points, problem);
-    return preview_put(bytes, stream, status, problem);
-}
-
-static Status preview_put_impacts(Bytes *bytes, const Preview *preview, Problem *problem) {
-    TableStream *stream = table_stream_new(outcome_ref(preview->outcome));
-    if (stream == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the impacts");
-    return preview_put(bytes, stream, table_stream_impacts(stream, &format_json, NULL, problem),
-                       problem);
 }
 
 static Status preview_reply(App *app, const Request *request, Reply *reply, void *context,
@@ -66,29 +56,24 @@ static Status preview_reply(App *app, const Request *request, Reply *reply, void
     const Preview *preview = context;
     Bytes bytes = {.most = app->reply_most};
     (void)request;
-    if (preview->status != STATUS_OK)
-        return problem_set(problem, preview->status, "%s", preview->problem.detail);
+    if (preview->status != STATUS_OK) {
+        *problem = preview->problem;
+        return preview->status;
+    }
     ResultRow row = {.count = 0};
     Status status = document_outcome(preview->outcome, &row);
     if (status == STATUS_OK) {
-        bytes_text(&bytes, "{\"plan\": ");
-        bytes_text(&bytes, row.plan);
-        bytes_text(&bytes, ", \"summary\": ");
-        bytes_text(&bytes, row.summary);
-        bytes_text(&bytes, ",\n\"series\": ");
-        status = preview_put_series(&bytes, preview, problem);
+        bytes_json(&bytes, "{\"plan\": %p, \"summary\": %p,\n\"series\": ", row.plan, row.summary);
+        status = preview_put_table(&bytes, preview, true, problem);
     }
     result_row_clear(&row);
-    bytes_text(&bytes, ", \"impacts\": ");
+    bytes_text(&bytes, ",\n\"impacts\": ");
     if (preview->outcome->response.is_unlisted)
         bytes_text(&bytes, "null");
     else if (status == STATUS_OK)
-        status = preview_put_impacts(&bytes, preview, problem);
+        status = preview_put_table(&bytes, preview, false, problem);
     bytes_text(&bytes, "}\n");
-    if (status == STATUS_OK)
-        return reply_bytes(reply, 200, type_json, &bytes, problem);
-    bytes_clear(&bytes);
-    return status;
+    return reply_json(reply, 200, &bytes, status, problem);
 }
 
 static Status preview_check(const DryRun *plan, Problem *problem) {

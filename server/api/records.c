@@ -288,11 +288,6 @@ static void record_put(Bytes *bytes, const RecordRow *row) {
                base_path(), row->name);
 }
 
-static void record_put_uses(Bytes *bytes, const RecordUses *uses) {
-    bytes_format(bytes, ", \"used_by\": {\"results\": %llu, \"unfinished_jobs\": %llu}",
-                 (unsigned long long)uses->results, (unsigned long long)uses->jobs);
-}
-
 // Others with the same samples may be meant.
 static Status record_warn_twins(App *app, RecordUpload *upload, Problem *problem) {
     RecordRows twins;
@@ -300,48 +295,51 @@ static Status record_warn_twins(App *app, RecordUpload *upload, Problem *problem
     TRY(db_record_twins(app->db, &upload->row, &twins, problem));
     for (size_t i = 0; i < twins.count; i++)
         text_list(list, sizeof list, twins.at[i].name);
-    const size_t count = twins.count;
     record_rows_clear(&twins);
-    if (count > 0 &&
-        warnings_add(&upload->warnings, "/samples",
-                     "are to the bit those of %s, under another name", list) != STATUS_OK)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for warnings");
-    return STATUS_OK;
+    return list[0] == '\0' ||
+                   warnings_add(&upload->warnings, "/samples",
+                                "are to the bit those of %s, under another name", list) == STATUS_OK
+               ? STATUS_OK
+               : upload_no_memory(problem);
 }
 
-static Status record_answer(App *app, RecordUpload *upload, bool is_there, Reply *reply,
-                            Problem *problem) {
-    RecordRow row;
-    RecordUses uses;
+// The record with its uses and, of an upload, warnings.
+static Status record_reply(App *app, const RecordRow *row, const RecordUses *uses,
+                           const Warnings *warnings, int code, Reply *reply, Problem *problem) {
     Bytes bytes = {.most = app->reply_most};
-    TRY(record_warn_twins(app, upload, problem));
-    TRY(db_record(app->db, upload->row.name, &row, problem));
-    const Status status = db_record_uses(app->db, row.name, &uses, problem);
-    if (status == STATUS_OK) {
-        record_put(&bytes, &row);
-        record_put_uses(&bytes, &uses);
+    record_put(&bytes, row);
+    bytes_json(&bytes, ", \"used_by\": {\"results\": %llu, \"unfinished_jobs\": %llu}",
+               (unsigned long long)uses->results, (unsigned long long)uses->jobs);
+    if (warnings != NULL) {
         bytes_text(&bytes, ", \"warnings\": ");
-        document_warnings(&bytes, &upload->warnings);
-        bytes_text(&bytes, "}\n");
-        snprintf(reply->location, sizeof reply->location, "/v1/records/%.64s", row.name);
+        document_warnings(&bytes, warnings);
     }
-    record_row_clear(&row);
-    return status == STATUS_OK
-               ? reply_bytes(reply, is_there ? 200 : 201, type_json, &bytes, problem)
-               : status;
+    bytes_text(&bytes, "}\n");
+    return reply_bytes(reply, code, type_json, &bytes, problem);
 }
 
 Status records_create(App *app, const Request *request, Reply *reply, Problem *problem) {
     RecordUpload upload = {.unit = CHOICE_ABSENT};
+    RecordRow row = {.name = NULL};
+    RecordUses uses;
     bool is_there = false;
     Status status = upload_read(request, &upload, problem);
-    if (status == STATUS_OK && request->client != NULL &&
-        (upload.row.author = strdup(request->client)) == NULL)
-        status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the record");
+    if (status == STATUS_OK && request->client != NULL)
+        status = upload_copy(&upload.row.author, request->client, problem);
     if (status == STATUS_OK)
         status = db_record_add(app->db, &upload.row, &upload.samples, &is_there, problem);
     if (status == STATUS_OK)
-        status = record_answer(app, &upload, is_there, reply, problem);
+        status = record_warn_twins(app, &upload, problem);
+    if (status == STATUS_OK)
+        status = db_record(app->db, upload.row.name, &row, problem);
+    if (status == STATUS_OK)
+        status = db_record_uses(app->db, row.name, &uses, problem);
+    if (status == STATUS_OK) {
+        snprintf(reply->location, sizeof reply->location, "/v1/records/%.64s", row.name);
+        status =
+            record_reply(app, &row, &uses, &upload.warnings, is_there ? 200 : 201, reply, problem);
+    }
+    record_row_clear(&row);
     upload_clear(&upload);
     return status;
 }
@@ -378,13 +376,8 @@ Status records_show(App *app, const Request *request, Reply *reply, Problem *pro
     if (status == STATUS_OK) {
         snprintf(tag, sizeof tag, "%.32s-%lld-%llu-%llu", row.digest, (long long)row.number,
                  (unsigned long long)uses.results, (unsigned long long)uses.jobs);
-        if (!reply_tagged(reply, request, tag)) {
-            Bytes bytes = {.most = app->reply_most};
-            record_put(&bytes, &row);
-            record_put_uses(&bytes, &uses);
-            bytes_text(&bytes, "}\n");
-            status = reply_bytes(reply, 200, type_json, &bytes, problem);
-        }
+        if (!reply_tagged(reply, request, tag))
+            status = record_reply(app, &row, &uses, NULL, 200, reply, problem);
     }
     record_row_clear(&row);
     return status;
