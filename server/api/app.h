@@ -71,7 +71,7 @@ bool query_range_has(const QueryRange *range, double value);
 // A copy of the text, NULL where it is absent or empty. The caller frees it.
 Status query_copy(const Request *request, const char *name, char **target, Problem *problem);
 // As query_choice for a member of a document that is sent as queries: STATUS_INVALID at `pointer`,
-// with the spelling that may be meant. *choice stays where it is absent.
+// with a suggestion. *choice stays where it is absent.
 Status query_spelled(const Request *request, const char *name, const char *pointer,
                      const char *const *names, int *choice, Problem *problem);
 // Whether the body is JSON or one of `texts` (NULL-terminated). STATUS_UNSUPPORTED_TYPE with what

@@ -132,7 +132,7 @@ static Status dry_run(App *app, const Request *request, Reply *reply, Problem *p
     return reply_bytes(reply, 200, type_json, &bytes, problem);
 }
 
-// How long the client would wait, told in the reply.
+// How long the client waits [s]; the reply states it.
 static double read_wait(const Request *request, Reply *reply) {
     if (request->prefer == NULL)
         return wait_initial;
@@ -254,7 +254,7 @@ Status jobs_scene(App *app, const Request *request, Reply *reply, Problem *probl
     return reply_bytes(reply, 200, type_json, &bytes, problem);
 }
 
-// Whether the request may change what the job of that id came to.
+// Whether the request may change the job.
 static Status require_own(App *app, const Request *request, const char *id, Problem *problem) {
     Job *job = NULL;
     char what[64];
@@ -337,15 +337,15 @@ static bool jobs_list_row(App *app, Bytes *bytes, const JobRow *row, int state,
     const bool is_unfinished = !job_state_is_final(row->state);
     if (is_unfinished && jobs_find(app->manager, row->id, &job, NULL) == STATUS_OK) {
         const Status status = job_view(job, &show);
-        const bool is_meant = state < 0 || (int)show.state == state;
+        const bool is_wanted = state < 0 || (int)show.state == state;
         job_unref(job);
-        if (status == STATUS_OK && is_meant) {
+        if (status == STATUS_OK && is_wanted) {
             bytes_text(bytes, separator);
             job_json_put(bytes, &show, JOB_PUT_LINKS | JOB_PUT_SENDER);
         }
         job_view_clear(&show);
         if (status == STATUS_OK)
-            return is_meant;
+            return is_wanted;
     }
     if (state >= 0 && row->state != state)
         return false;

@@ -1,4 +1,4 @@
-// GET /metrics: counters and gauges of all rooms in the Prometheus text format, version 0.0.4.
+// GET /metrics: counters and gauges of all modules in the Prometheus text format, version 0.0.4.
 #include "server/api/app.h"
 #include "server/http/access.h"
 #include "server/http/response_cache.h"

@@ -23,7 +23,7 @@ typedef struct RecordUpload {
     RecordRow row;
     int unit;          // of the samples as they came
     Reals samples;     // [m/s^2], once it is read
-    Warnings warnings; // what is allowed but unlikely to be meant
+    Warnings warnings; // of what is allowed but unlikely
 } RecordUpload;
 
 #define INTERVAL_MIN 1e-9
@@ -88,9 +88,9 @@ static Status upload_warn_file(const GroundMotionText *file, bool has_unit, Warn
     const char *unit = acceleration_unit_names[file->unit];
     char start[32];
     if (file->stated_unit == CHOICE_ABSENT && !has_unit)
-        TRY(warnings_add(warnings, "/unit", "the file tells no unit, %s is taken", unit));
+        TRY(warnings_add(warnings, "/unit", "the file states no unit, %s is assumed", unit));
     if (file->stated_unit != CHOICE_ABSENT && file->stated_unit != file->unit)
-        TRY(warnings_add(warnings, "/unit", "the file tells %s, %s is taken",
+        TRY(warnings_add(warnings, "/unit", "the file states %s, %s is used",
                          acceleration_unit_names[file->stated_unit], unit));
     if (file->start != 0)
         TRY(warnings_add(warnings, "/samples",
@@ -193,10 +193,10 @@ static Status upload_warn(const RecordLook *look, const RecordRow *row, Warnings
         status = warnings_add(warnings, doubts->faults[i].pointer, "%s", doubts->faults[i].detail);
     free(doubts);
     if (status == STATUS_OK && row->source == NULL)
-        status = warnings_add(warnings, "/source", "is not told: say where the file comes from");
+        status = warnings_add(warnings, "/source", "is missing: state where the file comes from");
     if (status == STATUS_OK && row->processing == NULL)
         status = warnings_add(warnings, "/processing",
-                              "is not told: the same earthquake with another filter or baseline is "
+                              "is missing: the same earthquake with another filter or baseline is "
                               "another record");
     return status;
 }
@@ -288,7 +288,7 @@ static void record_put(Bytes *bytes, const RecordRow *row) {
                base_path(), row->name);
 }
 
-// Others with the same samples may be meant.
+// Warns of others with the same samples.
 static Status record_warn_twins(App *app, RecordUpload *upload, Problem *problem) {
     RecordRows twins;
     char list[RECORD_TWINS * (RECORD_NAME_SIZE + 2) + 8] = "";

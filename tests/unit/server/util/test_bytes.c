@@ -121,3 +121,17 @@ TEST(strings_are_escaped_and_always_utf8) {
         bytes_clear(&bytes);
     }
 }
+
+TEST(json_is_written_by_a_format) {
+    Bytes bytes = {0};
+    const char *volatile none = NULL;
+    bytes_json(&bytes, "{\"a\": %s, \"b\": %s, \"c\": \"/%s/%llu\", \"d\": %g, \"e\": %g",
+               "say \"x\"", none, "v1", 18446744073709551615ULL, 0.1, (double)NAN);
+    bytes_json(&bytes, ", \"f\": %p, \"g\": %p, \"h\": %d, \"i\": %zu, \"j\": %p}\n", "[1, 2]",
+               none, -1, (size_t)7, json_flag(true));
+    assert_string_equal(bytes.at,
+                        "{\"a\": \"say \\\"x\\\"\", \"b\": null, \"c\": "
+                        "\"/v1/18446744073709551615\", \"d\": 0.1, \"e\": null, \"f\": [1, 2], "
+                        "\"g\": null, \"h\": -1, \"i\": 7, \"j\": true}\n");
+    bytes_clear(&bytes);
+}
