@@ -65,6 +65,8 @@ static Status preview_reply(App *app, const Request *request, Reply *reply, void
     if (status == STATUS_OK) {
         bytes_json(&bytes, "{\"plan\": %p, \"summary\": %p,\n\"series\": ", row.plan, row.summary);
         status = preview_put_table(&bytes, preview, true, problem);
+    } else {
+        (void)problem_set(problem, status, "no memory for a preview");
     }
     result_row_clear(&row);
     bytes_text(&bytes, ",\n\"impacts\": ");

@@ -258,9 +258,9 @@ static Status records_add(ApiCall *call, Problem *problem) {
 
 static Status record_ask(ApiCall *call, const char *method, Problem *problem) {
     const char *name = call->operands[0];
-    ApiRequest request = {.method = method, .path = api_path("/v1/records/")};
     if (name[0] == '\0' || strcmp(name, "..") == 0)
         return problem_set(problem, STATUS_USAGE, "must be the name of a record");
+    ApiRequest request = {.method = method, .path = api_path("/v1/records/")};
     bytes_percent(&request.path, name);
     return api_ask(&call->client, &request, &call->answer, problem);
 }
