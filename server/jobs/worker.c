@@ -182,10 +182,9 @@ static void worker_compute(Worker *worker, Task *task, Problem *problem) {
     pthread_mutex_lock(&manager->lock);
     worker->running = NULL;
     manager->slow_running -= task_is_slow(task);
-    if (study == NULL) {
-        task->workers = 0;
+    // It keeps its worker until it is saved: a cancel queues only a study that no worker is at.
+    if (study == NULL)
         task_end(task);
-    }
     const bool is_stopped = atomic_load(&task->is_stopped);
     if (is_stalled && !is_stopped)
         task_wait(task);
