@@ -35,7 +35,7 @@ enum {
 typedef struct Exchange {
     WorkItem work; // in the pool
     EventLoop *loop;
-    ServerShared *shared;
+    Server *server;
     struct MHD_Connection *connection;
     ConnectionTimer *timer;
     struct Exchange *next_reader, **reader_link; // in the loop's list while the body is read
@@ -67,7 +67,7 @@ static bool sending_is_admitted(Sending *sending) {
     if (now_ns - sending->admitted_ns < CHECK_MS * 1000000LL)
         return true;
     sending->admitted_ns = now_ns;
-    return router_still_admits(sending->exchange->shared->settings.router,
+    return router_still_admits(sending->exchange->server->settings.router,
                                &sending->exchange->request);
 }
 
@@ -199,7 +199,7 @@ static struct MHD_Response *response_new(Exchange *exchange, Reply *reply) {
     if (response == NULL)
         reply_clear(reply);
     else
-        response_add_all(response, reply, &exchange->shared->settings);
+        response_add_all(response, reply, &exchange->server->settings);
     return response;
 }
 
@@ -224,7 +224,7 @@ static enum MHD_Result response_queue(Exchange *exchange, Reply *reply, bool clo
 static void exchange_problem(Exchange *exchange, int code, const Problem *problem, Reply *reply) {
     reply_default(reply);
     reply_problem(reply, problem, code, NULL, exchange->request.id);
-    access_record(exchange->shared->settings.router->access, &exchange->request, reply);
+    access_record(exchange->server->settings.router->access, &exchange->request, reply);
 }
 
 static enum MHD_Result exchange_add_header(void *context, enum MHD_ValueKind kind, const char *name,
@@ -276,7 +276,7 @@ static enum MHD_Result exchange_refuse(Exchange *exchange, Reply *refusal, bool 
 // The head is complete: validate and route it, and refuse at once what cannot be read to its end.
 static enum MHD_Result exchange_begin(Exchange *exchange, struct MHD_Connection *connection,
                                       const char *method, const char *version) {
-    ServerShared *shared = exchange->shared;
+    Server *server = exchange->server;
     Request *request = &exchange->request;
     exchange->is_begun = true;
     exchange->connection = connection;
@@ -284,17 +284,17 @@ static enum MHD_Result exchange_begin(Exchange *exchange, struct MHD_Connection 
     request->path = request->target = exchange->target;
     request->started_ns = clock_monotonic_ns();
     request->callback = timer_callback(exchange->timer);
-    request->body_most = shared->settings.body_most;
-    const AcceptedHosts *hosts = shared->settings.hosts;
+    request->body_most = server->settings.body_most;
+    const AcceptedHosts *hosts = server->settings.hosts;
     MHD_get_connection_values_n(connection, MHD_HEADER_KIND, exchange_add_header, exchange);
     request->allow_origin = request_allowed_origin(request, hosts);
     if (request->id[0] == '\0')
-        exchange_write_id(request->id, shared->first_id + atomic_fetch_add(&shared->requests, 1));
+        exchange_write_id(request->id, server->first_id + atomic_fetch_add(&server->requests, 1));
     Problem problem;
     problem_clear(&problem);
     int code = request_validate(request, hosts, exchange->target, version, &problem);
     if (request->host == NULL)
-        request->host = strstr(shared->url, "://") + 3;
+        request->host = strstr(server->url, "://") + 3;
     const bool is_framed = code == 0; // it is certain where the body ends
     if (code == 0 && request_open(request, exchange->target, &problem) != STATUS_OK)
         code = encode_problem_code(problem.status);
@@ -323,7 +323,7 @@ static enum MHD_Result exchange_begin(Exchange *exchange, struct MHD_Connection 
         request->range = NULL;
     }
     reply_default(&reply);
-    exchange->is_answered = !router_admit(shared->settings.router, request, &reply);
+    exchange->is_answered = !router_admit(server->settings.router, request, &reply);
     if (exchange->is_answered && has_body)
         return exchange_refuse(exchange, &reply, drains);
     if (exchange->is_answered)
@@ -335,7 +335,7 @@ static enum MHD_Result exchange_begin(Exchange *exchange, struct MHD_Connection 
 
 static void exchange_drop_body(Exchange *exchange) {
     if (exchange->is_counted)
-        atomic_fetch_sub(&exchange->shared->body_bytes, exchange->body.count);
+        atomic_fetch_sub(&exchange->server->body_bytes, exchange->body.count);
     exchange->is_counted = false;
     bytes_clear(&exchange->body);
     exchange->request.body = NULL;
@@ -343,8 +343,8 @@ static void exchange_drop_body(Exchange *exchange) {
 }
 
 static enum MHD_Result exchange_add_body(Exchange *exchange, const char *data, size_t size) {
-    ServerShared *shared = exchange->shared;
-    const size_t most = shared->settings.body_most;
+    Server *server = exchange->server;
+    const size_t most = server->settings.body_most;
     exchange->received += size;
     if (exchange->received > DRAINED * most)
         return MHD_NO;
@@ -355,11 +355,11 @@ static enum MHD_Result exchange_add_body(Exchange *exchange, const char *data, s
     if (!exchange->request.is_too_large) {
         exchange->is_counted = true;
         exchange->is_busy =
-            atomic_fetch_add(&shared->body_bytes, size) + size > BODIES_HELD * most &&
+            atomic_fetch_add(&server->body_bytes, size) + size > BODIES_HELD * most &&
             exchange->received > BODY_SMALL;
         bytes_put(&exchange->body, data, size);
         if (exchange->body.is_failed) {
-            atomic_fetch_sub(&shared->body_bytes, exchange->received);
+            atomic_fetch_sub(&server->body_bytes, exchange->received);
             exchange->is_counted = false;
             exchange->is_busy = true;
         }
@@ -383,7 +383,7 @@ static bool exchange_handle(Exchange *exchange, Reply *reply) {
     Request *request = &exchange->request;
     for (;;) {
         reply_default(reply);
-        router_answer(exchange->shared->settings.router, request, reply);
+        router_answer(exchange->server->settings.router, request, reply);
         request->kept = reply->keep;
         exchange->forget = reply->forget;
         if (reply->wait_ms == 0)
@@ -427,7 +427,7 @@ static enum MHD_Result exchange_answer(Exchange *exchange) {
         request->is_expired = !timer_was_woken(exchange->timer);
     } else {
         timer_limit(exchange->timer, 0, false);
-        timer_begin(exchange->timer);
+        (void)timer_was_woken(exchange->timer);
         request->body = exchange->body.at;
         request->body_size = exchange->body.count;
         request->received = exchange->received;
@@ -438,7 +438,7 @@ static enum MHD_Result exchange_answer(Exchange *exchange) {
             exchange->work.run = exchange_work;
             // Suspended first: the answer may be there before thread_pool_add returns.
             MHD_suspend_connection(exchange->connection);
-            thread_pool_add(exchange->shared->pool, &exchange->work);
+            thread_pool_add(exchange->server->pool, &exchange->work);
             return MHD_YES;
         }
     }
@@ -455,7 +455,7 @@ static void exchange_suspend(void *context) {
 static void exchange_wake(void *context) {
     Exchange *exchange = context;
     if (exchange->is_in_pool)
-        thread_pool_add(exchange->shared->pool, &exchange->work);
+        thread_pool_add(exchange->server->pool, &exchange->work);
     else
         exchange_resume(exchange);
 }
@@ -499,9 +499,9 @@ void *exchange_open(void *context, const char *target, struct MHD_Connection *co
         return NULL;
     }
     exchange->loop = loop;
-    exchange->shared = loop->shared;
+    exchange->server = loop->server;
     exchange->timer = timer;
-    atomic_fetch_add(&loop->shared->exchanges, 1);
+    atomic_fetch_add(&loop->server->exchanges, 1);
     timer_limit(timer, HEAD_MS, false);
     return exchange;
 }
@@ -547,7 +547,7 @@ void exchange_close(void *context, struct MHD_Connection *connection, void **sta
     timer_limit(exchange->timer, is_complete ? IDLE_MS : 1, is_complete);
     free(exchange->target);
     free(exchange);
-    atomic_fetch_sub(&loop->shared->exchanges, 1);
+    atomic_fetch_sub(&loop->server->exchanges, 1);
 }
 
 // Whether the library could read more of the request than it does.
@@ -555,7 +555,7 @@ static bool exchange_has_unread(const Exchange *exchange, int descriptor) {
     int unread = 0;
     const union MHD_ConnectionInfo *session =
         MHD_get_connection_info(exchange->connection, MHD_CONNECTION_INFO_GNUTLS_SESSION);
-    if (exchange->shared->settings.certificate != NULL && session != NULL &&
+    if (exchange->server->settings.certificate != NULL && session != NULL &&
         tls_has_pending(session->tls_session))
         return true;
     return ioctl(descriptor, FIONREAD, &unread) == 0 && unread > 0;

@@ -48,34 +48,15 @@ const Callback *timer_callback(const ConnectionTimer *timer);
 // the connection is between two requests.
 void timer_limit(ConnectionTimer *timer, int64_t max_ms, bool is_idle);
 
-// Forgets earlier calls of the callback: a new request begins.
-void timer_begin(ConnectionTimer *timer);
-// Suspends `connection` unless the callback was called since timer_begin or the last wait, or the
-// wheel is closing: then false. From any thread.
+// Suspends `connection` unless the callback was called since the last timer_was_woken or wait, or
+// the wheel is closing: then false. From any thread.
 bool timer_sleep(ConnectionTimer *timer, void *connection, int64_t max_ms);
 // Whether the callback was called; forgets it. From any thread.
 bool timer_was_woken(ConnectionTimer *timer);
 
-// What all loops of a server share.
-typedef struct ServerShared {
-    ServerSettings settings;
-    ThreadPool *pool;
-    const char *url;
-    int descriptor;         // the listening socket
-    size_t connections_max; // over all loops
-    struct EventLoop *loops;
-    size_t loop_count;
-    atomic_size_t acceptor; // the loop that accepts new connections
-    atomic_bool is_accepting;
-    uint64_t first_id;
-    atomic_uint_fast64_t requests;
-    atomic_size_t exchanges;  // under way
-    atomic_size_t body_bytes; // of bodies in memory
-} ServerShared;
-
 // Belongs to its thread, except the atomic members and the wheel's waits.
 typedef struct EventLoop {
-    ServerShared *shared;
+    Server *server;
     size_t index;
     struct MHD_Daemon *daemon;
     pthread_t thread;
@@ -89,6 +70,25 @@ typedef struct EventLoop {
     atomic_bool is_stopping;
     atomic_size_t connections;
 } EventLoop;
+
+enum { LOOPS_MAX = 16 };
+
+// What all loops share.
+struct Server {
+    ServerSettings settings;
+    ThreadPool *pool;
+    char url[96];
+    int descriptor;         // the listening socket
+    size_t connections_max; // over all loops
+    EventLoop loops[LOOPS_MAX];
+    size_t loop_count;
+    atomic_size_t acceptor; // the loop that accepts new connections
+    atomic_bool is_accepting;
+    uint64_t first_id;
+    atomic_uint_fast64_t requests;
+    atomic_size_t exchanges;  // under way
+    atomic_size_t body_bytes; // of bodies in memory
+};
 
 extern const TimerCallbacks connection_timer_calls;
 

@@ -20,7 +20,6 @@
 #include "server/util/clock.h"
 
 enum {
-    LOOPS_MAX = 16,
     THREADS_MAX = 16,       // that run handlers which may take a while
     CONNECTIONS_MAX = 8192, // over all loops, if as many files may be open
     FILES_KEPT = 64,        // for everything else
@@ -32,41 +31,31 @@ enum {
     IDLE_MIN_MS = 500, // then a connection between two requests may be closed for a new one
 };
 
-struct Server {
-    ServerShared shared;
-    char url[96];
-    EventLoop loops[LOOPS_MAX];
-};
-
 void loop_wake(EventLoop *loop) {
     const uint64_t one = 1;
     if (!atomic_exchange(&loop->is_woken, true))
         (void)!write(loop->wakeup, &one, sizeof one);
 }
 
-static size_t shared_connections(const ServerShared *shared) {
+size_t server_connections(const Server *server) {
     size_t count = 0;
-    for (size_t i = 0; i < shared->loop_count; i++)
-        count += atomic_load(&shared->loops[i].connections);
+    for (size_t i = 0; i < server->loop_count; i++)
+        count += atomic_load(&server->loops[i].connections);
     return count;
 }
 
-size_t server_connections(const Server *server) {
-    return shared_connections(&server->shared);
-}
-
-static void loop_pass_accepting(ServerShared *shared, size_t index) {
-    atomic_store(&shared->acceptor, index);
-    loop_wake(&shared->loops[index]);
+static void loop_pass_accepting(Server *server, size_t index) {
+    atomic_store(&server->acceptor, index);
+    loop_wake(&server->loops[index]);
 }
 
 // The first loop with few connections, else the one with the fewest.
-static size_t shared_next_acceptor(const ServerShared *shared) {
+static size_t server_next_acceptor(const Server *server) {
     size_t least = 0;
     for (size_t i = 1;
-         i < shared->loop_count && atomic_load(&shared->loops[least].connections) >= TOGETHER; i++)
-        if (atomic_load(&shared->loops[i].connections) <
-            atomic_load(&shared->loops[least].connections))
+         i < server->loop_count && atomic_load(&server->loops[least].connections) >= TOGETHER; i++)
+        if (atomic_load(&server->loops[i].connections) <
+            atomic_load(&server->loops[least].connections))
             least = i;
     return least;
 }
@@ -74,21 +63,21 @@ static size_t shared_next_acceptor(const ServerShared *shared) {
 // Beyond the limit new connections wait in the kernel's queue until another one closes: the one
 // that has been idle for longest is made to.
 static void loop_make_room(EventLoop *loop, int64_t now_ns) {
-    ServerShared *shared = loop->shared;
+    Server *server = loop->server;
     timer_wheel_close_idle(loop->wheel, IDLE_MIN_MS);
     loop->accept_ns = now_ns + RETRY_MS * 1000000LL;
-    if (shared->loop_count > 1)
-        loop_pass_accepting(shared, (loop->index + 1) % shared->loop_count);
+    if (server->loop_count > 1)
+        loop_pass_accepting(server, (loop->index + 1) % server->loop_count);
 }
 
 static void loop_accept(EventLoop *loop, int64_t now_ns) {
-    ServerShared *shared = loop->shared;
+    Server *server = loop->server;
     for (size_t next = loop->index; next == loop->index;) {
         struct sockaddr_storage peer = {.ss_family = AF_INET};
         socklen_t size = sizeof peer;
-        const bool is_full = shared_connections(shared) >= shared->connections_max;
+        const bool is_full = server_connections(server) >= server->connections_max;
         const int descriptor =
-            is_full ? -1 : accept(shared->descriptor, (struct sockaddr *)&peer, &size);
+            is_full ? -1 : accept(server->descriptor, (struct sockaddr *)&peer, &size);
         if (descriptor < 0) {
             if (is_full || errno == EMFILE || errno == ENFILE || errno == ENOMEM ||
                 errno == ENOBUFS)
@@ -99,9 +88,9 @@ static void loop_accept(EventLoop *loop, int64_t now_ns) {
         // Closes the descriptor if it fails.
         if (MHD_add_connection(loop->daemon, descriptor, (struct sockaddr *)&peer, size) != MHD_YES)
             atomic_fetch_sub(&loop->connections, 1);
-        next = shared_next_acceptor(shared);
+        next = server_next_acceptor(server);
         if (next != loop->index)
-            loop_pass_accepting(shared, next);
+            loop_pass_accepting(server, next);
     }
 }
 
@@ -117,7 +106,7 @@ static int loop_timeout(const EventLoop *loop, int64_t now_ns, int64_t next_ns) 
 
 static void *loop_run(void *context) {
     EventLoop *loop = context;
-    ServerShared *shared = loop->shared;
+    Server *server = loop->server;
     const union MHD_DaemonInfo *info = MHD_get_daemon_info(loop->daemon, MHD_DAEMON_INFO_EPOLL_FD);
     struct pollfd events[] = {{.fd = info->epoll_fd, .events = POLLIN},
                               {.fd = loop->wakeup, .events = POLLIN},
@@ -129,15 +118,15 @@ static void *loop_run(void *context) {
         connection_close_stalled(loop, now_ns);
         if (busy % BUSY_RUNS == 0) {
             const bool may_accept =
-                atomic_load(&shared->is_accepting) && atomic_load(&shared->acceptor) == loop->index;
+                atomic_load(&server->is_accepting) && atomic_load(&server->acceptor) == loop->index;
             const bool accepts = may_accept && now_ns >= loop->accept_ns;
             int wait_ms =
                 busy > 0 || atomic_load(&loop->is_woken) ? 0 : loop_timeout(loop, now_ns, next_ns);
             if (may_accept && !accepts && wait_ms > RETRY_MS)
                 wait_ms = RETRY_MS;
-            events[2].fd = accepts ? shared->descriptor : -1;
+            events[2].fd = accepts ? server->descriptor : -1;
             if (poll(events, COUNT(events), wait_ms) > 0 && (events[2].revents & POLLIN) != 0 &&
-                atomic_load(&shared->is_accepting))
+                atomic_load(&server->is_accepting))
                 loop_accept(loop, now_ns);
         }
         uint64_t count;
@@ -150,10 +139,10 @@ static void *loop_run(void *context) {
     return NULL;
 }
 
-static Status loop_start(EventLoop *loop, ServerShared *shared, Problem *problem) {
-    const ServerSettings *settings = &shared->settings;
-    loop->shared = shared;
-    loop->index = shared->loop_count;
+static Status loop_start(EventLoop *loop, Server *server, Problem *problem) {
+    const ServerSettings *settings = &server->settings;
+    loop->server = server;
+    loop->index = server->loop_count;
     const bool is_tls = settings->certificate != NULL;
     const unsigned flags = MHD_USE_EPOLL | MHD_USE_NO_LISTEN_SOCKET | MHD_ALLOW_SUSPEND_RESUME |
                            MHD_USE_TURBO | (is_tls ? (unsigned)MHD_USE_TLS : 0);
@@ -168,7 +157,7 @@ static Status loop_start(EventLoop *loop, ServerShared *shared, Problem *problem
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for an event loop");
     loop->daemon = MHD_start_daemon(
         flags, 0, NULL, NULL, exchange_continue, loop, MHD_OPTION_CONNECTION_LIMIT,
-        (unsigned)shared->connections_max, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
+        (unsigned)server->connections_max, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
         (size_t)CONNECTION_MEMORY, MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)SILENCE_S,
         MHD_OPTION_STRICT_FOR_CLIENT, 0, MHD_OPTION_URI_LOG_CALLBACK, exchange_open, loop,
         MHD_OPTION_NOTIFY_CONNECTION, connection_notify, loop, MHD_OPTION_NOTIFY_COMPLETED,
@@ -219,23 +208,20 @@ static size_t server_connections_max(void) {
 }
 
 static Status server_start(Server *server, Problem *problem) {
-    ServerShared *shared = &server->shared;
-    ServerSettings *settings = &shared->settings;
-    TRY(thread_pool_open(THREADS_MAX, &shared->pool, problem));
-    TRY(address_open(&settings->address, &shared->descriptor, problem));
+    ServerSettings *settings = &server->settings;
+    TRY(thread_pool_open(THREADS_MAX, &server->pool, problem));
+    TRY(address_open(&settings->address, &server->descriptor, problem));
     address_url(&settings->address, settings->certificate != NULL, server->url);
-    shared->url = server->url;
-    shared->loops = server->loops;
-    shared->first_id = (uint64_t)clock_unix_ms() << 16;
-    shared->connections_max = server_connections_max();
+    server->first_id = (uint64_t)clock_unix_ms() << 16;
+    server->connections_max = server_connections_max();
     const long processors = sysconf(_SC_NPROCESSORS_ONLN);
     const size_t count = processors < 1           ? 1
                          : processors > LOOPS_MAX ? LOOPS_MAX
                                                   : (size_t)processors;
-    for (; shared->loop_count < count; shared->loop_count++)
-        TRY(loop_start(&server->loops[shared->loop_count], shared, problem));
-    atomic_store(&shared->is_accepting, true);
-    loop_pass_accepting(shared, 0);
+    for (; server->loop_count < count; server->loop_count++)
+        TRY(loop_start(&server->loops[server->loop_count], server, problem));
+    atomic_store(&server->is_accepting, true);
+    loop_pass_accepting(server, 0);
     return STATUS_OK;
 }
 
@@ -244,8 +230,8 @@ Status server_open(const ServerSettings *settings, Server **server, Problem *pro
     Server *made = calloc(1, sizeof *made);
     if (made == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the server");
-    made->shared.settings = *settings;
-    made->shared.descriptor = -1;
+    made->settings = *settings;
+    made->descriptor = -1;
     const Status status = server_start(made, problem);
     if (status != STATUS_OK) {
         server_free(made);
@@ -260,36 +246,35 @@ const char *server_url(const Server *server) {
 }
 
 void server_stop(Server *server, int grace_ms) {
-    if (server == NULL || server->shared.pool == NULL)
+    if (server == NULL || server->pool == NULL)
         return;
-    ServerShared *shared = &server->shared;
-    atomic_store(&shared->is_accepting, false);
+    atomic_store(&server->is_accepting, false);
     // From here on connections are refused; a loop may still be polling it.
-    shutdown(shared->descriptor, SHUT_RDWR);
-    for (size_t i = 0; i < shared->loop_count; i++) {
-        loop_wake(&shared->loops[i]);
-        timer_wheel_wake_all(shared->loops[i].wheel);
+    shutdown(server->descriptor, SHUT_RDWR);
+    for (size_t i = 0; i < server->loop_count; i++) {
+        loop_wake(&server->loops[i]);
+        timer_wheel_wake_all(server->loops[i].wheel);
     }
     const int64_t until = clock_monotonic_ns() + (int64_t)grace_ms * 1000000;
     const struct timespec pause = {.tv_nsec = 5000000};
-    while (atomic_load(&shared->exchanges) > 0 && clock_monotonic_ns() < until)
+    while (atomic_load(&server->exchanges) > 0 && clock_monotonic_ns() < until)
         nanosleep(&pause, NULL);
-    for (size_t i = 0; i < shared->loop_count; i++)
-        loop_stop(&shared->loops[i]);
+    for (size_t i = 0; i < server->loop_count; i++)
+        loop_stop(&server->loops[i]);
     // The library cannot be stopped while a connection is suspended: the pool ends its work first.
-    thread_pool_close(shared->pool);
-    shared->pool = NULL;
-    for (size_t i = 0; i < shared->loop_count; i++)
-        loop_close(&shared->loops[i]);
-    close(shared->descriptor); // -1 is harmless
-    shared->descriptor = -1;
+    thread_pool_close(server->pool);
+    server->pool = NULL;
+    for (size_t i = 0; i < server->loop_count; i++)
+        loop_close(&server->loops[i]);
+    close(server->descriptor); // -1 is harmless
+    server->descriptor = -1;
 }
 
 void server_free(Server *server) {
     if (server == NULL)
         return;
     server_stop(server, 0);
-    for (size_t i = 0; i < server->shared.loop_count; i++)
+    for (size_t i = 0; i < server->loop_count; i++)
         timer_wheel_free(server->loops[i].wheel);
     free(server);
 }

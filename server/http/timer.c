@@ -165,10 +165,6 @@ void timer_limit(ConnectionTimer *timer, int64_t max_ms, bool is_idle) {
     (void)timer_lower_next(timer->wheel, timer->limit_ns);
 }
 
-void timer_begin(ConnectionTimer *timer) {
-    atomic_store(&timer->is_woken, false);
-}
-
 bool timer_sleep(ConnectionTimer *timer, void *connection, int64_t max_ms) {
     TimerWheel *wheel = timer->wheel;
     const int64_t wake_ns = clock_monotonic_ns() + max_ms * 1000000;
