@@ -1,4 +1,4 @@
-// impactd: the daemon and the command line in one program.
+// impactd: the server and the command line in one program.
 #include <fcntl.h>
 #include <unistd.h>
 

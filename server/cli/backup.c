@@ -15,7 +15,7 @@ typedef struct BackupSettings {
 
 // clang-format off
 #define DATA_FIELD \
-    FIELD_TEXT(BackupSettings, data, 4000, PRESENCE_OPTIONAL, 0, "the daemon's folder ($IMPACTD_DATA, else as impactd serve has it)")
+    FIELD_TEXT(BackupSettings, data, 4000, PRESENCE_OPTIONAL, 0, "directory of the server's database ($IMPACTD_DATA, else that of impactd serve)")
 static const Field backup_fields[] = {
     DATA_FIELD,
     FIELD_FLAG(BackupSettings, force, false, "replace FILE if it is there"),
@@ -97,12 +97,12 @@ static int restore(const Command *self, void *of, const Options *options, Proble
 const Command command_backup = {
     .name = "backup",
     .operands = "FILE",
-    .summary = "copy the database, while the daemon runs or without it",
+    .summary = "copy the database, while the server runs or without it",
     .help = "  impactd backup lab.db                          everything that was answered before\n"
             "  impactd backup lab.db --force                  in the place of the last one\n"
             "  impactd backup /backups/lab-$(date +%F).db --data /var/lib/impactd\n"
             "\n"
-            "The daemon answers meanwhile. The copy is of one moment, is checked, and appears\n"
+            "The server answers meanwhile. The copy is of one moment, is checked, and appears\n"
             "whole or not at all; it has the tokens' digests and is readable by you alone.\n"
             "Ctrl-C leaves nothing.\n"
             "\n"
@@ -115,15 +115,15 @@ const Command command_backup = {
 const Command command_restore = {
     .name = "restore",
     .operands = "FILE",
-    .summary = "put a backup back as the daemon's database",
+    .summary = "put a backup back as the server's database",
     .help =
         "  impactd restore lab.db --data DIR              into a folder without a database\n"
         "  impactd restore lab.db --force                 in the place of the folder's database\n"
         "\n"
-        "Stop the daemon first. FILE is copied and checked, and the folder has either the\n"
+        "Stop the server first. FILE is copied and checked, and the folder has either the\n"
         "database of before or the whole of FILE, whatever happens. FILE itself stays as\n"
         "it is. Jobs that were unfinished in the backup are taken up again when the\n"
-        "daemon starts.\n",
+        "server starts.\n",
     .options = restore_fields,
     .size = sizeof(BackupSettings),
     .run = restore,

@@ -448,70 +448,6 @@ static Status api_exchange(ApiClient *client, const ApiRequest *request, ApiAnsw
     return status;
 }
 
-void api_answer_clear(ApiAnswer *answer) {
-    bytes_clear(&answer->body);
-    *answer = (ApiAnswer){0};
-}
-
-Status api_ask(ApiClient *client, ApiRequest *request, ApiAnswer *answer, Problem *problem) {
-    Status status = STATUS_OK;
-    api_answer_clear(answer);
-    if (request->path.is_failed)
-        status = problem_set(problem, STATUS_USAGE, "asks for too much at once");
-    while (status == STATUS_OK &&
-           (status = api_exchange(client, request, answer, problem)) == STATUS_OK) {
-        const int code = answer->code;
-        if (code == 200 || code == 201 || code == 202 || code == 204)
-            break;
-        const int pause = answer->retry_after > 0 ? answer->retry_after : 1;
-        if ((code != 503 && code != 429) || pause > api_client_left(client)) {
-            status = problem_reply_read(answer, problem);
-        } else {
-            api_answer_clear(answer);
-            (void)poll(NULL, 0, 1000 * pause);
-        }
-    }
-    bytes_clear(&request->path);
-    return status;
-}
-
-Status api_download(ApiCall *call, ApiRequest *request, const char *path, Problem *problem) {
-    Status status = output_open(path, problem);
-    if (status == STATUS_OK)
-        status = api_ask(&call->client, request, &call->answer, problem);
-    if (status == STATUS_OK)
-        status = output_close(problem);
-    output_drop();
-    bytes_clear(&request->path);
-    return status;
-}
-
-void api_print(const ApiAnswer *answer) {
-    (void)fwrite(answer->body.at, 1, answer->body.count, stdout);
-}
-
-Status api_print_tables(const ApiAnswer *answer, const PrintTableView *view, bool is_json,
-                        size_t *longest, Problem *problem) {
-    *longest = SIZE_MAX;
-    if (!is_json)
-        return print_table_print_json(answer->body.at, answer->body.count, view, stdout, longest,
-                                      problem);
-    api_print(answer);
-    return STATUS_OK;
-}
-
-bool api_is_id(const char *text) {
-    const size_t length = strlen(text);
-    return length > 0 && length <= 80 &&
-           strspn(text, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-") ==
-               length;
-}
-
-Status api_unexpected(const char *wanted, Problem *problem) {
-    return problem_set(problem, STATUS_UNREACHABLE,
-                       "the answer is not %s; is the server really impactd?", wanted);
-}
-
 typedef struct FaultReply {
     char *pointer, *detail, *unit, *did_you_mean;
     uint64_t row;
@@ -585,7 +521,8 @@ static Status http_status(int code, const char *type) {
     return STATUS_INTERNAL;
 }
 
-Status problem_reply_read(const ApiAnswer *answer, Problem *problem) {
+// The problem document of an answer; returns what its code means, never STATUS_OK.
+static Status problem_reply_read(const ApiAnswer *answer, Problem *problem) {
     ProblemReply reply = {0};
     // Unknown members are not faults of an answer.
     (void)json_parse(answer->body.at, answer->body.count, problem_reply_fields, &reply, NULL);
@@ -596,6 +533,70 @@ Status problem_reply_read(const ApiAnswer *answer, Problem *problem) {
         (void)problem_set(problem, status, "the server answers %d without a reason", answer->code);
     fields_clear(problem_reply_fields, &reply);
     return status;
+}
+
+void api_answer_clear(ApiAnswer *answer) {
+    bytes_clear(&answer->body);
+    *answer = (ApiAnswer){0};
+}
+
+Status api_ask(ApiClient *client, ApiRequest *request, ApiAnswer *answer, Problem *problem) {
+    Status status = STATUS_OK;
+    api_answer_clear(answer);
+    if (request->path.is_failed)
+        status = problem_set(problem, STATUS_USAGE, "asks for too much at once");
+    while (status == STATUS_OK &&
+           (status = api_exchange(client, request, answer, problem)) == STATUS_OK) {
+        const int code = answer->code;
+        if (code == 200 || code == 201 || code == 202 || code == 204)
+            break;
+        const int pause = answer->retry_after > 0 ? answer->retry_after : 1;
+        if ((code != 503 && code != 429) || pause > api_client_left(client)) {
+            status = problem_reply_read(answer, problem);
+        } else {
+            api_answer_clear(answer);
+            (void)poll(NULL, 0, 1000 * pause);
+        }
+    }
+    bytes_clear(&request->path);
+    return status;
+}
+
+Status api_download(ApiCall *call, ApiRequest *request, const char *path, Problem *problem) {
+    Status status = output_open(path, problem);
+    if (status == STATUS_OK)
+        status = api_ask(&call->client, request, &call->answer, problem);
+    if (status == STATUS_OK)
+        status = output_close(problem);
+    output_drop();
+    bytes_clear(&request->path);
+    return status;
+}
+
+void api_print(const ApiAnswer *answer) {
+    (void)fwrite(answer->body.at, 1, answer->body.count, stdout);
+}
+
+Status api_print_tables(const ApiAnswer *answer, const PrintTableView *view, bool is_json,
+                        size_t *longest, Problem *problem) {
+    *longest = SIZE_MAX;
+    if (!is_json)
+        return print_table_print_json(answer->body.at, answer->body.count, view, stdout, longest,
+                                      problem);
+    api_print(answer);
+    return STATUS_OK;
+}
+
+bool api_is_id(const char *text) {
+    const size_t length = strlen(text);
+    return length > 0 && length <= 80 &&
+           strspn(text, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-") ==
+               length;
+}
+
+Status api_unexpected(const char *wanted, Problem *problem) {
+    return problem_set(problem, STATUS_UNREACHABLE,
+                       "the answer is not %s; is the server really impactd?", wanted);
 }
 
 Bytes api_path(const char *format, ...) {

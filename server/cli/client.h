@@ -125,7 +125,5 @@ extern const Field problem_reply_fields[];
 
 // Adds the faults of the document to `problem`, with `status` and without control characters.
 void problem_reply_put(const ProblemReply *reply, Status status, Problem *problem);
-// The problem document of an answer; returns what its code means, never STATUS_OK.
-Status problem_reply_read(const ApiAnswer *answer, Problem *problem);
 
 #endif

@@ -82,7 +82,7 @@ static Status impacts_fill(TableStream *stream, Problem *problem) {
     return table_stream_impacts(stream, &format_json, NULL, problem);
 }
 
-// {job, series, impacts, psd}, each as the daemon sends it.
+// {job, series, impacts, psd}, each as the server sends it.
 static Status whole_write(Outcome *outcome, const Bytes *job, Bytes *bytes, Problem *problem) {
     bytes_text(bytes, "{\"job\": ");
     bytes_put(bytes, job->at, job->count);
@@ -181,7 +181,7 @@ static Status run_scene(const char *path, const Bytes *text, void *of, Problem *
         status =
             problem_add(problem, STATUS_INVALID, "/study",
                         "is not for `run`, which runs the scene alone: `impactd study` makes it, "
-                        "or the daemon; `impactd tradeoff` and `impactd ensemble` print theirs");
+                        "or a server; `impactd tradeoff` and `impactd ensemble` print theirs");
     // Before the run, so that a wrong folder is reported at once.
     if (status == STATUS_OK)
         status = output_open(settings->output, problem);
@@ -217,7 +217,7 @@ static int run(const Command *self, void *of, const Options *options, Problem *p
 const Command command_run = {
     .name = "run",
     .operands = "SCENE.json",
-    .summary = "run one scene here, without a daemon",
+    .summary = "run one scene here, without a server",
     .help =
         "  impactd run scene.json                 print the finished job\n"
         "  impactd run scene.json -o out.csv      write the time series, as a table\n"
@@ -339,7 +339,8 @@ struct StudyCommand {
 #define OUTPUT_ROW(formats)                                                                        \
     FIELD_TEXTS(StudySettings, output, NULL, NULL, OUTPUTS_MAX, PRESENCE_OPTIONAL, 0,              \
                 "write to this file, " formats "; may be given again")
-#define JSON_ROW FIELD_FLAG(StudySettings, json, false, "print the document, as the daemon has it")
+#define JSON_ROW                                                                                   \
+    FIELD_FLAG(StudySettings, json, false, "print the document, as the server sends it")
 
 // The format of a path's extension; NULL if the study has none such.
 static const StudyFormat *study_format(const StudyKind *kind, const char *path) {
@@ -772,7 +773,7 @@ const Command command_sweep = {
             "    {\"pointer\": \"/dampers/0/buffer\", \"values\": [\"sponge\", \"aluminium\"]}]}\n"
             "\n"
             "Every point is validated before the first runs. The same sweep gives the same\n"
-            "bytes, here and by the daemon, which uses all its workers. Exit code 3 if the\n"
+            "bytes, here and by a server, which uses all its workers. Exit code 3 if the\n"
             "scene has faults.\n",
     .options = sweep_fields,
     .size = sizeof(StudySettings),

@@ -1,4 +1,4 @@
-// impactd serve: the daemon. Opens the database, the job manager and the HTTP server in this order
+// impactd serve: the server. Opens the database, the job manager and the HTTP server in this order
 // and waits for SIGTERM or SIGINT. Then it stops requests, work and background tasks before it
 // closes what they use.
 #include <errno.h>

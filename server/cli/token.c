@@ -19,11 +19,11 @@ typedef struct TokenSettings {
 
 // clang-format off
 static const Field token_fields[] = {
-    FIELD_TEXT(TokenSettings, name, 64, PRESENCE_OPTIONAL, 0, "whose it is: letters, digits, dot, underscore and dash; its jobs are counted under this name"),
-    FIELD_TEXT(TokenSettings, scopes, 60, PRESENCE_OPTIONAL, 0, "what it may: read, submit, materials, admin (which is all), with commas between (read,submit)"),
-    FIELD_REAL(TokenSettings, expires, "days", ABOVE(0), OPTIONAL, "when it ends; never if absent"),
+    FIELD_TEXT(TokenSettings, name, 64, PRESENCE_OPTIONAL, 0, "name: letters, digits, dot, underscore and dash; its jobs are counted under this name"),
+    FIELD_TEXT(TokenSettings, scopes, 60, PRESENCE_OPTIONAL, 0, "scopes, separated by commas: read, submit, materials, admin, which includes all (read,submit)"),
+    FIELD_REAL(TokenSettings, expires, "days", ABOVE(0), OPTIONAL, "time until it expires (never)"),
     FIELD_FLAG(TokenSettings, json, false, "list: print it as JSON"),
-    FIELD_TEXT(TokenSettings, data, 4000, PRESENCE_OPTIONAL, 0, "the daemon's folder ($IMPACTD_DATA, else as impactd serve has it)"),
+    FIELD_TEXT(TokenSettings, data, 4000, PRESENCE_OPTIONAL, 0, "directory of the server's database ($IMPACTD_DATA, else that of impactd serve)"),
     FIELD_END,
 };
 // clang-format on
@@ -114,7 +114,7 @@ static Status token_revoke(Db *db, const TokenSettings *settings, TokenRow *row,
     (void)settings;
     row->revoked_unix_ms = clock_unix_ms();
     TRY(db_token_revoke(db, row, problem));
-    fprintf(stderr, "The token \"%s\" is revoked; a running daemon knows within a second.\n",
+    fprintf(stderr, "The token \"%s\" is revoked; a running server follows within a second.\n",
             row->name);
     return STATUS_OK;
 }
@@ -153,7 +153,7 @@ static Status token_act(TokenSettings *settings, const Options *options, Problem
                                                     : NULL;
     const size_t size = name != NULL ? strlen(name) : 0;
     if (name == NULL && action->needs_name)
-        return problem_set(problem, STATUS_USAGE, "which token? Say --name NAME");
+        return problem_set(problem, STATUS_USAGE, "needs the name of a token: --name NAME");
     if (name != NULL && (size == 0 || size >= sizeof row.name || strspn(name, allowed) != size))
         return problem_set(problem, STATUS_USAGE,
                            "a token's name must be 1 to 64 letters, digits, dots, underscores and "
@@ -174,13 +174,13 @@ static int token(const Command *self, void *settings, const Options *options, Pr
 const Command command_token = {
     .name = "token",
     .operands = "create|list|revoke|forget [NAME]",
-    .summary = "access tokens: who may use the daemon, and for what",
+    .summary = "access tokens: who may use the server, and for what",
     .help = "  TOKEN=$(impactd token create --name lab --scopes read,submit --expires 90)\n"
             "  curl -H \"Authorization: Bearer $TOKEN\" http://127.0.0.1:8080/v1/jobs\n"
             "  impactd token list\n"
             "  impactd token revoke lab\n"
             "\n"
-            "Works beside a running daemon, which follows within a second, and without one.\n"
+            "Works beside a running server, which follows within a second, and without one.\n"
             "From the first token on, also if it is revoked, every request needs one; once\n"
             "all are forgotten (forget strikes a revoked one from the list) loopback is open\n"
             "again.\n",

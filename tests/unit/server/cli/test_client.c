@@ -1,6 +1,5 @@
-// Addresses that a client accepts, and problem documents; exchanges are in contract/test_client.py.
+// Addresses that a client accepts; exchanges are in contract/test_client.py.
 #include <stdlib.h>
-#include <string.h>
 
 #include "server/cli/client.h"
 #include "tests/support/test.h"
@@ -45,43 +44,5 @@ TEST(a_token_is_exposed_by_plain_http_to_others) {
         bool exposes;
         assert_int_equal(opened(rows[i].url, rows[i].token, &exposes), STATUS_OK);
         assert_int_equal(exposes, rows[i].exposes);
-    }
-}
-
-static ApiAnswer answer_of(int code, const char *text) {
-    ApiAnswer answer = {.code = code};
-    bytes_text(&answer.body, text);
-    return answer;
-}
-
-TEST(a_problem_document_becomes_a_problem) {
-    Problem *problem = calloc(1, sizeof *problem);
-    ApiAnswer answer = answer_of(
-        422,
-        "{\"type\": \"/problems/invalid-scene\", \"detail\": \"two\", \"errors\": ["
-        "{\"pointer\": \"/a\", \"detail\": \"bad \\u001b[31m\", \"value\": {\"x\": 1}, "
-        "\"did_you_mean\": \"b\"}, {\"pointer\": \"/c\", \"detail\": \"worse\"}], \"more\": 7}");
-    assert_int_equal(problem_reply_read(&answer, problem), STATUS_INVALID);
-    assert_int_equal(problem->count, 9);
-    assert_string_equal(problem->faults[0].pointer, "/a");
-    assert_string_equal(problem->faults[0].detail, "bad ?[31m");
-    assert_string_equal(problem->faults[0].did_you_mean, "b");
-    assert_string_equal(problem->faults[1].detail, "worse");
-    api_answer_clear(&answer);
-    free(problem);
-}
-
-TEST(every_code_has_a_status) {
-    static const struct {
-        int code;
-        Status status;
-    } rows[] = {{400, STATUS_USAGE},       {401, STATUS_FORBIDDEN}, {404, STATUS_NOT_FOUND},
-                {410, STATUS_NOT_FOUND},   {409, STATUS_CONFLICT},  {422, STATUS_INVALID},
-                {429, STATUS_UNREACHABLE}, {500, STATUS_INTERNAL},  {503, STATUS_UNREACHABLE},
-                {299, STATUS_INTERNAL}};
-    for (size_t i = 0; i < COUNT(rows); i++) {
-        ApiAnswer answer = answer_of(rows[i].code, "<html>");
-        assert_int_equal(problem_reply_read(&answer, NULL), rows[i].status);
-        api_answer_clear(&answer);
     }
 }
