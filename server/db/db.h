@@ -306,4 +306,10 @@ Status backup_write(const BackupRequest *request, Backup *backup, Problem *probl
 // where it has a database and that may not be replaced, and where the schema is not this program's.
 Status backup_restore(const BackupRequest *request, Backup *backup, Problem *problem);
 
+// Export reads row by row the state at one moment. Rows are only added, so that the newest number
+// of each table is a moment.
+typedef struct MaterialMoment {
+    int64_t revisions, reviews, measurements;
+} MaterialMoment;
+
 #endif

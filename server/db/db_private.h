@@ -5,7 +5,6 @@
 #include <stdatomic.h>
 
 #include "server/db/db.h"
-#include "server/db/materials.h"
 #include "server/db/sqlite.h"
 
 // Makes `directory` and what is missing above it, for this user alone. STATUS_FORBIDDEN where every
@@ -59,13 +58,20 @@ typedef struct RecordMemory RecordMemory; // samples of records, each once
 RecordMemory *record_memory_new(void);    // NULL without memory
 void record_memory_free(RecordMemory *memory);
 RecordMemory *db_record_memory(Db *db);
+// A reference to the record of that name and digest, or NULL.
+struct NamedRecord *record_memory_find(RecordMemory *memory, const char *name, const char *digest);
 // Adds it, or frees it where the same record is there already; returns a reference to that.
 struct NamedRecord *record_memory_add(RecordMemory *memory, struct NamedRecord *named);
 
 // Within a transaction:
 
-// All that changes of a job, or the whole of it where it is_unsaved. STATUS_NOT_FOUND.
-Status job_row_save(Sqlite *database, const JobRow *row, Problem *problem);
+struct MaterialRevision;
+struct MaterialReview;
+struct MaterialMeasurement;
+struct AuditEntry;
+
+// Adds the result and its uses, unless it is there.
+Status result_row_add(Sqlite *database, const ResultRow *row, Problem *problem);
 // Runs `sql` with each of the lines as :name.
 Status use_lines_add(Sqlite *database, const char *sql, const char *lines, Problem *problem);
 
@@ -84,13 +90,14 @@ Status material_key_find(Sqlite *database, const char *slug, uint64_t revision, 
 // Each adds a row without validation and without an audit entry. The material exists, except for
 // the first. STATUS_LIMIT.
 Status material_row_add(Sqlite *database, const char *slug, Problem *problem);
-Status material_revision_add(Sqlite *database, const MaterialRevision *revision, Problem *problem);
-Status material_review_add(Sqlite *database, const MaterialReview *review, Problem *problem);
-Status material_measurement_add(Sqlite *database, const MaterialMeasurement *measurement,
+Status material_revision_add(Sqlite *database, const struct MaterialRevision *revision,
+                             Problem *problem);
+Status material_review_add(Sqlite *database, const struct MaterialReview *review, Problem *problem);
+Status material_measurement_add(Sqlite *database, const struct MaterialMeasurement *measurement,
                                 Problem *problem);
-Status audit_entry_add(Sqlite *database, const AuditEntry *entry, Problem *problem);
+Status audit_entry_add(Sqlite *database, const struct AuditEntry *entry, Problem *problem);
 
 // Reads revision->lists into the lists of its material. STATUS_INTERNAL: it is damaged.
-Status material_lists_read(MaterialRevision *revision, Problem *problem);
+Status material_lists_read(struct MaterialRevision *revision, Problem *problem);
 
 #endif

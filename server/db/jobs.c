@@ -76,7 +76,8 @@ void db_job_post(Db *db, const JobRow *row, PendingWrite *write) {
 
 #define JOB_UPDATE "SET {set}, scene = CASE :state WHEN 2 THEN '' ELSE scene END"
 
-Status job_row_save(Sqlite *database, const JobRow *row, Problem *problem) {
+// All that changes of a job, or the whole of it where it is_unsaved. STATUS_NOT_FOUND.
+static Status job_row_save(Sqlite *database, const JobRow *row, Problem *problem) {
     static const char update_sql[] = "UPDATE jobs " JOB_UPDATE " WHERE id = :id";
     static const char upsert_sql[] =
         "INSERT INTO jobs {insert} ON CONFLICT (id) DO UPDATE " JOB_UPDATE;
@@ -85,6 +86,19 @@ Status job_row_save(Sqlite *database, const JobRow *row, Problem *problem) {
         return job_insert(database, upsert_sql, row, problem);
     TRY(sqlite_change(database, update_sql, job_columns, row, &changes, problem));
     return changes > 0 ? STATUS_OK : problem_set(problem, STATUS_NOT_FOUND, no_job, row->id);
+}
+
+static Status job_apply_commit(Sqlite *database, const void *work, Problem *problem) {
+    const ResultCommit *commit = work;
+    if (commit->result != NULL)
+        TRY(result_row_add(database, commit->result, problem));
+    for (const JobRow *row = commit->jobs; row != NULL; row = row->next)
+        TRY(job_row_save(database, row, problem));
+    return STATUS_OK;
+}
+
+void db_result_post(Db *db, const ResultCommit *commit, PendingWrite *write) {
+    db_enqueue(db, job_apply_commit, commit, WRITE_NORMAL, write);
 }
 
 static Status job_apply_save(Sqlite *database, const void *work, Problem *problem) {

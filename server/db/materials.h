@@ -108,11 +108,6 @@ Status db_audit_entries(Db *db, const char *slug, uint64_t before, size_t max,
                         AuditEntries *entries, Problem *problem);
 void audit_entries_clear(AuditEntries *entries);
 
-// Export reads row by row the state at one moment. Rows are only added, so that the newest number
-// of each table is a moment.
-typedef struct MaterialMoment {
-    int64_t revisions, reviews, measurements;
-} MaterialMoment;
 Status db_material_moment(Db *db, MaterialMoment *moment, Problem *problem);
 // What the functions below find is cleared by the caller in any case; *is_found is false after the
 // last one. The revision of the material after `number`; 0: the first one of the next material.

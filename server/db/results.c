@@ -53,23 +53,13 @@ Status use_lines_add(Sqlite *database, const char *sql, const char *lines, Probl
     return STATUS_OK;
 }
 
-static Status result_apply_finish(Sqlite *database, const void *work, Problem *problem) {
+Status result_row_add(Sqlite *database, const ResultRow *row, Problem *problem) {
     static const char sql[] = "INSERT INTO results {insert} ON CONFLICT (id) DO NOTHING";
     static const char uses_sql[] = "INSERT INTO result_uses (name, result) VALUES (:name, "
                                    "last_insert_rowid()) ON CONFLICT DO NOTHING";
-    const ResultCommit *commit = work;
-    int added = 0;
-    if (commit->result != NULL)
-        TRY(sqlite_change(database, sql, result_columns, commit->result, &added, problem));
-    if (added > 0)
-        TRY(use_lines_add(database, uses_sql, commit->result->uses, problem));
-    for (const JobRow *row = commit->jobs; row != NULL; row = row->next)
-        TRY(job_row_save(database, row, problem));
-    return STATUS_OK;
-}
-
-void db_result_post(Db *db, const ResultCommit *commit, PendingWrite *write) {
-    db_enqueue(db, result_apply_finish, commit, WRITE_NORMAL, write);
+    int added;
+    TRY(sqlite_change(database, sql, result_columns, row, &added, problem));
+    return added > 0 ? use_lines_add(database, uses_sql, row->uses, problem) : STATUS_OK;
 }
 
 static Status result_load(Db *db, const char *sql, const char *id, ResultRow *row,
