@@ -248,3 +248,19 @@ uint32_t segments_crc32(const Segments *segments) {
     }
     return crc;
 }
+
+void table_lay_column(const Table *table, size_t column, size_t width, Segments *segments) {
+    if (table->source != NULL)
+        segments_cells(segments, table->source, column, width, table->count);
+    else
+        segments_values(segments, table_values(table, table->columns[column]->values),
+                        table->count);
+}
+
+void table_lay_axis(const Table *table, Segments *segments) {
+    if (table->axis != NULL)
+        segments_values(segments, table_values(table, table->axis), table->count);
+    else
+        segments_counted(segments, table->first, table->bucket > 0 ? table->bucket : 1,
+                         table->axis_rate, table->count);
+}

@@ -61,6 +61,12 @@ typedef struct Sending {
 } Sending;
 
 // A body that takes long may outlive its client's token.
+void loop_wake(EventLoop *loop) {
+    const uint64_t one = 1;
+    if (!atomic_exchange(&loop->is_woken, true))
+        (void)!write(loop->wakeup, &one, sizeof one);
+}
+
 static bool sending_is_admitted(Sending *sending) {
     enum { CHECK_MS = 500 };
     const int64_t now_ns = clock_monotonic_ns();

@@ -1,6 +1,6 @@
 // Where the server listens, its certificate, and the server itself: accepts connections, collects
-// requests, has them answered, sends the replies. libmicrohttpd is used in server.c, connection.c
-// and connection.h alone.
+// requests, has them answered, sends the replies. libmicrohttpd is used in event_loop.c,
+// connection.c and connection.h alone.
 #ifndef SERVER_HTTP_SERVER_H
 #define SERVER_HTTP_SERVER_H
 

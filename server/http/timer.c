@@ -2,8 +2,10 @@
 //
 // The lock guards the waits, which other threads end; each change is a few stores. Limits are the
 // loop's alone. `next_ns` is a lower bound of all times, so that setting a later one costs nothing.
-#include "server/http/connection.h"
+#include "server/http/timer.h"
 
+#include <pthread.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <sys/socket.h>
 

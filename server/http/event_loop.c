@@ -31,12 +31,6 @@ enum {
     IDLE_MIN_MS = 500, // then a connection between two requests may be closed for a new one
 };
 
-void loop_wake(EventLoop *loop) {
-    const uint64_t one = 1;
-    if (!atomic_exchange(&loop->is_woken, true))
-        (void)!write(loop->wakeup, &one, sizeof one);
-}
-
 size_t server_connections(const Server *server) {
     size_t count = 0;
     for (size_t i = 0; i < server->loop_count; i++)
@@ -179,7 +173,7 @@ static Status loop_start(EventLoop *loop, Server *server, Problem *problem) {
                              strerror(code));
 }
 
-// No callback runs any more.
+// Stops the loop's thread; none of its callbacks runs afterwards.
 static void loop_stop(EventLoop *loop) {
     atomic_store(&loop->is_stopping, true);
     loop_wake(loop);
