@@ -124,10 +124,10 @@ Status health_ready(App *app, const Request *request, Reply *reply, Problem *pro
         return problem_set(problem, STATUS_BUSY,
                            "the last write to the database failed: is the disk full or read-only?");
     jobs_tally(app->manager, &metrics);
-    if (metrics.queued + metrics.running >= metrics.queue_most)
+    if (metrics.unfinished >= metrics.queue_most)
         return problem_set(problem, STATUS_BUSY,
                            "the queue is full: of unfinished jobs it has %zu, and may have %zu",
-                           metrics.queued + metrics.running, metrics.queue_most);
+                           metrics.unfinished, metrics.queue_most);
     Bytes bytes = {.most = app->reply_most};
     bytes_format(&bytes,
                  "{\"status\": \"ready\", \"queued\": %zu, \"running\": %zu, \"workers\": %zu, "

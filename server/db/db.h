@@ -1,6 +1,6 @@
-// The database as the rest of the server sees it: jobs, results, materials. One writer thread
-// commits whatever is queued (durable when a call returns), each reader has its own connection. No
-// SQL outside this room.
+// The database: jobs, results, series, sweeps. One writer thread commits what is queued; each
+// reader has a connection of its own. A write is durable when its call returns, except db_*_post,
+// which reports it later. SQL is only in this folder.
 #ifndef SERVER_DB_DB_H
 #define SERVER_DB_DB_H
 
@@ -140,7 +140,7 @@ typedef struct ResultRow {
     char *scene, *plan, *summary, *warnings; // JSON documents
     char *work;                              // JSON document; NULL: not known
     char *notes;         // JSON array, what the run itself warned of; NULL: nothing
-    StoredBytes outcome; // jobs/outcome_blob.h
+    StoredBytes outcome; // jobs/outcome_blob.c
     uint64_t impact_count;
     char *study;    // JSON, the answer of the scene's study; NULL: none
     char *uses;     // when saved: what of the catalogue it was made with, "sponge@1", a line each;
@@ -190,7 +190,7 @@ void db_series_tally(Db *db, uint64_t *count, uint64_t *bytes, uint64_t *evictio
 
 // A sweep, stored before any of it runs.
 typedef struct SweepRow {
-    int64_t number; // the store's
+    int64_t number; // in the database
     char result[72];
     char *scene;                      // canonical JSON, with the study
     uint64_t points, metrics, chunks; // scene i is in chunk i mod chunks
@@ -201,7 +201,7 @@ void sweep_row_clear(SweepRow *row);
 
 // The rows of one chunk, all of them.
 typedef struct SweepChunkRow {
-    int64_t number; // the store's
+    int64_t number; // in the database
     int64_t sweep;
     uint64_t chunk, failed;
     bool is_open;  // those that failed are to be tried again

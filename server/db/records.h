@@ -65,7 +65,7 @@ Status db_record_uses(Db *db, const char *name, RecordUses *uses, Problem *probl
 void record_use_name(const char *name, char target[RECORD_NAME_SIZE + 8]);
 
 // Deletes it; STATUS_CONFLICT, with *uses, where it is used, STATUS_NOT_FOUND. Jobs that are on
-// their way to the store are not seen: that is the caller's to prevent.
+// their way to the database are not seen: the caller prevents that.
 Status db_record_delete(Db *db, const char *name, RecordUses *uses, Problem *problem);
 
 #endif

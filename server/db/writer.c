@@ -160,7 +160,8 @@ static void writer_commit_all(Db *db, PendingWrite *first) {
         reader_put(db, database);
 }
 
-// Its owner may free it as soon as it was called, or the lock is free.
+// The owner may free `write` as soon as done.call was called or, if it waits, the queue's lock is
+// released.
 static void writer_report(Db *db, PendingWrite *write) {
     char *detail = write->detail;
     if (write->done.call != NULL) {

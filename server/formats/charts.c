@@ -125,7 +125,7 @@ static size_t tradeoff_list(Chart *chart, const Tradeoff *tradeoff, TradeoffMark
     return count;
 }
 
-// From each point that none is cheaper and closer than along its error to the next one.
+// The Pareto front as steps: from each of its points horizontally to the CPU time of the next one.
 static void tradeoff_add_best(Chart *chart, ChartPanel *panel, const TradeoffMark *marks,
                               size_t count) {
     double *x = chart_new(chart, 2 * count + 1, sizeof *x);

@@ -166,10 +166,10 @@ struct Reply {
     Stream stream;                  // `next` not NULL: in place of body
     void (*release)(void *context); // called once when the body was sent or given up; may be NULL
     void *context;
-    char location[512]; // "" for none; of our own pages without the base path, dispatch puts it
+    char location[512]; // "": not sent; without the base path, which the router adds
     char etag[112];     // with quotes, "" for none
     char cache_control[64];
-    char link[2048];          // likewise
+    char link[2048];          // "": not sent; without the base path
     const char *policy;       // Content-Security-Policy; NULL: nothing may load anything
     const char *authenticate; // WWW-Authenticate; NULL: none
     char preference_applied[48];

@@ -117,7 +117,7 @@ static bool router_redirect_slash(const Router *router, const Request *request, 
     char path[REQUEST_TARGET_MAX + 1];
     const size_t size = strlen(request->path);
     if (strcmp(request->method, "GET") != 0 || size < 2 || size >= sizeof path ||
-        request->path[size - 1] != '/' || strncmp(request->path, "/guide/", 7) == 0 ||
+        request->path[size - 1] != '/' || strncmp(request->path, "/guide/", 7) == 0 || // folders
         strncmp(request->path, "/web/", 5) == 0)
         return false;
     memcpy(path, request->path, size - 1);

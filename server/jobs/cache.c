@@ -5,52 +5,6 @@
 
 #include "server/jobs/jobs_private.h"
 
-// The texts stand behind the struct, in one block.
-ResultSummary *result_summary_new(const ResultRow *row) {
-    const char *const texts[] = {row->plan, row->summary, row->work, row->notes};
-    size_t bytes = sizeof(ResultSummary);
-    for (size_t i = 0; i < COUNT(texts); i++)
-        bytes += texts[i] != NULL ? strlen(texts[i]) + 1 : 0;
-    ResultSummary *summary = malloc(bytes);
-    if (summary == NULL)
-        return NULL;
-    char *at = (char *)(summary + 1);
-    const char *copies[COUNT(texts)] = {NULL};
-    for (size_t i = 0; i < COUNT(texts); i++) {
-        if (texts[i] == NULL)
-            continue;
-        const size_t size = strlen(texts[i]) + 1;
-        copies[i] = memcpy(at, texts[i], size);
-        at += size;
-    }
-    summary->plan = copies[0];
-    summary->summary = copies[1];
-    summary->work = copies[2];
-    summary->notes = copies[3];
-    summary->bytes = bytes;
-    atomic_init(&summary->refcount, 1);
-    return summary;
-}
-
-Status result_summary_load(Db *db, const char *result, ResultSummary **summary) {
-    ResultRow row = {0};
-    const Status status = db_result_head(db, result, &row, NULL);
-    *summary = status == STATUS_OK ? result_summary_new(&row) : NULL;
-    result_row_clear(&row);
-    return status;
-}
-
-ResultSummary *result_summary_ref(ResultSummary *summary) {
-    if (summary != NULL)
-        atomic_fetch_add(&summary->refcount, 1);
-    return summary;
-}
-
-void result_summary_unref(ResultSummary *summary) {
-    if (summary != NULL && atomic_fetch_sub(&summary->refcount, 1) == 1)
-        free(summary);
-}
-
 typedef struct CachedResult {
     LruEntry entry;         // by id
     Outcome *outcome;       // or NULL

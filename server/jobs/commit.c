@@ -36,9 +36,9 @@ char *problem_document(const Problem *problem) {
     return bytes_take(&bytes, NULL);
 }
 
-// The same of one sentence.
+// A problem document with a status and a detail.
 static char *commit_problem_document(Status status, const char *detail) {
-    Problem problem; // large, but the writer's stack is larger
+    Problem problem;
     problem_clear(&problem);
     problem_set(&problem, status, "%s", detail);
     return problem_document(&problem);
@@ -61,11 +61,6 @@ Status run_result_add_to_study(RunResult *run_result, Problem *problem) {
     return run_result->result.study != NULL
                ? STATUS_OK
                : problem_set(problem, STATUS_NO_MEMORY, "no memory for the study's document");
-}
-
-void jobs_end_write(JobManager *manager) {
-    if (--manager->writes == 0)
-        pthread_cond_broadcast(&manager->settled);
 }
 
 // With the lock held: the jobs that wait, in their last state. One whose insertion is under way
@@ -148,7 +143,7 @@ static void commit_end_job(Task *task, Job *job, Status status, const char *deta
     job->task = NULL;
     job->next_shared = NULL;
     if (status != STATUS_OK && !job->is_durable) {
-        job_refuse(job, status, detail); // it never was
+        job_refuse(job, status, detail); // it was not accepted: its client gets this error
     } else {
         job->row = job->written;
         job->row.is_unsaved = false;

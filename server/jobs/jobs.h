@@ -154,7 +154,8 @@ void jobs_layers(JobManager *manager, const char *result, CacheLayers *cache_lay
 
 typedef struct JobStats {
     size_t queued, running, workers, queue_most, cached_outcomes, cached_bytes;
-    size_t saving;     // computations that have run and are not yet in the store
+    size_t unfinished; // jobs that count against queue_most
+    size_t saving;     // computed tasks that are not in the database yet
     CacheStats heads;  // in memory, by result: plan, summary, work and notes
     CacheStats series; // in memory, by result; its bytes are those of both
     CacheStats rows;   // results in the database: those found there and not

@@ -175,16 +175,25 @@ struct JobManager {
     JobMetrics metrics;
 };
 
-// job.c. With the lock held, but for the first seven.
+// --- task.c ---
+
+// Without the lock:
+
 Task *task_new(JobManager *manager, const char *result);
-void task_free(Task *task); // its study was freed
+void task_free(Task *task); // the caller has freed task->study before
 void run_result_clear(RunResult *run_result);
-Job *job_new(JobManager *manager);     // one reference; NULL without memory
+Job *job_new(JobManager *manager); // one reference; NULL without memory
+// The manager's lock; a job that was loaded from the database has none.
+void job_lock(Job *job);
+void job_unlock(Job *job);
 bool task_is_shared(const Task *task); // its study has members, which all workers make
 Task *task_of(QueueEntry *entry);
 // A Progress's advance: sets a task's progress. False once it was stopped.
 bool task_advance(void *task, double fraction);
-bool task_is_wanted(void *task, double fraction); // the same without setting it
+bool task_is_wanted(void *task, double fraction); // does not set it
+
+// With the lock held:
+
 bool subscribers_add(Subscribers *subscribers, const Callback *callback); // false without memory
 void subscribers_call(Subscribers *subscribers);                          // calls and removes all
 // Puts it into the queue; `client` NULL: ahead of all.

@@ -82,7 +82,7 @@ static Status manager_resume_all(JobManager *manager, Problem *problem) {
 static Status manager_start_workers(JobManager *manager, Problem *problem) {
     const size_t count = manager->settings.workers + 1;
     Status status = STATUS_OK;
-    pthread_mutex_lock(&manager->lock); // those that run already look at the others
+    pthread_mutex_lock(&manager->lock); // started workers read worker_count and workers[]
     while (status == STATUS_OK && manager->worker_count < count) {
         Worker *worker = &manager->workers[manager->worker_count];
         worker->manager = manager;
@@ -260,6 +260,7 @@ void jobs_tally(JobManager *manager, JobStats *stats) {
     *stats = (JobStats){.queued = queue_count(manager->queue),
                         .workers = manager->settings.workers,
                         .queue_most = manager->settings.queue_most,
+                        .unfinished = manager->live,
                         .saving = manager->saving,
                         .heads = manager->summaries,
                         .series = manager->series,
@@ -272,33 +273,6 @@ void jobs_tally(JobManager *manager, JobStats *stats) {
         stats->running += manager->workers[i].running != NULL || manager->workers[i].study != NULL;
     pthread_mutex_unlock(&manager->lock);
     stats->stored.most_bytes = manager->settings.store_bytes;
-}
-
-void job_metrics_ended(JobMetrics *metrics, int state, bool is_cached) {
-    counter_add(&metrics->ended[state], 1);
-    if (is_cached)
-        counter_add(&metrics->cached, 1);
-}
-
-void job_metrics_run(JobMetrics *metrics, const Outcome *outcome, int64_t cpu_ns) {
-    size_t i = 0;
-    while (solvers[i] != NULL && (outcome->plan.solver == NULL ||
-                                  strcmp(solvers[i]->kind.name, outcome->plan.solver) != 0))
-        i++;
-    if (solvers[i] == NULL || i >= METRICS_SOLVERS)
-        return;
-    SolverMetrics *solver = &metrics->solvers[i];
-    counter_add(&solver->runs, 1);
-    counter_add(&solver->cpu_ns, cpu_ns > 0 ? (uint64_t)cpu_ns : 0);
-    const char *work = (const char *)&outcome->work;
-    for (size_t k = 0; work_counters_fields[k].kind == FIELD_KIND_COUNT && k < METRICS_WORK; k++)
-        counter_add(&solver->work[k],
-                    *(const uint64_t *)(const void *)(work + work_counters_fields[k].offset));
-}
-
-void job_metrics_study(JobMetrics *metrics, bool is_begun, int64_t cpu_ns) {
-    counter_add(&metrics->study_runs, is_begun ? 1 : 0);
-    counter_add(&metrics->study_cpu_ns, cpu_ns > 0 ? (uint64_t)cpu_ns : 0);
 }
 
 static void metrics_write_jobs(const JobMetrics *metrics, Bytes *bytes) {

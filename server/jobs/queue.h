@@ -1,7 +1,6 @@
-// What waits to be computed, in the order in which it will be: fair between clients by the time
-// they were given, and for each client the quick before the slow, until the slow have waited long
-// enough. Not locked and not the work itself: the intake's lock guards it. Used by intake.c,
-// submit.c, worker.c and quota.c.
+// The queue of tasks: fair between clients by the CPU time that each was given; for each client
+// quick tasks before slow ones, until the slow ones have waited long enough. Not locked: callers
+// hold the lock of the job manager.
 #ifndef SERVER_JOBS_QUEUE_H
 #define SERVER_JOBS_QUEUE_H
 

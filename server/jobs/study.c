@@ -651,7 +651,7 @@ static void *study_threads_main(void *context) {
     StudyThreads *threads = context;
     StudyEngine *engine = &threads->engine;
     Workspace workspace = {0};
-    Problem problem; // large, but a thread's stack is larger
+    Problem problem;
     size_t member;
     while (study_engine_next(engine, true, &member)) {
         problem_clear(&problem);

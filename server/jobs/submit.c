@@ -313,7 +313,8 @@ static Status submit_queue(Entry *entry, Problem *problem) {
     pthread_mutex_lock(&manager->lock);
     // It may have been saved meanwhile.
     if (!is_retry && submit_find_task(manager, job->row.result) == NULL)
-        is_cached = (job->summary = cache_head(manager, job->row.result)) != NULL;
+        is_cached = cache_has(manager, job->row.result, false) &&
+                    (job->summary = cache_head(manager, job->row.result)) != NULL;
     Status status = is_cached ? STATUS_OK : submit_check_room(manager, job, problem);
     if (status == STATUS_OK && !is_cached) {
         job_admit(job);
@@ -588,7 +589,7 @@ static Status submit_resume(JobManager *manager, JobRow *row, StudyRequest *requ
 Status jobs_resume(JobManager *manager, JobRow *row, Problem *problem) {
     StudyRequest request = {0};
     Warnings warnings = {NULL, 0};
-    Problem fault; // large, but the thread's stack is larger
+    Problem fault;
     problem_clear(&fault);
     Status status = jobs_prepare(manager->db, row->scene, strlen(row->scene),
                                  &manager->settings.limits, &request, &warnings, &fault);

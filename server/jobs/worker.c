@@ -201,7 +201,7 @@ static void worker_compute(Worker *worker, Task *task, Problem *problem) {
 void *worker_main(void *context) {
     Worker *worker = context;
     JobManager *manager = worker->manager;
-    Problem problem; // large, but a thread's stack is larger
+    Problem problem;
     WorkerItem item;
     pthread_mutex_lock(&manager->lock);
     while (worker_next(worker, &item)) {

@@ -123,7 +123,7 @@ def check_foreign(path, target):
     if path.startswith("core/") and pure not in PURE:
         return f"<{target}> is not the C library's pure part"
     if pure not in SYSTEM:
-        return f"<{target}> is foreign: give it one room and name that in test_includes.py"
+        return f"<{target}> is foreign: give it util/clock.c's and name that in test_includes.py"
     return None
 
 

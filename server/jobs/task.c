@@ -7,7 +7,6 @@
 #include <sys/random.h>
 
 #include "server/jobs/jobs_private.h"
-#include "server/jobs/study.h"
 #include "server/util/clock.h"
 
 const char *const job_state_names[] = {"accepted", "running",   "successful",
@@ -109,12 +108,12 @@ void job_unref(Job *job) {
     free(job);
 }
 
-static void job_lock(Job *job) {
+void job_lock(Job *job) {
     if (job->manager != NULL)
         pthread_mutex_lock(&job->manager->lock);
 }
 
-static void job_unlock(Job *job) {
+void job_unlock(Job *job) {
     if (job->manager != NULL)
         pthread_mutex_unlock(&job->manager->lock);
 }
@@ -128,81 +127,6 @@ bool job_is_finished(Job *job) {
 
 const char *job_client(const Job *job) {
     return job->row.client; // never changes
-}
-
-static void job_view_progress(const Job *job, JobView *view) {
-    const Task *task = job->task;
-    if (job->row.state == JOB_SUCCESSFUL) {
-        view->progress = 100;
-    } else if (task != NULL) {
-        view->progress = atomic_load(&task->progress) / 100.0;
-    }
-    if (task != NULL && task->study != NULL && task->study->is_sweep) {
-        view->points = task->study->sweep.points;
-        view->points_done = atomic_load(&task->study->rows_made);
-        view->points_failed = atomic_load(&task->study->rows_failed);
-    }
-    if (!job_state_is_final(job->row.state) && job->submitted_ns > 0) {
-        const int64_t now = clock_monotonic_ns();
-        view->total = 1e-9 * (double)(now - job->submitted_ns);
-        view->queued = job->started_ns > 0 ? job->row.queued : view->total;
-        view->run = job->started_ns > 0 ? 1e-9 * (double)(now - job->started_ns) : 0;
-    }
-}
-
-Status job_view(Job *job, JobView *view) {
-    job_lock(job);
-    const JobRow *row = &job->row;
-    *view = (JobView){.state = (JobState)row->state,
-                      .is_cached = row->is_cached,
-                      .created_unix_ms = row->created_unix_ms,
-                      .started_unix_ms = row->started_unix_ms,
-                      .finished_unix_ms = row->finished_unix_ms,
-                      .queued = row->queued,
-                      .run = row->run,
-                      .total = row->total};
-    text_fit(view->id, sizeof view->id, row->id);
-    if (row->state == JOB_SUCCESSFUL) {
-        text_fit(view->result, sizeof view->result, row->result);
-        view->is_result_deleted = job->manager == NULL && !row->has_result;
-    }
-    job_view_progress(job, view);
-    const Status all[] = {study_copy_text(row->problem, &view->problem),
-                          study_copy_text(row->warnings, &view->warnings),
-                          study_copy_text(row->title, &view->title),
-                          study_copy_text(row->labels, &view->labels),
-                          study_copy_text(row->study, &view->study),
-                          study_copy_text(row->client, &view->client)};
-    view->head = result_summary_ref(job->summary);
-    job_unlock(job);
-    if (view->head != NULL) {
-        view->plan = view->head->plan;
-        view->summary = view->head->summary;
-        view->work = view->head->work;
-        view->notes = view->head->notes;
-    }
-    return status_first(all, COUNT(all));
-}
-
-void job_view_clear(JobView *view) {
-    free(view->problem);
-    free(view->warnings);
-    free(view->title);
-    free(view->labels);
-    free(view->study);
-    free(view->client);
-    result_summary_unref(view->head);
-    *view = (JobView){0};
-}
-
-JobState job_peek(Job *job, double *progress) {
-    JobView view = {0};
-    job_lock(job);
-    const JobState state = (JobState)job->row.state;
-    job_view_progress(job, &view);
-    job_unlock(job);
-    *progress = view.progress;
-    return state;
 }
 
 Status job_is_durable(Job *job, bool *is_durable, Problem *problem) {
@@ -297,6 +221,56 @@ Status jobs_find(JobManager *manager, const char *id, Job **found, Problem *prob
     *found = job;
     return STATUS_OK;
 }
+
+// --- summaries of results ---
+
+// The texts stand behind the struct, in one block.
+ResultSummary *result_summary_new(const ResultRow *row) {
+    const char *const texts[] = {row->plan, row->summary, row->work, row->notes};
+    size_t bytes = sizeof(ResultSummary);
+    for (size_t i = 0; i < COUNT(texts); i++)
+        bytes += texts[i] != NULL ? strlen(texts[i]) + 1 : 0;
+    ResultSummary *summary = malloc(bytes);
+    if (summary == NULL)
+        return NULL;
+    char *at = (char *)(summary + 1);
+    const char *copies[COUNT(texts)] = {NULL};
+    for (size_t i = 0; i < COUNT(texts); i++) {
+        if (texts[i] == NULL)
+            continue;
+        const size_t size = strlen(texts[i]) + 1;
+        copies[i] = memcpy(at, texts[i], size);
+        at += size;
+    }
+    summary->plan = copies[0];
+    summary->summary = copies[1];
+    summary->work = copies[2];
+    summary->notes = copies[3];
+    summary->bytes = bytes;
+    atomic_init(&summary->refcount, 1);
+    return summary;
+}
+
+Status result_summary_load(Db *db, const char *result, ResultSummary **summary) {
+    ResultRow row = {0};
+    const Status status = db_result_head(db, result, &row, NULL);
+    *summary = status == STATUS_OK ? result_summary_new(&row) : NULL;
+    result_row_clear(&row);
+    return status;
+}
+
+ResultSummary *result_summary_ref(ResultSummary *summary) {
+    if (summary != NULL)
+        atomic_fetch_add(&summary->refcount, 1);
+    return summary;
+}
+
+void result_summary_unref(ResultSummary *summary) {
+    if (summary != NULL && atomic_fetch_sub(&summary->refcount, 1) == 1)
+        free(summary);
+}
+
+// --- tasks ---
 
 void run_result_clear(RunResult *run_result) {
     outcome_unref(run_result->outcome);
@@ -500,4 +474,38 @@ void task_release(Task *task) {
         job_unref(job);
     }
     subscribers_call(&task->result_waiters);
+}
+
+void jobs_end_write(JobManager *manager) {
+    if (--manager->writes == 0)
+        pthread_cond_broadcast(&manager->settled);
+}
+
+// --- metrics ---
+
+void job_metrics_ended(JobMetrics *metrics, int state, bool is_cached) {
+    counter_add(&metrics->ended[state], 1);
+    if (is_cached)
+        counter_add(&metrics->cached, 1);
+}
+
+void job_metrics_run(JobMetrics *metrics, const Outcome *outcome, int64_t cpu_ns) {
+    size_t i = 0;
+    while (solvers[i] != NULL && (outcome->plan.solver == NULL ||
+                                  strcmp(solvers[i]->kind.name, outcome->plan.solver) != 0))
+        i++;
+    if (solvers[i] == NULL || i >= METRICS_SOLVERS)
+        return;
+    SolverMetrics *solver = &metrics->solvers[i];
+    counter_add(&solver->runs, 1);
+    counter_add(&solver->cpu_ns, cpu_ns > 0 ? (uint64_t)cpu_ns : 0);
+    const char *work = (const char *)&outcome->work;
+    for (size_t k = 0; work_counters_fields[k].kind == FIELD_KIND_COUNT && k < METRICS_WORK; k++)
+        counter_add(&solver->work[k],
+                    *(const uint64_t *)(const void *)(work + work_counters_fields[k].offset));
+}
+
+void job_metrics_study(JobMetrics *metrics, bool is_begun, int64_t cpu_ns) {
+    counter_add(&metrics->study_runs, is_begun ? 1 : 0);
+    counter_add(&metrics->study_cpu_ns, cpu_ns > 0 ? (uint64_t)cpu_ns : 0);
 }
