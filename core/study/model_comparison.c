@@ -175,8 +175,8 @@ static Status comparison_add(CompareEntries *entries, const ContactLaw *law, int
     entry->separation = separation;
     snprintf(name, sizeof name, "%s%s%s", law->kind.name, separation == CHOICE_ABSENT ? "" : ", ",
              separation == CHOICE_ABSENT ? "" : separation_names[separation]);
-    TRY(study_copy_text(name, &entry->name));
-    return study_copy_text(law->kind.name, &entry->contact_model);
+    TRY(text_copy(name, &entry->name));
+    return text_copy(law->kind.name, &entry->contact_model);
 }
 
 // The entries of a completed study without results; the first is the scene as it is.
@@ -463,8 +463,8 @@ static Status comparison_begin(void *of, const StudyTools *tools, Problem *probl
     if (answer->trace_samples < 1)
         answer->trace_samples = 1;
     answer->trace_rate = reference->response.sample_rate / (double)answer->trace_samples;
-    TRY(study_copy_text(densities->at[0].name, &answer->channel));
-    TRY(study_copy_text(densities->at[0].unit, &answer->unit));
+    TRY(text_copy(densities->at[0].name, &answer->channel));
+    TRY(text_copy(densities->at[0].unit, &answer->unit));
     TRY(study_copy_reals(reference->spectrum.frequency, densities->rows, &answer->frequency));
     first->steps = reference->steps;
     first->summary = reference->summary;

@@ -205,7 +205,7 @@ static Status uncertainty_fill_recorded(InputUncertainty *uncertainty,
                                   .buffer = (int)(i % BUFFERS),
                                   .restitution = recorded[0],
                                   .contact_time = recorded[1]};
-        TRY(study_copy_text(buffer->material, &added->source));
+        TRY(text_copy(buffer->material, &added->source));
     }
     return STATUS_OK;
 }
@@ -740,7 +740,7 @@ static Status sensitivity_fill_contact(const SensitivityWork *work) {
         stop->damping = from->damping;
         if (why == NULL)
             sensitivity_fill_stop(work->study, damper, (Separation)contact->separation, stop);
-        TRY(study_copy_text(why, &stop->why));
+        TRY(text_copy(why, &stop->why));
     }
     return STATUS_OK;
 }
@@ -756,7 +756,7 @@ static Status sensitivity_fill_rows(SensitivityWork *work) {
         const char *refused = perturbation_refuse(work->simulation, row->parameter);
         if (refused == NULL)
             work->rows[stepped++] = i;
-        TRY(study_copy_text(refused, &row->why));
+        TRY(text_copy(refused, &row->why));
     }
     work->steps = stepped * ROW_STEPS;
     return STATUS_OK;
@@ -805,7 +805,7 @@ static Status sensitivity_begin(void *of, const StudyTools *tools, Problem *prob
     answer->runs = study->runs;
     answer->seed = study->seed;
     answer->confidence = STATISTICS_CONFIDENCE;
-    TRY(study_copy_text(
+    TRY(text_copy(
         study->uncertainty.spread.count == 0
             ? "log-normal factors of mean 1 and the stated relative deviation, independent for the "
               "restitution and the contact time of each buffer; a restitution beyond 1 is drawn "

@@ -144,7 +144,7 @@ Status statistics_fill(const RunTable *table, int metric, RunStatistic *statisti
     free(statistic->unit);
     statistic->metric = metric;
     const char *unit = fields_find(summary_fields, statistics_metric_names[metric], NULL)->unit;
-    TRY(study_copy_text(unit != NULL ? unit : "1", &statistic->unit));
+    TRY(text_copy(unit != NULL ? unit : "1", &statistic->unit));
     TRY(statistics_collect(table, metric, &values));
     const size_t count = values.count;
     statistic->count = count;
@@ -355,8 +355,8 @@ Status spectrum_accumulator_report(const SpectrumAccumulator *sums, const Spectr
     for (size_t c = 0; c < densities->count; c++) {
         RunSpectrum *spectrum = list_append(spectra, sizeof *spectrum);
         TRY(status_made(spectrum != NULL));
-        TRY(study_copy_text(densities->at[c].name, &spectrum->channel));
-        TRY(study_copy_text(densities->at[c].unit, &spectrum->unit));
+        TRY(text_copy(densities->at[c].name, &spectrum->channel));
+        TRY(text_copy(densities->at[c].unit, &spectrum->unit));
         if (has_quantiles)
             TRY(study_copy_reals(densities->at[c].values, sums->rows, &spectrum->value));
         TRY(has_quantiles

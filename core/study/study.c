@@ -14,7 +14,7 @@ Status study_advance(const Progress *progress, double fraction, Problem *problem
                : problem_set(problem, STATUS_CANCELLED, "the study was stopped");
 }
 
-Status study_copy_text(const char *text, char **target) {
+Status text_copy(const char *text, char **target) {
     *target = text != NULL ? strdup(text) : NULL;
     return status_made(*target != NULL || text == NULL);
 }
@@ -53,8 +53,8 @@ Status study_failures_add(StudyFailures *failures, int status, const char *reaso
     StudyFailure *failure = list_append(failures, sizeof *failure);
     TRY(status_made(failure != NULL));
     *failure = (StudyFailure){.status = status, .count = 1, .first = number};
-    TRY(study_copy_text(reason, &failure->reason));
-    return study_copy_text(why, &failure->detail);
+    TRY(text_copy(reason, &failure->reason));
+    return text_copy(why, &failure->detail);
 }
 
 double study_summary_value(const Summary *summary, const char *name) {
@@ -158,7 +158,7 @@ Status study_part_make(const StudyWork *work, size_t member, const StudyTools *t
     if (study_run_ends_study(run->status))
         return study_result(run->status, problem);
     if (run->status != STATUS_OK) {
-        const Status copied = study_copy_text(problem->detail, &run->why);
+        const Status copied = text_copy(problem->detail, &run->why);
         problem_clear(problem);
         return study_result(copied, problem);
     }

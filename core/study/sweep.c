@@ -571,8 +571,8 @@ static Status sweep_fill(const SweepGrid *grid, Sweep *sweep) {
         const SweepValues *values = &grid->axes[i];
         SweepAxisValues *axis = list_append(&sweep->axes, sizeof *axis);
         TRY(status_made(axis != NULL));
-        TRY(study_copy_text(values->axis->pointer, &axis->pointer));
-        TRY(study_copy_text(values->is_tag ? NULL : values->field->unit, &axis->unit));
+        TRY(text_copy(values->axis->pointer, &axis->pointer));
+        TRY(text_copy(values->is_tag ? NULL : values->field->unit, &axis->unit));
         for (size_t k = 0; k < values->count; k++) {
             char digits[32];
             TRY(texts_append(&axis->values,

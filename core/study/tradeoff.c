@@ -80,7 +80,7 @@ static Status candidate_add(TradeoffPoints *points, const Kind *solver, const ch
         const bool is_whole = value == floor(value) && value < 1e15;
         snprintf(rest, sizeof rest, is_whole ? ", %s%.0f%s" : ", %s%.6g%s", before, value, after);
     }
-    TRY(study_copy_text(solver->name, &point->solver));
+    TRY(text_copy(solver->name, &point->solver));
     return status_made(text_format(&point->name, "%s%s", solver->name, rest));
 }
 
@@ -195,7 +195,7 @@ static Status candidate_add_reference(TradeoffPoints *points, const Kind *solver
         const char *model = contact_impulse.kind.name;
         TRY(candidate_add(points, solver, NULL, NAN, "", ""));
         TradeoffPoint *point = &points->at[points->count - 1];
-        TRY(study_copy_text(model, &point->contact_model));
+        TRY(text_copy(model, &point->contact_model));
         TRY(status_made(text_format(&point->name, "%s, contact %s", solver->name, model)));
     }
     for (size_t modes = storeys / 2; storeys >= STOREYS_MIN && modes > 0; modes /= 2)
@@ -429,7 +429,7 @@ static Status tradeoff_run_reference(TradeoffRun *run, Problem *problem) {
     TradeoffPoint exact;
     Simulation simulation = {0};
     (void)fields_default(tradeoff_point_fields, &exact);
-    TRY(study_copy_text(solver_exact.kind.name, &reference->solver));
+    TRY(text_copy(solver_exact.kind.name, &reference->solver));
     exact.solver = reference->solver;
     Status status =
         candidate_settings_apply(run->simulation, &exact, run->tools->limits, &simulation, problem);
@@ -469,8 +469,8 @@ static Status tradeoff_measure(TradeoffRun *run, size_t index, Problem *problem)
         point->steps = floor(outcome->steps + 0.5); // parts of one are counted too
         point->errors = error_metrics_measure(run->reference, outcome, has_motion);
     } else if (!study_run_ends_study(status)) {
-        status = study_copy_text(problem->count > 0 ? problem->faults[0].detail : problem->detail,
-                                 &point->why);
+        status = text_copy(problem->count > 0 ? problem->faults[0].detail : problem->detail,
+                           &point->why);
         problem_clear(problem);
     }
     if (steps <= run->limits.steps)

@@ -103,7 +103,7 @@ Status job_find_visible(App *app, const Request *request, Job **job, Problem *pr
 // Sets Retry-After where a scene was refused with STATUS_BUSY or STATUS_QUOTA; returns `status`.
 Status jobs_refused(App *app, const Request *request, Reply *reply, Status status);
 
-// jobs_tally, with the series in the database. cache.c.
+// jobs_stats, with the series in the database. cache.c.
 void cache_tally_all(App *app, JobStats *stats);
 
 // --- results, results.c ---

@@ -23,8 +23,8 @@ static void cache_put_layer(Bytes *bytes, const char *name, const CacheStats *la
 
 void cache_tally_all(App *app, JobStats *stats) {
     uint64_t count, size;
-    jobs_tally(app->manager, stats);
-    db_series_tally(app->db, &count, &size, &stats->stored.evictions);
+    jobs_stats(app->manager, stats);
+    db_series_stats(app->db, &count, &size, &stats->stored.evictions);
     stats->stored.count = count;
     stats->stored.bytes = size;
 }

@@ -123,7 +123,7 @@ Status health_ready(App *app, const Request *request, Reply *reply, Problem *pro
     if (!db_is_writable(app->db))
         return problem_set(problem, STATUS_BUSY,
                            "the last write to the database failed: is the disk full or read-only?");
-    jobs_tally(app->manager, &metrics);
+    jobs_stats(app->manager, &metrics);
     if (metrics.unfinished >= metrics.queue_most)
         return problem_set(problem, STATUS_BUSY,
                            "the queue is full: of unfinished jobs it has %zu, and may have %zu",

@@ -186,7 +186,7 @@ Status db_series_post(Db *db, const char *result, char *body, size_t size, uint6
 // *body is to be freed. STATUS_NOT_FOUND.
 Status db_series_load(Db *db, const char *result, char **body, size_t *size, Problem *problem);
 bool db_series_exists(Db *db, const char *result);
-void db_series_tally(Db *db, uint64_t *count, uint64_t *bytes, uint64_t *evictions);
+void db_series_stats(Db *db, uint64_t *count, uint64_t *bytes, uint64_t *evictions);
 
 // A sweep, stored before any of it runs.
 typedef struct SweepRow {

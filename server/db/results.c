@@ -274,7 +274,7 @@ bool db_series_exists(Db *db, const char *result) {
            is_found;
 }
 
-void db_series_tally(Db *db, uint64_t *count, uint64_t *bytes, uint64_t *evictions) {
+void db_series_stats(Db *db, uint64_t *count, uint64_t *bytes, uint64_t *evictions) {
     QueryCounts sum = {0};
     (void)db_first(db, sum_sql, NULL, NULL, query_counts_columns, &sum, NULL, NULL);
     *count = sum.count;

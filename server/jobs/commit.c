@@ -336,7 +336,7 @@ static void insert_done(void *context, Status status, const char *detail) {
     job_unref(job);
 }
 
-void job_insert(Job *job) {
+void job_insert_later(Job *job) {
     insert_begin(job);
     job->write.done = (WriteDone){insert_done, job_ref(job)};
     job->manager->writes++;
@@ -361,7 +361,7 @@ void job_save(Job *job) {
     pthread_mutex_lock(&job->manager->lock);
     if (!job->is_durable && !job->is_inserting && !job->is_ending && job->refusal == STATUS_OK &&
         !job_state_is_final(job->row.state))
-        job_insert(job);
+        job_insert_later(job);
     pthread_mutex_unlock(&job->manager->lock);
 }
 

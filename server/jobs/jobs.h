@@ -161,7 +161,7 @@ typedef struct JobStats {
     CacheStats rows;   // results in the database: those found there and not
     CacheStats stored; // series in the database
 } JobStats;
-void jobs_tally(JobManager *manager, JobStats *metrics);
+void jobs_stats(JobManager *manager, JobStats *metrics);
 // What was done since the start, in the Prometheus text format.
 void jobs_write_metrics(const JobManager *manager, Bytes *bytes);
 

@@ -231,7 +231,7 @@ void task_abandon(JobManager *manager, Task *task);
 bool jobs_is_behind(const JobManager *manager);
 void jobs_end_write(JobManager *manager); // likewise; one less is under way
 // With the lock held: inserts it as it is, without waiting.
-void job_insert(Job *job);
+void job_insert_later(Job *job);
 // Without the lock. The same, and waits for it. STATUS_CONFLICT: another job has its key, or a
 // record that it names does not exist.
 Status job_insert_now(Job *job, Problem *problem);

@@ -255,7 +255,7 @@ void jobs_layers(JobManager *manager, const char *result, CacheLayers *layers) {
     layers->series_in_database = db_series_exists(manager->db, result);
 }
 
-void jobs_tally(JobManager *manager, JobStats *stats) {
+void jobs_stats(JobManager *manager, JobStats *stats) {
     pthread_mutex_lock(&manager->lock);
     *stats = (JobStats){.queued = queue_count(manager->queue),
                         .workers = manager->settings.workers,

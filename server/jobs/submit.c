@@ -242,7 +242,7 @@ static Status submit_finish(Entry *entry, Problem *problem) {
         TRY(submit_insert(entry, &entry->request, problem));
     } else {
         pthread_mutex_lock(&manager->lock);
-        job_insert(job);
+        job_insert_later(job);
         pthread_mutex_unlock(&manager->lock);
     }
     if (entry->earlier == NULL)
@@ -394,11 +394,11 @@ static Status submit_fill(const Entry *entry, const Warnings *warnings, Problem 
         submit_take(&uses, &row->uses),
         submit_take(&shown, &row->labels),
         submit_take(&words, &row->words),
-        study_copy_text(simulation->title, &row->title),
-        study_copy_text(request->study == NULL ? NULL : request->study->kind->name, &row->study),
-        study_copy_text(entry->submission->client, &row->client),
-        study_copy_text(has_key ? entry->key : NULL, &row->idempotency_key),
-        study_copy_text(has_key ? entry->digest : NULL, &row->request),
+        text_copy(simulation->title, &row->title),
+        text_copy(request->study == NULL ? NULL : request->study->kind->name, &row->study),
+        text_copy(entry->submission->client, &row->client),
+        text_copy(has_key ? entry->key : NULL, &row->idempotency_key),
+        text_copy(has_key ? entry->digest : NULL, &row->request),
         status_made(row->result[0] != '\0')};
     return status_first(all, COUNT(all)) == STATUS_OK ? STATUS_OK : submit_no_memory(problem);
 }

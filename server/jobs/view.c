@@ -41,12 +41,10 @@ Status job_view(Job *job, JobView *view) {
         view->is_result_deleted = job->manager == NULL && !row->has_result;
     }
     job_view_progress(job, view);
-    const Status all[] = {study_copy_text(row->problem, &view->problem),
-                          study_copy_text(row->warnings, &view->warnings),
-                          study_copy_text(row->title, &view->title),
-                          study_copy_text(row->labels, &view->labels),
-                          study_copy_text(row->study, &view->study),
-                          study_copy_text(row->client, &view->client)};
+    const Status all[] = {
+        text_copy(row->problem, &view->problem), text_copy(row->warnings, &view->warnings),
+        text_copy(row->title, &view->title),     text_copy(row->labels, &view->labels),
+        text_copy(row->study, &view->study),     text_copy(row->client, &view->client)};
     view->head = result_summary_ref(job->summary);
     job_unlock(job);
     if (view->head != NULL) {

@@ -22,9 +22,9 @@ static Status worker_describe(const Task *task, RunResult *run_result, Problem *
     row->created_unix_ms = clock_unix_ms();
     const Status all[] = {
         document_outcome(outcome, row),
-        study_copy_text(engine_version, &row->engine),
-        study_copy_text(task->scene, &row->scene),
-        study_copy_text(task->warnings, &row->warnings),
+        text_copy(engine_version, &row->engine),
+        text_copy(task->scene, &row->scene),
+        text_copy(task->warnings, &row->warnings),
         status_made((row->uses = bytes_take(&uses, NULL)) != NULL),
         status_made((row->outcome.at = bytes_take(&blob, &row->outcome.size)) != NULL)};
     return status_first(all, COUNT(all)) == STATUS_OK

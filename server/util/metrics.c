@@ -5,7 +5,7 @@
 static const struct {
     int64_t ns;
     const char *edge; // [s]
-} edges[TALLY_BUCKETS] = {
+} edges[HISTOGRAM_BUCKETS] = {
     {100000, "0.0001"},  {250000, "0.00025"}, {500000, "0.0005"},  {1000000, "0.001"},
     {2500000, "0.0025"}, {5000000, "0.005"},  {10000000, "0.01"},  {25000000, "0.025"},
     {50000000, "0.05"},  {100000000, "0.1"},  {250000000, "0.25"}, {500000000, "0.5"},
@@ -15,7 +15,7 @@ static const struct {
 
 void histogram_add(Histogram *histogram, int64_t ns) {
     int i = 0;
-    while (i < TALLY_BUCKETS && ns > edges[i].ns)
+    while (i < HISTOGRAM_BUCKETS && ns > edges[i].ns)
         i++;
     counter_add(&histogram->buckets[i], 1);
     counter_add(&histogram->sum_ns, ns > 0 ? (uint64_t)ns : 0);
@@ -23,7 +23,7 @@ void histogram_add(Histogram *histogram, int64_t ns) {
 
 uint64_t histogram_count(const Histogram *histogram) {
     uint64_t count = 0;
-    for (int i = 0; i <= TALLY_BUCKETS; i++)
+    for (int i = 0; i <= HISTOGRAM_BUCKETS; i++)
         count += counter_get(&histogram->buckets[i]);
     return count;
 }
@@ -56,10 +56,10 @@ void metrics_histogram(Bytes *bytes, const char *name, const char *labels,
                        const Histogram *histogram) {
     uint64_t count = 0;
     const char *comma = labels[0] != '\0' ? "," : "";
-    for (int i = 0; i <= TALLY_BUCKETS; i++) {
+    for (int i = 0; i <= HISTOGRAM_BUCKETS; i++) {
         count += counter_get(&histogram->buckets[i]);
         bytes_format(bytes, "%s_bucket{%s%sle=\"%s\"} %llu\n", name, labels, comma,
-                     i < TALLY_BUCKETS ? edges[i].edge : "+Inf", (unsigned long long)count);
+                     i < HISTOGRAM_BUCKETS ? edges[i].edge : "+Inf", (unsigned long long)count);
     }
     metrics_put_name(bytes, name, "_sum", labels);
     bytes_real(bytes, 1e-9 * (double)counter_get(&histogram->sum_ns));

@@ -17,9 +17,10 @@ static inline uint64_t counter_get(const Counter *counter) {
     return atomic_load_explicit(counter, memory_order_relaxed);
 }
 
-enum { TALLY_BUCKETS = 18 };
+enum { HISTOGRAM_BUCKETS = 18 };
 typedef struct Histogram {
-    Counter buckets[TALLY_BUCKETS + 1]; // by upper edge, from 0.1 ms to a minute; the last has none
+    Counter
+        buckets[HISTOGRAM_BUCKETS + 1]; // by upper edge, from 0.1 ms to a minute; the last has none
     Counter sum_ns;
 } Histogram;
 void histogram_add(Histogram *histogram, int64_t ns);

@@ -235,7 +235,7 @@ TEST_IN(series_are_kept_under_a_budget_and_the_longest_unused_goes, make_folder,
     assert_false(db_series_exists(db, "r-1"));
     assert_true(db_series_exists(db, "r-2") && db_series_exists(db, "r-3"));
     uint64_t count, bytes, evictions;
-    db_series_tally(db, &count, &bytes, &evictions);
+    db_series_stats(db, &count, &bytes, &evictions);
     assert_int_equal(count, 3);
     assert_int_equal(bytes, 3000);
     assert_int_equal(evictions, 1);

@@ -209,7 +209,7 @@ static void wait_until_idle(Room *room) {
     bool is_idle = false;
     for (int i = 0; i < 60000 && !is_idle; i++) {
         nanosleep(&moment, NULL);
-        jobs_tally(room->manager, &metrics);
+        jobs_stats(room->manager, &metrics);
         pthread_mutex_lock(&room->manager->lock);
         is_idle = metrics.queued + metrics.running + room->manager->writes == 0;
         pthread_mutex_unlock(&room->manager->lock);
@@ -283,7 +283,7 @@ TEST_IN(a_job_that_cannot_be_kept_never_was, NULL, lift_limit) {
     JobStats metrics;
     do {
         nanosleep(&moment, NULL);
-        jobs_tally(room.manager, &metrics);
+        jobs_stats(room.manager, &metrics);
     } while (metrics.queued + metrics.running > 0);
     room_end(&room);
 }
@@ -401,7 +401,7 @@ TEST(running_jobs_share_one_budget_of_memory) {
     for (int i = 0; i < 300; i++)
         nanosleep(&moment, NULL);
     JobStats stats;
-    jobs_tally(room.manager, &stats);
+    jobs_stats(room.manager, &stats);
     assert_int_equal(stats.running, 1);
     for (size_t i = 0; i < 3; i++) { // in turn, whether they run or wait
         JobView now = show(jobs[i]);
