@@ -57,6 +57,11 @@ void text_fit_format(char *target, size_t size, const char *format, va_list argu
     text_fit(target, size, text);
 }
 
+Status text_copy(const char *text, char **target) {
+    *target = text != NULL ? strdup(text) : NULL;
+    return status_made(*target != NULL || text == NULL);
+}
+
 bool text_same(const char *a, const char *b) {
     return a == NULL || b == NULL ? a == b : strcmp(a, b) == 0;
 }

@@ -103,6 +103,8 @@ void text_fit_format(char *target, size_t size, const char *format, va_list argu
 
 // Whether two texts are equal; NULL equals NULL only.
 bool text_same(const char *a, const char *b);
+// A copy of a text, or of NULL. STATUS_NO_MEMORY.
+Status text_copy(const char *text, char **target);
 
 // Appends `item` to the list in `target[size]`, after ", "; truncated as by text_fit.
 void text_list(char *target, size_t size, const char *item);

@@ -14,11 +14,6 @@ Status study_advance(const Progress *progress, double fraction, Problem *problem
                : problem_set(problem, STATUS_CANCELLED, "the study was stopped");
 }
 
-Status text_copy(const char *text, char **target) {
-    *target = text != NULL ? strdup(text) : NULL;
-    return status_made(*target != NULL || text == NULL);
-}
-
 Status study_copy_reals(const double *values, size_t count, Reals *target) {
     if (!reals_allocate(target, count))
         return STATUS_NO_MEMORY;

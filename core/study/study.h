@@ -94,8 +94,7 @@ static inline Status study_first_failure(Status first, Status second) {
     return first != STATUS_OK ? first : second;
 }
 
-// Copies of a text (NULL: none) and of numbers. STATUS_NO_MEMORY, as of all functions below.
-Status text_copy(const char *text, char **target);
+// A copy of numbers. STATUS_NO_MEMORY, as of all functions below.
 Status study_copy_reals(const double *values, size_t count, Reals *target);
 
 // Appends a number.
