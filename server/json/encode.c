@@ -17,33 +17,20 @@ static void encode_put_name(Bytes *bytes, const char *name, size_t *count) {
 
 static void encode_put_reals(Bytes *bytes, const Reals *reals) {
     bytes_text(bytes, "[");
-    for (size_t i = 0; i < reals->count; i++) {
-        if (i > 0)
-            bytes_put(bytes, ",", 1);
-        bytes_real(bytes, reals->at[i]);
-    }
+    bytes_reals(bytes, reals->at, reals->count);
     bytes_text(bytes, "]");
 }
 
-static void encode_put_rows(Bytes *bytes, const Rows *rows) {
+// Rows of numbers, or texts, which may be JSON.
+static void encode_put_list(Bytes *bytes, const Field *field, const List *list) {
+    const bool is_json = (field->flags & FIELD_SCALARS) != 0;
     bytes_text(bytes, "[");
-    for (size_t i = 0; i < rows->count; i++) {
-        if (i > 0)
-            bytes_text(bytes, ", ");
-        encode_put_reals(bytes, &rows->at[i]);
-    }
-    bytes_text(bytes, "]");
-}
-
-static void encode_put_texts(Bytes *bytes, const Texts *texts, bool is_json) {
-    bytes_text(bytes, "[");
-    for (size_t i = 0; i < texts->count; i++) {
-        if (i > 0)
-            bytes_text(bytes, ", ");
-        if (is_json)
-            bytes_text(bytes, texts->at[i]);
+    for (size_t i = 0; i < list->count; i++) {
+        bytes_text(bytes, i > 0 ? ", " : "");
+        if (field->kind == FIELD_KIND_ROWS)
+            encode_put_reals(bytes, (const Reals *)list->at + i);
         else
-            bytes_json_string(bytes, texts->at[i]);
+            bytes_json(bytes, is_json ? "%p" : "%s", ((char *const *)list->at)[i]);
     }
     bytes_text(bytes, "]");
 }
@@ -85,11 +72,12 @@ static void encode_put_value(Bytes *bytes, const Field *field, const void *membe
         break;
     }
     case FIELD_KIND_ROWS:
-        encode_put_rows(bytes, member);
+    case FIELD_KIND_TEXTS: {
+        List list;
+        memcpy(&list, member, sizeof list);
+        encode_put_list(bytes, field, &list);
         break;
-    case FIELD_KIND_TEXTS:
-        encode_put_texts(bytes, member, (field->flags & FIELD_SCALARS) != 0);
-        break;
+    }
     case FIELD_KIND_ITEM:
         encode_item(bytes, field->fields, member, style);
         break;

@@ -175,35 +175,35 @@ static const char *decode_wrong_name(Decoder *decoder, const char *pointer, cons
     return meant;
 }
 
-// Whether `value` is an array (or `is_lone`) within the limit of its row, of `count` `what`.
-static bool decode_array(Decoder *decoder, const json_t *value, const Field *field, bool is_lone,
-                         const char *wanted, size_t count, const char *what, const char *pointer) {
-    if (!json_is_array(value) && !is_lone) {
-        decode_wrong_type(decoder, pointer, value, field, wanted);
-        return false;
-    }
-    if (is_lone && json_is_number(value))
-        return true;
-    if (field->max == 0 || count <= field->max)
-        return true;
-    decode_fault(decoder, pointer, value, NULL, NULL, "must have at most %zu %s, has %zu",
-                 field->max, what, count);
-    return false;
+static void decode_real(Decoder *decoder, const json_t *value, const Field *field, void *target,
+                        const char *pointer) {
+    if (json_is_number(value))
+        *(double *)target = number_of(value);
+    else
+        decode_wrong_type(decoder, pointer, value, field, "a number");
 }
 
-static void decode_count(Decoder *decoder, const json_t *value, const Field *field,
-                         uint64_t *target, const char *pointer) {
+static void decode_flag(Decoder *decoder, const json_t *value, const Field *field, void *target,
+                        const char *pointer) {
+    if (json_is_boolean(value))
+        *(bool *)target = json_is_true(value);
+    else
+        decode_wrong_type(decoder, pointer, value, field, "true or false");
+}
+
+static void decode_count(Decoder *decoder, const json_t *value, const Field *field, void *target,
+                         const char *pointer) {
     if (!json_is_number(value)) {
         decode_wrong_type(decoder, pointer, value, field, "a whole number");
         return;
     }
     if (json_is_integer(value) && json_integer_value(value) >= 0) {
-        *target = (uint64_t)json_integer_value(value);
+        *(uint64_t *)target = (uint64_t)json_integer_value(value);
         return;
     }
     const double number = number_of(value);
     if (number >= 0 && number < 0x1p63 && floor(number) == number) {
-        *target = (uint64_t)number;
+        *(uint64_t *)target = (uint64_t)number;
         return;
     }
     const Range *range = &field->range;
@@ -219,7 +219,7 @@ static void decode_count(Decoder *decoder, const json_t *value, const Field *fie
                      real_text(range->max < 0x1p63 ? range->max : 0x1p63).at, is);
 }
 
-static void decode_text(Decoder *decoder, const json_t *value, const Field *field, char **target,
+static void decode_text(Decoder *decoder, const json_t *value, const Field *field, void *target,
                         const char *pointer) {
     const bool takes_null = (field->flags & FIELD_NULL_IS_EMPTY) != 0;
     if (!json_is_string(value) && !(takes_null && json_is_null(value))) {
@@ -238,11 +238,11 @@ static void decode_text(Decoder *decoder, const json_t *value, const Field *fiel
         decoder->is_out_of_memory = true;
         return;
     }
-    free(*target);
-    *target = text;
+    free(*(char **)target);
+    *(char **)target = text;
 }
 
-static void decode_choice(Decoder *decoder, const json_t *value, const Field *field, int *target,
+static void decode_choice(Decoder *decoder, const json_t *value, const Field *field, void *target,
                           const char *pointer) {
     if (!json_is_string(value)) {
         decode_wrong_type(decoder, pointer, value, field, "a string");
@@ -250,7 +250,7 @@ static void decode_choice(Decoder *decoder, const json_t *value, const Field *fi
     }
     for (int i = 0; field->choices[i] != NULL; i++) {
         if (strcmp(field->choices[i], json_string_value(value)) == 0) {
-            *target = i;
+            *(int *)target = i;
             return;
         }
     }
@@ -264,118 +264,34 @@ static double allowed_number(const Range *range) {
     return isinf(range->max) ? 0 : range->max;
 }
 
-static void decode_reals(Decoder *decoder, const json_t *value, const Field *field, Reals *target,
-                         const char *pointer) {
-    const bool takes_number = (field->flags & FIELD_LONE) != 0;
-    const bool is_number = takes_number && json_is_number(value);
-    const size_t count = is_number ? 1 : json_array_size(value);
-    Reals reals = {NULL, 0};
-    if (!decode_array(decoder, value, field, is_number,
-                      takes_number ? "a number or an array of numbers" : "an array of numbers",
-                      count, "numbers", pointer))
-        return;
-    if (count > 0 && !reals_allocate(&reals, count)) {
-        decoder->is_out_of_memory = true;
-        return;
-    }
-    for (size_t i = 0; i < count; i++) {
-        const json_t *element = is_number ? value : json_array_get(value, i);
-        char place[POINTER_SIZE];
-        if (json_is_number(element)) {
-            reals.at[i] = number_of(element);
-            continue;
-        }
-        reals.at[i] = allowed_number(&field->range);
-        json_pointer_index(place, sizeof place, pointer, i);
-        decode_wrong_type(decoder, place, element, field, "a number");
-    }
-    free(target->at);
-    *target = reals;
-}
-
-static void decode_rows(Decoder *decoder, const json_t *value, const Field *field, Rows *target,
-                        const char *pointer) {
-    const size_t count = json_array_size(value);
-    if (!decode_array(decoder, value, field, false, "an array of rows of numbers", count, "rows",
-                      pointer))
-        return;
-    Reals *rows = count > 0 ? calloc(count, sizeof *rows) : NULL;
-    if (rows == NULL && count > 0) {
-        decoder->is_out_of_memory = true;
-        return;
-    }
-    for (size_t i = 0; i < count; i++) {
-        char place[POINTER_SIZE];
-        json_pointer_index(place, sizeof place, pointer, i);
-        decode_reals(decoder, json_array_get(value, i), field, &rows[i], place);
-    }
-    for (size_t i = 0; i < target->count; i++)
-        free(target->at[i].at);
-    free(target->at);
-    *target = (Rows){rows, count};
-}
-
-// An element of a list of texts: a string, with its key in front ("key=value") where it is a member
-// of an object; under FIELD_SCALARS the JSON text of a string, number or boolean.
-static void decode_element(Decoder *decoder, const json_t *value, const char *key,
-                           const Field *field, Bytes *text, const char *place) {
-    if ((field->flags & FIELD_SCALARS) != 0) {
-        if (json_is_string(value)) {
-            bytes_json_string(text, json_string_value(value));
-        } else if (json_is_boolean(value)) {
-            bytes_text(text, json_is_true(value) ? "true" : "false");
-        } else if (json_is_integer(value) && json_integer_value(value) > (json_int_t)1 << 53) {
-            bytes_format(text, "%lld", (long long)json_integer_value(value));
-        } else {
-            bytes_real(text, number_of(value));
-            if (!json_is_number(value))
-                decode_wrong_type(decoder, place, value, NULL, "a number, a string, true or false");
-        }
-        return;
-    }
-    if (key != NULL) {
-        bytes_text(text, key);
-        bytes_text(text, "=");
-    }
-    if (json_is_string(value)) {
-        bytes_text(text, json_string_value(value));
-        return;
-    }
-    bytes_text(text, field->choices != NULL ? field->choices[0] : "");
-    decode_wrong_type(decoder, place, value, NULL, "a string");
-}
-
-static void decode_texts(Decoder *decoder, const json_t *value, const Field *field, Texts *target,
-                         const char *pointer) {
-    const bool takes_pairs = (field->flags & FIELD_PAIRS) != 0;
-    const bool is_pairs = takes_pairs && json_is_object(value);
-    const size_t count = is_pairs ? json_object_size(value) : json_array_size(value);
-    if (!decode_array(decoder, value, field, is_pairs,
-                      takes_pairs ? "an array or an object of strings" : "an array of strings",
-                      count, "texts", pointer))
-        return;
-    Texts texts = {calloc(1, sizeof *texts.at), 0}; // an empty array is not an absent one
+// A text of a list: a string, with its key in front ("key=value") where it is a member of an
+// object; under FIELD_SCALARS the JSON text of a string, number or boolean.
+static void decode_list_text(Decoder *decoder, const json_t *value, const char *key,
+                             const Field *field, char **target, const char *place) {
     Bytes text = {0};
-    decoder->is_out_of_memory = decoder->is_out_of_memory || texts.at == NULL;
-    void *member = is_pairs ? json_object_iter((json_t *)value) : NULL;
-    for (size_t i = 0; i < count && !decoder->is_out_of_memory; i++) {
-        const char *key = is_pairs ? json_object_iter_key(member) : NULL;
-        const json_t *element =
-            is_pairs ? json_object_iter_value(member) : json_array_get(value, i);
-        char place[POINTER_SIZE];
-        if (is_pairs)
-            json_pointer_join(place, sizeof place, pointer, key);
-        else
-            json_pointer_index(place, sizeof place, pointer, i);
-        text.count = 0;
-        decode_element(decoder, element, key, field, &text, place);
-        decoder->is_out_of_memory =
-            !bytes_reserve(&text, 0) || texts_append(&texts, text.at) != STATUS_OK;
-        member = is_pairs ? json_object_iter_next((json_t *)value, member) : NULL;
+    const bool is_scalar = (field->flags & FIELD_SCALARS) != 0, is_number = json_is_number(value);
+    if (key != NULL) {
+        bytes_text(&text, key);
+        bytes_text(&text, "=");
     }
+    if (json_is_string(value) && is_scalar)
+        bytes_json_string(&text, json_string_value(value));
+    else if (json_is_string(value))
+        bytes_text(&text, json_string_value(value));
+    else if (!is_scalar)
+        bytes_text(&text, field->choices != NULL ? field->choices[0] : "");
+    else if (json_is_boolean(value))
+        bytes_text(&text, json_is_true(value) ? "true" : "false");
+    else if (json_is_integer(value) && json_integer_value(value) > (json_int_t)1 << 53)
+        bytes_format(&text, "%lld", (long long)json_integer_value(value));
+    else
+        bytes_real(&text, number_of(value));
+    if (!json_is_string(value) && !(is_scalar && (is_number || json_is_boolean(value))))
+        decode_wrong_type(decoder, place, value, NULL,
+                          is_scalar ? "a number, a string, true or false" : "a string");
+    *target = text.is_failed ? NULL : strdup(text.at); // less room than in `text`
+    decoder->is_out_of_memory = decoder->is_out_of_memory || *target == NULL;
     bytes_clear(&text);
-    texts_clear(target);
-    *target = texts;
 }
 
 static void decode_root(Decoder *decoder, const json_t *root, const Field *fields, void *item,
@@ -387,27 +303,89 @@ static void decode_root(Decoder *decoder, const json_t *root, const Field *field
 }
 
 static void decode_list(Decoder *decoder, const json_t *value, const Field *field, void *target,
-                        const char *pointer) {
-    const size_t count = json_array_size(value);
-    if (!decode_array(decoder, value, field, false, "an array of objects", count, "elements",
-                      pointer) ||
-        count == 0)
-        return;
-    List list = {calloc(count, field->size), 0};
-    decoder->is_out_of_memory = decoder->is_out_of_memory || list.at == NULL;
-    for (size_t i = 0; i < count && list.at != NULL; i++) {
-        void *element = (char *)list.at + i * field->size;
-        char place[POINTER_SIZE];
-        list.count = i + 1;
-        if (fields_default(field->fields, element) != STATUS_OK) {
+                        const char *pointer);
+
+// `key`: NULL: an element of an array, else of an object.
+static void decode_element(Decoder *decoder, const json_t *value, const char *key,
+                           const Field *field, void *element, const char *place) {
+    Field row = *field; // of the numbers of a row
+    switch (field->kind) {
+    case FIELD_KIND_REALS:
+        *(double *)element =
+            json_is_number(value) ? number_of(value) : allowed_number(&field->range);
+        if (!json_is_number(value))
+            decode_wrong_type(decoder, place, value, field, "a number");
+        break;
+    case FIELD_KIND_ROWS:
+        row.kind = FIELD_KIND_REALS;
+        row.size = sizeof(double);
+        decode_list(decoder, value, &row, element, place);
+        break;
+    case FIELD_KIND_TEXTS:
+        decode_list_text(decoder, value, key, field, element, place);
+        break;
+    default:
+        if (fields_default(field->fields, element) == STATUS_OK)
+            decode_root(decoder, value, field->fields, element, place);
+        else
             decoder->is_out_of_memory = true;
-            break;
-        }
-        json_pointer_index(place, sizeof place, pointer, i);
-        decode_root(decoder, json_array_get(value, i), field->fields, element, place);
     }
-    // A typed list is written as bytes, as field.c reads it. Lists have no default elements to
-    // free.
+}
+
+// An array of any kind; under FIELD_LONE also a number, under FIELD_PAIRS also an object.
+static void decode_list(Decoder *decoder, const json_t *value, const Field *field, void *target,
+                        const char *pointer) {
+    static const struct {
+        const char *wanted, *what;
+    } kinds[] = {
+        [FIELD_KIND_REALS] = {"an array of numbers", "numbers"},
+        [FIELD_KIND_ROWS] = {"an array of rows of numbers", "rows"},
+        [FIELD_KIND_TEXTS] = {"an array of strings", "texts"},
+        [FIELD_KIND_LIST] = {"an array of objects", "elements"},
+    };
+    const bool takes_number = (field->flags & FIELD_LONE) != 0;
+    const bool takes_object = (field->flags & FIELD_PAIRS) != 0;
+    const bool is_number = takes_number && json_is_number(value);
+    const bool is_object = takes_object && json_is_object(value);
+    if (!json_is_array(value) && !is_number && !is_object) {
+        decode_wrong_type(decoder, pointer, value, field,
+                          takes_number   ? "a number or an array of numbers"
+                          : takes_object ? "an array or an object of strings"
+                                         : kinds[field->kind].wanted);
+        return;
+    }
+    const size_t count = is_number   ? 1
+                         : is_object ? json_object_size(value)
+                                     : json_array_size(value);
+    if (!is_number && field->max > 0 && count > field->max) {
+        decode_fault(decoder, pointer, value, NULL, NULL, "must have at most %zu %s, has %zu",
+                     field->max, kinds[field->kind].what, count);
+        return;
+    }
+    // A typed list is written as bytes, as field.c reads it. An empty list of texts is not an
+    // absent one.
+    List list = {NULL, 0};
+    Field old[] = {*field, FIELD_END};
+    if (count > 0 || field->kind == FIELD_KIND_TEXTS)
+        list.at = calloc(count + 1, field->size);
+    decoder->is_out_of_memory = decoder->is_out_of_memory || (count > 0 && list.at == NULL);
+    void *member = is_object ? json_object_iter((json_t *)value) : NULL;
+    for (size_t i = 0; i < count && !decoder->is_out_of_memory; i++) {
+        char place[POINTER_SIZE];
+        const char *key = is_object ? json_object_iter_key(member) : NULL;
+        const json_t *element = is_number   ? value
+                                : is_object ? json_object_iter_value(member)
+                                            : json_array_get(value, i);
+        if (is_object)
+            json_pointer_join(place, sizeof place, pointer, key);
+        else
+            json_pointer_index(place, sizeof place, pointer, i);
+        list.count = i + 1;
+        decode_element(decoder, element, key, field, (char *)list.at + i * field->size, place);
+        member = is_object ? json_object_iter_next((json_t *)value, member) : NULL;
+    }
+    old[0].offset = 0;
+    fields_clear(old, target);
     memcpy(target, &list, sizeof list);
 }
 
@@ -472,8 +450,8 @@ static const Kind *decode_kind(Decoder *decoder, const json_t *object, const Kin
 
 // Members of an unknown kind are read, so that they are not reported as missing, but their faults
 // are not reported.
-static void decode_variant(Decoder *decoder, const json_t *value, const Field *field,
-                           Variant **target, const char *pointer) {
+static void decode_variant(Decoder *decoder, const json_t *value, const Field *field, void *target,
+                           const char *pointer) {
     if (!json_is_object(value)) {
         decode_wrong_type(decoder, pointer, value, NULL, "an object");
         return;
@@ -485,8 +463,8 @@ static void decode_variant(Decoder *decoder, const json_t *value, const Field *f
         decoder->is_out_of_memory = true;
         return;
     }
-    variant_free(*target);
-    *target = variant;
+    variant_free(*(Variant **)target);
+    *(Variant **)target = variant;
     Decoder silent = {0};
     decode_members(is_known ? decoder : &silent, value, variant->kind->fields, variant, pointer,
                    field->kinds);
@@ -495,51 +473,15 @@ static void decode_variant(Decoder *decoder, const json_t *value, const Field *f
 
 static void decode_field(Decoder *decoder, const json_t *value, const Field *field, void *member,
                          const char *pointer) {
-    switch (field->kind) {
-    case FIELD_KIND_REAL:
-        if (json_is_number(value))
-            *(double *)member = number_of(value);
-        else
-            decode_wrong_type(decoder, pointer, value, field, "a number");
-        break;
-    case FIELD_KIND_COUNT:
-        decode_count(decoder, value, field, member, pointer);
-        break;
-    case FIELD_KIND_FLAG:
-        if (json_is_boolean(value))
-            *(bool *)member = json_is_true(value);
-        else
-            decode_wrong_type(decoder, pointer, value, field, "true or false");
-        break;
-    case FIELD_KIND_TEXT:
-        decode_text(decoder, value, field, member, pointer);
-        break;
-    case FIELD_KIND_CHOICE:
-        decode_choice(decoder, value, field, member, pointer);
-        break;
-    case FIELD_KIND_REALS:
-        decode_reals(decoder, value, field, member, pointer);
-        break;
-    case FIELD_KIND_ROWS:
-        decode_rows(decoder, value, field, member, pointer);
-        break;
-    case FIELD_KIND_TEXTS:
-        decode_texts(decoder, value, field, member, pointer);
-        break;
-    case FIELD_KIND_LIST:
-        decode_list(decoder, value, field, member, pointer);
-        break;
-    case FIELD_KIND_ITEM:
-        decode_item(decoder, value, field, member, pointer);
-        break;
-    case FIELD_KIND_VARIANT:
-        decode_variant(decoder, value, field, member, pointer);
-        break;
-    case FIELD_KIND_BASE:
-    case FIELD_KIND_REFCOUNT:
-    case FIELD_KIND_END:
-        break;
-    }
+    static void (*const kinds[])(Decoder *, const json_t *, const Field *, void *, const char *) = {
+        [FIELD_KIND_REAL] = decode_real,       [FIELD_KIND_COUNT] = decode_count,
+        [FIELD_KIND_FLAG] = decode_flag,       [FIELD_KIND_TEXT] = decode_text,
+        [FIELD_KIND_CHOICE] = decode_choice,   [FIELD_KIND_REALS] = decode_list,
+        [FIELD_KIND_ROWS] = decode_list,       [FIELD_KIND_TEXTS] = decode_list,
+        [FIELD_KIND_LIST] = decode_list,       [FIELD_KIND_ITEM] = decode_item,
+        [FIELD_KIND_VARIANT] = decode_variant,
+    };
+    kinds[field->kind](decoder, value, field, member, pointer);
 }
 
 // Names the kinds that have the key, if `own` kind has not.
