@@ -16,23 +16,16 @@ static void json_put_head(const Table *table, Bytes *bytes) {
         bytes_text(bytes, table->members);
         return;
     }
-    if (table->axis == NULL && table->axis_name != NULL) {
-        bytes_text(bytes, "\"sample_rate\": ");
-        bytes_real(bytes, table->axis_rate);
-        bytes_text(bytes, ", \"start\": ");
-        bytes_real(bytes, table_time(table, 0));
-        bytes_text(bytes, ", ");
-    }
+    if (table->axis == NULL && table->axis_name != NULL)
+        bytes_json(bytes, "\"sample_rate\": %g, \"start\": %g, ", table->axis_rate,
+                   table_time(table, 0));
     bytes_format(bytes, "\"count\": %zu, ", table->count);
     if (table->bucket > 0)
         bytes_format(bytes, "\"bucket\": %zu, \"samples\": %zu, ", table->bucket, table->samples);
 }
 
 static void json_open_list(Bytes *bytes, const char *name, const char *unit, const char *values) {
-    bytes_json_string(bytes, name);
-    bytes_text(bytes, ": {\"unit\": ");
-    bytes_json_string(bytes, unit);
-    bytes_format(bytes, ", \"%s\": [", values);
+    bytes_json(bytes, "\"%s\": {\"unit\": %s, \"%s\": [", name, unit, values);
 }
 
 // Column `c`, or the axis; in buckets two columns are the lists "min" and "max" of one channel.
@@ -75,12 +68,8 @@ static bool json_put_values(const Table *table, const double *values, size_t c, 
     if (column.texts == NULL)
         bytes_reals(bytes, numbers, count);
     for (size_t i = 0; i < count && column.texts != NULL; i++) {
-        const char *text = column.texts[(size_t)numbers[i]];
-        bytes_text(bytes, i > 0 ? "," : "");
-        if (column.is_json)
-            bytes_text(bytes, text);
-        else
-            bytes_json_string(bytes, text);
+        bytes_json(bytes, column.is_json ? "%p%p" : "%p%s", i > 0 ? "," : "",
+                   column.texts[(size_t)numbers[i]]);
     }
     return true;
 }
@@ -131,9 +120,7 @@ static bool json_next_records(const Table *table, TextPlace *place, Bytes *bytes
     place->row += count;
     if (place->row < table->count)
         return true;
-    bytes_text(bytes, "]");
-    bytes_text(bytes, table->end != NULL ? table->end : "");
-    bytes_text(bytes, "}\n");
+    bytes_format(bytes, "]%s}\n", table->end != NULL ? table->end : "");
     return false;
 }
 

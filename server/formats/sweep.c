@@ -61,14 +61,10 @@ static bool sweep_read(void *context, size_t index, size_t first, size_t count, 
 static void sweep_put_axes(const Sweep *sweep, Bytes *bytes) {
     for (size_t i = 0; i < sweep->axes.count; i++) {
         const SweepAxisValues *axis = &sweep->axes.at[i];
-        bytes_text(bytes, i > 0 ? ", {\"pointer\": " : "{\"pointer\": ");
-        bytes_json_string(bytes, axis->pointer);
-        bytes_text(bytes, ", \"unit\": ");
-        bytes_json_string(bytes, axis->unit);
-        bytes_text(bytes, ", \"values\": [");
+        bytes_json(bytes, "%p{\"pointer\": %s, \"unit\": %s, \"values\": [", i > 0 ? ", " : "",
+                   axis->pointer, axis->unit);
         for (size_t k = 0; k < axis->values.count; k++) {
-            bytes_text(bytes, k > 0 ? "," : "");
-            bytes_text(bytes, axis->values.at[k]);
+            bytes_format(bytes, "%s%s", k > 0 ? "," : "", axis->values.at[k]);
         }
         bytes_text(bytes, "]}");
     }
@@ -78,12 +74,11 @@ static void sweep_put_failures(const Sweep *sweep, Bytes *bytes) {
     const StudyFailures *failures = &sweep->table.failures;
     for (size_t i = 0; i < failures->count; i++) {
         const StudyFailure *failure = &failures->at[i];
-        bytes_format(bytes, "%s{\"status\": \"%s\", \"count\": %llu, \"first_point\": %llu",
-                     i > 0 ? ", " : "", sweep_status_names[failure->status],
-                     (unsigned long long)failure->count, (unsigned long long)failure->first);
-        bytes_text(bytes, ", \"detail\": ");
-        bytes_json_string(bytes, failure->detail);
-        bytes_text(bytes, "}");
+        bytes_json(bytes,
+                   "%p{\"status\": \"%s\", \"count\": %llu, \"first_point\": %llu, \"detail\": %s}",
+                   i > 0 ? ", " : "", sweep_status_names[failure->status],
+                   (unsigned long long)failure->count, (unsigned long long)failure->first,
+                   failure->detail);
     }
 }
 
@@ -108,9 +103,11 @@ static void sweep_put_links(const void *context, Bytes *bytes) {
     const char *base = base_path(), *result = ((const SweepDocument *)context)->result;
     if (result == NULL)
         return;
-    bytes_format(bytes, ", \"links\": {\"self\": \"%s/v1/results/%s/table.json\"", base, result);
-    bytes_format(bytes, ", \"point\": \"%s/v1/results/%s/points/{index}\"", base, result);
-    bytes_format(bytes, ", \"scene\": \"%s/v1/results/%s/points/{index}/scene\"}", base, result);
+    bytes_format(bytes,
+                 ", \"links\": {\"self\": \"%s/v1/results/%s/table.json\", "
+                 "\"point\": \"%s/v1/results/%s/points/{index}\", "
+                 "\"scene\": \"%s/v1/results/%s/points/{index}/scene\"}",
+                 base, result, base, result, base, result);
 }
 
 Table sweep_document_table(SweepDocument *document) {

@@ -156,27 +156,15 @@ void encode_list(Bytes *bytes, const Field *fields, const void *at, size_t count
     bytes_text(bytes, "]");
 }
 
-// `, "NAME": TEXT`; nothing where there is no text.
-static void encode_put_text_member(Bytes *bytes, const char *name, const char *text) {
-    if (text == NULL || *text == '\0')
-        return;
-    bytes_format(bytes, ", \"%s\": ", name);
-    bytes_json_string(bytes, text);
-}
-
 static void encode_put_fault(Bytes *bytes, const Fault *fault) {
-    bytes_text(bytes, "{\"pointer\": ");
-    bytes_json_string(bytes, fault->pointer);
-    bytes_text(bytes, ", \"value\": ");
-    bytes_text(bytes, fault->value[0] != '\0' ? fault->value : "null");
-    bytes_text(bytes, ", \"detail\": ");
-    bytes_json_string(bytes, fault->detail);
-    encode_put_text_member(bytes, "unit", fault->unit);
-    encode_put_text_member(bytes, "did_you_mean", fault->did_you_mean);
-    if (fault->row > 0) {
-        bytes_format(bytes, ", \"row\": %zu, \"column\": ", fault->row);
-        bytes_json_string(bytes, fault->column);
-    }
+    bytes_json(bytes, "{\"pointer\": %s, \"value\": %p, \"detail\": %s", fault->pointer,
+               fault->value[0] != '\0' ? fault->value : NULL, fault->detail);
+    if (fault->unit[0] != '\0')
+        bytes_json(bytes, ", \"unit\": %s", fault->unit);
+    if (fault->did_you_mean[0] != '\0')
+        bytes_json(bytes, ", \"did_you_mean\": %s", fault->did_you_mean);
+    if (fault->row > 0)
+        bytes_json(bytes, ", \"row\": %zu, \"column\": %s", fault->row, fault->column);
     bytes_text(bytes, "}");
 }
 
@@ -209,9 +197,9 @@ void encode_problem(Bytes *bytes, const Problem *problem, int status_code, const
     const char *detail = problem->detail;
     if (detail[0] == '\0')
         detail = problem->count > 0 ? problem->faults[0].detail : status_title(problem->status);
-    bytes_format(bytes, ", \"status\": %d, \"detail\": ", status_code);
-    bytes_json_string(bytes, detail);
-    encode_put_text_member(bytes, "instance", instance);
+    bytes_json(bytes, ", \"status\": %d, \"detail\": %s", status_code, detail);
+    if (instance != NULL && *instance != '\0')
+        bytes_json(bytes, ", \"instance\": %s", instance);
     for (size_t i = 0; i < problem->count && i < PROBLEM_FAULTS; i++) {
         bytes_text(bytes, i > 0 ? ", " : ", \"errors\": [");
         encode_put_fault(bytes, &problem->faults[i]);

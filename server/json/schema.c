@@ -56,27 +56,29 @@ static void schema_object(Bytes *bytes, const Field *fields, const KindTable *ki
                           const Kind *kind);
 
 static void schema_text(Bytes *bytes, const char *name, const char *text) {
-    bytes_format(bytes, ",\"%s\":", name);
-    bytes_json_string(bytes, text);
+    bytes_json(bytes, ",\"%s\":%s", name, text);
 }
 
 static void schema_real(Bytes *bytes, const char *name, double value) {
-    bytes_format(bytes, ",\"%s\":", name);
-    bytes_real(bytes, value);
+    bytes_json(bytes, ",\"%s\":%g", name, value);
 }
 
 static void schema_texts(Bytes *bytes, const char *name, const char *const *texts) {
     bytes_format(bytes, ",\"%s\":[", name);
-    for (size_t i = 0; texts != NULL && texts[i] != NULL; i++) {
-        bytes_text(bytes, ",");
-        bytes_json_string(bytes, texts[i]);
-    }
+    for (size_t i = 0; texts != NULL && texts[i] != NULL; i++)
+        bytes_json(bytes, ",%s", texts[i]);
     bytes_text(bytes, "]");
 }
 
-static void schema_range(Bytes *bytes, const Range *range) {
-    if (!isinf(range->min))
-        schema_real(bytes, range->is_open_below ? "exclusiveMinimum" : "minimum", range->min);
+// A count is never negative, also where its row allows it.
+static void schema_number(Bytes *bytes, const Field *field) {
+    const bool is_count = field->kind == FIELD_KIND_COUNT;
+    const Range *range = &field->range;
+    const double min = is_count ? fmax(range->min, 0) : range->min;
+    bytes_format(bytes, ",\"type\":\"%s\"", is_count ? "integer" : "number");
+    if (!isinf(min))
+        schema_real(
+            bytes, range->is_open_below && min == range->min ? "exclusiveMinimum" : "minimum", min);
     if (!isinf(range->max))
         schema_real(bytes, "maximum", range->max);
 }
@@ -100,11 +102,6 @@ static void schema_choices(Bytes *bytes, const Field *field) {
     for (size_t i = 0; field->choices[i] != NULL; i++)
         bytes_format(bytes, "%s%s", i > 0 ? "|" : "", field->choices[i]);
     bytes_text(bytes, ")(_[1-9][0-9]*)?$\"");
-}
-
-static void schema_number(Bytes *bytes, const Field *field) {
-    bytes_text(bytes, ",\"type\":\"number\"");
-    schema_range(bytes, &field->range);
 }
 
 static void schema_reals(Bytes *bytes, const Field *field) {
@@ -157,34 +154,21 @@ static void schema_variant(Bytes *bytes, const Field *field) {
     const Kind *kind;
     bytes_text(bytes, ",\"oneOf\":[");
     for (size_t i = 0; (kind = field->kinds->at(i)) != NULL; i++) {
-        bytes_text(bytes, ",{");
-        schema_text(bytes, "title", kind->name);
-        schema_text(bytes, "description", kind->doc);
+        bytes_json(bytes, ",{\"title\":%s,\"description\":%s", kind->name, kind->doc);
         schema_object(bytes, kind->fields, field->kinds, kind);
         bytes_text(bytes, "}");
     }
     bytes_text(bytes, "]");
-    if (field->presence == PRESENCE_DEFAULT) {
-        bytes_text(bytes, ",\"default\":{");
-        schema_text(bytes, field->kinds->tag, field->kinds->at(0)->name);
-        bytes_text(bytes, "}");
-    }
+    if (field->presence == PRESENCE_DEFAULT)
+        bytes_json(bytes, ",\"default\":{\"%s\":%s}", field->kinds->tag, field->kinds->at(0)->name);
 }
 
 static void schema_value(Bytes *bytes, const Field *field) {
     const bool has_default = field->presence == PRESENCE_DEFAULT;
-    // A count is never negative, also where its row allows it.
-    const Range counts = {fmax(field->range.min, 0), field->range.max,
-                          field->range.is_open_below && field->range.min >= 0};
     switch (field->kind) {
     case FIELD_KIND_REAL:
-        schema_number(bytes, field);
-        if (has_default)
-            schema_real(bytes, "default", field->initial);
-        break;
     case FIELD_KIND_COUNT:
-        bytes_text(bytes, ",\"type\":\"integer\"");
-        schema_range(bytes, &counts);
+        schema_number(bytes, field);
         if (has_default)
             schema_real(bytes, "default", field->initial);
         break;
@@ -274,11 +258,8 @@ static void schema_required(Bytes *bytes, const Field *fields) {
 static void schema_object(Bytes *bytes, const Field *fields, const KindTable *kinds,
                           const Kind *kind) {
     bytes_text(bytes, ",\"type\":\"object\",\"properties\":{");
-    if (kind != NULL) {
-        bytes_format(bytes, ",\"%s\":{", kinds->tag);
-        schema_text(bytes, "const", kind->name);
-        bytes_text(bytes, "}");
-    }
+    if (kind != NULL)
+        bytes_json(bytes, ",\"%s\":{\"const\":%s}", kinds->tag, kind->name);
     schema_properties(bytes, fields);
     bytes_text(bytes, "},\"required\":[");
     if (kind != NULL && (kinds->is_named || kind != kinds->at(0)))
@@ -328,10 +309,10 @@ static void schema_lay_out(Bytes *bytes, const char *text) {
 
 void schema_write_document(Bytes *bytes, const SchemaDocument *document) {
     Bytes text = {0};
-    bytes_text(&text, "{");
-    schema_text(&text, "$schema", "https://json-schema.org/draft/2020-12/schema");
-    bytes_format(&text, ",\"$id\":\"/schemas/%s\"", document->name);
-    schema_text(&text, "title", document->title);
+    bytes_json(&text,
+               "{,\"$schema\":\"https://json-schema.org/draft/2020-12/schema\","
+               "\"$id\":\"/schemas/%s\",\"title\":%s",
+               document->name, document->title);
     schema_object(&text, document->fields, NULL, NULL);
     bytes_text(&text, "}");
     if (text.is_failed)
