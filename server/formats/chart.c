@@ -85,37 +85,8 @@ ChartPanel *chart_spectra(Chart *chart, const char *heading, double left, double
     return panel;
 }
 
-static ChartSeries *chart_add(ChartPanel *panel, ChartKind kind, const double *x, const double *y,
-                              const double *high, size_t count, size_t colour) {
-    ChartSeries *series = &panel->series[panel->count < CHART_SERIES ? panel->count++ : 0];
-    *series = (ChartSeries){.kind = kind, .x = x, .y = y, .high = high, .count = count};
-    series->colour = colour;
-    return series;
-}
-
-ChartSeries *chart_line(ChartPanel *panel, const double *x, const double *y, const double *high,
-                        size_t count, size_t colour, const char *name, const char *legend) {
-    ChartSeries *line = chart_add(panel, CHART_LINE, x, y, high, count, colour);
-    line->name = name;
-    line->legend = legend;
-    return line;
-}
-
-void chart_band(ChartPanel *panel, const double *x, const double *low, const double *high,
-                size_t count, size_t colour) {
-    (void)chart_add(panel, CHART_BAND, x, low, high, count, colour);
-}
-
-ChartSeries *chart_markers(ChartPanel *panel, const double *x, const double *y, size_t count,
-                           ChartShape shape, size_t colour, const char *legend) {
-    ChartSeries *markers = chart_add(panel, CHART_MARKERS, x, y, NULL, count, colour);
-    markers->shape = shape;
-    markers->legend = legend;
-    return markers;
-}
-
-void chart_map(ChartPanel *panel, const double *values, size_t count, size_t columns) {
-    chart_add(panel, CHART_MAP, NULL, values, NULL, count, 0)->columns = columns;
+void chart_add(ChartPanel *panel, ChartSeries series) {
+    panel->series[panel->count < CHART_SERIES ? panel->count++ : 0] = series;
 }
 
 void chart_note(Chart *chart, const char *before, const char *text) {

@@ -56,10 +56,10 @@ typedef struct ChartSeries {
     // pixel are drawn as their mean.
     const double *high;
     size_t count;
-    size_t columns;     // of a map
     size_t colour;      // one of CHART_COLOURS, or CHART_STRONG
     ChartShape shape;   // CHART_SHAPE: that of the colour
     bool is_joined;     // markers: by a line
+    size_t columns;     // of a map
     const char *look;   // a further class of the style sheet; NULL: none
     const char *name;   // tooltip of a line; NULL: none
     const char *legend; // NULL: none
@@ -127,14 +127,8 @@ ChartPanel *chart_panel(Chart *chart, const char *heading, double left, double r
 // The same for spectra over frequency, both logarithmic; at most CHART_DECADES are shown.
 ChartPanel *chart_spectra(Chart *chart, const char *heading, double left, double right, double top,
                           double bottom);
-// Add a series; there is room for CHART_SERIES.
-ChartSeries *chart_line(ChartPanel *panel, const double *x, const double *y, const double *high,
-                        size_t count, size_t colour, const char *name, const char *legend);
-void chart_band(ChartPanel *panel, const double *x, const double *low, const double *high,
-                size_t count, size_t colour);
-ChartSeries *chart_markers(ChartPanel *panel, const double *x, const double *y, size_t count,
-                           ChartShape shape, size_t colour, const char *legend);
-void chart_map(ChartPanel *panel, const double *values, size_t count, size_t columns);
+// Adds a series, whose `y` of a map are its values; there is room for CHART_SERIES.
+void chart_add(ChartPanel *panel, ChartSeries series);
 // Appends "BEFORE TEXT." to the description, TEXT escaped; nothing where `text` is NULL.
 void chart_note(Chart *chart, const char *before, const char *text);
 

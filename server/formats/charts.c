@@ -57,12 +57,15 @@ static void charts_add_bands(Chart *chart, ChartPanel *panel, const Reals *frequ
         const Reals *value = has_mean ? &spectrum->mean : &spectrum->value;
         const Reals *low = has_mean ? &spectrum->low : &spectrum->q05;
         const Reals *high = has_mean ? &spectrum->high : &spectrum->q95;
-        (void)chart_line(panel, frequency->at, value->at, NULL, charts_shorter(frequency, value), i,
-                         spectrum->channel,
-                         chart_quantity(chart, spectrum->channel, spectrum->unit));
+        chart_add(
+            panel,
+            (ChartSeries){CHART_LINE, frequency->at, value->at, NULL,
+                          charts_shorter(frequency, value), .colour = i, .name = spectrum->channel,
+                          .legend = chart_quantity(chart, spectrum->channel, spectrum->unit)});
         const size_t count = charts_shorter(low, high);
         if (count > 0 && count <= frequency->count)
-            chart_band(panel, frequency->at, low->at, high->at, count, i);
+            chart_add(panel, (ChartSeries){CHART_BAND, frequency->at, low->at, high->at, count,
+                                           .colour = i});
     }
 }
 
@@ -143,7 +146,8 @@ static void tradeoff_add_best(Chart *chart, ChartPanel *panel, const TradeoffMar
         y[steps] = y[steps - 1];
         steps++;
     }
-    chart_line(panel, x, y, y, steps, CHART_STRONG, NULL, "best of all")->look = "best";
+    chart_add(panel, (ChartSeries){CHART_LINE, x, y, y, steps, CHART_STRONG, .look = "best",
+                                   .legend = "best of all"});
 }
 
 // The errors are those of all points; each series has the CPU times of its own.
@@ -166,22 +170,20 @@ static void tradeoff_fill(Chart *chart, ChartPanel *panel, const Tradeoff *trade
                     ? point->cpu_minimum
                     : (double)NAN;
     }
-    for (size_t group = 0; group < CHART_COLOURS && groups[group] != NULL; group++) {
-        ChartSeries *series =
-            chart_markers(panel, x + group * count, y, count, CHART_SHAPE, group, groups[group]);
-        series->is_joined = true;
-        series->describe = tradeoff_describe;
-        series->context = marks;
-    }
+    for (size_t group = 0; group < CHART_COLOURS && groups[group] != NULL; group++)
+        chart_add(panel, (ChartSeries){CHART_MARKERS, x + group * count, y, NULL, count, group,
+                                       .is_joined = true, .legend = groups[group],
+                                       .describe = tradeoff_describe, .context = marks});
     tradeoff_add_best(chart, panel, marks, count);
+    const double *wanted = charts_pair(chart, tradeoff->error, tradeoff->error);
     if (tradeoff->error > 0)
-        chart_line(
-            panel, charts_edges, charts_pair(chart, tradeoff->error, tradeoff->error), NULL, 2,
-            CHART_STRONG, NULL,
-            chart_text(chart, "wanted: %.3g%s", tradeoff->error, metric_units[tradeoff->metric]))
-            ->look = "wanted";
-    chart_markers(panel, x + CHOICE * count, y, count, CHART_RING, CHART_STRONG, "to take")->look =
-        "ring";
+        chart_add(panel,
+                  (ChartSeries){CHART_LINE, charts_edges, wanted, NULL, 2, CHART_STRONG,
+                                .look = "wanted",
+                                .legend = chart_text(chart, "wanted: %.3g%s", tradeoff->error,
+                                                     metric_units[tradeoff->metric])});
+    chart_add(panel, (ChartSeries){CHART_MARKERS, x + CHOICE * count, y, NULL, count, CHART_STRONG,
+                                   CHART_RING, .look = "ring", .legend = "to take"});
 }
 
 void chart_tradeoff(const Variant *answer, Bytes *bytes) {
@@ -259,8 +261,9 @@ static void compare_add_trace(Chart *chart, ChartPanel *panel, const Comparison 
     double *time = chart_new(chart, count, sizeof *time);
     for (size_t i = 0; i < count && time != NULL; i++)
         time[i] = (double)i / comparison->trace_rate;
-    (void)chart_line(panel, time, entry->trace.minimum.at, entry->trace.maximum.at,
-                     time != NULL ? count : 0, colour, entry->name, NULL);
+    chart_add(panel,
+              (ChartSeries){CHART_LINE, time, entry->trace.minimum.at, entry->trace.maximum.at,
+                            time != NULL ? count : 0, colour, .name = entry->name});
 }
 
 void chart_compare(const Variant *answer, Bytes *bytes) {
@@ -281,11 +284,13 @@ void chart_compare(const Variant *answer, Bytes *bytes) {
             continue;
         }
         const bool has_level = drawn > 0 && !isnan(entry->psd.level);
-        (void)chart_line(
-            spectra, comparison->frequency.at, entry->density.at, NULL,
-            charts_shorter(&comparison->frequency, &entry->density), drawn, entry->name,
+        const char *legend =
             has_level ? chart_text(&chart, "%s: %.2g dB off", entry->name, entry->psd.level)
-                      : entry->name);
+                      : entry->name;
+        chart_add(spectra,
+                  (ChartSeries){CHART_LINE, comparison->frequency.at, entry->density.at, NULL,
+                                charts_shorter(&comparison->frequency, &entry->density), drawn,
+                                .name = entry->name, .legend = legend});
         compare_add_trace(&chart, traces, comparison, entry, drawn++);
     }
     chart_write(&chart, bytes);
@@ -502,13 +507,14 @@ static void sweep_add_panels(Chart *chart, const Sweep *sweep, const SweepCells 
         if (is_map) {
             panel->x = sweep_end_ticks(chart, &cells->x->values);
             panel->y = sweep_end_ticks(chart, &cells->y->values);
-            chart_map(panel, low, count, cells->columns);
+            chart_add(panel, (ChartSeries){CHART_MAP, .y = low, .count = count,
+                                           .columns = cells->columns});
         } else {
-            if (has_markers)
-                chart_markers(panel, x, low, count, CHART_DOT, 0, NULL)->is_joined = is_numeric;
-            else
-                (void)chart_line(panel, x, low, cells->high + i * count, count, 0, NULL, NULL);
-            (void)chart_markers(panel, x, cells->failed + i * count, count, CHART_CROSS, 0, NULL);
+            chart_add(panel, (ChartSeries){has_markers ? CHART_MARKERS : CHART_LINE, x, low,
+                                           has_markers ? NULL : cells->high + i * count, count, 0,
+                                           CHART_DOT, .is_joined = is_numeric});
+            chart_add(panel, (ChartSeries){CHART_MARKERS, x, cells->failed + i * count, NULL, count,
+                                           0, .shape = CHART_CROSS});
         }
         chart->height = panel->bottom + (is_map ? 60 : 52);
     }
@@ -603,11 +609,9 @@ static void quantity_add_readings(Chart *chart, ChartPanel *panel, const Quantit
     }
     for (size_t i = 0; i < COUNT(shapes) && x != NULL; i++) {
         const bool is_ring = shapes[i] == CHART_RING;
-        ChartSeries *series =
-            chart_markers(panel, x, x + (i + 1) * count, count, shapes[i], is_ring ? 3 : 0, NULL);
-        series->look = is_ring ? "ring" : NULL;
-        series->describe = quantity_describe;
-        series->context = quantity;
+        chart_add(panel, (ChartSeries){CHART_MARKERS, x, x + (i + 1) * count, NULL, count,
+                                       is_ring ? 3 : 0, shapes[i], .look = is_ring ? "ring" : NULL,
+                                       .describe = quantity_describe, .context = quantity});
     }
 }
 
@@ -619,17 +623,17 @@ static void evaluation_add_mean(Chart *chart, ChartPanel *panel, const Statistic
         const double *y =
             charts_pair(chart, trend->mean_value + trend->slope * (from - trend->mean_speed),
                         trend->mean_value + trend->slope * (to - trend->mean_speed));
-        chart_line(panel, charts_pair(chart, from, to), y, NULL, 2, 1,
-                   chart_text(chart, "%.3g per m/s", trend->slope), NULL)
-            ->look = "trend";
+        chart_add(panel, (ChartSeries){CHART_LINE, charts_pair(chart, from, to), y, NULL, 2, 1,
+                                       .name = chart_text(chart, "%.3g per m/s", trend->slope),
+                                       .look = "trend"});
     }
     if (isnan(mean))
         return;
-    (void)chart_line(panel, charts_edges, charts_pair(chart, mean, mean), NULL, 2, 0,
-                     chart_text(chart, "mean %.4g", mean), NULL);
+    chart_add(panel, (ChartSeries){CHART_LINE, charts_edges, charts_pair(chart, mean, mean), NULL,
+                                   2, 0, .name = chart_text(chart, "mean %.4g", mean)});
     if (!isnan(low))
-        chart_band(panel, charts_edges, charts_pair(chart, low, low),
-                   charts_pair(chart, high, high), 2, 0);
+        chart_add(panel, (ChartSeries){CHART_BAND, charts_edges, charts_pair(chart, low, low),
+                                       charts_pair(chart, high, high), 2, .colour = 0});
 }
 
 static void evaluation_add_panel(Chart *chart, const Evaluation *evaluation, bool is_time) {
@@ -754,7 +758,8 @@ static void svg_add_series(Chart *chart, const Table *table) {
             continue;
         }
         svg_thin(table, i, part, next, next + points);
-        (void)chart_line(panel, x, next, next + points, points, panel->count, name, NULL);
+        chart_add(panel, (ChartSeries){CHART_LINE, x, next, next + points, points, panel->count,
+                                       .name = name});
         next += 2 * points;
     }
     svg_place_panels(chart, table, units);
@@ -769,9 +774,11 @@ static void svg_add_spectra(Chart *chart, const Table *table) {
         if (i >= CHART_COLOURS)
             chart_note(chart, " Not drawn: ", column->name);
         else
-            (void)chart_line(panel, table_values(table, table->axis),
-                             table_values(table, column->values), NULL, table->count, i,
-                             column->name, chart_quantity(chart, column->name, column->unit));
+            chart_add(panel,
+                      (ChartSeries){CHART_LINE, table_values(table, table->axis),
+                                    table_values(table, column->values), NULL, table->count, i,
+                                    .name = column->name,
+                                    .legend = chart_quantity(chart, column->name, column->unit)});
     }
 }
 

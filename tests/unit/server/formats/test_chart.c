@@ -83,7 +83,7 @@ static char *draw_line(const double *y, const double *high, size_t count, bool i
     for (size_t i = 0; i < count; i++)
         x[i] = (double)i;
     panel->y.is_logarithmic = is_logarithmic;
-    (void)chart_line(panel, x, y, high, count, 0, NULL, NULL);
+    chart_add(panel, (ChartSeries){CHART_LINE, x, y, high, count, .colour = 0});
     Bytes bytes = {0};
     chart_write(&chart, &bytes);
     char *text = bytes_take(&bytes, NULL);
