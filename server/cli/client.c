@@ -179,6 +179,76 @@ static int api_refuse(const Command *command, const char *about, Status status,
     return command_exit(status);
 }
 
+// clang-format off
+static const Field fault_fields[] = {
+    FIELD_TEXT(ReplyFault, pointer, 0, PRESENCE_OPTIONAL, 0, "place"),
+    FIELD_TEXT(ReplyFault, detail, 0, PRESENCE_OPTIONAL, 0, "what is wrong"),
+    FIELD_TEXT(ReplyFault, unit, 0, PRESENCE_OPTIONAL, 0, "unit"),
+    FIELD_TEXT(ReplyFault, did_you_mean, 0, PRESENCE_OPTIONAL, 0, "suggestion"),
+    FIELD_COUNT(ReplyFault, row, NULL, ANY, OPTIONAL, "of a table"),
+    FIELD_TEXT(ReplyFault, column, 0, PRESENCE_OPTIONAL, 0, "of that row"),
+    FIELD_END,
+};
+static const Field problem_fields[] = {
+    FIELD_TEXT(ProblemReply, type, 0, PRESENCE_OPTIONAL, 0, "kind"),
+    FIELD_TEXT(ProblemReply, title, 0, PRESENCE_OPTIONAL, 0, "in short"),
+    FIELD_TEXT(ProblemReply, detail, 0, PRESENCE_OPTIONAL, 0, "sentence"),
+    FIELD_LIST(ProblemReply, errors, fault_fields, 0, PRESENCE_OPTIONAL, "faults"),
+    FIELD_COUNT(ProblemReply, more, NULL, ANY, 0, "faults beyond those"),
+    FIELD_END,
+};
+static const Field review_fields[] = {
+    FIELD_FLAG(ReviewReply, self_approved, false, "by the author of the revision"),
+    FIELD_END,
+};
+static const Field name_fields[] = {
+    FIELD_TEXT(NameReply, name, 0, PRESENCE_OPTIONAL, 0, "of a record"),
+    FIELD_END,
+};
+static const Field reply_fields[] = {
+    FIELD_BASE(ApiReply, self, problem_fields),
+    FIELD_TEXT(ApiReply, id, 0, PRESENCE_OPTIONAL, 0, "of a job"),
+    FIELD_TEXT(ApiReply, status, 0, PRESENCE_OPTIONAL, 0, "of a job or a revision"),
+    FIELD_TEXT(ApiReply, result, 0, PRESENCE_OPTIONAL, 0, "of a job"),
+    FIELD_REAL(ApiReply, progress, "%", ANY, OPTIONAL, "of a job"),
+    FIELD_ITEM_OR_NULL(ApiReply, problem, problem_fields, PRESENCE_OPTIONAL, "of a failed job"),
+    FIELD_TEXT(ApiReply, slug, 0, PRESENCE_OPTIONAL, 0, "of a material"),
+    FIELD_COUNT(ApiReply, revision, NULL, ANY, OPTIONAL, "of a material"),
+    FIELD_ITEM_OR_NULL(ApiReply, review, review_fields, PRESENCE_OPTIONAL, "the last of a revision"),
+    FIELD_TEXT(ApiReply, name, 0, PRESENCE_OPTIONAL, 0, "of a record, as all below"),
+    FIELD_TEXT(ApiReply, layout, 0, PRESENCE_OPTIONAL, 0, "of its file"),
+    FIELD_REAL(ApiReply, interval, "s", ANY, OPTIONAL, "between samples"),
+    FIELD_REAL(ApiReply, peak, "m/s^2", ANY, OPTIONAL, "largest magnitude"),
+    FIELD_REAL(ApiReply, peak_time, "s", ANY, OPTIONAL, "of the peak"),
+    FIELD_COUNT(ApiReply, count, NULL, ANY, OPTIONAL, "samples"),
+    FIELD_LIST(ApiReply, warnings, fault_fields, 0, PRESENCE_OPTIONAL, "doubts"),
+    FIELD_LIST(ApiReply, records, name_fields, 0, PRESENCE_OPTIONAL, "list of records"),
+    FIELD_END,
+};
+// clang-format on
+
+// The texts of an item, at any depth.
+static void reply_make_printable(const Field *row, void *item) {
+    for (; row->kind != FIELD_KIND_END; row++) {
+        char *at = (char *)item + row->offset;
+        const bool is_list = row->kind == FIELD_KIND_LIST;
+        const List one = {at, 1}, *list = is_list ? (const List *)(const void *)at : &one;
+        if (row->kind == FIELD_KIND_TEXT)
+            text_make_printable(*(char **)(void *)at);
+        for (size_t i = 0; row->fields != NULL && i < list->count; i++)
+            reply_make_printable(row->fields, (char *)list->at + i * row->size);
+    }
+}
+
+const ApiReply *api_reply(ApiCall *call) {
+    const Bytes *body = &call->answer.body;
+    fields_clear(reply_fields, &call->reply);
+    // Unknown members are not faults of an answer.
+    (void)json_parse(body->at, body->count, reply_fields, &call->reply, NULL);
+    reply_make_printable(reply_fields, &call->reply);
+    return &call->reply;
+}
+
 int api_command(const Command *self, void *settings, const Options *options, Problem *problem) {
     const ApiAction *actions = self->actions;
     ApiCall call = {.settings = settings, .operands = options->operands};
@@ -211,7 +281,8 @@ int api_command(const Command *self, void *settings, const Options *options, Pro
         status == STATUS_OK ? COMMAND_OK : api_refuse(self, call.client.about, status, problem);
     api_client_close(&call.client);
     bytes_clear(&call.body);
-    api_answer_clear(&call.answer);
+    bytes_clear(&call.answer.body);
+    fields_clear(reply_fields, &call.reply);
     return code;
 }
 
@@ -381,7 +452,10 @@ static CURLcode transfer_perform(Transfer *transfer, const char *url, struct cur
                          request->body->at != NULL ? request->body->at : "");
         curl_easy_setopt(curl, CURLOPT_POSTFIELDSIZE_LARGE, (curl_off_t)request->body->count);
     }
-    curl_easy_setopt(curl, CURLOPT_CUSTOMREQUEST, request->method);
+    curl_easy_setopt(curl, CURLOPT_CUSTOMREQUEST,
+                     request->method != NULL ? request->method
+                     : request->body != NULL ? "POST"
+                                             : "GET");
     curl_easy_setopt(curl, CURLOPT_HEADERFUNCTION, header_count);
     curl_easy_setopt(curl, CURLOPT_HEADERDATA, transfer);
     curl_easy_setopt(curl, CURLOPT_WRITEFUNCTION, body_read);
@@ -430,6 +504,7 @@ static Status transfer_run(Transfer *transfer, const char *url, bool *is_cut) {
 // One request. STATUS_OK if the server answered, with any status code.
 static Status api_exchange(ApiClient *client, const ApiRequest *request, ApiAnswer *answer,
                            Problem *problem) {
+    bytes_clear(&answer->body);
     *answer = (ApiAnswer){.body.most = DOCUMENT_MAX};
     Transfer transfer = {
         .client = client, .request = request, .answer = answer, .problem = problem};
@@ -448,59 +523,30 @@ static Status api_exchange(ApiClient *client, const ApiRequest *request, ApiAnsw
     return status;
 }
 
-typedef struct FaultReply {
-    char *pointer, *detail, *unit, *did_you_mean;
-    uint64_t row;
-    char *column;
-} FaultReply;
-
-// clang-format off
-static const Field fault_fields[] = {
-    FIELD_TEXT(FaultReply, pointer, 0, PRESENCE_OPTIONAL, 0, "place"),
-    FIELD_TEXT(FaultReply, detail, 0, PRESENCE_OPTIONAL, 0, "what is wrong"),
-    FIELD_TEXT(FaultReply, unit, 0, PRESENCE_OPTIONAL, 0, "unit"),
-    FIELD_TEXT(FaultReply, did_you_mean, 0, PRESENCE_OPTIONAL, 0, "suggestion"),
-    FIELD_COUNT(FaultReply, row, NULL, ANY, OPTIONAL, "of a table"),
-    FIELD_TEXT(FaultReply, column, 0, PRESENCE_OPTIONAL, 0, "of that row"),
-    FIELD_END,
-};
-const Field problem_reply_fields[] = {
-    FIELD_TEXT(ProblemReply, type, 0, PRESENCE_OPTIONAL, 0, "kind"),
-    FIELD_TEXT(ProblemReply, title, 0, PRESENCE_OPTIONAL, 0, "in short"),
-    FIELD_TEXT(ProblemReply, detail, 0, PRESENCE_OPTIONAL, 0, "sentence"),
-    {.name = "errors", .kind = FIELD_KIND_LIST, .offset = offsetof(ProblemReply, errors),
-     .fields = fault_fields, .size = sizeof(FaultReply), .presence = PRESENCE_OPTIONAL, .doc = "faults"},
-    FIELD_COUNT(ProblemReply, more, NULL, ANY, 0, "faults beyond those"),
-    FIELD_END,
-};
-// clang-format on
-
-static void text_fit_printable(char *target, size_t size, const char *text) {
+static void reply_fit(char *target, size_t size, const char *text) {
     text_fit(target, size, text != NULL ? text : "");
-    text_make_printable(target);
 }
 
 void problem_reply_put(const ProblemReply *reply, Status status, Problem *problem) {
-    const FaultReply *faults = reply->errors.at;
-    for (size_t i = 0; i < reply->errors.count && problem != NULL; i++) {
-        const FaultReply *one = &faults[i];
+    for (size_t i = 0; i < reply->errors.count; i++) {
+        const ReplyFault *one = &reply->errors.at[i];
         Fault fault = {0};
         char place[sizeof fault.pointer];
         // The place of a fault in a table is its cell, not that of a document.
         snprintf(place, sizeof place, "row %llu%s%.100s", (unsigned long long)one->row,
                  one->column != NULL ? ", column " : "", one->column != NULL ? one->column : "");
-        text_fit_printable(fault.pointer, sizeof fault.pointer,
-                           one->row != COUNT_ABSENT ? place : one->pointer);
-        text_fit_printable(fault.detail, sizeof fault.detail, one->detail);
-        text_fit_printable(fault.unit, sizeof fault.unit, one->unit);
-        text_fit_printable(fault.did_you_mean, sizeof fault.did_you_mean, one->did_you_mean);
+        reply_fit(fault.pointer, sizeof fault.pointer,
+                  one->row != COUNT_ABSENT ? place : one->pointer);
+        reply_fit(fault.detail, sizeof fault.detail, one->detail);
+        reply_fit(fault.unit, sizeof fault.unit, one->unit);
+        reply_fit(fault.did_you_mean, sizeof fault.did_you_mean, one->did_you_mean);
         (void)problem_add_fault(problem, status, &fault);
     }
-    if (problem != NULL && reply->more < 1000000000)
+    if (reply->more < 1000000000)
         problem->count += problem->count > 0 ? reply->more : 0;
-    char detail[400];
-    text_fit_printable(detail, sizeof detail, reply->detail != NULL ? reply->detail : reply->title);
-    (void)problem_set(problem, status, "%s", detail[0] != '\0' ? detail : "no reason is given");
+    const char *detail = reply->detail != NULL ? reply->detail : reply->title;
+    (void)problem_set(problem, status, "%s",
+                      detail != NULL && detail[0] != '\0' ? detail : "no reason is given");
 }
 
 // The status that leads to the exit code of an HTTP status code.
@@ -521,51 +567,46 @@ static Status http_status(int code, const char *type) {
     return STATUS_INTERNAL;
 }
 
-// The problem document of an answer; returns what its code means, never STATUS_OK.
-static Status problem_reply_read(const ApiAnswer *answer, Problem *problem) {
-    ProblemReply reply = {0};
-    // Unknown members are not faults of an answer.
-    (void)json_parse(answer->body.at, answer->body.count, problem_reply_fields, &reply, NULL);
-    const Status status = http_status(answer->code, reply.type);
-    if (reply.detail != NULL || reply.title != NULL || reply.errors.count > 0)
-        problem_reply_put(&reply, status, problem);
+// The problem document of the answer; returns what its code means, never STATUS_OK.
+static Status problem_reply_read(ApiCall *call, Problem *problem) {
+    const ProblemReply *reply = &api_reply(call)->self;
+    const int code = call->answer.code;
+    const Status status = http_status(code, reply->type);
+    if (reply->detail != NULL || reply->title != NULL || reply->errors.count > 0)
+        problem_reply_put(reply, status, problem);
     else
-        (void)problem_set(problem, status, "the server answers %d without a reason", answer->code);
-    fields_clear(problem_reply_fields, &reply);
+        (void)problem_set(problem, status, "the server answers %d without a reason", code);
     return status;
 }
 
-void api_answer_clear(ApiAnswer *answer) {
-    bytes_clear(&answer->body);
-    *answer = (ApiAnswer){0};
-}
-
-Status api_ask(ApiClient *client, ApiRequest *request, ApiAnswer *answer, Problem *problem) {
+Status api_ask(ApiCall *call, ApiRequest *request, Problem *problem) {
+    ApiAnswer *answer = &call->answer;
     Status status = STATUS_OK;
-    api_answer_clear(answer);
     if (request->path.is_failed)
         status = problem_set(problem, STATUS_USAGE, "asks for too much at once");
     while (status == STATUS_OK &&
-           (status = api_exchange(client, request, answer, problem)) == STATUS_OK) {
+           (status = api_exchange(&call->client, request, answer, problem)) == STATUS_OK) {
         const int code = answer->code;
         if (code == 200 || code == 201 || code == 202 || code == 204)
             break;
         const int pause = answer->retry_after > 0 ? answer->retry_after : 1;
-        if ((code != 503 && code != 429) || pause > api_client_left(client)) {
-            status = problem_reply_read(answer, problem);
-        } else {
-            api_answer_clear(answer);
+        if ((code != 503 && code != 429) || pause > api_client_left(&call->client))
+            status = problem_reply_read(call, problem);
+        else
             (void)poll(NULL, 0, 1000 * pause);
-        }
     }
     bytes_clear(&request->path);
     return status;
 }
 
+Status api_get(ApiCall *call, Bytes path, Problem *problem) {
+    return api_ask(call, &(ApiRequest){.path = path}, problem);
+}
+
 Status api_download(ApiCall *call, ApiRequest *request, const char *path, Problem *problem) {
     Status status = output_open(path, problem);
     if (status == STATUS_OK)
-        status = api_ask(&call->client, request, &call->answer, problem);
+        status = api_ask(call, request, problem);
     if (status == STATUS_OK)
         status = output_close(problem);
     output_drop();
@@ -573,17 +614,16 @@ Status api_download(ApiCall *call, ApiRequest *request, const char *path, Proble
     return status;
 }
 
-void api_print(const ApiAnswer *answer) {
-    (void)fwrite(answer->body.at, 1, answer->body.count, stdout);
+void api_print(const ApiCall *call) {
+    (void)fwrite(call->answer.body.at, 1, call->answer.body.count, stdout);
 }
 
-Status api_print_tables(const ApiAnswer *answer, const PrintTableView *view, bool is_json,
-                        size_t *longest, Problem *problem) {
-    *longest = SIZE_MAX;
-    if (!is_json)
-        return print_table_print_json(answer->body.at, answer->body.count, view, stdout, longest,
-                                      problem);
-    api_print(answer);
+Status api_print_tables(ApiCall *call, const PrintTableView *view, Problem *problem) {
+    const Bytes *body = &call->answer.body;
+    call->rows = SIZE_MAX;
+    if (!((const ClientSettings *)call->settings)->json)
+        return print_table_print_json(body->at, body->count, view, stdout, &call->rows, problem);
+    api_print(call);
     return STATUS_OK;
 }
 

@@ -14,6 +14,7 @@
 typedef struct ClientSettings {
     char *server, *token_file, *ca_file;
     double wait; // [s] for a busy server and for an unfinished job
+    bool json;   // print answers as they came
 } ClientSettings;
 
 #define CLIENT_ROWS                                                                                \
@@ -42,7 +43,7 @@ bool api_client_exposes_token(const ApiClient *client);
 double api_client_left(const ApiClient *client); // [s] of the wait, at least 0
 
 typedef struct ApiRequest {
-    const char *method;
+    const char *method;          // NULL: GET, with a body POST
     Bytes path;                  // "/v1/jobs?dry_run=1"
     const Bytes *body;           // NULL: none
     const char *content_type;    // of the body; NULL: JSON
@@ -62,21 +63,52 @@ typedef struct ApiAnswer {
     Bytes body;
 } ApiAnswer;
 
-// Sends a request, again after each 503 and 429 when Retry-After is over and while the wait lasts,
-// and clears its path. STATUS_OK for 200, 201, 202 and 204 only; the problem document of other
-// codes is in `problem`. STATUS_UNREACHABLE: no answer, or not in HTTP. The earlier answer is
-// cleared; the new one is cleared by api_answer_clear in any case.
-Status api_ask(ApiClient *client, ApiRequest *request, ApiAnswer *answer, Problem *problem);
-void api_answer_clear(ApiAnswer *answer);
+typedef struct ReplyFault {
+    char *pointer, *detail, *unit, *did_you_mean, *column;
+    uint64_t row; // of a table
+} ReplyFault;
+typedef struct ReplyFaults {
+    ReplyFault *at;
+    size_t count;
+} ReplyFaults;
 
-// Prints the body as it came.
-void api_print(const ApiAnswer *answer);
-// The same, or without `is_json` as tables; *longest is the number of rows of the longest one,
-// SIZE_MAX for JSON.
-Status api_print_tables(const ApiAnswer *answer, const PrintTableView *view, bool is_json,
-                        size_t *longest, Problem *problem);
+// A problem document (RFC 9457).
+typedef struct ProblemReply {
+    char *type, *title, *detail;
+    ReplyFaults errors;
+    uint64_t more;
+} ProblemReply;
 
-// A call of a command. The client, body and answer are closed at its end.
+typedef struct ReviewReply {
+    bool self_approved;
+} ReviewReply;
+typedef struct NameReply {
+    char *name;
+} NameReply;
+typedef struct NameReplies {
+    NameReply *at;
+    size_t count;
+} NameReplies;
+
+// The members that commands use of any answer: of a problem, a job, a revision, a record and a list
+// of records. Unknown members are skipped, missing ones are absent: the server may be newer, older
+// or no impactd. Texts have no control characters.
+typedef struct ApiReply {
+    ProblemReply self;
+    char *id, *status, *result;
+    double progress;      // [%]
+    ProblemReply problem; // of a failed job
+    char *slug;
+    uint64_t revision;
+    ReviewReply review;
+    char *name, *layout;
+    double interval, peak, peak_time; // [s], [m/s^2]
+    uint64_t count;
+    ReplyFaults warnings;
+    NameReplies records;
+} ApiReply;
+
+// A call of a command. The client, body, answer and reply are closed at its end.
 typedef struct ApiCall {
     ApiClient client;
     const void *settings;
@@ -85,7 +117,23 @@ typedef struct ApiCall {
     char id[96]; // of the job that was sent
     Bytes body;  // of the next request
     ApiAnswer answer;
+    ApiReply reply;
+    size_t rows; // of the longest table that was printed; SIZE_MAX for JSON
 } ApiCall;
+
+// Sends a request, again after each 503 and 429 when Retry-After is over and while the wait lasts,
+// and clears its path. STATUS_OK for 200, 201, 202 and 204 only; the problem document of other
+// codes is in `problem`. STATUS_UNREACHABLE: no answer, or not in HTTP. The answer replaces the
+// earlier one.
+Status api_ask(ApiCall *call, ApiRequest *request, Problem *problem);
+Status api_get(ApiCall *call, Bytes path, Problem *problem);
+// Reads the answer into the call's reply, until the next one is read.
+const ApiReply *api_reply(ApiCall *call);
+
+// Prints the body as it came.
+void api_print(const ApiCall *call);
+// The same, or without --json as tables.
+Status api_print_tables(ApiCall *call, const PrintTableView *view, Problem *problem);
 
 typedef struct ApiAction {
     const char *name;  // the first operand; NULL: the command has this action alone
@@ -115,15 +163,7 @@ void api_query(Bytes *path, const char *name, const char *value);
 // The same for the rows `names` ("q kind status") of `settings` that are not absent; a flag is 1.
 void api_query_rows(Bytes *path, const Field *fields, const void *settings, const char *names);
 
-// A problem document (RFC 9457) as the server sent it.
-typedef struct ProblemReply {
-    char *type, *title, *detail;
-    List errors;
-    uint64_t more;
-} ProblemReply;
-extern const Field problem_reply_fields[];
-
-// Adds the faults of the document to `problem`, with `status` and without control characters.
+// Adds the faults of the document to `problem`, with `status`.
 void problem_reply_put(const ProblemReply *reply, Status status, Problem *problem);
 
 #endif

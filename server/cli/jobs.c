@@ -6,56 +6,33 @@
 #include "server/cli/client.h"
 #include "server/cli/files.h"
 #include "server/json/document.h"
-#include "server/json/parse.h"
 #include "server/util/clock.h"
 
 static const double poll_period = 0.5;                  // [s] between two requests for a job
 static const int64_t restart_ns = (int64_t)10000000000; // time that a server may take to restart
 
-// A job as the server sends it. Unknown members are skipped, missing ones are empty: the server may
-// be newer, older or no impactd.
-typedef struct JobReply {
-    char *id, *status, *result;
-    double progress;      // [%]; NAN: unknown
-    ProblemReply problem; // of a failed job
-} JobReply;
-
-// clang-format off
-static const Field job_fields[] = {
-    FIELD_TEXT(JobReply, id, 0, PRESENCE_OPTIONAL, 0, "id"),
-    FIELD_TEXT(JobReply, status, 0, PRESENCE_OPTIONAL, 0, "state"),
-    FIELD_TEXT(JobReply, result, 0, PRESENCE_OPTIONAL, 0, "result"),
-    FIELD_REAL(JobReply, progress, "%", ANY, OPTIONAL, "progress"),
-    FIELD_ITEM_OR_NULL(JobReply, problem, problem_reply_fields, PRESENCE_OPTIONAL, "cause"),
-    FIELD_END,
-};
-// clang-format on
-
-// Reads the answer into `job`, cleared by fields_clear in any case.
-static Status job_read(const ApiAnswer *answer, JobReply *job, Problem *problem) {
-    fields_clear(job_fields, job);
-    (void)json_parse(answer->body.at, answer->body.count, job_fields, job, NULL);
-    if (job->id == NULL || job->status == NULL || strlen(job->status) > 40 || !api_is_id(job->id))
-        return api_unexpected("a job", problem);
-    text_make_printable(job->status);
-    return STATUS_OK;
+// Reads the answer, which must be a job.
+static Status job_read(ApiCall *call, Problem *problem) {
+    const ApiReply *job = api_reply(call);
+    return job->id != NULL && job->status != NULL && strlen(job->status) <= 40 && api_is_id(job->id)
+               ? STATUS_OK
+               : api_unexpected("a job", problem);
 }
 
-static bool job_is_final(const JobReply *job) {
+static bool job_is_final(const ApiReply *job) {
     return strcmp(job->status, "accepted") != 0 && strcmp(job->status, "running") != 0;
 }
 
 // Requests a job; the server answers after `wait` seconds at the latest, or when the job ends.
-static Status job_get(ApiCall *call, const char *id, double wait, JobReply *job, Problem *problem) {
-    ApiRequest request = {
-        .method = "GET",
-        .path = api_path("/v1/jobs/%s?wait=%.3f", id, fmin(wait, api_client_left(&call->client)))};
-    TRY(api_ask(&call->client, &request, &call->answer, problem));
-    return job_read(&call->answer, job, problem);
+static Status job_get(ApiCall *call, const char *id, double wait, Problem *problem) {
+    TRY(api_get(call,
+                api_path("/v1/jobs/%s?wait=%.3f", id, fmin(wait, api_client_left(&call->client))),
+                problem));
+    return job_read(call, problem);
 }
 
 // STATUS_OK if the job was successful; otherwise the cause is in `problem`.
-static Status job_verdict(const JobReply *job, Problem *problem) {
+static Status job_verdict(const ApiReply *job, Problem *problem) {
     if (strcmp(job->status, "successful") == 0)
         return STATUS_OK;
     if (strcmp(job->status, "failed") == 0)
@@ -68,26 +45,23 @@ static Status job_verdict(const JobReply *job, Problem *problem) {
 // The result of `id`: itself, or that of a job that finishes while the wait lasts. STATUS_TIMEOUT:
 // the job continues.
 static Status job_result(ApiCall *call, const char *id, char result[96], Problem *problem) {
-    JobReply job = {0};
-    Status status;
+    const ApiReply *job = &call->reply;
     snprintf(result, 96, "%s", id);
     if (strncmp(id, "j-", 2) != 0)
         return STATUS_OK;
     do
-        status = job_get(call, id, 20, &job, problem);
-    while (status == STATUS_OK && !job_is_final(&job) && api_client_left(&call->client) > 0);
-    if (status == STATUS_OK && !job_is_final(&job))
-        status = problem_set(problem, STATUS_TIMEOUT,
-                             "is still %s; \"impactd watch %s\" follows it, --wait S waits",
-                             job.status, id);
-    if (status == STATUS_OK && job.result == NULL)
-        status = job_verdict(&job, problem);
-    if (status == STATUS_OK && (job.result == NULL || !api_is_id(job.result)))
-        status = api_unexpected("a job with a result", problem);
-    if (status == STATUS_OK)
-        snprintf(result, 96, "%s", job.result);
-    fields_clear(job_fields, &job);
-    return status;
+        TRY(job_get(call, id, 20, problem));
+    while (!job_is_final(job) && api_client_left(&call->client) > 0);
+    if (!job_is_final(job))
+        return problem_set(problem, STATUS_TIMEOUT,
+                           "is still %s; \"impactd watch %s\" follows it, --wait S waits",
+                           job->status, id);
+    if (job->result == NULL)
+        TRY(job_verdict(job, problem));
+    if (job->result == NULL || !api_is_id(job->result))
+        return api_unexpected("a job with a result", problem);
+    snprintf(result, 96, "%s", job->result);
+    return STATUS_OK;
 }
 
 // The progress of a job: a bar on a terminal, else a line when its state changes or it has advanced
@@ -99,7 +73,7 @@ typedef struct JobProgress {
     double progress;
 } JobProgress;
 
-static void job_progress_show(JobProgress *show, const char *id, const JobReply *job) {
+static void job_progress_show(JobProgress *show, const char *id, const ApiReply *job) {
     const double progress = job->progress >= 0 && job->progress <= 100 ? job->progress : 0;
     if (show->bar.is_terminal) {
         const Progress watch = progress_bar_watch(&show->bar);
@@ -116,9 +90,9 @@ static void job_progress_show(JobProgress *show, const char *id, const JobReply 
 }
 
 // Follows a job to its end. STATUS_TIMEOUT when the wait is over: the job continues. The call's
-// answer and `job` have the last state. A server that has answered once may be restarted meanwhile.
-static Status job_follow(ApiCall *call, const char *id, FILE *lines, JobReply *job,
-                         Problem *problem) {
+// answer and reply have the last state. A server that has answered once may be restarted meanwhile.
+static Status job_follow(ApiCall *call, const char *id, FILE *lines, Problem *problem) {
+    const ApiReply *job = &call->reply;
     char farewell[256];
     JobProgress show = {.lines = lines};
     int64_t answered_ns = INT64_MIN;
@@ -129,7 +103,7 @@ static Status job_follow(ApiCall *call, const char *id, FILE *lines, JobReply *j
     output_farewell(farewell);
     progress_bar_start(&show.bar);
     for (;;) {
-        status = job_get(call, id, poll_period, job, problem);
+        status = job_get(call, id, poll_period, problem);
         const double left = api_client_left(&call->client);
         const int64_t now_ns = clock_monotonic_ns();
         if (status == STATUS_UNREACHABLE && now_ns - restart_ns < answered_ns && left >= 1) {
@@ -159,7 +133,7 @@ static Status job_follow(ApiCall *call, const char *id, FILE *lines, JobReply *j
 // Options of all five commands; each has rows for those that it takes.
 typedef struct JobsSettings {
     ClientSettings client;
-    bool json, dry_run;
+    bool dry_run;
     char *title, *idempotency_key;
     Texts label;
     char *output, *channels;
@@ -175,40 +149,40 @@ static bool text_is_printable(const char *text) {
 }
 
 // Sends the scene of the body.
-static Status submit_send(ApiCall *call, JobReply *job, Problem *problem) {
+static Status submit_send(ApiCall *call, Problem *problem) {
     const JobsSettings *settings = call->settings;
+    const bool is_json = settings->client.json;
     const double wait = settings->client.wait;
+    const ApiReply *job = &call->reply;
     char prefer[48];
     snprintf(prefer, sizeof prefer, "wait=%.0f", ceil(fmin(wait, 2)));
-    ApiRequest request = {.method = "POST",
-                          .path = api_path("/v1/jobs%s", settings->dry_run ? "?dry_run=1" : ""),
+    ApiRequest request = {.path = api_path("/v1/jobs%s", settings->dry_run ? "?dry_run=1" : ""),
                           .body = &call->body,
                           .prefer = wait > 0 ? prefer : "respond-async",
                           .idempotency_key = settings->idempotency_key};
-    TRY(api_ask(&call->client, &request, &call->answer, problem));
+    TRY(api_ask(call, &request, problem));
     if (settings->dry_run) {
-        api_print(&call->answer);
+        api_print(call);
         return STATUS_OK;
     }
-    TRY(job_read(&call->answer, job, problem));
+    TRY(job_read(call, problem));
     snprintf(call->id, sizeof call->id, "%s", job->id);
-    if (!settings->json) {
+    call->client.about = call->id;
+    if (!is_json) {
         printf("%s\n", call->id);
         fflush(stdout);
     }
     Status status = STATUS_OK;
-    call->client.about = call->id;
     if (wait > 0 && !job_is_final(job))
-        status = job_follow(call, call->id, stderr, job, problem);
-    if (settings->json && (status == STATUS_OK || status == STATUS_TIMEOUT))
-        api_print(&call->answer);
+        status = job_follow(call, call->id, stderr, problem);
+    if (is_json && (status == STATUS_OK || status == STATUS_TIMEOUT))
+        api_print(call);
     // A job that has ended is reported also if the end was not waited for.
     return status == STATUS_OK && job_is_final(job) ? job_verdict(job, problem) : status;
 }
 
 static Status submit_act(ApiCall *call, Problem *problem) {
     const JobsSettings *settings = call->settings;
-    JobReply job = {0};
     if (!text_is_printable(settings->idempotency_key))
         return problem_add(problem, STATUS_USAGE, "--idempotency-key",
                            "must be of printable ASCII characters");
@@ -217,33 +191,24 @@ static Status submit_act(ApiCall *call, Problem *problem) {
         TRY(json_edit_set(&call->body, "title", settings->title, problem));
     for (size_t i = 0; i < settings->label.count; i++)
         TRY(json_edit_label(&call->body, settings->label.at[i], problem));
-    const Status status = submit_send(call, &job, problem);
-    fields_clear(job_fields, &job);
-    return status;
+    return submit_send(call, problem);
 }
 
 static Status watch_act(ApiCall *call, Problem *problem) {
-    const JobsSettings *settings = call->settings;
-    JobReply job = {0};
-    Status status =
-        job_follow(call, call->operands[0], settings->json ? NULL : stdout, &job, problem);
-    if (status == STATUS_OK && settings->json)
-        api_print(&call->answer);
-    if (status == STATUS_OK)
-        status = job_verdict(&job, problem);
-    fields_clear(job_fields, &job);
-    return status;
+    const bool is_json = ((const ClientSettings *)call->settings)->json;
+    TRY(job_follow(call, call->operands[0], is_json ? NULL : stdout, problem));
+    if (is_json)
+        api_print(call);
+    return job_verdict(&call->reply, problem);
 }
 
 static Status cancel_act(ApiCall *call, Problem *problem) {
-    JobReply job = {0};
-    ApiRequest request = {.method = "DELETE", .path = api_path("/v1/jobs/%s", call->operands[0])};
-    TRY(api_ask(&call->client, &request, &call->answer, problem));
-    const Status status = job_read(&call->answer, &job, problem);
-    if (status == STATUS_OK)
-        printf("%s %s\n", job.id, job.status);
-    fields_clear(job_fields, &job);
-    return status;
+    TRY(api_ask(
+        call, &(ApiRequest){.method = "DELETE", .path = api_path("/v1/jobs/%s", call->operands[0])},
+        problem));
+    TRY(job_read(call, problem));
+    printf("%s %s\n", call->reply.id, call->reply.status);
+    return STATUS_OK;
 }
 
 static Status compare_act(ApiCall *call, Problem *problem) {
@@ -255,24 +220,15 @@ static Status compare_act(ApiCall *call, Problem *problem) {
         {"psd", {"channel", "unit", "from", "to", "level", "difference", "power"}},
         {NULL, {NULL}},
     };
-    static const char *const skipped[] = {"links", NULL}, *const sides[] = {"a", "b"};
+    static const char *const skipped[] = {"links", NULL};
     static const PrintTableView view = {skipped, columns, NULL};
-    const JobsSettings *settings = call->settings;
-    ApiRequest request = {.method = "GET", .path = api_path("/v1/compare")};
-    size_t longest;
-    Status status = STATUS_OK;
-    for (int i = 0; i < 2 && status == STATUS_OK; i++) {
-        char result[96];
+    char results[2][96];
+    for (int i = 0; i < 2; i++) {
         call->client.about = call->operands[i];
-        status = job_result(call, call->operands[i], result, problem);
-        api_query(&request.path, sides[i], result);
+        TRY(job_result(call, call->operands[i], results[i], problem));
     }
-    if (status == STATUS_OK)
-        status = api_ask(&call->client, &request, &call->answer, problem);
-    bytes_clear(&request.path);
-    return status == STATUS_OK
-               ? api_print_tables(&call->answer, &view, settings->json, &longest, problem)
-               : status;
+    TRY(api_get(call, api_path("/v1/compare?a=%s&b=%s", results[0], results[1]), problem));
+    return api_print_tables(call, &view, problem);
 }
 
 static const char *const formats[] = {"json", "csv", "npy", "npz", "mat", "zip", "svg", NULL};
@@ -354,8 +310,7 @@ static Status get_act(ApiCall *call, Problem *problem) {
     else
         TRY(job_result(call, call->operands[0], result, problem));
     const bool is_whole = is_job || strcmp(what, "result") == 0;
-    ApiRequest request = {.method = "GET",
-                          .path = api_path("/v1/%s/%s%s%s", is_job ? "jobs" : "results", result,
+    ApiRequest request = {.path = api_path("/v1/%s/%s%s%s", is_job ? "jobs" : "results", result,
                                            is_whole ? "" : "/", is_whole ? "" : what),
                           .output_max = settings->max_bytes};
     api_query_rows(&request.path, get_fields, settings, "channels from to points");
@@ -370,13 +325,13 @@ static const Field submit_fields[] = {
     FIELD_TEXTS(JobsSettings, label, NULL, NULL, 64, PRESENCE_OPTIONAL, 0, "KEY=VALUE, added to the labels of the scene; repeatable"),
     FIELD_FLAG(JobsSettings, dry_run, false, "print the plan and the estimated cost as JSON; run nothing"),
     FIELD_TEXT(JobsSettings, idempotency_key, 255, PRESENCE_OPTIONAL, 0, "a scene that is sent again with this key is the same job"),
-    FIELD_FLAG(JobsSettings, json, false, "print the job as JSON instead of its id"),
+    FIELD_FLAG(ClientSettings, json, false, "print the job as JSON instead of its id"),
     FIELD_END,
 };
 static const Field watch_fields[] = {
     CLIENT_ROWS,
     FIELD_REAL(ClientSettings, wait, "s", AT_MIN(0), 1e9, "how long to wait for the job to finish (no limit)"),
-    FIELD_FLAG(JobsSettings, json, false, "print the finished job as JSON instead of lines"),
+    FIELD_FLAG(ClientSettings, json, false, "print the finished job as JSON instead of lines"),
     FIELD_END,
 };
 static const Field cancel_fields[] = {
@@ -386,7 +341,7 @@ static const Field cancel_fields[] = {
 static const Field compare_fields[] = {
     CLIENT_ROWS,
     FIELD_REAL(ClientSettings, wait, "s", AT_MIN(0), 60, "how long to wait for an unfinished job and a busy server"),
-    FIELD_FLAG(JobsSettings, json, false, "print the answer of the server as JSON"),
+    FIELD_FLAG(ClientSettings, json, false, "print the answer of the server as JSON"),
     FIELD_END,
 };
 // clang-format on

@@ -21,7 +21,7 @@
 
 typedef struct MaterialsSettings {
     ClientSettings client;
-    bool json, dry_run, confirm, editable, force;
+    bool dry_run, confirm, editable, force;
     char *q, *kind, *e, *T_c;
     int status; // CHOICE_ABSENT: any
     char *comment, *reason;
@@ -43,7 +43,7 @@ static const char *const statuses[] = {"draft", "approved", "deprecated", NULL};
 static const Field materials_fields[] = {
     CLIENT_ROWS,
     FIELD_REAL(ClientSettings, wait, "s", AT_MIN(0), 60, "how long to wait for a busy server"),
-    FIELD_FLAG(MaterialsSettings, json, false, "print the server's answer, as JSON"),
+    FIELD_FLAG(ClientSettings, json, false, "print the server's answer, as JSON"),
     FIELD_TEXT(MaterialsSettings, q, 200, PRESENCE_OPTIONAL, 0, "words in slug, name, kind, supplier, source, tags or notes"),
     FIELD_TEXT(MaterialsSettings, kind, 60, PRESENCE_OPTIONAL, 0, "those of one kind: foam, rubber, metal ..."),
     FIELD_CHOICE(MaterialsSettings, status, statuses, OPTIONAL, "draft, approved or deprecated"),
@@ -125,17 +125,15 @@ static Status materials_name(const char *text, bool may_have_revision, Problem *
 }
 
 // The answer as tables, or with --json as it came.
-static Status materials_print(const ApiCall *call, Problem *problem) {
+static Status materials_print(ApiCall *call, Problem *problem) {
     static const char *const skipped[] = {"links", "test", NULL};
     static const Field *const fields[] = {material_fields, pair_parameters_fields,
                                           evaluation_fields, buffer_fields, NULL};
     static const PrintTableView view = {skipped, columns, fields};
-    const MaterialsSettings *settings = call->settings;
-    size_t longest;
-    TRY(api_print_tables(&call->answer, &view, settings->json, &longest, problem));
-    if (longest == 0)
+    TRY(api_print_tables(call, &view, problem));
+    if (call->rows == 0)
         fputs("impactd materials: nothing fits\n", stderr);
-    if (longest == LIST_MAX)
+    if (call->rows == LIST_MAX)
         fprintf(stderr, "impactd materials: the first %d; narrow the search to see others\n",
                 LIST_MAX);
     return STATUS_OK;
@@ -145,10 +143,9 @@ static Status materials_print(const ApiCall *call, Problem *problem) {
 static Status materials_ask(ApiCall *call, bool may_have_revision, const char *rest,
                             const char *queries, Problem *problem) {
     TRY(materials_name(call->operands[0], may_have_revision, problem));
-    ApiRequest request = {.method = "GET",
-                          .path = api_path("/v1/materials/%s%s", call->operands[0], rest)};
-    api_query_rows(&request.path, materials_fields, call->settings, queries);
-    return api_ask(&call->client, &request, &call->answer, problem);
+    Bytes path = api_path("/v1/materials/%s%s", call->operands[0], rest);
+    api_query_rows(&path, materials_fields, call->settings, queries);
+    return api_get(call, path, problem);
 }
 
 static Status materials_show_rest(ApiCall *call, bool may_have_revision, const char *rest,
@@ -157,49 +154,18 @@ static Status materials_show_rest(ApiCall *call, bool may_have_revision, const c
     return materials_print(call, problem);
 }
 
-typedef struct ReviewReply {
-    bool self_approved;
-} ReviewReply;
-typedef struct RevisionReply {
-    char *slug, *status;
-    uint64_t revision;
-    ReviewReply review;
-} RevisionReply;
-
-// clang-format off
-static const Field review_reply_fields[] = {
-    FIELD_FLAG(ReviewReply, self_approved, false, "by the author of the revision"),
-    FIELD_END,
-};
-static const Field revision_reply_fields[] = {
-    FIELD_TEXT(RevisionReply, slug, 0, PRESENCE_OPTIONAL, 0, "slug"),
-    FIELD_TEXT(RevisionReply, status, 0, PRESENCE_OPTIONAL, 0, "status"),
-    FIELD_COUNT(RevisionReply, revision, NULL, ANY, OPTIONAL, "revision"),
-    FIELD_ITEM_OR_NULL(RevisionReply, review, review_reply_fields, PRESENCE_OPTIONAL, "last review"),
-    FIELD_END,
-};
-// clang-format on
-
 // "sponge@2 draft" of an answer that is a revision.
-static Status materials_print_revision(const ApiCall *call, Problem *problem) {
-    const Bytes *body = &call->answer.body;
-    RevisionReply reply = {0};
-    Status status = STATUS_OK;
-    if (((const MaterialsSettings *)call->settings)->json) {
-        api_print(&call->answer);
+static Status materials_print_revision(ApiCall *call, Problem *problem) {
+    const ApiReply *reply = api_reply(call);
+    if (((const ClientSettings *)call->settings)->json) {
+        api_print(call);
         return STATUS_OK;
     }
-    (void)json_parse(body->at, body->count, revision_reply_fields, &reply, NULL);
-    if (reply.slug == NULL || reply.status == NULL || reply.revision == COUNT_ABSENT) {
-        status = api_unexpected("a revision", problem);
-    } else {
-        text_make_printable(reply.slug);
-        text_make_printable(reply.status);
-        printf("%s@%llu %s%s\n", reply.slug, (unsigned long long)reply.revision, reply.status,
-               reply.review.self_approved ? ", by its own author" : "");
-    }
-    fields_clear(revision_reply_fields, &reply);
-    return status;
+    if (reply->slug == NULL || reply->status == NULL || reply->revision == COUNT_ABSENT)
+        return api_unexpected("a revision", problem);
+    printf("%s@%llu %s%s\n", reply->slug, (unsigned long long)reply->revision, reply->status,
+           reply->review.self_approved ? ", by its own author" : "");
+    return STATUS_OK;
 }
 
 static Status materials_add_comment(ApiCall *call, Problem *problem) {
@@ -244,11 +210,9 @@ static Status materials_write(ApiCall *call, const char *slug, const char *name,
         return materials_error_stale(slug, problem);
     }
     snprintf(state, sizeof state, "%s", tag); // the answer is replaced
-    ApiRequest request = {.method = "POST",
-                          .path = api_path("/v1/materials/%s%s", name, rest),
-                          .body = &call->body,
-                          .if_match = state};
-    const Status status = api_ask(&call->client, &request, &call->answer, problem);
+    ApiRequest request = {
+        .path = api_path("/v1/materials/%s%s", name, rest), .body = &call->body, .if_match = state};
+    const Status status = api_ask(call, &request, problem);
     if (status == STATUS_STALE)
         return materials_error_stale(slug, problem);
     return status == STATUS_OK ? materials_print_revision(call, problem) : status;
@@ -258,16 +222,14 @@ static Status materials_write(ApiCall *call, const char *slug, const char *name,
 static Status materials_write_now(ApiCall *call, const char *slug, const char *name,
                                   const char *rest, Problem *problem) {
     // The history has an ETag also if all revisions are deprecated.
-    ApiRequest request = {.method = "GET",
-                          .path = api_path("/v1/materials/%s/history?limit=1", slug)};
-    TRY(api_ask(&call->client, &request, &call->answer, problem));
+    TRY(api_get(call, api_path("/v1/materials/%s/history?limit=1", slug), problem));
     return materials_write(call, slug, name, rest, call->answer.etag, problem);
 }
 
 static Status materials_list(ApiCall *call, Problem *problem) {
-    ApiRequest request = {.method = "GET", .path = api_path("/v1/materials" LIMIT)};
-    api_query_rows(&request.path, materials_fields, call->settings, "q kind status e T_c");
-    TRY(api_ask(&call->client, &request, &call->answer, problem));
+    Bytes path = api_path("/v1/materials" LIMIT);
+    api_query_rows(&path, materials_fields, call->settings, "q kind status e T_c");
+    TRY(api_get(call, path, problem));
     return materials_print(call, problem);
 }
 
@@ -336,8 +298,8 @@ static Status materials_derived(ApiCall *call, Problem *problem) {
 
 static Status materials_add(ApiCall *call, Problem *problem) {
     TRY(materials_read_body(call, call->operands[0], problem));
-    ApiRequest request = {.method = "POST", .path = api_path("/v1/materials"), .body = &call->body};
-    TRY(api_ask(&call->client, &request, &call->answer, problem));
+    ApiRequest request = {.path = api_path("/v1/materials"), .body = &call->body};
+    TRY(api_ask(call, &request, problem));
     return materials_print_revision(call, problem);
 }
 
@@ -410,10 +372,9 @@ static Status materials_add_trace(ApiCall *call, const char *path, Problem *prob
 
 // Sends the body to `path`, with --dry-run, and prints the answer.
 static Status materials_send(ApiCall *call, ApiRequest *request, Problem *problem) {
-    request->method = "POST";
     request->body = &call->body;
     api_query_rows(&request->path, materials_fields, call->settings, "dry_run");
-    TRY(api_ask(&call->client, request, &call->answer, problem));
+    TRY(api_ask(call, request, problem));
     return materials_print(call, problem);
 }
 
@@ -439,13 +400,13 @@ static Status materials_propose(ApiCall *call, Problem *problem) {
     const MaterialsSettings *settings = call->settings;
     const char *slug = call->operands[0];
     TRY(materials_ask(call, false, "/proposal", "measurements separation as", problem));
-    if (!settings->json || !settings->confirm)
+    if (!settings->client.json || !settings->confirm)
         TRY(materials_print(call, problem));
     if (!settings->confirm)
         return STATUS_OK;
     TRY(json_edit_extract(&call->answer.body, "revision", &call->body, problem));
     TRY(materials_add_comment(call, problem));
-    if (!settings->json)
+    if (!settings->client.json)
         putchar('\n');
     return materials_write(call, slug, slug, "/revisions", call->answer.etag, problem);
 }
@@ -467,8 +428,7 @@ static Status materials_export(ApiCall *call, Problem *problem) {
     if (!settings->force && access(call->operands[0], F_OK) == 0)
         return problem_set(problem, STATUS_CONFLICT,
                            "exists: name another file, or replace it with --force");
-    ApiRequest request = {.method = "GET",
-                          .path = api_path("/v1/materials.%s", is_table ? "csv" : "json"),
+    ApiRequest request = {.path = api_path("/v1/materials.%s", is_table ? "csv" : "json"),
                           .output_max = UINT64_MAX};
     return api_download(call, &request, call->operands[0], problem);
 }

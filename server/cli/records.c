@@ -9,7 +9,6 @@
 #include "server/cli/client.h"
 #include "server/cli/files.h"
 #include "server/json/encode.h"
-#include "server/json/parse.h"
 
 #define G 9.80665 // [m/s^2]
 
@@ -103,46 +102,9 @@ typedef struct RecordsSettings {
     char *name, *source, *processing, *earthquake, *station, *notes, *q;
     double interval;
     int unit;
-    bool json;
 } RecordsSettings;
 
-// A record as the server sends it; missing members are NULL, NAN or COUNT_ABSENT.
-typedef struct RecordWarning {
-    char *pointer, *detail;
-} RecordWarning;
-typedef struct RecordReply {
-    char *name, *layout;
-    double interval, duration, peak, peak_time; // [s], [m/s^2]
-    uint64_t count;
-    List warnings; // RecordWarning
-} RecordReply;
-typedef struct RecordsReply {
-    List records; // RecordReply
-} RecordsReply;
-
 // clang-format off
-static const Field record_warning_fields[] = {
-    FIELD_TEXT(RecordWarning, pointer, 0, PRESENCE_OPTIONAL, 0, "place"),
-    FIELD_TEXT(RecordWarning, detail, 0, PRESENCE_OPTIONAL, 0, "what is doubtful"),
-    FIELD_END,
-};
-static const Field record_reply_fields[] = {
-    FIELD_TEXT(RecordReply, name, 0, PRESENCE_OPTIONAL, 0, "name"),
-    FIELD_TEXT(RecordReply, layout, 0, PRESENCE_OPTIONAL, 0, "of its file"),
-    FIELD_REAL(RecordReply, interval, "s", ANY, OPTIONAL, "between samples"),
-    FIELD_REAL(RecordReply, duration, "s", ANY, OPTIONAL, "from the first sample to the last"),
-    FIELD_REAL(RecordReply, peak, "m/s^2", ANY, OPTIONAL, "largest magnitude"),
-    FIELD_REAL(RecordReply, peak_time, "s", ANY, OPTIONAL, "of the peak"),
-    FIELD_COUNT(RecordReply, count, NULL, ANY, OPTIONAL, "samples"),
-    {.name = "warnings", .kind = FIELD_KIND_LIST, .offset = offsetof(RecordReply, warnings),
-     .fields = record_warning_fields, .size = sizeof(RecordWarning), .presence = PRESENCE_OPTIONAL, .doc = "doubts"},
-    FIELD_END,
-};
-static const Field records_reply_fields[] = {
-    {.name = "records", .kind = FIELD_KIND_LIST, .offset = offsetof(RecordsReply, records),
-     .fields = record_reply_fields, .size = sizeof(RecordReply), .presence = PRESENCE_OPTIONAL, .doc = "records"},
-    FIELD_END,
-};
 static const Field records_fields[] = {
     CLIENT_ROWS,
     FIELD_TEXT(RecordsSettings, name, RECORD_NAME_SIZE - 1, PRESENCE_OPTIONAL, 0, "add: name for scenes (name of the file without its extension)"),
@@ -154,7 +116,7 @@ static const Field records_fields[] = {
     FIELD_TEXT(RecordsSettings, station, 200, PRESENCE_OPTIONAL, 0, "add: station and direction"),
     FIELD_TEXT(RecordsSettings, notes, 4000, PRESENCE_OPTIONAL, 0, "add: remarks"),
     FIELD_TEXT(RecordsSettings, q, 200, PRESENCE_OPTIONAL, 0, "list: only records with this text"),
-    FIELD_FLAG(RecordsSettings, json, false, "list and add: print the answer of the server as JSON"),
+    FIELD_FLAG(ClientSettings, json, false, "list and add: print the answer of the server as JSON"),
     FIELD_REAL(ClientSettings, wait, "s", AT_MIN(0), 0, "how long to wait for a busy server (0)"),
     FIELD_END,
 };
@@ -162,38 +124,35 @@ static const Field records_fields[] = {
 
 // Prints a page of the list. `after` becomes the name that the next page starts behind, "" at the
 // end.
-static Status records_print(const ApiAnswer *answer, bool is_json, char after[RECORD_NAME_SIZE],
-                            Problem *problem) {
+static Status records_print(ApiCall *call, char after[RECORD_NAME_SIZE], Problem *problem) {
     static const char *const skipped[] = {"links", NULL};
     static const PrintTableColumns columns[] = {
         {"records", {"name", "count", "interval", "duration", "peak", "source"}}, {NULL, {NULL}}};
-    static const Field *const fields[] = {record_reply_fields, NULL};
+    static const Field record[] = {
+        {.name = "interval", .kind = FIELD_KIND_REAL, .unit = "s"},
+        {.name = "duration", .kind = FIELD_KIND_REAL, .unit = "s"},
+        {.name = "peak", .kind = FIELD_KIND_REAL, .unit = "m/s^2"},
+        FIELD_END,
+    };
+    static const Field *const fields[] = {record, NULL};
     static const PrintTableView view = {skipped, columns, fields};
-    size_t longest;
-    RecordsReply reply = {{NULL, 0}};
-    Status status = STATUS_OK;
-    (void)json_parse(answer->body.at, answer->body.count, records_reply_fields, &reply, NULL);
-    const size_t count = reply.records.count;
-    const RecordReply *last = count > 0 ? (RecordReply *)reply.records.at + count - 1 : NULL;
-    const char *name = last != NULL && last->name != NULL ? last->name : "";
-    if (count >= PAGE && strcmp(name, after) <= 0)
-        status = problem_set(problem, STATUS_UNREACHABLE, "the list of records has no end");
+    const NameReplies *records = &api_reply(call)->records;
+    const size_t count = records->count;
+    const char *name = count > 0 ? records->at[count - 1].name : NULL;
+    if (count >= PAGE && (name == NULL || strcmp(name, after) <= 0))
+        return problem_set(problem, STATUS_UNREACHABLE, "the list of records has no end");
     text_fit(after, RECORD_NAME_SIZE, count >= PAGE ? name : "");
-    if (status == STATUS_OK)
-        status = api_print_tables(answer, &view, is_json, &longest, problem);
-    fields_clear(records_reply_fields, &reply);
-    return status;
+    return api_print_tables(call, &view, problem);
 }
 
 static Status records_list(ApiCall *call, Problem *problem) {
-    const RecordsSettings *settings = call->settings;
     char after[RECORD_NAME_SIZE] = "";
     do {
-        ApiRequest request = {.method = "GET", .path = api_path("/v1/records?limit=%d", PAGE)};
-        api_query(&request.path, "q", settings->q);
-        api_query(&request.path, "after", after[0] != '\0' ? after : NULL);
-        TRY(api_ask(&call->client, &request, &call->answer, problem));
-        TRY(records_print(&call->answer, settings->json, after, problem));
+        Bytes path = api_path("/v1/records?limit=%d", PAGE);
+        api_query_rows(&path, records_fields, call->settings, "q");
+        api_query(&path, "after", after[0] != '\0' ? after : NULL);
+        TRY(api_get(call, path, problem));
+        TRY(records_print(call, after, problem));
     } while (after[0] != '\0');
     return STATUS_OK;
 }
@@ -211,19 +170,16 @@ static void record_name(const char *path, char name[RECORD_NAME_SIZE]) {
             *c = '-';
 }
 
-static void record_report(const char *path, RecordReply *record, bool is_new) {
-    const RecordWarning *warnings = record->warnings.at;
-    text_make_printable(record->layout);
+static void record_report(const char *path, const ApiReply *record, bool is_new) {
     fprintf(stderr, "%s: %s%s, %.0f samples, interval %.6g s; peak %.6g m/s^2 at %.6g s\n", path,
             is_new ? "" : "already stored; ", record->layout != NULL ? record->layout : "-",
             record->count == COUNT_ABSENT ? (double)NAN : (double)record->count, record->interval,
             record->peak, record->peak_time);
     for (size_t i = 0; i < record->warnings.count; i++) {
-        text_make_printable(warnings[i].pointer);
-        text_make_printable(warnings[i].detail);
+        const ReplyFault *warning = &record->warnings.at[i];
         fprintf(stderr, "%s: warning: %s %s\n", path,
-                warnings[i].pointer != NULL ? warnings[i].pointer : "",
-                warnings[i].detail != NULL ? warnings[i].detail : "");
+                warning->pointer != NULL ? warning->pointer : "",
+                warning->detail != NULL ? warning->detail : "");
     }
 }
 
@@ -231,29 +187,24 @@ static Status records_add(ApiCall *call, Problem *problem) {
     const RecordsSettings *settings = call->settings;
     const char *path = call->operands[0];
     char name[RECORD_NAME_SIZE];
-    RecordReply record = {0};
     TRY(input_read(path, &call->body, problem));
     record_name(path, name);
-    ApiRequest request = {.method = "POST",
-                          .path = api_path("/v1/records"),
-                          .body = &call->body,
-                          .content_type = "text/plain"};
+    ApiRequest request = {
+        .path = api_path("/v1/records"), .body = &call->body, .content_type = "text/plain"};
     api_query(&request.path, "name", settings->name != NULL ? settings->name : name);
     api_query_rows(&request.path, records_fields, settings,
                    "unit source processing earthquake station notes interval");
-    TRY(api_ask(&call->client, &request, &call->answer, problem));
-    (void)json_parse(call->answer.body.at, call->answer.body.count, record_reply_fields, &record,
-                     NULL);
-    const bool is_record = record.name != NULL;
-    if (is_record && settings->json) {
-        api_print(&call->answer);
-    } else if (is_record) {
-        record_report(input_name(path), &record, call->answer.code == 201);
-        text_make_printable(record.name);
-        printf("%s\n", record.name);
+    TRY(api_ask(call, &request, problem));
+    const ApiReply *record = api_reply(call);
+    if (record->name == NULL)
+        return api_unexpected("a record", problem);
+    if (settings->client.json) {
+        api_print(call);
+        return STATUS_OK;
     }
-    fields_clear(record_reply_fields, &record);
-    return is_record ? STATUS_OK : api_unexpected("a record", problem);
+    record_report(input_name(path), record, call->answer.code == 201);
+    printf("%s\n", record->name);
+    return STATUS_OK;
 }
 
 static Status record_ask(ApiCall *call, const char *method, Problem *problem) {
@@ -262,12 +213,12 @@ static Status record_ask(ApiCall *call, const char *method, Problem *problem) {
         return problem_set(problem, STATUS_USAGE, "must be the name of a record");
     ApiRequest request = {.method = method, .path = api_path("/v1/records/")};
     bytes_percent(&request.path, name);
-    return api_ask(&call->client, &request, &call->answer, problem);
+    return api_ask(call, &request, problem);
 }
 
 static Status records_show(ApiCall *call, Problem *problem) {
     TRY(record_ask(call, "GET", problem));
-    api_print(&call->answer);
+    api_print(call);
     return STATUS_OK;
 }
 
