@@ -1,5 +1,5 @@
 // impactd serve: the server. Opens the database, the job manager and the HTTP server in this order
-// and waits for SIGTERM or SIGINT. Then it stops requests, work and background tasks before it
+// and waits for SIGTERM or SIGINT. Then it stops requests, jobs and background tasks before it
 // closes what they use.
 #include <errno.h>
 #include <pthread.h>
@@ -31,8 +31,8 @@ typedef struct ServeSettings {
     bool require_tokens, print_config;
 } ServeSettings;
 
-// ASIDES: concurrent background computations. HOT_SHARE: the part of the cache for responses.
-enum { GRACE_MS = 1500, ASIDES = 2, HOT_SHARE = 4 };
+// BACKGROUND_TASKS at the same time; 1/RESPONSE_SHARE of the cache is for responses.
+enum { GRACE_MS = 1500, BACKGROUND_TASKS = 2, RESPONSE_SHARE = 4 };
 
 #define MIB ((double)(1 << 20))
 
@@ -63,7 +63,7 @@ static const Field serve_fields[] = {
     FIELD_FLAG(ServeSettings, require_tokens, false, "require a token on loopback too, also if none exists"),
     FIELD_TEXT(ServeSettings, tls_cert, 4000, PRESENCE_OPTIONAL, 0, "PEM file of the certificate, for HTTPS"),
     FIELD_TEXT(ServeSettings, tls_key, 4000, PRESENCE_OPTIONAL, 0, "PEM file of its key"),
-    FIELD_CHOICE(ServeSettings, journal, log_mode_names, JOURNAL_ERRORS, "requests to log on standard error: off, errors or all"),
+    FIELD_CHOICE(ServeSettings, journal, log_mode_names, LOG_ERRORS, "requests to log on standard error: off, errors or all"),
     FIELD_TEXT(ServeSettings, config, 4000, PRESENCE_OPTIONAL, 0, "file of settings, one \"name = value\" per line"),
     FIELD_FLAG(ServeSettings, print_config, false, "print each setting and its origin, and exit"),
     FIELD_END,
@@ -309,12 +309,12 @@ static void serve_until_stopped(App *app, Server *server, const ServeSettings *s
 
 static Status serve(const ServeSettings *settings, const sigset_t *signals, Problem *problem) {
     App app = {.reply_most = (size_t)1 << 30, .started_unix_ms = clock_unix_ms()};
-    AccessControl access = {.journal = (LogMode)settings->journal};
-    const size_t response_cache_bytes = settings->cache_bytes / HOT_SHARE;
+    AccessControl access = {.log_mode = (LogMode)settings->journal};
+    const size_t response_cache_bytes = settings->cache_bytes / RESPONSE_SHARE;
     const Router router = {&app, routes, response_cache_new(response_cache_bytes), &access,
                            short_ids_redirect};
-    ServerSettings door = {.body_most = settings->max_body, .router = &router};
-    const JobManagerSettings work = {
+    ServerSettings server_settings = {.body_most = settings->max_body, .router = &router};
+    const JobManagerSettings job_settings = {
         .workers = settings->workers,
         .queue_most = settings->queue,
         .queue_bytes = settings->queue_bytes,
@@ -341,14 +341,15 @@ static Status serve(const ServeSettings *settings, const sigset_t *signals, Prob
     Server *server = NULL;
     process_return_memory();
     fft_start();
-    Status status = address_read(settings->listen, &door.address, problem);
+    Status status = address_read(settings->listen, &server_settings.address, problem);
     if (status == STATUS_OK) {
-        needs_tokens = settings->require_tokens || !address_is_loopback(&door.address);
+        needs_tokens = settings->require_tokens || !address_is_loopback(&server_settings.address);
         if (settings->base_url != NULL)
             status = base_url_read(settings->base_url, &url, problem);
-        const Status all[] = {status, serve_check(settings, problem),
-                              hosts_set(settings, &door.address, &url, &hosts, &origins, problem),
-                              certificate_read(settings, problem)};
+        const Status all[] = {
+            status, serve_check(settings, problem),
+            hosts_set(settings, &server_settings.address, &url, &hosts, &origins, problem),
+            certificate_read(settings, problem)};
         status = status_first(all, COUNT(all));
     }
     if (status == STATUS_OK && (request_metrics = request_metrics_new(routes)) == NULL)
@@ -358,22 +359,23 @@ static Status serve(const ServeSettings *settings, const sigset_t *signals, Prob
     if (status == STATUS_OK)
         status = tokens_open(app.db, needs_tokens, &access.tokens, problem);
     if (status == STATUS_OK && needs_tokens)
-        status = tokens_require(&door.address, tokens_usable(access.tokens), problem);
+        status = tokens_require(&server_settings.address, tokens_usable(access.tokens), problem);
     if (status == STATUS_OK)
-        status = jobs_open(app.db, &work, &app.manager, problem);
+        status = jobs_open(app.db, &job_settings, &app.manager, problem);
     if (status == STATUS_OK)
-        status = background_open(ASIDES, &app.background_tasks, problem);
+        status = background_open(BACKGROUND_TASKS, &app.background_tasks, problem);
     if (status == STATUS_OK) {
-        accepted = (AcceptedHosts){(const char *const *)hosts.at, address_is_any(&door.address),
-                                   origins.count > 1 ? (const char *const *)origins.at : NULL};
+        accepted =
+            (AcceptedHosts){(const char *const *)hosts.at, address_is_any(&server_settings.address),
+                            origins.count > 1 ? (const char *const *)origins.at : NULL};
         base_path_set(url.path);
         text_fit(app.base_url, sizeof app.base_url, url.text);
         app.has_tls = tls_source() != NULL;
         app.request_metrics = access.request_metrics = request_metrics;
         app.response_cache = router.response_cache;
-        door.hosts = &accepted;
-        door.certificate = tls_source();
-        status = server_open(&door, &server, problem);
+        server_settings.hosts = &accepted;
+        server_settings.certificate = tls_source();
+        status = server_open(&server_settings, &server, problem);
     }
     if (status == STATUS_OK)
         serve_until_stopped(&app, server, settings, signals, problem);

@@ -156,6 +156,6 @@ void access_record(const AccessControl *access, const Request *request, const Re
                               request->received, sent);
     const int code = reply->code;
     const bool is_fault = code >= 500 && code != 501 && code != 503 && code != 505;
-    if (access->journal == JOURNAL_ALL || (access->journal == JOURNAL_ERRORS && is_fault))
+    if (access->log_mode == LOG_ALL || (access->log_mode == LOG_ERRORS && is_fault))
         access_log(request, reply, ns, sent);
 }

@@ -8,9 +8,9 @@
 #include "server/util/metrics.h"
 
 typedef enum LogMode {
-    JOURNAL_OFF,
-    JOURNAL_ERRORS, // answers of 500 and more, except those that ask to come back later
-    JOURNAL_ALL,
+    LOG_OFF,
+    LOG_ERRORS, // answers of 500 and more, except those that ask to come back later
+    LOG_ALL,
 } LogMode;
 extern const char *const log_mode_names[];
 
@@ -27,7 +27,7 @@ void request_metrics_write(const RequestMetrics *metrics, Bytes *bytes);
 typedef struct AccessControl {
     Tokens *tokens;
     RequestMetrics *request_metrics;
-    LogMode journal;
+    LogMode log_mode;
 } AccessControl;
 
 // Whether the request may use a route of this scope ("open": without a token); sets
