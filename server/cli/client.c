@@ -260,7 +260,7 @@ int api_command(const Command *self, void *settings, const Options *options, Pro
         call.operands++;
         call.count--;
     }
-    const ApiAction *action = &actions[index];
+    const ApiAction *action = call.action = &actions[index];
     if (call.count < action->min || call.count > action->max) {
         const char *name = action->name != NULL ? action->name : "";
         (void)problem_set(problem, STATUS_USAGE, "%s%stakes %s, is given %zu operands", name,

@@ -111,6 +111,7 @@ typedef struct ApiReply {
 // A call of a command. The client, body, answer and reply are closed at its end.
 typedef struct ApiCall {
     ApiClient client;
+    const struct ApiAction *action;
     const void *settings;
     const char *const *operands; // after the action's name
     size_t count;
@@ -140,7 +141,8 @@ typedef struct ApiAction {
     const char *takes; // its operands, for a message
     size_t min, max;   // their number
     Status (*act)(ApiCall *call, Problem *problem);
-    size_t ids; // the first operands, which must be ids
+    size_t ids;         // the first operands, which must be ids
+    const char *detail; // for an `act` of several actions; may be NULL
 } ApiAction;
 
 // Runs one of the actions of `self` on settings that begin with a ClientSettings. Prints the reason

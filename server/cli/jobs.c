@@ -346,15 +346,6 @@ static const Field compare_fields[] = {
 };
 // clang-format on
 
-static const ApiAction submit_actions[] = {{NULL, "one scene", 1, 1, submit_act, 0}};
-static const ApiAction watch_actions[] = {{NULL, "one job's id, like j-7f3a", 1, 1, watch_act, 1}};
-static const ApiAction get_actions[] = {
-    {NULL, "the id of a result or a job, like r-91c0, and a part of it", 1, 2, get_act, 1}};
-static const ApiAction cancel_actions[] = {
-    {NULL, "one job's id, like j-7f3a", 1, 1, cancel_act, 1}};
-static const ApiAction compare_actions[] = {
-    {NULL, "the ids of two results or jobs, like r-91c0", 2, 2, compare_act, 2}};
-
 const Command command_submit = {
     .name = "submit",
     .operands = "SCENE.json",
@@ -375,7 +366,7 @@ const Command command_submit = {
     .options = submit_fields,
     .size = sizeof(JobsSettings),
     .run = api_command,
-    .actions = submit_actions,
+    .actions = &(const ApiAction){NULL, "one scene", 1, 1, submit_act, 0, NULL},
 };
 
 const Command command_watch = {
@@ -392,7 +383,7 @@ const Command command_watch = {
     .options = watch_fields,
     .size = sizeof(JobsSettings),
     .run = api_command,
-    .actions = watch_actions,
+    .actions = &(const ApiAction){NULL, "one job's id, like j-7f3a", 1, 1, watch_act, 1, NULL},
 };
 
 const Command command_get = {
@@ -418,7 +409,9 @@ const Command command_get = {
     .options = get_fields,
     .size = sizeof(JobsSettings),
     .run = api_command,
-    .actions = get_actions,
+    .actions =
+        &(const ApiAction){NULL, "the id of a result or a job, like r-91c0, and a part of it", 1, 2,
+                           get_act, 1, NULL},
 };
 
 const Command command_cancel = {
@@ -431,7 +424,7 @@ const Command command_cancel = {
     .options = cancel_fields,
     .size = sizeof(JobsSettings),
     .run = api_command,
-    .actions = cancel_actions,
+    .actions = &(const ApiAction){NULL, "one job's id, like j-7f3a", 1, 1, cancel_act, 1, NULL},
 };
 
 const Command command_compare = {
@@ -445,5 +438,6 @@ const Command command_compare = {
     .options = compare_fields,
     .size = sizeof(JobsSettings),
     .run = api_command,
-    .actions = compare_actions,
+    .actions = &(const ApiAction){NULL, "the ids of two results or jobs, like r-91c0", 2, 2,
+                                  compare_act, 2, NULL},
 };

@@ -148,12 +148,6 @@ static Status materials_ask(ApiCall *call, bool may_have_revision, const char *r
     return api_get(call, path, problem);
 }
 
-static Status materials_show_rest(ApiCall *call, bool may_have_revision, const char *rest,
-                                  const char *queries, Problem *problem) {
-    TRY(materials_ask(call, may_have_revision, rest, queries, problem));
-    return materials_print(call, problem);
-}
-
 // "sponge@2 draft" of an answer that is a revision.
 static Status materials_print_revision(ApiCall *call, Problem *problem) {
     const ApiReply *reply = api_reply(call);
@@ -265,8 +259,10 @@ static Status materials_show(ApiCall *call, Problem *problem) {
                               : materials_print(call, problem);
 }
 
-static Status materials_history(ApiCall *call, Problem *problem) {
-    return materials_show_rest(call, false, "/history" LIMIT, "", problem);
+// Shows what is below the material at the path that is the action's detail.
+static Status materials_show_part(ApiCall *call, Problem *problem) {
+    TRY(materials_ask(call, false, call->action->detail, "", problem));
+    return materials_print(call, problem);
 }
 
 static Status materials_diff(ApiCall *call, Problem *problem) {
@@ -277,13 +273,14 @@ static Status materials_diff(ApiCall *call, Problem *problem) {
         snprintf(rest + used, sizeof rest - used, "%s%.20s",
                  i == 1 ? "?from=" : "&to=", call->operands[i]);
     }
-    return materials_show_rest(call, false, rest, "", problem);
+    TRY(materials_ask(call, false, rest, "", problem));
+    return materials_print(call, problem);
 }
 
 static Status materials_used_by(ApiCall *call, Problem *problem) {
     const bool is_revision = strchr(call->operands[0], '@') != NULL;
-    return materials_show_rest(call, true, is_revision ? "/used-by" LIMIT : "/used-by", "",
-                               problem);
+    TRY(materials_ask(call, true, is_revision ? "/used-by" LIMIT : "/used-by", "", problem));
+    return materials_print(call, problem);
 }
 
 static Status materials_derived(ApiCall *call, Problem *problem) {
@@ -292,8 +289,9 @@ static Status materials_derived(ApiCall *call, Problem *problem) {
         return problem_set(problem, STATUS_USAGE,
                            "needs --damper-mass M in kg, and --structure-mass M unless the "
                            "structure does not move");
-    return materials_show_rest(call, true, "/derived",
-                               "damper_mass structure_mass identified_for separation", problem);
+    TRY(materials_ask(call, true, "/derived",
+                      "damper_mass structure_mass identified_for separation", problem));
+    return materials_print(call, problem);
 }
 
 static Status materials_add(ApiCall *call, Problem *problem) {
@@ -322,7 +320,8 @@ static Status materials_revert(ApiCall *call, Problem *problem) {
     return materials_write_now(call, slug, slug, "/revert", problem);
 }
 
-static Status materials_review(ApiCall *call, const char *verdict, Problem *problem) {
+// The detail of the action is the status that it sets.
+static Status materials_review(ApiCall *call, Problem *problem) {
     const MaterialsSettings *settings = call->settings;
     const char *name = call->operands[0], *at = strchr(name, '@');
     char slug[MATERIAL_SLUG_MAX + 1];
@@ -332,17 +331,9 @@ static Status materials_review(ApiCall *call, const char *verdict, Problem *prob
     if (settings->reason == NULL)
         return problem_set(problem, STATUS_USAGE, "needs --reason TEXT");
     snprintf(slug, sizeof slug, "%.*s", (int)(at - name), name);
-    bytes_format(&call->body, "{\"status\": \"%s\"}", verdict);
+    bytes_format(&call->body, "{\"status\": \"%s\"}", call->action->detail);
     TRY(json_edit_set(&call->body, "reason", settings->reason, problem));
     return materials_write_now(call, slug, name, "/review", problem);
-}
-
-static Status materials_approve(ApiCall *call, Problem *problem) {
-    return materials_review(call, "approved", problem);
-}
-
-static Status materials_deprecate(ApiCall *call, Problem *problem) {
-    return materials_review(call, "deprecated", problem);
 }
 
 // Appends a file of forces to the body's traces.
@@ -388,11 +379,6 @@ static Status materials_measure(ApiCall *call, Problem *problem) {
     return materials_send(
         call, &(ApiRequest){.path = api_path("/v1/materials/%s/measurements", call->operands[0])},
         problem);
-}
-
-static Status materials_measurements(ApiCall *call, Problem *problem) {
-    // The answer has their count.
-    return materials_show_rest(call, false, "/measurements?limit=100", "", problem);
 }
 
 // --confirm writes the proposal that was shown, based on the state that it was shown of.
@@ -444,22 +430,22 @@ static Status materials_import(ApiCall *call, Problem *problem) {
 }
 
 static const ApiAction actions[] = {
-    {"list", "no operands", 0, 0, materials_list, 0},
-    {"show", "SLUG or SLUG@REVISION", 1, 1, materials_show, 0},
-    {"add", "FILE.json", 1, 1, materials_add, 0},
-    {"revise", "SLUG FILE.json", 2, 2, materials_revise, 0},
-    {"revert", "SLUG REVISION", 2, 2, materials_revert, 0},
-    {"approve", "SLUG@REVISION", 1, 1, materials_approve, 0},
-    {"deprecate", "SLUG@REVISION", 1, 1, materials_deprecate, 0},
-    {"history", "SLUG", 1, 1, materials_history, 0},
-    {"diff", "SLUG [FROM [TO]]", 1, 3, materials_diff, 0},
-    {"used-by", "SLUG or SLUG@REVISION", 1, 1, materials_used_by, 0},
-    {"measure", "SLUG TEST.json", 2, 2, materials_measure, 0},
-    {"measurements", "SLUG", 1, 1, materials_measurements, 0},
-    {"propose", "SLUG", 1, 1, materials_propose, 0},
-    {"derived", "SLUG or SLUG@REVISION", 1, 1, materials_derived, 0},
-    {"export", "FILE.json or FILE.csv", 1, 1, materials_export, 0},
-    {"import", "FILE.json or FILE.csv", 1, 1, materials_import, 0},
+    {"list", "no operands", 0, 0, materials_list, 0, NULL},
+    {"show", "SLUG or SLUG@REVISION", 1, 1, materials_show, 0, NULL},
+    {"add", "FILE.json", 1, 1, materials_add, 0, NULL},
+    {"revise", "SLUG FILE.json", 2, 2, materials_revise, 0, NULL},
+    {"revert", "SLUG REVISION", 2, 2, materials_revert, 0, NULL},
+    {"approve", "SLUG@REVISION", 1, 1, materials_review, 0, "approved"},
+    {"deprecate", "SLUG@REVISION", 1, 1, materials_review, 0, "deprecated"},
+    {"history", "SLUG", 1, 1, materials_show_part, 0, "/history" LIMIT},
+    {"diff", "SLUG [FROM [TO]]", 1, 3, materials_diff, 0, NULL},
+    {"used-by", "SLUG or SLUG@REVISION", 1, 1, materials_used_by, 0, NULL},
+    {"measure", "SLUG TEST.json", 2, 2, materials_measure, 0, NULL},
+    {"measurements", "SLUG", 1, 1, materials_show_part, 0, "/measurements?limit=100"},
+    {"propose", "SLUG", 1, 1, materials_propose, 0, NULL},
+    {"derived", "SLUG or SLUG@REVISION", 1, 1, materials_derived, 0, NULL},
+    {"export", "FILE.json or FILE.csv", 1, 1, materials_export, 0, NULL},
+    {"import", "FILE.json or FILE.csv", 1, 1, materials_import, 0, NULL},
     {.name = NULL},
 };
 

@@ -229,10 +229,10 @@ static Status records_delete(ApiCall *call, Problem *problem) {
 }
 
 static const ApiAction actions[] = {
-    {"list", "no operand", 0, 0, records_list, 0},
-    {"add", "a file", 1, 1, records_add, 0},
-    {"show", "the name of a record", 1, 1, records_show, 0},
-    {"delete", "the name of a record", 1, 1, records_delete, 0},
+    {"list", "no operand", 0, 0, records_list, 0, NULL},
+    {"add", "a file", 1, 1, records_add, 0, NULL},
+    {"show", "the name of a record", 1, 1, records_show, 0, NULL},
+    {"delete", "the name of a record", 1, 1, records_delete, 0, NULL},
     {.name = NULL},
 };
 
