@@ -68,72 +68,61 @@ static void option_check(const OptionReader *reader, const char *typed, const Fi
     problem->status = status != STATUS_OK ? status : STATUS_USAGE;
 }
 
+// Reads a value into a member that owns nothing. False, with what is wanted.
+static bool option_parse(const Field *row, const char *value, void *member, char wanted[200]) {
+    char names[160] = "", *end = NULL;
+    int index = 0;
+    errno = 0;
+    if (row->kind == FIELD_KIND_REAL) {
+        const double number = strtod(value, &end);
+        snprintf(wanted, 200, "a number");
+        *(double *)member = number;
+        return end != value && *end == '\0' && isfinite(number);
+    }
+    if (row->kind == FIELD_KIND_COUNT) {
+        const unsigned long long number = strtoull(value, &end, 10);
+        snprintf(wanted, 200, "a whole number of at least 0");
+        *(uint64_t *)member = number;
+        return isdigit((unsigned char)value[0]) && *end == '\0' && errno == 0 &&
+               number != COUNT_ABSENT;
+    }
+    if (row->kind == FIELD_KIND_FLAG) {
+        const bool is_on = strcmp(value, "true") == 0 || strcmp(value, "1") == 0;
+        snprintf(wanted, 200, "true or false");
+        *(bool *)member = is_on;
+        return is_on || strcmp(value, "false") == 0 || strcmp(value, "0") == 0;
+    }
+    while (row->choices[index] != NULL && strcmp(row->choices[index], value) != 0)
+        text_list(names, sizeof names, row->choices[index++]);
+    snprintf(wanted, 200, "one of %s", names);
+    *(int *)member = index;
+    return row->choices[index] != NULL;
+}
+
 static void option_set(const OptionReader *reader, const Field *row, const char *typed,
                        const char *value, OptionOrigin origin) {
     void *member = (char *)reader->item + row->offset;
     OptionOrigin *set = &reader->options->origins[row - reader->fields];
-    char *end = NULL, *copy;
+    char wanted[200], *copy = NULL;
     if (*set > origin)
         return;
     const bool is_first = *set != origin;
     *set = origin;
-    errno = 0;
-    switch (row->kind) {
-    case FIELD_KIND_REAL: {
-        const double number = strtod(value, &end);
-        if (end == value || *end != '\0' || !isfinite(number)) {
-            option_fault(reader, typed, value, row, "a number");
-            return;
-        }
-        *(double *)member = number;
-        break;
-    }
-    case FIELD_KIND_COUNT: {
-        const unsigned long long number = strtoull(value, &end, 10);
-        if (!isdigit((unsigned char)value[0]) || *end != '\0' || errno != 0 ||
-            number == COUNT_ABSENT) {
-            option_fault(reader, typed, value, row, "a whole number of at least 0");
-            return;
-        }
-        *(uint64_t *)member = number;
-        break;
-    }
-    case FIELD_KIND_FLAG: {
-        const bool is_on = strcmp(value, "true") == 0 || strcmp(value, "1") == 0;
-        if (!is_on && strcmp(value, "false") != 0 && strcmp(value, "0") != 0) {
-            option_fault(reader, typed, value, row, "true or false");
-            return;
-        }
-        *(bool *)member = is_on;
-        break;
-    }
-    case FIELD_KIND_CHOICE: {
-        char names[160] = "", wanted[200];
-        int index = 0;
-        while (row->choices[index] != NULL && strcmp(row->choices[index], value) != 0)
-            text_list(names, sizeof names, row->choices[index++]);
-        if (row->choices[index] == NULL) {
-            snprintf(wanted, sizeof wanted, "one of %s", names);
-            option_fault(reader, typed, value, row, wanted);
-            return;
-        }
-        *(int *)member = index;
-        break;
-    }
-    case FIELD_KIND_TEXTS:
+    if (row->kind == FIELD_KIND_TEXTS) {
         if (is_first)
             texts_clear(member);
         if (texts_append(member, value) != STATUS_OK)
             option_no_memory(reader);
-        break;
-    default:
+    } else if (row->kind == FIELD_KIND_TEXT) {
         if ((copy = strdup(value)) == NULL) {
             option_no_memory(reader);
             return;
         }
         free(*(char **)member);
         *(char **)member = copy;
-        break;
+    } else if (!option_parse(row, value, member, wanted)) {
+        option_fault(reader, typed, value, row, wanted);
+        return;
     }
     option_check(reader, typed, row);
 }

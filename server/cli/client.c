@@ -175,7 +175,7 @@ static int api_refuse(const Command *command, const char *about, Status status,
     // Faults of options and of the environment are at their names.
     if (status == STATUS_USAGE && (pointer[0] == '-' || pointer[0] == 'I'))
         return command_error(command->name, problem);
-    input_refuse(about, problem);
+    command_print_faults(input_name(about), ": ", "\"", problem);
     return command_exit(status);
 }
 

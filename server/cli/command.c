@@ -6,17 +6,30 @@
 #include <string.h>
 
 #include "core/base/spelling.h"
+#include "server/json/table.h"
 
-int command_error(const char *name, const Problem *problem) {
+void command_print_faults(const char *name, const char *separator, const char *quote,
+                          const Problem *problem) {
     for (size_t i = 0; i < problem->count && i < PROBLEM_FAULTS; i++) {
-        const Fault *fault = &problem->faults[i];
-        fprintf(stderr, "impactd %s: %s %s", name, fault->pointer, fault->detail);
-        if (fault->did_you_mean[0] != '\0')
-            fprintf(stderr, " (did you mean %s?)", fault->did_you_mean);
+        Fault fault = problem->faults[i];
+        text_make_printable(fault.pointer);
+        text_make_printable(fault.detail);
+        fprintf(stderr, "%s: %s%s%s", name, fault.pointer,
+                fault.pointer[0] != '\0' ? separator : "", fault.detail);
+        if (fault.did_you_mean[0] != '\0')
+            fprintf(stderr, " (did you mean %s%s%s?)", quote, fault.did_you_mean, quote);
         fputc('\n', stderr);
     }
+    if (problem->count > PROBLEM_FAULTS)
+        fprintf(stderr, "%s: and %zu more faults\n", name, problem->count - PROBLEM_FAULTS);
     if (problem->count == 0)
-        fprintf(stderr, "impactd %s: %s\n", name, problem->detail);
+        fprintf(stderr, "%s: %s\n", name, problem->detail);
+}
+
+int command_error(const char *name, const Problem *problem) {
+    char full[40];
+    snprintf(full, sizeof full, "impactd %.20s", name);
+    command_print_faults(full, " ", "", problem);
     fprintf(stderr, "see impactd help %s\n", name);
     return COMMAND_USAGE;
 }

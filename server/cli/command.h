@@ -46,6 +46,11 @@ const Command *command_find(const char *name); // NULL if there is none
 // The whole program: finds the command, answers --help, runs it. Returns the exit code.
 int command_main(int argc, char *const *argv);
 
+// Prints all faults on stderr, one a line: NAME: POINTER, separator, detail (did you mean ...?).
+// Control characters, which a fault may quote from a file, are replaced.
+void command_print_faults(const char *name, const char *separator, const char *quote,
+                          const Problem *problem);
+
 // Usage faults on stderr, "impactd run: --outpt is not an option (did you mean --output?)"; returns
 // COMMAND_USAGE.
 int command_error(const char *name, const Problem *problem);

@@ -11,7 +11,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "server/json/table.h"
 #include "server/util/clock.h"
 
 const char *input_name(const char *path) {
@@ -59,26 +58,8 @@ int input_command(const Command *self, const char *what, const Options *options,
         status = run(path, &text, settings, problem);
     bytes_clear(&text);
     if (status != STATUS_OK)
-        input_refuse(path, problem);
+        command_print_faults(input_name(path), ": ", "\"", problem);
     return command_exit(status);
-}
-
-void input_refuse(const char *path, const Problem *problem) {
-    const char *name = input_name(path);
-    for (size_t i = 0; i < problem->count && i < PROBLEM_FAULTS; i++) {
-        Fault fault = problem->faults[i];
-        text_make_printable(fault.pointer);
-        text_make_printable(fault.detail);
-        fprintf(stderr, "%s: %s%s%s", name, fault.pointer, fault.pointer[0] != '\0' ? ": " : "",
-                fault.detail);
-        if (fault.did_you_mean[0] != '\0')
-            fprintf(stderr, " (did you mean \"%s\"?)", fault.did_you_mean);
-        fputc('\n', stderr);
-    }
-    if (problem->count > PROBLEM_FAULTS)
-        fprintf(stderr, "%s: and %zu more faults\n", name, problem->count - PROBLEM_FAULTS);
-    if (problem->count == 0)
-        fprintf(stderr, "%s: %s\n", name, problem->detail);
 }
 
 const char *path_extension(const char *path) {

@@ -21,10 +21,6 @@ int input_command(const Command *self, const char *what, const Options *options,
                   Status (*run)(const char *path, const Bytes *text, void *settings,
                                 Problem *problem),
                   Problem *problem);
-// One line on stderr per fault: "scene.json: /structure/mass: must be above 0 kg, is -1". Control
-// characters, which a fault may quote from the file, are replaced.
-void input_refuse(const char *path, const Problem *problem);
-
 // "csv" of "/data/out.csv"; NULL if there is none.
 const char *path_extension(const char *path);
 

@@ -289,14 +289,25 @@ static void signals_unblock(const sigset_t *signals) {
     pthread_sigmask(SIG_UNBLOCK, signals, NULL);
 }
 
-static void serve_until_stopped(App *app, Server *server, const ServeSettings *settings,
+// What serve opens, in this order, and closes in the opposite one.
+typedef struct Serving {
+    App app;
+    AccessControl access;
+    Router router;
+    ServerSettings http;
+    Texts hosts, origins;
+    AcceptedHosts accepted;
+    Server *server;
+} Serving;
+
+static void serve_until_stopped(Serving *serving, const ServeSettings *settings,
                                 const sigset_t *signals, Problem *problem) {
-    atomic_store(&app->server, server);
-    serve_greet(server, settings, app);
+    atomic_store(&serving->app.server, serving->server);
+    serve_greet(serving->server, settings, &serving->app);
     process_notify_systemd("READY=1");
     const int signal = serve_wait(signals, settings, problem);
     process_notify_systemd("STOPPING=1");
-    atomic_store(&app->is_stopping, true);
+    atomic_store(&serving->app.is_stopping, true);
     signals_unblock(signals);
     Bytes line = {0};
     bytes_format(&line, "%s, stopping",
@@ -307,24 +318,18 @@ static void serve_until_stopped(App *app, Server *server, const ServeSettings *s
     bytes_clear(&line);
 }
 
-static Status serve(const ServeSettings *settings, const sigset_t *signals, Problem *problem) {
-    App app = {.reply_most = (size_t)1 << 30, .started_unix_ms = clock_unix_ms()};
-    AccessControl access = {.log_mode = (LogMode)settings->journal};
-    const size_t response_cache_bytes = settings->cache_bytes / RESPONSE_SHARE;
-    const Router router = {&app, routes, response_cache_new(response_cache_bytes), &access,
-                           short_ids_redirect};
-    ServerSettings server_settings = {.body_most = settings->max_body, .router = &router};
+static Status serve_open_jobs(App *app, const ServeSettings *settings, Problem *problem) {
     const JobManagerSettings job_settings = {
         .workers = settings->workers,
         .queue_most = settings->queue,
         .queue_bytes = settings->queue_bytes,
-        .cache_bytes = settings->cache_bytes - response_cache_bytes,
+        .cache_bytes = settings->cache_bytes - settings->cache_bytes / RESPONSE_SHARE,
         .store_bytes = settings->store_bytes,
         .quota = settings->quota,
         .rate = settings->rate,
         .study_seconds = settings->max_study_seconds,
         .memory_bytes = 2 * settings->max_run_bytes,
-        .deleted = {router.response_cache, forget_answers},
+        .deleted = {app->response_cache, forget_answers},
         .limits = {.samples = settings->max_samples,
                    .impacts = settings->max_impacts,
                    .steps = settings->max_cpu_seconds / SOLVER_STEP,
@@ -333,65 +338,74 @@ static Status serve(const ServeSettings *settings, const sigset_t *signals, Prob
                    .points = settings->max_points},
         .has_maintenance = true,
         .keep = {settings->keep_days, settings->keep_jobs, settings->keep_bytes}};
-    Texts hosts = {NULL, 0}, origins = {NULL, 0};
-    AcceptedHosts accepted;
+    return jobs_open(app->db, &job_settings, &app->manager, problem);
+}
+
+static Status serve_open(Serving *serving, const ServeSettings *settings, Problem *problem) {
+    App *app = &serving->app;
+    AccessControl *access = &serving->access;
+    ServerSettings *http = &serving->http;
+    const Address *address = &http->address;
     BaseUrl url = {.host = ""};
-    bool needs_tokens = false;
-    RequestMetrics *request_metrics = NULL;
-    Server *server = NULL;
+    TRY(address_read(settings->listen, &http->address, problem));
+    const bool needs_tokens = settings->require_tokens || !address_is_loopback(address);
+    const Status url_status =
+        settings->base_url != NULL ? base_url_read(settings->base_url, &url, problem) : STATUS_OK;
+    const Status all[] = {
+        url_status, serve_check(settings, problem),
+        hosts_set(settings, address, &url, &serving->hosts, &serving->origins, problem),
+        certificate_read(settings, problem)};
+    TRY(status_first(all, COUNT(all)));
+    access->log_mode = (LogMode)settings->journal;
+    app->request_metrics = access->request_metrics = request_metrics_new(routes);
+    if (access->request_metrics == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the counters");
+    app->response_cache = response_cache_new(settings->cache_bytes / RESPONSE_SHARE);
+    TRY(db_open(settings->data, &app->db, problem));
+    TRY(tokens_open(app->db, needs_tokens, &access->tokens, problem));
+    if (needs_tokens)
+        TRY(tokens_require(address, tokens_usable(access->tokens), problem));
+    TRY(serve_open_jobs(app, settings, problem));
+    TRY(background_open(BACKGROUND_TASKS, &app->background_tasks, problem));
+    serving->accepted = (AcceptedHosts){
+        (const char *const *)serving->hosts.at, address_is_any(address),
+        serving->origins.count > 1 ? (const char *const *)serving->origins.at : NULL};
+    base_path_set(url.path);
+    text_fit(app->base_url, sizeof app->base_url, url.text);
+    app->has_tls = tls_source() != NULL;
+    serving->router = (Router){app, routes, app->response_cache, access, short_ids_redirect};
+    http->body_most = settings->max_body;
+    http->router = &serving->router;
+    http->hosts = &serving->accepted;
+    http->certificate = tls_source();
+    return server_open(http, &serving->server, problem);
+}
+
+static void serve_close(Serving *serving) {
+    App *app = &serving->app;
+    server_stop(serving->server, GRACE_MS);
+    background_close(app->background_tasks);
+    if (app->manager != NULL)
+        jobs_stop(app->manager);
+    server_free(serving->server);
+    jobs_close(app->manager);
+    response_cache_free(app->response_cache);
+    tokens_close(serving->access.tokens);
+    db_close(app->db);
+    request_metrics_free(serving->access.request_metrics);
+    texts_clear(&serving->hosts);
+    texts_clear(&serving->origins);
+    tls_forget();
+}
+
+static Status serve(const ServeSettings *settings, const sigset_t *signals, Problem *problem) {
+    Serving serving = {.app = {.reply_most = (size_t)1 << 30, .started_unix_ms = clock_unix_ms()}};
     process_return_memory();
     fft_start();
-    Status status = address_read(settings->listen, &server_settings.address, problem);
-    if (status == STATUS_OK) {
-        needs_tokens = settings->require_tokens || !address_is_loopback(&server_settings.address);
-        if (settings->base_url != NULL)
-            status = base_url_read(settings->base_url, &url, problem);
-        const Status all[] = {
-            status, serve_check(settings, problem),
-            hosts_set(settings, &server_settings.address, &url, &hosts, &origins, problem),
-            certificate_read(settings, problem)};
-        status = status_first(all, COUNT(all));
-    }
-    if (status == STATUS_OK && (request_metrics = request_metrics_new(routes)) == NULL)
-        status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the counters");
+    const Status status = serve_open(&serving, settings, problem);
     if (status == STATUS_OK)
-        status = db_open(settings->data, &app.db, problem);
-    if (status == STATUS_OK)
-        status = tokens_open(app.db, needs_tokens, &access.tokens, problem);
-    if (status == STATUS_OK && needs_tokens)
-        status = tokens_require(&server_settings.address, tokens_usable(access.tokens), problem);
-    if (status == STATUS_OK)
-        status = jobs_open(app.db, &job_settings, &app.manager, problem);
-    if (status == STATUS_OK)
-        status = background_open(BACKGROUND_TASKS, &app.background_tasks, problem);
-    if (status == STATUS_OK) {
-        accepted =
-            (AcceptedHosts){(const char *const *)hosts.at, address_is_any(&server_settings.address),
-                            origins.count > 1 ? (const char *const *)origins.at : NULL};
-        base_path_set(url.path);
-        text_fit(app.base_url, sizeof app.base_url, url.text);
-        app.has_tls = tls_source() != NULL;
-        app.request_metrics = access.request_metrics = request_metrics;
-        app.response_cache = router.response_cache;
-        server_settings.hosts = &accepted;
-        server_settings.certificate = tls_source();
-        status = server_open(&server_settings, &server, problem);
-    }
-    if (status == STATUS_OK)
-        serve_until_stopped(&app, server, settings, signals, problem);
-    server_stop(server, GRACE_MS);
-    background_close(app.background_tasks);
-    if (app.manager != NULL)
-        jobs_stop(app.manager);
-    server_free(server);
-    jobs_close(app.manager);
-    response_cache_free(router.response_cache);
-    tokens_close(access.tokens);
-    db_close(app.db);
-    request_metrics_free(request_metrics);
-    texts_clear(&hosts);
-    texts_clear(&origins);
-    tls_forget();
+        serve_until_stopped(&serving, settings, signals, problem);
+    serve_close(&serving);
     return status;
 }
 
