@@ -160,8 +160,11 @@ static Status scene_run(const char *path, const StudyRequest *request, const War
                                    problem);
     if (status == STATUS_NO_MEMORY || job.is_failed || table.is_failed)
         status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the answer");
+    const Bytes *whole = settings->format != NULL ? &table : &job;
     if (status == STATUS_OK)
-        status = output_put(settings->output, settings->format != NULL ? &table : &job, problem);
+        status = output_write(whole->at, whole->count, problem);
+    if (status == STATUS_OK)
+        status = output_close(problem);
     bytes_clear(&job);
     bytes_clear(&table);
     outcome_unref(outcome);
@@ -181,9 +184,10 @@ static Status run_scene(const char *path, const Bytes *text, void *of, Problem *
                         "or a server; `impactd tradeoff` and `impactd ensemble` print theirs");
     // Before the run, so that a wrong folder is reported at once.
     if (status == STATUS_OK)
-        status = output_check(settings->output, problem);
+        status = output_open(settings->output, problem);
     if (status == STATUS_OK)
         status = scene_run(path, &request, &warnings, settings, problem);
+    output_drop();
     study_request_clear(&request);
     warnings_clear(&warnings);
     return status;
