@@ -16,23 +16,23 @@ void segments_clear(Segments *segments) {
     *segments = (Segments){0};
 }
 
-static Segment *segments_add(Segments *segments, uint64_t size) {
-    if (segments->is_failed || size == 0)
-        return NULL;
+// Appends a segment that begins at the document's end; nothing where it is empty.
+static void segments_add(Segments *segments, Segment segment) {
+    if (segments->is_failed || segment.size == 0)
+        return;
     if (segments->count == segments->room) {
         const size_t room = segments->room > 0 ? 2 * segments->room : FIRST_SEGMENTS;
         Segment *at = realloc(segments->at, room * sizeof *at);
         if (at == NULL) {
             segments->is_failed = true;
-            return NULL;
+            return;
         }
         segments->at = at;
         segments->room = room;
     }
-    Segment *segment = &segments->at[segments->count++];
-    *segment = (Segment){.start = segments->size, .size = size};
-    segments->size += size;
-    return segment;
+    segment.start = segments->size;
+    segments->at[segments->count++] = segment;
+    segments->size += segment.size;
 }
 
 static bool segment_is_text(const Segment *segment) {
@@ -57,9 +57,7 @@ void segments_put(Segments *segments, const void *data, size_t size) {
         segments->size += size;
         return;
     }
-    Segment *segment = segments_add(segments, size);
-    if (segment != NULL)
-        segment->text = text;
+    segments_add(segments, (Segment){.size = size, .text = text});
 }
 
 void segments_text(Segments *segments, Bytes *text) {
@@ -78,47 +76,35 @@ void segments_fill(Segments *segments, char with, size_t count) {
 }
 
 void segments_values(Segments *segments, const double *values, size_t count) {
-    Segment *segment = segments_add(segments, count * sizeof *values);
-    if (segment != NULL)
-        segment->values = values;
+    segments_add(segments, (Segment){.size = count * sizeof *values, .values = values});
 }
 
 void segments_counted(Segments *segments, size_t first, size_t step, double rate, size_t count) {
-    Segment *segment = segments_add(segments, count * sizeof(double));
-    if (segment == NULL)
-        return;
-    segment->first = (double)first;
-    segment->step = (double)step;
-    segment->rate = rate;
+    segments_add(segments, (Segment){.size = count * sizeof(double),
+                                     .first = (double)first,
+                                     .step = (double)step,
+                                     .rate = rate});
 }
 
 void segments_cells(Segments *segments, const TableSource *source, size_t column, size_t width,
                     size_t rows) {
     const TableColumn described = source->column(source->context, column);
-    Segment *segment =
-        segments_add(segments, (uint64_t)rows * (width > 0 ? width : sizeof(double)));
-    if (segment == NULL)
-        return;
-    segment->source = source;
-    segment->column = column;
-    segment->width = width;
-    segment->is_numeric = width == 0 && table_column_is_numeric(&described);
+    segments_add(segments,
+                 (Segment){.size = (uint64_t)rows * (width > 0 ? width : sizeof(double)),
+                           .source = source,
+                           .column = column,
+                           .width = width,
+                           .is_numeric = width == 0 && table_column_is_numeric(&described)});
 }
 
 void segments_join(Segments *segments, const Segments *other) {
     segments->is_failed = segments->is_failed || other->is_failed;
     for (size_t i = 0; i < other->count && !segments->is_failed; i++) {
         const Segment *from = &other->at[i];
-        if (segment_is_text(from)) {
+        if (segment_is_text(from))
             segments_put(segments, segment_memory(other, from), (size_t)from->size);
-            continue;
-        }
-        const uint64_t start = segments->size;
-        Segment *segment = segments_add(segments, from->size);
-        if (segment == NULL)
-            return;
-        *segment = *from;
-        segment->start = start;
+        else
+            segments_add(segments, *from);
     }
 }
 

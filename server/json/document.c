@@ -196,34 +196,38 @@ Status json_edit_set(Bytes *text, const char *name, const char *value, Problem *
     return json_edit_write(text, root, is_set, problem);
 }
 
+// The member `name` of `root`, which becomes `empty` where it is missing. Takes `empty`.
+static json_t *json_edit_member(json_t *root, const char *name, json_t *empty) {
+    if (root != NULL && json_object_get(root, name) == NULL)
+        (void)json_object_set(root, name, empty);
+    json_decref(empty);
+    return json_object_get(root, name);
+}
+
 Status json_edit_label(Bytes *text, const char *label, Problem *problem) {
     const char *equals = strchr(label, '=');
     if (equals == NULL || equals == label)
         return problem_add(problem, STATUS_USAGE, "--label", "must be KEY=VALUE, is %.100s", label);
     TRY(json_edit_check_utf8("label", label, problem));
-    json_t *root = json_parse_tree(text->at, text->count),
-           *labels = json_object_get(root, "labels");
-    if (root == NULL || (labels != NULL && !json_is_object(labels) && !json_is_array(labels))) {
-        json_decref(root);
-        return STATUS_OK;
-    }
-    bool is_set = true;
-    if (labels == NULL) {
-        labels = json_object();
-        is_set = json_object_set_new(root, "labels", labels) == 0;
-    }
-    if (is_set && json_is_array(labels)) {
+    json_t *root = json_parse_tree(text->at, text->count);
+    json_t *labels = json_edit_member(root, "labels", json_object());
+    bool is_set = false;
+    if (json_is_array(labels)) {
         is_set = json_array_append_new(labels, json_string(label)) == 0;
-    } else if (is_set) {
+    } else if (json_is_object(labels)) {
         char *key = strndup(label, (size_t)(equals - label));
         is_set = key != NULL && json_object_set_new(labels, key, json_string(equals + 1)) == 0;
         free(key);
+    } else if (root == NULL || labels != NULL) {
+        json_decref(root);
+        return STATUS_OK;
     }
     return json_edit_write(text, root, is_set, problem);
 }
 
 Status json_edit_append(Bytes *text, const char *list, const Bytes *value, Problem *problem) {
-    json_t *root = json_parse_tree(text->at, text->count), *items = json_object_get(root, list);
+    json_t *root = json_parse_tree(text->at, text->count);
+    json_t *items = json_edit_member(root, list, json_array());
     if (root == NULL || (items != NULL && !json_is_array(items))) {
         json_decref(root);
         return STATUS_OK;
@@ -234,15 +238,7 @@ Status json_edit_append(Bytes *text, const char *list, const Bytes *value, Probl
         json_decref(root);
         return problem_set(problem, STATUS_INVALID, "must be UTF-8 text");
     }
-    bool is_there = items != NULL;
-    if (!is_there) {
-        items = json_array();
-        is_there = json_object_set_new(root, list, items) == 0;
-    }
-    if (!is_there)
-        json_decref(item);
-    return json_edit_write(text, root, is_there && json_array_append_new(items, item) == 0,
-                           problem);
+    return json_edit_write(text, root, json_array_append_new(items, item) == 0, problem);
 }
 
 static void nulls_remove(json_t *value) {

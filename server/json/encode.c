@@ -72,21 +72,19 @@ static void encode_put_value(Bytes *bytes, const Field *field, const void *membe
         break;
     }
     case FIELD_KIND_ROWS:
-    case FIELD_KIND_TEXTS: {
+    case FIELD_KIND_TEXTS:
+    case FIELD_KIND_LIST: {
         List list;
         memcpy(&list, member, sizeof list);
-        encode_put_list(bytes, field, &list);
+        if (field->kind == FIELD_KIND_LIST)
+            encode_list(bytes, field->fields, list.at, list.count, field->size, style);
+        else
+            encode_put_list(bytes, field, &list);
         break;
     }
     case FIELD_KIND_ITEM:
         encode_item(bytes, field->fields, member, style);
         break;
-    case FIELD_KIND_LIST: {
-        List list;
-        memcpy(&list, member, sizeof list);
-        encode_list(bytes, field->fields, list.at, list.count, field->size, style);
-        break;
-    }
     case FIELD_KIND_VARIANT:
         encode_put_variant(bytes, field->kinds, *(Variant *const *)member, style);
         break;

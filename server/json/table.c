@@ -22,19 +22,6 @@ void text_make_printable(char *text) {
         }
 }
 
-// Takes ownership of `text`; NULL: no memory.
-static void print_table_take(PrintTable *table, char *text) {
-    char **cells = text != NULL ? realloc(table->cells, (table->count + 1) * sizeof *cells) : NULL;
-    if (cells == NULL) {
-        free(text);
-        table->is_failed = true;
-        return;
-    }
-    text_make_printable(text);
-    table->cells = cells;
-    table->cells[table->count++] = text;
-}
-
 void print_table_add(PrintTable *table, const char *format, ...) {
     va_list arguments, again;
     va_start(arguments, format);
@@ -45,13 +32,21 @@ void print_table_add(PrintTable *table, const char *format, ...) {
         (void)vsnprintf(text, (size_t)size + 1, format, again);
     va_end(again);
     va_end(arguments);
-    print_table_take(table, text);
+    text_make_printable(text);
+    char **cells = text != NULL ? realloc(table->cells, (table->count + 1) * sizeof *cells) : NULL;
+    if (cells == NULL) {
+        free(text);
+        table->is_failed = true;
+        return;
+    }
+    table->cells = cells;
+    table->cells[table->count++] = text;
 }
 
 void print_table_number(PrintTable *table, const char *format, double value) {
     char text[64];
     snprintf(text, sizeof text, format, value);
-    print_table_take(table, strdup(isnan(value) ? "-" : text));
+    print_table_add(table, "%s", isnan(value) ? "-" : text);
 }
 
 void print_table_clear(PrintTable *table) {
