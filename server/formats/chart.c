@@ -34,6 +34,10 @@ static const char *const chart_shapes[CHART_COLOURS] = {"M-5 0a5 5 0 1 0 10 0a5 
                                                         "M-3-6h6v12h-6z",
                                                         "M-5-5h10L0 0L5 5h-10L0 0z"};
 
+static const char *const chart_marks[] = {[CHART_DOT] = "M-3 0a3 3 0 1 0 6 0a3 3 0 1 0-6 0z",
+                                          [CHART_CROSS] = "M-4-4l8 8M4-4l-8 8",
+                                          [CHART_RING] = "M-8 0a8 8 0 1 0 16 0a8 8 0 1 0-16 0z"};
+
 enum { TICKS_MAX = 12, DECADES_LABELLED = 8, MAP_STEPS = 24, LEGEND_LINE = 20 };
 
 struct ChartBlock {
@@ -170,11 +174,11 @@ static bool axis_shows(const ChartAxis *axis, double value) {
 }
 
 static void axis_extend(ChartAxis *axis, double value) {
-    if (!axis_shows(axis, value))
-        return;
     const double at = axis->is_logarithmic ? log10(value) : value;
-    axis->min = fmin(axis->min, at);
-    axis->max = fmax(axis->max, at);
+    if (axis_shows(axis, value)) {
+        axis->min = fmin(axis->min, at);
+        axis->max = fmax(axis->max, at);
+    }
 }
 
 static void panel_extend(ChartPanel *panel, double x, double y, bool *has_zero) {
@@ -209,15 +213,13 @@ bool chart_fit(ChartPanel *panel) {
     panel->x.max = panel->y.max = -DBL_MAX;
     for (size_t i = 0; i < panel->count; i++) {
         const ChartSeries *series = &panel->series[i];
-        for (size_t k = 0; k < series->count; k++)
-            if (series->kind == CHART_MAP) {
-                panel_extend(panel, (double)(k % series->columns), (double)(k / series->columns),
-                             &has_zero);
-            } else {
-                panel_extend(panel, series->x[k], series->y[k], &has_zero);
-                if (series->high != NULL)
-                    panel_extend(panel, series->x[k], series->high[k], &has_zero);
-            }
+        if (series->kind == CHART_MAP) // has no axes
+            return true;
+        for (size_t k = 0; k < series->count; k++) {
+            panel_extend(panel, series->x[k], series->y[k], &has_zero);
+            if (series->high != NULL)
+                panel_extend(panel, series->x[k], series->high[k], &has_zero);
+        }
     }
     if (panel->y.max < panel->y.min && !has_zero)
         return false;
@@ -427,11 +429,8 @@ static void series_put_line(const ChartPanel *panel, const ChartSeries *series, 
 
 // Without the end of its element.
 static void series_put_marker(const ChartSeries *series, double x, double y, Bytes *bytes) {
-    const char *shape = series->shape == CHART_DOT     ? "M-3 0a3 3 0 1 0 6 0a3 3 0 1 0-6 0z"
-                        : series->shape == CHART_CROSS ? "M-4-4l8 8M4-4l-8 8"
-                        : series->shape == CHART_RING
-                            ? "M-8 0a8 8 0 1 0 16 0a8 8 0 1 0-16 0z"
-                            : chart_shapes[series->colour % CHART_COLOURS];
+    const char *shape = series->shape == CHART_SHAPE ? chart_shapes[series->colour % CHART_COLOURS]
+                                                     : chart_marks[series->shape];
     bytes_text(bytes, "<path ");
     if (series->shape == CHART_CROSS)
         bytes_text(bytes, "class=\"cross\"");

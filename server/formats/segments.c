@@ -8,7 +8,7 @@
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__ && sizeof(double) == 8,
                "numbers are written as they lie in memory, and the formats say little-endian");
 
-enum { FIRST_SEGMENTS = 16, CHUNK = 1024 }; // numbers that are counted up at once
+enum { FIRST_SEGMENTS = 16, PIECE_BYTES = 8192 };
 
 void segments_clear(Segments *segments) {
     free(segments->at);
@@ -108,69 +108,63 @@ void segments_join(Segments *segments, const Segments *other) {
     }
 }
 
-// Whole numbers below 2^53, so that each sum is exact and each quotient that of the text formats.
-// The loop becomes vectors.
-static void segment_count_up(const Segment *segment, size_t from, size_t count, double *target) {
-    const double first = segment->first + (double)from * segment->step, step = segment->step;
+// Numbers first ... first + count - 1, counted or from the source. False: they cannot be read any
+// more.
+static bool segment_numbers(const Segment *segment, size_t first, size_t count, double *numbers) {
+    const TableSource *source = segment->source;
+    const double start = segment->first + (double)first * segment->step, step = segment->step;
+    if (source != NULL)
+        return source->read(source->context, segment->column, first, count, numbers);
+    // Whole numbers below 2^53, so that each sum is exact and each quotient that of the text
+    // formats. The loop becomes vectors.
     for (int i = 0; i < (int)count; i++)
-        target[i] = (first + i * step) / segment->rate;
+        numbers[i] = (start + i * step) / segment->rate;
+    return true;
 }
 
-// Bytes skip ... skip + size - 1 of a cell.
-static void segment_copy_cell(const Segment *segment, const TableColumn *column, double value,
-                              size_t skip, char *target, size_t size) {
-    if (segment->width == 0) {
-        if (segment->is_numeric)
-            value = strtod(column->texts[(size_t)value], NULL);
-        memcpy(target, (const char *)&value + skip, size);
-        return;
+// Texts of `width` bytes each, without the first `skip` bytes.
+static void segment_copy_texts(const TableColumn *column, const double *values, size_t width,
+                               size_t skip, char *target, size_t size) {
+    memset(target, 0, size);
+    for (; size > 0; values++, skip = 0) {
+        size_t length;
+        const char *text = table_bare(column, *values, &length);
+        const size_t some = width - skip < size ? width - skip : size;
+        if (length > skip)
+            memcpy(target, text + skip, length - skip < some ? length - skip : some);
+        target += some;
+        size -= some;
     }
-    size_t length;
-    const char *text = table_bare(column, value, &length);
-    const size_t left = length > skip ? length - skip : 0, kept = left < size ? left : size;
-    memcpy(target, text + skip, kept);
-    memset(target + kept, 0, size - kept);
 }
 
 // Zeros where the source cannot be read any more.
-static void segment_read_cells(const Segment *segment, uint64_t offset, char *at, size_t size) {
-    const TableSource *source = segment->source;
-    const TableColumn column = source->column(source->context, segment->column);
-    const size_t width = segment->width > 0 ? segment->width : sizeof(double);
-    size_t row = (size_t)(offset / width), skip = (size_t)(offset % width);
-    char *const end = at + size;
-    double values[TABLE_PIECE];
-    while (at < end) {
-        const size_t rows = (skip + (size_t)(end - at) + width - 1) / width;
-        const size_t count = rows < TABLE_PIECE ? rows : TABLE_PIECE;
-        if (!source->read(source->context, segment->column, row, count, values)) {
-            memset(at, 0, (size_t)(end - at));
-            return;
-        }
-        for (size_t i = 0; i < count; i++, skip = 0) {
-            const size_t left = (size_t)(end - at), whole = width - skip;
-            const size_t some = whole < left ? whole : left;
-            segment_copy_cell(segment, &column, values[i], skip, at, some);
-            at += some;
-        }
-        row += count;
-    }
-}
-
 static void segment_read(const Segments *segments, const Segment *segment, uint64_t offset,
                          char *target, size_t size) {
     const char *memory = segment_memory(segments, segment);
-    double numbers[CHUNK];
-    if (memory != NULL)
+    const TableSource *source = segment->source;
+    if (memory != NULL) {
         memcpy(target, memory + offset, size);
-    else if (segment->source != NULL)
-        segment_read_cells(segment, offset, target, size);
-    while (segment->rate != 0 && size > 0) {
-        const size_t number = (size_t)(offset / sizeof *numbers), skip = offset % sizeof *numbers;
-        const size_t max = sizeof numbers - skip, some = size < max ? size : max;
-        segment_count_up(segment, number, (skip + some + sizeof *numbers - 1) / sizeof *numbers,
-                         numbers);
-        memcpy(target, (const char *)numbers + skip, some);
+        return;
+    }
+    const TableColumn column =
+        source != NULL ? source->column(source->context, segment->column) : (TableColumn){NULL};
+    const size_t width = segment->width > 0 ? segment->width : sizeof(double);
+    double numbers[TABLE_PIECE];
+    while (size > 0) {
+        const size_t row = (size_t)(offset / width), skip = (size_t)(offset % width);
+        const size_t rows = (skip + size + width - 1) / width;
+        const size_t count = rows < TABLE_PIECE ? rows : TABLE_PIECE, whole = count * width - skip;
+        const size_t some = whole < size ? whole : size;
+        if (!segment_numbers(segment, row, count, numbers)) {
+            memset(target, 0, size);
+            return;
+        }
+        for (size_t i = 0; i < count && segment->is_numeric; i++)
+            numbers[i] = strtod(column.texts[(size_t)numbers[i]], NULL);
+        if (segment->width > 0)
+            segment_copy_texts(&column, numbers, width, skip, target, some);
+        else
+            memcpy(target, (const char *)numbers + skip, some);
         target += some;
         offset += some;
         size -= some;
@@ -216,7 +210,7 @@ void segments_write(const Segments *segments, Bytes *bytes) {
 
 uint32_t segments_crc32(const Segments *segments) {
     uint32_t crc = 0;
-    char piece[CHUNK * sizeof(double)];
+    char piece[PIECE_BYTES];
     for (size_t i = 0; i < segments->count; i++) {
         const Segment *segment = &segments->at[i];
         const char *memory = segment_memory(segments, segment);
