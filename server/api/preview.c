@@ -79,15 +79,14 @@ static Status preview_reply(App *app, const Request *request, Reply *reply, void
 }
 
 static Status preview_check(const DryRun *plan, Problem *problem) {
-    char seconds[32];
     if (plan->inquiry.study != NULL)
         return problem_add(problem, STATUS_INVALID, "/study",
                            "must be absent: a preview runs one scene; POST /v1/jobs runs studies");
     if (plan->cost.cpu_seconds > cpu_max)
         return problem_set(problem, STATUS_LIMIT,
-                           "the scene is predicted to take %s s of CPU, a preview at most %g s: "
+                           "the scene is predicted to take %.3g s of CPU, a preview at most %g s: "
                            "POST /v1/jobs, or reduce duration, sample_rate or channels",
-                           text_real(seconds, plan->cost.cpu_seconds), cpu_max);
+                           plan->cost.cpu_seconds, cpu_max);
     return STATUS_OK;
 }
 

@@ -5,18 +5,19 @@
 
 #include "server/api/app.h"
 #include "server/jobs/job.h"
+#include "server/util/base_path.h"
 
 enum { DIGITS_MIN = 8, CANDIDATES_MAX = 10 };
 
 // Where the id begins in the target; NULL if the route has none or it is not a short one.
 static const char *short_id_find(const Request *request) {
-    static const char *const prefixes[] = {"/v1/jobs/{id}", "/v1/results/{id}"};
-    const char *id = request->parameters[0];
-    bool has_id = false;
-    for (size_t i = 0; i < COUNT(prefixes); i++)
-        has_id = has_id || strncmp(request->route->pattern, prefixes[i], strlen(prefixes[i])) == 0;
-    if (!has_id || id == NULL || strcmp(request->method, "GET") != 0 || id[1] != '-' ||
-        (id[0] != 'j' && id[0] != 'r'))
+    static const char job[] = "/v1/jobs/{id}", result[] = "/v1/results/{id}";
+    const char *id = request->parameters[0], *pattern = request->route->pattern;
+    const char kind = strncmp(pattern, job, sizeof job - 1) == 0         ? 'j'
+                      : strncmp(pattern, result, sizeof result - 1) == 0 ? 'r'
+                                                                         : '\0';
+    if (kind == '\0' || id == NULL || strcmp(request->method, "GET") != 0 || id[0] != kind ||
+        id[1] != '-')
         return NULL;
     const size_t digits = strspn(id + 2, "0123456789abcdef");
     const size_t full = id[0] == 'j' ? JOB_ID_LENGTH - 2 : 64;
@@ -36,7 +37,7 @@ static Status short_id_ambiguous(const char *id, const JobRows *rows, Problem *p
 
 Status short_ids_redirect(App *app, const Request *request, Reply *reply, Problem *problem) {
     const char *id = request->parameters[0], *at = short_id_find(request);
-    const char *path = strstr(request->target, "/v1/");
+    const char *path = base_path_strip(request->target);
     JobRows rows = {0};
     if (at == NULL || path == NULL ||
         strlen(path) + sizeof rows.at->result >= sizeof reply->location)

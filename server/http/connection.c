@@ -44,7 +44,8 @@ typedef struct Exchange {
     size_t received, checked_received;
     int stalled_checks;
     char *target;
-    Reply reply; // once it is answered in the pool or before its body was read
+    const char *head_at; // behind the value of the last header seen, in the library's buffer
+    Reply reply;         // once it is answered in the pool or before its body was read
     void (*forget)(void *kept);
     bool is_begun, is_counted, is_busy;
     bool is_in_pool;  // it is answered there, its connection suspended
@@ -60,13 +61,13 @@ typedef struct Sending {
     void *context;
 } Sending;
 
-// A body that takes long may outlive its client's token.
 void loop_wake(EventLoop *loop) {
     const uint64_t one = 1;
     if (!atomic_exchange(&loop->is_woken, true))
         (void)!write(loop->wakeup, &one, sizeof one);
 }
 
+// A body that takes long may outlive its client's token.
 static bool sending_is_admitted(Sending *sending) {
     enum { CHECK_MS = 500 };
     const int64_t now_ns = clock_monotonic_ns();
@@ -233,10 +234,26 @@ static void exchange_problem(Exchange *exchange, int code, const Problem *proble
     access_record(exchange->server->settings.router->access, &exchange->request, reply);
 }
 
+// The library parses a head where it was received, and says nothing of lines that it drops: headers
+// continued on a second line, and what follows a header without a name. Something else than blanks
+// and line ends between two headers is such a line.
+static void exchange_check_gap(Exchange *exchange, const char *next) {
+    const char *at = exchange->head_at;
+    if (next < at || next - at > CONNECTION_MEMORY) {
+        exchange->request.has_hidden_lines = true;
+        return;
+    }
+    while (at < next && (*at == '\0' || *at == '\r' || *at == '\n' || *at == ' ' || *at == '\t'))
+        at++;
+    exchange->request.has_hidden_lines |= at < next;
+}
+
 static enum MHD_Result exchange_add_header(void *context, enum MHD_ValueKind kind, const char *name,
                                            size_t name_size, const char *value, size_t value_size) {
     (void)kind;
     Exchange *exchange = context;
+    exchange_check_gap(exchange, name);
+    exchange->head_at = value != NULL ? value + value_size : name + name_size;
     request_header(&exchange->request, name, name_size, value, value_size);
     return MHD_YES;
 }
@@ -292,7 +309,16 @@ static enum MHD_Result exchange_begin(Exchange *exchange, struct MHD_Connection 
     request->callback = timer_callback(exchange->timer);
     request->body_most = server->settings.body_most;
     const AcceptedHosts *hosts = server->settings.hosts;
+    exchange->head_at = version + strlen(version);
     MHD_get_connection_values_n(connection, MHD_HEADER_KIND, exchange_add_header, exchange);
+    const union MHD_ConnectionInfo *head =
+        MHD_get_connection_info(connection, MHD_CONNECTION_INFO_REQUEST_HEADER_SIZE);
+    if (head != NULL) {
+        exchange_check_gap(exchange, method + head->header_size);
+        // A line ":" ends the head, and looks like two line ends with a blank before them.
+        if (method + head->header_size - exchange->head_at > 4)
+            request->has_hidden_lines = true;
+    }
     request->allow_origin = request_allowed_origin(request, hosts);
     if (request->id[0] == '\0')
         exchange_write_id(request->id, server->first_id + atomic_fetch_add(&server->requests, 1));
@@ -389,7 +415,9 @@ static bool exchange_handle(Exchange *exchange, Reply *reply) {
     Request *request = &exchange->request;
     for (;;) {
         reply_default(reply);
-        router_answer(exchange->server->settings.router, request, reply);
+        if (!router_answer(exchange->server->settings.router, request, reply) &&
+            exchange->forget != NULL)
+            exchange->forget(request->kept);
         request->kept = reply->keep;
         exchange->forget = reply->forget;
         if (reply->wait_ms == 0)

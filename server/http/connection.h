@@ -29,7 +29,10 @@ typedef struct EventLoop {
     atomic_size_t connections;
 } EventLoop;
 
-enum { LOOPS_MAX = 16 };
+enum {
+    LOOPS_MAX = 16,
+    CONNECTION_MEMORY = 16 * 1024, // bytes of the library for each connection: the longest head
+};
 
 // What all loops share.
 struct Server {

@@ -24,11 +24,10 @@ enum {
     CONNECTIONS_MAX = 8192, // over all loops, if as many files may be open
     FILES_KEPT = 64,        // for everything else
     TOGETHER = 16,          // connections that one loop takes before another does: fewer wake-ups
-    CONNECTION_MEMORY = 16 * 1024,
-    SILENCE_S = 60,    // nothing sent or received; a client that waits for us is not silent
-    BUSY_RUNS = 16,    // in a row, before a loop looks for new connections
-    RETRY_MS = 5,      // until accepting is tried again
-    IDLE_MIN_MS = 500, // then a connection between two requests may be closed for a new one
+    SILENCE_S = 60,         // nothing sent or received; a client that waits for us is not silent
+    BUSY_RUNS = 16,         // in a row, before a loop looks for new connections
+    RETRY_MS = 5,           // until accepting is tried again
+    IDLE_MIN_MS = 500,      // then a connection between two requests may be closed for a new one
 };
 
 size_t server_connections(const Server *server) {

@@ -328,8 +328,13 @@ int request_validate(Request *request, const AcceptedHosts *hosts, const char *t
     const char *fault = target_fault(target);
     if (fault != NULL)
         return head_refuse(problem, 400, fault);
+    if (request->has_hidden_lines)
+        return head_refuse(problem, 400,
+                           "the head holds a header that is continued on a second line, a header "
+                           "without a name, or blanks behind its last header");
     if (request->faulty[0] != '\0') {
-        problem_set(problem, STATUS_USAGE, "the head holds a control character (in %s)",
+        problem_set(problem, STATUS_USAGE,
+                    "the head holds a control character, or a name that is none (in %s)",
                     request->faulty);
         return 400;
     }
@@ -425,7 +430,7 @@ Status request_require_body(const Request *request, Problem *problem) {
     if (request->is_too_large)
         return request_error_large(request->body_most, problem);
     if (request->body == NULL || request->body_size == 0)
-        return problem_set(problem, STATUS_UNREADABLE, "there is no body; send the scene as JSON");
+        return problem_set(problem, STATUS_UNREADABLE, "there is no body");
     return STATUS_OK;
 }
 

@@ -60,6 +60,7 @@ struct Request {
     const char *expect, *authorization, *accept_encoding, *content_encoding, *if_match,
         *idempotency_key, *last_event_id, *content_length, *transfer_encoding, *origin, *fetch_site;
     const char *repeated;     // the name of a header that may be there only once, or NULL
+    bool has_hidden_lines;    // the head has lines that belong to no header
     char faulty[40];          // the name of a header with a character that is not allowed, or ""
     uint64_t length;          // of the body, from Content-Length
     bool is_chunked;          // the body has no Content-Length

@@ -323,19 +323,21 @@ static Status router_finish(const Router *router, Request *request, Reply *reply
     return reply_range(reply, request, problem);
 }
 
-void router_answer(const Router *router, Request *request, Reply *reply) {
+bool router_answer(const Router *router, Request *request, Reply *reply) {
     Problem problem;
     problem_clear(&problem);
     Status status = STATUS_OK;
     if (request->is_resumed) // its token may have been revoked meanwhile
         status = access_authorize(router->access, request->route->scope, request, &problem);
-    if (status == STATUS_OK)
+    const bool is_admitted = status == STATUS_OK;
+    if (is_admitted)
         status = request->route->handle(router->app, request, reply, &problem);
     if (status == STATUS_NOT_FOUND && router->not_found != NULL)
         status = router->not_found(router->app, request, reply, &problem);
     if (status == STATUS_OK && reply->wait_ms == 0)
         status = router_finish(router, request, reply, &problem);
     router_close(router, request, status, &problem, reply);
+    return is_admitted;
 }
 
 bool router_still_admits(const Router *router, Request *request) {

@@ -21,8 +21,9 @@ extern const Route routes[]; // api/routes.c
 // a cached response or a refusal.
 bool router_admit(const Router *router, Request *request, Reply *reply);
 
-// Calls the handler and fills `reply`. reply->wait_ms > 0 asks for another call.
-void router_answer(const Router *router, Request *request, Reply *reply);
+// Calls the handler and fills `reply`. reply->wait_ms > 0 asks for another call. False: the request
+// waited and may not go on, and the handler was not called: request->kept is to be freed.
+bool router_answer(const Router *router, Request *request, Reply *reply);
 
 // Whether the sender of an admitted request may still have its answer: its token may have been
 // revoked.

@@ -64,6 +64,13 @@ ResultSummary *cache_head(JobManager *manager, const char *id) {
     return is_hit ? result_summary_ref(entry->summary) : NULL;
 }
 
+uint64_t cache_deletions(JobManager *manager) {
+    pthread_mutex_lock(&manager->lock);
+    const uint64_t deletions = manager->deletions;
+    pthread_mutex_unlock(&manager->lock);
+    return deletions;
+}
+
 bool cache_has(const JobManager *manager, const char *id, bool with_series) {
     const CachedResult *entry = lru_peek(manager->cache, id);
     return entry != NULL && (with_series ? entry->outcome != NULL : entry->summary != NULL);
@@ -140,6 +147,7 @@ static Outcome *series_load(JobManager *manager, const char *result) {
     char *body = NULL;
     size_t size = 0;
     Outcome *outcome = NULL;
+    const uint64_t deletions = cache_deletions(manager);
     if (db_series_load(manager->db, result, &body, &size, NULL) == STATUS_OK &&
         outcome_load(manager, result, &outcome, NULL) == STATUS_OK &&
         !series_blob_read(body, size, &outcome->response.series)) {
@@ -150,7 +158,7 @@ static Outcome *series_load(JobManager *manager, const char *result) {
     pthread_mutex_lock(&manager->lock);
     manager->stored.hits += outcome != NULL;
     manager->stored.misses += outcome == NULL;
-    if (outcome != NULL)
+    if (outcome != NULL && deletions == manager->deletions)
         cache_put(manager, result, outcome, NULL);
     pthread_mutex_unlock(&manager->lock);
     return outcome;

@@ -245,13 +245,14 @@ void task_finish(JobManager *manager, Task *task, RunResult *run_result) {
     if (run->status == STATUS_OK && !task->recompute_only)
         task->summary = result_summary_new(&run->result);
     // Only the series was wanted: the result is saved already, unless it was deleted meanwhile.
+    const uint64_t deletions = cache_deletions(manager);
     const bool is_cached =
         outcome != NULL && task->recompute_only && db_result_exists(manager->db, task->result);
     pthread_mutex_lock(&manager->lock);
     manager->saving++;
     manager->saving_bytes += task->saving_bytes;
     task->is_saving = true;
-    if (is_cached)
+    if (is_cached && deletions == manager->deletions)
         cache_put(manager, task->result, outcome, NULL);
     commit_continue(task);
     pthread_mutex_unlock(&manager->lock);

@@ -165,6 +165,7 @@ struct JobManager {
     size_t saving, saving_bytes;        // tasks that have run and are not yet saved
     Task *retry_commits;                // of these, those that wait for room in the database
     Job *retry_cancels;                 // referenced: cancelled, but it could not be written
+    uint64_t deletions;                 // of results
     Lru *cache;                         // of results by id: summaries and, where kept, series
     CacheStats series, summaries;       // there, which share the budget
     CacheStats rows, stored;            // results and series found in the database
@@ -265,7 +266,10 @@ bool series_blob_read(const void *blob, size_t size, Columns *series);
 // what is cached of it. The newest result is kept even if it is larger than the budget. Without
 // memory nothing is cached.
 void cache_put(JobManager *manager, const char *id, Outcome *outcome, ResultSummary *summary);
-ResultSummary *cache_head(JobManager *manager, const char *id);              // a reference, or NULL
+ResultSummary *cache_head(JobManager *manager, const char *id); // a reference, or NULL
+// The number of results deleted so far. What was read from the database is cached only if it has
+// not changed since before the reading. Without the lock.
+uint64_t cache_deletions(JobManager *manager);
 bool cache_has(const JobManager *manager, const char *id, bool with_series); // not a use
 void cache_release(LruEntry *entry, void *manager, bool is_evicted);
 // Without the lock: saves the series if it is more expensive to compute than to read.

@@ -26,6 +26,7 @@ void jobs_retry_writes(JobManager *manager) {
 
 static void manager_forget(JobManager *manager, const char *result) {
     pthread_mutex_lock(&manager->lock);
+    manager->deletions++;
     LruEntry *entry = lru_peek(manager->cache, result);
     if (entry != NULL)
         lru_remove(manager->cache, entry);

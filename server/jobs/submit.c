@@ -195,6 +195,7 @@ static Status submit_find_result(JobManager *manager, Job *job, Problem *problem
     job->summary = cache_head(manager, job->row.result);
     const bool is_computed =
         job->summary == NULL && submit_find_task(manager, job->row.result) != NULL;
+    const uint64_t deletions = manager->deletions;
     pthread_mutex_unlock(&manager->lock);
     if (job->summary != NULL)
         return STATUS_OK;
@@ -204,7 +205,7 @@ static Status submit_find_result(JobManager *manager, Job *job, Problem *problem
     pthread_mutex_lock(&manager->lock);
     manager->rows.hits += status == STATUS_OK;
     manager->rows.misses += status == STATUS_NOT_FOUND;
-    if (job->summary != NULL)
+    if (job->summary != NULL && deletions == manager->deletions)
         cache_put(manager, job->row.result, NULL, job->summary);
     pthread_mutex_unlock(&manager->lock);
     return status == STATUS_OK || status == STATUS_NOT_FOUND

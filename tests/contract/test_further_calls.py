@@ -111,9 +111,16 @@ def test_ids_may_be_shortened():
             problem(reply, 409)
             assert job["id"] in reply.json()["detail"] and other["id"] in reply.json()["detail"], reply
         for path in (f"/v1/results/{job['result'][:9]}", "/v1/results/r-0123456789", f"/v1/jobs/{job['id'][:9]}",
-                     "/v1/jobs/j-00000000", f"/v1/results/{job['id'][:12]}x"):
+                     "/v1/jobs/j-00000000", f"/v1/results/{job['id'][:12]}x", f"/v1/results/{job['id'][:20]}",
+                     f"/v1/jobs/{job['result'][:20]}"):
             problem(daemon.get(path), 404)
         problem(daemon.request("DELETE", f"/v1/results/{job['result'][:20]}"), 404)
+    with program.daemon("--base-url", "https://lab.example.org/a/v1/b") as daemon:
+        reply = daemon.request("POST", "/a/v1/b/v1/jobs", body=json.dumps(sponge()), headers={"Content-Type": "application/json"})
+        assert reply.status == 200, reply
+        result = reply.json()["result"]
+        reply = daemon.get(f"/a/v1/b/v1/results/{result[:20]}/psd.csv")
+        assert reply.status == 307 and reply.headers["location"] == f"/a/v1/b/v1/results/{result}/psd.csv", reply.headers
 
 
 def test_a_title_belongs_to_a_job():

@@ -12,6 +12,8 @@ import time
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
+from access import bearer, impactd, token, until  # noqa: E402
+from asking import endless  # noqa: E402
 
 SANITIZED = True
 WAITS = True
@@ -140,6 +142,22 @@ def stop_within_a_head(daemon, data):
     return [int(code) for code in re.findall(rb"^HTTP/1\.1 (\d{3}) ", got, re.M)], got
 
 
+def test_a_request_that_waits_ends_with_its_token():
+    """A token revoked while its requests wait for a job: 401, and nothing of what they waited for is left."""
+    with program.daemon() as daemon:
+        keys = {name: token(daemon.data, name, "admin") for name in ("stays", "goes")}
+        assert until(lambda: daemon.get("/v1/jobs").status == 401)
+        job = daemon.submit(endless(), headers={**bearer(keys["stays"]), "Prefer": "respond-async"}).json()
+        waiting = [http.client.HTTPConnection(daemon.host, daemon.port, timeout=60) for _ in range(5)]
+        for one in waiting:
+            one.request("GET", job["links"]["self"] + "?wait=25", headers=bearer(keys["goes"]))
+        time.sleep(0.5)
+        assert impactd("token", "revoke", "goes", "--data", daemon.data).returncode == 0
+        assert until(lambda: daemon.get("/v1/jobs", headers=bearer(keys["goes"])).status == 401)
+        assert daemon.request("DELETE", job["links"]["self"], headers=bearer(keys["stays"])).status == 200
+        assert [one.getresponse().status for one in waiting] == [401] * 5
+
+
 def test_garbage_is_not_served():
     """Bytes that are no HTTP at all end in a 4xx or a closed connection, or are not answered."""
     with program.daemon() as daemon:
@@ -150,6 +168,27 @@ def test_garbage_is_not_served():
             statuses, got = exchange(daemon, data, ends=True) if has_head else stop_within_a_head(daemon, data)
             assert all(status >= 400 for status in statuses), (data[:60], got)
         assert daemon.get("/version").status == 200
+
+
+def test_lines_that_belong_to_no_header_are_refused():
+    """Continued headers, which libmicrohttpd drops, and headers without a name: 400, and no body becomes a request."""
+    inner = GET + HOST + b"X-Request-Id: smuggled\r\n\r\n"
+    length = b"Content-Length: %d\r\n" % len(inner)
+    with program.daemon() as daemon:
+        for head in (GET + HOST + length + b" x\r\n\r\n", GET + HOST + length + b"\t0\r\nAccept: */*\r\n\r\n",
+                     POST + length + b" 0\r\n\r\n", POST + b": x\r\n" + length + b"\r\n", POST + b":\r\n" + length + b"\r\n",
+                     GET + HOST + b"Host: evil\r\n x\r\n" + length + b"\r\n", GET + HOST + b"X-B: c\r\n d\r\n" + length + b"\r\n"):
+            statuses, got = exchange(daemon, head + inner)
+            assert statuses == [400], (head, got)
+        # A head that comes in pieces, blanks around values, values without any.
+        head = GET + b"\r\n" .join([HOST.rstrip(), b"Accept:  */* \t", b"X-A:b", b"X-B:", b"X-C: " + b"c" * 9000]) + b"\r\n\r\n"
+        with socket.create_connection((daemon.host, daemon.port), timeout=20) as line:
+            for part in (head[:1], head[1:40], head[40:70], head[70:3000], head[3000:9050], head[9050:] + head + head[:50], head[50:]):
+                line.sendall(part)
+                time.sleep(0.02)
+            got = b""
+            while got.count(b"HTTP/1.1 200 OK") < 3:
+                got += line.recv(65536)
 
 
 def test_old_and_unusual_but_good_requests_are_served():
