@@ -33,8 +33,8 @@ SOURCES = ("test_openapi.py", "test_auth.py", "test_bad_requests.py", "test_cach
            "test_materials.py", "test_measurements.py", "test_metrics.py", "test_records.py", "test_sensitivity.py",
            "test_serving.py", "test_sweep.py")
 
-# The base path that test_serving.py gives its daemon; paths are taken with and without it.
-BASE = "/impactd"
+# The base paths that tests give their daemons; paths are taken with and without them.
+BASES = ("/impactd", "/a/v1/b")
 
 # On every answer, so that no operation names them.
 EVERYWHERE = {"content-type", "content-length", "date", "connection", "cache-control", "vary", "accept-ranges",
@@ -155,7 +155,10 @@ def template_of(path):
 
 def operation_of(method, path):
     """(path template, operation) that answers. None if there is none."""
-    template = template_of(urllib.parse.unquote(re.split("[?#]", path)[0]).removeprefix(BASE) or "/")
+    path = urllib.parse.unquote(re.split("[?#]", path)[0])
+    for base in BASES:
+        path = path.removeprefix(base)
+    template = template_of(path or "/")
     operation = DOCUMENT["paths"][template].get({"HEAD": "get"}.get(method, method.lower())) if template else None
     return (template, operation) if operation else None
 
