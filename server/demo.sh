@@ -77,7 +77,7 @@ jq -r '.impacts[:5][] | [.start, .side, .approach_speed, .separation_speed, .pea
 jq -r 'if .count > 5 then "  ... \(.count - 5) more" else empty end' "$work/impacts"
 echo
 jq -r '.summary | to_entries[] | select(.value != null) | [.key, .value] | @tsv' "$work/job" |
-    awk -F '\t' '{ printf "  %-20s %.9g\n", $1, $2 }'
+    awk -F '\t' '{ printf "  %-28s %.9g\n", $1, $2 }'
 echo
 echo "  PSD of the mean acceleration, where it is largest:"
 jq -r '[.frequency.values, .channels.mean_acceleration.values] | transpose | sort_by(-.[1])[:3] | sort_by(.[0])[] | @tsv' \
