@@ -35,7 +35,7 @@ static Status bundle_put_table(Zip *zip, const char *name, const TableFormat *fo
 static Status bundle_put_series(Zip *zip, TableStream *stream, Problem *problem) {
     Segments content = {.size = 0};
     TRY(table_stream_series(stream, problem));
-    Status status = format_npz.lay(&stream->table, &content, problem);
+    Status status = format_npz.layout(&stream->table, &content, problem);
     if (status == STATUS_OK)
         status = zip_put(zip, "series.npz", &content, problem);
     segments_clear(&content);

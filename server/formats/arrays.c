@@ -106,14 +106,14 @@ static void npy_put_header(Segments *segments, const char *type, size_t rows, si
     segments_put(segments, "\n", 1);
 }
 
-static Status npy_lay(const Table *table, Segments *segments, Problem *problem) {
+static Status npy_layout(const Table *table, Segments *segments, Problem *problem) {
     const bool has_axis = table->axis_name != NULL;
     (void)problem;
     npy_put_header(segments, "<f8", table->count, table->column_count + has_axis);
     if (has_axis)
-        table_lay_axis(table, segments);
+        table_layout_axis(table, segments);
     for (size_t c = 0; c < table->column_count; c++)
-        table_lay_column(table, c, 0, segments);
+        table_layout_column(table, c, 0, segments);
     return STATUS_OK;
 }
 
@@ -140,16 +140,16 @@ static Status npz_put(Zip *zip, const Table *table, bool is_axis, size_t c, Prob
         snprintf(type, sizeof type, "|S%zu", width);
     npy_put_header(&array, type, table->count, 0);
     if (is_axis)
-        table_lay_axis(table, &array);
+        table_layout_axis(table, &array);
     else
-        table_lay_column(table, c, width, &array);
+        table_layout_column(table, c, width, &array);
     snprintf(file, sizeof file, "%.74s.npy", column.name + (*column.name == '/'));
     const Status status = zip_put(zip, file, &array, problem);
     segments_clear(&array);
     return status;
 }
 
-static Status npz_lay(const Table *table, Segments *segments, Problem *problem) {
+static Status npz_layout(const Table *table, Segments *segments, Problem *problem) {
     Zip zip = {.segments = segments};
     Status status = table->axis_name != NULL ? npz_put(&zip, table, true, 0, problem) : STATUS_OK;
     for (size_t c = 0; c < table->column_count && status == STATUS_OK; c++)
@@ -162,14 +162,14 @@ const TableFormat format_npy = {
     .extension = "npy",
     .content_type = "application/x-npy",
     .is_binary = true,
-    .lay = npy_lay,
+    .layout = npy_layout,
 };
 
 const TableFormat format_npz = {
     .extension = "npz",
     .content_type = "application/x-npz",
     .is_binary = true,
-    .lay = npz_lay,
+    .layout = npz_layout,
 };
 
 // --- MATLAB ---
@@ -238,7 +238,7 @@ static Status mat_open_variable(Segments *segments, const char *name, size_t row
     return STATUS_OK;
 }
 
-static Status mat_lay(const Table *table, Segments *segments, Problem *problem) {
+static Status mat_layout(const Table *table, Segments *segments, Problem *problem) {
     char text[MAT_TEXT + 1];
     // No time of day: the same result is the same bytes.
     snprintf(text, sizeof text, "%-*s", MAT_TEXT, "MATLAB 5.0 MAT-file, written by impactd");
@@ -248,12 +248,12 @@ static Status mat_lay(const Table *table, Segments *segments, Problem *problem) 
     segments_put(segments, "IM", 2); // little-endian
     if (table->axis_name != NULL) {
         TRY(mat_open_variable(segments, table->axis_name, table->count, problem));
-        table_lay_axis(table, segments);
+        table_layout_axis(table, segments);
     }
     for (size_t c = 0; c < table->column_count; c++) {
         const char *name = table_column(table, c).name;
         TRY(mat_open_variable(segments, name + (*name == '/'), table->count, problem));
-        table_lay_column(table, c, 0, segments);
+        table_layout_column(table, c, 0, segments);
     }
     return STATUS_OK;
 }
@@ -262,5 +262,5 @@ const TableFormat format_mat = {
     .extension = "mat",
     .content_type = "application/x-matlab-data",
     .is_binary = true,
-    .lay = mat_lay,
+    .layout = mat_layout,
 };

@@ -111,8 +111,8 @@ const char *table_bare(const TableColumn *column, double value, size_t *length);
 
 // Appends the numbers of a column, its texts in `width` bytes each (0: as numbers), or the axis,
 // which there is.
-void table_lay_column(const Table *table, size_t column, size_t width, Segments *segments);
-void table_lay_axis(const Table *table, Segments *segments);
+void table_layout_column(const Table *table, size_t column, size_t width, Segments *segments);
+void table_layout_axis(const Table *table, Segments *segments);
 
 // Structs as columns by their Field rows, a row for each of `count` structs of `size` bytes. A
 // choice is its index, from 0; an absent member is NAN; texts and lists are left out. Cleared by
@@ -131,7 +131,7 @@ typedef struct TableFormat {
     bool is_binary;           // Range requests make sense
     // One of the two, or none where TableStream's segments are filled already. Binary: appends all
     // segments of the document ...
-    Status (*lay)(const Table *table, Segments *segments, Problem *problem);
+    Status (*layout)(const Table *table, Segments *segments, Problem *problem);
     // ... text: appends the next piece; false: it was the last one.
     bool (*next)(const Table *table, TextPlace *place, Bytes *bytes);
 } TableFormat;

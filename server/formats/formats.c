@@ -22,7 +22,7 @@ Status format_write(const TableFormat *format, const Table *table, Bytes *bytes,
         return STATUS_OK;
     }
     Segments segments = {0};
-    const Status status = format->lay(table, &segments, problem);
+    const Status status = format->layout(table, &segments, problem);
     if (status == STATUS_OK)
         segments_write(&segments, bytes);
     segments_clear(&segments);

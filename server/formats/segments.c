@@ -229,7 +229,7 @@ uint32_t segments_crc32(const Segments *segments) {
     return crc;
 }
 
-void table_lay_column(const Table *table, size_t column, size_t width, Segments *segments) {
+void table_layout_column(const Table *table, size_t column, size_t width, Segments *segments) {
     if (table->source != NULL)
         segments_cells(segments, table->source, column, width, table->count);
     else
@@ -237,7 +237,7 @@ void table_lay_column(const Table *table, size_t column, size_t width, Segments 
                         table->count);
 }
 
-void table_lay_axis(const Table *table, Segments *segments) {
+void table_layout_axis(const Table *table, Segments *segments) {
     if (table->axis != NULL)
         segments_values(segments, table_values(table, table->axis), table->count);
     else

@@ -175,8 +175,8 @@ Status table_stream_open(TableStream *stream, const TableFormat *format, Problem
     stream->format = format;
     if (format->next != NULL)
         stream->is_last = !format->next(&stream->table, &stream->place, &stream->piece);
-    else if (format->lay != NULL)
-        TRY(format->lay(&stream->table, &stream->segments, problem));
+    else if (format->layout != NULL)
+        TRY(format->layout(&stream->table, &stream->segments, problem));
     stream->until = stream->segments.size;
     TRY(table_stream_check(stream, problem));
     return stream->piece.is_failed || stream->segments.is_failed ? table_stream_no_memory(problem)

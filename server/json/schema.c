@@ -1,5 +1,5 @@
 // Every row becomes a property, in the order of the table. The schema is written without layout and
-// with a comma in front of each member; schema_lay_out drops the first commas and indents.
+// with a comma in front of each member; schema_indent drops the first commas and indents.
 #include "server/json/schema.h"
 
 #include "core/study/study.h"
@@ -275,7 +275,7 @@ static void schema_new_line(Bytes *bytes, int depth) {
 }
 
 // A member or object a line; a list of texts on one line.
-static void schema_lay_out(Bytes *bytes, const char *text) {
+static void schema_indent(Bytes *bytes, const char *text) {
     int depth = 0;
     bool is_in_text = false, is_in_line = false;
     for (const char *c = text; *c != '\0'; c++) {
@@ -318,6 +318,6 @@ void schema_write_document(Bytes *bytes, const SchemaDocument *document) {
     if (text.is_failed)
         bytes->is_failed = true;
     else
-        schema_lay_out(bytes, text.at);
+        schema_indent(bytes, text.at);
     bytes_clear(&text);
 }
