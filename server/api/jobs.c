@@ -349,22 +349,9 @@ static bool jobs_list_row(App *app, Bytes *bytes, const JobRow *row, int state,
     }
     if (state >= 0 && row->state != state)
         return false;
-    show = (JobView){.state = (JobState)row->state,
-                     .progress = row->state == JOB_SUCCESSFUL ? 100 : 0,
-                     .is_cached = row->is_cached,
-                     .created_unix_ms = row->created_unix_ms,
-                     .started_unix_ms = row->started_unix_ms,
-                     .finished_unix_ms = row->finished_unix_ms,
-                     .queued = row->queued,
-                     .run = row->run,
-                     .total = row->total,
-                     .problem = row->problem,
-                     .title = row->title,
-                     .labels = row->labels,
-                     .study = row->study,
-                     .client = row->client,
-                     .is_result_deleted = !row->has_result};
-    text_fit(show.id, sizeof show.id, row->id);
+    job_view_row(row, &show);
+    show.progress = row->state == JOB_SUCCESSFUL ? 100 : 0;
+    show.is_result_deleted = !row->has_result;
     text_fit(show.result, sizeof show.result, row->result);
     bytes_text(bytes, separator);
     job_json_put(bytes, &show, JOB_PUT_LINKS | JOB_PUT_SENDER); // borrows the row's texts

@@ -62,6 +62,9 @@ bool job_is_finished(Job *job);
 // Its sender, as in JobView; lives as long as the job.
 const char *job_client(const Job *job);
 Status job_view(Job *job, JobView *view);
+struct JobRow;
+// What a row alone states: without result, progress and warnings. Borrows its texts.
+void job_view_row(const struct JobRow *row, JobView *view);
 void job_view_clear(JobView *view);
 // Its state and, in *progress, percent: cheap enough to be called often.
 JobState job_peek(Job *job, double *progress);

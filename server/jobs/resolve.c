@@ -237,7 +237,7 @@ static void material_fill_test(BufferTest *test, const Material *material) {
 static Status material_warn(const MaterialRevision *found, const char *name, const char *pointer,
                             Warnings *warnings) {
     if (strcmp(found->status, "draft") == 0)
-        return warnings_add(warnings, pointer, "%s is a draft that nobody has approved", name);
+        return warnings_add(warnings, pointer, "%s is a draft that has not been approved", name);
     if (strcmp(found->status, "deprecated") != 0)
         return STATUS_OK;
     char reason[200] = "";

@@ -24,9 +24,7 @@ static void job_view_progress(const Job *job, JobView *view) {
     }
 }
 
-Status job_view(Job *job, JobView *view) {
-    job_lock(job);
-    const JobRow *row = &job->row;
+void job_view_row(const JobRow *row, JobView *view) {
     *view = (JobView){.state = (JobState)row->state,
                       .is_cached = row->is_cached,
                       .created_unix_ms = row->created_unix_ms,
@@ -34,8 +32,19 @@ Status job_view(Job *job, JobView *view) {
                       .finished_unix_ms = row->finished_unix_ms,
                       .queued = row->queued,
                       .run = row->run,
-                      .total = row->total};
+                      .total = row->total,
+                      .problem = row->problem,
+                      .title = row->title,
+                      .labels = row->labels,
+                      .study = row->study,
+                      .client = row->client};
     text_fit(view->id, sizeof view->id, row->id);
+}
+
+Status job_view(Job *job, JobView *view) {
+    job_lock(job);
+    const JobRow *row = &job->row;
+    job_view_row(row, view);
     if (row->state == JOB_SUCCESSFUL) {
         text_fit(view->result, sizeof view->result, row->result);
         view->is_result_deleted = job->manager == NULL && !row->has_result;

@@ -105,7 +105,7 @@ def test_warnings_of_drafts_follow_what_is_thought_now():
     """A job on a draft is warned, and so is its result for ever; once it is approved the same body is answered without the warning."""
     with program.daemon() as daemon:
         add(daemon, "felt", "draft")
-        draft = "felt@1 is a draft that nobody has approved"
+        draft = "felt@1 is a draft that has not been approved"
         for _ in range(3):  # computed, cached, known by its bytes
             job = program.finished(daemon, scene("felt"))
             assert draft in warned(job, "/dampers/0/buffer"), job["warnings"]

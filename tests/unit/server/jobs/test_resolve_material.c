@@ -193,7 +193,7 @@ TEST_IN(a_name_alone_is_the_approved_head_and_never_a_deprecated_one, set_up, te
     resolve_well("\"buffer\": \"foam\"", "");
     assert_string_equal(damper()->buffer.material, "foam@1");
     assert_int_equal(warnings.count, 1);
-    assert_string_equal(warnings.at[0].detail, "foam@1 is a draft that nobody has approved");
+    assert_string_equal(warnings.at[0].detail, "foam@1 is a draft that has not been approved");
     review("foam", 1, "approved");
     say("foam", SAID("\"restitution\": 0.6"));
     resolve_well("\"buffer\": \"foam\"", "");
