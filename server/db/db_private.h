@@ -54,14 +54,21 @@ __attribute__((format(printf, 8, 9))) Status db_get(Db *db, const char *sql, con
 
 atomic_uint_fast64_t *db_evictions(Db *db); // of series
 
-typedef struct RecordMemory RecordMemory; // samples of records, each once
-RecordMemory *record_memory_new(void);    // NULL without memory
-void record_memory_free(RecordMemory *memory);
-RecordMemory *db_record_memory(Db *db);
-// A reference to the record of that name and digest, or NULL.
-struct NamedRecord *record_memory_find(RecordMemory *memory, const char *name, const char *digest);
-// Adds it, or frees it where the same record is there already; returns a reference to that.
-struct NamedRecord *record_memory_add(RecordMemory *memory, struct NamedRecord *named);
+// Objects that were read once and are shared, by key: samples of records, revisions of materials.
+enum { SHARED_KEY_SIZE = 160 };
+typedef struct SharedCache SharedCache;
+SharedCache *shared_cache_new(size_t max_bytes); // NULL without memory
+void shared_cache_free(SharedCache *cache);
+void shared_cache_clear(SharedCache *cache);
+// A reference, or NULL. *generation is for shared_cache_add.
+Refcount *shared_cache_find(SharedCache *cache, const char *key, uint64_t *generation);
+// Adds `object`, or removes the reference to it where an object of that key is there already;
+// returns a reference to the object to use. Nothing is added if the cache was emptied since
+// `generation` was found, for `object` may be out of date.
+Refcount *shared_cache_add(SharedCache *cache, const char *key, uint64_t generation,
+                           Refcount *object, size_t bytes);
+typedef enum DbCache { CACHE_RECORDS, CACHE_MATERIALS, CACHE_COUNT } DbCache;
+SharedCache *db_cache(Db *db, DbCache which);
 
 // Within a transaction:
 

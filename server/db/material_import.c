@@ -635,5 +635,7 @@ Status db_material_import(Db *db, MaterialImport *import, bool is_dry, ImportTal
     if (is_dry || problem->count > 0)
         return db_read(db, import_apply, &context, problem);
     context.writes = true;
-    return db_write(db, import_apply, &context, problem);
+    const Status status = db_write(db, import_apply, &context, problem);
+    shared_cache_clear(db_cache(db, CACHE_MATERIALS));
+    return status;
 }

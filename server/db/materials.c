@@ -3,6 +3,7 @@
 #include "server/db/materials.h"
 
 #include <pthread.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -205,6 +206,18 @@ Status material_lists_read(MaterialRevision *revision, Problem *problem) {
     return status;
 }
 
+static int64_t length(const char *text) {
+    return text != NULL ? (int64_t)strlen(text) : 0;
+}
+
+static int64_t texts_length(const Material *material) {
+    int64_t bytes = 0;
+    for (const Field *field = material_fields; field->kind != FIELD_KIND_END; field++)
+        if (field->kind == FIELD_KIND_TEXT)
+            bytes += length(*(char *const *)((const char *)material + field->offset));
+    return bytes;
+}
+
 // Reading.
 
 // Not by the view: SQLite would make all its rows for the join.
@@ -265,6 +278,43 @@ Status db_material(Db *db, const char *slug, uint64_t revision, MaterialRevision
                  material_revision_columns(), material, &is_found, problem));
     return is_found ? material_lists_read(material, problem)
                     : error_no_revision(db, slug, revision, problem);
+}
+
+static void shared_revision_free(Refcount *refcount) {
+    SharedRevision *shared = (SharedRevision *)(void *)refcount;
+    material_revision_clear(&shared->revision);
+    free(shared);
+}
+
+// 2 us instead of 50 us. The cache is emptied after every write of materials: only the process that
+// has the folder writes them.
+Status db_material_shared(Db *db, const char *slug, uint64_t revision, SharedRevision **shared,
+                          Problem *problem) {
+    SharedCache *cache = db_cache(db, CACHE_MATERIALS);
+    char key[SHARED_KEY_SIZE];
+    uint64_t generation;
+    snprintf(key, sizeof key, "%.128s@%llu", slug, (unsigned long long)revision);
+    *shared = (SharedRevision *)(void *)shared_cache_find(cache, key, &generation);
+    if (*shared != NULL)
+        return STATUS_OK;
+    SharedRevision *made = calloc(1, sizeof *made);
+    if (made == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a material");
+    made->refcount = (Refcount){.count = 1, .free = shared_revision_free};
+    const Status status = db_material(db, slug, revision, &made->revision, problem);
+    if (status != STATUS_OK) {
+        refcount_unref(&made->refcount);
+        return status;
+    }
+    const Material *material = &made->revision.material;
+    const size_t bytes = sizeof *made + (size_t)texts_length(material) +
+                         material->table.count * sizeof *material->table.at +
+                         material->measurements.count * sizeof *material->measurements.at +
+                         (size_t)(length(made->revision.comment) + length(made->revision.reason)) +
+                         1000; // tags and short texts
+    *shared =
+        (SharedRevision *)(void *)shared_cache_add(cache, key, generation, &made->refcount, bytes);
+    return STATUS_OK;
 }
 
 Status db_material_slugs(Db *db, Texts *slugs, Problem *problem) {
@@ -399,10 +449,6 @@ typedef struct Room {
 } Room;
 static const SqlColumn room_columns[] = {COLUMN(Room, bytes), COLUMN(Room, max), COLUMN_END};
 
-static int64_t length(const char *text) {
-    return text != NULL ? (int64_t)strlen(text) : 0;
-}
-
 // Counts a row with that many bytes of texts, in the transaction that adds it.
 static Status room_reserve(Sqlite *database, int64_t bytes, Problem *problem) {
     enum { ROW = 200 };
@@ -457,11 +503,8 @@ Status material_revision_add(Sqlite *database, const MaterialRevision *revision,
         }
     }
     stored.lists = lists.at;
-    int64_t bytes = length(stored.lists) + length(stored.comment);
-    for (const Field *field = material_fields; field->kind != FIELD_KIND_END; field++)
-        if (field->kind == FIELD_KIND_TEXT)
-            bytes += length(*(char *const *)((const char *)material + field->offset));
-    Status status = room_reserve(database, bytes, problem);
+    Status status = room_reserve(
+        database, length(stored.lists) + length(stored.comment) + texts_length(material), problem);
     if (status == STATUS_OK)
         status = sqlite_change(database, sql, material_revision_columns(), &stored, NULL, problem);
     bytes_clear(&lists);
@@ -573,24 +616,27 @@ static Status material_apply(Sqlite *database, const void *work, Problem *proble
     return audit_entry_add(database, &entry, problem);
 }
 
+static Status material_write(Db *db, const MaterialWrite *write, Problem *problem) {
+    const Status status = db_write(db, material_apply, write, problem);
+    shared_cache_clear(db_cache(db, CACHE_MATERIALS));
+    return status;
+}
+
 Status db_material_add(Db *db, MaterialRevision *first, Problem *problem) {
-    return db_write(db, material_apply, &(MaterialWrite){.revision = first, .is_first = true},
-                    problem);
+    return material_write(db, &(MaterialWrite){.revision = first, .is_first = true}, problem);
 }
 
 Status db_material_revise(Db *db, MaterialRevision *revision, uint64_t version, Problem *problem) {
-    return db_write(db, material_apply, &(MaterialWrite){.revision = revision, .version = version},
-                    problem);
+    return material_write(db, &(MaterialWrite){.revision = revision, .version = version}, problem);
 }
 
 Status db_material_review(Db *db, const MaterialReview *review, uint64_t version,
                           Problem *problem) {
-    return db_write(db, material_apply, &(MaterialWrite){.review = review, .version = version},
-                    problem);
+    return material_write(db, &(MaterialWrite){.review = review, .version = version}, problem);
 }
 
 Status db_material_measure(Db *db, MaterialMeasurement *measurement, uint64_t version,
                            Problem *problem) {
-    return db_write(db, material_apply,
-                    &(MaterialWrite){.measurement = measurement, .version = version}, problem);
+    return material_write(db, &(MaterialWrite){.measurement = measurement, .version = version},
+                          problem);
 }

@@ -44,6 +44,14 @@ Status db_material_state(Db *db, const char *slug, MaterialState *state, Problem
 // also if all are deprecated. `material` is cleared by the caller in any case.
 Status db_material(Db *db, const char *slug, uint64_t revision, MaterialRevision *material,
                    Problem *problem);
+// A revision that several share, read once while no material changes. To be given to
+// refcount_unref(&shared->refcount).
+typedef struct SharedRevision {
+    Refcount refcount;
+    MaterialRevision revision;
+} SharedRevision;
+Status db_material_shared(Db *db, const char *slug, uint64_t revision, SharedRevision **shared,
+                          Problem *problem);
 // The slugs of all materials, by name.
 Status db_material_slugs(Db *db, Texts *slugs, Problem *problem);
 void material_slugs_clear(Texts *slugs);

@@ -186,19 +186,24 @@ static Status record_read_samples(Db *db, const RecordRow *row, Reals *samples, 
 }
 
 Status db_record_named(Db *db, const char *name, NamedRecord **named, Problem *problem) {
-    RecordMemory *memory = db_record_memory(db);
+    SharedCache *cache = db_cache(db, CACHE_RECORDS);
+    char key[SHARED_KEY_SIZE];
+    uint64_t generation;
     RecordRow row;
     Reals samples;
     *named = NULL;
     Status status = db_record(db, name, &row, problem);
-    if (status == STATUS_OK)
-        *named = record_memory_find(memory, name, row.digest);
+    if (status == STATUS_OK) {
+        snprintf(key, sizeof key, "%.64s %.64s", row.name, row.digest);
+        *named = (NamedRecord *)(void *)shared_cache_find(cache, key, &generation);
+    }
     if (status == STATUS_OK && *named == NULL) {
         status = record_read_samples(db, &row, &samples, problem);
         if (status == STATUS_OK)
             *named = named_record_new(row.name, row.digest, row.interval, &samples);
         if (*named != NULL)
-            *named = record_memory_add(memory, *named);
+            *named = (NamedRecord *)(void *)shared_cache_add(
+                cache, key, generation, &(*named)->shared, row.count * sizeof(double));
         else if (status == STATUS_OK)
             status = problem_set(problem, STATUS_NO_MEMORY, "no memory for a record");
     }

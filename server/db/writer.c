@@ -25,7 +25,7 @@
 #include "server/util/clock.h"
 #include "server/util/embedded.h"
 
-enum { READERS = 4 };
+enum { READERS = 4, RECORDS_BYTES = 64 << 20, MATERIALS_BYTES = 1 << 20 };
 
 typedef struct WriteQueue {
     PendingWrite *first, **last;
@@ -40,7 +40,7 @@ typedef struct WriteWaiter {
 
 struct Db {
     int lock_file;
-    RecordMemory *records;
+    SharedCache *caches[CACHE_COUNT];
     atomic_uint_fast64_t evictions; // of series
     PendingWrite probe;             // of db_is_writable
     atomic_bool is_probing;
@@ -294,8 +294,9 @@ static Status db_open_at(const char *directory, bool is_beside, Db **db, Problem
     pthread_cond_init(&made->some, NULL);
     pthread_mutex_init(&made->queue_lock, NULL);
     pthread_cond_init(&made->wake, NULL);
-    made->records = record_memory_new();
-    Status status = made->records == NULL
+    made->caches[CACHE_RECORDS] = shared_cache_new(RECORDS_BYTES);
+    made->caches[CACHE_MATERIALS] = shared_cache_new(MATERIALS_BYTES);
+    Status status = made->caches[CACHE_RECORDS] == NULL || made->caches[CACHE_MATERIALS] == NULL
                         ? problem_set(problem, STATUS_NO_MEMORY, "no memory for the database")
                     : directory != NULL ? db_open_files(made, directory, is_beside, problem)
                                         : db_open_memory(made, problem);
@@ -335,7 +336,8 @@ void db_close(Db *db) {
     // The last one to close moves the journal into the database.
     sqlite_close(db->own);
     data_dir_unlock(db->lock_file);
-    record_memory_free(db->records);
+    for (size_t i = 0; i < CACHE_COUNT; i++)
+        shared_cache_free(db->caches[i]);
     pthread_cond_destroy(&db->wake);
     pthread_mutex_destroy(&db->queue_lock);
     pthread_cond_destroy(&db->some);
@@ -373,8 +375,8 @@ atomic_uint_fast64_t *db_evictions(Db *db) {
     return &db->evictions;
 }
 
-RecordMemory *db_record_memory(Db *db) {
-    return db->records;
+SharedCache *db_cache(Db *db, DbCache which) {
+    return db->caches[which];
 }
 
 bool db_is_private(const Db *db) {

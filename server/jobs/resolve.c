@@ -285,17 +285,18 @@ static Status resolve_buffer(Db *db, Buffer *buffer, const char *pointer, Warnin
                              Problem *problem) {
     char slug[128];
     uint64_t revision;
-    MaterialRevision found = {0};
+    SharedRevision *found = NULL;
     if (buffer->material == NULL)
         return STATUS_OK;
     if (!material_split_name(buffer->material, slug, &revision))
         return material_refuse_unknown(db, buffer->material, buffer->material, pointer, problem);
-    Status status = db_material(db, slug, revision, &found, NULL);
+    Status status = db_material_shared(db, slug, revision, &found, NULL);
     if (status == STATUS_OK)
-        status = material_fill(buffer, &found, pointer, warnings, problem);
+        status = material_fill(buffer, &found->revision, pointer, warnings, problem);
     else if (status == STATUS_NOT_FOUND)
         status = material_refuse(db, buffer->material, slug, revision, pointer, problem);
-    material_revision_clear(&found);
+    if (found != NULL)
+        refcount_unref(&found->refcount);
     if (status != STATUS_OK && status != STATUS_INVALID)
         problem_set(problem, status, "the material \"%.80s\" could not be looked up", slug);
     return status;

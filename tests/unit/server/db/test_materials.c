@@ -127,6 +127,32 @@ TEST_IN(no_sql_changes_a_stored_row, make_folder, remove_folder) {
     sqlite_close(database);
 }
 
+// A revision is read once as long as no material changes; a reference outlives the change.
+TEST(shared_revisions_are_read_again_after_a_write) {
+    Db *db = felt_store(NULL);
+    MaterialRevision one = felt_saying(0.5), two = felt_saying(0.7);
+    SharedRevision *head = NULL, *again = NULL;
+    assert_int_equal(db_material_shared(db, "felt", 0, &head, NULL), STATUS_NOT_FOUND);
+    assert_null(head);
+    assert_int_equal(db_material_add(db, &one, NULL), STATUS_OK);
+    assert_int_equal(db_material_shared(db, "felt", 0, &head, NULL), STATUS_OK);
+    assert_int_equal(db_material_shared(db, "felt", 0, &again, NULL), STATUS_OK);
+    assert_ptr_equal(head, again);
+    refcount_unref(&again->refcount);
+    assert_int_equal(db_material_revise(db, &two, ANY_VERSION, NULL), STATUS_OK);
+    assert_int_equal(db_material_shared(db, "felt", 0, &again, NULL), STATUS_OK);
+    assert_int_equal(again->revision.revision, 2);
+    refcount_unref(&again->refcount);
+    assert_int_equal(felt_review(db, 1, "approved", NULL, ANY_VERSION), STATUS_OK);
+    assert_int_equal(db_material_shared(db, "felt", 0, &again, NULL), STATUS_OK);
+    assert_int_equal(again->revision.revision, 1);
+    assert_string_equal(again->revision.status, "approved");
+    assert_string_equal(head->revision.status, "draft");
+    refcount_unref(&again->refcount);
+    db_close(db);
+    refcount_unref(&head->refcount);
+}
+
 static Status apply_sql(Sqlite *database, const void *sql, Problem *problem) {
     return sqlite_execute(database, sql, problem);
 }

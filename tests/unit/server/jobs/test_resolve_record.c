@@ -145,7 +145,7 @@ TEST(a_sweep_holds_only_so_many_samples) {
     StudyRequest inquiry;
     for (size_t i = 0; i < COUNT(large); i++) {
         Reals samples;
-        char name[8], digest[RECORD_DIGEST_SIZE], sql[400];
+        char name[8], digest[RECORD_DIGEST_SIZE], sql[400], key[SHARED_KEY_SIZE];
         snprintf(name, sizeof name, "large%zu", i);
         snprintf(digest, sizeof digest, "%064zu", i);
         snprintf(sql, sizeof sql,
@@ -155,8 +155,9 @@ TEST(a_sweep_holds_only_so_many_samples) {
                  name, RECORD_SAMPLES, digest);
         assert_int_equal(db_write(db, apply_sql, sql, &problem), STATUS_OK);
         assert_true(reals_allocate(&samples, RECORD_SAMPLES)); // never written
-        large[i] =
-            record_memory_add(db_record_memory(db), named_record_new(name, digest, 1, &samples));
+        large[i] = named_record_new(name, digest, 1, &samples);
+        snprintf(key, sizeof key, "%s %s", name, digest);
+        (void)shared_cache_add(db_cache(db, CACHE_RECORDS), key, 0, &large[i]->shared, 1 << 27);
     }
     assert_int_equal(prepare("\"name\": \"a\"",
                              "{\"kind\": \"sweep\", \"axes\": [{\"pointer\": "
