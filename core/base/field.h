@@ -119,7 +119,8 @@ enum {
     // Does not affect results (title, labels): omitted from the canonical form.
     FIELD_NOTE = 1,
     // ITEM: JSON null is allowed and makes every member absent (fields_clear). TEXT: JSON null is
-    // allowed and means "", which is not absent and is written as null.
+    // allowed and means "", which is not absent and is written as null. TEXTS: JSON null is allowed
+    // and means an empty list.
     FIELD_NULL_IS_EMPTY = 2,
     // TEXTS: a JSON object of strings is also allowed and stored as "key=value".
     FIELD_PAIRS = 4,

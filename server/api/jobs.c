@@ -265,7 +265,7 @@ static Status require_own(App *app, const Request *request, const char *id, Prob
     return status;
 }
 
-// The body has two members of a scene, by the same rows; null removes the title.
+// The body has two members of a scene, by the same rows; null removes either.
 Status jobs_change(App *app, const Request *request, Reply *reply, Problem *problem) {
     Field rows[] = {*fields_find(simulation_fields, "title", NULL),
                     *fields_find(simulation_fields, "labels", NULL), FIELD_END};
@@ -273,6 +273,7 @@ Status jobs_change(App *app, const Request *request, Reply *reply, Problem *prob
     Job *job = NULL;
     const char *id = request->parameters[0];
     rows[0].flags |= FIELD_NULL_IS_EMPTY;
+    rows[1].flags |= FIELD_NULL_IS_EMPTY;
     problem->whose = "change";
     TRY(request_require_json(request, problem));
     TRY(require_own(app, request, id, problem));

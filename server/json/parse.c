@@ -345,9 +345,10 @@ static void decode_list(Decoder *decoder, const json_t *value, const Field *fiel
     };
     const bool takes_number = (field->flags & FIELD_LONE) != 0;
     const bool takes_object = (field->flags & FIELD_PAIRS) != 0;
+    const bool is_null = json_is_null(value) && (field->flags & FIELD_NULL_IS_EMPTY) != 0;
     const bool is_number = takes_number && json_is_number(value);
     const bool is_object = takes_object && json_is_object(value);
-    if (!json_is_array(value) && !is_number && !is_object) {
+    if (!json_is_array(value) && !is_number && !is_object && !is_null) {
         decode_wrong_type(decoder, pointer, value, field,
                           takes_number   ? "a number or an array of numbers"
                           : takes_object ? "an array or an object of strings"

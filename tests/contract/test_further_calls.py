@@ -145,7 +145,8 @@ def test_a_title_belongs_to_a_job():
         assert found("label=b") == found("label=a") == found("q=leitung") == [sent[0]["id"]] == found("q=b%3Dc")
         for body, title, labels in (({}, "Überlandleitung", ["a", "b=c"]), ({"title": None}, None, ["a", "b=c"]),
                                     ({"labels": []}, None, None), ({"title": "x", "labels": {"k": "v"}}, "x", ["k=v"]),
-                                    ({"title": "", "labels": []}, None, None), ({"labels": ["only"]}, None, ["only"])):
+                                    ({"title": "", "labels": []}, None, None), ({"title": "y", "labels": ["z"]}, "y", ["z"]),
+                                    ({"labels": None}, "y", None), ({"title": None}, None, None), ({"labels": ["only"]}, None, ["only"])):
             shown = change(first, body).json()
             assert (shown.get("title"), shown.get("labels")) == (title, labels), (body, shown)
         assert found("q=only") == [sent[0]["id"]]
