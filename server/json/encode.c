@@ -185,7 +185,10 @@ int encode_problem_code(Status status) {
 }
 
 void encode_problem(Bytes *bytes, const Problem *problem, int status_code, const char *instance) {
-    bytes_format(bytes, "{\"type\": \"/problems/%s\", \"title\": ", status_slug(problem->status));
+    // The type of faults is the scene's alone; those of other documents are a bad request's.
+    const bool is_other = problem->status == STATUS_INVALID && problem->whose != NULL;
+    bytes_format(bytes, "{\"type\": \"/problems/%s\", \"title\": ",
+                 status_slug(is_other ? STATUS_USAGE : problem->status));
     if (problem->status == STATUS_INVALID && problem->count > 0)
         bytes_format(bytes, "\"The %s has %zu fault%s\"",
                      problem->whose != NULL ? problem->whose : "scene", problem->count,

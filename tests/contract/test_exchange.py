@@ -295,6 +295,7 @@ def test_faults_beyond_a_hundred_are_counted():
     with program.daemon() as daemon:
         told = problem(bring(daemon, table_of(rows)), 422)
         assert len(told["errors"]) == 100 and told["more"] == 50 and told["title"] == "The file has 150 faults", told["title"]
+        assert told["type"] == "/problems/bad-request", told["type"]
         assert told["detail"].startswith("row 2, column restitution: "), told["detail"]
         text = export(daemon)
         told = problem(bring(daemon, text[:-40]), 400)

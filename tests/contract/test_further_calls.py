@@ -159,7 +159,8 @@ def test_a_title_belongs_to_a_job():
         assert [(job["title"], job["labels"]) for job in listed] == [("very slow", ["x"])] * 2, listed
         for job in running:
             assert daemon.request("DELETE", job["links"]["self"]).json()["title"] == "very slow"
-        problem(change(first, {"title": 1, "label": []}), 422, "/title", "/label")
+        faulty = problem(change(first, {"title": 1, "label": []}), 422, "/title", "/label")
+        assert (faulty["type"], faulty["title"]) == ("/problems/bad-request", "The change has 2 faults"), faulty
         problem(change(first, {"title": "x" * 300, "labels": ["x\ny"] * 40}), 422)
         problem(change(first, ["title"]), 422)
         problem(change("/v1/jobs/j-none", {"title": "x"}), 404)

@@ -148,6 +148,16 @@ TEST(problems_are_problem_documents) {
                  " \"did_you_mean\": \"structure\", \"row\": 3, \"column\": \"name\"}]}");
     bytes_clear(&text);
     problem_clear(&problem);
+    problem.whose = "material";
+    problem_add(&problem, STATUS_INVALID, "/name", "is required");
+    encode_problem(&text, &problem, 422, NULL);
+    assert_string_equal(
+        text.at, "{\"type\": \"/problems/bad-request\", \"title\": \"The material has 1 fault\","
+                 " \"status\": 422, \"detail\": \"/name: is required\","
+                 " \"errors\": [{\"pointer\": \"/name\", \"value\": null,"
+                 " \"detail\": \"is required\"}]}");
+    bytes_clear(&text);
+    problem_clear(&problem);
     problem_set(&problem, STATUS_NOT_FOUND, "no job \"%s\"", "j-1");
     encode_problem(&text, &problem, 404, "/v1/jobs/j-1");
     assert_string_equal(text.at, "{\"type\": \"/problems/not-found\", \"title\": \"Not found\","
