@@ -295,33 +295,35 @@ char option_spell(const Field *fields, const Field *row, char name[OPTION_NAME])
     return is_first ? row->name[0] : '\0';
 }
 
-static void value_print(const Field *row, const void *item, FILE *file) {
+void option_value(const Field *row, const void *item, Bytes *text) {
     const void *at = (const char *)item + row->offset;
     if (row->kind == FIELD_KIND_REAL)
-        fputs(real_text(*(const double *)at).at, file);
+        bytes_text(text, real_text(*(const double *)at).at);
     else if (row->kind == FIELD_KIND_COUNT)
-        fprintf(file, "%llu", (unsigned long long)*(const uint64_t *)at);
+        bytes_format(text, "%llu", (unsigned long long)*(const uint64_t *)at);
     else if (row->kind == FIELD_KIND_FLAG)
-        fputs(*(const bool *)at ? "true" : "false", file);
+        bytes_text(text, json_flag(*(const bool *)at));
     else if (row->kind == FIELD_KIND_CHOICE)
-        fputs(row->choices[*(const int *)at], file);
+        bytes_text(text, row->choices[*(const int *)at]);
     else if (row->kind == FIELD_KIND_TEXTS)
         for (size_t i = 0; i < ((const Texts *)at)->count; i++)
-            fprintf(file, "%s%s", i > 0 ? ", " : "", ((const Texts *)at)->at[i]);
+            bytes_format(text, "%s%s", i > 0 ? ", " : "", ((const Texts *)at)->at[i]);
     else
-        fputs(*(char *const *)at, file);
+        bytes_text(text, *(char *const *)at);
 }
 
 void options_print(const Field *fields, const void *item, const Options *options, FILE *file) {
     static const char *const origins[] = {"default", "file", "environment", "flag"};
     for (const Field *row = fields; row->kind != FIELD_KIND_END; row++) {
         const bool is_set = row->kind == FIELD_KIND_FLAG || !field_is_absent(row, item);
-        // "config" and "print_config" are not settings of a file.
-        fprintf(file, "%s%s = ", is_set && strstr(row->name, "config") == NULL ? "" : "# ",
-                row->name);
+        Bytes value = {0};
         if (is_set)
-            value_print(row, item, file);
-        fprintf(file, "  # %s\n", origins[options->origins[row - fields]]);
+            option_value(row, item, &value);
+        // "config" and "print_config" are not settings of a file.
+        fprintf(file, "%s%s = %s  # %s\n",
+                is_set && strstr(row->name, "config") == NULL ? "" : "# ", row->name,
+                value.at != NULL ? value.at : "", origins[options->origins[row - fields]]);
+        bytes_clear(&value);
     }
 }
 

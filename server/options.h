@@ -6,6 +6,7 @@
 #include <stdio.h>
 
 #include "core/base/field.h"
+#include "server/util/bytes.h"
 
 enum { OPTIONS_ROWS = 96, OPTIONS_OPERANDS = 8 };
 
@@ -30,6 +31,8 @@ typedef struct Options {
 Status options_read(const Field *fields, void *item, int argc, char *const *argv,
                     const char *prefix, Options *options, Problem *problem);
 
+// Appends the value of a row as it is given to an option.
+void option_value(const Field *row, const void *item, Bytes *text);
 // One line per row in the format of the file, with the origin of the value as a comment.
 void options_print(const Field *fields, const void *item, const Options *options, FILE *file);
 

@@ -31,7 +31,8 @@ struct Command {
     const char *environment;   // prefix of the variables that set options; NULL: none
     // `settings` holds the options; it is cleared by the caller. Returns the exit code.
     int (*run)(const Command *self, void *settings, const Options *options, Problem *problem);
-    const struct ApiAction *actions; // of a command that asks a server; ends with a NULL name
+    const struct ApiAction *actions;   // of a command that asks a server; ends with a NULL name
+    const struct PrintTableView *view; // of its answers as tables; NULL: they are JSON
 };
 
 // Each is in the file of its name or of its resource: jobs.c, records.c, study.c.

@@ -11,56 +11,60 @@
 static const double poll_period = 0.5;                  // [s] between two requests for a job
 static const int64_t restart_ns = (int64_t)10000000000; // time that a server may take to restart
 
+static const char *job_text(const ApiCall *call, const char *name) {
+    return json_get_text(call->reply, name);
+}
+
 // Reads the answer, which must be a job.
 static Status job_read(ApiCall *call, Problem *problem) {
-    const ApiReply *job = api_reply(call);
-    return job->id != NULL && job->status != NULL && strlen(job->status) <= 40 && api_is_id(job->id)
+    (void)api_reply(call);
+    const char *id = job_text(call, "id"), *status = job_text(call, "status");
+    return id != NULL && api_is_id(id) && status != NULL && strlen(status) <= 40
                ? STATUS_OK
                : api_unexpected("a job", problem);
 }
 
-static bool job_is_final(const ApiReply *job) {
-    return strcmp(job->status, "accepted") != 0 && strcmp(job->status, "running") != 0;
+static bool job_is_final(const ApiCall *call) {
+    const char *status = job_text(call, "status");
+    return strcmp(status, "accepted") != 0 && strcmp(status, "running") != 0;
 }
 
 // Requests a job; the server answers after `wait` seconds at the latest, or when the job ends.
 static Status job_get(ApiCall *call, const char *id, double wait, Problem *problem) {
-    TRY(api_get(call,
-                api_path("/v1/jobs/%s?wait=%.3f", id, fmin(wait, api_client_left(&call->client))),
-                problem));
+    TRY(api_get(call, api_path("/v1/jobs/%s?wait=%.3f", id, fmin(wait, api_left(call))), problem));
     return job_read(call, problem);
 }
 
 // STATUS_OK if the job was successful; otherwise the cause is in `problem`.
-static Status job_verdict(const ApiReply *job, Problem *problem) {
-    if (strcmp(job->status, "successful") == 0)
+static Status job_verdict(const ApiCall *call, Problem *problem) {
+    const char *status = job_text(call, "status");
+    if (strcmp(status, "successful") == 0)
         return STATUS_OK;
-    if (strcmp(job->status, "failed") == 0)
-        problem_reply_put(&job->problem, STATUS_INTERNAL, problem);
-    else
-        (void)problem_set(problem, STATUS_INTERNAL, "was %s", job->status);
+    if (strcmp(status, "failed") != 0)
+        return problem_set(problem, STATUS_INTERNAL, "was %s", status);
+    api_add_faults(json_get_object(call->reply, "problem"), STATUS_INTERNAL, problem);
     return STATUS_INTERNAL;
 }
 
 // The result of `id`: itself, or that of a job that finishes while the wait lasts. STATUS_TIMEOUT:
 // the job continues.
 static Status job_result(ApiCall *call, const char *id, char result[96], Problem *problem) {
-    const ApiReply *job = &call->reply;
     snprintf(result, 96, "%s", id);
     if (strncmp(id, "j-", 2) != 0)
         return STATUS_OK;
     do
         TRY(job_get(call, id, 20, problem));
-    while (!job_is_final(job) && api_client_left(&call->client) > 0);
-    if (!job_is_final(job))
+    while (!job_is_final(call) && api_left(call) > 0);
+    if (!job_is_final(call))
         return problem_set(problem, STATUS_TIMEOUT,
                            "is still %s; \"impactd watch %s\" follows it, --wait S waits",
-                           job->status, id);
-    if (job->result == NULL)
-        TRY(job_verdict(job, problem));
-    if (job->result == NULL || !api_is_id(job->result))
+                           job_text(call, "status"), id);
+    const char *made = job_text(call, "result");
+    if (made == NULL)
+        TRY(job_verdict(call, problem));
+    if (made == NULL || !api_is_id(made))
         return api_unexpected("a job with a result", problem);
-    snprintf(result, 96, "%s", job->result);
+    snprintf(result, 96, "%s", made);
     return STATUS_OK;
 }
 
@@ -73,26 +77,27 @@ typedef struct JobProgress {
     double progress;
 } JobProgress;
 
-static void job_progress_show(JobProgress *show, const char *id, const ApiReply *job) {
-    const double progress = job->progress >= 0 && job->progress <= 100 ? job->progress : 0;
+static void job_progress_show(JobProgress *show, const char *id, const ApiCall *call) {
+    const double percent = json_get_number(call->reply, "progress");
+    const double progress = percent >= 0 && percent <= 100 ? percent : 0;
+    const char *status = job_text(call, "status");
     if (show->bar.is_terminal) {
         const Progress watch = progress_bar_watch(&show->bar);
         (void)progress_advance(&watch, progress / 100);
         return;
     }
     if (show->lines == NULL ||
-        (strcmp(show->status, job->status) == 0 && progress < show->progress + 10))
+        (strcmp(show->status, status) == 0 && progress < show->progress + 10))
         return;
-    snprintf(show->status, sizeof show->status, "%s", job->status);
+    snprintf(show->status, sizeof show->status, "%s", status);
     show->progress = progress;
-    fprintf(show->lines, "%s %s %.0f %%\n", id, job->status, progress);
+    fprintf(show->lines, "%s %s %.0f %%\n", id, status, progress);
     fflush(show->lines);
 }
 
 // Follows a job to its end. STATUS_TIMEOUT when the wait is over: the job continues. The call's
 // answer and reply have the last state. A server that has answered once may be restarted meanwhile.
 static Status job_follow(ApiCall *call, const char *id, FILE *lines, Problem *problem) {
-    const ApiReply *job = &call->reply;
     char farewell[256];
     JobProgress show = {.lines = lines};
     int64_t answered_ns = INT64_MIN;
@@ -104,7 +109,7 @@ static Status job_follow(ApiCall *call, const char *id, FILE *lines, Problem *pr
     progress_bar_start(&show.bar);
     for (;;) {
         status = job_get(call, id, poll_period, problem);
-        const double left = api_client_left(&call->client);
+        const double left = api_left(call);
         const int64_t now_ns = clock_monotonic_ns();
         if (status == STATUS_UNREACHABLE && now_ns - restart_ns < answered_ns && left >= 1) {
             problem_clear(problem);
@@ -114,19 +119,19 @@ static Status job_follow(ApiCall *call, const char *id, FILE *lines, Problem *pr
         if (status != STATUS_OK)
             break;
         answered_ns = now_ns;
-        job_progress_show(&show, id, job);
-        if (job_is_final(job))
+        job_progress_show(&show, id, call);
+        if (job_is_final(call))
             break;
         if (left <= 0) {
             status = problem_set(problem, STATUS_TIMEOUT, "is still %s after the time given; %.*s",
-                                 job->status, (int)strlen(farewell) - 1, farewell);
+                                 job_text(call, "status"), (int)strlen(farewell) - 1, farewell);
             break;
         }
     }
     progress_bar_stop(&show.bar);
     output_farewell(NULL);
     if (status == STATUS_OK && show.bar.is_terminal && lines != NULL)
-        fprintf(lines, "%s %s\n", id, job->status);
+        fprintf(lines, "%s %s\n", id, job_text(call, "status"));
     return status;
 }
 
@@ -153,11 +158,10 @@ static Status submit_send(ApiCall *call, Problem *problem) {
     const JobsSettings *settings = call->settings;
     const bool is_json = settings->client.json;
     const double wait = settings->client.wait;
-    const ApiReply *job = &call->reply;
     char prefer[48];
     snprintf(prefer, sizeof prefer, "wait=%.0f", ceil(fmin(wait, 2)));
-    ApiRequest request = {.path = api_path("/v1/jobs%s", settings->dry_run ? "?dry_run=1" : ""),
-                          .body = &call->body,
+    ApiRequest request = {.method = "POST",
+                          .path = api_path("/v1/jobs%s", settings->dry_run ? "?dry_run=1" : ""),
                           .prefer = wait > 0 ? prefer : "respond-async",
                           .idempotency_key = settings->idempotency_key};
     TRY(api_ask(call, &request, problem));
@@ -166,19 +170,19 @@ static Status submit_send(ApiCall *call, Problem *problem) {
         return STATUS_OK;
     }
     TRY(job_read(call, problem));
-    snprintf(call->id, sizeof call->id, "%s", job->id);
-    call->client.about = call->id;
+    snprintf(call->id, sizeof call->id, "%s", job_text(call, "id"));
+    call->about = call->id;
     if (!is_json) {
         printf("%s\n", call->id);
         fflush(stdout);
     }
     Status status = STATUS_OK;
-    if (wait > 0 && !job_is_final(job))
+    if (wait > 0 && !job_is_final(call))
         status = job_follow(call, call->id, stderr, problem);
     if (is_json && (status == STATUS_OK || status == STATUS_TIMEOUT))
         api_print(call);
     // A job that has ended is reported also if the end was not waited for.
-    return status == STATUS_OK && job_is_final(job) ? job_verdict(job, problem) : status;
+    return status == STATUS_OK && job_is_final(call) ? job_verdict(call, problem) : status;
 }
 
 static Status submit_act(ApiCall *call, Problem *problem) {
@@ -199,36 +203,34 @@ static Status watch_act(ApiCall *call, Problem *problem) {
     TRY(job_follow(call, call->operands[0], is_json ? NULL : stdout, problem));
     if (is_json)
         api_print(call);
-    return job_verdict(&call->reply, problem);
+    return job_verdict(call, problem);
 }
 
 static Status cancel_act(ApiCall *call, Problem *problem) {
-    TRY(api_ask(
-        call, &(ApiRequest){.method = "DELETE", .path = api_path("/v1/jobs/%s", call->operands[0])},
-        problem));
+    TRY(api_send(call, problem));
     TRY(job_read(call, problem));
-    printf("%s %s\n", call->reply.id, call->reply.status);
+    printf("%s %s\n", job_text(call, "id"), job_text(call, "status"));
     return STATUS_OK;
 }
 
-static Status compare_act(ApiCall *call, Problem *problem) {
-    static const PrintTableColumns columns[] = {
+static const PrintTableView compare_view = {
+    .skipped = (const char *const[]){"links", NULL},
+    .lists = (const PrintTableColumns[]){
         {"inputs", {"pointer", "a", "b", "detail"}},
         {"metrics", {"name", "unit", "a", "b", "difference", "relative"}},
         {"channels",
          {"channel", "unit", "rms", "other_rms", "difference_rms", "relative", "correlation"}},
         {"psd", {"channel", "unit", "from", "to", "level", "difference", "power"}},
-        {NULL, {NULL}},
-    };
-    static const char *const skipped[] = {"links", NULL};
-    static const PrintTableView view = {skipped, columns, NULL};
+        {NULL, {NULL}}}};
+
+static Status compare_act(ApiCall *call, Problem *problem) {
     char results[2][96];
     for (int i = 0; i < 2; i++) {
-        call->client.about = call->operands[i];
+        call->about = call->operands[i];
         TRY(job_result(call, call->operands[i], results[i], problem));
     }
     TRY(api_get(call, api_path("/v1/compare?a=%s&b=%s", results[0], results[1]), problem));
-    return api_print_tables(call, &view, problem);
+    return api_print_tables(call, problem);
 }
 
 static const char *const formats[] = {"json", "csv", "npy", "npz", "mat", "zip", "svg", NULL};
@@ -313,7 +315,7 @@ static Status get_act(ApiCall *call, Problem *problem) {
     ApiRequest request = {.path = api_path("/v1/%s/%s%s%s", is_job ? "jobs" : "results", result,
                                            is_whole ? "" : "/", is_whole ? "" : what),
                           .output_max = settings->max_bytes};
-    api_query_rows(&request.path, get_fields, settings, "channels from to points");
+    api_query_options(&request.path, call, "channels from to points");
     return api_download(call, &request, settings->output, problem);
 }
 
@@ -366,7 +368,7 @@ const Command command_submit = {
     .options = submit_fields,
     .size = sizeof(JobsSettings),
     .run = api_command,
-    .actions = &(const ApiAction){NULL, "one scene", 1, 1, submit_act, 0, NULL},
+    .actions = &(const ApiAction){.takes = "one scene", .operands = "f", .act = submit_act},
 };
 
 const Command command_watch = {
@@ -383,7 +385,8 @@ const Command command_watch = {
     .options = watch_fields,
     .size = sizeof(JobsSettings),
     .run = api_command,
-    .actions = &(const ApiAction){NULL, "one job's id, like j-7f3a", 1, 1, watch_act, 1, NULL},
+    .actions =
+        &(const ApiAction){.takes = "one job's id, like j-7f3a", .operands = "i", .act = watch_act},
 };
 
 const Command command_get = {
@@ -410,8 +413,9 @@ const Command command_get = {
     .size = sizeof(JobsSettings),
     .run = api_command,
     .actions =
-        &(const ApiAction){NULL, "the id of a result or a job, like r-91c0, and a part of it", 1, 2,
-                           get_act, 1, NULL},
+        &(const ApiAction){.takes = "the id of a result or a job, like r-91c0, and a part of it",
+                           .operands = "i?f",
+                           .act = get_act},
 };
 
 const Command command_cancel = {
@@ -424,7 +428,11 @@ const Command command_cancel = {
     .options = cancel_fields,
     .size = sizeof(JobsSettings),
     .run = api_command,
-    .actions = &(const ApiAction){NULL, "one job's id, like j-7f3a", 1, 1, cancel_act, 1, NULL},
+    .actions = &(const ApiAction){.takes = "one job's id, like j-7f3a",
+                                  .operands = "i",
+                                  .act = cancel_act,
+                                  .method = "DELETE",
+                                  .path = "/v1/jobs/{}"},
 };
 
 const Command command_compare = {
@@ -438,6 +446,8 @@ const Command command_compare = {
     .options = compare_fields,
     .size = sizeof(JobsSettings),
     .run = api_command,
-    .actions = &(const ApiAction){NULL, "the ids of two results or jobs, like r-91c0", 2, 2,
-                                  compare_act, 2, NULL},
+    .actions = &(const ApiAction){.takes = "the ids of two results or jobs, like r-91c0",
+                                  .operands = "ii",
+                                  .act = compare_act},
+    .view = &compare_view,
 };

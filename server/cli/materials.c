@@ -15,9 +15,6 @@
 #include "core/scene/material.h"
 #include "server/cli/client.h"
 #include "server/cli/files.h"
-#include "server/json/document.h"
-#include "server/json/encode.h"
-#include "server/json/parse.h"
 
 typedef struct MaterialsSettings {
     ClientSettings client;
@@ -33,9 +30,6 @@ typedef struct MaterialsSettings {
     double damper_mass, structure_mass;
     int identified_for;
 } MaterialsSettings;
-
-enum { LIST_MAX = 1000, REVISION_DIGITS = 9 };
-#define LIMIT "?limit=1000"
 
 static const char *const statuses[] = {"draft", "approved", "deprecated", NULL};
 
@@ -94,71 +88,26 @@ static const PrintTableColumns columns[] = {
     {"results", {"id", "created"}},
     {NULL, {NULL}},
 };
+static const PrintTableView materials_view = {
+    .skipped = (const char *const[]){"links", "test", NULL},
+    .lists = columns,
+    .fields = (const Field *const[]){material_fields, pair_parameters_fields, evaluation_fields, buffer_fields, NULL},
+};
 // clang-format on
-
-static Status materials_number(const char *text, const char *what, Problem *problem) {
-    const size_t size = strlen(text);
-    return size > 0 && size <= REVISION_DIGITS && text[0] != '0' &&
-                   strspn(text, "0123456789") == size
-               ? STATUS_OK
-               : problem_set(problem, STATUS_USAGE,
-                             "%s must be a whole number from 1, is \"%.60s\"", what, text);
-}
-
-// Checks an operand: a slug, or where the action allows it SLUG@REVISION.
-static Status materials_name(const char *text, bool may_have_revision, Problem *problem) {
-    char slug[MATERIAL_SLUG_MAX + 1];
-    const size_t length = strcspn(text, "@");
-    snprintf(slug, sizeof slug, "%.*s", (int)(length < sizeof slug ? length : 0), text);
-    if (!material_slug_is_valid(slug))
-        return problem_set(problem, STATUS_USAGE,
-                           "the name of a material is 1 to %d lower-case letters, digits, "
-                           "underscores and dashes%s, is \"%.80s\"",
-                           MATERIAL_SLUG_MAX, may_have_revision ? ", optionally @REVISION" : "",
-                           text);
-    if (text[length] == '\0')
-        return STATUS_OK;
-    if (!may_have_revision)
-        return problem_set(problem, STATUS_USAGE,
-                           "takes a material without a revision: %s, is %.80s", slug, text);
-    return materials_number(text + length + 1, "the revision after @", problem);
-}
-
-// The answer as tables, or with --json as it came.
-static Status materials_print(ApiCall *call, Problem *problem) {
-    static const char *const skipped[] = {"links", "test", NULL};
-    static const Field *const fields[] = {material_fields, pair_parameters_fields,
-                                          evaluation_fields, buffer_fields, NULL};
-    static const PrintTableView view = {skipped, columns, fields};
-    TRY(api_print_tables(call, &view, problem));
-    if (call->rows == 0)
-        fputs("impactd materials: nothing fits\n", stderr);
-    if (call->rows == LIST_MAX)
-        fprintf(stderr, "impactd materials: the first %d; narrow the search to see others\n",
-                LIST_MAX);
-    return STATUS_OK;
-}
-
-// Requests `rest` below the material of the first operand, with options `queries` as its query.
-static Status materials_ask(ApiCall *call, bool may_have_revision, const char *rest,
-                            const char *queries, Problem *problem) {
-    TRY(materials_name(call->operands[0], may_have_revision, problem));
-    Bytes path = api_path("/v1/materials/%s%s", call->operands[0], rest);
-    api_query_rows(&path, materials_fields, call->settings, queries);
-    return api_get(call, path, problem);
-}
 
 // "sponge@2 draft" of an answer that is a revision.
 static Status materials_print_revision(ApiCall *call, Problem *problem) {
-    const ApiReply *reply = api_reply(call);
+    const JsonDocument *reply = api_reply(call);
+    const char *slug = json_get_text(reply, "slug"), *status = json_get_text(reply, "status");
+    const double revision = json_get_number(reply, "revision");
     if (((const ClientSettings *)call->settings)->json) {
         api_print(call);
         return STATUS_OK;
     }
-    if (reply->slug == NULL || reply->status == NULL || reply->revision == COUNT_ABSENT)
+    if (slug == NULL || status == NULL || isnan(revision))
         return api_unexpected("a revision", problem);
-    printf("%s@%llu %s%s\n", reply->slug, (unsigned long long)reply->revision, reply->status,
-           reply->review.self_approved ? ", by its own author" : "");
+    const bool is_own = json_get_flag(json_get_object(reply, "review"), "self_approved");
+    printf("%s@%.0f %s%s\n", slug, revision, status, is_own ? ", by its own author" : "");
     return STATUS_OK;
 }
 
@@ -171,7 +120,7 @@ static Status materials_add_comment(ApiCall *call, Problem *problem) {
 
 // The body from a JSON file, with --comment in it.
 static Status materials_read_body(ApiCall *call, const char *path, Problem *problem) {
-    call->client.about = path;
+    call->about = path;
     TRY(input_read(path, &call->body, problem));
     return materials_add_comment(call, problem);
 }
@@ -187,153 +136,75 @@ static Status materials_error_stale(const char *slug, Problem *problem) {
                        detail, slug);
 }
 
-// Posts the body to `rest` below `name` of the material `slug`, based on the state in `tag`, which
-// is "SLUG@REVISION-VERSION" in quotes. STATUS_STALE: another client has changed it.
-static Status materials_write(ApiCall *call, const char *slug, const char *name, const char *rest,
-                              const char *tag, Problem *problem) {
-    char state[sizeof call->answer.etag];
-    const char *at = strrchr(tag, '@');
+// Posts the body to `path`, which it clears, based on the state that the last answer has as its
+// ETag, "SLUG@REVISION-VERSION" in quotes. STATUS_STALE: another client has changed it.
+static Status materials_write(ApiCall *call, Bytes path, Problem *problem) {
+    char state[sizeof call->answer.etag], slug[MATERIAL_SLUG_MAX + 1];
+    snprintf(state, sizeof state, "%s", call->answer.etag); // the answer is replaced
+    snprintf(slug, sizeof slug, "%.*s", (int)strcspn(call->operands[0], "@"), call->operands[0]);
+    const char *at = strrchr(state, '@');
     const unsigned long long latest = at != NULL ? strtoull(at + 1, NULL, 10) : 0;
     const uint64_t from = ((const MaterialsSettings *)call->settings)->from;
-    if (tag[0] == '\0')
-        return api_unexpected("a material with an ETag", problem);
-    if (from != COUNT_ABSENT && from != latest) {
-        (void)problem_set(problem, STATUS_STALE,
-                          "the newest revision is %.63s@%llu, not %.63s@%llu", slug, latest, slug,
-                          (unsigned long long)from);
-        return materials_error_stale(slug, problem);
-    }
-    snprintf(state, sizeof state, "%s", tag); // the answer is replaced
-    ApiRequest request = {
-        .path = api_path("/v1/materials/%s%s", name, rest), .body = &call->body, .if_match = state};
-    const Status status = api_ask(call, &request, problem);
+    ApiRequest request = {.method = "POST", .path = path, .if_match = state};
+    Status status = STATUS_STALE;
+    if (state[0] == '\0')
+        status = api_unexpected("a material with an ETag", problem);
+    else if (from != COUNT_ABSENT && from != latest)
+        (void)problem_set(problem, status, "the newest revision is %.63s@%llu, not %.63s@%llu",
+                          slug, latest, slug, (unsigned long long)from);
+    else
+        status = api_ask(call, &request, problem);
+    bytes_clear(&request.path);
     if (status == STATUS_STALE)
         return materials_error_stale(slug, problem);
     return status == STATUS_OK ? materials_print_revision(call, problem) : status;
 }
 
-// The same, based on the present state.
-static Status materials_write_now(ApiCall *call, const char *slug, const char *name,
-                                  const char *rest, Problem *problem) {
+// The same for the action, based on the present state.
+static Status materials_write_now(ApiCall *call, Problem *problem) {
+    const char *name = call->operands[0];
     // The history has an ETag also if all revisions are deprecated.
-    TRY(api_get(call, api_path("/v1/materials/%s/history?limit=1", slug), problem));
-    return materials_write(call, slug, name, rest, call->answer.etag, problem);
+    TRY(api_get(call, api_path("/v1/materials/%.*s/history?limit=1", (int)strcspn(name, "@"), name),
+                problem));
+    return materials_write(call, api_action_path(call), problem);
 }
 
-static Status materials_list(ApiCall *call, Problem *problem) {
-    Bytes path = api_path("/v1/materials" LIMIT);
-    api_query_rows(&path, materials_fields, call->settings, "q kind status e T_c");
-    TRY(api_get(call, path, problem));
-    return materials_print(call, problem);
-}
-
-// The contents of a revision, one member a line, as revise takes them.
-static Status materials_print_editable(ApiCall *call, Problem *problem) {
-    Bytes *body = &call->answer.body, text = {0};
-    Material material = {0};
-    TRY(json_edit_remove_nulls(body, problem));
-    // Other members (author, links ...) are faults here, and left out.
-    (void)json_parse(body->at, body->count, material_fields, &material, NULL);
-    for (const Field *row = material_fields; row->kind != FIELD_KIND_END; row++) {
-        const Field alone[] = {*row, FIELD_END};
-        Bytes member = {0};
-        if (encode_members(&member, alone, &material, WRITE_SCENE) > 0) {
-            bytes_text(&text, text.count == 0 ? "{\n  " : ",\n  ");
-            bytes_put(&text, member.at, member.count);
-        }
-        text.is_failed = text.is_failed || member.is_failed;
-        bytes_clear(&member);
-    }
-    fields_clear(material_fields, &material);
-    const bool is_whole = !text.is_failed && text.count > 0;
-    if (is_whole)
-        printf("%s\n}\n", text.at);
-    bytes_clear(&text);
-    return is_whole ? STATUS_OK : api_unexpected("a material", problem);
-}
-
+// Shows a revision, with --editable its contents as revise takes them.
 static Status materials_show(ApiCall *call, Problem *problem) {
-    const MaterialsSettings *settings = call->settings;
-    TRY(materials_ask(call, true, "", "", problem));
-    return settings->editable ? materials_print_editable(call, problem)
-                              : materials_print(call, problem);
-}
-
-// Shows what is below the material at the path that is the action's detail.
-static Status materials_show_part(ApiCall *call, Problem *problem) {
-    TRY(materials_ask(call, false, call->action->detail, "", problem));
-    return materials_print(call, problem);
-}
-
-static Status materials_diff(ApiCall *call, Problem *problem) {
-    char rest[80] = "/diff";
-    for (size_t i = 1; i < call->count; i++) {
-        TRY(materials_number(call->operands[i], "a revision", problem));
-        const size_t used = strlen(rest);
-        snprintf(rest + used, sizeof rest - used, "%s%.20s",
-                 i == 1 ? "?from=" : "&to=", call->operands[i]);
-    }
-    TRY(materials_ask(call, false, rest, "", problem));
-    return materials_print(call, problem);
-}
-
-static Status materials_used_by(ApiCall *call, Problem *problem) {
-    const bool is_revision = strchr(call->operands[0], '@') != NULL;
-    TRY(materials_ask(call, true, is_revision ? "/used-by" LIMIT : "/used-by", "", problem));
-    return materials_print(call, problem);
-}
-
-static Status materials_derived(ApiCall *call, Problem *problem) {
-    const MaterialsSettings *settings = call->settings;
-    if (isnan(settings->damper_mass))
-        return problem_set(problem, STATUS_USAGE,
-                           "needs --damper-mass M in kg, and --structure-mass M unless the "
-                           "structure does not move");
-    TRY(materials_ask(call, true, "/derived",
-                      "damper_mass structure_mass identified_for separation", problem));
-    return materials_print(call, problem);
+    if (!((const MaterialsSettings *)call->settings)->editable)
+        return api_show(call, problem);
+    Bytes text = {0};
+    TRY(api_send(call, problem));
+    const bool is_material = json_edit_pick(&call->answer.body, material_fields, &text);
+    if (is_material)
+        fputs(text.at, stdout);
+    bytes_clear(&text);
+    return is_material ? STATUS_OK : api_unexpected("a material", problem);
 }
 
 static Status materials_add(ApiCall *call, Problem *problem) {
     TRY(materials_read_body(call, call->operands[0], problem));
-    ApiRequest request = {.path = api_path("/v1/materials"), .body = &call->body};
-    TRY(api_ask(call, &request, problem));
+    TRY(api_send(call, problem));
     return materials_print_revision(call, problem);
 }
 
 static Status materials_revise(ApiCall *call, Problem *problem) {
-    const char *slug = call->operands[0];
-    TRY(materials_name(slug, false, problem));
     TRY(materials_read_body(call, call->operands[1], problem));
-    return materials_write_now(call, slug, slug, "/revisions", problem);
+    return materials_write_now(call, problem);
 }
 
 static Status materials_revert(ApiCall *call, Problem *problem) {
-    const MaterialsSettings *settings = call->settings;
-    const char *slug = call->operands[0], *to = call->operands[1];
-    TRY(materials_name(slug, false, problem));
-    TRY(materials_number(to, "the revision to go back to", problem));
-    if (settings->comment == NULL)
-        return problem_set(problem, STATUS_USAGE, "needs --comment TEXT, the reason");
-    bytes_format(&call->body, "{\"to\": %s}", to);
+    bytes_format(&call->body, "{\"to\": %s}", call->operands[1]);
     TRY(materials_add_comment(call, problem));
-    return materials_write_now(call, slug, slug, "/revert", problem);
+    return materials_write_now(call, problem);
 }
 
 // The detail of the action is the status that it sets.
 static Status materials_review(ApiCall *call, Problem *problem) {
     const MaterialsSettings *settings = call->settings;
-    const char *name = call->operands[0], *at = strchr(name, '@');
-    char slug[MATERIAL_SLUG_MAX + 1];
-    TRY(materials_name(name, true, problem));
-    if (at == NULL)
-        return problem_set(problem, STATUS_USAGE, "takes one revision, as %.63s@1", name);
-    if (settings->reason == NULL)
-        return problem_set(problem, STATUS_USAGE, "needs --reason TEXT");
-    snprintf(slug, sizeof slug, "%.*s", (int)(at - name), name);
     bytes_format(&call->body, "{\"status\": \"%s\"}", call->action->detail);
     TRY(json_edit_set(&call->body, "reason", settings->reason, problem));
-    return materials_write_now(call, slug, name, "/review", problem);
+    return materials_write_now(call, problem);
 }
 
 // Appends a file of forces to the body's traces.
@@ -341,7 +212,7 @@ static Status materials_add_trace(ApiCall *call, const char *path, Problem *prob
     const char *slash = strrchr(path, '/');
     Bytes text = {0}, json = {0};
     Trace trace = {.interval = ((const MaterialsSettings *)call->settings)->interval};
-    call->client.about = path;
+    call->about = path;
     Status status = input_read(path, &text, problem);
     if (status == STATUS_OK)
         status = force_trace_text_read(text.at != NULL ? text.at : "", text.count,
@@ -361,40 +232,29 @@ static Status materials_add_trace(ApiCall *call, const char *path, Problem *prob
     return status;
 }
 
-// Sends the body to `path`, with --dry-run, and prints the answer.
-static Status materials_send(ApiCall *call, ApiRequest *request, Problem *problem) {
-    request->body = &call->body;
-    api_query_rows(&request->path, materials_fields, call->settings, "dry_run");
-    TRY(api_ask(call, request, problem));
-    return materials_print(call, problem);
-}
-
 static Status materials_measure(ApiCall *call, Problem *problem) {
     const MaterialsSettings *settings = call->settings;
-    TRY(materials_name(call->operands[0], false, problem));
     TRY(materials_read_body(call, call->operands[1], problem));
     for (size_t i = 0; i < settings->trace.count; i++)
         TRY(materials_add_trace(call, settings->trace.at[i], problem));
-    call->client.about = call->operands[1];
-    return materials_send(
-        call, &(ApiRequest){.path = api_path("/v1/materials/%s/measurements", call->operands[0])},
-        problem);
+    call->about = call->operands[1];
+    return api_show(call, problem);
 }
 
 // --confirm writes the proposal that was shown, based on the state that it was shown of.
 static Status materials_propose(ApiCall *call, Problem *problem) {
     const MaterialsSettings *settings = call->settings;
-    const char *slug = call->operands[0];
-    TRY(materials_ask(call, false, "/proposal", "measurements separation as", problem));
+    TRY(api_send(call, problem));
     if (!settings->client.json || !settings->confirm)
-        TRY(materials_print(call, problem));
+        TRY(api_print_tables(call, problem));
     if (!settings->confirm)
         return STATUS_OK;
     TRY(json_edit_extract(&call->answer.body, "revision", &call->body, problem));
     TRY(materials_add_comment(call, problem));
     if (!settings->client.json)
         putchar('\n');
-    return materials_write(call, slug, slug, "/revisions", call->answer.etag, problem);
+    return materials_write(call, api_path("/v1/materials/%s/revisions", call->operands[0]),
+                           problem);
 }
 
 // Whether FILE is a table, by its name.
@@ -423,31 +283,35 @@ static Status materials_import(ApiCall *call, Problem *problem) {
     bool is_table;
     TRY(materials_format(call, &is_table, problem));
     TRY(input_read(call->operands[0], &call->body, problem));
-    return materials_send(call,
-                          &(ApiRequest){.path = api_path("/v1/materials/import"),
-                                        .content_type = is_table ? "text/csv" : NULL},
-                          problem);
+    ApiRequest request = {.method = "POST",
+                          .path = api_action_path(call),
+                          .content_type = is_table ? "text/csv" : NULL};
+    TRY(api_ask(call, &request, problem));
+    return api_print_tables(call, problem);
 }
 
-static const ApiAction actions[] = {
-    {"list", "no operands", 0, 0, materials_list, 0, NULL},
-    {"show", "SLUG or SLUG@REVISION", 1, 1, materials_show, 0, NULL},
-    {"add", "FILE.json", 1, 1, materials_add, 0, NULL},
-    {"revise", "SLUG FILE.json", 2, 2, materials_revise, 0, NULL},
-    {"revert", "SLUG REVISION", 2, 2, materials_revert, 0, NULL},
-    {"approve", "SLUG@REVISION", 1, 1, materials_review, 0, "approved"},
-    {"deprecate", "SLUG@REVISION", 1, 1, materials_review, 0, "deprecated"},
-    {"history", "SLUG", 1, 1, materials_show_part, 0, "/history" LIMIT},
-    {"diff", "SLUG [FROM [TO]]", 1, 3, materials_diff, 0, NULL},
-    {"used-by", "SLUG or SLUG@REVISION", 1, 1, materials_used_by, 0, NULL},
-    {"measure", "SLUG TEST.json", 2, 2, materials_measure, 0, NULL},
-    {"measurements", "SLUG", 1, 1, materials_show_part, 0, "/measurements?limit=100"},
-    {"propose", "SLUG", 1, 1, materials_propose, 0, NULL},
-    {"derived", "SLUG or SLUG@REVISION", 1, 1, materials_derived, 0, NULL},
-    {"export", "FILE.json or FILE.csv", 1, 1, materials_export, 0, NULL},
-    {"import", "FILE.json or FILE.csv", 1, 1, materials_import, 0, NULL},
+// clang-format off
+#define MATERIAL "/v1/materials/{}"
+static const ApiAction materials_actions[] = {
+    {"list", "no operands", "", api_show, NULL, "/v1/materials?limit=1000", "q kind status e T_c", NULL, NULL},
+    {"show", "SLUG or SLUG@REVISION", "r", materials_show, NULL, MATERIAL, NULL, NULL, NULL},
+    {"add", "FILE.json", "f", materials_add, "POST", "/v1/materials", NULL, NULL, NULL},
+    {"revise", "SLUG without a revision and FILE.json", "sf", materials_revise, "POST", MATERIAL "/revisions", NULL, NULL, NULL},
+    {"revert", "SLUG without a revision and REVISION", "sn", materials_revert, "POST", MATERIAL "/revert", NULL, "comment", NULL},
+    {"approve", "SLUG@REVISION, as sponge@1", "v", materials_review, "POST", MATERIAL "/review", NULL, "reason", "approved"},
+    {"deprecate", "SLUG@REVISION, as sponge@1", "v", materials_review, "POST", MATERIAL "/review", NULL, "reason", "deprecated"},
+    {"history", "SLUG without a revision", "s", api_show, NULL, MATERIAL "/history?limit=1000", NULL, NULL, NULL},
+    {"diff", "SLUG [FROM [TO]], without a revision after SLUG", "s?nn", api_show, NULL, MATERIAL "/diff?from={}&to={}", NULL, NULL, NULL},
+    {"used-by", "SLUG or SLUG@REVISION", "r", api_show, NULL, MATERIAL "/used-by", NULL, NULL, NULL},
+    {"measure", "SLUG without a revision and TEST.json", "sf", materials_measure, "POST", MATERIAL "/measurements", "dry_run", NULL, NULL},
+    {"measurements", "SLUG without a revision", "s", api_show, NULL, MATERIAL "/measurements?limit=100", NULL, NULL, NULL},
+    {"propose", "SLUG without a revision", "s", materials_propose, NULL, MATERIAL "/proposal", "measurements separation as", NULL, NULL},
+    {"derived", "SLUG or SLUG@REVISION", "r", api_show, NULL, MATERIAL "/derived", "damper_mass structure_mass identified_for separation", "damper_mass", NULL},
+    {"export", "FILE.json or FILE.csv", "f", materials_export, NULL, NULL, NULL, NULL, NULL},
+    {"import", "FILE.json or FILE.csv", "f", materials_import, "POST", "/v1/materials/import", "dry_run", NULL, NULL},
     {.name = NULL},
 };
+// clang-format on
 
 const Command command_materials = {
     .name = "materials",
@@ -487,5 +351,6 @@ const Command command_materials = {
     .groups = groups,
     .size = sizeof(MaterialsSettings),
     .run = api_command,
-    .actions = actions,
+    .actions = materials_actions,
+    .view = &materials_view,
 };

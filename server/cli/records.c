@@ -95,8 +95,6 @@ static int import_run(const Command *self, void *settings, const Options *option
     return input_command(self, "file", options, settings, import_act, problem);
 }
 
-enum { PAGE = 500 }; // records of a request, the most that the API allows
-
 typedef struct RecordsSettings {
     ClientSettings client;
     char *name, *source, *processing, *earthquake, *station, *notes, *q;
@@ -122,41 +120,6 @@ static const Field records_fields[] = {
 };
 // clang-format on
 
-// Prints a page of the list. `after` becomes the name that the next page starts behind, "" at the
-// end.
-static Status records_print(ApiCall *call, char after[RECORD_NAME_SIZE], Problem *problem) {
-    static const char *const skipped[] = {"links", NULL};
-    static const PrintTableColumns columns[] = {
-        {"records", {"name", "count", "interval", "duration", "peak", "source"}}, {NULL, {NULL}}};
-    static const Field record[] = {
-        {.name = "interval", .kind = FIELD_KIND_REAL, .unit = "s"},
-        {.name = "duration", .kind = FIELD_KIND_REAL, .unit = "s"},
-        {.name = "peak", .kind = FIELD_KIND_REAL, .unit = "m/s^2"},
-        FIELD_END,
-    };
-    static const Field *const fields[] = {record, NULL};
-    static const PrintTableView view = {skipped, columns, fields};
-    const NameReplies *records = &api_reply(call)->records;
-    const size_t count = records->count;
-    const char *name = count > 0 ? records->at[count - 1].name : NULL;
-    if (count >= PAGE && (name == NULL || strcmp(name, after) <= 0))
-        return problem_set(problem, STATUS_UNREACHABLE, "the list of records has no end");
-    text_fit(after, RECORD_NAME_SIZE, count >= PAGE ? name : "");
-    return api_print_tables(call, &view, problem);
-}
-
-static Status records_list(ApiCall *call, Problem *problem) {
-    char after[RECORD_NAME_SIZE] = "";
-    do {
-        Bytes path = api_path("/v1/records?limit=%d", PAGE);
-        api_query_rows(&path, records_fields, call->settings, "q");
-        api_query(&path, "after", after[0] != '\0' ? after : NULL);
-        TRY(api_get(call, path, problem));
-        TRY(records_print(call, after, problem));
-    } while (after[0] != '\0');
-    return STATUS_OK;
-}
-
 // "I-ELC180" of "/data/I-ELC180.AT2", with dashes for characters that a name may not have.
 static void record_name(const char *path, char name[RECORD_NAME_SIZE]) {
     const char *slash = strrchr(path, '/'), *from = slash != NULL ? slash + 1 : path;
@@ -170,16 +133,18 @@ static void record_name(const char *path, char name[RECORD_NAME_SIZE]) {
             *c = '-';
 }
 
-static void record_report(const char *path, const ApiReply *record, bool is_new) {
+static void record_report(const char *path, const JsonDocument *record, bool is_new) {
+    const char *layout = json_get_text(record, "layout");
+    const JsonDocument *warning;
     fprintf(stderr, "%s: %s%s, %.0f samples, interval %.6g s; peak %.6g m/s^2 at %.6g s\n", path,
-            is_new ? "" : "already stored; ", record->layout != NULL ? record->layout : "-",
-            record->count == COUNT_ABSENT ? (double)NAN : (double)record->count, record->interval,
-            record->peak, record->peak_time);
-    for (size_t i = 0; i < record->warnings.count; i++) {
-        const ReplyFault *warning = &record->warnings.at[i];
-        fprintf(stderr, "%s: warning: %s %s\n", path,
-                warning->pointer != NULL ? warning->pointer : "",
-                warning->detail != NULL ? warning->detail : "");
+            is_new ? "" : "already stored; ", layout != NULL ? layout : "-",
+            json_get_number(record, "count"), json_get_number(record, "interval"),
+            json_get_number(record, "peak"), json_get_number(record, "peak_time"));
+    for (size_t i = 0; (warning = json_get_item(record, "warnings", i)) != NULL; i++) {
+        const char *pointer = json_get_text(warning, "pointer");
+        const char *detail = json_get_text(warning, "detail");
+        fprintf(stderr, "%s: warning: %s %s\n", path, pointer != NULL ? pointer : "",
+                detail != NULL ? detail : "");
     }
 }
 
@@ -190,51 +155,57 @@ static Status records_add(ApiCall *call, Problem *problem) {
     TRY(input_read(path, &call->body, problem));
     record_name(path, name);
     ApiRequest request = {
-        .path = api_path("/v1/records"), .body = &call->body, .content_type = "text/plain"};
+        .method = "POST", .path = api_path("/v1/records"), .content_type = "text/plain"};
     api_query(&request.path, "name", settings->name != NULL ? settings->name : name);
-    api_query_rows(&request.path, records_fields, settings,
-                   "unit source processing earthquake station notes interval");
+    api_query_options(&request.path, call,
+                      "unit source processing earthquake station notes interval");
     TRY(api_ask(call, &request, problem));
-    const ApiReply *record = api_reply(call);
-    if (record->name == NULL)
+    const JsonDocument *record = api_reply(call);
+    if (json_get_text(record, "name") == NULL)
         return api_unexpected("a record", problem);
     if (settings->client.json) {
         api_print(call);
         return STATUS_OK;
     }
     record_report(input_name(path), record, call->answer.code == 201);
-    printf("%s\n", record->name);
+    printf("%s\n", json_get_text(record, "name"));
     return STATUS_OK;
 }
 
-static Status record_ask(ApiCall *call, const char *method, Problem *problem) {
-    const char *name = call->operands[0];
-    if (name[0] == '\0' || strcmp(name, "..") == 0)
-        return problem_set(problem, STATUS_USAGE, "must be the name of a record");
-    ApiRequest request = {.method = method, .path = api_path("/v1/records/")};
-    bytes_percent(&request.path, name);
-    return api_ask(call, &request, problem);
-}
-
 static Status records_show(ApiCall *call, Problem *problem) {
-    TRY(record_ask(call, "GET", problem));
+    TRY(api_send(call, problem));
     api_print(call);
     return STATUS_OK;
 }
 
 static Status records_delete(ApiCall *call, Problem *problem) {
-    TRY(record_ask(call, "DELETE", problem));
+    TRY(api_send(call, problem));
     fprintf(stderr, "The record \"%s\" is deleted.\n", call->operands[0]);
     return STATUS_OK;
 }
 
-static const ApiAction actions[] = {
-    {"list", "no operand", 0, 0, records_list, 0, NULL},
-    {"add", "a file", 1, 1, records_add, 0, NULL},
-    {"show", "the name of a record", 1, 1, records_show, 0, NULL},
-    {"delete", "the name of a record", 1, 1, records_delete, 0, NULL},
+// clang-format off
+static const ApiAction records_actions[] = {
+    {"list", "no operand", "", api_show, NULL, "/v1/records?limit=500", "q", NULL, NULL},
+    {"add", "a file", "f", records_add, NULL, NULL, NULL, NULL, NULL},
+    {"show", "the name of a record", "t", records_show, NULL, "/v1/records/{}", NULL, NULL, NULL},
+    {"delete", "the name of a record", "t", records_delete, "DELETE", "/v1/records/{}", NULL, NULL, NULL},
     {.name = NULL},
 };
+// clang-format on
+
+static const PrintTableView records_view = {
+    .skipped = (const char *const[]){"links", NULL},
+    .lists =
+        (const PrintTableColumns[]){
+            {"records", {"name", "count", "interval", "duration", "peak", "source"}},
+            {NULL, {NULL}}},
+    .fields = (const Field *const[]){
+        (const Field[]){{.name = "interval", .kind = FIELD_KIND_REAL, .unit = "s"},
+                        {.name = "duration", .kind = FIELD_KIND_REAL, .unit = "s"},
+                        {.name = "peak", .kind = FIELD_KIND_REAL, .unit = "m/s^2"},
+                        FIELD_END},
+        NULL}};
 
 // clang-format off
 static const Field import_fields[] = {
@@ -282,5 +253,6 @@ const Command command_records = {
     .options = records_fields,
     .size = sizeof(RecordsSettings),
     .run = api_command,
-    .actions = actions,
+    .actions = records_actions,
+    .view = &records_view,
 };

@@ -6,6 +6,7 @@
 
 #include "core/base/json_pointer.h"
 #include "server/json/parse.h"
+#include "server/json/table.h"
 
 // --- differences: a walk over both trees at once, at most JSON_DEPTH_MAX deep ---
 
@@ -255,12 +256,21 @@ static void nulls_remove(json_t *value) {
     json_array_foreach(value, i, inner) nulls_remove(inner);
 }
 
-Status json_edit_remove_nulls(Bytes *text, Problem *problem) {
+bool json_edit_pick(const Bytes *text, const Field *fields, Bytes *picked) {
     json_t *root = json_parse_tree(text->at, text->count);
-    if (root == NULL)
-        return STATUS_OK;
+    const char *separator = "{\n  ";
     nulls_remove(root);
-    return json_edit_write(text, root, true, problem);
+    for (const Field *row = fields; row->kind != FIELD_KIND_END; row++) {
+        const json_t *value = json_object_get(root, row->name);
+        if (value == NULL || (json_is_array(value) && json_array_size(value) == 0))
+            continue;
+        bytes_format(picked, "%s\"%s\": ", separator, row->name);
+        value_put(picked, value);
+        separator = ",\n  ";
+    }
+    json_decref(root);
+    bytes_text(picked, picked->count > 0 ? "\n}\n" : "");
+    return picked->count > 0;
 }
 
 Status json_edit_extract(const Bytes *text, const char *name, Bytes *part, Problem *problem) {
@@ -273,4 +283,37 @@ Status json_edit_extract(const Bytes *text, const char *name, Bytes *part, Probl
     bytes_text(part, taken);
     free(taken);
     return part->is_failed ? problem_set(problem, STATUS_NO_MEMORY, "no memory") : STATUS_OK;
+}
+
+// --- reading ---
+
+JsonDocument *json_open(const Bytes *text) {
+    return json_parse_tree(text->at, text->count);
+}
+
+void json_close(JsonDocument *document) {
+    json_decref(document);
+}
+
+const char *json_get_text(const JsonDocument *of, const char *name) {
+    const char *text = json_string_value(json_object_get(of, name));
+    text_make_printable((char *)text); // the document's own memory
+    return text;
+}
+
+double json_get_number(const JsonDocument *of, const char *name) {
+    const json_t *value = json_object_get(of, name);
+    return json_is_number(value) ? json_number_value(value) : (double)NAN;
+}
+
+bool json_get_flag(const JsonDocument *of, const char *name) {
+    return json_is_true(json_object_get(of, name));
+}
+
+const JsonDocument *json_get_object(const JsonDocument *of, const char *name) {
+    return json_object_get(of, name);
+}
+
+const JsonDocument *json_get_item(const JsonDocument *of, const char *name, size_t i) {
+    return json_array_get(json_object_get(of, name), i);
 }

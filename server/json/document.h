@@ -1,8 +1,9 @@
-// JSON documents as text, with any members: the differences of two, and edits of one.
+// JSON documents as text, with any members: the differences of two, edits of one, and reading one
+// whose sender is not trusted.
 #ifndef SERVER_JSON_DOCUMENT_H
 #define SERVER_JSON_DOCUMENT_H
 
-#include "core/base/status.h"
+#include "core/base/field.h"
 #include "server/util/bytes.h"
 
 enum { DIFF_MAX = 200, DIFF_VALUE_MAX = 400 }; // differences written; bytes of a value
@@ -30,10 +31,26 @@ Status json_edit_label(Bytes *text, const char *label, Problem *problem);
 // Appends a JSON value to a list, which is created if it is missing. A member of another type is
 // left unchanged. STATUS_INVALID: the value is not JSON.
 Status json_edit_append(Bytes *text, const char *list, const Bytes *value, Problem *problem);
-// Removes members that are null, at any depth.
-Status json_edit_remove_nulls(Bytes *text, Problem *problem);
+// Appends the members of an object that `fields` have and that are not empty, in the order of the
+// fields and one a line. False if there are none.
+bool json_edit_pick(const Bytes *text, const Field *fields, Bytes *picked);
 
 // Appends the text of the member `name`, an object, to `part`. STATUS_NOT_FOUND.
 Status json_edit_extract(const Bytes *text, const char *name, Bytes *part, Problem *problem);
+
+// Reading. Members that are missing or of another type are absent: the sender may be newer, older
+// or no impactd. A document or member that is NULL has no members.
+typedef struct json_t JsonDocument;
+
+// The document of a text that is an object, else NULL.
+JsonDocument *json_open(const Bytes *text);
+void json_close(JsonDocument *document);
+// A text member, with '?' for control characters; NULL: absent.
+const char *json_get_text(const JsonDocument *of, const char *name);
+double json_get_number(const JsonDocument *of, const char *name); // NAN: absent
+bool json_get_flag(const JsonDocument *of, const char *name);
+const JsonDocument *json_get_object(const JsonDocument *of, const char *name);
+// Element i of a list of objects; NULL behind the last.
+const JsonDocument *json_get_item(const JsonDocument *of, const char *name, size_t i);
 
 #endif

@@ -397,6 +397,15 @@ def test_compare_prints_what_differs():
             assert client(url, "compare", "r-1", "r-2")[0] == 7, body[:20]
 
 
+def test_lists_are_printed_with_all_their_pages():
+    """A list is followed by its Link headers to the last page, under the base path of the server."""
+    first = say(body=b'{"records": [{"name": "a", "count": 2}]}', Link='</v1/records?limit=500&after=a>; rel="next"')
+    with fake(first, say(body=b'{"records": [{"name": "b", "count": 3}]}')) as (url, seen):
+        code, out, errors = client(url + "/base", "records", "list", "--q", "x y")
+        assert code == 0 and errors == "" and [line.split()[0] for line in out.splitlines()] == ["name", "a", "name", "b"], (code, out, errors)
+        assert [path for _, path, _ in seen] == ["/base/v1/records?limit=500&q=x%20y", "/base/v1/records?limit=500&after=a"], seen
+
+
 def test_tls_is_verified():
     """A certificate that nobody trusts is refused with the mend; --ca-file trusts it."""
     import ssl

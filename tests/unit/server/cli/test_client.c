@@ -6,15 +6,15 @@
 
 static Status opened(const char *url, const char *token, bool *exposes) {
     char address[100];
-    ApiClient client;
     snprintf(address, sizeof address, "%s", url);
+    ApiCall call = {.settings = &(ClientSettings){.server = address}};
     if (token != NULL)
         setenv("IMPACTD_TOKEN", token, 1);
     else
         unsetenv("IMPACTD_TOKEN");
-    const Status status = api_client_open(&(ClientSettings){.server = address}, &client, NULL);
-    *exposes = status == STATUS_OK && api_client_exposes_token(&client);
-    api_client_close(&client);
+    const Status status = api_open(&call, NULL);
+    *exposes = status == STATUS_OK && api_exposes_token(&call);
+    api_close(&call);
     return status;
 }
 
