@@ -79,7 +79,7 @@ TEST(a_chart_has_a_map_or_a_line_for_each_metric_and_no_cell_for_what_is_missing
     sweep.points = 2;
     sweep.table.points.count = sweep.table.statuses.count = 1;
     draw(&sweep, &bytes);
-    assert_int_equal(count_of(bytes.at, "<path class=\"line s0\""), 2);
+    assert_int_equal(count_of(bytes.at, "<path class=\"line area s0\""), 2);
     assert_null(strstr(bytes.at, "nan"));
     bytes_clear(&bytes);
     sweep.table = (SweepTable){.failed = 0};
