@@ -333,7 +333,9 @@ struct StudyCommand {
     // Puts the flags into the document's study of this kind, or into a new one; may take what
     // `settings` own. NULL: there are no flags.
     void (*choose)(void *study, StudySettings *settings);
-    void (*print)(const Variant *answer); // a table for people; NULL: JSON
+    const PrintTableView *view; // of the answer; NULL: it is printed as JSON
+    // Appends members, which are shown too, to the answer's object. NULL: none.
+    void (*add)(const Variant *answer, Bytes *json);
 };
 
 #define OUTPUT_ROW(formats)                                                                        \
@@ -370,6 +372,27 @@ static Status study_write(const StudyFormat *format, const char *path, const Var
     return status;
 }
 
+// The answer as tables, with the units of its rows.
+static Status study_print(const StudyCommand *command, const Variant *answer, Problem *problem) {
+    const Field *const fields[] = {answer->kind->fields, NULL};
+    PrintTableView view = *command->view;
+    Bytes json = {0};
+    size_t longest;
+    view.fields = fields;
+    study_format_write(study_formats(answer->kind), answer, &json);
+    if (command->add != NULL && json.count > 2) {
+        json.count -= 2; // "}\n"
+        command->add(answer, &json);
+        bytes_text(&json, "}");
+    }
+    const Status status =
+        json.is_failed
+            ? problem_set(problem, STATUS_NO_MEMORY, "no memory for the answer")
+            : print_table_print_json(json.at, json.count, &view, stdout, &longest, problem);
+    bytes_clear(&json);
+    return status;
+}
+
 static Status study_make(const StudyRequest *request, const StudySettings *settings,
                          const SimulationLimits *limits, Problem *problem) {
     const StudyCommand *command = settings->command;
@@ -384,10 +407,10 @@ static Status study_make(const StudyRequest *request, const StudySettings *setti
     progress_bar_stop(&bar);
     // The first format of every study is JSON. The document's own study prints nothing where it is
     // written to files.
-    if (status == STATUS_OK && (settings->json || (command->print == NULL && outputs->count == 0)))
+    if (status == STATUS_OK && (settings->json || (command->view == NULL && outputs->count == 0)))
         status = study_write(study_formats(kind->answer), NULL, answer, problem);
-    else if (status == STATUS_OK && command->print != NULL)
-        command->print(answer);
+    else if (status == STATUS_OK && command->view != NULL)
+        status = study_print(command, answer, problem);
     for (size_t i = 0; i < outputs->count && status == STATUS_OK; i++)
         status = study_write(study_format(kind, outputs->at[i]), outputs->at[i], answer, problem);
     variant_free(answer);
@@ -440,19 +463,6 @@ static Status study_scene(const char *path, const Bytes *text, void *of, Problem
 static int study_command_run(const Command *self, void *settings, const Options *options,
                              Problem *problem);
 
-static void study_heads_add(PrintTable *listing, const char *const *heads) {
-    listing->has_heads = true;
-    for (size_t i = 0; i < listing->columns; i++)
-        print_table_add(listing, "%s", heads[i]);
-}
-
-// "rms_displacement [m]"
-static void study_metric_add(PrintTable *listing, const char *name, const char *unit) {
-    const bool has_unit = unit != NULL && strcmp(unit, "1") != 0;
-    print_table_add(listing, "%.40s%s%s%s", name, has_unit ? " [" : "", has_unit ? unit : "",
-                    has_unit ? "]" : "");
-}
-
 static const Field study_fields[] = {
     OUTPUT_ROW(".json the whole or .csv the table or .svg the chart, where the study has them"),
     JSON_ROW,
@@ -494,59 +504,13 @@ static const Field tradeoff_fields[] = {
     FIELD_END,
 };
 
-static void tradeoff_points_print(const Tradeoff *tradeoff) {
-    static const char *const heads[] = {"  ",       "CPU [s]", "median",  "steps", "displ.",
-                                        "mean acc", "force",   "impacts", "PSD dB"};
-    PrintTable listing = {.columns = COUNT(heads)};
-    study_heads_add(&listing, heads);
-    for (size_t i = 0; i < tradeoff->points.count; i++) {
-        const TradeoffPoint *point = &tradeoff->points.at[i];
-        const Errors *errors = &point->errors;
-        if (point->status != TRADEOFF_MEASURED)
-            continue;
-        print_table_add(&listing, "%c %s",
-                        tradeoff->recommendation.point == i + 1 ? '>'
-                        : point->is_best                        ? '*'
-                                                                : ' ',
-                        point->name);
-        print_table_number(&listing, "%.2e", point->cpu_minimum);
-        print_table_number(&listing, "%.2e", point->cpu_median);
-        print_table_number(&listing, "%.2e", point->steps);
-        print_table_number(&listing, "%.1e", errors->displacement);
-        print_table_number(&listing, "%.1e", errors->mean_acceleration);
-        print_table_number(&listing, "%.1e", errors->peak_force);
-        print_table_number(&listing, "%.0f", errors->impacts);
-        print_table_number(&listing, "%.2g", errors->psd);
-    }
-    print_table_print(&listing, stdout);
-    for (size_t i = 0; i < tradeoff->points.count; i++) {
-        const TradeoffPoint *point = &tradeoff->points.at[i];
-        if (point->status != TRADEOFF_MEASURED)
-            printf("  %s  %s: %s\n", point->name, tradeoff_status_names[point->status],
-                   point->why != NULL ? point->why : "");
-    }
-}
-
-static void tradeoff_print(const Variant *answer) {
-    const Tradeoff *tradeoff = (const Tradeoff *)(const void *)answer;
-    const ReferenceSummary *reference = &tradeoff->reference.yardstick;
-    char estimate[24];
-    snprintf(estimate, sizeof estimate, isnan(reference->error_estimate) ? "-" : "%.1e",
-             reference->error_estimate);
-    printf("Errors against %s, whose own is %s; ", tradeoff->reference.solver, estimate);
-    if (isnan(reference->trust_horizon))
-        puts("samples and impacts compared over the whole run.");
-    else
-        printf("samples and impacts compared to t = %.4g s, beyond which rounding decides.\n",
-               reference->trust_horizon);
-    if (!isnan(reference->psd_to))
-        printf("Spectra compared from %.3g to %.4g Hz. ", reference->psd_from, reference->psd_to);
-    printf("CPU times are the smallest and the median of %llu.\n\n",
-           (unsigned long long)tradeoff->repeats);
-    tradeoff_points_print(tradeoff);
-    printf("\n* no other is both cheaper and closer in %s; > the one to take:\n%s.\n",
-           metric_names[tradeoff->metric], tradeoff->recommendation.why);
-}
+static const PrintTableView tradeoff_view = {
+    .skipped = (const char *const[]){"kind", "trial", "largest", NULL},
+    .lists = (const PrintTableColumns[]){
+        {"points",
+         {"name", "is_best", "cpu_minimum", "steps", "errors.displacement",
+          "errors.mean_acceleration", "errors.peak_force", "errors.impacts", "errors.psd", "why"}},
+        {NULL, {NULL}}}};
 
 static void tradeoff_choose(void *asked, StudySettings *settings) {
     TradeoffStudy *study = (TradeoffStudy *)(void *)asked;
@@ -618,68 +582,33 @@ static void ensemble_choose(void *asked, StudySettings *settings) {
         study->metric = settings->metric;
 }
 
-static void ensemble_statistics_print(const Ensemble *ensemble) {
-    static const char *const heads[] = {"", "mean", "+-", "s.d.", "smallest", "median", "largest"};
-    PrintTable listing = {.columns = COUNT(heads)};
-    study_heads_add(&listing, heads);
-    for (int metric = 0; metric < STATISTICS_METRICS; metric++) {
-        const RunStatistic *statistic = &ensemble->statistics.of[metric];
-        study_metric_add(&listing, statistics_metric_names[metric], statistic->unit);
-        print_table_number(&listing, "%.5g", statistic->mean);
-        print_table_number(&listing, "%.2g", statistic->high - statistic->mean);
-        print_table_number(&listing, "%.2g", statistic->standard_deviation);
-        print_table_number(&listing, "%.4g", statistic->minimum);
-        print_table_number(&listing, "%.4g", statistic->median);
-        print_table_number(&listing, "%.4g", statistic->maximum);
-    }
-    print_table_print(&listing, stdout);
-}
+static const PrintTableView ensemble_view = {
+    .skipped = (const char *const[]){"kind", "table", "frequency", "spectra", NULL},
+    .lists = (const PrintTableColumns[]){
+        {"statistics",
+         {"mean", "low", "high", "standard_deviation", "minimum", "median", "maximum"}},
+        {NULL, {NULL}}}};
 
-static void ensemble_spectrum_print(const Ensemble *ensemble, const RunSpectrum *spectrum) {
-    size_t peak = 0;
-    for (size_t k = 1; k < spectrum->mean.count; k++)
-        if (spectrum->mean.at[k] > spectrum->mean.at[peak])
-            peak = k;
-    if (spectrum->low.count == 0)
-        return;
-    printf("  psd of %s: largest at %.4g Hz, %.4g %s, between %.4g and %.4g\n", spectrum->channel,
-           ensemble->frequency.at[peak], spectrum->mean.at[peak], spectrum->unit,
-           spectrum->low.at[peak], spectrum->high.at[peak]);
-}
-
-static void ensemble_failures_print(const StudyFailures *failures) {
-    for (size_t i = 0; i < failures->count; i++)
-        printf("%llu failed, %s; first seed %llu: %s\n", (unsigned long long)failures->at[i].count,
-               failures->at[i].reason, (unsigned long long)failures->at[i].first,
-               failures->at[i].detail);
-}
-
-static void ensemble_print(const Variant *answer) {
+// The peaks of the mean spectra.
+static void ensemble_add(const Variant *answer, Bytes *json) {
     const Ensemble *ensemble = (const Ensemble *)(const void *)answer;
-    const EnsembleTarget *target = &ensemble->target;
-    const unsigned long long made = (unsigned long long)ensemble->made;
-    printf("%llu run%s, seeds %llu to %llu, %.3g solver steps. Means with their %g %% interval "
-           "(Student's t).\n\n",
-           made, made == 1 ? "" : "s", (unsigned long long)ensemble->first_seed,
-           (unsigned long long)ensemble->first_seed + made - 1, ensemble->steps,
-           100 * ensemble->confidence);
-    ensemble_statistics_print(ensemble);
-    if (ensemble->spectra.count > 0)
-        putchar('\n');
-    for (size_t i = 0; i < ensemble->spectra.count; i++)
-        ensemble_spectrum_print(ensemble, &ensemble->spectra.at[i]);
-    putchar('\n');
-    ensemble_failures_print(&ensemble->failures);
-    if (ensemble->trust.beyond > 0)
-        printf("%llu of the runs go on beyond their trust horizon, t = %.4g s at the shortest: "
-               "statistics hold there, single motions do not.\n",
-               (unsigned long long)ensemble->trust.beyond, ensemble->trust.shortest_horizon);
-    if (target->why == NULL)
-        return;
-    if (target->predicted_runs != COUNT_ABSENT)
-        printf("After %llu runs, %llu were predicted to be enough.\n",
-               (unsigned long long)target->pilot, (unsigned long long)target->predicted_runs);
-    printf("Target %s: %s.\n", target->is_kept ? "kept" : "not kept", target->why);
+    bytes_text(json, ", \"peaks\": [");
+    for (size_t i = 0; i < ensemble->spectra.count; i++) {
+        const RunSpectrum *spectrum = &ensemble->spectra.at[i];
+        size_t peak = 0;
+        for (size_t k = 1; k < spectrum->mean.count; k++)
+            if (spectrum->mean.at[k] > spectrum->mean.at[peak])
+                peak = k;
+        const bool has_interval = spectrum->low.count > 0;
+        bytes_text(json, i > 0 ? ", " : "");
+        bytes_json(json,
+                   "{\"psd of\": %s, \"largest at [Hz]\": %g, \"mean\": %g, \"low\": %g, "
+                   "\"high\": %g, \"unit\": %s}",
+                   spectrum->channel, ensemble->frequency.at[peak], spectrum->mean.at[peak],
+                   has_interval ? spectrum->low.at[peak] : (double)NAN,
+                   has_interval ? spectrum->high.at[peak] : (double)NAN, spectrum->unit);
+    }
+    bytes_text(json, "]");
 }
 
 const Command command_ensemble = {
@@ -711,49 +640,34 @@ static const Field sweep_fields[] = {
     FIELD_END,
 };
 
-// The extremes of a metric, and where they are.
-static void sweep_extremes_add(PrintTable *listing, const Sweep *sweep, size_t metric) {
-    const SweepTable *table = &sweep->table;
-    const size_t metrics = sweep->metrics.count, none = table->points.count;
-    size_t ends[2] = {none, none}; // the smallest and the largest
-    for (size_t i = 0; i < table->points.count; i++) {
-        const double value = table->values.at[i * metrics + metric];
-        if (isnan(value))
-            continue;
-        if (ends[0] == none || value < table->values.at[ends[0] * metrics + metric])
-            ends[0] = i;
-        if (ends[1] == none || value > table->values.at[ends[1] * metrics + metric])
-            ends[1] = i;
-    }
-    study_metric_add(listing, sweep->metrics.at[metric],
-                     sweep_metric_unit(sweep->metrics.at[metric]));
-    for (size_t k = 0; k < COUNT(ends); k++) {
-        const bool is_known = ends[k] != none;
-        print_table_number(listing, "%.6g",
-                           is_known ? table->values.at[ends[k] * metrics + metric] : (double)NAN);
-        print_table_number(listing, "%.0f", is_known ? (double)ends[k] : (double)NAN);
-    }
-}
+static const PrintTableView sweep_view = {
+    .skipped = (const char *const[]){"kind", "status", "done", "columns", NULL},
+};
 
-static void sweep_print(const Variant *answer) {
+// The extremes of each metric, and the points where they are.
+static void sweep_add(const Variant *answer, Bytes *json) {
     const Sweep *sweep = (const Sweep *)(const void *)answer;
-    static const char *const heads[] = {"", "smallest", "at point", "largest", "at point"};
-    const SweepTable *table = &sweep->table;
-    PrintTable listing = {.columns = COUNT(heads)};
-    printf("%llu points", (unsigned long long)sweep->points);
-    for (size_t i = 0; i < sweep->axes.count; i++)
-        printf("%s %s (%zu)", i > 0 ? "," : ":", sweep->axes.at[i].pointer,
-               sweep->axes.at[i].values.count);
-    puts("\n");
-    study_heads_add(&listing, heads);
-    for (size_t i = 0; i < sweep->metrics.count; i++)
-        sweep_extremes_add(&listing, sweep, i);
-    print_table_print(&listing, stdout);
-    for (size_t i = 0; i < table->failures.count; i++)
-        printf("\n%llu failed, %s; point %llu: %s\n",
-               (unsigned long long)table->failures.at[i].count,
-               sweep_status_names[table->failures.at[i].status],
-               (unsigned long long)table->failures.at[i].first, table->failures.at[i].detail);
+    const size_t metrics = sweep->metrics.count;
+    bytes_text(json, ", \"extremes\": {");
+    for (size_t m = 0; m < metrics; m++) {
+        const double *values = sweep->table.values.at + m;
+        double ends[2] = {(double)NAN, (double)NAN}, points[2] = {(double)NAN, (double)NAN};
+        for (size_t i = 0; i < sweep->table.points.count; i++) {
+            const double value = values[i * metrics];
+            for (int end = 0; end < 2; end++)
+                if (!isnan(value) && !(end == 0 ? value >= ends[0] : value <= ends[1])) {
+                    ends[end] = value;
+                    points[end] = (double)i;
+                }
+        }
+        bytes_text(json, m > 0 ? ", " : "");
+        bytes_json_string(json, sweep->metrics.at[m]);
+        bytes_json(json,
+                   ": {\"unit\": %s, \"smallest\": %g, \"at point\": %g, \"largest\": %g, "
+                   "\"and at point\": %g}",
+                   sweep_metric_unit(sweep->metrics.at[m]), ends[0], points[0], ends[1], points[1]);
+    }
+    bytes_text(json, "}");
 }
 
 const Command command_sweep = {
@@ -783,10 +697,10 @@ const Command command_sweep = {
 static int study_command_run(const Command *self, void *of, const Options *options,
                              Problem *problem) {
     static const StudyCommand all[] = {
-        {&command_study, NULL, NULL, NULL},
-        {&command_tradeoff, &study_tradeoff, tradeoff_choose, tradeoff_print},
-        {&command_ensemble, &study_ensemble, ensemble_choose, ensemble_print},
-        {&command_sweep, &study_sweep, NULL, sweep_print},
+        {&command_study, NULL, NULL, NULL, NULL},
+        {&command_tradeoff, &study_tradeoff, tradeoff_choose, &tradeoff_view, NULL},
+        {&command_ensemble, &study_ensemble, ensemble_choose, &ensemble_view, ensemble_add},
+        {&command_sweep, &study_sweep, NULL, &sweep_view, sweep_add},
     };
     StudySettings *settings = of;
     settings->command = all;

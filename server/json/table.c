@@ -22,7 +22,17 @@ void text_make_printable(char *text) {
         }
 }
 
-void print_table_add(PrintTable *table, const char *format, ...) {
+// A table is filled cell by cell; with heads the first row has the names of the columns. Columns of
+// numbers are right-aligned.
+typedef struct PrintTable {
+    size_t columns, count; // count of cells
+    char **cells;
+    bool has_heads, is_failed; // is_failed: no memory
+} PrintTable;
+
+// Adds the next cell. Control characters, which a terminal would interpret, become '?'.
+static void __attribute__((format(printf, 2, 3)))
+print_table_add(PrintTable *table, const char *format, ...) {
     va_list arguments, again;
     va_start(arguments, format);
     va_copy(again, arguments);
@@ -43,13 +53,7 @@ void print_table_add(PrintTable *table, const char *format, ...) {
     table->cells[table->count++] = text;
 }
 
-void print_table_number(PrintTable *table, const char *format, double value) {
-    char text[64];
-    snprintf(text, sizeof text, format, value);
-    print_table_add(table, "%s", isnan(value) ? "-" : text);
-}
-
-void print_table_clear(PrintTable *table) {
+static void print_table_clear(PrintTable *table) {
     for (size_t i = 0; i < table->count; i++)
         free(table->cells[i]);
     free(table->cells);
@@ -82,7 +86,8 @@ static bool print_table_is_numeric(const PrintTable *table, size_t column) {
     return is_numeric;
 }
 
-void print_table_print(PrintTable *table, FILE *file) {
+// Prints and clears the table; an empty cell under a head is "-".
+static void print_table_print(PrintTable *table, FILE *file) {
     int widths[LISTING_COLUMNS] = {0};
     bool is_numeric[LISTING_COLUMNS];
     const size_t columns = table->columns;
@@ -209,8 +214,9 @@ static void value_add(PrintTable *table, const json_t *value, const char *unit) 
 }
 
 static void name_add(const Printer *printer, PrintTable *table, const char *name) {
-    const char *unit = printer_unit(printer, name);
-    print_table_add(table, "%s%s%s%s", name, unit != NULL ? " [" : "", unit != NULL ? unit : "",
+    const char *point = strchr(name, '.'), *last = point != NULL ? point + 1 : name;
+    const char *unit = printer_unit(printer, last);
+    print_table_add(table, "%s%s%s%s", last, unit != NULL ? " [" : "", unit != NULL ? unit : "",
                     unit != NULL ? "]" : "");
 }
 
@@ -218,10 +224,20 @@ static void heading_join(char target[HEADING_SIZE], const char *heading, const c
     snprintf(target, HEADING_SIZE, "%.120s%s%.120s", heading, heading[0] != '\0' ? " " : "", name);
 }
 
+// The member of an object; "errors.psd" is that of a member.
+static const json_t *member_get(const json_t *object, const char *name) {
+    const json_t *value = json_object_get(object, name);
+    const char *point = strchr(name, '.');
+    if (value != NULL || point == NULL)
+        return value;
+    value = json_object_getn(object, name, (size_t)(point - name));
+    return json_object_get(value, point + 1);
+}
+
 // Whether any object of a list has a value there that is worth a cell; "no" everywhere is not.
 static bool list_has(const json_t *list, const char *name) {
     for (size_t i = 0; i < json_array_size(list) && i < ROWS_MAX; i++) {
-        const json_t *value = json_object_get(json_array_get(list, i), name);
+        const json_t *value = member_get(json_array_get(list, i), name);
         if (!value_is_empty(value) && value_is_plain(value) && !json_is_false(value))
             return true;
     }
@@ -249,6 +265,8 @@ static void list_add_column(const json_t *list, const char *name,
 static void list_print(Printer *printer, const json_t *list, const char *const *wanted,
                        const char *heading) {
     const char *columns[LISTING_COLUMNS + 1] = {NULL};
+    if (wanted != NULL) // the names of neighbouring objects
+        list_add_column(list, "", columns);
     const size_t size = json_array_size(list), rows = size < ROWS_MAX ? size : ROWS_MAX;
     for (; wanted != NULL && *wanted != NULL; wanted++)
         list_add_column(list, *wanted, columns);
@@ -265,7 +283,7 @@ static void list_print(Printer *printer, const json_t *list, const char *const *
         name_add(printer, &table, columns[table.columns++]);
     for (size_t i = 0; i < rows; i++)
         for (size_t k = 0; k < table.columns; k++)
-            value_add(&table, json_object_get(json_array_get(list, i), columns[k]), NULL);
+            value_add(&table, member_get(json_array_get(list, i), columns[k]), NULL);
     const bool is_cut = table.columns > 0 && size > rows;
     printer_table(printer, &table, heading);
     if (is_cut)
@@ -327,7 +345,7 @@ static void neighbours_print(Printer *printer, json_t *object, void **at, const 
              json_is_object(json_object_iter_value(*at)) &&
              has_same_members(first, json_object_iter_value(*at)));
     if (json_array_size(list) > 1)
-        objects_print(printer, list, NULL, heading, depth);
+        objects_print(printer, list, list_columns(printer, heading), heading, depth);
     else
         object_print(printer, first, inner, depth + 1);
     json_decref(list);

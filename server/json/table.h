@@ -1,4 +1,4 @@
-// Tables of text for people: built cell by cell, or made of a JSON document.
+// Tables of text for people, made of a JSON document.
 #ifndef SERVER_JSON_TABLE_H
 #define SERVER_JSON_TABLE_H
 
@@ -8,27 +8,11 @@
 
 enum { LISTING_COLUMNS = 12 };
 
-// An empty table is zero but for the number of columns. Cells are added row by row; with heads the
-// first row has the names of the columns. Columns of numbers are right-aligned.
-typedef struct PrintTable {
-    size_t columns, count; // count of cells
-    char **cells;
-    bool has_heads, is_failed; // is_failed: no memory
-} PrintTable;
-
-// Adds the next cell. Control characters, which a terminal would interpret, become '?'.
-void print_table_add(PrintTable *table, const char *format, ...)
-    __attribute__((format(printf, 2, 3)));
-// The same for a number; NAN is "-".
-void print_table_number(PrintTable *table, const char *format, double value);
-void print_table_clear(PrintTable *table);
-// Prints and clears the table; an empty cell under a head is "-".
-void print_table_print(PrintTable *table, FILE *file);
-
 // Replaces control characters by '?', in place; NULL is allowed.
 void text_make_printable(char *text);
 
-// The columns of a list of objects, in this order; empty ones are left out. A list without such an
+// The columns of a list of objects, or of the objects that are the members of an object, in this
+// order; empty ones are left out. "errors.psd" is a member of a member. A list without such an
 // entry has all columns.
 typedef struct PrintTableColumns {
     const char *list;

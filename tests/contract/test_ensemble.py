@@ -117,10 +117,10 @@ def test_the_command_prints_statistics_and_writes_all_formats():
     check_csv(texts[1], answer)
     check_chart(texts[2], answer)
     lines = out.splitlines()
-    assert lines[0].startswith("20 runs, seeds 1 to 20, "), lines[0]
+    assert {"runs 20", "first_seed 1", "made 20"} <= {" ".join(line.split()) for line in lines}, lines
     for name in STATISTICS:
         assert sum(line.strip().startswith(name) for line in lines) == 1, name
-    assert max(len(line) for line in lines[:9]) <= 100
+    assert max(len(line) for line in lines) <= 120
 
 
 def test_every_row_can_be_run_again():
@@ -163,12 +163,12 @@ def test_a_target_is_kept_with_fewer_runs():
         whole, _ = answer("--target", "1e-12")
         assert whole["made"] == 200 and whole["target"]["estimated_error"] == 0 and whole["target"]["is_kept"]
         loose, out = answer()
-        assert loose["target"]["metric"] == "impacts" and loose["made"] < 30 and "Target kept" in out
+        assert loose["target"]["metric"] == "impacts" and loose["made"] < 30 and loose["target"]["why"] in out
         for metric in ("rms_displacement", "psd"):
             part, out = answer("--target", "0.1", "--metric", metric)
             told = part["target"]
             assert 8 <= part["made"] < 200 and told["is_kept"] and told["estimated_error"] <= 0.1, told
-            assert told["pilot"] == 8 and f"{told['predicted_runs']} were predicted to be enough" in out
+            assert told["pilot"] == 8 and told["why"] in out
             assert part["table"] == whole["table"][:part["made"]]
             if metric == "psd":
                 mean, all_ = (numpy.array(one["spectra"][0]["mean"]) for one in (part, whole))

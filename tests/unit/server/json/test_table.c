@@ -1,4 +1,4 @@
-// Tables of text, built by hand and made of documents.
+// Tables of text, made of documents.
 #include <stdlib.h>
 #include <string.h>
 
@@ -20,26 +20,6 @@ TEST(control_characters_are_replaced) {
     text_make_printable(NULL);
 }
 
-TEST(numbers_stand_to_the_right_and_unknown_cells_are_marked) {
-    char *text = NULL;
-    size_t size;
-    FILE *file = open_memstream(&text, &size);
-    PrintTable listing = {.columns = 3, .has_heads = true};
-    static const char *const cells[] = {"name", "n", "note", "\xc3\xa4", "", "x", "bb", "12.5", ""};
-    for (size_t i = 0; i < COUNT(cells); i++)
-        print_table_add(&listing, "%s", cells[i]);
-    print_table_print(&listing, file);
-    print_table_number(&listing, "%.1f", 1);
-    print_table_number(&listing, "%.1f", (double)NAN);
-    print_table_print(&listing, file);
-    fclose(file);
-    assert_string_equal(text, "name     n  note\n"
-                              "\xc3\xa4        -  x\n"
-                              "bb    12.5  -\n"
-                              "1.0  -\n");
-    free(text);
-}
-
 // What is printed of a document.
 static Status printed(const char *json, char **text, size_t *longest) {
     static const char *const skipped[] = {"links", NULL};
@@ -52,6 +32,19 @@ static Status printed(const char *json, char **text, size_t *longest) {
     const Status status = print_table_print_json(json, strlen(json), &view, file, longest, NULL);
     fclose(file);
     return status;
+}
+
+TEST(numbers_stand_to_the_right_and_unknown_cells_are_marked) {
+    char *text;
+    size_t longest;
+    assert_int_equal(printed("{\"rows\": [{\"b\": \"\xc3\xa4\", \"c\": \"x\"}, {\"b\": \"bb\", "
+                             "\"a\": 12.5}]}",
+                             &text, &longest),
+                     STATUS_OK);
+    assert_string_equal(text, "b      a  c\n"
+                              "\xc3\xa4      -  x\n"
+                              "bb  12.5  -\n");
+    free(text);
 }
 
 TEST(text_that_is_not_an_object_is_refused_and_a_long_list_is_cut) {
