@@ -95,7 +95,7 @@ static ssize_t sending_next(void *context, uint64_t position, char *target, size
             return MHD_CONTENT_READER_END_WITH_ERROR;
         if (count != STREAM_WAIT)
             return count;
-        if (timer_wheel_is_closing(exchange->loop->wheel))
+        if (timer_list_is_closing(exchange->loop->timers))
             return MHD_CONTENT_READER_END_OF_STREAM;
         if (timer_sleep(exchange->timer, exchange, sending->stream.wait_ms))
             return 0;
@@ -214,7 +214,7 @@ static struct MHD_Response *response_new(Exchange *exchange, Reply *reply) {
 static enum MHD_Result response_queue(Exchange *exchange, Reply *reply, bool closes) {
     const Request *request = &exchange->request;
     const int code = reply->code;
-    closes = closes || timer_wheel_is_closing(exchange->loop->wheel);
+    closes = closes || timer_list_is_closing(exchange->loop->timers);
     struct MHD_Response *response = response_new(exchange, reply);
     if (response == NULL)
         return MHD_NO;
@@ -507,7 +507,7 @@ void connection_notify(void *context, struct MHD_Connection *connection, void **
     if (code == MHD_CONNECTION_NOTIFY_STARTED) {
         const union MHD_ConnectionInfo *info =
             MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
-        *timer = info != NULL ? timer_take(loop->wheel, info->connect_fd) : NULL;
+        *timer = info != NULL ? timer_take(loop->timers, info->connect_fd) : NULL;
         if (*timer != NULL)
             timer_limit(*timer, HEAD_MS, true);
         return;

@@ -12,7 +12,7 @@
 #include "server/http/timer.h"
 #include "server/util/thread_pool.h"
 
-// Belongs to its thread, except the atomic members and the wheel's waits.
+// Belongs to its thread, except the atomic members and the timers' waits.
 typedef struct EventLoop {
     Server *server;
     size_t index;
@@ -20,7 +20,7 @@ typedef struct EventLoop {
     pthread_t thread;
     int wakeup;           // an eventfd: connections were resumed, a time was set, or it is to stop
     atomic_bool is_woken; // since the loop last looked: another signal is not needed
-    TimerWheel *wheel;
+    TimerList *timers;
     size_t calls;             // of exchange_continue
     struct Exchange *readers; // exchanges whose body is being read
     int64_t readers_checked_ns;

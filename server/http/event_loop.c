@@ -57,7 +57,7 @@ static size_t server_next_acceptor(const Server *server) {
 // that has been idle for longest is made to.
 static void loop_make_room(EventLoop *loop, int64_t now_ns) {
     Server *server = loop->server;
-    timer_wheel_close_idle(loop->wheel, IDLE_MIN_MS);
+    timer_list_close_idle(loop->timers, IDLE_MIN_MS);
     loop->accept_ns = now_ns + RETRY_MS * 1000000LL;
     if (server->loop_count > 1)
         loop_pass_accepting(server, (loop->index + 1) % server->loop_count);
@@ -107,7 +107,7 @@ static void *loop_run(void *context) {
     size_t busy = 0; // runs in a row that called something: then there is probably more to do
     while (!atomic_load(&loop->is_stopping)) {
         const int64_t now_ns = clock_monotonic_ns();
-        const int64_t next_ns = timer_wheel_run(loop->wheel, now_ns);
+        const int64_t next_ns = timer_list_run(loop->timers, now_ns);
         connection_close_stalled(loop, now_ns);
         if (busy % BUSY_RUNS == 0) {
             const bool may_accept =
@@ -145,8 +145,8 @@ static Status loop_start(EventLoop *loop, Server *server, Problem *problem) {
          (void *)(uintptr_t) "SECURE128:-VERS-ALL:+VERS-TLS1.2:+VERS-TLS1.3:-RSA"},
         {MHD_OPTION_END, 0, NULL}};
     const struct MHD_OptionItem none[] = {{MHD_OPTION_END, 0, NULL}};
-    loop->wheel = timer_wheel_new(&connection_timer_calls, loop);
-    if (loop->wheel == NULL)
+    loop->timers = timer_list_new(&connection_timer_calls, loop);
+    if (loop->timers == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for an event loop");
     loop->daemon = MHD_start_daemon(
         flags, 0, NULL, NULL, exchange_continue, loop, MHD_OPTION_CONNECTION_LIMIT,
@@ -164,7 +164,7 @@ static Status loop_start(EventLoop *loop, Server *server, Problem *problem) {
     if (loop->daemon != NULL)
         MHD_stop_daemon(loop->daemon);
     close(loop->wakeup); // -1 is harmless
-    timer_wheel_free(loop->wheel);
+    timer_list_free(loop->timers);
     return loop->daemon == NULL
                ? problem_set(problem, STATUS_INTERNAL, "the HTTP library cannot start%s",
                              is_tls ? " with this certificate and key" : "")
@@ -246,7 +246,7 @@ void server_stop(Server *server, int grace_ms) {
     shutdown(server->descriptor, SHUT_RDWR);
     for (size_t i = 0; i < server->loop_count; i++) {
         loop_wake(&server->loops[i]);
-        timer_wheel_wake_all(server->loops[i].wheel);
+        timer_list_wake_all(server->loops[i].timers);
     }
     const int64_t until = clock_monotonic_ns() + (int64_t)grace_ms * 1000000;
     const struct timespec pause = {.tv_nsec = 5000000};
@@ -268,6 +268,6 @@ void server_free(Server *server) {
         return;
     server_stop(server, 0);
     for (size_t i = 0; i < server->loop_count; i++)
-        timer_wheel_free(server->loops[i].wheel);
+        timer_list_free(server->loops[i].timers);
     free(server);
 }

@@ -12,7 +12,7 @@
 #include "server/util/clock.h"
 
 struct ConnectionTimer {
-    TimerWheel *wheel;
+    TimerList *timers;
     ConnectionTimer *next; // of all
     ConnectionTimer *next_free;
     Callback callback;
@@ -23,7 +23,7 @@ struct ConnectionTimer {
     int64_t idle_ns;           // since when it is between two requests; INT64_MAX: it is not
 };
 
-struct TimerWheel {
+struct TimerList {
     TimerCallbacks calls;
     void *loop;
     pthread_mutex_t lock;
@@ -38,32 +38,32 @@ static void timer_wake_locked(ConnectionTimer *timer) {
     void *connection = timer->waiting;
     timer->waiting = NULL;
     timer->wake_ns = INT64_MAX;
-    timer->wheel->calls.resume(connection);
+    timer->timers->calls.resume(connection);
 }
 
 static void timer_wake(void *context) {
     ConnectionTimer *timer = context;
-    pthread_mutex_lock(&timer->wheel->lock);
+    pthread_mutex_lock(&timer->timers->lock);
     timer->is_woken = true;
     timer_wake_locked(timer);
-    pthread_mutex_unlock(&timer->wheel->lock);
+    pthread_mutex_unlock(&timer->timers->lock);
 }
 
 // Whether `time_ns` is earlier than all others.
-static bool timer_lower_next(TimerWheel *wheel, int64_t time_ns) {
-    int64_t next = atomic_load(&wheel->next_ns);
+static bool timer_lower_next(TimerList *timers, int64_t time_ns) {
+    int64_t next = atomic_load(&timers->next_ns);
     while (time_ns < next)
-        if (atomic_compare_exchange_weak(&wheel->next_ns, &next, time_ns))
+        if (atomic_compare_exchange_weak(&timers->next_ns, &next, time_ns))
             return true;
     return false;
 }
 
-int64_t timer_wheel_run(TimerWheel *wheel, int64_t now_ns) {
-    if (atomic_load(&wheel->next_ns) > now_ns)
-        return atomic_load(&wheel->next_ns);
-    pthread_mutex_lock(&wheel->lock);
+int64_t timer_list_run(TimerList *timers, int64_t now_ns) {
+    if (atomic_load(&timers->next_ns) > now_ns)
+        return atomic_load(&timers->next_ns);
+    pthread_mutex_lock(&timers->lock);
     int64_t next = INT64_MAX;
-    for (ConnectionTimer *timer = wheel->all; timer != NULL; timer = timer->next) {
+    for (ConnectionTimer *timer = timers->all; timer != NULL; timer = timer->next) {
         if (timer->wake_ns <= now_ns)
             timer_wake_locked(timer);
         if (timer->limit_ns <= now_ns) {
@@ -73,37 +73,37 @@ int64_t timer_wheel_run(TimerWheel *wheel, int64_t now_ns) {
         next = timer->wake_ns < next ? timer->wake_ns : next;
         next = timer->limit_ns < next ? timer->limit_ns : next;
     }
-    atomic_store(&wheel->next_ns, next); // others lower it with the lock
-    pthread_mutex_unlock(&wheel->lock);
+    atomic_store(&timers->next_ns, next); // others lower it with the lock
+    pthread_mutex_unlock(&timers->lock);
     return next;
 }
 
-TimerWheel *timer_wheel_new(const TimerCallbacks *calls, void *loop) {
-    TimerWheel *wheel = calloc(1, sizeof *wheel);
-    if (wheel == NULL)
+TimerList *timer_list_new(const TimerCallbacks *calls, void *loop) {
+    TimerList *timers = calloc(1, sizeof *timers);
+    if (timers == NULL)
         return NULL;
-    wheel->calls = *calls;
-    wheel->loop = loop;
-    atomic_init(&wheel->next_ns, INT64_MAX);
-    pthread_mutex_init(&wheel->lock, NULL);
-    return wheel;
+    timers->calls = *calls;
+    timers->loop = loop;
+    atomic_init(&timers->next_ns, INT64_MAX);
+    pthread_mutex_init(&timers->lock, NULL);
+    return timers;
 }
 
-void timer_wheel_wake_all(TimerWheel *wheel) {
-    pthread_mutex_lock(&wheel->lock);
-    wheel->is_closing = true;
-    for (ConnectionTimer *timer = wheel->all; timer != NULL; timer = timer->next)
+void timer_list_wake_all(TimerList *timers) {
+    pthread_mutex_lock(&timers->lock);
+    timers->is_closing = true;
+    for (ConnectionTimer *timer = timers->all; timer != NULL; timer = timer->next)
         timer_wake_locked(timer);
-    pthread_mutex_unlock(&wheel->lock);
+    pthread_mutex_unlock(&timers->lock);
 }
 
-bool timer_wheel_is_closing(TimerWheel *wheel) {
-    return atomic_load(&wheel->is_closing);
+bool timer_list_is_closing(TimerList *timers) {
+    return atomic_load(&timers->is_closing);
 }
 
-void timer_wheel_close_idle(TimerWheel *wheel, int64_t min_ms) {
+void timer_list_close_idle(TimerList *timers, int64_t min_ms) {
     ConnectionTimer *longest = NULL;
-    for (ConnectionTimer *timer = wheel->all; timer != NULL; timer = timer->next)
+    for (ConnectionTimer *timer = timers->all; timer != NULL; timer = timer->next)
         if (timer->idle_ns < (longest != NULL ? longest->idle_ns : INT64_MAX))
             longest = timer;
     if (longest == NULL || longest->idle_ns > clock_monotonic_ns() - min_ms * 1000000)
@@ -112,28 +112,28 @@ void timer_wheel_close_idle(TimerWheel *wheel, int64_t min_ms) {
     longest->idle_ns = INT64_MAX;
 }
 
-void timer_wheel_free(TimerWheel *wheel) {
-    if (wheel == NULL)
+void timer_list_free(TimerList *timers) {
+    if (timers == NULL)
         return;
-    while (wheel->all != NULL) {
-        ConnectionTimer *next = wheel->all->next;
-        free(wheel->all);
-        wheel->all = next;
+    while (timers->all != NULL) {
+        ConnectionTimer *next = timers->all->next;
+        free(timers->all);
+        timers->all = next;
     }
-    pthread_mutex_destroy(&wheel->lock);
-    free(wheel);
+    pthread_mutex_destroy(&timers->lock);
+    free(timers);
 }
 
-ConnectionTimer *timer_take(TimerWheel *wheel, int descriptor) {
-    pthread_mutex_lock(&wheel->lock);
-    ConnectionTimer *timer = wheel->free_list;
+ConnectionTimer *timer_take(TimerList *timers, int descriptor) {
+    pthread_mutex_lock(&timers->lock);
+    ConnectionTimer *timer = timers->free_list;
     if (timer != NULL) {
-        wheel->free_list = timer->next_free;
+        timers->free_list = timer->next_free;
     } else if ((timer = malloc(sizeof *timer)) != NULL) {
-        timer->wheel = wheel;
+        timer->timers = timers;
         timer->callback = (Callback){timer, timer_wake};
-        timer->next = wheel->all;
-        wheel->all = timer;
+        timer->next = timers->all;
+        timers->all = timer;
     }
     if (timer != NULL) {
         timer->descriptor = descriptor;
@@ -141,19 +141,19 @@ ConnectionTimer *timer_take(TimerWheel *wheel, int descriptor) {
         timer->is_woken = false;
         timer->wake_ns = timer->limit_ns = timer->idle_ns = INT64_MAX;
     }
-    pthread_mutex_unlock(&wheel->lock);
+    pthread_mutex_unlock(&timers->lock);
     return timer;
 }
 
 void timer_leave(ConnectionTimer *timer) {
-    TimerWheel *wheel = timer->wheel;
-    pthread_mutex_lock(&wheel->lock);
+    TimerList *timers = timer->timers;
+    pthread_mutex_lock(&timers->lock);
     timer->descriptor = -1;
     timer->waiting = NULL;
     timer->wake_ns = timer->limit_ns = timer->idle_ns = INT64_MAX;
-    timer->next_free = wheel->free_list;
-    wheel->free_list = timer;
-    pthread_mutex_unlock(&wheel->lock);
+    timer->next_free = timers->free_list;
+    timers->free_list = timer;
+    pthread_mutex_unlock(&timers->lock);
 }
 
 const Callback *timer_callback(const ConnectionTimer *timer) {
@@ -164,23 +164,23 @@ void timer_limit(ConnectionTimer *timer, int64_t max_ms, bool is_idle) {
     const int64_t now_ns = max_ms > 0 ? clock_monotonic_ns() : 0;
     timer->limit_ns = max_ms > 0 ? now_ns + max_ms * 1000000 : INT64_MAX;
     timer->idle_ns = is_idle ? now_ns : INT64_MAX;
-    (void)timer_lower_next(timer->wheel, timer->limit_ns);
+    (void)timer_lower_next(timer->timers, timer->limit_ns);
 }
 
 bool timer_sleep(ConnectionTimer *timer, void *connection, int64_t max_ms) {
-    TimerWheel *wheel = timer->wheel;
+    TimerList *timers = timer->timers;
     const int64_t wake_ns = clock_monotonic_ns() + max_ms * 1000000;
-    pthread_mutex_lock(&wheel->lock);
-    const bool waits = !timer->is_woken && !wheel->is_closing;
+    pthread_mutex_lock(&timers->lock);
+    const bool waits = !timer->is_woken && !timers->is_closing;
     if (waits) {
         // The state first: the resume may come from another thread as soon as the lock is free.
         timer->waiting = connection;
         timer->wake_ns = wake_ns;
-        wheel->calls.suspend(connection);
-        if (timer_lower_next(wheel, wake_ns))
-            wheel->calls.changed(wheel->loop);
+        timers->calls.suspend(connection);
+        if (timer_lower_next(timers, wake_ns))
+            timers->calls.changed(timers->loop);
     }
-    pthread_mutex_unlock(&wheel->lock);
+    pthread_mutex_unlock(&timers->lock);
     return waits;
 }
 
