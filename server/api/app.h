@@ -49,51 +49,9 @@ Handler health_live, health_ready, metrics_show, version_show, landing_show;
 Handler short_ids_redirect; // of no route: Router.not_found
 Handler assets_show, assets_show_icon;
 
-// Takes the JSON in `bytes` as the body of the reply, unless `status` is an error already.
-Status reply_json(Reply *reply, int code, Bytes *bytes, Status status, Problem *problem);
-
-// --- queries of lists, query.c ---
-
-enum { QUERY_TEXT_MAX = 200 };
-
-// The query's text, NULL where it is absent or empty; at most QUERY_TEXT_MAX bytes.
-Status query_text(const Request *request, const char *name, const char **text, Problem *problem);
-// Which of `names` (NULL-terminated) it is; `initial` where it is absent.
-Status query_choice(const Request *request, const char *name, const char *const *names, int initial,
-                    int *choice, Problem *problem);
-// "0.4..0.7", "0.4..", "..0.7" or "0.4", both ends included; without it everything, also NAN.
-typedef struct QueryRange {
-    double least, most;
-    bool is_asked;
-} QueryRange;
-Status query_range(const Request *request, const char *name, QueryRange *range, Problem *problem);
-bool query_range_has(const QueryRange *range, double value);
-// A copy of the text, NULL where it is absent or empty. The caller frees it.
-Status query_copy(const Request *request, const char *name, char **target, Problem *problem);
-// As query_choice for a member of a document that is sent as queries: STATUS_INVALID at `pointer`,
-// with a suggestion. *choice stays where it is absent.
-Status query_spelled(const Request *request, const char *name, const char *pointer,
-                     const char *const *names, int *choice, Problem *problem);
-// Whether the body is JSON or one of `texts` (NULL-terminated). STATUS_UNSUPPORTED_TYPE with what
-// is wanted and a hint, STATUS_TOO_LARGE, STATUS_UNREADABLE.
-Status query_body_type(const Request *request, const char *const *texts, const char *wanted,
-                       const char *hint, bool *is_json, Problem *problem);
-// The JSON body of a request without queries, which are for other types.
-Status query_read_document(const Request *request, const Field *fields, void *item,
-                           Problem *problem);
 // The table of a ground motion in the body, records.c. Cleared by ground_motion_text_clear.
-Status query_read_motion(const Request *request, const GroundMotionOptions *options,
-                         GroundMotionText *motion, Problem *problem);
-// Links the next page: the same queries, with `name` now `value`.
-void query_link_next(const Request *request, Reply *reply, const char *name, const char *value);
-// The format of the extension in the path's `parameter`, else by Accept, out of `count`.
-// STATUS_NOT_FOUND, STATUS_NOT_ACCEPTABLE.
-typedef struct QueryFormat {
-    const char *extension, *content_type;
-} QueryFormat;
-enum { QUERY_FORMATS_MAX = 16 };
-Status query_format(const Request *request, size_t parameter, const QueryFormat *at, size_t count,
-                    Reply *reply, size_t *choice, Problem *problem);
+Status records_read_motion(const Request *request, const GroundMotionOptions *options,
+                           GroundMotionText *motion, Problem *problem);
 
 // --- jobs, jobs.c ---
 

@@ -17,17 +17,17 @@ static const double wait_max = 60; // [s]
 
 Status columns_format(const Request *request, size_t parameter, bool has_chart, Reply *reply,
                       const TableFormat **format, Problem *problem) {
-    const TableFormat *offered[QUERY_FORMATS_MAX];
-    QueryFormat formats[QUERY_FORMATS_MAX];
+    const TableFormat *offered[REPLY_FORMATS_MAX];
+    ReplyFormat formats[REPLY_FORMATS_MAX];
     size_t count = 0, choice;
-    for (size_t i = 0; table_formats[i] != NULL && count < QUERY_FORMATS_MAX; i++) {
+    for (size_t i = 0; table_formats[i] != NULL && count < REPLY_FORMATS_MAX; i++) {
         if (table_formats[i] == &format_svg && !has_chart)
             continue;
         offered[count] = table_formats[i];
         formats[count++] =
-            (QueryFormat){table_formats[i]->extension, table_formats[i]->content_type};
+            (ReplyFormat){table_formats[i]->extension, table_formats[i]->content_type};
     }
-    TRY(query_format(request, parameter, formats, count, reply, &choice, problem));
+    TRY(reply_format(request, parameter, formats, count, reply, &choice, problem));
     *format = offered[choice];
     return STATUS_OK;
 }

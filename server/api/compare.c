@@ -71,6 +71,11 @@ static const Field measured_request_fields[] = {
     FIELD_REAL(MeasuredRequest, most_shift, "s", ABOVE(0), OPTIONAL, "under auto, within which it is sought; anywhere if absent"),
     FIELD_END
 };
+
+static const Field unit_fields[] = {
+    FIELD_CHOICE(GroundMotionOptions, unit, acceleration_unit_names, OPTIONAL, "of a table of accelerations"),
+    FIELD_END
+};
 // clang-format on
 
 // What a request works with and keeps while it waits, so that no cache can drop one outcome while
@@ -412,15 +417,13 @@ Status compare_results(App *app, const Request *request, Reply *reply, Problem *
 static Status measured_read_text(const Request *request, MeasuredRequest *asked, Problem *problem) {
     GroundMotionOptions options = {.interval = (double)NAN, .unit = CHOICE_ABSENT};
     GroundMotionText motion = {0};
-    TRY(query_copy(request, "a", &asked->a, problem));
-    TRY(query_copy(request, "channel", &asked->channel, problem));
-    TRY(query_spelled(request, "align", "/align", align_names, &asked->align, problem));
-    TRY(query_spelled(request, "unit", "/unit", acceleration_unit_names, &options.unit, problem));
+    TRY(request_read_fields(request, measured_request_fields, asked, problem));
+    TRY(request_read_fields(request, unit_fields, &options, problem));
     TRY(request_number(request, "shift", -1e9, 1e9, 0, &asked->shift, problem));
     TRY(request_number(request, "most_shift", 1e-12, 1e9, (double)NAN, &asked->most_shift,
                        problem));
     TRY(request_number(request, "interval", 1e-9, 1e6, (double)NAN, &options.interval, problem));
-    const Status status = query_read_motion(request, &options, &motion, problem);
+    const Status status = records_read_motion(request, &options, &motion, problem);
     asked->measured =
         (Measured){motion.samples, motion.interval, motion.start, asked->measured.quantity};
     motion.samples = (Reals){NULL, 0};
@@ -431,13 +434,13 @@ static Status measured_read_text(const Request *request, MeasuredRequest *asked,
 static Status measured_read(const Request *request, MeasuredRequest *asked, Problem *problem) {
     static const char *const texts[] = {"text/csv", "text/plain", NULL};
     bool is_json;
-    TRY(query_body_type(request, texts,
-                        "application/json, or a table of times and accelerations as text/csv "
-                        "or text/plain with ?a=RESULT",
-                        "", &is_json, problem));
+    TRY(request_require_type(request, texts,
+                             "application/json, or a table of times and accelerations as text/csv "
+                             "or text/plain with ?a=RESULT",
+                             "", &is_json, problem));
     if (fields_default(measured_request_fields, asked) != STATUS_OK)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the measurement");
-    TRY(is_json ? query_read_document(request, measured_request_fields, asked, problem)
+    TRY(is_json ? request_read_document(request, measured_request_fields, asked, problem)
                 : measured_read_text(request, asked, problem));
     TRY(fields_validate(measured_request_fields, asked, "", problem));
     if (asked->measured.samples.count < MEASURED_MIN)

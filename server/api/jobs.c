@@ -362,7 +362,7 @@ static bool jobs_list_row(App *app, Bytes *bytes, const JobRow *row, int state,
 static Status search_read_time(const Request *request, const char *name, bool is_end,
                                int64_t *unix_ms, Problem *problem) {
     const char *text;
-    TRY(query_text(request, name, &text, problem));
+    TRY(request_text(request, name, &text, problem));
     if (text == NULL)
         return STATUS_OK;
     if (!rfc3339_read(text, unix_ms))
@@ -384,14 +384,14 @@ static Status search_read(const Request *request, JobSearch *search, int *state,
     int kind;
     TRY(request_count(request, "limit", 1, LIST_MAX, LIST_INITIAL, &limit, problem));
     *search = job_search_all(limit);
-    TRY(query_choice(request, "status", job_state_names, -1, state, problem));
-    TRY(query_choice(request, "kind", kinds, -1, &kind, problem));
-    TRY(query_text(request, "before", &search->before, problem));
+    TRY(request_choice(request, "status", job_state_names, -1, state, problem));
+    TRY(request_choice(request, "kind", kinds, -1, &kind, problem));
+    TRY(request_text(request, "before", &search->before, problem));
     if (search->before != NULL)
         search->before_unix_ms = job_id_unix_ms(search->before);
-    TRY(query_text(request, "q", &search->words, problem));
-    TRY(query_text(request, "label", &search->label, problem));
-    TRY(query_text(request, "result", &search->result, problem));
+    TRY(request_text(request, "q", &search->words, problem));
+    TRY(request_text(request, "label", &search->label, problem));
+    TRY(request_text(request, "result", &search->result, problem));
     TRY(search_read_time(request, "since", false, &search->since_unix_ms, problem));
     TRY(search_read_time(request, "until", true, &search->until_unix_ms, problem));
     if (kind >= 0) // the names are the studies' own, and outlive this
@@ -454,6 +454,6 @@ Status jobs_list(App *app, const Request *request, Reply *reply, Problem *proble
     }
     bytes_text(&bytes, "]}\n");
     if (last[0] != '\0')
-        query_link_next(request, reply, "before", last);
+        reply_link_next(request, reply, "before", last);
     return reply_bytes(reply, 200, type_json, &bytes, problem);
 }

@@ -137,7 +137,7 @@ static Status proposal_run(App *app, const Request *request, const Material *bef
                            Problem *problem) {
     const char *slug = request->parameters[0];
     int form;
-    TRY(query_choice(request, "as", proposal_form_names, PROPOSAL_CONSTANT, &form, problem));
+    TRY(request_choice(request, "as", proposal_form_names, PROPOSAL_CONSTANT, &form, problem));
     Evaluation evaluation = {.separation = separation};
     MaterialProposal proposal = {.why = NULL};
     Status status = selection_load(app, selection, slug, problem);
@@ -164,10 +164,10 @@ Status proposals_show(App *app, const Request *request, Reply *reply, Problem *p
     const char *slug = request->parameters[0];
     MaterialState state;
     MaterialRevision before;
-    static const QueryFormat formats[] = {{"json", "application/json"}, {"svg", chart_type}};
+    static const ReplyFormat formats[] = {{"json", "application/json"}, {"svg", chart_type}};
     size_t format;
     int separation;
-    TRY(query_format(request, 1, formats, COUNT(formats), reply, &format, problem));
+    TRY(reply_format(request, 1, formats, COUNT(formats), reply, &format, problem));
     TRY(db_material_state(app->db, slug, &state, problem));
     TRY(measurement_separation(app, request, &separation, problem));
     TRY(material_latest(app, slug, &before, problem));
@@ -198,10 +198,10 @@ static Status pair_query_read(const Request *request, PairQuery *query, Problem 
                        problem));
     TRY(request_number(request, "structure_mass", mass_min, mass_max, (double)NAN,
                        &query->structure_mass, problem));
-    TRY(query_choice(request, "identified_for", identified_for_names, IDENTIFIED_FOR_SCENE,
-                     &query->identified_for, problem));
-    return query_choice(request, "separation", separation_names, CHOICE_ABSENT, &query->separation,
-                        problem);
+    TRY(request_choice(request, "identified_for", identified_for_names, IDENTIFIED_FOR_SCENE,
+                       &query->identified_for, problem));
+    return request_choice(request, "separation", separation_names, CHOICE_ABSENT,
+                          &query->separation, problem);
 }
 
 static void pair_write(Bytes *bytes, const MaterialRevision *revision, const PairParameters *pair) {

@@ -53,7 +53,7 @@ void material_page_link(const Request *request, Reply *reply, uint64_t last) {
     char number[24];
     snprintf(number, sizeof number, "%llu", (unsigned long long)last);
     if (last > 1)
-        query_link_next(request, reply, "before", number);
+        reply_link_next(request, reply, "before", number);
 }
 
 Status material_body_read(const Request *request, const char *whose, const Field *fields,
@@ -129,18 +129,52 @@ Status material_condition(App *app, const Request *request, bool is_required, ui
 
 // List.
 
+// "0.4..0.7", "0.4..", "..0.7" or "0.4", both ends included; without it everything, also NAN.
+typedef struct SearchRange {
+    double least, most;
+    bool is_asked;
+} SearchRange;
+
+static Status search_range(const Request *request, const char *name, SearchRange *range,
+                           Problem *problem) {
+    const char *text;
+    *range = (SearchRange){(double)-INFINITY, (double)INFINITY, false};
+    TRY(request_text(request, name, &text, problem));
+    if (text == NULL)
+        return STATUS_OK;
+    const char *dots = strstr(text, "..");
+    const size_t first = dots != NULL ? (size_t)(dots - text) : strlen(text);
+    const char *second = dots != NULL ? dots + 2 : text;
+    // Either end may be left out.
+    const bool is_read =
+        (first == 0 || request_read_real(text, first, &range->least)) &&
+        (*second == '\0' || request_read_real(second, strlen(second), &range->most)) &&
+        strcmp(text, "..") != 0;
+    if (!is_read || range->least > range->most)
+        return problem_set(problem, STATUS_USAGE,
+                           "the query parameter \"%s\" must be a number or a rising range, as "
+                           "0.4..0.7, 0.4.. or ..0.7, is \"%.40s\"",
+                           name, text);
+    range->is_asked = true;
+    return STATUS_OK;
+}
+
+static bool search_range_has(const SearchRange *range, double value) {
+    return !range->is_asked || (value >= range->least && value <= range->most);
+}
+
 typedef struct MaterialSearch {
     Bytes words, kind; // case folded; empty: any
     const char *after;
     int status; // CHOICE_ABSENT: any
-    QueryRange restitution, contact_time;
+    SearchRange restitution, contact_time;
     size_t limit;
 } MaterialSearch;
 
 static Status search_read_folded(const Request *request, const char *name, Bytes *folded,
                                  Problem *problem) {
     const char *text;
-    TRY(query_text(request, name, &text, problem));
+    TRY(request_text(request, name, &text, problem));
     if (text != NULL)
         bytes_folded(folded, text);
     return STATUS_OK;
@@ -151,10 +185,11 @@ static const char *const search_statuses[] = {"draft", "approved", "deprecated",
 static Status search_read(const Request *request, MaterialSearch *search, Problem *problem) {
     TRY(search_read_folded(request, "q", &search->words, problem));
     TRY(search_read_folded(request, "kind", &search->kind, problem));
-    TRY(query_choice(request, "status", search_statuses, CHOICE_ABSENT, &search->status, problem));
-    TRY(query_range(request, "e", &search->restitution, problem));
-    TRY(query_range(request, "T_c", &search->contact_time, problem));
-    TRY(query_text(request, "after", &search->after, problem));
+    TRY(request_choice(request, "status", search_statuses, CHOICE_ABSENT, &search->status,
+                       problem));
+    TRY(search_range(request, "e", &search->restitution, problem));
+    TRY(search_range(request, "T_c", &search->contact_time, problem));
+    TRY(request_text(request, "after", &search->after, problem));
     return request_count(request, "limit", 1, LIST_MAX, LIST_INITIAL, &search->limit, problem);
 }
 
@@ -185,13 +220,13 @@ static bool search_has_kind(const Material *material, const char *kind) {
 
 // One row of a table in both ranges is enough.
 static bool search_in_ranges(const MaterialSearch *search, const Material *material) {
-    const QueryRange *restitution = &search->restitution, *contact_time = &search->contact_time;
+    const SearchRange *restitution = &search->restitution, *contact_time = &search->contact_time;
     for (size_t i = 0; i < material->table.count; i++)
-        if (query_range_has(restitution, material->table.at[i].restitution) &&
-            query_range_has(contact_time, material->table.at[i].contact_time))
+        if (search_range_has(restitution, material->table.at[i].restitution) &&
+            search_range_has(contact_time, material->table.at[i].contact_time))
             return true;
-    return material->table.count == 0 && query_range_has(restitution, material->restitution) &&
-           query_range_has(contact_time, material->contact_time);
+    return material->table.count == 0 && search_range_has(restitution, material->restitution) &&
+           search_range_has(contact_time, material->contact_time);
 }
 
 static bool search_matches(const MaterialSearch *search, const MaterialRevision *revision) {
@@ -206,7 +241,7 @@ static bool search_matches(const MaterialSearch *search, const MaterialRevision 
 // Writes at most search->limit heads; *is_more: there is another after `last`.
 static Status search_run(Db *db, const MaterialSearch *search, Bytes *bytes,
                          char last[MATERIAL_SLUG_MAX + 1], bool *is_more, Problem *problem) {
-    char after[QUERY_TEXT_MAX + 1];
+    char after[REQUEST_TEXT_MAX + 1];
     size_t count = 0;
     bool is_end = false;
     text_fit(after, sizeof after, search->after != NULL ? search->after : "");
@@ -241,7 +276,7 @@ Status materials_list(App *app, const Request *request, Reply *reply, Problem *p
     if (status == STATUS_OK)
         status = search_run(app->db, &search, &bytes, last, &is_more, problem);
     if (status == STATUS_OK && is_more)
-        query_link_next(request, reply, "after", last);
+        reply_link_next(request, reply, "after", last);
     bytes_clear(&search.words);
     bytes_clear(&search.kind);
     bytes_text(&bytes, "]}\n");
@@ -554,9 +589,10 @@ Status materials_import(App *app, const Request *request, Reply *reply, Problem 
     ImportTally tally;
     Bytes bytes = {.most = app->reply_most};
     TRY(request_flag(request, "dry_run", &options.is_dry, problem));
-    TRY(query_body_type(request, texts, "application/json or text/csv",
-                        "; with curl use -H 'Content-Type: text/csv' --data-binary @materials.csv",
-                        &is_json, problem));
+    TRY(request_require_type(
+        request, texts, "application/json or text/csv",
+        "; with curl use -H 'Content-Type: text/csv' --data-binary @materials.csv", &is_json,
+        problem));
     options.is_table = !is_json;
     // First, so that the memory of a reply this short is there before anything is written.
     bytes_format(&bytes, "{\"dry_run\": %s", options.is_dry ? "true" : "false");

@@ -17,7 +17,8 @@ static const double cpu_quick = 0.5, cpu_max = 30; // [s]
 
 Status measurement_separation(App *app, const Request *request, int *separation, Problem *problem) {
     MaterialRevision latest;
-    TRY(query_choice(request, "separation", separation_names, CHOICE_ABSENT, separation, problem));
+    TRY(request_choice(request, "separation", separation_names, CHOICE_ABSENT, separation,
+                       problem));
     if (*separation != CHOICE_ABSENT)
         return STATUS_OK;
     TRY(material_latest(app, request->parameters[0], &latest, problem));

@@ -65,23 +65,10 @@ static Status upload_copy(char **target, const char *text, Problem *problem) {
 }
 
 static Status upload_read_document(const Request *request, RecordUpload *upload, Problem *problem) {
-    TRY(query_read_document(request, upload_fields, upload, problem));
+    TRY(request_read_document(request, upload_fields, upload, problem));
     if (upload->unit == CHOICE_ABSENT)
         upload->unit = ACCELERATION_METRES;
     return upload_copy(&upload->row.layout, "json", problem);
-}
-
-static Status upload_read_queries(const Request *request, RecordUpload *upload, Problem *problem) {
-    RecordRow *row = &upload->row;
-    TRY(query_copy(request, "name", &row->name, problem));
-    TRY(query_copy(request, "source", &row->source, problem));
-    TRY(query_copy(request, "processing", &row->processing, problem));
-    TRY(query_copy(request, "earthquake", &row->earthquake, problem));
-    TRY(query_copy(request, "station", &row->station, problem));
-    TRY(query_copy(request, "notes", &row->notes, problem));
-    TRY(request_number(request, "interval", INTERVAL_MIN, INTERVAL_MAX, (double)NAN, &row->interval,
-                       problem));
-    return query_spelled(request, "unit", "/unit", acceleration_unit_names, &upload->unit, problem);
 }
 
 static Status upload_warn_file(const GroundMotionText *file, bool has_unit, Warnings *warnings) {
@@ -117,8 +104,8 @@ static Status upload_take_file(GroundMotionText *file, RecordUpload *upload, Pro
                : upload_no_memory(problem);
 }
 
-Status query_read_motion(const Request *request, const GroundMotionOptions *options,
-                         GroundMotionText *motion, Problem *problem) {
+Status records_read_motion(const Request *request, const GroundMotionOptions *options,
+                           GroundMotionText *motion, Problem *problem) {
     char *text = malloc(request->body_size + 1);
     Problem *fault = calloc(1, sizeof *fault);
     Status status = STATUS_NO_MEMORY;
@@ -146,12 +133,14 @@ Status query_read_motion(const Request *request, const GroundMotionOptions *opti
 
 // The file in the body, and everything else in the query; faults of both are reported.
 static Status upload_read_file(const Request *request, RecordUpload *upload, Problem *problem) {
-    const Status queries = upload_read_queries(request, upload, problem);
+    TRY(request_number(request, "interval", INTERVAL_MIN, INTERVAL_MAX, (double)NAN,
+                       &upload->row.interval, problem));
+    const Status queries = request_read_fields(request, upload_fields, upload, problem);
     if (queries != STATUS_OK && queries != STATUS_INVALID)
         return queries;
     const GroundMotionOptions options = {.interval = upload->row.interval, .unit = upload->unit};
     GroundMotionText file = {0};
-    Status status = query_read_motion(request, &options, &file, problem);
+    Status status = records_read_motion(request, &options, &file, problem);
     if (status == STATUS_OK)
         status = upload_take_file(&file, upload, problem);
     ground_motion_text_clear(&file);
@@ -228,11 +217,12 @@ static Status upload_read(const Request *request, RecordUpload *upload, Problem 
     bool is_json;
     problem->whose = "record";
     static const char *const texts[] = {"text/plain", "application/octet-stream", "text/csv", NULL};
-    TRY(query_body_type(request, texts,
-                        "a ground motion's file as text/plain with ?name=NAME, or "
-                        "application/json",
-                        "; with curl use -H 'Content-Type: text/plain' --data-binary @motion.AT2",
-                        &is_json, problem));
+    TRY(request_require_type(
+        request, texts,
+        "a ground motion's file as text/plain with ?name=NAME, or "
+        "application/json",
+        "; with curl use -H 'Content-Type: text/plain' --data-binary @motion.AT2", &is_json,
+        problem));
     if (fields_default(upload_fields, upload) != STATUS_OK)
         return upload_no_memory(problem);
     Status status = is_json ? upload_read_document(request, upload, problem)
@@ -349,8 +339,8 @@ Status records_list(App *app, const Request *request, Reply *reply, Problem *pro
     size_t limit;
     RecordRows rows;
     TRY(request_count(request, "limit", 1, LIST_MAX, LIST_INITIAL, &limit, problem));
-    TRY(query_text(request, "q", &words, problem));
-    TRY(query_text(request, "after", &after, problem));
+    TRY(request_text(request, "q", &words, problem));
+    TRY(request_text(request, "after", &after, problem));
     // One more than asked for tells whether there is a next page.
     TRY(db_records(app->db, words, after != NULL ? after : "", limit + 1, &rows, problem));
     Bytes bytes = {.most = app->reply_most};
@@ -362,7 +352,7 @@ Status records_list(App *app, const Request *request, Reply *reply, Problem *pro
     }
     bytes_text(&bytes, "]}\n");
     if (rows.count > limit)
-        query_link_next(request, reply, "after", rows.at[limit - 1].name);
+        reply_link_next(request, reply, "after", rows.at[limit - 1].name);
     record_rows_clear(&rows);
     return reply_bytes(reply, 200, type_json, &bytes, problem);
 }

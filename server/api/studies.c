@@ -28,11 +28,11 @@ static Status study_read_kind(const ResultRow *row, const StudyKind *kind, Study
 // The format by the extension in the request's second parameter, else by Accept.
 static Status study_format(const Request *request, const StudyFormat *offered, Reply *reply,
                            const StudyFormat **format, Problem *problem) {
-    QueryFormat formats[STUDY_FORMATS_MAX];
+    ReplyFormat formats[STUDY_FORMATS_MAX];
     size_t count = 0, choice;
     for (; offered[count].extension != NULL; count++)
-        formats[count] = (QueryFormat){offered[count].extension, offered[count].content_type};
-    TRY(query_format(request, 1, formats, count, reply, &choice, problem));
+        formats[count] = (ReplyFormat){offered[count].extension, offered[count].content_type};
+    TRY(reply_format(request, 1, formats, count, reply, &choice, problem));
     *format = &offered[choice];
     return STATUS_OK;
 }

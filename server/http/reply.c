@@ -68,6 +68,13 @@ Status reply_bytes(Reply *reply, int code, const char *content_type, Bytes *byte
     return STATUS_OK;
 }
 
+Status reply_json(Reply *reply, int code, Bytes *bytes, Status status, Problem *problem) {
+    if (status == STATUS_OK)
+        return reply_bytes(reply, code, type_json, bytes, problem);
+    bytes_clear(bytes);
+    return status;
+}
+
 // Puts `bytes`, which are whole, in the place of the body.
 static void reply_replace_body(Reply *reply, Bytes *bytes) {
     if (reply->release != NULL)
@@ -242,6 +249,51 @@ Status reply_range(Reply *reply, const Request *request, Problem *problem) {
     snprintf(reply->content_range, sizeof reply->content_range, "bytes */%zu", size);
     return problem_set(problem, STATUS_USAGE, "the range lies outside the %zu bytes there are",
                        size);
+}
+
+void reply_link_next(const Request *request, Reply *reply, const char *name, const char *value) {
+    Bytes bytes = {.most = sizeof reply->link - 1};
+    bytes_format(&bytes, "<%s?", request->path);
+    for (size_t i = 0; i < request->query_count; i++)
+        if (strcmp(request->queries[i].name, name) != 0) {
+            bytes_format(&bytes, "%s=", request->queries[i].name);
+            bytes_percent(&bytes, request->queries[i].value);
+            bytes_text(&bytes, "&");
+        }
+    bytes_format(&bytes, "%s=", name);
+    bytes_percent(&bytes, value);
+    bytes_text(&bytes, ">; rel=\"next\"");
+    if (!bytes.is_failed)
+        snprintf(reply->link, sizeof reply->link, "%s", bytes.at);
+    bytes_clear(&bytes);
+}
+
+Status reply_format(const Request *request, size_t parameter, const ReplyFormat *at, size_t count,
+                    Reply *reply, size_t *choice, Problem *problem) {
+    const char *extension = request->parameters[parameter];
+    const char *types[REPLY_FORMATS_MAX + 1] = {NULL};
+    char names[96] = "";
+    int found = -1;
+    for (size_t i = 0; i < count && i < REPLY_FORMATS_MAX; i++) {
+        text_list(names, sizeof names, at[i].extension);
+        types[i] = at[i].content_type;
+        if (extension != NULL && strcmp(extension, at[i].extension) == 0)
+            found = (int)i;
+    }
+    reply->varies_by_accept = extension == NULL;
+    if (extension == NULL)
+        found = header_accept(request->accept, types);
+    if (found < 0)
+        return extension != NULL
+                   ? problem_set(problem, STATUS_NOT_FOUND,
+                                 "there is no format \"%.20s\"; there are %s", extension, names)
+                   : problem_set(problem, STATUS_NOT_ACCEPTABLE,
+                                 "none of the formats fits Accept; there are %s, by extension too",
+                                 names);
+    if (strcmp(types[found], "image/svg+xml") == 0)
+        reply->policy = reply_drawing_policy;
+    *choice = (size_t)found;
+    return STATUS_OK;
 }
 
 void reply_wait(Reply *reply, int wait_ms, void *keep, void (*forget)(void *keep)) {

@@ -17,6 +17,9 @@ void reply_clear(Reply *reply);
 Status reply_bytes(Reply *reply, int code, const char *content_type, Bytes *bytes,
                    Problem *problem);
 
+// The same of JSON, unless `status` is an error already.
+Status reply_json(Reply *reply, int code, Bytes *bytes, Status status, Problem *problem);
+
 // A body that lives as long as the program, or until `release(context)`.
 void reply_borrow(Reply *reply, int code, const char *content_type, const void *body, size_t size);
 
@@ -42,6 +45,18 @@ bool reply_pack(Reply *reply, const Request *request);
 // Turns a whole 200 into 206 or 416 where the request asks for a part of a body that accepts
 // ranges. STATUS_USAGE with code 416 set in `reply` where there is no such part.
 Status reply_range(Reply *reply, const Request *request, Problem *problem);
+
+// Links the next page: the same queries, with `name` now `value`.
+void reply_link_next(const Request *request, Reply *reply, const char *name, const char *value);
+
+// The format of the extension in the path's `parameter`, else by Accept, out of `count`.
+// STATUS_NOT_FOUND, STATUS_NOT_ACCEPTABLE.
+typedef struct ReplyFormat {
+    const char *extension, *content_type;
+} ReplyFormat;
+enum { REPLY_FORMATS_MAX = 16 };
+Status reply_format(const Request *request, size_t parameter, const ReplyFormat *at, size_t count,
+                    Reply *reply, size_t *choice, Problem *problem);
 
 // Asks to be called again when request->callback is called or after `wait_ms`. `keep` comes back as
 // request->kept.

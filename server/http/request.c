@@ -12,7 +12,9 @@
 #include <string.h>
 #include <strings.h>
 
+#include "core/base/spelling.h"
 #include "server/http/header.h"
+#include "server/json/parse.h"
 #include "server/util/base_path.h"
 
 static int hex_digit(char c) {
@@ -371,23 +373,28 @@ const char *request_query(const Request *request, const char *name) {
     return NULL;
 }
 
+bool request_read_real(const char *text, size_t size, double *value) {
+    // strtod would also take leading blanks, "inf", "nan" and hexadecimal digits: none is a number
+    // here.
+    char *end;
+    if (size == 0 || size >= 64 || strspn(text, "0123456789+-.eE") < size)
+        return false;
+    *value = strtod(text, &end);
+    return end >= text + size && isfinite(*value);
+}
+
 Status request_number(const Request *request, const char *name, double least, double most,
                       double initial, double *value, Problem *problem) {
     const char *text = request_query(request, name);
+    double number;
     *value = initial;
     if (text == NULL)
         return STATUS_OK;
-    char *end = NULL;
-    // strtod would also take leading blanks, "inf", "nan" and hexadecimal digits: none is a number
-    // here.
-    const bool is_plain = *text != '\0' && text[strspn(text, "0123456789+-.eE")] == '\0';
-    const double number = is_plain ? strtod(text, &end) : NAN;
-    char low[32], high[32];
-    if (!is_plain || *end != '\0' || !(number >= least && number <= most))
+    if (!request_read_real(text, strlen(text), &number) || !(number >= least && number <= most))
         return problem_set(
             problem, STATUS_USAGE,
             "the query parameter \"%s\" must be a number within [%s, %s], is \"%.40s\"", name,
-            text_real(low, least), text_real(high, most), text);
+            real_text(least).at, real_text(most).at, text);
     *value = number;
     return STATUS_OK;
 }
@@ -414,6 +421,63 @@ Status request_flag(const Request *request, const char *name, bool *flag, Proble
                        "the query parameter \"%s\" must be 1 or 0, is \"%.40s\"", name, text);
 }
 
+Status request_text(const Request *request, const char *name, const char **text, Problem *problem) {
+    *text = request_query(request, name);
+    if (*text != NULL && strlen(*text) > REQUEST_TEXT_MAX)
+        return problem_set(problem, STATUS_USAGE,
+                           "the query parameter \"%s\" may have %d bytes, has %zu", name,
+                           REQUEST_TEXT_MAX, strlen(*text));
+    if (*text != NULL && **text == '\0')
+        *text = NULL;
+    return STATUS_OK;
+}
+
+Status request_choice(const Request *request, const char *name, const char *const *names,
+                      int initial, int *choice, Problem *problem) {
+    const char *text;
+    TRY(request_text(request, name, &text, problem));
+    *choice = initial;
+    if (text == NULL)
+        return STATUS_OK;
+    char list[160] = "";
+    for (int i = 0; names[i] != NULL; i++) {
+        if (strcmp(names[i], text) == 0) {
+            *choice = i;
+            return STATUS_OK;
+        }
+        text_list(list, sizeof list, names[i]);
+    }
+    return problem_set(problem, STATUS_USAGE,
+                       "the query parameter \"%s\" must be one of %s, is \"%.40s\"", name, list,
+                       text);
+}
+
+Status request_read_fields(const Request *request, const Field *fields, void *item,
+                           Problem *problem) {
+    Status status = STATUS_OK;
+    for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
+        void *member = (char *)item + field->offset;
+        const char *text = request_query(request, field->name);
+        if (field->kind == FIELD_KIND_BASE) {
+            TRY(request_read_fields(request, field->fields, member, problem));
+        } else if (field->kind == FIELD_KIND_TEXT && text != NULL && *text != '\0') {
+            if (text_copy(text, (char **)member) != STATUS_OK)
+                return problem_set(problem, STATUS_NO_MEMORY, "no memory for a query");
+        } else if (field->kind == FIELD_KIND_CHOICE && text != NULL) {
+            char pointer[80];
+            int choice = 0;
+            while (field->choices[choice] != NULL && strcmp(field->choices[choice], text) != 0)
+                choice++;
+            snprintf(pointer, sizeof pointer, "/%s", field->name);
+            if (field->choices[choice] != NULL)
+                *(int *)member = choice;
+            else
+                status = spelling_reject(field->choices, text, pointer, problem);
+        }
+    }
+    return status;
+}
+
 Status request_error_large(size_t max, Problem *problem) {
     return problem_set(problem, STATUS_TOO_LARGE,
                        "the body is larger than %zu bytes; impactd serve --max-body lets in more",
@@ -434,14 +498,35 @@ Status request_require_body(const Request *request, Problem *problem) {
     return STATUS_OK;
 }
 
-Status request_require_json(const Request *request, Problem *problem) {
-    if (!header_type_is(request->content_type, "application/json"))
+Status request_require_type(const Request *request, const char *const *texts, const char *wanted,
+                            const char *hint, bool *is_json, Problem *problem) {
+    *is_json = header_type_is(request->content_type, "application/json");
+    bool is_known = *is_json;
+    for (size_t i = 0; texts[i] != NULL; i++)
+        is_known = is_known || header_type_is(request->content_type, texts[i]);
+    if (!is_known)
         return problem_set(
-            problem, STATUS_UNSUPPORTED_TYPE,
-            "the body must be application/json, is %.60s; with curl use --json @scene.json, or "
-            "-H 'Content-Type: application/json'",
-            request->content_type != NULL ? request->content_type : "of no given type");
+            problem, STATUS_UNSUPPORTED_TYPE, "the body must be %s, is %.60s%s", wanted,
+            request->content_type != NULL ? request->content_type : "of no given type", hint);
     return request_require_body(request, problem);
+}
+
+Status request_require_json(const Request *request, Problem *problem) {
+    static const char *const none[] = {NULL};
+    bool is_json;
+    return request_require_type(request, none, "application/json",
+                                "; with curl use --json @scene.json, or -H 'Content-Type: "
+                                "application/json'",
+                                &is_json, problem);
+}
+
+Status request_read_document(const Request *request, const Field *fields, void *item,
+                             Problem *problem) {
+    if (request->query_count > 0)
+        return problem_set(problem, STATUS_USAGE,
+                           "beside JSON there is no query: \"%.40s\" is a member of the document",
+                           request->queries[0].name);
+    return json_parse(request->body, request->body_size, fields, item, problem);
 }
 
 bool request_is_empty(const Request *request) {

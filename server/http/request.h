@@ -7,7 +7,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "core/base/status.h"
+#include "core/base/field.h"
 #include "server/auth/tokens.h"
 #include "server/jobs/job.h"
 
@@ -16,6 +16,7 @@ enum {
     REQUEST_QUERIES = 32,
     REQUEST_TARGET_MAX = 4096,
     REQUEST_ID_SIZE = 65,
+    REQUEST_TEXT_MAX = 200,
 };
 
 typedef struct RequestPair {
@@ -129,11 +130,30 @@ Status request_flag(const Request *request, const char *name, bool *flag, Proble
 Status request_count(const Request *request, const char *name, size_t least, size_t most,
                      size_t initial, size_t *value, Problem *problem);
 
+// The text, NULL where it is absent or empty; at most REQUEST_TEXT_MAX bytes.
+Status request_text(const Request *request, const char *name, const char **text, Problem *problem);
+// Which of `names` (NULL-terminated) it is; `initial` where it is absent.
+Status request_choice(const Request *request, const char *name, const char *const *names,
+                      int initial, int *choice, Problem *problem);
+// Whether text[size], which need not end there, is a finite decimal number of less than 64 bytes.
+bool request_read_real(const char *text, size_t size, double *value);
+// The members of a document that is sent as queries: texts and choices, of which those absent or
+// empty stay as they are. STATUS_INVALID at the member's pointer, with a suggestion.
+Status request_read_fields(const Request *request, const Field *fields, void *item,
+                           Problem *problem);
+
 // STATUS_UNSUPPORTED_TYPE unless the body is JSON by its Content-Type and not encoded,
 // STATUS_TOO_LARGE if it was over the limit, STATUS_UNREADABLE if there is none.
 Status request_require_json(const Request *request, Problem *problem);
 // The same of any type.
 Status request_require_body(const Request *request, Problem *problem);
+// Whether the body is JSON or one of `texts` (NULL-terminated), likewise; a fault says what is
+// wanted and a hint.
+Status request_require_type(const Request *request, const char *const *texts, const char *wanted,
+                            const char *hint, bool *is_json, Problem *problem);
+// The JSON body of a request without queries, which are for other types.
+Status request_read_document(const Request *request, const Field *fields, void *item,
+                             Problem *problem);
 // STATUS_TOO_LARGE: the limit, and how to raise it.
 Status request_error_large(size_t max, Problem *problem);
 
