@@ -140,12 +140,11 @@ Status health_ready(App *app, const Request *request, Reply *reply, Problem *pro
 
 Status version_show(App *app, const Request *request, Reply *reply, Problem *problem) {
     (void)request;
-    char started[32];
-    clock_rfc3339(app->started_unix_ms, started);
     Bytes bytes = {.most = app->reply_most};
     bytes_json(&bytes,
                "{\"program\": \"impactd\", \"version\": %s, \"engine\": %s, \"build\": %s, "
                "\"started\": %s}\n",
-               program_version, engine_version, program_build, started);
+               program_version, engine_version, program_build,
+               clock_rfc3339(app->started_unix_ms).at);
     return reply_bytes(reply, 200, type_json, &bytes, problem);
 }

@@ -5,14 +5,6 @@
 #include "server/util/base_path.h"
 #include "server/util/clock.h"
 
-// NULL for none.
-static const char *job_json_time(int64_t unix_ms, char text[32]) {
-    if (unix_ms <= 0)
-        return NULL;
-    clock_rfc3339(unix_ms, text);
-    return text;
-}
-
 static void job_json_put_links(Bytes *bytes, const JobView *show, bool has_result) {
     const char *base = base_path();
     bytes_json(bytes, "\"self\": \"%s/v1/jobs/%s\"", base, show->id);
@@ -27,7 +19,6 @@ static void job_json_put_links(Bytes *bytes, const JobView *show, bool has_resul
 
 void job_json_put(Bytes *bytes, const JobView *show, int parts) {
     const bool has_result = show->state == JOB_SUCCESSFUL && show->result[0] != '\0';
-    char created[32], started[32], finished[32];
     bytes_json(bytes, "{\"id\": %s", show->id);
     if (show->title != NULL)
         bytes_json(bytes, ", \"title\": %s", show->title);
@@ -48,9 +39,10 @@ void job_json_put(Bytes *bytes, const JobView *show, int parts) {
     if (has_result && show->is_result_deleted)
         bytes_json(bytes, ", \"result_deleted\": true");
     bytes_json(bytes, ", \"created\": %s, \"started\": %s, \"finished\": %s, \"problem\": %p",
-               job_json_time(show->created_unix_ms, created),
-               job_json_time(show->started_unix_ms, started),
-               job_json_time(show->finished_unix_ms, finished), show->problem);
+               show->created_unix_ms > 0 ? clock_rfc3339(show->created_unix_ms).at : NULL,
+               show->started_unix_ms > 0 ? clock_rfc3339(show->started_unix_ms).at : NULL,
+               show->finished_unix_ms > 0 ? clock_rfc3339(show->finished_unix_ms).at : NULL,
+               show->problem);
     if (parts & JOB_PUT_WHOLE) {
         bytes_json(bytes,
                    ", \"plan\": %p, \"summary\": %p, \"work\": %p, \"warnings\": ", show->plan,

@@ -20,12 +20,10 @@ Status materials_revisions(App *app, const Request *request, Reply *reply, Probl
     MaterialRevisions revisions;
     MaterialState state;
     MaterialPage page;
-    TRY(material_page_read(request, REVISIONS_MAX, REVISIONS_MAX, &page, problem));
     TRY(db_material_state(app->db, slug, &state, problem));
+    TRY(material_page_read(request, REVISIONS_MAX, REVISIONS_MAX, state.latest, &page, problem));
     if (material_is_cached(request, reply, &state))
         return STATUS_OK;
-    if (page.before > state.latest + 1)
-        page.before = state.latest + 1;
     TRY(db_material_page(app->db, slug, page.before, page.limit, &revisions, problem));
     Bytes bytes = {.most = app->reply_most};
     bytes_format(&bytes, "{\"slug\": \"%s\", \"latest\": %llu, \"version\": %llu, \"revisions\": [",
@@ -46,26 +44,23 @@ Status materials_history(App *app, const Request *request, Reply *reply, Problem
     AuditEntries entries;
     MaterialState state;
     MaterialPage page;
-    TRY(material_page_read(request, AUDIT_INITIAL, AUDIT_MAX, &page, problem));
     TRY(db_material_state(app->db, slug, &state, problem));
+    TRY(material_page_read(request, AUDIT_INITIAL, AUDIT_MAX, state.version, &page, problem));
     if (material_is_cached(request, reply, &state))
         return STATUS_OK;
-    if (page.before > state.version + 1)
-        page.before = state.version + 1;
     TRY(db_audit_entries(app->db, slug, page.before, page.limit, &entries, problem));
     Bytes bytes = {.most = app->reply_most};
     bytes_json(&bytes, "{\"slug\": %s, \"version\": %llu, \"history\": [", slug,
                (unsigned long long)state.version);
     for (size_t i = 0; i < entries.count; i++) {
         const AuditEntry *entry = &entries.at[i];
-        bytes_json(&bytes, "%p{\"version\": %llu, \"action\": %s", i > 0 ? ",\n " : "",
-                   (unsigned long long)entry->version, entry->action);
-        material_put_number(&bytes, "revision", entry->revision);
-        material_put_number(&bytes, "measurement", entry->measurement);
-        material_put_text(&bytes, "who", entry->who);
-        material_put_text(&bytes, "why", entry->why);
-        material_put_time(&bytes, "when", entry->created_unix_ms);
-        bytes_text(&bytes, "}");
+        bytes_json(&bytes,
+                   "%p{\"version\": %llu, \"action\": %s, \"revision\": %g, \"measurement\": %g, "
+                   "\"who\": %s, \"why\": %s, \"when\": %s}",
+                   i > 0 ? ",\n " : "", (unsigned long long)entry->version, entry->action,
+                   material_count(entry->revision), material_count(entry->measurement), entry->who,
+                   entry->why,
+                   entry->created_unix_ms > 0 ? clock_rfc3339(entry->created_unix_ms).at : NULL);
     }
     bytes_text(&bytes, "]}\n");
     if (entries.count > 0)
@@ -76,13 +71,11 @@ Status materials_history(App *app, const Request *request, Reply *reply, Problem
 
 static void diff_put_side(Bytes *bytes, const char *name, const MaterialRevision *revision) {
     const unsigned long long number = revision->revision;
-    char created[32];
-    clock_rfc3339(revision->created_unix_ms, created);
     bytes_json(bytes,
                ", \"%s\": {\"revision\": %llu, \"status\": %s, \"author\": %s, \"comment\": %s, "
                "\"created\": %s, \"links\": {\"self\": \"%s/v1/materials/%s@%llu\"}}",
-               name, number, revision->status, revision->author, revision->comment, created,
-               base_path(), revision->slug, number);
+               name, number, revision->status, revision->author, revision->comment,
+               clock_rfc3339(revision->created_unix_ms).at, base_path(), revision->slug, number);
 }
 
 // Member by member; a list is one.
@@ -167,12 +160,11 @@ static Status uses_list(App *app, const Request *request, uint64_t revision, Rep
                  slug, number, (unsigned long long)total);
     for (size_t i = 0; i < uses.count && i < limit; i++) {
         const ResultUse *use = &uses.at[i];
-        char created[32];
-        clock_rfc3339(use->created_unix_ms, created);
         bytes_json(&bytes,
                    "%p{\"id\": %s, \"created\": %s, \"links\": {\"self\": \"%s/v1/results/%s\", "
                    "\"manifest\": \"%s/v1/results/%s/manifest\"}}",
-                   i > 0 ? ",\n " : "", use->id, created, base, use->id, base, use->id);
+                   i > 0 ? ",\n " : "", use->id, clock_rfc3339(use->created_unix_ms).at, base,
+                   use->id, base, use->id);
     }
     bytes_text(&bytes, "]}\n");
     if (uses.count > limit)

@@ -118,8 +118,7 @@ static void proposal_write(Bytes *bytes, const Request *request, const Selection
     } else {
         bytes_text(bytes, "null");
     }
-    material_put_text(bytes, "why", proposal->why);
-    bytes_text(bytes, ", ");
+    bytes_json(bytes, ", \"why\": %s, ", proposal->why);
     evaluation_write(bytes, evaluation, true);
     bytes_text(bytes, ", \"links\": {");
     proposal_write_link(bytes, request, "\"self\": ", "");

@@ -42,11 +42,13 @@ Status material_number(const char *text, const char *what, uint64_t *number, Pro
                                      "there is no %s \"%.20s\"; they count from 1", what, text);
 }
 
-Status material_page_read(const Request *request, size_t initial, size_t max, MaterialPage *page,
-                          Problem *problem) {
-    const size_t beyond = (size_t)1 << 53;
+Status material_page_read(const Request *request, size_t initial, size_t max, uint64_t newest,
+                          MaterialPage *page, Problem *problem) {
+    const size_t all = (size_t)newest + 1;
     TRY(request_count(request, "limit", 1, max, initial, &page->limit, problem));
-    return request_count(request, "before", 1, beyond, beyond, &page->before, problem);
+    TRY(request_count(request, "before", 1, (size_t)1 << 53, all, &page->before, problem));
+    page->before = page->before < all ? page->before : all;
+    return STATUS_OK;
 }
 
 void material_page_link(const Request *request, Reply *reply, uint64_t last) {

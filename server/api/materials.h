@@ -26,12 +26,12 @@ Status material_condition(App *app, const Request *request, bool is_required, ui
 // STATUS_NOT_FOUND.
 Status material_number(const char *text, const char *what, uint64_t *number, Problem *problem);
 
-// A page of a list numbered from 1, newest first: `limit` items before `before`.
+// A page of a list numbered from 1 to `newest`, newest first: `limit` items before `before`.
 typedef struct MaterialPage {
     size_t limit, before;
 } MaterialPage;
-Status material_page_read(const Request *request, size_t initial, size_t max, MaterialPage *page,
-                          Problem *problem);
+Status material_page_read(const Request *request, size_t initial, size_t max, uint64_t newest,
+                          MaterialPage *page, Problem *problem);
 // Links the next page after the item numbered `last`; 0: there is no item.
 void material_page_link(const Request *request, Reply *reply, uint64_t last);
 

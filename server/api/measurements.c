@@ -226,11 +226,9 @@ Status measurements_list(App *app, const Request *request, Reply *reply, Problem
     MaterialState state;
     MaterialPage page;
     TRY(db_material_state(app->db, slug, &state, problem));
-    TRY(material_page_read(request, LIST_INITIAL, LIST_MAX, &page, problem));
+    TRY(material_page_read(request, LIST_INITIAL, LIST_MAX, state.measurements, &page, problem));
     if (material_is_cached(request, reply, &state))
         return STATUS_OK;
-    if (page.before > state.measurements + 1)
-        page.before = state.measurements + 1;
     Status status = db_measurement_heads(app->db, slug, page.before, page.limit, &heads, problem);
     Bytes bytes = {.most = app->reply_most};
     bytes_format(&bytes, "{\"slug\": \"%s\", \"count\": %llu, \"measurements\": [", slug,

@@ -267,15 +267,14 @@ static const Field record_fields[] = {
 
 // Without the closing brace.
 static void record_put(Bytes *bytes, const RecordRow *row) {
-    char created[32];
-    clock_rfc3339(row->created_unix_ms, created);
     bytes_text(bytes, "{");
     (void)encode_members(bytes, record_fields, row, WRITE_REPORT);
     bytes_json(bytes,
                ", \"duration\": %g, \"created\": %s, \"links\": {\"self\": \"%s/v1/records/%s\", "
                "\"samples\": \"%s/v1/records/%s/samples\"}",
-               (double)(row->count - 1) / (1 / row->interval), created, base_path(), row->name,
-               base_path(), row->name);
+               (double)(row->count - 1) / (1 / row->interval),
+               clock_rfc3339(row->created_unix_ms).at, base_path(), row->name, base_path(),
+               row->name);
 }
 
 // Warns of others with the same samples.

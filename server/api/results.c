@@ -205,12 +205,11 @@ Status manifest_put(App *app, const ResultRow *row, Bytes *bytes, Problem *probl
     StudyRequest inquiry = {0};
     const Status status = result_read_scene(row, &inquiry, problem);
     if (status == STATUS_OK) {
-        char created[32];
-        clock_rfc3339(row->created_unix_ms, created);
         bytes_json(bytes,
                    "{\"id\": %s, \"engine\": %s, \"created\": %s, \"program\": {\"name\": "
                    "\"impactd\", \"version\": %s, \"build\": %s}, \"scene\": %p, \"materials\": ",
-                   row->id, row->engine, created, program_version, program_build, row->scene);
+                   row->id, row->engine, clock_rfc3339(row->created_unix_ms).at, program_version,
+                   program_build, row->scene);
         result_put_materials(app, bytes, &inquiry, manifest_put_material);
         // The CPU time of a study is measured once and stored; another run measures another one.
         const bool is_measured = inquiry.study != NULL && study_kind(inquiry.study)->is_measured;

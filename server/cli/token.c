@@ -62,10 +62,9 @@ static Status token_create(Db *db, const TokenSettings *settings, TokenRow *row,
     return STATUS_OK;
 }
 
-static const char *token_time(int64_t unix_ms, char text[32]) {
-    if (unix_ms > 0)
-        clock_rfc3339(unix_ms, text);
-    return unix_ms > 0 ? text : NULL;
+static const char *token_time(int64_t unix_ms, ClockText *text) {
+    *text = clock_rfc3339(unix_ms);
+    return unix_ms > 0 ? text->at : NULL;
 }
 
 static Status token_list(Db *db, const TokenSettings *settings, TokenRow *row, Problem *problem) {
@@ -80,14 +79,14 @@ static Status token_list(Db *db, const TokenSettings *settings, TokenRow *row, P
     for (size_t i = 0; i < rows.count; i++) {
         const TokenRow *one = &rows.at[i];
         const bool has_ended = one->expires_unix_ms > 0 && one->expires_unix_ms <= now;
-        char times[3][32];
+        ClockText times[3];
         const struct {
             const char *name, *value;
         } members[] = {{"name", one->name},
                        {"scopes", one->scopes},
-                       {"created", token_time(one->created_unix_ms, times[0])},
-                       {"used", token_time(one->used_unix_ms, times[1])},
-                       {"expires", token_time(one->expires_unix_ms, times[2])},
+                       {"created", token_time(one->created_unix_ms, &times[0])},
+                       {"used", token_time(one->used_unix_ms, &times[1])},
+                       {"expires", token_time(one->expires_unix_ms, &times[2])},
                        {"state", one->revoked_unix_ms > 0 ? "revoked"
                                  : has_ended              ? "expired"
                                                           : "good"}};

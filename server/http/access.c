@@ -128,10 +128,8 @@ void request_metrics_write(const RequestMetrics *metrics, Bytes *bytes) {
 
 static void access_log(const Request *request, const Reply *reply, int64_t ns, uint64_t sent) {
     enum { PATH_SHOWN = 200, NAME_SHOWN = 80 };
-    char now[32];
     Bytes line = {.most = 4096};
-    clock_rfc3339(clock_unix_ms(), now);
-    bytes_text(&line, now);
+    bytes_text(&line, clock_rfc3339(clock_unix_ms()).at);
     log_put(&line, "request", request->id, NAME_SHOWN);
     log_put(&line, "client", request->client, NAME_SHOWN);
     log_put(&line, "method", request->method, NAME_SHOWN);

@@ -36,10 +36,8 @@ static Status tls_check_time(gnutls_certificate_credentials_t credentials, const
     gnutls_free(chain);
     if (ends >= clock_unix_ms() / 1000)
         return STATUS_OK;
-    char text[32];
-    clock_rfc3339(ends * 1000, text);
     return problem_set(problem, STATUS_USAGE, "the certificate in %s expired at %s; renew it", path,
-                       text);
+                       clock_rfc3339(ends * 1000).at);
 }
 
 static Status tls_check(const char *cert, const char *cert_path, const char *key,

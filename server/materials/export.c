@@ -131,31 +131,26 @@ static void export_row(const MaterialExport *export, Bytes *bytes, const ImportR
     }
 }
 
-// RFC 3339.
-typedef struct CreatedText {
-    char at[32];
-} CreatedText;
-
 static Status export_revision(const MaterialExport *export, Bytes *bytes,
                               const MaterialRevision *revision, Problem *problem) {
     MaterialReviews reviews;
     TRY(db_reviews(export->db, &export->moment, revision->slug, revision->revision, &reviews,
                    problem));
-    CreatedText created, *times = calloc(reviews.count + 1, sizeof *times);
+    ClockText created, *times = calloc(reviews.count + 1, sizeof *times);
     ImportReview *shown = calloc(reviews.count + 1, sizeof *shown);
     Status status = STATUS_OK;
     if (shown == NULL || times == NULL)
         status = export_no_memory(problem);
     for (size_t i = 0; status == STATUS_OK && i < reviews.count; i++) {
         const MaterialReview *review = &reviews.at[i];
-        clock_rfc3339(review->created_unix_ms, times[i].at);
+        times[i] = clock_rfc3339(review->created_unix_ms);
         shown[i] = (ImportReview){.status = strcmp(review->status, material_verdicts[0]) != 0,
                                   .reason = review->reason,
                                   .reviewer = export_name(review->reviewer),
                                   .created = times[i].at};
     }
     if (status == STATUS_OK) {
-        clock_rfc3339(revision->created_unix_ms, created.at);
+        created = clock_rfc3339(revision->created_unix_ms);
         const ImportRow row = {.kind = IMPORT_REVISION,
                                .slug = revision->slug,
                                .number = revision->revision,
@@ -176,10 +171,9 @@ static Status export_revision(const MaterialExport *export, Bytes *bytes,
 static Status export_measurement(const MaterialExport *export, Bytes *bytes,
                                  const MaterialMeasurement *measurement, Problem *problem) {
     ImportRow row;
-    CreatedText created;
+    ClockText created = clock_rfc3339(measurement->created_unix_ms);
     if (fields_default(import_row_fields, &row) != STATUS_OK)
         return export_no_memory(problem);
-    clock_rfc3339(measurement->created_unix_ms, created.at);
     row.kind = IMPORT_MEASUREMENT;
     row.slug = measurement->slug;
     row.number = measurement->measurement;

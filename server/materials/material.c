@@ -1,5 +1,6 @@
 #include "server/materials/material.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -21,38 +22,21 @@ Status slug_validate(const char *slug, const char *pointer, Problem *problem) {
     return problem_add_fault(problem, STATUS_INVALID, &fault);
 }
 
-void material_put_text(Bytes *bytes, const char *name, const char *text) {
-    bytes_format(bytes, ", \"%s\": ", name);
-    bytes_json_string(bytes, text);
-}
-
-void material_put_number(Bytes *bytes, const char *name, uint64_t number) {
-    if (number > 0)
-        bytes_format(bytes, ", \"%s\": %llu", name, (unsigned long long)number);
-    else
-        bytes_format(bytes, ", \"%s\": null", name);
-}
-
-void material_put_time(Bytes *bytes, const char *name, int64_t unix_ms) {
-    char text[32];
-    if (unix_ms > 0)
-        clock_rfc3339(unix_ms, text);
-    material_put_text(bytes, name, unix_ms > 0 ? text : NULL);
+double material_count(uint64_t number) {
+    return number > 0 ? (double)number : (double)NAN;
 }
 
 static void material_write_review(Bytes *bytes, const MaterialRevision *revision) {
-    if (revision->reviewed_unix_ms == 0) {
+    const bool is_own = text_same(revision->reviewer, revision->author) &&
+                        strcmp(revision->status, "approved") == 0;
+    if (revision->reviewed_unix_ms == 0)
         bytes_text(bytes, ", \"review\": null");
-        return;
-    }
-    const bool is_own = text_same(revision->reviewer, revision->author);
-    bytes_format(bytes, ", \"review\": {\"status\": \"%s\"", revision->status);
-    material_put_text(bytes, "reason", revision->reason);
-    material_put_text(bytes, "reviewer", revision->reviewer);
-    bytes_format(bytes, ", \"self_approved\": %s",
-                 is_own && strcmp(revision->status, "approved") == 0 ? "true" : "false");
-    material_put_time(bytes, "created", revision->reviewed_unix_ms);
-    bytes_text(bytes, "}");
+    else
+        bytes_json(bytes,
+                   ", \"review\": {\"status\": %s, \"reason\": %s, \"reviewer\": %s, "
+                   "\"self_approved\": %p, \"created\": %s}",
+                   revision->status, revision->reason, revision->reviewer, json_flag(is_own),
+                   clock_rfc3339(revision->reviewed_unix_ms).at);
 }
 
 void material_write(Bytes *bytes, const MaterialRevision *revision) {
@@ -64,10 +48,9 @@ void material_write(Bytes *bytes, const MaterialRevision *revision) {
                  slug, number, (unsigned long long)revision->latest,
                  (unsigned long long)revision->version, revision->status);
     (void)encode_members(bytes, material_fields, &revision->material, WRITE_REPORT);
-    material_put_text(bytes, "author", revision->author);
-    material_put_text(bytes, "comment", revision->comment);
-    material_put_number(bytes, "reverts", revision->reverts);
-    material_put_time(bytes, "created", revision->created_unix_ms);
+    bytes_json(bytes, ", \"author\": %s, \"comment\": %s, \"reverts\": %g, \"created\": %s",
+               revision->author, revision->comment, material_count(revision->reverts),
+               revision->created_unix_ms > 0 ? clock_rfc3339(revision->created_unix_ms).at : NULL);
     material_write_review(bytes, revision);
     bytes_format(bytes,
                  ", \"links\": {\"self\": \"%s/v1/materials/%s\", \"revision\": "
@@ -113,11 +96,11 @@ Status stored_test_load(Db *db, const char *slug, uint64_t number, StoredTest *s
 }
 
 void measurement_write_row(Bytes *bytes, const MaterialMeasurement *row) {
-    bytes_format(bytes, "\"slug\": \"%s\", \"measurement\": %llu", row->slug,
-                 (unsigned long long)row->measurement);
-    material_put_text(bytes, "author", row->author);
-    material_put_text(bytes, "comment", row->comment);
-    material_put_time(bytes, "created", row->created_unix_ms);
+    bytes_json(bytes,
+               "\"slug\": %s, \"measurement\": %llu, \"author\": %s, \"comment\": %s, "
+               "\"created\": %s",
+               row->slug, (unsigned long long)row->measurement, row->author, row->comment,
+               row->created_unix_ms > 0 ? clock_rfc3339(row->created_unix_ms).at : NULL);
 }
 
 void measurement_write_links(Bytes *bytes, const char *slug, uint64_t number) {

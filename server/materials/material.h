@@ -15,10 +15,8 @@ void material_write(Bytes *bytes, const MaterialRevision *revision);
 // Only slug, revision, status and the material itself.
 void material_write_contents(Bytes *bytes, const MaterialRevision *revision);
 
-// `, "name": ` and the value; NULL and 0 are null.
-void material_put_text(Bytes *bytes, const char *name, const char *text);
-void material_put_number(Bytes *bytes, const char *name, uint64_t number);
-void material_put_time(Bytes *bytes, const char *name, int64_t unix_ms);
+// A number that counts from 1 as JSON has it; 0 is null.
+double material_count(uint64_t number);
 
 // A measurement with its drop test.
 typedef struct StoredTest {

@@ -26,17 +26,18 @@ int64_t clock_thread_cpu_ns(void) {
     return read_ns(CLOCK_THREAD_CPUTIME_ID);
 }
 
-void clock_rfc3339(int64_t unix_ms, char target[32]) {
+ClockText clock_rfc3339(int64_t unix_ms) {
     const int64_t first_ms = -62162035200000, last_ms = 253402300799999; // of 0000-03-01, of 9999
-    target[0] = '\0';
+    ClockText text = {""};
     if (unix_ms < first_ms || unix_ms > last_ms)
-        return;
+        return text;
     const int64_t ms = (unix_ms % 1000 + 1000) % 1000;
     const time_t seconds = (time_t)((unix_ms - ms) / 1000);
     struct tm utc;
     if (gmtime_r(&seconds, &utc) == NULL)
-        return;
-    snprintf(target, 32, "%04d-", utc.tm_year + 1900); // %Y has no leading zeros
-    strftime(target + 5, 27, "%m-%dT%H:%M:%S", &utc);
-    snprintf(target + 19, 13, ".%03dZ", (int)ms);
+        return text;
+    snprintf(text.at, sizeof text.at, "%04d-", utc.tm_year + 1900); // %Y has no leading zeros
+    strftime(text.at + 5, 27, "%m-%dT%H:%M:%S", &utc);
+    snprintf(text.at + 19, 13, ".%03dZ", (int)ms);
+    return text;
 }
