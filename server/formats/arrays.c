@@ -107,13 +107,11 @@ static void npy_put_header(Segments *segments, const char *type, size_t rows, si
 }
 
 static Status npy_layout(const Table *table, Segments *segments, Problem *problem) {
-    const bool has_axis = table->axis_name != NULL;
+    const size_t width = table_width(table);
     (void)problem;
-    npy_put_header(segments, "<f8", table->count, table->column_count + has_axis);
-    if (has_axis)
-        table_layout_axis(table, segments);
-    for (size_t c = 0; c < table->column_count; c++)
-        table_layout_column(table, c, 0, segments);
+    npy_put_header(segments, "<f8", table->count, width);
+    for (size_t c = 0; c < width; c++)
+        segments_column(segments, table, c, 0);
     return STATUS_OK;
 }
 
@@ -129,20 +127,15 @@ static size_t npz_width(const TableColumn *column) {
     return width;
 }
 
-// The array of a column, or of the axis.
-static Status npz_put(Zip *zip, const Table *table, bool is_axis, size_t c, Problem *problem) {
+static Status npz_put(Zip *zip, const Table *table, size_t c, Problem *problem) {
     Segments array = {0};
     char file[ZIP_NAME_MAX + 1], type[32] = "<f8";
-    const TableColumn column =
-        is_axis ? (TableColumn){.name = table->axis_name} : table_column(table, c);
+    const TableColumn column = table_column(table, c);
     const size_t width = npz_width(&column);
     if (width > 0)
         snprintf(type, sizeof type, "|S%zu", width);
     npy_put_header(&array, type, table->count, 0);
-    if (is_axis)
-        table_layout_axis(table, &array);
-    else
-        table_layout_column(table, c, width, &array);
+    segments_column(&array, table, c, width);
     snprintf(file, sizeof file, "%.74s.npy", column.name + (*column.name == '/'));
     const Status status = zip_put(zip, file, &array, problem);
     segments_clear(&array);
@@ -151,9 +144,9 @@ static Status npz_put(Zip *zip, const Table *table, bool is_axis, size_t c, Prob
 
 static Status npz_layout(const Table *table, Segments *segments, Problem *problem) {
     Zip zip = {.segments = segments};
-    Status status = table->axis_name != NULL ? npz_put(&zip, table, true, 0, problem) : STATUS_OK;
-    for (size_t c = 0; c < table->column_count && status == STATUS_OK; c++)
-        status = npz_put(&zip, table, false, c, problem);
+    Status status = STATUS_OK;
+    for (size_t c = 0; c < table_width(table) && status == STATUS_OK; c++)
+        status = npz_put(&zip, table, c, problem);
     const Status ended = zip_end(&zip, status == STATUS_OK ? problem : NULL);
     return status != STATUS_OK ? status : ended;
 }
@@ -246,14 +239,10 @@ static Status mat_layout(const Table *table, Segments *segments, Problem *proble
     segments_fill(segments, '\0', 8);
     segments_number(segments, MAT_VERSION, 2);
     segments_put(segments, "IM", 2); // little-endian
-    if (table->axis_name != NULL) {
-        TRY(mat_open_variable(segments, table->axis_name, table->count, problem));
-        table_layout_axis(table, segments);
-    }
-    for (size_t c = 0; c < table->column_count; c++) {
+    for (size_t c = 0; c < table_width(table); c++) {
         const char *name = table_column(table, c).name;
         TRY(mat_open_variable(segments, name + (*name == '/'), table->count, problem));
-        table_layout_column(table, c, 0, segments);
+        segments_column(segments, table, c, 0);
     }
     return STATUS_OK;
 }

@@ -2,10 +2,10 @@
 // program's own and hold neither comma nor quote.
 #include "server/util/csv.h"
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "server/formats/format.h"
-#include "server/util/dtoa.h"
 
 // A cell, quoted if it must be.
 static void csv_put_text(Bytes *bytes, const char *text, size_t length) {
@@ -26,11 +26,9 @@ static void csv_put_title(Bytes *bytes, const char *name, const char *unit) {
 }
 
 static void csv_put_header(const Table *table, Bytes *bytes) {
-    if (table->axis_name != NULL)
-        csv_put_name(bytes, table->axis_name, table->axis_unit);
-    for (size_t c = 0; c < table->column_count; c++) {
-        bytes_text(bytes, c > 0 || table->axis_name != NULL ? "," : "");
+    for (size_t c = 0; c < table_width(table); c++) {
         const TableColumn column = table_column(table, c);
+        bytes_text(bytes, c > 0 ? "," : "");
         csv_put_title(bytes, column.name, column.unit);
     }
     for (const Field *field = table->fields; field != NULL && field->kind != FIELD_KIND_END;
@@ -58,53 +56,34 @@ static void csv_put_record(Bytes *bytes, const Field *fields, const void *record
     bytes_text(bytes, "\n");
 }
 
-// Rows of columns, with room for all digits made before.
-static void csv_put_rows(const Table *table, size_t from, size_t end, Bytes *bytes) {
-    const size_t width = 1 + table->column_count, first = table->bucket > 0 ? 0 : table->first;
-    if (!bytes_reserve(bytes, (end - from) * width * (SHORTEST_SIZE + 1)))
-        return;
-    char *at = bytes->at + bytes->count;
-    for (size_t i = from; i < end; i++) {
-        if (table->axis_name != NULL)
-            at = csv_put_real(at,
-                              table->axis != NULL ? table->axis[first + i] : table_time(table, i));
-        for (size_t c = 0; c < table->column_count; c++) {
-            if (c > 0 || table->axis_name != NULL)
-                *at++ = ',';
-            at = csv_put_real(at, table->columns[c]->values[first + i]);
-        }
-        *at++ = '\n';
-    }
-    *at = '\0';
-    bytes->count = (size_t)(at - bytes->at);
-}
-
-enum { CSV_SOURCE_ROWS = 64 };
-
-// Rows of a source; false: it cannot be read any more.
-static bool csv_put_cells(const Table *table, size_t from, size_t end, Bytes *bytes) {
-    const TableSource *source = table->source;
-    double cells[TABLE_SOURCE_COLUMNS][CSV_SOURCE_ROWS];
-    TableColumn columns[TABLE_SOURCE_COLUMNS];
-    for (size_t c = 0; c < table->column_count; c++) {
+// Rows of columns; false: they cannot be read any more.
+static bool csv_put_rows(const Table *table, size_t from, size_t count, Bytes *bytes) {
+    const size_t width = table_width(table);
+    double *cells = malloc((width * count + 1) * sizeof *cells);
+    TableColumn *columns = malloc((width + 1) * sizeof *columns);
+    bool is_read = true;
+    bytes->is_failed = bytes->is_failed || cells == NULL || columns == NULL;
+    for (size_t c = 0; c < width && is_read && !bytes->is_failed; c++) {
         columns[c] = table_column(table, c);
-        if (!source->read(source->context, c, from, end - from, cells[c]))
-            return false;
+        is_read = table_read(table, c, from, count, cells + c * count);
     }
-    for (size_t row = 0; row < end - from; row++) {
-        for (size_t c = 0; c < table->column_count; c++) {
+    for (size_t row = 0; row < count && is_read && !bytes->is_failed; row++) {
+        for (size_t c = 0; c < width; c++) {
+            const double value = cells[c * count + row];
             size_t length;
             bytes_text(bytes, c > 0 ? "," : "");
             if (columns[c].texts == NULL) {
-                csv_cells_real(bytes, cells[c][row]);
+                csv_cells_real(bytes, value);
                 continue;
             }
-            const char *text = table_bare(&columns[c], cells[c][row], &length);
+            const char *text = table_bare(&columns[c], value, &length);
             csv_put_text(bytes, text, length);
         }
         bytes_text(bytes, "\n");
     }
-    return true;
+    free(columns);
+    free(cells);
+    return is_read;
 }
 
 static bool csv_next(const Table *table, TextPlace *place, Bytes *bytes) {
@@ -112,19 +91,12 @@ static bool csv_next(const Table *table, TextPlace *place, Bytes *bytes) {
         csv_put_header(table, bytes);
         return table->count > 0;
     }
-    const size_t rows = table->source != NULL
-                            ? CSV_SOURCE_ROWS
-                            : FORMAT_PIECE_NUMBERS / (1 + table->column_count) + 1;
+    const size_t rows = FORMAT_PIECE_NUMBERS / (1 + table->column_count) + 1;
     const size_t end = table->count - place->row < rows ? table->count : place->row + rows;
-    if (table->source != NULL) {
-        if (!csv_put_cells(table, place->row, end, bytes))
-            return false;
-    } else if (table->fields == NULL)
-        csv_put_rows(table, place->row, end, bytes);
-    else
-        for (size_t i = place->row; i < end; i++)
-            csv_put_record(bytes, table->fields,
-                           (const char *)table->records + i * table->record_size);
+    for (size_t i = place->row; i < end && table->fields != NULL; i++)
+        csv_put_record(bytes, table->fields, (const char *)table->records + i * table->record_size);
+    if (table->fields == NULL && !csv_put_rows(table, place->row, end - place->row, bytes))
+        return false;
     place->row = end;
     return end < table->count;
 }

@@ -27,17 +27,17 @@ typedef struct TableSource {
     void (*put_end)(const void *context, Bytes *bytes);
 } TableSource;
 
+struct Table;
+
 typedef struct Segment {
     uint64_t start, size;      // in the document
-    const double *values;      // borrowed; NULL: text, or counted
+    const struct Table *table; // borrowed; NULL: text
     size_t text;               // where it begins in `text` of Segments
-    double first, step, rate;  // counted: number i is (first + i step) / rate; else rate 0
-    const TableSource *source; // borrowed; NULL: not from there
-    size_t column, width;      // of the source; bytes of a text, 0: numbers
+    size_t column, width;      // of the table; bytes of a text, 0: numbers
     bool is_numeric;           // the column's texts are numbers
 } Segment;
 
-// A document as a list of segments: headers, and numbers as they lie in memory or are counted up.
+// A document as a list of segments: headers, and columns of a table.
 // Its size is known, and any part of it can be read alone, without a copy of the whole. All zero is
 // empty. Once it failed (memory) it stays so, like Bytes.
 typedef struct Segments {
@@ -54,13 +54,9 @@ void segments_text(Segments *segments, Bytes *text);                  // copied,
 void segments_number(Segments *segments, uint64_t value,
                      size_t size); // its `size` lowest bytes, lowest first
 void segments_fill(Segments *segments, char with, size_t count);
-void segments_values(Segments *segments, const double *values, size_t count); // borrowed
-// (first + i step) / rate for i = 0 ... count - 1.
-void segments_counted(Segments *segments, size_t first, size_t step, double rate, size_t count);
-// Rows of a column of `source`, which is borrowed: texts of `width` bytes, filled up with zeros; or
-// with width 0 numbers: those that all texts are, else the indices of texts.
-void segments_cells(Segments *segments, const TableSource *source, size_t column, size_t width,
-                    size_t rows);
+// A column of `table`, which is borrowed: texts of `width` bytes, filled up with zeros; or with
+// width 0 numbers: those that all texts are, else the indices of texts.
+void segments_column(Segments *segments, const struct Table *table, size_t column, size_t width);
 void segments_join(Segments *segments,
                    const Segments *other); // behind; borrows what `other` borrows
 
@@ -103,16 +99,15 @@ static inline double table_time(const Table *table, size_t row) {
     return (double)(table->first + row * step) / table->axis_rate;
 }
 
+// Columns with the axis, if there is one: it is column 0.
+size_t table_width(const Table *table);
 TableColumn table_column(const Table *table, size_t column);
+// Rows first ... first + count - 1 of a column. False: they cannot be read any more.
+bool table_read(const Table *table, size_t column, size_t first, size_t count, double *target);
 // Whether a column has texts, and all of them are numbers.
 bool table_column_is_numeric(const TableColumn *column);
 // A text without the quotes of a JSON string; those of columns have none inside.
 const char *table_bare(const TableColumn *column, double value, size_t *length);
-
-// Appends the numbers of a column, its texts in `width` bytes each (0: as numbers), or the axis,
-// which there is.
-void table_layout_column(const Table *table, size_t column, size_t width, Segments *segments);
-void table_layout_axis(const Table *table, Segments *segments);
 
 // Structs as columns by their Field rows, a row for each of `count` structs of `size` bytes. A
 // choice is its index, from 0; an absent member is NAN; texts and lists are left out. Cleared by
@@ -138,8 +133,7 @@ typedef struct TableFormat {
 
 enum {
     FORMAT_PIECE_NUMBERS = 2048, // of a text's piece, about
-    TABLE_PIECE = 256,           // rows that are read from a source at once, at most
-    TABLE_SOURCE_COLUMNS = 96,   // of a source, at most
+    TABLE_PIECE = 256,           // rows of a binary format that are read at once, at most
 };
 
 // JSON: {"sample_rate", "start", "count", "channels"}. CSV: a header with units, a row per sample.

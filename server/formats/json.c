@@ -28,42 +28,33 @@ static void json_open_list(Bytes *bytes, const char *name, const char *unit, con
     bytes_json(bytes, "\"%s\": {\"unit\": %s, \"%s\": [", name, unit, values);
 }
 
-// Column `c`, or the axis; in buckets two columns are the lists "min" and "max" of one channel.
-static void json_open_column(const Table *table, size_t c, bool is_axis, Bytes *bytes) {
-    if (is_axis) {
-        json_open_list(bytes, table->axis_name, table->axis_unit, "values");
-        return;
-    }
-    if (table->source != NULL) {
-        const TableColumn described = table_column(table, c);
+// In buckets two columns are the lists "min" and "max" of one channel.
+static void json_open_column(const Table *table, size_t c, Bytes *bytes) {
+    const size_t channel = c - (table->axis_name != NULL);
+    const TableColumn column = table_column(table, c);
+    char name[sizeof((Column){0}.name)];
+    if (table->axis != NULL && c == 0) {
+        json_open_list(bytes, column.name, column.unit, "values");
+    } else if (table->source != NULL) {
         bytes_text(bytes, c > 0 ? ",\n " : "\"columns\": {\n ");
-        json_open_list(bytes, described.name, described.unit, "values");
-        return;
-    }
-    const Column *column = table->columns[c];
-    char name[sizeof column->name];
-    if (table->bucket > 0 && c % 2 == 1) {
+        json_open_list(bytes, column.name, column.unit, "values");
+    } else if (table->bucket > 0 && channel % 2 == 1) {
         bytes_text(bytes, ", \"max\": [");
-        return;
+    } else {
+        text_fit(name, sizeof name, column.name);
+        if (table->bucket > 0 && strlen(name) > strlen("_min"))
+            name[strlen(name) - strlen("_min")] = '\0';
+        bytes_text(bytes, channel > 0 ? ", " : "\"channels\": {");
+        json_open_list(bytes, name, column.unit, table->bucket > 0 ? "min" : "values");
     }
-    text_fit(name, sizeof name, column->name);
-    if (table->bucket > 0 && strlen(name) > strlen("_min"))
-        name[strlen(name) - strlen("_min")] = '\0';
-    bytes_text(bytes, c > 0 ? ", " : "\"channels\": {");
-    json_open_list(bytes, name, column->unit, table->bucket > 0 ? "min" : "values");
 }
 
-// Rows of a column; false: the source cannot be read any more.
-static bool json_put_values(const Table *table, const double *values, size_t c, size_t first,
-                            size_t count, Bytes *bytes) {
-    const TableSource *source = table->source;
-    if (source == NULL) {
-        bytes_reals(bytes, table_values(table, values) + first, count);
-        return true;
-    }
-    double numbers[TABLE_PIECE];
+// Rows of a column; false: they cannot be read any more.
+static bool json_put_values(const Table *table, size_t c, size_t first, size_t count,
+                            Bytes *bytes) {
+    double numbers[FORMAT_PIECE_NUMBERS];
     const TableColumn column = table_column(table, c);
-    if (!source->read(source->context, c, first, count, numbers))
+    if (!table_read(table, c, first, count, numbers))
         return false;
     if (column.texts == NULL)
         bytes_reals(bytes, numbers, count);
@@ -74,31 +65,30 @@ static bool json_put_values(const Table *table, const double *values, size_t c, 
     return true;
 }
 
+// An axis that is counted has no list.
 static bool json_next_values(const Table *table, TextPlace *place, Bytes *bytes) {
-    const size_t axes = table->axis != NULL ? 1 : 0, list = place->part - 1;
-    const bool is_axis = list < axes;
-    if (list == axes + table->column_count) {
+    const bool is_counted = table->axis_name != NULL && table->axis == NULL;
+    const size_t c = place->part - 1 + is_counted;
+    if (c == table_width(table)) {
         bytes_text(bytes, table->column_count == 0 ? "\"channels\": {}" : "}");
         if (table->source != NULL)
             table->source->put_end(table->source->context, bytes);
         bytes_text(bytes, "}\n");
         return false;
     }
-    const size_t c = list - axes, left = table->count - place->row;
-    const size_t max = table->source != NULL ? TABLE_PIECE : FORMAT_PIECE_NUMBERS;
-    const size_t count = left < max ? left : max;
-    const double *values = is_axis                 ? table->axis
-                           : table->source != NULL ? NULL
-                                                   : table->columns[c]->values;
+    const size_t left = table->count - place->row;
+    const size_t count = left < FORMAT_PIECE_NUMBERS ? left : FORMAT_PIECE_NUMBERS;
     if (place->row == 0)
-        json_open_column(table, c, is_axis, bytes);
+        json_open_column(table, c, bytes);
     else
         bytes_text(bytes, ",");
-    if (!json_put_values(table, values, c, place->row, count, bytes))
+    if (!json_put_values(table, c, place->row, count, bytes))
         return false;
     place->row += count;
     if (place->row == table->count) {
-        const bool has_max = table->bucket > 0 && !is_axis && c % 2 == 0;
+        const bool is_axis = table->axis != NULL && c == 0;
+        const bool has_max =
+            table->bucket > 0 && !is_axis && (c - (table->axis_name != NULL)) % 2 == 0;
         bytes_text(bytes, is_axis ? "]}, " : has_max ? "]" : "]}");
         *place = (TextPlace){place->part + 1, 0};
     }

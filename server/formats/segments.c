@@ -35,16 +35,6 @@ static void segments_add(Segments *segments, Segment segment) {
     segments->size += segment.size;
 }
 
-static bool segment_is_text(const Segment *segment) {
-    return segment->values == NULL && segment->rate == 0 && segment->source == NULL;
-}
-
-// Where its bytes are in memory; NULL: nowhere.
-static const char *segment_memory(const Segments *segments, const Segment *segment) {
-    return segment_is_text(segment) ? segments->text.at + segment->text
-                                    : (const char *)segment->values;
-}
-
 void segments_put(Segments *segments, const void *data, size_t size) {
     const size_t text = segments->text.count;
     bytes_put(&segments->text, data, size);
@@ -52,7 +42,7 @@ void segments_put(Segments *segments, const void *data, size_t size) {
     if (segments->is_failed)
         return;
     Segment *last = segments->count > 0 ? &segments->at[segments->count - 1] : NULL;
-    if (last != NULL && segment_is_text(last)) {
+    if (last != NULL && last->table == NULL) {
         last->size += size;
         segments->size += size;
         return;
@@ -75,23 +65,11 @@ void segments_fill(Segments *segments, char with, size_t count) {
         segments_put(segments, &with, 1);
 }
 
-void segments_values(Segments *segments, const double *values, size_t count) {
-    segments_add(segments, (Segment){.size = count * sizeof *values, .values = values});
-}
-
-void segments_counted(Segments *segments, size_t first, size_t step, double rate, size_t count) {
-    segments_add(segments, (Segment){.size = count * sizeof(double),
-                                     .first = (double)first,
-                                     .step = (double)step,
-                                     .rate = rate});
-}
-
-void segments_cells(Segments *segments, const TableSource *source, size_t column, size_t width,
-                    size_t rows) {
-    const TableColumn described = source->column(source->context, column);
+void segments_column(Segments *segments, const Table *table, size_t column, size_t width) {
+    const TableColumn described = table_column(table, column);
     segments_add(segments,
-                 (Segment){.size = (uint64_t)rows * (width > 0 ? width : sizeof(double)),
-                           .source = source,
+                 (Segment){.size = (uint64_t)table->count * (width > 0 ? width : sizeof(double)),
+                           .table = table,
                            .column = column,
                            .width = width,
                            .is_numeric = width == 0 && table_column_is_numeric(&described)});
@@ -101,25 +79,11 @@ void segments_join(Segments *segments, const Segments *other) {
     segments->is_failed = segments->is_failed || other->is_failed;
     for (size_t i = 0; i < other->count && !segments->is_failed; i++) {
         const Segment *from = &other->at[i];
-        if (segment_is_text(from))
-            segments_put(segments, segment_memory(other, from), (size_t)from->size);
+        if (from->table == NULL)
+            segments_put(segments, other->text.at + from->text, (size_t)from->size);
         else
             segments_add(segments, *from);
     }
-}
-
-// Numbers first ... first + count - 1, counted or from the source. False: they cannot be read any
-// more.
-static bool segment_numbers(const Segment *segment, size_t first, size_t count, double *numbers) {
-    const TableSource *source = segment->source;
-    const double start = segment->first + (double)first * segment->step, step = segment->step;
-    if (source != NULL)
-        return source->read(source->context, segment->column, first, count, numbers);
-    // Whole numbers below 2^53, so that each sum is exact and each quotient that of the text
-    // formats. The loop becomes vectors.
-    for (int i = 0; i < (int)count; i++)
-        numbers[i] = (start + i * step) / segment->rate;
-    return true;
 }
 
 // Texts of `width` bytes each, without the first `skip` bytes.
@@ -140,14 +104,11 @@ static void segment_copy_texts(const TableColumn *column, const double *values, 
 // Zeros where the source cannot be read any more.
 static void segment_read(const Segments *segments, const Segment *segment, uint64_t offset,
                          char *target, size_t size) {
-    const char *memory = segment_memory(segments, segment);
-    const TableSource *source = segment->source;
-    if (memory != NULL) {
-        memcpy(target, memory + offset, size);
+    if (segment->table == NULL) {
+        memcpy(target, segments->text.at + segment->text + offset, size);
         return;
     }
-    const TableColumn column =
-        source != NULL ? source->column(source->context, segment->column) : (TableColumn){NULL};
+    const TableColumn column = table_column(segment->table, segment->column);
     const size_t width = segment->width > 0 ? segment->width : sizeof(double);
     double numbers[TABLE_PIECE];
     while (size > 0) {
@@ -155,7 +116,7 @@ static void segment_read(const Segments *segments, const Segment *segment, uint6
         const size_t rows = (skip + size + width - 1) / width;
         const size_t count = rows < TABLE_PIECE ? rows : TABLE_PIECE, whole = count * width - skip;
         const size_t some = whole < size ? whole : size;
-        if (!segment_numbers(segment, row, count, numbers)) {
+        if (!table_read(segment->table, segment->column, row, count, numbers)) {
             memset(target, 0, size);
             return;
         }
@@ -211,36 +172,11 @@ void segments_write(const Segments *segments, Bytes *bytes) {
 uint32_t segments_crc32(const Segments *segments) {
     uint32_t crc = 0;
     char piece[PIECE_BYTES];
-    for (size_t i = 0; i < segments->count; i++) {
-        const Segment *segment = &segments->at[i];
-        const char *memory = segment_memory(segments, segment);
-        if (memory != NULL) {
-            crc = gzip_crc32(crc, memory, (size_t)segment->size);
-            continue;
-        }
-        for (uint64_t at = 0; at < segment->size;) {
-            const uint64_t left = segment->size - at;
-            const size_t size = left < sizeof piece ? (size_t)left : sizeof piece;
-            segment_read(segments, segment, at, piece, size);
-            crc = gzip_crc32(crc, piece, size);
-            at += size;
-        }
+    for (uint64_t at = 0; at < segments->size; at += sizeof piece) {
+        const uint64_t left = segments->size - at;
+        const size_t size = left < sizeof piece ? (size_t)left : sizeof piece;
+        segments_read(segments, at, piece, size);
+        crc = gzip_crc32(crc, piece, size);
     }
     return crc;
-}
-
-void table_layout_column(const Table *table, size_t column, size_t width, Segments *segments) {
-    if (table->source != NULL)
-        segments_cells(segments, table->source, column, width, table->count);
-    else
-        segments_values(segments, table_values(table, table->columns[column]->values),
-                        table->count);
-}
-
-void table_layout_axis(const Table *table, Segments *segments) {
-    if (table->axis != NULL)
-        segments_values(segments, table_values(table, table->axis), table->count);
-    else
-        segments_counted(segments, table->first, table->bucket > 0 ? table->bucket : 1,
-                         table->axis_rate, table->count);
 }

@@ -2,8 +2,6 @@
 
 #include "server/util/base_path.h"
 
-_Static_assert(2 + (int)SWEEP_AXES + (int)SWEEP_METRICS <= (int)TABLE_SOURCE_COLUMNS, "columns");
-
 static bool sweep_table_read(void *context, size_t cell, size_t first, size_t count,
                              double *target) {
     const Sweep *sweep = context;

@@ -5,11 +5,40 @@
 
 #include "server/formats/format.h"
 
+static bool table_has_axis(const Table *table) {
+    return table->axis_name != NULL;
+}
+
+size_t table_width(const Table *table) {
+    return table->column_count + table_has_axis(table);
+}
+
 TableColumn table_column(const Table *table, size_t column) {
     if (table->source != NULL)
         return table->source->column(table->source->context, column);
-    return (TableColumn){.name = table->columns[column]->name,
-                         .unit = table->columns[column]->unit};
+    if (table_has_axis(table) && column == 0)
+        return (TableColumn){.name = table->axis_name, .unit = table->axis_unit};
+    const Column *one = table->columns[column - table_has_axis(table)];
+    return (TableColumn){.name = one->name, .unit = one->unit};
+}
+
+bool table_read(const Table *table, size_t column, size_t first, size_t count, double *target) {
+    if (table->source != NULL)
+        return table->source->read(table->source->context, column, first, count, target);
+    const bool is_axis = table_has_axis(table) && column == 0;
+    const double *values =
+        is_axis ? table->axis : table->columns[column - table_has_axis(table)]->values;
+    if (values != NULL) {
+        memcpy(target, table_values(table, values) + first, count * sizeof *target);
+        return true;
+    }
+    // Whole numbers below 2^53, so that each sum is exact and each quotient that of table_time. The
+    // loop becomes vectors.
+    const double step = table->bucket > 0 ? (double)table->bucket : 1;
+    const double start = (double)table->first + (double)first * step;
+    for (int i = 0; i < (int)count; i++)
+        target[i] = (start + i * step) / table->axis_rate;
+    return true;
 }
 
 bool table_column_is_numeric(const TableColumn *column) {

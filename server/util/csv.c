@@ -4,17 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/util/dtoa.h"
-
-char *csv_put_real(char *at, double value) {
-    if (isfinite(value))
-        return at + dtoa_write(at, value);
-    const char *text = isnan(value) ? "nan" : value < 0 ? "-inf" : "inf";
-    const size_t length = strlen(text);
-    memcpy(at, text, length);
-    return at + length;
-}
-
 void csv_put_name(Bytes *bytes, const char *name, const char *unit) {
     bytes_text(bytes, name);
     if (unit != NULL && unit[0] != '\0')
@@ -39,8 +28,10 @@ void csv_cells_header(Bytes *bytes, const Field *fields) {
 }
 
 void csv_cells_real(Bytes *bytes, double value) {
-    char digits[SHORTEST_SIZE];
-    bytes_put(bytes, digits, (size_t)(csv_put_real(digits, value) - digits));
+    if (isfinite(value))
+        bytes_real(bytes, value);
+    else
+        bytes_text(bytes, isnan(value) ? "nan" : value < 0 ? "-inf" : "inf");
 }
 
 void csv_cells_reals(Bytes *bytes, const double *values, size_t count) {

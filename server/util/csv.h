@@ -5,8 +5,6 @@
 #include "core/base/field.h"
 #include "server/util/bytes.h"
 
-// The digits of a number at `at`, which has room for SHORTEST_SIZE bytes; returns their end.
-char *csv_put_real(char *at, double value);
 void csv_put_name(Bytes *bytes, const char *name, const char *unit); // "name [unit]"
 
 // ",name [unit]" for each REAL and COUNT row.
