@@ -242,99 +242,70 @@ static const char parts[] =
     "result series psd impacts energy manifest bundle job tradeoff ensemble compare sensitivity "
     "table";
 
-static bool has_operand(const Command *command, const char *part) {
-    return command->operands != NULL && strstr(command->operands, part) != NULL;
-}
-
-// "create list" of the operands "create|list [NAME]".
-enum { ACTIONS_SIZE = 160 };
-static bool actions_of(const Command *command, char actions[ACTIONS_SIZE]) {
-    const char *operands = command->operands != NULL ? command->operands : "";
-    const size_t length = strcspn(operands, " ");
-    if (memchr(operands, '|', length) == NULL || length >= ACTIONS_SIZE)
-        return false;
-    snprintf(actions, ACTIONS_SIZE, "%.*s", (int)length, operands);
-    for (char *bar = actions; (bar = strchr(bar, '|')) != NULL;)
-        *bar = ' ';
-    return true;
-}
-
 static void names_print(FILE *file) {
     for (size_t i = 0; commands[i] != NULL; i++)
         fprintf(file, "%s%s", i > 0 ? " " : "", commands[i]->name);
 }
 
-// A pattern "run:--output | run:-o" of a row, after others if there are any.
-static void pattern_print(FILE *file, const Command *command, const Field *row, bool is_first) {
+// The words that an operand may be: the actions of "create|list [NAME]", commands or parts.
+static void completion_operands(FILE *file, const char *operands) {
+    const size_t length = strcspn(operands, " ");
+    const bool is_action = memchr(operands, '|', length) != NULL;
+    const bool is_part = strstr(operands, "WHAT") != NULL;
+    if (!is_action && !is_part && strstr(operands, "COMMAND") == NULL)
+        return;
+    fprintf(file, "        *) [ \"$COMP_CWORD\" -ne %d ] || words='", is_part ? 3 : 2);
+    if (is_action)
+        for (size_t i = 0; i < length; i++)
+            fputc(operands[i] == '|' ? ' ' : operands[i], file);
+    else if (is_part)
+        fputs(parts, file);
+    else
+        names_print(file);
+    fputs("' ;;\n", file);
+}
+
+// The words after an option that takes one of some texts, the options, and the operands.
+static void completion_command(FILE *file, const Command *command) {
     char name[OPTION_NAME];
-    const char letter = option_spell(command->options, row, name);
-    fprintf(file, "%s%s:%s", is_first ? "    " : " | ", command->name, name);
-    if (letter != '\0')
-        fprintf(file, " | %s:-%c", command->name, letter);
-}
-
-// What may follow an option: one of its choices, or something that is not known here.
-static void completion_values(FILE *file, const Command *command) {
-    bool is_first = true;
-    for (const Field *row = command->options; row != NULL && row->kind != FIELD_KIND_END; row++)
-        if (row->kind == FIELD_KIND_CHOICE) {
-            pattern_print(file, command, row, true);
-            fputs(") mapfile -t COMPREPLY < <(compgen -W '", file);
-            for (size_t i = 0; row->choices[i] != NULL; i++)
-                fprintf(file, "%s%s", i > 0 ? " " : "", row->choices[i]);
-            fputs("' -- \"$cur\") && return ;;\n", file);
-        }
-    for (const Field *row = command->options; row != NULL && row->kind != FIELD_KIND_END; row++)
-        if (row->kind != FIELD_KIND_CHOICE && row->kind != FIELD_KIND_FLAG) {
-            pattern_print(file, command, row, is_first);
-            is_first = false;
-        }
-    fputs(is_first ? "" : ") return ;;\n", file);
-}
-
-// The options and the operands of a command.
-static void completion_words(FILE *file, const Command *command) {
-    static const char words[] = "mapfile -t COMPREPLY < <(compgen -W '";
-    char name[OPTION_NAME], actions[ACTIONS_SIZE];
-    fprintf(file, "    %s:-*) %s--help", command->name, words);
+    fprintf(file, "    %s) case $prev:$cur in\n", command->name);
+    for (const Field *row = command->options; row != NULL && row->kind != FIELD_KIND_END; row++) {
+        const char letter = option_spell(command->options, row, name);
+        if (row->kind == FIELD_KIND_FLAG)
+            continue;
+        fprintf(file, "        %s:*%s%.*s%s) ", name, letter != '\0' ? " | -" : "",
+                letter != '\0' ? 1 : 0, &letter, letter != '\0' ? ":*" : "");
+        fputs(row->kind == FIELD_KIND_CHOICE ? "words='" : "return ;;\n", file);
+        for (size_t i = 0; row->kind == FIELD_KIND_CHOICE && row->choices[i] != NULL; i++)
+            fprintf(file, "%s ", row->choices[i]);
+        fputs(row->kind == FIELD_KIND_CHOICE ? "' ;;\n" : "", file);
+    }
+    fputs("        *:-*) words='--help", file);
     for (const Field *row = command->options; row != NULL && row->kind != FIELD_KIND_END; row++) {
         (void)option_spell(command->options, row, name);
         fprintf(file, " %s", name);
     }
-    fputs("' -- \"$cur\") ;;\n", file);
-    if (has_operand(command, "COMMAND")) {
-        fprintf(file, "    %s:*) %s", command->name, words);
-        names_print(file);
-    } else if (has_operand(command, "WHAT")) {
-        fprintf(file, "    %s:*) [ \"$COMP_CWORD\" -lt 3 ] || %s%s", command->name, words, parts);
-    } else if (actions_of(command, actions)) {
-        fprintf(file, "    %s:*) [ \"$COMP_CWORD\" -ne 2 ] || %s%s", command->name, words, actions);
-    } else {
-        return;
-    }
-    fputs("' -- \"$cur\") ;;\n", file);
+    fputs("' ;;\n", file);
+    completion_operands(file, command->operands != NULL ? command->operands : "");
+    fputs("        esac ;;\n", file);
 }
 
 static void completion_bash(FILE *file) {
     fputs("# bash completion of impactd, printed from its tables.\n"
           "_impactd() {\n"
-          "    local cur=${COMP_WORDS[COMP_CWORD]} prev=${COMP_WORDS[COMP_CWORD - 1]}\n"
+          "    local words= cur=${COMP_WORDS[COMP_CWORD]} prev=${COMP_WORDS[COMP_CWORD - 1]}\n"
           "    COMPREPLY=()\n"
           "    if [ \"$COMP_CWORD\" -eq 1 ]; then\n"
-          "        mapfile -t COMPREPLY < <(compgen -W '",
+          "        words='--help --version ",
           file);
     names_print(file);
-    fputs(" --help --version' -- \"$cur\")\n"
-          "        return\n"
-          "    fi\n"
-          "    case ${COMP_WORDS[1]}:$prev in\n",
+    fputs("'\n"
+          "    else case ${COMP_WORDS[1]} in\n",
           file);
     for (size_t i = 0; commands[i] != NULL; i++)
-        completion_values(file, commands[i]);
-    fputs("    esac\n    case ${COMP_WORDS[1]}:$cur in\n", file);
-    for (size_t i = 0; commands[i] != NULL; i++)
-        completion_words(file, commands[i]);
-    fputs("    esac\n"
+        completion_command(file, commands[i]);
+    fputs("    esac; fi\n"
+          "    mapfile -t COMPREPLY < <(compgen -W \"$words\" -- \"$cur\")\n"
           "}\n"
           "complete -o default -F _impactd impactd\n",
           file);
