@@ -587,13 +587,12 @@ void api_print(const ApiCall *call) {
 }
 
 Status api_print_tables(ApiCall *call, Problem *problem) {
-    const Bytes *body = &call->answer.body;
     const PrintTableView *view = call->command->view;
     size_t rows = 1;
     if (view == NULL || ((const ClientSettings *)call->settings)->json)
         api_print(call);
     else
-        TRY(print_table_print_json(body->at, body->count, view, stdout, &rows, problem));
+        TRY(print_table_print_json(&call->answer.body, view, stdout, &rows, problem));
     if (rows == 0)
         fprintf(stderr, "impactd %s: nothing fits\n", call->command->name);
     return STATUS_OK;

@@ -32,7 +32,8 @@ struct Command {
     // `settings` holds the options; it is cleared by the caller. Returns the exit code.
     int (*run)(const Command *self, void *settings, const Options *options, Problem *problem);
     const struct ApiAction *actions;   // of a command that asks a server; ends with a NULL name
-    const struct PrintTableView *view; // of its answers as tables; NULL: they are JSON
+    const struct StudyCommand *study;  // of a command that makes a study
+    const struct PrintTableView *view; // of answers as tables; NULL: they are printed as JSON
 };
 
 // Each is in the file of its name or of its resource: jobs.c, records.c, study.c.

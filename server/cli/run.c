@@ -254,7 +254,6 @@ static Status plan_print(const char *path, DryRun *run, const Bytes *json, Probl
     static const PrintTableColumns lists[] = {
         {"decisions", {"about", "chose", "value", "unit", "why"}}, {NULL, {NULL}}};
     static const PrintTableView view = {skipped, lists, fields};
-    size_t longest;
     char *title = run->inquiry.simulation.title;
     text_make_printable(title);
     printf("%s: OK\n", input_name(path));
@@ -263,7 +262,7 @@ static Status plan_print(const char *path, DryRun *run, const Bytes *json, Probl
     if (run->inquiry.study != NULL)
         printf("Study: %s\n", run->inquiry.study->kind->name);
     putchar('\n');
-    return print_table_print_json(json->at, json->count, &view, stdout, &longest, problem);
+    return print_table_print_json(json, &view, stdout, NULL, problem);
 }
 
 static Status plan_show(const char *path, const Bytes *text, void *of, Problem *problem) {
@@ -311,11 +310,9 @@ const Command command_check = {
     .run = check,
 };
 
-typedef struct StudyCommand StudyCommand;
-
 // Of all four commands; each has rows for its own members.
 typedef struct StudySettings {
-    const StudyCommand *command;
+    const Command *command;
     Texts output;
     bool json;
     double max_cpu_seconds;
@@ -327,16 +324,14 @@ typedef struct StudySettings {
     double target;
 } StudySettings;
 
-struct StudyCommand {
-    const Command *command;
+typedef struct StudyCommand {
     const StudyKind *kind; // NULL: the study of the document, which must have one
     // Puts the flags into the document's study of this kind, or into a new one; may take what
     // `settings` own. NULL: there are no flags.
     void (*choose)(void *study, StudySettings *settings);
-    const PrintTableView *view; // of the answer; NULL: it is printed as JSON
     // Appends members, which are shown too, to the answer's object. NULL: none.
     void (*add)(const Variant *answer, Bytes *json);
-};
+} StudyCommand;
 
 #define OUTPUT_ROW(formats)                                                                        \
     FIELD_TEXTS(StudySettings, output, NULL, NULL, OUTPUTS_MAX, PRESENCE_OPTIONAL, 0,              \
@@ -373,29 +368,25 @@ static Status study_write(const StudyFormat *format, const char *path, const Var
 }
 
 // The answer as tables, with the units of its rows.
-static Status study_print(const StudyCommand *command, const Variant *answer, Problem *problem) {
+static Status study_print(const Command *command, const Variant *answer, Problem *problem) {
     const Field *const fields[] = {answer->kind->fields, NULL};
     PrintTableView view = *command->view;
     Bytes json = {0};
-    size_t longest;
     view.fields = fields;
     study_format_write(study_formats(answer->kind), answer, &json);
-    if (command->add != NULL && json.count > 2) {
+    if (command->study->add != NULL && json.count > 2) {
         json.count -= 2; // "}\n"
-        command->add(answer, &json);
+        command->study->add(answer, &json);
         bytes_text(&json, "}");
     }
-    const Status status =
-        json.is_failed
-            ? problem_set(problem, STATUS_NO_MEMORY, "no memory for the answer")
-            : print_table_print_json(json.at, json.count, &view, stdout, &longest, problem);
+    const Status status = print_table_print_json(&json, &view, stdout, NULL, problem);
     bytes_clear(&json);
     return status;
 }
 
 static Status study_make(const StudyRequest *request, const StudySettings *settings,
                          const SimulationLimits *limits, Problem *problem) {
-    const StudyCommand *command = settings->command;
+    const Command *command = settings->command;
     const StudyKind *kind = study_kind(request->study);
     const Texts *outputs = &settings->output;
     ProgressBar bar;
@@ -419,7 +410,7 @@ static Status study_make(const StudyRequest *request, const StudySettings *setti
 
 // The document's own study, or a new one, with the values of the flags.
 static Status study_choose(StudyRequest *request, StudySettings *settings, Problem *problem) {
-    const StudyCommand *command = settings->command;
+    const StudyCommand *command = settings->command->study;
     if (request->study == NULL && command->kind == NULL)
         return problem_add(problem, STATUS_INVALID, "/study",
                            "is required: what is to be found out, like {\"kind\": \"%s\"}",
@@ -460,8 +451,15 @@ static Status study_scene(const char *path, const Bytes *text, void *of, Problem
     return status;
 }
 
-static int study_command_run(const Command *self, void *settings, const Options *options,
-                             Problem *problem);
+static int study_command_run(const Command *self, void *of, const Options *options,
+                             Problem *problem) {
+    StudySettings *settings = of;
+    const StudyKind *kind = self->study->kind;
+    settings->command = self;
+    return kind == NULL || study_check_outputs(kind, &settings->output, problem) == STATUS_OK
+               ? input_command(self, "scene", options, settings, study_scene, problem)
+               : command_error(self->name, problem);
+}
 
 static const Field study_fields[] = {
     OUTPUT_ROW(".json the whole or .csv the table or .svg the chart, where the study has them"),
@@ -485,6 +483,7 @@ const Command command_study = {
     .options = study_fields,
     .size = sizeof(StudySettings),
     .run = study_command_run,
+    .study = &(const StudyCommand){NULL, NULL, NULL},
 };
 
 // Ranges and defaults are the study's own.
@@ -551,6 +550,8 @@ const Command command_tradeoff = {
     .options = tradeoff_fields,
     .size = sizeof(StudySettings),
     .run = study_command_run,
+    .study = &(const StudyCommand){&study_tradeoff, tradeoff_choose, NULL},
+    .view = &tradeoff_view,
 };
 
 // Ranges and defaults are the study's own.
@@ -631,6 +632,8 @@ const Command command_ensemble = {
     .options = ensemble_fields,
     .size = sizeof(StudySettings),
     .run = study_command_run,
+    .study = &(const StudyCommand){&study_ensemble, ensemble_choose, ensemble_add},
+    .view = &ensemble_view,
 };
 
 static const Field sweep_fields[] = {
@@ -692,22 +695,6 @@ const Command command_sweep = {
     .options = sweep_fields,
     .size = sizeof(StudySettings),
     .run = study_command_run,
+    .study = &(const StudyCommand){&study_sweep, NULL, sweep_add},
+    .view = &sweep_view,
 };
-
-static int study_command_run(const Command *self, void *of, const Options *options,
-                             Problem *problem) {
-    static const StudyCommand all[] = {
-        {&command_study, NULL, NULL, NULL, NULL},
-        {&command_tradeoff, &study_tradeoff, tradeoff_choose, &tradeoff_view, NULL},
-        {&command_ensemble, &study_ensemble, ensemble_choose, &ensemble_view, ensemble_add},
-        {&command_sweep, &study_sweep, NULL, &sweep_view, sweep_add},
-    };
-    StudySettings *settings = of;
-    settings->command = all;
-    while (settings->command->command != self)
-        settings->command++;
-    const StudyKind *kind = settings->command->kind;
-    return kind == NULL || study_check_outputs(kind, &settings->output, problem) == STATUS_OK
-               ? input_command(self, "scene", options, settings, study_scene, problem)
-               : command_error(self->name, problem);
-}

@@ -62,16 +62,12 @@ static Status token_create(Db *db, const TokenSettings *settings, TokenRow *row,
     return STATUS_OK;
 }
 
-static const char *token_time(int64_t unix_ms, ClockText *text) {
-    *text = clock_rfc3339(unix_ms);
-    return unix_ms > 0 ? text->at : NULL;
-}
-
 static Status token_list(Db *db, const TokenSettings *settings, TokenRow *row, Problem *problem) {
     static const PrintTableView view = {NULL, NULL, NULL};
+    const bool is_json = settings->json;
+    const char *never = is_json ? NULL : "never"; // NULL is null
     TokenRows rows = {0};
     Bytes json = {0};
-    size_t longest;
     (void)row;
     TRY(db_tokens(db, &rows, problem));
     const int64_t now = clock_unix_ms();
@@ -79,32 +75,24 @@ static Status token_list(Db *db, const TokenSettings *settings, TokenRow *row, P
     for (size_t i = 0; i < rows.count; i++) {
         const TokenRow *one = &rows.at[i];
         const bool has_ended = one->expires_unix_ms > 0 && one->expires_unix_ms <= now;
-        ClockText times[3];
-        const struct {
-            const char *name, *value;
-        } members[] = {{"name", one->name},
-                       {"scopes", one->scopes},
-                       {"created", token_time(one->created_unix_ms, &times[0])},
-                       {"used", token_time(one->used_unix_ms, &times[1])},
-                       {"expires", token_time(one->expires_unix_ms, &times[2])},
-                       {"state", one->revoked_unix_ms > 0 ? "revoked"
-                                 : has_ended              ? "expired"
-                                                          : "good"}};
-        for (size_t k = 0; k < COUNT(members); k++) {
-            bytes_format(&json, "%s\"%s\": ", k > 0 ? ", " : i > 0 ? ", {" : "{", members[k].name);
-            // NULL is null, in a table "never".
-            bytes_json_string(
-                &json, members[k].value == NULL && !settings->json ? "never" : members[k].value);
-        }
-        bytes_text(&json, "}");
+        bytes_text(&json, i > 0 ? ", " : "");
+        bytes_json(&json,
+                   "{\"name\": %s, \"scopes\": %s, \"created\": %s, \"used\": %s, \"expires\": %s, "
+                   "\"state\": %s}",
+                   one->name, one->scopes,
+                   one->created_unix_ms > 0 ? clock_rfc3339(one->created_unix_ms).at : never,
+                   one->used_unix_ms > 0 ? clock_rfc3339(one->used_unix_ms).at : never,
+                   one->expires_unix_ms > 0 ? clock_rfc3339(one->expires_unix_ms).at : never,
+                   one->revoked_unix_ms > 0 ? "revoked"
+                   : has_ended              ? "expired"
+                                            : "good");
     }
     bytes_text(&json, "]}\n");
     free(rows.at);
-    Status status =
-        json.is_failed ? problem_set(problem, STATUS_NO_MEMORY, "no memory for the list")
-        : settings->json
-            ? output_put(NULL, &json, problem)
-            : print_table_print_json(json.at, json.count, &view, stdout, &longest, problem);
+    if (is_json && json.is_failed)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the list");
+    const Status status = is_json ? output_put(NULL, &json, problem)
+                                  : print_table_print_json(&json, &view, stdout, NULL, problem);
     bytes_clear(&json);
     return status;
 }

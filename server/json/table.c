@@ -8,7 +8,6 @@
 #include <string.h>
 
 #include "server/json/parse.h"
-#include "server/util/bytes.h"
 
 enum { WIDTH_MAX = 40, ROWS_MAX = 2000, BLOCKS_MAX = 200, VALUES_SHOWN = 24, DEPTH_MAX = 6 };
 enum { CELL_BYTES = 1 << 16, OBJECT_BYTES = 160, HEADING_SIZE = 256 };
@@ -378,16 +377,18 @@ static void object_print(Printer *printer, json_t *object, const char *heading, 
     }
 }
 
-Status print_table_print_json(const char *text, size_t size, const PrintTableView *view, FILE *file,
+Status print_table_print_json(const Bytes *json, const PrintTableView *view, FILE *file,
                               size_t *longest, Problem *problem) {
     Printer printer = {.view = view, .file = file};
-    json_t *root = json_parse_tree(text, size);
-    if (root != NULL)
-        object_print(&printer, root, "", 0);
-    *longest = printer.longest;
-    const bool is_object = root != NULL;
+    if (json->is_failed)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the tables");
+    json_t *root = json_parse_tree(json->at, json->count);
+    if (root == NULL)
+        return problem_set(problem, STATUS_UNREACHABLE,
+                           "unexpected response; is the server really impactd?");
+    object_print(&printer, root, "", 0);
     json_decref(root);
-    return is_object ? STATUS_OK
-                     : problem_set(problem, STATUS_UNREACHABLE,
-                                   "unexpected response; is the server really impactd?");
+    if (longest != NULL)
+        *longest = printer.longest;
+    return STATUS_OK;
 }

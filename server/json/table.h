@@ -5,6 +5,7 @@
 #include <stdio.h>
 
 #include "core/base/field.h"
+#include "server/util/bytes.h"
 
 enum { LISTING_COLUMNS = 12 };
 
@@ -27,8 +28,9 @@ typedef struct PrintTableView {
 
 // Prints the members of a document that are not empty: plain values as name and value, a list of
 // objects as a table, neighbouring objects with the same members as rows of one table. *longest is
-// the number of rows of the longest table. STATUS_UNREACHABLE if the text is not a JSON object.
-Status print_table_print_json(const char *text, size_t size, const PrintTableView *view, FILE *file,
+// the number of rows of the longest table; NULL is allowed. STATUS_NO_MEMORY if the document has
+// failed, STATUS_UNREACHABLE if it is not a JSON object.
+Status print_table_print_json(const Bytes *json, const PrintTableView *view, FILE *file,
                               size_t *longest, Problem *problem);
 
 #endif

@@ -29,8 +29,12 @@ static Status printed(const char *json, char **text, size_t *longest) {
     size_t size;
     *text = NULL;
     FILE *file = open_memstream(text, &size);
-    const Status status = print_table_print_json(json, strlen(json), &view, file, longest, NULL);
+    Bytes bytes = {0};
+    *longest = 0;
+    bytes_text(&bytes, json);
+    const Status status = print_table_print_json(&bytes, &view, file, longest, NULL);
     fclose(file);
+    bytes_clear(&bytes);
     return status;
 }
 
