@@ -108,12 +108,7 @@ static int help_run(const Command *self, void *settings, const Options *options,
 
 static int version_run(const Command *self, void *settings, const Options *options,
                        Problem *problem) {
-    (void)settings;
-    if (options->operand_count > 0) {
-        (void)problem_set(problem, STATUS_USAGE, "takes no operands, is given %s",
-                          options->operands[0]);
-        return command_error(self->name, problem);
-    }
+    (void)self, (void)settings, (void)options, (void)problem;
     printf("impactd %s (engine %s)\n", program_version, engine_version);
     return COMMAND_OK;
 }
@@ -127,10 +122,13 @@ static int command_run_with(const Command *command, int argc, char *const *argv)
     void *settings = calloc(1, command->size + 1);
     int code = command_exit(STATUS_NO_MEMORY);
     if (problem != NULL && settings != NULL && fields_default(fields, settings) == STATUS_OK) {
-        code = options_read(fields, settings, argc, argv, command->environment, &options,
-                            problem) == STATUS_OK
-                   ? command->run(command, settings, &options, problem)
-                   : command_error(command->name, problem);
+        Status status =
+            options_read(fields, settings, argc, argv, command->environment, &options, problem);
+        if (status == STATUS_OK && command->operands == NULL && options.operand_count > 0)
+            status = problem_set(problem, STATUS_USAGE, "takes no operands, is given \"%.60s\"",
+                                 options.operands[0]);
+        code = status == STATUS_OK ? command->run(command, settings, &options, problem)
+                                   : command_error(command->name, problem);
         fields_clear(fields, settings);
     }
     free(settings);

@@ -453,12 +453,8 @@ static Status study_scene(const char *path, const Bytes *text, void *of, Problem
 
 static int study_command_run(const Command *self, void *of, const Options *options,
                              Problem *problem) {
-    StudySettings *settings = of;
-    const StudyKind *kind = self->study->kind;
-    settings->command = self;
-    return kind == NULL || study_check_outputs(kind, &settings->output, problem) == STATUS_OK
-               ? input_command(self, "scene", options, settings, study_scene, problem)
-               : command_error(self->name, problem);
+    ((StudySettings *)of)->command = self;
+    return input_command(self, "scene", options, of, study_scene, problem);
 }
 
 static const Field study_fields[] = {

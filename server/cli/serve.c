@@ -423,12 +423,7 @@ static void signals_block(sigset_t *signals) {
 
 static int serve_run(const Command *self, void *of, const Options *options, Problem *problem) {
     ServeSettings *settings = of;
-    Status status = STATUS_OK;
-    if (options->operand_count > 0)
-        status = problem_set(problem, STATUS_USAGE, "takes no operands, is given \"%.60s\"",
-                             options->operands[0]);
-    if (status == STATUS_OK)
-        status = serve_complete(settings, problem);
+    Status status = serve_complete(settings, problem);
     if (status == STATUS_OK && settings->print_config) {
         options_print(serve_fields, settings, options, stdout);
     } else if (status == STATUS_OK) {
