@@ -124,18 +124,6 @@ Status columns_reply(App *app, Reply *reply, const TableFormat *format, TableStr
 
 // --- series ---
 
-static void series_list_names(const Columns *columns, char *target, size_t size) {
-    target[0] = '\0';
-    for (size_t i = 0; i < columns->count; i++) {
-        const size_t used = strlen(target), more = strlen(columns->at[i].name) + 2;
-        if (used + more + sizeof ", and 1000 more" > size) {
-            snprintf(target + used, size - used, ", and %zu more", columns->count - i);
-            return;
-        }
-        snprintf(target + used, size - used, "%s%s", i > 0 ? ", " : "", columns->at[i].name);
-    }
-}
-
 // "?channels=a,b": those columns in that order; all without it.
 static Status series_choose(const Request *request, const Columns *columns, TableStream *stream,
                             Problem *problem) {
@@ -143,8 +131,9 @@ static Status series_choose(const Request *request, const Columns *columns, Tabl
     const char *text = request_query(request, "channels");
     if (text == NULL)
         return STATUS_OK;
-    char there[256];
-    series_list_names(columns, there, sizeof there);
+    char there[256] = "";
+    for (size_t i = 0; i < columns->count; i++)
+        text_list(there, sizeof there, columns->at[i].name);
     *count = 0;
     for (const char *at = text; at != NULL;
          at = strchr(at, ',') != NULL ? strchr(at, ',') + 1 : NULL) {

@@ -455,9 +455,7 @@ static Status measured_error_channel(const MeasuredRequest *asked, const Respons
     char there[200] = "";
     for (size_t i = 0; i < response->series.count; i++) {
         const Column *column = &response->series.at[i];
-        const size_t used = strlen(there);
-        if (strcmp(column->unit, quantity_units[asked->measured.quantity]) == 0 &&
-            used + sizeof column->name + 2 < sizeof there)
+        if (strcmp(column->unit, quantity_units[asked->measured.quantity]) == 0)
             text_list(there, sizeof there, column->name);
     }
     Fault fault = {.pointer = "/channel"};
