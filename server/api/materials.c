@@ -347,25 +347,6 @@ static Status revision_reply(const MaterialRevision *revision, int code, Bytes *
     return reply_json(reply, code, body, STATUS_OK, problem);
 }
 
-// The same with the revision as it is in the database, for a client that named no version.
-static Status revision_reply_stored(App *app, const char *slug, uint64_t number, int code,
-                                    Reply *reply, Problem *problem) {
-    MaterialRevision revision;
-    Status status = db_material(app->db, slug, number, &revision, problem);
-    if (status == STATUS_OK) {
-        Bytes body = revision_body(app, &revision);
-        status = revision_reply(&revision, code, &body, reply, problem);
-    }
-    material_revision_clear(&revision);
-    if (status == STATUS_OK)
-        return STATUS_OK;
-    char detail[sizeof problem->detail];
-    text_fit(detail, sizeof detail, problem->detail);
-    problem_clear(problem);
-    return problem_set(problem, STATUS_INTERNAL, "%.63s@%llu was written, but cannot be shown: %s",
-                       slug, (unsigned long long)number, detail);
-}
-
 // Writes a revision of the client's and shows it. The body of the reply is made first: if that
 // fails nothing is written.
 static Status revision_save(App *app, const Request *request, MaterialRevision *revision,
@@ -380,12 +361,16 @@ static Status revision_save(App *app, const Request *request, MaterialRevision *
     Status status = body.is_failed        ? reply_json(reply, 201, &body, STATUS_OK, problem)
                     : state->version == 0 ? db_material_add(app->db, revision, problem)
                                           : db_material_revise(app->db, revision, seen, problem);
-    if (status == STATUS_OK && seen != ANY_VERSION)
+    if (status == STATUS_OK &&
+        revision->revision != state->latest + 1) { // another client was first
+        revision->latest = revision->revision;
+        bytes_clear(&body);
+        body = revision_body(app, revision);
+    }
+    if (status == STATUS_OK)
         return revision_reply(revision, 201, &body, reply, problem);
     bytes_clear(&body);
-    return status != STATUS_OK ? status
-                               : revision_reply_stored(app, revision->slug, revision->revision, 201,
-                                                       reply, problem);
+    return status;
 }
 
 // What a change of the material in the path brings: its condition and its body.
@@ -467,8 +452,8 @@ Status materials_revert(App *app, const Request *request, Reply *reply, Problem 
 }
 
 // As for a revision, the body of the reply is made first.
-static Status review_save(App *app, const MaterialReview *review, uint64_t seen, Reply *reply,
-                          Problem *problem) {
+static Status review_save(App *app, const MaterialReview *review, const MaterialState *state,
+                          uint64_t seen, Reply *reply, Problem *problem) {
     MaterialRevision stored;
     Bytes body = {.most = 0};
     Status status = db_material(app->db, review->slug, review->revision, &stored, problem);
@@ -477,20 +462,17 @@ static Status review_save(App *app, const MaterialReview *review, uint64_t seen,
     shown.reason = review->reason;
     shown.reviewer = review->reviewer;
     shown.reviewed_unix_ms = review->created_unix_ms;
-    shown.version = seen + 1;
+    shown.version = state->version + 1;
     if (status == STATUS_OK) {
         body = revision_body(app, &shown);
         status = body.is_failed ? reply_json(reply, 200, &body, STATUS_OK, problem)
                                 : db_material_review(app->db, review, seen, problem);
     }
-    const bool has_reply = status == STATUS_OK && seen != ANY_VERSION;
-    if (has_reply)
+    if (status == STATUS_OK)
         status = revision_reply(&shown, 200, &body, reply, problem);
     bytes_clear(&body);
     material_revision_clear(&stored);
-    return has_reply || status != STATUS_OK
-               ? status
-               : revision_reply_stored(app, review->slug, review->revision, 200, reply, problem);
+    return status;
 }
 
 Status materials_review(App *app, const Request *request, Reply *reply, Problem *problem) {
@@ -511,7 +493,7 @@ Status materials_review(App *app, const Request *request, Reply *reply, Problem 
                                        .reason = body.reason,
                                        .reviewer = (char *)request->client,
                                        .created_unix_ms = clock_unix_ms()};
-        status = review_save(app, &review, seen, reply, problem);
+        status = review_save(app, &review, &state, seen, reply, problem);
     }
     fields_clear(material_review_fields, &body);
     return status;
