@@ -35,7 +35,6 @@ typedef struct MaterialExport {
     MaterialMoment moment;
     bool is_table;
     ExportStage stage;
-    size_t measurements;              // of this material so far
     char slug[MATERIAL_SLUG_MAX + 1]; // of this material; "" before the first
     uint64_t number;                  // of its last revision or measurement; 0 before the first
 } MaterialExport;

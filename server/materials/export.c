@@ -219,7 +219,7 @@ static Status export_next_revision(MaterialExport *export, Bytes *bytes, bool *i
         if (!export->is_table)
             bytes_text(bytes, is_first ? "]}\n" : "]");
         export->stage = EXPORT_MEASUREMENTS;
-        export->number = export->measurements = 0;
+        export->number = 0;
     }
     material_revision_clear(&revision);
     return status;
@@ -232,12 +232,12 @@ static Status export_next_measurement(MaterialExport *export, Bytes *bytes, Prob
                                          &measurement, &is_found, problem);
     if (status == STATUS_OK && is_found) {
         if (!export->is_table)
-            bytes_text(bytes, export->measurements++ > 0 ? ",\n" : ", \"measurements\": [\n");
+            bytes_text(bytes, export->number > 0 ? ",\n" : ", \"measurements\": [\n");
         export->number = measurement.measurement;
         status = export_measurement(export, bytes, &measurement, problem);
     } else if (status == STATUS_OK) {
         if (!export->is_table)
-            bytes_text(bytes, export->measurements > 0 ? "]}" : "}");
+            bytes_text(bytes, export->number > 0 ? "]}" : "}");
         export->stage = EXPORT_REVISIONS;
         export->number = 0;
     }
