@@ -120,12 +120,12 @@ static Status compare_resolve(App *app, const char *name, const char *id, char r
     job_unref(job);
     if (status != STATUS_OK)
         status = problem_set(problem, status, "the job cannot be shown");
-    else if (view.state != JOB_SUCCESSFUL)
+    else if (view.row.state != JOB_SUCCESSFUL)
         status =
             problem_set(problem, STATUS_CONFLICT, "the job %s (\"%s\") has no result: it is %s",
-                        view.id, name, job_state_names[view.state]);
+                        view.row.id, name, job_state_names[view.row.state]);
     else
-        snprintf(result, 72, "%s", view.result);
+        snprintf(result, 72, "%s", view.row.result);
     job_view_clear(&view);
     return status;
 }

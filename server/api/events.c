@@ -81,7 +81,8 @@ static void events_put_progress(Events *events, JobState state, double progress)
         bytes_json(&events->text,
                    "event: progress\nid: %d\ndata: {\"status\": %s, \"progress\": %g, \"timing\": "
                    "{\"queued\": %g, \"run\": %g, \"total\": %g}}\n\n",
-                   id, job_state_names[state], progress, show.queued, show.run, show.total);
+                   id, job_state_names[state], progress, show.row.queued, show.row.run,
+                   show.row.total);
     job_view_clear(&show);
     events->last_id = id;
 }

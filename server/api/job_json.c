@@ -7,52 +7,54 @@
 
 static void job_json_put_links(Bytes *bytes, const JobView *show, bool has_result) {
     const char *base = base_path();
-    bytes_json(bytes, "\"self\": \"%s/v1/jobs/%s\"", base, show->id);
+    const JobRow *row = &show->row;
+    bytes_json(bytes, "\"self\": \"%s/v1/jobs/%s\"", base, row->id);
     if (show->points > 0)
-        bytes_json(bytes, ", \"table\": \"%s/v1/jobs/%s/table.json\"", base, show->id);
+        bytes_json(bytes, ", \"table\": \"%s/v1/jobs/%s/table.json\"", base, row->id);
     if (has_result)
         bytes_json(bytes,
                    ", \"result\": \"%s/v1/results/%s\", \"series\": "
                    "\"%s/v1/results/%s/series.json\"",
-                   base, show->result, base, show->result);
+                   base, row->result, base, row->result);
 }
 
 void job_json_put(Bytes *bytes, const JobView *show, int parts) {
-    const bool has_result = show->state == JOB_SUCCESSFUL && show->result[0] != '\0';
-    bytes_json(bytes, "{\"id\": %s", show->id);
-    if (show->title != NULL)
-        bytes_json(bytes, ", \"title\": %s", show->title);
-    if (show->labels != NULL)
-        bytes_json(bytes, ", \"labels\": %p", show->labels);
-    if ((parts & JOB_PUT_SENDER) != 0 && show->client != NULL)
-        bytes_json(bytes, ", \"client\": %s", show->client);
-    if (show->study != NULL)
-        bytes_json(bytes, ", \"study\": %s", show->study);
-    bytes_json(bytes, ", \"status\": %s, \"progress\": %g", job_state_names[show->state],
+    const JobRow *row = &show->row;
+    const bool has_result = row->state == JOB_SUCCESSFUL && row->result[0] != '\0';
+    bytes_json(bytes, "{\"id\": %s", row->id);
+    if (row->title != NULL)
+        bytes_json(bytes, ", \"title\": %s", row->title);
+    if (row->labels != NULL)
+        bytes_json(bytes, ", \"labels\": %p", row->labels);
+    if ((parts & JOB_PUT_SENDER) != 0 && row->client != NULL)
+        bytes_json(bytes, ", \"client\": %s", row->client);
+    if (row->study != NULL)
+        bytes_json(bytes, ", \"study\": %s", row->study);
+    bytes_json(bytes, ", \"status\": %s, \"progress\": %g", job_state_names[row->state],
                show->progress);
     if (show->points > 0)
         bytes_json(bytes, ", \"points\": {\"all\": %llu, \"done\": %llu, \"failed\": %llu}",
                    (unsigned long long)show->points, (unsigned long long)show->points_done,
                    (unsigned long long)show->points_failed);
-    bytes_json(bytes, ", \"cached\": %p, \"result\": %s", json_flag(show->is_cached),
-               has_result ? show->result : NULL);
-    if (has_result && show->is_result_deleted)
+    bytes_json(bytes, ", \"cached\": %p, \"result\": %s", json_flag(row->is_cached),
+               has_result ? row->result : NULL);
+    if (has_result && !row->has_result)
         bytes_json(bytes, ", \"result_deleted\": true");
     bytes_json(bytes, ", \"created\": %s, \"started\": %s, \"finished\": %s, \"problem\": %p",
-               show->created_unix_ms > 0 ? clock_rfc3339(show->created_unix_ms).at : NULL,
-               show->started_unix_ms > 0 ? clock_rfc3339(show->started_unix_ms).at : NULL,
-               show->finished_unix_ms > 0 ? clock_rfc3339(show->finished_unix_ms).at : NULL,
-               show->problem);
+               row->created_unix_ms > 0 ? clock_rfc3339(row->created_unix_ms).at : NULL,
+               row->started_unix_ms > 0 ? clock_rfc3339(row->started_unix_ms).at : NULL,
+               row->finished_unix_ms > 0 ? clock_rfc3339(row->finished_unix_ms).at : NULL,
+               row->problem);
     if (parts & JOB_PUT_WHOLE) {
         bytes_json(bytes,
                    ", \"plan\": %p, \"summary\": %p, \"work\": %p, \"warnings\": ", show->plan,
                    show->summary, show->work);
-        document_join(bytes, show->warnings, show->notes);
+        document_join(bytes, row->warnings, show->notes);
     }
     bytes_json(bytes, ", \"timing\": {\"queued\": %g, \"run\": %g, \"total\": %g}, \"links\": {",
-               show->queued, show->run, show->total);
+               row->queued, row->run, row->total);
     if (parts & JOB_PUT_LINKS)
-        job_json_put_links(bytes, show, has_result && !show->is_result_deleted);
+        job_json_put_links(bytes, show, has_result && row->has_result);
     bytes_text(bytes, "}}");
 }
 

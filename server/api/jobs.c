@@ -33,12 +33,12 @@ static Status reply_job(App *app, Reply *reply, Job *job, int code, Problem *pro
         job_view_clear(&show);
         return problem_set(problem, status, "the job cannot be shown");
     }
-    const bool is_finished = job_state_is_final((int)show.state);
+    const bool is_finished = job_state_is_final(show.row.state);
     const int parts = JOB_PUT_WHOLE | JOB_PUT_LINKS | (code == 200 ? JOB_PUT_SENDER : 0);
     if (code == 0)
         code = is_finished ? 200 : 202;
     if (code == 202)
-        snprintf(reply->location, sizeof reply->location, "/v1/jobs/%s", show.id);
+        snprintf(reply->location, sizeof reply->location, "/v1/jobs/%s", show.row.id);
     if (!is_finished)
         reply->retry_after = 1;
     Bytes bytes = {.most = app->reply_most};
@@ -338,7 +338,7 @@ static bool jobs_list_row(App *app, Bytes *bytes, const JobRow *row, int state,
     const bool is_unfinished = !job_state_is_final(row->state);
     if (is_unfinished && jobs_find(app->manager, row->id, &job, NULL) == STATUS_OK) {
         const Status status = job_view(job, &show);
-        const bool is_wanted = state < 0 || (int)show.state == state;
+        const bool is_wanted = state < 0 || show.row.state == state;
         job_unref(job);
         if (status == STATUS_OK && is_wanted) {
             bytes_text(bytes, separator);
@@ -350,10 +350,7 @@ static bool jobs_list_row(App *app, Bytes *bytes, const JobRow *row, int state,
     }
     if (state >= 0 && row->state != state)
         return false;
-    job_view_row(row, &show);
-    show.progress = row->state == JOB_SUCCESSFUL ? 100 : 0;
-    show.is_result_deleted = !row->has_result;
-    text_fit(show.result, sizeof show.result, row->result);
+    show = (JobView){.row = *row, .progress = row->state == JOB_SUCCESSFUL ? 100 : 0};
     bytes_text(bytes, separator);
     job_json_put(bytes, &show, JOB_PUT_LINKS | JOB_PUT_SENDER); // borrows the row's texts
     return true;

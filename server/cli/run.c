@@ -110,21 +110,22 @@ static Status job_write(const StudyRequest *request, const Warnings *warnings,
     Bytes warned = {0};
     Status status = document_outcome(outcome, &row);
     document_warnings(&warned, warnings);
-    JobView show = {.id = "j-local",
-                    .state = JOB_SUCCESSFUL,
+    JobView show = {.row = {.id = "j-local",
+                            .state = JOB_SUCCESSFUL,
+                            .has_result = true,
+                            .created_unix_ms = began_unix_ms,
+                            .started_unix_ms = began_unix_ms,
+                            .finished_unix_ms = clock_unix_ms(),
+                            .run = took,
+                            .total = took,
+                            .warnings = warned.at,
+                            .title = request->simulation.title},
                     .progress = 100,
-                    .created_unix_ms = began_unix_ms,
-                    .started_unix_ms = began_unix_ms,
-                    .finished_unix_ms = clock_unix_ms(),
-                    .run = took,
-                    .total = took,
                     .plan = row.plan,
                     .summary = row.summary,
                     .work = row.work,
-                    .warnings = warned.at,
-                    .notes = row.notes,
-                    .title = request->simulation.title};
-    jobs_result_id(request, show.result);
+                    .notes = row.notes};
+    jobs_result_id(request, show.row.result);
     if (warned.is_failed)
         status = STATUS_NO_MEMORY;
     if (status == STATUS_OK)

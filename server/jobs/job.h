@@ -6,6 +6,7 @@
 #include <stdint.h>
 
 #include "core/base/status.h"
+#include "server/db/db.h"
 
 typedef struct Job Job;
 
@@ -32,27 +33,13 @@ typedef struct Callback {
     void (*wake)(void *context);
 } Callback;
 
-// A copy of the present state of a job. It owns its texts (job_view_clear).
+// A copy of the present state of a job. It owns the row's texts (job_view_clear).
 typedef struct JobView {
-    char id[40];
-    JobState state;
-    double progress; // percent
-    bool is_cached;
-    char result[72];                                            // "" while there is none
-    int64_t created_unix_ms, started_unix_ms, finished_unix_ms; // 0: not yet
-    double queued, run, total;                                  // [s]
-    char *problem;              // problem+json of a failed job; NULL
-    const char *plan;           // JSON; NULL while unknown
-    const char *summary;        // JSON; NULL while unknown
-    const char *work;           // JSON; NULL while unknown
-    char *warnings;             // JSON array, of the scene
-    const char *notes;          // JSON array, of the run; NULL: none
-    char *title;                // NULL if none
-    struct ResultSummary *head; // owns plan, summary, work and notes; NULL: the caller does
-    char *labels;               // JSON array; NULL: none
-    char *study;                // the kind of its study; NULL: none
-    char *client;               // its sender's token; NULL: none
-    bool is_result_deleted;
+    JobRow row;                        // without what only the database and the queue need
+    double progress;                   // percent
+    const char *plan, *summary, *work; // JSON; NULL while unknown
+    const char *notes;                 // JSON array, of the run; NULL: none
+    struct ResultSummary *head;        // owns these four; NULL: the caller does
     uint64_t points, points_done, points_failed; // of a sweep that is under way; 0: none is
 } JobView;
 
@@ -62,9 +49,6 @@ bool job_is_finished(Job *job);
 // Its sender, as in JobView; lives as long as the job.
 const char *job_client(const Job *job);
 Status job_view(Job *job, JobView *view);
-struct JobRow;
-// What a row alone states: without result, progress and warnings. Borrows its texts.
-void job_view_row(const struct JobRow *row, JobView *view);
 void job_view_clear(JobView *view);
 // Its state and, in *progress, percent: cheap enough to be called often.
 JobState job_peek(Job *job, double *progress);

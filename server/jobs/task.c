@@ -27,24 +27,10 @@ static int64_t job_id_us(void) {
     return next;
 }
 
-// Each thread draws for many ids at once; a number is used once.
-static bool job_id_draw(uint64_t *secret) {
-    enum { DRAWN = 32 }; // 256 bytes come whole
-    static _Thread_local uint64_t drawn[DRAWN];
-    static _Thread_local size_t left;
-    if (left == 0) {
-        if (getrandom(drawn, sizeof drawn, 0) != (ssize_t)sizeof drawn)
-            return false;
-        left = DRAWN;
-    }
-    *secret = drawn[--left];
-    return true;
-}
-
 bool job_id_make(char id[40]) {
     static const char digits[] = "0123456789abcdef";
     uint64_t secret;
-    if (!job_id_draw(&secret))
+    if (getrandom(&secret, sizeof secret, 0) != (ssize_t)sizeof secret)
         return false;
     uint64_t time = (uint64_t)job_id_us();
     id[0] = 'j';

@@ -1,6 +1,4 @@
 // Jobs as their readers see them.
-#include <stdlib.h>
-
 #include "server/jobs/study.h"
 #include "server/util/clock.h"
 
@@ -18,43 +16,24 @@ static void job_view_progress(const Job *job, JobView *view) {
     }
     if (!job_state_is_final(job->row.state) && job->submitted_ns > 0) {
         const int64_t now = clock_monotonic_ns();
-        view->total = 1e-9 * (double)(now - job->submitted_ns);
-        view->queued = job->started_ns > 0 ? job->row.queued : view->total;
-        view->run = job->started_ns > 0 ? 1e-9 * (double)(now - job->started_ns) : 0;
+        view->row.total = 1e-9 * (double)(now - job->submitted_ns);
+        view->row.queued = job->started_ns > 0 ? job->row.queued : view->row.total;
+        view->row.run = job->started_ns > 0 ? 1e-9 * (double)(now - job->started_ns) : 0;
     }
-}
-
-void job_view_row(const JobRow *row, JobView *view) {
-    *view = (JobView){.state = (JobState)row->state,
-                      .is_cached = row->is_cached,
-                      .created_unix_ms = row->created_unix_ms,
-                      .started_unix_ms = row->started_unix_ms,
-                      .finished_unix_ms = row->finished_unix_ms,
-                      .queued = row->queued,
-                      .run = row->run,
-                      .total = row->total,
-                      .problem = row->problem,
-                      .title = row->title,
-                      .labels = row->labels,
-                      .study = row->study,
-                      .client = row->client};
-    text_fit(view->id, sizeof view->id, row->id);
 }
 
 Status job_view(Job *job, JobView *view) {
     job_lock(job);
     const JobRow *row = &job->row;
-    job_view_row(row, view);
-    if (row->state == JOB_SUCCESSFUL) {
-        text_fit(view->result, sizeof view->result, row->result);
-        view->is_result_deleted = job->manager == NULL && !row->has_result;
-    }
+    JobRow *copy = &view->row;
+    *view = (JobView){.row = *row, .head = result_summary_ref(job->summary)};
+    copy->scene = copy->words = copy->idempotency_key = copy->request = copy->uses = NULL;
+    copy->has_result = row->has_result || job->manager != NULL;
     job_view_progress(job, view);
     const Status all[] = {
-        text_copy(row->problem, &view->problem), text_copy(row->warnings, &view->warnings),
-        text_copy(row->title, &view->title),     text_copy(row->labels, &view->labels),
-        text_copy(row->study, &view->study),     text_copy(row->client, &view->client)};
-    view->head = result_summary_ref(job->summary);
+        text_copy(row->problem, &copy->problem), text_copy(row->warnings, &copy->warnings),
+        text_copy(row->title, &copy->title),     text_copy(row->labels, &copy->labels),
+        text_copy(row->study, &copy->study),     text_copy(row->client, &copy->client)};
     job_unlock(job);
     if (view->head != NULL) {
         view->plan = view->head->plan;
@@ -66,18 +45,13 @@ Status job_view(Job *job, JobView *view) {
 }
 
 void job_view_clear(JobView *view) {
-    free(view->problem);
-    free(view->warnings);
-    free(view->title);
-    free(view->labels);
-    free(view->study);
-    free(view->client);
+    job_row_clear(&view->row);
     result_summary_unref(view->head);
-    *view = (JobView){0};
+    *view = (JobView){.head = NULL};
 }
 
 JobState job_peek(Job *job, double *progress) {
-    JobView view = {0};
+    JobView view = {.head = NULL};
     job_lock(job);
     const JobState state = (JobState)job->row.state;
     job_view_progress(job, &view);

@@ -166,7 +166,7 @@ static bool submit_known(JobManager *manager, const Submission *submission) {
         nanosleep(&(struct timespec){0, 1000000}, NULL);
     if (job_view(job, &show) != STATUS_OK)
         stop("a job");
-    const bool is_cached = show.is_cached;
+    const bool is_cached = show.row.is_cached;
     job_view_clear(&show);
     job_unref(job);
     return is_cached;

@@ -48,7 +48,7 @@ void room_submit(const Room *room, const char *text, const char *client, char id
     if (jobs_submit(room->manager, &submission, &job, &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
     assert_int_equal(job_view(job, &show), STATUS_OK);
-    text_fit(id, 40, show.id);
+    text_fit(id, 40, show.row.id);
     job_view_clear(&show);
     job_unref(job);
 }
@@ -65,8 +65,8 @@ JobState room_state(const Room *room, const char *id, char result[72]) {
     assert_int_equal(jobs_find(room->manager, id, &job, NULL), STATUS_OK);
     assert_int_equal(job_view(job, &show), STATUS_OK);
     job_unref(job);
-    const JobState state = show.state;
-    text_fit(result, 72, show.result);
+    const JobState state = show.row.state;
+    text_fit(result, 72, show.row.result);
     job_view_clear(&show);
     return state;
 }

@@ -149,14 +149,15 @@ static void *hammer(void *context) {
             continue;
         JobView now;
         if (job_view(job, &now) == STATUS_OK && rand_r(&own->seed) % 3 == 0)
-            own->dismissed += jobs_cancel(own->room->manager, now.id, &gone, fault) == STATUS_OK;
+            own->dismissed +=
+                jobs_cancel(own->room->manager, now.row.id, &gone, fault) == STATUS_OK;
         (void)job_subscribe(job, JOB_IS_FINISHED, &callback);
         job_unsubscribe(job, &callback);
         while (!job_is_finished(job))
             nanosleep(&(struct timespec){0, 200000}, NULL);
         job_view_clear(&now);
-        if (job_view(job, &now) == STATUS_OK && now.state == JOB_SUCCESSFUL)
-            (void)jobs_outcome(own->room->manager, now.result, &callback, &outcome, fault);
+        if (job_view(job, &now) == STATUS_OK && now.row.state == JOB_SUCCESSFUL)
+            (void)jobs_outcome(own->room->manager, now.row.result, &callback, &outcome, fault);
         own->finished++;
         outcome_unref(outcome);
         job_view_clear(&now);
@@ -230,9 +231,9 @@ TEST_IN(a_result_that_there_is_no_room_for_waits_for_it, NULL, lift_limit) {
     jobs_retry_writes(room.manager);
     wait_until_idle(&room);
     JobView waits = show(job), gone = show(dropped);
-    assert_int_equal(waits.state, JOB_RUNNING);
+    assert_int_equal(waits.row.state, JOB_RUNNING);
     Job *dismissed;
-    assert_int_equal(jobs_cancel(room.manager, gone.id, &dismissed, &problem), STATUS_OK);
+    assert_int_equal(jobs_cancel(room.manager, gone.row.id, &dismissed, &problem), STATUS_OK);
     assert_int_equal(wait_until_kept(dismissed, &problem), STATUS_FULL);
     job_unref(dismissed);
     limit_files(RLIM_INFINITY);
@@ -240,11 +241,11 @@ TEST_IN(a_result_that_there_is_no_room_for_waits_for_it, NULL, lift_limit) {
     wait_until_idle(&room);
     assert_true(job_is_finished(job));
     JobView now = show(job);
-    assert_int_equal(now.state, JOB_SUCCESSFUL);
-    assert_true(db_result_exists(room.db, now.result));
+    assert_int_equal(now.row.state, JOB_SUCCESSFUL);
+    assert_true(db_result_exists(room.db, now.row.result));
     assert_int_equal(wait_until_kept(dropped, &problem), STATUS_OK);
     JobView end = show(dropped);
-    assert_int_equal(end.state, JOB_DISMISSED);
+    assert_int_equal(end.row.state, JOB_DISMISSED);
     job_view_clear(&end);
     job_view_clear(&waits);
     job_view_clear(&gone);
@@ -270,8 +271,8 @@ TEST_IN(a_job_that_cannot_be_kept_never_was, NULL, lift_limit) {
     for (size_t i = 0; i < 2; i++) {
         JobView now = show(both[i]);
         assert_true(job_is_finished(both[i]));
-        assert_int_equal(jobs_find(room.manager, now.id, &found, &problem), STATUS_NOT_FOUND);
-        assert_false(db_result_exists(room.db, now.result));
+        assert_int_equal(jobs_find(room.manager, now.row.id, &found, &problem), STATUS_NOT_FOUND);
+        assert_false(db_result_exists(room.db, now.row.result));
         job_view_clear(&now);
         job_unref(both[i]);
     }
@@ -323,19 +324,19 @@ TEST(a_dismissed_job_is_dismissed_for_all_before_the_store_has_it) {
     snprintf(path, sizeof path, "%s/impactd.db", room.directory);
     assert_int_equal(sqlite_open(path, DATABASE_WRITER, &other, &problem), STATUS_OK);
     assert_int_equal(sqlite_execute(other, "BEGIN IMMEDIATE", &problem), STATUS_OK);
-    assert_int_equal(pthread_create(&thread, NULL, dismiss_it, (void *[]){room.manager, now.id}),
-                     0);
+    assert_int_equal(
+        pthread_create(&thread, NULL, dismiss_it, (void *[]){room.manager, now.row.id}), 0);
     wait_for(job);
-    assert_int_equal(jobs_find(room.manager, now.id, &found, &problem), STATUS_OK);
+    assert_int_equal(jobs_find(room.manager, now.row.id, &found, &problem), STATUS_OK);
     assert_true(job_is_finished(found));
     job_unref(found);
-    assert_int_equal(jobs_cancel(room.manager, now.id, &found, &problem), STATUS_CONFLICT);
+    assert_int_equal(jobs_cancel(room.manager, now.row.id, &found, &problem), STATUS_CONFLICT);
     assert_non_null(strstr(problem.detail, "dismissed already"));
     assert_int_equal(sqlite_execute(other, "ROLLBACK", &problem), STATUS_OK);
     sqlite_close(other);
     pthread_join(thread, &returned);
     assert_non_null(returned);
-    assert_int_equal(jobs_find(room.manager, now.id, &found, &problem), STATUS_OK);
+    assert_int_equal(jobs_find(room.manager, now.row.id, &found, &problem), STATUS_OK);
     assert_true(job_is_finished(found));
     job_unref(found);
     job_view_clear(&now);
@@ -406,7 +407,7 @@ TEST(running_jobs_share_one_budget_of_memory) {
     for (size_t i = 0; i < 3; i++) { // in turn, whether they run or wait
         JobView now = show(jobs[i]);
         Job *cancelled;
-        assert_int_equal(jobs_cancel(room.manager, now.id, &cancelled, &problem), STATUS_OK);
+        assert_int_equal(jobs_cancel(room.manager, now.row.id, &cancelled, &problem), STATUS_OK);
         assert_int_equal(wait_until_kept(cancelled, &problem), STATUS_OK);
         job_unref(cancelled);
         job_view_clear(&now);
@@ -416,7 +417,7 @@ TEST(running_jobs_share_one_budget_of_memory) {
         job_unref(small);
         for (int k = 0; i < 2 && k < 60000; k++) {
             now = show(jobs[i + 1]);
-            const bool is_running = now.state == JOB_RUNNING;
+            const bool is_running = now.row.state == JOB_RUNNING;
             job_view_clear(&now);
             if (is_running)
                 break;
@@ -446,7 +447,7 @@ TEST(a_result_is_saved_without_memory_for_a_list) {
         nanosleep(&moment, NULL);
     atomic_store(&lists_fail, false);
     JobView now = show(job);
-    assert_int_equal(now.state, JOB_SUCCESSFUL);
+    assert_int_equal(now.row.state, JOB_SUCCESSFUL);
     job_view_clear(&now);
     job_unref(job);
     room_end(&room);
