@@ -101,9 +101,7 @@ static void commit_enqueue(Task *task) {
     db_result_post(task->manager->db, &task->commit, &task->write);
 }
 
-// With the lock held, of a task that has run: writes the end of its jobs. Where none is left it has
-// ended, and is freed.
-static void commit_continue(Task *task) {
+void commit_continue(Task *task) {
     JobManager *manager = task->manager;
     const RunResult *run = &task->run_result;
     if (task->committing != NULL || task->is_waiting)
@@ -213,9 +211,7 @@ static void commit_done(void *context, Status status, const char *detail) {
         if (status == STATUS_OK || task->jobs == NULL) {
             commit_continue(task);
         } else if (!manager->is_closing) {
-            task->is_waiting = true;
-            task->next = manager->retry_commits;
-            manager->retry_commits = task;
+            task_wait(task);
         } // else jobs_stop releases it
     }
     jobs_end_write(manager);
@@ -418,21 +414,9 @@ Status jobs_cancel(JobManager *manager, const char *id, Job **cancelled, Problem
     return status;
 }
 
-void commit_retry(JobManager *manager) {
-    pthread_mutex_lock(&manager->lock);
-    Task *task = manager->retry_commits, *next;
-    Job *job = manager->retry_cancels, *after;
-    manager->retry_commits = NULL;
-    manager->retry_cancels = NULL;
-    for (; task != NULL; task = next) {
-        next = task->next;
-        task->is_waiting = false;
-        commit_continue(task);
-    }
-    for (; job != NULL; job = after) {
-        after = job->next_retry;
+void commit_retry_cancels(JobManager *manager) {
+    for (Job *job; (job = manager->retry_cancels) != NULL; job_unref(job)) {
+        manager->retry_cancels = job->next_retry;
         cancel_enqueue(job);
-        job_unref(job);
     }
-    pthread_mutex_unlock(&manager->lock);
 }

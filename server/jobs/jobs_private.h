@@ -79,7 +79,7 @@ typedef struct Task {
     bool is_running;                   // a worker began it
     bool is_saving;                    // it has run
     size_t workers;                    // that have a part of it now
-    struct Task *next;                 // in manager->waiting or manager->retry_commits
+    struct Task *next;                 // in manager->waiting
     int64_t began_ns;
     bool recompute_only;        // only its series is wanted: the result is saved already
     Job *jobs;                  // that wait for it, by next_shared; holds a reference to each
@@ -157,13 +157,12 @@ struct JobManager {
     Queue *queue;    // of tasks
     uint64_t memory; // in bytes, of running tasks, as estimated, where it is counted
     size_t memory_waiters;
-    Task *waiting, **waiting_last;      // for memory, or for room in the database
+    Task *waiting, **waiting_last;      // for memory, or until the database takes a write
     struct StudyRun *studies;           // under way
     size_t live;                        // jobs not yet finished
     size_t scene_bytes;                 // of them all
     size_t writes;                      // under way
     size_t saving, saving_bytes;        // tasks that have run and are not yet saved
-    Task *retry_commits;                // of these, those that wait for room in the database
     Job *retry_cancels;                 // referenced: cancelled, but it could not be written
     uint64_t deletions;                 // of results
     Lru *cache;                         // of results by id: summaries and, where kept, series
@@ -204,6 +203,7 @@ void jobs_call_worker(JobManager *manager); // something was put into the queue
 bool task_begin(Task *task);
 void task_end(Task *task);
 void task_wait(Task *task);
+void task_unwait(Task *task);                // nothing if it does not wait
 void jobs_call_waiting(JobManager *manager); // all that wait try again
 void task_attach(Task *task, Job *job);
 // From its task, which stops when no job and no reader is left.
@@ -236,8 +236,14 @@ void job_insert_later(Job *job);
 // Without the lock. The same, and waits for it. STATUS_CONFLICT: another job has its key, or a
 // record that it names does not exist.
 Status job_insert_now(Job *job, Problem *problem);
-// Without the lock: what could not be written is tried again.
-void commit_retry(JobManager *manager);
+// With the lock held, of a task that has run: writes the end of its jobs, if nothing of it is being
+// written. Where none is left it has ended, and is freed.
+void commit_continue(Task *task);
+// With the lock held: cancels that could not be written are tried again.
+void commit_retry_cancels(JobManager *manager);
+
+// study.c. With the lock held: the next turn is in the queue if there is something to do.
+void study_enqueue(struct StudyRun *run);
 
 // resolve.c. Of a prepared request: drops the samples of its records for as long as it waits, and
 // loads them again, with a fault for each that is no longer there.

@@ -17,10 +17,9 @@ static const size_t queue_bytes_default = (size_t)256 << 20; // of scenes
 enum { RETENTION_MS = 5000, RETENTION_PAUSE_MS = 10, RETRY_MS = 1000 };
 
 void jobs_retry_writes(JobManager *manager) {
-    commit_retry(manager);
     pthread_mutex_lock(&manager->lock);
     jobs_call_waiting(manager);
-    studies_resume(manager);
+    commit_retry_cancels(manager);
     pthread_mutex_unlock(&manager->lock);
 }
 

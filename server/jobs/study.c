@@ -365,11 +365,10 @@ void study_run_free(StudyRun *run) {
     free(run);
 }
 
-// With the lock held: the next turn is in the queue if there is something to do.
-static void study_enqueue(StudyRun *run) {
+void study_enqueue(StudyRun *run) {
     QueueEntry *entry = &run->task->queued;
     const bool has_work = run->is_sweep ? run->chunks != NULL : study_engine_has_next(&run->engine);
-    if (entry->number != 0 || !has_work || run->is_paused)
+    if (entry->number != 0 || !has_work || run->task->is_waiting)
         return;
     entry->is_turn = true;
     entry->seconds = fmax(run->member_seconds, 1e-3 * TURN_MS);
@@ -420,14 +419,6 @@ Status study_start(Worker *worker, Task *task, RunResult *run_result, Problem *p
     return STATUS_OK;
 }
 
-void studies_resume(JobManager *manager) {
-    for (StudyRun *run = manager->studies; run != NULL; run = run->next)
-        if (run->is_paused) {
-            run->is_paused = false;
-            study_enqueue(run);
-        }
-}
-
 // With the lock held: ends a turn. True: the study is over and this was its last turn; it is in no
 // list any more, and the caller ends it.
 static bool study_release(StudyRun *run) {
@@ -437,6 +428,7 @@ static bool study_release(StudyRun *run) {
         return false;
     }
     queue_remove(manager->queue, &run->task->queued);
+    task_unwait(run->task);
     task_end(run->task);
     StudyRun **at = &manager->studies;
     while (*at != run)
@@ -529,7 +521,8 @@ static void study_pause(StudyRun *run, const Problem *problem) {
         log_write(&line);
         bytes_clear(&line);
     }
-    run->is_pause_logged = run->is_paused = true;
+    run->is_pause_logged = true;
+    task_wait(run->task);
     queue_remove(run->manager->queue, &run->task->queued);
 }
 

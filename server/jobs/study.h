@@ -67,7 +67,6 @@ typedef struct StudyRun {
     // Under the manager's lock:
     SweepChunk *chunks;    // that wait
     double member_seconds; // that a member takes, about
-    bool is_paused;        // until the database takes its rows
     bool is_pause_logged;
     bool is_failed; // run_result says how
 } StudyRun;
@@ -92,7 +91,5 @@ void study_run_free(StudyRun *run); // NULL is fine
 // With the manager's lock held:
 // Begins the turn that was taken from the queue. False: there is nothing to do in it.
 bool study_take(StudyRun *run, StudyTurn *turn);
-// Those that wait for the database try again.
-void studies_resume(JobManager *manager);
 
 #endif

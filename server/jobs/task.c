@@ -366,8 +366,8 @@ bool task_begin(Task *task) {
 
 void task_wait(Task *task) {
     JobManager *manager = task->manager;
-    request_drop_records(&task->inquiry);
-    task->is_running = false;
+    if (task->is_waiting)
+        return;
     task->is_waiting = true;
     task->next = NULL;
     if (manager->waiting == NULL)
@@ -376,8 +376,10 @@ void task_wait(Task *task) {
     manager->waiting_last = &task->next;
 }
 
-static void task_unwait(Task *task) {
+void task_unwait(Task *task) {
     JobManager *manager = task->manager;
+    if (!task->is_waiting)
+        return;
     Task **at = &manager->waiting;
     while (*at != task)
         at = &(*at)->next;
@@ -392,8 +394,14 @@ void jobs_call_waiting(JobManager *manager) {
     while (manager->waiting != NULL) {
         Task *task = manager->waiting;
         task_unwait(task);
-        queue_push_front(manager->queue, &task->queued);
-        jobs_call_worker(manager);
+        if (task->is_saving) {
+            commit_continue(task);
+        } else if (task->study != NULL) {
+            study_enqueue(task->study);
+        } else {
+            queue_push_front(manager->queue, &task->queued);
+            jobs_call_worker(manager);
+        }
     }
 }
 
@@ -435,8 +443,7 @@ void job_detach(Job *job) {
     hashmap_remove(manager->tasks, &task->indexed);
     if (!task->is_running) {
         queue_remove(manager->queue, &task->queued);
-        if (task->is_waiting)
-            task_unwait(task);
+        task_unwait(task);
         task_free(task);
         return;
     }

@@ -186,8 +186,11 @@ static void worker_compute(Worker *worker, Task *task, Problem *problem) {
     if (study == NULL)
         task_end(task);
     const bool is_stopped = atomic_load(&task->is_stopped);
-    if (is_stalled && !is_stopped)
+    if (is_stalled && !is_stopped) {
+        request_drop_records(&task->inquiry);
+        task->is_running = false;
         task_wait(task);
+    }
     pthread_mutex_unlock(&manager->lock);
     if (study != NULL)
         study_leave(worker, study, problem);
