@@ -24,7 +24,7 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."
 import program  # noqa: E402
 
 CLIENTS = 8
-RUN = 0.08  # [s] of CPU a job
+RUN = 0.2  # [s] of CPU a job: several times what a request takes while all processors are busy
 
 
 def scene(number, duration):
