@@ -19,7 +19,7 @@ static void json_write(const Variant *answer, Bytes *bytes) {
 static void ensemble_csv(const Variant *answer, Bytes *bytes) {
     const Ensemble *ensemble = (const Ensemble *)(const void *)answer;
     bytes_text(bytes, "seed,steps");
-    csv_cells_header(bytes, summary_fields);
+    csv_cells_header(bytes, NULL, summary_fields);
     bytes_text(bytes, ",why\n");
     for (size_t i = 0; i < ensemble->table.count; i++) {
         const RunRecord *run = &ensemble->table.at[i];
@@ -36,11 +36,11 @@ static void ensemble_csv(const Variant *answer, Bytes *bytes) {
 static void compare_csv(const Variant *answer, Bytes *bytes) {
     const Comparison *comparison = (const Comparison *)(const void *)answer;
     bytes_text(bytes, "model,separation,status,stiffness,damping [N s/m],steps");
-    csv_cells_header(bytes, summary_fields);
-    csv_cells_header_of(bytes, "contacts", compare_contacts_fields);
-    csv_cells_header_of(bytes, "difference", compare_differences_fields);
-    csv_cells_header_of(bytes, "psd", spectrum_distance_fields);
-    csv_cells_header_of(bytes, "displacement", signal_comparison_fields);
+    csv_cells_header(bytes, NULL, summary_fields);
+    csv_cells_header(bytes, "contacts", compare_contacts_fields);
+    csv_cells_header(bytes, "difference", compare_differences_fields);
+    csv_cells_header(bytes, "psd", spectrum_distance_fields);
+    csv_cells_header(bytes, "displacement", signal_comparison_fields);
     bytes_text(bytes, ",divergence [s],why\n");
     for (size_t i = 0; i < comparison->entries.count; i++) {
         const CompareEntry *entry = &comparison->entries.at[i];

@@ -32,28 +32,26 @@ void *(*json_memory_source)(size_t size) = malloc;
 // a power of two, as the buffer doubles. All other requests fail from then on, so that the parser
 // soon stops. Strings of an array may be served likewise, at most twice the bytes of the text.
 static _Thread_local struct {
-    char *at; // NULL: no text is being parsed
-    size_t size, used;
+    char *at, *next, *end; // NULL: no text is being parsed
     bool has_failed;
 } reserve;
 
 static void *memory_allocate(size_t size) {
-    if (!reserve.has_failed) {
-        void *block = json_memory_source(size);
-        if (block != NULL || reserve.at == NULL)
-            return block;
-        reserve.has_failed = true;
-    }
-    if (size <= BUFFER_FIRST || (size & (size - 1)) != 0 || size > reserve.size - reserve.used)
+    char *block = reserve.has_failed ? NULL : json_memory_source(size);
+    if (block != NULL || reserve.at == NULL)
+        return block;
+    reserve.has_failed = true;
+    if (size <= BUFFER_FIRST || (size & (size - 1)) != 0 ||
+        size > (size_t)(reserve.end - reserve.next))
         return NULL;
-    char *block = reserve.at + reserve.used;
-    reserve.used += size;
+    block = reserve.next;
+    reserve.next += size;
     return block;
 }
 
 static void memory_free(void *block) {
-    const uintptr_t at = (uintptr_t)block, first = (uintptr_t)reserve.at;
-    if (reserve.at == NULL || at < first || at >= first + reserve.size)
+    const uintptr_t at = (uintptr_t)block;
+    if (reserve.at == NULL || at < (uintptr_t)reserve.at || at >= (uintptr_t)reserve.end)
         free(block);
 }
 
@@ -65,10 +63,9 @@ static json_t *memory_load(const char *text, size_t size, size_t flags, json_err
                            bool *is_out_of_memory) {
     static pthread_once_t once = PTHREAD_ONCE_INIT;
     pthread_once(&once, memory_install);
-    reserve.size = 4 * size + 4096;
-    reserve.used = 0;
-    reserve.has_failed = false;
-    reserve.at = json_memory_source(reserve.size);
+    const size_t room = 4 * size + 4096;
+    reserve.at = reserve.next = json_memory_source(room);
+    reserve.end = reserve.at != NULL ? reserve.at + room : NULL;
     json_t *root = reserve.at != NULL ? json_loadb(text, size, flags, error) : NULL;
     *is_out_of_memory = reserve.at == NULL || reserve.has_failed;
     if (*is_out_of_memory) {
@@ -76,8 +73,7 @@ static json_t *memory_load(const char *text, size_t size, size_t flags, json_err
         root = NULL;
     }
     free(reserve.at);
-    reserve.at = NULL;
-    reserve.has_failed = false;
+    memset(&reserve, 0, sizeof reserve);
     return root;
 }
 

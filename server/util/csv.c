@@ -14,17 +14,13 @@ static bool csv_is_number(const Field *field) {
     return field->kind == FIELD_KIND_REAL || field->kind == FIELD_KIND_COUNT;
 }
 
-void csv_cells_header_of(Bytes *bytes, const char *before, const Field *fields) {
+void csv_cells_header(Bytes *bytes, const char *before, const Field *fields) {
     for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
         if (!csv_is_number(field))
             continue;
-        bytes_format(bytes, ",%s%s", before, *before != '\0' ? "." : "");
+        bytes_format(bytes, ",%s%s", before != NULL ? before : "", before != NULL ? "." : "");
         csv_put_name(bytes, field->name, field->unit);
     }
-}
-
-void csv_cells_header(Bytes *bytes, const Field *fields) {
-    csv_cells_header_of(bytes, "", fields);
 }
 
 void csv_cells_real(Bytes *bytes, double value) {

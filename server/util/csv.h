@@ -7,10 +7,8 @@
 
 void csv_put_name(Bytes *bytes, const char *name, const char *unit); // "name [unit]"
 
-// ",name [unit]" for each REAL and COUNT row.
-void csv_cells_header(Bytes *bytes, const Field *fields);
-// The same with `before` and a dot in front of each name.
-void csv_cells_header_of(Bytes *bytes, const char *before, const Field *fields);
+// ",name [unit]" for each REAL and COUNT row; `before` (NULL: none) and a dot are in front of each.
+void csv_cells_header(Bytes *bytes, const char *before, const Field *fields);
 
 // "," and the number for each REAL and COUNT row; "nan" where it is unknown.
 void csv_cells_members(Bytes *bytes, const Field *fields, const void *item);

@@ -1,28 +1,17 @@
 #include "server/util/sha256.h"
 
-#include <stdlib.h>
-
 #include <gnutls/crypto.h>
 #include <gnutls/gnutls.h>
 
-struct Sha256 {
-    gnutls_hash_hd_t hash;
-};
-
+// A Sha256 is GnuTLS's own handle, which is a pointer.
 Sha256 *sha256_new(void) {
-    Sha256 *digest = malloc(sizeof *digest);
-    if (digest == NULL)
-        return NULL;
-    if (gnutls_hash_init(&digest->hash, GNUTLS_DIG_SHA256) < 0) {
-        free(digest);
-        return NULL;
-    }
-    return digest;
+    gnutls_hash_hd_t hash;
+    return gnutls_hash_init(&hash, GNUTLS_DIG_SHA256) < 0 ? NULL : (Sha256 *)hash;
 }
 
 void sha256_add(void *digest, const void *bytes, size_t size) {
     // SHA-256 in software fails on no input.
-    (void)gnutls_hash(((Sha256 *)digest)->hash, bytes, size);
+    (void)gnutls_hash(digest, bytes, size);
 }
 
 void sha256_hex(const unsigned char sum[DIGEST_BYTES], char target[65]) {
@@ -36,8 +25,7 @@ void sha256_hex(const unsigned char sum[DIGEST_BYTES], char target[65]) {
 
 void sha256_end(Sha256 *digest, char target[65]) {
     unsigned char sum[DIGEST_BYTES];
-    gnutls_hash_deinit(digest->hash, sum);
-    free(digest);
+    gnutls_hash_deinit((gnutls_hash_hd_t)(void *)digest, sum);
     sha256_hex(sum, target);
 }
 
