@@ -201,10 +201,8 @@ void task_enqueue(Task *task, QueueClient *client);
 void jobs_call_worker(JobManager *manager); // something was put into the queue
 // Counts its memory. False: it waits, in manager->waiting, until task_end puts it into the queue.
 bool task_begin(Task *task);
-void task_end(Task *task);
 void task_wait(Task *task);
-void task_unwait(Task *task);                // nothing if it does not wait
-void jobs_call_waiting(JobManager *manager); // all that wait try again
+void task_unwait(Task *task); // nothing if it does not wait
 void task_attach(Task *task, Job *job);
 // From its task, which stops when no job and no reader is left.
 void job_detach(Job *job);
@@ -242,8 +240,11 @@ void commit_continue(Task *task);
 // With the lock held: cancels that could not be written are tried again.
 void commit_retry_cancels(JobManager *manager);
 
-// study.c. With the lock held: the next turn is in the queue if there is something to do.
-void study_enqueue(struct StudyRun *run);
+// study.c. With the lock held:
+
+// Its memory is free for others.
+void task_end(Task *task);
+void jobs_call_waiting(JobManager *manager); // all that wait try again
 
 // resolve.c. Of a prepared request: drops the samples of its records for as long as it waits, and
 // loads them again, with a fault for each that is no longer there.

@@ -365,7 +365,8 @@ void study_run_free(StudyRun *run) {
     free(run);
 }
 
-void study_enqueue(StudyRun *run) {
+// With the lock held: the next turn is in the queue if there is something to do.
+static void study_enqueue(StudyRun *run) {
     QueueEntry *entry = &run->task->queued;
     const bool has_work = run->is_sweep ? run->chunks != NULL : study_engine_has_next(&run->engine);
     if (entry->number != 0 || !has_work || run->task->is_waiting)
@@ -376,6 +377,30 @@ void study_enqueue(StudyRun *run) {
     QueueClient *client = run->task->jobs != NULL ? run->task->jobs->client : entry->client;
     queue_put(run->manager->queue, entry, client, 1e-9 * (double)clock_monotonic_ns());
     jobs_call_worker(run->manager);
+}
+
+void jobs_call_waiting(JobManager *manager) {
+    while (manager->waiting != NULL) {
+        Task *task = manager->waiting;
+        task_unwait(task);
+        if (task->is_saving) {
+            commit_continue(task);
+        } else if (task->study != NULL) {
+            study_enqueue(task->study);
+        } else {
+            queue_push_front(manager->queue, &task->queued);
+            jobs_call_worker(manager);
+        }
+    }
+}
+
+void task_end(Task *task) {
+    JobManager *manager = task->manager;
+    if (!task->has_memory)
+        return;
+    task->has_memory = false;
+    manager->memory -= task->bytes;
+    jobs_call_waiting(manager);
 }
 
 static Status study_open(Worker *worker, StudyRun *run, StudyAnswer *answer, Problem *problem) {

@@ -390,30 +390,6 @@ void task_unwait(Task *task) {
     task->is_waiting = task->waits_for_memory = false;
 }
 
-void jobs_call_waiting(JobManager *manager) {
-    while (manager->waiting != NULL) {
-        Task *task = manager->waiting;
-        task_unwait(task);
-        if (task->is_saving) {
-            commit_continue(task);
-        } else if (task->study != NULL) {
-            study_enqueue(task->study);
-        } else {
-            queue_push_front(manager->queue, &task->queued);
-            jobs_call_worker(manager);
-        }
-    }
-}
-
-void task_end(Task *task) {
-    JobManager *manager = task->manager;
-    if (!task->has_memory)
-        return;
-    task->has_memory = false;
-    manager->memory -= task->bytes;
-    jobs_call_waiting(manager);
-}
-
 void task_attach(Task *task, Job *job) {
     job->task = task;
     job->next_shared = task->jobs;
