@@ -55,6 +55,7 @@ CREATE TABLE material_reviews (
     reason           TEXT    NOT NULL,
     reviewer         TEXT,
     created_unix_ms  INTEGER NOT NULL,
+    checks           BLOB,
     FOREIGN KEY (material, revision) REFERENCES material_revisions (material, revision)
 ) STRICT;
 CREATE INDEX material_reviews_of ON material_reviews (material, revision, number);
@@ -86,7 +87,8 @@ CREATE TABLE material_trail (
     measurement      INTEGER,
     who              TEXT,
     why              TEXT    NOT NULL,
-    created_unix_ms  INTEGER NOT NULL
+    created_unix_ms  INTEGER NOT NULL,
+    checks           BLOB
 ) STRICT;
 CREATE UNIQUE INDEX material_trail_of ON material_trail (material, version);
 
@@ -300,6 +302,7 @@ CREATE TABLE jobs (
     idempotency_key   TEXT,
     request           TEXT,
     words             TEXT,
+    checks            BLOB,
     scene             TEXT    NOT NULL
 ) STRICT;
 CREATE INDEX jobs_unfinished ON jobs (number) WHERE state < 2;
@@ -362,5 +365,6 @@ CREATE TABLE tokens (
     created_unix_ms  INTEGER NOT NULL,
     used_unix_ms     INTEGER NOT NULL,
     expires_unix_ms  INTEGER NOT NULL,
-    revoked_unix_ms  INTEGER NOT NULL
+    revoked_unix_ms  INTEGER NOT NULL,
+    checks           BLOB
 ) STRICT;

@@ -24,7 +24,7 @@ const char *const scope_names[] = {"read", "submit", "materials", "admin", NULL}
 
 typedef struct Entry {
     TokenRow row;
-    unsigned scopes;      // bit i is scope_names[i]; 0: a row that this program did not write
+    unsigned scopes;      // bit i is scope_names[i]; 0: the row is damaged or another program's
     int64_t seen_unix_ms; // last use, written back now and then
 } Entry;
 
@@ -102,7 +102,7 @@ static Status tokens_read(Tokens *tokens, Problem *problem) {
             const Entry *before = entry_find(tokens, rows.at[i].digest);
             entries[i].row = rows.at[i];
             entries[i].seen_unix_ms = before != NULL ? before->seen_unix_ms : 0;
-            entries[i].scopes = scopes_read(rows.at[i].scopes);
+            entries[i].scopes = rows.at[i].is_damaged ? 0 : scopes_read(rows.at[i].scopes);
         }
         free(tokens->entries);
         tokens->entries = entries;

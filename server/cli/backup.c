@@ -1,5 +1,5 @@
-// backup and restore. A first Ctrl-C asks the copying to stop, which then removes what it has
-// written; a second one, on a disk that does not answer, ends the program at once.
+// backup, restore and check-db. A first Ctrl-C asks the copying to stop, which then removes what it
+// has written; a second one, on a disk that does not answer, ends the program at once.
 #include <inttypes.h>
 #include <signal.h>
 #include <stdio.h>
@@ -21,6 +21,7 @@ static const Field backup_fields[] = {
     FIELD_FLAG(BackupSettings, force, false, "replace FILE if it is there"),
     FIELD_END,
 };
+static const Field check_db_fields[] = {DATA_FIELD, FIELD_END};
 static const Field restore_fields[] = {
     DATA_FIELD,
     FIELD_FLAG(BackupSettings, force, false, "replace the folder's database if it has one"),
@@ -94,6 +95,31 @@ static int restore(const Command *self, void *of, const Options *options, Proble
     return backup_run_copy(self, of, options, "read", backup_restore, problem);
 }
 
+static void check_db_print_table(void *context, const char *name, uint64_t rows, uint64_t damaged) {
+    (void)context;
+    printf("%-22s %10" PRIu64 " rows %6" PRIu64 " damaged\n", name, rows, damaged);
+}
+
+static void check_db_print_damage(void *context, const char *damage) {
+    (void)context;
+    printf("%s\n", damage);
+}
+
+static int check_db(const Command *self, void *of, const Options *options, Problem *problem) {
+    BackupSettings *settings = of;
+    const DbCheck check = {check_db_print_table, check_db_print_damage, NULL};
+    if (options->operand_count != 0) {
+        (void)problem_set(problem, STATUS_USAGE, "takes no file; --data DIR names the folder");
+        return command_error(self->name, problem);
+    }
+    Status status = command_data_folder(&settings->data, problem);
+    if (status == STATUS_OK)
+        status = db_check(settings->data, &check, problem);
+    if (status == STATUS_OK)
+        puts("the file, the references between tables and all checksums are as they should be");
+    return command_end(self, status, problem);
+}
+
 const Command command_backup = {
     .name = "backup",
     .operands = "FILE",
@@ -127,4 +153,18 @@ const Command command_restore = {
     .options = restore_fields,
     .size = sizeof(BackupSettings),
     .run = restore,
+};
+
+const Command command_check_db = {
+    .name = "check-db",
+    .summary = "check the server's database, while it runs or without it",
+    .help = "  impactd check-db --data /var/lib/impactd\n"
+            "\n"
+            "Checks the file as SQLite does, the references between tables and every row that has\n"
+            "checksums, and prints each damaged row. Exits with 1 if there is one. backup and\n"
+            "restore check what they copy in the same way. A daemon refuses to show a damaged\n"
+            "row; a damaged result or job can be deleted, else restore a backup.\n",
+    .options = check_db_fields,
+    .size = sizeof(BackupSettings),
+    .run = check_db,
 };

@@ -39,8 +39,8 @@ struct Command {
 // Each is in the file of its name or of its resource: jobs.c, records.c, study.c.
 extern const Command command_serve, command_run, command_check, command_tradeoff, command_ensemble,
     command_study, command_sweep, command_import, command_materials, command_records, command_token,
-    command_backup, command_restore, command_submit, command_watch, command_get, command_cancel,
-    command_compare;
+    command_backup, command_restore, command_check_db, command_submit, command_watch, command_get,
+    command_cancel, command_compare;
 
 extern const Command *const commands[];        // NULL-terminated
 const Command *command_find(const char *name); // NULL if there is none

@@ -28,11 +28,17 @@ static const Command command_version = {
 };
 
 const Command *const commands[] = {
-    &command_serve, &command_run,    &command_check,   &command_tradeoff,  &command_ensemble,
-    &command_study, &command_sweep,  &command_import,  &command_materials, &command_records,
-    &command_token, &command_backup, &command_restore, &command_submit,    &command_watch,
-    &command_get,   &command_cancel, &command_compare, &command_help,      &command_version,
-    NULL,
+    &command_serve,     &command_run,
+    &command_check,     &command_tradeoff,
+    &command_ensemble,  &command_study,
+    &command_sweep,     &command_import,
+    &command_materials, &command_records,
+    &command_token,     &command_backup,
+    &command_restore,   &command_check_db,
+    &command_submit,    &command_watch,
+    &command_get,       &command_cancel,
+    &command_compare,   &command_help,
+    &command_version,   NULL,
 };
 
 static const char overview[] =

@@ -83,9 +83,10 @@ static Status token_list(Db *db, const TokenSettings *settings, TokenRow *row, P
                    one->created_unix_ms > 0 ? clock_rfc3339(one->created_unix_ms).at : never,
                    one->used_unix_ms > 0 ? clock_rfc3339(one->used_unix_ms).at : never,
                    one->expires_unix_ms > 0 ? clock_rfc3339(one->expires_unix_ms).at : never,
-                   one->revoked_unix_ms > 0 ? "revoked"
-                   : has_ended              ? "expired"
-                                            : "good");
+                   one->is_damaged            ? "damaged"
+                   : one->revoked_unix_ms > 0 ? "revoked"
+                   : has_ended                ? "expired"
+                                              : "good");
     }
     bytes_text(&json, "]}\n");
     free(rows.at);

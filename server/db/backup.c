@@ -24,6 +24,8 @@ static const char *const own_names[] = {"impactd.db",
                                         "impactd.late",
                                         NULL};
 
+enum { DAMAGE_SIZE = 320 };
+
 static const double copy_share = 0.8; // of the time; the check takes the rest
 
 typedef struct Copying {
@@ -71,18 +73,98 @@ static Status check_target(const Copying *copying, Problem *problem) {
     return is_there && !copying->request->replaces ? refuse_taken(copying, problem) : STATUS_OK;
 }
 
-static Status open_source(Copying *copying, Sqlite **source, Problem *problem) {
+// *source is to be closed in any case.
+static Status open_source(const char *path, Sqlite **source, Problem *problem) {
     static const char sql[] =
         "SELECT count(*) AS jobs FROM sqlite_schema WHERE name IN ('jobs', 'results', 'materials')";
     bool is_current;
-    TRY(sqlite_open(copying->source, DATABASE_READER, source, problem));
+    Backup tables = {0};
+    TRY(sqlite_open(path, DATABASE_READER, source, problem));
     TRY(sqlite_is_current(*source, embedded_sql, &is_current, problem));
-    TRY(sqlite_first(*source, sql, NULL, NULL, backup_columns, &copying->backup, NULL, problem));
-    if (copying->backup.jobs != 3)
+    TRY(sqlite_first(*source, sql, NULL, NULL, backup_columns, &tables, NULL, problem));
+    if (tables.jobs != 3)
         return problem_set(problem, STATUS_NOT_FOUND,
-                           "%s holds nothing yet: no daemon has begun there", copying->source);
+                           "%s holds nothing yet: no daemon has begun there", path);
     return STATUS_OK;
 }
+
+// The check of a database.
+
+static const CheckedTable *const checked_tables[] = {
+    &revisions_table,  &reviews_table, &measurements_table, &audit_table,
+    &records_table,    &samples_table, &results_table,      &series_table,
+    &sweep_rows_table, &chunks_table,  &jobs_table,         &tokens_table};
+
+typedef struct Orphan {
+    char child[64], parent[64];
+    int64_t number;
+} Orphan;
+
+// Rows that refer to a row that is missing.
+static Status check_references(Sqlite *database, const DbCheck *check, uint64_t *damaged,
+                               Problem *problem) {
+    static const char sql[] =
+        "SELECT \"table\" AS child, parent, coalesce(rowid, 0) AS number FROM "
+        "pragma_foreign_key_check";
+    static const SqlColumn columns[] = {COLUMN(Orphan, child), COLUMN(Orphan, parent),
+                                        COLUMN(Orphan, number), COLUMN_END};
+    struct {
+        Orphan *at;
+        size_t count;
+    } orphans;
+    TRY(sqlite_list(database, sql, NULL, NULL, columns, sizeof *orphans.at, &orphans, problem));
+    for (size_t i = 0; i < orphans.count; i++) {
+        const Orphan *orphan = &orphans.at[i];
+        char text[256];
+        snprintf(text, sizeof text, "a row of table %s (number %lld) refers to a missing row of %s",
+                 orphan->child, (long long)orphan->number, orphan->parent);
+        check->report_damage(check->context, text);
+    }
+    *damaged += orphans.count;
+    free(orphans.at);
+    return STATUS_OK;
+}
+
+// SQLite's own check of the file, then references, then the checksums of all rows. STATUS_IO: there
+// is damage.
+static Status check_database(Sqlite *database, const DbCheck *check, Problem *problem) {
+    uint64_t damaged = 0;
+    (void)material_revision_columns();
+    TRY(sqlite_check(database, problem));
+    TRY(check_references(database, check, &damaged, problem));
+    for (size_t i = 0; i < COUNT(checked_tables); i++) {
+        TableCheck table = {.report = check->report_damage, .context = check->context};
+        TRY(sqlite_check_table(database, checked_tables[i], &table, problem));
+        if (check->report_table != NULL)
+            check->report_table(check->context, checked_tables[i]->name, table.rows, table.damaged);
+        damaged += table.damaged;
+    }
+    return damaged == 0 ? STATUS_OK
+                        : problem_set(problem, STATUS_IO, "the database has %llu damaged rows",
+                                      (unsigned long long)damaged);
+}
+
+static Status check_exists(const char *path, const char *directory, Problem *problem) {
+    return access(path, F_OK) == 0 || errno == EACCES
+               ? STATUS_OK
+               : problem_set(problem, STATUS_NOT_FOUND,
+                             "there is no database in %s; --data DIR names the daemon's folder",
+                             directory);
+}
+
+Status db_check(const char *directory, const DbCheck *check, Problem *problem) {
+    char path[PATH_MAX];
+    Sqlite *database = NULL;
+    snprintf(path, sizeof path, "%.4000s/impactd.db", directory);
+    TRY(check_exists(path, directory, problem));
+    Status status = open_source(path, &database, problem);
+    if (status == STATUS_OK)
+        status = check_database(database, check, problem);
+    sqlite_close(database);
+    return status;
+}
+
+// Copies.
 
 static Status open_part(Copying *copying, Problem *problem) {
     const int size =
@@ -97,15 +179,24 @@ static Status open_part(Copying *copying, Problem *problem) {
                        "%s cannot be written: %s", copying->target, strerror(errno));
 }
 
+static void copy_keep_damage(void *context, const char *damage) {
+    char *first = context;
+    if (first[0] == '\0')
+        text_fit(first, DAMAGE_SIZE, damage);
+}
+
 static Status check_copy(Copying *copying, Problem *problem) {
     static const char sql[] = "SELECT (SELECT count(*) FROM jobs) AS jobs, "
                               "(SELECT count(*) FROM results) AS results, "
                               "(SELECT count(*) FROM materials) AS materials";
+    char damage[DAMAGE_SIZE] = "";
+    const DbCheck check = {.report_damage = copy_keep_damage, .context = damage};
     Problem found = {0};
-    const Status status = sqlite_check(copying->copy, &found);
+    const Status status = check_database(copying->copy, &check, &found);
     if (status != STATUS_OK)
-        return problem_set(problem, status, "%s: %s; nothing was copied, keep the other backups",
-                           copying->source, found.detail);
+        return problem_set(problem, status,
+                           "%s: %s%s%s; nothing was copied, keep the other backups",
+                           copying->source, found.detail, damage[0] != '\0' ? ": " : "", damage);
     return sqlite_first(copying->copy, sql, NULL, NULL, backup_columns, &copying->backup, NULL,
                         problem);
 }
@@ -115,7 +206,7 @@ static Status fill_part(Copying *copying, Problem *problem) {
     ProgressRange reading = {copying->request->watch, 0, copy_share, 0};
     ProgressRange checking = {copying->request->watch, copy_share, 1 - copy_share, 0};
     const Progress watches[] = {progress_range_view(&reading), progress_range_view(&checking)};
-    Status status = open_source(copying, &source, problem);
+    Status status = open_source(copying->source, &source, problem);
     if (status == STATUS_OK)
         status = open_part(copying, problem);
     if (status == STATUS_OK)
@@ -174,14 +265,19 @@ static void remove_beside(const char *path, bool removes_path) {
     }
 }
 
+static Status check_restored_file(const char *path, struct stat *source, Problem *problem) {
+    if (stat(path, source) != 0)
+        return problem_set(problem, errno == ENOENT ? STATUS_NOT_FOUND : STATUS_IO,
+                           "%s cannot be read: %s", path, strerror(errno));
+    return S_ISREG(source->st_mode)
+               ? STATUS_OK
+               : problem_set(problem, STATUS_CONFLICT, "%s is not a regular file", path);
+}
+
 static Status check_restore(const Copying *copying, Problem *problem) {
     const char *directory = copying->request->directory, *path = copying->source;
     struct stat source, target;
-    if (stat(path, &source) != 0)
-        return problem_set(problem, errno == ENOENT ? STATUS_NOT_FOUND : STATUS_IO,
-                           "%s cannot be read: %s", path, strerror(errno));
-    if (!S_ISREG(source.st_mode))
-        return problem_set(problem, STATUS_CONFLICT, "%s is not a regular file", path);
+    TRY(check_restored_file(path, &source, problem));
     if (stat(copying->target, &target) != 0)
         return STATUS_OK;
     if (is_same_file(&source, &target))
@@ -224,10 +320,8 @@ static Status backup_copy(const BackupRequest *request, bool is_restore, Backup 
                  slash == NULL || slash == request->path ? 1 : (int)(slash - request->path),
                  slash == NULL ? "." : request->path);
     Status status = is_restore ? check_restore(copying, problem) : check_target(copying, problem);
-    if (status == STATUS_OK && !is_restore && access(own, F_OK) != 0 && errno != EACCES)
-        status = problem_set(problem, STATUS_NOT_FOUND,
-                             "there is no database in %s; --data DIR names the daemon's folder",
-                             request->directory);
+    if (status == STATUS_OK && !is_restore)
+        status = check_exists(own, request->directory, problem);
     if (status == STATUS_OK)
         status = fill_part(copying, problem);
     sqlite_close(copying->copy);
@@ -257,6 +351,8 @@ Status backup_write(const BackupRequest *request, Backup *backup, Problem *probl
 
 Status backup_restore(const BackupRequest *request, Backup *backup, Problem *problem) {
     int lock;
+    struct stat source;
+    TRY(check_restored_file(request->path, &source, problem)); // before a folder is made
     TRY(data_dir_lock(request->directory, &lock, problem));
     const Status status = backup_copy(request, true, backup, problem);
     data_dir_unlock(lock);

@@ -90,9 +90,9 @@ void db_job_post(Db *db, const JobRow *row, PendingWrite *write);
 // State, is_cached, times, problem, result. STATUS_NOT_FOUND, unless it is_unsaved.
 Status db_job_update(Db *db, const JobRow *row, Problem *problem);
 void db_job_update_post(Db *db, const JobRow *row, PendingWrite *write);
-// All but the scene, here and in the list; the unfinished ones come with theirs. `row` may be
-// uninitialised.
+// All but the scene, as in lists. `row` may be uninitialised.
 Status db_job_load(Db *db, const char *id, JobRow *row, Problem *problem);
+Status db_job_load_with_scene(Db *db, const char *id, JobRow *row, Problem *problem);
 // The scene that it asked for, to be freed: canonical JSON. STATUS_NOT_FOUND; STATUS_GONE where it
 // went with a deleted result.
 Status db_job_scene(Db *db, const char *id, char **scene, Problem *problem);
@@ -102,7 +102,7 @@ typedef struct JobRows {
     JobRow *at;
     size_t count;
 } JobRows;
-Status db_job_unfinished(Db *db, JobRows *rows, Problem *problem); // oldest first
+Status db_job_unfinished(Db *db, JobRows *rows, Problem *problem); // ids alone, oldest first
 void job_rows_clear(JobRows *rows);
 // Ids that begin with `prefix`, of jobs ("j-...") or results ("r-..."), `max` at most, in order: as
 // `result` of the rows.
@@ -266,6 +266,7 @@ typedef struct TokenRow {
     char digest[65];            // SHA-256, in hexadecimal digits
     char scopes[64];            // "read,submit"
     int64_t created_unix_ms, used_unix_ms, expires_unix_ms, revoked_unix_ms;
+    bool is_damaged; // the row differs from its checksums: it gives access to nothing
 } TokenRow;
 typedef struct TokenRows {
     TokenRow *at; // freed by free
@@ -282,6 +283,17 @@ Status db_token_revoke(Db *db, const TokenRow *row, Problem *problem);
 Status db_token_forget(Db *db, const TokenRow *row, Problem *problem);
 // Stores row->used_unix_ms.
 Status db_token_used(Db *db, const TokenRow *row, Problem *problem);
+
+// A check of the folder's database, while a daemon has it or without: SQLite's own, of references
+// between tables and of the checksums of rows. Gets each table and a sentence for each damaged row.
+typedef struct DbCheck {
+    void (*report_table)(void *context, const char *name, uint64_t rows,
+                         uint64_t damaged); // or NULL
+    void (*report_damage)(void *context, const char *damage);
+    void *context;
+} DbCheck;
+// STATUS_IO: there is damage. STATUS_NOT_FOUND without a database.
+Status db_check(const char *directory, const DbCheck *check, Problem *problem);
 
 // A database as one file: a copy of the daemon's, made beside it while it runs or without it, and
 // the way back.

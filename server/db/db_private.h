@@ -82,6 +82,11 @@ Status result_row_add(Sqlite *database, const ResultRow *row, Problem *problem);
 // Runs `sql` with each of the lines as :name.
 Status use_lines_add(Sqlite *database, const char *sql, const char *lines, Problem *problem);
 
+// Tables whose rows have checksums. The columns of revisions are made by the first call of
+// material_revision_columns.
+extern const CheckedTable revisions_table, reviews_table, measurements_table, audit_table,
+    records_table, samples_table, results_table, series_table, sweep_rows_table, chunks_table,
+    jobs_table, tokens_table;
 const SqlColumn *material_revision_columns(void);
 extern const SqlColumn material_review_columns[], material_measurement_columns[];
 

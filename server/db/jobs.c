@@ -11,30 +11,35 @@
 #include "server/util/clock.h"
 
 // clang-format off
+#define CHECKED(Type, member, flags) COLUMN_WITH(Type, member, COLUMN_CHECKED | (flags))
 static const SqlColumn job_columns[] = {
-    COLUMN(JobRow, id),
-    COLUMN_WITH(JobRow, state, COLUMN_MUTABLE),
-    COLUMN_WITH(JobRow, result, COLUMN_MUTABLE),
-    COLUMN_WITH(JobRow, is_cached, COLUMN_MUTABLE),
-    COLUMN(JobRow, created_unix_ms),
-    COLUMN_WITH(JobRow, started_unix_ms, COLUMN_MUTABLE),
-    COLUMN_WITH(JobRow, finished_unix_ms, COLUMN_MUTABLE),
-    COLUMN_WITH(JobRow, queued, COLUMN_MUTABLE),
-    COLUMN_WITH(JobRow, run, COLUMN_MUTABLE),
-    COLUMN_WITH(JobRow, total, COLUMN_MUTABLE),
-    COLUMN(JobRow, title),
-    COLUMN_WITH(JobRow, problem, COLUMN_MUTABLE),
-    COLUMN(JobRow, warnings),
-    COLUMN(JobRow, labels),
-    COLUMN(JobRow, study),
-    COLUMN(JobRow, client),
+    // The first two as in notes_columns.
+    CHECKED(JobRow, title, 0),
+    CHECKED(JobRow, labels, 0),
+    CHECKED(JobRow, id, COLUMN_ID),
+    CHECKED(JobRow, state, COLUMN_MUTABLE),
+    CHECKED(JobRow, result, COLUMN_MUTABLE),
+    CHECKED(JobRow, is_cached, COLUMN_MUTABLE),
+    CHECKED(JobRow, created_unix_ms, 0),
+    CHECKED(JobRow, started_unix_ms, COLUMN_MUTABLE),
+    CHECKED(JobRow, finished_unix_ms, COLUMN_MUTABLE),
+    CHECKED(JobRow, queued, COLUMN_MUTABLE),
+    CHECKED(JobRow, run, COLUMN_MUTABLE),
+    CHECKED(JobRow, total, COLUMN_MUTABLE),
+    CHECKED(JobRow, problem, COLUMN_MUTABLE),
+    CHECKED(JobRow, warnings, 0),
+    CHECKED(JobRow, study, 0),
+    CHECKED(JobRow, client, 0),
     COLUMN_READ(JobRow, has_result, "EXISTS (SELECT 1 FROM results WHERE id = jobs.result)"),
-    COLUMN_WITH(JobRow, scene, COLUMN_LONG),
-    COLUMN_WITH(JobRow, words, COLUMN_LONG),
-    COLUMN_WITH(JobRow, idempotency_key, COLUMN_LONG),
-    COLUMN_WITH(JobRow, request, COLUMN_LONG),
+    {.name = "scene", .kind = COLUMN_TEXT, .offset = offsetof(JobRow, scene), .size = sizeof(char *),
+     .flags = COLUMN_LONG | COLUMN_CHECKED | COLUMN_MUTABLE | COLUMN_KEPT,
+     .write = "coalesce(:scene, scene)"},
+    COLUMN_WITH(JobRow, words, COLUMN_LONG), // is made of title and labels, and never shown
+    CHECKED(JobRow, idempotency_key, COLUMN_LONG),
+    CHECKED(JobRow, request, COLUMN_LONG),
     COLUMN_END
 };
+const CheckedTable jobs_table = CHECKED_TABLE("jobs", job_columns, JobRow);
 // clang-format on
 
 void job_row_clear(JobRow *row) {
@@ -74,17 +79,17 @@ void db_job_post(Db *db, const JobRow *row, PendingWrite *write) {
     db_enqueue(db, job_apply_add, row, WRITE_NORMAL, write);
 }
 
-#define JOB_UPDATE "SET {set}, scene = CASE :state WHEN 2 THEN '' ELSE scene END"
-
 // All that changes of a job, or the whole of it where it is_unsaved. STATUS_NOT_FOUND.
 static Status job_row_save(Sqlite *database, const JobRow *row, Problem *problem) {
-    static const char update_sql[] = "UPDATE jobs " JOB_UPDATE " WHERE id = :id";
+    static const char update_sql[] = "UPDATE jobs SET {set} WHERE id = :id";
     static const char upsert_sql[] =
-        "INSERT INTO jobs {insert} ON CONFLICT (id) DO UPDATE " JOB_UPDATE;
+        "INSERT INTO jobs {insert} ON CONFLICT (id) DO UPDATE SET {set}";
+    JobRow stored = *row;
     int changes;
     if (row->is_unsaved)
         return job_insert(database, upsert_sql, row, problem);
-    TRY(sqlite_change(database, update_sql, job_columns, row, &changes, problem));
+    stored.scene = row->state == 2 ? "" : NULL;
+    TRY(sqlite_change(database, update_sql, job_columns, &stored, &changes, problem));
     return changes > 0 ? STATUS_OK : problem_set(problem, STATUS_NOT_FOUND, no_job, row->id);
 }
 
@@ -114,10 +119,14 @@ void db_job_update_post(Db *db, const JobRow *row, PendingWrite *write) {
 }
 
 // clang-format off
+#define NOTE(member) \
+    {.name = #member, .kind = COLUMN_TEXT, .offset = offsetof(JobNotes, member), .size = sizeof(char *), \
+     .flags = COLUMN_CHECKED | COLUMN_MUTABLE | COLUMN_KEPT, \
+     .write = "nullif(coalesce(:" #member ", " #member "), '')"}
 static const SqlColumn notes_columns[] = {
     COLUMN(JobNotes, id),
-    COLUMN(JobNotes, title),
-    COLUMN(JobNotes, labels),
+    NOTE(title),
+    NOTE(labels),
     COLUMN(JobNotes, title_words),
     COLUMN(JobNotes, label_words),
     COLUMN_END
@@ -127,8 +136,7 @@ static const SqlColumn notes_columns[] = {
 static Status job_apply_annotate(Sqlite *database, const void *work, Problem *problem) {
     // The words are the title's line and then the labels' lines; without both there are none.
     static const char sql[] =
-        "UPDATE jobs SET title = nullif(coalesce(:title, title), ''), "
-        "labels = nullif(coalesce(:labels, labels), ''), words = nullif("
+        "UPDATE jobs SET {set}, words = nullif("
         "coalesce(:title_words, substr(words, 1, instr(words, char(10))), char(10)) || "
         "coalesce(:label_words, substr(words, instr(words, char(10)) + 1), ''), char(10)) "
         "WHERE id = :id";
@@ -148,8 +156,14 @@ Status db_job_load(Db *db, const char *id, JobRow *row, Problem *problem) {
                   id);
 }
 
+Status db_job_load_with_scene(Db *db, const char *id, JobRow *row, Problem *problem) {
+    static const char sql[] = "SELECT {head}, scene FROM jobs WHERE id = :id";
+    return db_get(db, sql, &(QueryKey){.id = id}, job_columns, row, sizeof *row, problem, no_job,
+                  id);
+}
+
 Status db_job_scene(Db *db, const char *id, char **scene, Problem *problem) {
-    static const char sql[] = "SELECT result, scene FROM jobs WHERE id = :id";
+    static const char sql[] = "SELECT id, result, scene, checks FROM jobs WHERE id = :id";
     JobRow row;
     ResultRow result;
     *scene = NULL;
@@ -194,7 +208,7 @@ Status db_ids_with_prefix(Db *db, const char *prefix, size_t max, JobRows *rows,
 }
 
 Status db_job_unfinished(Db *db, JobRows *rows, Problem *problem) {
-    static const char sql[] = "SELECT {head}, scene FROM jobs WHERE state < 2 ORDER BY number";
+    static const char sql[] = "SELECT id FROM jobs WHERE state < 2 ORDER BY number";
     return db_list(db, sql, NULL, NULL, job_columns, sizeof *rows->at, rows, problem);
 }
 

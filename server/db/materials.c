@@ -22,8 +22,8 @@
 
 static const SqlColumn revision_own_columns[] = {
     OF_SLUG,
-    COLUMN_READ(MaterialRevision, slug, "slug"),
-    CHECKED(MaterialRevision, revision),
+    COLUMN_OF(MaterialRevision, slug, "slug", COLUMN_ID, "slug"),
+    COLUMN_WITH(MaterialRevision, revision, COLUMN_CHECKED | COLUMN_ID),
     CHECKED(MaterialRevision, lists),
     NUMBER_OR_NULL(MaterialRevision, reverts, COLUMN_CHECKED),
     CHECKED(MaterialRevision, author),
@@ -39,6 +39,8 @@ static const SqlColumn revision_own_columns[] = {
 };
 // clang-format on
 static SqlColumn revision_columns[40];
+const CheckedTable revisions_table =
+    CHECKED_TABLE("material_revisions", revision_columns, MaterialRevision);
 
 static void revision_columns_make(void) {
     SqlColumn *column = revision_columns;
@@ -72,19 +74,21 @@ const SqlColumn *material_revision_columns(void) {
 // clang-format off
 const SqlColumn material_review_columns[] = {
     OF_SLUG,
-    COLUMN_READ(MaterialReview, slug, "slug"),
-    COLUMN(MaterialReview, revision),
-    COLUMN(MaterialReview, status),
-    COLUMN(MaterialReview, reason),
-    COLUMN(MaterialReview, reviewer),
-    COLUMN(MaterialReview, created_unix_ms),
+    COLUMN_OF(MaterialReview, slug, "slug", COLUMN_ID, "slug"),
+    COLUMN_WITH(MaterialReview, revision, COLUMN_CHECKED | COLUMN_ID),
+    CHECKED(MaterialReview, status),
+    CHECKED(MaterialReview, reason),
+    CHECKED(MaterialReview, reviewer),
+    CHECKED(MaterialReview, created_unix_ms),
     COLUMN_END
 };
+const CheckedTable reviews_table =
+    CHECKED_TABLE("material_reviews", material_review_columns, MaterialReview);
 
 const SqlColumn material_measurement_columns[] = {
     OF_SLUG,
-    COLUMN_READ(MaterialMeasurement, slug, "slug"),
-    CHECKED(MaterialMeasurement, measurement),
+    COLUMN_OF(MaterialMeasurement, slug, "slug", COLUMN_ID, "slug"),
+    COLUMN_WITH(MaterialMeasurement, measurement, COLUMN_CHECKED | COLUMN_ID),
     CHECKED(MaterialMeasurement, author),
     CHECKED(MaterialMeasurement, comment),
     CHECKED(MaterialMeasurement, created_unix_ms),
@@ -96,21 +100,24 @@ const SqlColumn material_measurement_columns[] = {
     COLUMN_WRITE("head", "json_remove(:document, '$.drops', '$.traces')"),
     COLUMN_END
 };
+const CheckedTable measurements_table =
+    CHECKED_TABLE("material_measurements", material_measurement_columns, MaterialMeasurement);
 
 static const SqlColumn audit_columns[] = {
     OF_SLUG,
-    COLUMN_READ(AuditEntry, slug, "slug"),
-    {.name = "version", .kind = COLUMN_COUNT, .offset = offsetof(AuditEntry, version),
+    COLUMN_OF(AuditEntry, slug, "slug", COLUMN_ID, "slug"),
+    {.name = "version", .kind = COLUMN_COUNT, .flags = COLUMN_ID, .offset = offsetof(AuditEntry, version),
      .write = "1 + (SELECT coalesce(max(t.version), 0) FROM material_trail t JOIN materials m ON "
               "m.number = t.material WHERE m.slug = :slug)"},
-    COLUMN(AuditEntry, action),
-    NUMBER_OR_NULL(AuditEntry, revision, 0),
-    NUMBER_OR_NULL(AuditEntry, measurement, 0),
-    COLUMN(AuditEntry, who),
-    COLUMN(AuditEntry, why),
-    COLUMN(AuditEntry, created_unix_ms),
+    CHECKED(AuditEntry, action),
+    NUMBER_OR_NULL(AuditEntry, revision, COLUMN_CHECKED),
+    NUMBER_OR_NULL(AuditEntry, measurement, COLUMN_CHECKED),
+    CHECKED(AuditEntry, who),
+    CHECKED(AuditEntry, why),
+    CHECKED(AuditEntry, created_unix_ms),
     COLUMN_END
 };
+const CheckedTable audit_table = CHECKED_TABLE("material_trail", audit_columns, AuditEntry);
 
 // A row of one text is that text.
 static const SqlColumn slug_columns[] = {{.name = "slug", .kind = COLUMN_TEXT, .size = sizeof(char *)}, COLUMN_END};
@@ -376,9 +383,9 @@ Status db_measurement_heads(Db *db, const char *slug, uint64_t before, size_t ma
 
 Status db_audit_entries(Db *db, const char *slug, uint64_t before, size_t max,
                         AuditEntries *entries, Problem *problem) {
-    static const char sql[] =
-        "SELECT t.* FROM material_trail t JOIN materials m ON m.number = t.material WHERE m.slug = "
-        ":slug AND t.version < :number ORDER BY t.version DESC LIMIT :max";
+    static const char sql[] = "SELECT m.slug, t.* FROM material_trail t JOIN materials m ON "
+                              "m.number = t.material WHERE m.slug = "
+                              ":slug AND t.version < :number ORDER BY t.version DESC LIMIT :max";
     const QueryKey key = key_of(slug, before, max);
     return db_list(db, sql, query_key_columns, &key, audit_columns, sizeof *entries->at, entries,
                    problem);

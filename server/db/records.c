@@ -12,7 +12,7 @@
 // clang-format off
 static const SqlColumn record_columns[] = {
     COLUMN_READ(RecordRow, number, "number"),
-    COLUMN_WITH(RecordRow, name, COLUMN_CHECKED),
+    COLUMN_WITH(RecordRow, name, COLUMN_CHECKED | COLUMN_ID),
     COLUMN_WITH(RecordRow, source, COLUMN_CHECKED),
     COLUMN_WITH(RecordRow, processing, COLUMN_CHECKED),
     COLUMN_WITH(RecordRow, earthquake, COLUMN_CHECKED),
@@ -34,6 +34,7 @@ static const SqlColumn record_columns[] = {
     COLUMN_END
 };
 // clang-format on
+const CheckedTable records_table = CHECKED_TABLE("records", record_columns, RecordRow);
 
 typedef struct Samples {
     const char *name;
@@ -41,6 +42,7 @@ typedef struct Samples {
 } Samples;
 static const SqlColumn samples_columns[] = {
     COLUMN(Samples, name), COLUMN_WITH(Samples, samples, COLUMN_CHECKED), COLUMN_END};
+const CheckedTable samples_table = CHECKED_TABLE("record_samples", samples_columns, Samples);
 
 static const char one_sql[] = "SELECT {columns} FROM records WHERE name = :name";
 
@@ -171,7 +173,7 @@ Status db_record_twins(Db *db, const RecordRow *row, RecordRows *rows, Problem *
 // A copy owned by the caller, of exactly row->count numbers.
 static Status record_read_samples(Db *db, const RecordRow *row, Reals *samples, Problem *problem) {
     static const char sql[] =
-        "SELECT s.samples, s.checks FROM record_samples s JOIN records r USING "
+        "SELECT number, s.samples, s.checks FROM record_samples s JOIN records r USING "
         "(number) WHERE r.name = :name AND r.digest = :digest";
     const QueryKey key = {.name = row->name, .digest = row->digest};
     Samples found;

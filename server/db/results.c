@@ -9,11 +9,11 @@
 
 // clang-format off
 static const SqlColumn result_columns[] = {
-    COLUMN(ResultRow, id),
-    COLUMN(ResultRow, engine),
+    COLUMN_WITH(ResultRow, id, COLUMN_CHECKED | COLUMN_ID),
+    COLUMN_WITH(ResultRow, engine, COLUMN_CHECKED),
     COLUMN_WITH(ResultRow, sample_rate, COLUMN_CHECKED),
     COLUMN_WITH(ResultRow, count, COLUMN_CHECKED),
-    COLUMN(ResultRow, created_unix_ms),
+    COLUMN_WITH(ResultRow, created_unix_ms, COLUMN_CHECKED),
     COLUMN_WITH(ResultRow, summary, COLUMN_CHECKED),
     COLUMN_WITH(ResultRow, plan, COLUMN_CHECKED),
     COLUMN_WITH(ResultRow, warnings, COLUMN_CHECKED),
@@ -26,6 +26,7 @@ static const SqlColumn result_columns[] = {
     COLUMN_END
 };
 // clang-format on
+const CheckedTable results_table = CHECKED_TABLE("results", result_columns, ResultRow);
 
 void result_row_clear(ResultRow *row) {
     free(row->uses);
@@ -171,6 +172,7 @@ typedef struct Blob {
 
 static const SqlColumn series_columns[] = {
     COLUMN(Blob, result), COLUMN_WITH(Blob, body, COLUMN_CHECKED), COLUMN(Blob, bytes), COLUMN_END};
+const CheckedTable series_table = CHECKED_TABLE("series_bodies", series_columns, Blob);
 
 static const char sum_sql[] =
     "SELECT count(*) AS count, coalesce(sum(bytes), 0) AS bytes FROM series";
@@ -243,8 +245,9 @@ static void series_touch_done(void *context, Status status, const char *detail) 
 }
 
 Status db_series_load(Db *db, const char *result, char **body, size_t *size, Problem *problem) {
-    static const char sql[] = "SELECT body, checks FROM series JOIN series_bodies USING (number) "
-                              "WHERE result = :result";
+    static const char sql[] =
+        "SELECT number, body, checks FROM series JOIN series_bodies USING (number) "
+        "WHERE result = :result";
     Blob blob = {.bytes = 0}, *used = calloc(1, sizeof *used);
     bool is_found = false;
     text_fit(blob.result, sizeof blob.result, result);

@@ -121,36 +121,72 @@ static bool columns_are_checked(const SqlColumn *columns) {
     return false;
 }
 
-// Replaces {insert}, {set}, {columns} and {head}.
+// The checks of a row after {set}: new ones of the columns that are set, those stored of the
+// others.
+static void sql_put_set_checks(const SqlColumn *table, Bytes *bytes) {
+    int place = 1;
+    bytes_text(bytes, ", checks = CAST(");
+    for (const SqlColumn *column = table; column->name != NULL; column++) {
+        if ((column->flags & COLUMN_CHECKED) == 0)
+            continue;
+        if ((column->flags & COLUMN_MUTABLE) == 0)
+            bytes_format(bytes, "substr(checks, %d, 4) || ", place);
+        else if ((column->flags & COLUMN_KEPT) == 0)
+            bytes_format(bytes, "substr(:checks, %d, 4) || ", place);
+        else
+            bytes_format(bytes, "substr(iif(:%s IS NULL, checks, :checks), %d, 4) || ",
+                         column->name, place);
+        place += 4;
+    }
+    bytes_format(bytes, "substr(checks, %d) AS BLOB)", place);
+}
+
+static bool sql_has_column(char kind, const SqlColumn *column) {
+    switch (kind) {
+    case 'i': // {insert}
+        return column->read == NULL;
+    case 's': // {set}
+        return (column->flags & COLUMN_MUTABLE) != 0;
+    case 'h': // {head}
+        return (column->flags & COLUMN_LONG) == 0;
+    case 'k': // {checked}
+        return column->read == NULL && (column->flags & (COLUMN_CHECKED | COLUMN_ID)) != 0;
+    default: // {columns}
+        return true;
+    }
+}
+
+// Replaces {insert}, {set}, {columns}, {head} and {checked}.
 static void sql_expand(const char *sql, const SqlColumn *keys, const SqlColumn *columns,
                        Bytes *bytes) {
     for (const char *brace; (brace = strchr(sql, '{')) != NULL; sql = strchr(brace, '}') + 1) {
-        const bool is_insert = brace[1] == 'i', is_set = brace[1] == 's', is_head = brace[1] == 'h';
+        const bool is_checked = strncmp(brace, "{ch", 3) == 0;
+        const char kind = is_checked ? 'k' : brace[1];
+        const bool is_insert = kind == 'i', is_set = kind == 's';
         const SqlColumn *table = is_insert || is_set ? keys : columns;
-        const char *separator = "";
+        const char *separator = is_checked ? ", " : "";
         Bytes values = {0};
         bytes_put(bytes, sql, (size_t)(brace - sql));
-        bytes_text(bytes, is_insert ? "(" : "");
+        bytes_text(bytes, is_insert ? "(" : is_checked ? "number" : "");
         for (const SqlColumn *column = table; column->name != NULL; column++) {
-            if (is_insert ? column->read != NULL
-                : is_set  ? (column->flags & COLUMN_MUTABLE) == 0
-                : is_head ? (column->flags & COLUMN_LONG) != 0
-                          : false)
+            if (!sql_has_column(kind, column))
                 continue;
-            if (is_set)
-                bytes_format(bytes, "%s%s = :%s", separator, column->name, column->name);
-            else if (column->read != NULL)
+            if (column->read != NULL)
                 bytes_format(bytes, "%s%s AS %s", separator, column->read, column->name);
             else
                 bytes_format(bytes, "%s%s", separator, column->name);
-            if (column->write != NULL)
-                bytes_format(&values, "%s%s", separator, column->write);
+            bytes_text(is_set ? bytes : &values, is_set ? " = " : separator);
+            if (column->write != NULL && (is_set || (column->flags & COLUMN_KEPT) == 0))
+                bytes_text(is_set ? bytes : &values, column->write);
             else
-                bytes_format(&values, "%s:%s", separator, column->name);
+                bytes_format(is_set ? bytes : &values, ":%s", column->name);
             separator = ", ";
         }
         if (columns_are_checked(table)) {
-            bytes_text(bytes, is_set ? ", checks = :checks" : ", checks");
+            if (is_set)
+                sql_put_set_checks(table, bytes);
+            else
+                bytes_text(bytes, ", checks");
             bytes_text(&values, ", :checks");
         }
         if (is_insert && !values.is_failed) {
@@ -381,24 +417,44 @@ static void free_owned(const SqlColumn *column, void *item) {
     }
 }
 
+enum { DAMAGE_SIZE = 320 };
+
+// a stored "labels" of table jobs (id j-...) differs from its checksum
+static void damage_describe(Statement *statement, const SqlColumn *column,
+                            char damage[DAMAGE_SIZE]) {
+    const char *table = sqlite3_column_table_name(statement->handle, statement->checks);
+    char row[160] = "";
+    for (int i = 0; i < statement->result_count; i++) {
+        const char *name = sqlite3_column_name(statement->handle, i);
+        const SqlColumn *result = statement->results[i];
+        const size_t used = strlen(row);
+        if (result != NULL ? (result->flags & COLUMN_ID) != 0
+                           : name != NULL && strcmp(name, "number") == 0)
+            snprintf(row + used, sizeof row - used, "%s%s %.80s", used > 0 ? ", " : " (", name,
+                     (const char *)sqlite3_column_text(statement->handle, i));
+    }
+    snprintf(damage, DAMAGE_SIZE, "a stored \"%s\" of table %s%s%s differs from its checksum",
+             column->name, table != NULL ? table : "?", row, row[0] != '\0' ? ")" : "");
+}
+
 // Also logged: readers of parts of a page do not look into its problem.
-static Status report_damage(Statement *statement, const SqlColumn *column, Problem *problem) {
-    Problem damage = {.status = STATUS_OK};
+static Status report_damage(Statement *statement, const char *damage, Problem *problem) {
+    char detail[sizeof problem->detail];
     Bytes line = {0};
-    (void)problem_set(&damage, STATUS_INTERNAL,
-                      "%s is damaged: a stored \"%s\" differs from its checksum; put a backup in "
-                      "its place (impactd restore)",
-                      sqlite3_db_filename(sqlite3_db_handle(statement->handle), "main"),
-                      column->name);
-    log_put(&line, "error", damage.detail, sizeof damage.detail);
+    snprintf(detail, sizeof detail,
+             "%s is damaged: %s; put a backup in its place (impactd restore)",
+             sqlite3_db_filename(sqlite3_db_handle(statement->handle), "main"), damage);
+    log_put(&line, "error", detail, sizeof detail);
     log_write(&line);
     bytes_clear(&line);
-    return problem_set(problem, STATUS_INTERNAL, "%s", damage.detail);
+    return problem_set(problem, STATUS_INTERNAL, "%s", detail);
 }
 
 // Compares what was read of the row with its checks, which are those of all checked columns.
-static Status row_check(Statement *statement, const SqlColumn *columns, const void *item,
-                        Problem *problem) {
+static bool row_is_damaged(Statement *statement, const SqlColumn *columns, const void *item,
+                           char damage[DAMAGE_SIZE]) {
+    if (statement->checks < 0)
+        return false;
     const char *checks = sqlite3_column_blob(statement->handle, statement->checks);
     const size_t size = (size_t)sqlite3_column_bytes(statement->handle, statement->checks);
     size_t at = 0;
@@ -411,26 +467,68 @@ static Status row_check(Statement *statement, const SqlColumn *columns, const vo
         at += sizeof check;
         for (int i = 0; i < statement->result_count; i++)
             if (statement->results[i] == column &&
-                check != column_check(column, (const char *)item + column->offset))
-                return report_damage(statement, column, problem);
+                check != column_check(column, (const char *)item + column->offset)) {
+                damage_describe(statement, column, damage);
+                return true;
+            }
+    }
+    return false;
+}
+
+// The present row, without comparing it. `item` owns nothing before.
+static Status row_read_members(Statement *statement, void *item, Problem *problem) {
+    for (int i = 0; i < statement->result_count; i++) {
+        const SqlColumn *column = statement->results[i];
+        if (column != NULL &&
+            !read_column(statement->handle, i, column, (char *)item + column->offset))
+            return problem_set(problem, STATUS_NO_MEMORY, "no memory for a row of the database");
     }
     return STATUS_OK;
 }
 
-// The present row. `item` owns nothing before; on failure what the columns own of it is freed.
+// On failure what the columns own of it is freed.
 static Status row_read(Statement *statement, const SqlColumn *columns, void *item,
                        Problem *problem) {
-    Status status = STATUS_OK;
-    for (int i = 0; i < statement->result_count && status == STATUS_OK; i++) {
-        const SqlColumn *column = statement->results[i];
-        if (column != NULL &&
-            !read_column(statement->handle, i, column, (char *)item + column->offset))
-            status = problem_set(problem, STATUS_NO_MEMORY, "no memory for a row of the database");
+    char damage[DAMAGE_SIZE];
+    Status status = row_read_members(statement, item, problem);
+    if (status == STATUS_OK && row_is_damaged(statement, columns, item, damage)) {
+        const SqlColumn *flag = column_find(columns, "is_damaged");
+        if (flag != NULL)
+            *(bool *)((char *)item + flag->offset) = true;
+        else
+            status = report_damage(statement, damage, problem);
     }
-    if (status == STATUS_OK && statement->checks >= 0)
-        status = row_check(statement, columns, item, problem);
     for (const SqlColumn *column = columns; status != STATUS_OK && column->name != NULL; column++)
         free_owned(column, item);
+    return status;
+}
+
+Status sqlite_check_table(Sqlite *database, const CheckedTable *table, TableCheck *check,
+                          Problem *problem) {
+    Statement *statement;
+    char damage[DAMAGE_SIZE];
+    bool has_row;
+    void *item = calloc(1, table->size);
+    Status status = item == NULL ? problem_set(problem, STATUS_NO_MEMORY, "no memory for a row")
+                                 : statement_begin(database, table->sql, NULL, NULL, table->columns,
+                                                   &statement, problem);
+    if (status != STATUS_OK) {
+        free(item);
+        return status;
+    }
+    while ((status = statement_step(statement, &has_row, problem)) == STATUS_OK && has_row) {
+        status = row_read_members(statement, item, problem);
+        if (status == STATUS_OK && row_is_damaged(statement, table->columns, item, damage)) {
+            check->damaged++;
+            check->report(check->context, damage);
+        }
+        check->rows++;
+        row_clear(table->columns, item, table->size);
+        if (status != STATUS_OK)
+            break;
+    }
+    statement_end(statement);
+    free(item);
     return status;
 }
 

@@ -33,8 +33,11 @@ typedef enum ColumnKind {
 enum {
     COLUMN_LONG = 1,    // not part of {head}
     COLUMN_MUTABLE = 2, // part of {set}
-    // Its CRC-32 is stored in the row's column `checks` and compared whenever both are read.
+    // Its CRC-32 is stored in the row's column `checks` and compared whenever both are read. Where
+    // they differ the row cannot be read, unless it has a member `is_damaged`, which is set then.
     COLUMN_CHECKED = 4,
+    COLUMN_ID = 8,    // names the row in reports of damage
+    COLUMN_KEPT = 16, // {set} leaves it as it is where the member is NULL
 };
 
 // One member of a stored struct.
@@ -103,9 +106,11 @@ uint64_t sqlite_rows_changed(Sqlite *database);
 // tables, which are the same each time:
 //
 //     {insert}    (a, b) VALUES (:a, :b)    all of `keys` but those with `read`, with their checks
-//     {set}       a = :a, b = :b            those that are COLUMN_MUTABLE, with the checks of all
+//     {set}       a = :a, b = :b            those that are COLUMN_MUTABLE, with their checks; the
+//                                           checked columns of `keys` are the first of the row's
 //     {columns}   a, b                      all of `columns`, with their checks
 //     {head}      a, b                      the same without those that are COLUMN_LONG
+//     {checked}   number, a, b              those that are COLUMN_CHECKED, with their checks
 
 // Runs one statement without rows. *changes (may be NULL): rows changed.
 Status sqlite_change(Sqlite *database, const char *sql, const SqlColumn *keys, const void *item,
@@ -116,6 +121,28 @@ Status sqlite_first(Sqlite *database, const char *sql, const SqlColumn *keys, co
 // All rows as a typed list of items of `size` bytes; on failure it is empty.
 Status sqlite_list(Sqlite *database, const char *sql, const SqlColumn *keys, const void *item,
                    const SqlColumn *columns, size_t size, void *list, Problem *problem);
+
+// A table whose rows have checksums.
+typedef struct CheckedTable {
+    const char *name, *sql; // "SELECT {checked} FROM name"
+    const SqlColumn *columns;
+    size_t size; // of the struct
+} CheckedTable;
+#define CHECKED_TABLE(name_, columns_, Type)                                                       \
+    {                                                                                              \
+        .name = name_, .sql = "SELECT {checked} FROM " name_, .columns = columns_,                 \
+        .size = sizeof(Type)                                                                       \
+    }
+
+// What was found in a table; `report` gets a sentence for each damaged row.
+typedef struct TableCheck {
+    uint64_t rows, damaged;
+    void (*report)(void *context, const char *damage);
+    void *context;
+} TableCheck;
+// Compares every row of the table with its checksums.
+Status sqlite_check_table(Sqlite *database, const CheckedTable *table, TableCheck *check,
+                          Problem *problem);
 
 // Frees what the columns own and sets all of `item`, of `size` bytes, to zero.
 void row_clear(const SqlColumn *columns, void *item, size_t size);

@@ -8,26 +8,28 @@
 // clang-format off
 static const SqlColumn sweep_columns[] = {
     COLUMN_READ(SweepRow, number, "number"),
-    COLUMN(SweepRow, result),
+    COLUMN_WITH(SweepRow, result, COLUMN_CHECKED | COLUMN_ID),
     COLUMN_WITH(SweepRow, scene, COLUMN_CHECKED),
     COLUMN_WITH(SweepRow, points, COLUMN_CHECKED),
     COLUMN_WITH(SweepRow, metrics, COLUMN_CHECKED),
     COLUMN_WITH(SweepRow, chunks, COLUMN_CHECKED),
     COLUMN(SweepRow, retries),
-    COLUMN(SweepRow, created_unix_ms),
+    COLUMN_WITH(SweepRow, created_unix_ms, COLUMN_CHECKED),
     COLUMN_END
 };
+const CheckedTable sweep_rows_table = CHECKED_TABLE("sweeps", sweep_columns, SweepRow);
 
 static const SqlColumn chunk_columns[] = {
     COLUMN_READ(SweepChunkRow, number, "number"),
-    COLUMN(SweepChunkRow, sweep),
-    COLUMN(SweepChunkRow, chunk),
+    COLUMN_WITH(SweepChunkRow, sweep, COLUMN_CHECKED | COLUMN_ID),
+    COLUMN_WITH(SweepChunkRow, chunk, COLUMN_CHECKED | COLUMN_ID),
     COLUMN_WITH(SweepChunkRow, failed, COLUMN_MUTABLE | COLUMN_CHECKED),
     COLUMN_WITH(SweepChunkRow, is_open, COLUMN_MUTABLE),
     COLUMN_WITH(SweepChunkRow, reasons, COLUMN_MUTABLE | COLUMN_LONG | COLUMN_CHECKED),
     COLUMN_WITH(SweepChunkRow, rows, COLUMN_MUTABLE | COLUMN_LONG | COLUMN_CHECKED),
     COLUMN_END
 };
+const CheckedTable chunks_table = CHECKED_TABLE("sweep_chunks", chunk_columns, SweepChunkRow);
 // clang-format on
 
 void sweep_row_clear(SweepRow *row) {

@@ -3,15 +3,17 @@
 
 // clang-format off
 static const SqlColumn token_columns[] = {
-    COLUMN(TokenRow, name),
-    COLUMN(TokenRow, digest),
-    COLUMN(TokenRow, scopes),
-    COLUMN(TokenRow, created_unix_ms),
+    COLUMN_WITH(TokenRow, name, COLUMN_CHECKED | COLUMN_ID),
+    COLUMN_WITH(TokenRow, digest, COLUMN_CHECKED),
+    COLUMN_WITH(TokenRow, scopes, COLUMN_CHECKED),
+    COLUMN_WITH(TokenRow, created_unix_ms, COLUMN_CHECKED),
     COLUMN(TokenRow, used_unix_ms),
-    COLUMN(TokenRow, expires_unix_ms),
-    COLUMN(TokenRow, revoked_unix_ms),
+    COLUMN_WITH(TokenRow, expires_unix_ms, COLUMN_CHECKED),
+    COLUMN_WITH(TokenRow, revoked_unix_ms, COLUMN_CHECKED | COLUMN_MUTABLE),
+    COLUMN_READ(TokenRow, is_damaged, "0"),
     COLUMN_END
 };
+const CheckedTable tokens_table = CHECKED_TABLE("tokens", token_columns, TokenRow);
 // clang-format on
 
 static Status token_find(Sqlite *database, const TokenRow *row, TokenRow *found, bool *is_found,
@@ -75,8 +77,7 @@ static Status token_apply_change(Sqlite *database, const void *work, Problem *pr
 }
 
 Status db_token_revoke(Db *db, const TokenRow *row, Problem *problem) {
-    static const char sql[] =
-        "UPDATE tokens SET revoked_unix_ms = :revoked_unix_ms WHERE name = :name";
+    static const char sql[] = "UPDATE tokens SET {set} WHERE name = :name";
     return db_write(db, token_apply_change, &(TokenChange){row, sql, false, "revoked already"},
                     problem);
 }

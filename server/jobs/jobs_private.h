@@ -22,7 +22,7 @@ typedef struct ResultSummary {
 // Copies them out of `row`. One reference; NULL without memory.
 ResultSummary *result_summary_new(const ResultRow *row);
 // Of a stored result; NULL also without memory. STATUS_NOT_FOUND.
-Status result_summary_load(Db *db, const char *result, ResultSummary **summary);
+Status result_summary_load(Db *db, const char *result, ResultSummary **summary, Problem *problem);
 ResultSummary *result_summary_ref(ResultSummary *summary); // NULL is accepted here and below
 void result_summary_unref(ResultSummary *summary);
 
@@ -286,8 +286,8 @@ void jobs_keep_series(JobManager *manager, const char *result, const Outcome *ou
 // worker.c
 void *worker_main(void *worker);
 
-// submit.c. Resumes an unfinished job of the database. Takes the row. Faults of the job make it a
-// failed one and are no error.
-Status jobs_resume(JobManager *manager, JobRow *row, Problem *problem);
+// submit.c. Resumes an unfinished job of the database. Faults of the job, also a damaged row, make it
+// a failed one and are no error.
+Status jobs_resume(JobManager *manager, const char *id, Problem *problem);
 
 #endif

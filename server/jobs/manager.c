@@ -74,7 +74,7 @@ static Status manager_resume_all(JobManager *manager, Problem *problem) {
     JobRows rows = {NULL, 0};
     Status status = db_job_unfinished(manager->db, &rows, problem);
     for (size_t i = 0; i < rows.count && status == STATUS_OK; i++)
-        status = jobs_resume(manager, &rows.at[i], problem);
+        status = jobs_resume(manager, rows.at[i].id, problem);
     job_rows_clear(&rows);
     return status;
 }
@@ -232,11 +232,10 @@ Status jobs_delete(JobManager *manager, const char *result, Problem *problem) {
 }
 
 Status jobs_remove(JobManager *manager, const char *id, Problem *problem) {
-    Job *job = NULL;
     Removed removed;
-    TRY(jobs_find(manager, id, &job, problem));
-    const bool is_live = job->manager != NULL; // also while its last state is being written
-    job_unref(job);
+    pthread_mutex_lock(&manager->lock);
+    const bool is_live = hashmap_find(manager->jobs, id) != NULL; // also while its end is written
+    pthread_mutex_unlock(&manager->lock);
     if (is_live)
         return problem_set(problem, STATUS_CONFLICT,
                            "the job %.40s is not finished: dismiss it first, or wait", id);

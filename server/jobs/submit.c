@@ -189,7 +189,9 @@ static Task *submit_find_task(const JobManager *manager, const char *result) {
     return task != NULL && task->recompute_only ? NULL : task;
 }
 
-// Sets job->summary where the result is there already. STATUS_NOT_FOUND if it is not.
+// Sets job->summary where the result is there already. STATUS_NOT_FOUND if it is not. One that is
+// damaged is an error: its row, which other jobs have too, is not computed anew before it is
+// deleted.
 static Status submit_find_result(JobManager *manager, Job *job, Problem *problem) {
     pthread_mutex_lock(&manager->lock);
     job->summary = cache_head(manager, job->row.result);
@@ -201,16 +203,16 @@ static Status submit_find_result(JobManager *manager, Job *job, Problem *problem
         return STATUS_OK;
     if (is_computed)
         return STATUS_NOT_FOUND;
-    const Status status = result_summary_load(manager->db, job->row.result, &job->summary);
+    const Status status = result_summary_load(manager->db, job->row.result, &job->summary, problem);
     pthread_mutex_lock(&manager->lock);
     manager->rows.hits += status == STATUS_OK;
     manager->rows.misses += status == STATUS_NOT_FOUND;
     if (job->summary != NULL && deletions == manager->deletions)
         cache_put(manager, job->row.result, NULL, job->summary);
     pthread_mutex_unlock(&manager->lock);
-    return status == STATUS_OK || status == STATUS_NOT_FOUND
-               ? status
-               : problem_set(problem, status, "the results could not be searched");
+    if (status == STATUS_NOT_FOUND)
+        problem_clear(problem);
+    return status;
 }
 
 // Inserts the job and waits. Where another request with the same key was earlier, entry->earlier is
@@ -587,24 +589,30 @@ static Status submit_resume(JobManager *manager, JobRow *row, StudyRequest *requ
     return STATUS_OK;
 }
 
-Status jobs_resume(JobManager *manager, JobRow *row, Problem *problem) {
+Status jobs_resume(JobManager *manager, const char *id, Problem *problem) {
+    JobRow row;
     StudyRequest request = {0};
     Warnings warnings = {NULL, 0};
     Problem fault;
     problem_clear(&fault);
-    Status status = jobs_prepare(manager->db, row->scene, strlen(row->scene),
-                                 &manager->settings.limits, &request, &warnings, &fault);
+    Status status = db_job_load_with_scene(manager->db, id, &row, &fault);
+    const bool is_damaged = status == STATUS_INTERNAL;
+    if (status == STATUS_OK)
+        status = jobs_prepare(manager->db, row.scene, strlen(row.scene), &manager->settings.limits,
+                              &request, &warnings, &fault);
     if (status == STATUS_OK) {
-        status = submit_resume(manager, row, &request, problem);
-    } else if (status == STATUS_INVALID || status == STATUS_UNREADABLE) {
-        // The limits or the program changed meanwhile: the job's owner learns why.
-        row->state = JOB_FAILED;
-        row->problem = problem_document(&fault);
-        row->finished_unix_ms = clock_unix_ms();
-        status = db_job_update(manager->db, row, problem);
+        status = submit_resume(manager, &row, &request, problem);
+    } else if (status == STATUS_INVALID || status == STATUS_UNREADABLE || is_damaged) {
+        // The limits or the program changed meanwhile, or the row: the job's owner learns why.
+        text_fit(row.id, sizeof row.id, id);
+        row.state = JOB_FAILED;
+        row.problem = problem_document(&fault);
+        row.finished_unix_ms = clock_unix_ms();
+        status = db_job_update(manager->db, &row, problem);
     } else {
         problem_set(problem, status, "%s", fault.detail);
     }
+    job_row_clear(&row);
     study_request_clear(&request);
     warnings_clear(&warnings);
     return status;

@@ -197,13 +197,18 @@ Status jobs_find(JobManager *manager, const char *id, Job **found, Problem *prob
     if (job == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
     job->is_durable = true;
-    const Status status = db_job_load(manager->db, id, &job->row, problem);
+    Status status = db_job_load(manager->db, id, &job->row, problem);
+    if (status == STATUS_OK && job->row.state == JOB_SUCCESSFUL && job->row.has_result)
+        status = result_summary_load(manager->db, job->row.result, &job->summary, problem);
+    if (status == STATUS_NOT_FOUND && job->row.has_result) { // deleted just now
+        problem_clear(problem);
+        job->row.has_result = false;
+        status = STATUS_OK;
+    }
     if (status != STATUS_OK) {
         job_unref(job);
         return status;
     }
-    if (job->row.state == JOB_SUCCESSFUL)
-        (void)result_summary_load(manager->db, job->row.result, &job->summary);
     *found = job;
     return STATUS_OK;
 }
@@ -237,9 +242,9 @@ ResultSummary *result_summary_new(const ResultRow *row) {
     return summary;
 }
 
-Status result_summary_load(Db *db, const char *result, ResultSummary **summary) {
+Status result_summary_load(Db *db, const char *result, ResultSummary **summary, Problem *problem) {
     ResultRow row = {0};
-    const Status status = db_result_head(db, result, &row, NULL);
+    const Status status = db_result_head(db, result, &row, problem);
     *summary = status == STATUS_OK ? result_summary_new(&row) : NULL;
     result_row_clear(&row);
     return status;

@@ -132,5 +132,109 @@ def test_a_changed_material_is_no_answer():
             assert reply.status == 200 and reply.headers["etag"] == etag
 
 
+def check_db(folder):
+    code, said = program.run("check-db", "--data", folder)[:2]
+    return code, said
+
+
+def test_a_changed_job_is_no_answer():
+    """A job whose labels, warnings or times differ from their checksums: 500 with its table and id in place of JSON that cannot be read."""
+    with tempfile.TemporaryDirectory() as folder:
+        with program.daemon(data=folder) as daemon:
+            scene = program.scene("paper_free_sponge")
+            job = program.finished(daemon, {**scene, "title": "run 1", "labels": ["lab=1"]})
+            place = f"/v1/jobs/{job['id']}"
+        for column in ("labels", "title", "created_unix_ms", "total"):
+            with changed(folder, "jobs", column), program.daemon(data=folder) as daemon:
+                refused(daemon, place)
+                refused(daemon, "/v1/jobs")
+                assert f"table jobs (id {job['id']})" in daemon.get(place).json()["detail"]
+                assert daemon.get(f"/v1/results/{job['result']}").status == 200
+        with program.daemon(data=folder) as daemon:
+            assert daemon.get(place).json()["labels"] == ["lab=1"]
+            kept = {"title": "run 2"}
+            assert daemon.request("PATCH", place, json=kept).status == 200
+        with program.daemon(data=folder) as daemon:
+            shown = daemon.get(place).json()
+            assert shown["title"] == "run 2" and shown["labels"] == ["lab=1"], shown
+        assert check_db(folder)[0] == 0
+        with changed(folder, "jobs", "labels"), program.daemon(data=folder) as daemon:
+            assert daemon.request("DELETE", place + "?purge=true").status == 204
+            assert daemon.get("/v1/jobs").status == 200
+
+
+def test_an_unfinished_job_that_changed_fails():
+    """It does not prevent the start."""
+    with tempfile.TemporaryDirectory() as folder:
+        with program.daemon(data=folder) as daemon:
+            job = program.finished(daemon, {**program.scene("paper_free_sponge"), "title": "run 1"})
+        connection = sqlite3.connect(os.path.join(folder, "impactd.db"), isolation_level=None)
+        connection.execute("UPDATE jobs SET state = 0")
+        connection.close()
+        with program.daemon(data=folder) as daemon:
+            shown = daemon.get(f"/v1/jobs/{job['id']}").json()
+            assert shown["status"] == "failed" and "damaged" in shown["problem"]["detail"], shown
+
+
+def test_a_changed_summary_is_no_answer():
+    """The job and a POST of the same scene are refused with the result's id; after its deletion the scene is computed again."""
+    with tempfile.TemporaryDirectory() as folder:
+        with program.daemon(data=folder) as daemon:
+            job = program.finished(daemon, program.scene("paper_free_sponge"))
+        with changed(folder, "results", "summary"), program.daemon(data=folder) as daemon:
+            refused(daemon, f"/v1/jobs/{job['id']}")
+            reply = daemon.submit(program.scene("paper_free_sponge"))
+            assert reply.status == 500 and f"table results (id {job['result']})" in reply.json()["detail"], reply
+            assert daemon.request("DELETE", f"/v1/results/{job['result']}").status == 204
+            again = program.finished(daemon, program.scene("paper_free_sponge"))
+            assert again["result"] == job["result"] and again["summary"] is not None, again
+
+
+def test_a_changed_token_gives_no_access():
+    """The other tokens do, and the changed one can be revoked."""
+    with tempfile.TemporaryDirectory() as folder:
+        with program.daemon(data=folder):
+            pass
+        made = [program.run("token", "create", name, "--scopes", "read", "--data", folder)[1].split()[0] for name in ("lab0", "lab1")]
+        with changed(folder, "tokens", "created_unix_ms"), program.daemon(data=folder) as daemon:
+            replies = [daemon.get("/v1/jobs", headers={"authorization": "Bearer " + token}) for token in made]
+            assert [reply.status for reply in replies] == [200, 401], replies
+            assert "damaged" in program.run("token", "list", "--data", folder)[1]
+            code, said = check_db(folder)
+            assert code == 1 and "table tokens (number 2, name lab1)" in said, (code, said)
+        assert program.run("token", "revoke", "lab1", "--data", folder)[0] == 0
+        assert check_db(folder)[0] == 0
+
+
+def test_check_db_names_every_damaged_row():
+    """The command counts the rows of each table; a copy of a damaged database is neither made nor taken."""
+    with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as other:
+        copy, bad = os.path.join(other, "copy.db"), os.path.join(other, "bad.db")
+        with program.daemon(data=folder) as daemon:
+            job = program.finished(daemon, {**program.scene("paper_free_sponge"), "labels": ["lab1"]})
+            code, said = check_db(folder)
+            assert code == 0 and "results" in said and "as they should be" in said, (code, said)
+        assert program.run("backup", copy, "--data", folder)[0] == 0
+        with changed(folder, "jobs", "labels"):
+            code, said = check_db(folder)
+            assert code == 1 and f'a stored "labels" of table jobs (number 1, id {job["id"]})' in said, (code, said)
+            code, _, said = program.run("backup", bad, "--data", folder)
+            assert code == 1 and '"labels" of table jobs' in said and not os.path.exists(bad), (code, said)
+        connection = sqlite3.connect(copy, isolation_level=None)
+        connection.execute("UPDATE results SET plan = plan || ' '")
+        connection.close()
+        code, _, said = program.run("restore", copy, "--force", "--data", folder)
+        assert code == 1 and '"plan" of table results' in said, (code, said)
+        assert check_db(folder)[0] == 0
+        connection = sqlite3.connect(os.path.join(folder, "impactd.db"), isolation_level=None)
+        connection.execute("INSERT INTO result_uses VALUES ('sponge@1', 99)")
+        connection.close()
+        code, said = check_db(folder)
+        assert code == 1 and "missing row of results" in said, (code, said)
+        nothing = os.path.join(other, "nothing")
+        assert program.run("check-db", "--data", nothing)[0] == 4 and not os.path.exists(nothing)
+        assert program.run("restore", os.path.join(other, "nope.db"), "--data", nothing)[0] == 4 and not os.path.exists(nothing)
+
+
 if __name__ == "__main__":
     sys.exit(program.main(globals()))
