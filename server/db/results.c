@@ -9,8 +9,8 @@
 
 // clang-format off
 static const SqlColumn result_columns[] = {
-    COLUMN_WITH(ResultRow, id, COLUMN_CHECKED | COLUMN_ID),
-    COLUMN_WITH(ResultRow, engine, COLUMN_CHECKED),
+    COLUMN_WITH(ResultRow, id, COLUMN_ID),
+    COLUMN(ResultRow, engine),
     COLUMN_WITH(ResultRow, sample_rate, COLUMN_CHECKED),
     COLUMN_WITH(ResultRow, count, COLUMN_CHECKED),
     COLUMN_WITH(ResultRow, created_unix_ms, COLUMN_CHECKED),
