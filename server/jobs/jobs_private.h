@@ -286,8 +286,8 @@ void jobs_keep_series(JobManager *manager, const char *result, const Outcome *ou
 // worker.c
 void *worker_main(void *worker);
 
-// submit.c. Resumes an unfinished job of the database. Faults of the job, also a damaged row, make it
-// a failed one and are no error.
+// submit.c. Resumes an unfinished job of the database. Faults of the job, also a damaged row, make
+// it a failed one and are no error.
 Status jobs_resume(JobManager *manager, const char *id, Problem *problem);
 
 #endif
