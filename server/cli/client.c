@@ -2,6 +2,7 @@
 // token would go with it), and only http and https are used.
 #include "server/cli/client.h"
 
+#include <assert.h>
 #include <curl/curl.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -150,6 +151,7 @@ static bool number_is_valid(const char *text) {
 }
 
 static bool operand_is_valid(char kind, const char *text) {
+    static_assert(MATERIAL_SLUG_MAX == 63, "a message states it");
     const size_t length = strcspn(text, "@");
     const bool has_revision = text[length] == '@';
     char slug[MATERIAL_SLUG_MAX + 2];
@@ -180,12 +182,13 @@ static Status operands_check(const ApiCall *call, Problem *problem) {
     for (size_t i = 0; i < call->count; i++) {
         const char kind = operand_kind(action, i);
         if (!operand_is_valid(kind, call->operands[i]))
-            return problem_set(problem, STATUS_USAGE, "%s%stakes %s, is given \"%.80s\"%s", name,
-                               name[0] != '\0' ? " " : "", action->takes, call->operands[i],
-                               strchr("srvn", kind) == NULL
-                                   ? ""
-                                   : "; SLUG is lower-case letters, digits, underscores and "
-                                     "dashes, REVISION is a whole number from 1");
+            return problem_set(
+                problem, STATUS_USAGE, "%s%stakes %s, is given \"%.80s\"%s", name,
+                name[0] != '\0' ? " " : "", action->takes, call->operands[i],
+                strchr("srvn", kind) == NULL
+                    ? ""
+                    : "; SLUG is 1 to 63 lower-case letters, digits, underscores and "
+                      "dashes, REVISION is a whole number from 1");
     }
     size_t offset = 0;
     const Field *row =
