@@ -67,6 +67,7 @@ typedef struct JobRow {
     bool is_cached;
     int64_t created_unix_ms, started_unix_ms, finished_unix_ms;
     double queued, run, total; // [s]
+    bool is_damaged;           // of a search: the row differs from its checksums; see db_job_search
     char *scene;               // canonical JSON, resolved
     char *problem, *warnings, *title;
     char *labels;          // JSON array of texts; NULL: none
@@ -123,6 +124,7 @@ typedef struct JobSearch {
 } JobSearch;
 JobSearch job_search_all(size_t most);
 // Newest first. STATUS_NOT_FOUND where there is no job `before`, and before_unix_ms is -1.
+// A damaged row does not hide the others: it is a failed job whose problem says so.
 Status db_job_search(Db *db, const JobSearch *search, JobRows *rows, Problem *problem);
 // The title and the labels (a JSON array) of a job, with their words. NULL: as it is; "": none.
 typedef struct JobNotes {

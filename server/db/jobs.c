@@ -2,6 +2,7 @@
 // order of (created, number), downwards. The rarest condition chooses the index of a search; the
 // others are tested row by row. Words are searched literally: "\n" separates the lines of what is
 // searched, and no text contains one.
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -39,6 +40,13 @@ static const SqlColumn job_columns[] = {
     CHECKED(JobRow, request, COLUMN_LONG),
     COLUMN_END
 };
+// The same, of which a damaged one does not hide the others.
+static SqlColumn job_list_columns[COUNT(job_columns) + 1] = {COLUMN_READ(JobRow, is_damaged, "0")};
+
+static void job_list_columns_make(void) {
+    memcpy(job_list_columns + 1, job_columns, sizeof job_columns);
+}
+
 const CheckedTable jobs_table = CHECKED_TABLE("jobs", job_columns, JobRow);
 // clang-format on
 
@@ -316,17 +324,45 @@ static Status search_find_place(Db *db, JobSearch *search, Problem *problem) {
                : problem_set(problem, STATUS_NOT_FOUND, no_job, search->before);
 }
 
+// What is left of a damaged row: a failed job that says so.
+static Status job_row_mark(JobRow *row) {
+    static const char problem[] =
+        "{\"type\": \"/problems/internal\", \"title\": \"Internal error\", \"status\": 500, "
+        "\"detail\": \"this job is damaged: its row in the table jobs differs from its checksums; "
+        "impactd check-db lists what is damaged, impactd restore puts a backup in its place\"}";
+    const JobRow damaged = *row;
+    *row = (JobRow){.state = 3, .is_damaged = true, .created_unix_ms = damaged.created_unix_ms};
+    text_fit(row->id, sizeof row->id, damaged.id);
+    job_row_clear(&(JobRow){.title = damaged.title,
+                            .labels = damaged.labels,
+                            .study = damaged.study,
+                            .problem = damaged.problem,
+                            .warnings = damaged.warnings,
+                            .client = damaged.client,
+                            .words = damaged.words,
+                            .scene = damaged.scene,
+                            .request = damaged.request});
+    return text_copy(problem, &row->problem);
+}
+
 Status db_job_search(Db *db, const JobSearch *search, JobRows *rows, Problem *problem) {
     JobSearch folded = *search;
     *rows = (JobRows){0};
     TRY(search_find_place(db, &folded, problem));
     const bool has_words = search_fold(&folded.words), has_label = search_fold(&folded.label);
-    const Status status = has_words && has_label
-                              ? db_list(db, search_choose(search), search_columns, &folded,
-                                        job_columns, sizeof *rows->at, rows, problem)
-                              : problem_set(problem, STATUS_NO_MEMORY, "no memory for a search");
+    static pthread_once_t once = PTHREAD_ONCE_INIT;
+    (void)pthread_once(&once, job_list_columns_make);
+    Status status = has_words && has_label
+                        ? db_list(db, search_choose(search), search_columns, &folded,
+                                  job_list_columns, sizeof *rows->at, rows, problem)
+                        : problem_set(problem, STATUS_NO_MEMORY, "no memory for a search");
     free((char *)folded.words);
     free((char *)folded.label);
+    for (size_t i = 0; i < rows->count && status == STATUS_OK; i++)
+        if (rows->at[i].is_damaged && job_row_mark(&rows->at[i]) != STATUS_OK)
+            status = problem_set(problem, STATUS_NO_MEMORY, "no memory for a search");
+    if (status != STATUS_OK)
+        job_rows_clear(rows);
     return status;
 }
 

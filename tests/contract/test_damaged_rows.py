@@ -147,7 +147,9 @@ def test_a_changed_job_is_no_answer():
         for column in ("labels", "title", "created_unix_ms", "total"):
             with changed(folder, "jobs", column), program.daemon(data=folder) as daemon:
                 refused(daemon, place)
-                refused(daemon, "/v1/jobs")
+                (listed,) = daemon.get("/v1/jobs").json()["jobs"]  # one damaged job does not hide the others
+                assert listed["id"] == job["id"] and listed["status"] == "failed", listed
+                assert "damaged" in listed["problem"]["detail"] and "labels" not in listed, listed
                 assert f"table jobs (id {job['id']})" in daemon.get(place).json()["detail"]
                 assert daemon.get(f"/v1/results/{job['result']}").status == 200
         with program.daemon(data=folder) as daemon:
