@@ -33,7 +33,7 @@ def listed(root):
 def commands():
     """Every command with its options, as help lists them."""
     text = program.run("--help")[1]
-    names = re.findall(r"^  (\w+) +\S", text[text.rindex('"sample_rate"'):], re.M)
+    names = re.findall(r"^  ([\w-]+) +\S", text[text.rindex('"sample_rate"'):], re.M)
     return {name: OPTION.findall(program.run("help", name)[1]) for name in names}
 
 
