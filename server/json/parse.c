@@ -648,10 +648,56 @@ static void scan_pointer(const char *text, size_t position, const char *base,
     }
 }
 
-// A document, or a value at `pointer` of one.
+bool scan_list(const char *text, size_t size, const char *name, ScanList *list) {
+    Scan scan = {.text = text};
+    char key[KEY_SIZE];
+    bool is_inside = false;
+    *list = (ScanList){.text = text, .end = size};
+    while (scan.at < size && !scan_is_too_deep(&scan) && text[scan.at] != '\0') {
+        const size_t at = scan.at, depth = scan.depth;
+        const Frame outer = scan.frames[0];
+        scan_step(&scan, size);
+        if (is_inside && scan.depth < 2) {
+            list->end = at;
+            return true;
+        }
+        if (is_inside || depth != 1 || scan.depth != 2 || text[at] != '[' || outer.is_array ||
+            outer.key == 0)
+            continue;
+        scan_key(&scan, &outer, key);
+        is_inside = strcmp(key, name) == 0;
+        list->begin = list->at = at + 1;
+    }
+    return is_inside && scan.at >= size;
+}
+
+static bool scan_is_blank(char c) {
+    return c == ' ' || c == '\t' || c == '\n' || c == '\r';
+}
+
+bool scan_element(ScanList *list) {
+    Scan scan = {.text = list->text, .at = list->at};
+    size_t first = list->at;
+    if (list->at > list->end)
+        return false;
+    while (scan.at < list->end && (scan.depth > 0 || list->text[scan.at] != ','))
+        scan_step(&scan, list->end);
+    size_t last = scan.at;
+    const bool is_all = list->at == list->begin && last == list->end;
+    list->at = last + 1; // behind the comma
+    while (first < last && scan_is_blank(list->text[first]))
+        first++;
+    while (last > first && scan_is_blank(list->text[last - 1]))
+        last--;
+    list->first = first;
+    list->count = last - first;
+    return list->count > 0 || !is_all; // an empty array has no element
+}
+
+// A document within a text: text[first ... first + count - 1], which is at `pointer` of the whole.
 typedef struct Part {
     const char *text;
-    size_t count;
+    size_t first, count;
     const char *pointer;
     Status status; // of a part that is not JSON
 } Part;
@@ -660,7 +706,7 @@ static Status part_error(const Part *part, size_t position, const char *sentence
                          Problem *problem) {
     char pointer[POINTER_SIZE];
     size_t line = 1, column = 1; // of characters, not bytes
-    for (size_t i = 0; i < position; i++) {
+    for (size_t i = 0; i < part->first + position; i++) {
         if (part->text[i] == '\n') {
             line++;
             column = 1;
@@ -668,7 +714,7 @@ static Status part_error(const Part *part, size_t position, const char *sentence
             column++;
         }
     }
-    scan_pointer(part->text, position, part->pointer, pointer);
+    scan_pointer(part->text + part->first, position, part->pointer, pointer);
     return problem_add(problem, part->status, pointer, "line %zu, column %zu: %s", line, column,
                        sentence);
 }
@@ -714,7 +760,7 @@ static Status part_syntax_error(const Part *part, const json_error_t *error, Pro
 }
 
 static Status part_parse(const Part *part, json_t **root, Problem *problem) {
-    const char *text = part->text;
+    const char *text = part->text + part->first;
     size_t position = 0;
     json_error_t error;
     *root = NULL;
@@ -742,26 +788,31 @@ size_t scan_mark(const char *text, size_t size) {
     return size >= count && memcmp(text, mark, count) == 0 ? count : 0;
 }
 
-Status json_parse(const char *text, size_t size, const Field *fields, void *item,
-                  Problem *problem) {
-    if (size == 0)
-        text = ""; // may be NULL
-    const size_t mark = scan_mark(text, size);
-    const Part part = {text + mark, size - mark, "", STATUS_UNREADABLE};
+Status json_parse_part(const char *text, size_t first, size_t count, const char *pointer,
+                       const Field *fields, void *item, Problem *problem) {
+    const Part part = {text, first, count, pointer, STATUS_UNREADABLE};
     Decoder decoder = {.problem = problem};
     json_t *root;
     if (fields_default(fields, item) != STATUS_OK)
         return part_no_memory(problem);
     TRY(part_parse(&part, &root, problem));
-    decode_root(&decoder, root, fields, item, "");
+    decode_root(&decoder, root, fields, item, pointer);
     return part_status(&decoder, root, problem);
+}
+
+Status json_parse(const char *text, size_t size, const Field *fields, void *item,
+                  Problem *problem) {
+    if (size == 0)
+        text = ""; // may be NULL
+    const size_t mark = scan_mark(text, size);
+    return json_parse_part(text + mark, 0, size - mark, "", fields, item, problem);
 }
 
 Status json_parse_value(const char *text, size_t size, const Field *field, void *item,
                         const char *pointer, Problem *problem) {
     Decoder decoder = {.problem = problem};
     json_t *root;
-    TRY(part_parse(&(Part){text, size, pointer, STATUS_INVALID}, &root, problem));
+    TRY(part_parse(&(Part){text, 0, size, pointer, STATUS_INVALID}, &root, problem));
     decode_field(&decoder, root, field, (char *)item + field->offset, pointer);
     return part_status(&decoder, root, problem);
 }
@@ -769,7 +820,7 @@ Status json_parse_value(const char *text, size_t size, const Field *field, void 
 json_t *json_parse_tree(const char *text, size_t size) {
     json_t *root = NULL;
     const size_t mark = size > 0 ? scan_mark(text, size) : 0;
-    const Part part = {text + mark, size - mark, "", STATUS_UNREADABLE};
+    const Part part = {text + mark, 0, size - mark, "", STATUS_UNREADABLE};
     if (size > 0 && part_parse(&part, &root, NULL) == STATUS_OK && json_is_object(root))
         return root;
     json_decref(root);

@@ -20,6 +20,11 @@ enum {
 // that fields_validate can add its faults to the same problem.
 Status json_parse(const char *text, size_t size, const Field *fields, void *item, Problem *problem);
 
+// The same of text[first ... first + count - 1], a document at `pointer` of the whole text, without
+// a byte order mark.
+Status json_parse_part(const char *text, size_t first, size_t count, const char *pointer,
+                       const Field *fields, void *item, Problem *problem);
+
 // Reads a text that is one value into the member of `item` under `field`; `item` has its defaults,
 // faults are at `pointer`. STATUS_INVALID also if the text is not JSON.
 Status json_parse_value(const char *text, size_t size, const Field *field, void *item,
@@ -34,5 +39,20 @@ extern void *(*json_memory_source)(size_t size);
 
 // The size of a byte order mark at the start, which RFC 8259, section 8.1, allows to ignore.
 size_t scan_mark(const char *text, size_t size);
+
+// The elements of one array as they are in the text, one after the other.
+typedef struct ScanList {
+    const char *text;
+    size_t begin, end;   // between the brackets
+    size_t at;           // start of the next element
+    size_t first, count; // of the element, without the white space around it
+} ScanList;
+
+// The array under the key `name` of a document that is an object. False if there is none, or a NUL
+// byte or too deep a nesting before its end. An array that is not closed ends with the text.
+bool scan_list(const char *text, size_t size, const char *name, ScanList *list);
+
+// The next element, which may be empty; false behind the last.
+bool scan_element(ScanList *list);
 
 #endif

@@ -1,5 +1,6 @@
-// Both kinds of files fill one staging list. A cell of a table becomes the JSON value that its
-// column's Field row takes, and is read and validated as in a document.
+// Both kinds of files fill one staging list. A document is read material by material, so that there
+// is never a tree of all of it. A cell of a table becomes the JSON value that its column's Field
+// row takes, and is read and validated as in a document.
 #include "server/materials/exchange.h"
 
 #include <math.h>
@@ -194,6 +195,12 @@ static Status import_take(MaterialImport *import, ImportRow *row, const char *pl
 
 // JSON.
 
+typedef struct Envelope {
+    char *format;
+    uint64_t version;
+    Texts materials; // none: they are read from a text of their own
+} Envelope;
+
 typedef struct DocumentRows {
     ImportRow *at;
     size_t count;
@@ -204,36 +211,56 @@ typedef struct DocumentMaterial {
     DocumentRows revisions, measurements;
 } DocumentMaterial;
 
-typedef struct Document {
-    char *format;
-    uint64_t version;
-    struct {
-        DocumentMaterial *at;
-        size_t count;
-    } materials;
-} Document;
-
 // clang-format off
+static const Field envelope_fields[] = {
+    FIELD_TEXT(Envelope, format, 100, PRESENCE_REQUIRED, 0, "\"impactd-materials\""),
+    FIELD_COUNT(Envelope, version, NULL, AT_MIN(1), REQUIRED, "of the format"),
+    FIELD_TEXTS(Envelope, materials, NULL, NULL, 0, PRESENCE_OPTIONAL, 0, "all of them"),
+    FIELD_END
+};
+
 static const Field document_material_fields[] = {
     FIELD_TEXT(DocumentMaterial, slug, 0, PRESENCE_REQUIRED, 0, "of a-z, 0-9, _ and -"),
     FIELD_LIST(DocumentMaterial, revisions, import_revision_fields, IMPORT_ROWS_MAX, PRESENCE_OPTIONAL, "by number"),
     FIELD_LIST(DocumentMaterial, measurements, import_measurement_fields, IMPORT_ROWS_MAX, PRESENCE_OPTIONAL, "by number"),
     FIELD_END
 };
-
-#define FORMAT FIELD_TEXT(Document, format, 100, PRESENCE_REQUIRED, 0, "\"impactd-materials\"")
-#define VERSION FIELD_COUNT(Document, version, NULL, AT_MIN(1), REQUIRED, "of the format")
-static const Field document_fields[] = {
-    FORMAT, VERSION,
-    FIELD_LIST(Document, materials, document_material_fields, IMPORT_ROWS_MAX, PRESENCE_OPTIONAL, "all of them"),
-    FIELD_END
-};
-// What is validated by the ranges of its rows alone.
-static const Field document_own_fields[] = {FORMAT, VERSION, FIELD_END};
 // clang-format on
 
+// The document without its materials; line breaks stay, so that lines count the same.
+static Status envelope_read(const char *text, size_t size, const ScanList *list, bool has_list,
+                            Problem *problem) {
+    Bytes outer = {.most = 0};
+    Envelope envelope;
+    const size_t begin = has_list ? list->begin : size;
+    bytes_put(&outer, text, begin);
+    for (size_t i = begin; has_list && i < list->end; i++)
+        if (text[i] == '\n')
+            bytes_put(&outer, "\n", 1);
+    if (has_list)
+        bytes_put(&outer, text + list->end, size - list->end);
+    if (outer.is_failed)
+        return import_no_memory(problem);
+    const Status status = json_parse(outer.at, outer.count, envelope_fields, &envelope, problem);
+    if (status == STATUS_OK || status == STATUS_INVALID) {
+        (void)fields_validate(envelope_fields, &envelope, "", problem);
+        if (envelope.format != NULL && strcmp(envelope.format, materials_format) != 0)
+            (void)problem_add(problem, STATUS_INVALID, "/format", "must be \"%s\"",
+                              materials_format);
+        if (envelope.version != COUNT_ABSENT && envelope.version != MATERIALS_FORMAT_VERSION)
+            (void)problem_add_real(problem, STATUS_INVALID, "/version", (double)envelope.version,
+                                   NULL, "must be %d", MATERIALS_FORMAT_VERSION);
+        if (!has_list)
+            (void)problem_add(problem, STATUS_INVALID, "/materials",
+                              "is required: an array of materials");
+    }
+    fields_clear(envelope_fields, &envelope);
+    bytes_clear(&outer);
+    return status == STATUS_INVALID ? STATUS_OK : status;
+}
+
 static Status document_take(MaterialImport *import, const DocumentMaterial *material,
-                            ImportKind kind, const char *pointer, Problem *problem) {
+                            ImportKind kind, const char *pointer, size_t faults, Problem *problem) {
     static const char *const names[] = {"revisions", "measurements"};
     const DocumentRows *rows =
         kind == IMPORT_REVISION ? &material->revisions : &material->measurements;
@@ -243,49 +270,53 @@ static Status document_take(MaterialImport *import, const DocumentMaterial *mate
     for (size_t i = 0; i < rows->count; i++) {
         ImportRow *row = &rows->at[i];
         json_pointer_index(place, sizeof place, list, i);
-        // Those of reading it, which are in `problem` already, make it faulty too.
-        const size_t faults = problem->count - problem_concerns(problem, place);
+        // Faults of this row make it faulty, not those of others of the material.
+        const size_t before = problem_concerns(problem, place) ? faults : problem->count;
         row->kind = (int)kind;
-        if (text_copy(material->slug, &row->slug) != STATUS_OK)
+        row->slug = material->slug != NULL ? strdup(material->slug) : NULL;
+        if (material->slug != NULL && row->slug == NULL)
             return import_no_memory(problem);
-        TRY(import_take(import, row, place, slug, faults, problem));
+        TRY(import_take(import, row, place, slug, before, problem));
     }
     return STATUS_OK;
 }
 
-static Status document_read(MaterialImport *import, const char *text, size_t size,
-                            Problem *problem) {
-    Document document;
-    import->number_names[IMPORT_REVISION] = "revision";
-    import->number_names[IMPORT_MEASUREMENT] = "measurement";
-    Status status = json_parse(text, size, document_fields, &document, problem);
-    if (status == STATUS_INVALID)
-        status = STATUS_OK;
-    for (size_t i = 0; status == STATUS_OK && i < document.materials.count; i++) {
-        const DocumentMaterial *material = &document.materials.at[i];
-        char pointer[POINTER_SIZE];
-        json_pointer_index(pointer, sizeof pointer, "/materials", i);
-        if (material->revisions.count + material->measurements.count == 0 &&
+static Status document_read_material(MaterialImport *import, const char *text, const ScanList *list,
+                                     size_t index, Problem *problem) {
+    char pointer[POINTER_SIZE];
+    DocumentMaterial material;
+    const size_t faults = problem->count;
+    json_pointer_index(pointer, sizeof pointer, "/materials", index);
+    Status status = json_parse_part(text, list->first, list->count, pointer,
+                                    document_material_fields, &material, problem);
+    if (status == STATUS_OK || status == STATUS_INVALID) {
+        if (material.revisions.count + material.measurements.count == 0 &&
             !problem_concerns(problem, pointer))
             (void)problem_add(problem, STATUS_INVALID, pointer,
                               "has neither revisions nor measurements: add one, or leave it out");
-        status = document_take(import, material, IMPORT_REVISION, pointer, problem);
+        status = document_take(import, &material, IMPORT_REVISION, pointer, faults, problem);
         if (status == STATUS_OK)
-            status = document_take(import, material, IMPORT_MEASUREMENT, pointer, problem);
+            status = document_take(import, &material, IMPORT_MEASUREMENT, pointer, faults, problem);
     }
-    if (status == STATUS_OK) {
-        (void)fields_validate(document_own_fields, &document, "", problem);
-        if (document.format != NULL && strcmp(document.format, materials_format) != 0)
-            (void)problem_add(problem, STATUS_INVALID, "/format", "must be \"%s\"",
-                              materials_format);
-        if (document.version != COUNT_ABSENT && document.version != MATERIALS_FORMAT_VERSION)
-            (void)problem_add_real(problem, STATUS_INVALID, "/version", (double)document.version,
-                                   NULL, "must be %d", MATERIALS_FORMAT_VERSION);
-        if (document.materials.count == 0 && strstr(text, "\"materials\"") == NULL)
-            (void)problem_add(problem, STATUS_INVALID, "/materials",
-                              "is required: an array of materials");
-    }
-    fields_clear(document_fields, &document);
+    fields_clear(document_material_fields, &material);
+    return status;
+}
+
+static Status document_read(MaterialImport *import, const char *text, size_t size,
+                            Problem *problem) {
+    ScanList list;
+    const bool has_list = scan_list(text, size, "materials", &list);
+    Status status = STATUS_OK;
+    import->number_names[IMPORT_REVISION] = "revision";
+    import->number_names[IMPORT_MEASUREMENT] = "measurement";
+    for (size_t i = 0; has_list && status == STATUS_OK && scan_element(&list); i++)
+        status = i >= IMPORT_ROWS_MAX ? import_error_rows(problem)
+                                      : document_read_material(import, text, &list, i, problem);
+    // Last: if the text is cut off, its last material says where.
+    if (status == STATUS_OK)
+        status = envelope_read(text, size, &list, has_list, problem);
+    if (status == STATUS_UNREADABLE) // whatever faults were found before
+        problem->status = status;
     return status;
 }
 
