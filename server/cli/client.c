@@ -262,7 +262,8 @@ static void headers_read(const Transfer *transfer) {
     ApiAnswer *answer = &transfer->call->answer;
     curl_off_t seconds = 0;
     const char *etag = header_get(transfer, "ETag"), *link = header_get(transfer, "Link");
-    const char *query = strstr(link, "rel=\"next\"") != NULL ? strchr(link, '?') : NULL;
+    const bool has_next = strstr(link, "rel=\"next\"") != NULL || strstr(link, "rel=next") != NULL;
+    const char *query = has_next ? strchr(link, '?') : NULL;
     text_fit(answer->etag, sizeof answer->etag, etag[0] == '"' ? etag : "");
     if (query != NULL)
         snprintf(answer->next, sizeof answer->next, "%.*s", (int)strcspn(query, ">"), query);
@@ -554,19 +555,35 @@ Status api_send(ApiCall *call, Problem *problem) {
                    problem);
 }
 
+// The pages that follow are added to the first one, and all are printed as one document.
 Status api_show(ApiCall *call, Problem *problem) {
+    Bytes all = {0};
+    char last[sizeof call->answer.next] = "";
     TRY(api_send(call, problem));
-    TRY(api_print_tables(call, problem));
-    for (int page = 1; call->answer.next[0] != '\0'; page++) {
+    Status status = STATUS_OK;
+    for (int page = 0; call->answer.next[0] != '\0' && status == STATUS_OK; page++) {
         Bytes path = api_action_path(call);
+        if (page == PAGES_MAX || strcmp(last, call->answer.next) == 0) {
+            bytes_clear(&path);
+            status = problem_set(problem, STATUS_UNREACHABLE, "the list has no end");
+            break;
+        }
+        if (page == 0)
+            bytes_put(&all, call->answer.body.at, call->answer.body.count);
+        text_fit(last, sizeof last, call->answer.next);
         path.count = path.at != NULL ? strcspn(path.at, "?") : 0;
         bytes_text(&path, call->answer.next);
-        TRY(api_get(call, path, problem));
-        TRY(api_print_tables(call, problem));
-        if (page == PAGES_MAX)
-            return problem_set(problem, STATUS_UNREACHABLE, "the list has no end");
+        status = api_get(call, path, problem);
+        if (status == STATUS_OK)
+            status = json_edit_extend(&all, &call->answer.body, problem);
     }
-    return STATUS_OK;
+    if (status == STATUS_OK && all.count > 0) {
+        bytes_clear(&call->answer.body);
+        call->answer.body = all;
+        all = (Bytes){0};
+    }
+    bytes_clear(&all);
+    return status != STATUS_OK ? status : api_print_tables(call, problem);
 }
 
 Status api_download(ApiCall *call, ApiRequest *request, const char *path, Problem *problem) {
@@ -586,7 +603,8 @@ const JsonDocument *api_reply(ApiCall *call) {
 }
 
 void api_print(const ApiCall *call) {
-    (void)fwrite(call->answer.body.at, 1, call->answer.body.count, stdout);
+    if (call->answer.body.count > 0)
+        (void)fwrite(call->answer.body.at, 1, call->answer.body.count, stdout);
 }
 
 Status api_print_tables(ApiCall *call, Problem *problem) {

@@ -532,6 +532,11 @@ void *exchange_open(void *context, const char *target, struct MHD_Connection *co
         free(exchange);
         return NULL;
     }
+    // libmicrohttpd would list the parameters in the connection's memory, and close the connection
+    // without a word where they do not fit: they are cut off in its buffer, which it reads next.
+    char *query = strchr((char *)(uintptr_t)target, '?');
+    if (query != NULL)
+        query[1] = '\0';
     exchange->loop = loop;
     exchange->server = loop->server;
     exchange->timer = timer;

@@ -242,6 +242,24 @@ Status json_edit_append(Bytes *text, const char *list, const Bytes *value, Probl
     return json_edit_write(text, root, json_array_append_new(items, item) == 0, problem);
 }
 
+Status json_edit_extend(Bytes *text, const Bytes *more, Problem *problem) {
+    json_t *root = json_parse_tree(text->at, text->count), *list, *added;
+    json_t *other = json_parse_tree(more->at, more->count);
+    const char *name;
+    bool is_changed = json_is_object(root) && json_is_object(other);
+    json_object_foreach(root, name, list) {
+        added = json_object_get(other, name);
+        if (json_is_array(list) && json_is_array(added))
+            is_changed = is_changed && json_array_extend(list, added) == 0;
+    }
+    json_decref(other);
+    if (!json_is_object(root)) {
+        json_decref(root);
+        return problem_set(problem, STATUS_INVALID, "a page of the list is not an object");
+    }
+    return json_edit_write(text, root, is_changed, problem);
+}
+
 static void nulls_remove(json_t *value) {
     const char *name;
     json_t *inner;

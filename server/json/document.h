@@ -31,6 +31,9 @@ Status json_edit_label(Bytes *text, const char *label, Problem *problem);
 // Appends a JSON value to a list, which is created if it is missing. A member of another type is
 // left unchanged. STATUS_INVALID: the value is not JSON.
 Status json_edit_append(Bytes *text, const char *list, const Bytes *value, Problem *problem);
+// Appends the elements of the lists in `more` to those of the same names in `text`. STATUS_INVALID:
+// one of them is not an object.
+Status json_edit_extend(Bytes *text, const Bytes *more, Problem *problem);
 // Appends the members of an object that `fields` have and that are not empty, in the order of the
 // fields and one a line. False if there are none.
 bool json_edit_pick(const Bytes *text, const Field *fields, Bytes *picked);

@@ -402,8 +402,14 @@ def test_lists_are_printed_with_all_their_pages():
     first = say(body=b'{"records": [{"name": "a", "count": 2}]}', Link='</v1/records?limit=500&after=a>; rel="next"')
     with fake(first, say(body=b'{"records": [{"name": "b", "count": 3}]}')) as (url, seen):
         code, out, errors = client(url + "/base", "records", "list", "--q", "x y")
-        assert code == 0 and errors == "" and [line.split()[0] for line in out.splitlines()] == ["name", "a", "name", "b"], (code, out, errors)
+        assert code == 0 and errors == "" and [line.split()[0] for line in out.splitlines()] == ["name", "a", "b"], (code, out, errors)
         assert [path for _, path, _ in seen] == ["/base/v1/records?limit=500&q=x%20y", "/base/v1/records?limit=500&after=a"], seen
+    with fake(first, say(body=b'{"records": [{"name": "b", "count": 3}]}')) as (url, _):
+        listed = json.loads(client(url, "records", "list", "--json")[1])["records"]
+        assert [record["name"] for record in listed] == ["a", "b"], listed
+    with fake(first, first, first) as (url, seen):
+        code, out, errors = client(url, "records", "list")
+        assert code == 7 and out == "" and "no end" in errors and len(seen) == 2, (code, out, errors, seen)
 
 
 def test_tls_is_verified():

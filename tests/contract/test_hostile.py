@@ -377,6 +377,14 @@ def test_clients_who_leave_while_waiting():
         assert len(others) == 60 and others.count("dismissed") > 50, others
 
 
+def test_very_many_parameters_are_answered():
+    """A target of its longest with as many parameters as fit into it: an answer, and no memory is kept of it."""
+    with program.daemon() as daemon:
+        for query in ("x&" * 2000, "a=1&" * 1000, "?" * 4000):
+            reply = daemon.get("/v1/jobs?" + query)
+            assert reply.status == 400 and "application/problem+json" in reply.headers["content-type"], reply
+
+
 def test_the_number_of_connections_makes_no_stall():
     """Keep-alive connections around multiples of 128: every one is answered, round after round."""
     with program.daemon() as daemon:
