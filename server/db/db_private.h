@@ -88,6 +88,9 @@ extern const CheckedTable revisions_table, reviews_table, measurements_table, au
     records_table, samples_table, results_table, series_table, sweep_rows_table, chunks_table,
     jobs_table, tokens_table;
 const SqlColumn *material_revision_columns(void);
+// Compares the checksums of all reviews of the materials from slug `first` to `last`: the view
+// material_states reads reviews without them. STATUS_INTERNAL: one is damaged.
+Status db_reviews_compare(Db *db, const char *first, const char *last, Problem *problem);
 extern const SqlColumn material_review_columns[], material_measurement_columns[];
 
 // A material; all zero if it does not exist.

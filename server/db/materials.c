@@ -244,6 +244,20 @@ static const char key_sql[] =
     "r.revision = :number), '') AS author "
     "FROM materials m WHERE m.slug = :slug";
 
+static Status reviews_compare(Sqlite *database, const void *key, Problem *problem) {
+    static const CheckedTable reviews = {
+        .sql = "SELECT m.slug, v.* FROM materials m JOIN material_reviews v ON v.material = "
+               "m.number WHERE m.slug BETWEEN :slug AND :name",
+        .columns = material_review_columns,
+        .size = sizeof(MaterialReview)};
+    TableCheck check = {.keys = query_key_columns, .key = key};
+    return sqlite_check_table(database, &reviews, &check, problem);
+}
+
+Status db_reviews_compare(Db *db, const char *first, const char *last, Problem *problem) {
+    return db_read(db, reviews_compare, &(QueryKey){.slug = first, .name = last}, problem);
+}
+
 static const char no_material[] = "there is no material \"%.64s\"";
 
 Status db_material_state(Db *db, const char *slug, MaterialState *state, Problem *problem) {
@@ -281,6 +295,7 @@ Status db_material(Db *db, const char *slug, uint64_t revision, MaterialRevision
     const QueryKey key = key_of(slug, revision, 0);
     bool is_found;
     memset(material, 0, sizeof *material);
+    TRY(db_reviews_compare(db, slug, slug, problem));
     TRY(db_first(db, revision == 0 ? head_sql : revision_sql, query_key_columns, &key,
                  material_revision_columns(), material, &is_found, problem));
     return is_found ? material_lists_read(material, problem)
@@ -335,6 +350,9 @@ static Status db_revisions(Db *db, const char *sql, const QueryKey *key,
                             sizeof *revisions->at, revisions, problem);
     for (size_t i = 0; i < revisions->count && status == STATUS_OK; i++)
         status = material_lists_read(&revisions->at[i], problem);
+    if (status == STATUS_OK && revisions->count > 0)
+        status = db_reviews_compare(db, revisions->at[0].slug,
+                                    revisions->at[revisions->count - 1].slug, problem);
     if (status != STATUS_OK)
         material_revisions_clear(revisions);
     return status;
@@ -398,6 +416,7 @@ Status db_material_moment(Db *db, MaterialMoment *moment, Problem *problem) {
         "SELECT (SELECT coalesce(max(number), 0) FROM material_revisions) AS revisions, "
         "(SELECT coalesce(max(number), 0) FROM material_reviews) AS reviews, "
         "(SELECT coalesce(max(number), 0) FROM material_measurements) AS measurements";
+    TRY(db_reviews_compare(db, "", "~", problem)); // of all: slugs are of a-z, 0-9, _ and -
     return db_first(db, sql, NULL, NULL, moment_columns, moment, NULL, problem);
 }
 
@@ -447,6 +466,7 @@ Status material_key_find(Sqlite *database, const char *slug, uint64_t revision, 
                          Problem *problem) {
     const QueryKey asked = key_of(slug, revision, 0);
     *key = (MaterialKey){0};
+    TRY(reviews_compare(database, &(QueryKey){.slug = slug, .name = slug}, problem));
     return sqlite_first(database, key_sql, query_key_columns, &asked, material_key_columns, key,
                         NULL, problem);
 }

@@ -155,6 +155,8 @@ Status db_material_uses(Db *db, const char *slug, MaterialReferences *uses, Prob
         "SELECT revision, status, (SELECT count(*) FROM result_uses u WHERE u.name = slug || '@' "
         "|| revision) AS results FROM material_states WHERE slug = :name ORDER BY revision DESC";
     const QueryKey key = {.name = slug};
+    *uses = (MaterialReferences){NULL, 0};
+    TRY(db_reviews_compare(db, slug, slug, problem));
     return db_list(db, sql, query_key_columns, &key, material_use_columns, sizeof *uses->at, uses,
                    problem);
 }

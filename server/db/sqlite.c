@@ -510,8 +510,8 @@ Status sqlite_check_table(Sqlite *database, const CheckedTable *table, TableChec
     bool has_row;
     void *item = calloc(1, table->size);
     Status status = item == NULL ? problem_set(problem, STATUS_NO_MEMORY, "no memory for a row")
-                                 : statement_begin(database, table->sql, NULL, NULL, table->columns,
-                                                   &statement, problem);
+                                 : statement_begin(database, table->sql, check->keys, check->key,
+                                                   table->columns, &statement, problem);
     if (status != STATUS_OK) {
         free(item);
         return status;
@@ -520,7 +520,10 @@ Status sqlite_check_table(Sqlite *database, const CheckedTable *table, TableChec
         status = row_read_members(statement, item, problem);
         if (status == STATUS_OK && row_is_damaged(statement, table->columns, item, damage)) {
             check->damaged++;
-            check->report(check->context, damage);
+            if (check->report != NULL)
+                check->report(check->context, damage);
+            else
+                status = report_damage(statement, damage, problem);
         }
         check->rows++;
         row_clear(table->columns, item, table->size);

@@ -134,13 +134,16 @@ typedef struct CheckedTable {
         .size = sizeof(Type)                                                                       \
     }
 
-// What was found in a table; `report` gets a sentence for each damaged row.
+// What was found in a table; `report` gets a sentence for each damaged row. NULL: the first one is
+// STATUS_INTERNAL, as where it is read.
 typedef struct TableCheck {
+    const SqlColumn *keys; // of the parameters; NULL: there are none
+    const void *key;
     uint64_t rows, damaged;
     void (*report)(void *context, const char *damage);
     void *context;
 } TableCheck;
-// Compares every row of the table with its checksums.
+// Compares every row that table->sql selects with its checksums.
 Status sqlite_check_table(Sqlite *database, const CheckedTable *table, TableCheck *check,
                           Problem *problem);
 

@@ -97,7 +97,7 @@ def test_a_changed_record_is_no_answer():
 
 
 def test_a_changed_material_is_no_answer():
-    """A revision and a measurement that differ from their checksums: neither shown, imported over nor used by a new job."""
+    """A revision, a review and a measurement that differ from their checksums: neither shown, imported over nor used by a new job."""
     felt = {"slug": "felt", "name": "Felt 1", "source": "lab 1", "restitution": 0.5, "contact_time": 0.02, "separation": "zero_penetration",
             "tags": ["lab1"], "comment": "1st"}
     with tempfile.TemporaryDirectory() as folder:
@@ -108,15 +108,22 @@ def test_a_changed_material_is_no_answer():
             sent = daemon.request("POST", "/v1/materials/felt/measurements", json={**test, "comment": "1"}, headers={"if-match": etag})
             assert sent.status == 201, sent
             etag = daemon.get("/v1/materials/felt").headers["etag"]
+            sent = daemon.request("POST", "/v1/materials/felt@1/review", json={"status": "approved", "reason": "ok 1"}, headers={"if-match": etag})
+            assert sent.status == 200, sent
+            etag = daemon.get("/v1/materials/felt").headers["etag"]
             whole = daemon.get("/v1/materials.json").json()
         connection = sqlite3.connect(os.path.join(folder, "impactd.db"), isolation_level=None)
         connection.execute("DROP TRIGGER material_revisions_keep")
+        connection.execute("DROP TRIGGER material_reviews_keep")
         connection.execute("DROP TRIGGER material_measurements_keep")
         connection.close()
-        for column in ("restitution", "name", "lists", "comment", "separation", "created_unix_ms"):
-            with changed(folder, "material_revisions", column), program.daemon(data=folder) as daemon:
-                for target in ("/v1/materials/felt", "/v1/materials/felt@1", "/v1/materials", "/v1/materials/felt/revisions"):
+        columns = [("material_revisions", column) for column in ("restitution", "name", "lists", "comment", "separation", "created_unix_ms")]
+        for table, column in columns + [("material_reviews", column) for column in ("reason", "revision", "created_unix_ms")]:
+            with changed(folder, table, column), program.daemon(data=folder) as daemon:
+                for target in ("/v1/materials/felt", "/v1/materials/felt@1", "/v1/materials", "/v1/materials/felt/revisions",
+                               "/v1/materials.json"):
                     refused(daemon, target)
+                    assert f"table {table} (" in daemon.get(target).json()["detail"]
                 again = daemon.request("POST", "/v1/materials/import", json=whole)
                 assert again.status == 500, again
                 scene = program.scene("paper_free_sponge")
