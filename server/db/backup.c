@@ -88,12 +88,26 @@ static Status open_source(const char *path, Sqlite **source, Problem *problem) {
     return STATUS_OK;
 }
 
-// The check of a database.
+// The tables that have checksums: their first rows get them when a database is made, all are
+// compared when it is checked.
 
-static const CheckedTable *const checked_tables[] = {
-    &revisions_table,  &reviews_table, &measurements_table, &audit_table,
-    &records_table,    &samples_table, &results_table,      &series_table,
-    &sweep_rows_table, &chunks_table,  &jobs_table,         &tokens_table};
+static const CheckedTable *const *checked_tables(void) {
+    // clang-format off
+    static const CheckedTable *const tables[] = {
+        &revisions_table, &reviews_table, &measurements_table, &audit_table, &records_table, &samples_table,
+        &results_table, &series_table, &sweep_rows_table, &chunks_table, &jobs_table, &tokens_table, NULL};
+    // clang-format on
+    (void)material_revision_columns(); // makes those of revisions_table
+    return tables;
+}
+
+Status db_open(const char *directory, Db **db, Problem *problem) {
+    return db_open_with(directory, false, checked_tables(), db, problem);
+}
+
+Status db_open_beside(const char *directory, Db **db, Problem *problem) {
+    return db_open_with(directory, true, checked_tables(), db, problem);
+}
 
 typedef struct Orphan {
     char child[64], parent[64];
@@ -129,14 +143,13 @@ static Status check_references(Sqlite *database, const DbCheck *check, uint64_t 
 // is damage.
 static Status check_database(Sqlite *database, const DbCheck *check, Problem *problem) {
     uint64_t damaged = 0;
-    (void)material_revision_columns();
     TRY(sqlite_check(database, problem));
     TRY(check_references(database, check, &damaged, problem));
-    for (size_t i = 0; i < COUNT(checked_tables); i++) {
+    for (const CheckedTable *const *tables = checked_tables(); *tables != NULL; tables++) {
         TableCheck table = {.report = check->report_damage, .context = check->context};
-        TRY(sqlite_check_table(database, checked_tables[i], &table, problem));
+        TRY(sqlite_check_table(database, *tables, &table, problem));
         if (check->report_table != NULL)
-            check->report_table(check->context, checked_tables[i]->name, table.rows, table.damaged);
+            check->report_table(check->context, (*tables)->name, table.rows, table.damaged);
         damaged += table.damaged;
     }
     return damaged == 0 ? STATUS_OK

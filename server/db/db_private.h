@@ -17,6 +17,10 @@ void data_dir_unlock(int lock); // below 0: nothing
 // Makes new names in `directory` durable.
 Status data_dir_sync(const char *directory, Problem *problem);
 
+// db_open and db_open_beside; `tables` is for sqlite_migrate.
+Status db_open_with(const char *directory, bool is_beside, const CheckedTable *const *tables,
+                    Db **db, Problem *problem);
+
 // Runs `apply` within the next transaction and returns when that is durable, or with its error; a
 // failed apply leaves no trace.
 Status db_write(Db *db, DbApply *apply, const void *work, Problem *problem);
@@ -82,8 +86,7 @@ Status result_row_add(Sqlite *database, const ResultRow *row, Problem *problem);
 // Runs `sql` with each of the lines as :name.
 Status use_lines_add(Sqlite *database, const char *sql, const char *lines, Problem *problem);
 
-// Tables whose rows have checksums. The columns of revisions are made by the first call of
-// material_revision_columns.
+// Tables whose rows have checksums.
 extern const CheckedTable revisions_table, reviews_table, measurements_table, audit_table,
     records_table, samples_table, results_table, series_table, sweep_rows_table, chunks_table,
     jobs_table, tokens_table;

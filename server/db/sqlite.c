@@ -420,7 +420,7 @@ static void free_owned(const SqlColumn *column, void *item) {
 enum { DAMAGE_SIZE = 320 };
 
 // a stored "labels" of table jobs (id j-...) differs from its checksum
-static void damage_describe(Statement *statement, const SqlColumn *column,
+static void damage_describe(Statement *statement, const SqlColumn *column, const char *fault,
                             char damage[DAMAGE_SIZE]) {
     const char *table = sqlite3_column_table_name(statement->handle, statement->checks);
     char row[160] = "";
@@ -433,8 +433,8 @@ static void damage_describe(Statement *statement, const SqlColumn *column,
             snprintf(row + used, sizeof row - used, "%s%s %.80s", used > 0 ? ", " : " (", name,
                      (const char *)sqlite3_column_text(statement->handle, i));
     }
-    snprintf(damage, DAMAGE_SIZE, "a stored \"%s\" of table %s%s%s differs from its checksum",
-             column->name, table != NULL ? table : "?", row, row[0] != '\0' ? ")" : "");
+    snprintf(damage, DAMAGE_SIZE, "a stored \"%s\" of table %s%s%s %s", column->name,
+             table != NULL ? table : "?", row, row[0] != '\0' ? ")" : "", fault);
 }
 
 // Also logged: readers of parts of a page do not look into its problem.
@@ -458,17 +458,20 @@ static bool row_is_damaged(Statement *statement, const SqlColumn *columns, const
     const char *checks = sqlite3_column_blob(statement->handle, statement->checks);
     const size_t size = (size_t)sqlite3_column_bytes(statement->handle, statement->checks);
     size_t at = 0;
-    for (const SqlColumn *column = columns; checks != NULL && column->name != NULL; column++) {
+    for (const SqlColumn *column = columns; column->name != NULL; column++) {
         if ((column->flags & COLUMN_CHECKED) == 0)
             continue;
-        uint32_t check = 0;
-        if (at + sizeof check <= size)
-            memcpy(&check, checks + at, sizeof check);
+        uint32_t check;
+        if (at + sizeof check > size) {
+            damage_describe(statement, column, "has no checksum", damage);
+            return true;
+        }
+        memcpy(&check, checks + at, sizeof check);
         at += sizeof check;
         for (int i = 0; i < statement->result_count; i++)
             if (statement->results[i] == column &&
                 check != column_check(column, (const char *)item + column->offset)) {
-                damage_describe(statement, column, damage);
+                damage_describe(statement, column, "differs from its checksum", damage);
                 return true;
             }
     }
@@ -503,6 +506,24 @@ static Status row_read(Statement *statement, const SqlColumn *columns, void *ite
     return status;
 }
 
+// Of the present row of a CheckedTable, whose first column is its number.
+static Status row_store_checks(Statement *statement, const CheckedTable *table, const void *item,
+                               Problem *problem) {
+    sqlite3 *connection = sqlite3_db_handle(statement->handle);
+    sqlite3_stmt *update = NULL;
+    char sql[96];
+    snprintf(sql, sizeof sql, "UPDATE %s SET checks = ? WHERE number = ?", table->name);
+    const bool is_stored =
+        sqlite3_prepare_v2(connection, sql, -1, &update, NULL) == SQLITE_OK &&
+        bind_checks(update, 1, table->columns, item) == SQLITE_OK &&
+        sqlite3_bind_int64(update, 2, sqlite3_column_int64(statement->handle, 0)) == SQLITE_OK &&
+        sqlite3_step(update) == SQLITE_DONE;
+    const Status status =
+        is_stored ? STATUS_OK : report(connection, "writing to the database", problem);
+    sqlite3_finalize(update);
+    return status;
+}
+
 Status sqlite_check_table(Sqlite *database, const CheckedTable *table, TableCheck *check,
                           Problem *problem) {
     Statement *statement;
@@ -518,7 +539,9 @@ Status sqlite_check_table(Sqlite *database, const CheckedTable *table, TableChec
     }
     while ((status = statement_step(statement, &has_row, problem)) == STATUS_OK && has_row) {
         status = row_read_members(statement, item, problem);
-        if (status == STATUS_OK && row_is_damaged(statement, table->columns, item, damage)) {
+        if (status == STATUS_OK && check->stores) {
+            status = row_store_checks(statement, table, item, problem);
+        } else if (status == STATUS_OK && row_is_damaged(statement, table->columns, item, damage)) {
             check->damaged++;
             if (check->report != NULL)
                 check->report(check->context, damage);
@@ -718,11 +741,25 @@ void sqlite_close(Sqlite *database) {
     free(database);
 }
 
+// Gives the rows that a new database begins with their checks.
+static Status store_checks(Sqlite *database, const CheckedTable *const *tables, Problem *problem) {
+    TableCheck check = {.stores = true};
+    Status status = STATUS_OK;
+    // Triggers refuse every change of these rows.
+    (void)sqlite3_db_config(database->connection, SQLITE_DBCONFIG_ENABLE_TRIGGER, 0, NULL);
+    for (; status == STATUS_OK && tables != NULL && *tables != NULL; tables++)
+        status = sqlite_check_table(database, *tables, &check, problem);
+    (void)sqlite3_db_config(database->connection, SQLITE_DBCONFIG_ENABLE_TRIGGER, 1, NULL);
+    return status;
+}
+
 static Status migrate_step(Sqlite *database, const EmbeddedFile *file, int64_t version,
-                           Problem *problem) {
+                           const CheckedTable *const *tables, Problem *problem) {
     char footer[96];
     TRY(sqlite_execute(database, "BEGIN IMMEDIATE", problem));
     Status status = sqlite_execute(database, file->bytes, problem);
+    if (status == STATUS_OK && version == 1)
+        status = store_checks(database, tables, problem);
     sqlite3_snprintf(sizeof footer, footer,
                      "PRAGMA application_id = %d; PRAGMA user_version = %lld; COMMIT", APPLICATION,
                      (long long)version);
@@ -764,11 +801,12 @@ Status sqlite_is_current(Sqlite *database, const EmbeddedFile *files, bool *is_c
     return STATUS_OK;
 }
 
-Status sqlite_migrate(Sqlite *database, const EmbeddedFile *files, Problem *problem) {
+Status sqlite_migrate(Sqlite *database, const EmbeddedFile *files,
+                      const CheckedTable *const *tables, Problem *problem) {
     int64_t version = 0, last = 0;
     TRY(read_version(database, files, &version, &last, problem));
     for (; version < last; version++)
-        TRY(migrate_step(database, &files[version], version + 1, problem));
+        TRY(migrate_step(database, &files[version], version + 1, tables, problem));
     return STATUS_OK;
 }
 

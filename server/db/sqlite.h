@@ -34,7 +34,8 @@ enum {
     COLUMN_LONG = 1,    // not part of {head}
     COLUMN_MUTABLE = 2, // part of {set}
     // Its CRC-32 is stored in the row's column `checks` and compared whenever both are read. Where
-    // they differ the row cannot be read, unless it has a member `is_damaged`, which is set then.
+    // they differ, or there is none, the row cannot be read, unless it has a member `is_damaged`,
+    // which is set then.
     COLUMN_CHECKED = 4,
     COLUMN_ID = 8,    // names the row in reports of damage
     COLUMN_KEPT = 16, // {set} leaves it as it is where the member is NULL
@@ -79,10 +80,24 @@ typedef enum SqliteMode {
 Status sqlite_open(const char *path, SqliteMode mode, Sqlite **database, Problem *problem);
 void sqlite_close(Sqlite *database);
 
+// A table whose rows have checksums.
+typedef struct CheckedTable {
+    const char *name, *sql; // "SELECT {checked} FROM name"
+    const SqlColumn *columns;
+    size_t size; // of the struct
+} CheckedTable;
+#define CHECKED_TABLE(name_, columns_, Type)                                                       \
+    {                                                                                              \
+        .name = name_, .sql = "SELECT {checked} FROM " name_, .columns = columns_,                 \
+        .size = sizeof(Type)                                                                       \
+    }
+
 // Brings the schema to the last of `files`, each a transaction of its own; the schema's version is
 // the number of files applied. STATUS_CONFLICT for any other version and for a file that is not
-// impactd's.
-Status sqlite_migrate(Sqlite *database, const EmbeddedFile *files, Problem *problem);
+// impactd's. The rows that the first file inserts into `tables`, which end with NULL, get their
+// checksums; `tables` may be NULL.
+Status sqlite_migrate(Sqlite *database, const EmbeddedFile *files,
+                      const CheckedTable *const *tables, Problem *problem);
 // Whether the schema is at the last of `files` already. STATUS_CONFLICT as above.
 Status sqlite_is_current(Sqlite *database, const EmbeddedFile *files, bool *is_current,
                          Problem *problem);
@@ -122,23 +137,12 @@ Status sqlite_first(Sqlite *database, const char *sql, const SqlColumn *keys, co
 Status sqlite_list(Sqlite *database, const char *sql, const SqlColumn *keys, const void *item,
                    const SqlColumn *columns, size_t size, void *list, Problem *problem);
 
-// A table whose rows have checksums.
-typedef struct CheckedTable {
-    const char *name, *sql; // "SELECT {checked} FROM name"
-    const SqlColumn *columns;
-    size_t size; // of the struct
-} CheckedTable;
-#define CHECKED_TABLE(name_, columns_, Type)                                                       \
-    {                                                                                              \
-        .name = name_, .sql = "SELECT {checked} FROM " name_, .columns = columns_,                 \
-        .size = sizeof(Type)                                                                       \
-    }
-
 // What was found in a table; `report` gets a sentence for each damaged row. NULL: the first one is
 // STATUS_INTERNAL, as where it is read.
 typedef struct TableCheck {
     const SqlColumn *keys; // of the parameters; NULL: there are none
     const void *key;
+    bool stores; // the checksums are computed and stored, not compared
     uint64_t rows, damaged;
     void (*report)(void *context, const char *damage);
     void *context;

@@ -252,7 +252,8 @@ void db_enqueue(Db *db, DbApply *apply, const void *work, WritePriority priority
 
 // Opening and reading.
 
-static Status db_open_files(Db *db, const char *directory, bool is_beside, Problem *problem) {
+static Status db_open_files(Db *db, const char *directory, bool is_beside,
+                            const CheckedTable *const *tables, Problem *problem) {
     char path[PATH_MAX];
     bool is_current = false;
     if (!is_beside)
@@ -266,7 +267,7 @@ static Status db_open_files(Db *db, const char *directory, bool is_beside, Probl
     if (is_beside && !is_current)
         TRY(data_dir_lock(directory, &db->lock_file, problem));
     if (!is_current) {
-        TRY(sqlite_migrate(db->own, embedded_sql, problem));
+        TRY(sqlite_migrate(db->own, embedded_sql, tables, problem));
         TRY(data_dir_sync(directory, problem));
     }
     while (db->free_count < READERS) {
@@ -276,13 +277,14 @@ static Status db_open_files(Db *db, const char *directory, bool is_beside, Probl
     return STATUS_OK;
 }
 
-static Status db_open_memory(Db *db, Problem *problem) {
+static Status db_open_memory(Db *db, const CheckedTable *const *tables, Problem *problem) {
     TRY(sqlite_open(NULL, DATABASE_WRITER, &db->readers[0], problem));
     db->free_count = 1;
-    return sqlite_migrate(db->readers[0], embedded_sql, problem);
+    return sqlite_migrate(db->readers[0], embedded_sql, tables, problem);
 }
 
-static Status db_open_at(const char *directory, bool is_beside, Db **db, Problem *problem) {
+Status db_open_with(const char *directory, bool is_beside, const CheckedTable *const *tables,
+                    Db **db, Problem *problem) {
     *db = NULL;
     Db *made = calloc(1, sizeof *made);
     if (made == NULL)
@@ -298,8 +300,8 @@ static Status db_open_at(const char *directory, bool is_beside, Db **db, Problem
     made->caches[CACHE_MATERIALS] = shared_cache_new(MATERIALS_BYTES);
     Status status = made->caches[CACHE_RECORDS] == NULL || made->caches[CACHE_MATERIALS] == NULL
                         ? problem_set(problem, STATUS_NO_MEMORY, "no memory for the database")
-                    : directory != NULL ? db_open_files(made, directory, is_beside, problem)
-                                        : db_open_memory(made, problem);
+                    : directory != NULL ? db_open_files(made, directory, is_beside, tables, problem)
+                                        : db_open_memory(made, tables, problem);
     if (status == STATUS_OK)
         made->is_writing = pthread_create(&made->writer, NULL, writer_main, made) == 0;
     if (status == STATUS_OK && !made->is_writing)
@@ -311,14 +313,6 @@ static Status db_open_at(const char *directory, bool is_beside, Db **db, Problem
     }
     *db = made;
     return STATUS_OK;
-}
-
-Status db_open(const char *directory, Db **db, Problem *problem) {
-    return db_open_at(directory, false, db, problem);
-}
-
-Status db_open_beside(const char *directory, Db **db, Problem *problem) {
-    return db_open_at(directory, true, db, problem);
 }
 
 void db_close(Db *db) {

@@ -12,6 +12,7 @@ import sys
 import threading
 import time
 import xml.etree.ElementTree as xml
+import zlib
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import access  # noqa: E402
@@ -268,11 +269,13 @@ def test_more_than_can_be_taken_is_told():
 def test_what_is_kept_is_shown_whatever_it_comes_to():
     """A kept trace that cannot be evaluated: 200 with the test, evaluation null, why among the warnings, and no ETag; lists have it."""
     test = {"notes": "kept before", "drops": [{"contact_time": 0.01}] * 3, "traces": [{"interval": 1e-4, "force": [1, 2]}]}
+    one = (1).to_bytes(8, sys.byteorder)
+    checks = b"".join(zlib.crc32(value).to_bytes(4, sys.byteorder) for value in (one, b"", b"c", one, json.dumps(test).encode()))
     with program.daemon() as daemon:
         with sqlite3.connect(os.path.join(daemon.data, "impactd.db")) as connection:
-            connection.execute("INSERT INTO material_measurements (material, measurement, comment, created_unix_ms, drops, traces, head, document) "
-                               "SELECT number, 1, 'c', 1, 3, 1, '{\"notes\": \"kept before\"}', ? FROM materials WHERE slug = 'sponge'",
-                               [json.dumps(test)])
+            connection.execute("INSERT INTO material_measurements (material, measurement, comment, created_unix_ms, drops, traces, head, document, checks) "
+                               "SELECT number, 1, 'c', 1, 3, 1, '{\"notes\": \"kept before\"}', ?, ? FROM materials WHERE slug = 'sponge'",
+                               [json.dumps(test), checks])
         connection.close()
         shown = daemon.get(f"{SPONGE}/measurements/1")
         assert shown.status == 200 and shown.json()["test"] == test and shown.json()["evaluation"] is None, shown

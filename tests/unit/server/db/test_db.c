@@ -159,12 +159,12 @@ static Sqlite *open_database(const char *name) {
 
 TEST_IN(a_database_is_migrated_from_each_step, make_folder, remove_folder) {
     Sqlite *database = open_database("m.db");
-    assert_int_equal(sqlite_migrate(database, one_step, NULL), STATUS_OK);
-    assert_int_equal(sqlite_migrate(database, one_step, NULL), STATUS_OK);
-    assert_int_not_equal(sqlite_migrate(database, broken_step, NULL), STATUS_OK);
+    assert_int_equal(sqlite_migrate(database, one_step, NULL, NULL), STATUS_OK);
+    assert_int_equal(sqlite_migrate(database, one_step, NULL, NULL), STATUS_OK);
+    assert_int_not_equal(sqlite_migrate(database, broken_step, NULL, NULL), STATUS_OK);
     assert_int_not_equal(sqlite_execute(database, "SELECT * FROM c", NULL), STATUS_OK);
     assert_false(sqlite_is_in_transaction(database));
-    assert_int_equal(sqlite_migrate(database, two_steps, NULL), STATUS_OK);
+    assert_int_equal(sqlite_migrate(database, two_steps, NULL, NULL), STATUS_OK);
     assert_int_equal(sqlite_execute(database, "SELECT y FROM a", NULL), STATUS_OK);
     sqlite_close(database);
 }
@@ -173,13 +173,13 @@ TEST_IN(a_newer_database_and_an_impossible_version_are_refused, make_folder, rem
     static Problem problem;
     problem_clear(&problem);
     Sqlite *database = open_database("impactd.db");
-    assert_int_equal(sqlite_migrate(database, two_steps, NULL), STATUS_OK);
-    assert_int_equal(sqlite_migrate(database, one_step, &problem), STATUS_CONFLICT);
+    assert_int_equal(sqlite_migrate(database, two_steps, NULL, NULL), STATUS_OK);
+    assert_int_equal(sqlite_migrate(database, one_step, NULL, &problem), STATUS_CONFLICT);
     assert_non_null(strstr(problem.detail, "newer"));
     assert_non_null(strstr(problem.detail, folder));
     assert_int_equal(sqlite_execute(database, "PRAGMA user_version = -1", NULL), STATUS_OK);
     problem_clear(&problem);
-    assert_int_equal(sqlite_migrate(database, two_steps, &problem), STATUS_CONFLICT);
+    assert_int_equal(sqlite_migrate(database, two_steps, NULL, &problem), STATUS_CONFLICT);
     assert_non_null(strstr(problem.detail, "damaged"));
     sqlite_close(database);
 }
