@@ -65,7 +65,7 @@ JobState room_state(const Room *room, const char *id, char result[72]) {
     assert_int_equal(jobs_find(room->manager, id, &job, NULL), STATUS_OK);
     assert_int_equal(job_view(job, &show), STATUS_OK);
     job_unref(job);
-    const JobState state = show.row.state;
+    const JobState state = (JobState)show.row.state;
     text_fit(result, 72, show.row.result);
     job_view_clear(&show);
     return state;
