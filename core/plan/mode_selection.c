@@ -30,6 +30,7 @@
 #include "core/math/matrix_exponential.h"
 
 enum { ROUNDINGS = 64 };
+static const double PROGRESS_STEPS = 4096; // between two looks at the progress
 static const double NEGLIGIBLE = ROUNDINGS * DBL_EPSILON;
 
 static const double PI = 3.14159265358979323846;
@@ -39,6 +40,8 @@ static const double RADIANS = 0.3;   // of the fastest motion in a step
 
 // All modes in motion. Arrays have a number for each mode.
 typedef struct ModalRun {
+    const Progress *progress;
+    bool is_stopped; // by it
     const Plan *plan;
     const Base *base;
     size_t n;
@@ -154,6 +157,10 @@ static void modal_run_all(ModalRun *run) {
     }
     double a = modal_run_base(base, 0, step);
     for (double i = 1; i <= ceil(duration / step * (1 - 1e-9)); i++) {
+        if (fmod(i, PROGRESS_STEPS) == 0 && !progress_advance(run->progress, 0)) {
+            run->is_stopped = true;
+            return;
+        }
         const double next = modal_run_base(base, i * step, step);
         modal_run_step(run, a, (next - a) / step);
         a = next;
@@ -293,9 +300,10 @@ static void truncation_conclude(const ModalRun *run, double *work, ImpactEffect 
     }
 }
 
-static Status truncation_run(const Plan *plan, const Base *base, TruncationError *errors) {
+static Status truncation_run(const Plan *plan, const Base *base, const Progress *progress,
+                             TruncationError *errors) {
     const size_t n = plan->modes.count, m = plan->storeys;
-    ModalRun run = {.plan = plan, .base = base, .n = n};
+    ModalRun run = {.plan = plan, .base = base, .n = n, .progress = progress};
     double **const rows[] = {&run.q,      &run.p,     &run.peak_q,    &run.peak_p,  &run.squares,
                              &run.speeds, &run.pulls, &run.absolutes, &run.products};
     double *block = calloc(n * (COUNT(rows) + 8) + 2 * m, sizeof *block);
@@ -310,20 +318,23 @@ static Status truncation_run(const Plan *plan, const Base *base, TruncationError
         truncation_couple(&run);
         truncation_conclude(&run, run.recurrence + 8 * n, impacts, errors);
     }
-    const Status status = block != NULL && impacts != NULL ? STATUS_OK : STATUS_NO_MEMORY;
+    const Status status = block == NULL || impacts == NULL ? STATUS_NO_MEMORY
+                          : run.is_stopped                 ? STATUS_CANCELLED
+                                                           : STATUS_OK;
     free(impacts);
     free(block);
     return status;
 }
 
-Status truncation_predict(const Plan *plan, const Scene *scene, TruncationError *errors) {
+Status truncation_predict(const Plan *plan, const Scene *scene, const Progress *progress,
+                          TruncationError *errors) {
     const Excitation *excitation = scene_excitation(scene);
     const Span span = {.duration = plan->duration, .sample_rate = plan->sample_rate};
     Base base = {0};
     if (plan->modes.count == 0)
         return STATUS_OK;
-    TRY(excitation_make(excitation, &span, NULL, &base, NULL));
-    const Status status = truncation_run(plan, &base, errors);
+    TRY(excitation_make(excitation, &span, progress, &base, NULL));
+    const Status status = truncation_run(plan, &base, progress, errors);
     base_clear(&base);
     return status;
 }
@@ -406,8 +417,8 @@ static Status mode_keep_moving(Plan *plan, const Scene *scene, size_t count, dou
 }
 
 static Status mode_keep_lowest(Plan *plan, const Scene *scene, size_t count,
-                               TruncationError *errors) {
-    TRY(truncation_predict(plan, scene, errors));
+                               const Progress *progress, TruncationError *errors) {
+    TRY(truncation_predict(plan, scene, progress, errors));
     const TruncationError *error = &errors[count - 1];
     plan->is_truncated = true;
     plan->given_up = error->displacement;
@@ -421,7 +432,8 @@ static Status mode_keep_lowest(Plan *plan, const Scene *scene, size_t count,
         error->displacement, error->mean_acceleration);
 }
 
-Status plan_keep(Plan *plan, const Scene *scene, size_t modes, Problem *problem) {
+Status plan_keep(Plan *plan, const Scene *scene, size_t modes, const Progress *progress,
+                 Problem *problem) {
     const size_t n = plan->storeys, count = modes == 0 || modes > n ? n : modes;
     if (plan->modes.count == 0)
         return STATUS_OK;
@@ -430,12 +442,14 @@ Status plan_keep(Plan *plan, const Scene *scene, size_t modes, Problem *problem)
     TruncationError *errors = calloc(n, sizeof *errors);
     Status status = STATUS_NO_MEMORY;
     if (seen != NULL && list != NULL && errors != NULL) {
-        status = count < n ? mode_keep_lowest(plan, scene, count, errors) : STATUS_OK;
+        status = count < n ? mode_keep_lowest(plan, scene, count, progress, errors) : STATUS_OK;
         if (status == STATUS_OK)
             status = mode_keep_moving(plan, scene, count, seen, seen + n, list);
     }
     free(seen);
     free(list);
     free(errors);
+    if (status == STATUS_CANCELLED)
+        return problem_set(problem, status, "cancelled before t = 0 s");
     return status == STATUS_OK ? status : problem_set(problem, status, "no memory for the modes");
 }

@@ -135,7 +135,9 @@ ContactParameters stops_freeze(const ContactStop *stop, double approach_speed);
 
 // Selects the modes of a plan of plan_new, once; `modes` is the number asked for, 0: all. Adds its
 // decisions and the predicted error to the plan. Does nothing where plan_is_single.
-Status plan_keep(Plan *plan, const Scene *scene, size_t modes, Problem *problem);
+// STATUS_CANCELLED where `progress`, which may be NULL, requests a stop.
+Status plan_keep(Plan *plan, const Scene *scene, size_t modes, const Progress *progress,
+                 Problem *problem);
 
 // Relative to the same run with all modes; at most 1. Exceeded in about 1 % of scenes without
 // dampers and 3 % of scenes with dampers.
@@ -148,7 +150,8 @@ typedef struct TruncationError {
 // Writes to errors[k] the error of a run with the k + 1 lowest modes, for all plan->modes.count of
 // them; it never rises with k and ends with 0. The plan has all modes of its structure (plan_new,
 // before plan_keep). Nothing is written where plan_is_single. Makes the base's motion.
-Status truncation_predict(const Plan *plan, const Scene *scene, TruncationError *errors);
+Status truncation_predict(const Plan *plan, const Scene *scene, const Progress *progress,
+                          TruncationError *errors);
 
 // The share of the lowest `kept` modes in the mass that the base moves, r' M r; 1 where it moves
 // none.

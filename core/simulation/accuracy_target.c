@@ -114,7 +114,8 @@ static double target_strike_error(const AccuracyTarget *target) {
 }
 
 // Cleared by target_clear, also after a failure.
-static Status target_make(AccuracyTarget *target, const Simulation *simulation, Problem *problem) {
+static Status target_make(AccuracyTarget *target, const Simulation *simulation,
+                          const Progress *progress, Problem *problem) {
     const Scene *scene = &simulation->scene;
     *target = (AccuracyTarget){.simulation = simulation,
                                .asked = (const AccuracyAuto *)(const void *)simulation->accuracy};
@@ -131,7 +132,7 @@ static Status target_make(AccuracyTarget *target, const Simulation *simulation, 
     target->left_out = calloc(target->plan->modes.count, sizeof *target->left_out);
     return target->left_out == NULL
                ? problem_set(problem, STATUS_NO_MEMORY, "no memory for the modes")
-               : truncation_predict(target->plan, scene, target->left_out);
+               : truncation_predict(target->plan, scene, progress, target->left_out);
 }
 
 static void target_clear(AccuracyTarget *target) {
@@ -334,7 +335,7 @@ static Status target_report(const AccuracyTarget *target, const Candidate *candi
 Status accuracy_target_plan(const Simulation *simulation, PlanReport *report, Problem *problem) {
     AccuracyTarget target;
     Simulation applied = {0};
-    Status status = target_make(&target, simulation, problem);
+    Status status = target_make(&target, simulation, NULL, problem);
     if (status == STATUS_OK) {
         const Candidate candidate = target_choose(&target, target.asked->target);
         status = candidate_apply(simulation, &candidate, &applied, problem);
@@ -354,7 +355,7 @@ Status accuracy_target_plan(const Simulation *simulation, PlanReport *report, Pr
 Cost accuracy_target_cost(const Simulation *simulation) {
     AccuracyTarget target;
     Cost cost = {0};
-    if (target_make(&target, simulation, NULL) == STATUS_OK) {
+    if (target_make(&target, simulation, NULL, NULL) == STATUS_OK) {
         const Candidate candidate = target_choose(&target, target.asked->target);
         cost = candidate_cost(simulation, &candidate);
     }
@@ -482,7 +483,7 @@ Status accuracy_target_run(const Simulation *simulation, const SimulationLimits 
                            Outcome **outcome, Problem *problem) {
     TargetSearch search = {.limits = limits, .progress = progress, .workspace = workspace};
     Candidate candidate = {0};
-    Status status = target_make(&search.target, simulation, problem);
+    Status status = target_make(&search.target, simulation, progress, problem);
     if (status == STATUS_OK) {
         candidate = target_choose(&search.target, search.target.asked->target);
         status = search_run(&search, &candidate, problem);

@@ -126,12 +126,13 @@ static Status omissions_add(const Simulation *simulation, Plan *plan, const Regi
                : STATUS_OK;
 }
 
-static Status run_make_plan(const Simulation *simulation, Plan **plan, Problem *problem) {
+static Status run_make_plan(const Simulation *simulation, const Progress *progress, Plan **plan,
+                            Problem *problem) {
     const Solver *solver = simulation_solver(simulation);
     TRY(plan_new(&simulation->scene, simulation->accuracy->kind->name, solver->kind.name, plan,
                  problem));
     Status status = plan_keep(*plan, &simulation->scene,
-                              simulation_modes(simulation, (*plan)->storeys), problem);
+                              simulation_modes(simulation, (*plan)->storeys), progress, problem);
     if (status == STATUS_OK && solver->decide != NULL)
         status = solver->decide(solver, simulation_settings(simulation),
                                 simulation_base_interval(simulation), *plan, problem);
@@ -167,7 +168,7 @@ Status plan_scene(const Simulation *simulation, PlanReport *report, Problem *pro
     Plan *plan;
     Base base = {0};
     Regime regime = {0};
-    TRY(run_make_plan(simulation, &plan, problem));
+    TRY(run_make_plan(simulation, NULL, &plan, problem));
     // A base in closed form costs nothing to make.
     const bool has_base = excitation_kind(scene_excitation(&simulation->scene))->interval == NULL;
     Status status = has_base ? run_make_base(simulation, 0, NULL, NULL, &base, problem) : STATUS_OK;
@@ -359,7 +360,7 @@ static Status run_all(RunContext *context, Workspace *workspace, Problem *proble
     const Simulation *simulation = context->simulation;
     const Output *output = &simulation->output;
     Outcome *outcome = context->outcome;
-    TRY(run_make_plan(simulation, &context->plan, problem));
+    TRY(run_make_plan(simulation, context->progress, &context->plan, problem));
     const Progress progress = progress_range_view(&(ProgressRange){context->progress, 0, 0.2, 0});
     if (!context->has_base)
         TRY(run_make_base(simulation, context->limits == NULL ? 0 : context->limits->samples,

@@ -40,11 +40,10 @@ def fetch():
 
 parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
 parser.add_argument("--build", default=BUILD, help="folder of the build to test")
-parser.add_argument("words", nargs="*")
-arguments, others = parser.parse_known_args()
+arguments, others = parser.parse_known_args()  # the others are run.mjs's: --slow, --seed, words of tests
 for program in ("node", "npm", "chromium-headless-shell"):
     if shutil.which(program) is None:
         ends(f"{program} is not here (tests/packages.txt)")
 fetch()
 sys.stdout.flush()
-os.execvp("node", ["node", os.path.join(HERE, "run.mjs"), "--build", arguments.build, *others, *arguments.words])
+os.execvp("node", ["node", os.path.join(HERE, "run.mjs"), "--build", arguments.build, *others])

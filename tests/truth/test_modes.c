@@ -253,7 +253,7 @@ static void judge(uint64_t number, bool has_dampers) {
     TruncationError errors[STOREYS];
     problem_clear(&problem);
     assert_int_equal(plan_new(scene, "exact", "exact", &plan, &problem), STATUS_OK);
-    assert_int_equal(truncation_predict(plan, scene, errors), STATUS_OK);
+    assert_int_equal(truncation_predict(plan, scene, NULL, errors), STATUS_OK);
     const bool is_classical = plan->modes.is_classical;
     plan_free(plan);
     Outcome *all = run(&drawn, drawn.storeys);

@@ -322,7 +322,7 @@ static size_t run_line(bool is_cut, double *values, size_t *impacts) {
     assert_int_equal(simulation_complete(&simulation, NULL, NULL, &problem), STATUS_OK);
     assert_int_equal(plan_new(&simulation.scene, "exact", "exact", &plan, &problem), STATUS_OK);
     if (is_cut)
-        assert_int_equal(plan_keep(plan, &simulation.scene, 0, &problem), STATUS_OK);
+        assert_int_equal(plan_keep(plan, &simulation.scene, 0, NULL, &problem), STATUS_OK);
     for (size_t i = 0; i < 4; i++)
         columns[i] = (RunColumn){i < 3 ? CHANNEL_ACCELERATION : CHANNEL_CONTACT_FORCE,
                                  i < 3 ? i : 0, values + i * SAMPLES};

@@ -42,7 +42,7 @@ TEST(the_lowest_modes_are_kept_as_they_were) {
     Simulation simulation;
     document_pass(&simulation, FOUR SINE);
     Plan *all = plan_of(&simulation), *some = plan_of(&simulation);
-    assert_int_equal(plan_keep(some, &simulation.scene, 2, &problem), STATUS_OK);
+    assert_int_equal(plan_keep(some, &simulation.scene, 2, NULL, &problem), STATUS_OK);
     assert_int_equal(some->modes.count, 2);
     assert_int_equal(some->storeys, 4);
     assert_true(some->is_truncated);
@@ -68,7 +68,7 @@ TEST(all_modes_asked_for_are_no_decision) {
     document_pass(&simulation, FOUR SINE);
     Plan *plan = plan_of(&simulation);
     const size_t before = plan->report.decisions.count;
-    assert_int_equal(plan_keep(plan, &simulation.scene, 4, &problem), STATUS_OK);
+    assert_int_equal(plan_keep(plan, &simulation.scene, 4, NULL, &problem), STATUS_OK);
     assert_int_equal(plan->modes.count, 4);
     assert_false(plan->is_truncated);
     assert_int_equal(plan->report.decisions.count, before);
@@ -80,7 +80,7 @@ static size_t left(const char *members, double *value) {
     Simulation simulation;
     document_pass(&simulation, members);
     Plan *plan = plan_of(&simulation);
-    assert_int_equal(plan_keep(plan, &simulation.scene, 0, &problem), STATUS_OK);
+    assert_int_equal(plan_keep(plan, &simulation.scene, 0, NULL, &problem), STATUS_OK);
     const size_t count = plan->modes.count;
     const Decision *decision = find(&plan->report, "unseen_modes");
     *value = decision == NULL ? 0 : decision->value;
@@ -154,7 +154,7 @@ TEST(a_predicted_error_falls_with_the_modes_kept_to_nothing) {
         snprintf(members, sizeof members, "%s%s", FOUR, excitations_of[i]);
         document_pass(&simulation, members);
         Plan *plan = plan_of(&simulation);
-        assert_int_equal(truncation_predict(plan, &simulation.scene, errors), STATUS_OK);
+        assert_int_equal(truncation_predict(plan, &simulation.scene, NULL, errors), STATUS_OK);
         for (size_t k = 0; k < 4; k++) {
             const double all[] = {errors[k].displacement, errors[k].mean_acceleration,
                                   errors[k].rms_displacement};
@@ -177,7 +177,7 @@ static TruncationError predicted(const char *members, size_t kept) {
     document_pass(&simulation, members);
     Plan *plan = plan_of(&simulation);
     assert_in_range(plan->storeys, kept, COUNT(errors));
-    assert_int_equal(truncation_predict(plan, &simulation.scene, errors), STATUS_OK);
+    assert_int_equal(truncation_predict(plan, &simulation.scene, NULL, errors), STATUS_OK);
     plan_free(plan);
     simulation_clear(&simulation);
     return errors[kept - 1];
