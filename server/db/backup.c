@@ -24,8 +24,6 @@ static const char *const own_names[] = {"impactd.db",
                                         "impactd.late",
                                         NULL};
 
-enum { DAMAGE_SIZE = 320 };
-
 static const double copy_share = 0.8; // of the time; the check takes the rest
 
 typedef struct Copying {
@@ -73,112 +71,6 @@ static Status check_target(const Copying *copying, Problem *problem) {
     return is_there && !copying->request->replaces ? refuse_taken(copying, problem) : STATUS_OK;
 }
 
-// *source is to be closed in any case.
-static Status open_source(const char *path, Sqlite **source, Problem *problem) {
-    static const char sql[] =
-        "SELECT count(*) AS jobs FROM sqlite_schema WHERE name IN ('jobs', 'results', 'materials')";
-    bool is_current;
-    Backup tables = {0};
-    TRY(sqlite_open(path, DATABASE_READER, source, problem));
-    TRY(sqlite_is_current(*source, embedded_sql, &is_current, problem));
-    TRY(sqlite_first(*source, sql, NULL, NULL, backup_columns, &tables, NULL, problem));
-    if (tables.jobs != 3)
-        return problem_set(problem, STATUS_NOT_FOUND,
-                           "%s holds nothing yet: no daemon has begun there", path);
-    return STATUS_OK;
-}
-
-// The tables that have checksums: their first rows get them when a database is made, all are
-// compared when it is checked.
-
-static const CheckedTable *const *checked_tables(void) {
-    // clang-format off
-    static const CheckedTable *const tables[] = {
-        &revisions_table, &reviews_table, &measurements_table, &audit_table, &records_table, &samples_table,
-        &results_table, &series_table, &sweep_rows_table, &chunks_table, &jobs_table, &tokens_table, NULL};
-    // clang-format on
-    (void)material_revision_columns(); // makes those of revisions_table
-    return tables;
-}
-
-Status db_open(const char *directory, Db **db, Problem *problem) {
-    return db_open_with(directory, false, checked_tables(), db, problem);
-}
-
-Status db_open_beside(const char *directory, Db **db, Problem *problem) {
-    return db_open_with(directory, true, checked_tables(), db, problem);
-}
-
-typedef struct Orphan {
-    char child[64], parent[64];
-    int64_t number;
-} Orphan;
-
-// Rows that refer to a row that is missing.
-static Status check_references(Sqlite *database, const DbCheck *check, uint64_t *damaged,
-                               Problem *problem) {
-    static const char sql[] =
-        "SELECT \"table\" AS child, parent, coalesce(rowid, 0) AS number FROM "
-        "pragma_foreign_key_check";
-    static const SqlColumn columns[] = {COLUMN(Orphan, child), COLUMN(Orphan, parent),
-                                        COLUMN(Orphan, number), COLUMN_END};
-    struct {
-        Orphan *at;
-        size_t count;
-    } orphans;
-    TRY(sqlite_list(database, sql, NULL, NULL, columns, sizeof *orphans.at, &orphans, problem));
-    for (size_t i = 0; i < orphans.count; i++) {
-        const Orphan *orphan = &orphans.at[i];
-        char text[256];
-        snprintf(text, sizeof text, "a row of table %s (number %lld) refers to a missing row of %s",
-                 orphan->child, (long long)orphan->number, orphan->parent);
-        check->report_damage(check->context, text);
-    }
-    *damaged += orphans.count;
-    free(orphans.at);
-    return STATUS_OK;
-}
-
-// SQLite's own check of the file, then references, then the checksums of all rows. STATUS_IO: there
-// is damage.
-static Status check_database(Sqlite *database, const DbCheck *check, Problem *problem) {
-    uint64_t damaged = 0;
-    TRY(sqlite_check(database, problem));
-    TRY(check_references(database, check, &damaged, problem));
-    for (const CheckedTable *const *tables = checked_tables(); *tables != NULL; tables++) {
-        TableCheck table = {.report = check->report_damage, .context = check->context};
-        TRY(sqlite_check_table(database, *tables, &table, problem));
-        if (check->report_table != NULL)
-            check->report_table(check->context, (*tables)->name, table.rows, table.damaged);
-        damaged += table.damaged;
-    }
-    return damaged == 0 ? STATUS_OK
-                        : problem_set(problem, STATUS_IO, "the database has %llu damaged rows",
-                                      (unsigned long long)damaged);
-}
-
-static Status check_exists(const char *path, const char *directory, Problem *problem) {
-    return access(path, F_OK) == 0 || errno == EACCES
-               ? STATUS_OK
-               : problem_set(problem, STATUS_NOT_FOUND,
-                             "there is no database in %s; --data DIR names the daemon's folder",
-                             directory);
-}
-
-Status db_check(const char *directory, const DbCheck *check, Problem *problem) {
-    char path[PATH_MAX];
-    Sqlite *database = NULL;
-    snprintf(path, sizeof path, "%.4000s/impactd.db", directory);
-    TRY(check_exists(path, directory, problem));
-    Status status = open_source(path, &database, problem);
-    if (status == STATUS_OK)
-        status = check_database(database, check, problem);
-    sqlite_close(database);
-    return status;
-}
-
-// Copies.
-
 static Status open_part(Copying *copying, Problem *problem) {
     const int size =
         snprintf(copying->part, sizeof copying->part, "%.4080s.XXXXXX", copying->target);
@@ -205,7 +97,7 @@ static Status check_copy(Copying *copying, Problem *problem) {
     char damage[DAMAGE_SIZE] = "";
     const DbCheck check = {.report_damage = copy_keep_damage, .context = damage};
     Problem found = {0};
-    const Status status = check_database(copying->copy, &check, &found);
+    const Status status = check_run(copying->copy, &check, &found);
     if (status != STATUS_OK)
         return problem_set(problem, status,
                            "%s: %s%s%s; nothing was copied, keep the other backups",
@@ -219,7 +111,7 @@ static Status fill_part(Copying *copying, Problem *problem) {
     ProgressRange reading = {copying->request->watch, 0, copy_share, 0};
     ProgressRange checking = {copying->request->watch, copy_share, 1 - copy_share, 0};
     const Progress watches[] = {progress_range_view(&reading), progress_range_view(&checking)};
-    Status status = open_source(copying->source, &source, problem);
+    Status status = check_open(copying->source, &source, problem);
     if (status == STATUS_OK)
         status = open_part(copying, problem);
     if (status == STATUS_OK)

@@ -17,6 +17,13 @@ void data_dir_unlock(int lock); // below 0: nothing
 // Makes new names in `directory` durable.
 Status data_dir_sync(const char *directory, Problem *problem);
 
+// check.c: SQLite's own check of the file, then references, then the checksums of all rows.
+// STATUS_IO: there is damage.
+Status check_run(Sqlite *database, const DbCheck *check, Problem *problem);
+// Opens a database that a daemon has begun, to be closed in any case.
+Status check_open(const char *path, Sqlite **source, Problem *problem);
+// STATUS_NOT_FOUND where there is no database at `path`, in the daemon's folder.
+Status check_exists(const char *path, const char *directory, Problem *problem);
 // db_open and db_open_beside; `tables` is for sqlite_migrate.
 Status db_open_with(const char *directory, bool is_beside, const CheckedTable *const *tables,
                     Db **db, Problem *problem);

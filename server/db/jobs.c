@@ -330,18 +330,10 @@ static Status job_row_mark(JobRow *row) {
         "{\"type\": \"/problems/internal\", \"title\": \"Internal error\", \"status\": 500, "
         "\"detail\": \"this job is damaged: its row in the table jobs differs from its checksums; "
         "impactd check-db lists what is damaged, impactd restore puts a backup in its place\"}";
-    const JobRow damaged = *row;
-    *row = (JobRow){.state = 3, .is_damaged = true, .created_unix_ms = damaged.created_unix_ms};
-    text_fit(row->id, sizeof row->id, damaged.id);
-    job_row_clear(&(JobRow){.title = damaged.title,
-                            .labels = damaged.labels,
-                            .study = damaged.study,
-                            .problem = damaged.problem,
-                            .warnings = damaged.warnings,
-                            .client = damaged.client,
-                            .words = damaged.words,
-                            .scene = damaged.scene,
-                            .request = damaged.request});
+    JobRow mark = {.state = 3, .is_damaged = true, .created_unix_ms = row->created_unix_ms};
+    text_fit(mark.id, sizeof mark.id, row->id);
+    job_row_clear(row);
+    *row = mark;
     return text_copy(problem, &row->problem);
 }
 

@@ -417,8 +417,6 @@ static void free_owned(const SqlColumn *column, void *item) {
     }
 }
 
-enum { DAMAGE_SIZE = 320 };
-
 // a stored "labels" of table jobs (id j-...) differs from its checksum
 static void damage_describe(Statement *statement, const SqlColumn *column, const char *fault,
                             char damage[DAMAGE_SIZE]) {

@@ -137,6 +137,7 @@ Status sqlite_first(Sqlite *database, const char *sql, const SqlColumn *keys, co
 Status sqlite_list(Sqlite *database, const char *sql, const SqlColumn *keys, const void *item,
                    const SqlColumn *columns, size_t size, void *list, Problem *problem);
 
+enum { DAMAGE_SIZE = 320 }; // of a sentence about a damaged row
 // What was found in a table; `report` gets a sentence for each damaged row. NULL: the first one is
 // STATUS_INTERNAL, as where it is read.
 typedef struct TableCheck {
