@@ -152,7 +152,7 @@ struct Field {
     size_t max;
     const KindTable *kinds; // VARIANT
     const char
-        *shorthand; // ITEM: a JSON string instead of the object sets this TEXT row; NULL: none
+        *shorthand; // ITEM, LIST: a JSON string instead of an object sets this TEXT or CHOICE row
     int flags;
     const char *doc;
 };
@@ -222,6 +222,9 @@ struct Field {
 #define FIELD_LIST(Type, member, rows_, max_, presence_, doc_) \
     {.name = #member, .kind = FIELD_KIND_LIST, .offset = FIELD_LIST_AT(Type, member), .fields = rows_, \
      .size = sizeof(*((Type *)0)->member.at), .max = max_, .presence = presence_, .doc = doc_}
+#define FIELD_LIST_OR_NAMES(Type, member, rows_, shorthand_, max_, presence_, doc_) \
+    {.name = #member, .kind = FIELD_KIND_LIST, .offset = FIELD_LIST_AT(Type, member), .fields = rows_, \
+     .size = sizeof(*((Type *)0)->member.at), .max = max_, .shorthand = shorthand_, .presence = presence_, .doc = doc_}
 #define FIELD_VARIANT(Type, member, kinds_, presence_, doc_) \
     {.name = #member, .kind = FIELD_KIND_VARIANT, .offset = FIELD_AT(Type, member, Variant *), \
      .kinds = kinds_, .presence = presence_, .doc = doc_}

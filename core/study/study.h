@@ -126,12 +126,17 @@ typedef struct StudyPart {
 
 #define STUDY_BEGUN 0.1 // progress of the study when its first member is made
 
+struct StudyReferences; // axis.h
+
 struct StudyKind {
     Kind kind;
-    const Kind *answer;  // of the same name; its value struct begins with a Variant
-    const char *shorten; // what makes it shorter: "ask for fewer runs"
-    bool is_measured;    // its answer holds CPU times, which differ in another run
-    double max_runs;     // its cost may be that of so many runs at their limit; 0: ten
+    const Kind *answer;   // of the same name; its value struct begins with a Variant
+    const char *shorten;  // what makes it shorter: "ask for fewer runs"
+    bool is_measured;     // its answer holds CPU times, which differ in another run
+    const char *document; // of a result: /v1/results/{id}/DOCUMENT; NULL: the kind's name
+    // Where a request names materials and records, as it was read; NULL: nowhere.
+    void (*references)(void *study, struct StudyReferences *references);
+    double max_runs; // its cost may be that of so many runs at their limit; 0: ten
     // Validates what rows cannot express and completes defaults, below "/study", for a completed
     // scene.
     Status (*complete)(void *study, const Simulation *simulation, const SimulationLimits *limits,

@@ -28,7 +28,6 @@ enum {
     RANGE_SAMPLES = 512,
 };
 
-static const char *const sweep_spacing_names[] = {"linear", "logarithmic", NULL};
 const char *const sweep_mode_names[] = {"grid", "list", NULL};
 const char *const sweep_status_names[] = {"made",   "invalid", "unstable", "limit",
                                           "failed", "pending", NULL};
@@ -43,40 +42,23 @@ const char *sweep_metric_unit(const char *name) {
 }
 
 // clang-format off
-static const Field sweep_axis_fields[] = {
-    FIELD_TEXT(SweepAxis, pointer, 200, PRESENCE_REQUIRED, 0, "JSON Pointer to the member that varies, such as /dampers/0/clearance; values of a buffer are names of materials, of /excitation/name names of records, of a kind's name (/contact/model) kinds"),
-    FIELD_TEXTS(SweepAxis, values, NULL, NULL, SWEEP_AXIS_VALUES, PRESENCE_OPTIONAL, FIELD_SCALARS, "its values in this order; or give a range"),
-    FIELD_REAL(SweepAxis, from, NULL, ANY, OPTIONAL, "first value of a range"),
-    FIELD_REAL(SweepAxis, to, NULL, ANY, OPTIONAL, "last number of a range"),
-    FIELD_COUNT(SweepAxis, count, NULL, WITHIN(2, SWEEP_AXIS_VALUES), OPTIONAL, "number of values, both ends included"),
-    FIELD_CHOICE(SweepAxis, spacing, sweep_spacing_names, OPTIONAL, "spacing of a range: equal differences or equal ratios; linear if absent"),
-    FIELD_END
-};
-
-static const Field pinned_record_fields[] = {
-    FIELD_TEXT(PinnedRecord, name, RECORD_NAME_SIZE - 1, PRESENCE_REQUIRED, 0, "of an uploaded record"),
-    FIELD_TEXT(PinnedRecord, digest, RECORD_DIGEST_SIZE - 1, PRESENCE_OPTIONAL, 0, "SHA-256 of its interval and samples"),
-    FIELD_REFCOUNT(PinnedRecord, named),
-    FIELD_END
-};
-
 static const Field sweep_study_fields[] = {
-    FIELD_LIST(SweepStudy, axes, sweep_axis_fields, SWEEP_AXES, PRESENCE_REQUIRED, "members that vary; they are set in this order, and in a grid the last axis varies fastest"),
+    FIELD_LIST(SweepStudy, axes, study_axis_fields, STUDY_AXES, PRESENCE_REQUIRED, "members that vary; they are set in this order, and in a grid the last axis varies fastest"),
     FIELD_CHOICE(SweepStudy, mode, sweep_mode_names, SWEEP_GRID, "grid: every combination of the axes' values; list: their first values together, then their second, and so on"),
     FIELD_TEXTS(SweepStudy, metrics, sweep_metric_names, sweep_default_metrics, SWEEP_METRICS, PRESENCE_DEFAULT, 0, "metrics kept of each point: numbers of the summary, and steps, the solver's"),
-    FIELD_LIST(SweepStudy, materials, buffer_fields, 0, PRESENCE_OPTIONAL, "numbers of the materials that the scene and the axes name, at submission; filled in if absent"),
-    FIELD_LIST(SweepStudy, records, pinned_record_fields, 0, PRESENCE_OPTIONAL, "ground motions that the axes name, at submission; filled in if absent"),
+    FIELD_BASE(SweepStudy, names, study_names_fields),
     FIELD_END
 };
 
-static const Field sweep_axis_values_fields[] = {
+const Field sweep_axis_values_fields[] = {
     FIELD_TEXT(SweepAxisValues, pointer, 0, PRESENCE_OPTIONAL, 0, "JSON Pointer to the member that varies"),
+    FIELD_TEXTS(SweepAxisValues, pointers, NULL, NULL, 0, PRESENCE_OPTIONAL, 0, "all of them, where several are tied"),
     FIELD_TEXT(SweepAxisValues, unit, 0, PRESENCE_OPTIONAL, 0, "of its numbers"),
     FIELD_TEXTS(SweepAxisValues, values, NULL, NULL, 0, PRESENCE_OPTIONAL, FIELD_SCALARS, "all its values"),
     FIELD_END
 };
 
-static const Field sweep_failure_fields[] = {
+const Field sweep_failure_fields[] = {
     FIELD_CHOICE(StudyFailure, status, sweep_status_names, OPTIONAL, "reason"),
     FIELD_COUNT(StudyFailure, count, NULL, AT_MIN(1), 0, "points that failed for this reason"),
     {.name = "first_point", .kind = FIELD_KIND_COUNT, .offset = FIELD_AT(StudyFailure, first, uint64_t), .range = AT_MIN(0), .presence = PRESENCE_OPTIONAL, .doc = "the first of them"},
@@ -103,19 +85,11 @@ static const Field sweep_answer_fields[] = {
 };
 // clang-format on
 
-static bool sweep_axis_is_range(const SweepAxis *axis) {
-    return axis->values.count == 0;
-}
-
-static size_t sweep_axis_length(const SweepAxis *axis) {
-    return sweep_axis_is_range(axis) ? (size_t)axis->count : axis->values.count;
-}
-
 // SIZE_MAX on overflow.
 static size_t sweep_points(const SweepStudy *study) {
     size_t points = study->axes.count > 0;
     for (size_t i = 0; i < study->axes.count; i++) {
-        const size_t length = sweep_axis_length(&study->axes.at[i]);
+        const size_t length = study_axis_length(&study->axes.at[i]);
         if (study->mode == SWEEP_LIST && i > 0)
             continue; // all are as long as the first
         if (length > 0 && points > SIZE_MAX / length)
@@ -123,37 +97,6 @@ static size_t sweep_points(const SweepStudy *study) {
         points *= length;
     }
     return points;
-}
-
-// Equal differences are not scaled: whole numbers stay whole.
-static double sweep_axis_value(const SweepAxis *axis, size_t index) {
-    const double last = (double)(axis->count - 1);
-    if (index == 0)
-        return axis->from;
-    if (index + 1 == axis->count)
-        return axis->to;
-    return axis->spacing == SWEEP_LOGARITHMIC
-               ? axis->from * pow(axis->to / axis->from, (double)index / last)
-               : axis->from + (axis->to - axis->from) / last * (double)index;
-}
-
-// Sets the member that an axis varies to one of its values.
-static Status sweep_axis_set(const SweepAxis *axis, size_t index, Simulation *target,
-                             char why[JSON_POINTER_MESSAGE_MAX]) {
-    if (sweep_axis_is_range(axis)) {
-        const JsonScalar number = json_scalar_number(sweep_axis_value(axis, index));
-        return json_pointer_set(simulation_fields, target, axis->pointer, &number, why);
-    }
-    const char *json = axis->values.at[index];
-    char *text = malloc(strlen(json) + 1);
-    JsonScalar value;
-    TRY(status_made(text != NULL));
-    const Status status =
-        json_scalar_read(json, &value, text)
-            ? json_pointer_set(simulation_fields, target, axis->pointer, &value, why)
-            : STATUS_INTERNAL;
-    free(text);
-    return status;
 }
 
 void sweep_grid_free(SweepGrid *grid) {
@@ -166,105 +109,20 @@ static size_t sweep_grid_index(const SweepGrid *grid, size_t axis, size_t point)
     return point / values->stride % values->count;
 }
 
-// A pointer to one side's buffer splits the buffer that both sides share.
-static Status sweep_grid_split_buffer(const char *pointer, Simulation *target) {
-    static const char before[] = "/dampers/";
-    if (strncmp(pointer, before, sizeof before - 1) != 0)
-        return STATUS_OK;
-    char *end;
-    const size_t number = strtoul(pointer + sizeof before - 1, &end, 10);
-    const bool is_left = strncmp(end, "/left_buffer", 12) == 0;
-    if ((!is_left && strncmp(end, "/right_buffer", 13) != 0) ||
-        number >= target->scene.dampers.count)
-        return STATUS_OK;
-    Damper *damper = &target->scene.dampers.at[number];
-    if (!buffer_is_given(&damper->buffer))
-        return STATUS_OK;
-    fields_clear(buffer_fields, &damper->left_buffer);
-    fields_clear(buffer_fields, &damper->right_buffer);
-    TRY(fields_copy(buffer_fields, &damper->buffer, &damper->left_buffer));
-    buffer_move(&damper->right_buffer, &damper->buffer);
-    return STATUS_OK;
-}
-
-// Fills the numbers of a material: those that an axis set have removed its name, but a completed
-// scene has dropped numbers that its contact model does not use, and a point's model may use them.
-static Status sweep_grid_fill_material(const Buffer *pinned, Buffer *buffer) {
-    if (isnan(buffer->restitution))
-        buffer->restitution = pinned->restitution;
-    if (isnan(buffer->contact_time))
-        buffer->contact_time = pinned->contact_time;
-    buffer->test = pinned->test;
-    if (pinned->table.count == 0)
-        return STATUS_OK;
-    ContactRow *rows = calloc(pinned->table.count, sizeof *rows);
-    TRY(status_made(rows != NULL));
-    memcpy(rows, pinned->table.at, pinned->table.count * sizeof *rows);
-    free(buffer->table.at);
-    buffer->table = (ContactRows){rows, pinned->table.count};
-    return STATUS_OK;
-}
-
-// Resolves materials to the numbers that the study holds.
-static Status sweep_grid_fill_materials(const Buffers *materials, Simulation *target) {
-    for (size_t i = 0; i < 3 * target->scene.dampers.count; i++) {
-        Damper *damper = &target->scene.dampers.at[i / 3];
-        Buffer *const sides[] = {&damper->buffer, &damper->left_buffer, &damper->right_buffer};
-        Buffer *buffer = sides[i % 3];
-        for (size_t k = 0; buffer->material != NULL && k < materials->count; k++)
-            if (strcmp(materials->at[k].material, buffer->material) == 0)
-                TRY(sweep_grid_fill_material(&materials->at[k], buffer));
-    }
-    return STATUS_OK;
-}
-
-// Likewise a named ground motion.
-static Status sweep_grid_fill_record(const PinnedRecords *records, Simulation *target) {
-    ExcitationRecord *record = (ExcitationRecord *)(void *)target->scene.excitation;
-    if (excitation_kind(&record->excitation) != &excitation_record || record->name == NULL)
-        return STATUS_OK;
-    for (size_t i = 0; i < records->count; i++) {
-        const PinnedRecord *pinned = &records->at[i];
-        if (pinned->named != NULL && strcmp(pinned->name, record->name) == 0)
-            return status_made(record_resolve(record, (NamedRecord *)(void *)pinned->named));
-    }
-    return STATUS_OK;
-}
-
-// `*axis` is the one whose value cannot be set.
-static Status sweep_grid_apply(const SweepGrid *grid, size_t point, Simulation *target,
-                               size_t *axis, char why[JSON_POINTER_MESSAGE_MAX]) {
-    TRY(fields_copy(simulation_fields, grid->simulation, target));
-    target->output.reduction = false; // unless an axis requests it
-    for (size_t i = 0; i < grid->axis_count; i++) {
-        const SweepValues *values = &grid->axes[i];
-        if (values->field == NULL)
-            continue; // its pointer is faulty, which is reported already
-        *axis = i;
-        TRY(sweep_grid_split_buffer(values->axis->pointer, target));
-        TRY(sweep_axis_set(values->axis, sweep_grid_index(grid, i, point), target, why));
-    }
-    TRY(sweep_grid_fill_materials(&grid->study->materials, target));
-    for (size_t i = 0; i < target->scene.dampers.count; i++)
-        damper_reset_rig(&grid->simulation->scene.dampers.at[i], &target->scene.dampers.at[i]);
-    return sweep_grid_fill_record(&grid->study->records, target);
+static StudyValue sweep_grid_value(const SweepGrid *grid, size_t axis, size_t point) {
+    const SweepValues *values = &grid->axes[axis];
+    if (values->field == NULL) // its pointer is faulty, which is reported already
+        return (StudyValue){NULL, (double)NAN};
+    return study_axis_value(values->axis, sweep_grid_index(grid, axis, point));
 }
 
 Status sweep_grid_scene(const SweepGrid *grid, size_t point, bool is_bare,
                         const SimulationLimits *limits, Simulation *target, Problem *problem) {
-    size_t axis = 0;
-    char why[JSON_POINTER_MESSAGE_MAX] = "";
-    const Status status = sweep_grid_apply(grid, point, target, &axis, why);
-    if (status == STATUS_INVALID)
-        return problem_add(problem, status, grid->axes[axis].axis->pointer, "%s", why);
-    if (status != STATUS_OK)
-        return study_result(STATUS_NO_MEMORY, problem);
-    if (is_bare) {
-        texts_clear(&target->output.channels);
-        texts_clear(&target->output.psd.channels);
-        target->output.impacts = false;
-    }
-    return simulation_complete(target, limits, NULL, problem);
+    StudyValue values[STUDY_AXES];
+    for (size_t i = 0; i < grid->axis_count; i++)
+        values[i] = sweep_grid_value(grid, i, point);
+    return study_scene_make(grid->simulation, &grid->study->axes, values, &grid->study->names,
+                            is_bare, limits, target, problem);
 }
 
 // Number of points, at least 16, whose scenes are as much work to complete as `scenes` scenes of
@@ -300,47 +158,19 @@ static double sweep_grid_steps(const SweepGrid *grid, const SimulationLimits *li
     return samples > 0 ? steps * (double)grid->points / (double)samples : 0;
 }
 
-// Checks of an axis beyond those of its rows.
-static Status sweep_axis_check(const SweepAxis *axis, const char *place, Problem *problem) {
-    const bool has_range = !isnan(axis->from) || !isnan(axis->to) || axis->count != COUNT_ABSENT;
-    if (axis->values.count > 0 && (has_range || axis->spacing != CHOICE_ABSENT))
-        return problem_add(problem, STATUS_INVALID, place,
-                           "has values and a range: leave out values, or from, to, count and "
-                           "spacing");
-    if (axis->values.count > 0)
-        return STATUS_OK;
-    if (isnan(axis->from) || isnan(axis->to) || axis->count == COUNT_ABSENT)
-        return problem_add(problem, STATUS_INVALID, place,
-                           "needs values, or a range of from, to and count");
-    if (axis->spacing == SWEEP_LOGARITHMIC && !(axis->from * axis->to > 0))
-        return problem_add(problem, STATUS_INVALID, place,
-                           "logarithmic spacing needs from and to of one sign, neither 0");
-    return STATUS_OK;
-}
-
 static Status sweep_grid_check_axes(const SweepStudy *study, Problem *problem) {
-    const SweepAxes *axes = &study->axes;
-    Status status = STATUS_OK;
-    for (size_t i = 0; i < axes->count; i++) {
-        char place[PLACE];
-        json_pointer_index(place, sizeof place, "/study/axes", i);
-        if (sweep_axis_check(&axes->at[i], place, problem) != STATUS_OK)
-            status = STATUS_INVALID;
-        for (size_t k = 0; k < i; k++)
-            if (strcmp(axes->at[i].pointer, axes->at[k].pointer) == 0) {
-                status =
-                    json_pointer_fault(problem, place, "pointer",
-                                       "is also the pointer of axis %zu: give one axis each", k);
-            }
-        const size_t length = sweep_axis_length(&axes->at[i]),
-                     first = sweep_axis_length(&axes->at[0]);
-        if (status == STATUS_OK && study->mode == SWEEP_LIST && length != first)
-            status = problem_add(problem, STATUS_INVALID, place,
-                                 "has %zu values, the first axis has %zu: in a list all must "
-                                 "have the same number",
-                                 length, first);
+    const StudyAxes *axes = &study->axes;
+    TRY(study_axes_check(axes, true, "/study/axes", problem));
+    for (size_t i = 1; i < axes->count && study->mode == SWEEP_LIST; i++) {
+        const size_t length = study_axis_length(&axes->at[i]),
+                     first = study_axis_length(&axes->at[0]);
+        if (length != first)
+            return problem_add(problem, STATUS_INVALID, json_pointer_at("/study/axes", i).at,
+                               "has %zu values, the first axis has %zu: in a list all must have "
+                               "the same number",
+                               length, first);
     }
-    return status;
+    return STATUS_OK;
 }
 
 // The answer holds all values of the axes.
@@ -350,7 +180,7 @@ static Status sweep_grid_check_size(const SweepStudy *study, const SimulationLim
     const size_t max = limits != NULL && limits->points > 0 ? limits->points : SWEEP_POINTS;
     size_t values = 0;
     for (size_t i = 0; i < study->axes.count; i++)
-        values += sweep_axis_length(&study->axes.at[i]);
+        values += study_axis_length(&study->axes.at[i]);
     if (limits != NULL && points > max)
         return problem_add(
             problem, STATUS_INVALID, "/study/axes",
@@ -364,36 +194,19 @@ static Status sweep_grid_check_size(const SweepStudy *study, const SimulationLim
     return STATUS_OK;
 }
 
-// Finds the member of an axis's pointer in `scene`, and sets it.
-static Status sweep_axis_find(SweepValues *values, size_t number, Simulation *scene,
-                              Problem *problem) {
-    const char *pointer = values->axis->pointer;
-    char why[JSON_POINTER_MESSAGE_MAX];
-    TRY(sweep_grid_split_buffer(pointer, scene));
-    values->field = json_pointer_find(simulation_fields, scene, pointer, &values->is_tag, why);
-    if (values->field == NULL) {
-        Fault fault = {0};
-        snprintf(fault.pointer, sizeof fault.pointer, "/study/axes/%zu/pointer", number);
-        text_fit(fault.detail, sizeof fault.detail, why);
-        text_quote(fault.value, sizeof fault.value, pointer);
-        return problem_add_fault(problem, STATUS_INVALID, &fault);
-    }
-    // Impossible values are reported point by point; a possible one is enough here.
-    Status set = STATUS_INVALID;
-    for (size_t k = 0; k < values->count && set == STATUS_INVALID; k++)
-        set = sweep_axis_set(values->axis, k, scene, why);
-    return status_made(set != STATUS_NO_MEMORY);
-}
-
 // Earlier axes may make a member by their values.
 static Status sweep_grid_find_fields(SweepGrid *grid, Problem *problem) {
     Simulation scene;
     Status status = fields_copy(simulation_fields, grid->simulation, &scene);
-    for (size_t i = 0; i < grid->axis_count && status != STATUS_NO_MEMORY; i++) {
-        const Status own = sweep_axis_find(&grid->axes[i], i, &scene, problem);
-        status = own != STATUS_OK ? own : status;
+    for (size_t i = 0; i < grid->axis_count && status == STATUS_OK; i++) {
+        SweepValues *values = &grid->axes[i];
+        const JsonPointer place = json_pointer_at("/study/axes", i);
+        values->field = study_axis_find(values->axis, &scene, &values->is_tag, place.at, problem);
     }
     simulation_clear(&scene);
+    for (size_t i = 0; i < grid->axis_count && status == STATUS_OK; i++)
+        if (grid->axes[i].field == NULL)
+            status = STATUS_INVALID;
     return status;
 }
 
@@ -412,7 +225,7 @@ Status sweep_grid_new(const SweepStudy *study, const Simulation *simulation,
     for (size_t i = grid->axis_count; i-- > 0;) {
         SweepValues *values = &grid->axes[i];
         values->axis = &study->axes.at[i];
-        values->count = sweep_axis_length(&study->axes.at[i]);
+        values->count = study_axis_length(&study->axes.at[i]);
         values->stride = study->mode == SWEEP_LIST ? 1 : stride;
         stride *= values->count;
     }
@@ -434,12 +247,15 @@ static void sweep_grid_add_fault(const SweepGrid *grid, size_t point, const Faul
     Fault own = *fault;
     size_t cause = grid->axis_count > 1 ? grid->axis_count : 0;
     for (size_t i = 0; i < grid->axis_count; i++)
-        if (sweep_grid_is_below(fault->pointer, grid->axes[i].axis->pointer) ||
-            sweep_grid_is_below(grid->axes[i].axis->pointer, fault->pointer))
-            cause = i;
+        for (size_t k = 0; k < study_axis_pointer_count(grid->axes[i].axis); k++) {
+            const char *pointer = study_axis_pointer(grid->axes[i].axis, k);
+            if (sweep_grid_is_below(fault->pointer, pointer) ||
+                sweep_grid_is_below(pointer, fault->pointer))
+                cause = i;
+        }
     if (cause == grid->axis_count)
         snprintf(own.pointer, PLACE, "/study/axes");
-    else if (sweep_axis_is_range(grid->axes[cause].axis))
+    else if (study_axis_is_range(grid->axes[cause].axis))
         snprintf(own.pointer, PLACE, "/study/axes/%zu", cause);
     else
         snprintf(own.pointer, PLACE, "/study/axes/%zu/values/%zu", cause,
@@ -483,7 +299,7 @@ static Status sweep_grid_validate_sample(Validation *of, size_t max) {
     TRY(sweep_grid_validate_point(of, grid->points - 1));
     for (size_t i = 0; i < axes; i++) {
         const size_t count = grid->axes[i].count;
-        const bool is_short = is_list || sweep_axis_is_range(grid->axes[i].axis);
+        const bool is_short = is_list || study_axis_is_range(grid->axes[i].axis);
         const size_t wanted = is_short && share > RANGE_SAMPLES ? RANGE_SAMPLES : share;
         const size_t samples = count < wanted ? count : wanted;
         // Both ends are among them.
@@ -529,9 +345,9 @@ static Status sweep_complete(void *request, const Simulation *simulation,
     SweepStudy *study = request;
     SweepGrid *grid;
     for (size_t i = 0; i < study->axes.count; i++) {
-        SweepAxis *axis = &study->axes.at[i];
+        StudyAxis *axis = &study->axes.at[i];
         if (axis->values.count == 0 && axis->spacing == CHOICE_ABSENT)
-            axis->spacing = SWEEP_LINEAR;
+            axis->spacing = STUDY_LINEAR;
     }
     const Status metrics = sweep_check_metrics(study, problem);
     Status status = sweep_grid_new(study, simulation, limits, &grid, problem);
@@ -571,13 +387,15 @@ static Status sweep_fill(const SweepGrid *grid, Sweep *sweep) {
         const SweepValues *values = &grid->axes[i];
         SweepAxisValues *axis = list_append(&sweep->axes, sizeof *axis);
         TRY(status_made(axis != NULL));
-        TRY(text_copy(values->axis->pointer, &axis->pointer));
+        TRY(text_copy(study_axis_pointer(values->axis, 0), &axis->pointer));
+        for (size_t k = 0; k < values->axis->pointers.count; k++)
+            TRY(texts_append(&axis->pointers, values->axis->pointers.at[k]));
         TRY(text_copy(values->is_tag ? NULL : values->field->unit, &axis->unit));
         for (size_t k = 0; k < values->count; k++) {
             char digits[32];
             TRY(texts_append(&axis->values,
-                             sweep_axis_is_range(values->axis)
-                                 ? text_real(digits, sweep_axis_value(values->axis, k))
+                             study_axis_is_range(values->axis)
+                                 ? text_real(digits, study_axis_value(values->axis, k).number)
                                  : values->axis->values.at[k]));
         }
     }
@@ -609,6 +427,12 @@ void sweep_values(const Texts *metrics, const RunRecord *run, double *values) {
         values[i] = strcmp(metrics->at[i], "steps") == 0
                         ? run->steps
                         : study_summary_value(&run->summary, metrics->at[i]);
+}
+
+static void sweep_references(void *request, StudyReferences *references) {
+    SweepStudy *study = request;
+    *references = (StudyReferences){
+        .axes = &study->axes, .axes_place = "/study/axes", .names = &study->names};
 }
 
 typedef struct SweepWork {
@@ -665,6 +489,8 @@ const StudyKind study_sweep = {
              sweep_study_fields, sizeof(SweepStudy)},
     .answer = &(const Kind){"sweep", "result of each point", sweep_answer_fields, sizeof(Sweep)},
     .shorten = "ask for fewer points, or a cheaper scene",
+    .document = "table",
+    .references = sweep_references,
     .max_runs = 1000,
     .complete = sweep_complete,
     .cost = sweep_cost,

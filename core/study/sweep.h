@@ -3,57 +3,23 @@
 #ifndef CORE_STUDY_SWEEP_H
 #define CORE_STUDY_SWEEP_H
 
-#include "core/study/study.h"
+#include "core/study/axis.h"
 
 enum {
-    SWEEP_AXES = 64,
-    SWEEP_AXIS_VALUES = 1 << 20,
     SWEEP_METRICS = 16,
     SWEEP_POINTS = 1000000, // where the limits say nothing
 };
 
-typedef enum SweepSpacing { SWEEP_LINEAR, SWEEP_LOGARITHMIC } SweepSpacing;
 typedef enum SweepMode { SWEEP_GRID, SWEEP_LIST } SweepMode;
 extern const char *const sweep_mode_names[];
-
-// One axis: values, or a range.
-typedef struct SweepAxis {
-    char *pointer; // into the completed scene
-    Texts values;  // scalars as JSON text
-    double from, to;
-    uint64_t count;
-    int spacing; // SweepSpacing; CHOICE_ABSENT beside values
-} SweepAxis;
-
-typedef struct SweepAxes {
-    SweepAxis *at;
-    size_t count;
-} SweepAxes;
-
-typedef struct Buffers {
-    Buffer *at;
-    size_t count;
-} Buffers;
-
-// A record that an axis names, in its version at submission.
-typedef struct PinnedRecord {
-    char *name, *digest;
-    Refcount *named; // a NamedRecord; NULL: not found yet
-} PinnedRecord;
-
-typedef struct PinnedRecords {
-    PinnedRecord *at;
-    size_t count;
-} PinnedRecords;
 
 // The request.
 typedef struct SweepStudy {
     Variant variant;
-    SweepAxes axes; // of a grid the last one varies fastest
+    StudyAxes axes; // of a grid the last one varies fastest
     int mode;       // SweepMode
     Texts metrics;
-    Buffers materials;     // the numbers of every material that the scene or an axis names
-    PinnedRecords records; // the ground motions that an axis names
+    StudyNames names;
 } SweepStudy;
 
 const char *sweep_metric_unit(const char *name);
@@ -73,6 +39,7 @@ extern const char *const sweep_status_names[];
 // An axis of the answer: all its values.
 typedef struct SweepAxisValues {
     char *pointer, *unit;
+    Texts pointers; // tied members; none: the one
     Texts values;
 } SweepAxisValues;
 
@@ -80,6 +47,8 @@ typedef struct SweepAxesValues {
     SweepAxisValues *at;
     size_t count;
 } SweepAxesValues;
+
+extern const Field sweep_axis_values_fields[], sweep_failure_fields[]; // of a StudyFailure
 
 // Rows by position, as far as they are made.
 typedef struct SweepTable {
@@ -113,7 +82,7 @@ void sweep_values(const Texts *metrics, const RunRecord *run, double *values);
 
 // An axis of a grid.
 typedef struct SweepValues {
-    const SweepAxis *axis;
+    const StudyAxis *axis;
     size_t count, stride; // point p has value (p / stride) % count
     const Field *field;   // NULL: the pointer is faulty, the axis changes nothing
     bool is_tag;

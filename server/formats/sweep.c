@@ -1,5 +1,6 @@
 #include "server/formats/study_formats.h"
 
+#include "server/json/encode.h"
 #include "server/util/base_path.h"
 
 static bool sweep_table_read(void *context, size_t cell, size_t first, size_t count,
@@ -56,30 +57,6 @@ static bool sweep_read(void *context, size_t index, size_t first, size_t count, 
     return true;
 }
 
-static void sweep_put_axes(const Sweep *sweep, Bytes *bytes) {
-    for (size_t i = 0; i < sweep->axes.count; i++) {
-        const SweepAxisValues *axis = &sweep->axes.at[i];
-        bytes_json(bytes, "%p{\"pointer\": %s, \"unit\": %s, \"values\": [", i > 0 ? ", " : "",
-                   axis->pointer, axis->unit);
-        for (size_t k = 0; k < axis->values.count; k++) {
-            bytes_format(bytes, "%s%s", k > 0 ? "," : "", axis->values.at[k]);
-        }
-        bytes_text(bytes, "]}");
-    }
-}
-
-static void sweep_put_failures(const Sweep *sweep, Bytes *bytes) {
-    const StudyFailures *failures = &sweep->table.failures;
-    for (size_t i = 0; i < failures->count; i++) {
-        const StudyFailure *failure = &failures->at[i];
-        bytes_json(bytes,
-                   "%p{\"status\": \"%s\", \"count\": %llu, \"first_point\": %llu, \"detail\": %s}",
-                   i > 0 ? ", " : "", sweep_status_names[failure->status],
-                   (unsigned long long)failure->count, (unsigned long long)failure->first,
-                   failure->detail);
-    }
-}
-
 static void sweep_put_head(const void *context, Bytes *bytes) {
     const SweepDocument *document = context;
     const Sweep *sweep = document->sweep;
@@ -90,11 +67,13 @@ static void sweep_put_head(const void *context, Bytes *bytes) {
     bytes_format(bytes, "\"status\": \"%s\", \"points\": %llu, \"done\": %zu, \"failed\": %llu",
                  rows == sweep->points ? "complete" : "partial", (unsigned long long)sweep->points,
                  rows, (unsigned long long)sweep->table.failed);
-    bytes_format(bytes, ", \"mode\": \"%s\", \"axes\": [", sweep_mode_names[sweep->mode]);
-    sweep_put_axes(sweep, bytes);
-    bytes_text(bytes, "], \"failures\": [");
-    sweep_put_failures(sweep, bytes);
-    bytes_text(bytes, "], ");
+    bytes_format(bytes, ", \"mode\": \"%s\", \"axes\": ", sweep_mode_names[sweep->mode]);
+    encode_list(bytes, sweep_axis_values_fields, sweep->axes.at, sweep->axes.count,
+                sizeof *sweep->axes.at, WRITE_REPORT);
+    bytes_text(bytes, ", \"failures\": ");
+    encode_list(bytes, sweep_failure_fields, sweep->table.failures.at, sweep->table.failures.count,
+                sizeof *sweep->table.failures.at, WRITE_REPORT);
+    bytes_text(bytes, ", ");
 }
 
 static void sweep_put_links(const void *context, Bytes *bytes) {

@@ -3,8 +3,8 @@
 //
 // A material's name becomes that of a revision, with its values; a record's name stays, with the
 // digest of its samples beside it, so that the same scene always means the same samples, also when
-// a record of that name was deleted and another one uploaded. A sweep keeps the values of every
-// material and the samples of every record that it names: its points are made without a database.
+// a record of that name was deleted and another one uploaded. A study keeps the values of every
+// material and the samples of every record that it names: its runs are made without a database.
 #include <math.h>
 #include <stddef.h>
 #include <stdio.h>
@@ -14,7 +14,7 @@
 #include "core/base/canonical.h"
 #include "core/base/json_pointer.h"
 #include "core/base/spelling.h"
-#include "core/study/sweep.h"
+#include "core/study/axis.h"
 #include "server/db/materials.h"
 #include "server/db/records.h"
 #include "server/jobs/jobs_private.h"
@@ -28,7 +28,7 @@ enum {
     LARGE_PLACES = 4,
     SUGGESTED = 10,         // faults that list the names there are
     RECORDS_LISTED = 1000,  // names among which the nearest one is searched
-    SWEEP_SAMPLES = 1 << 24 // of all records that one sweep names, in memory as long as it runs
+    STUDY_SAMPLES = 1 << 24 // of all records that one study names, in memory as long as it runs
 };
 
 // Keeps the first fault of the scene; false for what ends the walk.
@@ -381,10 +381,22 @@ static ExcitationRecord *request_record(const StudyRequest *request) {
     return record->name != NULL ? record : NULL;
 }
 
-static SweepStudy *request_sweep(const StudyRequest *request) {
-    return request->study != NULL && study_kind(request->study) == &study_sweep
-               ? (SweepStudy *)(void *)request->study
-               : NULL;
+// All absent where the study has none.
+static StudyReferences request_references(const StudyRequest *request) {
+    StudyReferences references = {.axes = NULL};
+    if (request->study != NULL && study_kind(request->study)->references != NULL)
+        study_kind(request->study)->references(request->study, &references);
+    return references;
+}
+
+// The lists of records that a study keeps: of its axes, and its suite.
+enum { PINNED_LISTS = 2 };
+static PinnedRecords *references_records(const StudyReferences *references, size_t list,
+                                         const char **place) {
+    *place = list == 0 ? "/study/records" : references->suite_place;
+    return list > 0                    ? references->suite
+           : references->names != NULL ? &references->names->records
+                                       : NULL;
 }
 
 // The scene's record, whose digest is set if it is not there.
@@ -401,34 +413,32 @@ static Status resolve_record(Db *db, const StudyRequest *request, Problem *probl
                        : problem_set(problem, STATUS_NO_MEMORY, "no memory for a scene");
 }
 
-// A record that the sweep keeps; likewise.
-static Status resolve_kept_record(Db *db, PinnedRecord *kept, size_t index, Problem *problem) {
-    char name[64], digest[64];
+// A record that a study keeps, at `place`; likewise.
+static Status resolve_kept_record(Db *db, PinnedRecord *kept, const char *place, Problem *problem) {
     NamedRecord *named;
     if (kept->name == NULL || kept->named != NULL)
         return STATUS_OK; // a missing name is a fault already
-    snprintf(name, sizeof name, "/study/records/%zu/name", index);
-    snprintf(digest, sizeof digest, "/study/records/%zu/digest", index);
-    TRY(record_find(db, kept->name, kept->digest, name, digest, &named, problem));
+    TRY(record_find(db, kept->name, kept->digest, json_pointer_of(place, "name").at,
+                    json_pointer_of(place, "digest").at, &named, problem));
     kept->named = &named->shared;
     return kept->digest != NULL || (kept->digest = strdup(named->digest)) != NULL
                ? STATUS_OK
                : STATUS_NO_MEMORY;
 }
 
-// The names in a sweep: of the materials and records that came with it, those of its scene, and
+// The names in a study: of the materials and records that came with it, those of its scene, and
 // those on its axes.
-typedef struct SweepNames {
+typedef struct NameResolver {
     Db *db;
-    SweepStudy *study;
+    StudyReferences references;
     size_t samples; // of its records
     Warnings *warnings;
     Problem *problem;
-} SweepNames;
+} NameResolver;
 
 // Keeps the values of a material.
-static Status sweep_keep_material(SweepNames *names, const Buffer *buffer) {
-    Buffers *materials = &names->study->materials;
+static Status names_keep_material(NameResolver *names, const Buffer *buffer) {
+    Buffers *materials = &names->references.names->materials;
     for (size_t i = 0; i < materials->count; i++)
         if (text_same(materials->at[i].material, buffer->material))
             return STATUS_OK;
@@ -445,7 +455,7 @@ static Status sweep_keep_material(SweepNames *names, const Buffer *buffer) {
 }
 
 // A name on an axis becomes that of a revision.
-static Status sweep_resolve_material(SweepNames *names, const char *name, char **value,
+static Status names_resolve_material(NameResolver *names, const char *name, char **value,
                                      const char *place) {
     Buffer buffer;
     Bytes text = {0};
@@ -454,7 +464,7 @@ static Status sweep_resolve_material(SweepNames *names, const char *name, char *
     if (status == STATUS_OK)
         status = resolve_buffer(names->db, &buffer, place, names->warnings, names->problem);
     if (status == STATUS_OK)
-        status = sweep_keep_material(names, &buffer);
+        status = names_keep_material(names, &buffer);
     if (status == STATUS_OK) {
         bytes_json_string(&text, buffer.material);
         free(*value);
@@ -464,19 +474,19 @@ static Status sweep_resolve_material(SweepNames *names, const char *name, char *
     return status;
 }
 
-static Status sweep_add_samples(SweepNames *names, const Refcount *named, const char *place) {
+static Status names_add_samples(NameResolver *names, const Refcount *named, const char *place) {
     names->samples += ((const NamedRecord *)(const void *)named)->samples.count;
-    if (names->samples <= SWEEP_SAMPLES)
+    if (names->samples <= STUDY_SAMPLES)
         return STATUS_OK;
     (void)problem_add(names->problem, STATUS_INVALID, place,
-                      "names one more record than a sweep can hold: all of its records may have "
-                      "%d samples, with this one they have %zu; sweep over fewer at a time",
-                      SWEEP_SAMPLES, names->samples);
+                      "names one more record than a study can hold: all of its records may have "
+                      "%d samples, with this one they have %zu; take fewer at a time",
+                      STUDY_SAMPLES, names->samples);
     return STATUS_LIMIT;
 }
 
-static Status sweep_resolve_record(SweepNames *names, const char *name, const char *place) {
-    PinnedRecords *records = &names->study->records;
+static Status names_resolve_record(NameResolver *names, const char *name, const char *place) {
+    PinnedRecords *records = &names->references.names->records;
     NamedRecord *named;
     for (size_t i = 0; i < records->count; i++)
         if (text_same(records->at[i].name, name))
@@ -492,32 +502,40 @@ static Status sweep_resolve_record(SweepNames *names, const char *name, const ch
     *kept = (PinnedRecord){strdup(named->name), strdup(named->digest), &named->shared};
     if (kept->name == NULL || kept->digest == NULL)
         return STATUS_NO_MEMORY;
-    return sweep_add_samples(names, kept->named, place);
+    return names_add_samples(names, kept->named, place);
+}
+
+static bool axis_names_materials(const char *pointer) {
+    static const char *const materials[] = {"buffer", "left_buffer", "right_buffer", "material"};
+    const char *last = strrchr(pointer, '/');
+    bool names_materials = false;
+    for (size_t i = 0; last != NULL && i < COUNT(materials); i++)
+        names_materials = names_materials || strcmp(last + 1, materials[i]) == 0;
+    return names_materials;
 }
 
 // The values of an axis that name materials or records. What is no text is for the axis to refuse.
-static Status sweep_resolve_axis(SweepNames *names, size_t index) {
-    static const char *const materials[] = {"buffer", "left_buffer", "right_buffer", "material"};
-    const SweepAxis *axis = &names->study->axes.at[index];
-    const char *last = axis->pointer == NULL ? NULL : strrchr(axis->pointer, '/');
-    const bool has_records = text_same(axis->pointer, "/excitation/name");
-    bool has_materials = false;
-    for (size_t i = 0; last != NULL && i < COUNT(materials); i++)
-        has_materials = has_materials || strcmp(last + 1, materials[i]) == 0;
+static Status names_resolve_axis(NameResolver *names, size_t index) {
+    const StudyAxis *axis = &names->references.axes->at[index];
+    const char *pointer = study_axis_pointer_count(axis) > 0 ? study_axis_pointer(axis, 0) : NULL;
+    const bool has_records = text_same(pointer, "/excitation/name");
+    const bool has_materials = pointer != NULL && axis_names_materials(pointer);
+    const JsonPointer own = json_pointer_at(names->references.axes_place, index),
+                      values = json_pointer_of(own.at, "values");
     Status status = STATUS_OK, one;
     for (size_t k = 0; k < axis->values.count && (has_records || has_materials); k++) {
-        char place[96], **value = &axis->values.at[k], *text = malloc(strlen(*value) + 1);
+        char **value = &axis->values.at[k], *text = malloc(strlen(*value) + 1);
+        const JsonPointer place = json_pointer_at(values.at, k);
         JsonScalar scalar;
         if (text == NULL)
             return STATUS_NO_MEMORY;
-        snprintf(place, sizeof place, "/study/axes/%zu/values/%zu", index, k);
         if (names->problem->count >= PROBLEM_FAULTS) // no more are reported
             one = STATUS_LIMIT;
         else if (!json_scalar_read(*value, &scalar, text) || scalar.kind != JSON_SCALAR_TEXT)
             one = STATUS_OK;
         else
-            one = has_records ? sweep_resolve_record(names, text, place)
-                              : sweep_resolve_material(names, text, value, place);
+            one = has_records ? names_resolve_record(names, text, place.at)
+                              : names_resolve_material(names, text, value, place.at);
         free(text);
         if (!resolve_continues(one, &status))
             break;
@@ -525,44 +543,54 @@ static Status sweep_resolve_axis(SweepNames *names, size_t index) {
     return status;
 }
 
-// Adds all faults. STATUS_LIMIT, with a fault: not all names were looked up.
-static Status sweep_resolve_names(SweepNames *names, const Dampers *dampers) {
-    SweepStudy *study = names->study;
+// The records that came with the study.
+static Status names_resolve_records(NameResolver *names, size_t list) {
+    const char *place;
+    const PinnedRecords *records = references_records(&names->references, list, &place);
     Status status = STATUS_OK;
-    char place[64];
-    for (size_t i = 0; i < study->materials.count; i++) {
-        snprintf(place, sizeof place, "/study/materials/%zu", i);
-        if (!resolve_continues(resolve_buffer(names->db, &study->materials.at[i], place,
+    for (size_t i = 0; records != NULL && i < records->count; i++) {
+        PinnedRecord *kept = &records->at[i];
+        const JsonPointer own = json_pointer_at(place, i);
+        Status one = resolve_kept_record(names->db, kept, own.at, names->problem);
+        if (one == STATUS_OK && kept->named != NULL)
+            one = names_add_samples(names, kept->named, own.at);
+        if (!resolve_continues(one, &status))
+            break;
+    }
+    return status;
+}
+
+// Adds all faults. STATUS_LIMIT, with a fault: not all names were looked up.
+static Status names_resolve(NameResolver *names, const Dampers *dampers) {
+    const StudyReferences *references = &names->references;
+    const Buffers *materials = references->names != NULL ? &references->names->materials : NULL;
+    Status status = STATUS_OK;
+    for (size_t i = 0; materials != NULL && i < materials->count; i++)
+        if (!resolve_continues(resolve_buffer(names->db, &materials->at[i],
+                                              json_pointer_at("/study/materials", i).at,
                                               names->warnings, names->problem),
                                &status))
             return status;
-    }
-    for (size_t i = 0; i < 3 * dampers->count; i++)
+    for (size_t i = 0; materials != NULL && i < 3 * dampers->count; i++)
         if (dampers_buffer(dampers, i)->material != NULL)
-            TRY(sweep_keep_material(names, dampers_buffer(dampers, i)));
-    for (size_t i = 0; i < study->records.count; i++) {
-        PinnedRecord *kept = &study->records.at[i];
-        snprintf(place, sizeof place, "/study/records/%zu", i);
-        Status one = resolve_kept_record(names->db, kept, i, names->problem);
-        if (one == STATUS_OK && kept->named != NULL)
-            one = sweep_add_samples(names, kept->named, place);
-        if (!resolve_continues(one, &status))
+            TRY(names_keep_material(names, dampers_buffer(dampers, i)));
+    for (size_t list = 0; list < PINNED_LISTS; list++)
+        if (!resolve_continues(names_resolve_records(names, list), &status))
             return status;
-    }
-    for (size_t i = 0; i < study->axes.count; i++)
-        if (!resolve_continues(sweep_resolve_axis(names, i), &status))
+    for (size_t i = 0; references->axes != NULL && i < references->axes->count; i++)
+        if (!resolve_continues(names_resolve_axis(names, i), &status))
             return status;
     return status;
 }
 
-// In place of study_request_complete for a sweep. The fault of an unknown name on an axis is
+// Resolves and completes a study with its scene. The fault of an unknown name on an axis is
 // reported beside those of the other values, and replaces what the same name leads to there.
-static Status sweep_resolve(Db *db, StudyRequest *request, const SimulationLimits *limits,
+static Status study_resolve(Db *db, StudyRequest *request, const SimulationLimits *limits,
                             Warnings *warnings, Problem *problem) {
-    SweepNames names = {db, request_sweep(request), 0, warnings, problem};
+    NameResolver names = {db, request_references(request), 0, warnings, problem};
     // If the scene has faults of its own, the axes are validated with it.
     const bool has_own = problem->count > 0;
-    const Status resolved = sweep_resolve_names(&names, &request->simulation.scene.dampers);
+    const Status resolved = names_resolve(&names, &request->simulation.scene.dampers);
     if (resolved == STATUS_LIMIT || problem->count >= PROBLEM_FAULTS)
         return STATUS_INVALID; // names that were not looked up are not validated further
     if (resolved != STATUS_OK && resolved != STATUS_INVALID)
@@ -584,23 +612,32 @@ static Status sweep_resolve(Db *db, StudyRequest *request, const SimulationLimit
 
 void request_drop_records(StudyRequest *request) {
     ExcitationRecord *record = request_record(request);
-    SweepStudy *study = request_sweep(request);
+    const StudyReferences references = request_references(request);
+    const char *place;
     if (record != NULL) {
         refcount_unref(record->named);
         record->named = NULL;
     }
-    for (size_t i = 0; study != NULL && i < study->records.count; i++) {
-        refcount_unref(study->records.at[i].named);
-        study->records.at[i].named = NULL;
+    for (size_t list = 0; list < PINNED_LISTS; list++) {
+        const PinnedRecords *records = references_records(&references, list, &place);
+        for (size_t i = 0; records != NULL && i < records->count; i++) {
+            refcount_unref(records->at[i].named);
+            records->at[i].named = NULL;
+        }
     }
 }
 
 Status request_load_records(Db *db, StudyRequest *request, Problem *problem) {
-    const SweepStudy *study = request_sweep(request);
+    const StudyReferences references = request_references(request);
+    const char *place;
     Status status = resolve_record(db, request, problem);
-    for (size_t i = 0; study != NULL && i < study->records.count; i++)
-        (void)resolve_continues(resolve_kept_record(db, &study->records.at[i], i, problem),
-                                &status);
+    for (size_t list = 0; list < PINNED_LISTS; list++) {
+        const PinnedRecords *records = references_records(&references, list, &place);
+        for (size_t i = 0; records != NULL && i < records->count; i++)
+            (void)resolve_continues(
+                resolve_kept_record(db, &records->at[i], json_pointer_at(place, i).at, problem),
+                &status);
+    }
     return status;
 }
 
@@ -626,15 +663,20 @@ static void references_add_record(Bytes *lines, const char *name) {
 void references_write(Bytes *lines, const StudyRequest *request, bool has_materials) {
     const Dampers *dampers = &request->simulation.scene.dampers;
     const ExcitationRecord *record = request_record(request);
-    const SweepStudy *study = request_sweep(request);
+    const StudyReferences references = request_references(request);
+    const char *place;
     for (size_t i = 0; has_materials && i < 3 * dampers->count; i++)
         references_add(lines, dampers_buffer(dampers, i)->material);
     if (record != NULL)
         references_add_record(lines, record->name);
-    for (size_t i = 0; study != NULL && i < study->records.count; i++)
-        references_add_record(lines, study->records.at[i].name);
-    for (size_t i = 0; has_materials && study != NULL && i < study->materials.count; i++)
-        references_add(lines, study->materials.at[i].material);
+    for (size_t list = 0; list < PINNED_LISTS; list++) {
+        const PinnedRecords *records = references_records(&references, list, &place);
+        for (size_t i = 0; records != NULL && i < records->count; i++)
+            references_add_record(lines, records->at[i].name);
+    }
+    const Buffers *materials = references.names != NULL ? &references.names->materials : NULL;
+    for (size_t i = 0; has_materials && materials != NULL && i < materials->count; i++)
+        references_add(lines, materials->at[i].material);
 }
 
 bool references_next(const char **lines, ReferenceRow *row) {
@@ -681,9 +723,10 @@ static Status request_resolve(Db *db, const SimulationLimits *limits, StudyReque
         (void)resolve_continues(resolve_record(db, request, problem), &status);
     if (status != STATUS_OK && status != STATUS_INVALID)
         return status;
-    const Status completed = request_sweep(request) != NULL
-                                 ? sweep_resolve(db, request, limits, warnings, problem)
-                                 : study_request_complete(request, limits, warnings, problem);
+    const Status completed =
+        request->study != NULL && study_kind(request->study)->references != NULL
+            ? study_resolve(db, request, limits, warnings, problem)
+            : study_request_complete(request, limits, warnings, problem);
     return completed != STATUS_OK ? completed : status;
 }
 

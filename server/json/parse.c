@@ -301,6 +301,18 @@ static void decode_root(Decoder *decoder, const json_t *root, const Field *field
 static void decode_list(Decoder *decoder, const json_t *value, const Field *field, void *target,
                         const char *pointer);
 
+// A string under a shorthand stands for an object with that member alone.
+static bool decode_is_short(const json_t *value, const Field *field) {
+    return json_is_string(value) && field->shorthand != NULL;
+}
+
+static void decode_short(Decoder *decoder, const json_t *value, const Field *field, void *item,
+                         const char *pointer) {
+    size_t offset = 0;
+    const Field *row = fields_find(field->fields, field->shorthand, &offset);
+    decode_field(decoder, value, row, (char *)item + offset + row->offset, pointer);
+}
+
 // `key`: NULL: an element of an array, else of an object.
 static void decode_element(Decoder *decoder, const json_t *value, const char *key,
                            const Field *field, void *element, const char *place) {
@@ -321,10 +333,12 @@ static void decode_element(Decoder *decoder, const json_t *value, const char *ke
         decode_list_text(decoder, value, key, field, element, place);
         break;
     default:
-        if (fields_default(field->fields, element) == STATUS_OK)
-            decode_root(decoder, value, field->fields, element, place);
-        else
+        if (fields_default(field->fields, element) != STATUS_OK)
             decoder->is_out_of_memory = true;
+        else if (decode_is_short(value, field))
+            decode_short(decoder, value, field, element, place);
+        else
+            decode_root(decoder, value, field->fields, element, place);
     }
 }
 
@@ -386,11 +400,10 @@ static void decode_list(Decoder *decoder, const json_t *value, const Field *fiel
     memcpy(target, &list, sizeof list);
 }
 
-// A string under a shorthand stands for an object with that member alone.
 static void decode_item(Decoder *decoder, const json_t *value, const Field *field, void *target,
                         const char *pointer) {
     const bool takes_null = (field->flags & FIELD_NULL_IS_EMPTY) != 0;
-    const bool is_short = json_is_string(value) && field->shorthand != NULL;
+    const bool is_short = decode_is_short(value, field);
     if (json_is_null(value) && takes_null) {
         fields_clear(field->fields, target);
         return;
@@ -406,9 +419,7 @@ static void decode_item(Decoder *decoder, const json_t *value, const Field *fiel
     if (field->presence != PRESENCE_DEFAULT && fields_default(field->fields, target) != STATUS_OK) {
         decoder->is_out_of_memory = true;
     } else if (is_short) {
-        size_t offset = 0;
-        const Field *row = fields_find(field->fields, field->shorthand, &offset);
-        decode_field(decoder, value, row, (char *)target + offset + row->offset, pointer);
+        decode_short(decoder, value, field, target, pointer);
     } else {
         decode_members(decoder, value, field->fields, target, pointer, NULL);
     }

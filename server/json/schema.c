@@ -141,7 +141,9 @@ static void schema_item(Bytes *bytes, const Field *field) {
     if (field->shorthand != NULL) {
         const Field *row = fields_find(field->fields, field->shorthand, NULL);
         bytes_text(bytes, "},{\"type\":\"string\"");
-        if (row->max > 0)
+        if (row->kind == FIELD_KIND_CHOICE)
+            schema_texts(bytes, "enum", row->choices);
+        else if (row->max > 0)
             bytes_format(bytes, ",\"maxLength\":%zu", row->max);
         schema_text(bytes, "description", row->doc);
     }
@@ -211,7 +213,7 @@ static void schema_value(Bytes *bytes, const Field *field) {
         break;
     case FIELD_KIND_LIST:
         bytes_text(bytes, ",\"type\":\"array\",\"items\":{");
-        schema_object(bytes, field->fields, NULL, NULL);
+        schema_item(bytes, field);
         bytes_text(bytes, "}");
         schema_length(bytes, field);
         bytes_text(bytes, has_default ? ",\"default\":[]" : "");

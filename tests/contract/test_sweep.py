@@ -126,6 +126,18 @@ def test_kinds_names_whole_numbers_and_truth_values_vary_too():
         assert column(document, "rms_displacement")[1] != column(document, "rms_displacement")[0]
 
 
+def test_tied_members_get_the_same_value():
+    """Both sides' buffers, which the scene gives as one; the document names all pointers."""
+    sides = ["/dampers/0/left_buffer/restitution", "/dampers/0/right_buffer/restitution"]
+    scene = sweep({"pointers": sides, "from": 0.3, "to": 0.5, "count": 3})
+    with Daemon(program.build) as daemon:
+        job = made(daemon, scene)
+        document = table(daemon, job)
+        assert document["axes"][0]["pointers"] == sides and document["axes"][0]["pointer"] == sides[0]
+        point = daemon.get(document["links"]["point"].replace("{index}", "1")).json()["scene"]["dampers"][0]
+        assert point["left_buffer"]["restitution"] == point["right_buffer"]["restitution"] == 0.4
+
+
 def test_a_members_change_takes_its_materials_name_away():
     """A restitution beside a material's contact time is no longer that material's."""
     with Daemon(program.build) as daemon:
@@ -163,6 +175,10 @@ def test_axes_that_make_no_sense_are_refused():
                                                         "spacing": "logarithmic"}))
         assert "/study/axes/1" in errors(daemon, sweep(CLEARANCES, MATERIALS, mode="list"))
         assert "/study/axes/1/pointer" in errors(daemon, sweep(CLEARANCES, CLEARANCES))
+        tied = {"pointers": ["/dampers/0/mass", clearance], "values": [0.1]}
+        assert "/study/axes/1/pointers/1" in errors(daemon, sweep(CLEARANCES, tied))
+        assert "/study/axes/0" in errors(daemon, sweep({**tied, "pointer": "/duration"}))
+        assert "/study/axes/0" in errors(daemon, sweep({"values": [1]}))
         assert "/study/metrics/1" in errors(daemon, sweep(CLEARANCES, metrics=["impacts", "impacts"]))
         assert "/study/metrics" in errors(daemon, sweep(CLEARANCES, metrics=[]))
         for pointer in ("", "dampers", "/dampers", "/dampers/0", "/dampers/1/mass", "/dampers/00/mass", "/title",

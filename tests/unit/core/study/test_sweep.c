@@ -26,12 +26,12 @@ static SweepStudy *study_of(const StudyRequest *inquiry) {
     return (SweepStudy *)(void *)inquiry->study;
 }
 
-static SweepAxis *axis_add(StudyRequest *inquiry, const char *pointer) {
-    SweepAxes *axes = &study_of(inquiry)->axes;
+static StudyAxis *axis_add(StudyRequest *inquiry, const char *pointer) {
+    StudyAxes *axes = &study_of(inquiry)->axes;
     axes->at = realloc(axes->at, (axes->count + 1) * sizeof *axes->at);
     assert_non_null(axes->at);
-    SweepAxis *axis = &axes->at[axes->count++];
-    *axis = (SweepAxis){.pointer = strdup(pointer),
+    StudyAxis *axis = &axes->at[axes->count++];
+    *axis = (StudyAxis){.pointer = strdup(pointer),
                         .from = (double)NAN,
                         .to = (double)NAN,
                         .count = COUNT_ABSENT,
@@ -41,7 +41,7 @@ static SweepAxis *axis_add(StudyRequest *inquiry, const char *pointer) {
 
 static void range_add(StudyRequest *inquiry, const char *pointer, double from, double to,
                       uint64_t count) {
-    SweepAxis *axis = axis_add(inquiry, pointer);
+    StudyAxis *axis = axis_add(inquiry, pointer);
     axis->from = from;
     axis->to = to;
     axis->count = count;
@@ -213,9 +213,9 @@ TEST(too_many_points_or_values_are_refused) {
     range_add(&inquiry, "/dampers/0/mass", 0.1, 0.2, 10);
     assert_int_equal(study_request_complete(&inquiry, &limits, NULL, &problem), STATUS_INVALID);
     assert_non_null(strstr(detail_at(&problem, "/study/axes"), "110 points, at most 100"));
-    study_of(&inquiry)->axes.at[0].count = study_of(&inquiry)->axes.at[1].count = SWEEP_AXIS_VALUES;
-    range_add(&inquiry, "/dampers/0/offset", 0.1, 0.2, SWEEP_AXIS_VALUES);
-    range_add(&inquiry, "/structure/mass", 0.1, 0.2, SWEEP_AXIS_VALUES);
+    study_of(&inquiry)->axes.at[0].count = study_of(&inquiry)->axes.at[1].count = STUDY_AXIS_VALUES;
+    range_add(&inquiry, "/dampers/0/offset", 0.1, 0.2, STUDY_AXIS_VALUES);
+    range_add(&inquiry, "/structure/mass", 0.1, 0.2, STUDY_AXIS_VALUES);
     problem_clear(&problem);
     assert_int_equal(study_request_complete(&inquiry, &limits, NULL, &problem), STATUS_INVALID);
     assert_non_null(strstr(detail_at(&problem, "/study/axes"), "points, at most 100"));
@@ -226,14 +226,14 @@ TEST(sides_and_materials_are_filled_from_what_is_pinned) {
     StudyRequest inquiry = study_request_make();
     static const char *const names[] = {"\"sponge@1\"", "\"steel@2\""};
     SweepStudy *study = study_of(&inquiry);
-    study->materials.at = calloc(2, sizeof *study->materials.at);
-    assert_non_null(study->materials.at);
+    study->names.materials.at = calloc(2, sizeof *study->names.materials.at);
+    assert_non_null(study->names.materials.at);
     for (size_t i = 0; i < 2; i++) {
-        assert_int_equal(fields_default(buffer_fields, &study->materials.at[i]), STATUS_OK);
-        study->materials.count++;
-        study->materials.at[i].material = strdup(i == 0 ? "sponge@1" : "steel@2");
-        study->materials.at[i].restitution = 0.5 + 0.1 * (double)i;
-        study->materials.at[i].contact_time = 0.01;
+        assert_int_equal(fields_default(buffer_fields, &study->names.materials.at[i]), STATUS_OK);
+        study->names.materials.count++;
+        study->names.materials.at[i].material = strdup(i == 0 ? "sponge@1" : "steel@2");
+        study->names.materials.at[i].restitution = 0.5 + 0.1 * (double)i;
+        study->names.materials.at[i].contact_time = 0.01;
     }
     values_add(&inquiry, "/dampers/0/left_buffer", 2, names);
     SweepGrid *plan = plan_of(&inquiry);

@@ -12,7 +12,8 @@ static char rms[] = "rms_displacement", impacts[] = "impacts", grew[] = "the \"n
 // Two clearances, two buffers; point 1 is not there yet and point 2 failed.
 static Sweep sweep_make(void) {
     static char *lengths[] = {narrow, wide}, *names[] = {soft, hard}, *metrics[] = {rms, impacts};
-    static SweepAxisValues axes[] = {{clearance, metre, {lengths, 2}}, {buffer, NULL, {names, 2}}};
+    static SweepAxisValues axes[] = {{.pointer = clearance, .unit = metre, .values = {lengths, 2}},
+                                     {.pointer = buffer, .values = {names, 2}}};
     static double points[] = {0, 2, 3}, statuses[] = {SWEEP_MADE, SWEEP_UNSTABLE, SWEEP_MADE};
     static double values[] = {0.1, 7, (double)NAN, (double)NAN, 0.3, 9};
     static StudyFailure failures[] = {{SWEEP_UNSTABLE, NULL, 1, 2, grew}};

@@ -97,9 +97,9 @@ TEST(a_sweep_pins_the_records_of_its_axes_once_each) {
                 &inquiry),
         STATUS_OK);
     const SweepStudy *study = (const SweepStudy *)(const void *)inquiry.study;
-    assert_int_equal(study->records.count, 2);
-    assert_string_equal(study->records.at[0].name, "b");
-    assert_string_equal(study->records.at[1].digest, record_in(&inquiry)->digest);
+    assert_int_equal(study->names.records.count, 2);
+    assert_string_equal(study->names.records.at[0].name, "b");
+    assert_string_equal(study->names.records.at[1].digest, record_in(&inquiry)->digest);
     references_write(&uses, &inquiry, false);
     assert_string_equal(uses.at, "record:a\nrecord:b\n");
     bytes_clear(&uses);
@@ -116,7 +116,7 @@ TEST(samples_are_let_go_of_and_had_again) {
                 "[\"b\", \"gone\"]}]}",
                 &inquiry),
         STATUS_OK);
-    const PinnedRecords *pinned = &((const SweepStudy *)(const void *)inquiry.study)->records;
+    const PinnedRecords *pinned = &((const SweepStudy *)(const void *)inquiry.study)->names.records;
     const Refcount *samples = record_in(&inquiry)->named;
     request_drop_records(&inquiry);
     assert_true(record_in(&inquiry)->named == NULL && pinned->at[1].named == NULL);

@@ -1,0 +1,109 @@
+// What a study varies: members of its scene, each over a list of values or a range, and the
+// materials and ground motions that such values name. sweep, optimize, calibrate, response and
+// ensemble share it.
+#ifndef CORE_STUDY_AXIS_H
+#define CORE_STUDY_AXIS_H
+
+#include "core/excitation/recorded_motion.h"
+#include "core/study/study.h"
+
+enum {
+    STUDY_AXES = 64,
+    STUDY_AXIS_VALUES = 1 << 20,
+    STUDY_AXIS_POINTERS = 64, // tied members
+};
+
+typedef enum StudySpacing { STUDY_LINEAR, STUDY_LOGARITHMIC } StudySpacing;
+
+// A member of the completed scene, or several that all get the same value; with values, or with a
+// range, which is a grid of `count` values or, without `count`, every number within.
+typedef struct StudyAxis {
+    char *pointer;  // NULL: `pointers`
+    Texts pointers; // tied members
+    Texts values;   // scalars as JSON text
+    double from, to;
+    uint64_t count;
+    int spacing; // StudySpacing; CHOICE_ABSENT beside values
+} StudyAxis;
+
+typedef struct StudyAxes {
+    StudyAxis *at;
+    size_t count;
+} StudyAxes;
+
+// All members; and without count and spacing, of a continuous range or values.
+extern const Field study_axis_fields[], study_variable_fields[];
+
+typedef struct Buffers {
+    Buffer *at;
+    size_t count;
+} Buffers;
+
+// A record that a study names, in its version at submission.
+typedef struct PinnedRecord {
+    char *name, *digest;
+    Refcount *named; // a NamedRecord; NULL: not found yet
+} PinnedRecord;
+extern const Field pinned_record_fields[]; // "name" is the shorthand
+
+typedef struct PinnedRecords {
+    PinnedRecord *at;
+    size_t count;
+} PinnedRecords;
+
+// What the values of axes name. A study's own struct has it as FIELD_BASE.
+typedef struct StudyNames {
+    Buffers materials;     // the numbers of every material that the scene or an axis names
+    PinnedRecords records; // the ground motions that an axis names
+} StudyNames;
+extern const Field study_names_fields[];
+
+// One value for an axis: JSON text, else the number; NAN leaves the scene's own.
+typedef struct StudyValue {
+    const char *json;
+    double number;
+} StudyValue;
+
+size_t study_axis_pointer_count(const StudyAxis *axis);
+const char *study_axis_pointer(const StudyAxis *axis, size_t index); // from 0
+bool study_axis_is_range(const StudyAxis *axis);
+// Number of values; COUNT_ABSENT of a continuous range.
+size_t study_axis_length(const StudyAxis *axis);
+StudyValue study_axis_value(const StudyAxis *axis, size_t index);
+
+// Checks of one axis beyond its rows, at `place`; a range must have a count where `is_grid`, and
+// from < to where not.
+Status study_axis_check(const StudyAxis *axis, bool is_grid, const char *place, Problem *problem);
+// The same of all, below `place` ("/study/axes"), and that no two vary the same member.
+Status study_axes_check(const StudyAxes *axes, bool is_grid, const char *place, Problem *problem);
+
+// The row of the first member that an axis varies; NULL, and a fault below `place`, that of the
+// axis, if any of its pointers is faulty. Sets `scene` to the first value that is possible, so that
+// a later axis finds members that this one makes.
+const Field *study_axis_find(const StudyAxis *axis, Simulation *scene, bool *is_tag,
+                             const char *place, Problem *problem);
+// Validates that the pointers of all axes are in the completed simulation.
+Status study_axes_find(const StudyAxes *axes, const Simulation *simulation, const char *place,
+                       Problem *problem);
+
+// The completed scene with a value for each axis, set in their order. `is_bare`: without output.
+// `names` may be NULL. Cleared by simulation_clear in any case. Faults have the pointers of the
+// scene.
+Status study_scene_make(const Simulation *base, const StudyAxes *axes, const StudyValue *values,
+                        const StudyNames *names, bool is_bare, const SimulationLimits *limits,
+                        Simulation *target, Problem *problem);
+
+// Makes a pinned and resolved record the ground motion of a scene, which has to be completed again:
+// an excitation of another kind is replaced, of a record scale and start stay. STATUS_NO_MEMORY.
+Status study_scene_use_record(Simulation *scene, const PinnedRecord *pinned);
+
+// Where a study names materials and records; the server resolves them at submission.
+typedef struct StudyReferences {
+    StudyAxes *axes; // NULL: none, as of the others
+    const char *axes_place;
+    StudyNames *names;    // of the axes
+    PinnedRecords *suite; // records that the study lists
+    const char *suite_place;
+} StudyReferences;
+
+#endif
