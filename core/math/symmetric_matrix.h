@@ -1,4 +1,4 @@
-// Dense symmetric matrices of at most a few hundred rows. LAPACK is used only here.
+// Dense symmetric matrices of at most a few hundred rows, by LAPACK.
 #ifndef CORE_MATH_SYMMETRIC_MATRIX_H
 #define CORE_MATH_SYMMETRIC_MATRIX_H
 

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "core/simulation/internal.h"
+#include "core/solve/cycle_flow.h"
 
 const char engine_version[] = "impactd-6";
 
@@ -423,4 +424,25 @@ Status run_scene(const Simulation *simulation, const SimulationLimits *limits,
 void run_inputs_clear(RunInputs *inputs) {
     plan_free(inputs->plan);
     base_clear(&inputs->base);
+}
+
+Status simulation_cycle_flow(const Simulation *simulation, const SimulationLimits *limits,
+                             const Progress *progress, const CycleFlow *from, CycleFlow **flow,
+                             Problem *problem) {
+    const Excitation *excitation = scene_excitation(&simulation->scene);
+    *flow = NULL;
+    if (excitation_kind(excitation) != &excitation_sine)
+        return problem_add(problem, STATUS_INVALID, "/excitation/kind",
+                           "must be sine, is %s: only a sine has cycles",
+                           excitation_kind(excitation)->kind.name);
+    const double frequency = ((const ExcitationSine *)(const void *)excitation)->frequency;
+    CycleFlowInputs inputs = {.period = 1 / frequency,
+                              .accuracy = simulation_solver(simulation) == &solver_exact
+                                              ? simulation_settings(simulation)
+                                              : NULL,
+                              .steps_max = run_steps_max(limits),
+                              .progress = progress};
+    TRY(run_make_base(simulation, 0, NULL, progress, &inputs.base, problem));
+    TRY(run_make_plan(simulation, progress, &inputs.plan, problem));
+    return cycle_flow_new(&inputs, from, flow, problem);
 }

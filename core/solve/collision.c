@@ -79,8 +79,19 @@ static bool collision_is_wrong(const ModalState *state, size_t d) {
                : lack > rounding;
 }
 
-void collision_resolve(ModalState *state) {
+static void collision_apply(ModalState *state) {
     double *impulses = state->scratch;
+    for (size_t d = 0; d < state->dampers; d++)
+        impulses[d] = modal_state_sign(state->damper[d].side) * state->damper[d].impulse;
+    collision_push(state, impulses);
+    for (size_t d = 0; d < state->dampers; d++) {
+        DamperState *damper = &state->damper[d];
+        if (damper->in_collision && damper->impulse != 0)
+            damper->w = -modal_state_sign(damper->side) * damper->separation_speed;
+    }
+}
+
+void collision_resolve(ModalState *state) {
     for (size_t d = 0; d < state->dampers; d++) {
         DamperState *damper = &state->damper[d];
         damper->is_pressing =
@@ -112,12 +123,13 @@ void collision_resolve(ModalState *state) {
         DamperState *damper = &state->damper[d];
         if (damper->plan->clearance > 0 && !(damper->impulse > 0))
             damper->impulse = 0;
-        impulses[d] = modal_state_sign(damper->side) * damper->impulse;
     }
-    collision_push(state, impulses);
-    for (size_t d = 0; d < state->dampers; d++) {
-        DamperState *damper = &state->damper[d];
-        if (damper->in_collision && damper->impulse != 0)
-            damper->w = -modal_state_sign(damper->side) * damper->separation_speed;
-    }
+    collision_apply(state);
+}
+
+void collision_transmit(ModalState *state) {
+    for (size_t d = 0; d < state->dampers; d++)
+        state->damper[d].in_collision = state->damper[d].is_pressing;
+    collision_solve(state);
+    collision_apply(state);
 }

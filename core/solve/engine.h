@@ -99,6 +99,10 @@ Status contact_event_apply(ModalState *state, const ContactEvent *event);
 // approach_speed and separation_speed, and changes all speeds, p and w.
 void collision_resolve(ModalState *state);
 
+// The same where it is known which dampers press (is_pressing), whatever the signs of their speeds:
+// small changes of a collision.
+void collision_transmit(ModalState *state);
+
 // Changes all speeds by one impulse per damper [N s].
 void collision_push(ModalState *state, const double *impulses);
 
@@ -387,9 +391,10 @@ typedef struct EventEngine {
     SustainedContact sustained;
     PowerContact power;
     Recorder record;
-    double work;                   // solver steps since the last check
-    size_t idle;                   // steps of contact in a row without time passing
-    struct RoundingGrowth *growth; // of a single mass, or NULL
+    double work;                         // solver steps since the last check
+    size_t idle;                         // steps of contact in a row without time passing
+    struct RoundingGrowth *growth;       // of a single mass, or NULL
+    struct LinearisedMotion *linearised; // beside a run by Taylor steps alone, or NULL
     double *track; // of the last FLIGHT_BUFFER_MAX samples, all modes: sample k at (k - 1) %
                    // FLIGHT_BUFFER_MAX; NULL: not wanted
 } EventEngine;

@@ -10,6 +10,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/solve/linearised_motion.h"
 #include "core/solve/rounding_growth.h"
 
 enum { STORM_EVENTS = 100, IDLE_STEPS = 1000 };
@@ -73,6 +74,8 @@ static void event_engine_accept(EventEngine *engine, const ContactEvent *hit) {
     for (size_t d = 0; d < state->dampers && !state->is_shadow; d++)
         if (state->damper[d].row.is_open)
             event_engine_log_contact(engine, d);
+    if (engine->linearised != NULL)
+        linearised_motion_step(engine->linearised, state, arc);
     taylor_step_state(arc, state, 1);
     state->offset += arc->length;
     state->events_at_instant = 0;
@@ -93,8 +96,14 @@ static void event_engine_accept(EventEngine *engine, const ContactEvent *hit) {
 static Status event_engine_apply(EventEngine *engine, const ContactEvent *event) {
     ModalState *state = &engine->state;
     RoundingGrowth *growth = engine->growth;
-    if (growth == NULL)
-        return contact_event_apply(state, event);
+    if (engine->linearised != NULL)
+        linearised_motion_begin_event(engine->linearised, state, event);
+    if (growth == NULL) {
+        TRY(contact_event_apply(state, event));
+        if (engine->linearised != NULL)
+            linearised_motion_end_event(engine->linearised, state, event);
+        return STATUS_OK;
+    }
     const DamperState *damper = &state->damper[0];
     const ContactPhase phase = damper->phase;
     const double shape = state->modes->shapes[0];
@@ -120,7 +129,11 @@ static double event_engine_arc_max(const ModalState *state, const Slice *slice) 
 static Status event_engine_step_power(EventEngine *engine, const Slice *slice, double length) {
     ModalState *state = &engine->state;
     PowerContactStep step;
+    if (engine->linearised != NULL)
+        linearised_motion_begin_step(engine->linearised, state);
     power_contact_step(&engine->power, slice, length, &step);
+    if (engine->linearised != NULL)
+        linearised_motion_end_step(engine->linearised, state, step.length);
     event_engine_add_work(engine, &step.work);
     const double before = state->offset;
     state->offset += step.length;
@@ -141,8 +154,8 @@ static Status event_engine_step_power(EventEngine *engine, const Slice *slice, d
 static bool event_engine_step_sustained(EventEngine *engine, const Slice *slice, double length) {
     ModalState *state = &engine->state;
     StepWork work;
-    if (slice->omega > 0 && state->base_omega == 0)
-        return false; // the tables have no such base
+    if ((slice->omega > 0 && state->base_omega == 0) || engine->linearised != NULL)
+        return false; // the tables have no such base, or only Taylor steps are followed
     const double taken = sustained_contact_step(&engine->sustained, state, slice, length,
                                                 state->is_shadow ? NULL : &work);
     if (taken == 0)

@@ -37,7 +37,7 @@ FOREIGN = {
     "sqlite3.h": ["server/db/sqlite.c"],
     "jansson.h": ["server/json/"],
     "fftw3.h": ["core/math/fft.c"],
-    "lapacke.h": ["core/math/symmetric_matrix.c"],
+    "lapacke.h": ["core/math/symmetric_matrix.c", "core/math/eigenvalues.c"],
     "arkode/": ["core/solve/adaptive.c"],
     "nvector/": ["core/solve/adaptive.c"],
     "gnutls/": ["server/util/sha256.c", "server/http/tls.c"],

@@ -1,0 +1,317 @@
+// A cycle is one interval of the engine's clock, which starts again with each cycle, so that the
+// return map is the same function in every cycle. Only Taylor steps and steps of power laws are
+// taken: both serve any length.
+#include "core/solve/cycle_flow.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/math/linear_system.h"
+#include "core/solve/linearised_motion.h"
+
+enum { SHIFTS = 16 };
+
+struct CycleFlow {
+    EventEngine engine;
+    LinearisedMotion linearised;
+    Run run;
+    Response response;
+    Base base;
+    Plan *plan;
+    double period; // [s]
+    double shift;  // of the section after the zero crossing [s]
+    double *kept;  // q and p
+    DamperState *kept_dampers;
+};
+
+void cycle_flow_free(CycleFlow *flow) {
+    if (flow == NULL)
+        return;
+    linearised_motion_clear(&flow->linearised);
+    event_engine_clear(&flow->engine);
+    response_clear(&flow->response);
+    plan_free(flow->plan);
+    free(flow->kept);
+    free(flow->kept_dampers);
+    free(flow);
+}
+
+// u - r of a damper.
+static double cycle_flow_origin(const DamperState *damper) {
+    return damper->origin == FROM_MIDDLE
+               ? 0
+               : modal_state_sign((Side)damper->origin) * damper->plan->clearance / 2;
+}
+
+size_t cycle_flow_size(const CycleFlow *flow) {
+    return flow->linearised.size;
+}
+
+void cycle_flow_get(const CycleFlow *flow, double *y) {
+    const ModalState *state = &flow->engine.state;
+    const size_t n = state->mode_count, m = state->dampers;
+    memcpy(y, state->q, n * sizeof *y);
+    memcpy(y + n, state->p, n * sizeof *y);
+    for (size_t d = 0; d < m; d++) {
+        y[2 * n + d] = state->damper[d].r + cycle_flow_origin(&state->damper[d]);
+        y[2 * n + m + d] = state->damper[d].w;
+    }
+}
+
+void cycle_flow_set(CycleFlow *flow, const double *y) {
+    ModalState *state = &flow->engine.state;
+    const size_t n = state->mode_count, m = state->dampers;
+    memcpy(state->q, y, n * sizeof *y);
+    memcpy(state->p, y + n, n * sizeof *y);
+    for (size_t d = 0; d < m; d++) {
+        DamperState *damper = &state->damper[d];
+        if (damper->phase == PHASE_RESTING)
+            continue;
+        damper->r = y[2 * n + d] - cycle_flow_origin(damper);
+        damper->w = y[2 * n + m + d];
+    }
+}
+
+void cycle_flow_scales(const CycleFlow *flow, double *scales) {
+    const ModalState *state = &flow->engine.state;
+    const size_t n = state->mode_count, m = state->dampers;
+    const double omega = 2 * 3.14159265358979323846 / flow->period;
+    double squares = 0, largest = DBL_MIN;
+    for (size_t i = 0; i < n; i++)
+        squares += state->q[i] * state->q[i] + state->p[i] / omega * (state->p[i] / omega);
+    const double size = fmax(sqrt(squares), DBL_MIN);
+    for (size_t i = 0; i < n; i++)
+        largest = fmax(largest, size * state->max_shape[i]);
+    for (size_t i = 0; i < n; i++) {
+        scales[i] = size;
+        scales[n + i] = size * omega;
+    }
+    for (size_t d = 0; d < m; d++) {
+        const double room = state->damper[d].plan->clearance / 2;
+        scales[2 * n + d] = room > 0 ? room : largest;
+        scales[2 * n + m + d] = scales[2 * n + d] * omega;
+    }
+}
+
+void cycle_flow_keep(CycleFlow *flow) {
+    const ModalState *state = &flow->engine.state;
+    memcpy(flow->kept, state->q, state->padded * sizeof *flow->kept);
+    memcpy(flow->kept + state->padded, state->p, state->padded * sizeof *flow->kept);
+    memcpy(flow->kept_dampers, state->damper, state->dampers * sizeof *state->damper);
+}
+
+void cycle_flow_restore(CycleFlow *flow) {
+    ModalState *state = &flow->engine.state;
+    memcpy(state->q, flow->kept, state->padded * sizeof *flow->kept);
+    memcpy(state->p, flow->kept + state->padded, state->padded * sizeof *flow->kept);
+    memcpy(state->damper, flow->kept_dampers, state->dampers * sizeof *state->damper);
+    modal_state_constrain(state);
+}
+
+// Of a mass at rest nothing can change.
+static void cycle_flow_clear_resting(const CycleFlow *flow, double *columns, size_t count) {
+    const ModalState *state = &flow->engine.state;
+    const size_t n = state->mode_count, m = state->dampers, size = flow->linearised.size;
+    for (size_t i = 0; i < count; i++)
+        for (size_t d = 0; d < m; d++)
+            if (state->damper[d].phase == PHASE_RESTING)
+                columns[i * size + 2 * n + d] = columns[i * size + 2 * n + m + d] = 0;
+}
+
+// To `time` after the zero crossing before.
+static Status cycle_flow_cross(CycleFlow *flow, double time) {
+    ModalState *state = &flow->engine.state;
+    state->events_at_instant = state->chatter_events = 0;
+    state->chatter_time = state->suppress_time = state->suppressed_at = 0;
+    TRY(event_engine_cross(&flow->engine, time));
+    TRY(event_engine_check(&flow->engine));
+    state->offset = time;
+    return STATUS_OK;
+}
+
+Status cycle_flow_run(CycleFlow *flow, size_t cycles, double *columns, size_t count,
+                      CycleMotion *motion) {
+    ModalState *state = &flow->engine.state;
+    LinearisedMotion *linearised = &flow->linearised;
+    const uint64_t before = flow->response.impact_count;
+    linearised->columns = columns;
+    linearised->count = columns != NULL ? count : 0;
+    cycle_flow_clear_resting(flow, columns, linearised->count);
+    linearised->is_measured = motion != NULL;
+    linearised->peak = 0;
+    memset(linearised->squares, 0, state->storey_count * sizeof *linearised->squares);
+    Status status = STATUS_OK;
+    for (size_t i = 0; i < cycles && status == STATUS_OK; i++) {
+        state->offset = flow->shift;
+        status = cycle_flow_cross(flow, flow->shift + flow->period);
+    }
+    linearised->count = 0;
+    linearised->is_measured = false;
+    TRY(status);
+    if (motion == NULL)
+        return STATUS_OK;
+    double largest = 0;
+    for (size_t j = 0; j < state->storey_count; j++)
+        largest = fmax(largest, linearised->squares[j]);
+    *motion = (CycleMotion){linearised->peak, sqrt(largest / ((double)cycles * flow->period)),
+                            flow->response.impact_count - before};
+    return STATUS_OK;
+}
+
+bool cycle_flow_is_linearised(const CycleFlow *flow) {
+    for (size_t d = 0; d < flow->plan->damper_count; d++)
+        if (stops_vary(&flow->plan->dampers[d]))
+            return false;
+    return flow->plan->form != CONTACT_POWER;
+}
+
+Status cycle_flow_shift(CycleFlow *flow, bool is_home, bool *is_found) {
+    ModalState *state = &flow->engine.state;
+    *is_found = true;
+    if (is_home) {
+        state->offset = flow->shift;
+        if (flow->shift > 0)
+            TRY(cycle_flow_cross(flow, flow->period));
+        flow->shift = 0;
+        return STATUS_OK;
+    }
+    state->offset = flow->shift = 0;
+    for (int i = 0; i < SHIFTS; i++) {
+        size_t flying = 0;
+        for (size_t d = 0; d < state->dampers; d++)
+            flying += state->damper[d].phase == PHASE_FLIGHT;
+        if (flying == state->dampers)
+            return STATUS_OK;
+        const double next = flow->period * (i + 1) / SHIFTS;
+        TRY(cycle_flow_cross(flow, next));
+        flow->shift = i + 1 < SHIFTS ? next : 0;
+    }
+    *is_found = false;
+    return STATUS_OK;
+}
+
+void cycle_flow_top(const CycleFlow *flow, double *displacement, double *velocity) {
+    const ModalState *state = &flow->engine.state;
+    const size_t n = state->mode_count;
+    const double *shape = state->modes->shapes + (state->storey_count - 1) * n;
+    *displacement = modal_state_dot(shape, state->q, n);
+    *velocity = modal_state_dot(shape, state->p, n);
+}
+
+// (W^2 - omega^2 + i omega D) q = -participation a.
+double cycle_flow_undamped_peak(const CycleFlow *flow) {
+    const ModalState *state = &flow->engine.state;
+    const size_t n = state->mode_count, size = 2 * n;
+    const double omega = flow->base.omega;
+    double *A = calloc(size * size + size, sizeof *A), most = (double)NAN;
+    if (A == NULL)
+        return most;
+    double *b = A + size * size;
+    for (size_t i = 0; i < n; i++) {
+        A[i * size + i] = A[(n + i) * size + n + i] = state->omega2[i] - omega * omega;
+        for (size_t k = 0; k < n; k++) {
+            A[i * size + n + k] = -omega * state->damping[i * n + k];
+            A[(n + i) * size + k] = omega * state->damping[i * n + k];
+        }
+        b[i] = -state->participation[i] * flow->base.amplitude;
+    }
+    if (linear_system_solve(A, b, size, 1))
+        for (size_t j = 0; j < state->storey_count; j++) {
+            const double *shape = state->modes->shapes + j * n;
+            most =
+                fmax(most, hypot(modal_state_dot(shape, b, n), modal_state_dot(shape, b + n, n)));
+        }
+    free(A);
+    return isfinite(most) ? most : (double)NAN;
+}
+
+double cycle_flow_steps(const CycleFlow *flow) {
+    return flow->run.steps;
+}
+
+// The storeys' state becomes the plan's initial one.
+static void cycle_flow_carry_storeys(CycleFlow *flow, const ModalState *from) {
+    const size_t n = from->mode_count;
+    for (size_t j = 0; j < from->storey_count; j++) {
+        const double *shape = from->modes->shapes + j * n;
+        flow->plan->displacement[j] = modal_state_dot(shape, from->q, n);
+        flow->plan->velocity[j] = modal_state_dot(shape, from->p, n);
+    }
+}
+
+// Contacts go on with the parameters of the new stops, but those of power laws end.
+static void cycle_flow_carry_dampers(CycleFlow *flow, const ModalState *from) {
+    ModalState *state = &flow->engine.state;
+    for (size_t d = 0; d < state->dampers; d++) {
+        const DamperState *old = &from->damper[d];
+        DamperState *damper = &state->damper[d];
+        const double limit = old->phase != PHASE_FLIGHT   ? INFINITY
+                             : old->origin == FROM_MIDDLE ? damper->plan->clearance / 2
+                                                          : damper->plan->clearance;
+        damper->w = old->w;
+        damper->side = old->side;
+        damper->origin = old->origin;
+        damper->r = fmin(fmax(old->r, -limit), limit);
+        if (flow->plan->form == CONTACT_POWER && old->phase != PHASE_FLIGHT) {
+            damper->r = 0;
+            damper->w = modal_state_sign(old->side) * fmin(modal_state_sign(old->side) * old->w, 0);
+            continue;
+        }
+        damper->phase = old->phase;
+        damper->zero_gap_terms = old->zero_gap_terms;
+        damper->row = old->row;
+        if (old->phase == PHASE_CONTACT || old->phase == PHASE_INSIDE)
+            damper->contact = stops_freeze(&damper->plan->stops[old->side],
+                                           fmax(old->row.impact.approach_speed, 0));
+    }
+    modal_state_constrain(state);
+}
+
+static Status cycle_flow_make(CycleFlow *flow, const CycleFlow *from, Problem *problem) {
+    ModalState *state = &flow->engine.state;
+    if (from != NULL)
+        cycle_flow_carry_storeys(flow, &from->engine.state);
+    TRY(event_engine_make(&flow->engine, &flow->run, exact_tolerance(flow->run.accuracy),
+                          &flow->response, problem));
+    TRY(linearised_motion_make(&flow->linearised, state, problem));
+    flow->engine.linearised = &flow->linearised;
+    state->is_shadow = true;
+    flow->kept = calloc(2 * state->padded, sizeof *flow->kept);
+    flow->kept_dampers = calloc(state->dampers + 1, sizeof *flow->kept_dampers);
+    if (flow->kept == NULL || flow->kept_dampers == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the motion");
+    if (from != NULL)
+        cycle_flow_carry_dampers(flow, &from->engine.state);
+    else
+        TRY(event_engine_settle(&flow->engine));
+    return STATUS_OK;
+}
+
+Status cycle_flow_new(const CycleFlowInputs *inputs, const CycleFlow *from, CycleFlow **made,
+                      Problem *problem) {
+    CycleFlow *flow = *made = calloc(1, sizeof *flow);
+    if (flow == NULL) {
+        plan_free(inputs->plan);
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the motion");
+    }
+    flow->plan = inputs->plan;
+    flow->base = inputs->base;
+    flow->period = inputs->period;
+    flow->plan->sample_rate = 1 / inputs->period;
+    flow->plan->duration = inputs->period;
+    flow->plan->count = 2;
+    flow->response.is_unlisted = true;
+    flow->run = (Run){.plan = flow->plan,
+                      .base = &flow->base,
+                      .progress = inputs->progress,
+                      .accuracy = inputs->accuracy,
+                      .steps_max = inputs->steps_max};
+    const Status status = cycle_flow_make(flow, from, problem);
+    if (status != STATUS_OK) {
+        cycle_flow_free(flow);
+        *made = NULL;
+    }
+    return status;
+}
