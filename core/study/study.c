@@ -52,16 +52,6 @@ Status study_failures_add(StudyFailures *failures, int status, const char *reaso
     return text_copy(why, &failure->detail);
 }
 
-double study_summary_value(const Summary *summary, const char *name) {
-    size_t offset = 0;
-    const Field *row = fields_find(summary_fields, name, &offset);
-    const void *member = (const char *)summary + offset + row->offset;
-    if (row->kind == FIELD_KIND_REAL)
-        return *(const double *)member;
-    const uint64_t count = *(const uint64_t *)member;
-    return count != COUNT_ABSENT ? (double)count : (double)NAN;
-}
-
 double study_run_densities(const Simulation *simulation) {
     const SpectrumRequest *psd = &simulation->output.psd;
     return psd->channels.count == 0
@@ -144,6 +134,7 @@ Status study_part_make(const StudyWork *work, size_t member, const StudyTools *t
     RunRecord *run = &part->run;
     run->steps = (double)NAN;
     (void)fields_default(summary_fields, &run->summary); // absent: nothing to allocate
+    (void)fields_default(reduction_fields, &run->reduction);
     run->status = kind->scene(work, member, &scene, part, problem);
     part->is_refused = run->status != STATUS_OK;
     if (run->status == STATUS_OK)
@@ -160,6 +151,8 @@ Status study_part_make(const StudyWork *work, size_t member, const StudyTools *t
     Status status = STATUS_OK;
     run->steps = outcome->steps;
     run->summary = outcome->summary;
+    if (outcome->has_reduction)
+        run->reduction = outcome->reduction;
     if (kind->keep != NULL) {
         status = kind->keep(work, outcome, tools, part, problem);
     } else {

@@ -20,6 +20,7 @@ typedef struct RunRecord {
     char *why;                       // reason of the failure; NULL: none
     double steps;                    // solver steps; NAN after a failure
     Summary summary;                 // absent after a failure
+    Reduction reduction;             // absent also where it was not requested
     Reals restitution, contact_time; // factors of a drawn run, buffer by buffer
 } RunRecord;
 
