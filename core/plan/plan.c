@@ -303,6 +303,7 @@ static Status plan_values(const Scene *scene, Plan *plan) {
     TRY(plan_allocate(plan, structure_storeys(structure), scene->dampers.count));
     structure_assemble(structure, &(const StructureMatrices){plan->mass, plan->stiffness,
                                                              plan->damping, plan->influence});
+    plan->has_drifts = structure_kind(structure)->has_drifts;
     plan_copy_start(&excitation->displacement, plan->displacement);
     plan_copy_start(&excitation->velocity, plan->velocity);
     plan->duration = scene->duration;

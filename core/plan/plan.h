@@ -91,6 +91,7 @@ typedef struct Plan {
     size_t storeys;
     double *mass, *stiffness, *damping; // M, K, C of the structure [kg], [N/m], [N s/m]
     double *influence;                  // r of M x'' + C x' + K x = -M r a_g + N [-]
+    bool has_drifts;                    // the structure has storey drifts
     double *displacement, *velocity;    // of the storeys at t = 0 [m], [m/s]
     Modes modes;       // all, or those kept; empty where plan_is_single, and in a sketch
     bool is_truncated; // moving modes are left out (plan_keep)

@@ -16,6 +16,8 @@ const Channel channels[CHANNEL_COUNT] = {
     [CHANNEL_PENETRATION]         = {"penetration", "m", "m^2/Hz", "of the buffer in contact", CHANNEL_OF_DAMPER},
     [CHANNEL_CONTACT_FORCE]       = {"contact_force", "N", "N^2/Hz", "on the structure, positive to the right", CHANNEL_OF_DAMPER},
     [CHANNEL_BASE_ACCELERATION]   = {"base_acceleration", "m/s^2", "(m/s^2)^2/Hz", "of the base", CHANNEL_OF_BASE},
+    [CHANNEL_STOREY_DRIFT]        = {"storey_drift", "m", "m^2/Hz", "displacement of a frame's storey less that of the storey below, of the first one relative to the base", CHANNEL_OF_STOREY},
+    [CHANNEL_BASE_SHEAR]          = {"base_shear", "N", "N^2/Hz", "force of the structure's springs and dashpots on the base, positive to the right", CHANNEL_OF_BASE},
 };
 
 const char *const channel_requests[] = {
@@ -29,6 +31,8 @@ const char *const channel_requests[] = {
     [1 + CHANNEL_PENETRATION        ] = "penetration",
     [1 + CHANNEL_CONTACT_FORCE      ] = "contact_force",
     [1 + CHANNEL_BASE_ACCELERATION  ] = "base_acceleration",
+    [1 + CHANNEL_STOREY_DRIFT       ] = "storey_drift",
+    [1 + CHANNEL_BASE_SHEAR         ] = "base_shear",
     [1 + CHANNEL_COUNT              ] = NULL,
 };
 // clang-format on

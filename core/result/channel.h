@@ -14,6 +14,8 @@ typedef enum ChannelId {
     CHANNEL_PENETRATION,
     CHANNEL_CONTACT_FORCE,
     CHANNEL_BASE_ACCELERATION,
+    CHANNEL_STOREY_DRIFT, // of frames only
+    CHANNEL_BASE_SHEAR,
     CHANNEL_COUNT
 } ChannelId;
 

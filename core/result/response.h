@@ -62,6 +62,8 @@ typedef struct Energy {
 // largest of all storeys or dampers.
 typedef struct Peaks {
     double displacement, velocity, acceleration, damper_displacement, contact_force;
+    double storey_drift; // of frames of several storeys
+    double base_shear;
 } Peaks;
 
 typedef struct Response {

@@ -93,6 +93,7 @@ const StructureKind structure_shear_frame = {
     .kind = {"frame", "a shear frame: storeys on top of each other, the first on the ground",
              frame_fields, sizeof(ShearFrame)},
     .damping_name = "dampings",
+    .has_drifts = true,
     .storeys = frame_storeys,
     .has_damping = frame_has_damping,
     .complete = frame_complete,

@@ -22,6 +22,7 @@ typedef struct StructureMatrices {
 typedef struct StructureKind {
     Kind kind;
     const char *damping_name; // the member that excludes damping_ratio
+    bool has_drifts;          // storey i stands on storey i - 1, the first on the base
     size_t (*storeys)(const Structure *structure);
     bool (*has_damping)(const Structure *structure); // whether that member is given
     // Adds the faults that involve several members, below `pointer`; then sets defaults.

@@ -15,15 +15,19 @@ static const ChannelId usual[] = {CHANNEL_DISPLACEMENT, CHANNEL_VELOCITY, CHANNE
 typedef struct ChannelCounts {
     size_t storeys, dampers;
     bool are_numbered;
+    const StructureKind *structure;
 } ChannelCounts;
 
 static ChannelCounts channel_counts(const Scene *scene) {
     const size_t storeys = structure_storeys(scene_structure(scene));
-    return (ChannelCounts){storeys, scene->dampers.count, storeys > 1 || scene->dampers.count > 1};
+    return (ChannelCounts){storeys, scene->dampers.count, storeys > 1 || scene->dampers.count > 1,
+                           structure_kind(scene_structure(scene))};
 }
 
 // Number of channels of that kind.
 static size_t channel_counts_of(const ChannelCounts *counts, const Channel *channel) {
+    if (channel == &channels[CHANNEL_STOREY_DRIFT] && !counts->structure->has_drifts)
+        return 0;
     return channel->owner == CHANNEL_OF_STOREY   ? counts->storeys
            : channel->owner == CHANNEL_OF_DAMPER ? counts->dampers
                                                  : 1;
@@ -127,6 +131,10 @@ static Status channel_names_check(const char *name, const ChannelCounts *counts,
                    ? STATUS_OK // reported with the fields
                    : spelling_reject(channel_requests, name, pointer, problem);
     const size_t most = channel_counts_of(counts, channel);
+    if (most == 0 && channel->owner == CHANNEL_OF_STOREY)
+        return problem_add(problem, STATUS_INVALID, pointer,
+                           "%s needs a structure of the kind frame, this one is of the kind %s",
+                           name, counts->structure->kind.name);
     if (most == 0)
         return problem_add(problem, STATUS_INVALID, pointer,
                            "%s needs a damper, the scene has none", name);
@@ -158,9 +166,9 @@ static Status channel_names_check(const char *name, const ChannelCounts *counts,
 
 Status channel_names_complete(const Scene *scene, Texts *names, bool is_spectrum,
                               const char *pointer, Problem *problem) {
-    const size_t storeys = scene_storeys(scene, problem), dampers = scene->dampers.count;
-    const ChannelCounts counts = {storeys, dampers, storeys > 1 || dampers > 1};
-    const bool are_known = storeys > 0 && !problem_concerns(problem, "/dampers");
+    const bool are_known =
+        scene_storeys(scene, problem) > 0 && !problem_concerns(problem, "/dampers");
+    const ChannelCounts counts = are_known ? channel_counts(scene) : (ChannelCounts){0};
     ExpandedNames expanded = {0, 1};
     if (are_known)
         TRY(channel_names_expand(names, &counts, is_spectrum, &expanded, problem));

@@ -82,6 +82,8 @@ static Status baseline_compute(const Simulation *view, const SimulationLimits *l
                            .rms_displacement = outcome->summary.rms_displacement,
                            .peak_acceleration = outcome->summary.peak_acceleration,
                            .rms_acceleration = outcome->summary.rms_acceleration,
+                           .peak_storey_drift = outcome->summary.peak_storey_drift,
+                           .peak_base_shear = outcome->summary.peak_base_shear,
                            .steps = outcome->steps,
                            .work = outcome->work};
     baseline->work.base_samples = 0; // the motion is that of the scene with dampers
@@ -129,7 +131,7 @@ static Status outcome_add_reduction(const Simulation *simulation, const Simulati
     Problem own = {0};
     undamped_baseline_set(simulation, &undamped);
     outcome->has_reduction = true;
-    outcome->reduction = (Reduction){NAN, NAN, NAN, NAN};
+    outcome->reduction = (Reduction){NAN, NAN, NAN, NAN, NAN, NAN};
     const Status status =
         baseline_get(&undamped.view, limits, progress, workspace, inputs, &without, &own);
     if (status == STATUS_OK) {
@@ -139,6 +141,8 @@ static Status outcome_add_reduction(const Simulation *simulation, const Simulati
             undamped_baseline_reduction(with->rms_displacement, without.rms_displacement),
             undamped_baseline_reduction(with->peak_acceleration, without.peak_acceleration),
             undamped_baseline_reduction(with->rms_acceleration, without.rms_acceleration),
+            undamped_baseline_reduction(with->peak_storey_drift, without.peak_storey_drift),
+            undamped_baseline_reduction(with->peak_base_shear, without.peak_base_shear),
         };
         outcome->steps += without.steps;
         work_counters_add(&outcome->work, &without.work);

@@ -8,7 +8,7 @@
 #include "core/simulation/internal.h"
 #include "core/solve/cycle_flow.h"
 
-const char engine_version[] = "impactd-6";
+const char engine_version[] = "impactd-7";
 
 // clang-format off
 const Field summary_fields[] = {
@@ -18,6 +18,8 @@ const Field summary_fields[] = {
     FIELD_REAL(Summary, rms_acceleration, "m/s^2", ANY, OPTIONAL, "root mean square over samples, the largest of all storeys"),
     FIELD_COUNT(Summary, impacts, NULL, AT_MIN(0), OPTIONAL, "number of impacts"),
     FIELD_REAL(Summary, peak_contact_force, "N", ANY, OPTIONAL, "largest |contact force| over events, of all dampers"),
+    FIELD_REAL(Summary, peak_storey_drift, "m", ANY, OPTIONAL, "largest |storey drift| over samples and events, of all storeys; unknown if the structure is no frame"),
+    FIELD_REAL(Summary, peak_base_shear, "N", ANY, OPTIONAL, "largest |base shear| over samples and events"),
     FIELD_REAL(Summary, energy_residual, NULL, ANY, OPTIONAL, "largest |balance| over the largest energy"),
     FIELD_REAL(Summary, error_estimate, NULL, ANY, OPTIONAL, "estimated largest error of displacement over its largest value, at most 1; unknown if the solver makes no estimate"),
     FIELD_REAL(Summary, trust_horizon, "s", ANY, OPTIONAL, "end of the predictable trajectory: here rounding, or the error of the solver's steps, reaches 1e-6 of the largest displacement, and beyond it only statistics are valid; null with an error_estimate: not within the run"),
@@ -29,6 +31,8 @@ const Field reduction_fields[] = {
     FIELD_REAL(Reduction, rms_displacement_reduction, NULL, ANY, OPTIONAL, "1 - rms_displacement over that without dampers"),
     FIELD_REAL(Reduction, peak_acceleration_reduction, NULL, ANY, OPTIONAL, "1 - peak_acceleration over that without dampers"),
     FIELD_REAL(Reduction, rms_acceleration_reduction, NULL, ANY, OPTIONAL, "1 - rms_acceleration over that without dampers"),
+    FIELD_REAL(Reduction, peak_storey_drift_reduction, NULL, ANY, OPTIONAL, "1 - peak_storey_drift over that without dampers"),
+    FIELD_REAL(Reduction, peak_base_shear_reduction, NULL, ANY, OPTIONAL, "1 - peak_base_shear over that without dampers"),
     FIELD_END
 };
 // clang-format on
@@ -291,22 +295,27 @@ static void run_add_given_up(const Plan *plan, Response *response) {
 }
 
 // Finite inputs may have products that overflow.
-static Status run_summarize(Outcome *outcome, Problem *problem) {
+static Status run_summarize(const Plan *plan, Outcome *outcome, Problem *problem) {
     const Response *response = &outcome->response;
+    const Peaks *peaks = &response->peaks;
+    const double drift = plan->storeys == 1 ? peaks->displacement : peaks->storey_drift;
     const double count = (double)response->statistics_count;
     Summary *summary = &outcome->summary;
-    *summary = (Summary){.peak_displacement = response->peaks.displacement,
+    *summary = (Summary){.peak_displacement = peaks->displacement,
                          .rms_displacement = sqrt(response->sum_squares_displacement / count),
-                         .peak_acceleration = response->peaks.acceleration,
+                         .peak_acceleration = peaks->acceleration,
                          .rms_acceleration = sqrt(response->sum_squares_acceleration / count),
                          .impacts = response->impact_count,
-                         .peak_contact_force = response->peaks.contact_force,
+                         .peak_contact_force = peaks->contact_force,
+                         .peak_storey_drift = plan->has_drifts ? drift : NAN,
+                         .peak_base_shear = peaks->base_shear,
                          .energy_residual = response->energy.residual,
                          .error_estimate = response->has_trust ? response->error_estimate : NAN,
                          .trust_horizon = response->has_trust ? response->trust_horizon : NAN};
     if (isfinite(summary->peak_displacement + summary->rms_displacement +
                  summary->peak_acceleration + summary->rms_acceleration +
-                 summary->peak_contact_force + summary->energy_residual))
+                 summary->peak_contact_force + drift + summary->peak_base_shear +
+                 summary->energy_residual))
         return STATUS_OK;
     return problem_set(problem, STATUS_UNSTABLE,
                        "the scene's numbers are too large: peaks or energies overflow double "
@@ -378,7 +387,7 @@ static Status run_all(RunContext *context, Workspace *workspace, Problem *proble
     TRY(run_make_approaches(&simulation->scene, &outcome->response, problem));
     TRY(run_solve(context, &regime, workspace, problem));
     run_add_given_up(context->plan, &outcome->response);
-    TRY(run_summarize(outcome, problem));
+    TRY(run_summarize(context->plan, outcome, problem));
     PlanReport *report = &context->plan->report;
     if (scene_warnings_of_result(&simulation->scene, &report->derived, outcome) != STATUS_OK)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a warning");

@@ -95,7 +95,8 @@ Status scene_warnings_of_pairs(const Scene *scene, const DerivedList *derived, W
 typedef struct Summary {
     double peak_displacement, rms_displacement, peak_acceleration, rms_acceleration;
     uint64_t impacts;
-    double peak_contact_force, energy_residual, error_estimate, trust_horizon;
+    double peak_contact_force, peak_storey_drift, peak_base_shear;
+    double energy_residual, error_estimate, trust_horizon;
 } Summary;
 extern const Field summary_fields[];
 
@@ -103,7 +104,7 @@ extern const Field summary_fields[];
 // for example where nothing moves.
 typedef struct Reduction {
     double peak_displacement_reduction, rms_displacement_reduction, peak_acceleration_reduction,
-        rms_acceleration_reduction;
+        rms_acceleration_reduction, peak_storey_drift_reduction, peak_base_shear_reduction;
 } Reduction;
 extern const Field reduction_fields[];
 

@@ -12,6 +12,8 @@ typedef struct Instant {
     double x, v, acceleration; // of the structure; acceleration is absolute
     double damper_x, damper_v; // relative to the base
     double penetration, force;
+    double drift; // largest |storey drift|
+    double shear; // of the base
 } Instant;
 
 typedef struct EnergyState {
@@ -96,6 +98,8 @@ static inline void impact_log_peaks(ImpactLog *log, const Instant *at) {
     peaks->velocity = impact_log_larger(peaks->velocity, fabs(at->v));
     peaks->acceleration = impact_log_larger(peaks->acceleration, fabs(at->acceleration));
     peaks->damper_displacement = impact_log_larger(peaks->damper_displacement, fabs(at->damper_x));
+    peaks->storey_drift = impact_log_larger(peaks->storey_drift, at->drift);
+    peaks->base_shear = impact_log_larger(peaks->base_shear, fabs(at->shear));
 }
 
 // Statistics begin here: restarts the peaks. `force` is the largest one now [N].

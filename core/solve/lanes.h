@@ -34,6 +34,7 @@ typedef struct FlightBlock {
     double z;                       // velocity of the free mass relative to the base [m/s]
     double left, right;             // r stays within (-left, right); INFINITY without a damper
     double middle;                  // displacement of the free mass less x and r [m]
+    double mass;                    // of the structure [kg]
     double base_max;                // |a_g| is not larger over the whole run [m/s^2]
     const BaseCursor *base;         // of a sine
     double *columns[CHANNEL_COUNT]; // those that flight fills, from sample 0; NULL: not wanted

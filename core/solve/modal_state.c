@@ -80,7 +80,7 @@ void modal_state_forces(ModalState *state) {
     }
 }
 
-const double *modal_state_expand(const ModalState *state, const double *modal, size_t rows) {
+double *modal_state_expand(const ModalState *state, const double *modal, size_t rows) {
     const size_t slots = modal_state_even(state->slot_count);
     if (rows == 1)
         state->lanes->multiply(state->shape_matrix, state->tall, modal, slots,
@@ -289,10 +289,14 @@ static Status modal_state_allocate(ModalState *state) {
         {&state->p, n},
         {&state->elastic, n},
         {&state->max_shape, n},
+        {&state->max_drift, n},
+        {&state->base_shear, n},
+        {&state->max_base_shear, n},
         {&state->shapes, m * n},
         {&state->shape_matrix, modal_state_even(state->slot_count) * tall},
         {&state->storey_values, FLIGHT_ROWS * tall},
         {&state->difference, n},
+        {&state->largest, n},
         {&state->mobility, m * tall},
         {&state->delassus, m * m},
         {&state->constraint_mass, m * m},
@@ -322,6 +326,11 @@ static void modal_state_make_residual(ModalState *state) {
         most = fmax(most, fabs(state->residual_influence[j]));
     }
     state->max_shape[n] = most;
+    for (size_t j = 0; j < state->storey_count; j++)
+        for (size_t k = 0; k < state->storey_count; k++)
+            state->base_shear[n] -= state->plan->influence[j] *
+                                    state->plan->mass[j * state->storey_count + k] *
+                                    state->residual_influence[k];
 }
 
 // Copies of the modes, padded, and what follows from them.
@@ -332,8 +341,12 @@ static void modal_state_make_modes(ModalState *state) {
         state->omega2[i] = modes->omega[i] * modes->omega[i];
         state->stiff = fmax(state->stiff, state->omega2[i]);
         state->participation[i] = state->momentum_weights[i] = modes->participation[i];
+        state->base_shear[i] = modes->participation[i];
         for (size_t j = 0; j < state->storey_count; j++) {
             const double shape = modes->shapes[j * n + i];
+            const double below = j > 0 ? modes->shapes[(j - 1) * n + i] : 0;
+            if (state->plan->has_drifts)
+                state->max_drift[i] = fmax(state->max_drift[i], fabs(shape - below));
             state->max_shape[i] = fmax(state->max_shape[i], fabs(shape));
             state->shape_matrix[i * state->tall + j] = shape;
         }
@@ -342,6 +355,8 @@ static void modal_state_make_modes(ModalState *state) {
         modal_state_make_residual(state);
     else
         state->residual_influence = NULL;
+    for (size_t i = 0; i < state->slot_count; i++)
+        state->max_base_shear[i] = fabs(state->base_shear[i]);
 }
 
 static void modal_state_start(ModalState *state, Run *run, Problem *problem) {

@@ -54,7 +54,11 @@ typedef struct DamperState {
 // kept. Modes that are left out move with the base: a storey's absolute acceleration is
 //   residual_influence_j a_g - shape_j . (D q' + W^2 q) + ...,   residual_influence_j = influence_j
 //   - shape_j . participation,
-// and `elastic` has one more slot with a_g, whose shape is -residual_influence.
+// and `elastic` has one more slot with a_g, whose shape is -residual_influence. The force of the
+// structure on the base is
+//   r' (C x' + K x) = participation . (D q' + W^2 q) - residual_mass a_g,   residual_mass = r' M
+//   residual_influence,
+// which of a frame is k_1 x_1 + c_1 x_1'.
 typedef struct ModalState {
     Run *run;
     const Plan *plan;
@@ -79,7 +83,11 @@ typedef struct ModalState {
     double *shape_matrix;       // of all storeys: a column of `tall` values for each slot
     double *storey_values;      // scratch of modal_state_expand
     double *difference;         // scratch of modal_state_difference
+    double *largest;            // of each slot, scratch of the recorder
     double *max_shape;          // of each slot, the largest |shape| of any storey
+    double *max_drift;          // likewise |shape| less that of the storey below; 0 without drifts
+    double *base_shear;         // of each slot: its share in the force on the base
+    double *max_base_shear;     // their sizes
     double *residual_influence; // of the storeys; NULL where all modes are kept [-]
     double *momentum_weights;   // participation + sum of m_d shape_d; -a_g momentum_weights . p is
                                 // the power of the base
@@ -168,7 +176,7 @@ double modal_state_difference(const ModalState *state, const double *q, const do
                               double least);
 // Values of all storeys, `tall` of each row, from those of all modes in 1 or FLIGHT_ROWS rows, one
 // after the other; valid until the next call.
-const double *modal_state_expand(const ModalState *state, const double *modal, size_t rows);
+double *modal_state_expand(const ModalState *state, const double *modal, size_t rows);
 // r'' of a damper in flight, after modal_state_forces [m/s^2].
 double modal_state_acceleration(const ModalState *state, size_t damper);
 EnergyState modal_state_energy(const ModalState *state);

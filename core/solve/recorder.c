@@ -50,12 +50,16 @@ Status recorder_start(Recorder *record, const ModalState *state, Response *respo
                               : owner == CHANNEL_OF_DAMPER
                                   ? state->plan->dampers[column->number].storey
                                   : 0;
-        memcpy(record->shapes + i * padded, state->modes->shapes + storey * n,
-               n * sizeof *record->shapes);
+        double *shape = record->shapes + i * padded;
+        memcpy(shape, state->modes->shapes + storey * n, n * sizeof *shape);
+        for (size_t k = 0; k < n && column->channel == CHANNEL_STOREY_DRIFT && storey > 0; k++)
+            shape[k] -= state->modes->shapes[(storey - 1) * n + k];
+        if (column->channel == CHANNEL_BASE_SHEAR)
+            memcpy(shape, state->base_shear, padded * sizeof *shape);
         // Row p has 0 in the slot of a_g.
         if (state->residual_influence != NULL && (column->channel == CHANNEL_ACCELERATION ||
                                                   column->channel == CHANNEL_MEAN_ACCELERATION))
-            record->shapes[i * padded + n] = -state->residual_influence[column->number];
+            shape[n] = -state->residual_influence[column->number];
     }
     record->statistics_start =
         (size_t)ceil(state->run->statistics_from * state->plan->sample_rate * (1 - 1e-12));
@@ -80,14 +84,16 @@ static void recorder_write_means(Recorder *record, const ModalState *state, size
     }
 }
 
+// A sum over modes.
 static void recorder_write_storey(Recorder *record, const ModalState *state, size_t column,
                                   double *values, size_t count) {
     const FlightBuffer *buffer = &record->buffer;
     const ChannelId channel = state->run->columns[column].channel;
     const size_t padded = state->padded, storey = state->run->columns[column].number;
-    const double *rows = channel == CHANNEL_ACCELERATION   ? buffer->elastic
-                         : channel == CHANNEL_DISPLACEMENT ? buffer->q
-                                                           : buffer->p;
+    const double *rows =
+        channel == CHANNEL_ACCELERATION || channel == CHANNEL_BASE_SHEAR     ? buffer->elastic
+        : channel == CHANNEL_DISPLACEMENT || channel == CHANNEL_STOREY_DRIFT ? buffer->q
+                                                                             : buffer->p;
     const double *shape = record->shapes + column * padded;
     state->lanes->dot(padded, count, shape, rows + padded, values);
     if (channel == CHANNEL_MEAN_ACCELERATION)
@@ -131,12 +137,13 @@ static void recorder_write_column(Recorder *record, const ModalState *state, siz
                                   size_t count) {
     const size_t first = state->sample + 1 - count;
     double *values = state->run->columns[column].values + first;
-    const ChannelOwner owner = channels[state->run->columns[column].channel].owner;
-    if (owner == CHANNEL_OF_STOREY)
+    const ChannelId channel = state->run->columns[column].channel;
+    const ChannelOwner owner = channels[channel].owner;
+    if (owner == CHANNEL_OF_STOREY || channel == CHANNEL_BASE_SHEAR)
         recorder_write_storey(record, state, column, values, count);
     else if (owner == CHANNEL_OF_DAMPER)
         recorder_write_damper(record, state, column, values, count);
-    for (size_t k = 0; k < count && owner == CHANNEL_OF_BASE; k++)
+    for (size_t k = 0; k < count && channel == CHANNEL_BASE_ACCELERATION; k++)
         values[k] = base_cursor_at(&state->base, first + k);
 }
 
@@ -225,44 +232,73 @@ void recorder_acceleration(ModalState *state) {
     impact_log_acceleration(&state->impacts, at);
 }
 
-// The largest value of any storey in `count` rows, or `least` if that is larger. `bounds` becomes
-// an upper bound for each row.
+// The largest value of any storey in `count` rows, or `least` if that is larger; `is_drift`: of its
+// difference from the storey below. `largest` has the largest size of each mode in these rows.
 static double recorder_find_peak(const ModalState *state, const double *rows, size_t count,
-                                 double least, double *bounds) {
+                                 bool is_drift, const double *largest, double least) {
+    const double *weights = is_drift ? state->max_drift : state->max_shape;
     const size_t padded = state->padded;
-    state->lanes->weighted_abs(padded, count, state->max_shape, rows, bounds);
+    double bounds[FLIGHT_BUFFER_MAX];
+    state->lanes->dot(padded, 1, weights, largest, bounds);
+    if (!(bounds[0] > least))
+        return least;
+    state->lanes->weighted_abs(padded, count, weights, rows, bounds);
     for (size_t k = 0; k < count; k += FLIGHT_ROWS) {
         bool may_rise = false;
         for (size_t j = k; j < k + FLIGHT_ROWS && j < count; j++)
             may_rise = may_rise || bounds[j] > least;
         if (!may_rise)
             continue;
-        const double *values =
-            modal_state_expand(state, rows + k * padded, count == 1 ? 1 : FLIGHT_ROWS);
-        for (size_t j = k; j < k + FLIGHT_ROWS && j < count; j++)
-            least = impact_log_larger(
-                least, recorder_largest_value(values + (j - k) * state->tall, state->storey_count));
+        double *values = modal_state_expand(state, rows + k * padded, count == 1 ? 1 : FLIGHT_ROWS);
+        for (size_t j = k; j < k + FLIGHT_ROWS && j < count; j++, values += state->tall) {
+            for (size_t i = state->storey_count - 1; i > 0 && is_drift; i--)
+                values[i] -= values[i - 1];
+            least = impact_log_larger(least, recorder_largest_value(values, state->storey_count));
+        }
     }
     return least;
 }
 
-// Updates all peaks but those of accelerations by `count` rows of q and p, and of the dampers' r,
-// each damper's `stride` values apart.
+// Likewise of the force on the base.
+static double recorder_find_shear(const ModalState *state, const double *elastic, size_t count,
+                                  const double *largest, double least) {
+    double values[FLIGHT_BUFFER_MAX];
+    state->lanes->dot(state->padded, 1, state->max_base_shear, largest, values);
+    if (!(values[0] > least))
+        return least;
+    state->lanes->dot(state->padded, count, state->base_shear, elastic, values);
+    for (size_t k = 0; k < count; k++)
+        least = impact_log_larger(least, fabs(values[k]));
+    return least;
+}
+
+// Updates all peaks by `count` rows of q, p and elastic, and of the dampers' r, each damper's
+// `stride` values apart; that of the acceleration in flight only, where it has no contact forces.
 static void recorder_find_peaks(ModalState *state, const double *q, const double *p,
-                                const double *r, size_t stride, size_t count) {
+                                const double *elastic, const double *r, size_t stride, size_t count,
+                                bool is_flight) {
     const Peaks *peaks = &state->impacts.response->peaks;
-    double far[FLIGHT_BUFFER_MAX], bounds[FLIGHT_BUFFER_MAX];
-    Instant at = {
-        .v = recorder_find_peak(state, p, count, peaks->velocity, bounds),
-        .x = recorder_find_peak(state, q, count, peaks->displacement, far),
-        .damper_x = peaks->damper_displacement,
-    };
+    const SimdKernels *lanes = state->lanes;
+    double *largest = state->largest, far;
+    Instant at = {.damper_x = peaks->damper_displacement};
+    lanes->largest(state->padded, count, p, largest);
+    at.v = recorder_find_peak(state, p, count, false, largest, peaks->velocity);
+    lanes->largest(state->padded, count, elastic, largest);
+    at.shear = recorder_find_shear(state, elastic, count, largest, peaks->base_shear);
+    if (is_flight)
+        at.acceleration =
+            recorder_find_peak(state, elastic, count, false, largest, peaks->acceleration);
+    lanes->largest(state->padded, count, q, largest);
+    at.x = recorder_find_peak(state, q, count, false, largest, peaks->displacement);
+    if (state->plan->has_drifts && state->storey_count > 1)
+        at.drift = recorder_find_peak(state, q, count, true, largest, peaks->storey_drift);
+    lanes->dot(state->padded, 1, state->max_shape, largest, &far);
     for (size_t d = 0; d < state->dampers; d++) {
         const DamperState *damper = &state->damper[d];
         const double middle = recorder_middle(damper);
         for (size_t k = 0; k < count; k++) {
             const double relative = middle + r[d * stride + k];
-            if (far[k] + fabs(relative) > at.damper_x)
+            if (far + fabs(relative) > at.damper_x)
                 at.damper_x = fmax(
                     at.damper_x,
                     fabs(modal_state_dot(damper->shape, q + k * state->padded, state->mode_count) +
@@ -276,7 +312,7 @@ void recorder_peaks(ModalState *state) {
     double r[SCENE_DAMPERS];
     for (size_t d = 0; d < state->dampers; d++)
         r[d] = state->damper[d].r;
-    recorder_find_peaks(state, state->q, state->p, r, 1, 1);
+    recorder_find_peaks(state, state->q, state->p, state->elastic, r, 1, 1, false);
     recorder_acceleration(state);
 }
 
@@ -291,7 +327,7 @@ void recorder_flight(Recorder *record, ModalState *state, size_t count) {
     const FlightBuffer *buffer = &record->buffer;
     const size_t padded = state->padded;
     const double *q = buffer->q + padded, *p = buffer->p + padded;
-    double *elastic = buffer->elastic + padded, bounds[FLIGHT_BUFFER_MAX];
+    double *elastic = buffer->elastic + padded;
     state->base_acceleration = base_cursor_at(&state->base, state->sample);
     if (state->diagonal != NULL)
         state->lanes->mix(padded, count, state->diagonal, p, state->omega2, q, elastic);
@@ -305,10 +341,7 @@ void recorder_flight(Recorder *record, ModalState *state, size_t count) {
     if (state->sample + 1 - count == record->statistics_start)
         recorder_restart_peaks(state);
     recorder_write(record, state, count);
-    recorder_find_peaks(state, q, p, buffer->r + 1, FLIGHT_BUFFER_ROWS, count);
-    impact_log_acceleration(
-        &state->impacts, recorder_find_peak(state, elastic, count,
-                                            state->impacts.response->peaks.acceleration, bounds));
+    recorder_find_peaks(state, q, p, elastic, buffer->r + 1, FLIGHT_BUFFER_ROWS, count, true);
 }
 
 void recorder_sample(Recorder *record, ModalState *state) {

@@ -5,6 +5,10 @@
 #include <stdint.h>
 #include <stdlib.h>
 
+#ifdef __x86_64__
+#include <immintrin.h>
+#endif
+
 #include "core/solve/lanes.h"
 
 enum { LARGE = 4096 };
@@ -18,7 +22,7 @@ static inline double simd_kernels_total(const double s[LANES]) {
 #define KIND(name)                                                                                 \
     {.fly = fly_##name, .sum = sum_##name, .mix = mix_##name, .dot = dot_##name,                   \
      .weigh = weigh_##name, .order = order_##name, .series = series_##name,                        \
-     .weighted_abs = weighted_abs_##name, .square = square_##name, .multiply = multiply_##name, .multiply_four = multiply_four_##name}
+     .weighted_abs = weighted_abs_##name, .largest = largest_##name, .square = square_##name, .multiply = multiply_##name, .multiply_four = multiply_four_##name}
 // clang-format on
 
 #define WIDTH 2

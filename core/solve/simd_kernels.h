@@ -62,6 +62,8 @@ typedef struct SimdKernels {
     // out[k] = sum of weights |rows[k]|.
     void (*weighted_abs)(size_t padded, size_t count, const double *weights, const double *rows,
                          double *out);
+    // out = the largest |rows[k]|, column by column.
+    void (*largest)(size_t padded, size_t count, const double *rows, double *out);
     // squares += rows' rows of the first `modes` columns, row after row. Only the lower triangle is
     // complete.
     void (*square)(size_t modes, size_t padded, size_t count, const double *rows, double *squares);

@@ -494,13 +494,16 @@ INLINE void single_mass_block_record(SingleMass *single, size_t count, BlockRows
     const double mass = single_mass_effective(single);
     const size_t first = single->sample + 1, bytes = count * sizeof(double);
     double *const *columns = single->columns;
-    _Alignas(32) double place[BLOCK];
-    const double *const rows[] = {y[0] + 1, y[1] + 1, acceleration + 1, place, n + 1};
+    const double damping = single->plan->damping[0], stiffness = single->plan->stiffness[0];
+    _Alignas(32) double place[BLOCK], shear[BLOCK];
+    const double *const rows[] = {y[0] + 1, y[1] + 1, acceleration + 1, place, shear, n + 1};
     enum { ROWS = COUNT(rows) };
     Four peaks[ROWS] = {{0}}, squares[2] = {{0}};
     double peak[ROWS];
-    for (size_t k = 0; k < count; k += 4)
+    for (size_t k = 0; k < count; k += 4) {
         PUT_FOUR(place + k, FOUR(y[0] + k + 1) + (middle + FOUR(y[2] + k + 1)));
+        PUT_FOUR(shear + k, damping * FOUR(y[1] + k + 1) + stiffness * FOUR(y[0] + k + 1));
+    }
     for (size_t k = count; k % 4 != 0; k++)
         place[k] = 0;
     for (size_t k = 0; k < count; k += 4) {
@@ -520,15 +523,16 @@ INLINE void single_mass_block_record(SingleMass *single, size_t count, BlockRows
     all->velocity = single_mass_larger(all->velocity, peak[1]);
     all->acceleration = single_mass_larger(all->acceleration, peak[2]);
     all->damper_displacement = single_mass_larger(all->damper_displacement, peak[3]);
-    impact_log_force(&single->impacts, &single->row, mass * peak[4]);
+    all->base_shear = single_mass_larger(all->base_shear, peak[4]);
+    impact_log_force(&single->impacts, &single->row, mass * peak[5]);
     if (single->sample >= single->statistics_start) {
         for (int i = 0; i < 2; i++)
             single->squares[i] += (squares[i][0] + squares[i][2]) + (squares[i][1] + squares[i][3]);
         single->statistics_count += count;
     }
     static const int channel[] = {CHANNEL_DISPLACEMENT, CHANNEL_VELOCITY, CHANNEL_ACCELERATION,
-                                  CHANNEL_DAMPER_DISPLACEMENT};
-    for (int i = 0; i < 4; i++)
+                                  CHANNEL_DAMPER_DISPLACEMENT, CHANNEL_BASE_SHEAR};
+    for (int i = 0; i < 5; i++)
         if (columns[channel[i]] != NULL)
             memcpy(columns[channel[i]] + first, rows[i], bytes);
     for (size_t k = 0; k < count && columns[CHANNEL_DAMPER_VELOCITY] != NULL; k++)
@@ -930,6 +934,9 @@ static Status single_mass_start(SingleMass *single, Run *run, Response *response
     single->impacts.gain_max = IMPACT_LOG_GAIN_EXACT;
     for (size_t i = 0; i < run->column_count; i++)
         single->columns[run->columns[i].channel] = run->columns[i].values;
+    // The drift of the only storey is its displacement; where both are wanted, it is copied later.
+    if (single->columns[CHANNEL_DISPLACEMENT] == NULL)
+        single->columns[CHANNEL_DISPLACEMENT] = single->columns[CHANNEL_STOREY_DRIFT];
     single->statistics_start = (size_t)ceil(run->statistics_from * plan->sample_rate * (1 - 1e-12));
     response->sample_rate = plan->sample_rate;
     response->count = plan->count;
@@ -947,11 +954,12 @@ static Status single_mass_start(SingleMass *single, Run *run, Response *response
     if (base->form == BASE_SINE)
         stretch->base_max = single->base_slope = fabs(base->amplitude);
     stretch->base = &single->base;
+    stretch->mass = plan->mass[0];
     memcpy(stretch->columns, single->columns, sizeof stretch->columns);
     stretch->left = stretch->right = INFINITY;
     for (int i = 0; i < CHANNEL_COUNT; i++) {
         const bool is_damper = i == CHANNEL_DAMPER_DISPLACEMENT || i == CHANNEL_DAMPER_VELOCITY;
-        if (i == CHANNEL_PENETRATION || i == CHANNEL_CONTACT_FORCE ||
+        if (i == CHANNEL_PENETRATION || i == CHANNEL_CONTACT_FORCE || i == CHANNEL_STOREY_DRIFT ||
             (i == CHANNEL_BASE_ACCELERATION && base->form != BASE_SINE) ||
             (is_damper && plan->damper_count == 0))
             stretch->columns[i] = NULL;
@@ -1013,6 +1021,9 @@ static Status single_mass_run_with(SingleMass *single, Run *run, Response *respo
     response->sum_squares_displacement += single->squares[0];
     response->sum_squares_acceleration += single->squares[1];
     response->statistics_count += single->statistics_count;
+    double *const drift = single->columns[CHANNEL_STOREY_DRIFT];
+    if (drift != NULL && drift != single->columns[CHANNEL_DISPLACEMENT])
+        memcpy(drift, single->columns[CHANNEL_DISPLACEMENT], run->plan->count * sizeof *drift);
     if (single->engine != NULL)
         event_engine_clear(single->engine);
     free(single->engine);

@@ -20,10 +20,11 @@ void single_mass_put(double *column, size_t sample, double value) {
 // The present instant, for the peaks.
 Instant single_mass_instant(const SingleMass *single) {
     const State *at = &single->state;
-    const double n = single_mass_contact_term(single, at);
+    const double n = single_mass_contact_term(single, at), push = single_mass_push(single, at);
     Instant instant = {.x = at->x,
                        .v = at->v,
-                       .acceleration = single->flying.share * n - single_mass_push(single, at),
+                       .acceleration = single->flying.share * n - push,
+                       .shear = single->plan->mass[0] * push,
                        .force = single_mass_effective(single) * n};
     if (single->plan->damper_count > 0) {
         instant.damper_x = at->x + (single_mass_origin(single) + at->r);
@@ -47,6 +48,7 @@ void single_mass_record(SingleMass *single) {
     single_mass_put(columns[CHANNEL_DISPLACEMENT], sample, at.x);
     single_mass_put(columns[CHANNEL_VELOCITY], sample, at.v);
     single_mass_put(columns[CHANNEL_ACCELERATION], sample, at.acceleration);
+    single_mass_put(columns[CHANNEL_BASE_SHEAR], sample, at.shear);
     single_mass_put(columns[CHANNEL_MEAN_ACCELERATION], sample,
                     sample == 0 ? at.acceleration
                                 : (at.v - single->last_velocity + single->base_speed) *
@@ -84,8 +86,9 @@ void single_mass_flush(SingleMass *single) {
     lanes_take_sums(lanes, stretch, sums);
     const double speed = lanes_take_peak(stretch, OF_VELOCITY);
     peaks->velocity = single_mass_larger(peaks->velocity, speed);
-    peaks->acceleration =
-        single_mass_larger(peaks->acceleration, lanes_take_peak(stretch, OF_ACCELERATION));
+    const double push = lanes_take_peak(stretch, OF_ACCELERATION);
+    peaks->acceleration = single_mass_larger(peaks->acceleration, push);
+    peaks->base_shear = single_mass_larger(peaks->base_shear, plan->mass[0] * push);
     const double damper = lanes_take_peak(stretch, OF_DAMPER);
     if (plan->damper_count > 0)
         peaks->damper_displacement = single_mass_larger(peaks->damper_displacement, damper);

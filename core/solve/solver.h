@@ -58,6 +58,7 @@ typedef struct Baseline {
     char *key; // canonical form of the scene; NULL: none
     size_t key_size;
     double peak_displacement, rms_displacement, peak_acceleration, rms_acceleration;
+    double peak_storey_drift, peak_base_shear;
     double steps;
     WorkCounters work;
 } Baseline;

@@ -49,10 +49,12 @@ typedef struct StudyFailures {
 Status study_failures_add(StudyFailures *failures, int status, const char *reason, uint64_t number,
                           const char *why);
 
-// The metrics of a summary that studies compare, by their names there.
-#define STUDY_METRICS                                                                              \
+// The metrics of a summary that studies compare, by their names there; the usual ones have
+// statistics and are the default.
+#define STUDY_METRICS_USUAL                                                                        \
     "peak_displacement", "rms_displacement", "peak_acceleration", "rms_acceleration", "impacts",   \
         "peak_contact_force"
+#define STUDY_METRICS STUDY_METRICS_USUAL, "peak_storey_drift", "peak_base_shear"
 
 // A number of a summary by its name; NAN: unknown.
 double study_summary_value(const Summary *summary, const char *name);

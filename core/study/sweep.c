@@ -34,7 +34,7 @@ const char *const sweep_status_names[] = {"made",   "invalid", "unstable", "limi
 // The metrics of a point: the summary's numbers in their order, then the solver's steps.
 static const char *const sweep_metric_names[] = {
     STUDY_METRICS, "energy_residual", "error_estimate", "trust_horizon", "steps", NULL};
-static const char *const sweep_default_metrics[] = {STUDY_METRICS, NULL};
+static const char *const sweep_default_metrics[] = {STUDY_METRICS_USUAL, NULL};
 
 const char *sweep_metric_unit(const char *name) {
     const Field *row = fields_find(summary_fields, name, NULL);

@@ -377,7 +377,7 @@ def test_the_bundle_explains_itself():
 def test_summary_has_the_reduction_by_the_dampers():
     """output.reduction, by default true where there are dampers: 1 - with over without dampers; nothing else changes."""
     with program.daemon() as daemon:
-        names = ("peak_displacement", "rms_displacement", "peak_acceleration", "rms_acceleration")
+        names = ("peak_displacement", "rms_displacement", "peak_acceleration", "rms_acceleration", "peak_base_shear")
         scene, bare = program.scene("paper_random_sponge"), program.scene("paper_random_sponge")
         bare["dampers"] = []
         bare["output"] = {"channels": [], "psd": None}

@@ -60,6 +60,10 @@ def test_the_summary_is_of_the_storey_that_moves_most():
             rms = numpy.sqrt((storeys ** 2).mean(axis=1)).max()
             assert abs(summary[f"rms_{name}"] / rms - 1) < 1e-12, (name, rms, summary)
             assert abs(storeys).max() <= summary[f"peak_{name}"] < 1.1 * abs(storeys).max(), (name, summary)
+        x_1, x_2, x_3 = (columns[f"displacement_{i}"] for i in (1, 2, 3))
+        drift = max(abs(drifts).max() for drifts in (x_1, x_2 - x_1, x_3 - x_2))
+        assert drift * (1 - 1e-12) <= summary["peak_storey_drift"] < 1.1 * drift, summary
+        assert summary["peak_base_shear"] > 0.9 * 900000 * abs(x_1).max(), summary
         impacts = daemon.get(f"/v1/results/{job['result']}/impacts.json").json()["impacts"]
         assert {impact["damper"] for impact in impacts} == {1, 2}
         assert max(impact["peak_force"] for impact in impacts) == summary["peak_contact_force"]

@@ -43,10 +43,11 @@ static void fly(const Lanes *lanes, const State *start, double room, const doubl
                        .left = room,
                        .right = room,
                        .middle = 0.001,
+                       .mass = 2,
                        .base_max = base == NULL && lanes->base_omega == 0 ? 0 : 1.4,
                        .base = &cursor};
     for (int i = 0; i < CHANNEL_COUNT; i++)
-        if (i <= CHANNEL_DAMPER_VELOCITY)
+        if (i <= CHANNEL_DAMPER_VELOCITY || i == CHANNEL_BASE_SHEAR)
             s->columns[i] = flown->columns[i];
     flown->count = lanes_fly(lanes, s, 0, COUNT_MAX, base);
 }
@@ -87,6 +88,7 @@ TEST(lanes_agree_with_pieces) {
             assert_true(fabs(flown.columns[CHANNEL_DISPLACEMENT][i + 1] - at.x) < 1e-15);
             assert_true(fabs(flown.columns[CHANNEL_VELOCITY][i + 1] - at.v) < 1e-14);
             assert_true(fabs(flown.columns[CHANNEL_ACCELERATION][i + 1] + push) < 1e-12);
+            assert_true(fabs(flown.columns[CHANNEL_BASE_SHEAR][i + 1] - 2 * push) < 2e-12);
             assert_true(fabs(flown.columns[CHANNEL_MEAN_ACCELERATION][i + 1] -
                              (at.v - before + integrals.a) / INTERVAL) < 1e-11);
             assert_true(fabs(flown.columns[CHANNEL_DAMPER_DISPLACEMENT][i + 1] -

@@ -13,7 +13,7 @@ typedef struct Results {
     double dots[ROWS], weighed[ROWS], reached[ROWS];
     double elastic[PADDED], after[PADDED], push[2];
     double series[4][PADDED], squares[PADDED][PADDED];
-    double product[PADDED], large[LARGE], four[FLIGHT_ROWS][PADDED];
+    double sizes[PADDED], product[PADDED], large[LARGE], four[FLIGHT_ROWS][PADDED];
 } Results;
 
 typedef struct Given {
@@ -81,6 +81,7 @@ static void solve(Given *given, const SimdKernels *lanes, Results *out) {
                                .push = out->push};
     lanes->order(&order);
     lanes->series(PADDED, COUNT_MAX, given->rows[0], 4, given->factors[0], ROWS, out->series[0]);
+    lanes->largest(PADDED, ROWS, given->rows[0], out->sizes);
     lanes->square(MODES, PADDED, ROWS, given->rows[0], out->squares[0]);
     for (size_t i = 0; i < PADDED; i++)
         memset(out->squares[i] + i + 1, 0, (PADDED - i - 1) * sizeof(double)); // of no use
@@ -157,6 +158,12 @@ TEST(job_metrics_are_what_plain_loops_make_of_them) {
         near(got.dots[k], dot);
         near(got.weighed[k], weighed);
         near(got.reached[k], reached);
+    }
+    for (size_t i = 0; i < MODES; i++) {
+        double size = 0;
+        for (size_t k = 0; k < ROWS; k++)
+            size = fmax(size, fabs(given.rows[k][i]));
+        assert_true(got.sizes[i] == size);
     }
     for (size_t d = 0; d < 2; d++) {
         double push = 0;
