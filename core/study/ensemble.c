@@ -1,21 +1,45 @@
 // Each run is the scene with another seed and without sampled channels. Its summary becomes a row
 // of the table and its spectra are added up; a run that fails is a row with its reason.
+//
+// With uncertain inputs it is the scene of a draw, and may have one channel for the displacement
+// over time. For Sobol indices each base sample has k + 2 runs (sobol_indices.h), of which the
+// first two, of independent draws, are rows of the table. Under a random base the seed is an input
+// like the others: its share of the variance is that of the ground motion.
 #include "core/study/ensemble.h"
 
 #include <math.h>
+#include <stdlib.h>
+#include <string.h>
 
 #include "core/excitation/excitation.h"
+#include "core/study/sobol_indices.h"
 
-enum { RUNS_MAX = 10000 };
+enum {
+    RUNS_MAX = 10000,
+    MEMBERS_MAX = 100000,  // runs for Sobol indices
+    HISTORY_POINTS = 1000, // of the displacement over time
+    COST_SAMPLES = 16,
+};
 
 // clang-format off
 static const Field ensemble_study_fields[] = {
-    FIELD_COUNT(EnsembleStudy, runs, NULL, WITHIN(2, RUNS_MAX), 64, "runs, each with its own seed; with a target the largest number of them"),
-    FIELD_COUNT(EnsembleStudy, first_seed, NULL, WITHIN(0, 0x1p53 - 1), OPTIONAL, "the seeds are this one and those that follow it; the excitation's own if absent"),
+    FIELD_COUNT(EnsembleStudy, runs, NULL, WITHIN(2, RUNS_MAX), 64, "runs, each with its own seed; with a target the largest number of them; with sobol_indices base samples, each of as many runs as there are inputs and two more"),
+    FIELD_COUNT(EnsembleStudy, first_seed, NULL, WITHIN(0, 0x1p53 - 1), OPTIONAL, "the seeds are this one and those that follow it; the excitation's own if absent, 1 if it has none. It is also the seed of the inputs' draws"),
     FIELD_REAL(EnsembleStudy, target, NULL, ABOVE(0), OPTIONAL, "wanted relative error of the metric's mean, against its mean over all of the runs: no more runs are made than necessary; all are made if absent"),
     FIELD_CHOICE(EnsembleStudy, metric, statistics_metric_names, OPTIONAL, "metric of the target; psd: norm of the difference of the mean densities over the norm of the density, of the channel with the largest error; rms_displacement if absent"),
+    FIELD_LIST(EnsembleStudy, inputs, uncertain_input_fields, INPUTS_MAX, PRESENCE_OPTIONAL, "uncertain members of the scene, drawn independently for each run; with inputs the excitation may be of any kind"),
+    FIELD_CHOICE(EnsembleStudy, sampling, sampling_names, OPTIONAL, "points of the draws: independent, a Latin hypercube or a Sobol sequence with a random shift (evenest if runs is a power of 2), under which intervals of means are on the safe side; random if absent"),
+    FIELD_FLAG(EnsembleStudy, sobol_indices, false, "Sobol indices of the inputs, and of the seed under a random base"),
     FIELD_END
 };
+
+#define QUANTILE_ROWS(where)                                                                       \
+    FIELD_REALS(RunSpectrum, q05, NULL, ANY, 0, PRESENCE_OPTIONAL, "5 % of the runs are below, " where), \
+    FIELD_REALS(RunSpectrum, q16, NULL, ANY, 0, PRESENCE_OPTIONAL, "16 % of the runs are below"),  \
+    FIELD_REALS(RunSpectrum, median, NULL, ANY, 0, PRESENCE_OPTIONAL, "half of the runs are below"), \
+    FIELD_REALS(RunSpectrum, q84, NULL, ANY, 0, PRESENCE_OPTIONAL, "84 % of the runs are below"),  \
+    FIELD_REALS(RunSpectrum, q95, NULL, ANY, 0, PRESENCE_OPTIONAL, "95 % of the runs are below"),  \
+    FIELD_COUNT(RunSpectrum, quantile_runs, NULL, AT_MIN(0), OPTIONAL, "runs that the quantiles are of, the first ones: as many as memory allows")
 
 static const Field ensemble_statistic_fields[] = {
     FIELD_TEXT(RunStatistic, unit, 0, PRESENCE_OPTIONAL, 0, "of the numbers below"),
@@ -27,9 +51,11 @@ static const Field ensemble_statistic_fields[] = {
     FIELD_REAL(RunStatistic, high, NULL, ANY, OPTIONAL, "upper end of that interval"),
     FIELD_REAL(RunStatistic, minimum, NULL, ANY, OPTIONAL, "the smallest"),
     FIELD_REAL(RunStatistic, q05, NULL, ANY, OPTIONAL, "5 % of the runs are below"),
+    FIELD_REAL(RunStatistic, q16, NULL, ANY, OPTIONAL, "16 % of the runs are below"),
     FIELD_REAL(RunStatistic, q25, NULL, ANY, OPTIONAL, "25 % of the runs are below"),
     FIELD_REAL(RunStatistic, median, NULL, ANY, OPTIONAL, "half of the runs are below"),
     FIELD_REAL(RunStatistic, q75, NULL, ANY, OPTIONAL, "75 % of the runs are below"),
+    FIELD_REAL(RunStatistic, q84, NULL, ANY, OPTIONAL, "84 % of the runs are below"),
     FIELD_REAL(RunStatistic, q95, NULL, ANY, OPTIONAL, "95 % of the runs are below"),
     FIELD_REAL(RunStatistic, maximum, NULL, ANY, OPTIONAL, "the largest"),
     FIELD_COUNT(RunStatistic, minimum_seed, NULL, AT_MIN(0), OPTIONAL, "seed of the smallest, the first of equal ones"),
@@ -72,14 +98,43 @@ static const Field ensemble_spectrum_fields[] = {
     FIELD_REALS(RunSpectrum, standard_deviation, NULL, ANY, 0, PRESENCE_OPTIONAL, "of one run's density"),
     FIELD_REALS(RunSpectrum, low, NULL, ANY, 0, PRESENCE_OPTIONAL, "lower end of the confidence interval of the mean over all possible seeds, at each frequency separately, by Student's t of its logarithm"),
     FIELD_REALS(RunSpectrum, high, NULL, ANY, 0, PRESENCE_OPTIONAL, "upper end of that interval"),
+    QUANTILE_ROWS("at each frequency separately, with inputs"),
+    FIELD_END
+};
+
+static const Field ensemble_displacement_fields[] = {
+    FIELD_TEXT(RunSpectrum, channel, 0, PRESENCE_OPTIONAL, 0, "channel"),
+    FIELD_TEXT(RunSpectrum, unit, 0, PRESENCE_OPTIONAL, 0, "of the numbers below"),
+    FIELD_REALS(RunSpectrum, mean, NULL, ANY, 0, PRESENCE_OPTIONAL, "mean over the runs at each time"),
+    QUANTILE_ROWS("at each time separately"),
+    FIELD_END
+};
+
+static const Field ensemble_input_fields[] = {
+    FIELD_TEXT(EnsembleInput, pointer, 0, PRESENCE_OPTIONAL, 0, "the member, of tied ones the first"),
+    FIELD_TEXT(EnsembleInput, unit, 0, PRESENCE_OPTIONAL, 0, "of the number"),
+    FIELD_FLAG(EnsembleInput, is_factor, false, "the number is a factor of the scene's own"),
+    FIELD_COUNT(EnsembleInput, drawn_again, NULL, AT_MIN(0), 0, "draws that were out of the member's range and repeated"),
+    FIELD_END
+};
+
+static const Field ensemble_index_fields[] = {
+    FIELD_TEXT(EnsembleIndex, pointer, 0, PRESENCE_OPTIONAL, 0, "the input, of tied members the first; /excitation/seed stands for the random base"),
+    FIELD_CHOICE(EnsembleIndex, metric, statistics_metric_names, OPTIONAL, "metric of the summary"),
+    FIELD_COUNT(EnsembleIndex, samples, NULL, AT_MIN(0), 0, "base samples whose runs all ended"),
+    FIELD_REAL(EnsembleIndex, first, NULL, ANY, OPTIONAL, "part of the metric's variance that this input causes alone"),
+    FIELD_REALS(EnsembleIndex, first_interval_95, NULL, ANY, 2, PRESENCE_OPTIONAL, "its 95 % confidence interval; estimates may be below 0 or above 1"),
+    FIELD_REAL(EnsembleIndex, total, NULL, ANY, OPTIONAL, "part that it causes alone and with others"),
+    FIELD_REALS(EnsembleIndex, total_interval_95, NULL, ANY, 2, PRESENCE_OPTIONAL, "its 95 % confidence interval"),
     FIELD_END
 };
 
 static const Field ensemble_run_fields[] = {
-    {.name = "seed", .kind = FIELD_KIND_COUNT, .offset = FIELD_AT(RunRecord, number, uint64_t), .range = AT_MIN(0), .presence = PRESENCE_OPTIONAL, .doc = "the scene with this seed gives this row"},
+    {.name = "seed", .kind = FIELD_KIND_COUNT, .offset = FIELD_AT(RunRecord, number, uint64_t), .range = AT_MIN(0), .presence = PRESENCE_OPTIONAL, .doc = "the scene with this seed, and these inputs, gives this row"},
     FIELD_TEXT(RunRecord, why, 0, PRESENCE_OPTIONAL, 0, "reason of its failure"),
     FIELD_REAL(RunRecord, steps, NULL, ANY, OPTIONAL, "solver steps"),
     FIELD_BASE(RunRecord, summary, summary_fields),
+    FIELD_REALS(RunRecord, inputs, NULL, ANY, 0, PRESENCE_OPTIONAL, "drawn numbers, in the order of inputs"),
     FIELD_END
 };
 
@@ -108,34 +163,100 @@ static const Field ensemble_answer_fields[] = {
     FIELD_LIST(Ensemble, failures, ensemble_failure_fields, 0, PRESENCE_DEFAULT, "runs that failed, by their reason"),
     FIELD_REALS(Ensemble, frequency, "Hz", ANY, 0, PRESENCE_OPTIONAL, "of the spectra"),
     FIELD_LIST(Ensemble, spectra, ensemble_spectrum_fields, 0, PRESENCE_DEFAULT, "mean densities, channel by channel"),
-    FIELD_LIST(Ensemble, table, ensemble_run_fields, 0, PRESENCE_DEFAULT, "every run, in the order of the seeds"),
+    FIELD_CHOICE(Ensemble, sampling, sampling_names, OPTIONAL, "points of the inputs' draws"),
+    FIELD_LIST(Ensemble, inputs, ensemble_input_fields, 0, PRESENCE_DEFAULT, "numbers that are drawn for each run"),
+    FIELD_LIST(Ensemble, indices, ensemble_index_fields, 0, PRESENCE_DEFAULT, "Sobol indices, metric by metric"),
+    FIELD_REALS(Ensemble, time, "s", ANY, 0, PRESENCE_OPTIONAL, "of the displacement"),
+    FIELD_LIST(Ensemble, displacement, ensemble_displacement_fields, 0, PRESENCE_DEFAULT, "with inputs, over time, of the last displacement among the output's channels"),
+    FIELD_LIST(Ensemble, table, ensemble_run_fields, 0, PRESENCE_DEFAULT, "every run, in the order of the seeds; with sobol_indices the two independent ones of each base sample"),
     FIELD_END
 };
 // clang-format on
 
+static bool ensemble_is_random(const Simulation *simulation) {
+    return excitation_kind(scene_excitation(&simulation->scene)) == &excitation_random;
+}
+
+// Inputs that have indices.
+static size_t ensemble_indexed(const EnsembleStudy *study, const Simulation *simulation) {
+    return study->inputs.count + (ensemble_is_random(simulation) ? 1 : 0);
+}
+
+// Runs of one base sample.
+static size_t ensemble_sample_runs(const EnsembleStudy *study, const Simulation *simulation) {
+    return study->sobol_indices ? ensemble_indexed(study, simulation) + 2 : 1;
+}
+
+// Rows of the table.
+static size_t ensemble_rows(const EnsembleStudy *study) {
+    return (size_t)study->runs * (study->sobol_indices ? 2 : 1);
+}
+
 static Status ensemble_check_seeds(const EnsembleStudy *study, Problem *problem) {
-    if (!((double)study->first_seed + (double)(study->runs - 1) > 0x1p53 - 1))
+    const size_t seeds = ensemble_rows(study);
+    if (!((double)study->first_seed + (double)(seeds - 1) > 0x1p53 - 1))
         return STATUS_OK;
     char max[32];
     return problem_add_real(problem, STATUS_INVALID, "/study/first_seed", (double)study->first_seed,
-                            NULL, "must be at most %s for %llu runs: seeds end at 2^53 - 1",
-                            text_real(max, 0x1p53 - (double)study->runs),
-                            (unsigned long long)study->runs);
+                            NULL, "must be at most %s for %zu runs: seeds end at 2^53 - 1",
+                            text_real(max, 0x1p53 - (double)seeds), seeds);
+}
+
+// What the options of inputs need of each other.
+static Status ensemble_check_inputs(const EnsembleStudy *study, const Simulation *simulation,
+                                    Problem *problem) {
+    const size_t each = ensemble_sample_runs(study, simulation),
+                 dimensions =
+                     uncertain_inputs_numbers(&study->inputs) * (study->sobol_indices ? 2 : 1);
+    Status status = STATUS_OK;
+    if (!isnan(study->target) && study->sobol_indices)
+        status = problem_add(problem, STATUS_INVALID, "/study/target",
+                             "must be left out with sobol_indices, which need all runs");
+    else if (!isnan(study->target) && study->sampling != SAMPLING_RANDOM)
+        status = problem_add(problem, STATUS_INVALID, "/study/target",
+                             "needs sampling random: its rule is that of independent runs");
+    if (study->sampling == SAMPLING_SOBOL && dimensions > SAMPLING_SOBOL_DIMENSIONS)
+        status = problem_add(problem, STATUS_INVALID, "/study/sampling",
+                             "sobol has %d dimensions, the draws need %zu: take fewer inputs, or "
+                             "latin_hypercube",
+                             (int)SAMPLING_SOBOL_DIMENSIONS, dimensions);
+    if ((size_t)study->runs * each > MEMBERS_MAX)
+        status = problem_add_real(problem, STATUS_INVALID, "/study/runs", (double)study->runs, NULL,
+                                  "must be at most %zu: each base sample of sobol_indices has %zu "
+                                  "runs, of which %d are allowed in all",
+                                  MEMBERS_MAX / each, each, (int)MEMBERS_MAX);
+    return status;
+}
+
+// Completes inputs and their options.
+static Status ensemble_complete_inputs(EnsembleStudy *study, const Simulation *simulation,
+                                       const SimulationLimits *limits, Problem *problem) {
+    if (study->inputs.count == 0) {
+        if (study->sampling != CHOICE_ABSENT || study->sobol_indices)
+            return problem_add(problem, STATUS_INVALID,
+                               study->sobol_indices ? "/study/sobol_indices" : "/study/sampling",
+                               "must be left out without inputs");
+        return STATUS_OK;
+    }
+    if (study->sampling == CHOICE_ABSENT)
+        study->sampling = SAMPLING_RANDOM;
+    TRY(uncertain_inputs_complete(&study->inputs, simulation, limits, problem));
+    return ensemble_check_inputs(study, simulation, problem);
 }
 
 static Status ensemble_complete(void *request, const Simulation *simulation,
                                 const SimulationLimits *limits, Problem *problem) {
     EnsembleStudy *study = request;
     const Excitation *excitation = scene_excitation(&simulation->scene);
-    const ExcitationKind *kind = excitation_kind(excitation);
-    (void)limits;
-    if (kind != &excitation_random)
+    const bool is_random = ensemble_is_random(simulation);
+    if (!is_random && study->inputs.count == 0)
         return problem_add(problem, STATUS_INVALID, "/study/kind",
                            "ensemble runs many seeds of a random base: /excitation/kind must be "
-                           "random, is %s",
-                           kind->kind.name);
+                           "random, is %s; or give inputs",
+                           excitation_kind(excitation)->kind.name);
     if (study->first_seed == COUNT_ABSENT)
-        study->first_seed = ((const ExcitationRandom *)(const void *)excitation)->seed;
+        study->first_seed =
+            is_random ? ((const ExcitationRandom *)(const void *)excitation)->seed : 1;
     if (isnan(study->target))
         study->metric = CHOICE_ABSENT;
     else if (study->metric == CHOICE_ABSENT)
@@ -148,39 +269,179 @@ static Status ensemble_complete(void *request, const Simulation *simulation,
                                       "/study/metric", problem);
     const Status densities =
         study_run_check_densities(simulation, study_run_densities(simulation), problem);
-    return study_first_failure(study_first_failure(seeds, metric), densities);
+    return study_first_failure(study_first_failure(study_first_failure(seeds, metric), densities),
+                               ensemble_complete_inputs(study, simulation, limits, problem));
+}
+
+// The channel of the displacement over time; NULL: none.
+static const char *ensemble_history_channel(const EnsembleStudy *study,
+                                            const Simulation *simulation) {
+    const Texts *names = &simulation->output.channels;
+    const char *found = NULL;
+    for (size_t i = 0; i < names->count && study->inputs.count > 0; i++) {
+        size_t number;
+        if (channel_find(names->at[i], &number) == &channels[CHANNEL_DISPLACEMENT])
+            found = names->at[i];
+    }
+    return found;
+}
+
+// The scene that all runs start from.
+static Status ensemble_base(const EnsembleStudy *study, const Simulation *simulation,
+                            Simulation *base) {
+    const char *history = ensemble_history_channel(study, simulation);
+    TRY(study_run_copy(simulation, base));
+    return history != NULL ? texts_append(&base->output.channels, history) : STATUS_OK;
+}
+
+static Status ensemble_model(const EnsembleStudy *study, const Simulation *simulation,
+                             InputModel *model) {
+    return input_model_make(&study->inputs, simulation, study->sampling, study->first_seed,
+                            (size_t)study->runs, study->sobol_indices ? 2 : 1, model);
+}
+
+// Draws table 0 of a row, of inputs `mixed` table 1.
+static Status ensemble_draw(const InputModel *model, size_t row, bool is_second, size_t mixed,
+                            double values[INPUT_NUMBERS_MAX], uint64_t again[INPUT_NUMBERS_MAX],
+                            Problem *problem) {
+    Status status = STATUS_OK;
+    for (size_t i = 0; i < model->count && status == STATUS_OK; i++)
+        status =
+            input_model_draw(model, i, row, is_second || model->numbers[i].index == mixed ? 1 : 0,
+                             &values[i], &again[i], problem);
+    return status;
+}
+
+// Mean over the scenes of the first draws; that of the base if none of them is valid.
+static Status ensemble_cost_of_draws(const EnsembleStudy *study, const Simulation *base,
+                                     const SimulationLimits *limits, double *steps) {
+    InputModel model;
+    double sum = 0;
+    size_t count = 0;
+    Status status = ensemble_model(study, base, &model);
+    for (size_t i = 0; i < COST_SAMPLES && i < study->runs && status == STATUS_OK; i++) {
+        double values[INPUT_NUMBERS_MAX];
+        uint64_t again[INPUT_NUMBERS_MAX] = {0};
+        Simulation scene = {0};
+        status = ensemble_draw(&model, i, false, SIZE_MAX, values, again, NULL);
+        if (status == STATUS_OK)
+            status = input_model_scene(&model, values, base, limits, &scene, NULL);
+        if (status == STATUS_OK) {
+            sum += simulation_cost(&scene).steps;
+            count++;
+        }
+        simulation_clear(&scene);
+        status = status == STATUS_NO_MEMORY ? status : STATUS_OK;
+    }
+    input_model_clear(&model);
+    if (count > 0)
+        *steps = sum / (double)count;
+    return status;
 }
 
 // Of all runs: how many of them a target needs is unknown before the first are made.
 static Status ensemble_cost(const void *request, const Simulation *simulation,
                             const SimulationLimits *limits, double *steps) {
     const EnsembleStudy *study = request;
-    Simulation member = *simulation; // a borrowed view
-    (void)limits;
-    member.output.channels = (Texts){NULL, 0};
-    member.output.reduction = false;
-    *steps = (double)study->runs * simulation_cost(&member).steps;
-    return STATUS_OK;
+    Simulation base;
+    double each = 0;
+    Status status = ensemble_base(study, simulation, &base);
+    if (status == STATUS_OK)
+        each = simulation_cost(&base).steps;
+    if (status == STATUS_OK && study->inputs.count > 0)
+        status = ensemble_cost_of_draws(study, &base, limits, &each);
+    *steps = (double)study->runs * (double)ensemble_sample_runs(study, simulation) * each;
+    simulation_clear(&base);
+    return status;
 }
 
 typedef struct EnsembleWork {
     StudyWork work;
     const EnsembleStudy *study;
     Ensemble *answer;
-    bool has_force;
+    bool has_force, is_random;
     SpectrumAccumulator sums;
     Spectrum like; // of the first run that ended
+    size_t kept;   // runs whose spectra are kept
     size_t check;  // ended runs at the next check of the target
+    Simulation base;
+    InputModel model;
+    size_t each, indexed;        // runs of one base sample, and its inputs
+    double *values;              // metrics of each member, for Sobol indices
+    SpectrumAccumulator history; // displacements over time, as if they were spectra
+    Spectrum history_like;       // of the first run that ended
 } EnsembleWork;
+
+typedef struct EnsemblePart {
+    StudyPart part;
+    Spectrum history; // the displacement over time, which is its `frequency`
+    uint64_t again[INPUT_NUMBERS_MAX];
+} EnsemblePart;
+
+// Position of a member. Runs 0 and 1 of a base sample are rows of the table.
+typedef struct EnsemblePlace {
+    size_t sample, run;
+    size_t mixed; // the input from table 1; SIZE_MAX: none, or all in run 1
+    uint64_t seed;
+} EnsemblePlace;
+
+static EnsemblePlace ensemble_place(const EnsembleWork *work, size_t member) {
+    EnsemblePlace place = {member / work->each, member % work->each, SIZE_MAX,
+                           work->study->first_seed + member};
+    if (!work->study->sobol_indices)
+        return place;
+    place.mixed = place.run < 2 ? SIZE_MAX : place.run - 2;
+    // The seed is the last input.
+    place.seed = work->study->first_seed + 2 * place.sample +
+                 (place.run == 1 || place.mixed == work->study->inputs.count ? 1 : 0);
+    return place;
+}
 
 static Status ensemble_scene(const void *of, size_t member, Simulation *scene, StudyPart *part,
                              Problem *problem) {
     const EnsembleWork *work = of;
-    (void)part;
-    (void)problem;
-    TRY(study_run_copy(work->work.simulation, scene));
-    ((ExcitationRandom *)(void *)scene->scene.excitation)->seed = work->study->first_seed + member;
+    const EnsemblePlace place = ensemble_place(work, member);
+    if (work->model.count == 0) {
+        TRY(fields_copy(simulation_fields, &work->base, scene));
+    } else {
+        double values[INPUT_NUMBERS_MAX];
+        TRY(ensemble_draw(&work->model, place.sample, place.run == 1, place.mixed, values,
+                          ((EnsemblePart *)(void *)part)->again, problem));
+        if (place.run < 2)
+            TRY(study_copy_reals(values, work->model.count, &part->run.inputs));
+        TRY(input_model_scene(&work->model, values, &work->base, work->work.limits, scene,
+                              problem));
+    }
+    if (work->is_random)
+        ((ExcitationRandom *)(void *)scene->scene.excitation)->seed = place.seed;
     return STATUS_OK;
+}
+
+// Keeps the displacement at equally spaced times.
+static Status ensemble_keep(const void *of, const Outcome *outcome, const StudyTools *tools,
+                            StudyPart *made, Problem *problem) {
+    const Response *response = &outcome->response;
+    EnsemblePart *part = (EnsemblePart *)(void *)made;
+    (void)of;
+    (void)tools;
+    if (response->series.count == 0 || response->count == 0)
+        return STATUS_OK;
+    const Column *column = &response->series.at[0];
+    const size_t stride = (response->count + HISTORY_POINTS - 1) / HISTORY_POINTS,
+                 points = (response->count - 1) / stride + 1;
+    part->history.frequency = calloc(points, sizeof *part->history.frequency);
+    TRY(status_made(part->history.frequency != NULL));
+    TRY(columns_allocate(&part->history.densities, 1, points, 0, problem));
+    columns_name(&part->history.densities, 0, column->name, column->unit);
+    for (size_t i = 0; i < points; i++) {
+        part->history.frequency[i] = (double)(i * stride) / response->sample_rate;
+        part->history.densities.at[0].values[i] = column->values[i * stride];
+    }
+    return STATUS_OK;
+}
+
+static void ensemble_clear(StudyPart *part) {
+    spectrum_clear(&((EnsemblePart *)(void *)part)->history);
 }
 
 static bool ensemble_has_target(const EnsembleWork *work) {
@@ -234,28 +495,61 @@ static void ensemble_extend(EnsembleWork *ensemble) {
         work->expected = work->wanted;
 }
 
+// Runs whose spectra are kept for quantiles, or for the spread of a target.
+static size_t ensemble_kept(const EnsembleStudy *study, double densities) {
+    const size_t rows = ensemble_rows(study),
+                 min = study->metric == STATISTICS_PSD ? SPECTRUM_ACCUMULATOR_FIRST : 0,
+                 max = (size_t)(SPECTRUM_ACCUMULATOR_MAX / fmax(densities, 1));
+    const size_t kept = study->inputs.count == 0 ? 0 : rows < max ? rows : max;
+    return kept > min ? kept : min;
+}
+
+// Adds to the sums; the first one is also moved to `like`.
+static Status ensemble_sum(SpectrumAccumulator *sums, size_t kept, Spectrum *spectrum,
+                           Spectrum *like) {
+    TRY(spectrum_accumulator_add(sums, spectrum, kept));
+    if (like->densities.count == 0) {
+        *like = *spectrum;
+        *spectrum = (Spectrum){0};
+    }
+    return STATUS_OK;
+}
+
+// Adds a row, after a run that may have failed.
+static Status ensemble_fold_row(EnsembleWork *work, uint64_t seed, StudyPart *made) {
+    Ensemble *answer = work->answer;
+    EnsemblePart *part = (EnsemblePart *)(void *)made;
+    const bool has_failed = made->run.why != NULL;
+    for (size_t i = 0; i < work->model.count; i++)
+        answer->inputs.at[i].drawn_again += part->again[i];
+    TRY(run_table_add(&answer->table, &made->run, seed));
+    if (has_failed)
+        return STATUS_OK;
+    TRY(ensemble_sum(&work->history, ensemble_kept(work->study, HISTORY_POINTS), &part->history,
+                     &work->history_like));
+    return ensemble_sum(&work->sums, work->kept, &made->spectrum, &work->like);
+}
+
 static Status ensemble_fold(void *of, size_t member, StudyPart *part) {
     EnsembleWork *work = of;
     Ensemble *answer = work->answer;
-    const uint64_t seed = work->study->first_seed + member;
-    TRY(run_table_add(&answer->table, &part->run, seed));
-    RunRecord *run = &answer->table.at[member];
+    const EnsemblePlace place = ensemble_place(work, member);
+    RunRecord *run = &part->run;
     answer->made++;
     if (run->why != NULL) {
         answer->failed++;
-        TRY(study_failures_add(&answer->failures, (int)run->status, status_slug(run->status), seed,
-                               run->why));
+        TRY(study_failures_add(&answer->failures, (int)run->status, status_slug(run->status),
+                               place.seed, run->why));
     } else {
         answer->steps += run->steps;
         if (!work->has_force)
             run->summary.peak_contact_force = (double)NAN;
-        const size_t kept = work->study->metric == STATISTICS_PSD ? SPECTRUM_ACCUMULATOR_FIRST : 0;
-        TRY(spectrum_accumulator_add(&work->sums, &part->spectrum, kept));
-        if (work->like.densities.count == 0) {
-            work->like = part->spectrum;
-            part->spectrum = (Spectrum){0};
-        }
     }
+    for (int metric = 0; metric < STATISTICS_METRICS && work->values != NULL; metric++)
+        work->values[member * STATISTICS_METRICS + (size_t)metric] =
+            statistics_value(&run->summary, metric);
+    if (place.run < 2)
+        TRY(ensemble_fold_row(work, place.seed, part));
     if (!ensemble_has_target(work))
         return STATUS_OK;
     if (answer->made == answer->runs || ensemble_ended(work) >= work->check)
@@ -288,38 +582,110 @@ static Status ensemble_fill_target(const EnsembleWork *work) {
                           100 * target->confidence));
 }
 
+static Status ensemble_add_index(const EnsembleWork *work, int metric, size_t input) {
+    const UncertainInputs *inputs = &work->study->inputs;
+    const SobolRuns runs = {work->values + metric, STATISTICS_METRICS, (size_t)work->study->runs,
+                            work->indexed};
+    SobolIndex estimate;
+    sobol_index_estimate(&runs, input, &estimate);
+    EnsembleIndex *index = list_append(&work->answer->indices, sizeof *index);
+    TRY(status_made(index != NULL));
+    *index = (EnsembleIndex){.metric = metric,
+                             .samples = estimate.count,
+                             .first = estimate.first,
+                             .total = estimate.total};
+    TRY(text_copy(input < inputs->count ? uncertain_input_pointer(&inputs->at[input], 0)
+                                        : "/excitation/seed",
+                  &index->pointer));
+    TRY(study_copy_reals(estimate.first_interval, 2, &index->first_interval_95));
+    return study_copy_reals(estimate.total_interval, 2, &index->total_interval_95);
+}
+
+static Status ensemble_add_indices(const EnsembleWork *work, const StudyTools *tools,
+                                   Problem *problem) {
+    for (int metric = 0; metric < STATISTICS_METRICS; metric++)
+        for (size_t i = 0; i < work->indexed && work->values != NULL; i++) {
+            if (metric == STATISTICS_PEAK_CONTACT_FORCE && !work->has_force)
+                continue;
+            TRY(study_advance(tools->progress, 1, problem));
+            TRY(ensemble_add_index(work, metric, i));
+        }
+    return STATUS_OK;
+}
+
 static Status ensemble_end(void *of, const StudyTools *tools, Problem *problem) {
     const EnsembleWork *work = of;
     Ensemble *answer = work->answer;
-    (void)tools;
     if (ensemble_has_target(work))
         TRY(ensemble_fill_target(work));
     for (int metric = 0; metric < STATISTICS_METRICS; metric++)
         TRY(statistics_fill(&answer->table, metric, &answer->statistics.of[metric]));
     statistics_trust(&answer->table, &answer->trust);
-    return spectrum_accumulator_report(&work->sums, &work->like, false, NULL, &answer->frequency,
-                                       &answer->spectra, problem);
+    TRY(ensemble_add_indices(work, tools, problem));
+    TRY(spectrum_accumulator_report(&work->history, &work->history_like, SPECTRUM_QUANTILES,
+                                    tools->progress, &answer->time, &answer->displacement,
+                                    problem));
+    return spectrum_accumulator_report(
+        &work->sums, &work->like,
+        SPECTRUM_INTERVALS | (work->model.count > 0 ? SPECTRUM_QUANTILES : 0), tools->progress,
+        &answer->frequency, &answer->spectra, problem);
 }
 
 static void ensemble_free(void *of) {
     EnsembleWork *work = of;
     spectrum_clear(&work->like);
+    spectrum_clear(&work->history_like);
     spectrum_accumulator_clear(&work->sums);
+    spectrum_accumulator_clear(&work->history);
+    simulation_clear(&work->base);
+    input_model_clear(&work->model);
+    free(work->values);
+}
+
+// What uncertain inputs need; nothing without.
+static Status ensemble_begin_inputs(EnsembleWork *work) {
+    const EnsembleStudy *study = work->study;
+    Ensemble *answer = work->answer;
+    answer->sampling = study->sampling;
+    if (study->inputs.count == 0)
+        return STATUS_OK;
+    TRY(ensemble_model(study, &work->base, &work->model));
+    for (size_t i = 0; i < work->model.count; i++) {
+        const InputNumber *number = &work->model.numbers[i];
+        EnsembleInput *input = list_append(&answer->inputs, sizeof *input);
+        TRY(status_made(input != NULL));
+        input->is_factor = !isnan(number->deviation);
+        TRY(text_copy(work->model.axes.at[number->member].pointer, &input->pointer));
+        TRY(text_copy(number->unit, &input->unit));
+    }
+    if (!study->sobol_indices)
+        return STATUS_OK;
+    work->indexed = ensemble_indexed(study, work->work.simulation);
+    work->values = calloc(work->work.members * STATISTICS_METRICS, sizeof *work->values);
+    return status_made(work->values != NULL);
 }
 
 static Status ensemble_begin(void *of, const StudyTools *tools, Problem *problem) {
     EnsembleWork *work = of;
     const EnsembleStudy *study = work->study = work->work.study;
     Ensemble *answer = work->answer = work->work.answer;
+    const double densities = study_run_densities(work->work.simulation);
     (void)tools;
     (void)problem;
     work->has_force = simulation_has_force(work->work.simulation);
+    work->is_random = ensemble_is_random(work->work.simulation);
     work->check = STOPPING_RULE_PILOT;
-    work->work.members = (size_t)study->runs;
+    work->each = ensemble_sample_runs(study, work->work.simulation);
+    work->kept = ensemble_kept(study, densities);
+    work->work.members = (size_t)study->runs * work->each;
+    TRY(ensemble_base(study, work->work.simulation, &work->base));
+    TRY(ensemble_begin_inputs(work));
     if (ensemble_has_target(work) && study->runs > STOPPING_RULE_PILOT)
         work->work.wanted = STOPPING_RULE_PILOT;
-    work->work.part_bytes =
-        sizeof(StudyPart) + sizeof(double) * (size_t)study_run_densities(work->work.simulation);
+    const size_t history = work->base.output.channels.count > 0 ? 2 * HISTORY_POINTS : 0;
+    work->work.part_bytes = sizeof(EnsemblePart) + sizeof(double) * ((size_t)densities + history);
+    work->work.bytes = sizeof(double) * ((size_t)densities * work->kept +
+                                         history / 2 * ensemble_kept(study, HISTORY_POINTS));
     answer->runs = study->runs;
     answer->first_seed = study->first_seed;
     answer->confidence = STATISTICS_CONFIDENCE;
@@ -327,18 +693,22 @@ static Status ensemble_begin(void *of, const StudyTools *tools, Problem *problem
 }
 
 const StudyKind study_ensemble = {
-    .kind = {"ensemble", "many seeds of a random base: means with their confidence, and spread",
+    .kind = {"ensemble",
+             "many seeds of a random base, or draws of uncertain inputs: means with their "
+             "confidence, spread, and shares of the inputs in it",
              ensemble_study_fields, sizeof(EnsembleStudy)},
-    .answer = &(const Kind){"ensemble", "results of many seeds", ensemble_answer_fields,
+    .answer = &(const Kind){"ensemble", "results of many seeds or draws", ensemble_answer_fields,
                             sizeof(Ensemble)},
     .shorten = "ask for fewer runs",
     .complete = ensemble_complete,
     .cost = ensemble_cost,
     .work_size = sizeof(EnsembleWork),
-    .part_size = sizeof(StudyPart),
+    .part_size = sizeof(EnsemblePart),
     .begin = ensemble_begin,
     .scene = ensemble_scene,
+    .keep = ensemble_keep,
     .fold = ensemble_fold,
     .end = ensemble_end,
+    .clear = ensemble_clear,
     .free = ensemble_free,
 };

@@ -1,17 +1,21 @@
-// The study "ensemble": many seeds of one random base motion. Means with their confidence, spread,
-// mean spectra, and a row for each run.
+// The study "ensemble": many seeds of one random base motion, or draws of uncertain inputs. Means
+// with their confidence, spread, mean spectra, and a row for each run.
 #ifndef CORE_STUDY_ENSEMBLE_H
 #define CORE_STUDY_ENSEMBLE_H
 
+#include "core/study/inputs.h"
 #include "core/study/statistics.h"
 
 // The request.
 typedef struct EnsembleStudy {
     Variant variant;
-    uint64_t runs;       // at most, one for each seed
+    uint64_t runs;       // at most, one for each seed; under sobol_indices base samples
     uint64_t first_seed; // COUNT_ABSENT until completed: the scene's own
     double target;       // relative error of the metric's mean; NAN: none, all runs are made
     int metric;          // StatisticsMetric of the target; CHOICE_ABSENT without one
+    UncertainInputs inputs;
+    int sampling; // SamplingMethod; CHOICE_ABSENT without inputs
+    bool sobol_indices;
 } EnsembleStudy;
 
 typedef union EnsembleStatistics {
@@ -34,6 +38,22 @@ typedef struct EnsembleTarget {
     char *why;
 } EnsembleTarget;
 
+// A number that was drawn for each run, in the order of the rows' inputs.
+typedef struct EnsembleInput {
+    char *pointer, *unit;
+    bool is_factor;       // of the number there, or of all rows of the buffer's table
+    uint64_t drawn_again; // values out of range
+} EnsembleInput;
+
+// Sobol indices of one input for one metric.
+typedef struct EnsembleIndex {
+    char *pointer;
+    int metric; // StatisticsMetric
+    uint64_t samples;
+    double first, total;
+    Reals first_interval_95, total_interval_95;
+} EnsembleIndex;
+
 // The answer.
 typedef struct Ensemble {
     Variant variant;
@@ -47,7 +67,18 @@ typedef struct Ensemble {
     StudyFailures failures;
     Reals frequency; // [Hz]
     RunSpectra spectra;
-    RunTable table; // the numbers are seeds
+    int sampling; // SamplingMethod; CHOICE_ABSENT without inputs, and nothing in the next four
+    struct {
+        EnsembleInput *at;
+        size_t count;
+    } inputs;
+    struct {
+        EnsembleIndex *at;
+        size_t count;
+    } indices;
+    Reals time;              // [s]
+    RunSpectra displacement; // over time, of one channel
+    RunTable table;          // the numbers are seeds
 } Ensemble;
 
 #endif

@@ -108,8 +108,7 @@ void perturbation_apply(const Simulation *simulation, int parameter, double fact
                            &target->scene.dampers.at[i / BUFFERS]);
 }
 
-// Log-normal, of mean 1 and relative deviation s.
-static double perturbation_factor(double normal, double s) {
+double perturbation_factor(double normal, double s) {
     const double variance = log1p(s * s);
     return exp(sqrt(variance) * normal - variance / 2);
 }
@@ -673,7 +672,8 @@ static Status sensitivity_end(void *of, const StudyTools *tools, Problem *proble
     if (work->study->runs == 0)
         return STATUS_OK;
     TRY(sensitivity_fill_statistics(work));
-    return spectrum_accumulator_report(&work->sums, &work->own->spectrum, true, tools->progress,
+    return spectrum_accumulator_report(&work->sums, &work->own->spectrum,
+                                       SPECTRUM_VALUE | SPECTRUM_QUANTILES, tools->progress,
                                        &answer->frequency, &answer->spectra, problem);
 }
 

@@ -68,6 +68,9 @@ double perturbation_max_step(const Simulation *simulation, int parameter, double
 void perturbation_apply(const Simulation *simulation, int parameter, double factor,
                         Simulation *target);
 
+// Log-normal of mean 1 and relative deviation `s`, from a standard normal number.
+double perturbation_factor(double normal, double s);
+
 // Draws run `run` into `target`, a copy of `simulation`, and appends the factors of each buffer
 // that is given, one where both sides share it. They are log-normal with mean 1 and the given
 // relative deviation; a factor that puts a restitution beyond 1 is drawn again. STATUS_NO_MEMORY.

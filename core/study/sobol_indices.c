@@ -40,12 +40,15 @@ static SobolTerms sobol_terms(const SobolSample *sample, double mean) {
 }
 
 void sobol_index_estimate(const SobolRuns *runs, size_t input, SobolIndex *index) {
+    const double unknown = (double)NAN;
     SobolSample sample;
     SobolTerms means = {0, 0, 0};
     double mean = 0, first_squares = 0, total_squares = 0;
     size_t count = 0;
-    *index = (SobolIndex){0,           (double)NAN, (double)NAN, (double)NAN,
-                          (double)NAN, (double)NAN, (double)NAN};
+    *index = (SobolIndex){.first = unknown,
+                          .first_interval = {unknown, unknown},
+                          .total = unknown,
+                          .total_interval = {unknown, unknown}};
     for (size_t j = 0; j < runs->samples; j++)
         if (sobol_sample_get(runs, j, input, &sample)) {
             count++;
@@ -73,8 +76,9 @@ void sobol_index_estimate(const SobolRuns *runs, size_t input, SobolIndex *index
         }
     const double n = (double)count,
                  t = student_t_quantile(CONFIDENCE, count - 1) / sqrt(n * (n - 1));
-    index->first_low = index->first - t * sqrt(first_squares);
-    index->first_high = index->first + t * sqrt(first_squares);
-    index->total_low = index->total - t * sqrt(total_squares);
-    index->total_high = index->total + t * sqrt(total_squares);
+    for (int side = 0; side < 2; side++) {
+        const double width = side == 0 ? -t : t;
+        index->first_interval[side] = index->first + width * sqrt(first_squares);
+        index->total_interval[side] = index->total + width * sqrt(total_squares);
+    }
 }

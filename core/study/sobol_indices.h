@@ -16,8 +16,8 @@ typedef struct SobolRuns {
 // Of one input, each with the interval that contains it with a probability of 95 % (NAN: unknown).
 typedef struct SobolIndex {
     size_t count; // samples whose runs are all known
-    double first, first_low, first_high;
-    double total, total_low, total_high;
+    double first, first_interval[2];
+    double total, total_interval[2];
 } SobolIndex;
 
 // The indices of an input. All NAN where the results do not differ or fewer than two samples are

@@ -161,9 +161,11 @@ Status statistics_fill(const RunTable *table, int metric, RunStatistic *statisti
         reals_sort(values.at, count);
         statistic->minimum = values.at[0];
         statistic->q05 = statistics_quantile(values.at, count, 0.05);
+        statistic->q16 = statistics_quantile(values.at, count, 0.16);
         statistic->q25 = statistics_quantile(values.at, count, 0.25);
         statistic->median = statistics_quantile(values.at, count, 0.5);
         statistic->q75 = statistics_quantile(values.at, count, 0.75);
+        statistic->q84 = statistics_quantile(values.at, count, 0.84);
         statistic->q95 = statistics_quantile(values.at, count, 0.95);
         statistic->maximum = values.at[count - 1];
         statistic->minimum_seed = statistics_find_run(table, metric, statistic->minimum);
@@ -206,7 +208,7 @@ void statistics_trust(const RunTable *table, RunTrust *trust) {
     }
 }
 
-enum { FREQUENCIES_PER_CHECK = 64 }; // between checks of the progress
+enum { FREQUENCIES_PER_CHECK = 16 }; // between checks of the progress
 
 static Status spectrum_accumulator_start(SpectrumAccumulator *sums, const Columns *densities,
                                          size_t kept_max) {
@@ -294,12 +296,11 @@ RunSpread spectrum_accumulator_spread(const SpectrumAccumulator *sums, size_t al
     return worst;
 }
 
-static Status spectrum_accumulator_report_channel(const SpectrumAccumulator *sums, size_t channel,
-                                                  RunSpectrum *spectrum, Problem *problem) {
+static Status spectrum_accumulator_report_intervals(const SpectrumAccumulator *sums, size_t channel,
+                                                    RunSpectrum *spectrum, Problem *problem) {
     const double *mean = sums->mean + channel * sums->rows;
     const double *squares = sums->squares + channel * sums->rows;
     const double n = (double)sums->count;
-    TRY(study_copy_reals(mean, sums->rows, &spectrum->mean));
     if (sums->count < 2)
         return STATUS_OK;
     TRY(status_made(reals_allocate(&spectrum->standard_deviation, sums->rows) &&
@@ -323,21 +324,22 @@ static Status spectrum_accumulator_report_channel(const SpectrumAccumulator *sum
 static Status spectrum_accumulator_report_quantiles(const SpectrumAccumulator *sums, size_t channel,
                                                     const Progress *progress, RunSpectrum *spectrum,
                                                     Problem *problem) {
-    const size_t rows = sums->rows, runs = sums->count;
-    double *values = calloc(runs, sizeof *values);
-    Status status = status_made(values != NULL && reals_allocate(&spectrum->mean, rows) &&
-                                reals_allocate(&spectrum->q05, rows) &&
-                                reals_allocate(&spectrum->median, rows) &&
-                                reals_allocate(&spectrum->q95, rows));
+    static const double shares[] = {0.05, 0.16, 0.5, 0.84, 0.95};
+    Reals *const quantiles[] = {&spectrum->q05, &spectrum->q16, &spectrum->median, &spectrum->q84,
+                                &spectrum->q95};
+    const size_t rows = sums->rows,
+                 runs = sums->count < sums->kept_max ? sums->count : sums->kept_max;
+    double *values = calloc(runs + 1, sizeof *values);
+    Status status = status_made(values != NULL);
+    spectrum->quantile_runs = runs;
+    for (size_t q = 0; q < COUNT(shares); q++)
+        status = study_first_failure(status, status_made(reals_allocate(quantiles[q], rows)));
     for (size_t k = 0; k < rows && status == STATUS_OK; k++) {
-        for (size_t i = 0; i < runs; i++) {
+        for (size_t i = 0; i < runs; i++)
             values[i] = sums->kept[(i * sums->channels + channel) * rows + k];
-            spectrum->mean.at[k] += values[i] / (double)runs;
-        }
         reals_sort(values, runs);
-        spectrum->q05.at[k] = statistics_quantile(values, runs, 0.05);
-        spectrum->median.at[k] = statistics_quantile(values, runs, 0.5);
-        spectrum->q95.at[k] = statistics_quantile(values, runs, 0.95);
+        for (size_t q = 0; q < COUNT(shares); q++)
+            quantiles[q]->at[k] = statistics_quantile(values, runs, shares[q]);
         if (k % FREQUENCIES_PER_CHECK == 0)
             status = study_advance(progress, 1, problem);
     }
@@ -345,9 +347,9 @@ static Status spectrum_accumulator_report_quantiles(const SpectrumAccumulator *s
     return status;
 }
 
-Status spectrum_accumulator_report(const SpectrumAccumulator *sums, const Spectrum *like,
-                                   bool has_quantiles, const Progress *progress, Reals *frequency,
-                                   RunSpectra *spectra, Problem *problem) {
+Status spectrum_accumulator_report(const SpectrumAccumulator *sums, const Spectrum *like, int what,
+                                   const Progress *progress, Reals *frequency, RunSpectra *spectra,
+                                   Problem *problem) {
     const Columns *densities = &like->densities;
     if (sums->count == 0)
         return STATUS_OK;
@@ -357,11 +359,14 @@ Status spectrum_accumulator_report(const SpectrumAccumulator *sums, const Spectr
         TRY(status_made(spectrum != NULL));
         TRY(text_copy(densities->at[c].name, &spectrum->channel));
         TRY(text_copy(densities->at[c].unit, &spectrum->unit));
-        if (has_quantiles)
+        spectrum->quantile_runs = COUNT_ABSENT;
+        TRY(study_copy_reals(sums->mean + c * sums->rows, sums->rows, &spectrum->mean));
+        if ((what & SPECTRUM_VALUE) != 0)
             TRY(study_copy_reals(densities->at[c].values, sums->rows, &spectrum->value));
-        TRY(has_quantiles
-                ? spectrum_accumulator_report_quantiles(sums, c, progress, spectrum, problem)
-                : spectrum_accumulator_report_channel(sums, c, spectrum, problem));
+        if ((what & SPECTRUM_INTERVALS) != 0)
+            TRY(spectrum_accumulator_report_intervals(sums, c, spectrum, problem));
+        if ((what & SPECTRUM_QUANTILES) != 0)
+            TRY(spectrum_accumulator_report_quantiles(sums, c, progress, spectrum, problem));
     }
     return STATUS_OK;
 }

@@ -50,7 +50,7 @@ typedef struct RunStatistic {
     double value; // of the study's own scene
     double mean, standard_deviation, standard_error;
     double low, high; // of the mean, by Student's t
-    double minimum, q05, q25, median, q75, q95, maximum;
+    double minimum, q05, q16, q25, median, q75, q84, q95, maximum;
     uint64_t minimum_seed, maximum_seed; // numbers of the runs; the first of equal ones
 } RunStatistic;
 
@@ -79,7 +79,9 @@ void statistics_trust(const RunTable *table, RunTrust *trust);
 typedef struct RunSpectrum {
     char *channel, *unit;
     Reals mean, standard_deviation, low, high; // the last two of the mean
-    Reals value, q05, median, q95;             // the first of the study's own scene
+    Reals value;                               // of the study's own scene
+    Reals q05, q16, median, q84, q95;
+    uint64_t quantile_runs; // whose quantiles they are; COUNT_ABSENT: none
 } RunSpectrum;
 
 typedef struct RunSpectra {
@@ -111,12 +113,18 @@ Status spectrum_accumulator_add(SpectrumAccumulator *sums, const Spectrum *spect
 // largest error among `all` runs. Needs SPECTRUM_ACCUMULATOR_FIRST kept runs.
 RunSpread spectrum_accumulator_spread(const SpectrumAccumulator *sums, size_t all);
 
-// Fills frequencies and spectra: mean, deviation and confidence interval of the mean. `like` is the
-// spectrum of any of the runs. With quantiles, which need all runs kept: mean and quantiles, and
-// `like` as the value; `progress` may then stop the sorting.
-Status spectrum_accumulator_report(const SpectrumAccumulator *sums, const Spectrum *like,
-                                   bool has_quantiles, const Progress *progress, Reals *frequency,
-                                   RunSpectra *spectra, Problem *problem);
+// What is reported of the densities beside their mean.
+enum {
+    SPECTRUM_VALUE = 1,     // `like` as the value
+    SPECTRUM_INTERVALS = 2, // deviation and confidence interval of the mean
+    SPECTRUM_QUANTILES = 4, // of the runs kept
+};
+
+// Fills frequencies and spectra. `like` is the spectrum of any of the runs. `progress` may stop the
+// sorting for quantiles.
+Status spectrum_accumulator_report(const SpectrumAccumulator *sums, const Spectrum *like, int what,
+                                   const Progress *progress, Reals *frequency, RunSpectra *spectra,
+                                   Problem *problem);
 
 void spectrum_accumulator_clear(SpectrumAccumulator *sums);
 

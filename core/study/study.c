@@ -34,7 +34,7 @@ Status run_table_add(RunTable *table, RunRecord *run, uint64_t number) {
     *added = *run;
     added->number = number;
     run->why = NULL;
-    run->restitution = run->contact_time = (Reals){NULL, 0};
+    run->restitution = run->contact_time = run->inputs = (Reals){NULL, 0};
     return STATUS_OK;
 }
 
@@ -153,12 +153,10 @@ Status study_part_make(const StudyWork *work, size_t member, const StudyTools *t
     run->summary = outcome->summary;
     if (outcome->has_reduction)
         run->reduction = outcome->reduction;
-    if (kind->keep != NULL) {
+    if (kind->keep != NULL)
         status = kind->keep(work, outcome, tools, part, problem);
-    } else {
-        part->spectrum = outcome->spectrum;
-        outcome->spectrum = (Spectrum){0};
-    }
+    part->spectrum = outcome->spectrum;
+    outcome->spectrum = (Spectrum){0};
     outcome_unref(outcome);
     return study_result(status, problem);
 }
@@ -180,6 +178,7 @@ void study_part_free(const StudyWork *work, StudyPart *part) {
     free(part->run.why);
     free(part->run.restitution.at);
     free(part->run.contact_time.at);
+    free(part->run.inputs.at);
     spectrum_clear(&part->spectrum);
     free(part);
 }

@@ -22,6 +22,7 @@ typedef struct RunRecord {
     Summary summary;                 // absent after a failure
     Reduction reduction;             // absent also where it was not requested
     Reals restitution, contact_time; // factors of a drawn run, buffer by buffer
+    Reals inputs;                    // numbers of a drawn run of an ensemble
 } RunRecord;
 
 typedef struct RunTable {
@@ -156,7 +157,7 @@ struct StudyKind {
     // `scene` is cleared by the caller. A failure is the member's, unless it ends the study.
     Status (*scene)(const void *work, size_t member, Simulation *scene, StudyPart *part,
                     Problem *problem);
-    // Keeps what the fold needs of a run beside steps and summary. NULL: the spectra.
+    // Keeps what the fold needs of a run beside steps, summary and spectra. May be NULL.
     Status (*keep)(const void *work, const Outcome *outcome, const StudyTools *tools,
                    StudyPart *part, Problem *problem);
     // Adds a part to the answer and may take its contents. May change what is wanted.

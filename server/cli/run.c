@@ -581,7 +581,8 @@ static void ensemble_choose(void *asked, StudySettings *settings) {
 }
 
 static const PrintTableView ensemble_view = {
-    .skipped = (const char *const[]){"kind", "table", "frequency", "spectra", NULL},
+    .skipped = (const char *const[]){"kind", "table", "frequency", "spectra", "time",
+                                     "displacement", NULL},
     .lists = (const PrintTableColumns[]){
         {"statistics",
          {"mean", "low", "high", "standard_deviation", "minimum", "median", "maximum"}},
@@ -612,7 +613,7 @@ static void ensemble_add(const Variant *answer, Bytes *json) {
 const Command command_ensemble = {
     .name = "ensemble",
     .operands = "SCENE.json",
-    .summary = "many seeds of a random base: means with their confidence, and spread",
+    .summary = "many seeds or uncertain inputs: means with their confidence, and spread",
     .help =
         "  impactd ensemble scene.json                          64 seeds: statistics and spectra\n"
         "  impactd ensemble scene.json --runs 1000 -o out.csv   each run's numbers, by its seed\n"
@@ -622,10 +623,11 @@ const Command command_ensemble = {
         "  impactd ensemble scene.json --runs 1000 --target 0.05 --metric psd\n"
         "  impactd ensemble - < scene.json                      from standard input\n"
         "\n"
-        "The scene's excitation must be random. A run is the scene with one seed, from\n"
-        "--first-seed on; any of them can be run again alone. One that fails is reported\n"
-        "and left out. The same study gives the same bytes. Ctrl-C stops at once. Exit\n"
-        "code 3 if the scene has faults.\n",
+        "The scene's excitation must be random, or its study must have uncertain inputs.\n"
+        "A run is the scene with one seed, from --first-seed on, and one draw of the\n"
+        "inputs; any of them can be run again alone. One that fails is reported and left\n"
+        "out. The same study gives the same bytes. Ctrl-C stops at once. Exit code 3 if\n"
+        "the scene has faults.\n",
     .options = ensemble_fields,
     .size = sizeof(StudySettings),
     .run = study_command_run,

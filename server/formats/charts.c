@@ -47,14 +47,17 @@ static size_t charts_shorter(const Reals *a, const Reals *b) {
 
 // The spectra of many runs, each with a band.
 static void charts_add_bands(Chart *chart, ChartPanel *panel, const Reals *frequency,
-                             const RunSpectra *spectra, bool has_mean) {
+                             const RunSpectra *spectra) {
     for (size_t i = SPECTRA_DRAWN; i < spectra->count; i++)
         charts_add_undrawn(chart, spectra->at[i].channel, NULL);
     for (size_t i = 0; i < spectra->count && i < SPECTRA_DRAWN; i++) {
         const RunSpectrum *spectrum = &spectra->at[i];
-        const Reals *value = has_mean ? &spectrum->mean : &spectrum->value;
-        const Reals *low = has_mean ? &spectrum->low : &spectrum->q05;
-        const Reals *high = has_mean ? &spectrum->high : &spectrum->q95;
+        const bool has_quantiles = spectrum->q05.count > 0;
+        const Reals *value = spectrum->value.count > 0 ? &spectrum->value
+                             : has_quantiles           ? &spectrum->median
+                                                       : &spectrum->mean;
+        const Reals *low = has_quantiles ? &spectrum->q05 : &spectrum->low;
+        const Reals *high = has_quantiles ? &spectrum->q95 : &spectrum->high;
         chart_add(
             panel,
             (ChartSeries){CHART_LINE, frequency->at, value->at, NULL,
@@ -242,10 +245,74 @@ static void ensemble_add_statistics(Chart *chart, const Ensemble *ensemble) {
                         (ChartSeries){CHART_LINE, .colour = CHART_STRONG, .look = "all"});
 }
 
+// The displacement over time, and the Sobol indices of each metric: a dot for the first and a ring
+// for the total one.
+static void ensemble_add_history(Chart *chart, const Ensemble *ensemble) {
+    if (ensemble->displacement.count == 0)
+        return;
+    const RunSpectrum *history = &ensemble->displacement.at[0];
+    ChartPanel *panel =
+        chart_panel(chart, chart_quantity(chart, history->channel, history->unit), 200);
+    const double *time = ensemble->time.at;
+    panel->x.title = "time [s]";
+    chart_add(panel, (ChartSeries){CHART_LINE, time, history->median.at, NULL,
+                                   charts_shorter(&ensemble->time, &history->median), .colour = 0,
+                                   .name = "median"});
+    chart_add(panel, (ChartSeries){CHART_BAND, time, history->q16.at, history->q84.at,
+                                   charts_shorter(&history->q16, &history->q84), .colour = 0});
+    chart_add(panel, (ChartSeries){CHART_BAND, time, history->q05.at, history->q95.at,
+                                   charts_shorter(&history->q05, &history->q95), .colour = 0});
+}
+
+static void ensemble_add_indices(Chart *chart, const Ensemble *ensemble) {
+    const size_t count = ensemble->indices.count;
+    if (count == 0)
+        return;
+    ChartPanel *panel = chart_panel(chart, "Sobol indices", 36 * STATISTICS_METRICS);
+    charts_add_rows(chart, panel);
+    panel->x.title = "part of the variance, alone (dot) and in all (ring)";
+    double *first = chart_new(chart, count, sizeof *first),
+           *total = chart_new(chart, count, sizeof *total), *y = chart_new(chart, count, sizeof *y);
+    const char **names = chart_new(chart, count, sizeof *names);
+    for (size_t i = 0; i < count && !chart->is_failed; i++) {
+        const EnsembleIndex *index = &ensemble->indices.at[i];
+        first[i] = index->first;
+        total[i] = index->total;
+        y[i] = -index->metric;
+        names[i] = index->pointer;
+    }
+    // The inputs of a metric follow each other.
+    size_t inputs = 1;
+    while (inputs < count && ensemble->indices.at[inputs].metric == ensemble->indices.at[0].metric)
+        inputs++;
+    for (size_t i = 0; i < count && !chart->is_failed; i++) {
+        const ChartSeries dot = {CHART_MARKERS,
+                                 &first[i],
+                                 &y[i],
+                                 NULL,
+                                 1,
+                                 i % inputs % CHART_COLOURS,
+                                 CHART_DOT,
+                                 .names = &names[i],
+                                 .legend = i < inputs ? names[i] : NULL};
+        ChartSeries ring = dot;
+        ring.x = &total[i];
+        ring.shape = CHART_RING;
+        ring.legend = NULL;
+        if (panel->count + 2 <= CHART_SERIES) {
+            chart_add(panel, dot);
+            chart_add(panel, ring);
+        }
+    }
+}
+
 void chart_ensemble(const Variant *answer, Bytes *bytes) {
     const Ensemble *ensemble = (const Ensemble *)(const void *)answer;
     Chart chart = {.width = 640, .left = 160, .right = 14};
-    const unsigned long long runs = ensemble->made - ensemble->failed;
+    const bool has_inputs = ensemble->inputs.count > 0;
+    unsigned long long runs = 0;
+    for (size_t i = 0; i < ensemble->table.count; i++)
+        runs += ensemble->table.at[i].why == NULL ? 1 : 0;
     chart.title = chart_text(&chart, "Mean of %llu runs", runs);
     chart.heading = chart_text(&chart, "Mean of %llu runs, with its %g %% interval", runs,
                                100 * ensemble->confidence);
@@ -254,13 +321,16 @@ void chart_ensemble(const Variant *answer, Bytes *bytes) {
                  (unsigned long long)ensemble->first_seed, (unsigned long long)ensemble->failed);
     chart_note(&chart, " Target: ", ensemble->target.why);
     bytes_format(&chart.description,
-                 " Bands and black lines: %g %% intervals of the mean over all seeds; boxes: half "
-                 "of the runs; grey lines: all of them.",
-                 100 * ensemble->confidence);
+                 " %s: %g %% intervals of the mean over all seeds; boxes: half of the runs; grey "
+                 "lines: all of them.%s",
+                 has_inputs ? "Black lines" : "Bands and black lines", 100 * ensemble->confidence,
+                 has_inputs ? " Bands: 90 % of the runs, around their median." : "");
     if (ensemble->spectra.count > 0)
         charts_add_bands(&chart, chart_spectra(&chart, NULL, 256), &ensemble->frequency,
-                         &ensemble->spectra, true);
+                         &ensemble->spectra);
+    ensemble_add_history(&chart, ensemble);
     ensemble_add_statistics(&chart, ensemble);
+    ensemble_add_indices(&chart, ensemble);
     chart_write(&chart, bytes);
 }
 
@@ -340,7 +410,7 @@ void chart_sensitivity(const Variant *answer, Bytes *bytes) {
     if (sensitivity->spectra.count > 0)
         charts_add_bands(&chart,
                          chart_spectra(&chart, "Spectra, with 5 to 95 % of the drawn runs", 286),
-                         &sensitivity->frequency, &sensitivity->spectra, false);
+                         &sensitivity->frequency, &sensitivity->spectra);
     ChartPanel *panel =
         chart_panel(&chart, "Relative change of the statistic over that of the parameter", 300);
     charts_add_rows(&chart, panel);

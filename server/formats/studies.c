@@ -15,17 +15,25 @@ static void json_write(const Variant *answer, Bytes *bytes) {
     bytes_text(bytes, "\n");
 }
 
-// A row for each seed.
+// A row for each seed, with the drawn inputs.
 static void ensemble_csv(const Variant *answer, Bytes *bytes) {
     const Ensemble *ensemble = (const Ensemble *)(const void *)answer;
+    const double unknown = (double)NAN;
     bytes_text(bytes, "seed,steps");
     csv_cells_header(bytes, NULL, summary_fields);
+    for (size_t i = 0; i < ensemble->inputs.count; i++) {
+        const char *unit = ensemble->inputs.at[i].unit;
+        bytes_format(bytes, ",%s%s%s%s", ensemble->inputs.at[i].pointer, unit != NULL ? " [" : "",
+                     unit != NULL ? unit : "", unit != NULL ? "]" : "");
+    }
     bytes_text(bytes, ",why\n");
     for (size_t i = 0; i < ensemble->table.count; i++) {
         const RunRecord *run = &ensemble->table.at[i];
         bytes_format(bytes, "%llu", (unsigned long long)run->number);
         csv_cells_reals(bytes, &run->steps, 1);
         csv_cells_members(bytes, summary_fields, &run->summary);
+        for (size_t k = 0; k < ensemble->inputs.count; k++)
+            csv_cells_reals(bytes, k < run->inputs.count ? &run->inputs.at[k] : &unknown, 1);
         bytes_text(bytes, ",");
         csv_cells_text(bytes, run->why);
         bytes_text(bytes, "\n");

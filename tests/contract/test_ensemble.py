@@ -17,6 +17,8 @@ import program  # noqa: E402
 
 SANITIZED = "nightly"
 SPONGE = os.path.join(program.EXAMPLES, "paper_random_sponge.json")
+INPUTS = [{"pointer": "/dampers/0/clearance", "distribution": "normal", "mean": 0.015, "deviation": 0.001},
+          {"pointer": "/dampers/0/buffer", "distribution": "material", "contact_time_deviation": 0.1}]
 SVG = "{http://www.w3.org/2000/svg}"
 STATISTICS = ["peak_displacement", "rms_displacement", "peak_acceleration", "rms_acceleration", "impacts",
               "peak_contact_force"]
@@ -53,6 +55,7 @@ def check_statistics(answer):
         wanted = {"mean": values.mean(), "standard_deviation": values.std(ddof=1), "standard_error": error,
                   "low": values.mean() - half, "high": values.mean() + half, "minimum": values.min(),
                   "maximum": values.max(), "median": numpy.median(values), "q05": numpy.quantile(values, 0.05),
+                  "q16": numpy.quantile(values, 0.16), "q84": numpy.quantile(values, 0.84),
                   "q25": numpy.quantile(values, 0.25), "q75": numpy.quantile(values, 0.75),
                   "q95": numpy.quantile(values, 0.95)}
         for member, value in wanted.items():
@@ -82,18 +85,19 @@ def check_chart(text, answer):
     for name in STATISTICS:
         assert name.replace("_", " ") in texts, name
     bands = [path for path in root.iter(SVG + "path") if (path.get("class") or "").startswith("band")]
-    assert len(bands) == min(len(answer["spectra"]), 4)
+    assert len(bands) == min(len(answer["spectra"]), 4) + 2 * len(answer["displacement"])
     assert f"{answer['made']} runs of {answer['runs']}" in root.find(SVG + "desc").text
 
 
 def check_csv(text, answer):
-    """A row for each run with its seed, as the JSON has it."""
+    """A row for each run with its seed and its inputs, as the JSON has it."""
     rows = list(csv.reader(io.StringIO(text)))
     assert rows[0][:4] == ["seed", "steps", "peak_displacement [m]", "rms_displacement [m]"], rows[0]
-    assert len(rows) == 1 + answer["made"] and all(len(row) == len(rows[0]) for row in rows)
+    assert len(rows) == 1 + len(answer["table"]) and all(len(row) == len(rows[0]) for row in rows)
     for row, run in zip(rows[1:], answer["table"]):
         assert int(row[0]) == run["seed"] and row[-1] == (run["why"] or "")
-        values = [run["steps"]] + [value for name, value in run.items() if name not in ("seed", "why", "steps")]
+        values = [run["steps"]] + [value for name, value in run.items() if name not in ("seed", "why", "steps", "inputs")]
+        values += run["inputs"] or [None] * len(answer["inputs"])
         for cell, value in zip(row[1:-1], values):
             assert (cell == "nan") if value is None else float(cell) == value, (row, run)
 
@@ -186,7 +190,7 @@ def test_a_job_makes_the_study():
         alone = {name: value for name, value in scene.items() if name != "study"}
         single = daemon.request("POST", "/v1/jobs?dry_run=1", json=alone).json()
         assert plan["cost"]["cpu_seconds"] > 3 * single["cost"]["cpu_seconds"] and plan["result"] != single["result"]
-        assert plan["scene"]["study"] == {"kind": "ensemble", "runs": 12, "first_seed": 1}
+        assert plan["scene"]["study"] == {"kind": "ensemble", "runs": 12, "first_seed": 1, "sobol_indices": False}
         job = program.finished(daemon, scene)
         assert job["result"] == plan["result"]
         base = "/v1/results/" + job["result"]
@@ -222,6 +226,8 @@ def test_the_same_bytes_by_any_number_of_workers():
     """One worker or four, this time or after a restart, or the command: the answer has the same bytes."""
     scenes = [study(duration=3, first_seed=10 * i, **members) for i in range(3)
               for members in ({}, {"target": 0.2, "runs": 60}, {"target": 0.2, "runs": 60, "metric": "psd"})]
+    scenes += [study(duration=3, inputs=INPUTS, sampling=name, sobol_indices=name == "sobol", runs=16)
+               for name in ("random", "latin_hypercube", "sobol")]
     seen = []
     with tempfile.TemporaryDirectory() as folder:
         for workers, data in (("1", None), ("4", folder), ("2", folder)):
@@ -239,6 +245,53 @@ def test_the_same_bytes_by_any_number_of_workers():
             assert program.run("ensemble", "-", "-o", path, text=json.dumps(scene))[0] == 0
             with open(path, "rb") as file:
                 assert file.read() == seen[0][3 * index]
+
+
+def test_uncertain_inputs_have_quantiles_and_indices():
+    """Rows are those of `impactd run` with the drawn numbers; quantiles of them are NumPy's; indices add up."""
+    scene = {**program.scene("paper_free_sponge"), "duration": 3}
+    scene["study"] = {"kind": "ensemble", "runs": 12, "inputs": INPUTS, "sampling": "sobol", "sobol_indices": True}
+    scene.pop("output", None)
+    with tempfile.TemporaryDirectory() as folder:
+        paths = [os.path.join(folder, "out." + ending) for ending in ("json", "csv", "svg")]
+        code, out, errors = program.run("ensemble", "-", *[word for path in paths for word in ("-o", path)],
+                                        text=json.dumps(scene))
+        assert code == 0, errors
+        answer, table, chart = (open(path, encoding="utf-8").read() for path in paths)  # noqa: SIM115
+        answer = json.loads(answer)
+        assert answer["made"] == 12 * 4 and len(answer["table"]) == 24 and answer["failed"] == 0
+        check_statistics(answer)
+        check_csv(table, answer)
+        check_chart(chart, answer)
+        assert table.splitlines()[0].endswith(",/dampers/0/clearance [m],/dampers/0/buffer/contact_time,why")
+        assert [one["is_factor"] for one in answer["inputs"]] == [False, True] and "Sobol" not in out
+        motions, densities = [], []
+        del scene["study"]
+        scene["output"] = {"reduction": False}
+        code, plan, _ = program.run("check", "--json", "-", text=json.dumps(scene))
+        buffer = {name: json.loads(plan)["scene"]["dampers"][0]["buffer"][name]
+                  for name in ("restitution", "contact_time")}
+        for row in answer["table"]:
+            scene["dampers"][0]["clearance"] = row["inputs"][0]
+            scene["dampers"][0]["buffer"] = {**buffer, "contact_time": buffer["contact_time"] * row["inputs"][1]}
+            again = os.path.join(folder, "run.json")
+            assert program.run("run", "-", "-o", again, text=json.dumps(scene))[0] == 0
+            with open(again, encoding="utf-8") as file:
+                run = json.load(file)
+            for name, value in run["job"]["summary"].items():
+                assert row[name] == value, (row, name, value)
+            motions.append(run["series"]["channels"]["displacement"]["values"])
+            densities.append(run["psd"]["channels"]["mean_acceleration"]["values"])
+    (told,) = answer["displacement"]
+    motions = numpy.array(motions)[:, ::-(-len(motions[0]) // 1000)]
+    assert len(answer["time"]) == motions.shape[1] and told["quantile_runs"] == 24
+    for members, rows in ((told, motions), (answer["spectra"][0], numpy.array(densities))):
+        for name, share in (("q05", 0.05), ("q16", 0.16), ("median", 0.5), ("q84", 0.84), ("q95", 0.95)):
+            assert numpy.allclose(members[name], numpy.quantile(rows, share, axis=0), rtol=1e-9, atol=1e-15), name
+    for one in answer["indices"]:
+        low, high = one["total_interval_95"]
+        assert one["samples"] == 12 and (one["total"] is None or low <= one["total"] <= high), one
+    assert {one["pointer"] for one in answer["indices"]} == {"/dampers/0/clearance", "/dampers/0/buffer"}
 
 
 def test_seeds_that_fail_are_rows():

@@ -153,7 +153,7 @@ def test_faults_of_a_study_are_told_with_the_scenes():
 def test_wrong_types_in_a_study():
     """Every member of a study gets a value of every other type: 422 at its place, or a plan."""
     with program.daemon() as daemon:
-        for kind, names in (("ensemble", ("kind", "runs", "first_seed", "target", "metric")),
+        for kind, names in (("ensemble", ("kind", "runs", "first_seed", "target", "metric", "inputs", "sampling", "sobol_indices")),
                             ("tradeoff", ("kind", "error", "metric", "repeats", "solvers", "point_steps", "trial"))):
             refused = 0
             for name in names:

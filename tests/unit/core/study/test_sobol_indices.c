@@ -68,8 +68,8 @@ TEST(intervals_contain_the_indices_of_the_ishigami_function) {
         size_t inside[2] = {0, 0};
         for (uint64_t seed = 1; seed <= TRIALS; seed++) {
             const SobolIndex index = estimate(ishigami, SAMPLING_RANDOM, seed, SAMPLES, i);
-            inside[0] += index.first_low <= first[i] && first[i] <= index.first_high;
-            inside[1] += index.total_low <= total[i] && total[i] <= index.total_high;
+            inside[0] += index.first_interval[0] <= first[i] && first[i] <= index.first_interval[1];
+            inside[1] += index.total_interval[0] <= total[i] && total[i] <= index.total_interval[1];
         }
         for (size_t k = 0; k < 2; k++) // 95 % of 200, three standard deviations either way
             if (inside[k] < 181 || inside[k] > 199)
@@ -83,8 +83,8 @@ TEST(even_points_give_indices_within_narrower_errors) {
     for (size_t i = 0; i < INPUTS; i++) {
         const SobolIndex index = estimate(ishigami, SAMPLING_SOBOL, 1, 4096, i);
         assert_true(fabs(index.first - first[i]) < 0.01 && fabs(index.total - total[i]) < 0.01);
-        assert_true(index.first_low <= first[i] && first[i] <= index.first_high);
-        assert_true(index.total_low <= total[i] && total[i] <= index.total_high);
+        assert_true(index.first_interval[0] <= first[i] && first[i] <= index.first_interval[1]);
+        assert_true(index.total_interval[0] <= total[i] && total[i] <= index.total_interval[1]);
     }
 }
 
@@ -108,7 +108,7 @@ TEST(unknown_runs_are_left_out_and_constant_results_have_no_indices) {
     for (size_t i = 0; i < COUNT(values); i++)
         values[i] = 7;
     sobol_index_estimate(&runs, 0, &index);
-    assert_true(isnan(index.first) && isnan(index.total) && isnan(index.total_low));
+    assert_true(isnan(index.first) && isnan(index.total) && isnan(index.total_interval[0]));
     sobol_index_estimate(&(SobolRuns){values, 1, 1, 1}, 0, &index);
     assert_true(index.count == 1 && isnan(index.first));
 }

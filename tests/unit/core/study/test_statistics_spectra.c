@@ -48,8 +48,8 @@ static Ensemble *tell(const SpectrumAccumulator *fold) {
     spectrum_of(0, &like);
     Ensemble *answer = (Ensemble *)(void *)variant_new(study_ensemble.answer);
     assert_non_null(answer);
-    assert_int_equal(spectrum_accumulator_report(fold, &like, false, NULL, &answer->frequency,
-                                                 &answer->spectra, &problem),
+    assert_int_equal(spectrum_accumulator_report(fold, &like, SPECTRUM_INTERVALS, NULL,
+                                                 &answer->frequency, &answer->spectra, &problem),
                      STATUS_OK);
     columns_clear(&like.densities);
     return answer;
