@@ -166,6 +166,11 @@ Status simulation_check_metric(const Simulation *simulation, const char *metric,
                            metric,
                            has_damper ? "impulses have none, choose another contact model"
                                       : "the scene has no damper");
+    const StructureKind *structure = structure_kind(scene_structure(&simulation->scene));
+    if (strcmp(metric, "peak_storey_drift") == 0 && !structure->has_drifts)
+        return problem_add(problem, STATUS_INVALID, pointer,
+                           "%s needs a structure of the kind frame, this one is of the kind %s",
+                           metric, structure->kind.name);
     if (strcmp(metric, "impacts") == 0 && !has_damper)
         return problem_add(problem, STATUS_INVALID, pointer,
                            "impacts needs a damper: the scene has none");

@@ -13,10 +13,14 @@
     X(rms_acceleration, "m/s^2")                                                                   \
     X(impacts, NULL)                                                                               \
     X(peak_contact_force, "N")                                                                     \
+    X(peak_storey_drift, "m")                                                                      \
+    X(peak_base_shear, "N")                                                                        \
     X(peak_displacement_reduction, NULL)                                                           \
     X(rms_displacement_reduction, NULL)                                                            \
     X(peak_acceleration_reduction, NULL)                                                           \
-    X(rms_acceleration_reduction, NULL)
+    X(rms_acceleration_reduction, NULL)                                                            \
+    X(peak_storey_drift_reduction, NULL)                                                           \
+    X(peak_base_shear_reduction, NULL)
 
 #define STUDY_METRIC_ONE(name, unit) +1
 enum { STUDY_METRIC_COUNT = 0 STUDY_METRIC_LIST(STUDY_METRIC_ONE) };
