@@ -43,7 +43,7 @@ Handler materials_list, materials_show, materials_export, materials_import, mate
     materials_revise, materials_revert, materials_review, materials_revisions, materials_history,
     materials_diff, materials_uses;
 Handler measurements_list, measurements_create, measurements_show, proposals_show, derived_show;
-Handler records_create, records_list, records_show, records_samples, records_delete;
+Handler records_create, records_list, records_show, records_samples, records_spectrum, records_delete;
 Handler examples_list, examples_show, schemas_list, schemas_show, openapi_show;
 Handler health_live, health_ready, metrics_show, version_show, landing_show;
 Handler short_ids_redirect; // of no route: Router.not_found

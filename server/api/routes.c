@@ -21,6 +21,7 @@ static const char *const of_pages[] = {"limit", "before", NULL};
 static const char *const of_diff[] = {"from", "to", NULL};
 static const char *const of_uses[] = {"revision", "limit", "before", NULL};
 static const char *const of_samples[] = {"from", "to", "points", NULL};
+static const char *const of_spectrum[] = {"damping_ratio", "from", "to", "points", NULL};
 static const char *const of_records[] = {"q", "limit", "after", NULL};
 static const char *const of_record[] = {"name",  "interval",   "unit",    "source", "processing",
                                         "notes", "earthquake", "station", NULL};
@@ -100,6 +101,8 @@ const Route routes[] = {
     {"GET",    "/v1/records",                           "read",   of_records,   "Ground motions, by name; ?q= searches", records_list, NULL},
     {"GET",    "/v1/records/{name}/samples.{format}",   "read",   of_samples,   "A ground motion's samples as json, csv, npy, npz or mat; ?points= keeps the extremes of buckets", records_samples, NULL},
     {"GET",    "/v1/records/{name}/samples",            "read",   of_samples,   "A ground motion's samples, format by Accept", records_samples, NULL},
+    {"GET",    "/v1/records/{name}/spectrum.{format}",  "read",   of_spectrum,  "A ground motion's response spectrum as json or csv, or its chart as svg", records_spectrum, NULL},
+    {"GET",    "/v1/records/{name}/spectrum",           "read",   of_spectrum,  "A ground motion's response spectrum, format by Accept", records_spectrum, NULL},
     {"GET",    "/v1/records/{name}",                    "read",   NULL,         "A ground motion, and the number of its uses", records_show, NULL},
     {"DELETE", "/v1/records/{name}",                    "materials", NULL,      "Delete a ground motion that nothing uses", records_delete, NULL},
     {"GET",    "/v1/examples",                          "read",   NULL,         "Scenes that run as they are", examples_list, NULL},

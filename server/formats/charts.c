@@ -707,6 +707,26 @@ void chart_evaluation(const Evaluation *evaluation, const char *slug, Bytes *byt
 enum { SVG_POINTS = 800 }; // of a line over time
 
 // The columns of one line: the same one twice, or the minima and the maxima of buckets.
+// --- response spectrum ---
+
+void chart_response_spectrum(const char *record, double damping_ratio, const Columns *columns,
+                             Bytes *bytes) {
+    Chart chart = {.width = 760, .left = 80, .right = 14, .title = "Response spectrum"};
+    chart.heading = chart_text(&chart, "Response spectrum of %s, damping ratio %g", record,
+                               damping_ratio);
+    for (size_t i = columns->count; i-- > 1;) {
+        const Column *column = &columns->at[i];
+        const char *name = chart_quantity(&chart, charts_words(&chart, column->name), column->unit);
+        ChartPanel *panel = chart_panel(&chart, name, 180);
+        panel->x.is_logarithmic = panel->y.is_logarithmic = true;
+        panel->x.is_unlabelled = i > 1;
+        panel->x.title = chart_quantity(&chart, columns->at[0].name, columns->at[0].unit);
+        chart_add(panel, (ChartSeries){CHART_LINE, columns->at[0].values, column->values, NULL,
+                                       columns->rows, 0, .name = column->name});
+    }
+    chart_write(&chart, bytes);
+}
+
 static const Column *svg_column(const Table *table, size_t line, bool is_high) {
     return table->columns[table->bucket > 0 ? 2 * line + is_high : line];
 }

@@ -71,5 +71,9 @@ void chart_sensitivity(const Variant *answer, Bytes *bytes);
 bool chart_sweep(const SweepDocument *document, Bytes *bytes);
 // Every reading over approach speed; those without a speed are at the left edge.
 void chart_evaluation(const Evaluation *evaluation, const char *slug, Bytes *bytes);
+// The response spectrum of a ground motion: the first column is the period, the last the
+// pseudo-acceleration.
+void chart_response_spectrum(const char *record, double damping_ratio, const Columns *columns,
+                             Bytes *bytes);
 
 #endif

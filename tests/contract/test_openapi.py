@@ -133,7 +133,7 @@ def test_real_answers_have_the_promised_shapes():
                   "/v1/results/{id}/impacts/{number}/force.{format}": {"number": "1"},
                   "/v1/results/{id}/impacts/{number}/force": {"number": "22"},
                   "/v1/jobs/{id}": {"id": job["id"]}, "/v1/jobs/{id}/events": {"id": job["id"]}, "/v1/jobs/{id}/scene": {"id": job["id"]},
-                  **{f"/v1/records/{{name}}{rest}": {"name": "shake"} for rest in ("", "/samples", "/samples.{format}")},
+                  **{f"/v1/records/{{name}}{rest}": {"name": "shake"} for rest in ("", "/samples", "/samples.{format}", "/spectrum", "/spectrum.{format}")},
                   **{f"/v1/materials/{{slug}}{rest}": {"slug": "sponge"} for rest in ("", "/revisions", "/history", "/diff", "/used-by")},
                   **{f"/v1/materials/{{slug}}@{{revision}}{rest}": {"slug": "sponge", "revision": "1"} for rest in ("", "/used-by")},
                   "/v1/examples/{name}": {"name": "paper_free_sponge"}, "/schemas/{name}": {"name": "scene"},

@@ -17,6 +17,7 @@ import urllib.parse
 
 import numpy
 import scipy.io
+import scipy.signal
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
@@ -538,6 +539,50 @@ def test_the_command_line_adds_lists_shows_and_deletes():
         code, out, _ = client(daemon.url, "records", "list")
         assert code == 0 and len(out.splitlines()) == 232, len(out.splitlines())
     assert client("http://127.0.0.1:9", "records", "list")[0] == 7
+
+
+def test_the_response_spectrum_is_that_of_an_oscillator_for_each_period():
+    """Displacement, pseudo-velocity and pseudo-acceleration, the same in every format; limits are refused."""
+    with program.daemon() as daemon:
+        upload(daemon, "r")
+        motion = shake()
+        spectrum = daemon.get("/v1/records/r/spectrum.json?from=0.1&to=4&points=9&damping_ratio=0.1").json()
+        assert list(spectrum) == ["record", "damping_ratio", "period", "displacement", "pseudo_velocity",
+                                  "pseudo_acceleration"], list(spectrum)
+        assert spectrum["record"] == "r" and spectrum["damping_ratio"] == 0.1
+        values = [spectrum[name]["values"] for name in ("period", "displacement", "pseudo_velocity", "pseudo_acceleration")]
+        assert values[0][0] == 0.1 and values[0][-1] == 4 and len(values[0]) == 9
+        base = numpy.array(motion["samples"])
+        times = numpy.arange(len(base)) * motion["interval"]
+        for period, displacement, velocity, acceleration in zip(*values):
+            omega = 2 * math.pi / period
+            assert abs(velocity / (omega * displacement) - 1) < 1e-14
+            assert abs(acceleration / (omega * velocity) - 1) < 1e-14
+            fine = numpy.linspace(0, times[-1], 40 * (len(base) - 1) + 1)
+            oscillator = scipy.signal.StateSpace([[0, 1], [-omega ** 2, -0.2 * omega]], [[0], [-1]], [[1, 0]], [[0]])
+            x = scipy.signal.lsim(oscillator, numpy.interp(fine, times, base), fine)[1]
+            assert displacement >= abs(x).max() * (1 - 1e-9), (period, displacement, abs(x).max())
+            assert displacement <= abs(x).max() * (1 + 1e-3) or period > 1, (period, displacement, abs(x).max())
+        rows = daemon.get("/v1/records/r/spectrum.csv?from=0.1&to=4&points=9&damping_ratio=0.1").body.decode().split()
+        assert " ".join(rows[:5]).startswith("period [s],displacement [m],"), rows[:5]
+        last = daemon.get("/v1/records/r/spectrum.csv?from=0.1&to=4&points=9&damping_ratio=0.1").body.decode().splitlines()[-1]
+        assert [float(cell) for cell in last.split(",")] == [column[-1] for column in values]
+        chart = daemon.get("/v1/records/r/spectrum.svg")
+        assert chart.headers["content-type"] == "image/svg+xml" and b"Response spectrum of r" in chart.body
+        assert len(daemon.get("/v1/records/r/spectrum").json()["period"]["values"]) == 200
+        tag = {"If-None-Match": chart.headers["etag"]}
+        assert daemon.get("/v1/records/r/spectrum.svg", headers=tag).status == 304
+        for query in ("from=3&to=2", "points=1", "points=2001", "damping_ratio=1", "damping_ratio=-0.1", "from=0", "to=x", "at=1"):
+            problem(daemon.get(f"/v1/records/r/spectrum.json?{query}"), 400)
+        assert daemon.get("/v1/records/r/spectrum.npy").status == 404
+        assert daemon.get("/v1/records/none/spectrum.json").status == 404
+        upload(daemon, "long", **shake(count=20000))
+        slow = daemon.get("/v1/records/long/spectrum.json?points=400")
+        assert slow.status == 200 and len(slow.json()["displacement"]["values"]) == 400
+        for path in ("spectrum.json", "spectrum"):
+            reply = daemon.get(f"/v1/records/long/{path}?from=0.0002&points=2000")
+            problem(reply, 422)
+            assert "ask for fewer points" in reply.json()["detail"], reply.json()
 
 
 if __name__ == "__main__":

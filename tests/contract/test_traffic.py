@@ -49,6 +49,7 @@ UNSEEN = {
     ("GET", r"/v1/results/\{id\}.*", "409"): "ids of two results that begin with the same 8 digits",
     (None, READING, "503"): "series that are still being computed anew after a minute, or too many impacts looked at at once",
     ("POST", r"/v1/preview", "503"): "more runs of almost 50 ms at once than there are threads for",
+    ("GET", r"/v1/records/\{name\}/spectrum.*", "503"): "more spectra of long records at once than there are threads for",
     (None, r"/v1/materials/\{slug\}/(measurements.*|proposal.*)", "503"): "more long force traces at once than are evaluated",
     ("POST", r"/v1/results/\{id\}/again", "202|422|429|503|507"): "it submits as POST /v1/jobs does, where they are seen",
     ("POST", r"/v1/jobs/\{id\}/retry", "410|429|503|507"): "the same; 410: a sweep with failed points of another engine",
