@@ -1,0 +1,36 @@
+// Bounded non-linear least squares by Levenberg and Marquardt's method, from the normal equations
+// of each point, and the covariance of the result. The caller makes the residuals.
+#ifndef CORE_MATH_LEAST_SQUARES_H
+#define CORE_MATH_LEAST_SQUARES_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+enum { LEAST_SQUARES_VARIABLES = 16 };
+
+// Of the residuals r and their Jacobian matrix J at a point. Every variable lies in [0, 1].
+typedef struct NormalEquations {
+    size_t count;                                                     // variables
+    double matrix[LEAST_SQUARES_VARIABLES * LEAST_SQUARES_VARIABLES]; // J' J, count x count
+    double gradient[LEAST_SQUARES_VARIABLES];                         // J' r
+} NormalEquations;
+
+// columns[i] is the derivative of the `rows` residuals by variable i.
+void normal_equations_make(const double *const *columns, size_t count, const double *residual,
+                           size_t rows, NormalEquations *equations);
+
+// The damped step from `at` to `to`, within the bounds. Returns the decrease of the sum of squares
+// that the linear model predicts; 0: no step.
+double least_squares_step(const NormalEquations *equations, double damping, const double *at,
+                          double *to);
+
+// The inverse of J' J: covariance of the variables for residuals of unit variance. Directions that
+// do not change the residuals have variances that are huge, not infinite; that of a variable
+// without any effect is INFINITY and its covariances are 0.
+void least_squares_covariance(const NormalEquations *equations, double *covariance);
+
+// The step whose covariance is the inverse of J' J, from independent standard normal numbers.
+// Directions that do not change the residuals get steps of about 1e6.
+void least_squares_draw(const NormalEquations *equations, const double *normal, double *step);
+
+#endif

@@ -1,0 +1,217 @@
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/base/philox.h"
+#include "core/study/calibrate.h"
+#include "tests/support/fields.h"
+#include "tests/support/scenes.h"
+#include "tests/support/test.h"
+
+static Problem problem;
+
+static CalibrateStudy *study_of(const StudyRequest *request) {
+    return (CalibrateStudy *)(void *)request->study;
+}
+
+static void parameter_add(StudyRequest *request, const char *pointer, double from, double to) {
+    StudyAxis *axis = list_append(&study_of(request)->parameters, sizeof *axis);
+    assert_non_null(axis);
+    *axis = (StudyAxis){.pointer = strdup(pointer),
+                        .from = from,
+                        .to = to,
+                        .count = COUNT_ABSENT,
+                        .spacing = CHOICE_ABSENT};
+}
+
+// The displacement of a scene with noise of this part of its rms, every 5 ms.
+static MeasuredChannel *measure(StudyRequest *request, const Simulation *scene, double noise) {
+    Simulation made;
+    Outcome *outcome;
+    assert_int_equal(fields_copy(simulation_fields, scene, &made), STATUS_OK);
+    made.scene.sample_rate = 200;
+    problem_clear(&problem);
+    if (simulation_complete(&made, NULL, NULL, &problem) != STATUS_OK ||
+        simulation_run(&made, NULL, NULL, NULL, &outcome, &problem) != STATUS_OK)
+        fail_msg("%s", problem.detail);
+    MeasuredChannel *measured = list_append(&study_of(request)->measured, sizeof *measured);
+    assert_non_null(measured);
+    const Column *column = columns_find(&outcome->response.series, "displacement");
+    *measured = (MeasuredChannel){.channel = strdup("displacement"), .interval = 0.005};
+    measured->samples = reals_of(outcome->response.count, column->values);
+    measured->deviation = noise * measured_rms(measured);
+    for (size_t i = 0; i < measured->samples.count; i++) {
+        double normal[2];
+        philox_normal_pair(5, 0, i, normal);
+        measured->samples.at[i] += measured->deviation * normal[0];
+    }
+    outcome_unref(outcome);
+    simulation_clear(&made);
+    return measured;
+}
+
+// The paper's sponge scene for 2 s and a calibration of it without parameters.
+static StudyRequest request_make(void) {
+    StudyRequest request = {0};
+    scene_with_damper(&request.simulation, 0.61, 0.025);
+    request.simulation.scene.duration = 2;
+    request.study = variant_new(&study_calibrate.kind);
+    assert_non_null(request.study);
+    return request;
+}
+
+static Calibration *calibrate(StudyRequest *request) {
+    Variant *answer;
+    problem_clear(&problem);
+    if (study_request_complete(request, NULL, NULL, &problem) != STATUS_OK ||
+        study_run(request->study, &request->simulation, &(StudyTools){.limits = NULL}, &answer,
+                  &problem) != STATUS_OK)
+        fail_msg("%s %s", problem.faults[0].pointer, problem.detail);
+    return (Calibration *)(void *)answer;
+}
+
+static void assert_contains(const CalibratedParameter *parameter, double truth) {
+    if (!parameter->is_identifiable || !(parameter->interval_95.at[0] <= truth) ||
+        !(truth <= parameter->interval_95.at[1]))
+        fail_msg("%s: %g +- %g, true %g", parameter->pointer, parameter->value,
+                 parameter->standard_error, truth);
+}
+
+TEST(restitution_and_contact_time_are_found_in_a_noisy_motion) {
+    StudyRequest request = request_make();
+    MeasuredChannel *measured = measure(&request, &request.simulation, 0.03);
+    study_of(&request)->starts = 4;
+    parameter_add(&request, "/dampers/0/buffer/restitution", 0.4, 0.9);
+    parameter_add(&request, "/dampers/0/buffer/contact_time", 0.01, 0.05);
+    Calibration *answer = calibrate(&request);
+    assert_int_equal(answer->verdict, CALIBRATE_EXPLAINED);
+    assert_contains(&answer->parameters.at[0], 0.61);
+    assert_contains(&answer->parameters.at[1], 0.025);
+    assert_true(answer->parameters.at[0].standard_error < 0.02);
+    assert_true(answer->failed == 0 && answer->runs > 50 && answer->history.count > 4);
+    assert_true(fabs(answer->chi_square / (double)answer->freedom - 1) < 0.2);
+    assert_true(fabs(answer->correlation.at[0].at[1]) < 1 && answer->correlation.at[1].at[1] == 1);
+    assert_true(fabs(answer->residuals.at[0].rms / measured->deviation - 1) < 0.1);
+    // Again, with a deviation that has to be estimated.
+    const double deviation = measured->deviation;
+    measured->deviation = (double)NAN;
+    Calibration *again = calibrate(&request);
+    assert_int_equal(again->verdict, CALIBRATE_EXPLAINED);
+    assert_true(isnan(again->chi_square));
+    assert_true(fabs(again->residuals.at[0].deviation / deviation - 1) < 0.1);
+    assert_contains(&again->parameters.at[0], 0.61);
+    variant_free(&again->variant);
+    variant_free(&answer->variant);
+    study_request_clear(&request);
+}
+
+TEST(the_clock_of_a_measurement_may_be_wrong) {
+    StudyRequest request = request_make();
+    MeasuredChannel *measured = measure(&request, &request.simulation, 0.02);
+    // The first sample is in truth at 0.02 s.
+    memmove(measured->samples.at, measured->samples.at + 4,
+            (measured->samples.count - 4) * sizeof(double));
+    measured->samples.count -= 4;
+    study_of(&request)->starts = 2;
+    study_of(&request)->max_shift = 0.03;
+    parameter_add(&request, "/structure/stiffness", 700, 1000);
+    Calibration *answer = calibrate(&request);
+    assert_true(fabs(answer->shift - 0.02) < 3 * answer->shift_error);
+    assert_contains(&answer->parameters.at[0], 865);
+    variant_free(&answer->variant);
+    study_request_clear(&request);
+}
+
+TEST(parameters_of_which_only_a_ratio_matters_are_not_identifiable) {
+    StudyRequest request = request_make();
+    scene_start(&request.simulation, 0.015, 0);
+    request.simulation.scene.dampers.at[0].clearance = 1;
+    measure(&request, &request.simulation, 0.03);
+    study_of(&request)->starts = 4;
+    parameter_add(&request, "/structure/mass", 1, 2);
+    parameter_add(&request, "/structure/stiffness", 600, 1200);
+    parameter_add(&request, "/structure/damping", 0.5, 2);
+    Calibration *answer = calibrate(&request);
+    assert_int_equal(answer->verdict, CALIBRATE_NOT_IDENTIFIABLE);
+    assert_non_null(strstr(answer->detail, "/structure/mass"));
+    assert_true(!answer->parameters.at[0].is_identifiable &&
+                isnan(answer->parameters.at[0].standard_error));
+    variant_free(&answer->variant);
+    study_request_clear(&request);
+}
+
+TEST(a_model_without_the_damper_does_not_explain_a_motion_with_it) {
+    StudyRequest request = request_make();
+    measure(&request, &request.simulation, 0.02);
+    request.simulation.scene.dampers.at[0].clearance = 1;
+    study_of(&request)->starts = 2;
+    parameter_add(&request, "/structure/stiffness", 700, 1000);
+    Calibration *answer = calibrate(&request);
+    assert_int_equal(answer->verdict, CALIBRATE_NOT_EXPLAINED);
+    assert_non_null(strstr(answer->detail, "chi square"));
+    variant_free(&answer->variant);
+    study_request_clear(&request);
+}
+
+TEST(spectra_are_fitted_on_request) {
+    StudyRequest request = request_make();
+    request.simulation.scene.duration = 8;
+    measure(&request, &request.simulation, 0.01);
+    study_of(&request)->fit = CALIBRATE_PSD;
+    study_of(&request)->starts = 2;
+    parameter_add(&request, "/structure/stiffness", 700, 1000);
+    Calibration *answer = calibrate(&request);
+    assert_true(answer->fit == CALIBRATE_PSD && answer->motions.at[0].is_spectrum);
+    assert_contains(&answer->parameters.at[0], 865);
+    variant_free(&answer->variant);
+    study_request_clear(&request);
+}
+
+static void assert_refused(StudyRequest *request, const char *pointer, const char *detail) {
+    problem_clear(&problem);
+    assert_int_equal(study_request_complete(request, NULL, NULL, &problem), STATUS_INVALID);
+    if (strstr(detail_at(&problem, pointer), detail) == NULL)
+        fail_msg("%s: %s, not at %s", problem.faults[0].pointer, problem.detail, pointer);
+    study_request_clear(request);
+}
+
+TEST(what_cannot_be_fitted_is_refused) {
+    StudyRequest request = request_make();
+    parameter_add(&request, "/structure/stiffness", 700, 1000);
+    assert_refused(&request, "/study/measured", "at least one");
+    request = request_make();
+    measure(&request, &request.simulation, 0.02);
+    assert_refused(&request, "/study/parameters", "at least one");
+    request = request_make();
+    measure(&request, &request.simulation, 0.02);
+    parameter_add(&request, "/structure/stiffness", 1000, 700);
+    assert_refused(&request, "/study/parameters/0", "from must be below to");
+    request = request_make();
+    measure(&request, &request.simulation, 0.02);
+    parameter_add(&request, "/duration", 1, 2);
+    assert_refused(&request, "/study/parameters/0", "cannot be fitted");
+    request = request_make();
+    measure(&request, &request.simulation, 0.02);
+    parameter_add(&request, "/structure/mass", -1, 2);
+    assert_refused(&request, "/study/parameters/0/from", "/structure/mass");
+    request = request_make();
+    free(measure(&request, &request.simulation, 0.02)->channel);
+    study_of(&request)->measured.at[0].channel = strdup("displacemen");
+    parameter_add(&request, "/structure/stiffness", 700, 1000);
+    assert_refused(&request, "/study/measured/0/channel", "");
+    request = request_make();
+    measure(&request, &request.simulation, 0.02)->start = 1;
+    parameter_add(&request, "/structure/stiffness", 700, 1000);
+    assert_refused(&request, "/study/measured/0/samples", "end at");
+    request = request_make();
+    memset(measure(&request, &request.simulation, 0.02)->samples.at, 0, 401 * sizeof(double));
+    parameter_add(&request, "/structure/stiffness", 700, 1000);
+    assert_refused(&request, "/study/measured/0/samples", "same value");
+    request = request_make();
+    measure(&request, &request.simulation, 0.02);
+    study_of(&request)->fit = CALIBRATE_PSD;
+    study_of(&request)->max_shift = 0.1;
+    parameter_add(&request, "/structure/stiffness", 700, 1000);
+    assert_refused(&request, "/study/max_shift", "spectra");
+}
