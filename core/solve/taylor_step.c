@@ -117,6 +117,36 @@ static void taylor_step_make_order(TaylorStep *arc, const ModalState *state, siz
     }
 }
 
+// All orders of one mode and one damper: the same bytes as those of the loops below, in a third of
+// the time, half of that of a motion followed by cycle_flow.h.
+static void taylor_step_make_single(TaylorStep *arc, const ModalState *state) {
+    const DamperState *damper = state->damper;
+    const bool is_resting = damper->phase == PHASE_RESTING,
+               touches = damper->phase == PHASE_CONTACT;
+    const double length = arc->length, shape = damper->shape[0], viscous = state->diagonal[0],
+                 omega2 = state->omega2[0], share = state->participation[0],
+                 stiffness = damper->contact.stiffness, damping = damper->contact.damping;
+    double *const r = arc->r, *const force = arc->force, *after = arc->q + 2 * state->padded;
+    double q = arc->q[0], next = arc->q[state->padded];
+    for (size_t k = 0; k < arc->degree; k++, after += state->padded) {
+        const double order = (double)(k + 1), base = arc->base[k],
+                     scale = length * length / (double)((k + 1) * (k + 2));
+        const double elastic = viscous * (order / length * next) + omega2 * q;
+        const double push = shape * elastic + damper->base_coupling * base;
+        const double N = touches      ? stiffness * r[k] + damping * order * r[k + 1] / length
+                         : is_resting ? state->constraint_mass[0] * push
+                                      : 0;
+        force[k] = N;
+        q = next;
+        next = -scale * (elastic + share * base);
+        if (N != 0)
+            next += shape * (N * scale);
+        if (k + 2 <= arc->degree)
+            r[k + 2] = is_resting ? 0 : (push - state->delassus[0] * N) * scale;
+        *after = next;
+    }
+}
+
 void taylor_step_make(TaylorStep *arc, const ModalState *state, const Slice *slice, double length) {
     const size_t n = state->padded, m = state->dampers;
     arc->length = length;
@@ -133,6 +163,10 @@ void taylor_step_make(TaylorStep *arc, const ModalState *state, const Slice *sli
         const bool is_resting = state->damper[d].phase == PHASE_RESTING;
         arc->r[d * ROW] = is_resting ? 0 : state->damper[d].r;
         arc->r[d * ROW + 1] = is_resting ? 0 : state->damper[d].w * length;
+    }
+    if (state->mode_count == 1 && m == 1 && state->diagonal != NULL) {
+        taylor_step_make_single(arc, state);
+        return;
     }
     for (size_t k = 0; k < arc->degree; k++) {
         const double scale = length * length / (double)((k + 1) * (k + 2));
